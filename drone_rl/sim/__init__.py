@@ -1,0 +1,1 @@
+"""The world: what the drone and the cubes are, and the rules that hold between them."""

@@ -1,0 +1,187 @@
+"""The rules of cube collection, written once for one world and for thousands.
+
+Pure functions of tensors whose first dimension counts worlds. They know nothing of how the drone
+came to its position: computer-vision mode calls `displacement`, flight physics will not, and both
+hand the new position to `judge` (chapter, Algorithms 1 to 3).
+
+World frame, metres: x forward, y left, z up.
+"""
+
+import dataclasses
+import enum
+from collections.abc import Sequence
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from drone_rl.sim.settings import TaskSettings
+
+
+class Action(enum.IntEnum):
+    """The three moves of section 4."""
+
+    FORWARD = 0
+    LEFT = 1
+    RIGHT = 2
+
+
+class Side(enum.IntEnum):
+    """Where a cube stood, seen from the drone, when it became the next cube."""
+
+    LEFT = 0
+    AHEAD = 1
+    RIGHT = 2
+
+
+class EndReason(enum.IntEnum):
+    """Why an episode ended."""
+
+    RUNNING = 0
+    ALL_CUBES = 1
+    FRONT_BOUNDARY = 2
+    SIDE_BOUNDARY = 3
+    STEP_LIMIT = 4
+
+
+MOVES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0))
+"""Unit move of each `Action`, world frame."""
+
+
+@dataclasses.dataclass
+class WorldState:
+    """The whole state of `num_worlds` worlds; `C` is the number of cubes."""
+
+    drone: Tensor  # (num_worlds, 3) float64
+    """Position of the drone, metres."""
+    cubes: Tensor  # (num_worlds, C, 3) float64
+    """Positions at which the cubes were placed, metres, in the order of their x."""
+    collected: Tensor  # (num_worlds, C) bool
+    """Cubes that the drone has touched."""
+    passed: Tensor  # (num_worlds, C) bool
+    """Cubes that the drone has left behind untouched."""
+    side: Tensor  # (num_worlds, C) int64
+    """`Side` of each cube when it became the next one; -1 before that."""
+    steps: Tensor  # (num_worlds,) int64
+    """Steps taken in this episode."""
+    end_reason: Tensor  # (num_worlds,) int64
+    """`EndReason` of each world."""
+
+    def __getitem__(self, worlds: Tensor) -> "WorldState":
+        """Returns the state of some worlds (a copy)."""
+        return WorldState(**{k: v[worlds] for k, v in vars(self).items()})
+
+    def __setitem__(self, worlds: Tensor, state: "WorldState") -> None:
+        """Overwrites the state of some worlds."""
+        for name, value in vars(self).items():
+            value[worlds] = getattr(state, name)
+
+    def to(self, device: torch.device | str) -> "WorldState":
+        """Returns the state on another device."""
+        return WorldState(**{k: v.to(device) for k, v in vars(self).items()})
+
+    @property
+    def present(self) -> Tensor:
+        """Cubes that still stand. Shape: (num_worlds, C)."""
+        return ~(self.collected | self.passed)
+
+    @property
+    def next_cube(self) -> Tensor:
+        """Index of the nearest standing cube, C when none is left. Shape: (num_worlds,)."""
+        return (~self.present).long().cumprod(-1).sum(-1)
+
+
+def draw_cubes(settings: TaskSettings, random_state: np.random.RandomState) -> Tensor:
+    """Draws the places of an episode's cubes (Algorithm 2).
+
+    Returns:
+        Positions, metres. Shape: (num_cubes, 3).
+    """
+    n, y, z = settings.num_cubes, settings.lateral_bound, settings.vertical_bound
+    offsets = random_state.uniform(-1.0, 1.0, size=(n, 2)) * (y, z) + (0.0, settings.altitude)
+    x = settings.first_distance + settings.spacing * np.arange(n)
+    return torch.from_numpy(np.column_stack([x, offsets]))
+
+
+def start(settings: TaskSettings, cubes: Sequence[Tensor] | Tensor) -> WorldState:
+    """The state at the start of an episode, with the drone at its origin.
+
+    Args:
+        settings: The task's.
+        cubes: Positions of the cubes, metres. Shape: (num_worlds, num_cubes, 3).
+    """
+    cubes = torch.stack(list(cubes)) if not isinstance(cubes, Tensor) else cubes
+    num_worlds, num_cubes, _ = cubes.shape
+    no_cube = cubes.new_zeros(num_worlds, num_cubes, dtype=torch.bool)
+    state = WorldState(
+        drone=cubes.new_tensor([0.0, 0.0, settings.altitude]).repeat(num_worlds, 1),
+        cubes=cubes,
+        collected=no_cube,
+        passed=no_cube.clone(),
+        side=no_cube.long() - 1,
+        steps=no_cube[:, 0].long(),
+        end_reason=no_cube[:, 0].long(),
+    )
+    state.side = _sides(settings, state)
+    return state
+
+
+def displacement(settings: TaskSettings, action: Tensor) -> Tensor:
+    """How far an action moves the drone in computer-vision mode, metres, world frame.
+
+    Args:
+        settings: The task's.
+        action: `Action` indices. Shape: (num_worlds,).
+
+    Returns:
+        Shape: (num_worlds, 3), float64.
+    """
+    moves = torch.tensor(MOVES, dtype=torch.float64, device=action.device)
+    return moves[action] * settings.step_length
+
+
+def judge(settings: TaskSettings, state: WorldState, drone: Tensor) -> tuple[WorldState, Tensor]:
+    """Applies Algorithms 1 and 3 after the drone has moved.
+
+    A touched cube is collected and worth 1; a cube left behind vanishes; the episode ends when all
+    cubes are collected, when the drone is out of bounds, or at the step limit, in this order.
+
+    Args:
+        settings: The task's.
+        state: Before the move.
+        drone: Position after the move, metres. Shape: (num_worlds, 3).
+
+    Returns:
+        The new state and the reward. Reward shape: (num_worlds,), float64.
+    """
+    away = (drone[:, None] - state.cubes).abs().amax(-1)  # (num_worlds, C)
+    touched = state.present & (away <= settings.touch_distance)
+    collected = state.collected | touched
+    passed = state.passed | (~collected & (drone[:, None, 0] > state.cubes[..., 0]))
+    new = dataclasses.replace(
+        state, drone=drone, collected=collected, passed=passed, steps=state.steps + 1
+    )
+    new.side = _sides(settings, new)
+    new.end_reason = _end_reason(settings, new)
+    return new, touched.sum(-1, dtype=torch.float64)
+
+
+def _sides(settings: TaskSettings, state: WorldState) -> Tensor:
+    """Records the side of every cube up to the next one that has none yet. Shape: (N, C)."""
+    offset = state.cubes[..., 1] - state.drone[:, None, 1]
+    side = torch.full_like(state.side, Side.AHEAD)
+    side[offset > settings.touch_distance] = Side.LEFT
+    side[offset < -settings.touch_distance] = Side.RIGHT
+    index = torch.arange(state.side.shape[-1], device=side.device)
+    is_new = (state.side < 0) & (index <= state.next_cube[:, None])
+    return torch.where(is_new, side, state.side)
+
+
+def _end_reason(settings: TaskSettings, state: WorldState) -> Tensor:
+    """The first reason that holds, in the order of Algorithm 3. Shape: (num_worlds,)."""
+    reason = torch.zeros_like(state.steps)
+    reason[state.steps >= settings.step_limit] = EndReason.STEP_LIMIT
+    reason[state.drone[:, 1].abs() > settings.side_bound] = EndReason.SIDE_BOUNDARY
+    reason[state.drone[:, 0] > settings.front_bound] = EndReason.FRONT_BOUNDARY
+    reason[state.collected.all(-1)] = EndReason.ALL_CUBES
+    return reason
