@@ -1,0 +1,179 @@
+"""Many worlds of cube collection as one TorchRL environment."""
+
+import numpy as np
+import torch
+from tensordict import TensorDict, TensorDictBase
+from torch import Tensor
+from torchrl.data import Binary, Bounded, Categorical, Composite, Unbounded
+from torchrl.envs import EnvBase
+
+from drone_rl.sim.rules import Action, EndReason, WorldState
+from drone_rl.sim.settings import CameraSettings, TaskSettings
+from drone_rl.sim.worlds import CubeWorlds
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.seeding import get_state, set_state, world_random_state
+
+
+class DroneEnv(EnvBase):
+    """`num_envs` drones, each in a world of its own, stepped and drawn as one batch.
+
+    Observation "pixels": uint8, shape (num_envs, height, width, 3). Action: `rules.Action`. The
+    nested "info" holds the ground truth: cubes collected, which, on which side, why the episode
+    ended, and all positions (metres, world frame).
+
+    Only what is asked for is computed: a reset draws only the worlds that are reset, and worlds
+    outside a step's "_step" mask (TorchRL's partial steps) are neither moved nor drawn; their rows
+    repeat what they last showed.
+
+    World i draws its episodes from a stream of its own, so that the first k worlds of a batch are
+    the same whatever the size of the batch.
+    """
+
+    def __init__(
+        self,
+        num_envs: int,
+        task: TaskSettings | None = None,
+        camera: CameraSettings | None = None,
+        *,
+        seed: int = 0,
+        first_world: int = 0,
+        num_shards: int | None = None,
+        device: str = "cpu",
+    ) -> None:
+        """Builds the worlds.
+
+        Args:
+            num_envs: How many.
+            task: Cubes, moves and boundaries.
+            camera: The policy's camera.
+            seed: Root of all the worlds' random streams.
+            first_world: Number of the first world, so that two workers never share one.
+            num_shards: Threads that draw; the number of cores by default.
+            device: "cpu", "cuda" or "cuda:N".
+
+        Raises:
+            InputError: A setting is out of range.
+        """
+        if not (isinstance(num_envs, int) and num_envs >= 1):
+            raise InputError(f"num_envs={num_envs} is out of range; give a whole number from 1")
+        super().__init__(device=torch.device(device), batch_size=torch.Size([num_envs]))
+        self.worlds = CubeWorlds(num_envs, task, camera, device=device, num_shards=num_shards)
+        self.first_world = first_world
+        self._make_specs()
+        self._pixels = torch.zeros(
+            self.observation_spec["pixels"].shape, dtype=torch.uint8, device=self.device
+        )
+        self.set_seed(seed)
+
+    def state_dict(self, *args: object, **kwargs: object) -> dict:
+        """The worlds' random streams; enough to go on where every world is about to be reset."""
+        return {"random_states": [get_state(r) for r in self._random_states]}
+
+    def load_state_dict(self, state_dict: dict, strict: bool = True, assign: bool = False) -> None:
+        """Goes on with the streams of `state_dict`.
+
+        Raises:
+            InputError: It was saved by another number of worlds.
+        """
+        states = state_dict["random_states"]
+        if len(states) != len(self._random_states):
+            raise InputError(
+                f"the saved environment has {len(states)} worlds, this one "
+                f"{len(self._random_states)}; set num_envs={len(states)}"
+            )
+        for random_state, state in zip(self._random_states, states, strict=True):
+            set_state(random_state, state)
+
+    def close(self, *, raise_if_closed: bool = True) -> None:
+        """Ends the rendering threads."""
+        if not self.is_closed:
+            self.worlds.close()
+        super().close(raise_if_closed=raise_if_closed)
+
+    def _make_specs(self) -> None:
+        n, cubes, camera = self.batch_size[0], self.worlds.settings.num_cubes, self.worlds.camera
+        pixels = (n, camera.height, camera.width, 3)
+        info = Composite(
+            cubes=Bounded(0, cubes, (n, 1), dtype=torch.int64),
+            collected=Binary(cubes, (n, cubes), dtype=torch.bool),
+            side=Bounded(-1, 2, (n, cubes), dtype=torch.int64),
+            next_cube=Bounded(0, cubes, (n, 1), dtype=torch.int64),
+            end_reason=Bounded(0, len(EndReason) - 1, (n, 1), dtype=torch.int64),
+            drone=Unbounded((n, 3)),
+            cube_positions=Unbounded((n, cubes, 3)),
+            shape=(n,),
+        )
+        self.observation_spec = Composite(
+            pixels=Bounded(0, 255, pixels, dtype=torch.uint8), info=info, shape=(n,)
+        ).to(self.device)
+        self.action_spec = Categorical(len(Action), shape=(n,), dtype=torch.int64).to(self.device)
+        self.reward_spec = Unbounded((n, 1)).to(self.device)
+        done = {name: Binary(1, (n, 1), dtype=torch.bool) for name in _DONE_KEYS}
+        self.full_done_spec = Composite(**done, shape=(n,)).to(self.device)
+
+    def _set_seed(self, seed: int | None) -> None:
+        if seed is None:
+            raise InputError("seed=None can't be repeated; give a whole number, 0 or more")
+        first, n = self.first_world, self.batch_size[0]
+        self._random_states = [world_random_state(seed, first + i) for i in range(n)]
+
+    def _reset(self, tensordict: TensorDictBase | None = None, **kwargs: object) -> TensorDictBase:
+        mask = None if tensordict is None else tensordict.get("_reset", None)
+        worlds = self._indices(mask)
+        streams: list[np.random.RandomState] = [self._random_states[i] for i in worlds.tolist()]
+        self.worlds.reset(worlds, streams)
+        self._draw(worlds)
+        return self._observe({name: self._false() for name in _DONE_KEYS})
+
+    def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
+        worlds = self._indices(tensordict.get("_step", None))
+        reward = torch.zeros(*self.batch_size, 1, device=self.device)
+        action = tensordict.get(self.action_key)
+        reward[worlds, 0] = self.worlds.step(worlds, action[worlds]).float()
+        self._draw(worlds)
+        reason = self.worlds.state.end_reason[:, None]
+        truncated = reason == EndReason.STEP_LIMIT
+        done = reason != EndReason.RUNNING
+        flags = {"done": done, "terminated": done & ~truncated, "truncated": truncated}
+        return self._observe({"reward": reward, **flags})
+
+    def _draw(self, worlds: Tensor) -> None:
+        everyone = len(worlds) == len(self._pixels)
+        state = self.worlds.state if everyone else self.worlds.state[worlds]
+        pixels = self.worlds.render(state)
+        if everyone:
+            self._pixels = pixels
+        else:
+            self._pixels = self._pixels.clone()
+            self._pixels[worlds] = pixels
+
+    def _observe(self, entries: dict[str, Tensor]) -> TensorDict:
+        source = {"pixels": self._pixels, "info": _info(self.worlds.state, self.batch_size)}
+        return TensorDict({**source, **entries}, self.batch_size, device=self.device)
+
+    def _indices(self, mask: Tensor | None) -> Tensor:
+        if mask is None:
+            return torch.arange(self.batch_size[0], device=self.device)
+        return mask.reshape(self.batch_size).nonzero()[:, 0]
+
+    def _false(self) -> Tensor:
+        return torch.zeros(*self.batch_size, 1, dtype=torch.bool, device=self.device)
+
+
+_DONE_KEYS = ("done", "terminated", "truncated")
+
+
+def _info(state: WorldState, batch_size: torch.Size) -> TensorDict:
+    return TensorDict(
+        {
+            "cubes": state.collected.sum(-1, keepdim=True),
+            "collected": state.collected.clone(),
+            "side": state.side.clone(),
+            "next_cube": state.next_cube[:, None],
+            "end_reason": state.end_reason[:, None].clone(),
+            "drone": state.drone.float(),
+            "cube_positions": state.cubes.float(),
+        },
+        batch_size,
+        device=state.drone.device,
+    )

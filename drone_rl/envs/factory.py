@@ -1,0 +1,15 @@
+"""The one place where the order of the pixel pipeline is decided."""
+
+from collections.abc import Sequence
+
+from torchrl.envs import Compose, EnvBase, Transform, TransformedEnv
+
+
+def make_env(env: EnvBase, transforms: Sequence[Transform] = ()) -> TransformedEnv:
+    """Puts a pipeline of transforms behind an environment.
+
+    Args:
+        env: The environment.
+        transforms: In the order in which they are applied, cheapest data first.
+    """
+    return TransformedEnv(env, Compose(*transforms))

@@ -1,0 +1,150 @@
+"""From camera frames to what a network sees, in TorchRL transforms that need no torchvision."""
+
+import torch
+from tensordict import TensorDictBase
+from tensordict.utils import NestedKey
+from torch import Tensor
+from torch.nn import functional
+from torchrl.data import TensorSpec, Unbounded
+from torchrl.envs.transforms import ObservationTransform
+
+from drone_rl.utils.errors import InputError
+
+LUMA = (0.299, 0.587, 0.114)
+"""Weights of red, green and blue in a gray pixel (ITU-R BT.601), as in the original study."""
+
+
+class _PixelTransform(ObservationTransform):
+    """A map from pixels to pixels, applied alike at reset and at every step."""
+
+    def __init__(
+        self,
+        in_keys: list[NestedKey] | None = None,
+        out_keys: list[NestedKey] | None = None,
+    ) -> None:
+        in_keys = in_keys if in_keys is not None else ["pixels"]
+        super().__init__(in_keys=in_keys, out_keys=out_keys or list(in_keys))
+
+    def _reset(
+        self, tensordict: TensorDictBase, tensordict_reset: TensorDictBase
+    ) -> TensorDictBase:
+        return self._call(tensordict_reset)
+
+    def transform_observation_spec(self, observation_spec: TensorSpec) -> TensorSpec:
+        """Declares the shape that the transform makes of each pixel entry."""
+        for in_key, out_key in zip(self.in_keys, self.out_keys, strict=True):
+            before = observation_spec[in_key]
+            after = self._apply_transform(before.zero())
+            observation_spec[out_key] = Unbounded(
+                shape=after.shape, dtype=after.dtype, device=before.device
+            )
+        return observation_spec
+
+
+class GrayPixels(_PixelTransform):
+    """RGB bytes (*, H, W, 3) to gray (*, 1, H, W), float32 in [0, 1], in one pass.
+
+    The same as TorchRL's `ToTensorImage` and `GrayScale`, several times faster on a CPU.
+
+    Raises:
+        InputError: The frames are not RGB bytes with the colour last.
+    """
+
+    def _apply_transform(self, pixels: Tensor) -> Tensor:
+        if pixels.dtype != torch.uint8 or pixels.shape[-1] != 3:
+            raise InputError(
+                f"GrayPixels got {pixels.dtype} frames of shape {tuple(pixels.shape)}; "
+                "give uint8 of shape (..., height, width, 3)"
+            )
+        weights = torch.tensor(LUMA, device=pixels.device) / 255.0
+        return (pixels.float() @ weights).unsqueeze(-3)
+
+
+class CropRows(_PixelTransform):
+    """Keeps the rows `top` to `bottom` (exclusive) of frames (*, C, H, W).
+
+    Raises:
+        InputError: The rows are not in the frame.
+    """
+
+    def __init__(
+        self,
+        top: int,
+        bottom: int,
+        in_keys: list[NestedKey] | None = None,
+        out_keys: list[NestedKey] | None = None,
+    ) -> None:
+        super().__init__(in_keys, out_keys)
+        if not 0 <= top < bottom:
+            raise InputError(f"CropRows({top}, {bottom}) keeps no row; give 0 <= top < bottom")
+        self.top, self.bottom = top, bottom
+
+    def _apply_transform(self, pixels: Tensor) -> Tensor:
+        if self.bottom > pixels.shape[-2]:
+            raise InputError(
+                f"CropRows({self.top}, {self.bottom}) of a frame of {pixels.shape[-2]} rows; "
+                f"give a bottom of at most {pixels.shape[-2]}"
+            )
+        return pixels[..., self.top : self.bottom, :]
+
+    def __repr__(self) -> str:
+        return f"CropRows(top={self.top}, bottom={self.bottom})"
+
+
+class Resize(_PixelTransform):
+    """Resizes frames (*, C, H, W) by averaging over areas.
+
+    Raises:
+        InputError: A size is below 1.
+    """
+
+    def __init__(
+        self,
+        *,
+        height: int,
+        width: int,
+        in_keys: list[NestedKey] | None = None,
+        out_keys: list[NestedKey] | None = None,
+    ) -> None:
+        super().__init__(in_keys, out_keys)
+        if height < 1 or width < 1:
+            raise InputError(f"Resize(height={height}, width={width}): give 1 pixel or more")
+        self.height, self.width = height, width
+
+    def _apply_transform(self, pixels: Tensor) -> Tensor:
+        size = (self.height, self.width)
+        if pixels.shape[-2:] == size:
+            return pixels
+        flat = pixels.reshape(-1, *pixels.shape[-3:])
+        resized = functional.interpolate(flat, size, mode="area")
+        return resized.reshape(*pixels.shape[:-2], *size)
+
+    def __repr__(self) -> str:
+        return f"Resize(height={self.height}, width={self.width})"
+
+
+class StandardizePixels(_PixelTransform):
+    """Shifts and scales pixels: (x - mean) / std. The defaults are the original study's.
+
+    Raises:
+        InputError: The deviation is not above 0.
+    """
+
+    def __init__(
+        self,
+        mean: float = 0.53,
+        std: float = 0.21,
+        in_keys: list[NestedKey] | None = None,
+        out_keys: list[NestedKey] | None = None,
+    ) -> None:
+        super().__init__(in_keys, out_keys)
+        if not std > 0:
+            raise InputError(f"StandardizePixels(std={std}): give a deviation above 0")
+        self.register_buffer("mean", torch.tensor(float(mean)))
+        self.register_buffer("std", torch.tensor(float(std)))
+
+    def _apply_transform(self, pixels: Tensor) -> Tensor:
+        return (pixels - self.mean) / self.std
+
+    def __repr__(self) -> str:
+        return f"StandardizePixels(mean={self.mean:g}, std={self.std:g})"

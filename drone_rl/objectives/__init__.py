@@ -1,0 +1,27 @@
+"""Returns, their estimators, and the loss that learns from them."""
+
+from drone_rl.objectives.estimators import (
+    BatchNormalised,
+    LeaveOneOut,
+    LinearRamp,
+    ReturnEstimator,
+    RewardToGo,
+    Standardised,
+    SuccessScaled,
+    TimeBaseline,
+    TotalReward,
+)
+from drone_rl.objectives.reinforce import ReinforceLoss
+
+__all__ = [
+    "BatchNormalised",
+    "LeaveOneOut",
+    "LinearRamp",
+    "ReinforceLoss",
+    "ReturnEstimator",
+    "RewardToGo",
+    "Standardised",
+    "SuccessScaled",
+    "TimeBaseline",
+    "TotalReward",
+]

@@ -1,0 +1,170 @@
+"""Return estimators as modules: each writes "return_to_go" into a batch of complete episodes."""
+
+import abc
+
+import torch
+from tensordict import TensorDictBase
+from tensordict.nn import TensorDictModuleBase
+from tensordict.utils import NestedKey
+from torch import Tensor
+
+from drone_rl.objectives import returns
+from drone_rl.utils.errors import InputError
+
+
+class ReturnEstimator(TensorDictModuleBase, abc.ABC):
+    """Reads rewards and end flags of shape (*batch, T, 1), writes returns of the same shape."""
+
+    def __init__(
+        self,
+        *,
+        scale: bool = False,
+        reward_key: NestedKey = ("next", "reward"),
+        done_key: NestedKey = ("next", "done"),
+        out_key: NestedKey = "return_to_go",
+    ) -> None:
+        """Names the entries.
+
+        Args:
+            scale: Whether to divide the batch's returns by their root mean square.
+            reward_key: Entry with the rewards.
+            done_key: Entry with the end flags.
+            out_key: Entry that is written.
+        """
+        super().__init__()
+        self.in_keys, self.out_keys = [reward_key, done_key], [out_key]
+        self.scale = scale
+
+    @torch.no_grad()
+    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
+        """Writes the returns.
+
+        Raises:
+            InputError: An episode is not complete.
+        """
+        values = self.estimate(*(tensordict.get(key) for key in self.in_keys))
+        return tensordict.set(self.out_keys[0], returns.scale_to_unit(values) if self.scale else values)
+
+    @abc.abstractmethod
+    def estimate(self, reward: Tensor, done: Tensor) -> Tensor:
+        """The returns. Shape: that of `reward`."""
+
+
+class _Discounted(ReturnEstimator):
+    def __init__(self, gamma: float = 0.99, **kwargs: object) -> None:
+        """Sets the discount rate.
+
+        Args:
+            gamma: Discount rate in [0, 1].
+            **kwargs: See `ReturnEstimator`.
+
+        Raises:
+            InputError: gamma is out of range.
+        """
+        super().__init__(**kwargs)
+        if not 0.0 <= gamma <= 1.0:
+            raise InputError(f"returns.gamma={gamma} is out of range; give a rate from 0 to 1")
+        self.gamma = gamma
+
+
+class TotalReward(ReturnEstimator):
+    """The whole episode's reward at every step (Eq. 12)."""
+
+    def estimate(self, reward: Tensor, done: Tensor) -> Tensor:
+        """See `returns.total_reward`."""
+        return returns.total_reward(reward, done)
+
+
+class RewardToGo(_Discounted):
+    """Discounted return (Eq. 14)."""
+
+    def estimate(self, reward: Tensor, done: Tensor) -> Tensor:
+        """See `returns.reward_to_go`."""
+        return returns.reward_to_go(reward, done, self.gamma)
+
+
+class Standardised(_Discounted):
+    """Discounted return, standardised over each episode (Algorithm 4)."""
+
+    def estimate(self, reward: Tensor, done: Tensor) -> Tensor:
+        """See `returns.standardised`."""
+        return returns.standardised(reward, done, self.gamma)
+
+
+class LinearRamp(ReturnEstimator):
+    """The episode's reward times a ramp over the episode."""
+
+    def estimate(self, reward: Tensor, done: Tensor) -> Tensor:
+        """See `returns.linear_ramp`."""
+        return returns.linear_ramp(reward, done)
+
+
+class SuccessScaled(_Discounted):
+    """Discounted return scaled by exp(reward - max_reward)."""
+
+    def __init__(self, gamma: float = 0.99, max_reward: float = 3.0, **kwargs: object) -> None:
+        """Sets the scale.
+
+        Args:
+            gamma: Discount rate in [0, 1].
+            max_reward: Reward of a perfect episode.
+            **kwargs: See `ReturnEstimator`.
+        """
+        super().__init__(gamma, **kwargs)
+        self.max_reward = max_reward
+
+    def estimate(self, reward: Tensor, done: Tensor) -> Tensor:
+        """See `returns.success_scaled`."""
+        return returns.success_scaled(reward, done, self.gamma, self.max_reward)
+
+
+class TimeBaseline(_Discounted):
+    """Discounted return minus a running mean, over earlier episodes, for each time step."""
+
+    def __init__(
+        self, gamma: float = 0.99, decay: float = 0.9, max_steps: int = 300, **kwargs: object
+    ) -> None:
+        """Sets the memory.
+
+        Args:
+            gamma: Discount rate in [0, 1].
+            decay: Share of the old mean that is kept at each batch.
+            max_steps: Time steps that have a mean of their own.
+            **kwargs: See `ReturnEstimator`.
+
+        Raises:
+            InputError: decay is out of range.
+        """
+        super().__init__(gamma, **kwargs)
+        if not 0.0 <= decay < 1.0:
+            raise InputError(f"returns.decay={decay} is out of range; give 0 or more, below 1")
+        self.decay = decay
+        self.register_buffer("baseline", torch.zeros(max_steps))
+        self.register_buffer("seen", torch.zeros(max_steps, dtype=torch.bool))
+
+    def estimate(self, reward: Tensor, done: Tensor) -> Tensor:
+        """See `returns.time_baseline`; the running mean takes in this batch only afterwards."""
+        values = returns.time_baseline(reward, done, self.gamma, self.baseline)
+        mean, _ = returns.mean_by_time(returns.reward_to_go(reward, done, self.gamma), done)
+        known = min(len(mean), len(self.baseline))
+        old, mean, seen = self.baseline[:known], mean[:known], self.seen[:known]
+        blend = self.decay * old + (1 - self.decay) * mean
+        self.baseline[:known] = torch.where(seen, blend, mean)
+        self.seen[:known] = True
+        return values
+
+
+class LeaveOneOut(_Discounted):
+    """Discounted return minus the other episodes' mean at the same time step."""
+
+    def estimate(self, reward: Tensor, done: Tensor) -> Tensor:
+        """See `returns.leave_one_out`."""
+        return returns.leave_one_out(reward, done, self.gamma)
+
+
+class BatchNormalised(_Discounted):
+    """Discounted return, normalised over the batch."""
+
+    def estimate(self, reward: Tensor, done: Tensor) -> Tensor:
+        """See `returns.batch_normalised`."""
+        return returns.batch_normalised(reward, done, self.gamma)

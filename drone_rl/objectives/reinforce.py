@@ -1,0 +1,130 @@
+"""REINFORCE as a TorchRL loss module, without a critic."""
+
+import dataclasses
+
+import torch
+from tensordict import TensorDict, TensorDictBase, TensorDictParams
+from tensordict.nn import ProbabilisticTensorDictSequential, dispatch
+from tensordict.utils import NestedKey
+from torch import Tensor
+from torchrl.objectives import LossModule
+
+from drone_rl.utils.errors import InputError
+
+
+class ReinforceLoss(LossModule):
+    """-sum_t g_t log pi(a_t | s_t), reduced over the batch (chapter, Eq. 15).
+
+    The returns g_t come from a return estimator; the stored action is scored, never a new one.
+    `reduction="mean"` averages over steps, `"sum"` adds them up (Algorithm 4 on one episode), and
+    `"episode"` adds up the steps and averages over episodes (Eq. 12).
+
+    The output's `loss_*` entries add up to what is to be back-propagated; the others are detached.
+
+    Examples:
+        >>> loss = ReinforceLoss(actor)
+        >>> losses = loss(estimator(batch))
+        >>> (losses["loss_actor"] + losses["loss_entropy"]).backward()
+    """
+
+    @dataclasses.dataclass
+    class _AcceptedKeys:
+        """Names of the entries that the loss reads, changed by `set_keys`."""
+
+        action: NestedKey = "action"
+        """The stored action."""
+        return_to_go: NestedKey = "return_to_go"
+        """What a return estimator wrote. Shape: (*batch, 1)."""
+        done: NestedKey = "done"
+        """End flag, under "next"; read for `reduction="episode"` alone."""
+
+    tensor_keys: _AcceptedKeys
+    default_keys = _AcceptedKeys
+    out_keys = ("loss_actor", "loss_entropy", "entropy")
+    actor_network: ProbabilisticTensorDictSequential
+    actor_network_params: TensorDictParams
+    target_actor_network_params: TensorDictParams
+
+    def __init__(
+        self,
+        actor_network: ProbabilisticTensorDictSequential,
+        *,
+        entropy_coeff: float = 0.0,
+        reduction: str = "mean",
+    ) -> None:
+        """Wraps the policy.
+
+        Args:
+            actor_network: The policy that collected the batch.
+            entropy_coeff: Weight of the entropy bonus; 0 for none.
+            reduction: "mean", "sum", "episode" or "none".
+
+        Raises:
+            InputError: The reduction is unknown or the weight negative.
+        """
+        super().__init__()
+        if reduction not in ("mean", "sum", "episode", "none"):
+            raise InputError(
+                f"objective.reduction={reduction} is unknown; give mean, sum, episode or none"
+            )
+        if entropy_coeff < 0:
+            raise InputError(f"objective.entropy_coeff={entropy_coeff} is negative; give 0 or more")
+        self.reduction = reduction
+        self.convert_to_functional(actor_network, "actor_network", create_target_params=False)
+        self.register_buffer("entropy_coeff", torch.tensor(float(entropy_coeff)))
+
+    @property
+    def in_keys(self) -> list[NestedKey]:
+        """What `forward` reads."""
+        keys = self.tensor_keys
+        done = [("next", keys.done)] if self.reduction == "episode" else []
+        return [keys.action, keys.return_to_go, *self.actor_network.in_keys, *done]
+
+    @in_keys.setter
+    def in_keys(self, values: list[NestedKey]) -> None:
+        raise RuntimeError("in_keys follows from set_keys(...) and the actor; change those")
+
+    def _forward_value_estimator_keys(self, **kwargs: NestedKey) -> None:
+        """There is no value estimator to tell."""
+
+    @dispatch
+    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
+        """Computes the loss of a batch.
+
+        Args:
+            tensordict: Steps with what the policy saw, the action and the return.
+
+        Returns:
+            "loss_actor", "loss_entropy" and the detached "entropy".
+
+        Raises:
+            InputError: The returns are missing.
+        """
+        returns = tensordict.get(self.tensor_keys.return_to_go, None)
+        if returns is None:
+            raise InputError(
+                f"the batch has no entry {self.tensor_keys.return_to_go!r}; "
+                "pass it through a return estimator first"
+            )
+        with self.actor_network_params.to_module(self.actor_network):
+            distribution = self.actor_network.get_dist(tensordict.select(*self.actor_network.in_keys))
+        log_prob = distribution.log_prob(tensordict.get(self.tensor_keys.action))
+        entropy = distribution.entropy()
+        loss = -log_prob * returns.detach().reshape(log_prob.shape)
+        bonus = -self.entropy_coeff * entropy
+        return TensorDict(
+            {
+                "loss_actor": self._reduce(loss, tensordict),
+                "loss_entropy": self._reduce(bonus, tensordict),
+                "entropy": self._reduce(entropy, tensordict, mean=True).detach(),
+            }
+        )
+
+    def _reduce(self, values: Tensor, tensordict: TensorDictBase, mean: bool = False) -> Tensor:
+        mask = tensordict.get(("collector", "mask"), None)
+        kept = values if mask is None else values[mask.reshape(values.shape)]
+        if mean or self.reduction == "mean":
+            return kept.mean()
+        if self.reduction == "episode":
+            return kept.sum() / tensordict.get(("next", self.tensor_keys.done)).sum()
+        return kept.sum() if self.reduction == "sum" else kept

@@ -1,0 +1,163 @@
+"""What each step of an episode is credited with: pure functions of rewards.
+
+Every function takes `reward` and `done` of shape (*batch, T, 1), time in dimension -2, made of
+complete episodes: credit never crosses a `done`, and the last step of every row must be one. A
+flat batch (T, 1) of episodes one after the other and a batch (N, T, 1) are the same to them.
+
+The original study had five variants, called `advantage_type` 0 to 4: `standardised`,
+`linear_ramp`, `reward_to_go`, `success_scaled` and `time_baseline`. They are written here as they
+were meant: an episode of constant return standardises to zero instead of dividing by zero, and a
+baseline never contains the episode that it is subtracted from.
+"""
+
+import torch
+from torch import Tensor
+from torch.nn.utils.rnn import pad_sequence
+
+from drone_rl.utils.errors import InputError
+
+
+def episode_lengths(done: Tensor) -> list[int]:
+    """Lengths of the episodes, row after row.
+
+    Args:
+        done: End flags. Shape: (*batch, T, 1).
+
+    Raises:
+        InputError: A row does not end with its last episode.
+    """
+    if not bool(done[..., -1, :].all()):
+        raise InputError(
+            "a return needs complete episodes, but a row's last step is not done; "
+            "collect with EpisodeCollector, or cut the unfinished tail"
+        )
+    ends = done.flatten().nonzero()[:, 0]
+    return torch.diff(ends, prepend=ends.new_tensor([-1])).tolist()
+
+
+def total_reward(reward: Tensor, done: Tensor) -> Tensor:
+    """Every step gets its whole episode's reward, r(tau) of Eq. 12. Shape: (*batch, T, 1)."""
+    padded, lengths = _pad(reward, done)
+    return _unpad(padded.sum(0).expand_as(padded), lengths, reward)
+
+
+def reward_to_go(reward: Tensor, done: Tensor, gamma: float) -> Tensor:
+    """Discounted return, Eq. 14: g_t = r_{t+1} + gamma g_{t+1}. Shape: (*batch, T, 1)."""
+    padded, lengths = _pad(reward, done)
+    return _unpad(_discount(padded, gamma), lengths, reward)
+
+
+def standardised(reward: Tensor, done: Tensor, gamma: float) -> Tensor:
+    """Discounted return, (g - mean) / std over each episode (Algorithm 4, line 2; footnote 5).
+
+    The deviation is the population's; an episode of constant return gets zeros.
+    """
+    padded, lengths = _pad(reward, done)
+    returns = _discount(padded, gamma)
+    alive = _alive(lengths, returns)
+    centred = (returns - _mean(returns, alive)) * alive
+    deviation = _mean(centred.square(), alive).sqrt()
+    flat = torch.where(deviation > 1e-8, centred / deviation.clamp(min=1e-8), 0.0)
+    return _unpad(flat, lengths, reward)
+
+
+def linear_ramp(reward: Tensor, done: Tensor) -> Tensor:
+    """The episode's reward times a ramp from 1/T at its first step to 1 at its last."""
+    padded, lengths = _pad(reward, done)
+    step = torch.arange(1, padded.shape[0] + 1, device=padded.device)[:, None]
+    ramp = step / torch.tensor(lengths, device=padded.device)
+    return _unpad(padded.sum(0) * ramp, lengths, reward)
+
+
+def success_scaled(reward: Tensor, done: Tensor, gamma: float, max_reward: float) -> Tensor:
+    """Discounted return times exp(r(tau) - max_reward): episodes count by their success."""
+    scale = (total_reward(reward, done) - max_reward).exp()
+    return reward_to_go(reward, done, gamma) * scale
+
+
+def time_baseline(reward: Tensor, done: Tensor, gamma: float, baseline: Tensor) -> Tensor:
+    """Discounted return minus a baseline for each time step of an episode.
+
+    Args:
+        reward: Shape: (*batch, T, 1).
+        done: Shape: (*batch, T, 1).
+        gamma: Discount rate.
+        baseline: From earlier episodes; times beyond its end have baseline 0. Shape: (steps,).
+    """
+    padded, lengths = _pad(reward, done)
+    known = min(len(baseline), len(padded))
+    returns = _discount(padded, gamma)
+    returns[:known] -= baseline[:known, None]
+    return _unpad(returns, lengths, reward)
+
+
+def leave_one_out(reward: Tensor, done: Tensor, gamma: float) -> Tensor:
+    """Discounted return minus the mean, at the same time step, of the other episodes still going.
+
+    The baseline does not depend on the episode's own actions, so the gradient stays unbiased; an
+    episode that goes on alone has baseline 0.
+    """
+    padded, lengths = _pad(reward, done)
+    returns = _discount(padded, gamma)
+    alive = _alive(lengths, returns)
+    others = alive.sum(1, keepdim=True) - 1
+    baseline = (returns.sum(1, keepdim=True) - returns) / others.clamp(min=1)
+    return _unpad(torch.where(others > 0, returns - baseline, returns), lengths, reward)
+
+
+def batch_normalised(reward: Tensor, done: Tensor, gamma: float) -> Tensor:
+    """Discounted return, (g - mean) / std over the whole batch; zeros if it is constant."""
+    returns = reward_to_go(reward, done, gamma)
+    centred = returns - returns.mean()
+    deviation = centred.square().mean().sqrt()
+    return centred / deviation if deviation > 1e-8 else torch.zeros_like(centred)
+
+
+def scale_to_unit(returns: Tensor) -> Tensor:
+    """Divides by the root mean square of the batch, which keeps zero where it is."""
+    rms = returns.square().mean().sqrt()
+    return returns / rms if rms > 1e-8 else returns
+
+
+def mean_by_time(returns: Tensor, done: Tensor) -> tuple[Tensor, Tensor]:
+    """Mean return of the episodes still going at each time step, and how many there are.
+
+    Returns:
+        Two tensors of shape (longest episode,).
+    """
+    padded, lengths = _pad(returns, done)
+    count = _alive(lengths, padded).sum(1)
+    return padded.sum(1) / count, count
+
+
+def _pad(values: Tensor, done: Tensor) -> tuple[Tensor, list[int]]:
+    """Episodes side by side, zeros after their ends. Shape: (longest, episodes)."""
+    if values.shape != done.shape or values.shape[-1] != 1:
+        raise ValueError(
+            f"values {tuple(values.shape)} and done {tuple(done.shape)} must both be (*batch, T, 1)"
+        )
+    lengths = episode_lengths(done)
+    return pad_sequence(list(values.flatten().float().split(lengths))), lengths
+
+
+def _unpad(padded: Tensor, lengths: list[int], like: Tensor) -> Tensor:
+    episodes = zip(padded.T, lengths, strict=True)
+    return torch.cat([episode[:length] for episode, length in episodes]).reshape(like.shape)
+
+
+def _discount(padded: Tensor, gamma: float) -> Tensor:
+    returns = torch.empty_like(padded)
+    following = torch.zeros_like(padded[0])
+    for t in range(len(padded) - 1, -1, -1):
+        following = padded[t] + gamma * following
+        returns[t] = following
+    return returns
+
+
+def _alive(lengths: list[int], padded: Tensor) -> Tensor:
+    step = torch.arange(len(padded), device=padded.device)[:, None]
+    return step < torch.tensor(lengths, device=padded.device)
+
+
+def _mean(padded: Tensor, alive: Tensor) -> Tensor:
+    return (padded * alive).sum(0) / alive.sum(0)

@@ -1,0 +1,62 @@
+"""From a network to an actor: logits to actions."""
+
+import torch
+from tensordict.nn import TensorDictModule
+from torch import Tensor, nn
+from torch.distributions import Categorical
+from torchrl.data import TensorSpec
+from torchrl.modules import ProbabilisticActor
+
+
+class RandomSource:
+    """A torch generator that copies of a module share, so that no draw is made twice."""
+
+    def __init__(self, generator: torch.Generator) -> None:
+        self.generator = generator
+
+    def __deepcopy__(self, memo: dict) -> "RandomSource":
+        """Returns itself: the stream is one, however many copies draw from it."""
+        return self
+
+
+class SeededCategorical(Categorical):
+    """A categorical distribution that draws from a generator of its own, not the global one."""
+
+    def __init__(self, logits: Tensor, source: RandomSource | None = None) -> None:
+        super().__init__(logits=logits, validate_args=False)
+        self._source = source
+
+    @torch.no_grad()
+    def sample(self, sample_shape: torch.Size | tuple = ()) -> Tensor:
+        """Draws by inverting the cumulative distribution. Shape: (*sample_shape, *batch)."""
+        generator = None if self._source is None else self._source.generator
+        shape = (*sample_shape, *self.logits.shape[:-1], 1)
+        draw = torch.rand(shape, generator=generator, device=self.logits.device)
+        return (draw > self.probs.cumsum(-1)[..., :-1]).sum(-1)
+
+    @property
+    def deterministic_sample(self) -> Tensor:
+        """The most probable class. Shape: batch."""
+        return self.logits.argmax(-1)
+
+
+def make_actor(
+    network: nn.Module, action_spec: TensorSpec, generator: torch.Generator | None = None
+) -> ProbabilisticActor:
+    """A stochastic policy: "pixels" to "logits" to "action" (chapter, Eq. 9).
+
+    It samples by default and takes the most probable action under
+    `set_exploration_type(ExplorationType.DETERMINISTIC)`.
+
+    Args:
+        network: Pictures (*, C, H, W) to logits (*, num_actions).
+        action_spec: The environment's.
+        generator: Source of the sampled actions; torch's global one by default.
+    """
+    return ProbabilisticActor(
+        TensorDictModule(network, in_keys=["pixels"], out_keys=["logits"]),
+        in_keys=["logits"],
+        spec=action_spec,
+        distribution_class=SeededCategorical,
+        distribution_kwargs={"source": None if generator is None else RandomSource(generator)},
+    )

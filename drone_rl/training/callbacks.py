@@ -1,0 +1,202 @@
+"""What happens beside learning: checkpoints, logs, a progress bar."""
+
+import csv
+import logging
+import os
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from torchrl.record.loggers import Logger
+from tqdm import tqdm
+
+from drone_rl.training.checkpoint import save_checkpoint
+from drone_rl.utils.errors import InputError
+
+if TYPE_CHECKING:
+    from drone_rl.training.trainer import Trainer
+
+_log = logging.getLogger(__name__)
+
+
+class Callback:
+    """Hooks of the training loop; override those of interest."""
+
+    def on_start(self, trainer: "Trainer") -> None:
+        """Before the first update of this process."""
+
+    def on_update(self, trainer: "Trainer", metrics: Mapping[str, float]) -> None:
+        """After each update."""
+
+    def on_end(self, trainer: "Trainer", reason: str) -> None:
+        """After the last update, whyever it was the last."""
+
+    def on_failure(self, trainer: "Trainer") -> None:
+        """When an update failed; the parameters are those before it."""
+
+
+class CheckpointCallback(Callback):
+    """Keeps the newest state (`last.pt`) and the one with the best running mean (`best.pt`)."""
+
+    def __init__(
+        self, folder: str | Path, *, interval_s: float = 15.0, extra: Mapping[str, Any] | None = None
+    ) -> None:
+        """Sets where and how often.
+
+        Args:
+            folder: Where the checkpoints go; made if need be.
+            interval_s: Seconds between two savings.
+            extra: Stored beside the trainer's state: configuration, versions.
+        """
+        self.folder = Path(folder)
+        self.interval_s = interval_s
+        self.extra = dict(extra or {})
+        self.best = float("-inf")
+        self._saved_at = time.monotonic()
+
+    @property
+    def last_path(self) -> Path:
+        """The newest checkpoint."""
+        return self.folder / "last.pt"
+
+    @property
+    def best_path(self) -> Path:
+        """The best checkpoint."""
+        return self.folder / "best.pt"
+
+    def on_start(self, trainer: "Trainer") -> None:
+        """Makes sure, before any work is done, that there is a place to save to."""
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(
+                f"checkpoint folder {self.folder} can't be made ({error.strerror}); "
+                "choose another with hydra.run.dir=..."
+            ) from error
+        if not self.last_path.exists():
+            self._save(trainer)
+
+    def on_update(self, trainer: "Trainer", metrics: Mapping[str, float]) -> None:
+        """Saves when the interval has passed."""
+        if time.monotonic() - self._saved_at >= self.interval_s:
+            self._save(trainer)
+
+    def on_end(self, trainer: "Trainer", reason: str) -> None:
+        """Saves the final state."""
+        self._save(trainer)
+
+    def on_failure(self, trainer: "Trainer") -> None:
+        """Says where the last good state is."""
+        _log.error("the last good checkpoint is %s", self.last_path)
+
+    def _save(self, trainer: "Trainer") -> None:
+        running = trainer.progress.running_cubes
+        is_best = running > self.best
+        self.best = max(self.best, running)
+        state = {**trainer.state_dict(), "best": self.best, **self.extra}
+        save_checkpoint(self.last_path, state)
+        if is_best:
+            save_checkpoint(self.best_path, state)
+        self._saved_at = time.monotonic()
+
+
+class CsvCallback(Callback):
+    """One row of `metrics.csv` an update; a resumed run drops the rows that it will repeat."""
+
+    def __init__(self, path: str | Path) -> None:
+        """Sets the file."""
+        self.path = Path(path)
+
+    def on_start(self, trainer: "Trainer") -> None:
+        """Keeps the rows up to the state that training goes on from."""
+        if not self.path.exists():
+            return
+        with self.path.open(newline="") as file:
+            rows = [r for r in csv.reader(file)]
+        kept = rows[:1] + [r for r in rows[1:] if r and int(r[0]) <= trainer.progress.updates]
+        temporary = self.path.with_suffix(".tmp")
+        with temporary.open("w", newline="") as file:
+            csv.writer(file).writerows(kept)
+        os.replace(temporary, self.path)
+
+    def on_update(self, trainer: "Trainer", metrics: Mapping[str, float]) -> None:
+        """Appends a row."""
+        progress = trainer.progress
+        counters = {
+            "update": progress.updates,
+            "frames": progress.frames,
+            "episodes": progress.episodes,
+            "seconds": round(progress.seconds, 3),
+        }
+        is_new = not self.path.exists() or self.path.stat().st_size == 0
+        with self.path.open("a", newline="") as file:
+            writer = csv.writer(file)
+            if is_new:
+                writer.writerow([*counters, *metrics])
+            writer.writerow([*counters.values(), *(f"{v:.6g}" for v in metrics.values())])
+
+
+class LoggerCallback(Callback):
+    """Passes the metrics, by frames, to any of TorchRL's loggers."""
+
+    def __init__(self, loggers: Sequence[Logger]) -> None:
+        """Sets the loggers."""
+        self.loggers = list(loggers)
+
+    def on_update(self, trainer: "Trainer", metrics: Mapping[str, float]) -> None:
+        """Logs each metric."""
+        for logger in self.loggers:
+            for name, value in metrics.items():
+                logger.log_scalar(name, value, step=trainer.progress.frames)
+
+
+class ProgressCallback(Callback):
+    """A progress bar on a terminal, a line every few seconds elsewhere."""
+
+    def __init__(self, interval_s: float = 5.0) -> None:
+        """Sets the time between two lines where there is no terminal."""
+        self.interval_s = interval_s
+        self._bar: tqdm | None = None
+        self._said_at = 0.0
+
+    def on_start(self, trainer: "Trainer") -> None:
+        """Opens the bar at the frames already done."""
+        self._said_at = time.monotonic()
+        if sys.stderr.isatty():
+            total, done = trainer.total_frames, trainer.progress.frames
+            self._bar = tqdm(total=total, initial=done, unit="frame", unit_scale=True)
+
+    def on_update(self, trainer: "Trainer", metrics: Mapping[str, float]) -> None:
+        """Moves the bar."""
+        progress = trainer.progress
+        text = f"episodes {progress.episodes}, running cubes {progress.running_cubes:.2f}"
+        if self._bar is not None:
+            self._bar.set_postfix_str(text, refresh=False)
+            self._bar.update(progress.frames - self._bar.n)
+        elif time.monotonic() - self._said_at >= self.interval_s:
+            self._said_at = time.monotonic()
+            rate = metrics["time/frames_per_second"]
+            left = max(0, trainer.total_frames - progress.frames) / rate
+            _log.info(
+                "frames %d, %s, %.0f frames/s, at most %.0f s left",
+                progress.frames, text, rate, left,
+            )
+
+    def on_end(self, trainer: "Trainer", reason: str) -> None:
+        """Closes the bar and says how it ended."""
+        self._close()
+        progress = trainer.progress
+        _log.info(
+            "stopped (%s) after %d frames, %d episodes, %.1f s: running cubes %.3f",
+            reason, progress.frames, progress.episodes, progress.seconds, progress.running_cubes,
+        )
+
+    def on_failure(self, trainer: "Trainer") -> None:
+        """Closes the bar."""
+        self._close()
+
+    def _close(self) -> None:
+        if self._bar is not None:
+            self._bar.close()

@@ -1,0 +1,59 @@
+"""One seed, many random streams that never overlap.
+
+Every stream is a child of `numpy.random.SeedSequence(seed)` with a key of its own, so the streams
+of two worlds, of two purposes, or of seed and seed + 1 share nothing.
+"""
+
+import enum
+
+import numpy as np
+import torch
+
+from drone_rl.utils.errors import InputError
+
+
+class Stream(enum.IntEnum):
+    """What a random stream is for."""
+
+    WORLDS = 0
+    POLICY_INIT = 1
+    ACTIONS = 2
+    EVALUATION = 3
+
+
+def seed_sequence(seed: int, *key: int) -> np.random.SeedSequence:
+    """The child of `seed` under `key`.
+
+    Raises:
+        InputError: The seed is not a whole number, 0 or more.
+    """
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise InputError(f"seed={seed!r} is out of range; give a whole number, 0 or more")
+    return np.random.SeedSequence(int(seed), spawn_key=key)
+
+
+def world_random_state(seed: int, world: int) -> np.random.RandomState:
+    """The stream from which one world draws all its episodes."""
+    return np.random.RandomState(np.random.PCG64(seed_sequence(seed, Stream.WORLDS, world)))
+
+
+def torch_generator(
+    seed: int, stream: Stream, device: torch.device | str = "cpu"
+) -> torch.Generator:
+    """A torch generator for one purpose."""
+    state = seed_sequence(seed, stream).generate_state(1, np.uint64)[0]
+    return torch.Generator(device).manual_seed(int(state >> np.uint64(1)))
+
+
+def get_state(random_state: np.random.RandomState) -> dict[str, int]:
+    """The state of a `world_random_state` as plain numbers.
+
+    `RandomState` buffers nothing else for the uniform draws that worlds make.
+    """
+    return dict(random_state.get_state(legacy=False)["state"])
+
+
+def set_state(random_state: np.random.RandomState, state: dict[str, int]) -> None:
+    """Puts a `world_random_state` where `get_state` found one."""
+    full = random_state.get_state(legacy=False)
+    random_state.set_state({**full, "state": dict(state)})
