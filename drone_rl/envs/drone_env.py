@@ -11,7 +11,7 @@ from drone_rl.sim.rules import Action, EndReason, WorldState
 from drone_rl.sim.settings import CameraSettings, TaskSettings
 from drone_rl.sim.worlds import CubeWorlds
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.seeding import get_state, set_state, world_random_state
+from drone_rl.utils.seeding import Stream, get_state, set_state, world_random_state
 
 
 class DroneEnv(EnvBase):
@@ -36,6 +36,7 @@ class DroneEnv(EnvBase):
         camera: CameraSettings | None = None,
         *,
         seed: int = 0,
+        stream: Stream = Stream.WORLDS,
         first_world: int = 0,
         num_shards: int | None = None,
         device: str = "cpu",
@@ -47,6 +48,7 @@ class DroneEnv(EnvBase):
             task: Cubes, moves and boundaries.
             camera: The policy's camera.
             seed: Root of all the worlds' random streams.
+            stream: What the worlds are for; training and evaluation never share one.
             first_world: Number of the first world, so that two workers never share one.
             num_shards: Threads that draw; the number of cores by default.
             device: "cpu", "cuda" or "cuda:N".
@@ -58,6 +60,7 @@ class DroneEnv(EnvBase):
             raise InputError(f"num_envs={num_envs} is out of range; give a whole number from 1")
         super().__init__(device=torch.device(device), batch_size=torch.Size([num_envs]))
         self.worlds = CubeWorlds(num_envs, task, camera, device=device, num_shards=num_shards)
+        self.stream = stream
         self.first_world = first_world
         self._make_specs()
         self._pixels = torch.zeros(
@@ -115,7 +118,7 @@ class DroneEnv(EnvBase):
         if seed is None:
             raise InputError("seed=None can't be repeated; give a whole number, 0 or more")
         first, n = self.first_world, self.batch_size[0]
-        self._random_states = [world_random_state(seed, first + i) for i in range(n)]
+        self._random_states = [world_random_state(seed, first + i, self.stream) for i in range(n)]
 
     def _reset(self, tensordict: TensorDictBase | None = None, **kwargs: object) -> TensorDictBase:
         mask = None if tensordict is None else tensordict.get("_reset", None)

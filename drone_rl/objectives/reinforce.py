@@ -6,7 +6,6 @@ import torch
 from tensordict import TensorDict, TensorDictBase, TensorDictParams
 from tensordict.nn import ProbabilisticTensorDictSequential, dispatch
 from tensordict.utils import NestedKey
-from torch import Tensor
 from torchrl.objectives import LossModule
 
 from drone_rl.utils.errors import InputError
@@ -16,8 +15,8 @@ class ReinforceLoss(LossModule):
     """-sum_t g_t log pi(a_t | s_t), reduced over the batch (chapter, Eq. 15).
 
     The returns g_t come from a return estimator; the stored action is scored, never a new one.
-    `reduction="mean"` averages over steps, `"sum"` adds them up (Algorithm 4 on one episode), and
-    `"episode"` adds up the steps and averages over episodes (Eq. 12).
+    `reduction="mean"` averages over steps; `"sum"` adds them up, as Algorithm 4 does for one episode
+    (Eq. 12 is that sum over the number of episodes).
 
     The output's `loss_*` entries add up to what is to be back-propagated; the others are detached.
 
@@ -35,8 +34,6 @@ class ReinforceLoss(LossModule):
         """The stored action."""
         return_to_go: NestedKey = "return_to_go"
         """What a return estimator wrote. Shape: (*batch, 1)."""
-        done: NestedKey = "done"
-        """End flag, under "next"; read for `reduction="episode"` alone."""
 
     tensor_keys: _AcceptedKeys
     default_keys = _AcceptedKeys
@@ -57,15 +54,15 @@ class ReinforceLoss(LossModule):
         Args:
             actor_network: The policy that collected the batch.
             entropy_coeff: Weight of the entropy bonus; 0 for none.
-            reduction: "mean", "sum", "episode" or "none".
+            reduction: "mean", "sum" or "none".
 
         Raises:
             InputError: The reduction is unknown or the weight negative.
         """
         super().__init__()
-        if reduction not in ("mean", "sum", "episode", "none"):
+        if reduction not in ("mean", "sum", "none"):
             raise InputError(
-                f"objective.reduction={reduction} is unknown; give mean, sum, episode or none"
+                f"objective.reduction={reduction} is unknown; give mean, sum or none"
             )
         if entropy_coeff < 0:
             raise InputError(f"objective.entropy_coeff={entropy_coeff} is negative; give 0 or more")
@@ -77,8 +74,7 @@ class ReinforceLoss(LossModule):
     def in_keys(self) -> list[NestedKey]:
         """What `forward` reads."""
         keys = self.tensor_keys
-        done = [("next", keys.done)] if self.reduction == "episode" else []
-        return [keys.action, keys.return_to_go, *self.actor_network.in_keys, *done]
+        return [keys.action, keys.return_to_go, *self.actor_network.in_keys]
 
     @in_keys.setter
     def in_keys(self, values: list[NestedKey]) -> None:
@@ -114,17 +110,8 @@ class ReinforceLoss(LossModule):
         bonus = -self.entropy_coeff * entropy
         return TensorDict(
             {
-                "loss_actor": self._reduce(loss, tensordict),
-                "loss_entropy": self._reduce(bonus, tensordict),
-                "entropy": self._reduce(entropy, tensordict, mean=True).detach(),
+                "loss_actor": self._reduce_loss(loss, tensordict),
+                "loss_entropy": self._reduce_loss(bonus, tensordict),
+                "entropy": entropy.detach().mean(),
             }
         )
-
-    def _reduce(self, values: Tensor, tensordict: TensorDictBase, mean: bool = False) -> Tensor:
-        mask = tensordict.get(("collector", "mask"), None)
-        kept = values if mask is None else values[mask.reshape(values.shape)]
-        if mean or self.reduction == "mean":
-            return kept.mean()
-        if self.reduction == "episode":
-            return kept.sum() / tensordict.get(("next", self.tensor_keys.done)).sum()
-        return kept.sum() if self.reduction == "sum" else kept

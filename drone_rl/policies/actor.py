@@ -1,7 +1,7 @@
 """From a network to an actor: logits to actions."""
 
 import torch
-from tensordict.nn import TensorDictModule
+from tensordict.nn import InteractionType, TensorDictModule
 from torch import Tensor, nn
 from torch.distributions import Categorical
 from torchrl.data import TensorSpec
@@ -57,6 +57,7 @@ def make_actor(
         TensorDictModule(network, in_keys=["pixels"], out_keys=["logits"]),
         in_keys=["logits"],
         spec=action_spec,
+        default_interaction_type=InteractionType.RANDOM,
         distribution_class=SeededCategorical,
         distribution_kwargs={"source": None if generator is None else RandomSource(generator)},
     )

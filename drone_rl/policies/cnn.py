@@ -1,7 +1,7 @@
 """Convolutional policy networks. Layers are named: explanations address them by name."""
 
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import torch
 from torch import Tensor, nn
@@ -12,16 +12,26 @@ from drone_rl.utils.errors import InputError
 class PolicyNetwork(nn.Module):
     """Layers from a picture to one logit an action; any number of leading batch dimensions."""
 
-    def __init__(self, in_shape: Sequence[int], layers: "OrderedDict[str, nn.Module]") -> None:
-        """Wraps the layers.
+    def __init__(
+        self,
+        in_shape: Sequence[int],
+        layers: "OrderedDict[str, nn.Module]",
+        initialise: Callable[[nn.Module, bool], None],
+    ) -> None:
+        """Wraps and initialises the layers.
 
         Args:
             in_shape: Shape (C, H, W) of one picture.
             layers: By name, in order.
+            initialise: Called with each convolution and linear layer, and whether it is the last.
         """
         super().__init__()
         self.in_shape = tuple(in_shape)
-        self.layers = nn.Sequential(layers).to(memory_format=torch.channels_last)
+        self.layers = nn.Sequential(layers)
+        for layer in self.layers:
+            if isinstance(layer, nn.Conv2d | nn.Linear):
+                initialise(layer, layer is self.layers[-1])
+        self.layers.to(memory_format=torch.channels_last)  # twice as fast on a CPU
 
     def forward(self, pixels: Tensor) -> Tensor:
         """Pictures (*, C, H, W) to logits (*, num_actions).
@@ -69,14 +79,17 @@ class OriginalCNN(PolicyNetwork):
             convolutions[f"relu{i}"] = nn.ReLU()
             convolutions[f"pool{i}"] = nn.MaxPool2d(2)
             before = after
-        super().__init__(in_shape, _with_head(convolutions, in_shape, hidden, num_actions))
-        for layer in self.layers:
+
+        def initialise(layer: nn.Module, is_last: bool) -> None:
+            del is_last
             if isinstance(layer, nn.Conv2d):
                 nn.init.kaiming_normal_(layer.weight, nonlinearity="relu", generator=generator)
-                nn.init.zeros_(layer.bias)
-            elif isinstance(layer, nn.Linear):
+            else:
                 nn.init.xavier_normal_(layer.weight, generator=generator)
-                nn.init.zeros_(layer.bias)
+            nn.init.zeros_(layer.bias)
+
+        layers = _with_head(convolutions, in_shape, hidden, num_actions)
+        super().__init__(in_shape, layers, initialise)
 
 
 class SmallCNN(PolicyNetwork):
@@ -112,17 +125,18 @@ class SmallCNN(PolicyNetwork):
             convolutions[f"conv{i}"] = nn.Conv2d(before, after, kernel, stride)
             convolutions[f"relu{i}"] = nn.ReLU()
             before = after
-        super().__init__(in_shape, _with_head(convolutions, in_shape, hidden, num_actions))
-        init_orthogonal(self.layers, generator)
+        layers = _with_head(convolutions, in_shape, hidden, num_actions)
+        super().__init__(in_shape, layers, orthogonal(generator))
 
 
-def init_orthogonal(layers: nn.Sequential, generator: torch.Generator | None) -> None:
+def orthogonal(generator: torch.Generator | None) -> Callable[[nn.Module, bool], None]:
     """Orthogonal weights of gain sqrt(2), of gain 0.01 for the last layer; zero biases."""
-    for layer in layers:
-        if isinstance(layer, nn.Conv2d | nn.Linear):
-            gain = 0.01 if layer is layers[-1] else 2**0.5
-            nn.init.orthogonal_(layer.weight, gain, generator=generator)
-            nn.init.zeros_(layer.bias)
+
+    def initialise(layer: nn.Module, is_last: bool) -> None:
+        nn.init.orthogonal_(layer.weight, 0.01 if is_last else 2**0.5, generator=generator)
+        nn.init.zeros_(layer.bias)
+
+    return initialise
 
 
 def _with_head(

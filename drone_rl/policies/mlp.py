@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import torch
 from torch import nn
 
-from drone_rl.policies.cnn import PolicyNetwork, init_orthogonal
+from drone_rl.policies.cnn import PolicyNetwork, orthogonal
 
 
 class MLP(PolicyNetwork):
@@ -36,5 +36,4 @@ class MLP(PolicyNetwork):
             layers[f"fc_relu{i}"] = nn.ReLU()
             width = size
         layers["logits"] = nn.Linear(width, num_actions)
-        super().__init__(in_shape, layers)
-        init_orthogonal(self.layers, generator)
+        super().__init__(in_shape, layers, orthogonal(generator))

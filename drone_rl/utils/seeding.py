@@ -32,9 +32,11 @@ def seed_sequence(seed: int, *key: int) -> np.random.SeedSequence:
     return np.random.SeedSequence(int(seed), spawn_key=key)
 
 
-def world_random_state(seed: int, world: int) -> np.random.RandomState:
+def world_random_state(
+    seed: int, world: int, stream: Stream = Stream.WORLDS
+) -> np.random.RandomState:
     """The stream from which one world draws all its episodes."""
-    return np.random.RandomState(np.random.PCG64(seed_sequence(seed, Stream.WORLDS, world)))
+    return np.random.RandomState(np.random.PCG64(seed_sequence(seed, stream, world)))
 
 
 def torch_generator(

@@ -1,0 +1,1 @@
+"""The command line: composes settings, builds the parts, connects them."""

@@ -1,0 +1,139 @@
+"""`drone-rl train`."""
+
+import dataclasses
+import json
+import logging
+import signal
+from pathlib import Path
+from typing import Any
+
+from hydra.core.hydra_config import HydraConfig
+from hydra.utils import instantiate
+from omegaconf import DictConfig, OmegaConf
+
+from drone_rl.cli.build import build_env, build_policy
+from drone_rl.collectors import EpisodeCollector
+from drone_rl.training import (
+    CheckpointCallback,
+    CsvCallback,
+    LoggerCallback,
+    ProgressCallback,
+    Trainer,
+    check_same_config,
+    load_checkpoint,
+)
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.provenance import provenance
+
+MAY_CHANGE = (
+    "resume",
+    "logger",
+    "paths",
+    "trainer.total_frames",
+    "trainer.total_episodes",
+    "trainer.target",
+    "trainer.checkpoint_interval_s",
+)
+"""Settings that a resumed run may change: they don't enter into what is learned."""
+
+_log = logging.getLogger(__name__)
+
+
+def prepare(overrides: list[str]) -> list[str]:
+    """Makes `resume=FOLDER` mean: the settings of that run, and its folder."""
+    folders = [o.split("=", 1)[1] for o in overrides if o.startswith("resume=")]
+    if not folders or folders[-1] in ("", "null"):
+        return overrides
+    folder = Path(folders[-1])
+    if not (folder / "checkpoints" / "last.pt").is_file():
+        raise InputError(f"resume={folder} has no checkpoints/last.pt; give the folder of a run")
+    saved = folder / ".hydra" / "overrides.yaml"
+    before = list(OmegaConf.load(saved)) if saved.is_file() else []
+    kept = [o for o in before if not o.startswith("resume=")]
+    return [*kept, *overrides, f"hydra.run.dir={folder}"]
+
+
+def run(config: DictConfig) -> tuple[int, float]:
+    """Trains one policy. Returns the exit status and the running mean of cubes."""
+    folder = Path(HydraConfig.get().runtime.output_dir)
+    resolved: dict[str, Any] = OmegaConf.to_container(config, resolve=True)
+    state = load_checkpoint(folder / "checkpoints" / "last.pt") if config.resume else None
+    if state is not None:
+        check_same_config(state["config"], resolved, MAY_CHANGE)
+    trainer, checkpoints = _build(config, folder, resolved)
+    if state is not None:
+        trainer.load_state_dict(state)
+        checkpoints.best = state["best"]
+    try:
+        reason = trainer.run()
+    finally:
+        trainer.collector.shutdown()
+    result = {"reason": reason, **dataclasses.asdict(trainer.progress)}
+    (folder / "result.json").write_text(json.dumps(result, indent=2))
+    _log.info("run folder: %s", folder)
+    status = 128 + signal.Signals[reason].value if reason.startswith("SIG") else 0
+    if status:
+        _log.info("go on with: drone-rl train resume=%s", folder)
+    return status, trainer.progress.running_cubes
+
+
+def _build(
+    config: DictConfig, folder: Path, resolved: dict[str, Any]
+) -> tuple[Trainer, CheckpointCallback]:
+    settings = {k: v for k, v in config.trainer.items() if k != "checkpoint_interval_s"}
+    _check_trainer(config)
+    env = build_env(
+        config,
+        config.collector.num_envs,
+        seed=config.seed,
+        device=config.device,
+        num_shards=config.collector.num_shards,
+    )
+    network, actor, actions = build_policy(config, env, seed=config.seed)
+    optimiser = instantiate(config.optimiser)(network.parameters())
+    origin = provenance()
+    OmegaConf.save(OmegaConf.create({"config": resolved, **origin}), folder / "run.yaml")
+    checkpoints = CheckpointCallback(
+        folder / "checkpoints",
+        interval_s=config.trainer.checkpoint_interval_s,
+        extra={"config": resolved, "provenance": origin},
+    )
+    loggers = [instantiate(logger) for logger in config.logger.values()]
+    trainer = Trainer(
+        collector=EpisodeCollector(env, actor),
+        network=network,
+        estimator=instantiate(config.returns).to(env.device),
+        loss=instantiate(config.objective)(actor).to(env.device),
+        optimiser=optimiser,
+        scheduler=instantiate(config.scheduler)(optimiser),
+        callbacks=[
+            CsvCallback(folder / "metrics.csv"),
+            LoggerCallback(loggers),
+            ProgressCallback(),
+            checkpoints,
+        ],
+        generators={"actions": actions},
+        **settings,
+    )
+    return trainer, checkpoints
+
+
+def _check_trainer(config: DictConfig) -> None:
+    trainer, cubes = config.trainer, config.task.num_cubes
+    if trainer.total_frames < 1 or trainer.minibatch_frames < 1:
+        raise InputError(
+            f"trainer.total_frames={trainer.total_frames} and trainer.minibatch_frames="
+            f"{trainer.minibatch_frames} must be 1 or more"
+        )
+    if not 0 <= trainer.running_decay < 1:
+        raise InputError(
+            f"trainer.running_decay={trainer.running_decay} is out of range; give 0 to below 1"
+        )
+    lr = config.optimiser.get("lr")
+    if lr is not None and not lr > 0:
+        raise InputError(f"optimiser.lr={lr} is out of range; give a rate above 0")
+    if trainer.target is not None and trainer.target > cubes:
+        _log.warning(
+            "trainer.target=%s can't be reached with task.num_cubes=%d: no early stop",
+            trainer.target, cubes,
+        )
