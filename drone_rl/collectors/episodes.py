@@ -31,6 +31,7 @@ class EpisodeCollector:
         actor: TensorDictModuleBase,
         *,
         total_frames: int = -1,
+        keep_observations: bool = True,
         keep: tuple = (("next", "info", "cubes"), ("next", "info", "end_reason")),
     ) -> None:
         """Connects an environment and a policy.
@@ -39,7 +40,8 @@ class EpisodeCollector:
             env: A batched environment that honours TorchRL's "_step" masks.
             actor: Writes the action.
             total_frames: Stop before a batch once this many frames were collected; -1 for never.
-            keep: Entries kept besides the observation, action, reward and end flags.
+            keep_observations: Whether to keep what the actor saw and made of it.
+            keep: Entries kept besides that, the action, the reward and the end flags.
 
         Raises:
             InputError: The environment is not a batch of worlds.
@@ -52,6 +54,7 @@ class EpisodeCollector:
         self.frames = 0
         self.episodes = 0
         self._observed = tuple(actor.in_keys)
+        self._keep_observations = keep_observations
         flags = (env.reward_key, *env.done_keys)
         self._kept = (*(("next", key) for key in flags), *keep)
 
@@ -90,7 +93,8 @@ class EpisodeCollector:
         state[self.env.action_key] = action
         after = self.env.step(state)
         record = after.select(*self._kept)
-        record = acted.update(record if everyone else record[worlds])
+        kept = acted if self._keep_observations else acted.select(self.env.action_key)
+        record = kept.update(record if everyone else record[worlds])
         record["collector"] = TensorDict({"traj_ids": worlds}, record.batch_size)
         return record, after["next"].exclude(self.env.reward_key)
 

@@ -87,6 +87,11 @@ class DroneEnv(EnvBase):
         for random_state, state in zip(self._random_states, states, strict=True):
             set_state(random_state, state)
 
+    @property
+    def last_pixels(self) -> Tensor:
+        """What the cameras last saw. Shape: (num_envs, H, W, 3), uint8."""
+        return self._pixels
+
     def close(self, *, raise_if_closed: bool = True) -> None:
         """Ends the rendering threads."""
         if not self.is_closed:

@@ -1,0 +1,40 @@
+"""Runs a policy on many worlds at once and gathers how the episodes ended."""
+
+import torch
+from tensordict.nn import TensorDictModuleBase
+from torchrl.envs import EnvBase
+from torchrl.envs.utils import ExplorationType, set_exploration_type
+
+from drone_rl.collectors import EpisodeCollector
+from drone_rl.evaluation.metrics import Episodes
+
+
+def run_episodes(
+    env: EnvBase, actor: TensorDictModuleBase, num_episodes: int, *, greedy: bool = True
+) -> Episodes:
+    """Runs complete episodes, `env.batch_size[0]` at a time.
+
+    Args:
+        env: A batch of worlds.
+        actor: The policy.
+        num_episodes: How many; what a last batch has more is not used.
+        greedy: Whether to take the most probable action instead of drawing one.
+    """
+    keep = tuple(("next", "info", name) for name in ("collected", "side", "end_reason"))
+    collector = EpisodeCollector(env, actor, keep=keep, keep_observations=False)
+    kind = ExplorationType.DETERMINISTIC if greedy else ExplorationType.RANDOM
+    finals, lengths, count = [], [], 0
+    with set_exploration_type(kind):
+        while count < num_episodes:
+            batch = collector.collect()
+            done = batch["next", "done"][:, 0]
+            finals.append(batch["next", "info"][done])
+            lengths.append(batch["collector", "traj_ids"].unique(return_counts=True)[1])
+            count += len(lengths[-1])
+    info = torch.cat(finals)[:num_episodes]
+    return Episodes(
+        collected=info["collected"],
+        side=info["side"],
+        end_reason=info["end_reason"][:, 0],
+        length=torch.cat(lengths)[:num_episodes],
+    )

@@ -1,0 +1,124 @@
+"""Films of an episode: what the drone sees beside the drone itself, and what it makes of it."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import imageio.v3 as iio
+import numpy as np
+import torch
+from PIL import Image, ImageDraw, ImageFont
+from tensordict import TensorDictBase
+from tensordict.nn import TensorDictModuleBase
+from torch import Tensor
+from torchrl.envs import TransformedEnv
+from torchrl.envs.utils import ExplorationType, set_exploration_type
+
+from drone_rl.sim.cameras import CHASE
+from drone_rl.sim.rules import Action, EndReason
+from drone_rl.utils.errors import InputError
+
+PANEL_HEIGHT, PANEL_WIDTH = 360, 640
+FRAMES_PER_SECOND = 10
+_BACKGROUND, _TEXT, _CHOSEN, _BAR = (24, 26, 31), (235, 235, 240), (226, 74, 51), (120, 130, 150)
+_BARS = (Action.LEFT, Action.FORWARD, Action.RIGHT)
+"""The order in which the actions are drawn: as the drone would go."""
+
+
+@torch.no_grad()
+def film_episode(
+    env: TransformedEnv, actor: TensorDictModuleBase, *, greedy: bool = True
+) -> Iterator[np.ndarray]:
+    """Flies one episode in the first world of `env` and yields its pictures.
+
+    Args:
+        env: One world.
+        actor: The policy; its "logits", if it has any, are drawn as probabilities.
+        greedy: Whether to take the most probable action instead of drawing one.
+
+    Yields:
+        RGB pictures, uint8. Shape: (360 + 40, 2 * 640, 3).
+    """
+    worlds = env.base_env.worlds
+    chase = worlds.view(CHASE.name, height=PANEL_HEIGHT, width=PANEL_WIDTH, show_drone=True)
+    kind = ExplorationType.DETERMINISTIC if greedy else ExplorationType.RANDOM
+    state = env.reset()
+    with set_exploration_type(kind):
+        while True:
+            outside = worlds.render(worlds.state, chase)[0]
+            acted = actor(state.clone(False))
+            inside = env.base_env.last_pixels[0]
+            yield _compose(inside, outside, acted, _caption(state))
+            state = env.step(state.set("action", acted["action"]))["next"]
+            if bool(state["done"].all()):
+                outside = worlds.render(worlds.state, chase)[0]
+                yield _compose(env.base_env.last_pixels[0], outside, None, _caption(state))
+                return
+
+
+def write_video(frames: list[np.ndarray], path: Path) -> list[Path]:
+    """Writes an MP4 and, at half the size, a GIF.
+
+    Args:
+        frames: RGB pictures of one size.
+        path: Where to, without an ending.
+
+    Returns:
+        The two files.
+
+    Raises:
+        InputError: They can't be written.
+    """
+    files = [path.with_suffix(".mp4"), path.with_suffix(".gif")]
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        iio.imwrite(files[0], np.stack(frames), fps=FRAMES_PER_SECOND, codec="libx264")
+        half = [Image.fromarray(f).resize((f.shape[1] // 2, f.shape[0] // 2)) for f in frames]
+        palette = [image.quantize(64, dither=Image.Dither.NONE) for image in half]
+        palette[0].save(
+            files[1], save_all=True, append_images=palette[1:],
+            duration=1000 // FRAMES_PER_SECOND, loop=0,
+        )
+    except OSError as error:
+        raise InputError(f"video {path} can't be written ({error}); choose another folder") from error
+    return files
+
+
+def _caption(state: TensorDictBase) -> str:
+    info = state["info"]
+    text = f"cubes {int(info['cubes'][0])}"
+    reason = EndReason(int(info["end_reason"][0]))
+    ended = "" if reason is EndReason.RUNNING else f"   ended: {reason.name.lower()}"
+    return text + ended.replace("_", " ")
+
+
+def _compose(
+    inside: Tensor, outside: Tensor, acted: TensorDictBase | None, caption: str
+) -> np.ndarray:
+    """The drone's view, enlarged, left; the chase view right; words and bars below."""
+    canvas = Image.new("RGB", (2 * PANEL_WIDTH, PANEL_HEIGHT + 40), _BACKGROUND)
+    view = Image.fromarray(inside.cpu().numpy())
+    height = min(PANEL_HEIGHT, PANEL_WIDTH * view.height // view.width)
+    view = view.resize((PANEL_WIDTH, height), Image.Resampling.NEAREST)
+    canvas.paste(view, (0, (PANEL_HEIGHT - height) // 2))
+    canvas.paste(Image.fromarray(outside.cpu().numpy()), (PANEL_WIDTH, 0))
+    draw, font = ImageDraw.Draw(canvas), ImageFont.load_default(16)
+    draw.text((12, 10), "what the policy's camera sees", _TEXT, font)
+    draw.text((12, PANEL_HEIGHT + 10), caption, _TEXT, font)
+    if acted is not None:
+        _draw_bars(draw, font, acted)
+    return np.asarray(canvas)
+
+
+def _draw_bars(
+    draw: ImageDraw.ImageDraw, font: ImageFont.ImageFont, acted: TensorDictBase
+) -> None:
+    """One bar an action, as long as it is probable; the chosen one in red (as in Fig. 13)."""
+    chosen = Action(int(acted["action"][0]))
+    logits = acted.get("logits", None)
+    probability = torch.eye(len(Action))[chosen] if logits is None else logits[0].softmax(-1)
+    for i, action in enumerate(_BARS):
+        x, y = 300 + 320 * i, PANEL_HEIGHT + 10
+        share = float(probability[action])
+        draw.text((x, y), f"{action.name.lower()} {share:.2f}", _TEXT, font)
+        color = _CHOSEN if action == chosen else _BAR
+        draw.rectangle((x + 120, y + 2, x + 120 + max(1, int(180 * share)), y + 18), color)
