@@ -41,7 +41,7 @@ class CollectorConfig:
     """Schema of conf/collector."""
 
     num_envs: int = MISSING
-    num_shards: int | None = MISSING
+    num_threads: int = MISSING
 
 
 @dataclasses.dataclass

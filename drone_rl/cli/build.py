@@ -9,6 +9,7 @@ from omegaconf import DictConfig, OmegaConf
 from tensordict.nn import TensorDictModuleBase
 from torchrl.envs import TransformedEnv
 
+from drone_rl.collectors import EpisodeCollector, ThreadedCollector
 from drone_rl.envs import DroneEnv, make_env
 from drone_rl.policies import PolicyNetwork, make_actor
 from drone_rl.sim.settings import CameraSettings, TaskSettings
@@ -23,30 +24,58 @@ def build_env(
     *,
     seed: int,
     device: str,
-    stream: Stream = Stream.WORLDS,
-    num_shards: int | None = None,
+    pixels: bool = True,
+    **kwargs: object,
 ) -> TransformedEnv:
     """The worlds of `config.task` seen through `config.camera` and `config.transforms`."""
     task: TaskSettings = instantiate(config.task)
     camera: CameraSettings = instantiate(config.camera)
-    transforms = [instantiate(t) for t in config.transforms.values() if t is not None]
-    env = DroneEnv(
-        num_envs, task, camera, seed=seed, stream=stream, num_shards=num_shards, device=device
-    )
+    transforms = [instantiate(t) for t in config.transforms.values() if pixels and t is not None]
+    env = DroneEnv(num_envs, task, camera, seed=seed, device=device, pixels=pixels, **kwargs)
     return make_env(env, transforms)
 
 
-def build_policy(
-    config: DictConfig, env: TransformedEnv, *, seed: int
-) -> tuple[PolicyNetwork, TensorDictModuleBase, torch.Generator]:
-    """A network sized by the environment's specs, its actor, and the stream its actions draw on."""
+def build_network(config: DictConfig, env: TransformedEnv, *, seed: int) -> PolicyNetwork:
+    """The network of `config.policy`, sized by the environment's specs."""
     network: PolicyNetwork = instantiate(config.policy)(
         tuple(env.observation_spec["pixels"].shape[1:]),
         env.action_spec.space.n,
         generator=torch_generator(seed, Stream.POLICY_INIT),
-    ).to(env.device)
-    actions = torch_generator(seed, Stream.ACTIONS, env.device)
-    return network, make_actor(network, env.action_spec, actions), actions
+    )
+    return network.to(env.device)
+
+
+def build_collector(
+    config: DictConfig,
+) -> tuple[ThreadedCollector, PolicyNetwork, dict[str, torch.Generator]]:
+    """A training's worlds, shared out to threads, the network that flies in all of them, and the
+    random streams of its actions.
+
+    Raises:
+        InputError: There are no worlds or no threads.
+    """
+    worlds, threads = config.collector.num_envs, config.collector.num_threads
+    if worlds < 1 or threads < 1:
+        raise InputError(
+            f"collector.num_envs={worlds} and collector.num_threads={threads} must be 1 or more"
+        )
+    threads = min(worlds, threads)
+    shares = [worlds // threads + (i < worlds % threads) for i in range(threads)]
+    network, collectors, generators = None, [], {}
+    for i, share in enumerate(shares):
+        env = build_env(
+            config,
+            share,
+            seed=config.seed,
+            device=config.device,
+            first_world=sum(shares[:i]),
+            num_shards=1,
+        )
+        network = network or build_network(config, env, seed=config.seed)
+        actions = torch_generator(config.seed, Stream.ACTIONS, number=i, device=env.device)
+        generators[f"actions_{i}"] = actions
+        collectors.append(EpisodeCollector(env, make_actor(network, env.action_spec, actions)))
+    return ThreadedCollector(collectors), network, generators
 
 
 def find_checkpoint(where: str, outputs: str) -> Path:
@@ -74,22 +103,38 @@ def find_checkpoint(where: str, outputs: str) -> Path:
 
 
 def load_trained(
-    path: Path, num_envs: int, *, task: dict[str, Any], seed: int, stream: Stream, device: str
+    path: Path, num_envs: int, *, task: dict[str, Any], seed: int, device: str
 ) -> tuple[TransformedEnv, TensorDictModuleBase, dict[str, Any]]:
-    """A checkpoint's policy, in worlds like those that it was trained in.
+    """A checkpoint's policy, in held-out worlds like those that it was trained in.
 
     Args:
         path: The checkpoint.
         num_envs: Number of worlds.
         task: Settings that replace the checkpoint's own.
         seed: Root of the worlds' random streams.
-        stream: What the worlds are for.
         device: Where to run.
 
     Returns:
         The environment, the actor and the checkpoint's state.
+
+    Raises:
+        InputError: The checkpoint or a setting is unusable.
     """
     state = load_checkpoint(path)
+    config = trained_config(state, task)
+    env = build_env(config, num_envs, seed=seed, stream=Stream.EVALUATION, device=device)
+    network = build_network(config, env, seed=seed)
+    load_policy(network, state["policy"])
+    actions = torch_generator(seed, Stream.EVALUATION, device=env.device)
+    return env, make_actor(network, env.action_spec, actions), state
+
+
+def trained_config(state: dict[str, Any], task: dict[str, Any]) -> DictConfig:
+    """The settings that a checkpoint was trained with, some of the task's replaced.
+
+    Raises:
+        InputError: The task has no such setting.
+    """
     config = OmegaConf.create(state["config"])
     unknown = sorted(set(task) - set(config.task))
     if unknown:
@@ -98,7 +143,4 @@ def load_trained(
             f"{', '.join(k for k in config.task if k != '_target_')}"
         )
     config.task.update(task)
-    env = build_env(config, num_envs, seed=seed, stream=stream, device=device)
-    network, actor, _ = build_policy(config, env, seed=seed)
-    load_policy(network, state["policy"])
-    return env, actor, state
+    return config

@@ -7,10 +7,8 @@ from typing import Any
 
 from hydra.core.hydra_config import HydraConfig
 from omegaconf import DictConfig, OmegaConf
-from tensordict.nn import TensorDictModuleBase
-from torchrl.envs import TransformedEnv
 
-from drone_rl.cli.build import find_checkpoint, load_trained
+from drone_rl.cli.build import build_env, find_checkpoint, load_trained, trained_config
 from drone_rl.cli.play import film
 from drone_rl.evaluation import Oracle, RandomPolicy, run_episodes, summarise
 from drone_rl.utils.errors import InputError
@@ -29,20 +27,18 @@ def run(config: DictConfig) -> tuple[int, float]:
     folder = Path(HydraConfig.get().runtime.output_dir)
     path = find_checkpoint(config.checkpoint, config.paths.outputs)
     task: dict[str, Any] = OmegaConf.to_container(config.task, resolve=True)
-    results = {}
-    for name in ("policy", "random", "oracle") if config.baselines else ("policy",):
-        # each in a fresh copy of the same worlds
-        env, actor, state = load_trained(
-            path,
-            min(config.num_envs, config.episodes),
-            task=task,
-            seed=config.seed,
-            stream=Stream.EVALUATION,
-            device=config.device,
-        )
-        actor = _baseline(name, env, config.seed) or actor
-        results[name] = summarise(run_episodes(env, actor, config.episodes, greedy=config.greedy))
-        env.close()
+    env, actor, state = load_trained(
+        path,
+        min(config.num_envs, config.episodes),
+        task=task,
+        seed=config.seed,
+        device=config.device,
+    )
+    policy = run_episodes(env, actor, config.episodes, greedy=config.greedy)
+    env.close()
+    results = {"policy": summarise(policy)}
+    if config.baselines:
+        results |= _baselines(config, trained_config(state, task))
     report = {
         "checkpoint": str(path),
         "greedy": config.greedy,
@@ -81,8 +77,25 @@ def _share(value: dict[str, Any]) -> str:
     return f"{value['share']:.3f} [{value['lower95']:.3f}, {value['upper95']:.3f}]"
 
 
-def _baseline(name: str, env: TransformedEnv, seed: int) -> TensorDictModuleBase | None:
-    if name == "random":
-        generator = torch_generator(seed, Stream.ACTIONS, env.device)
-        return RandomPolicy(env.action_spec.space.n, generator)
-    return Oracle(env.base_env.worlds.settings) if name == "oracle" else None
+def _baselines(config: DictConfig, trained: DictConfig) -> dict[str, dict[str, Any]]:
+    """The random policy and the oracle, each in a fresh copy of the policy's worlds."""
+    results = {}
+    for name in ("random", "oracle"):
+        num_envs = min(config.num_envs, config.episodes)
+        env = build_env(
+            trained,
+            num_envs,
+            seed=config.seed,
+            device=config.device,
+            stream=Stream.EVALUATION,
+            pixels=False,
+        )
+        generator = torch_generator(config.seed, Stream.ACTIONS, device=env.device)
+        actor = (
+            Oracle(env.base_env.worlds.settings)
+            if name == "oracle"
+            else RandomPolicy(env.action_spec.space.n, generator)
+        )
+        results[name] = summarise(run_episodes(env, actor, config.episodes))
+        env.close()
+    return results

@@ -10,7 +10,6 @@ from omegaconf import DictConfig, OmegaConf
 from drone_rl.cli.build import find_checkpoint, load_trained
 from drone_rl.evaluation.video import film_episode, write_video
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.seeding import Stream
 
 _log = logging.getLogger(__name__)
 
@@ -31,9 +30,7 @@ def run(config: DictConfig) -> tuple[int, None]:
 def film(config: DictConfig, path: Path, folder: Path, episodes: int) -> None:
     """Writes videos of a checkpoint's policy on held-out worlds."""
     task: dict[str, Any] = OmegaConf.to_container(config.task, resolve=True)
-    env, actor, _ = load_trained(
-        path, 1, task=task, seed=config.seed, stream=Stream.EVALUATION, device=config.device
-    )
+    env, actor, _ = load_trained(path, 1, task=task, seed=config.seed, device=config.device)
     for episode in range(episodes):
         frames = list(film_episode(env, actor, greedy=config.greedy))
         for file in write_video(frames, folder / f"episode_{episode}"):

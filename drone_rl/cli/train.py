@@ -11,8 +11,7 @@ from hydra.core.hydra_config import HydraConfig
 from hydra.utils import instantiate
 from omegaconf import DictConfig, OmegaConf
 
-from drone_rl.cli.build import build_env, build_policy
-from drone_rl.collectors import EpisodeCollector
+from drone_rl.cli.build import build_collector
 from drone_rl.training import (
     CheckpointCallback,
     CsvCallback,
@@ -82,14 +81,8 @@ def _build(
 ) -> tuple[Trainer, CheckpointCallback]:
     settings = {k: v for k, v in config.trainer.items() if k != "checkpoint_interval_s"}
     _check_trainer(config)
-    env = build_env(
-        config,
-        config.collector.num_envs,
-        seed=config.seed,
-        device=config.device,
-        num_shards=config.collector.num_shards,
-    )
-    network, actor, actions = build_policy(config, env, seed=config.seed)
+    collector, network, generators = build_collector(config)
+    actor = collector.collectors[0].actor
     optimiser = instantiate(config.optimiser)(network.parameters())
     origin = provenance()
     OmegaConf.save(OmegaConf.create({"config": resolved, **origin}), folder / "run.yaml")
@@ -100,10 +93,10 @@ def _build(
     )
     loggers = [instantiate(logger) for logger in config.logger.values()]
     trainer = Trainer(
-        collector=EpisodeCollector(env, actor),
+        collector=collector,
         network=network,
-        estimator=instantiate(config.returns).to(env.device),
-        loss=instantiate(config.objective)(actor).to(env.device),
+        estimator=instantiate(config.returns).to(config.device),
+        loss=instantiate(config.objective)(actor).to(config.device),
         optimiser=optimiser,
         scheduler=instantiate(config.scheduler)(optimiser),
         callbacks=[
@@ -112,7 +105,7 @@ def _build(
             ProgressCallback(),
             checkpoints,
         ],
-        generators={"actions": actions},
+        generators=generators,
         **settings,
     )
     return trainer, checkpoints
@@ -135,5 +128,6 @@ def _check_trainer(config: DictConfig) -> None:
     if trainer.target is not None and trainer.target > cubes:
         _log.warning(
             "trainer.target=%s can't be reached with task.num_cubes=%d: no early stop",
-            trainer.target, cubes,
+            trainer.target,
+            cubes,
         )

@@ -73,8 +73,7 @@ class EpisodeCollector:
             record, state = self._step(state, active)
             steps.append(record)
             active = active & ~state["done"].reshape(active.shape)
-        batch = torch.cat(steps)
-        batch = batch[batch["collector", "traj_ids"].argsort(stable=True)]
+        batch = _join(steps, len(active))
         batch["collector", "traj_ids"] += self.episodes
         self.frames += len(batch)
         self.episodes += len(active)
@@ -112,3 +111,19 @@ class EpisodeCollector:
         """Closes the environment."""
         if not self.env.is_closed:
             self.env.close()
+
+
+def _join(steps: list[TensorDictBase], num_worlds: int) -> TensorDictBase:
+    """Time-major steps to episode after episode, copying each frame once. Shape: (T_total,)."""
+    worlds = [step["collector", "traj_ids"] for step in steps]
+    lengths = torch.cat(worlds).bincount(minlength=num_worlds)
+    first = lengths.cumsum(0) - lengths
+    rows = [first[indices] + t for t, indices in enumerate(worlds)]
+    batch = TensorDict({}, [int(lengths.sum())], device=steps[0].device)
+    for key in steps[0].keys(include_nested=True, leaves_only=True):
+        parts = [step.get(key) for step in steps]
+        joined = parts[0].new_empty(len(batch), *parts[0].shape[1:])
+        for indices, part in zip(rows, parts, strict=True):
+            joined.index_copy_(0, indices, part)
+        batch.set(key, joined)
+    return batch

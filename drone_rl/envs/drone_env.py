@@ -39,6 +39,7 @@ class DroneEnv(EnvBase):
         stream: Stream = Stream.WORLDS,
         first_world: int = 0,
         num_shards: int | None = None,
+        pixels: bool = True,
         device: str = "cpu",
     ) -> None:
         """Builds the worlds.
@@ -51,6 +52,7 @@ class DroneEnv(EnvBase):
             stream: What the worlds are for; training and evaluation never share one.
             first_world: Number of the first world, so that two workers never share one.
             num_shards: Threads that draw; the number of cores by default.
+            pixels: Whether to draw and observe; policies that read the truth don't need it.
             device: "cpu", "cuda" or "cuda:N".
 
         Raises:
@@ -60,12 +62,13 @@ class DroneEnv(EnvBase):
             raise InputError(f"num_envs={num_envs} is out of range; give a whole number from 1")
         super().__init__(device=torch.device(device), batch_size=torch.Size([num_envs]))
         self.worlds = CubeWorlds(num_envs, task, camera, device=device, num_shards=num_shards)
+        self.pixels = pixels
+        if pixels:
+            self.worlds.prepare()
         self.stream = stream
         self.first_world = first_world
         self._make_specs()
-        self._pixels = torch.zeros(
-            self.observation_spec["pixels"].shape, dtype=torch.uint8, device=self.device
-        )
+        self._pixels = self._pixel_spec().zero()
         self.set_seed(seed)
 
     def state_dict(self, *args: object, **kwargs: object) -> dict:
@@ -99,8 +102,7 @@ class DroneEnv(EnvBase):
         super().close(raise_if_closed=raise_if_closed)
 
     def _make_specs(self) -> None:
-        n, cubes, camera = self.batch_size[0], self.worlds.settings.num_cubes, self.worlds.camera
-        pixels = (n, camera.height, camera.width, 3)
+        n, cubes = self.batch_size[0], self.worlds.settings.num_cubes
         info = Composite(
             cubes=Bounded(0, cubes, (n, 1), dtype=torch.int64),
             collected=Binary(cubes, (n, cubes), dtype=torch.bool),
@@ -111,13 +113,17 @@ class DroneEnv(EnvBase):
             cube_positions=Unbounded((n, cubes, 3)),
             shape=(n,),
         )
-        self.observation_spec = Composite(
-            pixels=Bounded(0, 255, pixels, dtype=torch.uint8), info=info, shape=(n,)
-        ).to(self.device)
+        observed = {"pixels": self._pixel_spec(), "info": info} if self.pixels else {"info": info}
+        self.observation_spec = Composite(observed, shape=(n,)).to(self.device)
         self.action_spec = Categorical(len(Action), shape=(n,), dtype=torch.int64).to(self.device)
         self.reward_spec = Unbounded((n, 1)).to(self.device)
         done = {name: Binary(1, (n, 1), dtype=torch.bool) for name in _DONE_KEYS}
         self.full_done_spec = Composite(**done, shape=(n,)).to(self.device)
+
+    def _pixel_spec(self) -> Bounded:
+        camera = self.worlds.camera
+        shape = (self.batch_size[0], camera.height, camera.width, 3)
+        return Bounded(0, 255, shape, dtype=torch.uint8, device=self.device)
 
     def _set_seed(self, seed: int | None) -> None:
         if seed is None:
@@ -146,6 +152,8 @@ class DroneEnv(EnvBase):
         return self._observe({"reward": reward, **flags})
 
     def _draw(self, worlds: Tensor) -> None:
+        if not self.pixels:
+            return
         everyone = len(worlds) == len(self._pixels)
         state = self.worlds.state if everyone else self.worlds.state[worlds]
         pixels = self.worlds.render(state)
@@ -156,8 +164,9 @@ class DroneEnv(EnvBase):
             self._pixels[worlds] = pixels
 
     def _observe(self, entries: dict[str, Tensor]) -> TensorDict:
-        source = {"pixels": self._pixels, "info": _info(self.worlds.state, self.batch_size)}
-        return TensorDict({**source, **entries}, self.batch_size, device=self.device)
+        pixels = {"pixels": self._pixels} if self.pixels else {}
+        info = _info(self.worlds.state, self.batch_size)
+        return TensorDict({**pixels, "info": info, **entries}, self.batch_size, device=self.device)
 
     def _indices(self, mask: Tensor | None) -> Tensor:
         if mask is None:

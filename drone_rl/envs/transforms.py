@@ -144,7 +144,7 @@ class StandardizePixels(_PixelTransform):
         self.register_buffer("std", torch.tensor(float(std)))
 
     def _apply_transform(self, pixels: Tensor) -> Tensor:
-        return (pixels - self.mean) / self.std
+        return torch.add(-self.mean / self.std, pixels, alpha=float(1.0 / self.std))
 
     def __repr__(self) -> str:
         return f"StandardizePixels(mean={self.mean:g}, std={self.std:g})"

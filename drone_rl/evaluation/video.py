@@ -75,11 +75,16 @@ def write_video(frames: list[np.ndarray], path: Path) -> list[Path]:
         half = [Image.fromarray(f).resize((f.shape[1] // 2, f.shape[0] // 2)) for f in frames]
         palette = [image.quantize(64, dither=Image.Dither.NONE) for image in half]
         palette[0].save(
-            files[1], save_all=True, append_images=palette[1:],
-            duration=1000 // FRAMES_PER_SECOND, loop=0,
+            files[1],
+            save_all=True,
+            append_images=palette[1:],
+            duration=1000 // FRAMES_PER_SECOND,
+            loop=0,
         )
     except OSError as error:
-        raise InputError(f"video {path} can't be written ({error}); choose another folder") from error
+        raise InputError(
+            f"video {path} can't be written ({error}); choose another folder"
+        ) from error
     return files
 
 
@@ -109,9 +114,7 @@ def _compose(
     return np.asarray(canvas)
 
 
-def _draw_bars(
-    draw: ImageDraw.ImageDraw, font: ImageFont.ImageFont, acted: TensorDictBase
-) -> None:
+def _draw_bars(draw: ImageDraw.ImageDraw, font: ImageFont.ImageFont, acted: TensorDictBase) -> None:
     """One bar an action, as long as it is probable; the chosen one in red (as in Fig. 13)."""
     chosen = Action(int(acted["action"][0]))
     logits = acted.get("logits", None)

@@ -43,7 +43,9 @@ class ReturnEstimator(TensorDictModuleBase, abc.ABC):
             InputError: An episode is not complete.
         """
         values = self.estimate(*(tensordict.get(key) for key in self.in_keys))
-        return tensordict.set(self.out_keys[0], returns.scale_to_unit(values) if self.scale else values)
+        return tensordict.set(
+            self.out_keys[0], returns.scale_to_unit(values) if self.scale else values
+        )
 
     @abc.abstractmethod
     def estimate(self, reward: Tensor, done: Tensor) -> Tensor:

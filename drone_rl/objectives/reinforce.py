@@ -61,9 +61,7 @@ class ReinforceLoss(LossModule):
         """
         super().__init__()
         if reduction not in ("mean", "sum", "none"):
-            raise InputError(
-                f"objective.reduction={reduction} is unknown; give mean, sum or none"
-            )
+            raise InputError(f"objective.reduction={reduction} is unknown; give mean, sum or none")
         if entropy_coeff < 0:
             raise InputError(f"objective.entropy_coeff={entropy_coeff} is negative; give 0 or more")
         self.reduction = reduction
@@ -103,7 +101,9 @@ class ReinforceLoss(LossModule):
                 "pass it through a return estimator first"
             )
         with self.actor_network_params.to_module(self.actor_network):
-            distribution = self.actor_network.get_dist(tensordict.select(*self.actor_network.in_keys))
+            distribution = self.actor_network.get_dist(
+                tensordict.select(*self.actor_network.in_keys)
+            )
         log_prob = distribution.log_prob(tensordict.get(self.tensor_keys.action))
         entropy = distribution.entropy()
         loss = -log_prob * returns.detach().reshape(log_prob.shape)

@@ -6,9 +6,7 @@ from dm_control import composer, mjcf
 class Cube(composer.Entity):
     """A cube that is seen but never pushes: touching is a rule, not a contact."""
 
-    def _build(
-        self, size: float, color: tuple[float, float, float], name: str = "cube"
-    ) -> None:
+    def _build(self, size: float, color: tuple[float, float, float], name: str = "cube") -> None:
         """Makes the cube.
 
         Args:

@@ -80,6 +80,7 @@ class WarpRenderer:
             InputError: The model has no such camera, or there is no such device.
         """
         check_device(device)
+        wp.config.log_level = max(wp.config.log_level, wp.LOG_WARNING)
         self.view = view
         self.device = torch.device(device)
         on_gpu = self.device.type == "cuda"
@@ -92,9 +93,8 @@ class WarpRenderer:
             names = ", ".join(model.camera(i).name for i in range(model.ncam))
             raise InputError(f"camera {view.camera!r} is not in the model; choose from: {names}")
         with wp.ScopedDevice(device):
-            self._shards = [
-                _Shard(model, view, camera, capacity, background) for _ in range(count)
-            ]
+            self._shards = [_Shard(model, view, camera, capacity, background) for _ in range(count)]
+            self._shards[0].warm_up()
         for shard in self._shards[1:]:
             shard.share_kernel_of(self._shards[0])
         self._pool = None if count == 1 else ThreadPoolExecutor(count, "render")
@@ -160,7 +160,9 @@ class _Shard:
         mujoco.mj_forward(model, data)
         self._model = mjw.put_model(model)
         self._data = mjw.put_data(model, data, nworld=capacity)
-        groups = sorted({int(g) for g in model.geom_group} - (set() if view.show_drone else {BODY_GROUP}))
+        groups = sorted(
+            {int(g) for g in model.geom_group} - (set() if view.show_drone else {BODY_GROUP})
+        )
         self._context = mjw.create_render_context(
             model,
             nworld=capacity,
@@ -181,10 +183,12 @@ class _Shard:
         self._mocap_pos = wp.to_torch(self._data.mocap_pos)
         self._pixels = self._buffer()
 
+    def warm_up(self) -> None:
+        """Compiles or loads the kernels now, on this thread: later calls may come from any."""
+        self.draw(self._qpos[:1].clone(), self._mocap_pos[:1].clone(), None)
+
     def share_kernel_of(self, other: "_Shard") -> None:
         """Reuses a kernel specialised to the same model and view, which takes long to load."""
-        if other._context._megakernel is None:
-            other.draw(other._qpos, other._mocap_pos, None)
         self._context._megakernel = other._context._megakernel
 
     def draw(self, qpos: Tensor, mocap_pos: Tensor, out: Tensor | None) -> None:

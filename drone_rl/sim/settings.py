@@ -60,12 +60,12 @@ class TaskSettings:
 
     @property
     def last_distance(self) -> float:
-        """x of the last cube, in metres."""
+        """X of the last cube, in metres."""
         return self.first_distance + (self.num_cubes - 1) * self.spacing
 
     @property
     def front_bound(self) -> float:
-        """x beyond which the drone is out of bounds, in metres. Grows with the number of cubes."""
+        """X beyond which the drone is out of bounds, in metres. Grows with the number of cubes."""
         return self.last_distance + self.front_margin
 
     @property

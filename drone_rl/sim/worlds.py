@@ -55,7 +55,6 @@ class CubeWorlds:
         self._num_shards = num_shards
         self._renderers: dict[View, WarpRenderer] = {}
         self.policy_view = self.view()
-        self._renderer(self.policy_view)
         places = torch.zeros(num_worlds, self.settings.num_cubes, 3, dtype=torch.float64)
         self.state = rules.start(self.settings, places).to(self.device)
 
@@ -130,6 +129,10 @@ class CubeWorlds:
         """Ends the renderers' threads."""
         for renderer in self._renderers.values():
             renderer.close()
+
+    def prepare(self, view: View | None = None) -> None:
+        """Makes a renderer and its kernels ready, which the first picture would do otherwise."""
+        self._renderer(view or self.policy_view)
 
     def _renderer(self, view: View) -> WarpRenderer:
         if view not in self._renderers:

@@ -41,7 +41,11 @@ class CheckpointCallback(Callback):
     """Keeps the newest state (`last.pt`) and the one with the best running mean (`best.pt`)."""
 
     def __init__(
-        self, folder: str | Path, *, interval_s: float = 15.0, extra: Mapping[str, Any] | None = None
+        self,
+        folder: str | Path,
+        *,
+        interval_s: float = 15.0,
+        extra: Mapping[str, Any] | None = None,
     ) -> None:
         """Sets where and how often.
 
@@ -181,7 +185,10 @@ class ProgressCallback(Callback):
             left = max(0, trainer.total_frames - progress.frames) / rate
             _log.info(
                 "frames %d, %s, %.0f frames/s, at most %.0f s left",
-                progress.frames, text, rate, left,
+                progress.frames,
+                text,
+                rate,
+                left,
             )
 
     def on_end(self, trainer: "Trainer", reason: str) -> None:
@@ -190,7 +197,11 @@ class ProgressCallback(Callback):
         progress = trainer.progress
         _log.info(
             "stopped (%s) after %d frames, %d episodes, %.1f s: running cubes %.3f",
-            reason, progress.frames, progress.episodes, progress.seconds, progress.running_cubes,
+            reason,
+            progress.frames,
+            progress.episodes,
+            progress.seconds,
+            progress.running_cubes,
         )
 
     def on_failure(self, trainer: "Trainer") -> None:

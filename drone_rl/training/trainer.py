@@ -171,7 +171,9 @@ class Trainer:
             (sum(terms.values()) * share).backward()
             for name, value in losses.items():
                 weight = share if name in terms else len(chunk) / len(batch)
-                totals[f"loss/{name}"] = totals.get(f"loss/{name}", 0.0) + float(value.detach()) * weight
+                totals[f"loss/{name}"] = (
+                    totals.get(f"loss/{name}", 0.0) + float(value.detach()) * weight
+                )
         for name, parameter in self.network.named_parameters():
             if parameter.grad is not None:
                 self._check(parameter.grad, f"the gradient of {name}")

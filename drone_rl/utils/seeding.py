@@ -40,10 +40,10 @@ def world_random_state(
 
 
 def torch_generator(
-    seed: int, stream: Stream, device: torch.device | str = "cpu"
+    seed: int, stream: Stream, *, number: int = 0, device: torch.device | str = "cpu"
 ) -> torch.Generator:
-    """A torch generator for one purpose."""
-    state = seed_sequence(seed, stream).generate_state(1, np.uint64)[0]
+    """A torch generator for one purpose; `number` tells apart those of several workers."""
+    state = seed_sequence(seed, stream, number).generate_state(1, np.uint64)[0]
     return torch.Generator(device).manual_seed(int(state >> np.uint64(1)))
 
 
