@@ -5,6 +5,8 @@ from dm_control import composer
 SKY_COLOR = (0.62, 0.74, 0.92)
 """Red, green, blue of everything that is neither floor, cube nor drone."""
 FLOOR_COLOR = (0.5, 0.54, 0.48)
+FLOOR_SIZE = (300.0, 300.0, 100.0)
+"""Half extents in metres, and the spacing of OpenGL's grid: finite and coarse is 20 times faster."""
 DRAW_DISTANCE = 200.0
 """Metres beyond which nothing is drawn."""
 
@@ -23,7 +25,7 @@ class CubeArena(composer.Arena):
         sky = {"rgb1": SKY_COLOR, "rgb2": SKY_COLOR, "width": 8, "height": 48}
         root.asset.add("texture", name="sky", type="skybox", builtin="flat", **sky)
         root.worldbody.add(
-            "geom", name="floor", type="plane", size=(0, 0, 1), rgba=(*FLOOR_COLOR, 1.0)
+            "geom", name="floor", type="plane", size=FLOOR_SIZE, rgba=(*FLOOR_COLOR, 1.0)
         )
         root.worldbody.add(
             "light",

@@ -116,6 +116,7 @@ class CollectCubes(composer.Task):
         self._state, reward = rules.judge(self.settings, self._state, drone)
         self._reward = float(reward)
         self._show_cubes(physics)
+        physics.forward()  # what is observed next must not show cubes that have just vanished
 
     def get_reward(self, physics: mjcf.Physics) -> float:
         """1 for each cube collected by the last move."""

@@ -95,9 +95,14 @@ class CubeWorlds:
         Returns:
             Reward. Shape: (k,), float64.
         """
-        state = self.state[worlds]
+        everyone = len(worlds) == self.num_worlds
+        state = self.state if everyone else self.state[worlds]
         drone = state.drone + rules.displacement(self.settings, action)
-        self.state[worlds], reward = rules.judge(self.settings, state, drone)
+        state, reward = rules.judge(self.settings, state, drone)
+        if everyone:
+            self.state = state
+        else:
+            self.state[worlds] = state
         return reward
 
     def render(self, state: rules.WorldState, view: View | None = None) -> Tensor:

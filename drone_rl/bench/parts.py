@@ -1,0 +1,66 @@
+"""The default pipeline, for benchmarks that time its parts."""
+
+import statistics
+import time
+from collections.abc import Callable
+
+import torch
+
+from drone_rl.collectors import EpisodeCollector, ThreadedCollector
+from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, make_env
+from drone_rl.policies import SmallCNN, make_actor
+from drone_rl.sim.settings import TaskSettings
+
+
+def default_collector(num_envs: int, num_threads: int, device: str) -> ThreadedCollector:
+    """The collector of `drone-rl train`, with a policy that has learned nothing yet."""
+    network, collectors = None, []
+    for i in range(num_threads):
+        share = num_envs // num_threads
+        base = DroneEnv(share, first_world=i * share, num_shards=1, device=device)
+        env = make_env(base, [GrayPixels(), StandardizePixels()])
+        shape = tuple(env.observation_spec["pixels"].shape[1:])
+        network = network or SmallCNN(shape, 3, hidden=(128,)).to(device)
+        generator = torch.Generator(device).manual_seed(i)
+        collectors.append(EpisodeCollector(env, make_actor(network, env.action_spec, generator)))
+    return ThreadedCollector(collectors)
+
+
+def random_walk(env: DroneEnv, steps: int, seed: int = 0) -> int:
+    """Steps a batch with random actions, resetting what ends. Returns the frames made."""
+    generator = torch.Generator(env.device).manual_seed(seed)
+    state = env.reset()
+    for _ in range(steps):
+        action = torch.randint(3, env.batch_size, generator=generator, device=env.device)
+        _, state = env.step_and_maybe_reset(state.set("action", action))
+    return steps * env.batch_size[0]
+
+
+def make_worlds(num_envs: int, device: str, num_cubes: int = 3) -> DroneEnv:
+    """A batch of worlds on all cores."""
+    task = TaskSettings(num_cubes=num_cubes)
+    return DroneEnv(num_envs, task, device=device)
+
+
+def rate(work: Callable[[], int], seconds: float) -> float:
+    """Items a second of work that is repeated until the time is up."""
+    done, begin = 0, time.perf_counter()
+    while time.perf_counter() - begin < seconds:
+        done += work()
+    return done / (time.perf_counter() - begin)
+
+
+def paired(
+    first: Callable[[], int], second: Callable[[], int], seconds: float, rounds: int
+) -> tuple[float, float, float]:
+    """Rates of two kinds of work in turn, so that a drift of the machine hits both.
+
+    Returns:
+        The median rate of each and the median of the ratios first / second.
+    """
+    rates = [(rate(first, seconds), rate(second, seconds)) for _ in range(rounds)]
+    return (
+        statistics.median(a for a, _ in rates),
+        statistics.median(b for _, b in rates),
+        statistics.median(a / b for a, b in rates),
+    )

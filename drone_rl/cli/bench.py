@@ -1,0 +1,67 @@
+"""`drone-rl bench`."""
+
+import json
+import logging
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import torch
+from omegaconf import DictConfig
+
+from drone_rl.bench.scaling import bench_scaling
+from drone_rl.bench.speed import bench_collector, bench_dm_control, bench_render
+from drone_rl.bench.training import bench_memory, bench_solve
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.provenance import provenance
+
+NAMES = ("render", "collector", "dm_control", "scaling", "memory", "solve")
+_log = logging.getLogger(__name__)
+
+
+def prepare(overrides: list[str]) -> list[str]:
+    """Makes `drone-rl bench collector --quick` mean `only=[collector] quick=true`."""
+    names = [o for o in overrides if o in NAMES]
+    kept = [o for o in overrides if o not in (*NAMES, "--quick")]
+    for override in kept:
+        if "=" not in override and not override.startswith("-"):
+            raise InputError(f"benchmark {override!r} is unknown; use some of: {', '.join(NAMES)}")
+    if names:
+        kept.append(f"only=[{','.join(names)}]")
+    return [*kept, "quick=true"] if "--quick" in overrides else kept
+
+
+def run(config: DictConfig) -> tuple[int, None]:
+    """Runs benchmarks one after the other; each adds to results.json when it is done."""
+    unknown = [name for name in config.only if name not in NAMES]
+    if unknown:
+        raise InputError(f"only={unknown} is unknown; use some of: {', '.join(NAMES)}")
+    folder = Path(config.folder) / "quick" if config.quick else Path(config.folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / "results.json"
+    benchmarks = _benchmarks(config, folder)
+    for name in config.only:
+        _log.info("benchmark: %s", name)
+        results = json.loads(path.read_text()) if path.exists() else {}
+        results |= benchmarks[name]()
+        results |= {"quick": config.quick, "device": config.device, **provenance()}
+        path.write_text(json.dumps(results, indent=2))
+    print(json.dumps({k: v for k, v in results.items() if k not in ("versions",)}, indent=2))
+    _log.info("written: %s", path)
+    return 0, None
+
+
+def _benchmarks(config: DictConfig, folder: Path) -> dict[str, Callable[[], dict[str, Any]]]:
+    worlds, device, quick = config.num_envs, config.device, config.quick
+    threads = 1 if device.startswith("cuda") else torch.get_num_threads()
+    runs = folder / "runs"
+    shutil.rmtree(runs, ignore_errors=True)
+    return {
+        "render": lambda: bench_render(worlds, device, quick),
+        "collector": lambda: bench_collector(worlds, threads, device, quick),
+        "dm_control": lambda: bench_dm_control(worlds, device, quick),
+        "scaling": lambda: bench_scaling(folder, device, quick),
+        "memory": lambda: bench_memory(runs, config.memory_frames, device, quick),
+        "solve": lambda: bench_solve(runs, list(config.seeds), config.episodes, device, quick),
+    }

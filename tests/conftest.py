@@ -1,0 +1,43 @@
+"""Shared fixtures: small worlds, and whether OpenGL is there."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+import torch
+
+from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, make_env
+from drone_rl.policies import SmallCNN, make_actor
+
+torch.set_num_threads(1)
+
+
+@pytest.fixture(scope="session")
+def egl():
+    """Skips where OpenGL can't draw without a display."""
+    code = "from dm_control import _render; _render.Renderer(8, 8).make_current()"
+    environment = {**os.environ, "MUJOCO_GL": "egl"}
+    command = [sys.executable, "-c", code]
+    if subprocess.run(command, env=environment, capture_output=True, check=False).returncode:
+        pytest.skip("no OpenGL renderer (EGL) on this machine")
+    if os.environ.get("MUJOCO_GL") != "egl":
+        pytest.skip("EGL is there but not chosen; set MUJOCO_GL=egl")
+
+
+@pytest.fixture
+def make_pipeline():
+    """Builds an environment with the default pipeline and an actor with a fresh small network."""
+    envs = []
+
+    def build(num_envs=4, seed=0, **kwargs):
+        env = make_env(DroneEnv(num_envs, seed=seed, **kwargs), [GrayPixels(), StandardizePixels()])
+        envs.append(env)
+        generator = torch.Generator().manual_seed(seed)
+        shape = tuple(env.observation_spec["pixels"].shape[1:])
+        network = SmallCNN(shape, 3, channels=(4,), hidden=(8,), generator=generator)
+        return env, make_actor(network, env.action_spec, generator)
+
+    yield build
+    for env in envs:
+        env.close(raise_if_closed=False)

@@ -1,0 +1,102 @@
+import numpy as np
+import pytest
+from dm_control import composer
+
+from drone_rl.sim import cameras
+from drone_rl.sim.collect_cubes import VANISHED_DEPTH, CollectCubes, make_environment
+from drone_rl.sim.rules import Action, EndReason
+from drone_rl.sim.settings import TaskSettings
+
+
+@pytest.fixture
+def env():
+    return make_environment(pixels=False, random_state=1)
+
+
+def test_runs_under_plain_composer_environment(env):
+    assert isinstance(env, composer.Environment)
+    timestep = env.reset()
+    assert timestep.first()
+    assert env.action_spec().num_values == 3
+    while not timestep.last():
+        timestep = env.step(Action.FORWARD)
+        for name, spec in env.observation_spec().items():
+            spec.validate(timestep.observation[name])
+    assert timestep.observation["end_reason"].item() == EndReason.FRONT_BOUNDARY
+    assert timestep.discount == 0.0
+    assert env.task.state.steps.item() == 45
+
+
+def test_step_limit_truncates_with_discount_one():
+    env = make_environment(TaskSettings(step_limit=32), pixels=False, random_state=0)
+    timestep = env.reset()
+    for step in range(32):
+        timestep = env.step(Action.LEFT if step % 2 else Action.RIGHT)
+    assert timestep.last()
+    assert timestep.discount == 1.0
+    assert timestep.observation["end_reason"].item() == EndReason.STEP_LIMIT
+
+
+def test_drone_moved_by_hand_collects(env):
+    env.reset()
+    task, physics = env.task, env.physics
+    cube = task.state.cubes[0, 0].numpy()
+    task.drone.set_pose(physics, cube - (1.0, 0.0, 0.0), (1, 0, 0, 0))
+    timestep = env.step(Action.FORWARD)
+    assert timestep.reward == 1.0
+    assert timestep.observation["cubes"].item() == 1
+    assert timestep.observation["collected"].tolist() == [True, False, False]
+
+
+def test_collected_cube_is_out_of_sight(env):
+    env.reset()
+    place = env.task.state.cubes[0, 0].numpy()
+    env.task.drone.set_pose(env.physics, place - (1.0, 0.0, 0.0), (1, 0, 0, 0))
+    env.step(Action.FORWARD)
+    shown = env.physics.bind(env.task.root_entity.mjcf_model.find("geom", "cube_0/geom")).xpos
+    assert shown[2] == pytest.approx(place[2] - VANISHED_DEPTH)
+
+
+def test_physics_does_not_move_the_drone(env):
+    env.reset()
+    for action in (Action.FORWARD, Action.FORWARD, Action.LEFT, Action.RIGHT, Action.RIGHT):
+        env.step(action)
+    position, quaternion = env.task.drone.get_pose(env.physics)
+    np.testing.assert_allclose(position, (2.0, -1.0, 2.5), atol=1e-12)
+    np.testing.assert_allclose(quaternion, (1, 0, 0, 0), atol=1e-12)
+
+
+def test_resets_differ_and_seeds_repeat():
+    def places(seed, episodes=3):
+        env = make_environment(pixels=False, random_state=seed)
+        return [env.reset() and env.task.state.cubes.numpy().copy() for _ in range(episodes)]
+
+    first, again, other = places(5), places(5), places(6)
+    np.testing.assert_array_equal(first, again)
+    assert not np.array_equal(first[0], first[1])
+    assert not np.array_equal(first[0], other[0])
+
+
+def test_five_cameras_with_airsims_names():
+    model = CollectCubes(pixels=False).drone.mjcf_model
+    names = [spec.name for spec in cameras.DRONE_CAMERAS]
+    assert names == ["front_center", "front_right", "front_left", "bottom_center", "back_center"]
+    assert all(model.find("camera", name) is not None for name in names)
+
+
+def test_observables_are_off_until_a_task_enables_them():
+    from drone_rl.sim.drone import Drone
+    from drone_rl.sim.settings import CameraSettings
+
+    drone = Drone(size=0.8, camera=CameraSettings())
+    assert not any(o.enabled for o in drone.observables.as_dict().values())
+
+
+@pytest.mark.render
+def test_pixels_through_opengl(egl):
+    env = make_environment(random_state=0)
+    timestep = env.reset()
+    pixels = timestep.observation["drone/front_center"]
+    assert pixels.shape == (25, 64, 3)
+    assert pixels.dtype == np.uint8
+    assert pixels.std() > 10

@@ -1,0 +1,64 @@
+import numpy as np
+import pytest
+import torch
+
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.seeding import (
+    Stream,
+    get_state,
+    seed_sequence,
+    set_state,
+    torch_generator,
+    world_random_state,
+)
+
+
+def draws(random_state):
+    return tuple(random_state.uniform(size=4))
+
+
+def test_streams_never_overlap():
+    seen = {
+        draws(world_random_state(seed, world, stream))
+        for seed in range(4)
+        for world in range(8)
+        for stream in Stream
+    }
+    assert len(seen) == 4 * 8 * len(Stream)
+
+
+def test_world_of_next_seed_is_no_world_of_this_one():
+    this = {draws(world_random_state(0, world)) for world in range(100)}
+    following = {draws(world_random_state(1, world)) for world in range(100)}
+    assert not this & following
+
+
+def test_same_key_repeats():
+    assert draws(world_random_state(3, 5)) == draws(world_random_state(3, 5))
+
+
+def test_state_round_trip_goes_on_where_it_was():
+    random_state = world_random_state(0, 0)
+    random_state.uniform(size=7)
+    state = get_state(random_state)
+    expected = draws(random_state)
+    other = world_random_state(9, 9)
+    set_state(other, state)
+    assert draws(other) == expected
+    assert all(isinstance(v, int) for v in state.values())
+
+
+def test_torch_generators_differ_by_stream_and_number():
+    keys = [(Stream.ACTIONS, 0), (Stream.ACTIONS, 1), (Stream.POLICY_INIT, 0)]
+    values = {float(torch.rand(1, generator=torch_generator(0, s, number=n))) for s, n in keys}
+    assert len(values) == 3
+
+
+@pytest.mark.parametrize("seed", [-1, 1.5, "0", None, True])
+def test_bad_seed_is_refused(seed):
+    with pytest.raises(InputError, match="whole number"):
+        seed_sequence(seed)
+
+
+def test_numpy_integers_are_seeds():
+    assert seed_sequence(np.int64(3)).entropy == 3
