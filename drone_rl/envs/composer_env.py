@@ -1,18 +1,25 @@
 """The dm_control task as a TorchRL environment: one world, drawn by OpenGL."""
 
+import torch
 from dm_control import composer
+from torchrl.data import Categorical
 from torchrl.envs import DMControlWrapper
 
 
 class ComposerEnv(DMControlWrapper):
-    """Wraps a `composer.Environment`, which TorchRL's own wrapper refuses.
+    """Wraps a `composer.Environment` with a discrete action, which TorchRL's own wrapper refuses.
 
-    It differs from `dm_control.rl.control.Environment` in the two methods below only.
+    Actions are indices, as in `DroneEnv`.
     """
 
     def _check_kwargs(self, kwargs: dict) -> None:
         if not isinstance(kwargs["env"], composer.Environment):
             raise TypeError(f"env={kwargs['env']!r} is not a composer.Environment")
+
+    def _make_specs(self, env: composer.Environment, batch_size: tuple = ()) -> None:
+        super()._make_specs(env, batch_size)
+        num_actions = env.action_spec().num_values
+        self.action_spec = Categorical(num_actions, dtype=torch.int64, device=self.device)
 
     def _set_seed(self, _seed: int | None) -> None:
         self._env.random_state.seed(_seed)

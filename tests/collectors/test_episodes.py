@@ -1,0 +1,121 @@
+import pytest
+import torch
+
+from drone_rl.collectors import EpisodeCollector, ThreadedCollector
+from drone_rl.sim.settings import TaskSettings
+from drone_rl.utils.errors import InputError
+
+SHORT = TaskSettings(num_cubes=2, first_distance=3.0, spacing=3.0, step_limit=12, front_margin=3.0)
+
+
+@pytest.fixture
+def collector(make_pipeline):
+    return EpisodeCollector(*make_pipeline(5, task=SHORT))
+
+
+def test_batch_is_complete_episodes_one_after_the_other(collector):
+    batch = collector.collect()
+    ids, done = batch["collector", "traj_ids"], batch["next", "done"][:, 0]
+    assert ids.unique().tolist() == [0, 1, 2, 3, 4]
+    assert torch.equal(ids, ids.sort().values)
+    last = torch.cat([ids[1:] != ids[:-1], torch.tensor([True])])
+    assert torch.equal(done, last)  # each episode ends in done, and nowhere else
+
+
+def test_frames_are_in_order_and_follow_from_the_actions(collector):
+    batch = collector.collect()
+    for i in range(5):
+        episode = batch[batch["collector", "traj_ids"] == i]
+        cubes = episode["next", "info", "cubes"][:, 0]
+        assert torch.equal(cubes, episode["next", "reward"][:, 0].cumsum(0).long())
+        assert (episode["next", "info", "end_reason"][:-1] == 0).all()
+        assert episode["next", "info", "end_reason"][-1] > 0
+
+
+def test_each_action_was_taken_on_the_frame_beside_it(make_pipeline):
+    env, actor = make_pipeline(3, task=SHORT)
+    batch = EpisodeCollector(env, actor).collect()
+    logits = actor.get_dist(batch.select("pixels")).logits
+    torch.testing.assert_close(logits, batch["logits"].log_softmax(-1), atol=1e-5, rtol=1e-4)
+
+
+def test_no_frame_is_dropped_or_used_twice(make_pipeline):
+    env, actor = make_pipeline(4, task=SHORT)
+    moved = []
+    step = env.base_env.worlds.step
+    env.base_env.worlds.step = lambda worlds, action: (
+        moved.append(len(worlds)) or step(worlds, action)
+    )
+    collector = EpisodeCollector(env, actor)
+    total = sum(len(collector.collect()) for _ in range(3))
+    assert total == sum(moved) == collector.frames
+    assert collector.episodes == 12
+
+
+def test_finished_worlds_are_not_drawn(make_pipeline):
+    env, actor = make_pipeline(4, task=SHORT)
+    drawn = []
+    render = env.base_env.worlds.render
+    env.base_env.worlds.render = lambda state: drawn.append(len(state.drone)) or render(state)
+    batch = EpisodeCollector(env, actor).collect()
+    assert sum(drawn) == len(batch) + 4  # each step's frame, and the first of each world
+
+
+def test_without_observations(make_pipeline):
+    env, actor = make_pipeline(2, task=SHORT)
+    batch = EpisodeCollector(env, actor, keep_observations=False).collect()
+    assert "pixels" not in batch
+    assert "action" in batch
+
+
+def test_stops_at_total_frames(make_pipeline):
+    env, actor = make_pipeline(2, task=SHORT)
+    collector = EpisodeCollector(env, actor, total_frames=30)
+    frames = sum(len(batch) for batch in collector)
+    assert frames == collector.frames >= 30
+
+
+def test_unbatched_environment_is_refused(make_pipeline):
+    env, actor = make_pipeline(1)
+
+    class Unbatched:
+        batch_size = torch.Size([])
+
+    with pytest.raises(InputError, match="batch of worlds"):
+        EpisodeCollector(Unbatched(), actor)
+
+
+def threaded(make_pipeline):
+    shares = [make_pipeline(2, task=SHORT, first_world=i * 2, num_shards=1) for i in range(2)]
+    return ThreadedCollector([EpisodeCollector(*share) for share in shares])
+
+
+def test_threads_give_the_same_batch_every_time(make_pipeline):
+    first, second = threaded(make_pipeline), threaded(make_pipeline)
+    for _ in range(3):
+        one, two = first.collect(), second.collect()
+        assert torch.equal(one["pixels"], two["pixels"])
+        assert torch.equal(one["action"], two["action"])
+    first.shutdown()
+    second.shutdown()
+
+
+def test_threads_join_in_order(make_pipeline):
+    joined = threaded(make_pipeline)
+    batch = joined.collect()
+    assert int(batch["next", "done"].sum()) == 4
+    alone = EpisodeCollector(*make_pipeline(2, task=SHORT, num_shards=1)).collect()
+    assert torch.equal(batch["pixels"][: len(alone)], alone["pixels"])
+    joined.shutdown()
+
+
+def test_threaded_state_round_trip(make_pipeline):
+    first = threaded(make_pipeline)
+    first.collect()
+    state = first.state_dict()
+    second = threaded(make_pipeline)
+    second.load_state_dict(state)
+    assert second.state_dict() == state
+    assert second.collectors[0].frames == first.collectors[0].frames
+    first.shutdown()
+    second.shutdown()

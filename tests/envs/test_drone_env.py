@@ -1,0 +1,108 @@
+import pytest
+import torch
+from torchrl.envs.utils import check_env_specs
+
+from drone_rl.envs import DroneEnv
+from drone_rl.sim.rules import EndReason
+from drone_rl.sim.settings import TaskSettings
+from drone_rl.utils.errors import InputError
+
+SHORT = TaskSettings(num_cubes=1, first_distance=3.0, step_limit=5, front_margin=3.0)
+
+
+def actions(env, value):
+    return torch.full(env.batch_size, value, dtype=torch.int64)
+
+
+@pytest.mark.parametrize("pixels", [True, False])
+@pytest.mark.parametrize("num_envs", [1, 3])
+def test_specs(num_envs, pixels):
+    env = DroneEnv(num_envs, SHORT, pixels=pixels)
+    check_env_specs(env, break_when_any_done="both")
+    env.close()
+
+
+def test_same_seed_repeats_and_others_differ():
+    def first(seed):
+        return DroneEnv(2, pixels=False, seed=seed).reset()["info", "cube_positions"]
+
+    assert torch.equal(first(1), first(1))
+    assert not torch.equal(first(1), first(2))
+    env = DroneEnv(2, pixels=False)
+    env.set_seed(1)
+    assert torch.equal(env.reset()["info", "cube_positions"], first(1))
+
+
+def test_batch_equals_single_worlds():
+    together = DroneEnv(3, seed=4)
+    alone = [DroneEnv(1, seed=4, first_world=i) for i in range(3)]
+    states = [env.reset() for env in (together, *alone)]
+    for action in (0, 1, 2, 0, 0):
+        for i, state in enumerate(states[1:]):
+            assert torch.equal(states[0][i]["pixels"], state[0]["pixels"])
+            assert torch.equal(states[0][i]["info", "drone"], state[0]["info", "drone"])
+        envs = (together, *alone)
+        states = [
+            env.step(state.set("action", actions(env, action)))["next"].exclude("reward")
+            for env, state in zip(envs, states, strict=True)
+        ]
+
+
+def test_partial_reset_touches_and_draws_only_masked_worlds():
+    env = DroneEnv(3, seed=0)
+    state = env.reset()
+    after = env.step(state.set("action", actions(env, 0)))["next"]
+    drawn = []
+    render = env.worlds.render
+    env.worlds.render = lambda state: drawn.append(len(state.drone)) or render(state)
+    mask = torch.tensor([[False], [True], [False]])
+    reset = env.reset(after.clone().exclude("reward").set("_reset", mask))
+    assert drawn == [1]
+    assert reset["info", "drone"][:, 0].tolist() == [1.0, 0.0, 1.0]
+    assert torch.equal(reset["pixels"][[0, 2]], after["pixels"][[0, 2]])
+    assert torch.equal(reset["info", "cube_positions"][0], after["info", "cube_positions"][0])
+    assert not torch.equal(reset["info", "cube_positions"][1], after["info", "cube_positions"][1])
+
+
+def test_partial_step_leaves_others_alone_and_undrawn():
+    env = DroneEnv(2, seed=0)
+    state = env.reset().set("action", actions(env, 0))
+    state["_step"] = torch.tensor([True, False])
+    after = env.step(state)["next"]
+    assert after["info", "drone"][:, 0].tolist() == [1.0, 0.0]
+    assert torch.equal(after["pixels"][1], state["pixels"][1])
+
+
+def test_truncation_step_is_exact_and_told_from_termination():
+    env = DroneEnv(1, SHORT, pixels=False)
+    state = env.reset()
+    for step in range(1, 6):
+        state = env.step(state.set("action", actions(env, 1 + step % 2)))["next"]
+        assert state["truncated"].item() == (step == 5)
+    assert state["done"].item()
+    assert not state["terminated"].item()
+    assert state["info", "end_reason"].item() == EndReason.STEP_LIMIT
+
+
+def test_state_round_trip_repeats_the_next_episodes():
+    env = DroneEnv(2, pixels=False, seed=0)
+    env.reset()
+    saved = env.state_dict()
+    expected = env.reset()["info", "cube_positions"]
+    other = DroneEnv(2, pixels=False, seed=99)
+    other.load_state_dict(saved)
+    assert torch.equal(other.reset()["info", "cube_positions"], expected)
+    with pytest.raises(InputError, match="num_envs=2"):
+        DroneEnv(3, pixels=False).load_state_dict(saved)
+
+
+@pytest.mark.parametrize("num_envs", [0, -1, 2.0])
+def test_bad_number_of_worlds(num_envs):
+    with pytest.raises(InputError, match="num_envs"):
+        DroneEnv(num_envs)
+
+
+@pytest.mark.gpu
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a CUDA GPU")
+def test_specs_on_gpu():
+    check_env_specs(DroneEnv(3, SHORT, device="cuda"))

@@ -1,0 +1,102 @@
+import pytest
+import torch
+from torchrl.envs import CatFrames, Compose, StepCounter, ToTensorImage, TransformedEnv
+from torchrl.envs.transforms import GrayScale, RewardSum
+from torchrl.envs.utils import check_env_specs
+
+from drone_rl.envs import CropRows, DroneEnv, GrayPixels, Resize, StandardizePixels
+from drone_rl.utils.errors import InputError
+
+
+@pytest.fixture(scope="module")
+def base():
+    env = DroneEnv(2)
+    yield env
+    env.close()
+
+
+PIPELINES = {
+    "gray": lambda: [GrayPixels()],
+    "standardize": lambda: [GrayPixels(), StandardizePixels()],
+    "crop": lambda: [GrayPixels(), CropRows(5, 20)],
+    "resize": lambda: [GrayPixels(), Resize(height=10, width=32)],
+    "everything": lambda: [
+        GrayPixels(),
+        CropRows(1, 25),
+        Resize(height=12, width=32),
+        StandardizePixels(),
+        CatFrames(2, dim=-3, in_keys=["pixels"]),
+        RewardSum(),
+        StepCounter(),
+    ],
+}
+
+
+@pytest.mark.parametrize("name", PIPELINES)
+def test_specs_agree_with_data(base, name):
+    env = TransformedEnv(base, Compose(*PIPELINES[name]()))
+    check_env_specs(env, break_when_any_done="both")
+
+
+@pytest.mark.parametrize("name", PIPELINES)
+def test_any_leading_dimensions(name):
+    pixels = torch.randint(0, 256, (2, 3, 25, 64, 3), dtype=torch.uint8)
+    for transform in PIPELINES[name]()[:4]:
+        flat = transform._apply_transform(pixels.flatten(0, 1))
+        pixels = transform._apply_transform(pixels)
+        assert torch.equal(pixels.flatten(0, 1), flat)
+
+
+def test_reset_and_step_agree(base):
+    env = TransformedEnv(base, Compose(GrayPixels(), StandardizePixels()))
+    state = env.reset()
+    raw = base.last_pixels
+    expected = (GrayPixels()._apply_transform(raw) - 0.53) / 0.21
+    torch.testing.assert_close(state["pixels"], expected)
+    after = env.step(state.set("action", torch.zeros(2, dtype=torch.int64)))["next"]
+    expected = (GrayPixels()._apply_transform(base.last_pixels) - 0.53) / 0.21
+    torch.testing.assert_close(after["pixels"], expected)
+
+
+def test_gray_by_hand():
+    pixels = torch.tensor([[[255, 0, 0], [0, 255, 0]], [[0, 0, 255], [100, 100, 100]]])
+    gray = GrayPixels()._apply_transform(pixels.to(torch.uint8))
+    assert gray.shape == (1, 2, 2)
+    expected = torch.tensor([[[0.299, 0.587], [0.114, 100 / 255]]])
+    torch.testing.assert_close(gray, expected)
+
+
+def test_gray_is_torchrls_to_tensor_image_and_gray_scale():
+    pixels = torch.randint(0, 256, (4, 5, 7, 3), dtype=torch.uint8)
+    theirs = GrayScale()._apply_transform(ToTensorImage()._apply_transform(pixels))
+    torch.testing.assert_close(GrayPixels()._apply_transform(pixels), theirs, atol=2e-4, rtol=1e-3)
+
+
+def test_resize_averages_areas_and_keeps_height_apart_from_width():
+    pixels = torch.arange(8.0).reshape(1, 2, 4)
+    resized = Resize(height=1, width=2)._apply_transform(pixels)
+    assert resized.tolist() == [[[2.5, 4.5]]]
+
+
+def test_crop_keeps_top_and_drops_bottom():
+    pixels = torch.arange(5.0).reshape(1, 5, 1)
+    assert CropRows(1, 4)._apply_transform(pixels).flatten().tolist() == [1.0, 2.0, 3.0]
+
+
+def test_parameters_are_shown():
+    assert repr(CropRows(1, 2)) == "CropRows(top=1, bottom=2)"
+    assert repr(Resize(height=1, width=2)) == "Resize(height=1, width=2)"
+    assert repr(StandardizePixels()) == "StandardizePixels(mean=0.53, std=0.21)"
+
+
+def test_bad_sizes_are_refused():
+    with pytest.raises(InputError, match="0 <= top < bottom"):
+        CropRows(5, 5)
+    with pytest.raises(InputError, match="at most 4"):
+        CropRows(0, 5)._apply_transform(torch.zeros(1, 4, 4))
+    with pytest.raises(InputError, match="1 pixel or more"):
+        Resize(height=0, width=4)
+    with pytest.raises(InputError, match="above 0"):
+        StandardizePixels(std=0.0)
+    with pytest.raises(InputError, match="uint8"):
+        GrayPixels()._apply_transform(torch.zeros(2, 2, 3))

@@ -1,0 +1,245 @@
+import pytest
+import torch
+from tensordict import TensorDict
+from tensordict.nn import TensorDictModule
+from torch import nn
+from torchrl.data import Categorical
+from torchrl.modules import ProbabilisticActor
+
+from drone_rl.collectors import EpisodeCollector
+from drone_rl.envs.three_state import SUCCESS_PROBABILITY, ThreeStateEnv
+from drone_rl.objectives import ReinforceLoss, returns
+from drone_rl.policies.actor import RandomSource, SeededCategorical
+from drone_rl.utils.errors import InputError
+
+
+class Linear(nn.Module):
+    """Two logits, linear in the observation (Eq. 1)."""
+
+    def __init__(self, features=2):
+        super().__init__()
+        self.theta = nn.Parameter(torch.zeros(features, 2))
+
+    def forward(self, observation):
+        return observation @ self.theta
+
+
+def make(features=2, seed=0, in_key="observation"):
+    network = Linear(features)
+    actor = ProbabilisticActor(
+        TensorDictModule(network, in_keys=[in_key], out_keys=["logits"]),
+        in_keys=["logits"],
+        spec=Categorical(2),
+        distribution_class=SeededCategorical,
+        distribution_kwargs={"source": RandomSource(torch.Generator().manual_seed(seed))},
+        default_interaction_type="random",
+    )
+    return network, actor
+
+
+def make_batch(n=6, seed=0):
+    generator = torch.Generator().manual_seed(seed)
+    return TensorDict(
+        {
+            "observation": torch.randn(n, 2, generator=generator),
+            "action": torch.randint(2, (n,), generator=generator),
+            "return_to_go": torch.randn(n, 1, generator=generator),
+            "next": {"done": torch.ones(n, 1, dtype=torch.bool)},
+        },
+        [n],
+    )
+
+
+def gradient(loss, network, batch):
+    network.zero_grad()
+    losses = loss(batch)
+    sum(v for k, v in losses.items() if k.startswith("loss_")).backward()
+    return network.theta.grad.clone()
+
+
+def test_gradient_is_the_analytic_one_of_a_linear_policy():
+    """d/dtheta[:, b] of log pi(a|s) is s (1[a = b] - pi(b|s))."""
+    network, actor = make()
+    with torch.no_grad():
+        network.theta.copy_(torch.tensor([[0.3, -0.2], [0.1, 0.4]]))
+    batch = make_batch()
+    probabilities = (batch["observation"] @ network.theta.detach()).softmax(-1)
+    chosen = nn.functional.one_hot(batch["action"], 2)
+    weighted = (chosen - probabilities) * batch["return_to_go"]
+    expected = -(batch["observation"].T @ weighted) / len(batch)
+    torch.testing.assert_close(gradient(ReinforceLoss(actor), network, batch), expected)
+
+
+@pytest.mark.parametrize("reduction", ["mean", "sum"])
+def test_gradient_is_autograds_of_the_written_out_formula(reduction):
+    network, actor = make()
+    batch = make_batch()
+    loss = ReinforceLoss(actor, reduction=reduction, entropy_coeff=0.1)
+    log_pi = (batch["observation"] @ network.theta).log_softmax(-1)
+    taken = log_pi.gather(-1, batch["action"][:, None])
+    entropy = -(log_pi.exp() * log_pi).sum(-1, keepdim=True)
+    written = -(taken * batch["return_to_go"]) - 0.1 * entropy
+    expected = torch.autograd.grad(getattr(written, reduction)(), network.theta)[0]
+    torch.testing.assert_close(gradient(loss, network, batch), expected)
+
+
+def test_algorithm_4_by_hand():
+    """Rewards 0, 0, 1, discount 1/2: g = 1/4, 1/2, 1; mean 7/12, deviation sqrt(14)/12.
+
+    With theta = 0 both actions have probability 1/2, so the gradient of log pi(a) with respect to
+    the logits is +-1/2, and theta moves by alpha g_t (1[a_t = b] - 1/2) s_t.
+    """
+    network, actor = make(features=1)
+    reward = torch.tensor([[0.0], [0.0], [1.0]])
+    done = torch.tensor([[False], [False], [True]])
+    normalised = returns.standardised(reward, done, 0.5)
+    root = 14**0.5
+    torch.testing.assert_close(normalised[:, 0], torch.tensor([-4 / root, -1 / root, 5 / root]))
+    batch = TensorDict(
+        {
+            "observation": torch.ones(3, 1),
+            "action": torch.tensor([0, 0, 1]),
+            "return_to_go": normalised,
+        },
+        [3],
+    )
+    optimiser = torch.optim.SGD(network.parameters(), lr=0.1)
+    gradient(ReinforceLoss(actor, reduction="sum"), network, batch)
+    optimiser.step()
+    step = 0.1 * 0.5 * (-4 - 1 - 5) / root
+    torch.testing.assert_close(network.theta.detach(), torch.tensor([[step, -step]]))
+
+
+@pytest.mark.parametrize("kind", ["total_reward", "reward_to_go"])
+def test_mean_gradient_is_the_exact_one_on_the_process_of_fig_3(kind):
+    """Eq. 12 and, undiscounted, Eq. 15 are unbiased estimates of the gradient of J.
+
+    With p the probability of action 1 in state 0, J = 3/4 (1 - (1 - p)^H), so with respect to the
+    logit of action 1, dJ = 3/4 H (1 - p)^(H - 1) p (1 - p).
+    """
+    horizon, episodes, repeats = 3, 500, 80
+    network, actor = make(features=3)
+    with torch.no_grad():
+        network.theta[0] = torch.tensor([0.4, -0.3])
+    p = float(network.theta[0].detach().softmax(-1)[1])
+    slope = SUCCESS_PROBABILITY * horizon * (1 - p) ** (horizon - 1) * p * (1 - p)
+    collector = EpisodeCollector(ThreeStateEnv(episodes, horizon=horizon), actor, keep=())
+    loss = ReinforceLoss(actor, reduction="sum")
+    estimates = []
+    for _ in range(repeats):
+        batch = collector.collect()
+        reward, done = batch["next", "reward"], batch["next", "done"]
+        args = (reward, done) if kind == "total_reward" else (reward, done, 1.0)
+        batch["return_to_go"] = getattr(returns, kind)(*args)
+        estimates.append(-gradient(loss, network, batch)[0, 1] / episodes)
+    estimates = torch.stack(estimates)
+    error = float(estimates.std() / repeats**0.5)
+    assert error < 0.02 * slope  # narrow enough that a wrong formula would show
+    assert abs(float(estimates.mean()) - slope) < 4 * error
+
+
+def test_constant_added_to_returns_leaves_the_expected_gradient_alone():
+    """Enumerated over both actions, weighted by their probabilities."""
+    network, actor = make()
+    with torch.no_grad():
+        network.theta.copy_(torch.tensor([[0.3, -0.2], [0.1, 0.4]]))
+    observation = torch.tensor([[1.0, -2.0]])
+    probabilities = (observation @ network.theta.detach()).softmax(-1)[0]
+    loss = ReinforceLoss(actor, reduction="sum")
+
+    def expected(shift):
+        total = torch.zeros(2, 2)
+        for action, value in ((0, 1.0), (1, 3.0)):
+            entries = {
+                "observation": observation,
+                "action": torch.tensor([action]),
+                "return_to_go": torch.tensor([[value + shift]]),
+            }
+            total += probabilities[action] * gradient(loss, network, TensorDict(entries, [1]))
+        return total
+
+    torch.testing.assert_close(expected(0.0), expected(17.0), atol=1e-5, rtol=1e-5)
+
+
+def test_stored_action_is_scored():
+    _, actor = make()
+    batch = make_batch()
+    first = ReinforceLoss(actor)(batch)["loss_actor"]
+    assert torch.equal(first, ReinforceLoss(actor)(batch)["loss_actor"])
+    flipped = batch.clone().set("action", 1 - batch["action"])
+    with torch.no_grad():
+        actor.module[0].module.theta.copy_(torch.tensor([[1.0, 0.0], [0.0, 1.0]]))
+    assert ReinforceLoss(actor)(flipped)["loss_actor"] != ReinforceLoss(actor)(batch)["loss_actor"]
+
+
+def test_masked_equals_sliced():
+    network, actor = make()
+    batch = make_batch()
+    mask = torch.tensor([True, True, False, True, False, True])
+    masked = batch.clone().set(("collector", "mask"), mask)
+    loss = ReinforceLoss(actor)
+    torch.testing.assert_close(
+        gradient(loss, network, masked), gradient(loss, network, batch[mask])
+    )
+
+
+def test_dispatch_equals_tensordict():
+    _, actor = make()
+    batch = make_batch()
+    loss = ReinforceLoss(actor)
+    named = loss(
+        action=batch["action"],
+        return_to_go=batch["return_to_go"],
+        observation=batch["observation"],
+    )
+    for value, key in zip(named, loss.out_keys, strict=True):
+        torch.testing.assert_close(value, loss(batch)[key])
+
+
+def test_input_is_left_alone():
+    _, actor = make()
+    batch = make_batch()
+    before = batch.clone()
+    ReinforceLoss(actor)(batch)
+    assert set(batch.keys(True, True)) == set(before.keys(True, True))
+    assert (batch == before).all()
+
+
+def test_diagnostics_are_detached_and_losses_add_up():
+    _, actor = make()
+    losses = ReinforceLoss(actor, entropy_coeff=0.5)(make_batch())
+    assert not losses["entropy"].requires_grad
+    assert float(losses["entropy"]) == pytest.approx(torch.tensor(2.0).log().item())
+    assert float(losses["loss_entropy"].detach()) == pytest.approx(-0.5 * float(losses["entropy"]))
+
+
+def test_keys_can_be_set_and_nested():
+    _, actor = make()
+    batch = make_batch()
+    loss = ReinforceLoss(actor)
+    expected = loss(batch)["loss_actor"]
+    loss.set_keys(action=("agent", "move"), return_to_go=("agent", "credit"))
+    moved = batch.exclude("action", "return_to_go")
+    moved["agent"] = {"move": batch["action"], "credit": batch["return_to_go"]}
+    torch.testing.assert_close(loss(moved)["loss_actor"], expected)
+    assert ("agent", "move") in loss.in_keys
+
+
+def test_unknown_key_is_refused():
+    _, actor = make()
+    with pytest.raises(ValueError, match="advantage"):
+        ReinforceLoss(actor).set_keys(advantage="a")
+
+
+def test_missing_returns_name_the_remedy():
+    _, actor = make()
+    with pytest.raises(InputError, match="return estimator first"):
+        ReinforceLoss(actor)(make_batch().exclude("return_to_go"))
+
+
+def test_bad_arguments_are_refused():
+    _, actor = make()
+    with pytest.raises(InputError, match="mean, sum or none"):
+        ReinforceLoss(actor, reduction="median")
+    with pytest.raises(InputError, match="entropy_coeff=-1"):
+        ReinforceLoss(actor, entropy_coeff=-1)

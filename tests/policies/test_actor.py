@@ -1,0 +1,57 @@
+import copy
+
+import torch
+from tensordict import TensorDict
+from torch import nn
+from torchrl.data import Categorical
+from torchrl.envs.utils import ExplorationType, set_exploration_type
+
+from drone_rl.policies import make_actor
+from drone_rl.policies.actor import RandomSource, SeededCategorical
+
+
+class Fixed(nn.Module):
+    def forward(self, pixels):
+        return torch.tensor([0.1, 0.7, 0.2]).log().expand(len(pixels), 3)
+
+
+def act(actor, n=20_000):
+    return actor(TensorDict({"pixels": torch.zeros(n, 1)}, [n]))["action"]
+
+
+def build(seed=0):
+    return make_actor(Fixed(), Categorical(3), torch.Generator().manual_seed(seed))
+
+
+def test_samples_with_the_given_probabilities_by_default():
+    shares = torch.bincount(act(build()), minlength=3) / 20_000
+    expected = torch.tensor([0.1, 0.7, 0.2])
+    deviation = (expected * (1 - expected) / 20_000).sqrt()
+    assert ((shares - expected).abs() < 4 * deviation).all()
+
+
+def test_greedy_takes_the_most_probable():
+    with set_exploration_type(ExplorationType.DETERMINISTIC):
+        assert (act(build()) == 1).all()
+
+
+def test_draws_from_its_own_generator_alone():
+    torch.manual_seed(0)
+    before = torch.get_rng_state()
+    first = act(build(1))
+    assert torch.equal(torch.get_rng_state(), before)
+    assert torch.equal(first, act(build(1)))
+    assert not torch.equal(first, act(build(2)))
+
+
+def test_copies_share_one_stream():
+    source = RandomSource(torch.Generator().manual_seed(0))
+    one = SeededCategorical(torch.zeros(100, 3), source).sample()
+    two = SeededCategorical(torch.zeros(100, 3), copy.deepcopy(source)).sample()
+    assert not torch.equal(one, two)
+
+
+def test_log_prob_and_entropy():
+    distribution = SeededCategorical(torch.tensor([[0.0, 0.0]]))
+    assert distribution.log_prob(torch.tensor([1])).exp().item() == 0.5
+    assert distribution.sample((7,)).shape == (7, 1)

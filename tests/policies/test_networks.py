@@ -1,0 +1,71 @@
+import pytest
+import torch
+from torch import nn
+
+from drone_rl.policies import MLP, OriginalCNN, SmallCNN
+from drone_rl.utils.errors import InputError
+
+NETWORKS = [OriginalCNN, SmallCNN, MLP]
+
+
+@pytest.mark.parametrize("network", NETWORKS)
+@pytest.mark.parametrize("shape", [(1, 25, 64), (3, 40, 33), (2, 100, 256)])
+def test_sizes_follow_from_the_picture(network, shape):
+    net = network(shape, 3)
+    assert net(torch.zeros(5, *shape)).shape == (5, 3)
+    assert net(torch.zeros(shape)).shape == (3,)
+    assert net(torch.zeros(2, 4, *shape)).shape == (2, 4, 3)
+
+
+def test_original_is_the_original_studys():
+    net = OriginalCNN((1, 25, 64), 3)
+    named = dict(net.layers.named_children())
+    assert list(named) == [
+        "conv1", "relu1", "pool1", "conv2", "relu2", "pool2", "flatten",
+        "fc1", "fc_relu1", "fc2", "fc_relu2", "logits",
+    ]  # fmt: skip
+    shapes = [tuple(m.weight.shape) for m in named.values() if hasattr(m, "weight")]
+    assert shapes == [(6, 1, 5, 5), (16, 6, 5, 5), (120, 624), (84, 120), (3, 84)]
+
+
+@pytest.mark.parametrize("network", NETWORKS)
+def test_weights_come_from_the_generator_alone(network):
+    def build(seed):
+        return network((1, 25, 64), 3, generator=torch.Generator().manual_seed(seed)).state_dict()
+
+    first, again, other = build(0), build(0), build(1)
+    assert all(torch.equal(first[k], again[k]) for k in first)
+    assert not torch.equal(first["layers.logits.weight"], other["layers.logits.weight"])
+
+
+@pytest.mark.parametrize("network", [SmallCNN, MLP])
+def test_first_policy_is_nearly_uniform(network):
+    net = network((1, 25, 64), 3, generator=torch.Generator().manual_seed(0))
+    probabilities = net(torch.randn(64, 1, 25, 64)).softmax(-1)
+    assert (probabilities - 1 / 3).abs().max() < 0.1
+
+
+def test_he_normal_convolutions():
+    net = OriginalCNN((1, 25, 64), 3, channels=(64, 64), generator=torch.Generator().manual_seed(0))
+    weight = net.layers.conv2.weight
+    assert float(weight.detach().std()) == pytest.approx((2 / (64 * 25)) ** 0.5, rel=0.05)
+
+
+@pytest.mark.parametrize("network", [OriginalCNN, SmallCNN])
+def test_picture_too_small_names_the_size_that_works(network):
+    with pytest.raises(InputError, match="2x2 pixels is too small") as error:
+        network((1, 2, 2), 3)
+    smallest = int(str(error.value).split("at least ")[1].split("x")[0])
+    network((1, smallest, smallest), 3)
+
+
+def test_picture_of_another_size_is_refused():
+    with pytest.raises(InputError, match="was built for"):
+        SmallCNN((1, 25, 64), 3)(torch.zeros(1, 1, 30, 64))
+
+
+def test_linear_and_convolutional_layers_are_trainable():
+    net = SmallCNN((1, 25, 64), 3)
+    net(torch.randn(4, 1, 25, 64)).sum().backward()
+    assert all(p.grad is not None for p in net.parameters())
+    assert sum(isinstance(m, nn.Conv2d) for m in net.layers) == 2

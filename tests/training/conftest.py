@@ -1,0 +1,66 @@
+"""A training of milliseconds: a bandit of two actions whose episodes have one to four steps."""
+
+import pytest
+import torch
+from tensordict import TensorDict
+from tensordict.nn import TensorDictModule
+from torch import nn
+from torchrl.data import Categorical
+
+from drone_rl.objectives import ReinforceLoss, TimeBaseline
+from drone_rl.policies import make_actor
+from drone_rl.training import Trainer
+
+
+class Bandit:
+    """A collector: action 1 is worth 1. All its randomness is in two generators."""
+
+    def __init__(self, actor, episodes=8, seed=0):
+        self.actor, self.episodes = actor, episodes
+        self.generator = torch.Generator().manual_seed(seed)
+        self.is_open = True
+
+    @torch.no_grad()
+    def collect(self):
+        lengths = torch.randint(1, 5, (self.episodes,), generator=self.generator).tolist()
+        steps = sum(lengths)
+        batch = self.actor(
+            TensorDict({"pixels": torch.randn(steps, 4, generator=self.generator)}, [steps])
+        )
+        done = torch.zeros(steps, 1, dtype=torch.bool)
+        done[torch.tensor(lengths).cumsum(0) - 1] = True
+        batch["next"] = {"reward": batch["action"][:, None].float(), "done": done}
+        return batch
+
+    def state_dict(self):
+        return {"generator": self.generator.get_state()}
+
+    def load_state_dict(self, state):
+        self.generator.set_state(state["generator"])
+
+    def shutdown(self):
+        self.is_open = False
+
+
+@pytest.fixture
+def make_trainer():
+    def build(seed=0, **kwargs):
+        network = nn.Linear(4, 2)
+        nn.init.normal_(network.weight, generator=torch.Generator().manual_seed(seed))
+        nn.init.zeros_(network.bias)
+        actions = torch.Generator().manual_seed(seed + 100)
+        actor = make_actor(network, Categorical(2), actions)
+        optimiser = torch.optim.Adam(network.parameters(), lr=0.05)
+        settings = {"target": None, "total_frames": 200, **kwargs}
+        return Trainer(
+            collector=Bandit(actor, seed=seed),
+            network=network,
+            estimator=TimeBaseline(0.9, max_steps=4),
+            loss=ReinforceLoss(actor),
+            optimiser=optimiser,
+            scheduler=torch.optim.lr_scheduler.StepLR(optimiser, 2, 0.9),
+            generators={"actions": actions},
+            **settings,
+        )
+
+    return build

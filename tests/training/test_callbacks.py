@@ -1,0 +1,78 @@
+import csv
+import logging
+
+import pytest
+from torchrl.record.loggers.csv import CSVLogger
+
+from drone_rl.training import (
+    CheckpointCallback,
+    CsvCallback,
+    LoggerCallback,
+    ProgressCallback,
+    load_checkpoint,
+)
+from drone_rl.utils.errors import InputError
+
+
+def rows(path):
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_newest_and_best_are_kept(make_trainer, tmp_path):
+    trainer = make_trainer(callbacks=[CheckpointCallback(tmp_path, interval_s=0.0)])
+    trainer.run()
+    last, best = (load_checkpoint(tmp_path / name) for name in ("last.pt", "best.pt"))
+    assert last["progress"]["updates"] == trainer.progress.updates
+    assert best["progress"]["running_cubes"] >= last["progress"]["running_cubes"]
+    assert best["best"] == best["progress"]["running_cubes"]
+
+
+def test_first_checkpoint_is_there_before_the_first_update(make_trainer, tmp_path):
+    callback = CheckpointCallback(tmp_path / "deep" / "folder")
+    callback.on_start(make_trainer())
+    assert load_checkpoint(callback.last_path)["progress"]["updates"] == 0
+
+
+def test_folder_that_cannot_be_made(make_trainer, tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="can't be made"):
+        CheckpointCallback(tmp_path / "file" / "sub").on_start(make_trainer())
+
+
+def test_one_row_an_update(make_trainer, tmp_path):
+    trainer = make_trainer(callbacks=[CsvCallback(tmp_path / "metrics.csv")])
+    trainer.run()
+    table = rows(tmp_path / "metrics.csv")
+    assert [int(r["update"]) for r in table] == list(range(1, trainer.progress.updates + 1))
+    assert float(table[-1]["train/running_cubes"]) == pytest.approx(
+        trainer.progress.running_cubes, rel=1e-4
+    )
+
+
+def test_resumed_run_repeats_no_row_and_loses_none(make_trainer, tmp_path):
+    path = tmp_path / "metrics.csv"
+    first = make_trainer(callbacks=[CsvCallback(path)], total_frames=100)
+    first.run()
+    state = first.state_dict()
+    first.total_frames = 200
+    first.run()  # rows that were never checkpointed
+    resumed = make_trainer(callbacks=[CsvCallback(path)], total_frames=300)
+    resumed.load_state_dict(state)
+    resumed.run()
+    updates = [int(r["update"]) for r in rows(path)]
+    assert updates == list(range(1, resumed.progress.updates + 1))
+
+
+def test_any_torchrl_logger(make_trainer, tmp_path):
+    logger = CSVLogger("run", log_dir=str(tmp_path))
+    make_trainer(callbacks=[LoggerCallback([logger])]).run()
+    assert list(tmp_path.glob("run/scalars/**/*cubes*.csv"))
+
+
+def test_lines_instead_of_a_bar_where_there_is_no_terminal(make_trainer, caplog):
+    caplog.set_level(logging.INFO)
+    make_trainer(callbacks=[ProgressCallback(interval_s=0.0)]).run()
+    lines = [r.getMessage() for r in caplog.records]
+    assert any("running cubes" in line and "frames/s" in line for line in lines)
+    assert "stopped (frames)" in lines[-1]

@@ -1,0 +1,101 @@
+import errno
+import os
+import pickle
+
+import pytest
+import torch
+from torch import nn
+
+from drone_rl.training import check_same_config, load_checkpoint, load_policy, save_checkpoint
+from drone_rl.utils.errors import InputError
+
+
+@pytest.fixture
+def saved(tmp_path):
+    path = tmp_path / "last.pt"
+    save_checkpoint(path, {"value": torch.arange(3), "name": "first"})
+    return path
+
+
+def test_round_trip(saved):
+    state = load_checkpoint(saved)
+    assert state["value"].tolist() == [0, 1, 2]
+    assert state["name"] == "first"
+    assert [p.name for p in saved.parent.iterdir()] == ["last.pt"]
+
+
+@pytest.mark.parametrize("step", ["fsync", "replace"])
+def test_full_disk_leaves_the_previous_checkpoint_and_no_debris(saved, monkeypatch, step):
+    def full(*args):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, step, full)
+    with pytest.raises(InputError, match="No space left") as error:
+        save_checkpoint(saved, {"name": "second"})
+    monkeypatch.undo()
+    assert "\n" not in str(error.value)
+    assert load_checkpoint(saved)["name"] == "first"
+    assert [p.name for p in saved.parent.iterdir()] == ["last.pt"]
+
+
+def test_folder_that_is_not_there(tmp_path):
+    with pytest.raises(InputError, match="hydra.run.dir"):
+        save_checkpoint(tmp_path / "no" / "last.pt", {})
+
+
+def test_missing(tmp_path):
+    with pytest.raises(InputError, match="does not exist"):
+        load_checkpoint(tmp_path / "last.pt")
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.9])
+def test_truncated(saved, share):
+    data = saved.read_bytes()
+    saved.write_bytes(data[: int(share * len(data))])
+    with pytest.raises(InputError, match="damaged or cut short"):
+        load_checkpoint(saved)
+
+
+@pytest.mark.parametrize("how", ["torch", "pickle"])
+def test_code_is_not_run(tmp_path, how):
+    path = tmp_path / "evil.pt"
+    marker = tmp_path / "ran"
+
+    class Evil:
+        def __reduce__(self):
+            return (os.mkdir, (str(marker),))
+
+    if how == "torch":
+        torch.save({"format": "drone_rl checkpoint", "x": Evil()}, path)
+    else:
+        path.write_bytes(pickle.dumps(Evil()))
+    with pytest.raises(InputError, match="code|damaged"):
+        load_checkpoint(path)
+    assert not marker.exists()
+
+
+def test_not_ours_and_of_another_version(tmp_path):
+    torch.save({"state_dict": {}}, tmp_path / "a.pt")
+    with pytest.raises(InputError, match="not a drone_rl checkpoint"):
+        load_checkpoint(tmp_path / "a.pt")
+    torch.save({"format": "drone_rl checkpoint", "format_version": 99}, tmp_path / "b.pt")
+    with pytest.raises(InputError, match="version 99"):
+        load_checkpoint(tmp_path / "b.pt")
+
+
+def test_other_architecture_names_the_first_difference():
+    with pytest.raises(InputError, match=r"weight is \(3, 4\) there and \(2, 4\) here"):
+        load_policy(nn.Linear(4, 2), nn.Linear(4, 3).state_dict())
+    with pytest.raises(InputError, match="bias is absent there"):
+        load_policy(nn.Linear(4, 2), nn.Linear(4, 2, bias=False).state_dict())
+    with pytest.raises(InputError, match="bias is .* there and absent here"):
+        load_policy(nn.Linear(4, 2, bias=False), nn.Linear(4, 2).state_dict())
+
+
+def test_changed_config_is_named_with_both_values():
+    saved = {"seed": 0, "optimiser": {"lr": 0.1}, "trainer": {"total_frames": 10}}
+    check_same_config(saved, {**saved, "trainer": {"total_frames": 99}}, ["trainer.total_frames"])
+    with pytest.raises(InputError, match=r"optimiser.lr=0.2: .* optimiser.lr=0.1"):
+        check_same_config(saved, {**saved, "optimiser": {"lr": 0.2}}, ["trainer.total_frames"])
+    with pytest.raises(InputError, match="extra=1"):
+        check_same_config(saved, {**saved, "extra": 1}, [])
