@@ -1,7 +1,7 @@
 """From settings to objects, for every command alike."""
 
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import torch
 from hydra.utils import instantiate
@@ -48,8 +48,7 @@ def build_network(config: DictConfig, env: TransformedEnv, *, seed: int) -> Poli
 def build_collector(
     config: DictConfig,
 ) -> tuple[ThreadedCollector, PolicyNetwork, dict[str, torch.Generator]]:
-    """A training's worlds, shared out to threads, the network that flies in all of them, and the
-    random streams of its actions.
+    """A training's worlds shared out to threads, the network in all of them, its random streams.
 
     Raises:
         InputError: There are no worlds or no threads.
@@ -76,6 +75,11 @@ def build_collector(
         generators[f"actions_{i}"] = actions
         collectors.append(EpisodeCollector(env, make_actor(network, env.action_spec, actions)))
     return ThreadedCollector(collectors), network, generators
+
+
+def plain(config: DictConfig) -> dict[str, Any]:
+    """Settings as plain values, every reference resolved."""
+    return cast(dict[str, Any], OmegaConf.to_container(config, resolve=True))
 
 
 def find_checkpoint(where: str, outputs: str) -> Path:

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from hydra.core.hydra_config import HydraConfig
-from omegaconf import DictConfig, OmegaConf
+from omegaconf import DictConfig
 
-from drone_rl.cli.build import build_env, find_checkpoint, load_trained, trained_config
+from drone_rl.cli.build import build_env, find_checkpoint, load_trained, plain, trained_config
 from drone_rl.cli.play import film
 from drone_rl.evaluation import Oracle, RandomPolicy, run_episodes, summarise
 from drone_rl.utils.errors import InputError
@@ -26,7 +26,7 @@ def run(config: DictConfig) -> tuple[int, float]:
         )
     folder = Path(HydraConfig.get().runtime.output_dir)
     path = find_checkpoint(config.checkpoint, config.paths.outputs)
-    task: dict[str, Any] = OmegaConf.to_container(config.task, resolve=True)
+    task = plain(config.task)
     env, actor, state = load_trained(
         path,
         min(config.num_envs, config.episodes),
@@ -61,8 +61,10 @@ def table(results: dict[str, dict[str, Any]]) -> str:
     rows = [("", list(results))]
     rows.append(("mean cubes", [f"{r['mean_cubes']:.3f}" for r in results.values()]))
     rows.append(("all cubes", [_share(r["all_cubes"]) for r in results.values()]))
-    for side in ("left", "ahead", "right"):
-        rows.append((f"collected {side}", [_share(r["by_side"][side]) for r in results.values()]))
+    rows.extend(
+        (f"collected {side}", [_share(r["by_side"][side]) for r in results.values()])
+        for side in ("left", "ahead", "right")
+    )
     for reason in next(iter(results.values()))["end_reason"]:
         label = f"ended: {reason.replace('_', ' ')}"
         rows.append((label, [str(r["end_reason"][reason]) for r in results.values()]))

@@ -1,14 +1,19 @@
 """`drone-rl play`."""
 
 import logging
+import os
 from pathlib import Path
-from typing import Any
 
+import dm_env
+import torch
 from hydra.core.hydra_config import HydraConfig
-from omegaconf import DictConfig, OmegaConf
+from omegaconf import DictConfig
+from tensordict import TensorDict
+from torchrl.envs.utils import ExplorationType, set_exploration_type
 
-from drone_rl.cli.build import find_checkpoint, load_trained
+from drone_rl.cli.build import find_checkpoint, load_trained, plain
 from drone_rl.evaluation.video import film_episode, write_video
+from drone_rl.sim.collect_cubes import make_environment
 from drone_rl.utils.errors import InputError
 
 _log = logging.getLogger(__name__)
@@ -29,7 +34,7 @@ def run(config: DictConfig) -> tuple[int, None]:
 
 def film(config: DictConfig, path: Path, folder: Path, episodes: int) -> None:
     """Writes videos of a checkpoint's policy on held-out worlds."""
-    task: dict[str, Any] = OmegaConf.to_container(config.task, resolve=True)
+    task = plain(config.task)
     env, actor, _ = load_trained(path, 1, task=task, seed=config.seed, device=config.device)
     for episode in range(episodes):
         frames = list(film_episode(env, actor, greedy=config.greedy))
@@ -39,5 +44,27 @@ def film(config: DictConfig, path: Path, folder: Path, episodes: int) -> None:
 
 
 def _view(config: DictConfig, path: Path) -> None:
-    """Opens dm_control's viewer on the composer task, flown by the checkpoint's policy."""
-    raise NotImplementedError
+    """Opens dm_control's viewer on the composer task, flown by the checkpoint's policy.
+
+    The viewer shows the dm_control simulation; the policy sees the same poses drawn by Warp, as
+    it did in training.
+    """
+    if not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        raise InputError("viewer=true needs a display, and there is none; leave it false to film")
+    from dm_control import viewer
+
+    task = plain(config.task)
+    env, actor, _ = load_trained(path, 1, task=task, seed=config.seed, device=config.device)
+    worlds = env.base_env.worlds
+    shown = make_environment(worlds.settings, worlds.camera, pixels=False, random_state=config.seed)
+    kind = ExplorationType.DETERMINISTIC if config.greedy else ExplorationType.RANDOM
+
+    @torch.no_grad()
+    def policy(timestep: dm_env.TimeStep) -> int:
+        del timestep
+        pixels = worlds.render(shown.task.state.to(worlds.device))
+        seen = env.transform(TensorDict({"pixels": pixels}, [1], device=worlds.device))
+        with set_exploration_type(kind):
+            return int(actor(seen)["action"])
+
+    viewer.launch(shown, policy, title="drone-rl play")

@@ -11,7 +11,7 @@ from hydra.core.hydra_config import HydraConfig
 from hydra.utils import instantiate
 from omegaconf import DictConfig, OmegaConf
 
-from drone_rl.cli.build import build_collector
+from drone_rl.cli.build import build_collector, plain
 from drone_rl.training import (
     CheckpointCallback,
     CsvCallback,
@@ -55,7 +55,7 @@ def prepare(overrides: list[str]) -> list[str]:
 def run(config: DictConfig) -> tuple[int, float]:
     """Trains one policy. Returns the exit status and the running mean of cubes."""
     folder = Path(HydraConfig.get().runtime.output_dir)
-    resolved: dict[str, Any] = OmegaConf.to_container(config, resolve=True)
+    resolved = plain(config)
     state = load_checkpoint(folder / "checkpoints" / "last.pt") if config.resume else None
     if state is not None:
         check_same_config(state["config"], resolved, MAY_CHANGE)

@@ -99,13 +99,13 @@ class EpisodeCollector:
 
     def state_dict(self) -> dict:
         """Counters and the environment's random streams, as they stand between two batches."""
-        env = self.env.state_dict()
-        return {"frames": self.frames, "episodes": self.episodes, "env": env}
+        worlds = getattr(self.env, "base_env", self.env).state_dict()
+        return {"frames": self.frames, "episodes": self.episodes, "worlds": worlds}
 
     def load_state_dict(self, state: dict) -> None:
         """Goes on from a `state_dict`."""
         self.frames, self.episodes = state["frames"], state["episodes"]
-        self.env.load_state_dict(state["env"])
+        getattr(self.env, "base_env", self.env).load_state_dict(state["worlds"])
 
     def shutdown(self) -> None:
         """Closes the environment."""

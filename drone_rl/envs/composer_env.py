@@ -16,8 +16,8 @@ class ComposerEnv(DMControlWrapper):
         if not isinstance(kwargs["env"], composer.Environment):
             raise TypeError(f"env={kwargs['env']!r} is not a composer.Environment")
 
-    def _make_specs(self, env: composer.Environment, batch_size: tuple = ()) -> None:
-        super()._make_specs(env, batch_size)
+    def _make_specs(self, env: composer.Environment) -> None:
+        super()._make_specs(env)
         num_actions = env.action_spec().num_values
         self.action_spec = Categorical(num_actions, dtype=torch.int64, device=self.device)
 

@@ -140,11 +140,10 @@ class StandardizePixels(_PixelTransform):
         super().__init__(in_keys, out_keys)
         if not std > 0:
             raise InputError(f"StandardizePixels(std={std}): give a deviation above 0")
-        self.register_buffer("mean", torch.tensor(float(mean)))
-        self.register_buffer("std", torch.tensor(float(std)))
+        self.mean, self.std = float(mean), float(std)
 
     def _apply_transform(self, pixels: Tensor) -> Tensor:
-        return torch.add(-self.mean / self.std, pixels, alpha=float(1.0 / self.std))
+        return (pixels - self.mean).div_(self.std)
 
     def __repr__(self) -> str:
         return f"StandardizePixels(mean={self.mean:g}, std={self.std:g})"

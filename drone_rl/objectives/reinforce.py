@@ -15,8 +15,8 @@ class ReinforceLoss(LossModule):
     """-sum_t g_t log pi(a_t | s_t), reduced over the batch (chapter, Eq. 15).
 
     The returns g_t come from a return estimator; the stored action is scored, never a new one.
-    `reduction="mean"` averages over steps; `"sum"` adds them up, as Algorithm 4 does for one episode
-    (Eq. 12 is that sum over the number of episodes).
+    `reduction="mean"` averages over steps; `"sum"` adds them up, as Algorithm 4 does for one
+    episode (Eq. 12 is that sum over the number of episodes).
 
     The output's `loss_*` entries add up to what is to be back-propagated; the others are detached.
 
@@ -37,7 +37,8 @@ class ReinforceLoss(LossModule):
 
     tensor_keys: _AcceptedKeys
     default_keys = _AcceptedKeys
-    out_keys = ("loss_actor", "loss_entropy", "entropy")
+    out_keys = ("loss_actor", "loss_entropy", "entropy")  # pyright: ignore
+    entropy_coeff: torch.Tensor
     actor_network: ProbabilisticTensorDictSequential
     actor_network_params: TensorDictParams
     target_actor_network_params: TensorDictParams

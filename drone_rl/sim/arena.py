@@ -6,7 +6,7 @@ SKY_COLOR = (0.62, 0.74, 0.92)
 """Red, green, blue of everything that is neither floor, cube nor drone."""
 FLOOR_COLOR = (0.5, 0.54, 0.48)
 FLOOR_SIZE = (300.0, 300.0, 100.0)
-"""Half extents in metres, and the spacing of OpenGL's grid: finite and coarse is 20 times faster."""
+"""Half extents in metres and the spacing of OpenGL's grid: coarse is 20 times faster there."""
 DRAW_DISTANCE = 200.0
 """Metres beyond which nothing is drawn."""
 

@@ -146,7 +146,8 @@ class CameraSettings:
                 raise InputError(f"camera.{name}={value} is out of range; give 1 to 4096 pixels")
         if not 1.0 <= self.horizontal_fov <= 170.0:
             raise InputError(
-                f"camera.horizontal_fov={self.horizontal_fov} is out of range; give 1 to 170 degrees"
+                f"camera.horizontal_fov={self.horizontal_fov} is out of range; "
+                "give 1 to 170 degrees"
             )
 
     @property

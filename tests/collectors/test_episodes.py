@@ -76,7 +76,7 @@ def test_stops_at_total_frames(make_pipeline):
 
 
 def test_unbatched_environment_is_refused(make_pipeline):
-    env, actor = make_pipeline(1)
+    _, actor = make_pipeline(1)
 
     class Unbatched:
         batch_size = torch.Size([])
@@ -116,6 +116,9 @@ def test_threaded_state_round_trip(make_pipeline):
     second = threaded(make_pipeline)
     second.load_state_dict(state)
     assert second.state_dict() == state
+    for one, two in zip(first.collectors, second.collectors, strict=True):
+        cubes = [c.env.reset()["info", "cube_positions"] for c in (one, two)]
+        assert torch.equal(*cubes)
     assert second.collectors[0].frames == first.collectors[0].frames
     first.shutdown()
     second.shutdown()

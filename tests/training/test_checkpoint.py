@@ -39,7 +39,7 @@ def test_full_disk_leaves_the_previous_checkpoint_and_no_debris(saved, monkeypat
 
 
 def test_folder_that_is_not_there(tmp_path):
-    with pytest.raises(InputError, match="hydra.run.dir"):
+    with pytest.raises(InputError, match=r"hydra\.run\.dir"):
         save_checkpoint(tmp_path / "no" / "last.pt", {})
 
 
@@ -69,7 +69,7 @@ def test_code_is_not_run(tmp_path, how):
         torch.save({"format": "drone_rl checkpoint", "x": Evil()}, path)
     else:
         path.write_bytes(pickle.dumps(Evil()))
-    with pytest.raises(InputError, match="code|damaged"):
+    with pytest.raises(InputError, match=r"code|damaged"):
         load_checkpoint(path)
     assert not marker.exists()
 
@@ -88,7 +88,7 @@ def test_other_architecture_names_the_first_difference():
         load_policy(nn.Linear(4, 2), nn.Linear(4, 3).state_dict())
     with pytest.raises(InputError, match="bias is absent there"):
         load_policy(nn.Linear(4, 2), nn.Linear(4, 2, bias=False).state_dict())
-    with pytest.raises(InputError, match="bias is .* there and absent here"):
+    with pytest.raises(InputError, match=r"bias is .* there and absent here"):
         load_policy(nn.Linear(4, 2, bias=False), nn.Linear(4, 2).state_dict())
 
 
