@@ -70,6 +70,11 @@ def test_defaults_are_the_settings_own():
     assert instantiate(config.camera) == CameraSettings()
 
 
+@pytest.mark.parametrize("command", ["evaluate", "play"])
+def test_any_setting_of_the_task_can_be_changed_for_a_trained_policy(command):
+    assert set(compose(command).task) == {f.name for f in dataclasses.fields(TaskSettings)}
+
+
 def test_schemas_know_every_setting():
     for group, settings in (("task", TaskSettings), ("camera", CameraSettings)):
         ours = {f.name for f in dataclasses.fields(SCHEMAS[group])} - {"_target_"}
@@ -108,7 +113,8 @@ def uncommented(path):
     lines = path.read_text().splitlines()
     for i, line in enumerate(lines):
         text = line.strip()
-        is_knob = ":" in text and not text.startswith(("#", "-", "_", "defaults:"))
+        is_knob = ":" in text and not text.startswith(("#", "-", "_", "defaults:", "{"))
+        is_knob &= not text.endswith((",", "}"))
         if is_knob and not lines[i - 1].strip().startswith("#") and not text.endswith(":"):
             yield f"{path.name}:{i + 1}: {text}"
 

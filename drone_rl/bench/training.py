@@ -59,7 +59,7 @@ def bench_memory(folder: Path, frames: int, device: str, quick: bool) -> dict[st
     Returns:
         The peak, and the slope over the last four fifths of the frames.
     """
-    frames = 20_000 if quick else frames
+    frames = 9_000 if quick else frames
     run = folder / "memory"
     command = ["train", "trainer.target=null", f"trainer.total_frames={frames}"]
     process = subprocess.Popen(

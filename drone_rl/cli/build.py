@@ -114,7 +114,7 @@ def load_trained(
     Args:
         path: The checkpoint.
         num_envs: Number of worlds.
-        task: Settings that replace the checkpoint's own.
+        task: Settings that replace the checkpoint's own; None keeps them.
         seed: Root of the worlds' random streams.
         device: Where to run.
 
@@ -134,17 +134,7 @@ def load_trained(
 
 
 def trained_config(state: dict[str, Any], task: dict[str, Any]) -> DictConfig:
-    """The settings that a checkpoint was trained with, some of the task's replaced.
-
-    Raises:
-        InputError: The task has no such setting.
-    """
+    """The settings that a checkpoint was trained with; what `task` gives replaces the task's."""
     config = OmegaConf.create(state["config"])
-    unknown = sorted(set(task) - set(config.task))
-    if unknown:
-        raise InputError(
-            f"task.{unknown[0]} is not a setting of the task; choose from: "
-            f"{', '.join(k for k in config.task if k != '_target_')}"
-        )
-    config.task.update(task)
+    config.task.update({k: v for k, v in task.items() if v is not None})
     return config

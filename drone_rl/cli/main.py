@@ -3,6 +3,7 @@
 import importlib
 import os
 import sys
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 
@@ -99,6 +100,8 @@ def _demo(overrides: list[str]) -> int:
 def _guarded(command: Callable[[list[str]], int], overrides: list[str]) -> int:
     """Turns the user's mistakes into one line each; bugs keep their traceback."""
     os.environ["HYDRA_FULL_ERROR"] = "1"  # let Hydra's own errors through to be shortened here
+    warnings.filterwarnings("ignore", message=".*DISPLAY.*")  # dm_control looks for a screen
+    warnings.filterwarnings("ignore", message=".*GLFW.*")
     from hydra.errors import HydraException
     from omegaconf.errors import OmegaConfBaseException
 

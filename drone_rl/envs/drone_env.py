@@ -7,6 +7,7 @@ from torch import Tensor
 from torchrl.data import Binary, Bounded, Categorical, Composite, Unbounded
 from torchrl.envs import EnvBase
 
+from drone_rl.sim.renderer import check_device
 from drone_rl.sim.rules import Action, EndReason, WorldState
 from drone_rl.sim.settings import CameraSettings, TaskSettings
 from drone_rl.sim.worlds import CubeWorlds
@@ -60,6 +61,7 @@ class DroneEnv(EnvBase):
         """
         if not (isinstance(num_envs, int) and num_envs >= 1):
             raise InputError(f"num_envs={num_envs} is out of range; give a whole number from 1")
+        check_device(device)
         super().__init__(device=torch.device(device), batch_size=torch.Size([num_envs]))
         self.worlds = CubeWorlds(num_envs, task, camera, device=device, num_shards=num_shards)
         self.pixels = pixels

@@ -80,7 +80,8 @@ class WarpRenderer:
             InputError: The model has no such camera, or there is no such device.
         """
         check_device(device)
-        wp.config.log_level = max(wp.config.log_level, wp.LOG_WARNING)
+        quiet = wp.LOG_ERROR if device == "cpu" else wp.LOG_WARNING  # no word about missing CUDA
+        wp.config.log_level = max(wp.config.log_level, quiet)
         self.view = view
         self.device = torch.device(device)
         on_gpu = self.device.type == "cuda"

@@ -187,9 +187,10 @@ def test_checkpoint_of_another_architecture_truncated_or_with_code(run, in_proce
 
 
 def test_unknown_setting_of_the_evaluated_task(run, in_process):
-    line = error_line(in_process("evaluate", f"checkpoint={run}", "task={num_cubs: 5}", cwd=run))
+    line = error_line(in_process("evaluate", f"checkpoint={run}", "task.num_cubs=5", cwd=run))
     assert "num_cubs" in line
-    assert "num_cubes" in line
+    line = error_line(in_process("evaluate", f"checkpoint={run}", "task.num_cubes=0", cwd=run))
+    assert "num_cubes=0" in line
 
 
 def test_full_disk_while_saving_keeps_the_previous_checkpoint(run, tmp_path):
