@@ -37,7 +37,7 @@ def bench_solve(
         _call(
             "evaluate",
             f"checkpoint={run}",
-            f"episodes={100 if quick else episodes}",
+            f"episodes={50 if quick else episodes}",
             "baselines=false",
             "videos=0",
             f"device={device}",
@@ -59,7 +59,7 @@ def bench_memory(folder: Path, frames: int, device: str, quick: bool) -> dict[st
     Returns:
         The peak, and the slope over the last four fifths of the frames.
     """
-    frames = 9_000 if quick else frames
+    frames = 6_000 if quick else frames
     run = folder / "memory"
     command = ["train", "trainer.target=null", f"trainer.total_frames={frames}"]
     process = subprocess.Popen(

@@ -58,7 +58,7 @@ def build_collector(
         raise InputError(
             f"collector.num_envs={worlds} and collector.num_threads={threads} must be 1 or more"
         )
-    threads = min(worlds, threads)
+    threads = 1 if config.device.startswith("cuda") else min(worlds, threads)
     shares = [worlds // threads + (i < worlds % threads) for i in range(threads)]
     network, collectors, generators = None, [], {}
     for i, share in enumerate(shares):

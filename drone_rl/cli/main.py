@@ -78,6 +78,8 @@ def run_command(command: str, overrides: list[str]) -> int:
             print(f"error: {error}", file=sys.stderr)
             status, value = 2, None
         statuses.append(status)
+        if status > 128:  # a signal ends a whole sweep, not one run of it
+            sys.exit(status)
         return value
 
     job.__module__ = stage.__name__

@@ -16,6 +16,7 @@ from drone_rl.training import (
     CheckpointCallback,
     CsvCallback,
     LoggerCallback,
+    NotANumberError,
     ProgressCallback,
     Trainer,
     check_same_config,
@@ -65,6 +66,8 @@ def run(config: DictConfig) -> tuple[int, float]:
         checkpoints.best = state["best"]
     try:
         reason = trainer.run()
+    except NotANumberError as error:
+        raise InputError(f"{error}; the last good checkpoint is {checkpoints.last_path}") from error
     finally:
         trainer.collector.shutdown()
     result = {"reason": reason, **dataclasses.asdict(trainer.progress)}

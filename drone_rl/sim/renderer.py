@@ -12,6 +12,7 @@ import dataclasses
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import AbstractContextManager, nullcontext
 from typing import Literal
 
 import mujoco
@@ -198,10 +199,11 @@ class _Shard:
         self._qpos[:num_worlds] = qpos
         self._mocap_pos[:num_worlds] = mocap_pos
         self._data.nworld = num_worlds
-        mjw.kinematics(self._model, self._data)
-        mjw.camlight(self._model, self._data)
-        mjw.refit_bvh(self._model, self._data, self._context)
-        mjw.render(self._model, self._data, self._context)
+        with _on_torch_stream(self._qpos.device):
+            mjw.kinematics(self._model, self._data)
+            mjw.camlight(self._model, self._data)
+            mjw.refit_bvh(self._model, self._data, self._context)
+            mjw.render(self._model, self._data, self._context)
         if out is not None:
             out.copy_(self._unpack(self._pixels[:num_worlds]))
 
@@ -225,6 +227,13 @@ class _Shard:
         if self._view.modality == "segmentation":
             return rows.view(*shape, 2)[..., 0]
         return rows.view(*shape, 4)[..., :3].flip(-1)  # packed as blue, green, red, alpha
+
+
+def _on_torch_stream(device: torch.device) -> AbstractContextManager:
+    """Puts Warp's launches in order with torch's on a GPU; a CPU has no streams."""
+    if device.type == "cpu":
+        return nullcontext()
+    return wp.ScopedStream(wp.stream_from_torch(torch.cuda.current_stream(device)))
 
 
 def check_device(device: str) -> None:

@@ -91,10 +91,6 @@ class CheckpointCallback(Callback):
         """Saves the final state."""
         self._save(trainer)
 
-    def on_failure(self, trainer: "Trainer") -> None:
-        """Says where the last good state is."""
-        _log.error("the last good checkpoint is %s", self.last_path)
-
     def _save(self, trainer: "Trainer") -> None:
         running = trainer.progress.running_cubes
         is_best = running > self.best

@@ -186,6 +186,31 @@ def test_checkpoint_of_another_architecture_truncated_or_with_code(run, in_proce
     assert "could run code" in line
 
 
+def test_nan_names_itself_and_the_last_good_checkpoint(in_process, tmp_path):
+    sgd = ["optimiser=sgd", "optimiser.lr=1e38", "trainer.total_frames=4000"]
+    line = error_line(in_process("train", *TINY, *sgd, "hydra.run.dir=nan"))
+    assert "NaN or infinite" in line
+    assert "nan/checkpoints/last.pt" in line
+    state = load_checkpoint(tmp_path / "nan" / "checkpoints" / "last.pt")
+    assert all(v.isfinite().all() for v in state["policy"].values())
+
+
+@pytest.mark.skipif("DISPLAY" in os.environ, reason="there is a display")
+def test_viewer_without_a_display(run, in_process):
+    line = error_line(in_process("play", f"checkpoint={run}", "viewer=true", cwd=run))
+    assert "needs a display" in line
+
+
+def test_play_films(run):
+    args = ["play", f"checkpoint={run}", "episodes=1", "greedy=false", "hydra.run.dir=films"]
+    done = drone_rl(*args, cwd=run)
+    assert done.returncode == 0, done.stderr
+    assert {p.name for p in (run / "films").glob("episode_0.*")} == {
+        "episode_0.mp4",
+        "episode_0.gif",
+    }
+
+
 def test_unknown_setting_of_the_evaluated_task(run, in_process):
     line = error_line(in_process("evaluate", f"checkpoint={run}", "task.num_cubs=5", cwd=run))
     assert "num_cubs" in line

@@ -1,0 +1,26 @@
+"""An installed wheel works outside the checkout: its configuration travels with it."""
+
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+
+
+def test_wheel_carries_the_configuration_and_runs_without_the_checkout(tmp_path):
+    build = ["-m", "hatchling", "build", "-t", "wheel", "-d", str(tmp_path)]
+    subprocess.run([sys.executable, *build], cwd=ROOT, check=True, capture_output=True)
+    (wheel,) = tmp_path.glob("*.whl")
+    with zipfile.ZipFile(wheel) as archive:
+        names = set(archive.namelist())
+        archive.extractall(tmp_path / "site")
+    carried = {p.relative_to(ROOT / "conf") for p in (ROOT / "conf").rglob("*.yaml")}
+    assert {f"drone_rl/conf/{path.as_posix()}" for path in carried} <= names
+    assert "drone_rl/py.typed" in names
+    code = "import sys; sys.path.insert(0, 'site'); from drone_rl.cli import main as m; "
+    code += "assert str(m.conf_dir()).endswith('site/drone_rl/conf'), m.conf_dir(); m.main()"
+    command = [sys.executable, "-c", code, "train", "--cfg", "job"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "num_cubes: 3" in done.stdout
