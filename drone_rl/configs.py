@@ -50,7 +50,7 @@ class TrainerConfig:
 
     total_frames: int = MISSING
     total_episodes: int | None = MISSING
-    target: float | None = MISSING
+    target_share: float | None = MISSING
     running_decay: float = MISSING
     max_grad_norm: float | None = MISSING
     minibatch_frames: int = MISSING

@@ -61,7 +61,7 @@ def bench_memory(folder: Path, frames: int, device: str, quick: bool) -> dict[st
     """
     frames = 6_000 if quick else frames
     run = folder / "memory"
-    command = ["train", "trainer.target=null", f"trainer.total_frames={frames}"]
+    command = ["train", "trainer.target_share=null", f"trainer.total_frames={frames}"]
     process = subprocess.Popen(
         [*_PROGRAM, *command, f"device={device}", f"hydra.run.dir={run}", "logger=csv"],
         stdout=subprocess.DEVNULL,

@@ -31,7 +31,7 @@ MAY_CHANGE = (
     "paths",
     "trainer.total_frames",
     "trainer.total_episodes",
-    "trainer.target",
+    "trainer.target_share",
     "trainer.checkpoint_interval_s",
 )
 """Settings that a resumed run may change: they don't enter into what is learned."""
@@ -82,7 +82,9 @@ def run(config: DictConfig) -> tuple[int, float]:
 def _build(
     config: DictConfig, folder: Path, resolved: dict[str, Any]
 ) -> tuple[Trainer, CheckpointCallback]:
-    settings = {k: v for k, v in config.trainer.items() if k != "checkpoint_interval_s"}
+    settings = dict(config.trainer)
+    del settings["checkpoint_interval_s"]
+    share = settings.pop("target_share")
     _check_trainer(config)
     collector, network, generators = build_collector(config)
     actor = collector.collectors[0].actor
@@ -109,13 +111,14 @@ def _build(
             checkpoints,
         ],
         generators=generators,
+        target=None if share is None else share * config.task.num_cubes,
         **settings,
     )
     return trainer, checkpoints
 
 
 def _check_trainer(config: DictConfig) -> None:
-    trainer, cubes = config.trainer, config.task.num_cubes
+    trainer = config.trainer
     if trainer.total_frames < 1 or trainer.minibatch_frames < 1:
         raise InputError(
             f"trainer.total_frames={trainer.total_frames} and trainer.minibatch_frames="
@@ -128,9 +131,8 @@ def _check_trainer(config: DictConfig) -> None:
     lr = config.optimiser.get("lr")
     if lr is not None and not lr > 0:
         raise InputError(f"optimiser.lr={lr} is out of range; give a rate above 0")
-    if trainer.target is not None and trainer.target > cubes:
-        _log.warning(
-            "trainer.target=%s can't be reached with task.num_cubes=%d: no early stop",
-            trainer.target,
-            cubes,
+    share = trainer.target_share
+    if share is not None and not 0 < share <= 1:
+        raise InputError(
+            f"trainer.target_share={share} is out of range; give a share above 0, up to 1, or null"
         )
