@@ -9,7 +9,6 @@ shard of the batch a core, each with its own buffers, on a pool of threads.
 """
 
 import dataclasses
-import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager, nullcontext
@@ -23,6 +22,7 @@ from torch import Tensor
 
 from drone_rl.sim.drone import BODY_GROUP
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.provenance import num_cores
 
 Modality = Literal["rgb", "depth", "segmentation"]
 
@@ -86,7 +86,7 @@ class WarpRenderer:
         self.view = view
         self.device = torch.device(device)
         on_gpu = self.device.type == "cuda"
-        wanted = 1 if on_gpu else num_shards or len(os.sched_getaffinity(0))
+        wanted = 1 if on_gpu else num_shards or num_cores()
         capacity = -(-max_worlds // max(1, min(wanted, max_worlds)))
         self._capacity = capacity
         count = -(-max_worlds // capacity)
