@@ -28,8 +28,8 @@ def bench_collector(num_envs: int, num_threads: int, device: str, quick: bool) -
     collected, drawn, ratio = paired(
         lambda: len(collector.collect()),
         lambda: len(worlds.render(worlds.state)),
-        seconds=1.0 if quick else 5.0,
-        rounds=1 if quick else 5,
+        seconds=1.0 if quick else 4.0,
+        rounds=1 if quick else 9,
     )
     collector.shutdown()
     env.close()
