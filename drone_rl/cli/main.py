@@ -17,17 +17,18 @@ commands
   train      learn a policy; writes checkpoints and logs under outputs/train
   evaluate   test a policy on unseen worlds: table, JSON, videos
   play       film a policy, or watch it in dm_control's viewer
+  sweep-report   compare the runs of a sweep: CSV, JSON, HTML
   bench      measure every figure that the README quotes
 
 examples
   drone-rl train                       train with the defaults
   drone-rl train seed=1 device=cuda    change settings
-  drone-rl train -m seed=0,1,2         one run for each value
+  drone-rl train -m seed=0,1,2         one run for each value, side by side
   drone-rl train resume=RUN_FOLDER     go on with an interrupted run
   drone-rl evaluate                    test the newest policy
   drone-rl COMMAND --help              every setting of a command
 """
-COMMANDS = ("train", "evaluate", "play", "bench")
+COMMANDS = ("train", "evaluate", "play", "sweep-report", "bench")
 
 
 def conf_dir() -> Path:
@@ -66,9 +67,11 @@ def run_command(command: str, overrides: list[str]) -> int:
     from drone_rl.configs import register_configs
     from drone_rl.utils.errors import InputError
 
-    stage = importlib.import_module(f"drone_rl.cli.{command}")
+    name = command.replace("-", "_")
+    stage = importlib.import_module(f"drone_rl.cli.{name}")
     overrides = getattr(stage, "prepare", lambda o: o)(overrides)
     register_configs()
+    getattr(stage, "register", lambda: None)()
     statuses: list[int] = []
 
     def job(config: object) -> object:
@@ -83,7 +86,8 @@ def run_command(command: str, overrides: list[str]) -> int:
         return value
 
     job.__module__ = stage.__name__
-    wrapped = hydra.main(version_base="1.3", config_path=str(conf_dir()), config_name=command)(job)
+    job.statuses = statuses  # where a launcher that runs jobs elsewhere notes how they ended
+    wrapped = hydra.main(version_base="1.3", config_path=str(conf_dir()), config_name=name)(job)
     argv = sys.argv
     sys.argv = [f"drone-rl {command}", *overrides]
     try:

@@ -11,7 +11,10 @@ from hydra.core.hydra_config import HydraConfig
 from hydra.utils import instantiate
 from omegaconf import DictConfig, OmegaConf
 
-from drone_rl.cli.build import build_collector, plain
+from drone_rl.cli.build import build_collector, load_trained, plain
+from drone_rl.cli.launchers import LocalLauncher, RayLauncher, SlurmLauncher, register_plugins
+from drone_rl.evaluation import run_episodes, summarise
+from drone_rl.sweeps.naming import is_sweep, sweep_name
 from drone_rl.training import (
     CheckpointCallback,
     CsvCallback,
@@ -23,6 +26,7 @@ from drone_rl.training import (
     load_checkpoint,
 )
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.files import folder_lock, write_atomically
 from drone_rl.utils.provenance import provenance
 
 MAY_CHANGE = (
@@ -33,17 +37,30 @@ MAY_CHANGE = (
     "trainer.total_episodes",
     "trainer.target_share",
     "trainer.checkpoint_interval_s",
+    "evaluate_after",
 )
 """Settings that a resumed run may change: they don't enter into what is learned."""
 
 _log = logging.getLogger(__name__)
 
 
+def register() -> None:
+    """Tells Hydra of the launchers."""
+    register_plugins(LocalLauncher, SlurmLauncher, RayLauncher)
+
+
 def prepare(overrides: list[str]) -> list[str]:
-    """Makes `resume=FOLDER` mean: the settings of that run, and its folder."""
+    """Makes `resume=FOLDER` mean: the settings of that run, and its folder; names a sweep's."""
+    if is_sweep(overrides):
+        if any(o.startswith("hydra.sweep.dir=") for o in overrides):
+            return overrides
+        parent = "${paths.outputs}/${hydra.job.config_name}/multiruns"
+        return [*overrides, f"hydra.sweep.dir={parent}/{sweep_name(overrides)}"]
     folders = [o.split("=", 1)[1] for o in overrides if o.startswith("resume=")]
     if not folders or folders[-1] in ("", "null"):
         return overrides
+    if any(o.startswith("hydra.run.dir=") for o in overrides):
+        return overrides  # a sweep gives all settings itself
     folder = Path(folders[-1])
     if not (folder / "checkpoints" / "last.pt").is_file():
         raise InputError(f"resume={folder} has no checkpoints/last.pt; give the folder of a run")
@@ -56,6 +73,11 @@ def prepare(overrides: list[str]) -> list[str]:
 def run(config: DictConfig) -> tuple[int, float]:
     """Trains one policy. Returns the exit status and the running mean of cubes."""
     folder = Path(HydraConfig.get().runtime.output_dir)
+    with folder_lock(folder):
+        return _train(config, folder)
+
+
+def _train(config: DictConfig, folder: Path) -> tuple[int, float]:
     resolved = plain(config)
     state = load_checkpoint(folder / "checkpoints" / "last.pt") if config.resume else None
     if state is not None:
@@ -71,12 +93,25 @@ def run(config: DictConfig) -> tuple[int, float]:
     finally:
         trainer.collector.shutdown()
     result = {"reason": reason, **dataclasses.asdict(trainer.progress)}
-    (folder / "result.json").write_text(json.dumps(result, indent=2))
+    result["num_cubes"] = config.task.num_cubes
+    if config.evaluate_after and not reason.startswith("SIG"):
+        result["evaluation"] = _evaluate(config, checkpoints.last_path)
+    write_atomically(folder / "result.json", json.dumps(result, indent=2))
     _log.info("run folder: %s", folder)
     status = 128 + signal.Signals[reason].value if reason.startswith("SIG") else 0
     if status:
         _log.info("go on with: drone-rl train resume=%s", folder)
     return status, trainer.progress.running_cubes
+
+
+def _evaluate(config: DictConfig, path: Path) -> dict[str, Any]:
+    """How good the last parameters are, in the held-out worlds of `drone-rl evaluate`."""
+    episodes = config.evaluate_after
+    worlds = min(episodes, 250)
+    env, actor, _ = load_trained(path, worlds, task={}, seed=0, device=config.device)
+    figures = summarise(run_episodes(env, actor, episodes))
+    env.close()
+    return figures
 
 
 def _build(
@@ -124,6 +159,8 @@ def _check_trainer(config: DictConfig) -> None:
             f"trainer.total_frames={trainer.total_frames} and trainer.minibatch_frames="
             f"{trainer.minibatch_frames} must be 1 or more"
         )
+    if config.evaluate_after < 0:
+        raise InputError(f"evaluate_after={config.evaluate_after} must be 0 or more")
     if not 0 <= trainer.running_decay < 1:
         raise InputError(
             f"trainer.running_decay={trainer.running_decay} is out of range; give 0 to below 1"

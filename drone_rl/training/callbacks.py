@@ -115,7 +115,8 @@ class CsvCallback(Callback):
             return
         with self.path.open(newline="") as file:
             rows = [r for r in csv.reader(file)]
-        kept = rows[:1] + [r for r in rows[1:] if r and int(r[0]) <= trainer.progress.updates]
+        whole = [r for r in rows[1:] if len(r) == len(rows[0])]  # the last may be cut short
+        kept = rows[:1] + [r for r in whole if int(r[0]) <= trainer.progress.updates]
         temporary = self.path.with_suffix(".tmp")
         with temporary.open("w", newline="") as file:
             csv.writer(file).writerows(kept)

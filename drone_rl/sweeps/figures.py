@@ -1,0 +1,155 @@
+"""The pictures of a sweep's report, each as PNG bytes for a light and for a dark page."""
+
+import dataclasses
+import io
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from matplotlib import colormaps, style
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from drone_rl.evaluation import proportion
+from drone_rl.sweeps.statistics import bootstrap_band, interquartile_mean, on_grid
+from drone_rl.sweeps.summary import Group
+from drone_rl.sweeps.verdict import KINDS
+
+FAVOURITE_AXIS = "optimiser.lr"
+COLORS = {"good": "tab:green", "one-sided": "tab:orange", "poor": "tab:red", "none": "0.5"}
+MAX_PANELS = 6
+
+
+@dataclasses.dataclass
+class Layout:
+    """Which setting lies along the axis, and what is drawn in which panel."""
+
+    axis: str | None
+    """A swept setting; None if only seeds differ."""
+    panels: dict[str, list[Group]]
+    """Groups by what they have in common beside that setting."""
+
+
+def lay_out(groups: Sequence[Group]) -> Layout:
+    """The learning rate, or else the first swept setting, along the axis; a panel for the rest."""
+    keys = list(groups[0].choice) if groups else []
+    axis = FAVOURITE_AXIS if FAVOURITE_AXIS in keys else (keys[-1] if keys else None)
+    panels: dict[str, list[Group]] = {}
+    for group in groups:
+        rest = [f"{key}={value}" for key, value in group.choice.items() if key != axis]
+        panels.setdefault(", ".join(rest), []).append(group)
+    return Layout(axis, dict(list(panels.items())[:MAX_PANELS]))
+
+
+def draw_curves(layout: Layout) -> tuple[bytes, bytes]:
+    """Learning curves: interquartile mean over seeds with its bootstrap band."""
+    return _draw(layout, _curves, height=3.6)
+
+
+def draw_verdicts(layout: Layout) -> tuple[bytes, bytes]:
+    """Share of each verdict against the axis, with exact intervals."""
+    return _draw(layout, _verdicts, height=3.4)
+
+
+def draw_costs(layout: Layout) -> tuple[bytes, bytes]:
+    """Frames to solve of every run that was solved, against the axis."""
+    return _draw(layout, _costs, height=3.2)
+
+
+def _draw(
+    layout: Layout, draw: Callable[[Axes, Layout, list[Group]], None], height: float
+) -> tuple[bytes, bytes]:
+    pictures = []
+    for sheet in ("default", "dark_background"):
+        with style.context(sheet):
+            count = max(1, len(layout.panels))
+            columns = min(2, count)
+            rows = -(-count // columns)
+            figure = Figure(figsize=(5.2 * columns, height * rows), layout="constrained")
+            figure.patch.set_alpha(0.0)
+            grid = figure.subplots(rows, columns, squeeze=False, sharey=True).flat
+            for axes, (title, groups) in zip(grid, layout.panels.items(), strict=False):
+                axes.patch.set_alpha(0.0)
+                axes.spines[["top", "right"]].set_visible(False)
+                axes.set_title(_literal(title), fontsize=10)
+                draw(axes, layout, groups)
+            for axes in list(grid)[count:]:
+                axes.set_visible(False)
+            file = io.BytesIO()
+            figure.savefig(file, format="png", dpi=110)
+            pictures.append(file.getvalue())
+    return pictures[0], pictures[1]
+
+
+def _curves(axes: Axes, layout: Layout, groups: list[Group]) -> None:
+    colors = colormaps["viridis"](np.linspace(0.1, 0.9, max(1, len(groups))))
+    for group, color in zip(groups, colors, strict=True):
+        curves = [row.curve for row in group.finished if len(row.curve[0])]
+        if not curves:
+            continue
+        grid = np.linspace(0, max(x[-1] for x, _ in curves), 120)
+        values = np.stack([on_grid(x, y, grid) for x, y in curves])
+        lower, upper = bootstrap_band(values, resamples=400)
+        label = _literal(group.choice.get(layout.axis or "", "all runs"))
+        axes.plot(grid, interquartile_mean(values), color=color, label=label)
+        axes.fill_between(grid, lower, upper, color=color, alpha=0.2, linewidth=0)
+    axes.set(xlabel="frames", ylabel="running mean, share of cubes", ylim=(0, 1))
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(title=_literal(layout.axis or ""), fontsize=7, title_fontsize=7)
+
+
+def _verdicts(axes: Axes, layout: Layout, groups: list[Group]) -> None:
+    places = _places(axes, layout, groups)
+    for i, kind in enumerate(KINDS):
+        shares = []
+        for group in groups:
+            judged = [row.verdict for row in group.finished if row.verdict is not None]
+            shares.append(proportion(judged.count(kind), len(judged)))
+        known = [(x, s) for x, s in zip(places, shares, strict=True) if s["trials"]]
+        if not known:
+            continue
+        x = np.array([place for place, _ in known])
+        y, low, high = (
+            np.array([s[k] for _, s in known]) for k in ("share", "lower95", "upper95")
+        )
+        shift = 1.03 ** (i - 1.5) if axes.get_xscale() == "log" else 1.0
+        error = np.abs([y - low, high - y])
+        axes.errorbar(
+            x * shift, y, yerr=error, marker="o", capsize=2, color=COLORS[kind], label=kind
+        )
+    axes.set(ylabel="share of runs", ylim=(-0.03, 1.03))
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(fontsize=7)
+
+
+def _costs(axes: Axes, layout: Layout, groups: list[Group]) -> None:
+    for place, group in zip(_places(axes, layout, groups), groups, strict=True):
+        frames = [row.result["frames"] for row in group.finished if row.is_solved]
+        axes.plot([place] * len(frames), frames, "o", alpha=0.6, color="tab:blue")
+        axes.annotate(
+            f"{len(frames)}/{len(group.finished)}",
+            (place, 1.0),
+            xycoords=("data", "axes fraction"),
+            ha="center",
+            va="top",
+            fontsize=7,
+        )
+    axes.set(ylabel="frames to solve", ylim=(0, None))
+
+
+def _places(axes: Axes, layout: Layout, groups: list[Group]) -> list[float]:
+    """Where the groups lie along the axis: at their numbers, or side by side."""
+    names = [group.choice.get(layout.axis or "", "") for group in groups]
+    axes.set_xlabel(_literal(layout.axis or "all runs"))
+    try:
+        places = [float(name) for name in names]
+    except ValueError:
+        axes.set_xticks(range(len(names)), [_literal(n) for n in names], rotation=20, fontsize=7)
+        return [float(i) for i in range(len(names))]
+    if min(places) > 0 and max(places) / min(places) > 20:
+        axes.set_xscale("log")
+    return places
+
+
+def _literal(text: str) -> str:
+    """Text in which matplotlib sees no formula."""
+    return text.replace("$", r"\$")

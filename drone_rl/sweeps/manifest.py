@@ -1,0 +1,120 @@
+"""What a sweep consists of, kept in its folder, so that the same command goes on with it."""
+
+import dataclasses
+import json
+import shlex
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from drone_rl.sweeps.runs import Run
+from drone_rl.training import check_same_config
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.files import write_atomically
+from drone_rl.utils.provenance import provenance
+
+FORMAT = "drone_rl sweep"
+MAY_CHANGE = ("resume", "logger", "paths", "trainer.checkpoint_interval_s")
+"""Settings that may differ when a sweep is gone on with."""
+
+
+@dataclasses.dataclass
+class Sweep:
+    """The content of `sweep.json`."""
+
+    folder: Path
+    """Of the whole sweep."""
+    command: str
+    """What the user typed first."""
+    settings: dict[str, Any]
+    """What all runs have in common, references unresolved."""
+    runs: list[Run]
+    """In the order of their numbers."""
+
+    def save(self) -> None:
+        """Writes `sweep.json`."""
+        runs = [
+            {"number": r.number, "overrides": list(r.overrides), "folder": r.folder.name}
+            for r in self.runs
+        ]
+        content = {
+            "format": FORMAT,
+            "command": self.command,
+            "settings": self.settings,
+            "runs": runs,
+            **provenance(),
+        }
+        write_atomically(self.folder / "sweep.json", json.dumps(content, indent=2))
+
+
+def read_sweep(folder: Path) -> Sweep:
+    """Reads `sweep.json`.
+
+    Raises:
+        InputError: The folder holds no sweep, or the file is damaged.
+    """
+    path = folder / "sweep.json"
+    if not path.is_file():
+        raise InputError(
+            f"{folder} is not the folder of a sweep (it has no sweep.json); "
+            "give one that drone-rl train -m made, outputs/train/multiruns/..."
+        )
+    try:
+        content = json.loads(path.read_text())
+        runs = [
+            Run(int(r["number"]), tuple(r["overrides"]), folder / r["folder"])
+            for r in content["runs"]
+        ]
+        return Sweep(folder, content["command"], content["settings"], runs)
+    except (ValueError, KeyError, TypeError) as error:
+        raise InputError(
+            f"{path} is damaged ({type(error).__name__}); move the folder away and sweep again"
+        ) from error
+
+
+def open_sweep(
+    folder: Path, command: Sequence[str], settings: Mapping[str, Any], runs: Sequence[Run]
+) -> Sweep:
+    """Begins a sweep in a new folder, or goes on with the same sweep in its folder.
+
+    Args:
+        folder: Of the sweep; made if need be.
+        command: What the user typed.
+        settings: What all runs have in common.
+        runs: Known ones must be as they were; new ones are added, such as those of more seeds.
+
+    Raises:
+        InputError: The folder holds another sweep.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    if not (folder / "sweep.json").exists():
+        _refuse_strangers(folder)
+        sweep = Sweep(folder, shlex.join(command), dict(settings), list(runs))
+    else:
+        sweep = read_sweep(folder)
+        _check_same_runs(sweep, runs)
+        check_same_config(sweep.settings, json.loads(json.dumps(settings)), MAY_CHANGE)
+        known = {run.number for run in sweep.runs}
+        sweep.runs += [run for run in runs if run.number not in known]
+    sweep.save()
+    return sweep
+
+
+def _refuse_strangers(folder: Path) -> None:
+    """Runs with no sweep.json are someone else's."""
+    stranger = next(folder.glob("*/run.yaml"), None)
+    if stranger is not None:
+        raise InputError(
+            f"hydra.sweep.dir={folder} holds runs of something else ({stranger.parent.name}); "
+            "choose another folder"
+        )
+
+
+def _check_same_runs(sweep: Sweep, runs: Sequence[Run]) -> None:
+    before = {run.number: run.overrides for run in sweep.runs}
+    for run in runs:
+        if before.get(run.number, run.overrides) != run.overrides:
+            raise InputError(
+                f"hydra.sweep.dir={sweep.folder} holds another sweep, begun by: {sweep.command}; "
+                "choose another folder, or give that command to go on with it"
+            )
