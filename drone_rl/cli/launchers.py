@@ -4,6 +4,7 @@ Hydra's own launcher runs all jobs in one process, and its joblib launcher has n
 a process a run starts each from the same state and lets one fail without the others.
 """
 
+import copy
 import importlib
 import logging
 import signal
@@ -84,12 +85,15 @@ class SweepLauncher(Launcher):
         return failed
 
     def _run(self, folder: Path, number: int, overrides: Sequence[str]) -> Run:
-        """A run in the folder that `hydra.sweep.subdir` names."""
-        config = self.hydra_context.config_loader.load_sweep_config(self.config, list(overrides))
+        """A run in the folder that `hydra.sweep.subdir` names; composing it all would be slow."""
+        config = copy.deepcopy(self.config)
+        left_out = tuple(f"{key}=" for key in config.hydra.job.config.override_dirname.exclude_keys)
+        told = sorted(o for o in overrides if not o.startswith(left_out))
         with open_dict(config):
             config.hydra.job.id = config.hydra.job.num = number
+            config.hydra.job.override_dirname = ",".join(told).replace("/", "-")
         HydraConfig.instance().set_config(config)
-        return Run(number, tuple(overrides), folder / str(config.hydra.sweep.subdir))
+        return Run(number, tuple(overrides), folder / str(config.hydra.sweep.subdir)[:200])
 
     def _settings(self) -> dict[str, Any]:
         everything = OmegaConf.to_container(self.config, resolve=False)
@@ -158,7 +162,9 @@ def _job_return(run: Run) -> JobReturn:
     """What a sweeper gets to see of a run: the running mean of cubes, or None if it failed."""
     result = read_result(run.folder)
     value = None if result is None else result.get("running_cubes")
-    job = JobReturn(overrides=list(run.overrides), status=JobStatus.COMPLETED)
+    job = JobReturn(
+        overrides=list(run.overrides), working_dir=str(run.folder), status=JobStatus.COMPLETED
+    )
     job.return_value = value
     return job
 

@@ -13,8 +13,10 @@ from omegaconf import DictConfig, OmegaConf
 
 from drone_rl.cli.build import build_collector, load_trained, plain
 from drone_rl.cli.launchers import LocalLauncher, RayLauncher, SlurmLauncher, register_plugins
+from drone_rl.cli.optuna_sweeper import OptunaSweeper
 from drone_rl.evaluation import run_episodes, summarise
 from drone_rl.sweeps.naming import is_sweep, sweep_name
+from drone_rl.sweeps.search import PruneCallback
 from drone_rl.training import (
     CheckpointCallback,
     CsvCallback,
@@ -38,6 +40,7 @@ MAY_CHANGE = (
     "trainer.target_share",
     "trainer.checkpoint_interval_s",
     "evaluate_after",
+    "trial",
 )
 """Settings that a resumed run may change: they don't enter into what is learned."""
 
@@ -45,8 +48,8 @@ _log = logging.getLogger(__name__)
 
 
 def register() -> None:
-    """Tells Hydra of the launchers."""
-    register_plugins(LocalLauncher, SlurmLauncher, RayLauncher)
+    """Tells Hydra of the launchers and the sweeper."""
+    register_plugins(LocalLauncher, SlurmLauncher, RayLauncher, OptunaSweeper)
 
 
 def prepare(overrides: list[str]) -> list[str]:
@@ -132,6 +135,7 @@ def _build(
         extra={"config": resolved, "provenance": origin},
     )
     loggers = [instantiate(logger) for logger in config.logger.values()]
+    searching = [] if config.trial is None else [PruneCallback(folder.parent, config.trial)]
     trainer = Trainer(
         collector=collector,
         network=network,
@@ -144,6 +148,7 @@ def _build(
             LoggerCallback(loggers),
             ProgressCallback(),
             checkpoints,
+            *searching,
         ],
         generators=generators,
         target=None if share is None else share * config.task.num_cubes,

@@ -108,9 +108,7 @@ def _verdicts(axes: Axes, layout: Layout, groups: list[Group]) -> None:
         if not known:
             continue
         x = np.array([place for place, _ in known])
-        y, low, high = (
-            np.array([s[k] for _, s in known]) for k in ("share", "lower95", "upper95")
-        )
+        y, low, high = (np.array([s[k] for _, s in known]) for k in ("share", "lower95", "upper95"))
         shift = 1.03 ** (i - 1.5) if axes.get_xscale() == "log" else 1.0
         error = np.abs([y - low, high - y])
         axes.errorbar(
@@ -125,7 +123,7 @@ def _costs(axes: Axes, layout: Layout, groups: list[Group]) -> None:
     for place, group in zip(_places(axes, layout, groups), groups, strict=True):
         frames = [row.result["frames"] for row in group.finished if row.is_solved]
         axes.plot([place] * len(frames), frames, "o", alpha=0.6, color="tab:blue")
-        axes.annotate(
+        note = axes.annotate(
             f"{len(frames)}/{len(group.finished)}",
             (place, 1.0),
             xycoords=("data", "axes fraction"),
@@ -133,6 +131,7 @@ def _costs(axes: Axes, layout: Layout, groups: list[Group]) -> None:
             va="top",
             fontsize=7,
         )
+        note.set_in_layout(False)
     axes.set(ylabel="frames to solve", ylim=(0, None))
 
 
@@ -147,6 +146,8 @@ def _places(axes: Axes, layout: Layout, groups: list[Group]) -> list[float]:
         return [float(i) for i in range(len(names))]
     if min(places) > 0 and max(places) / min(places) > 20:
         axes.set_xscale("log")
+    axes.update_datalim([(place, 0.0) for place in places])
+    axes.autoscale_view()
     return places
 
 

@@ -11,6 +11,8 @@ from pathlib import Path
 from drone_rl.sweeps.runs import THREADS, Run, read_result
 from drone_rl.utils.files import is_locked, write_atomically
 
+PROGRAM = (sys.executable, "-m", "drone_rl.cli.main")
+"""What a run is started with."""
 POLL_S = 0.1
 """Time between two looks at a process."""
 
@@ -56,7 +58,7 @@ class RunProcess:
         self.run.failure.unlink(missing_ok=True)
         with self._log.open("ab") as log:
             return subprocess.Popen(
-                [sys.executable, "-m", "drone_rl.cli.main", *self.run.arguments()],
+                [*PROGRAM, *self.run.arguments()],
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=subprocess.STDOUT,

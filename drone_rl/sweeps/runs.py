@@ -40,7 +40,8 @@ class Run:
 
     def repeat_command(self) -> str:
         """The shell command that trains the same once more."""
-        words = ["drone-rl", "train", *self.overrides, "hydra.mode=RUN"]
+        settings = [o for o in self.overrides if not o.startswith("trial=")]
+        words = ["drone-rl", "train", *settings, "hydra.mode=RUN"]
         return f"OMP_NUM_THREADS=1 {shlex.join(words)}"
 
 

@@ -150,7 +150,7 @@ def to_csv(rows: Sequence[Row]) -> str:
 
 def _choice(run: Run) -> dict[str, str]:
     parts = (override.partition("=") for override in run.overrides)
-    return {key.lstrip("+"): value for key, _, value in parts}
+    return {key.lstrip("+"): value for key, _, value in parts if key != "trial"}
 
 
 def _read_row(run: Run, choice: dict[str, str]) -> Row:

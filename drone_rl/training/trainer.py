@@ -112,6 +112,8 @@ class Trainer:
         self.minibatch_frames = minibatch_frames
         self.progress = Progress()
         self.stop_signal: signal.Signals | None = None
+        self.stop_request = ""
+        """Why a callback wants training to stop after this update; empty to go on."""
 
     def run(self) -> str:
         """Trains until solved, out of budget or told to stop.
@@ -120,7 +122,8 @@ class Trainer:
         aborts at once.
 
         Returns:
-            Why it stopped: "solved", "frames", "episodes" or a signal's name.
+            Why it stopped: "solved", "frames", "episodes", a signal's name or what a callback
+            gave as `stop_request`.
 
         Raises:
             NotANumberError: A loss or gradient was NaN or infinite.
@@ -201,6 +204,8 @@ class Trainer:
         progress = self.progress
         if self.stop_signal is not None:
             return self.stop_signal.name
+        if self.stop_request:
+            return self.stop_request
         if self.target is not None and progress.running_cubes >= self.target:
             return "solved"
         if self.total_episodes is not None and progress.episodes >= self.total_episodes:

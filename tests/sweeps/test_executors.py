@@ -1,0 +1,116 @@
+"""Runs are begun, gone on with, left alone or given up, each without harm to the others."""
+
+import json
+import sys
+import threading
+import time
+
+import pytest
+
+from drone_rl.sweeps import LocalExecutor, read_result
+from drone_rl.sweeps.executors import SlurmExecutor, extra
+from drone_rl.sweeps.process import finish_run
+from drone_rl.sweeps.runs import quoted, read_failure
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.files import folder_lock
+
+pytestmark = pytest.mark.usefixtures("fake_training")
+
+
+def starts(run):
+    return (run.folder / "starts").read_text().split()
+
+
+def test_all_runs_end_and_one_that_fails_stops_no_other(make_runs):
+    runs = make_runs("seed=0", "fail=true", "seed=2")
+    ended = dict(LocalExecutor(2).finish(runs))
+    assert [ended[run] for run in runs] == [0, 1, 0]
+    assert read_failure(runs[1]) == "fail=true is a mistake"
+    assert read_failure(runs[0]) is None
+    assert read_result(runs[1].folder) is None
+
+
+def test_two_at_once_take_half_as_long(make_runs):
+    begin = time.perf_counter()
+    list(LocalExecutor(4).finish(make_runs(*["sleep=1"] * 4)))
+    assert time.perf_counter() - begin < 3
+
+
+def test_finished_runs_are_left_alone_and_half_finished_ones_resumed(make_runs):
+    runs = make_runs("seed=0", "seed=1", "seed=2")
+    finish_run(runs[0])
+    (runs[1].folder / "checkpoints").mkdir(parents=True)
+    runs[1].checkpoint.touch()
+    runs[2].folder.mkdir()
+    (runs[2].folder / "result.json").write_text("{cut sho")
+    list(LocalExecutor(2).finish(runs))
+    assert [starts(run) for run in runs] == [["begun"], ["resumed"], ["begun"]]
+
+
+def test_a_run_that_was_stopped_is_not_finished(make_runs):
+    (run,) = make_runs("seed=0")
+    run.folder.mkdir()
+    (run.folder / "result.json").write_text(json.dumps({"reason": "SIGTERM"}))
+    assert read_result(run.folder) is None
+
+
+def test_a_failure_is_forgotten_when_the_run_succeeds(make_runs):
+    (run,) = make_runs("seed=0")
+    run.folder.mkdir()
+    run.failure.write_text(json.dumps({"error": "no space left"}))
+    assert finish_run(run) == 0
+    assert read_failure(run) is None
+
+
+def test_a_run_that_another_process_works_on_is_waited_for(make_runs):
+    (run,) = make_runs("seed=0")
+    run.folder.mkdir()
+    statuses = []
+    with folder_lock(run.folder):
+        thread = threading.Thread(target=lambda: statuses.append(finish_run(run)))
+        thread.start()
+        time.sleep(0.5)
+        assert not statuses
+        result = {"reason": "solved", "running_cubes": 2.0}
+        (run.folder / "result.json").write_text(json.dumps(result))
+    thread.join(10)
+    assert statuses == [0]
+    assert not (run.folder / "starts").exists()
+
+
+def test_interrupting_a_sweep_stops_its_runs(make_runs):
+    runs = make_runs("sleep=0", "sleep=60")
+    ends = LocalExecutor(2).finish(runs)
+    begin = time.perf_counter()
+    assert next(ends)[0] == runs[0]
+    ends.close()
+    assert time.perf_counter() - begin < 20
+    assert read_result(runs[1].folder) is None
+
+
+def test_slurm_by_submitits_local_executor(make_runs, tmp_path):
+    pytest.importorskip("submitit", reason="pip install 'drone-rl[slurm]'")
+    executor = SlurmExecutor(tmp_path / "jobs", cluster="local", num_jobs=2, timeout_min=5)
+    runs = make_runs("hydra.verbose=false", "no_such_setting=1")
+    for run in runs[:1]:
+        run.folder.mkdir()
+        (run.folder / "result.json").write_text(json.dumps({"reason": "solved"}))
+    ended = dict(executor.finish(runs))
+    assert ended[runs[0]] == 0
+    assert ended[runs[1]] != 0
+    assert "no_such_setting" in read_failure(runs[1])
+
+
+def test_missing_extra_names_the_command_that_installs_it(monkeypatch):
+    monkeypatch.setitem(sys.modules, "submitit", None)
+    with pytest.raises(InputError, match=r"pip install 'drone-rl\[slurm\]'"):
+        extra("submitit", "slurm", "hydra/launcher=slurm")
+
+
+def test_at_least_one_job():
+    with pytest.raises(InputError, match="num_jobs=0"):
+        LocalExecutor(0)
+
+
+def test_folders_with_odd_names_reach_the_program_whole(make_runs):
+    assert quoted("a'b,c=d") == "'a\\'b,c=d'"

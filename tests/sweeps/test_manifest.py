@@ -1,0 +1,54 @@
+"""A folder belongs to one sweep."""
+
+import json
+
+import pytest
+
+from drone_rl.sweeps import open_sweep, read_sweep
+from drone_rl.utils.errors import InputError
+
+
+def begin(folder, runs, **settings):
+    return open_sweep(folder, ["drone-rl", "train", "-m", "a=1,2"], settings, runs)
+
+
+def test_what_is_written_is_read_again(tmp_path, make_runs):
+    runs = make_runs("a=1", "a=2")
+    begin(tmp_path, runs, seed=0)
+    sweep = read_sweep(tmp_path)
+    assert sweep.runs == runs
+    assert sweep.command == "drone-rl train -m a=1,2"
+    assert sweep.settings == {"seed": 0}
+
+
+def test_the_same_is_gone_on_with_and_more_runs_are_added(tmp_path, make_runs):
+    begin(tmp_path, make_runs("a=1"))
+    begin(tmp_path, make_runs("a=1", "a=2"))
+    assert len(begin(tmp_path, make_runs("a=1")).runs) == 2
+
+
+def test_another_sweep_is_refused(tmp_path, make_runs):
+    begin(tmp_path, make_runs("a=1", "a=2"))
+    with pytest.raises(InputError, match=r"another sweep.*a=1,2.*another folder"):
+        begin(tmp_path, make_runs("b=1", "b=2"))
+
+
+def test_a_setting_that_has_changed_since_is_named(tmp_path, make_runs):
+    begin(tmp_path, make_runs("a=1"), task={"num_cubes": 3})
+    with pytest.raises(InputError, match=r"task.num_cubes=5.*task.num_cubes=3"):
+        begin(tmp_path, make_runs("a=1"), task={"num_cubes": 5})
+
+
+def test_runs_of_something_else_are_refused(tmp_path, make_runs):
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "run.yaml").touch()
+    with pytest.raises(InputError, match="something else"):
+        begin(tmp_path, make_runs("a=1"))
+
+
+def test_no_sweep_and_a_damaged_one(tmp_path):
+    with pytest.raises(InputError, match="not the folder of a sweep"):
+        read_sweep(tmp_path)
+    (tmp_path / "sweep.json").write_text(json.dumps({"runs": [{}]}))
+    with pytest.raises(InputError, match="damaged"):
+        read_sweep(tmp_path)

@@ -1,0 +1,72 @@
+"""Rows, groups, verdicts and pages of a sweep that was made by hand."""
+
+import csv
+import json
+
+import pytest
+
+from drone_rl.sweeps.page import write_report
+from drone_rl.sweeps.summary import best_row, make_groups, read_rows
+from drone_rl.sweeps.verdict import classify
+
+
+def test_rows_tell_what_became_of_every_run(sweep):
+    rows = read_rows(sweep)
+    assert [row.state for row in rows] == ["finished", "finished", "finished", "failed"]
+    assert rows[0].choice == {"optimiser.lr": "1e-3", "seed": "0"}
+    assert [row.verdict for row in rows] == ["good", "good", "one-sided", None]
+    assert rows[0].curve[1].tolist() == pytest.approx([0.1, 0.5])
+    assert best_row(rows).run.number == 0
+
+
+def test_groups_are_runs_that_differ_in_their_seed_alone(sweep):
+    low, high = (group.plain() for group in make_groups(read_rows(sweep)))
+    assert low["optimiser.lr"] == "1e-3"
+    assert low["solved"]["successes"] == 2
+    assert low["median_frames_to_solve"] == 1500
+    assert low["verdicts"]["good"]["share"] == 1.0
+    assert low["verdicts"]["good"]["lower95"] == pytest.approx(0.025**0.5)  # exact, 2 of 2
+    assert (high["finished"], high["runs"]) == (1, 2)
+
+
+def test_report_is_whole_and_escapes_what_it_shows(sweep):
+    page = write_report(sweep).read_text()
+    assert "<b>NaN</b>" not in page
+    assert "&lt;b&gt;NaN" in page
+    assert page.count("data:image/png;base64,") == 6  # three figures, light and dark
+    assert "OMP_NUM_THREADS=1 drone-rl train optimiser.lr=1e-3 seed=0" in page
+    assert "href='2/'" in page
+    assert "http" not in page.replace("http-equiv", "")
+    summary = json.loads((sweep.folder / "summary.json").read_text())
+    assert (summary["finished"], summary["failed"], summary["best"]["run"]) == (3, 1, 0)
+    with (sweep.folder / "summary.csv").open(newline="") as file:
+        assert [row["verdict"] for row in csv.DictReader(file)] == ["good", "good", "one-sided", ""]
+
+
+def test_a_corrupt_run_leaves_the_others_unharmed(sweep):
+    (sweep.folder / "0" / "metrics.csv").write_text("frames\nrubbish\n")
+    (sweep.folder / "1" / "result.json").write_text("{")
+    rows = read_rows(sweep)
+    assert [row.state for row in rows] == ["damaged", "unfinished", "finished", "failed"]
+    assert "can't be read" in rows[0].error
+    write_report(sweep)
+
+
+def test_a_sweep_with_nothing_finished_has_a_report(sweep):
+    for path in sweep.folder.glob("*/result.json"):
+        path.unlink()
+    assert "No run has finished yet" in write_report(sweep).read_text()
+
+
+@pytest.mark.parametrize(
+    ("figures", "verdict"),
+    [
+        ({}, "good"),
+        ({"left": 0, "cubes": 1.6}, "one-sided"),
+        ({"right": 1, "cubes": 1.6}, "one-sided"),
+        ({"left": 2, "right": 2, "cubes": 0.8}, "poor"),
+        ({"left": 12, "right": 12, "cubes": 2.0}, "none"),
+    ],
+)
+def test_verdicts(evaluation, figures, verdict):
+    assert classify(evaluation(**figures), 3) == verdict
