@@ -40,8 +40,18 @@ class CameraConfig:
 class CollectorConfig:
     """Schema of conf/collector."""
 
+    make: str = MISSING
     num_envs: int = MISSING
     num_threads: int = MISSING
+
+
+@dataclasses.dataclass
+class RayCollectorConfig(CollectorConfig):
+    """Schema of conf/collector/ray.yaml."""
+
+    address: str | None = MISSING
+    num_cpus: float = MISSING
+    max_lost_workers: int = MISSING
 
 
 @dataclasses.dataclass
@@ -71,3 +81,4 @@ def register_configs() -> None:
     store = ConfigStore.instance()
     for group, schema in SCHEMAS.items():
         store.store(group=group, name=f"base_{group}", node=schema)
+    store.store(group="collector", name="base_ray", node=RayCollectorConfig)

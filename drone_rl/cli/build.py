@@ -1,15 +1,16 @@
 """From settings to objects, for every command alike."""
 
+import functools
 from pathlib import Path
 from typing import Any, cast
 
 import torch
-from hydra.utils import instantiate
+from hydra.utils import get_method, instantiate
 from omegaconf import DictConfig, OmegaConf
 from tensordict.nn import TensorDictModuleBase
 from torchrl.envs import TransformedEnv
 
-from drone_rl.collectors import EpisodeCollector, ThreadedCollector
+from drone_rl.collectors import EpisodeCollector, RayEpisodeCollector, ThreadedCollector
 from drone_rl.envs import DroneEnv, make_env
 from drone_rl.policies import PolicyNetwork, make_actor
 from drone_rl.sim.settings import CameraSettings, TaskSettings
@@ -47,34 +48,83 @@ def build_network(config: DictConfig, env: TransformedEnv, *, seed: int) -> Poli
 
 def build_collector(
     config: DictConfig,
-) -> tuple[ThreadedCollector, PolicyNetwork, dict[str, torch.Generator]]:
-    """A training's worlds shared out to threads, the network in all of them, its random streams.
+) -> tuple[ThreadedCollector | RayEpisodeCollector, PolicyNetwork, dict[str, torch.Generator]]:
+    """A training's worlds shared out to workers, the network in all of them, its random streams.
 
     Raises:
-        InputError: There are no worlds or no threads.
+        InputError: There are no worlds or no workers.
     """
-    worlds, threads = config.collector.num_envs, config.collector.num_threads
-    if worlds < 1 or threads < 1:
+    worlds, workers = config.collector.num_envs, config.collector.num_threads
+    if worlds < 1 or workers < 1:
         raise InputError(
-            f"collector.num_envs={worlds} and collector.num_threads={threads} must be 1 or more"
+            f"collector.num_envs={worlds} and collector.num_threads={workers} must be 1 or more"
         )
-    threads = 1 if config.device.startswith("cuda") else min(worlds, threads)
-    shares = [worlds // threads + (i < worlds % threads) for i in range(threads)]
+    return get_method(config.collector.make)(config)
+
+
+def threaded_collector(
+    config: DictConfig,
+) -> tuple[ThreadedCollector, PolicyNetwork, dict[str, torch.Generator]]:
+    """`collector=episodes`: the workers are threads of this process."""
+    shares = _shares(config, is_one=config.device.startswith("cuda"))
     network, collectors, generators = None, [], {}
-    for i, share in enumerate(shares):
-        env = build_env(
-            config,
-            share,
-            seed=config.seed,
-            device=config.device,
-            first_world=sum(shares[:i]),
-            num_shards=1,
-        )
-        network = network or build_network(config, env, seed=config.seed)
-        actions = torch_generator(config.seed, Stream.ACTIONS, number=i, device=env.device)
+    for i in range(len(shares)):
+        collector, network, actions = build_share(config, shares, i, network)
+        collectors.append(collector)
         generators[f"actions_{i}"] = actions
-        collectors.append(EpisodeCollector(env, make_actor(network, env.action_spec, actions)))
     return ThreadedCollector(collectors), network, generators
+
+
+def ray_collector(
+    config: DictConfig,
+) -> tuple[RayEpisodeCollector, PolicyNetwork, dict[str, torch.Generator]]:
+    """`collector=ray`: the workers are processes of a Ray cluster."""
+    shares = _shares(config)
+    local, network, _ = build_share(config, [1], 0)
+    local.shutdown()
+    settings = plain(config)
+    makers = [functools.partial(_remote_share, settings, shares, i) for i in range(len(shares))]
+    collector = RayEpisodeCollector(
+        makers,
+        local.actor,
+        network,
+        address=config.collector.address,
+        num_cpus=config.collector.num_cpus,
+        max_lost_workers=config.collector.max_lost_workers,
+        device=config.device,
+    )
+    return collector, network, {}
+
+
+def build_share(
+    config: DictConfig, shares: list[int], number: int, network: PolicyNetwork | None = None
+) -> tuple[EpisodeCollector, PolicyNetwork, torch.Generator]:
+    """One worker's worlds, with the network that all share, and the stream of its actions."""
+    env = build_env(
+        config,
+        shares[number],
+        seed=config.seed,
+        device=config.device,
+        first_world=sum(shares[:number]),
+        num_shards=1,
+    )
+    network = network or build_network(config, env, seed=config.seed)
+    actions = torch_generator(config.seed, Stream.ACTIONS, number=number, device=env.device)
+    return EpisodeCollector(env, make_actor(network, env.action_spec, actions)), network, actions
+
+
+def _remote_share(
+    settings: dict[str, Any], shares: list[int], number: int
+) -> tuple[EpisodeCollector, PolicyNetwork, torch.Generator]:
+    """`build_share` from what can be sent."""
+    return build_share(OmegaConf.create(settings), shares, number)
+
+
+def _shares(config: DictConfig, is_one: bool = False) -> list[int]:
+    """Worlds of each worker."""
+    worlds = config.collector.num_envs
+    workers = 1 if is_one else min(worlds, config.collector.num_threads)
+    return [worlds // workers + (i < worlds % workers) for i in range(workers)]
 
 
 def plain(config: DictConfig) -> dict[str, Any]:

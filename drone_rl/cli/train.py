@@ -125,7 +125,6 @@ def _build(
     share = settings.pop("target_share")
     _check_trainer(config)
     collector, network, generators = build_collector(config)
-    actor = collector.collectors[0].actor
     optimiser = instantiate(config.optimiser)(network.parameters())
     origin = provenance()
     OmegaConf.save(OmegaConf.create({"config": resolved, **origin}), folder / "run.yaml")
@@ -140,7 +139,7 @@ def _build(
         collector=collector,
         network=network,
         estimator=instantiate(config.returns).to(config.device),
-        loss=instantiate(config.objective)(actor).to(config.device),
+        loss=instantiate(config.objective)(collector.actor).to(config.device),
         optimiser=optimiser,
         scheduler=instantiate(config.scheduler)(optimiser),
         callbacks=[

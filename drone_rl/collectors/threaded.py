@@ -5,6 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import torch
 from tensordict import TensorDictBase
+from tensordict.nn import TensorDictModuleBase
 
 from drone_rl.collectors.episodes import EpisodeCollector
 
@@ -29,6 +30,11 @@ class ThreadedCollector:
         self._pool = ThreadPoolExecutor(
             len(self.collectors), "collect", initializer=torch.set_num_threads, initargs=(1,)
         )
+
+    @property
+    def actor(self) -> TensorDictModuleBase:
+        """The policy that learns."""
+        return self.collectors[0].actor
 
     def __iter__(self) -> Iterator[TensorDictBase]:
         """Yields batches without end."""

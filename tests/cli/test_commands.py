@@ -119,10 +119,18 @@ def test_evaluate_writes_table_json_and_videos(run):
     assert {p.suffix for p in (run / "evaluation" / "videos").iterdir()} == {".mp4", ".gif"}
 
 
-def test_multirun_makes_a_folder_for_each_run(tmp_path):
-    done = drone_rl("train", "-m", *TINY, "seed=0,1", "hydra.sweep.dir=sweep", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert len(list((tmp_path / "sweep").glob("*/result.json"))) == 2
+@pytest.mark.parametrize(
+    ("module", "extra", "args"),
+    [
+        ("submitit", "slurm", ["-m", "seed=0,1", "hydra/launcher=slurm"]),
+        ("ray", "ray", ["-m", "seed=0,1", "hydra/launcher=ray"]),
+        ("ray", "ray", ["collector=ray", *TINY]),
+        ("optuna", "optuna", ["-m", "seed=0,1", "hydra/sweeper=optuna"]),
+    ],
+)
+def test_an_extra_that_is_not_installed(in_process, monkeypatch, module, extra, args):
+    monkeypatch.setitem(sys.modules, module, None)
+    assert f"pip install 'drone-rl[{extra}]'" in error_line(in_process("train", *args))
 
 
 def test_usage_and_help(tmp_path):
@@ -151,6 +159,11 @@ def test_usage_and_help(tmp_path):
         (["train", "hydra.run.dir=/dev/null/x"], ["/dev/null"]),
         (["evaluate"], ["checkpoint=latest", "drone-rl train"]),
         (["evaluate", "checkpoint=no.pt"], ["no.pt", "does not exist"]),
+        (["train", "-m", "no_such=1,2"], ["no_such", "--help"]),
+        (["train", "-m", "seed=0,1", "hydra.launcher.num_jobs=0"], ["num_jobs=0", "1 or more"]),
+        (["train", "-m", "seed=0,1", "hydra/launcher=pbs"], ["pbs", "slurm"]),
+        (["sweep-report"], ["folder=latest", "drone-rl train -m"]),
+        (["sweep-report", "no/such"], ["no/such", "sweep.json"]),
         (["bench", "speed"], ["speed", "render"]),
     ],
 )

@@ -1,0 +1,235 @@
+"""Collectors on a Ray cluster, whose workers may die.
+
+TorchRL's `RayCollector` makes the workers, places them on the cluster and ends them. Two of its
+habits don't fit complete episodes and workers that may be lost, so the round trip of a batch is
+ours: it stacks the workers' batches, which have to be of one length for that, and it sends the
+parameters through a process group that breaks with its first member. Here the parameters travel
+with the question and the random streams with the answer, so that whoever takes a lost worker's
+place flies the very episodes that were under way.
+"""
+
+import logging
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import torch
+from tensordict import TensorDict, TensorDictBase
+from tensordict.nn import TensorDictModuleBase
+from torch import nn
+from torchrl.collectors import BaseCollector
+
+from drone_rl.collectors.episodes import EpisodeCollector
+from drone_rl.utils.errors import InputError
+
+Parts = tuple[EpisodeCollector, nn.Module, torch.Generator]
+"""A worker's collector, the network inside it and the stream of its actions."""
+
+_log = logging.getLogger(__name__)
+
+
+class RemoteEpisodes(BaseCollector):
+    """What lives in a worker: an `EpisodeCollector` that is told its parameters and its state."""
+
+    def __init__(self, create_env_fn: Sequence[Callable[[], Parts]], **unused: object) -> None:
+        """Builds the parts; the rest of what `RayCollector` gives has no use here."""
+        super().__init__()
+        torch.set_num_threads(1)
+        self._episodes, self._network, self._actions = create_env_fn[0]()
+
+    def fly(
+        self, weights: dict[str, torch.Tensor], state: dict | None
+    ) -> tuple[dict[str, Any], dict]:
+        """One episode in every world.
+
+        Args:
+            weights: Of the network.
+            state: From which to go on; None at the very start.
+
+        Returns:
+            The batch as numpy arrays, which Ray hands over without copying, and the state after it.
+        """
+        self._network.load_state_dict(weights)
+        if state is not None:
+            self.load_state_dict(state)
+        batch = self._episodes.collect().cpu()
+        leaves = batch.items(include_nested=True, leaves_only=True)
+        return {key: value.numpy() for key, value in leaves}, self.state_dict()
+
+    def state_dict(self) -> dict:
+        """State between two batches."""
+        return {"episodes": self._episodes.state_dict(), "actions": self._actions.get_state()}
+
+    def load_state_dict(self, state_dict: dict) -> None:
+        """Goes on from a state."""
+        self._episodes.load_state_dict(state_dict["episodes"])
+        self._actions.set_state(state_dict["actions"])
+
+    def iterator(self) -> Iterator[TensorDictBase]:
+        """Batches without end."""
+        while True:
+            yield self._episodes.collect()
+
+    def set_seed(self, seed: int, static_seed: bool = False) -> int:
+        """Not here: the seed is part of the settings."""
+        raise NotImplementedError
+
+    def shutdown(self, *args: object, **kwargs: object) -> None:
+        """Closes the environment."""
+        self._episodes.shutdown()
+
+
+class RayEpisodeCollector:
+    """Joins the batches of collectors that run in workers of a Ray cluster.
+
+    The worlds, their random streams and the order of the batches are those of a
+    `ThreadedCollector` with as many threads as there are workers here, and so is the result.
+    """
+
+    def __init__(
+        self,
+        makers: Sequence[Callable[[], Parts]],
+        actor: TensorDictModuleBase,
+        network: nn.Module,
+        *,
+        address: str | None = None,
+        num_cpus: float = 1.0,
+        max_lost_workers: int = 10,
+        device: torch.device | str = "cpu",
+    ) -> None:
+        """Starts the workers.
+
+        Args:
+            makers: One a worker, over disjoint worlds; sent to it.
+            actor: The policy that learns, here.
+            network: Its network.
+            address: Of the cluster; None starts one on this machine.
+            num_cpus: Cores of a worker.
+            max_lost_workers: How many may be replaced before the training stops.
+            device: Where the batches go.
+
+        Raises:
+            InputError: Ray isn't installed, or the cluster is out of reach or too small.
+        """
+        self.actor = actor
+        self._network, self._device = network, device
+        self._ray, self._pool = _start(makers, address, num_cpus)
+        self._makers, self._num_cpus = list(makers), num_cpus
+        self._states: list[dict | None] = [None] * len(makers)
+        self._left = self._max_lost = max_lost_workers
+
+    @property
+    def workers(self) -> list[Any]:
+        """Handles of the remote `RemoteEpisodes`."""
+        return self._pool.remote_collectors
+
+    def __iter__(self) -> Iterator[TensorDictBase]:
+        """Yields batches without end."""
+        while True:
+            yield self.collect()
+
+    def collect(self) -> TensorDictBase:
+        """Runs one episode in every world of every worker. Shape: (T_total,).
+
+        Raises:
+            InputError: Too many workers were lost.
+        """
+        weights = {k: v.detach().cpu() for k, v in self._network.state_dict().items()}
+        shared = self._ray.put(weights)
+        numbers = range(len(self._makers))
+        tasks = [self.workers[i].fly.remote(shared, self._states[i]) for i in numbers]
+        answers = [self._answer(i, tasks[i], shared) for i in numbers]
+        self._states = [state for _, state in answers]
+        batches = [_to_tensordict(arrays) for arrays, _ in answers]
+        return torch.cat(batches).to(self._device)
+
+    def state_dict(self) -> dict:
+        """The workers' states, as they stand between two batches."""
+        return {"workers": self._states}
+
+    def load_state_dict(self, state: dict) -> None:
+        """Goes on from a `state_dict`."""
+        self._states = list(state["workers"])
+
+    def shutdown(self) -> None:
+        """Ends the workers; a cluster that was started here ends with this process."""
+        self._pool.shutdown()
+
+    def _answer(self, number: int, task: Any, weights: Any) -> tuple[dict[str, Any], dict]:
+        """A worker's batch and state, be it from the one that takes its place."""
+        while True:
+            try:
+                return self._ray.get(task)
+            except (
+                self._ray.exceptions.RayActorError,
+                self._ray.exceptions.WorkerCrashedError,
+                self._ray.exceptions.ObjectLostError,
+            ) as error:
+                self._replace(number, error)
+                task = self.workers[number].fly.remote(weights, self._states[number])
+
+    def _replace(self, number: int, error: Exception) -> None:
+        if self._left == 0:
+            raise InputError(
+                f"{self._max_lost + 1} Ray workers were lost, the last one by: "
+                f"{' '.join(str(error).split())[:200]}; see to the cluster, then go on with resume="
+            ) from error
+        self._left -= 1
+        _log.warning("Ray worker %d was lost; another flies its unfinished episodes", number)
+        self._pool.add_collectors(
+            [self._makers[number]], 1, None, [{}], [{"num_cpus": self._num_cpus}]
+        )
+        self.workers[number] = self.workers.pop()
+
+
+def _start(
+    makers: Sequence[Callable[[], Parts]], address: str | None, num_cpus: float
+) -> tuple[Any, Any]:
+    """The module ray and TorchRL's collector, whose workers are ready to be asked."""
+    try:
+        import ray
+    except ImportError as error:
+        raise InputError(
+            "collector=ray needs ray, which isn't installed; "
+            "install it with pip install 'drone-rl[ray]'"
+        ) from error
+    from torchrl.collectors.distributed import RayCollector
+
+    own = {"include_dashboard": False, "log_to_driver": False, "logging_level": "warning"}
+    try:
+        if not ray.is_initialized():
+            ray.init(address=address, **own)
+    except (ConnectionError, ValueError) as error:
+        raise InputError(
+            f"collector.address={address} can't be reached; start a cluster with "
+            "ray start --head or leave it null"
+        ) from error
+    cores = ray.cluster_resources().get("CPU", 0)
+    if len(makers) * num_cpus > cores:
+        ray.shutdown()
+        raise InputError(
+            f"collector.num_threads={len(makers)} workers of collector.num_cpus={num_cpus} need "
+            f"more than the cluster's {cores:g} cores; lower one of them"
+        )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # it misses a policy that it need not send
+        pool = RayCollector(
+            list(makers),
+            collector_class=RemoteEpisodes,
+            frames_per_batch=len(makers),
+            sync=True,
+            weight_sync_schemes={},
+            remote_configs={"num_cpus": num_cpus},
+        )
+    return ray, pool
+
+
+def _to_tensordict(arrays: dict[Any, Any]) -> TensorDictBase:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # read-only memory, which cat copies from
+        leaves = {key: torch.from_numpy(array) for key, array in arrays.items()}
+    length = len(next(iter(leaves.values())))
+    batch = TensorDict({}, [length])
+    for key, value in leaves.items():
+        batch.set(key, value)
+    return batch

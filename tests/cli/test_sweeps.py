@@ -1,0 +1,68 @@
+"""Sweeps as a user runs them: killed, gone on with, one run of them a mistake."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+import torch
+
+from drone_rl.training import load_checkpoint
+
+PROGRAM = [sys.executable, "-m", "drone_rl.cli.main"]
+TINY = ["experiment=smoke", "logger=csv", "collector.num_envs=4", "trainer.total_frames=1200"]
+SWEEP = [*PROGRAM, "train", "-m", *TINY, "seed=0,-1,1", "evaluate_after=10"]
+FOLDER = "outputs/train/multiruns"
+
+
+def kill_everything_of(folder):
+    """Kills -9, as a power cut would, what works under a folder."""
+    listed = subprocess.run(["pgrep", "-f", str(folder)], capture_output=True, text=True).stdout
+    for pid in listed.split():
+        os.kill(int(pid), signal.SIGKILL)
+
+
+@pytest.fixture(scope="module")
+def sweep(tmp_path_factory):
+    """Killed when its first run is half-way, then given again."""
+    folder = tmp_path_factory.mktemp("killed")
+    process = subprocess.Popen(SWEEP, cwd=folder, stderr=subprocess.DEVNULL)
+    while not any(
+        len(metrics.read_text().splitlines()) > 3 for metrics in folder.rglob("metrics.csv")
+    ):
+        assert process.poll() is None
+        time.sleep(0.02)
+    process.kill()
+    process.wait()
+    kill_everything_of(folder)
+    assert not list(folder.rglob("result.json"))
+    done = subprocess.run(SWEEP, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 1, done.stderr  # one of the runs is a mistake
+    (found,) = (folder / FOLDER).iterdir()
+    return found
+
+
+def test_a_killed_sweep_ends_as_one_that_never_was(sweep, tmp_path):
+    (run,) = sweep.glob("0_*seed=0*")
+    alone = [*PROGRAM, "train", *TINY, "seed=0", "hydra.run.dir=alone"]
+    subprocess.run(alone, cwd=tmp_path, check=True, env={**os.environ, "OMP_NUM_THREADS": "1"})
+    one, two = (
+        load_checkpoint(folder / "checkpoints" / "last.pt") for folder in (run, tmp_path / "alone")
+    )
+    assert all(torch.equal(one["policy"][k], two["policy"][k]) for k in one["policy"])
+    assert one["progress"]["running_cubes"] == two["progress"]["running_cubes"]
+    assert len((run / "metrics.csv").read_text().splitlines()) == len(
+        (tmp_path / "alone" / "metrics.csv").read_text().splitlines()
+    )
+
+
+def test_the_mistake_stands_in_the_summary_and_harms_no_other(sweep):
+    summary = json.loads((sweep / "summary.json").read_text())
+    states = {run["seed"]: run["state"] for run in summary["runs"]}
+    assert states == {"0": "finished", "-1": "failed", "1": "finished"}
+    assert "seed=-1 is out of range" in summary["runs"][1]["error"]
+    assert summary["runs"][0]["verdict"] is not None
+    assert "seed=-1 is out of range" in (sweep / "report.html").read_text()
