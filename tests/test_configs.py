@@ -41,7 +41,7 @@ def test_checkouts_configuration_is_used():
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_primary_configs_compose(command):
-    assert compose(command)
+    assert compose(command.replace("-", "_"))
 
 
 @pytest.mark.parametrize(("group", "name"), FILES)
