@@ -1,0 +1,121 @@
+"""What sweeps gain and cost: two runs at once, the launcher, the Ray collector."""
+
+import csv
+import importlib.util
+import os
+import runpy
+import statistics
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+from drone_rl.sweeps.runs import THREADS
+from drone_rl.training import CheckpointCallback, CsvCallback, LoggerCallback
+
+_PROGRAM = (sys.executable, "-m", "drone_rl.cli.main")
+_BARE = (sys.executable, "-m", "drone_rl.bench.sweeps")
+
+
+def bench_sweeps(folder: Path, device: str, quick: bool) -> dict[str, Any]:
+    """Times the same trainings bare and alone, in a sweep one at a time, and two at once.
+
+    Bare trainings write no metrics, no events and no checkpoints on their way.
+
+    Returns:
+        Seconds of each, trainings an hour two at once over one at a time, and the share of time
+        that launcher and logging add to the bare trainings.
+    """
+    seeds, episodes = (2, 20) if quick else (4, 200)
+    training = [
+        "experiment=single_episode",
+        f"trainer.total_episodes={episodes}",
+        "trainer.target_share=null",
+        f"device={device}",
+    ]
+    bare = sum(
+        _seconds(_BARE, *training, f"seed={i}", f"hydra.run.dir={folder}/bare_{i}")
+        for i in range(seeds)
+    )
+    one, two = (
+        _seconds(
+            _PROGRAM,
+            "-m",
+            *training,
+            f"seed=range({seeds})",
+            f"hydra.launcher.num_jobs={jobs}",
+            f"hydra.sweep.dir={folder}/sweep_{jobs}",
+        )
+        for jobs in (1, 2)
+    )
+    return {
+        "sweep_bare_s": bare,
+        "sweep_one_at_a_time_s": one,
+        "sweep_two_at_once_s": two,
+        "sweep_speedup": one / two,
+        "launcher_overhead": one / bare - 1,
+    }
+
+
+def bench_ray(folder: Path, device: str, quick: bool) -> dict[str, Any]:
+    """Frames a second of the Ray collector over the plain one, on the same two cores.
+
+    Returns:
+        The median rates and the median of their ratio; None where Ray isn't installed.
+    """
+    if importlib.util.find_spec("ray") is None:
+        return {"ray_fps": None, "ray_over_plain": None}
+    frames, rounds = (3_000, 1) if quick else (40_000, 3)
+    rates: dict[str, list[float]] = {"episodes": [], "ray": []}
+    for i in range(rounds):
+        for name, found in rates.items():
+            run = folder / f"{name}_{i}"
+            settings = [
+                f"collector={name}",
+                f"trainer.total_frames={frames}",
+                "trainer.target_share=null",
+                "logger=csv",
+            ]
+            _seconds(_PROGRAM, *settings, f"device={device}", f"hydra.run.dir={run}")
+            found.append(_collected_rate(run / "metrics.csv"))
+    ratios = [r / p for r, p in zip(rates["ray"], rates["episodes"], strict=True)]
+    return {
+        "plain_beside_ray_fps": statistics.median(rates["episodes"]),
+        "ray_fps": statistics.median(rates["ray"]),
+        "ray_over_plain": statistics.median(ratios),
+    }
+
+
+def _seconds(program: tuple[str, ...], *args: str) -> float:
+    """Time of one command."""
+    begin = time.perf_counter()
+    done = subprocess.run(
+        [*program, "train", *args],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, **THREADS},
+    )
+    if done.returncode != 0:
+        raise RuntimeError(f"drone-rl train {' '.join(args)} failed: {done.stderr.strip()[-500:]}")
+    return time.perf_counter() - begin
+
+
+def _collected_rate(path: Path) -> float:
+    """Frames a second of collecting alone, without the first batch, which starts the workers."""
+    with path.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    seconds = sum(float(row["time/collect_s"]) for row in rows[1:])
+    return (int(rows[-1]["frames"]) - int(rows[0]["frames"])) / seconds
+
+
+def _train_bare() -> None:
+    """`drone-rl` with nothing written between the first and the last update."""
+    for callback in (CsvCallback, LoggerCallback, CheckpointCallback):
+        callback.on_update = lambda *_: None
+    runpy.run_module("drone_rl.cli.main", run_name="__main__", alter_sys=True)
+
+
+if __name__ == "__main__":
+    _train_bare()
