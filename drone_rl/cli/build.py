@@ -1,5 +1,6 @@
 """From settings to objects, for every command alike."""
 
+import re
 from pathlib import Path
 from typing import Any, cast
 
@@ -16,6 +17,12 @@ from drone_rl.sim.settings import CameraSettings, TaskSettings
 from drone_rl.training import load_checkpoint, load_policy
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import Stream, torch_generator
+from drone_rl.zoo import load_exported, policy_names, policy_path
+
+
+def policy_is_checkpoint(overrides: list[str]) -> list[str]:
+    """Lets `policy=good` say `checkpoint=good`, in commands whose policy is trained already."""
+    return [re.sub(r"^policy=", "checkpoint=", override) for override in overrides]
 
 
 def build_env(
@@ -86,7 +93,8 @@ def find_checkpoint(where: str, outputs: str) -> Path:
     """The checkpoint file that the user means.
 
     Args:
-        where: A .pt file, the folder of a run, or "latest" for the newest run.
+        where: A .pt or .safetensors file, the folder of a run, "latest" for the newest run, or the
+            name of a policy that travels with the package.
         outputs: Folder under which runs are kept.
 
     Raises:
@@ -102,8 +110,24 @@ def find_checkpoint(where: str, outputs: str) -> Path:
                 "run drone-rl train first or give the path of a checkpoint"
             )
         return found[-1]
+    if where in policy_names():
+        return policy_path(where)
     path = Path(where)
+    if not path.exists():
+        raise InputError(
+            f"policy or checkpoint {where} does not exist; give a file, the folder of a run, "
+            f"latest, or one of {', '.join(policy_names())}"
+        )
     return path / "checkpoints" / "best.pt" if path.is_dir() else path
+
+
+def read_policy(path: Path) -> dict[str, Any]:
+    """A checkpoint's state, or that of an exported policy.
+
+    Raises:
+        InputError: The file is unusable.
+    """
+    return load_exported(path) if path.suffix == ".safetensors" else load_checkpoint(path)
 
 
 def load_trained(
@@ -124,7 +148,7 @@ def load_trained(
     Raises:
         InputError: The checkpoint or a setting is unusable.
     """
-    state = load_checkpoint(path)
+    state = read_policy(path)
     config = trained_config(state, task)
     env = build_env(config, num_envs, seed=seed, stream=Stream.EVALUATION, device=device)
     network = build_network(config, env, seed=seed)

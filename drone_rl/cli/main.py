@@ -13,10 +13,14 @@ drone-rl: a drone learns to fly from its camera, and you learn whether to trust 
 usage: drone-rl COMMAND [setting=value ...]
 
 commands
-  demo       train with the defaults, evaluate the result, film it
+  demo       train with the defaults, then evaluate, film and explain the result
   train      learn a policy; writes checkpoints and logs under outputs/train
   evaluate   test a policy on unseen worlds: table, JSON, videos
   play       film a policy, or watch it in dm_control's viewer
+  explain    see what a policy sees, and whether to trust it: one HTML report
+  report     make the report of explanations again, or of several side by side
+  verdict    good, poor or one-sided? as JSON and as an exit status
+  export     write a policy as safetensors with a model card
   bench      measure every figure that the README quotes
 
 examples
@@ -25,9 +29,10 @@ examples
   drone-rl train -m seed=0,1,2         one run for each value
   drone-rl train resume=RUN_FOLDER     go on with an interrupted run
   drone-rl evaluate                    test the newest policy
+  drone-rl explain policy=good         explain a policy that travels with the package
   drone-rl COMMAND --help              every setting of a command
 """
-COMMANDS = ("train", "evaluate", "play", "bench")
+COMMANDS = ("train", "evaluate", "play", "explain", "report", "verdict", "export", "bench")
 
 
 def conf_dir() -> Path:
@@ -96,7 +101,7 @@ def run_command(command: str, overrides: list[str]) -> int:
 def _demo(overrides: list[str]) -> int:
     """The main job end to end: `make demo`."""
     status = run_command("train", overrides)
-    return status or run_command("evaluate", [])
+    return status or run_command("evaluate", []) or run_command("explain", [])
 
 
 def _guarded(command: Callable[[list[str]], int], overrides: list[str]) -> int:
