@@ -1,8 +1,9 @@
 """From settings to objects, for every command alike."""
 
 import functools
+import re
 from pathlib import Path
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import torch
 from hydra.utils import get_method, instantiate
@@ -10,13 +11,23 @@ from omegaconf import DictConfig, OmegaConf
 from tensordict.nn import TensorDictModuleBase
 from torchrl.envs import TransformedEnv
 
-from drone_rl.collectors import EpisodeCollector, RayEpisodeCollector, ThreadedCollector
+from drone_rl.collectors import EpisodeCollector, ThreadedCollector
 from drone_rl.envs import DroneEnv, make_env
 from drone_rl.policies import PolicyNetwork, make_actor
 from drone_rl.sim.settings import CameraSettings, TaskSettings
 from drone_rl.training import load_checkpoint, load_policy
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import Stream, torch_generator
+from drone_rl.zoo import load_exported, policy_names, policy_path
+
+
+def policy_is_checkpoint(overrides: list[str]) -> list[str]:
+    """Lets `policy=good` say `checkpoint=good`, in commands whose policy is trained already."""
+    return [re.sub(r"^policy=", "checkpoint=", override) for override in overrides]
+
+
+if TYPE_CHECKING:
+    from drone_rl.collectors.ray import RayEpisodeCollector
 
 
 def build_env(
@@ -48,7 +59,7 @@ def build_network(config: DictConfig, env: TransformedEnv, *, seed: int) -> Poli
 
 def build_collector(
     config: DictConfig,
-) -> tuple[ThreadedCollector | RayEpisodeCollector, PolicyNetwork, dict[str, torch.Generator]]:
+) -> tuple["ThreadedCollector | RayEpisodeCollector", PolicyNetwork, dict[str, torch.Generator]]:
     """A training's worlds shared out to workers, the network in all of them, its random streams.
 
     Raises:
@@ -77,8 +88,10 @@ def threaded_collector(
 
 def ray_collector(
     config: DictConfig,
-) -> tuple[RayEpisodeCollector, PolicyNetwork, dict[str, torch.Generator]]:
+) -> tuple["RayEpisodeCollector", PolicyNetwork, dict[str, torch.Generator]]:
     """`collector=ray`: the workers are processes of a Ray cluster."""
+    from drone_rl.collectors.ray import RayEpisodeCollector  # slow to import, seldom needed
+
     shares = _shares(config)
     local, network, _ = build_share(config, [1], 0)
     local.shutdown()
@@ -136,7 +149,8 @@ def find_checkpoint(where: str, outputs: str) -> Path:
     """The checkpoint file that the user means.
 
     Args:
-        where: A .pt file, the folder of a run, or "latest" for the newest run.
+        where: A .pt or .safetensors file, the folder of a run, "latest" for the newest run, or the
+            name of a policy that travels with the package.
         outputs: Folder under which runs are kept.
 
     Raises:
@@ -152,8 +166,24 @@ def find_checkpoint(where: str, outputs: str) -> Path:
                 "run drone-rl train first or give the path of a checkpoint"
             )
         return found[-1]
+    if where in policy_names():
+        return policy_path(where)
     path = Path(where)
+    if not path.exists():
+        raise InputError(
+            f"policy or checkpoint {where} does not exist; give a file, the folder of a run, "
+            f"latest, or one of {', '.join(policy_names())}"
+        )
     return path / "checkpoints" / "best.pt" if path.is_dir() else path
+
+
+def read_policy(path: Path) -> dict[str, Any]:
+    """A checkpoint's state, or that of an exported policy.
+
+    Raises:
+        InputError: The file is unusable.
+    """
+    return load_exported(path) if path.suffix == ".safetensors" else load_checkpoint(path)
 
 
 def load_trained(
@@ -174,7 +204,7 @@ def load_trained(
     Raises:
         InputError: The checkpoint or a setting is unusable.
     """
-    state = load_checkpoint(path)
+    state = read_policy(path)
     config = trained_config(state, task)
     env = build_env(config, num_envs, seed=seed, stream=Stream.EVALUATION, device=device)
     network = build_network(config, env, seed=seed)

@@ -8,13 +8,21 @@ from typing import Any
 from hydra.core.hydra_config import HydraConfig
 from omegaconf import DictConfig
 
-from drone_rl.cli.build import build_env, find_checkpoint, load_trained, plain, trained_config
+from drone_rl.cli.build import (
+    build_env,
+    find_checkpoint,
+    load_trained,
+    plain,
+    policy_is_checkpoint,
+    trained_config,
+)
 from drone_rl.cli.play import film
 from drone_rl.evaluation import Oracle, RandomPolicy, run_episodes, summarise
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import Stream, torch_generator
 
+prepare = policy_is_checkpoint
 _log = logging.getLogger(__name__)
 
 

@@ -13,11 +13,15 @@ drone-rl: a drone learns to fly from its camera, and you learn whether to trust 
 usage: drone-rl COMMAND [setting=value ...]
 
 commands
-  demo       train with the defaults, evaluate the result, film it
+  demo       train with the defaults, then evaluate, film and explain the result
   train      learn a policy; writes checkpoints and logs under outputs/train
   evaluate   test a policy on unseen worlds: table, JSON, videos
   play       film a policy, or watch it in dm_control's viewer
-  sweep-report   compare the runs of a sweep: CSV, JSON, HTML
+  explain    see what a policy sees, and whether to trust it: one HTML report
+  report     make the report of explanations again, or of several side by side
+  verdict    good, poor or one-sided? as JSON and as an exit status
+  export     write a policy as safetensors with a model card
+  sweep-report  compare the runs of a sweep: CSV, JSON, one HTML page
   bench      measure every figure that the README quotes
 
 examples
@@ -26,9 +30,20 @@ examples
   drone-rl train -m seed=0,1,2         one run for each value, side by side
   drone-rl train resume=RUN_FOLDER     go on with an interrupted run
   drone-rl evaluate                    test the newest policy
+  drone-rl explain policy=good         explain a policy that travels with the package
   drone-rl COMMAND --help              every setting of a command
 """
-COMMANDS = ("train", "evaluate", "play", "sweep-report", "bench")
+COMMANDS = (
+    "train",
+    "evaluate",
+    "play",
+    "explain",
+    "report",
+    "verdict",
+    "export",
+    "sweep-report",
+    "bench",
+)
 
 
 def conf_dir() -> Path:
@@ -100,7 +115,7 @@ def run_command(command: str, overrides: list[str]) -> int:
 def _demo(overrides: list[str]) -> int:
     """The main job end to end: `make demo`."""
     status = run_command("train", overrides)
-    return status or run_command("evaluate", [])
+    return status or run_command("evaluate", []) or run_command("explain", [])
 
 
 def _guarded(command: Callable[[list[str]], int], overrides: list[str]) -> int:
@@ -108,6 +123,9 @@ def _guarded(command: Callable[[list[str]], int], overrides: list[str]) -> int:
     os.environ["HYDRA_FULL_ERROR"] = "1"  # let Hydra's own errors through to be shortened here
     warnings.filterwarnings("ignore", message=".*DISPLAY.*")  # dm_control looks for a screen
     warnings.filterwarnings("ignore", message=".*GLFW.*")
+    warnings.filterwarnings(
+        "ignore", message=".*WeightUpdaterBase.*"
+    )  # torchrl, of its own classes
     from hydra.errors import HydraException
     from omegaconf.errors import OmegaConfBaseException
 

@@ -11,11 +11,12 @@ from omegaconf import DictConfig
 from tensordict import TensorDict
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
-from drone_rl.cli.build import find_checkpoint, load_trained, plain
+from drone_rl.cli.build import find_checkpoint, load_trained, plain, policy_is_checkpoint
 from drone_rl.evaluation.video import film_episode, write_video
 from drone_rl.sim.collect_cubes import make_environment
 from drone_rl.utils.errors import InputError
 
+prepare = policy_is_checkpoint
 _log = logging.getLogger(__name__)
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from omegaconf import DictConfig
 
 from drone_rl.sweeps import read_sweep
-from drone_rl.sweeps.page import summary, write_report
+from drone_rl.sweeps.page import summarise_sweep, write_report
 from drone_rl.sweeps.summary import make_groups, read_rows
 from drone_rl.utils.errors import InputError
 
@@ -29,7 +29,7 @@ def run(config: DictConfig) -> tuple[int, None]:
     sweep = read_sweep(Path(folder).absolute())
     page = write_report(sweep)
     rows = read_rows(sweep)
-    figures = summary(sweep, rows, make_groups(rows))
+    figures = summarise_sweep(sweep, rows, make_groups(rows))
     print(_lines(figures))
     _log.info("written: %s", page)
     return 0, None

@@ -1,7 +1,6 @@
 """From environment and policy to batches of experience."""
 
 from drone_rl.collectors.episodes import EpisodeCollector
-from drone_rl.collectors.ray import RayEpisodeCollector
 from drone_rl.collectors.threaded import ThreadedCollector
 
-__all__ = ["EpisodeCollector", "RayEpisodeCollector", "ThreadedCollector"]
+__all__ = ["EpisodeCollector", "ThreadedCollector"]

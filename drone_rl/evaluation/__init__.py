@@ -2,6 +2,14 @@
 
 from drone_rl.evaluation.evaluator import run_episodes
 from drone_rl.evaluation.metrics import Episodes, proportion, summarise
-from drone_rl.evaluation.oracle import Oracle, RandomPolicy
+from drone_rl.evaluation.oracle import ConstantPolicy, Oracle, RandomPolicy
 
-__all__ = ["Episodes", "Oracle", "RandomPolicy", "proportion", "run_episodes", "summarise"]
+__all__ = [
+    "ConstantPolicy",
+    "Episodes",
+    "Oracle",
+    "RandomPolicy",
+    "proportion",
+    "run_episodes",
+    "summarise",
+]

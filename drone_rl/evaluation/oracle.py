@@ -57,3 +57,23 @@ class RandomPolicy(TensorDictModuleBase):
         shape, device = tensordict.batch_size, self.generator.device
         action = torch.randint(self.num_actions, shape, generator=self.generator, device=device)
         return tensordict.set("action", action)
+
+
+class ConstantPolicy(TensorDictModuleBase):
+    """Takes the same action whatever happens."""
+
+    def __init__(self, action: Action) -> None:
+        """Sets the action.
+
+        Args:
+            action: Taken at every step.
+        """
+        super().__init__()
+        self.in_keys = ["done"]
+        self.out_keys = ["action"]
+        self.action = action
+
+    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
+        """Writes the action of each world."""
+        action = tensordict["done"][..., 0].long() * 0 + int(self.action)
+        return tensordict.set("action", action)

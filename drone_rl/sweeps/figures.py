@@ -15,7 +15,7 @@ from drone_rl.sweeps.summary import Group
 from drone_rl.sweeps.verdict import KINDS
 
 FAVOURITE_AXIS = "optimiser.lr"
-COLORS = {"good": "tab:green", "one-sided": "tab:orange", "poor": "tab:red", "none": "0.5"}
+COLORS = {"good": "tab:green", "one-sided": "tab:orange", "poor": "tab:red", "none of these": "0.5"}
 MAX_PANELS = 6
 
 

@@ -46,6 +46,7 @@ def _evaluation(left=20, right=20, of=20, cubes=3.0):
     sides = {"left": proportion(left, of), "ahead": proportion(of, of)}
     whole = 100 if left == right == of else 0
     return {
+        "episodes": 100,
         "mean_cubes": cubes,
         "all_cubes": proportion(whole, 100),
         "by_side": {**sides, "right": proportion(right, of)},

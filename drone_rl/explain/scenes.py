@@ -1,0 +1,151 @@
+"""Scenes that were met or imagined: drawn, shown to the policy, and taken apart into objects."""
+
+import enum
+from collections.abc import Iterable
+
+import torch
+from torch import Tensor
+from torch.nn import functional
+from torchrl.envs import CatFrames, Transform, TransformedEnv
+
+from drone_rl.envs import CropRows
+from drone_rl.sim import rules
+from drone_rl.sim.rules import WorldState
+from drone_rl.sim.worlds import CubeWorlds
+
+
+class Region(enum.IntEnum):
+    """What a pixel shows."""
+
+    NEXT_CUBE = 0
+    OTHER_CUBE = 1
+    HORIZON = 2
+    GROUND = 3
+    SKY = 4
+
+
+class Scenes:
+    """Draws any `WorldState` as the policy's camera sees it, or would.
+
+    A scene is a still: where the policy's pipeline stacks frames, it gets the same one N times, as
+    it does at the start of an episode.
+    """
+
+    def __init__(self, env: TransformedEnv) -> None:
+        """Borrows the worlds and the transforms of an environment."""
+        self.worlds: CubeWorlds = env.base_env.worlds
+        pipeline: Iterable[Transform] = env.transform  # type: ignore[assignment]
+        self._transforms = [t for t in pipeline if "pixels" in (t.in_keys or [])]
+
+    def frames(self, state: WorldState) -> Tensor:
+        """RGB pictures. Shape: (T, H, W, 3), uint8."""
+        return self.worlds.render(state)
+
+    def depth(self, state: WorldState) -> Tensor:
+        """Metres along the optical axis, 0 for the sky. Shape: (T, H, W)."""
+        return self.worlds.render(state, self.worlds.view(modality="depth"))
+
+    def transform(self, frames: Tensor) -> Tensor:
+        """RGB pictures (T, H, W, 3) as the policy gets them: (T, C, h, w)."""
+        pixels = frames
+        for transform in self._transforms:
+            if isinstance(transform, CatFrames):
+                pixels = torch.cat([pixels] * transform.N, dim=transform.dim)
+            else:
+                pixels = transform._apply_transform(pixels)
+        return pixels
+
+    def to_frame(self, maps: Tensor) -> Tensor:
+        """Heat maps over what the policy gets, put back to where that is in the camera's frame.
+
+        Args:
+            maps: Shape (T, h, w).
+
+        Returns:
+            Shape: (T, H, W); 0 where the pipeline cropped the frame.
+        """
+        camera = self.worlds.camera
+        pixels = torch.zeros(1, camera.height, camera.width, 3, dtype=torch.uint8)
+        steps = []
+        for transform in self._transforms:
+            before = pixels.shape[-2:] if pixels.shape[-1] != 3 else pixels.shape[1:3]
+            if not isinstance(transform, CatFrames):
+                pixels = transform._apply_transform(pixels)
+                steps.append((transform, before))
+        for transform, size in reversed(steps):
+            if isinstance(transform, CropRows):
+                below = size[0] - transform.bottom
+                maps = functional.pad(maps, (0, 0, transform.top, below))
+            elif maps.shape[-2:] != size:
+                maps = functional.interpolate(maps[:, None], size, mode="bilinear")[:, 0]
+        return maps
+
+    def observe(self, state: WorldState) -> Tensor:
+        """Scenes as the policy gets them. Shape: (T, C, h, w)."""
+        return self.transform(self.frames(state))
+
+    def regions(self, state: WorldState) -> Tensor:
+        """What each pixel shows, a `Region`. Shape: (T, H, W), uint8.
+
+        The horizon is the ground and the sky within one pixel of where they meet.
+        """
+        geoms = self.worlds.render(state, self.worlds.view(modality="segmentation")).long()
+        cube_of = self._cube_of_geom(geoms.device)
+        cube = cube_of[geoms]  # geom -1 (the sky) reads the last entry
+        next_cube = state.next_cube[:, None, None]
+        regions = torch.full_like(cube, Region.GROUND)
+        regions[geoms < 0] = Region.SKY
+        regions[_meets_other(geoms < 0) & (cube < 0)] = Region.HORIZON
+        regions[cube >= 0] = Region.OTHER_CUBE
+        regions[(cube >= 0) & (cube == next_cube)] = Region.NEXT_CUBE
+        return regions.to(torch.uint8)
+
+    def _cube_of_geom(self, device: torch.device) -> Tensor:
+        """Cube of each geom, -1 for what is none; one more entry for the sky."""
+        model = self.worlds.model
+        names = [model.geom(i).name for i in range(model.ngeom)]
+        cubes = [int(n[5:].split("/")[0]) if n.startswith("cube_") else -1 for n in names]
+        return torch.tensor([*cubes, -1], device=device)
+
+
+def _meets_other(is_sky: Tensor) -> Tensor:
+    """Pixels within one row of a change from ground to sky. Shape: (T, H, W)."""
+    change = is_sky[:, 1:] != is_sky[:, :-1]
+    above = functional.pad(change, (0, 0, 0, 1))
+    below = functional.pad(change, (0, 0, 1, 0))
+    return above | below
+
+
+def place_cube(scenes: Scenes, forward: Tensor, lateral: Tensor) -> WorldState:
+    """Scenes with one cube at each place and the drone at its origin.
+
+    Args:
+        scenes: Where they will be drawn.
+        forward: Metres ahead of the drone. Shape: (T,).
+        lateral: Metres to its left. Shape: (T,).
+    """
+    settings = scenes.worlds.settings
+    count, cubes = len(forward), settings.num_cubes
+    places = torch.zeros(count, cubes, 3, dtype=torch.float64)
+    places[:, 0, 0], places[:, 0, 1] = forward.double(), lateral.double()
+    places[..., 2] = settings.altitude
+    state = rules.start(settings, places)
+    state.passed[:, 1:] = True  # the other cubes are not there
+    return state.to(scenes.worlds.device)
+
+
+def empty_scene(scenes: Scenes) -> WorldState:
+    """One scene with no cube at all."""
+    state = place_cube(scenes, torch.ones(1), torch.zeros(1))
+    state.passed[:] = True
+    return state
+
+
+def oracle_action(scenes: Scenes, lateral: Tensor) -> Tensor:
+    """What the oracle does about a cube that stands `lateral` metres to the left. Shape kept."""
+    settings = scenes.worlds.settings
+    tolerance = 0.5 * max(settings.step_length, settings.touch_distance)
+    action = torch.full_like(lateral, rules.Action.FORWARD, dtype=torch.int64)
+    action[lateral > tolerance] = rules.Action.LEFT
+    action[lateral < -tolerance] = rules.Action.RIGHT
+    return action

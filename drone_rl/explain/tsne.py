@@ -1,0 +1,166 @@
+"""t-SNE of what a policy sees (section 5.1), how faithful it is, and where to put the pictures."""
+
+import dataclasses
+
+import numpy as np
+import openTSNE
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+from scipy.spatial.distance import cdist
+
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.provenance import num_cores
+
+COMPONENTS = 50
+"""Principal components to which high-dimensional points are reduced first, as is usual."""
+NEIGHBOURS = 10
+"""Neighbours over which faithfulness is measured."""
+QUERIES = 1000
+"""Points whose neighbourhoods are compared; more change the measures little."""
+
+FEW = 2000
+"""Up to so many points the exact methods, on one thread, are the fastest."""
+
+
+@dataclasses.dataclass
+class Embedding:
+    """Points in the plane that lie near each other where the originals do (Eqs. 16 and 17)."""
+
+    points: NDArray  # (T, 2)
+    """Where each original came to lie."""
+    trustworthiness: float
+    """1 where no neighbour in the plane is a stranger in truth (Venna and Kaski, 2001)."""
+    neighbours_kept: float
+    """Share of the nearest true neighbours that are among the nearest in the plane."""
+    neighbours_chance: float
+    """The same share for a random placement."""
+    _mean: NDArray
+    _components: NDArray
+    _model: openTSNE.TSNEEmbedding
+
+    def place(self, originals: NDArray) -> NDArray:
+        """Puts new points into the existing picture, which stays as it is.
+
+        Args:
+            originals: Shape (N, D), of the same kind as the embedded ones.
+
+        Returns:
+            Shape: (N, 2).
+        """
+        flat = originals.reshape(len(originals), -1).astype(np.float64)
+        reduced = np.ascontiguousarray((flat - self._mean) @ self._components.T)
+        return np.asarray(self._model.transform(reduced))
+
+
+def embed(originals: NDArray, *, perplexity: float = 30.0, seed: int = 0) -> Embedding:
+    """Embeds points in the plane; the same points and seed give the same picture.
+
+    Args:
+        originals: One row a point. Shape: (T, *).
+        perplexity: Number of neighbours that each point looks to.
+        seed: Of the optimisation.
+
+    Raises:
+        InputError: There are too few points for the perplexity, or one is not finite.
+    """
+    flat = originals.reshape(len(originals), -1).astype(np.float64)
+    check_perplexity(perplexity, len(flat))
+    if not np.isfinite(flat).all():
+        raise InputError("features hold a value that is not finite; the policy's weights are bad")
+    mean = flat.mean(0)
+    components = _principal_components(flat - mean)
+    reduced = np.ascontiguousarray((flat - mean) @ components.T)
+    few = len(flat) <= FEW
+    model = openTSNE.TSNE(
+        perplexity=perplexity,
+        initialization="pca",
+        random_state=seed,
+        n_jobs=1 if few else num_cores(),
+        neighbors="exact" if few else "annoy",
+        negative_gradient_method="bh" if few else "fft",
+    ).fit(_distinct(reduced, seed))
+    points = np.asarray(model)
+    trust, kept = faithfulness(reduced, points)
+    chance = NEIGHBOURS / (len(flat) - 1)
+    return Embedding(points, trust, kept, min(1.0, chance), mean, components, model)
+
+
+def check_perplexity(perplexity: float, count: int) -> None:
+    """Refuses a perplexity that so few points can't have.
+
+    Raises:
+        InputError: It is out of range.
+    """
+    largest = (count - 1) // 3
+    if not 1 <= perplexity <= largest:
+        raise InputError(
+            f"perplexity={perplexity:g} does not fit {count} points; give 1 to {largest} or "
+            "record more frames"
+        )
+
+
+def faithfulness(originals: NDArray, points: NDArray, k: int = NEIGHBOURS) -> tuple[float, float]:
+    """How well a picture keeps neighbourhoods.
+
+    Args:
+        originals: Shape (T, D).
+        points: Shape (T, 2).
+        k: Size of a neighbourhood; less where there are few points.
+
+    Returns:
+        Trustworthiness (Venna and Kaski, 2001) and the share of neighbours kept.
+    """
+    count = len(originals)
+    k = max(1, min(k, (count - 1) // 2))
+    queries = np.unique(np.linspace(0, count - 1, min(count, QUERIES)).astype(int))
+    rows = np.arange(len(queries))
+    true_order = _neighbours(originals, queries)
+    drawn_order = _neighbours(points, queries)
+    rank = np.empty_like(true_order)
+    rank[rows[:, None], true_order] = np.arange(count)
+    drawn_ranks = rank[rows[:, None], drawn_order[:, 1 : k + 1]]  # 1 is the nearest
+    strangers = np.maximum(drawn_ranks - k, 0).sum()
+    worst = len(queries) * k * (2 * count - 3 * k - 1) / 2
+    return float(1 - strangers / worst), float((drawn_ranks <= k).mean())
+
+
+def lay_out(points: NDArray, columns: int, rows: int) -> NDArray:
+    """Puts each point on a cell of its own, as near as can be to where it lies.
+
+    Args:
+        points: Shape (T, 2).
+        columns: Cells across.
+        rows: Cells down; rows times columns must be at least T.
+
+    Returns:
+        Column and row of each point. Shape: (T, 2), int.
+    """
+    low, high = points.min(0), points.max(0)
+    wanted = (points - low) / np.maximum(high - low, 1e-12) * (columns - 1, rows - 1)
+    cells = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), -1).reshape(-1, 2)
+    cost = cdist(wanted, cells, "sqeuclidean")
+    _, chosen = linear_sum_assignment(cost)
+    return cells[chosen]
+
+
+def _principal_components(centred: NDArray) -> NDArray:
+    """Rows that span most of the variance, with signs that don't depend on the library."""
+    if centred.shape[1] <= COMPONENTS:
+        return np.eye(centred.shape[1])
+    _, vectors = np.linalg.eigh(centred.T @ centred)
+    components = vectors[:, ::-1][:, :COMPONENTS].T
+    largest = np.abs(components).argmax(1)
+    return components * np.sign(components[np.arange(COMPONENTS), largest])[:, None]
+
+
+def _distinct(points: NDArray, seed: int) -> NDArray:
+    """Moves points apart by next to nothing: identical ones have no defined neighbourhood."""
+    scale = max(points.std(), 1e-6) * 1e-6
+    return points + np.random.default_rng(seed).normal(0, scale, points.shape)
+
+
+def _neighbours(points: NDArray, queries: NDArray) -> NDArray:
+    """All points in order of distance from each query, the query itself first."""
+    distance = cdist(points[queries], points, "sqeuclidean")
+    distance[np.arange(len(queries)), queries] = -1
+    return distance.argsort(1, kind="stable")

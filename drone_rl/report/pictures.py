@@ -1,0 +1,126 @@
+"""Pictures made of the policy's own frames: tinted, heated, in rows, with the indicator."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib import colormaps
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+
+TINTS = {0: (214, 39, 40), 1: (44, 160, 44), 2: (31, 96, 200)}
+"""Red forward, green left, blue right, as in Figs. 7 and 8."""
+BACKGROUND, INK, MUTED, CHOSEN = (255, 255, 255), (30, 32, 36), (150, 156, 166), (214, 39, 40)
+SCALE = 5
+"""Screen pixels to one of the policy's in a single picture."""
+
+
+def tint(frame: NDArray, action: int, strength: float = 0.4) -> NDArray:
+    """A frame washed with its action's colour. Shape: (H, W, 3), uint8."""
+    color = np.array(TINTS[action], dtype=np.float64)
+    return (frame * (1 - strength) + color * strength).astype(np.uint8)
+
+
+def heated(frame: NDArray, heat: NDArray) -> NDArray:
+    """A frame in gray with a heat map over it, hot where it is bright. Shape: (H, W, 3), uint8."""
+    gray = np.repeat(frame.mean(-1, keepdims=True), 3, -1) * 0.75
+    top = float(heat.max())
+    share = heat.astype(np.float64) / top if top > 0 else np.zeros(heat.shape)
+    color = colormaps["inferno"](share)[..., :3] * 255
+    weight = (0.15 + 0.75 * share)[..., None] * (top > 0)
+    return (gray * (1 - weight) + color * weight).astype(np.uint8)
+
+
+def thumbnails(frames: NDArray, actions: NDArray, cells: NDArray) -> Image.Image:
+    """Tinted frames on cells of a grid, none over another.
+
+    Args:
+        frames: Shape (N, H, W, 3).
+        actions: Shape (N,).
+        cells: Column and row of each. Shape: (N, 2).
+    """
+    height, width = frames.shape[1:3]
+    columns, rows = cells.max(0) + 1
+    canvas = Image.new("RGB", (int(columns) * width, int(rows) * height), BACKGROUND)
+    for frame, action, (column, row) in zip(frames, actions, cells, strict=True):
+        picture = Image.fromarray(tint(frame, int(action)))
+        canvas.paste(picture, (int(column) * width, int(row) * height))
+    return canvas
+
+
+def indicator(probabilities: Sequence[float], chosen: int, width: int) -> Image.Image:
+    """The chapter's three bars: left, forward (up) and right, as long as they are probable.
+
+    Args:
+        probabilities: By action number.
+        chosen: Its bar is red.
+        width: Pixels across.
+    """
+    height = 84
+    canvas = Image.new("RGB", (width, height), (236, 238, 242))
+    draw, font = ImageDraw.Draw(canvas), ImageFont.load_default(13)
+    middle, base, thick = width // 2, height - 16, 10
+    reach, up = width // 2 - 62, height - 24
+    forward, left, right = (float(p) for p in probabilities)
+    bars = {
+        1: (middle - 8 - reach * left, base - thick, middle - 8, base),
+        2: (middle + 8, base - thick, middle + 8 + reach * right, base),
+        0: (middle - thick // 2, base - up * forward, middle + thick // 2, base),
+    }
+    for action, box in bars.items():
+        color = CHOSEN if action == chosen else MUTED
+        draw.rectangle((box[0], min(box[1], box[3] - 1), max(box[2], box[0] + 1), box[3]), color)
+    draw.text((6, base - 14), f"left {left:.2f}", INK, font)
+    draw.text((width - 62, base - 14), f"right {right:.2f}", INK, font)
+    draw.text((middle + 12, 4), f"fwd {forward:.2f}", INK, font)
+    return canvas
+
+
+def explained_frame(
+    frame: NDArray, heat: NDArray, probabilities: Sequence[float], chosen: int, caption: str
+) -> Image.Image:
+    """A frame, its heat map, the indicator and a caption, from top to bottom."""
+    plain, hot = enlarge(frame), enlarge(heated(frame, heat))
+    bars = indicator(probabilities, chosen, plain.width)
+    return stacked([titled(plain, caption), hot, bars])
+
+
+def enlarge(frame: NDArray, scale: int = SCALE) -> Image.Image:
+    """A frame with each pixel as a square."""
+    picture = Image.fromarray(frame)
+    return picture.resize((picture.width * scale, picture.height * scale), Image.Resampling.NEAREST)
+
+
+def titled(picture: Image.Image, caption: str) -> Image.Image:
+    """A picture under a line of text."""
+    canvas = Image.new("RGB", (picture.width, picture.height + 22), BACKGROUND)
+    ImageDraw.Draw(canvas).text((2, 2), caption, INK, ImageFont.load_default(14))
+    canvas.paste(picture, (0, 22))
+    return canvas
+
+
+def stacked(pictures: Sequence[Image.Image], gap: int = 3) -> Image.Image:
+    """Pictures one under another."""
+    width = max(p.width for p in pictures)
+    height = sum(p.height for p in pictures) + gap * (len(pictures) - 1)
+    canvas, y = Image.new("RGB", (width, height), BACKGROUND), 0
+    for picture in pictures:
+        canvas.paste(picture, (0, y))
+        y += picture.height + gap
+    return canvas
+
+
+def gridded(pictures: Sequence[Image.Image], columns: int, gap: int = 12) -> Image.Image:
+    """Pictures of one size in rows."""
+    width, height = pictures[0].width, pictures[0].height
+    rows = -(-len(pictures) // columns)
+    size = (columns * (width + gap) - gap, rows * (height + gap) - gap)
+    canvas = Image.new("RGB", size, BACKGROUND)
+    for i, picture in enumerate(pictures):
+        canvas.paste(picture, ((i % columns) * (width + gap), (i // columns) * (height + gap)))
+    return canvas
+
+
+def gray_picture(observation: NDArray, low: float, high: float) -> NDArray:
+    """What a policy gets, its newest channel, as gray bytes. (C, H, W) to (H, W, 3)."""
+    share = (observation[-1].astype(np.float64) - low) / max(high - low, 1e-12)
+    return np.repeat((share.clip(0, 1) * 255).astype(np.uint8)[..., None], 3, -1)

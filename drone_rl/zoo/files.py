@@ -1,0 +1,108 @@
+"""Policies as safetensors files: parameters, and as metadata all that is needed to run them."""
+
+import hashlib
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import torch
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save_file
+
+from drone_rl.utils.errors import InputError
+
+FORMAT = "drone_rl policy"
+_FOLDER = Path(__file__).resolve().parent
+
+
+def policy_names() -> list[str]:
+    """Names of the policies that travel with the package."""
+    return sorted(path.stem for path in _FOLDER.glob("*.safetensors"))
+
+
+def policy_path(name: str) -> Path:
+    """File of a policy that travels with the package."""
+    return _FOLDER / f"{name}.safetensors"
+
+
+def card_path(name: str) -> Path:
+    """Model card of such a policy."""
+    return _FOLDER / f"{name}.md"
+
+
+def export_policy(
+    path: Path, checkpoint: Mapping[str, Any], *, command: str, evaluation: Mapping[str, Any]
+) -> None:
+    """Writes a checkpoint's policy and its model card beside it.
+
+    Args:
+        path: Where to, ending in .safetensors; the card ends in .md.
+        checkpoint: From `load_checkpoint`.
+        command: The training command.
+        evaluation: From `summarise`.
+
+    Raises:
+        InputError: It can't be written.
+    """
+    parameters = {k: v.contiguous() for k, v in checkpoint["policy"].items()}
+    about = {
+        "config": checkpoint["config"],
+        "progress": checkpoint["progress"],
+        "provenance": checkpoint["provenance"],
+        "command": command,
+        "evaluation": evaluation,
+    }
+    try:
+        save_file(parameters, path, {"format": FORMAT, "about": json.dumps(about)})
+        path.with_suffix(".md").write_text(_card(path, about))
+    except (OSError, SafetensorError) as error:
+        raise InputError(f"policy {path} can't be written ({error})") from error
+
+
+def load_exported(path: Path) -> dict[str, Any]:
+    """Reads a policy in the form of a checkpoint: "policy", "config", "progress" and more.
+
+    Raises:
+        InputError: The file is missing, damaged or something else.
+    """
+    try:
+        with safe_open(path, framework="pt") as file:
+            metadata = file.metadata() or {}
+            parameters: dict[str, torch.Tensor] = {k: file.get_tensor(k) for k in file.keys()}  # noqa: SIM118
+    except (OSError, SafetensorError) as error:
+        raise InputError(f"policy {path} can't be read ({error}); export it again") from error
+    if metadata.get("format") != FORMAT:
+        raise InputError(f"{path} is not a drone_rl policy; use one that drone-rl export wrote")
+    return {"policy": parameters, **json.loads(metadata["about"])}
+
+
+def _card(path: Path, about: Mapping[str, Any]) -> str:
+    evaluation = about["evaluation"]
+    rows = [("mean cubes", f"{evaluation['mean_cubes']:.3f}")]
+    for name, share in {"all cubes": evaluation["all_cubes"], **evaluation["by_side"]}.items():
+        interval = f"{share['lower95']:.3f} to {share['upper95']:.3f}"
+        value = "none offered" if share["share"] is None else f"{share['share']:.3f}"
+        rows.append(
+            (
+                f"share collected: {name}" if name != "all cubes" else name,
+                f"{value} (95%: {interval})",
+            )
+        )
+    table = "\n".join(f"| {name} | {value} |" for name, value in rows)
+    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    packages = about["provenance"]["versions"]
+    return f"""# {path.stem}
+
+Trained by `{about["command"]}` in {about["progress"]["frames"]:,} frames; the settings are in the
+file's metadata. Evaluated on {evaluation["episodes"]:,} held-out episodes, greedy:
+
+| | |
+| --- | --- |
+{table}
+
+- SHA-256 of `{path.name}`: `{digest}`
+- versions: torch {packages["torch"]}, torchrl {packages["torchrl"]}, mujoco-warp \
+{packages["mujoco-warp"]}
+- intended use: an example for `drone-rl explain policy={path.stem}`; not for a real drone
+"""
