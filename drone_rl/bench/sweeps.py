@@ -66,7 +66,7 @@ def bench_ray(folder: Path, device: str, quick: bool) -> dict[str, Any]:
     """
     if importlib.util.find_spec("ray") is None:
         return {"ray_fps": None, "ray_over_plain": None}
-    frames, rounds = (3_000, 1) if quick else (40_000, 3)
+    frames, rounds = (15_000, 1) if quick else (40_000, 3)
     rates: dict[str, list[float]] = {"episodes": [], "ray": []}
     for i in range(rounds):
         for name, found in rates.items():

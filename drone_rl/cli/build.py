@@ -20,14 +20,13 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import Stream, torch_generator
 from drone_rl.zoo import load_exported, policy_names, policy_path
 
+if TYPE_CHECKING:
+    from drone_rl.collectors.ray import RayEpisodeCollector
+
 
 def policy_is_checkpoint(overrides: list[str]) -> list[str]:
     """Lets `policy=good` say `checkpoint=good`, in commands whose policy is trained already."""
     return [re.sub(r"^policy=", "checkpoint=", override) for override in overrides]
-
-
-if TYPE_CHECKING:
-    from drone_rl.collectors.ray import RayEpisodeCollector
 
 
 def build_env(

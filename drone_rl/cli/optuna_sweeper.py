@@ -16,8 +16,7 @@ from hydra.types import HydraContext, TaskFunction
 from omegaconf import DictConfig
 
 from drone_rl.sweeps import read_result
-from drone_rl.sweeps.executors import extra
-from drone_rl.sweeps.search import next_trials, open_study, tell
+from drone_rl.sweeps.search import import_optuna, next_trials, open_study, tell
 from drone_rl.utils.errors import InputError
 
 _log = logging.getLogger(__name__)
@@ -42,7 +41,7 @@ class OptunaSweeper(Sweeper):
         Raises:
             InputError: Optuna isn't installed, or a number is below 1.
         """
-        extra("optuna", "optuna", "hydra/sweeper=optuna")
+        import_optuna()
         if num_trials < 1 or batch < 1 or report_frames < 1:
             raise InputError(
                 f"hydra.sweeper.num_trials={num_trials}, batch={batch} and report_frames="
@@ -70,7 +69,7 @@ class OptunaSweeper(Sweeper):
         parser = OverridesParser.create(config_loader=self.hydra_context.config_loader)
         told = parser.parse_overrides([f"{k}={v}" for k, v in self.params.items()] + arguments)
         last = {override.get_key_element(): override for override in told}
-        space = {k: _distribution(o) for k, o in last.items() if o.is_sweep_override()}
+        space = {k: distribution(o) for k, o in last.items() if o.is_sweep_override()}
         fixed = [
             f"{k}={o.get_value_element_as_str()}"
             for k, o in last.items()
@@ -89,8 +88,7 @@ class OptunaSweeper(Sweeper):
         self._search(study, space, fixed)
 
     def _search(self, study: Any, space: dict[str, Any], fixed: list[str]) -> None:
-        import optuna
-
+        optuna = import_optuna()
         done = optuna.trial.TrialState.is_finished
         while (left := self.num_trials - sum(done(t.state) for t in study.trials)) > 0:
             trials = next_trials(study, space, min(left, self.batch), self.seed)
@@ -109,10 +107,9 @@ class OptunaSweeper(Sweeper):
             _log.info("best: run %d, %.3f cubes, %s", best.number, best.value, best.params)
 
 
-def _distribution(override: Override) -> Any:
+def distribution(override: Override) -> Any:
     """Optuna's distribution for a range in Hydra's grammar."""
-    from optuna import distributions as d
-
+    d = import_optuna().distributions
     value = override.value()
     if isinstance(value, ChoiceSweep):
         return d.CategoricalDistribution([str(v) for v in override.sweep_string_iterator()])

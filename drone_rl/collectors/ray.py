@@ -21,6 +21,7 @@ from torchrl.collectors import BaseCollector
 
 from drone_rl.collectors.episodes import EpisodeCollector
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.extras import extra
 
 Parts = tuple[EpisodeCollector, nn.Module, torch.Generator]
 """A worker's collector, the network inside it and the stream of its actions."""
@@ -186,13 +187,7 @@ def _start(
     makers: Sequence[Callable[[], Parts]], address: str | None, num_cpus: float
 ) -> tuple[Any, Any]:
     """The module ray and TorchRL's collector, whose workers are ready to be asked."""
-    try:
-        import ray
-    except ImportError as error:
-        raise InputError(
-            "collector=ray needs ray, which isn't installed; "
-            "install it with pip install 'drone-rl[ray]'"
-        ) from error
+    ray = extra("ray", "ray", "collector=ray")
     from torchrl.collectors.distributed import RayCollector
 
     own = {"include_dashboard": False, "log_to_driver": False, "logging_level": "warning"}

@@ -12,6 +12,7 @@ from typing import Any, Protocol
 from drone_rl.sweeps.process import POLL_S, RunProcess, finish_run
 from drone_rl.sweeps.runs import Run
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.extras import extra
 from drone_rl.utils.provenance import num_cores
 
 
@@ -145,25 +146,3 @@ class RayExecutor:
             return self._ray.get(task)
         except self._ray.exceptions.RayError:
             return 1
-
-
-def extra(module: str, name: str, setting: str) -> Any:
-    """Imports a module of an optional extra.
-
-    Args:
-        module: To import.
-        name: The extra that brings it.
-        setting: What asked for it.
-
-    Raises:
-        InputError: It isn't installed.
-    """
-    import importlib
-
-    try:
-        return importlib.import_module(module)
-    except ImportError as error:
-        raise InputError(
-            f"{setting} needs {module}, which isn't installed; "
-            f"install it with pip install 'drone-rl[{name}]'"
-        ) from error

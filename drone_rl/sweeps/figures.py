@@ -109,7 +109,7 @@ def _verdicts(axes: Axes, layout: Layout, groups: list[Group]) -> None:
             continue
         x = np.array([place for place, _ in known])
         y, low, high = (np.array([s[k] for _, s in known]) for k in ("share", "lower95", "upper95"))
-        shift = 1.03 ** (i - 1.5) if axes.get_xscale() == "log" else 1.0
+        shift = 1.08 ** (i - 1.5) if axes.get_xscale() == "log" else 1.0
         error = np.abs([y - low, high - y])
         axes.errorbar(
             x * shift, y, yerr=error, marker="o", capsize=2, color=COLORS[kind], label=kind
@@ -132,7 +132,7 @@ def _costs(axes: Axes, layout: Layout, groups: list[Group]) -> None:
             fontsize=7,
         )
         note.set_in_layout(False)
-    axes.set(ylabel="frames to solve", ylim=(0, None))
+    axes.set(ylabel="frames to solve", ylim=(0, 1.12 * axes.get_ylim()[1]))
 
 
 def _places(axes: Axes, layout: Layout, groups: list[Group]) -> list[float]:

@@ -8,13 +8,22 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from drone_rl.sweeps.executors import extra
 from drone_rl.training import Callback
+from drone_rl.utils.extras import extra
 
 if TYPE_CHECKING:
     from drone_rl.training import Trainer
 
 NAME = "sweep"
+
+
+def import_optuna() -> Any:
+    """The module.
+
+    Raises:
+        InputError: It isn't installed.
+    """
+    return extra("optuna", "optuna", "hydra/sweeper=optuna")
 
 
 def open_study(folder: Path, **settings: Any) -> Any:
@@ -30,7 +39,7 @@ def open_study(folder: Path, **settings: Any) -> Any:
     Raises:
         InputError: Optuna isn't installed.
     """
-    optuna = extra("optuna", "optuna", "hydra/sweeper=optuna")
+    optuna = import_optuna()
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     backend = optuna.storages.journal.JournalFileBackend(str(folder / "optuna.journal"))
     storage = optuna.storages.JournalStorage(backend)
@@ -52,8 +61,7 @@ def next_trials(study: Any, space: Mapping[str, Any], count: int, seed: int) -> 
     Returns:
         `optuna.trial.FrozenTrial`s with consecutive numbers.
     """
-    import optuna
-
+    optuna = import_optuna()
     running = optuna.trial.TrialState.RUNNING
     left = [trial.number for trial in study.trials if trial.state == running]
     if left:
@@ -67,8 +75,7 @@ def next_trials(study: Any, space: Mapping[str, Any], count: int, seed: int) -> 
 
 def tell(study: Any, number: int, result: Mapping[str, Any] | None) -> None:
     """Notes what became of a trial: its running mean of cubes, that it was pruned or failed."""
-    import optuna
-
+    optuna = import_optuna()
     if study.trials[number].state != optuna.trial.TrialState.RUNNING:
         return
     if result is None:
@@ -90,8 +97,7 @@ class PruneCallback(Callback):
             number: Of the trial.
         """
         study = open_study(folder)
-        import optuna
-
+        optuna = import_optuna()
         settings = study.user_attrs
         study.pruner = optuna.pruners.MedianPruner(n_startup_trials=settings["startup_trials"])
         self._trial = optuna.Trial(study, study.trials[number]._trial_id)

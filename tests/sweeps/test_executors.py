@@ -1,14 +1,13 @@
 """Runs are begun, gone on with, left alone or given up, each without harm to the others."""
 
 import json
-import sys
 import threading
 import time
 
 import pytest
 
 from drone_rl.sweeps import LocalExecutor, read_result
-from drone_rl.sweeps.executors import SlurmExecutor, extra
+from drone_rl.sweeps.executors import SlurmExecutor
 from drone_rl.sweeps.process import finish_run
 from drone_rl.sweeps.runs import quoted, read_failure
 from drone_rl.utils.errors import InputError
@@ -99,12 +98,6 @@ def test_slurm_by_submitits_local_executor(make_runs, tmp_path):
     assert ended[runs[0]] == 0
     assert ended[runs[1]] != 0
     assert "no_such_setting" in read_failure(runs[1])
-
-
-def test_missing_extra_names_the_command_that_installs_it(monkeypatch):
-    monkeypatch.setitem(sys.modules, "submitit", None)
-    with pytest.raises(InputError, match=r"pip install 'drone-rl\[slurm\]'"):
-        extra("submitit", "slurm", "hydra/launcher=slurm")
 
 
 def test_at_least_one_job():

@@ -1,0 +1,77 @@
+"""The search's study: it repeats, goes on after a kill, and stops the hopeless."""
+
+from types import SimpleNamespace
+
+import pytest
+
+optuna = pytest.importorskip("optuna", reason="pip install 'drone-rl[optuna]'")
+
+from drone_rl.sweeps.search import PruneCallback, next_trials, open_study, tell  # noqa: E402
+
+SPACE = {"optimiser.lr": optuna.distributions.FloatDistribution(1e-4, 1e-1, log=True)}
+
+
+def begin(folder, **attributes):
+    folder.mkdir(exist_ok=True)
+    study = open_study(folder, direction="maximize")
+    for name, value in {
+        "prune": True,
+        "startup_trials": 1,
+        "report_frames": 100,
+        **attributes,
+    }.items():
+        study.set_user_attr(name, value)
+    return study
+
+
+def params(trials):
+    return [trial.params for trial in trials]
+
+
+def test_a_killed_search_goes_on_with_the_trials_it_had_begun(tmp_path):
+    first = next_trials(begin(tmp_path), SPACE, 3, seed=0)
+    study = begin(tmp_path)  # a new process
+    assert params(next_trials(study, SPACE, 3, seed=0)) == params(first)
+    tell(study, 1, {"reason": "frames", "running_cubes": 2.0})
+    assert [t.number for t in next_trials(study, SPACE, 3, seed=0)] == [0, 1, 2]
+
+
+def test_the_same_results_lead_to_the_same_questions(tmp_path):
+    asked = []
+    for name in "ab":
+        study = begin(tmp_path / name)
+        for number in (0, 1):
+            next_trials(study, SPACE, 1, seed=0)
+            tell(study, number, {"reason": "frames", "running_cubes": float(number)})
+        asked.append(params(next_trials(study, SPACE, 2, seed=0)))
+    assert asked[0] == asked[1]
+
+
+def test_what_became_of_a_run_is_told(tmp_path):
+    study = begin(tmp_path)
+    next_trials(study, SPACE, 3, seed=0)
+    tell(study, 0, {"reason": "solved", "running_cubes": 2.97})
+    tell(study, 1, {"reason": "pruned", "running_cubes": 0.1})
+    tell(study, 2, None)
+    tell(study, 2, None)
+    assert [t.state.name for t in study.trials] == ["COMPLETE", "PRUNED", "FAIL"]
+    assert study.best_value == 2.97
+
+
+@pytest.mark.parametrize(("prune", "reason"), [(True, "pruned"), (False, "")])
+def test_a_run_below_the_median_is_stopped(tmp_path, prune, reason):
+    study = begin(tmp_path, prune=prune)
+    next_trials(study, SPACE, 2, seed=0)
+    reasons = []
+    for number, cubes in ((0, 2.0), (1, 0.5)):
+        trainer = SimpleNamespace(
+            progress=SimpleNamespace(frames=0, running_cubes=cubes), stop_request=""
+        )
+        callback = PruneCallback(tmp_path, number)
+        for frames in (50, 120, 130, 250):
+            trainer.progress.frames = frames
+            callback.on_update(trainer, {})
+        reasons.append(trainer.stop_request)
+        tell(study, number, {"reason": trainer.stop_request or "frames", "running_cubes": cubes})
+    assert reasons == ["", reason]
+    assert list(study.trials[0].intermediate_values) == [1, 2]
