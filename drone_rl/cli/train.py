@@ -7,6 +7,7 @@ import signal
 from pathlib import Path
 from typing import Any
 
+import torch
 from hydra.core.hydra_config import HydraConfig
 from hydra.utils import instantiate
 from omegaconf import DictConfig, OmegaConf
@@ -124,6 +125,8 @@ def _build(
     del settings["checkpoint_interval_s"]
     share = settings.pop("target_share")
     _check_trainer(config)
+    # sums depend on how many threads make them: on as many everywhere, whatever the machine has
+    torch.set_num_threads(config.collector.num_threads)
     collector, network, generators = build_collector(config)
     optimiser = instantiate(config.optimiser)(network.parameters())
     origin = provenance()

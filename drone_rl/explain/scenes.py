@@ -87,15 +87,16 @@ class Scenes:
     def regions(self, state: WorldState) -> Tensor:
         """What each pixel shows, a `Region`. Shape: (T, H, W), uint8.
 
-        The horizon is the ground and the sky within one pixel of where they meet.
+        The horizon is the lowest row of sky and the highest of ground, where they meet.
         """
         geoms = self.worlds.render(state, self.worlds.view(modality="segmentation")).long()
         cube_of = self._cube_of_geom(geoms.device)
         cube = cube_of[geoms]  # geom -1 (the sky) reads the last entry
         next_cube = state.next_cube[:, None, None]
         regions = torch.full_like(cube, Region.GROUND)
-        regions[geoms < 0] = Region.SKY
-        regions[_meets_other(geoms < 0) & (cube < 0)] = Region.HORIZON
+        sky = geoms < 0
+        regions[sky] = Region.SKY
+        regions[_border(sky, ~sky & (cube < 0))] = Region.HORIZON
         regions[cube >= 0] = Region.OTHER_CUBE
         regions[(cube >= 0) & (cube == next_cube)] = Region.NEXT_CUBE
         return regions.to(torch.uint8)
@@ -108,12 +109,10 @@ class Scenes:
         return torch.tensor([*cubes, -1], device=device)
 
 
-def _meets_other(is_sky: Tensor) -> Tensor:
-    """Pixels within one row of a change from ground to sky. Shape: (T, H, W)."""
-    change = is_sky[:, 1:] != is_sky[:, :-1]
-    above = functional.pad(change, (0, 0, 0, 1))
-    below = functional.pad(change, (0, 0, 1, 0))
-    return above | below
+def _border(sky: Tensor, ground: Tensor) -> Tensor:
+    """Pixels of sky right above ground, and of ground right below sky. Shape: (T, H, W)."""
+    meets = sky[:, :-1] & ground[:, 1:]
+    return functional.pad(meets, (0, 0, 0, 1)) | functional.pad(meets, (0, 0, 1, 0))
 
 
 def place_cube(scenes: Scenes, forward: Tensor, lateral: Tensor) -> WorldState:

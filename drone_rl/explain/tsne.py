@@ -49,7 +49,9 @@ class Embedding:
         """
         flat = originals.reshape(len(originals), -1).astype(np.float64)
         reduced = np.ascontiguousarray((flat - self._mean) @ self._components.T)
-        return np.asarray(self._model.transform(reduced))
+        placed = np.asarray(self._model.transform(reduced))
+        # the library may have shifted its whole picture meanwhile; ours stays where it is
+        return placed - (np.asarray(self._model) - self.points).mean(0)
 
 
 def embed(originals: NDArray, *, perplexity: float = 30.0, seed: int = 0) -> Embedding:
@@ -79,7 +81,7 @@ def embed(originals: NDArray, *, perplexity: float = 30.0, seed: int = 0) -> Emb
         neighbors="exact" if few else "annoy",
         negative_gradient_method="bh" if few else "fft",
     ).fit(_distinct(reduced, seed))
-    points = np.asarray(model)
+    points = np.array(model)
     trust, kept = faithfulness(reduced, points)
     chance = NEIGHBOURS / (len(flat) - 1)
     return Embedding(points, trust, kept, min(1.0, chance), mean, components, model)

@@ -1,5 +1,6 @@
 """What happens beside learning: checkpoints, logs, a progress bar."""
 
+import copy
 import csv
 import logging
 import os
@@ -58,6 +59,7 @@ class CheckpointCallback(Callback):
         self.interval_s = interval_s
         self.extra = dict(extra or {})
         self.best = float("-inf")
+        self._best_state: dict[str, Any] | None = None
         self._saved_at = time.monotonic()
 
     @property
@@ -83,7 +85,10 @@ class CheckpointCallback(Callback):
             self._save(trainer)
 
     def on_update(self, trainer: "Trainer", metrics: Mapping[str, float]) -> None:
-        """Saves when the interval has passed."""
+        """Notes the best state of all updates; saves when the interval has passed."""
+        if trainer.progress.running_cubes > self.best:
+            self.best = trainer.progress.running_cubes
+            self._best_state = copy.deepcopy(trainer.state_dict())
         if time.monotonic() - self._saved_at >= self.interval_s:
             self._save(trainer)
 
@@ -92,13 +97,12 @@ class CheckpointCallback(Callback):
         self._save(trainer)
 
     def _save(self, trainer: "Trainer") -> None:
-        running = trainer.progress.running_cubes
-        is_best = running > self.best
-        self.best = max(self.best, running)
-        state = {**trainer.state_dict(), "best": self.best, **self.extra}
-        save_checkpoint(self.last_path, state)
-        if is_best:
-            save_checkpoint(self.best_path, state)
+        shared = {"best": self.best, **self.extra}
+        state = trainer.state_dict()
+        save_checkpoint(self.last_path, {**state, **shared})
+        if self._best_state is not None or not self.best_path.exists():
+            save_checkpoint(self.best_path, {**(self._best_state or state), **shared})
+            self._best_state = None
         self._saved_at = time.monotonic()
 
 

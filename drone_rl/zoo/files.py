@@ -13,6 +13,8 @@ from safetensors.torch import save_file
 from drone_rl.utils.errors import InputError
 
 FORMAT = "drone_rl policy"
+_LOCAL = ("logger", "paths", "resume")
+"""Settings that speak of the machine where the training ran."""
 _FOLDER = Path(__file__).resolve().parent
 
 
@@ -46,10 +48,11 @@ def export_policy(
         InputError: It can't be written.
     """
     parameters = {k: v.contiguous() for k, v in checkpoint["policy"].items()}
+    origin = checkpoint["provenance"]
     about = {
-        "config": checkpoint["config"],
+        "config": {k: v for k, v in checkpoint["config"].items() if k not in _LOCAL},
         "progress": checkpoint["progress"],
-        "provenance": checkpoint["provenance"],
+        "provenance": {k: origin[k] for k in ("versions", "git_revision")},
         "command": command,
         "evaluation": evaluation,
     }
@@ -102,7 +105,7 @@ file's metadata. Evaluated on {evaluation["episodes"]:,} held-out episodes, gree
 {table}
 
 - SHA-256 of `{path.name}`: `{digest}`
-- versions: torch {packages["torch"]}, torchrl {packages["torchrl"]}, mujoco-warp \
+- revision {about["provenance"]["git_revision"] or "unknown"}; torch {packages["torch"]}, torchrl {packages["torchrl"]}, mujoco-warp \
 {packages["mujoco-warp"]}
 - intended use: an example for `drone-rl explain policy={path.stem}`; not for a real drone
 """

@@ -1,0 +1,44 @@
+import numpy as np
+
+from drone_rl.explain.dataset import RolloutDataset
+from drone_rl.explain.sequence import choose_episode, key_frames
+from drone_rl.sim.rules import EndReason
+
+
+def fake(length, collects=(), misses=(), end=EndReason.ALL_CUBES):
+    rewards, next_cube = np.zeros(length), np.zeros(length, int)
+    rewards[list(collects)] = 1
+    for t in (*collects, *misses):
+        next_cube[t + 1 :] += 1
+    reason = np.zeros(length, int)
+    reason[-1] = end
+    arrays = {
+        "rewards": rewards,
+        "next_cube": next_cube,
+        "end_reason": reason,
+        "episode": np.zeros(length, int),
+    }
+    return RolloutDataset(arrays, {}, {})
+
+
+def test_a_good_episode():
+    frames = key_frames(fake(41, collects=(10, 20, 40)), 0)
+    assert [t for t, _ in frames] == [0, 5, 10, 20, 30, 40]
+    assert [why for _, why in frames] == [
+        "start", "approach", "collects a cube", "collects a cube", "in between", "collects a cube",
+    ]  # fmt: skip
+
+
+def test_a_failed_episode_shows_what_was_missed():
+    why = dict(key_frames(fake(30, collects=(9,), misses=(19,), end=EndReason.FRONT_BOUNDARY), 0))
+    assert why[19] == "misses a cube" and why[29] == "fails: front boundary" and len(why) == 6
+
+
+def test_short_episodes_have_fewer_frames():
+    assert [t for t, _ in key_frames(fake(3), 0)] == [0, 1, 2]
+
+
+def test_an_episode_that_was_cut_is_not_chosen():
+    data = fake(10)
+    data.arrays["episode"] = np.repeat([0, 1], 5)
+    assert choose_episode(data) == 1
