@@ -27,9 +27,10 @@ def bench_sweeps(folder: Path, device: str, quick: bool) -> dict[str, Any]:
         Seconds of each, trainings an hour two at once over one at a time, and the share of time
         that launcher and logging add to the bare trainings.
     """
-    seeds, episodes = (2, 20) if quick else (4, 200)
+    seeds, episodes = (2, 20) if quick else (4, 500)
     training = [
         "experiment=single_episode",
+        "task=collect_one",
         f"trainer.total_episodes={episodes}",
         "trainer.target_share=null",
         f"device={device}",
