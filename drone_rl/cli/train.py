@@ -71,7 +71,7 @@ def prepare(overrides: list[str]) -> list[str]:
     saved = folder / ".hydra" / "overrides.yaml"
     before = list(OmegaConf.load(saved)) if saved.is_file() else []
     kept = [o for o in before if not o.startswith("resume=")]
-    return [*kept, *overrides, f"hydra.run.dir={folder}"]
+    return [*kept, *overrides, "hydra.mode=RUN", f"hydra.run.dir={folder}"]
 
 
 def run(config: DictConfig) -> tuple[int, float]:

@@ -66,3 +66,10 @@ def test_the_mistake_stands_in_the_summary_and_harms_no_other(sweep):
     assert "seed=-1 is out of range" in summary["runs"][1]["error"]
     assert summary["runs"][0]["verdict"] is not None
     assert "seed=-1 is out of range" in (sweep / "report.html").read_text()
+
+
+def test_one_run_of_a_sweep_can_be_gone_on_with_by_hand(sweep):
+    (run,) = sweep.glob("0_*seed=0*")
+    command = [*PROGRAM, "train", f"resume={run}", "trainer.total_frames=1600"]
+    subprocess.run(command, cwd=sweep, check=True)
+    assert json.loads((run / "result.json").read_text())["frames"] >= 1600
