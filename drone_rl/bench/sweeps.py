@@ -27,7 +27,7 @@ def bench_sweeps(folder: Path, device: str, quick: bool) -> dict[str, Any]:
         Seconds of each, trainings an hour two at once over one at a time, and the share of time
         that launcher and logging add to the bare trainings.
     """
-    seeds, episodes = (2, 20) if quick else (4, 500)
+    seeds, episodes = (2, 20) if quick else (4, 250)
     training = [
         "experiment=single_episode",
         "task=collect_one",

@@ -76,8 +76,8 @@ class SweepLauncher(Launcher):
         failed = 0
         try:
             unfinished = [run for run in runs if read_result(run.folder) is None]
-            executor = self.executor(sweep.folder) if unfinished else LocalExecutor(1)
-            for done, (run, status) in enumerate(executor.finish(unfinished), start=1):
+            endings = self.executor(sweep.folder).finish(unfinished) if unfinished else ()
+            for done, (run, status) in enumerate(endings, start=1):
                 failed += status != 0
                 _log.info("[%d/%d] %s: %s", done, len(unfinished), run.folder.name, _outcome(run))
         finally:

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
-from drone_rl.sweeps.process import POLL_S, RunProcess, finish_run
+from drone_rl.sweeps.process import POLL_S, RunProcess, finish_run, note_failure
 from drone_rl.sweeps.runs import Run
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.extras import extra
@@ -92,10 +92,16 @@ class SlurmExecutor:
         while left:
             ended = [run for run, job in left.items() if job.done()]
             for run in ended:
-                job = left.pop(run)
-                yield run, 1 if job.exception() is not None else job.result()
+                yield run, self._status(run, left.pop(run))
             if not ended:
                 time.sleep(1.0)
+
+    def _status(self, run: Run, job: Any) -> int:
+        error = job.exception()
+        if error is None:
+            return job.result()
+        note_failure(run, f"its Slurm job was lost: {_last_line(error)}")
+        return 1
 
 
 class RayExecutor:
@@ -136,13 +142,19 @@ class RayExecutor:
             while left:
                 ended, _ = self._ray.wait(list(left))
                 for task in ended:
-                    yield left.pop(task), self._status(task)
+                    run = left.pop(task)
+                    yield run, self._status(run, task)
         finally:
             if self._started:
                 self._ray.shutdown()
 
-    def _status(self, task: Any) -> int:
+    def _status(self, run: Run, task: Any) -> int:
         try:
             return self._ray.get(task)
-        except self._ray.exceptions.RayError:
+        except self._ray.exceptions.RayError as error:
+            note_failure(run, f"its Ray task was lost: {_last_line(error)}")
             return 1
+
+
+def _last_line(error: BaseException) -> str:
+    return (str(error).strip().splitlines() or [type(error).__name__])[-1]

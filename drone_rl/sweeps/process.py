@@ -72,8 +72,13 @@ class RunProcess:
 
     def _note_failure(self, status: int) -> None:
         tail = self._log.read_text(errors="replace")[-20_000:].splitlines()
-        failure = {"status": status, "error": _error(tail, status)}
-        write_atomically(self.run.failure, json.dumps(failure, indent=2))
+        note_failure(self.run, _error(tail, status))
+
+
+def note_failure(run: Run, error: str) -> None:
+    """Keeps the reason of a failure in the run's folder."""
+    run.folder.mkdir(parents=True, exist_ok=True)
+    write_atomically(run.failure, json.dumps({"error": error}, indent=2))
 
 
 def finish_run(run: Run) -> int:
