@@ -63,7 +63,7 @@ class SweepLauncher(Launcher):
         runs = [self._run(folder, initial_job_idx + i, o) for i, o in enumerate(job_overrides)]
         folder.mkdir(parents=True, exist_ok=True)
         with folder_lock(folder), _sigterm_as_interrupt():
-            sweep = open_sweep(folder, sys.argv, self._settings(), runs)
+            sweep = open_sweep(folder, _command(), self._settings(), runs)
             finished = sum(read_result(run.folder) is not None for run in runs)
             _log.info("sweep of %d runs, %d finished before: %s", len(runs), finished, folder)
             failed = self._finish(sweep, runs)
@@ -156,6 +156,12 @@ def register_plugins(*plugins: type[Plugin]) -> None:
         plugin.__module__ = NAMESPACE
         setattr(home, plugin.__name__, plugin)
         Plugins.instance().register(plugin)
+
+
+def _command() -> list[str]:
+    """What the user typed, without the folder that follows from it."""
+    told = [word for word in sys.argv[1:] if not word.startswith("hydra.sweep.dir=${")]
+    return [*sys.argv[0].split(), *told]
 
 
 def _job_return(run: Run) -> JobReturn:
