@@ -4,6 +4,7 @@ Each gives back the runs with their exit status as they end, in any order.
 """
 
 import collections
+import re
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -100,7 +101,7 @@ class SlurmExecutor:
         error = job.exception()
         if error is None:
             return job.result()
-        note_failure(run, f"its Slurm job was lost: {_last_line(error)}")
+        note_failure(run, f"its Slurm job was lost: {_reason(error)}")
         return 1
 
 
@@ -152,9 +153,13 @@ class RayExecutor:
         try:
             return self._ray.get(task)
         except self._ray.exceptions.RayError as error:
-            note_failure(run, f"its Ray task was lost: {_last_line(error)}")
+            note_failure(run, f"its Ray task was lost: {_reason(error)}")
             return 1
 
 
-def _last_line(error: BaseException) -> str:
-    return (str(error).strip().splitlines() or [type(error).__name__])[-1]
+def _reason(error: BaseException) -> str:
+    """The line of a remote traceback that names the error."""
+    lines = str(error).strip().splitlines() or [type(error).__name__]
+    return next(
+        (line for line in reversed(lines) if re.match(r"\w+(Error|Exception):", line)), lines[-1]
+    )

@@ -7,7 +7,7 @@ import time
 import pytest
 
 from drone_rl.sweeps import LocalExecutor, read_result
-from drone_rl.sweeps.executors import SlurmExecutor
+from drone_rl.sweeps.executors import RayExecutor, SlurmExecutor
 from drone_rl.sweeps.process import finish_run
 from drone_rl.sweeps.runs import quoted, read_failure
 from drone_rl.utils.errors import InputError
@@ -87,17 +87,27 @@ def test_interrupting_a_sweep_stops_its_runs(make_runs):
     assert read_result(runs[1].folder) is None
 
 
-def test_slurm_by_submitits_local_executor(make_runs, tmp_path):
+def slurm(folder):
     pytest.importorskip("submitit", reason="pip install 'drone-rl[slurm]'")
-    executor = SlurmExecutor(tmp_path / "jobs", cluster="local", num_jobs=2, timeout_min=5)
-    runs = make_runs("hydra.verbose=false", "no_such_setting=1")
-    for run in runs[:1]:
-        run.folder.mkdir()
-        (run.folder / "result.json").write_text(json.dumps({"reason": "solved"}))
-    ended = dict(executor.finish(runs))
-    assert ended[runs[0]] == 0
-    assert ended[runs[1]] != 0
-    assert "no_such_setting" in read_failure(runs[1])
+    return SlurmExecutor(folder / "jobs", cluster="local", num_jobs=2, timeout_min=5)
+
+
+def ray(folder):
+    pytest.importorskip("ray", reason="pip install 'drone-rl[ray]'")
+    return RayExecutor(address=None, num_cpus=1, num_gpus=0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("cluster", [slurm, ray])
+def test_clusters_of_this_machine(make_runs, tmp_path, cluster):
+    executor = cluster(tmp_path)
+    done, lost = make_runs("seed=0", "seed=1")
+    done.folder.mkdir()
+    (done.folder / "result.json").write_text(json.dumps({"reason": "solved"}))
+    (lost.folder / "output.log").mkdir(parents=True)  # where nothing can be started
+    assert dict(executor.finish([done, lost])) == {done: 0, lost: 1}
+    assert "was lost" in read_failure(lost)
+    assert "output.log" in read_failure(lost)
 
 
 def test_at_least_one_job():
