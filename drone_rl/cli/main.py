@@ -153,6 +153,8 @@ def _one_line(error: BaseException) -> str:
     text = " ".join(str(error).split()) or type(error).__name__
     if "is not in struct" in text or "Could not override" in text:
         text += "; see drone-rl COMMAND --help for the names that exist"
+    if "does not support sweep type" in text:
+        text += "; to search an interval, add hydra/sweeper=optuna"
     return text
 
 
