@@ -5,6 +5,8 @@ import time
 from collections.abc import Callable
 
 import torch
+from torchrl.envs import TransformedEnv
+from torchrl.modules import ProbabilisticActor
 
 from drone_rl.collectors import EpisodeCollector, ThreadedCollector
 from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, make_env
@@ -24,6 +26,15 @@ def default_collector(num_envs: int, num_threads: int, device: str) -> ThreadedC
         generator = torch.Generator(device).manual_seed(i)
         collectors.append(EpisodeCollector(env, make_actor(network, env.action_spec, generator)))
     return ThreadedCollector(collectors)
+
+
+def default_pipeline(num_envs: int) -> tuple[TransformedEnv, ProbabilisticActor, SmallCNN]:
+    """Worlds on all cores, a policy that has learned nothing yet, and its network."""
+    env = make_env(DroneEnv(num_envs), [GrayPixels(), StandardizePixels()])
+    shape = tuple(env.observation_spec["pixels"].shape[1:])
+    network = SmallCNN(shape, 3, hidden=(128,), generator=torch.Generator().manual_seed(0))
+    generator = torch.Generator().manual_seed(0)
+    return env, make_actor(network, env.action_spec, generator), network
 
 
 def random_walk(env: DroneEnv, steps: int, seed: int = 0) -> int:

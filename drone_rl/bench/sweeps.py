@@ -11,10 +11,10 @@ import time
 from pathlib import Path
 from typing import Any
 
+from drone_rl.bench.commands import PROGRAM
 from drone_rl.sweeps.runs import THREADS
 from drone_rl.training import CheckpointCallback, CsvCallback, LoggerCallback
 
-_PROGRAM = (sys.executable, "-m", "drone_rl.cli.main")
 _BARE = (sys.executable, "-m", "drone_rl.bench.sweeps")
 
 
@@ -41,7 +41,7 @@ def bench_sweeps(folder: Path, device: str, quick: bool) -> dict[str, Any]:
     )
     one, two = (
         _seconds(
-            _PROGRAM,
+            PROGRAM,
             "-m",
             *training,
             f"seed=range({seeds})",
@@ -78,7 +78,7 @@ def bench_ray(folder: Path, device: str, quick: bool) -> dict[str, Any]:
                 "trainer.target_share=null",
                 "logger=csv",
             ]
-            _seconds(_PROGRAM, *settings, f"device={device}", f"hydra.run.dir={run}")
+            _seconds(PROGRAM, *settings, f"device={device}", f"hydra.run.dir={run}")
             found.append(_collected_rate(run / "metrics.csv"))
     ratios = [r / p for r, p in zip(rates["ray"], rates["episodes"], strict=True)]
     return {

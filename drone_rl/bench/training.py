@@ -3,7 +3,6 @@
 import csv
 import json
 import subprocess
-import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-_PROGRAM = (sys.executable, "-m", "drone_rl.cli.main")
+from drone_rl.bench.commands import PROGRAM, call, memory_status
 
 
 def bench_solve(
@@ -29,12 +28,12 @@ def bench_solve(
     for seed in seeds[:1] if quick else seeds:
         run = folder / f"train_{seed}"
         begin = time.perf_counter()
-        _call("train", f"seed={seed}", f"device={device}", f"hydra.run.dir={run}", *settings)
+        call("train", f"seed={seed}", f"device={device}", f"hydra.run.dir={run}", *settings)
         results["time_to_solve_s"].append(time.perf_counter() - begin)
         result = json.loads((run / "result.json").read_text())
         results["frames_to_solve"].append(result["frames"])
         reasons.append(result["reason"])
-        _call(
+        call(
             "evaluate",
             f"checkpoint={run}",
             f"episodes={50 if quick else episodes}",
@@ -63,13 +62,13 @@ def bench_memory(folder: Path, frames: int, device: str, quick: bool) -> dict[st
     run = folder / "memory"
     command = ["train", "trainer.target_share=null", f"trainer.total_frames={frames}"]
     process = subprocess.Popen(
-        [*_PROGRAM, *command, f"device={device}", f"hydra.run.dir={run}", "logger=csv"],
+        [*PROGRAM, *command, f"device={device}", f"hydra.run.dir={run}", "logger=csv"],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
     samples, peak = [], 0.0
     while process.poll() is None:
-        status = _status(process.pid)
+        status = memory_status(process.pid)
         peak = max(peak, status.get("VmHWM", 0.0))
         samples.append((_frames(run / "metrics.csv"), status.get("VmRSS", 0.0)))
         time.sleep(0.5)
@@ -82,22 +81,6 @@ def bench_memory(folder: Path, frames: int, device: str, quick: bool) -> dict[st
         "memory_growth_mib_per_million_frames": None if slope is None else slope * 1e6,
         "memory_frames": frames,
     }
-
-
-def _call(*args: str) -> None:
-    done = subprocess.run([*_PROGRAM, *args], capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        raise RuntimeError(f"drone-rl {' '.join(args)} failed: {done.stderr.strip()[-500:]}")
-
-
-def _status(pid: int) -> dict[str, float]:
-    """Memory of a process in MiB, as the kernel counts it."""
-    try:
-        lines = Path(f"/proc/{pid}/status").read_text().splitlines()
-    except OSError:
-        return {}
-    fields = (line.split() for line in lines if line.startswith("Vm"))
-    return {name.rstrip(":"): float(kib) / 1024 for name, kib, *_ in fields}
 
 
 def _frames(path: Path) -> int:

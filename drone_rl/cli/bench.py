@@ -10,6 +10,7 @@ from typing import Any
 import torch
 from omegaconf import DictConfig
 
+from drone_rl.bench.explain import bench_explain, bench_verdicts
 from drone_rl.bench.scaling import bench_scaling
 from drone_rl.bench.speed import bench_collector, bench_dm_control, bench_render
 from drone_rl.bench.sweeps import bench_ray, bench_sweeps
@@ -17,7 +18,18 @@ from drone_rl.bench.training import bench_memory, bench_solve
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.provenance import provenance
 
-NAMES = ("render", "collector", "dm_control", "scaling", "memory", "solve", "sweeps", "ray")
+NAMES = (
+    "render",
+    "collector",
+    "dm_control",
+    "scaling",
+    "memory",
+    "solve",
+    "explain",
+    "verdicts",
+    "sweeps",
+    "ray",
+)
 _log = logging.getLogger(__name__)
 
 
@@ -66,6 +78,8 @@ def _benchmarks(config: DictConfig, folder: Path) -> dict[str, Callable[[], dict
         "scaling": lambda: bench_scaling(folder, device, quick),
         "memory": lambda: bench_memory(runs, config.memory_frames, device, quick),
         "solve": lambda: bench_solve(runs, list(config.seeds), config.episodes, device, quick),
+        "explain": lambda: bench_explain(runs, quick),
+        "verdicts": lambda: bench_verdicts(runs, device, quick),
         "sweeps": lambda: bench_sweeps(runs, device, quick),
         "ray": lambda: bench_ray(runs, device, quick),
     }

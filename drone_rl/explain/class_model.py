@@ -24,7 +24,7 @@ class ClassModelSettings:
     """What is driven up: the action's probability (Eq. 18), or its logit less the others' mean."""
     parameterisation: Literal["pixel", "fourier"] = "pixel"
     """Steps on the pixels, or on their Fourier coefficients, low frequencies first."""
-    steps: int = 128
+    steps: int = 64
     """Steps of gradient ascent."""
     lr: float = 20.0
     """Length of a step; of the whole picture (pixel) or Adam's rate times 400 (fourier)."""

@@ -30,6 +30,8 @@ from drone_rl.utils.errors import InputError
 FORMAT_VERSION = 1
 MIN_FRAMES = 20
 """Fewer frames than this show nothing."""
+MOVED = 0.01
+"""Mean effect of a change to the scene below which it counts as none."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -201,15 +203,16 @@ class _Explanation:
             self.maps["saliency"].shape,
             generator=torch.Generator().manual_seed(self.settings.seed),
         )
+        effects = {c.name: truth.mean_interval(c.effect, data.episode) for c in changes}
+        moved = max((effect["mean"] or 0.0) for effect in effects.values())
         self.numbers["truth"] = {
             "methods": methods,
             "random_map": truth.deletion_insertion(
                 network, observations, actions, random, self.explainer.absent, data.episode
             ),
-            "interventions": {
-                change.name: truth.mean_interval(change.effect, data.episode) for change in changes
-            },
-            "trusted": _trusted(methods),
+            "interventions": effects,
+            "moved_by_anything": moved >= MOVED,
+            "trusted": _trusted(methods) if moved >= MOVED else None,
         }
         shown = int(np.argmax(np.nan_to_num(changes[0].effect)))
         self.numbers["truth"]["shown_frame"] = shown

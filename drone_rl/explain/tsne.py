@@ -149,10 +149,15 @@ def _principal_components(centred: NDArray) -> NDArray:
     """Rows that span most of the variance, with signs that don't depend on the library."""
     if centred.shape[1] <= COMPONENTS:
         return np.eye(centred.shape[1])
-    _, vectors = np.linalg.eigh(centred.T @ centred)
-    components = vectors[:, ::-1][:, :COMPONENTS].T
+    if len(centred) < centred.shape[1]:  # the smaller of the two equivalent problems
+        _, left = np.linalg.eigh(centred @ centred.T)
+        components = left[:, ::-1][:, :COMPONENTS].T @ centred
+        components /= np.maximum(np.linalg.norm(components, axis=1, keepdims=True), 1e-12)
+    else:
+        _, vectors = np.linalg.eigh(centred.T @ centred)
+        components = vectors[:, ::-1][:, :COMPONENTS].T
     largest = np.abs(components).argmax(1)
-    return components * np.sign(components[np.arange(COMPONENTS), largest])[:, None]
+    return components * np.sign(components[np.arange(len(components)), largest])[:, None]
 
 
 def _distinct(points: NDArray, seed: int) -> NDArray:

@@ -98,6 +98,11 @@ def _attribution(numbers: dict[str, Any]) -> str:
 
 def _truth(numbers: dict[str, Any]) -> str:
     trusted = numbers["trusted"]
+    if not numbers["moved_by_anything"]:
+        return (
+            "Nothing that is changed in the scene moves this policy, so there is nothing that a "
+            "map of it could be true about: trust none of them."
+        )
     if trusted is None:
         return (
             "No method's maps may be trusted on this policy: none both changes with the weights "

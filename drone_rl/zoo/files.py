@@ -95,6 +95,7 @@ def _card(path: Path, about: Mapping[str, Any]) -> str:
     table = "\n".join(f"| {name} | {value} |" for name, value in rows)
     digest = hashlib.sha256(path.read_bytes()).hexdigest()
     packages = about["provenance"]["versions"]
+    revision = about["provenance"]["git_revision"] or "unknown"
     return f"""# {path.stem}
 
 Trained by `{about["command"]}` in {about["progress"]["frames"]:,} frames; the settings are in the
@@ -105,7 +106,7 @@ file's metadata. Evaluated on {evaluation["episodes"]:,} held-out episodes, gree
 {table}
 
 - SHA-256 of `{path.name}`: `{digest}`
-- revision {about["provenance"]["git_revision"] or "unknown"}; torch {packages["torch"]}, torchrl {packages["torchrl"]}, mujoco-warp \
-{packages["mujoco-warp"]}
+- revision {revision}; torch {packages["torch"]}, torchrl {packages["torchrl"]}, mujoco-warp
+  {packages["mujoco-warp"]}
 - intended use: an example for `drone-rl explain policy={path.stem}`; not for a real drone
 """

@@ -1,0 +1,50 @@
+"""Commands as a user starts them, each in a process of its own."""
+
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+PROGRAM = (sys.executable, "-m", "drone_rl.cli.main")
+
+
+def call(*args: str, statuses: tuple[int, ...] = (0,)) -> None:
+    """Runs `drone-rl` with arguments.
+
+    Raises:
+        RuntimeError: Its exit status is none of `statuses`.
+    """
+    done = subprocess.run([*PROGRAM, *args], capture_output=True, text=True, check=False)
+    if done.returncode not in statuses:
+        raise RuntimeError(f"drone-rl {' '.join(args)} failed: {done.stderr.strip()[-500:]}")
+
+
+def watch(*args: str) -> tuple[float, float]:
+    """Runs `drone-rl` with arguments.
+
+    Returns:
+        Seconds from start to end, and the peak of its memory in MiB.
+
+    Raises:
+        RuntimeError: It failed.
+    """
+    begin, peak = time.perf_counter(), 0.0
+    process = subprocess.Popen(
+        [*PROGRAM, *args], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+    while process.poll() is None:
+        peak = max(peak, memory_status(process.pid).get("VmHWM", 0.0))
+        time.sleep(0.1)
+    if process.returncode != 0:
+        raise RuntimeError(f"drone-rl {' '.join(args)} failed: status {process.returncode}")
+    return time.perf_counter() - begin, peak
+
+
+def memory_status(pid: int) -> dict[str, float]:
+    """Memory of a process in MiB, as the kernel counts it."""
+    try:
+        lines = Path(f"/proc/{pid}/status").read_text().splitlines()
+    except OSError:
+        return {}
+    fields = (line.split() for line in lines if line.startswith("Vm"))
+    return {name.rstrip(":"): float(kib) / 1024 for name, kib, *_ in fields}

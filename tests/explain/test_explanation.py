@@ -1,0 +1,70 @@
+import json
+
+import numpy as np
+import pytest
+import torch
+
+from drone_rl.explain.explanation import ExplainSettings, explain_policy
+from drone_rl.policies import MLP, make_actor
+from drone_rl.utils.errors import InputError
+
+SMALL = ExplainSettings(frames=40, episodes=6, perplexity=5, seed=3)
+
+
+def explain(env, actor, network, folder, settings=SMALL):
+    origin = {"policy": "a test", "trained": {}}
+    return explain_policy(env, actor, network, folder, settings, name="test", provenance=origin)
+
+
+@pytest.mark.slow
+def test_everything_is_written_and_the_same_seed_gives_the_same(make_pipeline, tmp_path):
+    contents = []
+    for name in ("a", "b"):
+        env, actor = make_pipeline(num_envs=4, seed=2)
+        network = actor.module[0].module
+        explain(env, actor, network, tmp_path / name)
+        numbers = json.loads((tmp_path / name / "explanation.json").read_text())
+        del numbers["seconds"]
+        arrays = np.load(tmp_path / name / "arrays.npz")
+        contents.append((numbers, {key: arrays[key] for key in arrays.files}))
+        assert sum(len(m._forward_hooks) for m in network.modules()) == 0
+    (numbers, arrays), (again, same) = contents
+    assert numbers == again
+    assert all(np.array_equal(arrays[key], same[key], equal_nan=True) for key in arrays)
+    assert {"verdict", "tsne", "truth", "response", "asymmetry", "loops"} <= numbers.keys()
+
+
+@pytest.mark.slow
+def test_a_policy_without_convolutions_and_with_one_action_is_explained(make_pipeline, tmp_path):
+    env, _ = make_pipeline(num_envs=4)
+    network = MLP((1, 25, 64), 3, hidden=(8,))
+    with torch.no_grad():
+        network.layers.logits.bias.copy_(torch.tensor([0.0, 50.0, 0.0]))  # always left
+    actor = make_actor(network, env.action_spec, torch.Generator().manual_seed(0))
+    numbers = explain(env, actor, network, tmp_path)
+    assert numbers["verdict"]["verdict"] == "poor"
+    assert numbers["dataset"]["action_shares"] == [0.0, 1.0, 0.0]
+    assert numbers["contradictions"]["pairs"] == 0
+    assert numbers["attribution"]["layer"] is None
+    assert numbers["truth"]["trusted"] is None
+
+
+def test_an_unknown_layer_is_refused_before_any_work(make_pipeline, tmp_path):
+    env, actor = make_pipeline()
+    settings = ExplainSettings(frames=40, perplexity=5, layer="conv7")
+    with pytest.raises(InputError, match=r"layer=conv7 .* choose from: conv1"):
+        explain(env, actor, actor.module[0].module, tmp_path / "x", settings)
+    assert not (tmp_path / "x").exists()
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"frames": 3}, "frames=3"),
+        ({"episodes": 0}, "episodes=0"),
+        ({"perplexity": 300.0}, "perplexity=300 does not fit 600 points; give 1 to 199"),
+    ],
+)
+def test_settings_out_of_range_are_refused(wrong, message):
+    with pytest.raises(InputError, match=message):
+        ExplainSettings(**wrong)
