@@ -37,8 +37,12 @@ class RunProcess:
                 return 0
             self._process = self._start()
         status = self._process.poll()
-        if status:
-            self._note_failure(status)
+        if not status:
+            return status
+        if is_locked(self.run.folder) or read_result(self.run.folder) is not None:
+            self._process = None  # one that an earlier sweep had started was quicker: it counts
+            return None
+        self._note_failure(status)
         return status
 
     def wait(self) -> int:

@@ -8,7 +8,7 @@ import pytest
 
 from drone_rl.sweeps import LocalExecutor, read_result
 from drone_rl.sweeps.executors import RayExecutor, SlurmExecutor
-from drone_rl.sweeps.process import finish_run
+from drone_rl.sweeps.process import RunProcess, finish_run
 from drone_rl.sweeps.runs import quoted, read_failure
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock
@@ -75,6 +75,16 @@ def test_a_run_that_another_process_works_on_is_waited_for(make_runs):
     thread.join(10)
     assert statuses == [0]
     assert not (run.folder / "starts").exists()
+
+
+def test_a_process_that_came_too_late_is_no_failure(make_runs):
+    (run,) = make_runs("fail=true")
+    process = RunProcess(run)
+    assert process.poll() is None
+    result = {"reason": "solved", "running_cubes": 2.0}
+    (run.folder / "result.json").write_text(json.dumps(result))  # by an earlier sweep's process
+    assert process.wait() == 0
+    assert read_failure(run) is None
 
 
 def test_interrupting_a_sweep_stops_its_runs(make_runs):
