@@ -145,10 +145,8 @@ def _randomisation(axis: plt.Axes, methods: dict) -> None:
         test = found["randomisation"]
         axis.plot([1.0, *test["correlation"]], color=color, marker="o", label=NAMES.get(name, name))
     layers = next(iter(methods.values()))["randomisation"]["layers"]
-    axis.set_xticks(range(len(layers) + 1), ["trained", *(f"+ {layer}" for layer in layers)])
+    axis.set_xticks(range(len(layers) + 1), ["trained", *layers])
     axis.axhline(0.5, color="#8b8f98", ls="--")
     axis.set(ylabel="likeness to the trained map", ylim=(-1.05, 1.05))
-    axis.set_title(
-        "weights randomised from the last layer on:\na true map must change", fontsize=11
-    )
+    axis.set_title("weights randomised, layer after layer:\na true map must change", fontsize=11)
     axis.legend(fontsize=8, loc="lower left")
