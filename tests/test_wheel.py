@@ -18,6 +18,8 @@ def test_wheel_carries_the_configuration_and_runs_without_the_checkout(tmp_path)
     carried = {p.relative_to(ROOT / "conf") for p in (ROOT / "conf").rglob("*.yaml")}
     assert {f"drone_rl/conf/{path.as_posix()}" for path in carried} <= names
     assert "drone_rl/py.typed" in names
+    assert "drone_rl/report/templates/report.html" in names
+    assert {f"drone_rl/zoo/{n}.safetensors" for n in ("good", "poor", "right_and_forward")} <= names
     code = "import sys; sys.path.insert(0, 'site'); from drone_rl.cli import main as m; "
     code += "assert str(m.conf_dir()).endswith('site/drone_rl/conf'), m.conf_dir(); m.main()"
     command = [sys.executable, "-c", code, "train", "--cfg", "job"]

@@ -5,6 +5,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+import torch
 from hydra.core.hydra_config import HydraConfig
 from omegaconf import DictConfig, ListConfig
 
@@ -21,11 +22,9 @@ _log = logging.getLogger(__name__)
 
 def run(config: DictConfig) -> tuple[int, str]:
     """Explains policies and reports on them. Returns the exit status and the report's path."""
-    names = (
-        list(config.checkpoint)
-        if isinstance(config.checkpoint, ListConfig)
-        else [config.checkpoint]
-    )
+    torch.set_num_threads(1)  # the same file on every machine; pictures this small gain nothing
+    which = config.checkpoint
+    names = list(which) if isinstance(which, ListConfig) else [which]
     if not names or len(set(names)) < len(names):
         raise InputError(f"policy={names} must name one or more policies, each once")
     kinds = [kind.value for kind in Kind]

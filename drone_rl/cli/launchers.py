@@ -7,6 +7,7 @@ a process a run starts each from the same state and lets one fail without the ot
 import copy
 import importlib
 import logging
+import re
 import signal
 import sys
 import types
@@ -87,11 +88,13 @@ class SweepLauncher(Launcher):
     def _run(self, folder: Path, number: int, overrides: Sequence[str]) -> Run:
         """A run in the folder that `hydra.sweep.subdir` names; composing it all would be slow."""
         config = copy.deepcopy(self.config)
-        left_out = tuple(f"{key}=" for key in config.hydra.job.config.override_dirname.exclude_keys)
+        names = config.hydra.job.config.override_dirname
+        left_out = tuple(f"{key}=" for key in names.exclude_keys)
         told = sorted(o for o in overrides if not o.startswith(left_out))
+        told = [re.sub(r"[^\w.-]+", names.kv_sep, o) for o in told]  # no need of quotes in a shell
         with open_dict(config):
             config.hydra.job.id = config.hydra.job.num = number
-            config.hydra.job.override_dirname = ",".join(told).replace("/", "-")
+            config.hydra.job.override_dirname = names.item_sep.join(told)
         HydraConfig.instance().set_config(config)
         return Run(number, tuple(overrides), folder / str(config.hydra.sweep.subdir)[:200])
 

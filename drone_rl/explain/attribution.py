@@ -137,7 +137,7 @@ def _in_batches(
 ) -> Tensor:
     """Attributions of all pictures, their sizes summed over channels. Shape: (T, H, W)."""
     maps = [
-        attribute(x.detach().clone(), a).detach().abs().sum(1)
+        attribute(x.detach().clone().requires_grad_(), a).detach().abs().sum(1)
         for x, a in zip(observations.split(BATCH), actions.split(BATCH), strict=True)
     ]
     return torch.cat(maps).float()

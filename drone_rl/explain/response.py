@@ -47,6 +47,18 @@ class ResponseMap:
         wrong = self.action != self.oracle
         return (change < BLIND) & wrong
 
+    @property
+    def answered(self) -> NDArray:
+        """Sideways places to which the policy turns in time, and away from which never.
+
+        A policy need not turn to a cube that is still far, so a column of the map counts as
+        answered if somewhere on the way the policy does what the oracle does, and nowhere the
+        opposite. Shape: (L,).
+        """
+        opposite = np.array(_MIRRORED)[self.oracle]
+        turns_away = (self.action == opposite) & (self.oracle != Action.FORWARD)
+        return (self.action == self.oracle).any(0) & ~turns_away.any(0)
+
     def summary(self) -> dict[str, Any]:
         """Counts for people and programs."""
         left, right = self.oracle == Action.LEFT, self.oracle == Action.RIGHT
@@ -57,6 +69,8 @@ class ResponseMap:
             "left_agrees": float(agrees[left].mean()),
             "right_agrees": float(agrees[right].mean()),
             "ahead_agrees": float(agrees[~left & ~right].mean()),
+            "left_answered": float(self.answered[left[0]].mean()),
+            "right_answered": float(self.answered[right[0]].mean()),
             "left_blind": float(self.blind[left].mean()),
             "right_blind": float(self.blind[right].mean()),
             "without_cube": self.without_cube.tolist(),

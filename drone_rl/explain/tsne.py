@@ -1,6 +1,7 @@
 """t-SNE of what a policy sees (section 5.1), how faithful it is, and where to put the pictures."""
 
 import dataclasses
+import logging
 
 import numpy as np
 import openTSNE
@@ -11,6 +12,7 @@ from scipy.spatial.distance import cdist
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.provenance import num_cores
 
+logging.getLogger("openTSNE").setLevel(logging.ERROR)  # its remarks are not for our users
 COMPONENTS = 50
 """Principal components to which high-dimensional points are reduced first, as is usual."""
 NEIGHBOURS = 10

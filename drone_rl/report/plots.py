@@ -29,12 +29,8 @@ def truth_chart(explanation: Explanation) -> Figure:
     _heat(axes[0, 1], methods)
     _causal(axes[0, 2], methods)
     random = explanation.numbers["truth"]["random_map"]
-    _curves(
-        axes[1, 0], methods, random, "deletion", "hottest pixels first taken away: lower is better"
-    )
-    _curves(
-        axes[1, 1], methods, random, "insertion", "hottest pixels first put in: higher is better"
-    )
+    _curves(axes[1, 0], methods, random, "deletion", "lower is better")
+    _curves(axes[1, 1], methods, random, "insertion", "higher is better")
     _randomisation(axes[1, 2], methods)
     return figure
 
@@ -63,7 +59,7 @@ def response_chart(explanation: Explanation) -> Figure:
         axes[3].contour(
             lateral, forward, blind.astype(float), levels=[0.5], colors="white", linewidths=2.5
         )
-        axes[3].set_xlabel("white line: blind there")
+        axes[3].set_xlabel("inside the white line: no notice taken")
     for axis in axes:
         axis.set_xlabel(axis.get_xlabel() or "metres to the left (+) or right (-)", fontsize=9)
     axes[0].set_ylabel("metres ahead")
@@ -145,10 +141,8 @@ def _randomisation(axis: plt.Axes, methods: dict) -> None:
         test = found["randomisation"]
         axis.plot([1.0, *test["correlation"]], color=color, marker="o", label=NAMES.get(name, name))
     layers = next(iter(methods.values()))["randomisation"]["layers"]
-    axis.set_xticks(range(len(layers) + 1), ["trained", *(f"+ {layer}" for layer in layers)])
+    axis.set_xticks(range(len(layers) + 1), ["trained", *layers])
     axis.axhline(0.5, color="#8b8f98", ls="--")
     axis.set(ylabel="likeness to the trained map", ylim=(-1.05, 1.05))
-    axis.set_title(
-        "weights randomised from the last layer on:\na true map must change", fontsize=11
-    )
+    axis.set_title("randomised from the last layer on:\na true map must change", fontsize=11)
     axis.legend(fontsize=8, loc="lower left")

@@ -120,15 +120,14 @@ def _truth(numbers: dict[str, Any]) -> str:
 
 
 def _response(numbers: dict[str, Any]) -> str:
-    text = f"The policy does what the oracle does in {percent(numbers['agrees_with_oracle'])} of "
-    text += f"places: {percent(numbers['left_agrees'])} with the cube on the left, "
-    text += f"{percent(numbers['ahead_agrees'])} ahead, {percent(numbers['right_agrees'])} right."
+    text = "On its way to a cube, the policy turns to it in time in "
+    text += f"{percent(numbers['left_answered'])} of the places on the left and "
+    text += f"{percent(numbers['right_answered'])} of those on the right; it does at once what the "
+    text += f"oracle does in {percent(numbers['agrees_with_oracle'])} of all places."
     for side in ("left", "right"):
-        if numbers[f"{side}_blind"] > 0.05:
+        if numbers[f"{side}_answered"] < 0.5 and numbers[f"{side}_blind"] > 0.05:
             blind = percent(numbers[f"{side}_blind"])
-            text += f" It takes no notice of {blind} of the places on the {side}"
-            far = "" if numbers["agrees_with_oracle"] > 0.9 else ", be it blind or in no hurry"
-            text += f"{far}."
+            text += f" It is blind to {blind} of the places on the {side}."
     return text
 
 

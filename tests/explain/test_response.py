@@ -42,6 +42,7 @@ def test_blind_is_where_a_turn_is_called_for_and_nothing_changes():
     assert found.blind.tolist() == [[True, False, False, False]]
     summary = found.summary()
     assert summary["agrees_with_oracle"] == 0.5 and summary["left_blind"] == 0.5
+    assert found.answered.tolist() == [False, True, True, False]
     assert summary["right_agrees"] == 0.0 and summary["right_blind"] == 0.0
 
 
