@@ -12,6 +12,8 @@ import torch
 
 from drone_rl.training import load_checkpoint
 
+pytestmark = pytest.mark.slow
+
 PROGRAM = [sys.executable, "-m", "drone_rl.cli.main"]
 TINY = ["experiment=smoke", "logger=csv", "collector.num_envs=4", "trainer.total_frames=1200"]
 SWEEP = [*PROGRAM, "train", "-m", *TINY, "seed=0,-1", "evaluate_after=10"]
@@ -46,7 +48,7 @@ def sweep(tmp_path_factory):
 
 
 def test_a_killed_sweep_ends_as_one_that_never_was(sweep, tmp_path):
-    (run,) = sweep.glob("0_*seed-0")
+    (run,) = sweep.glob("0_*seed-0*")
     alone = [*PROGRAM, "train", *TINY, "seed=0", "hydra.run.dir=alone"]
     subprocess.run(alone, cwd=tmp_path, check=True)
     one, two = (
@@ -69,7 +71,7 @@ def test_the_mistake_stands_in_the_summary_and_harms_no_other(sweep):
 
 
 def test_one_run_of_a_sweep_can_be_gone_on_with_by_hand(sweep):
-    (run,) = sweep.glob("0_*seed-0")
+    (run,) = sweep.glob("0_*seed-0*")
     command = [*PROGRAM, "train", f"resume={run}", "trainer.total_frames=1600"]
     subprocess.run(command, cwd=sweep, check=True)
     assert json.loads((run / "result.json").read_text())["frames"] >= 1600
