@@ -162,7 +162,7 @@ def test_usage_and_help(tmp_path):
         (["train", "-m", "no_such=1,2"], ["no_such", "--help"]),
         (["train", "-m", "seed=0,1", "hydra.launcher.num_jobs=0"], ["num_jobs=0", "1 or more"]),
         (["train", "-m", "seed=0,1", "hydra/launcher=pbs"], ["pbs", "slurm"]),
-        (["train", "sweep=search"], ["INTERVAL", "hydra/sweeper=optuna"]),
+        (["train", "-m", "seed=interval(0,1)"], ["INTERVAL", "hydra/sweeper=optuna"]),
         (["sweep-report"], ["folder=latest", "drone-rl train -m"]),
         (["sweep-report", "no/such"], ["no/such", "sweep.json"]),
         (["bench", "speed"], ["speed", "render"]),
