@@ -2,8 +2,6 @@
 PYTHON ?= python3
 # Optional parts to install too: make test EXTRAS=dev,slurm,ray,optuna
 EXTRAS ?= dev
-# What is installed besides the package itself; CI adds every optional extra.
-EXTRAS ?= dev
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
