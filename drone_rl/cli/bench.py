@@ -18,18 +18,9 @@ from drone_rl.bench.training import bench_memory, bench_solve
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.provenance import provenance
 
-NAMES = (
-    "render",
-    "collector",
-    "dm_control",
-    "scaling",
-    "memory",
-    "solve",
-    "explain",
-    "verdicts",
-    "sweeps",
-    "ray",
-)
+MAIN_JOB = ("render", "collector", "dm_control", "scaling", "memory", "solve")
+"""What `--quick` runs when nothing is named: within a minute."""
+NAMES = (*MAIN_JOB, "explain", "verdicts", "sweeps", "ray")
 _log = logging.getLogger(__name__)
 
 
@@ -40,9 +31,12 @@ def prepare(overrides: list[str]) -> list[str]:
     for override in kept:
         if "=" not in override and not override.startswith("-"):
             raise InputError(f"benchmark {override!r} is unknown; use some of: {', '.join(NAMES)}")
+    quick = "--quick" in overrides
+    if quick and not names and not any(o.startswith("only=") for o in kept):
+        names = list(MAIN_JOB)
     if names:
         kept.append(f"only=[{','.join(names)}]")
-    return [*kept, "quick=true"] if "--quick" in overrides else kept
+    return [*kept, "quick=true"] if quick else kept
 
 
 def run(config: DictConfig) -> tuple[int, None]:
