@@ -1,4 +1,3 @@
-import os
 import signal
 
 import pytest
@@ -59,7 +58,7 @@ def test_resumed_is_bit_for_bit_the_uninterrupted(make_trainer, tmp_path):
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_signal_saves_and_stops_after_the_update(make_trainer, tmp_path, number):
     before = signal.getsignal(number)
-    kill = At(3, lambda _: os.kill(os.getpid(), number))
+    kill = At(3, lambda _: signal.raise_signal(number))
     trainer = make_trainer(callbacks=[kill, CheckpointCallback(tmp_path)])
     assert trainer.run() == number.name
     assert trainer.progress.updates == 3
@@ -69,8 +68,8 @@ def test_signal_saves_and_stops_after_the_update(make_trainer, tmp_path, number)
 
 def test_second_ctrl_c_aborts_at_once(make_trainer):
     def twice(_):
-        os.kill(os.getpid(), signal.SIGINT)
-        os.kill(os.getpid(), signal.SIGINT)
+        signal.raise_signal(signal.SIGINT)
+        signal.raise_signal(signal.SIGINT)
 
     with pytest.raises(KeyboardInterrupt):
         make_trainer(callbacks=[At(2, twice)]).run()
