@@ -223,7 +223,11 @@ class _Explanation:
         for field in dataclasses.fields(found):
             self.arrays[f"response_{field.name}"] = getattr(found, field.name)
         self.arrays["response_blind"] = found.blind
-        self.numbers["response"] = found.summary()
+        summary = self.numbers["response"] = found.summary()
+        self.numbers["verdict"]["evidence"] = {
+            "mean_entropy": self.numbers["dataset"]["mean_entropy"],
+            **{f"{side}_answered": summary[f"{side}_answered"] for side in ("left", "right")},
+        }
         self.numbers["asymmetry"] = {
             "dataset": response.asymmetry(
                 self.network, self.dataset.tensor("observations"), self.dataset.episode

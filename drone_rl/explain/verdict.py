@@ -21,7 +21,8 @@ those on each side. one-sided: more than {SIDE_SHARE:.0%} of the cubes on one si
 {OTHER_SHARE:.0%} of those on the other. poor: less than {POOR_SHARE:.0%} of all cubes, and not \
 one-sided. none of these: anything else. Each share is compared with its threshold; the verdict is \
 called certain where the whole exact (Clopper-Pearson) 95% interval lies on the same side of every \
-threshold that decided it."""
+threshold that decided it. Entropy and response map are shown beside it as evidence; they decide \
+nothing, for a policy is what it collects."""
 
 
 class Kind(enum.StrEnum):

@@ -31,6 +31,7 @@ def test_everything_is_written_and_the_same_seed_gives_the_same(make_pipeline, t
     (numbers, arrays), (again, same) = contents
     assert numbers == again
     assert all(np.array_equal(arrays[key], same[key], equal_nan=True) for key in arrays)
+    assert 0 <= numbers["verdict"]["evidence"]["mean_entropy"] <= 1
     assert {"verdict", "tsne", "truth", "response", "asymmetry", "loops"} <= numbers.keys()
 
 
