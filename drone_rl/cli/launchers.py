@@ -26,7 +26,6 @@ from omegaconf import DictConfig, OmegaConf, open_dict
 
 from drone_rl.sweeps import LocalExecutor, Run, Sweep, open_sweep, read_result
 from drone_rl.sweeps.executors import Executor, RayExecutor, SlurmExecutor
-from drone_rl.sweeps.page import write_report
 from drone_rl.sweeps.runs import read_failure
 from drone_rl.utils.files import folder_lock
 
@@ -74,6 +73,8 @@ class SweepLauncher(Launcher):
 
     def _finish(self, sweep: Sweep, runs: Sequence[Run]) -> int:
         """Returns how many runs failed."""
+        from drone_rl.sweeps.page import write_report  # slow to import; no single run needs it
+
         failed = 0
         try:
             unfinished = [run for run in runs if read_result(run.folder) is None]

@@ -1,51 +1,15 @@
-"""`drone-rl train`."""
+"""`drone-rl train`: one run, or the sweep of many, which needs none of the heavy libraries."""
 
-import dataclasses
-import json
-import logging
-import signal
 from pathlib import Path
-from typing import Any
 
-import torch
 from hydra.core.hydra_config import HydraConfig
-from hydra.utils import instantiate
 from omegaconf import DictConfig, OmegaConf
 
-from drone_rl.cli.build import build_collector, load_trained, plain
 from drone_rl.cli.launchers import LocalLauncher, RayLauncher, SlurmLauncher, register_plugins
 from drone_rl.cli.optuna_sweeper import OptunaSweeper
-from drone_rl.evaluation import run_episodes, summarise
 from drone_rl.sweeps.naming import is_sweep, sweep_name
-from drone_rl.sweeps.search import PruneCallback
-from drone_rl.training import (
-    CheckpointCallback,
-    CsvCallback,
-    LoggerCallback,
-    NotANumberError,
-    ProgressCallback,
-    Trainer,
-    check_same_config,
-    load_checkpoint,
-)
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import folder_lock, write_atomically
-from drone_rl.utils.provenance import provenance
-
-MAY_CHANGE = (
-    "resume",
-    "logger",
-    "paths",
-    "trainer.total_frames",
-    "trainer.total_episodes",
-    "trainer.target_share",
-    "trainer.checkpoint_interval_s",
-    "evaluate_after",
-    "trial",
-)
-"""Settings that a resumed run may change: they don't enter into what is learned."""
-
-_log = logging.getLogger(__name__)
+from drone_rl.utils.files import folder_lock
 
 
 def register() -> None:
@@ -76,107 +40,8 @@ def prepare(overrides: list[str]) -> list[str]:
 
 def run(config: DictConfig) -> tuple[int, float]:
     """Trains one policy. Returns the exit status and the running mean of cubes."""
+    from drone_rl.cli.training import train  # slow to import; a sweep leaves it to its runs
+
     folder = Path(HydraConfig.get().runtime.output_dir)
     with folder_lock(folder):
-        return _train(config, folder)
-
-
-def _train(config: DictConfig, folder: Path) -> tuple[int, float]:
-    resolved = plain(config)
-    state = load_checkpoint(folder / "checkpoints" / "last.pt") if config.resume else None
-    if state is not None:
-        check_same_config(state["config"], resolved, MAY_CHANGE)
-    trainer, checkpoints = _build(config, folder, resolved)
-    if state is not None:
-        trainer.load_state_dict(state)
-        checkpoints.best = state["best"]
-    try:
-        reason = trainer.run()
-    except NotANumberError as error:
-        raise InputError(f"{error}; the last good checkpoint is {checkpoints.last_path}") from error
-    finally:
-        trainer.collector.shutdown()
-    result = {"reason": reason, **dataclasses.asdict(trainer.progress)}
-    result["num_cubes"] = config.task.num_cubes
-    if config.evaluate_after and not reason.startswith("SIG"):
-        result["evaluation"] = _evaluate(config, checkpoints.last_path)
-    write_atomically(folder / "result.json", json.dumps(result, indent=2))
-    _log.info("run folder: %s", folder)
-    status = 128 + signal.Signals[reason].value if reason.startswith("SIG") else 0
-    if status:
-        _log.info("go on with: drone-rl train resume=%s", folder)
-    return status, trainer.progress.running_cubes
-
-
-def _evaluate(config: DictConfig, path: Path) -> dict[str, Any]:
-    """How good the last parameters are, in the held-out worlds of `drone-rl evaluate`."""
-    episodes = config.evaluate_after
-    worlds = min(episodes, 250)
-    env, actor, _ = load_trained(path, worlds, task={}, seed=0, device=config.device)
-    figures = summarise(run_episodes(env, actor, episodes))
-    env.close()
-    return figures
-
-
-def _build(
-    config: DictConfig, folder: Path, resolved: dict[str, Any]
-) -> tuple[Trainer, CheckpointCallback]:
-    settings = dict(config.trainer)
-    del settings["checkpoint_interval_s"]
-    share = settings.pop("target_share")
-    _check_trainer(config)
-    # sums depend on how many threads make them: on as many everywhere, whatever the machine has
-    torch.set_num_threads(config.collector.num_threads)
-    collector, network, generators = build_collector(config)
-    optimiser = instantiate(config.optimiser)(network.parameters())
-    origin = provenance()
-    OmegaConf.save(OmegaConf.create({"config": resolved, **origin}), folder / "run.yaml")
-    checkpoints = CheckpointCallback(
-        folder / "checkpoints",
-        interval_s=config.trainer.checkpoint_interval_s,
-        extra={"config": resolved, "provenance": origin},
-    )
-    loggers = [instantiate(logger) for logger in config.logger.values()]
-    searching = [] if config.trial is None else [PruneCallback(folder.parent, config.trial)]
-    trainer = Trainer(
-        collector=collector,
-        network=network,
-        estimator=instantiate(config.returns).to(config.device),
-        loss=instantiate(config.objective)(collector.actor).to(config.device),
-        optimiser=optimiser,
-        scheduler=instantiate(config.scheduler)(optimiser),
-        callbacks=[
-            CsvCallback(folder / "metrics.csv"),
-            LoggerCallback(loggers),
-            ProgressCallback(),
-            checkpoints,
-            *searching,
-        ],
-        generators=generators,
-        target=None if share is None else share * config.task.num_cubes,
-        **settings,
-    )
-    return trainer, checkpoints
-
-
-def _check_trainer(config: DictConfig) -> None:
-    trainer = config.trainer
-    if trainer.total_frames < 1 or trainer.minibatch_frames < 1:
-        raise InputError(
-            f"trainer.total_frames={trainer.total_frames} and trainer.minibatch_frames="
-            f"{trainer.minibatch_frames} must be 1 or more"
-        )
-    if config.evaluate_after < 0:
-        raise InputError(f"evaluate_after={config.evaluate_after} must be 0 or more")
-    if not 0 <= trainer.running_decay < 1:
-        raise InputError(
-            f"trainer.running_decay={trainer.running_decay} is out of range; give 0 to below 1"
-        )
-    lr = config.optimiser.get("lr")
-    if lr is not None and not lr > 0:
-        raise InputError(f"optimiser.lr={lr} is out of range; give a rate above 0")
-    share = trainer.target_share
-    if share is not None and not 0 < share <= 1:
-        raise InputError(
-            f"trainer.target_share={share} is out of range; give a share above 0, up to 1, or null"
-        )
+        return train(config, folder)

@@ -1,7 +1,7 @@
 """How good a policy is, measured and filmed."""
 
 from drone_rl.evaluation.evaluator import run_episodes
-from drone_rl.evaluation.metrics import Episodes, proportion, summarise
+from drone_rl.evaluation.metrics import Episodes, summarise
 from drone_rl.evaluation.oracle import ConstantPolicy, Oracle, RandomPolicy
 
 __all__ = [
@@ -9,7 +9,6 @@ __all__ = [
     "Episodes",
     "Oracle",
     "RandomPolicy",
-    "proportion",
     "run_episodes",
     "summarise",
 ]

@@ -3,10 +3,10 @@
 import dataclasses
 from typing import Any
 
-from scipy.stats import beta
 from torch import Tensor
 
 from drone_rl.sim.rules import EndReason, Side
+from drone_rl.utils.intervals import proportion
 
 
 @dataclasses.dataclass
@@ -21,30 +21,6 @@ class Episodes:
     """`EndReason` of each."""
     length: Tensor  # (num_episodes,) int64
     """Steps of each."""
-
-
-def proportion(successes: int, trials: int, confidence: float = 0.95) -> dict[str, Any]:
-    """A share with its exact (Clopper-Pearson) interval.
-
-    Args:
-        successes: How many succeeded.
-        trials: Out of how many; 0 gives a share of None and the interval [0, 1].
-        confidence: Coverage of the interval.
-    """
-    alpha = 1.0 - confidence
-    lower = float(beta.ppf(alpha / 2, successes, trials - successes + 1)) if successes else 0.0
-    upper = (
-        float(beta.ppf(1 - alpha / 2, successes + 1, trials - successes))
-        if successes < trials
-        else 1.0
-    )
-    return {
-        "share": successes / trials if trials else None,
-        "lower95": lower,
-        "upper95": upper,
-        "successes": successes,
-        "trials": trials,
-    }
 
 
 def summarise(episodes: Episodes) -> dict[str, Any]:

@@ -4,7 +4,7 @@ import dataclasses
 import enum
 from typing import Any
 
-from drone_rl.evaluation.metrics import proportion
+from drone_rl.utils.intervals import proportion
 
 GOOD_SHARE = 0.9
 """A good policy collects more than this share of all cubes."""

@@ -9,10 +9,10 @@ from matplotlib import colormaps, style
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from drone_rl.evaluation import proportion
 from drone_rl.sweeps.statistics import bootstrap_band, interquartile_mean, on_grid
 from drone_rl.sweeps.summary import Group
 from drone_rl.sweeps.verdict import KINDS
+from drone_rl.utils.intervals import proportion
 
 FAVOURITE_AXIS = "optimiser.lr"
 COLORS = {"good": "tab:green", "one-sided": "tab:orange", "poor": "tab:red", "none of these": "0.5"}

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from drone_rl.sweeps.runs import Run
-from drone_rl.training import check_same_config
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import write_atomically
 from drone_rl.utils.provenance import provenance
+from drone_rl.utils.settings import check_same_config
 
 FORMAT = "drone_rl sweep"
 MAY_CHANGE = ("resume", "logger", "paths", "trainer.checkpoint_interval_s")

@@ -6,13 +6,9 @@ them: a search that was killed goes on with the trials that it had begun.
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from drone_rl.training import Callback
 from drone_rl.utils.extras import extra
-
-if TYPE_CHECKING:
-    from drone_rl.training import Trainer
 
 NAME = "sweep"
 
@@ -84,33 +80,3 @@ def tell(study: Any, number: int, result: Mapping[str, Any] | None) -> None:
         study.tell(number, state=optuna.trial.TrialState.PRUNED)
     else:
         study.tell(number, result["running_cubes"])
-
-
-class PruneCallback(Callback):
-    """Stops a run whose running mean lies below the median of the others at the same frames."""
-
-    def __init__(self, folder: Path, number: int) -> None:
-        """Joins the study.
-
-        Args:
-            folder: Of the sweep.
-            number: Of the trial.
-        """
-        study = open_study(folder)
-        optuna = import_optuna()
-        settings = study.user_attrs
-        study.pruner = optuna.pruners.MedianPruner(n_startup_trials=settings["startup_trials"])
-        self._trial = optuna.Trial(study, study.trials[number]._trial_id)
-        self._frames = settings["report_frames"]
-        self._prunes = settings["prune"]
-        self._reported = set(study.trials[number].intermediate_values)
-
-    def on_update(self, trainer: "Trainer", metrics: Mapping[str, float]) -> None:
-        """Reports each time that so many frames have passed."""
-        step = trainer.progress.frames // self._frames
-        if step == 0 or step in self._reported:
-            return
-        self._reported.add(step)
-        self._trial.report(trainer.progress.running_cubes, step)
-        if self._prunes and self._trial.should_prune():
-            trainer.stop_request = "pruned"

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from drone_rl.evaluation import proportion
 from drone_rl.sweeps.manifest import Sweep
 from drone_rl.sweeps.runs import Run, read_failure, read_result
 from drone_rl.sweeps.statistics import Array, bootstrap_band, interquartile_mean
 from drone_rl.sweeps.verdict import KINDS, classify
+from drone_rl.utils.intervals import proportion
 
 SEED = "seed"
 

@@ -8,7 +8,6 @@ from drone_rl.training.callbacks import (
     ProgressCallback,
 )
 from drone_rl.training.checkpoint import (
-    check_same_config,
     load_checkpoint,
     load_policy,
     save_checkpoint,
@@ -23,7 +22,6 @@ __all__ = [
     "NotANumberError",
     "ProgressCallback",
     "Trainer",
-    "check_same_config",
     "load_checkpoint",
     "load_policy",
     "save_checkpoint",

@@ -1,3 +1,6 @@
+import threading
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 import torch
@@ -34,6 +37,27 @@ def test_shards_draw_what_one_draws(worlds):
     assert torch.equal(single.render(worlds.state), double.render(worlds.state))
     single.close()
     double.close()
+
+
+def test_recording_a_frame_takes_in_nothing_that_other_threads_draw(worlds):
+    expected = worlds.render(worlds.state)
+    stop = threading.Event()
+
+    def draw_on() -> list[bool]:
+        same = []
+        while not stop.is_set():
+            same.append(torch.equal(worlds.render(worlds.state), expected))
+        return same
+
+    with ThreadPoolExecutor(1) as pool:
+        others = pool.submit(draw_on)
+        fresh = CubeWorlds(3, num_shards=1)  # builds, and records one, two and three worlds
+        pictures = [fresh.render(worlds.state[torch.arange(n)]) for n in (1, 2, 3)]
+        stop.set()
+    assert all(torch.equal(picture, expected[: len(picture)]) for picture in pictures)
+    assert others.result()
+    assert all(others.result())
+    fresh.close()
 
 
 def test_more_imagined_worlds_than_there_are(worlds):

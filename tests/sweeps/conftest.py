@@ -5,8 +5,8 @@ import sys
 
 import pytest
 
-from drone_rl.evaluation import proportion
 from drone_rl.sweeps import Run, open_sweep, process
+from drone_rl.utils.intervals import proportion
 
 FAKE = """
 import json, pathlib, sys, time

@@ -6,7 +6,8 @@ import pytest
 
 optuna = pytest.importorskip("optuna", reason="pip install 'drone-rl[optuna]'")
 
-from drone_rl.sweeps.search import PruneCallback, next_trials, open_study, tell  # noqa: E402
+from drone_rl.sweeps.pruning import PruneCallback  # noqa: E402
+from drone_rl.sweeps.search import next_trials, open_study, tell  # noqa: E402
 
 SPACE = {"optimiser.lr": optuna.distributions.FloatDistribution(1e-4, 1e-1, log=True)}
 

@@ -1,0 +1,37 @@
+"""Optuna's ear in a training: hopeless runs of a search are stopped early."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from drone_rl.sweeps.search import import_optuna, open_study
+from drone_rl.training import Callback, Trainer
+
+
+class PruneCallback(Callback):
+    """Stops a run whose running mean lies below the median of the others at the same frames."""
+
+    def __init__(self, folder: Path, number: int) -> None:
+        """Joins the study.
+
+        Args:
+            folder: Of the sweep.
+            number: Of the trial.
+        """
+        study = open_study(folder)
+        optuna = import_optuna()
+        settings = study.user_attrs
+        study.pruner = optuna.pruners.MedianPruner(n_startup_trials=settings["startup_trials"])
+        self._trial = optuna.Trial(study, study.trials[number]._trial_id)
+        self._frames = settings["report_frames"]
+        self._prunes = settings["prune"]
+        self._reported = set(study.trials[number].intermediate_values)
+
+    def on_update(self, trainer: Trainer, metrics: Mapping[str, float]) -> None:
+        """Reports each time that so many frames have passed."""
+        step = trainer.progress.frames // self._frames
+        if step == 0 or step in self._reported:
+            return
+        self._reported.add(step)
+        self._trial.report(trainer.progress.running_cubes, step)
+        if self._prunes and self._trial.should_prune():
+            trainer.stop_request = "pruned"
