@@ -169,9 +169,8 @@ def judge(settings: TaskSettings, state: WorldState, drone: Tensor) -> tuple[Wor
 def _sides(settings: TaskSettings, state: WorldState) -> Tensor:
     """Records the side of every cube up to the next one that has none yet. Shape: (N, C)."""
     offset = state.cubes[..., 1] - state.drone[:, None, 1]
-    side = torch.full_like(state.side, Side.AHEAD)
-    side[offset > settings.touch_distance] = Side.LEFT
-    side[offset < -settings.touch_distance] = Side.RIGHT
+    right = torch.where(offset < -settings.touch_distance, Side.RIGHT.value, Side.AHEAD.value)
+    side = torch.where(offset > settings.touch_distance, Side.LEFT.value, right)
     index = torch.arange(state.side.shape[-1], device=side.device)
     is_new = (state.side < 0) & (index <= state.next_cube[:, None])
     return torch.where(is_new, side, state.side)
@@ -179,9 +178,11 @@ def _sides(settings: TaskSettings, state: WorldState) -> Tensor:
 
 def _end_reason(settings: TaskSettings, state: WorldState) -> Tensor:
     """The first reason that holds, in the order of Algorithm 3. Shape: (num_worlds,)."""
-    reason = torch.zeros_like(state.steps)
-    reason[state.steps >= settings.step_limit] = EndReason.STEP_LIMIT
-    reason[state.drone[:, 1].abs() > settings.side_bound] = EndReason.SIDE_BOUNDARY
-    reason[state.drone[:, 0] > settings.front_bound] = EndReason.FRONT_BOUNDARY
-    reason[state.collected.all(-1)] = EndReason.ALL_CUBES
-    return reason
+    x, y, _ = state.drone.unbind(-1)
+    return (
+        torch.zeros_like(state.steps)
+        .masked_fill(state.steps >= settings.step_limit, EndReason.STEP_LIMIT)
+        .masked_fill(y.abs() > settings.side_bound, EndReason.SIDE_BOUNDARY)
+        .masked_fill(x > settings.front_bound, EndReason.FRONT_BOUNDARY)
+        .masked_fill(state.collected.all(-1), EndReason.ALL_CUBES)
+    )
