@@ -6,7 +6,7 @@ from pathlib import Path
 from omegaconf import DictConfig
 
 from drone_rl.sweeps import read_sweep
-from drone_rl.sweeps.page import summarise_sweep, write_report
+from drone_rl.sweeps.page import summarise_sweep, write_picture, write_report
 from drone_rl.sweeps.summary import make_groups, read_rows
 from drone_rl.utils.errors import InputError
 
@@ -31,6 +31,9 @@ def run(config: DictConfig) -> tuple[int, None]:
     rows = read_rows(sweep)
     figures = summarise_sweep(sweep, rows, make_groups(rows))
     print(_lines(figures))
+    if config.picture is not None:
+        write_picture(sweep, Path(config.picture))
+        _log.info("picture: %s", config.picture)
     _log.info("written: %s", page)
     return 0, None
 

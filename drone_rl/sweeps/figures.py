@@ -50,34 +50,53 @@ def draw_verdicts(layout: Layout) -> tuple[bytes, bytes]:
     return _draw(layout, _verdicts, height=3.4)
 
 
+def draw_sides(layout: Layout) -> tuple[bytes, bytes]:
+    """Cubes collected on the right minus on the left, of every run, against the axis."""
+    return _draw(layout, _sides, height=3.2)
+
+
 def draw_costs(layout: Layout) -> tuple[bytes, bytes]:
     """Frames to solve of every run that was solved, against the axis."""
     return _draw(layout, _costs, height=3.2)
 
 
-def _draw(
-    layout: Layout, draw: Callable[[Axes, Layout, list[Group]], None], height: float
-) -> tuple[bytes, bytes]:
+def draw_outcome(layout: Layout) -> bytes:
+    """Verdicts above lost sides, as one picture for a light page."""
+    return _picture(layout, [_verdicts, _sides], height=3.0)
+
+
+Draw = Callable[[Axes, Layout, list[Group]], None]
+
+
+def _draw(layout: Layout, draw: Draw, height: float) -> tuple[bytes, bytes]:
     pictures = []
     for sheet in ("default", "dark_background"):
         with style.context(sheet):
-            count = max(1, len(layout.panels))
-            columns = min(2, count)
-            rows = -(-count // columns)
-            figure = Figure(figsize=(5.2 * columns, height * rows), layout="constrained")
-            figure.patch.set_alpha(0.0)
-            grid = figure.subplots(rows, columns, squeeze=False, sharey=True).flat
-            for axes, (title, groups) in zip(grid, layout.panels.items(), strict=False):
-                axes.patch.set_alpha(0.0)
-                axes.spines[["top", "right"]].set_visible(False)
-                axes.set_title(_literal(title), fontsize=10)
-                draw(axes, layout, groups)
-            for axes in list(grid)[count:]:
-                axes.set_visible(False)
-            file = io.BytesIO()
-            figure.savefig(file, format="png", dpi=110)
-            pictures.append(file.getvalue())
+            pictures.append(_picture(layout, [draw], height, transparent=True))
     return pictures[0], pictures[1]
+
+
+def _picture(
+    layout: Layout, draws: Sequence[Draw], height: float, transparent: bool = False
+) -> bytes:
+    """One block of panels below the other, two panels side by side."""
+    panels = list(layout.panels.items())
+    columns = min(2, max(1, len(panels)))
+    rows = max(1, -(-len(panels) // columns))
+    size = (5.2 * columns, height * rows * len(draws))
+    figure = Figure(figsize=size, layout="constrained")
+    grid = figure.subplots(rows * len(draws), columns, squeeze=False, sharey="row")
+    for draw, block in zip(draws, np.split(grid, len(draws)), strict=True):
+        for axes, (title, groups) in zip(block.flat, panels, strict=False):
+            axes.patch.set_alpha(0.0)
+            axes.spines[["top", "right"]].set_visible(False)
+            axes.set_title(_literal(title), fontsize=10)
+            draw(axes, layout, groups)
+        for axes in block.flat[len(panels) :]:
+            axes.set_visible(False)
+    file = io.BytesIO()
+    figure.savefig(file, format="png", dpi=110, transparent=transparent)
+    return file.getvalue()
 
 
 def _curves(axes: Axes, layout: Layout, groups: list[Group]) -> None:
@@ -117,6 +136,21 @@ def _verdicts(axes: Axes, layout: Layout, groups: list[Group]) -> None:
     axes.set(ylabel="share of runs", ylim=(-0.03, 1.03))
     if axes.get_legend_handles_labels()[0]:
         axes.legend(fontsize=7)
+
+
+def _sides(axes: Axes, layout: Layout, groups: list[Group]) -> None:
+    for place, group in zip(_places(axes, layout, groups), groups, strict=True):
+        for kind in KINDS:
+            rows = [row for row in group.finished if row.verdict == kind]
+            leans = [lean for row in rows if (lean := row.lean) is not None]
+            spread = np.linspace(-1.0, 1.0, len(group.finished) + 2)[1 : 1 + len(leans)]
+            x = place * 1.12**spread if axes.get_xscale() == "log" else place + 0.1 * spread
+            axes.plot(x, leans, "o", alpha=0.6, color=COLORS[kind], label=kind)
+    axes.axhline(0.0, color="0.5", linewidth=0.8)
+    axes.set(ylabel="share right - share left", ylim=(-1.05, 1.05))
+    handles, labels = axes.get_legend_handles_labels()
+    first = dict(reversed(list(zip(labels, handles, strict=True))))
+    axes.legend([first[k] for k in KINDS], KINDS, fontsize=7)
 
 
 def _costs(axes: Axes, layout: Layout, groups: list[Group]) -> None:

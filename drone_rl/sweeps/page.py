@@ -13,6 +13,7 @@ from drone_rl.sweeps import figures
 from drone_rl.sweeps.manifest import Sweep
 from drone_rl.sweeps.summary import Group, Row, best_row, make_groups, read_rows, to_csv
 from drone_rl.sweeps.verdict import KINDS
+from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import write_atomically
 
 
@@ -30,6 +31,26 @@ def write_report(sweep: Sweep) -> Path:
     page = sweep.folder / "report.html"
     write_atomically(page, _render(sweep.folder.name, found, _pictures(groups)))
     return page
+
+
+def write_picture(sweep: Sweep, path: Path) -> None:
+    """Writes what policies came out, and which sides they lost, as a picture of its own.
+
+    Args:
+        sweep: With runs whose policies were judged.
+        path: Of the PNG.
+
+    Raises:
+        InputError: No run of the sweep is finished and judged.
+    """
+    groups = make_groups(read_rows(sweep))
+    if not any(row.verdict for group in groups for row in group.finished):
+        raise InputError(
+            f"picture={path}: no run of {sweep.folder} is finished and judged yet; "
+            "sweep with evaluate_after=200"
+        )
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_atomically(path, figures.draw_outcome(figures.lay_out(groups)))
 
 
 def summarise_sweep(sweep: Sweep, rows: Sequence[Row], groups: Sequence[Group]) -> dict[str, Any]:
@@ -70,7 +91,13 @@ def _pictures(groups: Sequence[Group]) -> list[dict[str, str]]:
             "(Clopper-Pearson) intervals.",
             figures.draw_verdicts(layout),
         )
-        pictures.insert(1, verdicts)
+        sides = _picture(
+            "Which side is lost",
+            "Each dot a run: the share of cubes that it collects of those on its right, less the "
+            "share of those on its left. At 1 it has lost the left, at -1 the right.",
+            figures.draw_sides(layout),
+        )
+        pictures[1:1] = [verdicts, sides]
     return pictures
 
 

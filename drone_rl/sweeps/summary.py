@@ -52,6 +52,13 @@ class Row:
         return classify(self.evaluation, self.result["num_cubes"])
 
     @property
+    def lean(self) -> float | None:
+        """Share of the cubes on the right that it collected minus that on the left."""
+        sides = {} if self.evaluation is None else self.evaluation["by_side"]
+        left, right = (sides.get(side, {}).get("share") for side in ("left", "right"))
+        return None if left is None or right is None else right - left
+
+    @property
     def final_share(self) -> float:
         """The running mean at the end, as a share of the task's cubes."""
         return self.result["running_cubes"] / self.result["num_cubes"]

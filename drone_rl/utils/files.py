@@ -14,10 +14,10 @@ _NO_LOCKS = (errno.ENOLCK, errno.ENOTSUP)
 """What file systems answer that know no locks."""
 
 
-def write_atomically(path: Path, text: str) -> None:
-    """Writes a small text file; whoever reads it finds the old one or the new one, never half."""
+def write_atomically(path: Path, content: str | bytes) -> None:
+    """Writes a small file; whoever reads it finds the old one or the new one, never half."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    temporary.write_text(text)
+    temporary.write_bytes(content.encode() if isinstance(content, str) else content)
     os.replace(temporary, path)
 
 

@@ -5,9 +5,10 @@ import json
 
 import pytest
 
-from drone_rl.sweeps.page import write_report
+from drone_rl.sweeps.page import write_picture, write_report
 from drone_rl.sweeps.summary import best_row, make_groups, read_rows
 from drone_rl.sweeps.verdict import classify
+from drone_rl.utils.errors import InputError
 
 
 def test_rows_tell_what_became_of_every_run(sweep):
@@ -16,6 +17,7 @@ def test_rows_tell_what_became_of_every_run(sweep):
     assert rows[0].choice == {"optimiser.lr": "1e-3", "seed": "0"}
     assert [row.verdict for row in rows] == ["good", "good", "one-sided", None]
     assert rows[0].curve[1].tolist() == pytest.approx([0.1, 0.5])
+    assert [row.lean for row in rows] == [0.0, 0.0, 1.0, None]  # all of the right, none of the left
     assert best_row(rows).run.number == 0
 
 
@@ -33,7 +35,7 @@ def test_report_is_whole_and_escapes_what_it_shows(sweep):
     page = write_report(sweep).read_text()
     assert "<b>NaN</b>" not in page
     assert "&lt;b&gt;NaN" in page
-    assert page.count("data:image/png;base64,") == 6  # three figures, light and dark
+    assert page.count("data:image/png;base64,") == 8  # four figures, light and dark
     assert "drone-rl train optimiser.lr=1e-3 seed=0" in page
     assert 'href="2/"' in page
     assert "http:" not in page
@@ -53,10 +55,15 @@ def test_a_corrupt_run_leaves_the_others_unharmed(sweep):
     write_report(sweep)
 
 
-def test_a_sweep_with_nothing_finished_has_a_report(sweep):
+def test_a_sweep_with_nothing_finished_has_a_report_and_no_picture(sweep, tmp_path):
+    picture = tmp_path / "new" / "folder" / "picture.png"
+    write_picture(sweep, picture)
+    assert picture.read_bytes().startswith(b"\x89PNG")
     for path in sweep.folder.glob("*/result.json"):
         path.unlink()
     assert "No run has finished yet" in write_report(sweep).read_text()
+    with pytest.raises(InputError, match="evaluate_after"):
+        write_picture(sweep, picture)
 
 
 @pytest.mark.parametrize(
