@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import torch
 from tensordict import TensorDict, TensorDictBase
 from tensordict.nn import TensorDictModuleBase
+from tensordict.utils import NestedKey
 from torch import Tensor
 from torchrl.envs import EnvBase
 
@@ -57,6 +58,8 @@ class EpisodeCollector:
         self._keep_observations = keep_observations
         flags = (env.reward_key, *env.done_keys)
         self._kept = (*(("next", key) for key in flags), *keep)
+        observed = {key if isinstance(key, str) else key[0] for key in self._observed}
+        self._dropped = {env.reward_key, "info"} - observed
 
     def __iter__(self) -> Iterator[TensorDictBase]:
         """Yields batches until `total_frames`."""
@@ -68,34 +71,41 @@ class EpisodeCollector:
         """Runs one episode in every world. Shape of the batch: (T_total,)."""
         state = self.env.reset()
         active = torch.ones(self.env.batch_size, dtype=torch.bool, device=state.device)
-        steps: list[TensorDictBase] = []
-        while active.any():
-            record, state = self._step(state, active)
-            steps.append(record)
-            active = active & ~state["done"].reshape(active.shape)
-        batch = _join(steps, len(active))
+        worlds: list[Tensor] = []
+        steps: list[dict[NestedKey, Tensor]] = []
+        while len(indices := active.nonzero()[:, 0]):
+            step, state = self._step(state, active, indices)
+            worlds.append(indices)
+            steps.append(step)
+            active = active & ~state.get("done").reshape(active.shape)
+        batch = _join(steps, worlds, len(active))
         batch["collector", "traj_ids"] += self.episodes
         self.frames += len(batch)
         self.episodes += len(active)
         return batch
 
-    def _step(self, state: TensorDictBase, active: Tensor) -> tuple[TensorDictBase, TensorDictBase]:
-        """Acts in the active worlds. Returns their transitions and the state after them."""
-        worlds = active.nonzero()[:, 0]
+    def _step(
+        self, state: TensorDictBase, active: Tensor, worlds: Tensor
+    ) -> tuple[dict[NestedKey, Tensor], TensorDictBase]:
+        """Acts in the active worlds. Returns what is kept of them and the state after them."""
         everyone = len(worlds) == len(active)
         seen = state.select(*self._observed)
         acted = self.actor(seen if everyone else seen[worlds])
-        action = acted[self.env.action_key]
+        action = acted.get(self.env.action_key)
+        keys = acted.keys(True, True) if self._keep_observations else (self.env.action_key,)
+        step = {key: acted.get(key) for key in keys}
         if not everyone:
             action = self.env.action_spec.zero().index_copy(0, worlds, action)
-            state["_step"] = active
-        state[self.env.action_key] = action
+            state.set("_step", active)
+        state.set(self.env.action_key, action)
         after = self.env.step(state)
-        record = after.select(*self._kept)
-        kept = acted if self._keep_observations else acted.select(self.env.action_key)
-        record = kept.update(record if everyone else record[worlds])
-        record["collector"] = TensorDict({"traj_ids": worlds}, record.batch_size)
-        return record, after["next"].exclude(self.env.reward_key)
+        for key in self._kept:
+            value = after.get(key)
+            step[key] = value if everyone else value[worlds]
+        state = after.get("next")
+        for key in self._dropped:  # entries that no step reads make each step dearer
+            state.pop(key, None)
+        return step, state
 
     def state_dict(self) -> dict:
         """Counters and the environment's random streams, as they stand between two batches."""
@@ -113,17 +123,20 @@ class EpisodeCollector:
             self.env.close()
 
 
-def _join(steps: list[TensorDictBase], num_worlds: int) -> TensorDictBase:
+def _join(
+    steps: list[dict[NestedKey, Tensor]], worlds: list[Tensor], num_worlds: int
+) -> TensorDictBase:
     """Time-major steps to episode after episode, copying each frame once. Shape: (T_total,)."""
-    worlds = [step["collector", "traj_ids"] for step in steps]
-    lengths = torch.cat(worlds).bincount(minlength=num_worlds)
+    everyone = torch.cat(worlds)
+    lengths = everyone.bincount(minlength=num_worlds)
     first = lengths.cumsum(0) - lengths
-    rows = [first[indices] + t for t, indices in enumerate(worlds)]
-    batch = TensorDict({}, [int(lengths.sum())], device=steps[0].device)
-    for key in steps[0].keys(include_nested=True, leaves_only=True):
-        parts = [step.get(key) for step in steps]
-        joined = parts[0].new_empty(len(batch), *parts[0].shape[1:])
-        for indices, part in zip(rows, parts, strict=True):
-            joined.index_copy_(0, indices, part)
+    rows = torch.cat([first[indices] + t for t, indices in enumerate(worlds)])
+    batch = TensorDict({}, [len(rows)], device=rows.device)
+    spans = rows.split([len(indices) for indices in worlds])
+    for key, value in steps[0].items():
+        joined = value.new_empty(len(batch), *value.shape[1:])
+        for indices, step in zip(spans, steps, strict=True):
+            joined.index_copy_(0, indices, step[key])
         batch.set(key, joined)
-    return batch
+    traj_ids = torch.empty_like(everyone).index_copy_(0, rows, everyone)
+    return batch.set(("collector", "traj_ids"), traj_ids)
