@@ -1,9 +1,12 @@
-"""What sweeps gain and cost: two runs at once, the launcher, the Ray collector."""
+"""What sweeps gain, cost and survive: two runs at once, the launcher, kills, the Ray collector."""
 
+import contextlib
 import csv
 import importlib.util
+import json
 import os
 import runpy
+import signal
 import statistics
 import subprocess
 import sys
@@ -11,9 +14,11 @@ import time
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from drone_rl.bench.commands import PROGRAM
 from drone_rl.sweeps.runs import THREADS
-from drone_rl.training import CheckpointCallback, CsvCallback, LoggerCallback
+from drone_rl.training import CheckpointCallback, CsvCallback, LoggerCallback, load_checkpoint
 
 _BARE = (sys.executable, "-m", "drone_rl.bench.sweeps")
 
@@ -59,6 +64,39 @@ def bench_sweeps(folder: Path, device: str, quick: bool) -> dict[str, Any]:
     }
 
 
+def bench_kills(folder: Path, device: str, quick: bool) -> dict[str, Any]:
+    """Runs a sweep twice, the second time killed (kill -9) at three random moments.
+
+    Returns:
+        How often it was killed, and how many of its runs ended with the same parameters and the
+        same result as in the sweep that was never killed.
+    """
+    count = 4 if quick else 12
+    settings = [
+        "experiment=smoke",
+        "trainer.total_frames=4000",
+        "trainer.checkpoint_interval_s=0.2",
+        "evaluate_after=20",
+        "logger=csv",
+        f"seed=range({count})",
+        f"device={device}",
+    ]
+    whole, killed = folder / "never_killed", folder / "killed"
+    seconds = _seconds(PROGRAM, "-m", *settings, f"hydra.sweep.dir={whole}")
+    again = (*PROGRAM, "train", "-m", *settings, f"hydra.sweep.dir={killed}")
+    kills, moments = 0, np.random.default_rng(0).uniform(0.2, 1.0, 3) * seconds / 3
+    for moment in moments:
+        sweep = subprocess.Popen(again, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            sweep.wait(moment)
+        kills += sweep.poll() is None
+        _kill_all_that_name(str(killed))
+        sweep.wait()
+    _seconds(PROGRAM, "-m", *settings, f"hydra.sweep.dir={killed}")
+    same = [_outcome(run) == _outcome(killed / run.name) for run in sorted(whole.glob("[0-9]*"))]
+    return {"sweep_kills": kills, "sweep_runs": count, "sweep_runs_same_after_kills": sum(same)}
+
+
 def bench_ray(folder: Path, device: str, quick: bool) -> dict[str, Any]:
     """Frames a second of the Ray collector over the plain one, on the same two cores.
 
@@ -101,6 +139,22 @@ def _seconds(program: tuple[str, ...], *args: str) -> float:
     if done.returncode != 0:
         raise RuntimeError(f"drone-rl train {' '.join(args)} failed: {done.stderr.strip()[-500:]}")
     return time.perf_counter() - begin
+
+
+def _kill_all_that_name(words: str) -> None:
+    """Ends (kill -9) every process with these words on its command line, but for this one."""
+    for path in Path("/proc").glob("[0-9]*/cmdline"):
+        with contextlib.suppress(OSError):
+            if int(path.parent.name) != os.getpid() and words.encode() in path.read_bytes():
+                os.kill(int(path.parent.name), signal.SIGKILL)
+
+
+def _outcome(run: Path) -> tuple[dict[str, Any], dict[str, list]]:
+    """What a run came to, but for the time it took."""
+    result = json.loads((run / "result.json").read_text())
+    del result["seconds"]
+    policy = load_checkpoint(run / "checkpoints" / "last.pt")["policy"]
+    return result, {name: values.tolist() for name, values in policy.items()}
 
 
 def _collected_rate(path: Path) -> float:

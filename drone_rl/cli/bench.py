@@ -13,14 +13,14 @@ from omegaconf import DictConfig
 from drone_rl.bench.explain import bench_explain, bench_verdicts
 from drone_rl.bench.scaling import bench_scaling
 from drone_rl.bench.speed import bench_collector, bench_dm_control, bench_render
-from drone_rl.bench.sweeps import bench_ray, bench_sweeps
+from drone_rl.bench.sweeps import bench_kills, bench_ray, bench_sweeps
 from drone_rl.bench.training import bench_memory, bench_solve
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.provenance import provenance
 
 MAIN_JOB = ("render", "collector", "dm_control", "scaling", "memory", "solve")
 """What `--quick` runs when nothing is named: within a minute."""
-NAMES = (*MAIN_JOB, "explain", "verdicts", "sweeps", "ray")
+NAMES = (*MAIN_JOB, "explain", "verdicts", "sweeps", "kills", "ray")
 _log = logging.getLogger(__name__)
 
 
@@ -75,5 +75,6 @@ def _benchmarks(config: DictConfig, folder: Path) -> dict[str, Callable[[], dict
         "explain": lambda: bench_explain(runs, quick),
         "verdicts": lambda: bench_verdicts(runs, device, quick),
         "sweeps": lambda: bench_sweeps(runs, device, quick),
+        "kills": lambda: bench_kills(runs, device, quick),
         "ray": lambda: bench_ray(runs, device, quick),
     }

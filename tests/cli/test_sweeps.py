@@ -75,3 +75,18 @@ def test_one_run_of_a_sweep_can_be_gone_on_with_by_hand(sweep):
     command = [*PROGRAM, "train", f"resume={run}", "trainer.total_frames=1600"]
     subprocess.run(command, cwd=sweep, check=True)
     assert json.loads((run / "result.json").read_text())["frames"] >= 1600
+
+
+@pytest.mark.parametrize(
+    ("module", "launcher"),
+    [
+        ("submitit", ["hydra/launcher=slurm", "hydra.launcher.cluster=local"]),
+        ("ray", ["hydra/launcher=ray"]),
+    ],
+)
+def test_clusters_from_the_command_line(module, launcher, tmp_path):
+    pytest.importorskip(module, reason="pip install 'drone-rl[slurm,ray]'")
+    sweep = [*PROGRAM, "train", "-m", *TINY, "seed=0,1", *launcher, "hydra.sweep.dir=sweep"]
+    subprocess.run(sweep, cwd=tmp_path, check=True)
+    summary = json.loads((tmp_path / "sweep" / "summary.json").read_text())
+    assert [run["state"] for run in summary["runs"]] == ["finished", "finished"]
