@@ -2,7 +2,7 @@
 
 import torch
 from tensordict import TensorDictBase
-from tensordict.nn import InteractionType, TensorDictModule
+from tensordict.nn import InteractionType, TensorDictModule, dispatch
 from torch import Tensor, nn
 from torch.distributions import Categorical
 from torchrl.data import TensorSpec
@@ -49,6 +49,7 @@ class CategoricalActor(ProbabilisticActor):
     takes longer than a small network does for one picture. The results are the same.
     """
 
+    @dispatch(auto_batch_size=False)
     def forward(
         self,
         tensordict: TensorDictBase,

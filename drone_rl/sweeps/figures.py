@@ -8,6 +8,8 @@ import numpy as np
 from matplotlib import colormaps, style
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
 
 from drone_rl.sweeps.statistics import bootstrap_band, interquartile_mean, on_grid
 from drone_rl.sweeps.summary import Group
@@ -124,33 +126,41 @@ def _verdicts(axes: Axes, layout: Layout, groups: list[Group]) -> None:
             judged = [row.verdict for row in group.finished if row.verdict is not None]
             shares.append(proportion(judged.count(kind), len(judged)))
         known = [(x, s) for x, s in zip(places, shares, strict=True) if s["trials"]]
-        if not known:
+        if not any(s["successes"] for _, s in known):
             continue
-        x = np.array([place for place, _ in known])
+        x = _aside(axes, np.array([place for place, _ in known]), 0.08 * (i - 1.5))
         y, low, high = (np.array([s[k] for _, s in known]) for k in ("share", "lower95", "upper95"))
-        shift = 1.08 ** (i - 1.5) if axes.get_xscale() == "log" else 1.0
         error = np.abs([y - low, high - y])
-        axes.errorbar(
-            x * shift, y, yerr=error, marker="o", capsize=2, color=COLORS[kind], label=kind
-        )
+        axes.errorbar(x, y, yerr=error, marker="o", markersize=4, capsize=2, color=COLORS[kind])
     axes.set(ylabel="share of runs", ylim=(-0.03, 1.03))
-    if axes.get_legend_handles_labels()[0]:
-        axes.legend(fontsize=7)
+    _explain_colours(axes)
 
 
 def _sides(axes: Axes, layout: Layout, groups: list[Group]) -> None:
     for place, group in zip(_places(axes, layout, groups), groups, strict=True):
-        for kind in KINDS:
-            rows = [row for row in group.finished if row.verdict == kind]
-            leans = [lean for row in rows if (lean := row.lean) is not None]
-            spread = np.linspace(-1.0, 1.0, len(group.finished) + 2)[1 : 1 + len(leans)]
-            x = place * 1.12**spread if axes.get_xscale() == "log" else place + 0.1 * spread
-            axes.plot(x, leans, "o", alpha=0.6, color=COLORS[kind], label=kind)
-    axes.axhline(0.0, color="0.5", linewidth=0.8)
-    axes.set(ylabel="share right - share left", ylim=(-1.05, 1.05))
-    handles, labels = axes.get_legend_handles_labels()
-    first = dict(reversed(list(zip(labels, handles, strict=True))))
-    axes.legend([first[k] for k in KINDS], KINDS, fontsize=7)
+        rows = [(row.lean, row.verdict) for row in group.finished if row.lean is not None]
+        for level in np.unique(heights := np.round([lean for lean, _ in rows], 1)):
+            beside = [row for row, height in zip(rows, heights, strict=True) if height == level]
+            for i, (lean, kind) in enumerate(sorted(beside, key=lambda r: KINDS.index(r[1]))):
+                x = _aside(axes, np.array([place]), 0.05 * (i - (len(beside) - 1) / 2))
+                axes.plot(x, [lean], "o", markersize=4, color=COLORS[kind])
+    axes.axhline(0.0, color="0.5", linewidth=0.8, zorder=0)
+    axes.set(ylabel="share right - share left", ylim=(-1.1, 1.1))
+    _explain_colours(axes)
+
+
+def _aside(axes: Axes, places: NDArray, shift: float) -> NDArray:
+    """Places moved along the axis a little, by a share of the way to the next."""
+    return places * 3.0**shift if axes.get_xscale() == "log" else places + shift
+
+
+def _explain_colours(axes: Axes) -> None:
+    """One legend a picture, above it."""
+    figure = axes.get_figure()
+    if figure is None or figure.legends:
+        return
+    handles = [Line2D([], [], marker="o", color=COLORS[kind], label=kind) for kind in KINDS]
+    figure.legend(handles=handles, loc="outside upper center", ncols=len(KINDS), fontsize=8)
 
 
 def _costs(axes: Axes, layout: Layout, groups: list[Group]) -> None:

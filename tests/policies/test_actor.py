@@ -1,10 +1,12 @@
 import copy
 
+import pytest
 import torch
 from tensordict import TensorDict
 from torch import nn
 from torchrl.data import Categorical
 from torchrl.envs.utils import ExplorationType, set_exploration_type
+from torchrl.modules import ProbabilisticActor
 
 from drone_rl.policies import make_actor
 from drone_rl.policies.actor import RandomSource, SeededCategorical
@@ -33,6 +35,22 @@ def test_samples_with_the_given_probabilities_by_default():
 def test_greedy_takes_the_most_probable():
     with set_exploration_type(ExplorationType.DETERMINISTIC):
         assert (act(build()) == 1).all()
+
+
+@pytest.mark.parametrize("how", [ExplorationType.RANDOM, ExplorationType.DETERMINISTIC])
+def test_the_straight_way_ends_where_torchrls_own_does(how):
+    pixels = TensorDict({"pixels": torch.zeros(500, 1)}, [500])
+    straight, around = build(3), build(3)
+    with set_exploration_type(how):
+        one, two = straight(pixels.clone()), ProbabilisticActor.forward(around, pixels.clone())
+    assert set(one.keys()) == set(two.keys()) == {"pixels", "logits", "action"}
+    assert all(torch.equal(one[key], two[key]) for key in ("logits", "action"))
+
+
+def test_other_ways_to_explore_are_left_to_torchrl():
+    with set_exploration_type(ExplorationType.MODE):
+        assert (act(build(), n=3) == 1).all()
+    assert build()(pixels=torch.zeros(2, 1))[1].shape == (2,)  # logits, action
 
 
 def test_draws_from_its_own_generator_alone():
