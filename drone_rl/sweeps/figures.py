@@ -12,13 +12,15 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from drone_rl.sweeps.statistics import bootstrap_band, interquartile_mean, on_grid
-from drone_rl.sweeps.summary import Group
+from drone_rl.sweeps.summary import Group, Row
 from drone_rl.sweeps.verdict import KINDS
 from drone_rl.utils.intervals import proportion
 
 FAVOURITE_AXIS = "optimiser.lr"
 COLORS = {"good": "tab:green", "one-sided": "tab:orange", "poor": "tab:red", "none of these": "0.5"}
 MAX_PANELS = 6
+UNIFORM = float(np.log(3))
+"""Entropy of three actions of the same probability, nats."""
 
 
 @dataclasses.dataclass
@@ -57,14 +59,19 @@ def draw_sides(layout: Layout) -> tuple[bytes, bytes]:
     return _draw(layout, _sides, height=3.2)
 
 
+def draw_entropies(layout: Layout) -> tuple[bytes, bytes]:
+    """Entropy of every run's policy at its end, against the axis."""
+    return _draw(layout, _entropies, height=3.2)
+
+
 def draw_costs(layout: Layout) -> tuple[bytes, bytes]:
     """Frames to solve of every run that was solved, against the axis."""
     return _draw(layout, _costs, height=3.2)
 
 
 def draw_outcome(layout: Layout) -> bytes:
-    """Verdicts above lost sides, as one picture for a light page."""
-    return _picture(layout, [_verdicts, _sides], height=3.0)
+    """Verdicts, lost sides and entropies, as one picture for a light page."""
+    return _picture(layout, [_verdicts, _sides, _entropies], height=2.5)
 
 
 Draw = Callable[[Axes, Layout, list[Group]], None]
@@ -137,15 +144,30 @@ def _verdicts(axes: Axes, layout: Layout, groups: list[Group]) -> None:
 
 
 def _sides(axes: Axes, layout: Layout, groups: list[Group]) -> None:
-    for place, group in zip(_places(axes, layout, groups), groups, strict=True):
-        rows = [(row.lean, row.verdict) for row in group.finished if row.lean is not None]
-        for level in np.unique(heights := np.round([lean for lean, _ in rows], 1)):
-            beside = [row for row, height in zip(rows, heights, strict=True) if height == level]
-            for i, (lean, kind) in enumerate(sorted(beside, key=lambda r: KINDS.index(r[1]))):
-                x = _aside(axes, np.array([place]), 0.05 * (i - (len(beside) - 1) / 2))
-                axes.plot(x, [lean], "o", markersize=4, color=COLORS[kind])
+    _dots(axes, layout, groups, lambda row: row.lean)
     axes.axhline(0.0, color="0.5", linewidth=0.8, zorder=0)
     axes.set(ylabel="share right - share left", ylim=(-1.1, 1.1))
+
+
+def _entropies(axes: Axes, layout: Layout, groups: list[Group]) -> None:
+    _dots(axes, layout, groups, lambda row: row.entropy)
+    axes.axhline(UNIFORM, color="0.5", linewidth=0.8, zorder=0)
+    axes.set(ylabel="entropy at the end, nats", ylim=(-0.06, 1.06 * UNIFORM))
+
+
+def _dots(
+    axes: Axes, layout: Layout, groups: list[Group], value: Callable[[Row], float | None]
+) -> None:
+    """A dot for every run that was judged, those of like value side by side."""
+    for place, group in zip(_places(axes, layout, groups), groups, strict=True):
+        judged = [(value(row), row.verdict) for row in group.finished]
+        rows = [(y, kind) for y, kind in judged if y is not None and kind is not None]
+        heights = np.round([y for y, _ in rows], 1)
+        for level in np.unique(heights):
+            beside = [row for row, height in zip(rows, heights, strict=True) if height == level]
+            for i, (y, kind) in enumerate(sorted(beside, key=lambda r: KINDS.index(r[1]))):
+                x = _aside(axes, np.array([place]), 0.05 * (i - (len(beside) - 1) / 2))
+                axes.plot(x, [y], "o", markersize=4, color=COLORS[kind])
     _explain_colours(axes)
 
 

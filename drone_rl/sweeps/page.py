@@ -34,7 +34,7 @@ def write_report(sweep: Sweep) -> Path:
 
 
 def write_picture(sweep: Sweep, path: Path) -> None:
-    """Writes what policies came out, and which sides they lost, as a picture of its own.
+    """Writes what policies came out, which sides they lost and whether they can still change.
 
     Args:
         sweep: With runs whose policies were judged.
@@ -97,7 +97,14 @@ def _pictures(groups: Sequence[Group]) -> list[dict[str, str]]:
             "share of those on its left. At 1 it has lost the left, at -1 the right.",
             figures.draw_sides(layout),
         )
-        pictures[1:1] = [verdicts, sides]
+        entropies = _picture(
+            "What can still change",
+            "Each dot a run: the mean entropy of its policy over the last updates; the line is "
+            "that of a policy which doesn't care. At 0 it never tries another action again, so "
+            "nothing can teach it one.",
+            figures.draw_entropies(layout),
+        )
+        pictures[1:1] = [verdicts, sides, entropies]
     return pictures
 
 

@@ -16,6 +16,8 @@ from drone_rl.sweeps.verdict import KINDS, classify
 from drone_rl.utils.intervals import proportion
 
 SEED = "seed"
+LAST_UPDATES = 20
+"""Updates at the end of a run over which the entropy is averaged."""
 
 
 @dataclasses.dataclass
@@ -33,6 +35,9 @@ class Row:
     """`result.json`."""
     curve: tuple[Array, Array] = (np.empty(0), np.empty(0))
     """Frames, and the running mean as a share of the task's cubes. Shape: (num_updates,) each."""
+
+    entropy: float | None = None
+    """Mean entropy of the policy over the last updates, nats; 0 if it can't change any more."""
 
     @property
     def is_solved(self) -> bool:
@@ -79,6 +84,7 @@ class Row:
             "mean_cubes": evaluation.get("mean_cubes"),
             "all_cubes": evaluation.get("all_cubes", {}).get("share"),
             **{side: sides.get(side, {}).get("share") for side in ("left", "ahead", "right")},
+            "entropy": self.entropy,
             "error": self.error,
             "folder": self.run.folder.name,
         }
@@ -109,6 +115,7 @@ class Group:
             "solved": proportion(len(solved), len(self.finished)),
             "median_frames_to_solve": _median([r["frames"] for r in solved]),
             "median_seconds_to_solve": _median([r["seconds"] for r in solved]),
+            "median_entropy": _median([r.entropy for r in self.finished if r.entropy is not None]),
             "final_share": _mean_with_band([row.final_share for row in self.finished]),
             "verdicts": {kind: proportion(judged.count(kind), len(judged)) for kind in KINDS},
         }
@@ -166,19 +173,21 @@ def _read_row(run: Run, choice: dict[str, str]) -> Row:
         error = read_failure(run)
         return Row(run, choice, "unfinished" if error is None else "failed", error)
     try:
-        row = Row(run, choice, "finished", None, result, _read_curve(run.folder, result))
+        row = Row(run, choice, "finished", None, result, *_read_metrics(run.folder, result))
         row.plain()
     except (OSError, ValueError, KeyError, TypeError) as error:
         return Row(run, choice, "damaged", f"its files can't be read ({error!r})")
     return row
 
 
-def _read_curve(folder: Path, result: dict[str, Any]) -> tuple[Array, Array]:
+def _read_metrics(folder: Path, result: dict[str, Any]) -> tuple[tuple[Array, Array], float | None]:
+    """The learning curve, and the entropy at its end."""
     with (folder / "metrics.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     frames = np.array([float(row["frames"]) for row in rows])
     cubes = np.array([float(row["train/running_cubes"]) for row in rows])
-    return frames, cubes / result["num_cubes"]
+    last = [float(row["loss/entropy"]) for row in rows[-LAST_UPDATES:] if row.get("loss/entropy")]
+    return (frames, cubes / result["num_cubes"]), float(np.mean(last)) if last else None
 
 
 def _median(values: Sequence[float]) -> float | None:

@@ -76,6 +76,6 @@ def sweep(tmp_path, make_runs):
             "evaluation": figures,
         }
         (run.folder / "result.json").write_text(json.dumps(result))
-        rows = "update,frames,train/running_cubes\n1,500,0.3\n2,1000,1.5\n"
+        rows = "update,frames,train/running_cubes,loss/entropy\n1,500,0.3,1.0\n2,1000,1.5,0.5\n"
         (run.folder / "metrics.csv").write_text(rows)
     return open_sweep(tmp_path, ["drone-rl", "train", "-m", "seed=0,1"], {"seed": 0}, runs)

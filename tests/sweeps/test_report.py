@@ -18,6 +18,7 @@ def test_rows_tell_what_became_of_every_run(sweep):
     assert [row.verdict for row in rows] == ["good", "good", "one-sided", None]
     assert rows[0].curve[1].tolist() == pytest.approx([0.1, 0.5])
     assert [row.lean for row in rows] == [0.0, 0.0, 1.0, None]  # all of the right, none of the left
+    assert [row.entropy for row in rows] == [0.75, 0.75, 0.75, None]  # of both updates
     assert best_row(rows).run.number == 0
 
 
@@ -35,7 +36,7 @@ def test_report_is_whole_and_escapes_what_it_shows(sweep):
     page = write_report(sweep).read_text()
     assert "<b>NaN</b>" not in page
     assert "&lt;b&gt;NaN" in page
-    assert page.count("data:image/png;base64,") == 8  # four figures, light and dark
+    assert page.count("data:image/png;base64,") == 10  # five figures, light and dark
     assert "drone-rl train optimiser.lr=1e-3 seed=0" in page
     assert 'href="2/"' in page
     assert "http:" not in page
