@@ -7,7 +7,7 @@ the policy see with the cube over there" is one call.
 Warp runs a CPU kernel on one core, and lets go of the interpreter's lock meanwhile: hence one
 shard of the batch a core, each with its own buffers, on a pool of threads. A CPU's shard records
 the kernels of a frame once for each number of worlds and then replays them, which spares Python the
-packing of some hundred arguments: a single world is drawn six times as fast.
+packing of some hundred arguments: a single world is drawn several times as fast.
 """
 
 import dataclasses
