@@ -32,6 +32,11 @@ class Layout:
     panels: dict[str, list[Group]]
     """Groups by what they have in common beside that setting."""
 
+    @property
+    def groups(self) -> list[Group]:
+        """Those of all panels."""
+        return [group for groups in self.panels.values() for group in groups]
+
 
 def lay_out(groups: Sequence[Group]) -> Layout:
     """The learning rate, or else the first swept setting, along the axis; a panel for the rest."""
@@ -198,7 +203,9 @@ def _costs(axes: Axes, layout: Layout, groups: list[Group]) -> None:
             fontsize=7,
         )
         note.set_in_layout(False)
-    axes.set(ylabel="frames to solve", ylim=(0, 1.12 * axes.get_ylim()[1]))
+    solved = [row for group in layout.groups for row in group.finished if row.is_solved]
+    top = max((row.result["frames"] for row in solved), default=1)  # of all panels, which share it
+    axes.set(ylabel="frames to solve", ylim=(0, 1.2 * top))
 
 
 def _places(axes: Axes, layout: Layout, groups: list[Group]) -> list[float]:

@@ -4,7 +4,9 @@ import csv
 import json
 
 import pytest
+from matplotlib.figure import Figure
 
+from drone_rl.sweeps import figures
 from drone_rl.sweeps.page import write_picture, write_report
 from drone_rl.sweeps.summary import best_row, make_groups, read_rows
 from drone_rl.sweeps.verdict import classify
@@ -45,6 +47,16 @@ def test_report_is_whole_and_escapes_what_it_shows(sweep):
     assert (summary["finished"], summary["failed"], summary["best"]["run"]) == (3, 1, 0)
     with (sweep.folder / "summary.csv").open(newline="") as file:
         assert [row["verdict"] for row in csv.DictReader(file)] == ["good", "good", "one-sided", ""]
+
+
+def test_runs_that_were_solved_are_seen_beside_a_panel_without_any(sweep):
+    solved, unsolved = make_groups(read_rows(sweep))
+    layout = figures.Layout("optimiser.lr", {"first": [unsolved], "second": [solved]})
+    first, second = Figure().subplots(1, 2, sharey=True)
+    figures._costs(first, layout, [unsolved])
+    figures._costs(second, layout, [solved])
+    assert second.get_ylim() == (0, 1.2 * 2000)
+    assert [list(line.get_ydata()) for line in second.lines] == [[1000, 2000]]
 
 
 def test_a_corrupt_run_leaves_the_others_unharmed(sweep):
