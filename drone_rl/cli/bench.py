@@ -19,7 +19,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.provenance import provenance
 
 MAIN_JOB = ("render", "collector", "dm_control", "scaling", "memory", "solve")
-"""What `--quick` runs when nothing is named: within a minute."""
+"""What `--quick` runs when nothing is named: in a minute or little more."""
 NAMES = (*MAIN_JOB, "explain", "verdicts", "sweeps", "kills", "ray")
 _log = logging.getLogger(__name__)
 
