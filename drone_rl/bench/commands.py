@@ -1,20 +1,33 @@
 """Commands as a user starts them, each in a process of its own."""
 
+import os
 import subprocess
 import sys
 import time
+from collections.abc import Mapping
 from pathlib import Path
 
 PROGRAM = (sys.executable, "-m", "drone_rl.cli.main")
 
 
-def call(*args: str, statuses: tuple[int, ...] = (0,)) -> None:
-    """Runs `drone-rl` with arguments.
+def call(
+    *args: str,
+    statuses: tuple[int, ...] = (0,),
+    program: tuple[str, ...] = PROGRAM,
+    environment: Mapping[str, str] | None = None,
+) -> None:
+    """Runs `drone-rl`, or a `program` that takes the same arguments, in an added environment.
 
     Raises:
         RuntimeError: Its exit status is none of `statuses`.
     """
-    done = subprocess.run([*PROGRAM, *args], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [*program, *args],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, **(environment or {})},
+    )
     if done.returncode not in statuses:
         raise RuntimeError(f"drone-rl {' '.join(args)} failed: {done.stderr.strip()[-500:]}")
 

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from drone_rl.bench.commands import PROGRAM
+from drone_rl.bench.commands import PROGRAM, call
 from drone_rl.sweeps.runs import THREADS
 from drone_rl.training import CheckpointCallback, CsvCallback, LoggerCallback, load_checkpoint
 
@@ -129,15 +129,7 @@ def bench_ray(folder: Path, device: str, quick: bool) -> dict[str, Any]:
 def _seconds(program: tuple[str, ...], *args: str) -> float:
     """Time of one command."""
     begin = time.perf_counter()
-    done = subprocess.run(
-        [*program, "train", *args],
-        capture_output=True,
-        text=True,
-        check=False,
-        env={**os.environ, **THREADS},
-    )
-    if done.returncode != 0:
-        raise RuntimeError(f"drone-rl train {' '.join(args)} failed: {done.stderr.strip()[-500:]}")
+    call("train", *args, program=program, environment=THREADS)
     return time.perf_counter() - begin
 
 

@@ -1,13 +1,13 @@
 """`drone-rl sweep-report`."""
 
+import json
 import logging
 from pathlib import Path
 
 from omegaconf import DictConfig
 
 from drone_rl.sweeps import read_sweep
-from drone_rl.sweeps.page import summarise_sweep, write_picture, write_report
-from drone_rl.sweeps.summary import make_groups, read_rows
+from drone_rl.sweeps.page import write_picture, write_report
 from drone_rl.utils.errors import InputError
 
 _log = logging.getLogger(__name__)
@@ -28,9 +28,7 @@ def run(config: DictConfig) -> tuple[int, None]:
     folder = _newest(Path(config.paths.outputs)) if config.folder == "latest" else config.folder
     sweep = read_sweep(Path(folder).absolute())
     page = write_report(sweep)
-    rows = read_rows(sweep)
-    figures = summarise_sweep(sweep, rows, make_groups(rows))
-    print(_lines(figures))
+    print(_lines(json.loads((sweep.folder / "summary.json").read_text())))
     if config.picture is not None:
         write_picture(sweep, Path(config.picture))
         _log.info("picture: %s", config.picture)

@@ -6,7 +6,6 @@ import io
 import json
 import re
 from collections.abc import Sequence
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -77,14 +76,17 @@ def _section(explanation: Explanation, folder: Path, prefix: str) -> dict[str, A
 
 
 def _render(explanations: list[Explanation], sections: list[dict], class_models: str) -> str:
-    source = resources.files("drone_rl.report").joinpath("templates/report.html").read_text()
-    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined)
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("drone_rl.report"),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+    )
     environment.filters["percent"] = lambda x: "none" if x is None else f"{100 * x:.0f}%"
     # "<" is the one character by which a name could leave a script
     environment.filters["script"] = lambda x: jinja2.utils.markupsafe.Markup(
         json.dumps(x).replace("<", "\\u003c")
     )
-    return environment.from_string(source).render(
+    return environment.get_template("report.html").render(
         title="Can these policies be trusted?"
         if len(sections) > 1
         else "Can this policy be trusted?",

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from drone_rl.sweeps.statistics import bootstrap_band, interquartile_mean, on_grid
 from drone_rl.sweeps.summary import Group, Row
 from drone_rl.sweeps.verdict import KINDS
-from drone_rl.utils.intervals import proportion
 
 FAVOURITE_AXIS = "optimiser.lr"
 COLORS = {"good": "tab:green", "one-sided": "tab:orange", "poor": "tab:red", "none of these": "0.5"}
@@ -102,7 +101,6 @@ def _picture(
     grid = figure.subplots(rows * len(draws), columns, squeeze=False, sharey="row")
     for draw, block in zip(draws, np.split(grid, len(draws)), strict=True):
         for axes, (title, groups) in zip(block.flat, panels, strict=False):
-            axes.patch.set_alpha(0.0)
             axes.spines[["top", "right"]].set_visible(False)
             axes.set_title(_literal(title), fontsize=10)
             draw(axes, layout, groups)
@@ -133,10 +131,7 @@ def _curves(axes: Axes, layout: Layout, groups: list[Group]) -> None:
 def _verdicts(axes: Axes, layout: Layout, groups: list[Group]) -> None:
     places = _places(axes, layout, groups)
     for i, kind in enumerate(KINDS):
-        shares = []
-        for group in groups:
-            judged = [row.verdict for row in group.finished if row.verdict is not None]
-            shares.append(proportion(judged.count(kind), len(judged)))
+        shares = [group.verdicts[kind] for group in groups]
         known = [(x, s) for x, s in zip(places, shares, strict=True) if s["trials"]]
         if not any(s["successes"] for _, s in known):
             continue

@@ -116,7 +116,10 @@ def _picture(title: str, text: str, content: tuple[bytes, bytes]) -> dict[str, s
 def _render(name: str, found: dict[str, Any], pictures: list[dict[str, str]]) -> str:
     source = resources.files("drone_rl.sweeps").joinpath("templates/report.html").read_text()
     environment = jinja2.Environment(
-        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True
+        loader=jinja2.PackageLoader("drone_rl.report"),  # the style that all reports share
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
     )
     environment.filters["figure"] = _figure
     return environment.from_string(source).render(

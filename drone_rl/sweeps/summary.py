@@ -104,9 +104,14 @@ class Group:
         """Those with a result."""
         return [row for row in self.rows if row.state == "finished"]
 
+    @property
+    def verdicts(self) -> dict[str, dict[str, Any]]:
+        """Share of each of `KINDS` among the judged, with exact intervals."""
+        judged = [row.verdict for row in self.finished if row.verdict is not None]
+        return {kind: proportion(judged.count(kind), len(judged)) for kind in KINDS}
+
     def plain(self) -> dict[str, Any]:
         """Its figures, shares with exact and means with bootstrap intervals."""
-        judged = [row.verdict for row in self.finished if row.verdict is not None]
         solved = [row.result for row in self.finished if row.is_solved]
         return {
             **self.choice,
@@ -117,7 +122,7 @@ class Group:
             "median_seconds_to_solve": _median([r["seconds"] for r in solved]),
             "median_entropy": _median([r.entropy for r in self.finished if r.entropy is not None]),
             "final_share": _mean_with_band([row.final_share for row in self.finished]),
-            "verdicts": {kind: proportion(judged.count(kind), len(judged)) for kind in KINDS},
+            "verdicts": self.verdicts,
         }
 
 
