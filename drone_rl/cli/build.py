@@ -148,8 +148,8 @@ def find_checkpoint(where: str, outputs: str) -> Path:
     """The checkpoint file that the user means.
 
     Args:
-        where: A .pt or .safetensors file, the folder of a run, "latest" for the newest run, or the
-            name of a policy that travels with the package.
+        where: A .pt or .safetensors file, the folder of a run (its `last.pt`, in every command),
+            "latest" for the newest run, or the name of a policy that travels with the package.
         outputs: Folder under which runs are kept.
 
     Raises:
@@ -157,7 +157,7 @@ def find_checkpoint(where: str, outputs: str) -> Path:
     """
     if where == "latest":
         found = sorted(
-            Path(outputs).glob("train/**/checkpoints/best.pt"), key=lambda p: p.stat().st_mtime
+            Path(outputs).glob("train/**/checkpoints/last.pt"), key=lambda p: p.stat().st_mtime
         )
         if not found:
             raise InputError(
@@ -173,7 +173,7 @@ def find_checkpoint(where: str, outputs: str) -> Path:
             f"policy or checkpoint {where} does not exist; give a file, the folder of a run, "
             f"latest, or one of {', '.join(policy_names())}"
         )
-    return path / "checkpoints" / "best.pt" if path.is_dir() else path
+    return path / "checkpoints" / "last.pt" if path.is_dir() else path
 
 
 def read_policy(path: Path) -> dict[str, Any]:
@@ -186,7 +186,13 @@ def read_policy(path: Path) -> dict[str, Any]:
 
 
 def load_trained(
-    path: Path, num_envs: int, *, task: dict[str, Any], seed: int, device: str
+    path: Path,
+    num_envs: int,
+    *,
+    task: dict[str, Any],
+    seed: int,
+    device: str,
+    stream: Stream = Stream.REPORT,
 ) -> tuple[TransformedEnv, TensorDictModuleBase, dict[str, Any]]:
     """A checkpoint's policy, in held-out worlds like those that it was trained in.
 
@@ -196,6 +202,7 @@ def load_trained(
         task: Settings that replace the checkpoint's own; None keeps them.
         seed: Root of the worlds' random streams.
         device: Where to run.
+        stream: Worlds to report on, or those to choose by.
 
     Returns:
         The environment, the actor and the checkpoint's state.
@@ -205,10 +212,10 @@ def load_trained(
     """
     state = read_policy(path)
     config = trained_config(state, task)
-    env = build_env(config, num_envs, seed=seed, stream=Stream.EVALUATION, device=device)
+    env = build_env(config, num_envs, seed=seed, stream=stream, device=device)
     network = build_network(config, env, seed=seed)
     load_policy(network, state["policy"])
-    actions = torch_generator(seed, Stream.EVALUATION, device=env.device)
+    actions = torch_generator(seed, stream, device=env.device)
     return env, make_actor(network, env.action_spec, actions), state
 
 

@@ -97,7 +97,7 @@ def _baselines(config: DictConfig, trained: DictConfig) -> dict[str, dict[str, A
             num_envs,
             seed=config.seed,
             device=config.device,
-            stream=Stream.EVALUATION,
+            stream=Stream.REPORT,
             pixels=False,
         )
         generator = torch_generator(config.seed, Stream.ACTIONS, device=env.device)

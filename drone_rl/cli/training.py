@@ -26,6 +26,7 @@ from drone_rl.training import (
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import write_atomically
 from drone_rl.utils.provenance import provenance
+from drone_rl.utils.seeding import Stream
 from drone_rl.utils.settings import check_same_config
 
 MAY_CHANGE = (
@@ -84,10 +85,12 @@ def train(config: DictConfig, folder: Path) -> tuple[int, float]:
 
 
 def _evaluate(config: DictConfig, path: Path) -> dict[str, Any]:
-    """How good the last parameters are, in the held-out worlds of `drone-rl evaluate`."""
+    """How good the last parameters are, in worlds to choose by, which no report ever shows."""
     episodes = config.evaluate_after
     worlds = min(episodes, 250)
-    env, actor, _ = load_trained(path, worlds, task={}, seed=0, device=config.device)
+    env, actor, _ = load_trained(
+        path, worlds, task={}, seed=0, device=config.device, stream=Stream.CHOICE
+    )
     figures = summarise(run_episodes(env, actor, episodes))
     env.close()
     return figures

@@ -64,7 +64,7 @@ def _policy(config: DictConfig, num_envs: int) -> tuple[EnvBase, TensorDictModul
         num_envs,
         settings,
         seed=config.seed,
-        stream=Stream.EVALUATION,
+        stream=Stream.REPORT,
         pixels=False,
         device=config.device,
     )

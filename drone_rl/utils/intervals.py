@@ -1,8 +1,12 @@
-"""Exact intervals of shares."""
+"""Intervals that hold: exact ones of shares, and of bounded means whatever their distribution."""
 
+import math
 from typing import Any
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 from scipy.special import betaincinv
+from scipy.stats import binom
 
 
 def proportion(successes: int, trials: int, confidence: float = 0.95) -> dict[str, Any]:
@@ -23,3 +27,79 @@ def proportion(successes: int, trials: int, confidence: float = 0.95) -> dict[st
         "successes": successes,
         "trials": trials,
     }
+
+
+def mean_bounds(
+    values: ArrayLike, low: float = 0.0, high: float = 1.0, confidence: float = 0.95
+) -> dict[str, Any]:
+    """A mean of bounded values with an interval that holds for any distribution and any number.
+
+    One value an episode (a share, an average over its frames, a paired difference) makes it an
+    interval whatever the dependence within episodes; no normality and no large sample is assumed.
+    A mean is refuted by who would have grown rich betting against it: the capital of fixed bets is
+    a martingale if the mean is true, so that it grows tenfold with probability 0.1 at most (Ville;
+    Waudby-Smith and Ramdas, 2024). A mixture of bets makes the order of the values irrelevant.
+
+    Args:
+        values: Independent and identically distributed, each from `low` to `high`. Shape: (n,).
+        low: Least possible value.
+        high: Greatest possible value.
+        confidence: Coverage of the interval.
+
+    Returns:
+        "mean" (None of no values), "lower95" and "upper95" (the whole range of no values) and
+        "count".
+
+    Raises:
+        ValueError: A value is not finite or out of range.
+    """
+    z = (np.asarray(values, np.float64).ravel() - low) / (high - low)
+    if not np.isfinite(z).all() or (z < -1e-9).any() or (z > 1 + 1e-9).any():
+        raise ValueError(f"values must lie from {low} to {high}")
+    if len(z) == 0:
+        return {"mean": None, "lower95": low, "upper95": high, "count": 0}
+    z, tail = z.clip(0.0, 1.0), (1.0 - confidence) / 2
+    lower, upper = _refuted_below(z, tail), 1.0 - _refuted_below(1.0 - z, tail)
+    return {
+        "mean": float(low + (high - low) * z.mean()),
+        "lower95": low + (high - low) * lower,
+        "upper95": low + (high - low) * upper,
+        "count": len(z),
+    }
+
+
+def _refuted_below(z: NDArray, tail: float) -> float:
+    """The mean up to which every mean is refuted at level `tail`; values in [0, 1]."""
+    distinct, counts = np.unique(z, return_counts=True)
+    # shares of the capital that are staked: from about 1 / sqrt(n) to everything
+    stakes = 2.0 ** -np.arange(max(1, math.ceil(math.log2(math.sqrt(len(z))))) + 1)
+    needed = math.log(len(stakes) / tail)
+
+    def is_refuted(mean: float) -> bool:
+        with np.errstate(divide="ignore"):
+            growth = np.log1p(stakes[:, None] * (distinct / mean - 1.0)) @ counts
+        return bool(np.logaddexp.reduce(growth) >= needed)
+
+    below, above = 0.0, 1.0
+    for _ in range(60):
+        middle = (below + above) / 2
+        below, above = (middle, above) if is_refuted(middle) else (below, middle)
+    return below
+
+
+def median_bounds(values: ArrayLike, confidence: float = 0.95) -> tuple[float, float] | None:
+    """An interval of the median by order statistics, exact for any distribution.
+
+    Args:
+        values: Independent; infinite ones (censored times) are allowed. Shape: (n,).
+        confidence: Least coverage.
+
+    Returns:
+        Two of the values; None if even the least and the greatest don't hold the median so surely
+        (fewer than six values at 95%).
+    """
+    ordered = np.sort(np.asarray(values, np.float64).ravel())
+    rank = int(binom.ppf((1.0 - confidence) / 2, len(ordered), 0.5)) if len(ordered) else 0
+    if rank < 1:
+        return None
+    return float(ordered[rank - 1]), float(ordered[-rank])

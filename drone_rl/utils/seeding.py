@@ -18,7 +18,10 @@ class Stream(enum.IntEnum):
     WORLDS = 0
     POLICY_INIT = 1
     ACTIONS = 2
-    EVALUATION = 3
+    CHOICE = 3
+    """Worlds by which one policy of several is chosen; never those of a report."""
+    REPORT = 4
+    """Worlds of which figures are reported; nothing is ever chosen by them."""
 
 
 def seed_sequence(seed: int, *key: int) -> np.random.SeedSequence:

@@ -15,7 +15,7 @@ from drone_rl.utils.seeding import Stream
     [TaskSettings(), TaskSettings(num_cubes=5), TaskSettings(step_length=0.5, cube_size=1.0)],
 )
 def test_oracle_collects_everything(settings):
-    env = DroneEnv(100, settings, pixels=False, stream=Stream.EVALUATION)
+    env = DroneEnv(100, settings, pixels=False, stream=Stream.REPORT)
     summary = summarise(run_episodes(env, Oracle(settings), 100))
     assert summary["all_cubes"]["share"] == 1.0
 
