@@ -10,7 +10,8 @@ from hydra.core.hydra_config import HydraConfig
 from omegaconf import DictConfig, ListConfig
 
 from drone_rl.cli.build import find_checkpoint, load_trained, plain, policy_is_checkpoint
-from drone_rl.explain.explanation import ExplainSettings, explain_policy
+from drone_rl.explain.explanation import explain_policy
+from drone_rl.explain.settings import ExplainSettings
 from drone_rl.explain.verdict import Kind
 from drone_rl.report import write_report
 from drone_rl.utils.errors import InputError
@@ -75,7 +76,6 @@ def _explain(
     try:
         return explain_policy(
             env,
-            actor,
             actor.module[0].module,
             folder,
             settings,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from drone_rl.utils.errors import InputError
 
 FORMAT = "drone_rl explanation"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 ACTIONS = ("forward", "left", "right")
 """By number, as in the files."""
 

@@ -7,8 +7,9 @@ import pytest
 import torch
 
 from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, make_env
-from drone_rl.explain.explanation import ExplainSettings, explain_policy
-from drone_rl.policies import SmallCNN, make_actor
+from drone_rl.explain.explanation import explain_policy
+from drone_rl.explain.settings import ExplainSettings
+from drone_rl.policies import SmallCNN
 
 NASTY = '</script><b>"a" & b'
 """A name that would break a page that didn't escape it."""
@@ -21,10 +22,9 @@ def explanations(tmp_path_factory):
     env = make_env(DroneEnv(4), [GrayPixels(), StandardizePixels()])
     generator = torch.Generator().manual_seed(0)
     network = SmallCNN((1, 25, 64), 3, channels=(4,), hidden=(8,), generator=generator)
-    actor = make_actor(network, env.action_spec, generator)
     settings = ExplainSettings(frames=60, episodes=6, perplexity=5)
     origin = {"policy": f"/somewhere/{NASTY}", "trained": {}}
-    explain_policy(env, actor, network, root / "a", settings, name=NASTY, provenance=origin)
+    explain_policy(env, network, root / "a", settings, name=NASTY, provenance=origin)
     env.close()
     shutil.copytree(root / "a", root / "b")
     numbers = json.loads((root / "b" / "explanation.json").read_text())

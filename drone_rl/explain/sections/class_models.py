@@ -1,0 +1,29 @@
+"""The picture that each action is waiting for."""
+
+import dataclasses
+from typing import Any
+
+from numpy.typing import NDArray
+
+from drone_rl.explain import class_model
+from drone_rl.explain.context import Context
+
+
+def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
+    """Makes "class_model"; arrays "class_model_probability" and "..._logit" (3, C, h, w)."""
+    statistics = class_model.PictureStatistics.of(context.observations)
+    numbers: dict[str, Any] = {"statistics": dataclasses.asdict(statistics)}
+    arrays = {}
+    for objective in ("probability", "logit"):
+        best, tried = class_model.search(
+            context.network, statistics, objective, seed=context.settings.seed
+        )
+        arrays[f"class_model_{objective}"] = best.pictures.numpy()
+        numbers[objective] = {
+            "probabilities": best.probabilities.tolist(),
+            "each_start": best.each_start.tolist(),
+            "roughness": best.roughness,
+            "settings": dataclasses.asdict(best.settings),
+            "tried": tried,
+        }
+    return {"class_model": numbers}, arrays

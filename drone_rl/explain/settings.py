@@ -1,0 +1,41 @@
+"""What an explanation computes, checked before anything is computed."""
+
+import dataclasses
+
+from drone_rl.explain import tsne
+from drone_rl.utils.errors import InputError
+
+MIN_FRAMES = 20
+"""Fewer frames than this show nothing."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class ExplainSettings:
+    """What to compute.
+
+    Raises:
+        InputError: A value is out of range.
+    """
+
+    frames: int = 600
+    """Frames in the data set."""
+    episodes: int = 400
+    """Episodes on which the verdict rests."""
+    greedy: bool = True
+    """Whether those take the most probable action; the data set's frames are always sampled."""
+    layer: str | None = None
+    """Layer whose features are embedded; the last one before the logits by default."""
+    grad_cam_layer: str | None = None
+    """Layer that Grad-CAM looks at; the last convolution's nonlinearity by default."""
+    perplexity: float = 30.0
+    """Of t-SNE."""
+    seed: int = 0
+    """Of everything that is drawn."""
+
+    def __post_init__(self) -> None:
+        """Refuses what shows nothing."""
+        if self.frames < MIN_FRAMES:
+            raise InputError(f"frames={self.frames} shows too little; give {MIN_FRAMES} or more")
+        if self.episodes < 1:
+            raise InputError(f"episodes={self.episodes} is out of range; give 1 or more")
+        tsne.check_perplexity(self.perplexity, self.frames)
