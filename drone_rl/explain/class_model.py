@@ -11,6 +11,9 @@ from torch.nn import functional
 from drone_rl.policies import PolicyNetwork
 from drone_rl.utils.errors import InputError
 
+AS_PROBABLE = 0.01
+"""Difference in probability below which the smoother of two pictures is the better one."""
+
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class ClassModelSettings:
@@ -37,7 +40,7 @@ class ClassModelSettings:
     total_variation: float = 0.0
     """Weight of the penalty on differences between neighbouring pixels."""
     starts: int = 8
-    """Random starts that are averaged."""
+    """Random starts, of which the best is shown."""
 
     def __post_init__(self) -> None:
         """Refuses what can't be run."""
@@ -59,18 +62,70 @@ class ClassModelSettings:
 
 
 @dataclasses.dataclass
-class ClassModel:
-    """One picture an action, averaged over the random starts."""
+class Attempts:
+    """What one setting made of each random start, for each action."""
 
-    pictures: Tensor  # (num_actions, C, H, W)
+    pictures: Tensor  # (num_actions, starts, C, H, W)
     """As the policy would get them."""
-    probabilities: Tensor  # (num_actions,)
-    """The policy's probability of the action on its averaged picture."""
-    each_start: Tensor  # (num_actions, starts)
-    """The same on the picture of each start."""
-    roughness: float
+    probabilities: Tensor  # (num_actions, starts)
+    """The policy's probability of the action on each picture."""
+    roughness: Tensor  # (num_actions, starts)
     """Mean difference of neighbouring pixels over that of the data set's pictures."""
     settings: ClassModelSettings
+
+
+@dataclasses.dataclass
+class ClassModel:
+    """For each action the best of all pictures that were made, and all that was tried."""
+
+    tried: list[Attempts]
+    """With the same number of starts each."""
+    chosen: list[tuple[int, int]]
+    """The setting and the start of each action's picture; see `best_start`."""
+
+    @property
+    def pictures(self) -> Tensor:
+        """Shape: (num_actions, C, H, W)."""
+        return torch.stack([self.tried[i].pictures[a, j] for a, (i, j) in enumerate(self.chosen)])
+
+    @property
+    def probabilities(self) -> list[float]:
+        """The policy's probability of each action on the very picture shown."""
+        return [float(self.tried[i].probabilities[a, j]) for a, (i, j) in enumerate(self.chosen)]
+
+    def summary(self) -> dict[str, Any]:
+        """Plain values; lists are by action.
+
+        "highest" is the highest probability that any of the `starts` random starts reached under
+        any of the `num_settings` settings, "starts_above_half" in how many of all these attempts
+        it was above one half. Of an action with "highest" below x it may be said that none of the
+        starts under these settings reached x; that no picture does can't be known.
+        """
+        every = torch.cat([attempts.probabilities for attempts in self.tried], 1)
+        return {
+            "probabilities": self.probabilities,
+            "roughness": [
+                float(self.tried[i].roughness[a, j]) for a, (i, j) in enumerate(self.chosen)
+            ],
+            "starts": self.tried[0].settings.starts,
+            "num_settings": len(self.tried),
+            "highest": every.amax(1).tolist(),
+            "starts_above_half": (every > 0.5).sum(1).tolist(),
+            "tried": [self._row(i) for i in range(len(self.tried))],
+        }
+
+    def _row(self, setting: int) -> dict[str, Any]:
+        attempts = self.tried[setting]
+        pairs = zip(attempts.probabilities, attempts.roughness, strict=True)
+        best = [best_start(*pair) for pair in pairs]
+        actions = range(len(best))
+        return {
+            **dataclasses.asdict(attempts.settings),
+            "probabilities": [float(attempts.probabilities[a, best[a]]) for a in actions],
+            "roughness": [float(attempts.roughness[a, best[a]]) for a in actions],
+            "each_start": attempts.probabilities.tolist(),
+            "chosen": [a for a in actions if self.chosen[a][0] == setting],
+        }
 
 
 @dataclasses.dataclass(frozen=True)
@@ -95,14 +150,25 @@ class PictureStatistics:
         )
 
 
+def best_start(probabilities: Tensor, roughness: Tensor) -> int:
+    """The start whose picture is most probable; of those about as probable, the smoothest.
+
+    Args:
+        probabilities: The policy's of the action. Shape: (starts,).
+        roughness: Shape: (starts,).
+    """
+    able = probabilities >= probabilities.max() - AS_PROBABLE
+    return int(roughness.masked_fill(~able, float("inf")).argmin())
+
+
 def visualise(
     network: PolicyNetwork,
     statistics: PictureStatistics,
     settings: ClassModelSettings,
     *,
     seed: int = 0,
-) -> ClassModel:
-    """Seeks the picture that makes each action most probable.
+) -> Attempts:
+    """Seeks, from each start, the picture that makes each action most probable.
 
     Args:
         network: The policy's; it is left as it is.
@@ -121,13 +187,11 @@ def visualise(
     found = ascend(network, pictures, action, statistics, settings, generator)
     with torch.no_grad():
         each = network(found).softmax(-1).gather(1, action[:, None])[:, 0]
-        average = found.view(num_actions, settings.starts, *shape).mean(1)
-        reached = network(average).softmax(-1).diagonal()
-    return ClassModel(
-        pictures=average,
-        probabilities=reached,
-        each_start=each.view(num_actions, settings.starts),
-        roughness=float(_differences(average).mean()) / max(statistics.roughness, 1e-12),
+    by_action = (num_actions, settings.starts)
+    return Attempts(
+        pictures=found.view(*by_action, *shape),
+        probabilities=each.view(by_action),
+        roughness=(_differences(found) / max(statistics.roughness, 1e-12)).view(by_action),
         settings=settings,
     )
 
@@ -138,15 +202,10 @@ def search(
     objective: Literal["probability", "logit"] = "logit",
     *,
     seed: int = 0,
-) -> tuple[ClassModel, list[dict[str, Any]]]:
-    """Tries a few settings and keeps the best: probable first, then smooth.
+) -> ClassModel:
+    """Tries a few settings and keeps, for each action, the best picture of all starts.
 
     Choosing settings is "an art" by the chapter's own word; this is a small search in its place.
-    A picture's merit is its probability less a tenth for each doubling of its roughness beyond
-    that of real pictures.
-
-    Returns:
-        The best result, and all that was tried with its figures.
     """
     tried = []
     for parameterisation, blur in itertools.product(("pixel", "fourier"), (0.5, 0.9, 1.4)):
@@ -154,23 +213,13 @@ def search(
             objective=objective, parameterisation=parameterisation, blur=blur
         )
         tried.append(visualise(network, statistics, settings, seed=seed))
-    best = max(tried, key=_merit)
-    rows = [
-        {
-            **dataclasses.asdict(result.settings),
-            "probabilities": result.probabilities.tolist(),
-            "roughness": result.roughness,
-            "merit": _merit(result),
-            "chosen": result is best,
-        }
-        for result in tried
+    probabilities = torch.cat([attempts.probabilities for attempts in tried], 1)
+    roughness = torch.cat([attempts.roughness for attempts in tried], 1)
+    starts = tried[0].settings.starts
+    chosen = [
+        divmod(best_start(*pair), starts) for pair in zip(probabilities, roughness, strict=True)
     ]
-    return best, rows
-
-
-def _merit(result: ClassModel) -> float:
-    rough = torch.tensor(max(result.roughness, 1.0)).log2()
-    return float(result.probabilities.mean() - 0.1 * rough)
+    return ClassModel(tried, chosen)
 
 
 def _objective(

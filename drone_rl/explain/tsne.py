@@ -19,9 +19,22 @@ NEIGHBOURS = 10
 """Neighbours over which faithfulness is measured."""
 QUERIES = 1000
 """Points whose neighbourhoods are compared; more change the measures little."""
-
 FEW = 2000
 """Up to so many points the exact methods, on one thread, are the fastest."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Faithfulness:
+    """How well a picture keeps neighbourhoods; see `faithfulness`."""
+
+    neighbours: int
+    """Size k of a neighbourhood; less than what was asked for where there are few points."""
+    trustworthiness: float
+    """1 where no neighbour in the plane is a stranger in truth (Venna and Kaski, 2001)."""
+    neighbours_kept: float
+    """Share of the k nearest in the plane that are among the k nearest in truth."""
+    neighbours_chance: float
+    """The same share for a random placement."""
 
 
 @dataclasses.dataclass
@@ -30,12 +43,8 @@ class Embedding:
 
     points: NDArray  # (T, 2)
     """Where each original came to lie."""
-    trustworthiness: float
-    """1 where no neighbour in the plane is a stranger in truth (Venna and Kaski, 2001)."""
-    neighbours_kept: float
-    """Share of the nearest true neighbours that are among the nearest in the plane."""
-    neighbours_chance: float
-    """The same share for a random placement."""
+    faithfulness: Faithfulness
+    """Against the originals themselves, not against the components that t-SNE works on."""
     _mean: NDArray
     _components: NDArray
     _model: openTSNE.TSNEEmbedding
@@ -72,8 +81,9 @@ def embed(originals: NDArray, *, perplexity: float = 30.0, seed: int = 0) -> Emb
     if not np.isfinite(flat).all():
         raise InputError("features hold a value that is not finite; the policy's weights are bad")
     mean = flat.mean(0)
-    components = _principal_components(flat - mean)
-    reduced = np.ascontiguousarray((flat - mean) @ components.T)
+    centred = flat - mean
+    components = _principal_components(centred)
+    reduced = np.ascontiguousarray(centred @ components.T)
     few = len(flat) <= FEW
     model = openTSNE.TSNE(
         perplexity=perplexity,
@@ -84,9 +94,7 @@ def embed(originals: NDArray, *, perplexity: float = 30.0, seed: int = 0) -> Emb
         negative_gradient_method="bh" if few else "fft",
     ).fit(_distinct(reduced, seed))
     points = np.array(model)
-    trust, kept = faithfulness(reduced, points)
-    chance = NEIGHBOURS / (len(flat) - 1)
-    return Embedding(points, trust, kept, min(1.0, chance), mean, components, model)
+    return Embedding(points, faithfulness(centred, points), mean, components, model)
 
 
 def check_perplexity(perplexity: float, count: int) -> None:
@@ -103,29 +111,35 @@ def check_perplexity(perplexity: float, count: int) -> None:
         )
 
 
-def faithfulness(originals: NDArray, points: NDArray, k: int = NEIGHBOURS) -> tuple[float, float]:
+def faithfulness(originals: NDArray, points: NDArray, k: int = NEIGHBOURS) -> Faithfulness:
     """How well a picture keeps neighbourhoods.
 
+    Originals that are equally far are equally near neighbours: the k-th and all that are as near
+    count as among the nearest, in the picture as in the figure for chance.
+
     Args:
-        originals: Shape (T, D).
+        originals: Three points or more. Shape: (T, D).
         points: Shape (T, 2).
         k: Size of a neighbourhood; less where there are few points.
-
-    Returns:
-        Trustworthiness (Venna and Kaski, 2001) and the share of neighbours kept.
     """
     count = len(originals)
-    k = max(1, min(k, (count - 1) // 2))
+    k = min(k, (count - 1) // 2)
     queries = np.unique(np.linspace(0, count - 1, min(count, QUERIES)).astype(int))
-    rows = np.arange(len(queries))
-    true_order = _neighbours(originals, queries)
-    drawn_order = _neighbours(points, queries)
-    rank = np.empty_like(true_order)
-    rank[rows[:, None], true_order] = np.arange(count)
-    drawn_ranks = rank[rows[:, None], drawn_order[:, 1 : k + 1]]  # 1 is the nearest
-    strangers = np.maximum(drawn_ranks - k, 0).sum()
+    true, drawn = _distances(originals, queries), _distances(points, queries)
+    nearest = drawn.argsort(1, kind="stable")[:, 1 : k + 1]  # the query itself comes first
+    ordered = np.sort(true, 1)
+    asked = np.take_along_axis(true, nearest, 1)
+    # 1 is the nearest; the query itself is nearer than all
+    rank = np.stack([np.searchsorted(o, a) for o, a in zip(ordered, asked, strict=True)])
+    strangers = np.maximum(rank - k, 0).sum()
     worst = len(queries) * k * (2 * count - 3 * k - 1) / 2
-    return float(1 - strangers / worst), float((drawn_ranks <= k).mean())
+    as_near = (true <= ordered[:, [k]]).sum(1) - 1
+    return Faithfulness(
+        neighbours=k,
+        trustworthiness=float(1 - strangers / worst),
+        neighbours_kept=float((rank <= k).mean()),
+        neighbours_chance=float(as_near.mean() / (count - 1)),
+    )
 
 
 def lay_out(points: NDArray, columns: int, rows: int) -> NDArray:
@@ -168,8 +182,14 @@ def _distinct(points: NDArray, seed: int) -> NDArray:
     return points + np.random.default_rng(seed).normal(0, scale, points.shape)
 
 
-def _neighbours(points: NDArray, queries: NDArray) -> NDArray:
-    """All points in order of distance from each query, the query itself first."""
-    distance = cdist(points[queries], points, "sqeuclidean")
+def _distances(points: NDArray, queries: NDArray) -> NDArray:
+    """Squared distance of each query to all points; to itself -1. Shape: (queries, T).
+
+    In units of their mean, and rounded, so that what is equally far is so despite rounding errors.
+    """
+    centred = points - points.mean(0)
+    square = (centred**2).sum(1)
+    distance = square[queries, None] + square - 2 * centred[queries] @ centred.T
+    distance = (distance / max(distance.mean(), 1e-300)).round(9)
     distance[np.arange(len(queries)), queries] = -1
-    return distance.argsort(1, kind="stable")
+    return distance

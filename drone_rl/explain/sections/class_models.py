@@ -15,15 +15,9 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
     numbers: dict[str, Any] = {"statistics": dataclasses.asdict(statistics)}
     arrays = {}
     for objective in ("probability", "logit"):
-        best, tried = class_model.search(
+        found = class_model.search(
             context.network, statistics, objective, seed=context.settings.seed
         )
-        arrays[f"class_model_{objective}"] = best.pictures.numpy()
-        numbers[objective] = {
-            "probabilities": best.probabilities.tolist(),
-            "each_start": best.each_start.tolist(),
-            "roughness": best.roughness,
-            "settings": dataclasses.asdict(best.settings),
-            "tried": tried,
-        }
+        arrays[f"class_model_{objective}"] = found.pictures.numpy()
+        numbers[objective] = found.summary()
     return {"class_model": numbers}, arrays

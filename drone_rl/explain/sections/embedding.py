@@ -1,5 +1,6 @@
 """t-SNE of what the policy makes of its pictures, and of the raw pictures."""
 
+import dataclasses
 from typing import Any
 
 from numpy.typing import NDArray
@@ -21,8 +22,6 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
         numbers[name] = {
             "layer": context.layer if name == "features" else None,
             "perplexity": settings.perplexity,
-            "trustworthiness": found.trustworthiness,
-            "neighbours_kept": found.neighbours_kept,
-            "neighbours_chance": found.neighbours_chance,
+            **dataclasses.asdict(found.faithfulness),
         }
     return {"tsne": numbers}, arrays
