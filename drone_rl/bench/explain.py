@@ -21,7 +21,7 @@ BASELINES = {"random": "poor", "oracle": "good", "forward": "poor", "left": "poo
 """Policies that are no network, and what they are."""
 RATES = (1e-3, 2e-3, 7e-3, 1e-2)
 SEEDS = (1, 2, 3)
-OUTCOMES = (0, 10, 11, 12)
+OUTCOMES = (0, 10, 11, 12, 13)
 """Exit statuses of a verdict."""
 
 
@@ -102,4 +102,4 @@ def _verdict(
         f"hydra.run.dir={run}",
         statuses=OUTCOMES,
     )
-    return json.loads((run / "verdict.json").read_text())["verdict"]
+    return json.loads((run / "verdict.json").read_text())["kind"]

@@ -43,7 +43,7 @@ def bench_solve(
             f"hydra.run.dir={run}/evaluation",
         )
         evaluation = json.loads((run / "evaluation" / "evaluation.json").read_text())
-        results["success_lower95"].append(evaluation["policy"]["all_cubes"]["lower95"])
+        results["success_lower95"].append(evaluation["greedy"]["success"]["lower95"])
     return {
         **results,
         "median_time_to_solve_s": float(np.median(results["time_to_solve_s"])),

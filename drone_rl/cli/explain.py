@@ -12,10 +12,10 @@ from omegaconf import DictConfig, ListConfig
 from drone_rl.cli.build import find_checkpoint, load_trained, plain, policy_is_checkpoint
 from drone_rl.explain.explanation import explain_policy
 from drone_rl.explain.settings import ExplainSettings
-from drone_rl.explain.verdict import Kind
 from drone_rl.report import write_report
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.provenance import provenance
+from drone_rl.verdicts.kinds import Kind
 
 prepare = policy_is_checkpoint
 _log = logging.getLogger(__name__)
@@ -43,12 +43,13 @@ def run(config: DictConfig) -> tuple[int, str]:
         found[name] = _explain(config, settings, name, path, folder / f"{number}_{_slug(name)}")
     report = write_report([folder / f"{i}_{_slug(n)}" for i, n in enumerate(names)], folder)
     for name, numbers in found.items():
-        print(f"{name}: {numbers['verdict']['verdict']}. {numbers['verdict']['sentence']}")
+        print(f"{name}: {numbers['verdict']['kind']}. {numbers['verdict']['sentence']}")
     _log.info("report: %s", report)
     refused = [
         n["verdict"]["exit_code"] or 12
         for n in found.values()
-        if config.require not in (None, n["verdict"]["verdict"])
+        if config.require is not None
+        and not (n["verdict"]["certain"] and config.require == n["verdict"]["kind"])
     ]
     return max(refused, default=0), str(report)
 

@@ -12,7 +12,6 @@ from hydra.utils import instantiate
 from omegaconf import DictConfig, OmegaConf
 
 from drone_rl.cli.build import build_collector, load_trained, plain
-from drone_rl.evaluation import run_episodes, summarise
 from drone_rl.sweeps.pruning import PruneCallback
 from drone_rl.training import (
     CheckpointCallback,
@@ -28,6 +27,7 @@ from drone_rl.utils.files import write_atomically
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import Stream
 from drone_rl.utils.settings import check_same_config
+from drone_rl.verdicts.judge import judge_policy
 
 MAY_CHANGE = (
     "resume",
@@ -75,7 +75,7 @@ def train(config: DictConfig, folder: Path) -> tuple[int, float]:
     result = {"reason": reason, **dataclasses.asdict(trainer.progress)}
     result["num_cubes"] = config.task.num_cubes
     if config.evaluate_after and not reason.startswith("SIG"):
-        result["evaluation"] = _evaluate(config, checkpoints.last_path)
+        result["verdict"] = _judge(config, checkpoints.last_path)
     write_atomically(folder / "result.json", json.dumps(result, indent=2))
     _log.info("run folder: %s", folder)
     status = 128 + signal.Signals[reason].value if reason.startswith("SIG") else 0
@@ -84,16 +84,16 @@ def train(config: DictConfig, folder: Path) -> tuple[int, float]:
     return status, trainer.progress.running_cubes
 
 
-def _evaluate(config: DictConfig, path: Path) -> dict[str, Any]:
+def _judge(config: DictConfig, path: Path) -> dict[str, Any]:
     """How good the last parameters are, in worlds to choose by, which no report ever shows."""
     episodes = config.evaluate_after
     worlds = min(episodes, 250)
     env, actor, _ = load_trained(
         path, worlds, task={}, seed=0, device=config.device, stream=Stream.CHOICE
     )
-    figures = summarise(run_episodes(env, actor, episodes))
+    verdict = judge_policy(env, actor, episodes)
     env.close()
-    return figures
+    return verdict.as_dict()
 
 
 def _build(

@@ -19,8 +19,8 @@ class DroneEnv(EnvBase):
     """`num_envs` drones, each in a world of its own, stepped and drawn as one batch.
 
     Observation "pixels": uint8, shape (num_envs, height, width, 3). Action: `rules.Action`. The
-    nested "info" holds the ground truth: cubes collected, which, on which side, why the episode
-    ended, and all positions (metres, world frame).
+    nested "info" holds the ground truth: cubes collected, which, on which side and how far aside,
+    why the episode ended, and all positions (metres, world frame).
 
     Only what is asked for is computed: a reset draws only the worlds that are reset, and worlds
     outside a step's "_step" mask (TorchRL's partial steps) are neither moved nor drawn; their rows
@@ -109,6 +109,7 @@ class DroneEnv(EnvBase):
             cubes=Bounded(0, cubes, (n, 1), dtype=torch.int64),
             collected=Binary(cubes, (n, cubes), dtype=torch.bool),
             side=Bounded(-1, 2, (n, cubes), dtype=torch.int64),
+            lateral=Unbounded((n, cubes), dtype=torch.float64),
             next_cube=Bounded(0, cubes, (n, 1), dtype=torch.int64),
             end_reason=Bounded(0, len(EndReason) - 1, (n, 1), dtype=torch.int64),
             drone=Unbounded((n, 3)),
@@ -188,6 +189,7 @@ def _info(state: WorldState, batch_size: torch.Size) -> TensorDict:
             "cubes": state.collected.sum(-1, keepdim=True),
             "collected": state.collected.clone(),
             "side": state.side.clone(),
+            "lateral": state.lateral.clone(),
             "next_cube": state.next_cube[:, None],
             "end_reason": state.end_reason[:, None].clone(),
             "drone": state.drone.float(),

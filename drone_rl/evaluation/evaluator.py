@@ -8,19 +8,27 @@ from torchrl.envs.utils import ExplorationType, set_exploration_type
 from drone_rl.collectors import EpisodeCollector
 from drone_rl.evaluation.metrics import Episodes
 
+_KEPT = ("collected", "side", "lateral", "end_reason", "cube_positions", "drone")
+
 
 def run_episodes(
     env: EnvBase, actor: TensorDictModuleBase, num_episodes: int, *, greedy: bool = True
 ) -> Episodes:
     """Runs complete episodes, `env.batch_size[0]` at a time.
 
+    World i draws its episodes from a stream of its own, one at a time, so that whatever the policy
+    the k-th episode is flown in the same world.
+
     Args:
         env: A batch of worlds.
         actor: The policy.
         num_episodes: How many; what a last batch has more is not used.
         greedy: Whether to take the most probable action instead of drawing one.
+
+    Returns:
+        The episodes, on the CPU.
     """
-    keep = tuple(("next", "info", name) for name in ("collected", "side", "end_reason"))
+    keep = tuple(("next", "info", name) for name in _KEPT)
     collector = EpisodeCollector(env, actor, keep=keep, keep_observations=False)
     kind = ExplorationType.DETERMINISTIC if greedy else ExplorationType.RANDOM
     finals, lengths, count = [], [], 0
@@ -31,10 +39,12 @@ def run_episodes(
             finals.append(batch["next", "info"][done])
             lengths.append(batch["collector", "traj_ids"].unique(return_counts=True)[1])
             count += len(lengths[-1])
-    info = torch.cat(finals)[:num_episodes]
+    info = torch.cat(finals)[:num_episodes].cpu()
     return Episodes(
         collected=info["collected"],
         side=info["side"],
+        lateral=info["lateral"],
+        height=(info["cube_positions"][..., 2] - info["drone"][:, None, 2]).double(),
         end_reason=info["end_reason"][:, 0],
-        length=torch.cat(lengths)[:num_episodes],
+        length=torch.cat(lengths)[:num_episodes].cpu(),
     )

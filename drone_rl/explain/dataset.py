@@ -92,6 +92,7 @@ class RolloutDataset:
             collected=collected,
             passed=~present & ~collected,
             side=torch.full(present.shape, -1),
+            lateral=torch.full(present.shape, torch.nan, dtype=torch.float64),
             steps=self.tensor("step").clone(),
             end_reason=torch.zeros(len(self), dtype=torch.int64),
         )

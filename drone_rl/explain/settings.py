@@ -21,8 +21,8 @@ class ExplainSettings:
     """Frames in the data set."""
     episodes: int = 400
     """Episodes on which the verdict rests."""
-    greedy: bool = True
-    """Whether those take the most probable action; the data set's frames are always sampled."""
+    good_share: float = 0.9
+    """A good policy succeeds in more than this share of the oracle's episodes."""
     layer: str | None = None
     """Layer whose features are embedded; the last one before the logits by default."""
     grad_cam_layer: str | None = None

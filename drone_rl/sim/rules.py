@@ -62,6 +62,8 @@ class WorldState:
     """Cubes that the drone has left behind untouched."""
     side: Tensor  # (num_worlds, C) int64
     """`Side` of each cube when it became the next one; -1 before that."""
+    lateral: Tensor  # (num_worlds, C) float64
+    """Metres to the left of the drone at which it stood then; NaN before that."""
     steps: Tensor  # (num_worlds,) int64
     """Steps taken in this episode."""
     end_reason: Tensor  # (num_worlds,) int64
@@ -119,10 +121,11 @@ def start(settings: TaskSettings, cubes: Sequence[Tensor] | Tensor) -> WorldStat
         collected=no_cube,
         passed=no_cube.clone(),
         side=no_cube.long() - 1,
+        lateral=torch.full_like(cubes[..., 1], torch.nan),
         steps=no_cube[:, 0].long(),
         end_reason=no_cube[:, 0].long(),
     )
-    state.side = _sides(settings, state)
+    state.side, state.lateral = _sightings(settings, state)
     return state
 
 
@@ -161,19 +164,19 @@ def judge(settings: TaskSettings, state: WorldState, drone: Tensor) -> tuple[Wor
     new = dataclasses.replace(
         state, drone=drone, collected=collected, passed=passed, steps=state.steps + 1
     )
-    new.side = _sides(settings, new)
+    new.side, new.lateral = _sightings(settings, new)
     new.end_reason = _end_reason(settings, new)
     return new, touched.sum(-1, dtype=torch.float64)
 
 
-def _sides(settings: TaskSettings, state: WorldState) -> Tensor:
-    """Records the side of every cube up to the next one that has none yet. Shape: (N, C)."""
+def _sightings(settings: TaskSettings, state: WorldState) -> tuple[Tensor, Tensor]:
+    """Side and lateral offset, now recorded of every cube up to the next one. Shapes: (N, C)."""
     offset = state.cubes[..., 1] - state.drone[:, None, 1]
     right = torch.where(offset < -settings.touch_distance, Side.RIGHT.value, Side.AHEAD.value)
     side = torch.where(offset > settings.touch_distance, Side.LEFT.value, right)
     index = torch.arange(state.side.shape[-1], device=side.device)
     is_new = (state.side < 0) & (index <= state.next_cube[:, None])
-    return torch.where(is_new, side, state.side)
+    return torch.where(is_new, side, state.side), torch.where(is_new, offset, state.lateral)
 
 
 def _end_reason(settings: TaskSettings, state: WorldState) -> Tensor:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from drone_rl.sweeps.statistics import bootstrap_band, interquartile_mean, on_grid
 from drone_rl.sweeps.summary import Group, Row
-from drone_rl.sweeps.verdict import KINDS
+from drone_rl.verdicts.kinds import KINDS
 
 FAVOURITE_AXIS = "optimiser.lr"
 COLORS = {"good": "tab:green", "one-sided": "tab:orange", "poor": "tab:red", "none of these": "0.5"}

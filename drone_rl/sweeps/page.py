@@ -12,9 +12,9 @@ import jinja2
 from drone_rl.sweeps import figures
 from drone_rl.sweeps.manifest import Sweep
 from drone_rl.sweeps.summary import Group, Row, best_row, make_groups, read_rows, to_csv
-from drone_rl.sweeps.verdict import KINDS
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import write_atomically
+from drone_rl.verdicts.kinds import KINDS
 
 
 def write_report(sweep: Sweep) -> Path:

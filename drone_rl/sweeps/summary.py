@@ -12,8 +12,8 @@ import numpy as np
 from drone_rl.sweeps.manifest import Sweep
 from drone_rl.sweeps.runs import Run, read_failure, read_result
 from drone_rl.sweeps.statistics import Array, bootstrap_band, interquartile_mean
-from drone_rl.sweeps.verdict import KINDS, classify
 from drone_rl.utils.intervals import proportion
+from drone_rl.verdicts.kinds import KINDS, Kind
 
 SEED = "seed"
 LAST_UPDATES = 20
@@ -47,20 +47,20 @@ class Row:
     @property
     def evaluation(self) -> dict[str, Any] | None:
         """The figures of its held-out episodes, if any were flown."""
-        return self.result.get("evaluation")
+        judged = self.result.get("verdict")
+        return None if judged is None else judged["greedy"]
 
     @property
     def verdict(self) -> str | None:
         """One of `KINDS`; None without an evaluation."""
-        if self.evaluation is None:
-            return None
-        return classify(self.evaluation, self.result["num_cubes"])
+        judged = self.result.get("verdict")
+        return None if judged is None else Kind(judged["kind"]).family
 
     @property
     def lean(self) -> float | None:
         """Share of the cubes on the right that it collected minus that on the left."""
-        sides = {} if self.evaluation is None else self.evaluation["by_side"]
-        left, right = (sides.get(side, {}).get("share") for side in ("left", "right"))
+        sides = {} if self.evaluation is None else self.evaluation["shares"]
+        left, right = (sides.get(side, {}).get("mean") for side in ("left", "right"))
         return None if left is None or right is None else right - left
 
     @property
@@ -71,7 +71,7 @@ class Row:
     def plain(self) -> dict[str, Any]:
         """One row of the table."""
         evaluation = self.evaluation or {}
-        sides = evaluation.get("by_side", {})
+        sides = evaluation.get("shares", {})
         figures = {key: self.result.get(key) for key in ("reason", "frames", "episodes")}
         return {
             "run": self.run.number,
@@ -82,8 +82,8 @@ class Row:
             "seconds": round(self.result["seconds"], 1) if self.result else None,
             "running_cubes": self.result.get("running_cubes"),
             "mean_cubes": evaluation.get("mean_cubes"),
-            "all_cubes": evaluation.get("all_cubes", {}).get("share"),
-            **{side: sides.get(side, {}).get("share") for side in ("left", "ahead", "right")},
+            "all_cubes": evaluation.get("success", {}).get("share"),
+            **{side: sides.get(side, {}).get("mean") for side in ("left", "ahead", "right")},
             "entropy": self.entropy,
             "error": self.error,
             "folder": self.run.folder.name,

@@ -83,15 +83,12 @@ def load_exported(path: Path) -> dict[str, Any]:
 def _card(path: Path, about: Mapping[str, Any]) -> str:
     evaluation = about["evaluation"]
     rows = [("mean cubes", f"{evaluation['mean_cubes']:.3f}")]
-    for name, share in {"all cubes": evaluation["all_cubes"], **evaluation["by_side"]}.items():
-        interval = f"{share['lower95']:.3f} to {share['upper95']:.3f}"
-        value = "none offered" if share["share"] is None else f"{share['share']:.3f}"
-        rows.append(
-            (
-                f"share collected: {name}" if name != "all cubes" else name,
-                f"{value} (95%: {interval})",
-            )
-        )
+    success = evaluation["success"]
+    for name, found in {"all cubes": success, **evaluation["shares"]}.items():
+        value = found["share"] if found is success else found["mean"]
+        interval = f"{found['lower95']:.3f} to {found['upper95']:.3f}"
+        text = "not offered" if value is None else f"{value:.3f} (95%: {interval})"
+        rows.append((name if found is success else f"share collected: {name}", text))
     table = "\n".join(f"| {name} | {value} |" for name, value in rows)
     digest = hashlib.sha256(path.read_bytes()).hexdigest()
     packages = about["provenance"]["versions"]

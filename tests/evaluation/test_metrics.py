@@ -1,25 +1,67 @@
+import pytest
 import torch
 
 from drone_rl.evaluation import Episodes, summarise
+from drone_rl.sim.rules import Side
+from drone_rl.utils.intervals import mean_bounds, proportion
+
+NAN = torch.nan
 
 
-def test_summary_by_hand():
-    summary = summarise(
-        Episodes(
-            collected=torch.tensor([[True, True], [True, False], [False, False]]),
-            side=torch.tensor([[0, 1], [2, 0], [0, -1]]),
-            end_reason=torch.tensor([1, 2, 4]),
-            length=torch.tensor([10, 20, 60]),
-        )
+@pytest.fixture
+def episodes():
+    """Three episodes of two cubes; the last one never came to its second cube."""
+    return Episodes(
+        collected=torch.tensor([[True, True], [True, False], [False, False]]),
+        side=torch.tensor([[0, 0], [0, 0], [2, -1]]),
+        lateral=torch.tensor([[5.0, 2.0], [2.0, 3.0], [-4.0, NAN]]),
+        height=torch.zeros(3, 2),
+        end_reason=torch.tensor([1, 2, 4]),
+        length=torch.tensor([10, 20, 60]),
     )
+
+
+def test_summary_by_hand(episodes):
+    summary = summarise(episodes)
+    assert summary["success"] == proportion(1, 3)
     assert summary["mean_cubes"] == 1.0
-    assert summary["all_cubes"]["successes"] == 1
-    sides = {k: (v["successes"], v["trials"]) for k, v in summary["by_side"].items()}
-    assert sides == {"left": (1, 3), "ahead": (1, 1), "right": (1, 1)}
-    assert summary["end_reason"] == {
-        "all_cubes": 1,
-        "front_boundary": 1,
-        "side_boundary": 0,
-        "step_limit": 1,
-    }
+    shares = summary["shares"]
+    assert shares["all"] == {**mean_bounds([1.0, 0.5, 0.0]), "cubes": 6}
+    assert shares["left"] == {**mean_bounds([1.0, 0.5]), "cubes": 4}  # an episode counts once
+    assert shares["right"] == {**mean_bounds([0.0]), "cubes": 1}
+    assert summary["never_reached"] == mean_bounds([0.0, 0.0, 0.5])
+    ends = {name: end["successes"] for name, end in summary["ends"].items()}
+    assert ends == {"all_cubes": 1, "front_boundary": 1, "side_boundary": 0, "step_limit": 1}
     assert (summary["mean_length"], summary["max_length"]) == (30.0, 60)
+
+
+def test_what_was_not_offered_has_no_share(episodes):
+    ahead = summarise(episodes)["shares"]["ahead"]
+    assert ahead["mean"] is None
+    assert (ahead["lower95"], ahead["upper95"], ahead["count"], ahead["cubes"]) == (0, 1, 0, 0)
+
+
+def test_dependent_cubes_don_t_make_an_interval_narrower():
+    """All or nothing: three cubes an episode tell no more than one."""
+    whole = torch.arange(100) < 90
+    common = {"end_reason": torch.ones(100).long(), "length": torch.ones(100).long()}
+    alike = [
+        Episodes(
+            collected=whole[:, None].expand(100, cubes),
+            side=torch.zeros(100, cubes).long(),
+            lateral=torch.ones(100, cubes),
+            height=torch.zeros(100, cubes),
+            **common,
+        )
+        for cubes in (1, 3)
+    ]
+    one, three = (summarise(e)["shares"]["left"] for e in alike)
+    assert (one["lower95"], one["upper95"]) == (three["lower95"], three["upper95"])
+    assert one["lower95"] < proportion(90, 100)["lower95"]
+
+
+def test_rows_can_be_chosen(episodes):
+    assert len(episodes[1:]) == 2
+    assert episodes[torch.tensor([2])].offered(Side.RIGHT).tolist() == [True]
+    assert episodes.side_share(Side.LEFT).tolist() == [1.0, 0.5]
+    assert episodes.success.tolist() == [1.0, 0.0, 0.0]

@@ -46,7 +46,7 @@ def test_a_policy_without_convolutions_and_with_one_action_is_explained(make_pip
     with torch.no_grad():
         network.layers.logits.bias.copy_(torch.tensor([0.0, 50.0, 0.0]))  # always left
     numbers = explain(env, network, tmp_path)
-    assert numbers["verdict"]["verdict"] == "poor"
+    assert numbers["verdict"]["kind"] == "poor"
     assert numbers["dataset"]["action_shares"] == [0.0, 1.0, 0.0]
     assert numbers["contradictions"]["pairs"] == 0
     assert numbers["attribution"]["layer"] is None

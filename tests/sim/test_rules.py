@@ -72,6 +72,13 @@ def test_side_is_where_the_cube_stood_when_it_became_next():
     assert state.side.tolist() == [[Side.LEFT, Side.RIGHT, -1]]
     state, _ = fly(state, 25.0, 1.0)  # passes the second
     assert state.side.tolist() == [[Side.LEFT, Side.RIGHT, Side.AHEAD]]
+    assert state.lateral.tolist() == [[5.0, -10.0, -0.5]]  # metres to the left, at that moment
+
+
+def test_lateral_offset_is_unknown_until_a_cube_is_the_next_one():
+    state = at(5.0, -5.0, 0.5)
+    assert state.lateral[0, 0] == 5.0
+    assert state.lateral[0, 1:].isnan().all()
 
 
 def test_ends_in_the_order_of_algorithm_3():

@@ -36,21 +36,15 @@ def make_runs(tmp_path):
     ]
 
 
-@pytest.fixture
-def evaluation():
-    """Figures of an evaluation, by cubes collected on each side."""
-    return _evaluation
-
-
-def _evaluation(left=20, right=20, of=20, cubes=3.0):
-    sides = {"left": proportion(left, of), "ahead": proportion(of, of)}
-    whole = 100 if left == right == of else 0
-    return {
+def _verdict(left=20, right=20, of=20, cubes=3.0):
+    sides = {"left": left / of, "ahead": 1.0, "right": right / of}
+    flown = {
         "episodes": 100,
         "mean_cubes": cubes,
-        "all_cubes": proportion(whole, 100),
-        "by_side": {**sides, "right": proportion(right, of)},
+        "success": proportion(100 if left == right == of else 0, 100),
+        "shares": {side: {"mean": share} for side, share in sides.items()},
     }
+    return {"kind": "good" if left == right else "one-sided (right)", "greedy": flown}
 
 
 @pytest.fixture
@@ -65,7 +59,7 @@ def sweep(tmp_path, make_runs):
         if run.number == 3:
             run.failure.write_text(json.dumps({"status": 2, "error": "<b>NaN</b>"}))
             continue
-        figures = _evaluation() if run.number < 2 else _evaluation(left=0, cubes=1.5)
+        figures = _verdict() if run.number < 2 else _verdict(left=0, cubes=1.5)
         result = {
             "reason": "solved" if run.number < 2 else "frames",
             "frames": 1000 * (run.number + 1),
@@ -73,7 +67,7 @@ def sweep(tmp_path, make_runs):
             "seconds": 2.0,
             "running_cubes": 2.97 - run.number,
             "num_cubes": 3,
-            "evaluation": figures,
+            "verdict": figures,
         }
         (run.folder / "result.json").write_text(json.dumps(result))
         rows = "update,frames,train/running_cubes,loss/entropy\n1,500,0.3,1.0\n2,1000,1.5,0.5\n"

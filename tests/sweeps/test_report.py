@@ -9,7 +9,6 @@ from matplotlib.figure import Figure
 from drone_rl.sweeps import figures
 from drone_rl.sweeps.page import write_picture, write_report
 from drone_rl.sweeps.summary import best_row, make_groups, read_rows
-from drone_rl.sweeps.verdict import classify
 from drone_rl.utils.errors import InputError
 
 
@@ -77,17 +76,3 @@ def test_a_sweep_with_nothing_finished_has_a_report_and_no_picture(sweep, tmp_pa
     assert "No run has finished yet" in write_report(sweep).read_text()
     with pytest.raises(InputError, match="evaluate_after"):
         write_picture(sweep, picture)
-
-
-@pytest.mark.parametrize(
-    ("figures", "verdict"),
-    [
-        ({}, "good"),
-        ({"left": 0, "cubes": 1.6}, "one-sided"),
-        ({"right": 1, "cubes": 1.6}, "one-sided"),
-        ({"left": 2, "right": 2, "cubes": 0.8}, "poor"),
-        ({"left": 12, "right": 12, "cubes": 2.0}, "none of these"),
-    ],
-)
-def test_verdicts(evaluation, figures, verdict):
-    assert classify(evaluation(**figures), 3) == verdict

@@ -7,7 +7,12 @@ from drone_rl.utils.errors import InputError
 from drone_rl.zoo import card_path, export_policy, load_exported, policy_names, policy_path
 
 SHARE = {"share": 0.5, "lower95": 0.4, "upper95": 0.6}
-EVALUATION = {"mean_cubes": 1.5, "episodes": 10, "all_cubes": SHARE, "by_side": {"left": SHARE}}
+EVALUATION = {
+    "mean_cubes": 1.5,
+    "episodes": 10,
+    "success": SHARE,
+    "shares": {"left": {"mean": None, "lower95": 0.0, "upper95": 1.0}},
+}
 CHECKPOINT = {
     "policy": {"layers.logits.weight": torch.arange(6.0).view(2, 3)},
     "config": {"policy": {"hidden": [3]}, "paths": {"outputs": "/home/somebody"}},
@@ -31,6 +36,7 @@ def test_what_is_exported_comes_back_without_traces_of_the_machine(tmp_path):
     card = path.with_suffix(".md").read_text()
     assert hashlib.sha256(path.read_bytes()).hexdigest() in card
     assert "1,234 frames" in card and "0.500 (95%: 0.400 to 0.600)" in card
+    assert "| share collected: left | not offered |" in card
 
 
 @pytest.mark.parametrize("content", [b"", b"not a policy at all"])

@@ -1,0 +1,183 @@
+"""From flown episodes to a verdict."""
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from tensordict.nn import TensorDictModuleBase
+from torch import Tensor
+from torchrl.envs import EnvBase
+
+from drone_rl.evaluation import Episodes, run_episodes, summarise
+from drone_rl.sim.rules import Side
+from drone_rl.sim.settings import TaskSettings
+from drone_rl.utils.intervals import mean_bounds, proportion
+from drone_rl.verdicts.failures import failure_table
+from drone_rl.verdicts.kinds import NOT_CERTAIN, Kind
+from drone_rl.verdicts.luck import BASELINES, fly_baselines
+from drone_rl.verdicts.rule import LUCK, QUANTITIES, Quantity, Rule, decide, kinds_within
+from drone_rl.words.licence import say
+from drone_rl.words.verdict import SENTENCES
+
+MANY = (2, 3, 5, 10, 20, 50, 100)
+"""How many times as many episodes are tried out, in thought, where they are not enough."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Verdict:
+    """The kind, whether the episodes are enough to be certain of it, and all that it rests on."""
+
+    kind: Kind
+    certain: bool
+    evidence: dict[str, Any]
+    """Plain values; what `as_dict` returns but for the sentence."""
+
+    @property
+    def exit_code(self) -> int:
+        """The kind's if it is certain, else 13."""
+        return self.kind.exit_code if self.certain else NOT_CERTAIN
+
+    @property
+    def sentence(self) -> str:
+        """For a person."""
+        return say(SENTENCES, self.evidence)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values, as in `verdict.json`."""
+        return {**self.evidence, "sentence": self.sentence}
+
+
+def judge_policy(
+    env: EnvBase,
+    actor: TensorDictModuleBase,
+    episodes: int,
+    *,
+    rule: Rule | None = None,
+    sampled: bool = True,
+) -> Verdict:
+    """Flies a policy, greedily and sampled, and the baselines, all in the same worlds, and judges.
+
+    Args:
+        env: A batch of worlds.
+        actor: The policy.
+        episodes: How many of each.
+        rule: Thresholds.
+        sampled: Whether to fly the policy with drawn actions, too; one that has no probabilities
+            to draw from need not.
+    """
+    base = getattr(env, "base_env", env)
+    worlds, task = base.state_dict(), base.worlds.settings
+    greedy = run_episodes(env, actor, episodes)
+    drawn = None
+    if sampled:
+        base.load_state_dict(worlds)
+        drawn = run_episodes(env, actor, episodes, greedy=False)
+    num_worlds, device = env.batch_size[0], str(base.worlds.device)
+    baselines = fly_baselines(num_worlds, task, worlds, episodes, device)
+    return judge(greedy, baselines, task, rule=rule, sampled=drawn)
+
+
+def judge(
+    greedy: Episodes,
+    baselines: Mapping[str, Episodes],
+    task: TaskSettings,
+    *,
+    rule: Rule | None = None,
+    sampled: Episodes | None = None,
+) -> Verdict:
+    """Applies the rule.
+
+    Args:
+        greedy: The policy's episodes, each with the most probable actions.
+        baselines: Those of each of `BASELINES`, the k-th in the same world as the policy's.
+        task: The task that all were flown in.
+        rule: Thresholds.
+        sampled: The policy's episodes with drawn actions, in the same worlds.
+
+    Raises:
+        ValueError: They were flown in different worlds.
+    """
+    rule = rule or Rule()
+    _check_pairs(greedy, [*baselines.values(), *([] if sampled is None else [sampled])])
+    found = measure(greedy, baselines, rule)
+    kind = decide([quantity.level for quantity in found])
+    certain = _is_certain(found)
+    evidence = {
+        "kind": kind.value,
+        "certain": certain,
+        "exit_code": kind.exit_code if certain else NOT_CERTAIN,
+        "rule": rule.text,
+        "error_rate": rule.error_rate,
+        "good_share": rule.good_share,
+        "num_cubes": greedy.collected.shape[-1],
+        "greedy": summarise(greedy),
+        "sampled": None if sampled is None else summarise(sampled),
+        "baselines": {name: summarise(baselines[name]) for name in BASELINES},
+        "skill": {name: _gain(greedy.share, baselines[name].share) for name in BASELINES},
+        "drawing": None if sampled is None else _gain(sampled.success, greedy.success),
+        "failures": failure_table(greedy, task),
+        "quantities": {name: q._asdict() for name, q in zip(QUANTITIES, found, strict=True)},
+        "enough": len(greedy) if certain else _enough(greedy, baselines, rule),
+    }
+    return Verdict(kind, certain, evidence)
+
+
+def measure(
+    greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule, times: int = 1
+) -> tuple[Quantity, ...]:
+    """The rule's `QUANTITIES` with intervals that hold all at once.
+
+    Args:
+        greedy: The policy's episodes.
+        baselines: Those of the baselines in the same worlds.
+        rule: Thresholds.
+        times: Counts every episode so often, to see what more of the same would tell.
+    """
+    oracle, found = baselines["oracle"], []
+
+    def mean(values: Tensor, low: float, high: float = 1.0) -> None:
+        bounds = mean_bounds(_repeat(values, times), low, high, rule.confidence)
+        found.append((bounds["mean"], bounds["lower95"], bounds["upper95"]))
+
+    mean(greedy.success - rule.good_share * oracle.success, -rule.good_share)
+    for side in Side:
+        offered = int(greedy.offered(side).sum())
+        share = proportion(times * offered, times * len(greedy), rule.confidence)
+        found.append((share["share"], share["lower95"], share["upper95"]))
+    for side in Side:
+        mean(greedy.side_share(side), 0.0)
+    for name in LUCK:
+        hurdle = (1 - rule.luck_margin) * baselines[name].share + rule.luck_margin * oracle.share
+        mean(greedy.share - hurdle, -1.0)
+    return tuple(Quantity(*f, t) for f, t in zip(found, rule.thresholds, strict=True))
+
+
+def _repeat(values: Tensor, times: int) -> NDArray:
+    return np.tile(values.numpy(), times)
+
+
+def _is_certain(found: tuple[Quantity, ...]) -> bool:
+    return len(kinds_within(tuple(quantity.levels for quantity in found))) == 1
+
+
+def _enough(greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule) -> int | None:
+    """Roughly how many episodes would do if they went on like this; None for very many."""
+    for times in MANY:
+        if _is_certain(measure(greedy, baselines, rule, times)):
+            return times * len(greedy)
+    return None
+
+
+def _gain(ours: Tensor, theirs: Tensor) -> dict[str, Any]:
+    """The mean paired difference of two shares, with its interval."""
+    return mean_bounds(ours - theirs, -1.0, 1.0)
+
+
+def _check_pairs(greedy: Episodes, others: list[Episodes]) -> None:
+    """The first cube is seen from the same place by all, so it tells worlds apart."""
+    for other in others:
+        same = len(other) == len(greedy)
+        if not (same and bool((other.lateral[:, 0] == greedy.lateral[:, 0]).all())):
+            raise ValueError("policy and baselines were flown in different worlds; pair them")

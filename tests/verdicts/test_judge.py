@@ -1,0 +1,135 @@
+import json
+import math
+
+import pytest
+
+from drone_rl.envs import DroneEnv
+from drone_rl.evaluation import Oracle
+from drone_rl.sim.rules import Side
+from drone_rl.sim.settings import TaskSettings
+from drone_rl.utils.intervals import mean_bounds, proportion
+from drone_rl.verdicts.judge import judge, judge_policy, measure
+from drone_rl.verdicts.kinds import Kind
+from drone_rl.verdicts.rule import QUANTITIES, Rule
+
+TASK = TaskSettings(num_cubes=2)
+LEFT, AHEAD, RIGHT = Side
+LAYOUTS = [[LEFT, RIGHT], [RIGHT, LEFT], [AHEAD, LEFT], [RIGHT, AHEAD]]
+
+
+@pytest.fixture
+def judged(make_episodes, make_baselines):
+    """The verdict on a policy that collects what `hits` says of the sides of 400 episodes."""
+
+    def judged(hits, number=400, **kwargs):
+        sides = [LAYOUTS[i % 4] for i in range(number)]
+        episodes = make_episodes(sides, [[hits(i, s) for s in row] for i, row in enumerate(sides)])
+        return judge(episodes, make_baselines(episodes), TASK, **kwargs)
+
+    return judged
+
+
+@pytest.mark.parametrize(
+    ("hits", "kind", "status"),
+    [
+        (lambda i, side: True, Kind.GOOD, 0),
+        (lambda i, side: False, Kind.POOR, 10),
+        (lambda i, side: side != LEFT, Kind.ONE_SIDED_RIGHT, 11),
+        (lambda i, side: side != RIGHT, Kind.ONE_SIDED_LEFT, 11),
+        (lambda i, side: side != AHEAD, Kind.NONE, 12),
+        (lambda i, side: side == AHEAD, Kind.POOR, 10),  # as flying straight on
+        (lambda i, side: i % 8 < 4, Kind.NONE, 12),
+    ],
+)
+def test_kinds(judged, hits, kind, status):
+    verdict = judged(hits)
+    assert (verdict.kind, verdict.certain, verdict.exit_code) == (kind, True, status)
+    plain = verdict.as_dict()
+    assert (plain["kind"], plain["certain"], plain["exit_code"]) == (kind.value, True, status)
+    assert plain["sentence"] == verdict.sentence
+    json.dumps(plain, allow_nan=False)
+
+
+def test_few_episodes_prove_nothing(judged):
+    verdict = judged(lambda i, side: True, number=5)
+    assert (verdict.kind, verdict.certain, verdict.exit_code) == (Kind.GOOD, False, 13)
+    assert verdict.evidence["enough"] == 100
+    assert judged(lambda i, side: True, number=100).exit_code == 0
+
+
+def test_exactly_at_the_threshold_is_not_good_and_never_certain(judged):
+    verdict = judged(lambda i, side: i % 10 > 0)
+    assert verdict.evidence["greedy"]["success"]["share"] == 0.9
+    assert (verdict.kind, verdict.certain) == (Kind.NONE, False)
+    assert verdict.evidence["enough"] is None
+    assert judged(lambda i, side: i % 10 > 0, rule=Rule(good_share=0.8)).kind is Kind.GOOD
+
+
+def test_quantities_by_hand(make_episodes, make_baselines):
+    episodes = make_episodes([[LEFT, LEFT], [LEFT, RIGHT], [AHEAD, -1]], [[1, 1], [1, 0], [0, 0]])
+    baselines, rule = make_baselines(episodes), Rule()
+    found = dict(zip(QUANTITIES, measure(episodes, baselines, rule), strict=True))
+    success = mean_bounds([0.1, -0.9, -0.9], -0.9, 1.0, rule.confidence)
+    assert found["success"][:3] == tuple(success[k] for k in ("mean", "lower95", "upper95"))
+    offered = proportion(2, 3, rule.confidence)
+    assert found["offered left"][:3] == tuple(offered[k] for k in ("share", "lower95", "upper95"))
+    assert found["collected left"].value == 1.0
+    assert found["collected right"].value == 0.0
+    assert (
+        found["collected right"].upper == mean_bounds([0.0], confidence=rule.confidence)["upper95"]
+    )
+    # shares 1, 0.5, 0; random 0; straight on 0, 0, 0.5, the oracle 1
+    assert found["above random"].value == pytest.approx(0.5 - 1 / 6)
+    assert found["above forward"].value == pytest.approx(0.5 - 5 / 6 * 0.5 / 3 - 1 / 6)
+
+
+def test_more_of_the_same_is_known_better(make_episodes, make_baselines):
+    episodes = make_episodes([[LEFT, RIGHT], [RIGHT, AHEAD]], [[1, 1], [1, 0]])
+    baselines, rule = make_baselines(episodes), Rule()
+    once, often = (measure(episodes, baselines, rule, times) for times in (1, 50))
+    for few, many in zip(once, often, strict=True):
+        assert few.value == pytest.approx(many.value)
+        assert many.upper - many.lower < few.upper - few.lower
+
+
+def test_what_was_not_offered_is_no_failure(make_episodes, make_baselines):
+    episodes = make_episodes([[AHEAD, AHEAD]] * 400, [[1, 1]] * 400)
+    verdict = judge(episodes, make_baselines(episodes), TASK)
+    assert (verdict.kind, verdict.certain) == (Kind.GOOD, True)
+    assert verdict.evidence["greedy"]["shares"]["left"]["mean"] is None
+    assert "0%" not in verdict.sentence.replace("100%", "")
+
+
+def test_other_worlds_are_no_baseline(make_episodes, make_baselines):
+    ours = make_episodes([[LEFT, LEFT]] * 2, [[1, 1]] * 2)
+    theirs = make_episodes([[RIGHT, LEFT]] * 2, [[1, 1]] * 2)
+    with pytest.raises(ValueError, match="different worlds"):
+        judge(ours, make_baselines(theirs), TASK)
+    with pytest.raises(ValueError, match="different worlds"):
+        judge(ours, make_baselines(ours), TASK, sampled=ours[:1])
+
+
+def test_sampled_flights_are_compared_pair_by_pair(judged, make_episodes):
+    sides = [LAYOUTS[i % 4] for i in range(400)]
+    drawn = make_episodes(sides, [[i % 2 == 0] * 2 for i in range(400)])
+    verdict = judged(lambda i, side: True, sampled=drawn)
+    assert verdict.evidence["drawing"]["mean"] == -0.5
+    assert verdict.evidence["sampled"]["success"]["share"] == 0.5
+    assert verdict.kind is Kind.GOOD
+
+
+def test_a_policy_is_flown_beside_its_baselines_and_repeats():
+    task = TaskSettings(num_cubes=1)
+    dicts = []
+    for _ in range(2):
+        env = DroneEnv(16, task, pixels=False)
+        dicts.append(judge_policy(env, Oracle(task), 20, sampled=True).as_dict())
+    first, again = dicts
+    assert first == again
+    assert first["greedy"] == first["sampled"] == first["baselines"]["oracle"]
+    assert first["skill"]["oracle"]["mean"] == 0.0
+    assert first["baselines"]["left"]["mean_cubes"] == 0.0
+    assert 0 < first["baselines"]["forward"]["mean_cubes"] < 1
+    assert math.isclose(
+        first["skill"]["forward"]["mean"], 1 - first["baselines"]["forward"]["mean_cubes"]
+    )
