@@ -1,0 +1,62 @@
+"""Policies whose weights were shuffled, and how like their maps are (Adebayo et al., 2018)."""
+
+import copy
+from collections.abc import Iterator
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+
+from drone_rl.explain.causal import rank_correlation
+from drone_rl.policies import PolicyNetwork
+
+NO_HEAT = 1e-6
+"""Share of a map's greatest heat up to which a pixel has none."""
+
+
+def shuffled_networks(network: PolicyNetwork, count: int, seed: int = 0) -> Iterator[PolicyNetwork]:
+    """Copies of a policy whose weights, and whose biases, were shuffled within each layer.
+
+    Args:
+        network: Stays as it is.
+        count: How many.
+        seed: Of the shuffling; the first of many copies are those of few.
+    """
+    generator = torch.Generator().manual_seed(seed)
+    for _ in range(count):
+        other = copy.deepcopy(network)
+        for layer in other.layers:
+            if isinstance(layer, nn.Conv2d | nn.Linear):
+                for parameter in (layer.weight, layer.bias):
+                    _shuffle(parameter, generator)
+        yield other
+
+
+@torch.no_grad()
+def _shuffle(parameter: Tensor, generator: torch.Generator) -> None:
+    order = torch.randperm(parameter.numel(), generator=generator)
+    parameter.copy_(parameter.flatten()[order].view(parameter.shape))
+
+
+def likeness(first: Tensor, second: Tensor) -> NDArray:
+    """Rank correlation of maps over the pixels on which not both are without heat.
+
+    What both leave out (where a picture equals the baseline, say) would make any two maps alike.
+
+    Args:
+        first: Shape (T, h, w), 0 or more.
+        second: Shape (T, h, w).
+
+    Returns:
+        Shape: (T,); 1 where both are the same everywhere, or one has no heat at all: that shows no
+        dependence on anything.
+    """
+    found = np.ones(len(first))
+    pairs = zip(first.flatten(1).double().numpy(), second.flatten(1).double().numpy(), strict=True)
+    for t, (a, b) in enumerate(pairs):
+        if a.max() > 0 and b.max() > 0:
+            told = (a > NO_HEAT * a.max()) | (b > NO_HEAT * b.max())
+            if max(np.ptp(a[told]) / a.max(), np.ptp(b[told]) / b.max()) > NO_HEAT:
+                found[t] = rank_correlation(a[None, told], b[None, told])[0]
+    return found

@@ -1,0 +1,53 @@
+import numpy as np
+import torch
+
+from drone_rl.explain.randomised import likeness, shuffled_networks
+from drone_rl.policies import MLP, SmallCNN
+
+
+def test_weights_are_shuffled_within_their_layer_and_the_policy_stays():
+    network = SmallCNN((1, 25, 64), 3, channels=(4,), hidden=(8,))
+    before = {k: v.clone() for k, v in network.state_dict().items()}
+    first, second = shuffled_networks(network, 2)
+    for name, values in before.items():
+        assert torch.equal(network.state_dict()[name], values)
+        for other in (first, second):
+            shuffled = other.state_dict()[name]
+            assert torch.equal(shuffled.flatten().sort().values, values.flatten().sort().values)
+            if "weight" in name:
+                assert not torch.equal(shuffled, values)
+    assert not torch.equal(first.layers.fc1.weight, second.layers.fc1.weight)
+    assert first.layers.conv1.weight.is_contiguous(memory_format=torch.channels_last)
+
+
+def test_the_first_of_many_are_those_of_few():
+    network = MLP((1, 4, 4), 3, hidden=(5,))
+    few, many = list(shuffled_networks(network, 1, 3)), list(shuffled_networks(network, 2, 3))
+    assert torch.equal(few[0].layers.fc1.weight, many[0].layers.fc1.weight)
+    assert not torch.equal(few[0].layers.fc1.weight, many[1].layers.fc1.weight)
+
+
+def test_likeness_by_hand():
+    first = torch.tensor([[[1.0, 2.0, 3.0, 0.0, 0.0]]])
+    assert likeness(first, torch.tensor([[[3.0, 2.0, 1.0, 0.0, 0.0]]])).tolist() == [-1.0]
+    assert likeness(first, 7 * first).tolist() == [1.0]
+    # pixel 3 has heat in one of them and counts: ranks 2 3 4 1 and 3 2 1 4
+    found = likeness(first, torch.tensor([[[0.2, 0.1, 0.0, 0.3, 0.0]]]))
+    np.testing.assert_allclose(found, -1.0)
+
+
+def test_maps_without_heat_show_no_dependence():
+    none, some = torch.zeros(1, 2, 2), torch.tensor([[[1.0, 2.0], [3.0, 4.0]]])
+    assert likeness(none, some) == likeness(some, none) == likeness(none, none) == 1.0
+
+
+def test_maps_that_are_the_same_everywhere_are_alike():
+    ones, ramp = torch.ones(1, 2, 2), torch.tensor([[[1.0, 2.0], [3.0, 4.0]]])
+    window = torch.tensor([[[1.0, 1.0], [0.0, 0.0]]])
+    assert likeness(ones, 3 * ones) == likeness(window, 2 * window) == 1.0
+    assert likeness(ones, ramp) == 0.0
+
+
+def test_rounding_errors_are_no_heat():
+    first = torch.tensor([[[1.0, 2.0, 1e-9, 0.0]]])
+    assert likeness(first, torch.tensor([[[2.0, 1.0, 0.0, 1e-9]]])).tolist() == [-1.0]
