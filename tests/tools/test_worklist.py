@@ -1,0 +1,100 @@
+"""Listing and drawing, where Cosmic Ray is installed (`make mutants` installs it)."""
+
+import json
+
+import pytest
+
+pytest.importorskip("cosmic_ray")
+
+from cosmic_ray.mutating import mutate_code
+from cosmic_ray.work_db import WorkDB, use_db
+
+from tools.mutants import kept, worklist
+from tools.mutants.operators import HalveNumber, SwapName
+
+SOURCE = """\
+def best(values: list | None, bonus: float = 0.5):
+    if not values:
+        raise ValueError(f"{len(values) + 1} values")
+    return max(values) + bonus
+"""
+
+
+@pytest.fixture
+def tree(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "module.py").write_text(SOURCE)
+    return tmp_path
+
+
+@pytest.fixture
+def database(tree):
+    with use_db(str(tree / "session.sqlite"), WorkDB.Mode.create) as found:
+        yield found
+
+
+def test_the_list_has_behaviour_only(tree, database):
+    worklist.fill(database, tree, ["module.py"], lambda mutants: mutants)
+    sample, done, listed = worklist.sample_of(database, tree)
+    assert listed == len(sample) and not done
+    rows = [kept.row(mutant, tree, "killed", {}) for mutant in sample]
+    changed = {(row["before"], " ".join(row["after"].split())) for row in rows}
+    first, last = SOURCE.splitlines()[0], "return max(values) + bonus"
+    assert (last, "return min(values) + bonus") in changed
+    assert (last, "return max(values) - bonus") in changed
+    assert (first, first.replace("0.5", "0.25")) in changed
+    assert ("if not values:", "if values:") in changed
+    assert not any("ValueError" in before or "&" in after for before, after in changed)
+    assert not any("list" in after and "| None" not in after for _, after in changed)
+
+
+def test_a_sample_is_part_of_the_list_and_the_same_for_the_same_seed(tree, database):
+    def ids(seed, size):
+        choose = lambda mutants: worklist.draw(mutants, tree, size, seed)  # noqa: E731
+        worklist.fill(database, tree, ["module.py"], choose)
+        return {mutant.id for mutant in worklist.sample_of(database, tree)[0]}
+
+    first = ids(0, 5)
+    assert len(first) == 5 and ids(0, 5) == first
+    assert first < ids(0, 8) < ids(0, 1000)
+    assert ids(1, 5) != first
+    (tree / "module.py").write_text("import math\n\n\n" + SOURCE)
+    assert ids(0, 5) == first  # lines that moved are the same lines
+
+
+@pytest.mark.parametrize(
+    ("operator", "before", "after"),
+    [
+        (SwapName(), 'x["lower95"]', 'x["upper95"]'),
+        (SwapName(), "x.all(-1)", "x.any(-1)"),
+        (HalveNumber(), "x = 0.9", "x = 0.45"),
+        (SwapName(), "min = 3", None),  # a name of one's own
+        (HalveNumber(), "x = 1e-8", None),  # a tolerance
+        (HalveNumber(), "x = 3", None),
+    ],
+)
+def test_operators_of_our_own(operator, before, after):
+    assert mutate_code(before, operator, 0) == after
+
+
+def test_the_kept_list_counts_equivalent_mutants_neither_way(tree, database):
+    worklist.fill(database, tree, ["module.py"], lambda mutants: mutants[:4])
+    sample, _, _ = worklist.sample_of(database, tree)
+    reasons = {sample[0].id: "because", sample[1].id: "wrongly so"}
+    outcomes = ("survived", "killed", "survived", "timeout")
+    rows = [kept.row(m, tree, o, reasons) for m, o in zip(sample, outcomes, strict=True)]
+    assert [row["outcome"] for row in rows] == ["equivalent", "killed", "survived", "timeout"]
+    assert rows[0]["reason"] == "because" and "reason" not in rows[1]
+    assert kept.score(rows) == pytest.approx(2 / 3)
+    kept.write(tree / "kept.json", {"seed": 0}, rows)
+    read = json.loads((tree / "kept.json").read_text())
+    assert read["seed"] == 0 and read["score"] == pytest.approx(2 / 3)
+    assert sorted(row["id"] for row in read["mutants"]) == sorted(row["id"] for row in rows)
+
+
+def test_hashes_are_those_of_files_and_of_folders(tree):
+    (tree / "tests").mkdir()
+    (tree / "tests" / "test_a.py").write_text("")
+    found = kept.hashes(tree, ["module.py", "tests"])
+    assert list(found) == ["module.py", "tests/test_a.py"]
+    assert found["tests/test_a.py"].startswith("e3b0c44298fc")  # SHA-256 of nothing

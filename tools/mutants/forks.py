@@ -1,0 +1,183 @@
+"""Test runs in forks of this process, which has imported the libraries but not the program."""
+
+import contextlib
+import dataclasses
+import gc
+import importlib
+import importlib.abc
+import importlib.machinery
+import os
+import resource
+import shutil
+import signal
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import pytest
+
+LIBRARIES = (
+    "torch",
+    "torchrl.envs.libs.dm_control",
+    "torchrl.collectors",
+    "torchrl.objectives",
+    "warp",
+    "mujoco_warp",
+    "dm_control.composer",
+    "scipy.stats",
+    "hypothesis",
+    "hypothesis.extra.numpy",
+    "captum.attr",
+    "openTSNE",
+    "imageio",
+    "PIL.Image",
+    "safetensors.torch",
+    "hydra",
+    "jinja2",
+    "_hypothesis_pytestplugin",
+)
+MEMORY_BYTES = 6 << 30
+"""A mutant that wants more is killed: a size that became a power, say."""
+OPTIONS = (
+    "-x",
+    "-q",
+    "--no-header",
+    "--tb=line",
+    *("-p", "no:cacheprovider"),
+    *("-p", "no:unraisableexception"),  # collects garbage of all libraries twice, for 1 s
+    *("-m", "not render"),
+)
+
+
+@dataclasses.dataclass(frozen=True)
+class Run:
+    """Tests to run on a copy of the tree, with one module's source replaced in memory."""
+
+    name: str
+    tests: Sequence[str]
+    limit_s: float
+    module: str | None = None
+    """Path of the mutated module below the tree; None for the tree as it is."""
+    source: str = ""
+
+
+@dataclasses.dataclass(frozen=True)
+class Outcome:
+    """How a run ended."""
+
+    run: Run
+    status: str
+    """"passed", "failed" (also a crash), or "timeout"."""
+    seconds: float
+    output: str
+
+
+def import_libraries() -> None:
+    """Imports what takes most of a test run's start; nothing of the program.
+
+    Raises:
+        RuntimeError: The program was imported, so that a fork would not see a mutation.
+    """
+    os.environ["OMP_NUM_THREADS"] = "1"
+    for name in LIBRARIES:
+        with contextlib.suppress(ImportError):
+            importlib.import_module(name)
+    import hypothesis
+
+    hypothesis.settings.register_profile("mutants", derandomize=True, deadline=None, database=None)
+    hypothesis.settings.load_profile("mutants")
+    if any(name.partition(".")[0] == "drone_rl" for name in sys.modules):
+        raise RuntimeError("drone_rl was imported before the fork")
+    gc.freeze()  # what is imported stays for good: no child looks through it
+
+
+def run_all(runs: Iterator[Run], tree: Path, scratch: Path, jobs: int) -> Iterator[Outcome]:
+    """Runs tests, `jobs` at a time, and yields each outcome as it comes.
+
+    Args:
+        runs: In this order.
+        tree: The copy of the project.
+        scratch: Folder for outputs and temporary files.
+        jobs: Processes at once.
+    """
+    running: dict[int, tuple[Run, float]] = {}
+    while True:
+        while len(running) < jobs and (run := next(runs, None)) is not None:
+            running[_start(run, tree, scratch)] = (run, time.monotonic())
+        if not running:
+            return
+        yield from _finished(running, scratch)
+        time.sleep(0.02)
+
+
+def _finished(running: dict[int, tuple[Run, float]], scratch: Path) -> Iterator[Outcome]:
+    for pid, (run, begin) in list(running.items()):
+        seconds = time.monotonic() - begin
+        ended, code = os.waitpid(pid, os.WNOHANG)
+        late = not ended and seconds > run.limit_s
+        if late:
+            os.killpg(pid, signal.SIGKILL)
+            os.waitpid(pid, 0)
+        elif ended:
+            with contextlib.suppress(ProcessLookupError):  # what a test left behind
+                os.killpg(pid, signal.SIGKILL)
+        else:
+            continue
+        del running[pid]
+        output = (scratch / f"{run.name}.txt").read_text(errors="replace")
+        status = "timeout" if late else "passed" if code == 0 else "failed"
+        shutil.rmtree(scratch / run.name, ignore_errors=True)
+        yield Outcome(run, status, seconds, output)
+
+
+def _start(run: Run, tree: Path, scratch: Path) -> int:
+    if pid := os.fork():
+        with contextlib.suppress(PermissionError, ProcessLookupError):  # the child was faster
+            os.setpgid(pid, pid)
+        return pid
+    code = 70
+    try:
+        os.setpgid(0, 0)
+        with (scratch / f"{run.name}.txt").open("wb") as file:
+            os.dup2(file.fileno(), 1)
+            os.dup2(file.fileno(), 2)
+        code = _test(run, tree, scratch / run.name)
+        sys.stdout.flush()
+    finally:
+        os._exit(code)
+
+
+def _test(run: Run, tree: Path, temporary: Path) -> int:
+    """Runs pytest in the child. Returns its exit status; 0 is that all tests passed."""
+    resource.setrlimit(resource.RLIMIT_DATA, (MEMORY_BYTES, MEMORY_BYTES))
+    os.chdir(tree)
+    os.environ["PYTHONPATH"] = str(tree)  # for the processes that tests start
+    sys.path.insert(0, str(tree))
+    if run.module is not None:
+        sys.meta_path.insert(0, _Replaced(run.module, run.source))
+    return int(pytest.main([*OPTIONS, f"--basetemp={temporary}", *run.tests]))
+
+
+class _Replaced(importlib.abc.MetaPathFinder):
+    """Finds one module, and gives it other source than its file has."""
+
+    def __init__(self, path: str, source: str) -> None:
+        self.name = path.removesuffix(".py").replace("/", ".").removesuffix(".__init__")
+        self.path, self.source = path, source
+
+    def find_spec(self, fullname: str, path: object, target: object = None) -> object:
+        if fullname != self.name:
+            return None
+        found = importlib.machinery.PathFinder.find_spec(fullname, path)
+        found.loader = _Loader(fullname, found.origin, self.source)
+        return found
+
+
+class _Loader(importlib.machinery.SourceFileLoader):
+    def __init__(self, name: str, path: str, source: str) -> None:
+        super().__init__(name, path)
+        self._source = source
+
+    def get_code(self, fullname: str) -> object:
+        return compile(self._source, self.path, "exec", dont_inherit=True)

@@ -1,0 +1,49 @@
+"""Which modules are mutated, and the tests that must notice: those that mirror a module first."""
+
+from pathlib import Path
+
+TARGETS: dict[str, tuple[str, ...]] = {
+    "sim/rules": ("sim/test_rules", "sim/test_worlds"),
+    "objectives/returns": ("objectives/test_returns",),
+    "objectives/estimators": ("objectives/test_estimators",),
+    "objectives/reinforce": ("objectives/test_reinforce",),
+    "collectors/episodes": ("collectors/test_episodes",),
+    "utils/seeding": ("utils/test_seeding",),
+    "utils/intervals": ("utils/test_intervals",),
+    "evaluation/*": ("evaluation/test_{name}",),
+    "verdicts/*": ("verdicts/test_{name}", "verdicts"),
+    "sweeps/statistics": ("sweeps/test_statistics",),
+    "explain/truth": ("explain/test_truth",),
+    "explain/interventions": ("explain/test_interventions",),
+    "explain/response": ("explain/test_response",),
+    "explain/contradictions": ("explain/test_contradictions",),
+}
+"""Names below drone_rl and below tests, without suffix; * is any name, {name} the module's."""
+
+NOT_MUTATED = ("evaluation/oracle", "evaluation/video")
+"""Neighbours of a pattern that quote no figure: the flown baseline and the film."""
+
+
+def find_targets(root: Path) -> dict[str, list[str]]:
+    """Modules of a tree and their tests, both as paths below it.
+
+    Raises:
+        ValueError: A pattern finds no module, or a module none of its tests.
+    """
+    found = {}
+    for pattern, tests in TARGETS.items():
+        paths = sorted((root / "drone_rl").glob(f"{pattern}.py"))
+        if not paths:
+            raise ValueError(f"no module is called {pattern}; mend tools/mutants/targets.py")
+        for path in paths:
+            module = path.relative_to(root / "drone_rl").with_suffix("").as_posix()
+            if path.stem == "__init__" or module in NOT_MUTATED:
+                continue
+            named = [f"tests/{test.format(name=path.stem)}" for test in tests]
+            exist = [
+                name for test in named for name in (test, f"{test}.py") if (root / name).exists()
+            ]
+            if not exist:
+                raise ValueError(f"{module} has none of its tests: {', '.join(named)}")
+            found[path.relative_to(root).as_posix()] = exist
+    return found

@@ -1,0 +1,122 @@
+"""The list of mutants and a sample of it, kept in a session of Cosmic Ray."""
+
+import dataclasses
+import hashlib
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+
+import cosmic_ray.plugins
+from cosmic_ray.commands.init import init
+from cosmic_ray.mutating import mutate_code
+from cosmic_ray.work_db import WorkDB
+from cosmic_ray.work_item import MutationSpec, WorkerOutcome, WorkResult
+
+from tools.mutants.filters import changes_program, is_of_one_kind, is_within, silent_spans
+from tools.mutants.operators import Provider
+
+cosmic_ray.plugins.OPERATOR_PROVIDERS["drone_rl"] = Provider()
+FILTERED = "changes no behaviour, or only crashes"
+"""Output of what the filters left out."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Mutant:
+    """One change to one module."""
+
+    id: str
+    """Stays the same as long as the changed line does, wherever it stands."""
+    job: str
+    """Its name in the session."""
+    spec: MutationSpec
+
+    @property
+    def module(self) -> str:
+        """Path of the module below the tree."""
+        return self.spec.module_path.as_posix()
+
+    def source(self, root: Path) -> str | None:
+        """The mutated module; None if there is nothing to mutate."""
+        operator = cosmic_ray.plugins.get_operator(self.spec.operator_name)()
+        return mutate_code((root / self.module).read_text(), operator, self.spec.occurrence)
+
+
+def fill(
+    database: WorkDB,
+    root: Path,
+    modules: list[str],
+    choose: Callable[[list[Mutant]], list[Mutant]],
+) -> None:
+    """Lists all mutations of some modules; marks as skipped what is none, and what is not chosen.
+
+    Args:
+        database: Is emptied first.
+        root: The tree, which is the working directory too.
+        modules: Paths below it.
+        choose: Gives those of all mutants that are to be run.
+    """
+    init([Path(module) for module in modules], database, {})
+    spans = {module: silent_spans((root / module).read_text()) for module in modules}
+    mutants, none = [], []
+    for mutant in _everything(database, root):
+        kept = is_of_one_kind(mutant.spec.operator_name) and not is_within(
+            mutant.spec.start_pos, spans[mutant.module]
+        )
+        (mutants if kept else none).append(mutant)
+    chosen = {mutant.job for mutant in choose(mutants)}
+    _skip(database, none, FILTERED)
+    _skip(database, [m for m in mutants if m.job not in chosen], "not in the sample")
+
+
+def sample_of(database: WorkDB, root: Path) -> tuple[list[Mutant], dict[str, WorkResult], int]:
+    """The mutants of a session to run, those results that are there by job, and how many it lists.
+
+    Mutants come in the order of module and place, so that an early look is no random one.
+    """
+    results = dict(database.results)
+    skipped = {j: r for j, r in results.items() if r.worker_outcome is WorkerOutcome.SKIPPED}
+    sample = [m for m in _everything(database, root) if m.job not in skipped]
+    filtered = sum(result.output == FILTERED for result in skipped.values())
+    done = {job: result for job, result in results.items() if job not in skipped}
+    return sample, done, database.num_work_items - filtered
+
+
+def _skip(database: WorkDB, mutants: list[Mutant], why: str) -> None:
+    """Marks mutants as not to be run, as Cosmic Ray's own filters do."""
+    result = WorkResult(worker_outcome=WorkerOutcome.SKIPPED, output=why)
+    database.set_multiple_results([mutant.job for mutant in mutants], result)
+
+
+def _everything(database: WorkDB, root: Path) -> list[Mutant]:
+    items = [(item.mutations[0], item.job_id) for item in database.work_items]
+    items.sort(key=lambda i: (i[0].module_path, i[0].operator_name, i[0].occurrence))
+    lines = {
+        spec.module_path: (root / spec.module_path).read_text().splitlines() for spec, _ in items
+    }
+    seen: Counter[str] = Counter()
+    found = []
+    for spec, job in items:
+        line = lines[spec.module_path][spec.start_pos[0] - 1].strip()
+        parts = (spec.module_path.as_posix(), spec.operator_name, spec.definition_name, line)
+        name = "|".join(map(str, parts))
+        seen[name] += 1
+        found.append(Mutant(_digest(f"{name}|{seen[name]}")[:10], job, spec))
+    return found
+
+
+def draw(mutants: list[Mutant], root: Path, size: int, seed: int) -> list[Mutant]:
+    """A uniform sample of the mutants that change the program.
+
+    It takes the smallest hashes of seed and id, so that it changes only where the source does.
+    """
+    sample = []
+    for mutant in sorted(mutants, key=lambda m: _digest(f"{seed}|{m.id}")):
+        if len(sample) == size:
+            break
+        if changes_program((root / mutant.module).read_text(), mutant.source(root)):
+            sample.append(mutant)
+    return sample
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
