@@ -1,5 +1,8 @@
 """The three-state Markov decision process of Fig. 3, small enough to know its exact gradient."""
 
+from collections.abc import Sequence
+from typing import NamedTuple
+
 import torch
 from tensordict import TensorDict, TensorDictBase
 from torchrl.data import Binary, Categorical, Composite, OneHot, Unbounded
@@ -7,6 +10,56 @@ from torchrl.envs import EnvBase
 
 SUCCESS_PROBABILITY = 0.75
 """Of action 1 in state 0: to state 2, with reward 1; otherwise to state 1, with none."""
+
+
+class Outcome(NamedTuple):
+    """One way in which an episode can go."""
+
+    probability: float
+    actions: tuple[int, ...]
+    rewards: tuple[float, ...]
+
+
+def outcomes(leaving: Sequence[float]) -> list[Outcome]:
+    """Every way in which an episode can go, so that expectations become sums.
+
+    Args:
+        leaving: The policy's probability of action 1 in state 0 at each step; as many as `horizon`.
+    """
+    found, still_there = [], 1.0
+    for t, leave in enumerate(leaving):
+        actions, waited = (*[0] * t, 1), (0.0,) * t
+        success, failure = SUCCESS_PROBABILITY, 1 - SUCCESS_PROBABILITY
+        found.append(Outcome(still_there * leave * success, actions, (*waited, 1.0)))
+        found.append(Outcome(still_there * leave * failure, actions, (*waited, 0.0)))
+        still_there *= 1 - leave
+    stayed = len(leaving)
+    return [*found, Outcome(still_there, (0,) * stayed, (0.0,) * stayed)]
+
+
+def exact_gradient(leaving: Sequence[float], gamma: float = 1.0) -> torch.Tensor:
+    """The policy gradient with respect to the logit of action 1 at each step, without sampling.
+
+    It is P(still in state 0) p (1 - p) (Q(action 1) - Q(action 0)), with p of the step.
+    Undiscounted this is the gradient of the expected reward. With gamma below 1 it is what Eq. 15
+    estimates with discounted returns, each discounted from its own step: the gradient of nothing,
+    but what REINFORCE climbs.
+
+    Args:
+        leaving: As in `outcomes`.
+        gamma: Discount rate of Q.
+
+    Returns:
+        Shape: (len(leaving),), float64.
+    """
+    value, lead = 0.0, []
+    for leave in reversed(leaving):
+        stay = gamma * value
+        lead.insert(0, SUCCESS_PROBABILITY - stay)
+        value = leave * SUCCESS_PROBABILITY + (1 - leave) * stay
+    p = torch.tensor(leaving, dtype=torch.float64)
+    still_there = torch.cat([p.new_ones(1), (1 - p).cumprod(0)[:-1]])
+    return still_there * p * (1 - p) * p.new_tensor(lead)
 
 
 class ThreeStateEnv(EnvBase):

@@ -26,7 +26,8 @@ class ReturnEstimator(TensorDictModuleBase, abc.ABC):
         """Names the entries.
 
         Args:
-            scale: Whether to divide the batch's returns by their root mean square.
+            scale: Whether to divide the batch's returns by their root mean square; biased, see
+                `returns.scale_to_unit`.
             reward_key: Entry with the rewards.
             done_key: Entry with the end flags.
             out_key: Entry that is written.

@@ -15,8 +15,12 @@ class ReinforceLoss(LossModule):
     """-sum_t g_t log pi(a_t | s_t), reduced over the batch (chapter, Eq. 15).
 
     The returns g_t come from a return estimator; the stored action is scored, never a new one.
-    `reduction="mean"` averages over steps; `"sum"` adds them up, as Algorithm 4 does for one
-    episode (Eq. 12 is that sum over the number of episodes).
+    `reduction="sum"` adds the steps up, as Algorithm 4 does for one episode; over the number of
+    episodes (Eq. 12) that is unbiased where the returns are. `reduction="mean"` divides by the
+    number of steps, which depends on the actions: episodes of batches with long ones count less.
+    That turns the expected gradient, less the larger the batch: with unscaled `leave_one_out` by
+    3.8 degrees with 2 episodes, 0.1 with 64, measured as in `objectives.returns`. Scaled as well,
+    as is the default of training, 10.7 degrees with 3 episodes, 3.9 with 8, 0.3 with 64.
 
     The output's `loss_*` entries add up to what is to be back-propagated; the others are detached.
 

@@ -6,8 +6,16 @@ flat batch (T, 1) of episodes one after the other and a batch (N, T, 1) are the 
 
 The original study had five variants, called `advantage_type` 0 to 4: `standardised`,
 `linear_ramp`, `reward_to_go`, `success_scaled` and `time_baseline`. They are written here as they
-were meant: an episode of constant return standardises to zero instead of dividing by zero, and a
-baseline never contains the episode that it is subtracted from.
+were meant: an episode of constant return standardises to zero instead of dividing by zero, and the
+baselines of `time_baseline` and `leave_one_out` never contain the episode that they are subtracted
+from.
+
+Unbiased means: with the loss summed over steps and divided by the number of episodes, the expected
+gradient is that of the expected reward (undiscounted), or that of Eq. 15 with discounted returns.
+What is said of bias here is measured by adding up all outcomes of small batches on the process of
+Fig. 3 (`envs.three_state`), two steps long, with even odds of both actions, gamma 0.95; angles are
+those between the expected update and the exact gradient. Discounting alone turns it by 1.4 degrees
+away from the gradient of the expected reward, in batches of any size.
 """
 
 import torch
@@ -15,6 +23,9 @@ from torch import Tensor
 from torch.nn.utils.rnn import pad_sequence
 
 from drone_rl.utils.errors import InputError
+
+ROUNDING = 1e-6
+"""Deviation of returns, in rewards, up to which they differ by rounding errors alone."""
 
 
 def episode_lengths(done: Tensor) -> list[int]:
@@ -36,13 +47,16 @@ def episode_lengths(done: Tensor) -> list[int]:
 
 
 def total_reward(reward: Tensor, done: Tensor) -> Tensor:
-    """Every step gets its whole episode's reward, r(tau) of Eq. 12. Shape: (*batch, T, 1)."""
+    """Every step gets its whole episode's reward, r(tau) of Eq. 12; unbiased.
+
+    Shape: (*batch, T, 1).
+    """
     padded, lengths = _pad(reward, done)
     return _unpad(padded.sum(0).expand_as(padded), lengths, reward)
 
 
 def reward_to_go(reward: Tensor, done: Tensor, gamma: float) -> Tensor:
-    """Discounted return, Eq. 14: g_t = r_{t+1} + gamma g_{t+1}. Shape: (*batch, T, 1)."""
+    """Discounted return, Eq. 14: g_t = r_{t+1} + gamma g_{t+1}; unbiased. Shape: (*batch, T, 1)."""
     padded, lengths = _pad(reward, done)
     return _unpad(_discount(padded, gamma), lengths, reward)
 
@@ -50,19 +64,26 @@ def reward_to_go(reward: Tensor, done: Tensor, gamma: float) -> Tensor:
 def standardised(reward: Tensor, done: Tensor, gamma: float) -> Tensor:
     """Discounted return, (g - mean) / std over each episode (Algorithm 4, line 2; footnote 5).
 
-    The deviation is the population's; an episode of constant return gets zeros.
+    The deviation is the population's; an episode of constant return gets zeros. Mean and deviation
+    are the episode's own, so this is biased in batches of any size: an episode of one step teaches
+    nothing, nor does, undiscounted, one that is rewarded at its end alone. With odds of 9 to 1 at
+    the first step and 1 to 9 at the second, the angle is 38.7 degrees.
     """
     padded, lengths = _pad(reward, done)
     returns = _discount(padded, gamma)
     alive = _alive(lengths, returns)
     centred = (returns - _mean(returns, alive)) * alive
     deviation = _mean(centred.square(), alive).sqrt()
-    flat = torch.where(deviation > 1e-8, centred / deviation.clamp(min=1e-8), 0.0)
+    flat = torch.where(deviation > ROUNDING, centred / deviation.clamp(min=ROUNDING), 0.0)
     return _unpad(flat, lengths, reward)
 
 
 def linear_ramp(reward: Tensor, done: Tensor) -> Tensor:
-    """The episode's reward times a ramp from 1/T at its first step to 1 at its last."""
+    """The episode's reward times a ramp from 1/T at its first step to 1 at its last.
+
+    The ramp depends on how long the episode is yet to become, so this is biased in batches of any
+    size: by 11.3 degrees.
+    """
     padded, lengths = _pad(reward, done)
     step = torch.arange(1, padded.shape[0] + 1, device=padded.device)[:, None]
     ramp = step / torch.tensor(lengths, device=padded.device)
@@ -70,13 +91,17 @@ def linear_ramp(reward: Tensor, done: Tensor) -> Tensor:
 
 
 def success_scaled(reward: Tensor, done: Tensor, gamma: float, max_reward: float) -> Tensor:
-    """Discounted return times exp(r(tau) - max_reward): episodes count by their success."""
+    """Discounted return times exp(r(tau) - max_reward): episodes count by their success.
+
+    Where an episode has one reward of 1 or none, that is a constant factor. Otherwise it is biased
+    towards what succeeds wholly, if seldom: an even chance of 2 is preferred to 1.1 for sure.
+    """
     scale = (total_reward(reward, done) - max_reward).exp()
     return reward_to_go(reward, done, gamma) * scale
 
 
 def time_baseline(reward: Tensor, done: Tensor, gamma: float, baseline: Tensor) -> Tensor:
-    """Discounted return minus a baseline for each time step of an episode.
+    """Discounted return minus a baseline for each time step of an episode; unbiased.
 
     Args:
         reward: Shape: (*batch, T, 1).
@@ -94,8 +119,9 @@ def time_baseline(reward: Tensor, done: Tensor, gamma: float, baseline: Tensor) 
 def leave_one_out(reward: Tensor, done: Tensor, gamma: float) -> Tensor:
     """Discounted return minus the mean, at the same time step, of the other episodes still going.
 
-    The baseline does not depend on the episode's own actions, so the gradient stays unbiased; an
-    episode that goes on alone has baseline 0.
+    The baseline does not depend on the episode's own actions, so this is unbiased, as long as it is
+    neither scaled (`scale_to_unit`) nor averaged over steps (`ReinforceLoss`); an episode that goes
+    on alone has baseline 0.
     """
     padded, lengths = _pad(reward, done)
     returns = _discount(padded, gamma)
@@ -106,17 +132,26 @@ def leave_one_out(reward: Tensor, done: Tensor, gamma: float) -> Tensor:
 
 
 def batch_normalised(reward: Tensor, done: Tensor, gamma: float) -> Tensor:
-    """Discounted return, (g - mean) / std over the whole batch; zeros if it is constant."""
+    """Discounted return, (g - mean) / std over the whole batch; zeros if it is constant.
+
+    Mean and deviation contain the episode itself, so this is biased, less the larger the batch: by
+    10.9 degrees with 2 episodes, 1.9 with 8; with a single one it is `standardised`.
+    """
     returns = reward_to_go(reward, done, gamma)
     centred = returns - returns.mean()
     deviation = centred.square().mean().sqrt()
-    return centred / deviation if deviation > 1e-8 else torch.zeros_like(centred)
+    return centred / deviation if deviation > ROUNDING else torch.zeros_like(centred)
 
 
 def scale_to_unit(returns: Tensor) -> Tensor:
-    """Divides by the root mean square of the batch, which keeps zero where it is."""
+    """Divides by the root mean square of the batch, which keeps zero where it is.
+
+    The batch's own returns are in the divisor, so what was unbiased becomes biased, though less the
+    larger the batch. `leave_one_out`: by 8.7 degrees with 3 episodes, 2.6 with 8, 0.1 with 64.
+    Returns that differ from 0 by rounding errors alone become 0 and are not scaled up.
+    """
     rms = returns.square().mean().sqrt()
-    return returns / rms if rms > 1e-8 else returns
+    return returns / rms if rms > ROUNDING else torch.zeros_like(returns)
 
 
 def mean_by_time(returns: Tensor, done: Tensor) -> tuple[Tensor, Tensor]:

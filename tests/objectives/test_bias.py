@@ -1,0 +1,225 @@
+"""What estimators and loss expect to do, by adding up all outcomes of small batches (Fig. 3).
+
+The policy has a logit of its own for each step, so that a gradient has a direction that can be
+wrong: it sees the step, one-hot, and leaves state 0 with a probability of that step.
+"""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+import torch
+from scipy.special import gammaln
+from tensordict import TensorDict
+from tensordict.nn import TensorDictModule
+from torch import nn
+from torchrl.data import Categorical
+from torchrl.modules import ProbabilisticActor
+
+from drone_rl.envs.three_state import SUCCESS_PROBABILITY, exact_gradient, outcomes
+from drone_rl.objectives import (
+    BatchNormalised,
+    LeaveOneOut,
+    LinearRamp,
+    ReinforceLoss,
+    RewardToGo,
+    Standardised,
+    SuccessScaled,
+    TimeBaseline,
+    TotalReward,
+    returns,
+)
+
+EVEN = (0.5, 0.5)
+SKEWED = (0.7, 0.2, 0.4)
+
+
+def expected_update(leaving, estimator, episodes, reduction="sum"):
+    """Expected ascent on the logits of action 1, of the shipped classes; over episodes if summed.
+
+    Exact: over every tuple of outcomes, weighted by its probability.
+    """
+    network = nn.Linear(len(leaving), 2, bias=False)
+    with torch.no_grad():
+        network.weight.copy_(
+            torch.tensor([[0.0] * len(leaving), [math.log(p / (1 - p)) for p in leaving]])
+        )
+    actor = ProbabilisticActor(
+        TensorDictModule(network, in_keys=["step"], out_keys=["logits"]),
+        in_keys=["logits"],
+        spec=Categorical(2),
+        distribution_class=torch.distributions.Categorical,
+    )
+    loss = ReinforceLoss(actor, reduction=reduction)
+    total = torch.zeros(len(leaving), dtype=torch.float64)
+    for batch in itertools.product(outcomes(leaving), repeat=episodes):
+        network.zero_grad()
+        loss(estimator(joined(batch, len(leaving))))["loss_actor"].backward()
+        total -= math.prod(o.probability for o in batch) * network.weight.grad[1].double()
+    return (total / (episodes if reduction == "sum" else 1)).numpy()
+
+
+def joined(batch, horizon):
+    steps = torch.cat([torch.arange(len(o.actions)) for o in batch])
+    following = torch.cat([steps[1:], steps.new_zeros(1)])
+    entries = {
+        "step": nn.functional.one_hot(steps, horizon).float(),
+        "action": torch.tensor([a for o in batch for a in o.actions]),
+        "next": {
+            "reward": torch.tensor([r for o in batch for r in o.rewards])[:, None],
+            "done": (following == 0)[:, None],
+        },
+    }
+    return TensorDict(entries, [len(steps)])
+
+
+def default_of_any_size(leaving, episodes, gamma=0.95, *, scale=True, mean=True):
+    """The same for `leave_one_out` on two steps, written out, for large batches.
+
+    Of an episode only its length and reward matter to the returns: long or short, rewarded or not,
+    so a batch is four counts. The score of a kind is its mean over the actions behind it.
+    """
+    first, second = leaving
+    success = SUCCESS_PROBABILITY
+    n = episodes
+    kinds = [
+        (a, b, c, n - a - b - c)
+        for a in range(n + 1)
+        for b in range(n + 1 - a)
+        for c in range(n + 1 - a - b)
+    ]
+    count = np.array(kinds, float)  # short and rewarded, short, long and rewarded, long
+    share = np.array([first * success, first * (1 - success), (1 - first) * second * success, 0])
+    share[3] = 1 - share.sum()
+    probability = np.exp(gammaln(n + 1) - gammaln(count + 1).sum(1) + count @ np.log(share))
+    is_long, going_on = np.array([0, 0, 1, 1]), count[:, 2:].sum(1)
+    to_go = np.array([1, 0, gamma, 0]), np.array([0, 0, 1, 0])
+    credit = to_go[0] - ((count @ to_go[0])[:, None] - to_go[0]) / (n - 1)
+    others = (count[:, [2]] - to_go[1]) / np.maximum(going_on - 1, 1)[:, None]
+    later = to_go[1] - np.where(going_on > 1, 1, 0)[:, None] * others
+    square = (count * (credit**2 + is_long * later**2)).sum(1)
+    steps = n + going_on
+    rms = np.sqrt(square / steps) if scale else np.ones(len(count))
+    weight = np.where(rms > 1e-6, probability / np.maximum(rms, 1e-6), 0) / (steps if mean else n)
+    stayed = (
+        -second * (1 - second) * success / (1 - second * success)
+    )  # of a long one without reward
+    score = np.array([1 - first, 1 - first, -first, -first]), np.array([0, 0, 1 - second, stayed])
+    return weight @ np.stack([count * credit @ score[0], count * later * is_long @ score[1]], 1)
+
+
+def angle(one, other):
+    """Degrees."""
+    cosine = one @ other / np.linalg.norm(one) / np.linalg.norm(other)
+    return math.degrees(math.acos(min(1.0, cosine)))
+
+
+def known_baseline():
+    """The running means of earlier batches, whatever they were."""
+    estimator = TimeBaseline(1.0, max_steps=3)
+    estimator.baseline += torch.tensor([0.7, -0.3, 0.2])
+    estimator.estimate = lambda r, d: returns.time_baseline(r, d, 1.0, estimator.baseline)
+    return estimator
+
+
+@pytest.mark.parametrize(("leaving", "episodes"), [(EVEN, 3), (SKEWED, 2)])
+@pytest.mark.parametrize(
+    "make", [TotalReward, lambda: RewardToGo(1.0), lambda: LeaveOneOut(1.0), known_baseline]
+)
+def test_unscaled_and_summed_these_are_exactly_unbiased(make, leaving, episodes):
+    found = expected_update(leaving, make(), episodes)
+    np.testing.assert_allclose(found, exact_gradient(leaving), atol=1e-6)
+
+
+@pytest.mark.parametrize("leaving", [EVEN, SKEWED])
+def test_discounted_returns_climb_the_discounted_gradient(leaving):
+    exact = exact_gradient(leaving, 0.95).numpy()
+    np.testing.assert_allclose(expected_update(leaving, LeaveOneOut(0.95), 2), exact, atol=1e-6)
+    np.testing.assert_allclose(expected_update(leaving, RewardToGo(0.95), 1), exact, atol=1e-6)
+
+
+def test_discounting_alone_turns_the_gradient():
+    discounted, plain = exact_gradient(EVEN, 0.95).numpy(), exact_gradient(EVEN).numpy()
+    assert angle(discounted, plain) == pytest.approx(1.397, abs=1e-3)
+
+
+@pytest.mark.parametrize(("episodes", "degrees", "length"), [(2, 2.89, 0.819), (3, 10.71, 1.093)])
+def test_bias_of_the_shipped_default(episodes, degrees, length):
+    """gamma 0.95, scaled, mean over steps, as in conf/train.yaml."""
+    exact = exact_gradient(EVEN, 0.95).numpy()
+    found = expected_update(EVEN, LeaveOneOut(0.95, scale=True), episodes, "mean")
+    np.testing.assert_allclose(found, default_of_any_size(EVEN, episodes), atol=1e-6)
+    assert angle(found, exact) == pytest.approx(degrees, abs=0.01)
+    assert np.linalg.norm(found) / np.linalg.norm(exact) == pytest.approx(length, abs=1e-3)
+
+
+@pytest.mark.parametrize("kind", [{"scale": False}, {"mean": False}])
+def test_written_out_default_is_that_of_the_classes(kind):
+    settings = {"scale": True, "mean": True} | kind
+    estimator = LeaveOneOut(0.95, scale=settings["scale"])
+    reduction = "mean" if settings["mean"] else "sum"
+    for leaving in (EVEN, (0.8, 0.3)):
+        found = expected_update(leaving, estimator, 3, reduction)
+        np.testing.assert_allclose(found, default_of_any_size(leaving, 3, **settings), atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("settings", "degrees"),
+    [
+        ({}, {3: 10.71, 8: 3.86, 64: 0.25}),
+        ({"mean": False}, {3: 8.72, 8: 2.61, 64: 0.10}),  # scaled only
+        ({"scale": False}, {2: 3.80, 8: 1.14, 64: 0.15}),  # mean only
+    ],
+)
+def test_bias_of_scale_and_mean_goes_as_the_batch_grows(settings, degrees):
+    exact = exact_gradient(EVEN, 0.95).numpy()
+    found = {n: angle(default_of_any_size(EVEN, n, **settings), exact) for n in degrees}
+    assert found == pytest.approx(degrees, abs=0.01)
+
+
+def test_in_large_batches_the_default_is_a_positive_multiple_of_the_gradient():
+    """1 / (RMS of the returns less their means, times the mean length), which a rate takes in."""
+    found = default_of_any_size(EVEN, 64) / exact_gradient(EVEN, 0.95).numpy()
+    # time 0: returns 1, 0, .95, 0 with probability 3/8, 1/8, 3/16, 5/16; time 1: 1, 0 with 3/8, 5/8
+    first = 3 / 8 + 0.95**2 * 3 / 16 - (3 / 8 + 0.95 * 3 / 16) ** 2
+    rms = ((first + 0.5 * 3 / 8 * 5 / 8) / 1.5) ** 0.5
+    np.testing.assert_allclose(found, 1 / (1.5 * rms), rtol=0.02)
+
+
+def test_standardised_is_biased_in_any_batch():
+    assert np.abs(expected_update(EVEN, Standardised(1.0), 1)).max() < 1e-6  # learns nothing
+    skewed = (0.9, 0.1)
+    exact = exact_gradient(skewed, 0.95).numpy()
+    for episodes in (1, 2):
+        found = expected_update(skewed, Standardised(0.95), episodes)
+        assert angle(found, exact) == pytest.approx(38.69, abs=0.01)
+
+
+def test_linear_ramp_is_biased_in_any_batch():
+    for episodes in (1, 2):
+        found = expected_update(EVEN, LinearRamp(), episodes)
+        np.testing.assert_allclose(found, [0.140625, 0.09375], atol=1e-6)
+        assert angle(found, exact_gradient(EVEN).numpy()) == pytest.approx(11.31, abs=0.01)
+
+
+def test_success_scaled_is_a_factor_where_there_is_one_reward():
+    found = expected_update(SKEWED, SuccessScaled(1.0, max_reward=3.0), 1)
+    np.testing.assert_allclose(found, exact_gradient(SKEWED) * math.exp(-2), atol=1e-6)
+
+
+def test_success_scaled_prefers_an_even_chance_of_two_to_more_for_sure():
+    """One step: 2 or nothing is 1 on average, less than 1.1; times exp(r) it is 7.4 against 3.3."""
+    done = torch.ones(3, 1, dtype=torch.bool)
+    credit = returns.success_scaled(torch.tensor([[2.0], [0.0], [1.1]]), done, 0.95, max_reward=2.0)
+    two, nothing, sure = credit[:, 0].tolist()
+    assert (two + nothing) / 2 == pytest.approx(1.0) and sure == pytest.approx(1.1 * math.exp(-0.9))
+    assert (two + nothing) / 2 > sure
+
+
+def test_batch_normalised_is_biased_less_the_larger_the_batch():
+    exact = exact_gradient(EVEN, 0.95).numpy()
+    alone = expected_update((0.9, 0.1), BatchNormalised(0.95), 1)
+    np.testing.assert_allclose(alone, expected_update((0.9, 0.1), Standardised(0.95), 1), atol=1e-6)
+    degrees = [angle(expected_update(EVEN, BatchNormalised(0.95), n), exact) for n in (2, 3)]
+    assert degrees == pytest.approx([10.87, 8.96], abs=0.01)
