@@ -35,9 +35,10 @@ def failure_table(
     Returns:
         "rows": each with "by", "value", "episodes" (that offered such a cube at or before their
         first failure), "failed" (whose first failure it was), "share" and its interval; "largest":
-        the row whose share is surely largest, by its lower end, None if nothing failed; that who
-        passed a cube flew on to the end of the field is not news enough for that; "bound":
-        the share of episodes that failed, with its exact interval.
+        the row that holds many failures and little else, by the number of failures times the least
+        share of them, None if nothing failed (who passed a cube flies on to the end of the field,
+        so that this end is left out);
+        "bound": the share of episodes that failed, with its exact interval.
     """
     first = episodes.collected.long().cumprod(-1).sum(-1)  # number of cubes where none failed
     num_cubes = episodes.collected.shape[-1]
@@ -55,7 +56,7 @@ def failure_table(
     each = 1.0 - (1.0 - confidence) / len(counts)
     rows = [_row(*count, confidence=each) for count in counts]
     hit = [row for row in rows if row["failed"] and row["value"] != EXPECTED_END]
-    largest = max(hit, key=lambda row: (row["lower95"], row["failed"]), default=None)
+    largest = max(hit, key=lambda row: row["failed"] * row["lower95"], default=None)
     return {
         "rows": rows,
         "largest": largest,

@@ -1,11 +1,12 @@
 """What a verdict says. Evidence: `verdict.json`."""
 
+from collections.abc import Sequence
 from typing import Any
 
 from drone_rl.words.licence import Evidence, Sentence, percent
 
-FREQUENT = 0.05
-"""An end is worth a word if surely more than this share of episodes end so."""
+FREQUENT = 0.02
+"""How an episode ends is worth a word if surely more than this share of episodes end so."""
 _LUCK = {
     "random": "acting at random",
     "forward": "flying straight on",
@@ -13,13 +14,25 @@ _LUCK = {
     "right": "flying right",
 }
 _SIDES = {"left": "on its left", "ahead": "ahead", "right": "on its right"}
+_HEIGHTS = {
+    "lower": "lower than itself",
+    "level": "at its own height",
+    "higher": "higher than itself",
+}
 _ENDS = {
     "front_boundary": "behind the last cube",
     "side_boundary": "outside the field, left or right",
     "step_limit": "at the step limit",
 }
 _EXPECTED_END = "front_boundary"
-"""Where an episode ends that has passed a cube and flown on: no news."""
+"""Who has passed a cube flies on to there: no news."""
+_KINDS = {
+    "good": "good",
+    "poor": "poor",
+    "one-sided (left)": "blind to cubes on its right",
+    "one-sided (right)": "blind to cubes on its left",
+    "none of these": "neither good nor poor nor one-sided",
+}
 
 
 def _success(flights: Evidence) -> str:
@@ -30,10 +43,14 @@ def _cubes(flights: Evidence) -> str:
     return percent(flights["shares"]["all"]["mean"])
 
 
-def best_luck(evidence: Evidence) -> str:
-    """The baseline that sees nothing and collected most."""
+def _best_luck(evidence: Evidence) -> str:
+    """What sees nothing and collects most."""
     flown = evidence["baselines"]
     return max(_LUCK, key=lambda name: flown[name]["shares"]["all"]["mean"])
+
+
+def _list(parts: Sequence[str], last: str = "and") -> str:
+    return f" {last} ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else parts)
 
 
 def _kind(evidence: Evidence) -> str:
@@ -44,37 +61,40 @@ def _kind(evidence: Evidence) -> str:
         return f"This policy can't be trusted with cubes on its {blind}: {every}."
     return {
         "good": f"This policy does its task: {every}.",
-        "poor": f"This policy does not do its task, no better than luck or hardly so: {every}.",
-        "none of these": f"This policy is neither good nor poor nor one-sided: {every}.",
+        "poor": f"This policy does not do its task: it is {_beside_luck(evidence)} luck.",
+        "none of these": f"This policy is {_KINDS['none of these']}: {every}.",
     }[kind]
+
+
+def _beside_luck(evidence: Evidence) -> str:
+    ours, theirs = evidence["greedy"], evidence["baselines"][_best_luck(evidence)]
+    is_more = ours["shares"]["all"]["mean"] > theirs["shares"]["all"]["mean"]
+    return "hardly better than" if is_more else "no better than"
 
 
 def _open(evidence: Evidence) -> str:
     flown, enough = evidence["greedy"], evidence["enough"]
-    more = f"about {enough:,} would do" if enough else "even many times as many might not do"
+    more = f"about {enough:,} would do" if enough else "many times as many might not do"
     return (
-        f"Whether this policy is {evidence['kind']!r} is not certain after {flown['episodes']:,} "
-        f"episodes ({more}): it collected every cube in {_success(flown)} of them."
+        f"This policy looks {_KINDS[evidence['kind']]}, but {flown['episodes']:,} episodes are too "
+        f"few to be certain ({more}): it collected every cube in {_success(flown)} of them."
     )
 
 
 def _shares(evidence: Evidence) -> str:
     shares = evidence["greedy"]["shares"]
-    met = [f"{percent(shares[k]['mean'])} {v}" for k, v in _SIDES.items() if shares[k]["count"]]
+    met = [(percent(shares[k]["mean"]), v) for k, v in _SIDES.items() if shares[k]["count"]]
     none = [v for k, v in _SIDES.items() if not shares[k]["count"]]
-    text = f"Of the cubes that it met it collects {_list(met)}"
+    parts = [f"{p} of {'those' if i else 'the cubes'} {v}" for i, (p, v) in enumerate(met)]
+    text = f"It collects {_list(parts)}"
     return text + (f"; none were offered {_list(none, 'or')}." if none else ".")
 
 
-def _list(parts: list[str], last: str = "and") -> str:
-    return f" {last} ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else parts)
-
-
 def _baselines(evidence: Evidence) -> str:
-    flown, luck = evidence["baselines"], best_luck(evidence)
+    flown, luck = evidence["baselines"], _best_luck(evidence)
     return (
         f"In the same worlds it collects {_cubes(evidence['greedy'])} of all cubes, "
-        f"{_LUCK[luck]} {_cubes(flown[luck])}, the oracle {_cubes(flown['oracle'])}."
+        f"{_LUCK[luck]} {_cubes(flown[luck])} and the oracle {_cubes(flown['oracle'])}."
     )
 
 
@@ -88,7 +108,7 @@ def _pointless(evidence: Evidence) -> str:
     flown = evidence["baselines"]
     luck = max(_LUCK, key=lambda name: flown[name]["success"]["share"])
     return (
-        f"That proves little, for luck is enough here: {_LUCK[luck]} collects every cube in "
+        f"This task tells little, for luck is enough: {_LUCK[luck]} collects every cube in "
         f"{_success(flown[luck])} of episodes."
     )
 
@@ -101,35 +121,31 @@ def _hopeless(evidence: Evidence) -> str:
 def _largest(evidence: Evidence) -> str:
     row: dict[str, Any] = evidence["failures"]["largest"]
     by, value = row["by"], row["value"]
-    which, of = {
-        "cube": (f"at the {value} cube", "that got so far"),
-        "side": (f"with cubes {_SIDES.get(value, value)}", "that offered one"),
-        "sideways": (f"with cubes {value} to its side", "that offered one"),
-        "height": (f"with cubes {_HEIGHTS.get(value, value)}", "that offered one"),
-        "end": (f"by ending {_ENDS.get(value, value)}", "in all"),
+    where = {
+        "cube": f"at the {value} cube",
+        "side": f"with cubes {_SIDES.get(value, value)}",
+        "sideways": f"with cubes {value} to its side",
+        "height": f"with cubes {_HEIGHTS.get(value, value)}",
+        "end": f"by ending {_ENDS.get(value, value)}",
     }[by]
-    return (
-        f"It fails most {which}: in {row['failed']} of the {row['episodes']} episodes {of} "
-        f"({percent(row['share'])}){_other_ends(evidence)}."
-    )
-
-
-_HEIGHTS = {
-    "lower": "lower than itself",
-    "level": "at its own height",
-    "higher": "higher than itself",
-}
+    whole = row["failed"] == row["episodes"]
+    count = f"all {row['episodes']:,}" if whole else f"{row['failed']:,} of {row['episodes']:,}"
+    offered = {"cube": " that got so far", "end": ""}.get(by, " that offered one")
+    if row["episodes"] == evidence["greedy"]["episodes"]:
+        offered = ""
+    share = "" if whole else f" ({percent(row['share'])})"
+    return f"It fails most {where}: in {count} episodes{offered}{share}{_other_ends(evidence)}."
 
 
 def _other_ends(evidence: Evidence) -> str:
     """Ends by which many episodes fail, but for the usual one and what has just been said."""
     largest = evidence["failures"]["largest"]
+    said = (_EXPECTED_END, largest["value"] if largest["by"] == "end" else None)
     rows = [
         row
         for row in evidence["failures"]["rows"]
-        if row["by"] == "end" and row["lower95"] > FREQUENT and row["value"] != _EXPECTED_END
+        if row["by"] == "end" and row["lower95"] > FREQUENT and row["value"] not in said
     ]
-    rows = [row for row in rows if (row["by"], row["value"]) != (largest["by"], largest["value"])]
     ends = [f"{percent(row['share'])} of all end {_ENDS[row['value']]}" for row in rows]
     return f"; {_list(ends)}" if ends else ""
 
@@ -148,41 +164,30 @@ def _differs(evidence: Evidence) -> bool:
 def _drawing(evidence: Evidence) -> str:
     sampled, greedy = _success(evidence["sampled"]), _success(evidence["greedy"])
     return (
-        f"That holds for its most probable actions only: with actions drawn by their "
-        f"probabilities every cube is collected in {sampled} of episodes, not {greedy}."
+        "That holds for its most probable actions: with actions drawn by their probabilities it "
+        f"collects every cube in {sampled} of episodes, not in {greedy}."
     )
+
+
+def _misses_or_lacks(evidence: Evidence) -> bool:
+    return any(evidence["greedy"]["shares"][side]["mean"] != 1.0 for side in _SIDES)
 
 
 SENTENCES = (
     Sentence("kind", "the kind is certain", lambda e: e["certain"], _kind),
     Sentence("open", "the kind is not certain", lambda e: not e["certain"], _open),
-    Sentence(
-        "shares",
-        "not every cube that was met was collected, or a side was not offered",
-        lambda e: any(e["greedy"]["shares"][side]["mean"] != 1.0 for side in _SIDES),
-        _shares,
-    ),
-    Sentence(
-        "baselines",
-        "luck is not enough",
-        lambda e: not _luck_suffices(e),
-        _baselines,
-    ),
-    Sentence(
-        "pointless",
-        "some luck succeeds in the share of the oracle's episodes that makes a policy good",
-        _luck_suffices,
-        _pointless,
-    ),
+    Sentence("shares", "a cube was missed, or a side not offered", _misses_or_lacks, _shares),
+    Sentence("baselines", "luck is not enough", lambda e: not _luck_suffices(e), _baselines),
+    Sentence("pointless", "luck succeeds as a good policy does", _luck_suffices, _pointless),
     Sentence(
         "hopeless",
-        "the oracle surely succeeds in less than half of the episodes",
+        "the oracle surely fails in more than half of the episodes",
         lambda e: e["baselines"]["oracle"]["success"]["upper95"] < 0.5,
         _hopeless,
     ),
     Sentence(
         "failures.largest",
-        "some episode failed",
+        "an episode failed",
         lambda e: e["failures"]["largest"] is not None,
         _largest,
     ),
