@@ -10,8 +10,8 @@ import numpy as np
 from drone_rl.bench.commands import call, watch
 from drone_rl.bench.parts import default_pipeline
 from drone_rl.explain import tsne
-from drone_rl.explain.dataset import record
 from drone_rl.explain.hooks import feature_layer
+from drone_rl.explain.recording import record
 from drone_rl.explain.response import response_map
 from drone_rl.explain.scenes import Scenes
 

@@ -67,10 +67,12 @@ class EpisodeCollector:
             yield self.collect()
 
     @torch.no_grad()
-    def collect(self) -> TensorDictBase:
-        """Runs one episode in every world. Shape of the batch: (T_total,)."""
+    def collect(self, num_worlds: int | None = None) -> TensorDictBase:
+        """Runs one episode in every world, or in the first `num_worlds`. Shape: (T_total,)."""
         state = self.env.reset()
         active = torch.ones(self.env.batch_size, dtype=torch.bool, device=state.device)
+        active[len(active) if num_worlds is None else num_worlds :] = False
+        flying = int(active.sum())
         worlds: list[Tensor] = []
         steps: list[dict[NestedKey, Tensor]] = []
         while len(indices := active.nonzero()[:, 0]):
@@ -81,7 +83,7 @@ class EpisodeCollector:
         batch = _join(steps, worlds, len(active))
         batch["collector", "traj_ids"] += self.episodes
         self.frames += len(batch)
-        self.episodes += len(active)
+        self.episodes += flying
         return batch
 
     def _step(

@@ -12,8 +12,9 @@ from torch import Tensor
 from torchrl.envs import TransformedEnv
 
 from drone_rl.explain.attribution import Explainer
-from drone_rl.explain.dataset import RolloutDataset, record
+from drone_rl.explain.dataset import RolloutDataset
 from drone_rl.explain.hooks import feature_layer, features
+from drone_rl.explain.recording import draw, fly, spread
 from drone_rl.explain.scenes import Scenes, empty_scene
 from drone_rl.explain.settings import ExplainSettings
 from drone_rl.policies import PolicyNetwork, make_actor
@@ -52,16 +53,21 @@ class Context:
         return make_actor(self.network, self.env.action_spec, generator)
 
     @functools.cached_property
-    def dataset(self) -> RolloutDataset:
-        """Sampled flights, the frames that are analysed."""
-        return record(
+    def flights(self) -> RolloutDataset:
+        """Sampled flights, every step of them, without pictures but for what the policy got."""
+        return fly(
             self.env,
             self.restart(),
-            self.network,
-            self.settings.frames,
-            layers=(self.layer,),
+            num_episodes=self.settings.data_episodes,
+            num_frames=self.settings.frames,
             meta={"layer": self.layer, "seed": self.settings.seed},
         )
+
+    @functools.cached_property
+    def dataset(self) -> RolloutDataset:
+        """The frames that are analysed, spread over all flights."""
+        rows = spread(self.flights.episode, self.settings.frames)
+        return draw(self.flights, rows, self.scenes, self.network, (self.layer,))
 
     @property
     def episode(self) -> NDArray:

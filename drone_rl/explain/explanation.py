@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from torchrl.envs import TransformedEnv
 
 from drone_rl.explain.context import Context
-from drone_rl.explain.dataset import RolloutDataset
 from drone_rl.explain.sections import SECTIONS, Section
 from drone_rl.explain.settings import ExplainSettings
 from drone_rl.policies import PolicyNetwork
@@ -73,16 +72,16 @@ def explain_policy(
         **numbers,
         "provenance": provenance,
     }
-    _write(folder, written, arrays, context.dataset)
+    _write(folder, written, arrays, context)
     return written
 
 
 def _write(
-    folder: Path, numbers: dict[str, Any], arrays: dict[str, NDArray], dataset: RolloutDataset
+    folder: Path, numbers: dict[str, Any], arrays: dict[str, NDArray], context: Context
 ) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        dataset.save(folder / "dataset.npz")
+        context.dataset.save(folder / "dataset.npz", context.flights)
         np.savez_compressed(folder / "arrays.npz", **arrays)
         (folder / "explanation.json").write_text(json.dumps(numbers, indent=1))
     except OSError as error:

@@ -1,39 +1,53 @@
-"""Intervals for means over frames that come in episodes."""
+"""Means over frames that come in episodes, with intervals that count the episodes."""
 
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-DRAWS = 2000
+from drone_rl.utils.intervals import mean_bounds
 
 
-def mean_interval(values: NDArray, episode: NDArray, seed: int = 0) -> dict[str, Any]:
-    """The mean over frames with a 95% bootstrap interval that resamples whole episodes.
-
-    Frames of one episode are alike, so that an interval that took them for independent would be
-    far too narrow.
+def episode_means(values: NDArray, episode: NDArray) -> NDArray:
+    """The mean of each episode over its frames that say something.
 
     Args:
         values: One a frame; NaN where a frame says nothing. Shape: (T,).
         episode: The episode of each frame. Shape: (T,).
-        seed: Of the resampling.
+
+    Returns:
+        Shape: (E,), the episodes in which some frame does.
+    """
+    told = np.isfinite(values)
+    _, number = np.unique(episode[told], return_inverse=True)
+    totals = np.bincount(number, weights=values[told].astype(np.float64))
+    return totals / np.bincount(number)
+
+
+def mean_interval(
+    values: NDArray, episode: NDArray, low: float = 0.0, high: float = 1.0
+) -> dict[str, Any]:
+    """The mean over episodes of their means, with a 95% interval that counts episodes.
+
+    Frames of one episode are alike, so that an interval that took them for independent would be
+    far too narrow. Episodes are independent, and that is all that this one assumes.
+
+    Args:
+        values: One a frame, from `low` to `high`; NaN where a frame says nothing. Shape: (T,).
+        episode: The episode of each frame. Shape: (T,).
+        low: Least possible value.
+        high: Greatest possible value.
 
     Returns:
         "mean", "lower95", "upper95" (None where there is no frame), "frames" and "episodes".
     """
-    told = np.isfinite(values)
-    if not told.any():
-        return {"mean": None, "lower95": None, "upper95": None, "frames": 0, "episodes": 0}
-    _, cluster = np.unique(episode[told], return_inverse=True)
-    totals = np.bincount(cluster, weights=values[told].astype(np.float64))
-    counts = np.bincount(cluster).astype(np.float64)
-    draws = np.random.default_rng(seed).integers(0, len(totals), (DRAWS, len(totals)))
-    means = totals[draws].sum(1) / counts[draws].sum(1)
+    means = episode_means(values, episode)
+    bounds = mean_bounds(means, low, high)
+    told = bounds["mean"] is not None
     return {
-        "mean": float(totals.sum() / counts.sum()),
-        "lower95": float(np.quantile(means, 0.025)),
-        "upper95": float(np.quantile(means, 0.975)),
-        "frames": int(told.sum()),
-        "episodes": len(totals),
+        "mean": bounds["mean"],
+        "lower95": bounds["lower95"] if told else None,
+        "upper95": bounds["upper95"] if told else None,
+        "frames": int(np.isfinite(values).sum()),
+        "episodes": len(means),
     }

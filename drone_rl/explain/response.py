@@ -1,4 +1,4 @@
-"""The response map: what a policy does about one cube, wherever it stands."""
+"""The response map: what a policy does about one cube wherever it stands, and what comes of it."""
 
 import dataclasses
 from typing import Any
@@ -8,147 +8,153 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from drone_rl.explain.flying import fly_on
 from drone_rl.explain.hooks import probabilities
-from drone_rl.explain.intervals import mean_interval
 from drone_rl.explain.scenes import Scenes, empty_scene, oracle_action, place_cube
 from drone_rl.policies import PolicyNetwork
 from drone_rl.sim.rules import Action
 
 BLIND = 0.1
 """A policy is blind to a cube that changes its action probabilities by less than this."""
-_MIRRORED = [Action.FORWARD, Action.RIGHT, Action.LEFT]
+MIRRORED = (Action.FORWARD, Action.RIGHT, Action.LEFT)
 """What each action becomes in a mirror."""
 
 
 @dataclasses.dataclass
 class ResponseMap:
-    """Action probabilities for one cube at every place of a grid; F ahead, L sideways."""
+    """Action probabilities for one cube at every place of a grid: Z up, F ahead, L sideways."""
 
+    height: NDArray  # (Z,)
+    """Metres above the drone."""
     forward: NDArray  # (F,)
-    """Metres ahead of the drone."""
+    """Metres ahead of it."""
     lateral: NDArray  # (L,)
     """Metres to its left."""
-    probabilities: NDArray  # (F, L, 3)
+    probabilities: NDArray  # (Z, F, L, 3)
     """By `Action`."""
     without_cube: NDArray  # (3,)
     """The same for the scene without a cube."""
-    oracle: NDArray  # (F, L)
-    """What the oracle does."""
+    oracle: NDArray  # (L,)
+    """What must be done: a turn where flying straight on would miss."""
 
     @property
     def action(self) -> NDArray:
-        """The most probable action. Shape: (F, L)."""
+        """The most probable action. Shape: (Z, F, L)."""
         return self.probabilities.argmax(-1)
 
     @property
     def blind(self) -> NDArray:
-        """Where the cube calls for a turn and the policy doesn't notice it. Shape: (F, L)."""
+        """Where the cube calls for a turn and the policy doesn't notice it. Shape: (Z, F, L)."""
         change = 0.5 * np.abs(self.probabilities - self.without_cube).sum(-1)
-        wrong = self.action != self.oracle
-        return (change < BLIND) & wrong
+        calls = self.oracle != Action.FORWARD
+        return (change < BLIND) & calls & (self.action != self.oracle)
 
-    @property
-    def answered(self) -> NDArray:
-        """Sideways places to which the policy turns in time, and away from which never.
 
-        A policy need not turn to a cube that is still far, so a column of the map counts as
-        answered if somewhere on the way the policy does what the oracle does, and nowhere the
-        opposite. Shape: (L,).
-        """
-        opposite = np.array(_MIRRORED)[self.oracle]
-        turns_away = (self.action == opposite) & (self.oracle != Action.FORWARD)
-        return (self.action == self.oracle).any(0) & ~turns_away.any(0)
+@dataclasses.dataclass
+class OutcomeMap:
+    """Whether the policy, flying on greedily, collects a cube that stands there."""
 
-    def summary(self) -> dict[str, Any]:
-        """Counts for people and programs."""
-        left, right = self.oracle == Action.LEFT, self.oracle == Action.RIGHT
-        agrees = self.action == self.oracle
-        return {
-            "grid": [len(self.lateral), len(self.forward)],
-            "agrees_with_oracle": float(agrees.mean()),
-            "left_agrees": float(agrees[left].mean()),
-            "right_agrees": float(agrees[right].mean()),
-            "ahead_agrees": float(agrees[~left & ~right].mean()),
-            "left_answered": float(self.answered[left[0]].mean()),
-            "right_answered": float(self.answered[right[0]].mean()),
-            "left_blind": float(self.blind[left].mean()),
-            "right_blind": float(self.blind[right].mean()),
-            "without_cube": self.without_cube.tolist(),
-        }
+    height: NDArray  # (Z,)
+    forward: NDArray  # (f,)
+    lateral: NDArray  # (l,)
+    """As in `ResponseMap`."""
+    collected: NDArray  # (Z, f, l) bool
+    oracle: NDArray  # (l,)
 
 
 def response_map(
-    scenes: Scenes,
-    network: PolicyNetwork,
-    *,
-    num_lateral: int = 41,
-    num_forward: int = 31,
-    reach: float | None = None,
+    scenes: Scenes, network: PolicyNetwork, *, num_lateral: int = 41, num_forward: int = 31
 ) -> ResponseMap:
-    """Draws one cube at every place of a grid, in one batch, and asks the policy about each.
+    """Draws one cube at every place of a grid and asks the policy about each.
 
     Args:
         scenes: Where they are drawn.
         network: The policy's.
-        num_lateral: Places sideways, symmetric about the middle.
-        num_forward: Places ahead, from touching to where an episode's first cube stands.
-        reach: Metres sideways; as far as a next cube ever stands by default.
+        num_lateral: Places sideways; see `_places`.
+        num_forward: Places ahead.
     """
-    settings = scenes.worlds.settings
-    reach = reach or 2.0 * settings.lateral_bound or settings.touch_distance * 2
-    nearest = settings.touch_distance + 0.5 * settings.step_length
-    forward = torch.linspace(nearest, settings.first_distance, num_forward).double()
-    lateral = torch.linspace(reach, -reach, num_lateral).double()
+    height, forward, lateral = _places(scenes, num_forward, num_lateral)
     ahead, aside = torch.meshgrid(forward, lateral, indexing="ij")
-    observed = scenes.observe(place_cube(scenes, ahead.flatten(), aside.flatten()))
-    probs = probabilities(network, observed).view(num_forward, num_lateral, -1)
+    layers = []
+    for up in height.tolist():
+        observed = scenes.observe(place_cube(scenes, ahead.flatten(), aside.flatten(), up))
+        layers.append(probabilities(network, observed).view(num_forward, num_lateral, -1))
     alone = probabilities(network, scenes.observe(empty_scene(scenes)))[0]
     return ResponseMap(
+        height=height.numpy(),
         forward=forward.numpy(),
         lateral=lateral.numpy(),
-        probabilities=probs.cpu().numpy(),
+        probabilities=torch.stack(layers).cpu().numpy(),
         without_cube=alone.cpu().numpy(),
-        oracle=oracle_action(scenes, aside).numpy(),
+        oracle=oracle_action(scenes, lateral).numpy(),
     )
 
 
-def asymmetry(network: PolicyNetwork, observations: Tensor, episode: NDArray) -> dict[str, Any]:
-    """pi(left | x) against pi(right | mirrored x), over a data set.
+def outcome_map(
+    scenes: Scenes, network: PolicyNetwork, *, num_lateral: int = 21, num_forward: int = 8
+) -> OutcomeMap:
+    """Flies on from every place of a coarser grid, and sees whether the cube is collected.
 
     Args:
+        scenes: Where the flights are drawn.
         network: The policy's.
-        observations: Shape (T, C, H, W).
-        episode: Shape (T,).
+        num_lateral: Places sideways; see `_places`.
+        num_forward: Places ahead.
+    """
+    height, forward, lateral = _places(scenes, num_forward, num_lateral)
+    ahead, aside = torch.meshgrid(forward, lateral, indexing="ij")
+    layers = []
+    for up in height.tolist():
+        starts = place_cube(scenes, ahead.flatten(), aside.flatten(), up)
+        ends = fly_on(scenes, network, starts)
+        layers.append(ends.collected[:, 0].view(num_forward, num_lateral))
+    return OutcomeMap(
+        height=height.numpy(),
+        forward=forward.numpy(),
+        lateral=lateral.numpy(),
+        collected=torch.stack(layers).cpu().numpy(),
+        oracle=oracle_action(scenes, lateral).numpy(),
+    )
+
+
+def summarise(response: ResponseMap, outcome: OutcomeMap) -> dict[str, Any]:
+    """Counts for people and programs.
 
     Returns:
-        "signed": the mean of pi(left | x) - pi(right | mirrored x), below 0 if the policy prefers
-        right; "absolute": the mean distance (total variation) between the policy and its mirror
-        image; "worst": frames in order of that distance, with it.
+        "without_cube"; "rows": for each height and side ("left", "ahead" where flying straight on
+        is enough, "right") the share of "places" at which the policy is "blind" (of the response
+        map) and from which the cube is "collected" (of the outcome map); None where no place of
+        the grid lies on that side.
     """
-    here = probabilities(network, observations)
-    there = probabilities(network, observations.flip(-1))[:, _MIRRORED]
-    signed = (here - there)[:, Action.LEFT].double().cpu().numpy()
-    distance = 0.5 * (here - there).abs().sum(-1).double().cpu().numpy()
-    worst = np.argsort(-distance, kind="stable")[:8]
-    return {
-        "signed": mean_interval(signed, episode),
-        "absolute": mean_interval(distance, episode),
-        "worst": [{"frame": int(t), "distance": float(distance[t])} for t in worst],
-    }
+    rows = []
+    for layer, height in enumerate(response.height.tolist()):
+        for side, action in (
+            ("left", Action.LEFT), ("ahead", Action.FORWARD), ("right", Action.RIGHT),
+        ):  # fmt: skip
+            blind = response.blind[layer][:, response.oracle == action]
+            collected = outcome.collected[layer][:, outcome.oracle == action]
+            rows.append(
+                {
+                    "height": height,
+                    "side": side,
+                    "blind": float(blind.mean()) if blind.size else None,
+                    "collected": int(collected.sum()),
+                    "places": int(collected.size),
+                }
+            )
+    return {"without_cube": response.without_cube.tolist(), "blind_below": BLIND, "rows": rows}
 
 
-def grid_asymmetry(response: ResponseMap) -> dict[str, Any]:
-    """The same over a response map, whose mirror image is itself read backwards."""
-    there = response.probabilities[:, ::-1][..., _MIRRORED]
-    difference = response.probabilities - there
-    distance = 0.5 * np.abs(difference).sum(-1)
-    at = np.unravel_index(distance.argmax(), distance.shape)
-    return {
-        "signed": float(difference[..., Action.LEFT].mean()),
-        "absolute": float(distance.mean()),
-        "worst": {
-            "distance": float(distance.max()),
-            "forward": float(response.forward[at[0]]),
-            "lateral": float(response.lateral[at[1]]),
-        },
-    }
+def _places(scenes: Scenes, num_forward: int, num_lateral: int) -> tuple[Tensor, Tensor, Tensor]:
+    """Metres up, ahead and to the left at which cubes can stand, seen from the drone.
+
+    Ahead: from all but touching to where an episode's first cube stands. Sideways: symmetric, as
+    far as a next cube ever stands. Up: where the task places them; level, lowest and highest.
+    """
+    settings = scenes.worlds.settings
+    reach = 2.0 * settings.lateral_bound or settings.touch_distance * 2
+    nearest = settings.touch_distance + 0.5 * settings.step_length
+    bound = settings.vertical_bound
+    height = torch.tensor([-bound, 0.0, bound] if bound else [0.0]).double()
+    forward = torch.linspace(nearest, settings.first_distance, num_forward).double()
+    return height, forward, torch.linspace(reach, -reach, num_lateral).double()

@@ -1,7 +1,7 @@
 """Scenes that were met or imagined: drawn, shown to the policy, and taken apart into objects."""
 
 import enum
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import torch
 from torch import Tensor
@@ -36,6 +36,9 @@ class Scenes:
         self.worlds: CubeWorlds = env.base_env.worlds
         pipeline: Iterable[Transform] = env.transform  # type: ignore[assignment]
         self._transforms = [t for t in pipeline if "pixels" in (t.in_keys or [])]
+        stacks = [t.N for t in self._transforms if isinstance(t, CatFrames)]
+        self.memory: int = max(stacks, default=1) - 1
+        """Pictures before the present one that the policy gets."""
 
     def frames(self, state: WorldState) -> Tensor:
         """RGB pictures. Shape: (T, H, W, 3), uint8."""
@@ -45,15 +48,25 @@ class Scenes:
         """Metres along the optical axis, 0 for the sky. Shape: (T, H, W)."""
         return self.worlds.render(state, self.worlds.view(modality="depth"))
 
-    def transform(self, frames: Tensor) -> Tensor:
-        """RGB pictures (T, H, W, 3) as the policy gets them: (T, C, h, w)."""
-        pixels = frames
+    def transform(self, frames: Tensor, earlier: Sequence[Tensor] = ()) -> Tensor:
+        """RGB pictures as the policy gets them.
+
+        Args:
+            frames: Shape (T, H, W, 3).
+            earlier: Those of the steps before, oldest first; the oldest repeats what is missing.
+
+        Returns:
+            Shape: (T, C, h, w).
+        """
+        film = [*earlier, frames]
         for transform in self._transforms:
             if isinstance(transform, CatFrames):
-                pixels = torch.cat([pixels] * transform.N, dim=transform.dim)
+                shown = film[-transform.N :]
+                shown = shown[:1] * (transform.N - len(shown)) + shown
+                film = [torch.cat(shown, dim=transform.dim)]
             else:
-                pixels = transform._apply_transform(pixels)
-        return pixels
+                film = [transform._apply_transform(pixels) for pixels in film]
+        return film[-1]
 
     def to_frame(self, maps: Tensor) -> Tensor:
         """Heat maps over what the policy gets, put back to where that is in the camera's frame.
@@ -115,19 +128,20 @@ def _border(sky: Tensor, ground: Tensor) -> Tensor:
     return functional.pad(meets, (0, 0, 0, 1)) | functional.pad(meets, (0, 0, 1, 0))
 
 
-def place_cube(scenes: Scenes, forward: Tensor, lateral: Tensor) -> WorldState:
+def place_cube(scenes: Scenes, forward: Tensor, lateral: Tensor, height: float = 0.0) -> WorldState:
     """Scenes with one cube at each place and the drone at its origin.
 
     Args:
         scenes: Where they will be drawn.
         forward: Metres ahead of the drone. Shape: (T,).
         lateral: Metres to its left. Shape: (T,).
+        height: Metres above it.
     """
     settings = scenes.worlds.settings
     count, cubes = len(forward), settings.num_cubes
     places = torch.zeros(count, cubes, 3, dtype=torch.float64)
     places[:, 0, 0], places[:, 0, 1] = forward.double(), lateral.double()
-    places[..., 2] = settings.altitude
+    places[..., 2] = settings.altitude + height
     state = rules.start(settings, places)
     state.passed[:, 1:] = True  # the other cubes are not there
     return state.to(scenes.worlds.device)
@@ -141,9 +155,11 @@ def empty_scene(scenes: Scenes) -> WorldState:
 
 
 def oracle_action(scenes: Scenes, lateral: Tensor) -> Tensor:
-    """What the oracle does about a cube that stands `lateral` metres to the left. Shape kept."""
-    settings = scenes.worlds.settings
-    tolerance = 0.5 * max(settings.step_length, settings.touch_distance)
+    """What must be done about a cube that stands `lateral` metres to the left. Shape kept.
+
+    Flying straight on touches a cube within the touch distance; any other calls for a turn.
+    """
+    tolerance = scenes.worlds.settings.touch_distance
     action = torch.full_like(lateral, rules.Action.FORWARD, dtype=torch.int64)
     action[lateral > tolerance] = rules.Action.LEFT
     action[lateral < -tolerance] = rules.Action.RIGHT

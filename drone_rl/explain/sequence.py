@@ -10,15 +10,6 @@ COUNT = 6
 """Frames in a sequence, as in Figs. 13 to 15."""
 
 
-def choose_episode(dataset: RolloutDataset) -> int:
-    """The first episode that is recorded to its end; the first of all if none is."""
-    for episode in np.unique(dataset.episode):
-        last = np.flatnonzero(dataset.episode == episode)[-1]
-        if dataset.end_reason[last] != EndReason.RUNNING:
-            return int(episode)
-    return int(dataset.episode[0])
-
-
 def key_frames(dataset: RolloutDataset, episode: int) -> list[tuple[int, str]]:
     """Six frames of an episode in order of time, each with why it was chosen.
 
@@ -27,8 +18,8 @@ def key_frames(dataset: RolloutDataset, episode: int) -> list[tuple[int, str]]:
     failed. What is still free goes to the frames furthest from those chosen.
 
     Args:
-        dataset: Rollouts.
-        episode: One of its episodes.
+        dataset: Whole flights.
+        episode: One of them.
 
     Returns:
         Frame number and reason; fewer than six only where the episode is shorter.

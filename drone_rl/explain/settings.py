@@ -5,8 +5,8 @@ import dataclasses
 from drone_rl.explain import tsne
 from drone_rl.utils.errors import InputError
 
-MIN_FRAMES = 20
-"""Fewer frames than this show nothing."""
+MIN_EPISODES = 30
+"""Fewer flights than this tell next to nothing of others."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -18,7 +18,9 @@ class ExplainSettings:
     """
 
     frames: int = 600
-    """Frames in the data set."""
+    """Frames that are analysed, spread evenly over the flights of the data set."""
+    data_episodes: int = MIN_EPISODES
+    """Whole flights in the data set, at least."""
     episodes: int = 400
     """Episodes on which the verdict rests."""
     good_share: float = 0.9
@@ -34,8 +36,15 @@ class ExplainSettings:
 
     def __post_init__(self) -> None:
         """Refuses what shows nothing."""
-        if self.frames < MIN_FRAMES:
-            raise InputError(f"frames={self.frames} shows too little; give {MIN_FRAMES} or more")
+        if self.data_episodes < MIN_EPISODES:
+            raise InputError(
+                f"data_episodes={self.data_episodes} shows too little; give {MIN_EPISODES} or more"
+            )
+        if self.frames < self.data_episodes:
+            raise InputError(
+                f"frames={self.frames} is less than one of each flight; give "
+                f"{self.data_episodes} (data_episodes) or more"
+            )
         if self.episodes < 1:
             raise InputError(f"episodes={self.episodes} is out of range; give 1 or more")
         tsne.check_perplexity(self.perplexity, self.frames)

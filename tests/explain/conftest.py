@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from drone_rl.explain.dataset import record
+from drone_rl.explain.recording import record
 from drone_rl.explain.scenes import Scenes
 
 

@@ -1,27 +1,20 @@
 """Alike pictures that are answered in opposite ways, and flights in loops."""
 
-import dataclasses
 from typing import Any
 
 from numpy.typing import NDArray
 
-from drone_rl.explain import contradictions
+from drone_rl.explain import contradictions, loops
 from drone_rl.explain.context import Context
 
 
 def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
-    """Makes "contradictions" and "loops"."""
-    data = context.dataset
-    pairs = contradictions.find_pairs(data)
-    loops = contradictions.find_loops(data)
+    """Makes "contradictions", of the frames analysed, and "loops", of the whole flights."""
+    data, flights = context.dataset, context.flights
+    alike = contradictions.one_move(flights)
+    pairs = contradictions.find_pairs(data, alike)
     numbers = {
-        "contradictions": {
-            **contradictions.summarise_pairs(pairs),
-            "list": [dataclasses.asdict(pair) for pair in pairs],
-        },
-        "loops": {
-            **contradictions.summarise_loops(data, loops),
-            "list": [dataclasses.asdict(loop) for loop in loops],
-        },
+        "contradictions": contradictions.summarise_pairs(pairs, data, alike),
+        "loops": loops.summarise_loops(flights, loops.find_loops(flights)),
     }
     return numbers, {}

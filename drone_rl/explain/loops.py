@@ -1,0 +1,56 @@
+"""Flights that move back and forth and get nowhere."""
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+
+from drone_rl.explain.dataset import RolloutDataset
+from drone_rl.sim.rules import Action
+from drone_rl.utils.intervals import proportion
+
+
+@dataclasses.dataclass(frozen=True)
+class Loop:
+    """A stretch of an episode in which the drone moves back and forth and gets nowhere."""
+
+    first: int
+    """Its first frame."""
+    length: int
+    """Frames."""
+    reversals: int
+    """Changes between left and right."""
+
+
+def find_loops(dataset: RolloutDataset, min_reversals: int = 2) -> list[Loop]:
+    """Runs of sideways moves, no forward one among them, that turn round at least so often.
+
+    Args:
+        dataset: Whole flights.
+        min_reversals: Two turns: back where it was, and away again.
+    """
+    actions, episode = dataset.actions, dataset.episode
+    loops, start = [], 0
+    for t in range(1, len(actions) + 1):
+        ends = t == len(actions) or episode[t] != episode[start]
+        if not ends and actions[t] != Action.FORWARD and actions[start] != Action.FORWARD:
+            continue
+        moves = actions[start:t]
+        if actions[start] != Action.FORWARD:
+            reversals = int((moves[1:] != moves[:-1]).sum())
+            if reversals >= min_reversals:
+                loops.append(Loop(start, len(moves), reversals))
+        start = t
+    return loops
+
+
+def summarise_loops(flights: RolloutDataset, loops: list[Loop]) -> dict[str, Any]:
+    """Counts for people and programs; "episodes" is the share of flights with a loop."""
+    looping = len({int(flights.episode[loop.first]) for loop in loops})
+    return {
+        "loops": len(loops),
+        "longest": max((loop.length for loop in loops), default=0),
+        "frames_share": sum(loop.length for loop in loops) / len(flights),
+        "episodes": proportion(looping, len(np.unique(flights.episode))),
+        "list": [dataclasses.asdict(loop) for loop in loops],
+    }
