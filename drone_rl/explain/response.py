@@ -155,6 +155,6 @@ def _places(scenes: Scenes, num_forward: int, num_lateral: int) -> tuple[Tensor,
     reach = 2.0 * settings.lateral_bound or settings.touch_distance * 2
     nearest = settings.touch_distance + 0.5 * settings.step_length
     bound = settings.vertical_bound
-    height = torch.tensor([-bound, 0.0, bound] if bound else [0.0]).double()
+    height = torch.tensor([-bound, 0.0, bound] if bound else [0.0], dtype=torch.float64)
     forward = torch.linspace(nearest, settings.first_distance, num_forward).double()
     return height, forward, torch.linspace(reach, -reach, num_lateral).double()

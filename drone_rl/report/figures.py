@@ -1,6 +1,6 @@
 """The figures of one explanation, and the numbers that are saved beside them."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -34,10 +34,10 @@ def draw_all(explanation: Explanation) -> dict[str, Image.Image | Figure]:
         "response": plots.response_chart(explanation),
         "asymmetry": asymmetry(explanation),
     }
-    for name, wanted in (("contradictions", True), ("justified", False)):
-        found = pairs(explanation, wanted)
+    for kind in ("contradiction", "justified", "unknown"):
+        found = pairs(explanation, kind)
         if found is not None:
-            drawn[name] = found
+            drawn[f"pairs_{kind}"] = found
     return drawn
 
 
@@ -82,9 +82,7 @@ def points(explanation: Explanation) -> dict[str, Any]:
     """What the interactive map needs to know of each shown frame."""
     data, chosen = explanation.data, shown_frames(explanation)
     height, width = data["frames"].shape[1:3]
-    last = {
-        int(e): int(data["step"][data["episode"] == e].max()) for e in np.unique(data["episode"])
-    }
+    last = np.bincount(data["flights/episode"]) - 1
     return {
         "tile": [width, height],
         "cells": {w: cells(explanation, w).tolist() for w in ("features", "pixels")},
@@ -93,17 +91,14 @@ def points(explanation: Explanation) -> dict[str, Any]:
         "episode": data["episode"][chosen].tolist(),
         "step": data["step"][chosen].tolist(),
         "reward": data["rewards"][chosen].tolist(),
-        "last": last,
+        "last": last.tolist(),
     }
 
 
-def pairs(explanation: Explanation, contradiction: bool, most: int = 4) -> Image.Image | None:
+def pairs(explanation: Explanation, kind: str, most: int = 4) -> Image.Image | None:
     """Alike frames with opposite actions, side by side (Fig. 9); None if there is none."""
-    found = [
-        pair
-        for pair in explanation.numbers["contradictions"]["list"]
-        if pair["contradiction"] == contradiction
-    ][:most]
+    listed = explanation.numbers["contradictions"]["list"]
+    found = [pair for pair in listed if pair["kind"] == kind][:most]
     if not found:
         return None
     tiles = [
@@ -132,20 +127,18 @@ def class_model_grid(explanations: Sequence[Explanation]) -> Image.Image:
 
 
 def sequence(explanation: Explanation) -> Image.Image:
-    """Six frames of an episode with Grad-CAM and the indicator (Figs. 13 to 15)."""
+    """Six frames of a flight with Grad-CAM and the indicator (Figs. 13 to 15)."""
     tiles = [
-        _explained(explanation, entry["frame"], f"{i}. {entry['why']}")
-        for i, entry in enumerate(explanation.numbers["attribution"]["sequence"], start=1)
+        _explained(explanation, entry["step"], f"{i}. {entry['why']}")
+        for i, entry in enumerate(explanation.numbers["attribution"]["film"]["key_steps"], start=1)
     ]
     return pictures.gridded(tiles, 3)
 
 
 def episode_video(explanation: Explanation) -> NDArray:
-    """The whole episode with heat map and indicator. Shape: (T, H, W, 3), uint8, even sizes."""
-    episode = explanation.numbers["attribution"]["episode"]
-    frames = np.flatnonzero(explanation.data["episode"] == episode)
-    shots = [np.asarray(_explained(explanation, int(t), f"step {i}")) for i, t in enumerate(frames)]
-    video = np.stack(shots)
+    """The whole flight with heat map and indicator. Shape: (T, H, W, 3), uint8, even sizes."""
+    steps = range(len(explanation.arrays["film_frames"]))
+    video = np.stack([np.asarray(_explained(explanation, t, f"step {t}")) for t in steps])
     height, width = (-(-n // 16) * 16 for n in video.shape[1:3])  # what the encoder wants
     wide = np.full((len(video), height, width, 3), 255, np.uint8)
     wide[:, : video.shape[1], : video.shape[2]] = video
@@ -186,14 +179,33 @@ def tables(explanation: Explanation) -> dict[str, list[list[Any]]]:
     for t, row in enumerate(both):
         action = ACTIONS[int(data["actions"][t])]
         tsne.append([t, int(data["episode"][t]), int(data["step"][t]), action, *row])
-    response = [["metres_ahead", "metres_left", *(f"p_{a}" for a in ACTIONS), "oracle", "blind"]]
-    for i, ahead in enumerate(arrays["response_forward"]):
-        for j, left in enumerate(arrays["response_lateral"]):
-            shares = arrays["response_probabilities"][i, j].round(5).tolist()
-            oracle = ACTIONS[int(arrays["response_oracle"][i, j])]
-            blind = int(arrays["response_blind"][i, j])
-            response.append([round(float(ahead), 3), round(float(left), 3), *shares, oracle, blind])
-    return {"tsne": tsne, "response": response}
+    return {"tsne": tsne, "response": _response(arrays), "outcomes": _outcomes(arrays)}
+
+
+def _response(arrays: dict[str, NDArray]) -> list[list[Any]]:
+    place = ["metres_up", "metres_ahead", "metres_left"]
+    rows: list[list[Any]] = [[*place, *(f"p_{a}" for a in ACTIONS), "needed", "blind"]]
+    for at, where in _grid(arrays, "response"):
+        shares = arrays["response_probabilities"][at].round(5).tolist()
+        needed = ACTIONS[int(arrays["response_oracle"][at[-1]])]
+        rows.append([*where, *shares, needed, int(arrays["response_blind"][at])])
+    return rows
+
+
+def _outcomes(arrays: dict[str, NDArray]) -> list[list[Any]]:
+    rows: list[list[Any]] = [["metres_up", "metres_ahead", "metres_left", "collected"]]
+    for at, where in _grid(arrays, "outcome"):
+        rows.append([*where, int(arrays["outcome_collected"][at])])
+    return rows
+
+
+def _grid(
+    arrays: dict[str, NDArray], name: str
+) -> Iterator[tuple[tuple[int, ...], tuple[float, ...]]]:
+    """Every index of a map with its place in metres: up, ahead, to the left."""
+    axes = [arrays[f"{name}_{axis}"] for axis in ("height", "forward", "lateral")]
+    for at in np.ndindex(*(len(axis) for axis in axes)):
+        yield at, tuple(round(float(axis[i]), 3) for axis, i in zip(axes, at, strict=True))
 
 
 def numbers(explanation: Explanation) -> dict[str, Any]:
@@ -205,27 +217,22 @@ def numbers(explanation: Explanation) -> dict[str, Any]:
         "class_model",
         "attribution",
         "truth",
+        "response",
         "asymmetry",
     )
     return {name: explanation.numbers[name] for name in names}
 
 
-def _heat(explanation: Explanation, frame: int) -> NDArray:
-    """Grad-CAM of a frame, of the logit where the probability's has none; else saliency."""
-    for name in ("map_grad_cam", "map_grad_cam_logit", "map_saliency"):
-        if name in explanation.arrays and explanation.arrays[name][frame].max() > 0:
-            return explanation.arrays[name][frame]
-    return explanation.arrays["map_saliency"][frame]
-
-
-def _explained(explanation: Explanation, frame: int, caption: str) -> Image.Image:
-    data = explanation.data
+def _explained(explanation: Explanation, step: int, caption: str) -> Image.Image:
+    """One step of the film."""
+    arrays = explanation.arrays
+    by = explanation.numbers["attribution"]["film"]["heat_by"][step]
     return pictures.explained_frame(
-        data["frames"][frame],
-        _heat(explanation, frame),
-        data["probabilities"][frame],
-        int(data["actions"][frame]),
-        caption,
+        arrays["film_frames"][step],
+        arrays["film_heat"][step],
+        arrays["film_probabilities"][step],
+        int(arrays["film_actions"][step]),
+        (caption, "no heat" if by is None else f"heat: {plots.NAMES[by]}"),
     )
 
 

@@ -15,9 +15,14 @@ import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 from PIL import Image
 
-from drone_rl.report import figures, words
+from drone_rl.report import figures
 from drone_rl.report.explanation import ACTIONS, Explanation
 from drone_rl.utils.errors import InputError
+from drone_rl.words import report, truth
+from drone_rl.words.licence import say
+
+WORDS = {**report.SECTIONS, "truth": truth.SENTENCES}
+"""Sentences by the part of the page in which they stand."""
 
 
 def write_report(folders: Sequence[Path], target: Path) -> Path:
@@ -70,7 +75,7 @@ def _section(explanation: Explanation, folder: Path, prefix: str) -> dict[str, A
         "video": _uri(video.read_bytes(), "video/mp4"),
         "sprite": _save(figures.sprite(explanation), None),
         "points": figures.points(explanation),
-        "words": words.sentences(explanation),
+        "words": {name: say(may, explanation.numbers) for name, may in WORDS.items()},
         "provenance": json.dumps(explanation.numbers["provenance"], indent=1),
     }
 

@@ -76,12 +76,16 @@ def indicator(probabilities: Sequence[float], chosen: int, width: int) -> Image.
 
 
 def explained_frame(
-    frame: NDArray, heat: NDArray, probabilities: Sequence[float], chosen: int, caption: str
+    frame: NDArray,
+    heat: NDArray,
+    probabilities: Sequence[float],
+    chosen: int,
+    captions: tuple[str, str],
 ) -> Image.Image:
-    """A frame, its heat map, the indicator and a caption, from top to bottom."""
+    """A frame, its heat map, each under a caption, and the indicator, from top to bottom."""
     plain, hot = enlarge(frame), enlarge(heated(frame, heat))
     bars = indicator(probabilities, chosen, plain.width)
-    return stacked([titled(plain, caption), hot, bars])
+    return stacked([titled(plain, captions[0]), titled(hot, captions[1]), bars])
 
 
 def enlarge(frame: NDArray, scale: int = SCALE) -> Image.Image:

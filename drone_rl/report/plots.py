@@ -1,22 +1,18 @@
 """Charts of an explanation's numbers."""
 
+from collections.abc import Sequence
+
 import matplotlib
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from drone_rl.report.explanation import ACTIONS, Explanation
+from drone_rl.words.truth import NAMES
 
-NAMES = {
-    "grad_cam": "Grad-CAM",
-    "grad_cam_logit": "Grad-CAM (logit)",
-    "saliency": "saliency",
-    "integrated_gradients": "integrated gradients",
-    "occlusion": "occlusion",
-}
-"""Methods as people call them."""
 COLORS = ("#4269d0", "#efb118", "#ff725c", "#6cc5b0", "#9c6b4e")
 _CHANCE = {"color": "#8b8f98", "marker": "|", "markersize": 16, "markeredgewidth": 2.5}
 
@@ -36,39 +32,59 @@ def truth_chart(explanation: Explanation) -> Figure:
 
 
 def response_chart(explanation: Explanation) -> Figure:
-    """Probability of each action by where the cube stands, the chosen action, the oracle's."""
+    """Probability of each action by where the cube stands, the chosen action, what comes of it.
+
+    A row for each height at which cubes stand, the highest on top.
+    """
     arrays = explanation.arrays
+    heights = arrays["response_height"]
+    figure, axes = plt.subplots(
+        len(heights), 5, figsize=(16, 3.9 * len(heights)), layout="constrained", squeeze=False,
+        sharex=True, sharey=True,
+    )  # fmt: skip
+    for layer, row in zip(range(len(heights)), axes[::-1], strict=True):
+        image = _response_row(row, arrays, layer)
+        level = f", cube {heights[layer]:+g} m" if len(heights) > 1 else ""
+        row[0].set_ylabel(f"metres ahead{level}")
+    figure.colorbar(image, ax=axes[:, :3], shrink=0.8, label="probability")
+    for axis in axes[-1]:
+        axis.set_xlabel("metres to the left (+) or right (-)", fontsize=9)
+    for axis, labels in ((axes[-1, 3], (_SHADES, ACTIONS)), (axes[-1, 4], _OUTCOMES)):
+        handles = [matplotlib.patches.Patch(color=c, label=n) for c, n in zip(*labels, strict=True)]
+        axis.legend(
+            handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3, fontsize=8,
+            frameon=False,
+        )  # fmt: skip
+    return figure
+
+
+_SHADES = ("#d62728", "#2ca02c", "#1f60c8")
+_OUTCOMES = (("#d9d9de", "#4269d0"), ("cube missed", "cube collected"))
+
+
+def _response_row(
+    axes: Sequence[plt.Axes], arrays: dict[str, NDArray], layer: int
+) -> matplotlib.image.AxesImage:
+    """The five maps of one height; returns one of the probabilities."""
     forward, lateral = arrays["response_forward"], arrays["response_lateral"]
-    probabilities, oracle = arrays["response_probabilities"], arrays["response_oracle"]
-    figure, axes = plt.subplots(1, 5, figsize=(16, 4.2), layout="constrained", sharey=True)
+    probabilities = arrays["response_probabilities"][layer]
     extent = (lateral[0], lateral[-1], forward[0], forward[-1])
     style = {"extent": extent, "origin": "lower", "aspect": "auto", "interpolation": "nearest"}
     for axis, action in zip(axes, (1, 0, 2), strict=False):
         image = axis.imshow(probabilities[..., action], vmin=0, vmax=1, cmap="viridis", **style)
         axis.set_title(f"P({ACTIONS[action]})")
-    figure.colorbar(image, ax=axes[:3], shrink=0.8, label="probability")
-    shades = matplotlib.colors.ListedColormap(["#d62728", "#2ca02c", "#1f60c8"])
-    for axis, chosen, title in (
-        (axes[3], probabilities.argmax(-1), "what the policy does"),
-        (axes[4], oracle, "what the oracle does"),
-    ):
-        axis.imshow(chosen, vmin=0, vmax=2, cmap=shades, **style)
-        axis.set_title(title)
-    blind = arrays["response_blind"]
+    shades = matplotlib.colors.ListedColormap(_SHADES)
+    axes[3].imshow(probabilities.argmax(-1), vmin=0, vmax=2, cmap=shades, **style)
+    axes[3].set_title("most probable action\n(in the white line: blind)", fontsize=10)
+    blind = arrays["response_blind"][layer]
     if blind.any():
         axes[3].contour(
             lateral, forward, blind.astype(float), levels=[0.5], colors="white", linewidths=2.5
         )
-        axes[3].set_xlabel("inside the white line: no notice taken")
-    for axis in axes:
-        axis.set_xlabel(axis.get_xlabel() or "metres to the left (+) or right (-)", fontsize=9)
-    axes[0].set_ylabel("metres ahead")
-    handles = [
-        matplotlib.patches.Patch(color=c, label=n)
-        for c, n in zip(shades.colors, ACTIONS, strict=True)
-    ]
-    axes[4].legend(handles=handles, loc="lower right", fontsize=8)
-    return figure
+    ends = matplotlib.colors.ListedColormap(_OUTCOMES[0])
+    axes[4].imshow(arrays["outcome_collected"][layer], vmin=0, vmax=1, cmap=ends, **style)
+    axes[4].set_title("what comes of it", fontsize=10)
+    return image
 
 
 def _labels(methods: dict) -> list[str]:

@@ -9,7 +9,7 @@ from tests.cli.test_commands import drone_rl, error_line, in_process  # noqa: F4
 
 @pytest.mark.slow
 def test_explain_then_report(tmp_path):
-    few = ["frames=40", "episodes=8", "perplexity=5", "num_envs=8"]
+    few = ["frames=60", "episodes=8", "perplexity=5", "num_envs=8"]
     done = drone_rl("explain", "policy=[good,poor]", *few, "hydra.run.dir=run", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "poor: poor" in done.stdout
@@ -56,7 +56,7 @@ def test_an_export_can_be_judged(in_process, tmp_path):  # noqa: F811
         (["explain", "policy=nobody"], ["nobody does not exist", "right_and_forward"]),
         (["explain", "policy=[]"], ["policy=[]"]),
         (["explain", "policy=[good,good]"], ["each once"]),
-        (["explain", "policy=good", "frames=3"], ["frames=3", "20 or more"]),
+        (["explain", "policy=good", "frames=3"], ["frames=3", "30 (data_episodes)"]),
         (["explain", "policy=good", "perplexity=500"], ["perplexity=500", "1 to 199"]),
         (["explain", "policy=good", "layer=conv9"], ["layer=conv9", "conv1, relu1"]),
         (["explain", "policy=good", "grad_cam_layer=fc1"], ["layer=fc1", "relu1, relu2"]),

@@ -2,10 +2,11 @@ import numpy as np
 import pytest
 
 from drone_rl.explain.contradictions import (
-    find_loops,
+    LISTED,
+    Kind,
     find_pairs,
+    one_move,
     opposition,
-    summarise_loops,
     summarise_pairs,
 )
 from drone_rl.explain.dataset import RolloutDataset
@@ -37,32 +38,63 @@ def test_opposition_by_hand():
     assert opposition(np.array([0, 0.7, 0.3]), np.array([0, 0.4, 0.6])) == pytest.approx(0.3)
 
 
+LEFT, RIGHT = [0.0, 0.9, 0.1], [0.0, 0.1, 0.9]
+
+
 def test_pairs_are_split_by_where_the_cube_is():
-    left, right = [0.0, 0.9, 0.1], [0.0, 0.1, 0.9]
-    # frames 0 and 1 look alike, so do 2 and 3; only in the first pair the cube stands alike
+    # frames 0 and 1 look alike, so do 2 and 3, 4 and 5; only in the first pair the cube stands
+    # alike (1 m away), in the second it is 6 m off, in the third there is none
     data = fake(
-        observations=[[0, 0], [0, 0.1], [5, 5], [5, 5.1]],
-        probabilities=[left, right, right, left],
-        offsets=[[5, 1], [5, 1.5], [5, 3], [5, -3]],
+        observations=[[0, 0], [0, 0.1], [5, 5], [5, 5.1], [9, 9], [9, 9.1]],
+        probabilities=[LEFT, RIGHT, RIGHT, LEFT, LEFT, RIGHT],
+        offsets=[[5, 1], [6, 2], [5, 3], [5, -3], [5, 1], [5, 1]],
     )
-    pairs = find_pairs(data)
-    assert {(p.left, p.right): p.contradiction for p in pairs} == {(0, 1): True, (3, 2): False}
+    data.arrays["next_cube"][4] = 1
+    pairs = find_pairs(data, alike=0.1)
+    assert {(p.left, p.right): p.kind for p in pairs} == {
+        (0, 1): Kind.CONTRADICTION, (3, 2): Kind.JUSTIFIED, (4, 5): Kind.UNKNOWN,
+    }  # fmt: skip
     assert pairs[0].opposition == pytest.approx(0.8)
-    summary = summarise_pairs(pairs)
-    assert (summary["contradictions"], summary["justified"]) == (1, 1)
+    assert pairs[0].distance == pytest.approx(0.1 / np.sqrt(2))
+    summary = summarise_pairs(pairs, data, 0.1)
+    assert (summary["contradictions"], summary["justified"], summary["unknown"]) == (1, 1, 1)
+    assert summary["pairs"] == 3 and summary["worst_opposition"] == pytest.approx(0.8)
+
+
+def test_pictures_farther_apart_are_not_alike():
+    data = fake([[0, 0], [0, 0.1]], [LEFT, RIGHT], [[5, 1], [5, 1]])
+    assert len(find_pairs(data, alike=0.0708)) == 1  # 0.1 / sqrt(2) = 0.07071
+    assert find_pairs(data, alike=0.0707) == []
+
+
+def test_wishes_less_opposed_are_no_pair():
+    data = fake([[0, 0]] * 2, [[0.8, 0.2, 0.0], [0.8, 0.01, 0.19]], [[5, 1]] * 2)
+    assert find_pairs(data, alike=1.0) == []  # opposed by 0.19
+
+
+def test_each_frame_is_in_one_pair_and_the_most_opposed_comes_first():
+    probs = [[0, 0.7, 0.3], [0, 0.9, 0.1], RIGHT]
+    pairs = find_pairs(fake(np.zeros((3, 2)), probs, [[5, 1]] * 3), alike=1.0)
+    assert [(p.left, p.right) for p in pairs] == [(1, 2)]
+
+
+def test_all_pairs_are_counted_and_some_are_listed():
+    count = 2 * LISTED + 10
+    data = fake(np.zeros((count, 2)), [LEFT, RIGHT] * (count // 2), [[5, 1]] * count)
+    summary = summarise_pairs(find_pairs(data, alike=1.0), data, 1.0)
+    assert summary["pairs"] == summary["contradictions"] == LISTED + 5
+    assert len(summary["list"]) == LISTED
 
 
 def test_one_action_makes_no_pairs():
     data = fake(np.zeros((5, 2)), [[0, 1, 0]] * 5, [[5, 1]] * 5)
-    assert find_pairs(data) == []
-    assert summarise_pairs([])["worst_opposition"] == 0.0
+    assert find_pairs(data, alike=1.0) == []
+    assert summarise_pairs([], data, 1.0)["worst_opposition"] is None
 
 
-def test_loops_are_turns_without_progress():
-    #         a loop of five    no loop     ends with the episode  two turns: a loop
-    actions = [F, L, R, L, R, L, F, L, L, R, F, L, R, R, L, R, F]
-    episode = [0] * 12 + [1] * 5
-    data = fake(np.zeros((17, 1)), np.zeros((17, 3)), np.zeros((17, 2)), actions, episode)
-    loops = find_loops(data)
-    assert [(loop.first, loop.length, loop.reversals) for loop in loops] == [(1, 5, 4), (12, 4, 2)]
-    assert summarise_loops(data, loops)["episodes_with_loops"] == 2
+def test_one_move_is_the_median_change_within_episodes():
+    # changes of 1, 2 and 6; that from one episode to the next, 90, does not count
+    data = fake([[0], [1], [3], [9], [99]], np.zeros((5, 3)), np.zeros((5, 2)))
+    data.arrays["episode"] = np.array([0, 0, 0, 0, 1])
+    assert one_move(data) == pytest.approx(2.0)
+    assert one_move(fake([[0]], np.zeros((1, 3)), np.zeros((1, 2)))) == 0.0

@@ -10,7 +10,7 @@ from drone_rl.explain.settings import ExplainSettings
 from drone_rl.policies import MLP
 from drone_rl.utils.errors import InputError
 
-SMALL = ExplainSettings(frames=40, episodes=6, perplexity=5, seed=3)
+SMALL = ExplainSettings(frames=60, episodes=6, perplexity=5, seed=3)
 
 
 def explain(env, network, folder, settings=SMALL, **kwargs):
@@ -35,7 +35,8 @@ def test_everything_is_written_and_the_order_of_sections_changes_nothing(make_pi
     assert numbers == again
     assert arrays.keys() == same.keys()
     assert all(np.array_equal(arrays[key], same[key], equal_nan=True) for key in arrays)
-    assert 0 <= numbers["dataset"]["mean_entropy"] <= 1
+    assert 0 <= numbers["dataset"]["entropy"]["mean"] <= 1
+    assert numbers["dataset"]["episodes"] == numbers["loops"]["episodes"]["trials"] == 30
     assert {"verdict", "tsne", "truth", "response", "asymmetry", "loops"} <= numbers.keys()
 
 
@@ -55,7 +56,7 @@ def test_a_policy_without_convolutions_and_with_one_action_is_explained(make_pip
 
 def test_an_unknown_layer_is_refused_before_any_work(make_pipeline, tmp_path):
     env, actor = make_pipeline()
-    settings = ExplainSettings(frames=40, perplexity=5, layer="conv7")
+    settings = ExplainSettings(frames=60, perplexity=5, layer="conv7")
     with pytest.raises(InputError, match=r"layer=conv7 .* choose from: conv1"):
         explain(env, actor.module[0].module, tmp_path / "x", settings)
     assert not (tmp_path / "x").exists()
@@ -64,7 +65,8 @@ def test_an_unknown_layer_is_refused_before_any_work(make_pipeline, tmp_path):
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({"frames": 3}, "frames=3"),
+        ({"frames": 29}, r"frames=29 .* give 30 \(data_episodes\) or more"),
+        ({"data_episodes": 29}, "data_episodes=29"),
         ({"episodes": 0}, "episodes=0"),
         ({"perplexity": 300.0}, "perplexity=300 does not fit 600 points; give 1 to 199"),
     ],

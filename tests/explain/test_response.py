@@ -1,65 +1,82 @@
 import numpy as np
 import torch
+from torch import nn
 
 from drone_rl.explain.hooks import probabilities
-from drone_rl.explain.response import ResponseMap, asymmetry, grid_asymmetry, response_map
-from drone_rl.explain.scenes import place_cube
-from drone_rl.policies import MLP
-from drone_rl.sim.rules import Action
+from drone_rl.explain.response import (
+    OutcomeMap,
+    ResponseMap,
+    outcome_map,
+    response_map,
+    summarise,
+)
+from drone_rl.explain.scenes import Scenes, place_cube
+from drone_rl.sim.settings import TaskSettings
+
+IDLE, LEFT = [1.0, 0.0, 0.0], [0.1, 0.9, 0.0]
 
 
-def sides(bias):
-    """A policy that compares the halves of a one-row picture, and prefers right by `bias`."""
-    network = MLP((1, 1, 4), 3, hidden=())
-    with torch.no_grad():
-        network.layers.logits.weight.zero_()
-        network.layers.logits.weight[Action.LEFT, :2] = 1.0
-        network.layers.logits.weight[Action.RIGHT, 2:] = 1.0
-        network.layers.logits.bias.copy_(torch.tensor([0.0, 0.0, bias]))
-    return network
+class Forward(nn.Module):
+    def forward(self, pictures):
+        return torch.tensor([9.0, 0.0, 0.0]).expand(len(pictures), 3)
 
 
 def test_a_place_on_the_grid_is_that_place_in_the_world(scenes, world):
     found = response_map(scenes, world[2], num_lateral=5, num_forward=4)
-    assert found.probabilities.shape == (4, 5, 3)
+    assert found.probabilities.shape == (1, 4, 5, 3)
     assert found.lateral.tolist() == [12, 6, 0, -6, -12] and found.forward[-1] == 15
-    assert (found.oracle == [[1, 1, 0, 2, 2]] * 4).all()
+    assert found.height.tolist() == [0]
+    assert found.oracle.tolist() == [1, 1, 0, 2, 2]
     at = place_cube(scenes, torch.tensor([found.forward[1]]), torch.tensor([found.lateral[3]]))
     expected = probabilities(world[2], scenes.observe(at))[0].numpy()
-    np.testing.assert_allclose(found.probabilities[1, 3], expected, atol=1e-6)
+    np.testing.assert_allclose(found.probabilities[0, 1, 3], expected, atol=1e-6)
+
+
+def test_heights_are_those_at_which_the_task_puts_cubes(make_pipeline):
+    env, actor = make_pipeline(num_envs=4, task=TaskSettings(vertical_bound=1.2))
+    scenes, network = Scenes(env), actor.module[0].module
+    found = response_map(scenes, network, num_lateral=3, num_forward=2)
+    assert found.height.tolist() == [-1.2, 0.0, 1.2]
+    at = place_cube(scenes, torch.tensor([15.0]), torch.tensor([12.0]), 1.2)
+    assert at.cubes[0, 0].tolist() == [15.0, 12.0, 2.5 + 1.2]
+    expected = probabilities(network, scenes.observe(at))[0].numpy()
+    np.testing.assert_allclose(found.probabilities[2, 1, 0], expected, atol=1e-6)
+    assert not np.allclose(found.probabilities[0], found.probabilities[2], atol=1e-6)
+
+
+def test_an_outcome_is_flown_not_guessed(scenes):
+    found = outcome_map(scenes, Forward(), num_lateral=17, num_forward=2)  # 1.5 m apart
+    straight = [False] * 7 + [True] * 3 + [False] * 7
+    assert found.collected.tolist() == [[straight, straight]]
+    assert (found.oracle == 0).tolist() == straight
 
 
 def test_blind_is_where_a_turn_is_called_for_and_nothing_changes():
-    idle, left = [1.0, 0.0, 0.0], [0.1, 0.9, 0.0]
     found = ResponseMap(
+        height=np.array([0.0]),
         forward=np.array([5.0]),
-        lateral=np.array([6.0, 3.0, 0.0, -6.0]),
-        probabilities=np.array([[idle, left, idle, left]]),
-        without_cube=np.array(idle),
-        oracle=np.array([[1, 1, 0, 2]]),
+        lateral=np.array([6.0, 3.0, 0.0, -3.0, -6.0]),
+        probabilities=np.array([[[IDLE, LEFT, IDLE, LEFT, [0.95, 0.0, 0.05]]]]),
+        without_cube=np.array(IDLE),
+        oracle=np.array([1, 1, 0, 2, 2]),
     )
-    # unnoticed; noticed; rightly ignored; noticed, though answered wrongly
-    assert found.blind.tolist() == [[True, False, False, False]]
-    summary = found.summary()
-    assert summary["agrees_with_oracle"] == 0.5 and summary["left_blind"] == 0.5
-    assert found.answered.tolist() == [False, True, True, False]
-    assert summary["right_agrees"] == 0.0 and summary["right_blind"] == 0.0
-
-
-def test_a_fair_policy_equals_its_mirror_image_and_a_biased_one_does_not():
-    x, episode = torch.randn(40, 1, 1, 4), np.arange(40)
-    fair, biased = asymmetry(sides(0.0), x, episode), asymmetry(sides(2.0), x, episode)
-    assert fair["absolute"]["mean"] < 1e-6
-    assert biased["absolute"]["mean"] > 0.1
-    assert biased["signed"]["upper95"] < 0  # right is preferred
-    assert biased["worst"][0]["distance"] >= biased["worst"][1]["distance"]
-
-
-def test_asymmetry_of_a_grid_by_hand():
-    probs = np.array([[[0.2, 0.8, 0.0], [1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]])  # sees only the left
-    found = ResponseMap(
-        np.array([5.0]), np.array([3.0, 0.0, -3.0]), probs, probs[0, 1], np.array([[1, 0, 2]])
+    # unnoticed; noticed; rightly ignored; noticed, though answered wrongly; hardly noticed
+    assert found.blind.tolist() == [[[True, False, False, False, True]]]
+    outcome = OutcomeMap(
+        height=found.height,
+        forward=found.forward,
+        lateral=np.array([6.0, 0.0]),
+        collected=np.array([[[False, True]]]),
+        oracle=np.array([1, 0]),
     )
-    result = grid_asymmetry(found)
-    assert result["worst"] == {"distance": 0.8, "forward": 5.0, "lateral": 3.0}
-    assert abs(result["signed"] - 0.8 / 3) < 1e-9
+    rows = summarise(found, outcome)["rows"]
+    assert rows == [
+        {"height": 0.0, "side": "left", "blind": 0.5, "collected": 0, "places": 1},
+        {"height": 0.0, "side": "ahead", "blind": 0.0, "collected": 1, "places": 1},
+        {"height": 0.0, "side": "right", "blind": 0.5, "collected": 0, "places": 0},
+    ]
+
+
+def test_who_flies_straight_on_by_nature_is_blind_only_beyond_its_reach(scenes):
+    found = response_map(scenes, Forward(), num_lateral=17, num_forward=2)
+    assert found.blind[0, 0].tolist() == [True] * 7 + [False] * 3 + [True] * 7

@@ -1,7 +1,7 @@
 import numpy as np
 
 from drone_rl.explain.dataset import RolloutDataset
-from drone_rl.explain.sequence import choose_episode, key_frames
+from drone_rl.explain.sequence import key_frames
 from drone_rl.sim.rules import EndReason
 
 
@@ -36,9 +36,3 @@ def test_a_failed_episode_shows_what_was_missed():
 
 def test_short_episodes_have_fewer_frames():
     assert [t for t, _ in key_frames(fake(3), 0)] == [0, 1, 2]
-
-
-def test_an_episode_that_was_cut_is_not_chosen():
-    data = fake(10)
-    data.arrays["episode"] = np.repeat([0, 1], 5)
-    assert choose_episode(data) == 1

@@ -22,7 +22,7 @@ def explanations(tmp_path_factory):
     env = make_env(DroneEnv(4), [GrayPixels(), StandardizePixels()])
     generator = torch.Generator().manual_seed(0)
     network = SmallCNN((1, 25, 64), 3, channels=(4,), hidden=(8,), generator=generator)
-    settings = ExplainSettings(frames=60, episodes=6, perplexity=5)
+    settings = ExplainSettings(frames=180, episodes=6, perplexity=5)
     origin = {"policy": f"/somewhere/{NASTY}", "trained": {}}
     explain_policy(env, network, root / "a", settings, name=NASTY, provenance=origin)
     env.close()

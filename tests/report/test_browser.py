@@ -39,37 +39,47 @@ def browser(explanations, tmp_path_factory):
     driver.quit()
 
 
+def points(browser):
+    """What the first map knows of its frames."""
+    found = browser.execute_script(
+        """const source = [...document.scripts].at(-1).textContent;
+        return source.match(/map0"\\), (\\{.*?\\}), "data:/)[1];"""
+    )
+    return json.loads(found)
+
+
 def middle_of_a_frame(browser, number):
     """Offset from the map's middle of some frame's cell."""
+    known = points(browser)
     return browser.execute_script(
         """const canvas = document.querySelector('#map0 canvas');
         const box = canvas.getBoundingClientRect();
-        const source = [...document.scripts].at(-1).textContent;
-        const points = JSON.parse(source.match(/map0"\\), (\\{.*?\\}), "data:/)[1]);
-        const [c, r] = points.cells.features[arguments[0]], [w, h] = points.tile;
+        const [[c, r], [w, h]] = arguments;
         return [(c + .5) * w * box.width / canvas.width - box.width / 2,
                 (r + .5) * h * box.height / canvas.height - box.height / 2];""",
-        number,
+        known["cells"]["features"][number],
+        known["tile"],
     )
 
 
 def test_hover_shows_the_frame_with_its_probabilities(browser):
     canvas = browser.find_element(By.CSS_SELECTOR, "#map0 canvas")
     browser.execute_script("arguments[0].scrollIntoView({block: 'center'})", canvas)
-    x, y = middle_of_a_frame(browser, 7)
+    x, y = middle_of_a_frame(browser, 8)
     ActionChains(browser).move_to_element_with_offset(canvas, round(x), round(y)).perform()
-    tip = browser.find_element(By.ID, "tip")
+    tip, known = browser.find_element(By.ID, "tip"), points(browser)
     assert tip.is_displayed()
-    assert "forward" in tip.text and "episode 0, step 7" in tip.text
+    assert "forward" in tip.text
+    assert f"episode 1, step {known['step'][8]} of {known['last'][1]}" in tip.text
 
 
 def test_click_shows_the_moment_in_the_episode(browser):
     canvas = browser.find_element(By.CSS_SELECTOR, "#map0 canvas")
-    x, y = middle_of_a_frame(browser, 7)
+    x, y = middle_of_a_frame(browser, 8)  # the third of six frames of episode 1
     ActionChains(browser).move_to_element_with_offset(canvas, round(x), round(y)).click().perform()
-    strip = browser.find_element(By.CSS_SELECTOR, "#map0 .strip")
-    assert "step 4:" in strip.text and "step 10:" in strip.text
-    assert "step 7:" in strip.find_element(By.CSS_SELECTOR, ".here").text
+    strip, steps = browser.find_element(By.CSS_SELECTOR, "#map0 .strip"), points(browser)["step"]
+    assert all(f"step {step}:" in strip.text for step in steps[6:12])
+    assert f"step {steps[8]}:" in strip.find_element(By.CSS_SELECTOR, ".here").text
 
 
 def test_the_map_of_pixels_can_be_chosen(browser):

@@ -1,0 +1,371 @@
+"""What a report says of each section but the verdict and the maps. Evidence: `explanation.json`."""
+
+from collections.abc import Sequence
+
+from drone_rl.words.licence import Evidence, Sentence, percent
+from drone_rl.words.numbers import among, bounds, listed, plural
+
+ACTIONS = ("forward", "left", "right")
+"""By number, as in the files."""
+
+
+def _size(evidence: Evidence) -> str:
+    data = evidence["dataset"]
+    return (
+        f"{data['frames']} frames, spread evenly over {data['episodes']} whole flights of "
+        f"{data['steps']:,} steps with sampled actions."
+    )
+
+
+def _actions(evidence: Evidence) -> str:
+    shares = evidence["dataset"]["action_shares"]
+    told = listed([f"{percent(s)} {a}" for s, a in zip(shares, ACTIONS, strict=True)])
+    return f"Of these steps {told}."
+
+
+def _one_action(evidence: Evidence) -> str:
+    shares = evidence["dataset"]["action_shares"]
+    return f"In every one of these steps it went {ACTIONS[shares.index(max(shares))]}."
+
+
+def _entropy(evidence: Evidence) -> str:
+    entropy = evidence["dataset"]["entropy"]
+    return (
+        f"Its mean entropy is {entropy['mean']:.2f} of 1, where 1 is a coin toss "
+        f"({bounds(entropy)})."
+    )
+
+
+DATASET = (
+    Sentence("dataset.size", "frames were recorded", lambda e: e["dataset"]["frames"] > 0, _size),
+    Sentence(
+        "dataset.actions",
+        "more than one action was taken",
+        lambda e: max(e["dataset"]["action_shares"]) < 1,
+        _actions,
+    ),
+    Sentence(
+        "dataset.one_action",
+        "every step flown took the same action",
+        lambda e: max(e["dataset"]["action_shares"]) == 1,
+        _one_action,
+    ),
+    Sentence(
+        "dataset.entropy",
+        "the policy's probabilities were recorded",
+        lambda e: e["dataset"]["entropy"]["mean"] is not None,
+        _entropy,
+    ),
+    Sentence(
+        "dataset.no_cube",
+        "no cube was collected in any step flown",
+        lambda e: e["dataset"]["cubes_collected"] == 0,
+        lambda e: "No cube was collected in these flights.",
+    ),
+)
+
+
+def _faithful(evidence: Evidence) -> str:
+    one, two = evidence["tsne"]["features"], evidence["tsne"]["pixels"]
+    return (
+        f"How faithful the maps are: of the {one['neighbours']} nearest here, "
+        f"{percent(one['neighbours_kept'])} (features of layer {one['layer']}) and "
+        f"{percent(two['neighbours_kept'])} (pixels) are among as many nearest in truth "
+        f"(chance: {percent(one['neighbours_chance'])}); trustworthiness "
+        f"{one['trustworthiness']:.3f} and {two['trustworthiness']:.3f} of 1."
+    )
+
+
+def _unfaithful(evidence: Evidence) -> list[str]:
+    """Maps on which most neighbours are strangers."""
+    return [n for n in ("features", "pixels") if evidence["tsne"][n]["neighbours_kept"] < 0.5]
+
+
+TSNE = (
+    Sentence("tsne.faithful", "always: it is the measure itself", lambda e: True, _faithful),
+    Sentence(
+        "tsne.unfaithful",
+        "less than half of the neighbours on a map are neighbours in truth",
+        lambda e: bool(_unfaithful(e)),
+        lambda e: f"Most neighbours on the map of {listed(_unfaithful(e))} are none in truth.",
+    ),
+)
+
+
+def _no_pair(evidence: Evidence) -> str:
+    found = evidence["contradictions"]
+    return (
+        f"Among these {found['frames']} frames no two that look alike are answered in opposite "
+        "ways."
+    )
+
+
+def _pairs(evidence: Evidence) -> str:
+    found = evidence["contradictions"]
+    text = (
+        f"Among these {found['frames']} frames {plural(found['pairs'], 'pair')} of alike ones, "
+        f"each frame in one pair at most, {'is' if found['pairs'] == 1 else 'are'} answered in "
+        f"opposite ways: {plural(found['contradictions'], 'contradiction')} (the next cube stands "
+        f"alike in both), {found['justified']} justified (it stands elsewhere)"
+    )
+    unknown = found["unknown"]
+    return text + (f", {unknown} unknown (a frame has no next cube)." if unknown else ".")
+
+
+def _worst(evidence: Evidence) -> str:
+    worst = evidence["contradictions"]["worst_opposition"]
+    return f"In the worst contradiction the wish to turn swings by {worst:.2f} of 1."
+
+
+CONTRADICTIONS = (
+    Sentence(
+        "contradictions.none",
+        "no pair was found among the frames analysed",
+        lambda e: e["contradictions"]["pairs"] == 0,
+        _no_pair,
+    ),
+    Sentence(
+        "contradictions.pairs",
+        "pairs were found; all are counted",
+        lambda e: e["contradictions"]["pairs"] > 0,
+        _pairs,
+    ),
+    Sentence(
+        "contradictions.worst",
+        "one of them is a contradiction",
+        lambda e: e["contradictions"]["contradictions"] > 0,
+        _worst,
+    ),
+)
+
+
+def _no_loop(evidence: Evidence) -> str:
+    share = evidence["loops"]["episodes"]
+    return (
+        f"In none of these {share['trials']} sampled flights the drone moves back and forth in a "
+        f"loop; up to {percent(share['upper95'])} of such flights may have one (95%)."
+    )
+
+
+def _loops(evidence: Evidence) -> str:
+    found = evidence["loops"]
+    share = found["episodes"]
+    return (
+        f"In {among(share)} of these sampled flights the drone moves back and forth in a loop "
+        f"({bounds(share, percent)}); the longest takes {found['longest']} steps, all together "
+        f"{percent(found['frames_share'])} of the steps flown."
+    )
+
+
+LOOPS = (
+    Sentence("loops.none", "no flight has a loop", lambda e: not e["loops"]["loops"], _no_loop),
+    Sentence("loops.some", "flights have loops", lambda e: e["loops"]["loops"] > 0, _loops),
+)
+
+
+def _reached(evidence: Evidence) -> str:
+    reached = evidence["class_model"]["logit"]["probabilities"]
+    told = listed([f"{a} {p:.3f}" for a, p in zip(ACTIONS, reached, strict=True)])
+    return f"The pictures sought by logit reach a probability of {told}."
+
+
+def _unreached(evidence: Evidence) -> list[str]:
+    """Actions that no attempt of either objective made more probable than not."""
+    found = evidence["class_model"]
+    highest = [max(p) for p in zip(*(found[o]["highest"] for o in _OBJECTIVES), strict=True)]
+    return [action for action, p in zip(ACTIONS, highest, strict=True) if p <= 0.5]
+
+
+_OBJECTIVES = ("probability", "logit")
+
+
+def _not_reached(evidence: Evidence) -> str:
+    found = evidence["class_model"]
+    attempts = sum(found[o]["starts"] * found[o]["num_settings"] for o in _OBJECTIVES)
+    return (
+        f"None of the {attempts} attempts made {listed(_unreached(evidence), 'or')} more probable "
+        "than not; that no picture does is not shown by that."
+    )
+
+
+CLASS_MODEL = (
+    Sentence("class_model.reached", "always: it is what was measured", lambda e: True, _reached),
+    Sentence(
+        "class_model.not_reached",
+        "no start under any setting got an action above one half",
+        lambda e: bool(_unreached(e)),
+        _not_reached,
+    ),
+)
+
+
+def _heat_by(evidence: Evidence) -> Sequence[str | None]:
+    return evidence["attribution"]["film"]["heat_by"]
+
+
+def _stand_in(evidence: Evidence) -> str:
+    by = _heat_by(evidence)
+    return (
+        f"On {list(by).count('grad_cam_logit')} of the {len(by)} steps shown Grad-CAM of the "
+        "probability has no heat; that of the logit stands there."
+    )
+
+
+def _no_heat(evidence: Evidence) -> str:
+    by = _heat_by(evidence)
+    return f"On {list(by).count(None)} of the {len(by)} steps shown there is no heat at all."
+
+
+ATTRIBUTION = (
+    Sentence(
+        "attribution.layer",
+        "the policy has a convolution",
+        lambda e: e["attribution"]["layer"] is not None,
+        lambda e: f"Grad-CAM of layer {e['attribution']['layer']}, on the first flight recorded.",
+    ),
+    Sentence(
+        "attribution.no_convolution",
+        "it has none",
+        lambda e: e["attribution"]["layer"] is None,
+        lambda e: "This policy has no convolution and thus no Grad-CAM; saliency is shown.",
+    ),
+    Sentence(
+        "attribution.stand_in",
+        "another map is shown on some steps",
+        lambda e: "grad_cam_logit" in _heat_by(e),
+        _stand_in,
+    ),
+    Sentence(
+        "attribution.no_heat", "some steps have none", lambda e: None in _heat_by(e), _no_heat
+    ),
+)
+
+
+def _level(evidence: Evidence, level: bool = True) -> list[Evidence]:
+    """Rows of cubes at the drone's height, or of all others."""
+    return [row for row in evidence["response"]["rows"] if (row["height"] == 0) == level]
+
+
+def _collected(rows: Sequence[Evidence]) -> str:
+    where = {"left": "on its left", "ahead": "ahead", "right": "on its right"}
+    told = [
+        f"{row['collected']} of {row['places']} places {where[row['side']]}"
+        for row in rows
+        if row["places"]
+    ]
+    return listed(told)
+
+
+def _outcomes(evidence: Evidence) -> str:
+    return (
+        "Put before one cube alone, and flying on with its most probable actions, it collects the "
+        f"cube from {_collected(_level(evidence))}."
+    )
+
+
+def _blind(evidence: Evidence) -> str:
+    rows = {row["side"]: row["blind"] for row in _level(evidence)}
+    told = [f"{percent(rows[s])} of the places on the {s}" for s in ("left", "right")]
+    return (
+        f"It is blind at {listed(told)}: a turn is called for and not made, and its probabilities "
+        f"differ by less than {evidence['response']['blind_below']:g} from those without a cube. "
+        "Farther on it may see the cube yet."
+    )
+
+
+def _heights(evidence: Evidence) -> str:
+    other = _level(evidence, level=False)
+    parts = []
+    for height in sorted({row["height"] for row in other}):
+        word = "higher" if height > 0 else "lower"
+        rows = [row for row in other if row["height"] == height]
+        parts.append(f"{abs(height):g} m {word}: from {_collected(rows)}")
+    return f"Where the cube stands {'; '.join(parts)}."
+
+
+RESPONSE = (
+    Sentence(
+        "response.collected",
+        "flights from the grid were followed to their outcome",
+        lambda e: any(row["places"] for row in _level(e)),
+        _outcomes,
+    ),
+    Sentence(
+        "response.heights",
+        "cubes of the task stand at other heights, too",
+        lambda e: bool(_level(e, level=False)),
+        _heights,
+    ),
+    Sentence(
+        "response.blind",
+        "places on both sides call for a turn",
+        lambda e: all(r["blind"] is not None for r in _level(e) if r["side"] != "ahead"),
+        _blind,
+    ),
+)
+
+
+def _differs(evidence: Evidence) -> str:
+    found = evidence["asymmetry"]
+    absolute = found["dataset"]["absolute"]
+    return (
+        f"On these frames it differs from its mirror image by {absolute['mean']:.2f} on average "
+        f"(0: perfectly symmetric, 1: always opposite; {bounds(absolute)}), on the grid by "
+        f"{found['grid']['absolute']:.2f}."
+    )
+
+
+def _signed(evidence: Evidence) -> Evidence:
+    return evidence["asymmetry"]["dataset"]["signed"]
+
+
+def _prefers(evidence: Evidence) -> str:
+    signed = _signed(evidence)
+    side = "left" if signed["mean"] > 0 else "right"
+    return f"It prefers the {side}, by {abs(signed['mean']):.2f} in probability ({bounds(signed)})."
+
+
+def _is_sure(evidence: Evidence) -> bool:
+    signed = _signed(evidence)
+    return signed["lower95"] > 0 or signed["upper95"] < 0
+
+
+ASYMMETRY = (
+    Sentence("asymmetry.differs", "always: it is what was measured", lambda e: True, _differs),
+    Sentence("asymmetry.prefers", "the interval of the preference excludes 0", _is_sure, _prefers),
+    Sentence(
+        "asymmetry.undecided",
+        "it contains 0",
+        lambda e: not _is_sure(e),
+        lambda e: (
+            "These flights do not tell whether it prefers a side "
+            f"({_signed(e)['mean']:+.2f}, {bounds(_signed(e))}; above 0: left)."
+        ),
+    ),
+)
+
+SCOPE = (
+    Sentence(
+        "scope.one_look",
+        "no other look of the task was flown",
+        lambda e: not e.get("shifts"),
+        lambda e: (
+            "Tested in one look and one light only, those of its task: nothing here tests other "
+            "colours, light or sizes."
+        ),
+    ),
+)
+
+SECTIONS = {
+    "scope": SCOPE,
+    "dataset": DATASET,
+    "tsne": TSNE,
+    "contradictions": CONTRADICTIONS,
+    "loops": LOOPS,
+    "class_model": CLASS_MODEL,
+    "attribution": ATTRIBUTION,
+    "response": RESPONSE,
+    "asymmetry": ASYMMETRY,
+}
+"""Sentences by the section of the page in which they stand."""
+SENTENCES = tuple(sentence for section in SECTIONS.values() for sentence in section)

@@ -1,0 +1,29 @@
+import numpy as np
+import pytest
+
+from drone_rl.explain.dataset import RolloutDataset
+from drone_rl.explain.loops import find_loops, summarise_loops
+
+F, L, R = 0, 1, 2
+
+
+def flights(actions, episode):
+    return RolloutDataset({"actions": np.array(actions), "episode": np.array(episode)}, {}, {})
+
+
+def test_loops_are_turns_without_progress():
+    #         a loop of five    no loop     ends with the episode  two turns: a loop
+    actions = [F, L, R, L, R, L, F, L, L, R, F, L, R, R, L, R, F]
+    data = flights(actions, [0] * 12 + [1] * 5)
+    loops = find_loops(data)
+    assert [(loop.first, loop.length, loop.reversals) for loop in loops] == [(1, 5, 4), (12, 4, 2)]
+    summary = summarise_loops(data, loops)
+    assert (summary["episodes"]["successes"], summary["episodes"]["trials"]) == (2, 2)
+    assert summary["longest"] == 5 and summary["frames_share"] == pytest.approx(9 / 17)
+
+
+def test_none_seen_is_not_never():
+    summary = summarise_loops(flights([F] * 30, range(30)), [])
+    assert summary["loops"] == summary["longest"] == 0
+    # 1 - 0.025 ** (1 / 30)
+    assert summary["episodes"]["upper95"] == pytest.approx(0.1157, abs=1e-4)
