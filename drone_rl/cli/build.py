@@ -6,19 +6,23 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 import torch
-from hydra.utils import get_method, instantiate
+from hydra.utils import get_method
 from omegaconf import DictConfig, OmegaConf
 from tensordict.nn import TensorDictModuleBase
 from torchrl.envs import TransformedEnv
 
 from drone_rl.collectors import EpisodeCollector, ThreadedCollector
-from drone_rl.envs import DroneEnv, make_env
 from drone_rl.policies import PolicyNetwork, make_actor
-from drone_rl.sim.settings import CameraSettings, TaskSettings
-from drone_rl.training import load_checkpoint, load_policy
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import Stream, torch_generator
-from drone_rl.zoo import load_exported, policy_names, policy_path
+from drone_rl.zoo import (
+    PolicyDescription,
+    describe,
+    parse,
+    policy_names,
+    policy_path,
+    read_policy,
+)
 
 if TYPE_CHECKING:
     from drone_rl.collectors.ray import RayEpisodeCollector
@@ -30,7 +34,7 @@ def policy_is_checkpoint(overrides: list[str]) -> list[str]:
 
 
 def build_env(
-    config: DictConfig,
+    description: PolicyDescription,
     num_envs: int,
     *,
     seed: int,
@@ -38,21 +42,15 @@ def build_env(
     pixels: bool = True,
     **kwargs: object,
 ) -> TransformedEnv:
-    """The worlds of `config.task` seen through `config.camera` and `config.transforms`."""
-    task: TaskSettings = instantiate(config.task)
-    camera: CameraSettings = instantiate(config.camera)
-    transforms = [instantiate(t) for t in config.transforms.values() if pixels and t is not None]
-    env = DroneEnv(num_envs, task, camera, seed=seed, device=device, pixels=pixels, **kwargs)
-    return make_env(env, transforms)
+    """The worlds that a policy is described to fly in, seen as it sees them."""
+    return description.build_env(num_envs, seed=seed, device=device, pixels=pixels, **kwargs)
 
 
-def build_network(config: DictConfig, env: TransformedEnv, *, seed: int) -> PolicyNetwork:
-    """The network of `config.policy`, sized by the environment's specs."""
-    network: PolicyNetwork = instantiate(config.policy)(
-        tuple(env.observation_spec["pixels"].shape[1:]),
-        env.action_spec.space.n,
-        generator=torch_generator(seed, Stream.POLICY_INIT),
-    )
+def build_network(
+    description: PolicyDescription, env: TransformedEnv, *, seed: int
+) -> PolicyNetwork:
+    """The described network with the initial weights of a seed."""
+    network = description.build_network(torch_generator(seed, Stream.POLICY_INIT))
     return network.to(env.device)
 
 
@@ -112,15 +110,16 @@ def build_share(
     config: DictConfig, shares: list[int], number: int, network: PolicyNetwork | None = None
 ) -> tuple[EpisodeCollector, PolicyNetwork, torch.Generator]:
     """One worker's worlds, with the network that all share, and the stream of its actions."""
+    description = describe(plain(config))
     env = build_env(
-        config,
+        description,
         shares[number],
         seed=config.seed,
         device=config.device,
         first_world=sum(shares[:number]),
         num_shards=1,
     )
-    network = network or build_network(config, env, seed=config.seed)
+    network = network or build_network(description, env, seed=config.seed)
     actions = torch_generator(config.seed, Stream.ACTIONS, number=number, device=env.device)
     return EpisodeCollector(env, make_actor(network, env.action_spec, actions)), network, actions
 
@@ -176,15 +175,6 @@ def find_checkpoint(where: str, outputs: str) -> Path:
     return path / "checkpoints" / "last.pt" if path.is_dir() else path
 
 
-def read_policy(path: Path) -> dict[str, Any]:
-    """A checkpoint's state, or that of an exported policy.
-
-    Raises:
-        InputError: The file is unusable.
-    """
-    return load_exported(path) if path.suffix == ".safetensors" else load_checkpoint(path)
-
-
 def load_trained(
     path: Path,
     num_envs: int,
@@ -205,22 +195,26 @@ def load_trained(
         stream: Worlds to report on, or those to choose by.
 
     Returns:
-        The environment, the actor and the checkpoint's state.
+        The environment, the actor and what `read_policy` says.
 
     Raises:
         InputError: The checkpoint or a setting is unusable.
     """
     state = read_policy(path)
-    config = trained_config(state, task)
-    env = build_env(config, num_envs, seed=seed, stream=stream, device=device)
-    network = build_network(config, env, seed=seed)
-    load_policy(network, state["policy"])
+    description = trained_config(state, task)
+    env = build_env(description, num_envs, seed=seed, stream=stream, device=device)
+    network = build_network(description, env, seed=seed)
+    network.load_state_dict(state["policy"])
     actions = torch_generator(seed, stream, device=env.device)
     return env, make_actor(network, env.action_spec, actions), state
 
 
-def trained_config(state: dict[str, Any], task: dict[str, Any]) -> DictConfig:
-    """The settings that a checkpoint was trained with; what `task` gives replaces the task's."""
-    config = OmegaConf.create(state["config"])
-    config.task.update({k: v for k, v in task.items() if v is not None})
-    return config
+def trained_config(state: dict[str, Any], task: dict[str, Any]) -> PolicyDescription:
+    """What a file says of its policy; what `task` gives replaces the task's settings.
+
+    Raises:
+        InputError: A setting of the task is unknown or out of range.
+    """
+    described = state["description"]
+    changed = {k: v for k, v in task.items() if v is not None}
+    return parse({**described, "task": {**described["task"], **changed}})

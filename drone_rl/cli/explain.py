@@ -67,7 +67,7 @@ def _explain(
     origin = {
         "policy": str(path),
         "trained": {
-            "config": state["config"],
+            "description": state["description"],
             "progress": state["progress"],
             "provenance": state["provenance"],
             "command": state.get("command"),

@@ -5,12 +5,13 @@ import shlex
 from pathlib import Path
 
 from hydra.core.hydra_config import HydraConfig
-from omegaconf import DictConfig, OmegaConf
+from omegaconf import DictConfig
 
 from drone_rl.cli.build import find_checkpoint, load_trained, policy_is_checkpoint
 from drone_rl.evaluation import run_episodes, summarise
 from drone_rl.utils.errors import InputError
-from drone_rl.zoo import export_policy
+from drone_rl.utils.overrides import read_overrides
+from drone_rl.zoo import COMMAND, export_policy
 
 prepare = policy_is_checkpoint
 _log = logging.getLogger(__name__)
@@ -22,6 +23,8 @@ def run(config: DictConfig) -> tuple[int, str]:
         raise InputError(
             f"episodes={config.episodes} and num_envs={config.num_envs} must be 1 or more"
         )
+    if config.command is not None:
+        COMMAND.read(config.command, "command")
     path = find_checkpoint(config.checkpoint, config.paths.outputs)
     num_envs = min(config.num_envs, config.episodes)
     env, actor, state = load_trained(
@@ -38,6 +41,4 @@ def run(config: DictConfig) -> tuple[int, str]:
 
 def _training_command(path: Path) -> str:
     """The command of the run that wrote a checkpoint, as Hydra noted it."""
-    noted = path.parents[1] / ".hydra" / "overrides.yaml"
-    overrides = list(OmegaConf.load(noted)) if noted.is_file() else []
-    return shlex.join(["drone-rl", "train", *overrides])
+    return shlex.join(["drone-rl", "train", *read_overrides(path.absolute().parents[1])])

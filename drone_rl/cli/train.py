@@ -3,13 +3,15 @@
 from pathlib import Path
 
 from hydra.core.hydra_config import HydraConfig
-from omegaconf import DictConfig, OmegaConf
+from omegaconf import DictConfig
 
 from drone_rl.cli.launchers import LocalLauncher, RayLauncher, SlurmLauncher, register_plugins
 from drone_rl.cli.optuna_sweeper import OptunaSweeper
 from drone_rl.sweeps.naming import is_sweep, sweep_name
+from drone_rl.sweeps.runs import quoted
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import folder_lock
+from drone_rl.utils.files import folder_lock, refuse_links
+from drone_rl.utils.overrides import taken_over
 
 
 def register() -> None:
@@ -32,10 +34,9 @@ def prepare(overrides: list[str]) -> list[str]:
     folder = Path(folders[-1])
     if not (folder / "checkpoints" / "last.pt").is_file():
         raise InputError(f"resume={folder} has no checkpoints/last.pt; give the folder of a run")
-    saved = folder / ".hydra" / "overrides.yaml"
-    before = list(OmegaConf.load(saved)) if saved.is_file() else []
-    kept = [o for o in before if not o.startswith("resume=")]
-    return [*kept, *overrides, "hydra.mode=RUN", f"hydra.run.dir={folder}"]
+    refuse_links(folder)
+    kept = taken_over(folder, overrides)
+    return [*kept, *overrides, "hydra.mode=RUN", f"hydra.run.dir={quoted(str(folder))}"]
 
 
 def run(config: DictConfig) -> tuple[int, float]:

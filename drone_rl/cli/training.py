@@ -20,7 +20,6 @@ from drone_rl.training import (
     NotANumberError,
     ProgressCallback,
     Trainer,
-    load_checkpoint,
 )
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import write_atomically
@@ -28,6 +27,7 @@ from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import Stream
 from drone_rl.utils.settings import check_same_config
 from drone_rl.verdicts.judge import judge_policy
+from drone_rl.zoo import describe, read_checkpoint
 
 MAY_CHANGE = (
     "resume",
@@ -59,7 +59,7 @@ def train(config: DictConfig, folder: Path) -> tuple[int, float]:
         InputError: A setting is unusable, or learning broke down.
     """
     resolved = plain(config)
-    state = load_checkpoint(folder / "checkpoints" / "last.pt") if config.resume else None
+    state = read_checkpoint(folder / "checkpoints" / "last.pt") if config.resume else None
     if state is not None:
         check_same_config(state["config"], resolved, MAY_CHANGE)
     trainer, checkpoints = _build(config, folder, resolved)
@@ -103,16 +103,18 @@ def _build(
     del settings["checkpoint_interval_s"]
     share = settings.pop("target_share")
     _check_trainer(config)
+    description = describe(resolved).as_dict()
     # sums depend on how many threads make them: on as many everywhere, whatever the machine has
     torch.set_num_threads(config.collector.num_threads)
     collector, network, generators = build_collector(config)
     optimiser = instantiate(config.optimiser)(network.parameters())
     origin = provenance()
-    OmegaConf.save(OmegaConf.create({"config": resolved, **origin}), folder / "run.yaml")
+    noted = {"config": resolved, "description": description, **origin}
+    OmegaConf.save(OmegaConf.create(noted), folder / "run.yaml")
     checkpoints = CheckpointCallback(
         folder / "checkpoints",
         interval_s=config.trainer.checkpoint_interval_s,
-        extra={"config": resolved, "provenance": origin},
+        extra={"config": resolved, "description": description, "provenance": origin},
     )
     loggers = [instantiate(logger) for logger in config.logger.values()]
     searching = [] if config.trial is None else [PruneCallback(folder.parent, config.trial)]

@@ -7,12 +7,9 @@ from drone_rl.training.callbacks import (
     LoggerCallback,
     ProgressCallback,
 )
-from drone_rl.training.checkpoint import (
-    load_checkpoint,
-    load_policy,
-    save_checkpoint,
-)
+from drone_rl.training.checkpoint import load_checkpoint, save_checkpoint
 from drone_rl.training.trainer import NotANumberError, Trainer
+from drone_rl.training.weights import check_weights
 
 __all__ = [
     "Callback",
@@ -22,7 +19,7 @@ __all__ = [
     "NotANumberError",
     "ProgressCallback",
     "Trainer",
+    "check_weights",
     "load_checkpoint",
-    "load_policy",
     "save_checkpoint",
 ]

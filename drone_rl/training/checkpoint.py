@@ -2,20 +2,22 @@
 
 import contextlib
 import os
-import pickle
 import tempfile
-import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import torch
-from torch import nn
 
+from drone_rl.training.unpickling import MOST_BYTES, ForeignError, unpickle
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.files import read_bytes
+from drone_rl.utils.schema import shown
 
 FORMAT = "drone_rl checkpoint"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
+"""With a description of the policy; version 1 has the training's settings alone."""
+READABLE = (1, FORMAT_VERSION)
 
 
 def save_checkpoint(path: str | Path, state: Mapping[str, Any]) -> None:
@@ -51,50 +53,33 @@ def save_checkpoint(path: str | Path, state: Mapping[str, Any]) -> None:
 
 
 def load_checkpoint(path: str | Path) -> dict[str, Any]:
-    """Reads a checkpoint onto the CPU, refusing anything that could run code.
+    """Reads a checkpoint onto the CPU: tensors and plain values, whatever is in the file.
 
     Raises:
         InputError: The file is missing, damaged, holds code, or is not a checkpoint of ours.
     """
     path = Path(path)
-    if not path.is_file():
+    if not path.exists():
         raise InputError(f"checkpoint {path} does not exist; give the path of a .pt file")
+    content = read_bytes(path, MOST_BYTES)
     try:
-        state = torch.load(path, weights_only=True, map_location="cpu")
-    except pickle.UnpicklingError as error:
+        state = unpickle(content, f"checkpoint {path}")
+    except ForeignError as error:
         raise InputError(
-            f"checkpoint {path} holds more than tensors and plain values and was not loaded, "
-            "since it could run code; use a checkpoint that drone-rl train wrote"
-        ) from error
-    except (RuntimeError, EOFError, OSError, ValueError, zipfile.BadZipFile, KeyError) as error:
+            f"checkpoint {path} holds more than tensors and plain values ({error}) and was not "
+            "loaded, since it could run code; use a checkpoint that drone-rl train wrote"
+        ) from None
+    except ValueError as error:
         raise InputError(
-            f"checkpoint {path} is damaged or cut short; use another one of that run "
+            f"checkpoint {path} is damaged or cut short ({error}); use another one of that run "
             "(last.pt, best.pt) or train again"
-        ) from error
+        ) from None
     if not isinstance(state, dict) or state.get("format") != FORMAT:
         raise InputError(f"{path} is not a drone_rl checkpoint; use one that drone-rl train wrote")
-    if state.get("format_version") != FORMAT_VERSION:
+    version = state.get("format_version")
+    if type(version) is not int or version not in READABLE:
         raise InputError(
-            f"checkpoint {path} has format version {state.get('format_version')}, this program "
-            f"reads {FORMAT_VERSION}; use the version of drone_rl that wrote it"
+            f"checkpoint {path} has format version {shown(version)}, this program reads "
+            f"{' and '.join(map(str, READABLE))}; use the version of drone_rl that wrote it"
         )
     return state
-
-
-def load_policy(network: nn.Module, state: Mapping[str, torch.Tensor]) -> None:
-    """Loads parameters into a network of the same architecture.
-
-    Raises:
-        InputError: The architectures differ; the first difference is named.
-    """
-    own = network.state_dict()
-    remedy = "choose the policy and camera that the checkpoint was trained with"
-    for name in [*own, *(name for name in state if name not in own)]:
-        here = tuple(own[name].shape) if name in own else "absent"
-        there = tuple(state[name].shape) if name in state else "absent"
-        if here != there:
-            raise InputError(
-                f"the checkpoint's policy differs from this one: {name} is {there} there and "
-                f"{here} here; {remedy}"
-            )
-    network.load_state_dict(state)

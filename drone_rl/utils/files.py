@@ -1,23 +1,123 @@
-"""Files that are whole or not there, and folders that belong to one process at a time."""
+"""Files that are whole or not there, read without trust; folders of one process at a time."""
 
 import contextlib
 import errno
 import fcntl
+import json
 import os
+import stat
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from drone_rl.utils.errors import InputError
 
 _NO_LOCKS = (errno.ENOLCK, errno.ENOTSUP)
 """What file systems answer that know no locks."""
+_LONGEST_NUMBER = 19
+"""Digits of a whole number in a JSON file."""
+
+
+def read_bytes(path: Path, most: int) -> bytes:
+    """The content of a plain file of bounded size, which is opened once and never waited for.
+
+    Args:
+        path: Of the file.
+        most: Bytes that it may have.
+
+    Raises:
+        InputError: It can't be read, is no plain file, is empty or too large.
+    """
+    try:
+        with open(path, "rb", opener=_open_at_once) as file:
+            about = os.fstat(file.fileno())
+            if not stat.S_ISREG(about.st_mode):
+                raise InputError(f"{path} is no plain file; give the path of a file")
+            content = file.read(most + 1) if about.st_size <= most else None
+    except (OSError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"{path} can't be read ({reason}); give another file") from None
+    if content is None or len(content) > most:
+        raise InputError(f"{path} is too large; files of its kind have at most {most} bytes")
+    if not content:
+        raise InputError(f"{path} is empty; the file was damaged or cut short")
+    return content
+
+
+def read_json(path: Path, most: int = 1_000_000) -> Any:
+    """Plain data out of a JSON file.
+
+    Raises:
+        InputError: See `read_bytes` and `parse_json`.
+    """
+    return parse_json(read_bytes(path, most), str(path))
+
+
+def parse_json(content: bytes | str, where: str, *, allow_nan: bool = False) -> Any:
+    """Plain data out of JSON, each key once, no number that isn't one or would fill a page.
+
+    Args:
+        content: The JSON.
+        where: Its name, for people.
+        allow_nan: Whether NaN and infinity are accepted.
+
+    Raises:
+        InputError: It is no such JSON.
+    """
+
+    def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        found = dict(pairs)
+        if len(found) < len(pairs):
+            raise ValueError("a name stands there twice")
+        return found
+
+    def whole(digits: str) -> int:
+        if len(digits) > _LONGEST_NUMBER:
+            raise ValueError("a number is too long")
+        return int(digits)
+
+    def no_number(name: str) -> float:
+        if not allow_nan:
+            raise ValueError(f"{name} is no number")
+        return float(name)
+
+    try:
+        text = content if isinstance(content, str) else content.decode()
+        return json.loads(text, object_pairs_hook=once, parse_int=whole, parse_constant=no_number)
+    except (ValueError, RecursionError) as error:
+        reason = "nested too deeply" if isinstance(error, RecursionError) else str(error)
+        raise InputError(f"{where} is damaged: no plain JSON ({reason[:200]})") from None
+
+
+def refuse_links(folder: Path, depth: int = 3) -> None:
+    """Makes sure that what is written or read under a folder stays in it.
+
+    Args:
+        folder: Which came from somewhere else, perhaps.
+        depth: Levels of folders to look at.
+
+    Raises:
+        InputError: Something in it is a link, or neither a file nor a folder.
+    """
+    for entry in os.scandir(folder):
+        if not (entry.is_file(follow_symlinks=False) or entry.is_dir(follow_symlinks=False)):
+            raise InputError(
+                f"{entry.path} is a link or a device; give a folder of plain files, "
+                "put there what it points to"
+            )
+        if depth > 1 and entry.is_dir(follow_symlinks=False):
+            refuse_links(Path(entry.path), depth - 1)
 
 
 def write_atomically(path: Path, content: str | bytes) -> None:
     """Writes a small file; whoever reads it finds the old one or the new one, never half."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    temporary.write_bytes(content.encode() if isinstance(content, str) else content)
+    temporary.unlink(missing_ok=True)
+    with temporary.open("xb") as file:  # never through a link that waits there
+        file.write(content.encode() if isinstance(content, str) else content)
     os.replace(temporary, path)
 
 
@@ -32,7 +132,7 @@ def folder_lock(folder: Path, *, patience_s: float = 1.0) -> Iterator[None]:
     Raises:
         InputError: Another process holds it.
     """
-    with (folder / ".lock").open("a") as file:
+    with _open_lock(folder) as file:
         until = time.monotonic() + patience_s
         while not _try_lock(file.fileno()):
             if time.monotonic() > until:
@@ -46,10 +146,24 @@ def folder_lock(folder: Path, *, patience_s: float = 1.0) -> Iterator[None]:
 def is_locked(folder: Path) -> bool:
     """Whether some process holds the folder."""
     try:
-        with (folder / ".lock").open("a") as file:
+        with _open_lock(folder) as file:
             return not _try_lock(file.fileno())
     except FileNotFoundError:
         return False
+
+
+def _open_lock(folder: Path) -> Any:
+    """The file of a folder's lock, which is never another file by a link."""
+    return open(
+        folder / ".lock",
+        "ab",
+        opener=lambda path, flags: os.open(path, flags | os.O_NOFOLLOW, 0o644),
+    )
+
+
+def _open_at_once(path: str, flags: int) -> int:
+    """Opens without waiting for whoever might write into a pipe."""
+    return os.open(path, flags | os.O_NONBLOCK)
 
 
 def _try_lock(descriptor: int) -> bool:

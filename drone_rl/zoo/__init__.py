@@ -1,11 +1,31 @@
-"""Trained policies that travel with the package: safetensors, each with a model card."""
+"""Policies as plain data, in files; some travel with the package, each with a model card."""
 
+from drone_rl.zoo.description import PolicyDescription, parse
 from drone_rl.zoo.files import (
+    COMMAND,
     card_path,
     export_policy,
     load_exported,
     policy_names,
     policy_path,
+    read_checkpoint,
+    read_policy,
 )
+from drone_rl.zoo.migration import describe
+from drone_rl.zoo.registry import register_network, register_transform
 
-__all__ = ["card_path", "export_policy", "load_exported", "policy_names", "policy_path"]
+__all__ = [
+    "COMMAND",
+    "PolicyDescription",
+    "card_path",
+    "describe",
+    "export_policy",
+    "load_exported",
+    "parse",
+    "policy_names",
+    "policy_path",
+    "read_checkpoint",
+    "read_policy",
+    "register_network",
+    "register_transform",
+]

@@ -1,21 +1,81 @@
-"""Policies as safetensors files: parameters, and as metadata all that is needed to run them."""
+"""Policies in files: what they consist of, their weights, and where they come from."""
 
 import hashlib
 import json
+import shlex
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import torch
-from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
+from safetensors import SafetensorError
+from safetensors.torch import load, save_file
 
+from drone_rl.training import check_weights, load_checkpoint
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.files import parse_json, read_bytes
+from drone_rl.utils.schema import Kind, Maybe, Plain, Real, Record, Text, Whole, as_mapping, shown
+from drone_rl.zoo.description import FORMAT, MOST_PARAMETERS, parse
+from drone_rl.zoo.migration import describe
 
-FORMAT = "drone_rl policy"
-_LOCAL = ("logger", "paths", "resume")
-"""Settings that speak of the machine where the training ran."""
+MOST_HEADER = 2**20
+"""Bytes of what an exported file says besides its weights."""
 _FOLDER = Path(__file__).resolve().parent
+_COUNT = Whole(0, 2**62)
+_PROGRESS = Record(
+    {
+        "frames": _COUNT,
+        "episodes": _COUNT,
+        "updates": _COUNT,
+        "seconds": Real(0.0, 1e12),
+        "running_cubes": Real(-1e6, 1e6),
+    }
+)
+
+
+class _Versions:
+    """Names of packages with their versions."""
+
+    def read(self, value: Any, where: str) -> dict[str, str]:
+        """See `drone_rl.utils.schema.Kind`."""
+        versions = Plain(most=100, deepest=1).read(as_mapping(value, where), where)
+        return {key: Text(200).read(item, f"{where}.{key}") for key, item in versions.items()}
+
+
+class _Command:
+    """A training's command, which people may copy into a shell: it does what it seems to do."""
+
+    def read(self, value: Any, where: str) -> str:
+        """See `drone_rl.utils.schema.Kind`."""
+        text = Text().read(value, where)
+        try:
+            words = shlex.split(text)
+        except ValueError:
+            words = []
+        if words[:2] != ["drone-rl", "train"] or shlex.join(words) != text or "`" in text:
+            raise InputError(
+                f"{where}={shown(value)} is no training command; give drone-rl train and its "
+                "settings, each quoted as a shell wants it"
+            )
+        return text
+
+
+COMMAND: Kind = _Command()
+"""The kind of text that says how a policy was trained."""
+_PROVENANCE = Record(
+    {
+        "versions": _Versions(),
+        "git_revision": Maybe(Text(200)),
+        "machine": Plain(most=100, deepest=2),
+    },
+    optional=frozenset({"machine"}),
+)
+_ABOUT: dict[str, Kind] = {
+    "progress": _PROGRESS,
+    "provenance": _PROVENANCE,
+    "command": COMMAND,
+    "evaluation": Plain(),
+}
 
 
 def policy_names() -> list[str]:
@@ -33,6 +93,47 @@ def card_path(name: str) -> Path:
     return _FOLDER / f"{name}.md"
 
 
+def read_policy(path: Path) -> dict[str, Any]:
+    """A policy out of a file: its description, weights that fit it, and where it comes from.
+
+    Args:
+        path: Of a checkpoint, or of an exported file (.safetensors).
+
+    Returns:
+        "description" (see `drone_rl.zoo.parse`), "policy" (the weights), "progress", "provenance";
+        of an exported file also "command" and "evaluation", of a checkpoint all of its state.
+
+    Raises:
+        InputError: The file is missing, damaged or something else.
+    """
+    return load_exported(path) if path.suffix == ".safetensors" else read_checkpoint(path)
+
+
+def read_checkpoint(path: Path) -> dict[str, Any]:
+    """A checkpoint of `drone-rl train`, see `read_policy`; its "config" is plain data alone.
+
+    Raises:
+        InputError: The file is missing, damaged or something else.
+    """
+    state = load_checkpoint(path)
+    try:
+        for key in ("policy", "progress", "provenance", "config"):
+            if key not in state:
+                raise InputError(f"it has no {key}")
+        state["config"] = Plain().read(as_mapping(state["config"], "config"), "config")
+        is_old = state["format_version"] == 1
+        found = describe(state["config"]) if is_old else parse(state.get("description"))
+        checked = {
+            "description": found.as_dict(),
+            "policy": check_weights(state["policy"], found.expected_weights()),
+            "progress": _PROGRESS.read(state["progress"], "progress"),
+            "provenance": _PROVENANCE.read(state["provenance"], "provenance"),
+        }
+    except InputError as error:
+        raise InputError(f"checkpoint {path} can't be used: {error}") from None
+    return {**state, **checked}
+
+
 def export_policy(
     path: Path, checkpoint: Mapping[str, Any], *, command: str, evaluation: Mapping[str, Any]
 ) -> None:
@@ -40,44 +141,84 @@ def export_policy(
 
     Args:
         path: Where to, ending in .safetensors; the card ends in .md.
-        checkpoint: From `load_checkpoint`.
+        checkpoint: From `read_policy`.
         command: The training command.
         evaluation: From `summarise`.
 
     Raises:
         InputError: It can't be written.
     """
-    parameters = {k: v.contiguous() for k, v in checkpoint["policy"].items()}
     origin = checkpoint["provenance"]
     about = {
-        "config": {k: v for k, v in checkpoint["config"].items() if k not in _LOCAL},
         "progress": checkpoint["progress"],
         "provenance": {k: origin[k] for k in ("versions", "git_revision")},
-        "command": command,
+        "command": COMMAND.read(command, "command"),
         "evaluation": evaluation,
     }
     try:
-        save_file(parameters, path, {"format": FORMAT, "about": json.dumps(about)})
+        write_exported(path, checkpoint["policy"], checkpoint["description"], about)
         path.with_suffix(".md").write_text(_card(path, about))
     except (OSError, SafetensorError) as error:
         raise InputError(f"policy {path} can't be written ({error})") from error
 
 
+def write_exported(
+    path: Path,
+    weights: Mapping[str, torch.Tensor],
+    description: Mapping[str, Any],
+    about: Mapping[str, Any],
+) -> None:
+    """Writes weights with their description and where they come from."""
+    contiguous = {name: value.contiguous() for name, value in weights.items()}
+    metadata = {"description": json.dumps(description), "about": json.dumps(about)}
+    save_file(contiguous, path, {"format": FORMAT, **metadata})
+
+
 def load_exported(path: Path) -> dict[str, Any]:
-    """Reads a policy in the form of a checkpoint: "policy", "config", "progress" and more.
+    """An exported policy, see `read_policy`.
 
     Raises:
         InputError: The file is missing, damaged or something else.
     """
+    content = read_bytes(path, 8 + MOST_HEADER + 4 * MOST_PARAMETERS)
     try:
-        with safe_open(path, framework="pt") as file:
-            metadata = file.metadata() or {}
-            parameters: dict[str, torch.Tensor] = {k: file.get_tensor(k) for k in file.keys()}  # noqa: SIM118
-    except (OSError, SafetensorError) as error:
-        raise InputError(f"policy {path} can't be read ({error}); export it again") from error
+        return _exported(content)
+    except InputError as error:
+        raise InputError(f"policy {path} can't be read: {error}; export it again") from None
+
+
+def _exported(content: bytes) -> dict[str, Any]:
+    size = int.from_bytes(content[:8], "little")
+    if not 2 <= size <= min(MOST_HEADER, len(content) - 8):
+        raise InputError("it is not in the safetensors format, or damaged")
+    header = as_mapping(parse_json(content[8 : 8 + size], "its header"), "header")
+    metadata = as_mapping(header.get("__metadata__", {}), "metadata")
     if metadata.get("format") != FORMAT:
-        raise InputError(f"{path} is not a drone_rl policy; use one that drone-rl export wrote")
-    return {"policy": parameters, **json.loads(metadata["about"])}
+        raise InputError("it is not a drone_rl policy; use one that drone-rl export wrote")
+    for name, entry in header.items():
+        if name != "__metadata__" and as_mapping(entry, name).get("dtype") != "F32":
+            raise InputError(f"the weights {shown(name)} are not float32")
+    is_old = "description" not in metadata
+    about = dict(as_mapping(_inner(metadata, "about"), "about"))
+    found = (
+        describe(about.pop("config", None)) if is_old else parse(_inner(metadata, "description"))
+    )
+    try:
+        weights = load(content)
+    except (SafetensorError, ValueError, KeyError, TypeError, RuntimeError) as error:
+        raise InputError(f"its weights are damaged ({str(error)[:100]})") from None
+    return {
+        "description": found.as_dict(),
+        "policy": check_weights(weights, found.expected_weights()),
+        **Record(_ABOUT).read(about, "about"),
+    }
+
+
+def _inner(metadata: Mapping[str, Any], key: str) -> Any:
+    text = metadata.get(key)
+    if not isinstance(text, str):
+        raise InputError(f"its {key} is missing")
+    return parse_json(text, f"its {key}")
 
 
 def _card(path: Path, about: Mapping[str, Any]) -> str:
@@ -95,7 +236,7 @@ def _card(path: Path, about: Mapping[str, Any]) -> str:
     revision = about["provenance"]["git_revision"] or "unknown"
     return f"""# {path.stem}
 
-Trained by `{about["command"]}` in {about["progress"]["frames"]:,} frames; the settings are in the
+Trained by `{about["command"]}` in {about["progress"]["frames"]:,} frames; its description is in the
 file's metadata. Evaluated on {evaluation["episodes"]:,} held-out episodes, greedy:
 
 | | |

@@ -147,7 +147,7 @@ def test_usage_and_help(tmp_path):
         (["train", "sed=1"], ["sed", "--help"]),
         (["train", "task.num_cubs=1"], ["num_cubs"]),
         (["train", "task.num_cubes=three"], ["three"]),
-        (["train", "task.spacing=-9"], ["spacing=-9", "above 0"]),
+        (["train", "task.spacing=-9"], ["spacing=-9", "from 0.001"]),
         (["train", "policy=resnet"], ["resnet", "small_cnn"]),
         (["train", "camera.height=2", "camera.width=2"], ["2x2", "too small"]),
         (["train", "seed=-1"], ["seed=-1", "0 or more"]),
@@ -188,7 +188,7 @@ def test_resume_with_a_changed_setting(run, in_process):
 
 def test_checkpoint_of_another_architecture_truncated_or_with_code(run, in_process, tmp_path):
     state = torch.load(run / "checkpoints" / "last.pt", weights_only=True)
-    state["config"]["policy"]["hidden"] = [7]
+    state["description"]["network"]["hidden"] = [7]
     torch.save(state, tmp_path / "other.pt")
     line = error_line(in_process("evaluate", "checkpoint=other.pt", cwd=tmp_path))
     assert "fc1" in line

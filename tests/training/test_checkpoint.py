@@ -4,9 +4,8 @@ import pickle
 
 import pytest
 import torch
-from torch import nn
 
-from drone_rl.training import load_checkpoint, load_policy, save_checkpoint
+from drone_rl.training import load_checkpoint, save_checkpoint
 from drone_rl.utils.errors import InputError
 
 
@@ -52,7 +51,7 @@ def test_missing(tmp_path):
 def test_truncated(saved, share):
     data = saved.read_bytes()
     saved.write_bytes(data[: int(share * len(data))])
-    with pytest.raises(InputError, match="damaged or cut short"):
+    with pytest.raises(InputError, match=r"damaged|cut short"):
         load_checkpoint(saved)
 
 
@@ -81,12 +80,6 @@ def test_not_ours_and_of_another_version(tmp_path):
     torch.save({"format": "drone_rl checkpoint", "format_version": 99}, tmp_path / "b.pt")
     with pytest.raises(InputError, match="version 99"):
         load_checkpoint(tmp_path / "b.pt")
-
-
-def test_other_architecture_names_the_first_difference():
-    with pytest.raises(InputError, match=r"weight is \(3, 4\) there and \(2, 4\) here"):
-        load_policy(nn.Linear(4, 2), nn.Linear(4, 3).state_dict())
-    with pytest.raises(InputError, match="bias is absent there"):
-        load_policy(nn.Linear(4, 2), nn.Linear(4, 2, bias=False).state_dict())
-    with pytest.raises(InputError, match=r"bias is .* there and absent here"):
-        load_policy(nn.Linear(4, 2, bias=False), nn.Linear(4, 2).state_dict())
+    torch.save({"format": "drone_rl checkpoint", "format_version": True}, tmp_path / "c.pt")
+    with pytest.raises(InputError, match="version True"):
+        load_checkpoint(tmp_path / "c.pt")

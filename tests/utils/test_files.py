@@ -1,12 +1,21 @@
-"""Whole files and locked folders."""
+"""Whole files, locked folders, and files that nobody should trust."""
 
+import math
 import multiprocessing
 import os
 
 import pytest
 
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import folder_lock, is_locked, write_atomically
+from drone_rl.utils.files import (
+    folder_lock,
+    is_locked,
+    parse_json,
+    read_bytes,
+    read_json,
+    refuse_links,
+    write_atomically,
+)
 
 
 def test_a_file_is_replaced_whole_and_nothing_is_left_beside_it(tmp_path):
@@ -40,3 +49,79 @@ def test_a_dead_process_holds_nothing(tmp_path):
     process.join()
     assert process.exitcode == 9
     assert not is_locked(tmp_path)
+
+
+def test_a_link_that_waits_where_a_file_is_written_leads_nowhere(tmp_path):
+    canary = tmp_path / "canary"
+    canary.write_text("sings")
+    (tmp_path / f".a.json.{os.getpid()}").symlink_to(canary)
+    (tmp_path / "a.json").symlink_to(canary)
+    write_atomically(tmp_path / "a.json", "new")
+    assert canary.read_text() == "sings"
+    assert not (tmp_path / "a.json").is_symlink()
+    (tmp_path / ".lock").symlink_to(canary)
+    with pytest.raises(OSError, match="symbolic"), folder_lock(tmp_path):
+        pass
+
+
+def test_plain_files_of_bounded_size_are_read(tmp_path):
+    path = tmp_path / "a"
+    path.write_bytes(b"1234")
+    assert read_bytes(path, 4) == b"1234"
+    with pytest.raises(InputError, match="at most 3 bytes"):
+        read_bytes(path, 3)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda path: os.mkfifo(path), "no plain file"),
+        (lambda path: path.mkdir(), "Is a directory"),
+        (lambda path: path.symlink_to("/dev/zero"), "no plain file"),
+        (lambda path: path.symlink_to(path), "symbolic links"),
+        (lambda path: path.touch(), "is empty"),
+        (lambda path: None, "No such file"),
+    ],
+)
+def test_what_is_no_plain_file_is_refused_at_once(tmp_path, make, message):
+    make(tmp_path / "a")
+    with pytest.raises(InputError, match=message):
+        read_bytes(tmp_path / "a", 9)
+
+
+def test_json_is_read(tmp_path):
+    (tmp_path / "a").write_text('{"a": [1, 2.5, null, true, "ä"]}')
+    assert read_json(tmp_path / "a") == {"a": [1, 2.5, None, True, "ä"]}
+    assert math.isnan(parse_json("[NaN]", "x", allow_nan=True)[0])
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (b'{"a": 1, "a": 2}', "twice"),
+        (b"1" + b"0" * 400, "too long"),
+        (b"[" * 100_000, "too deeply"),
+        (b"NaN", "NaN is no number"),
+        (b"[-Infinity]", "no number"),
+        (b"\xff\xfe", "utf-8"),
+        (b"{", "damaged"),
+        (b"1 2", "damaged"),
+    ],
+)
+def test_json_that_would_surprise_is_refused(text, message):
+    with pytest.raises(InputError, match=message) as error:
+        parse_json(text, "x")
+    assert "\n" not in str(error.value)
+
+
+def test_a_folder_with_a_link_in_it_is_refused(tmp_path):
+    (tmp_path / "a" / "b").mkdir(parents=True)
+    (tmp_path / "a" / "b" / "file").touch()
+    refuse_links(tmp_path)
+    (tmp_path / "a" / "b" / "out").symlink_to(tmp_path)
+    with pytest.raises(InputError, match="out is a link"):
+        refuse_links(tmp_path)
+    refuse_links(tmp_path, depth=2)
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(InputError, match="pipe is a link or a device"):
+        refuse_links(tmp_path, depth=1)

@@ -1,11 +1,27 @@
+"""Policies in files: what is written comes back, old files are read, anything else is refused."""
+
 import hashlib
+import json
+from pathlib import Path
 
 import pytest
 import torch
+from safetensors.torch import save
 
+from drone_rl.training import save_checkpoint
 from drone_rl.utils.errors import InputError
-from drone_rl.zoo import card_path, export_policy, load_exported, policy_names, policy_path
+from drone_rl.zoo import (
+    card_path,
+    export_policy,
+    load_exported,
+    parse,
+    policy_names,
+    policy_path,
+    read_policy,
+)
+from tests.zoo.test_description import DEFAULT
 
+DATA = Path(__file__).parents[1] / "data"
 SHARE = {"share": 0.5, "lower95": 0.4, "upper95": 0.6}
 EVALUATION = {
     "mean_cubes": 1.5,
@@ -13,24 +29,57 @@ EVALUATION = {
     "success": SHARE,
     "shares": {"left": {"mean": None, "lower95": 0.0, "upper95": 1.0}},
 }
+DESCRIPTION = {
+    **DEFAULT,
+    "network": {"name": "small_cnn", "patch": 4, "channels": [2], "hidden": []},
+}
+WEIGHTS = {
+    name: torch.arange(float(value.numel())).reshape(value.shape)
+    for name, value in parse(DESCRIPTION).expected_weights().items()
+}
+PROGRESS = {"frames": 1234, "episodes": 9, "updates": 3, "seconds": 0.5, "running_cubes": 1.0}
 CHECKPOINT = {
-    "policy": {"layers.logits.weight": torch.arange(6.0).view(2, 3)},
-    "config": {"policy": {"hidden": [3]}, "paths": {"outputs": "/home/somebody"}},
-    "progress": {"frames": 1234},
+    "policy": WEIGHTS,
+    "config": {"paths": {"outputs": "/home/somebody"}},
+    "description": DESCRIPTION,
+    "progress": PROGRESS,
     "provenance": {
         "versions": {"torch": "1", "torchrl": "2", "mujoco-warp": "3"},
         "git_revision": "abc",
         "machine": {"system": "here"},
     },
 }
+ABOUT = {
+    "progress": PROGRESS,
+    "provenance": {"versions": {"torch": "1"}, "git_revision": None},
+    "command": "drone-rl train",
+    "evaluation": EVALUATION,
+}
+
+
+def exported(weights=None, about=None, description=DESCRIPTION, **metadata):
+    """An exported file's content."""
+    texts = {
+        "format": "drone_rl policy",
+        "about": json.dumps({**ABOUT, **(about or {})}),
+        "description": json.dumps(description),
+        **metadata,
+    }
+    return save(WEIGHTS if weights is None else weights, texts)
+
+
+DAMAGED_DESCRIPTION = save(
+    WEIGHTS, {"format": "drone_rl policy", "about": "{}", "description": "{"}
+)
 
 
 def test_what_is_exported_comes_back_without_traces_of_the_machine(tmp_path):
     path = tmp_path / "mine.safetensors"
     export_policy(path, CHECKPOINT, command="drone-rl train", evaluation=EVALUATION)
     found = load_exported(path)
-    torch.testing.assert_close(found["policy"], CHECKPOINT["policy"])
-    assert found["config"] == {"policy": {"hidden": [3]}}
+    torch.testing.assert_close(found["policy"], WEIGHTS)
+    assert found["description"] == DESCRIPTION
+    assert found["progress"] == PROGRESS
     assert found["command"] == "drone-rl train"
     assert b"somebody" not in path.read_bytes()
     card = path.with_suffix(".md").read_text()
@@ -39,11 +88,81 @@ def test_what_is_exported_comes_back_without_traces_of_the_machine(tmp_path):
     assert "| share collected: left | not offered |" in card
 
 
-@pytest.mark.parametrize("content", [b"", b"not a policy at all"])
-def test_a_damaged_file_is_refused(tmp_path, content):
+def test_a_checkpoint_is_read_by_its_description_alone(tmp_path):
+    save_checkpoint(tmp_path / "a.pt", {**CHECKPOINT, "best": 0.5})
+    found = read_policy(tmp_path / "a.pt")
+    assert found["description"] == DESCRIPTION
+    assert found["best"] == 0.5
+    torch.testing.assert_close(found["policy"], WEIGHTS)
+
+
+@pytest.mark.parametrize("name", ["old_policy.safetensors", "old_checkpoint.pt"])
+def test_files_from_before_descriptions_are_translated(name):
+    found = read_policy(DATA / name)
+    assert found["description"]["task"]["num_cubes"] == 1
+    assert found["description"]["camera"]["width"] == 32
+    assert [t["name"] for t in found["description"]["transforms"]] == ["gray", "standardize"]
+    assert found["description"]["network"] == {
+        "name": "small_cnn",
+        "patch": 4,
+        "channels": [2, 3],
+        "hidden": [4],
+    }
+    assert found["policy"]["layers.fc1.weight"].shape == (4, 18)
+    network = parse(found["description"]).build_network()
+    network.load_state_dict(found["policy"])
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"\x02", "safetensors format"),
+        (b"not a policy at all", "safetensors format"),
+        ((2**40).to_bytes(8, "little") + b"{}", "safetensors format"),
+        (exported()[:-1], "weights are damaged"),
+        (exported() + b"1", "weights are damaged"),
+        (exported().replace(b'"layers.conv1.bias":{"dtype"', b'"layers.conv1.bias":{"dtypo"'), "f"),
+        (exported(format="drone_rl checkpoint"), "not a drone_rl policy"),
+        (exported(description=[]), "description"),
+        (exported(about={"extra": 1}), "'extra' is unknown"),
+        (exported(about={"command": "rm -rf /"}), "no training command"),
+        (exported(about={"command": "drone-rl train; rm -rf /"}), "no training command"),
+        (exported(about={"command": "drone-rl train `id`"}), "no training command"),
+        (exported(about={"command": "drone-rl train '"}), "no training command"),
+        (exported(about={"progress": {**PROGRESS, "frames": -1}}), "frames=-1"),
+        (exported(about={"provenance": {"versions": [], "git_revision": None}}), "versions"),
+        (exported(about={"evaluation": {"a": "b\nc"}}), "a text in"),
+        (exported({**WEIGHTS, "x": torch.zeros(1)}), "x' is .* absent by"),
+        (exported({k: v.double() for k, v in WEIGHTS.items()}), "not float32"),
+        (exported({k: v * float("nan") for k, v in WEIGHTS.items()}), "NaN"),
+        (exported({}), "absent in the file"),
+        (DAMAGED_DESCRIPTION, "its description is damaged"),
+    ],
+)
+def test_a_damaged_or_hostile_file_is_refused_in_one_line(tmp_path, content, message):
     (tmp_path / "x.safetensors").write_bytes(content)
-    with pytest.raises(InputError, match=r"x\.safetensors can't be read"):
+    with pytest.raises(InputError, match=message) as error:
         load_exported(tmp_path / "x.safetensors")
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"description": None}, "description=None"),
+        ({"policy": {}}, "absent in the file"),
+        ({"policy": 5}, "weights=5"),
+        ({"policy": {**WEIGHTS, "layers.conv1.bias": torch.tensor([0.0, float("inf")])}}, "NaN"),
+        ({"progress": {}}, r"progress\.frames is missing"),
+        ({"provenance": {"versions": {"torch": 5}, "git_revision": ""}}, r"versions\.torch=5"),
+        ({"config": {"a": torch.zeros(3)}}, "type Tensor"),
+        ({"config": [1]}, r"config=\(list\)"),
+    ],
+)
+def test_a_checkpoint_that_lies(tmp_path, change, message):
+    save_checkpoint(tmp_path / "a.pt", {**CHECKPOINT, **change})
+    with pytest.raises(InputError, match=message):
+        read_policy(tmp_path / "a.pt")
 
 
 def test_the_three_policies_travel_with_their_cards():
@@ -53,6 +172,7 @@ def test_the_three_policies_travel_with_their_cards():
         assert path.stat().st_size < 1_000_000
         assert hashlib.sha256(path.read_bytes()).hexdigest() in card
         assert load_exported(path)["command"] in card
+        assert b"_target_" not in path.read_bytes()
 
 
 def test_each_is_what_its_name_says():

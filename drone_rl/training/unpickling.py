@@ -1,0 +1,181 @@
+"""Tensors and plain values out of a file of `torch.save`, and nothing else, whatever is in it.
+
+`torch.load(weights_only=True)` runs no code, but it allocates what a file asks for, trusts the
+sizes of storages and knows types that a checkpoint never has. This reader knows a dozen
+instructions, builds tensors from the bytes that are there, and calls nothing.
+"""
+
+import collections
+import io
+import math
+import pickle
+import re
+from collections.abc import Mapping
+from typing import Any, ClassVar, NoReturn
+
+import torch
+from torch import Tensor
+
+from drone_rl.utils.archives import read_members
+
+MOST_BYTES = 2**28
+"""Of a checkpoint."""
+MOST_PICKLED = 2**21
+"""Bytes of the instructions, which tell of everything but the tensors' numbers."""
+_MEMBER = re.compile(r"[^/]+/(data\.pkl|data/\d+|byteorder|version|\.[\w/.]+)")
+_DTYPES = {
+    "FloatStorage": torch.float32,
+    "DoubleStorage": torch.float64,
+    "HalfStorage": torch.float16,
+    "BFloat16Storage": torch.bfloat16,
+    "LongStorage": torch.int64,
+    "IntStorage": torch.int32,
+    "ShortStorage": torch.int16,
+    "CharStorage": torch.int8,
+    "ByteStorage": torch.uint8,
+    "BoolStorage": torch.bool,
+    "ComplexFloatStorage": torch.complex64,
+    "ComplexDoubleStorage": torch.complex128,
+}
+_INSTRUCTIONS = {
+    name: getattr(pickle, name)[0]
+    for name in (
+        *("PROTO", "STOP", "MARK", "NONE", "NEWTRUE", "NEWFALSE"),
+        *("BININT", "BININT1", "BININT2", "LONG1", "BINFLOAT", "BINUNICODE"),
+        *("EMPTY_TUPLE", "TUPLE", "TUPLE1", "TUPLE2", "TUPLE3"),
+        *("EMPTY_LIST", "APPEND", "APPENDS", "EMPTY_DICT", "SETITEM", "SETITEMS"),
+        *("BINPUT", "LONG_BINPUT", "BINGET", "LONG_BINGET"),
+        *("GLOBAL", "REDUCE", "BUILD", "BINPERSID"),
+    )
+}
+
+
+class DamagedError(ValueError):
+    """The file is damaged or cut short."""
+
+
+class ForeignError(ValueError):
+    """The file holds more than tensors and plain values."""
+
+
+def unpickle(content: bytes, where: str) -> Any:
+    """What was saved, on the CPU.
+
+    Args:
+        content: Of the file.
+        where: Its name, for people.
+
+    Raises:
+        InputError: It is no archive, or too large.
+        DamagedError: It is damaged.
+        ForeignError: It holds something else.
+    """
+    members = {}
+    for name, data in read_members(content, where, most=MOST_BYTES):
+        if not _MEMBER.fullmatch(name):
+            raise ForeignError(f"a file {name[:80]!r}")
+        members[name.partition("/")[2]] = data
+    program = members.get("data.pkl")
+    if program is None or members.get("byteorder", b"little") != b"little":
+        raise DamagedError("it has no data.pkl of this byte order")
+    if len(program) > MOST_PICKLED:
+        raise ForeignError("more values than a checkpoint has")
+    try:
+        return _Unpickler(program, members).load()
+    except (DamagedError, ForeignError):
+        raise
+    except _DAMAGE as error:
+        raise DamagedError(type(error).__name__) from None
+
+
+_DAMAGE = (
+    *(pickle.UnpicklingError, EOFError, ValueError, TypeError, LookupError, AttributeError),
+    *(RuntimeError, OverflowError, RecursionError),
+)
+"""What nonsensical instructions end in."""
+
+
+class _Rebuild:
+    """Stands for the function that makes a tensor of a storage."""
+
+    __slots__ = ()
+
+    def __call__(self, storage: Any, offset: Any, size: Any, stride: Any, *_: Any) -> Tensor:
+        numbers = (offset, *size, *stride)
+        if not isinstance(storage, Tensor) or any(type(n) is not int or n < 0 for n in numbers):
+            raise DamagedError("a tensor without a storage")
+        extent = offset + sum((n - 1) * step for n, step in zip(size, stride, strict=True)) + 1
+        count = math.prod(size)
+        if len(size) > 8 or count > len(storage) or (count and extent > len(storage)):
+            raise DamagedError("a tensor is larger than its storage")
+        return storage.as_strided(size, stride, offset)
+
+
+class _NewMapping:
+    """Stands for an ordered mapping, which is made empty and then filled."""
+
+    __slots__ = ()
+
+    def __call__(self) -> dict:
+        return collections.OrderedDict()
+
+
+class _Unpickler(pickle._Unpickler):
+    """Python's own unpickler with the instructions that are needed left over."""
+
+    dispatch: ClassVar[dict] = {
+        code: pickle._Unpickler.dispatch[code] for code in _INSTRUCTIONS.values()
+    }
+
+    def __init__(self, program: bytes, members: Mapping[str, bytes]) -> None:
+        super().__init__(io.BytesIO(program))
+        self._members = members
+        self._storages: dict[tuple[str, torch.dtype], Tensor] = {}
+
+    def load(self) -> Any:
+        """Runs the instructions."""
+        used = _Watched(self.dispatch)
+        self.dispatch = used
+        return super().load()
+
+    def find_class(self, module: str, name: str) -> Any:
+        """The three things that a checkpoint names."""
+        if (module, name) == ("torch._utils", "_rebuild_tensor_v2"):
+            return _Rebuild()
+        if (module, name) == ("collections", "OrderedDict"):
+            return _NewMapping()
+        if module == "torch" and name in _DTYPES:
+            return _DTYPES[name]
+        raise ForeignError(f"{module}.{name}"[:80])
+
+    def persistent_load(self, pid: Any) -> Tensor:
+        """A storage, as long as its bytes say."""
+        kind, dtype, key, _, length = pid
+        if kind != "storage" or not isinstance(dtype, torch.dtype) or not isinstance(key, str):
+            raise ForeignError("a reference to something else than a storage")
+        content = self._members[f"data/{key}"]
+        if length * dtype.itemsize != len(content):
+            raise DamagedError("a storage is not as long as it says")
+        if (key, dtype) not in self._storages:
+            empty = not content
+            made = torch.empty(0, dtype=dtype) if empty else _tensor(content, dtype)
+            self._storages[key, dtype] = made
+        return self._storages[key, dtype]
+
+    def _ignore_state(self) -> None:
+        """What modules note beside their parameters (versions of layers) is not needed."""
+        self.stack.pop()
+
+    dispatch[_INSTRUCTIONS["BUILD"]] = _ignore_state
+
+
+class _Watched(dict):
+    """Instructions, of which an unknown one means that the file is not ours."""
+
+    def __missing__(self, code: int) -> NoReturn:
+        raise ForeignError(f"instruction {code}")
+
+
+def _tensor(content: bytes, dtype: torch.dtype) -> Tensor:
+    """A tensor that owns its numbers. Shape: (n,)."""
+    return torch.frombuffer(bytearray(content), dtype=dtype)

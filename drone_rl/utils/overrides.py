@@ -1,0 +1,95 @@
+"""Settings of an earlier run (`key=value`), as they stand in its folder: never believed unchecked.
+
+On a command line a setting may name classes, files and programs. In a file of which nobody knows
+who wrote it, it may not.
+"""
+
+import re
+from collections.abc import Collection
+from pathlib import Path
+
+import yaml
+
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.files import read_bytes
+from drone_rl.utils.schema import Several, Text, shown
+
+MOST_OVERRIDES = 200
+"""Settings of one run."""
+_LONGEST = 500
+_NAME = r"[A-Za-z]\w*"
+_HARMLESS = re.compile(rf"(\+{{0,2}}{_NAME}([./@]{_NAME})*=.*|~{_NAME}([./@]{_NAME})*)")
+_SCALAR = r"[\w.+-]*"
+_VALUE = rf"({_SCALAR}|\[({_SCALAR}(, ?{_SCALAR})*)?\])"
+_SECTIONS = "task|camera|trainer|policy|returns|objective|optimiser|scheduler|transforms"
+_TAKEN_OVER = (
+    r"(seed|evaluate_after|trial|resume)=\w*",
+    r"device=(cpu|cuda)(:\d+)?",
+    rf"({_SECTIONS}|collector|logger|experiment|sweep)=[A-Za-z][\w-]*",
+    rf"\+{{0,2}}({_SECTIONS})(\.{_NAME}){{1,2}}={_VALUE}",
+    rf"~transforms\.{_NAME}",
+    rf"collector\.(num_envs|num_threads|num_cpus|max_lost_workers)={_SCALAR}",
+)
+"""What a resumed run takes over: what is learned and how, chosen by name, in plain values."""
+
+
+def check_harmless(override: str, where: str) -> str:
+    """A setting that may be shown to people, who may copy it into a shell.
+
+    Raises:
+        InputError: It names Python, Hydra's own settings or another setting's value.
+    """
+    text = Text(_LONGEST).read(override, where)
+    key = text.partition("=")[0].lstrip("+~")
+    if not _HARMLESS.fullmatch(text) or key.startswith("hydra") or "${" in text or "`" in text:
+        raise InputError(
+            f"{where} sets {shown(text)}, which is no plain setting; a file may not do that"
+        )
+    return text
+
+
+def read_overrides(folder: Path) -> list[str]:
+    """The settings of a run as Hydra noted them; none if it noted none.
+
+    Args:
+        folder: Of the run.
+
+    Raises:
+        InputError: The file is damaged or a setting is not harmless.
+    """
+    path = folder / ".hydra" / "overrides.yaml"
+    if not path.exists():
+        return []
+    try:
+        found = yaml.safe_load(read_bytes(path, 2**16))
+    except (yaml.YAMLError, RecursionError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"{path} is damaged ({type(error).__name__})") from None
+    texts = Several(Text(_LONGEST), 0, MOST_OVERRIDES).read(found, str(path))
+    return [check_harmless(text, str(path)) for text in texts]
+
+
+def taken_over(folder: Path, told: Collection[str]) -> list[str]:
+    """The settings of a run that goes on, except those that are told anew.
+
+    Args:
+        folder: Of the run.
+        told: Settings on the command line, which say more than any file may.
+
+    Raises:
+        InputError: A setting may not be taken over from a file.
+    """
+    keys = {_key(override) for override in told}
+    found = [o for o in read_overrides(folder) if _key(o) not in keys and _key(o) != "resume"]
+    for override in found:
+        if not any(re.fullmatch(pattern, override) for pattern in _TAKEN_OVER):
+            raise InputError(
+                f"{folder}/.hydra/overrides.yaml sets {shown(override)}, which is not taken over "
+                "from a file; if it is yours, give it on the command line too"
+            )
+    return found
+
+
+def _key(override: str) -> str:
+    return override.partition("=")[0].lstrip("+~")

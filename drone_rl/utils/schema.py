@@ -1,0 +1,198 @@
+"""What plain data out of a file may be: types and bounds, checked before anything is made of it.
+
+Each kind has one method, `read(value, where)`, that returns the value or refuses it by name.
+"""
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol
+
+from drone_rl.utils.errors import InputError
+
+LONGEST_TEXT = 4000
+"""Characters of one text in a file."""
+MOST_VALUES = 20_000
+"""Values that a freely shaped part of a file may hold."""
+DEEPEST = 12
+"""Levels of such a part."""
+
+
+class Kind(Protocol):
+    """One kind of value."""
+
+    def read(self, value: Any, where: str) -> Any:
+        """The value, if it is of this kind.
+
+        Args:
+            value: Out of a file.
+            where: Its name, for people.
+
+        Raises:
+            InputError: It is of another type or out of bounds.
+        """
+        ...
+
+
+@dataclasses.dataclass(frozen=True)
+class Whole:
+    """A whole number; neither true nor 3.0 is one."""
+
+    low: int
+    high: int
+
+    def read(self, value: Any, where: str) -> int:
+        """See `Kind`."""
+        if type(value) is not int or not self.low <= value <= self.high:
+            raise InputError(
+                f"{where}={shown(value)} is out of range; give a whole number from {self.low} to "
+                f"{self.high}"
+            )
+        return value
+
+
+@dataclasses.dataclass(frozen=True)
+class Real:
+    """A finite number."""
+
+    low: float
+    high: float
+
+    def read(self, value: Any, where: str) -> float:
+        """See `Kind`."""
+        if type(value) not in (int, float) or not self.low <= value <= self.high:
+            raise InputError(
+                f"{where}={shown(value)} is out of range; give a number from {self.low:g} to "
+                f"{self.high:g}"
+            )
+        return float(value)
+
+
+@dataclasses.dataclass(frozen=True)
+class Text:
+    """One line of printable characters."""
+
+    longest: int = LONGEST_TEXT
+
+    def read(self, value: Any, where: str) -> str:
+        """See `Kind`."""
+        if not isinstance(value, str) or len(value) > self.longest or not value.isprintable():
+            raise InputError(
+                f"{where}={shown(value)} is no text; give one line of at most {self.longest} "
+                "printable characters"
+            )
+        return value
+
+
+@dataclasses.dataclass(frozen=True)
+class Maybe:
+    """A value of some kind, or none."""
+
+    kind: Kind
+
+    def read(self, value: Any, where: str) -> Any:
+        """See `Kind`."""
+        return None if value is None else self.kind.read(value, where)
+
+
+@dataclasses.dataclass(frozen=True)
+class Several:
+    """So many values of one kind, as a tuple."""
+
+    kind: Kind
+    least: int
+    most: int
+
+    def read(self, value: Any, where: str) -> tuple:
+        """See `Kind`."""
+        if not isinstance(value, list | tuple) or not self.least <= len(value) <= self.most:
+            raise InputError(
+                f"{where}={shown(value)} is out of range; give a list of {self.least} to "
+                f"{self.most} values"
+            )
+        return tuple(self.kind.read(item, f"{where}[{i}]") for i, item in enumerate(value))
+
+
+@dataclasses.dataclass(frozen=True)
+class Record:
+    """Exactly these keys, each with a value of its kind."""
+
+    fields: Mapping[str, Kind]
+    optional: frozenset[str] = frozenset()
+    """Keys that may be missing."""
+
+    def read(self, value: Any, where: str) -> dict[str, Any]:
+        """See `Kind`."""
+        value = as_mapping(value, where)
+        for key in value:
+            if key not in self.fields:
+                raise InputError(
+                    f"{where}.{shown(key)} is unknown; there are: {', '.join(self.fields) or '-'}"
+                )
+        for key in self.fields:
+            if key not in value and key not in self.optional:
+                raise InputError(f"{where}.{key} is missing; write the file again")
+        return {
+            key: kind.read(value[key], f"{where}.{key}")
+            for key, kind in self.fields.items()
+            if key in value
+        }
+
+
+@dataclasses.dataclass(frozen=True)
+class Plain:
+    """Any plain data, not too much of it: texts, numbers, true, false, none, lists, mappings."""
+
+    most: int = MOST_VALUES
+    deepest: int = DEEPEST
+
+    def read(self, value: Any, where: str) -> Any:
+        """See `Kind`."""
+        seen, level = 0, [value]
+        for _ in range(self.deepest + 1):
+            below: list[Any] = []
+            for item in level:
+                seen += len(item) if isinstance(item, Mapping | list | tuple) else 0
+                if seen > self.most:
+                    raise InputError(f"{where} holds more than {self.most} values")
+                below.extend(_inside(item, where))
+            if not below:
+                return value
+            level = below
+        raise InputError(f"{where} is nested more than {self.deepest} times")
+
+
+def as_mapping(value: Any, where: str) -> Mapping[str, Any]:
+    """A mapping with texts as keys.
+
+    Raises:
+        InputError: It is something else.
+    """
+    if not isinstance(value, Mapping) or not all(isinstance(key, str) for key in value):
+        raise InputError(f"{where}={shown(value)} must be a mapping from names to values")
+    return value
+
+
+def shown(value: Any) -> str:
+    """A value as it may stand in a message: short, on one line."""
+    if value is not None and not isinstance(value, str | int | float):
+        return f"({type(value).__name__})"
+    text = repr(value[:80] if isinstance(value, str) else value)
+    return text if len(text) <= 80 else f"{text[:77]}..."
+
+
+def _inside(item: Any, where: str) -> Sequence[Any]:
+    """What a list or mapping holds; a single value is checked and holds nothing."""
+    if isinstance(item, Mapping):
+        for key in as_mapping(item, where):
+            Text().read(key, f"a name in {where}")
+        return list(item.values())
+    if isinstance(item, list | tuple):
+        return item
+    if isinstance(item, str):
+        Text().read(item, f"a text in {where}")
+    elif isinstance(item, float) and not math.isfinite(item):
+        raise InputError(f"{where} holds {item}; every number must be finite")
+    elif item is not None and not isinstance(item, bool | int | float):
+        raise InputError(f"{where} holds a value of type {type(item).__name__}; give plain data")
+    return ()

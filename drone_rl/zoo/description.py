@@ -1,0 +1,187 @@
+"""A policy as plain data: task, camera, transforms and network, by registered names and values.
+
+The same description stands in checkpoints, exported files and run folders. It is all that is needed
+to build a policy, and all that a file can ask for.
+"""
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import torch
+from torchrl.envs import TransformedEnv
+
+from drone_rl.envs import DroneEnv, make_env
+from drone_rl.policies import PolicyNetwork
+from drone_rl.sim.rules import Action
+from drone_rl.sim.settings import CameraSettings, TaskSettings
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.schema import Record, Several, as_mapping, shown
+from drone_rl.zoo.registry import CAMERA, NETWORKS, TASK, TRANSFORMS, Part, Picture, find_part
+
+FORMAT = "drone_rl policy"
+FORMAT_VERSION = 2
+MOST_PARAMETERS = 2**24
+"""Of a network: 64 MiB."""
+MOST_PIXELS = 2**18
+"""Of a camera's frame."""
+MOST_NUMBERS = 2**20
+"""Of one picture after any transform."""
+MOST_TRANSFORMS = 16
+_KEYS = ("format", "format_version", "task", "camera", "transforms", "network")
+
+
+@dataclasses.dataclass(frozen=True)
+class Choice:
+    """A registered part and the values of its parameters."""
+
+    name: str
+    values: Mapping[str, Any]
+
+    def as_dict(self) -> dict[str, Any]:
+        """As in files."""
+        return {"name": self.name, **{k: _listed(v) for k, v in self.values.items()}}
+
+
+@dataclasses.dataclass(frozen=True)
+class PolicyDescription:
+    """What a policy flies in, sees and consists of; in bounds, and its parts fit together.
+
+    Raises:
+        InputError: They don't fit, or together exceed a bound.
+    """
+
+    task: TaskSettings
+    camera: CameraSettings
+    transforms: tuple[Choice, ...]
+    """In the order in which they are applied."""
+    network: Choice
+
+    def __post_init__(self) -> None:
+        """Refuses what could not be built, or only with much memory."""
+        pixels = self.camera.width * self.camera.height
+        if pixels > MOST_PIXELS:
+            raise InputError(f"camera has {pixels} pixels; give at most {MOST_PIXELS}")
+        if not self.picture.is_float:
+            raise InputError("the network needs floats; add a transform such as gray")
+        expected = self.expected_weights()
+        count = sum(value.numel() for value in expected.values())
+        if count > MOST_PARAMETERS:
+            raise InputError(
+                f"the network has {count} parameters; give sizes that make at most "
+                f"{MOST_PARAMETERS}"
+            )
+
+    @property
+    def picture(self) -> Picture:
+        """What the network sees."""
+        picture = Picture((self.camera.height, self.camera.width, 3))
+        for choice in self.transforms:
+            picture = TRANSFORMS[choice.name].change(picture, choice.values)
+            if math.prod(picture.shape) > MOST_NUMBERS:
+                raise InputError(
+                    f"the transform {choice.name} makes pictures of shape {picture.shape}; give "
+                    f"sizes that make at most {MOST_NUMBERS} numbers"
+                )
+        return picture
+
+    def as_dict(self) -> dict[str, Any]:
+        """As in files; `parse` undoes it."""
+        return {
+            "format": FORMAT,
+            "format_version": FORMAT_VERSION,
+            "task": {k: _listed(v) for k, v in dataclasses.asdict(self.task).items()},
+            "camera": dataclasses.asdict(self.camera),
+            "transforms": [choice.as_dict() for choice in self.transforms],
+            "network": self.network.as_dict(),
+        }
+
+    def build_env(
+        self, num_envs: int, *, seed: int, device: str, pixels: bool = True, **kwargs: Any
+    ) -> TransformedEnv:
+        """The described worlds, seen through the described camera and transforms.
+
+        Args:
+            num_envs: How many.
+            seed: Root of their random streams.
+            device: Where they are drawn.
+            pixels: Whether they are drawn at all.
+            kwargs: See `DroneEnv`.
+        """
+        made = []
+        for choice in self.transforms if pixels else ():
+            part = TRANSFORMS[choice.name]
+            made.append(part.make(**choice.values, **part.fixed))
+        env = DroneEnv(
+            num_envs, self.task, self.camera, seed=seed, device=device, pixels=pixels, **kwargs
+        )
+        return make_env(env, made)
+
+    def build_network(self, generator: torch.Generator | None = None) -> PolicyNetwork:
+        """The described network with fresh weights.
+
+        Args:
+            generator: Source of the initial weights; torch's global one by default.
+        """
+        part = NETWORKS[self.network.name]
+        return part.make(
+            self.picture.shape, len(Action), generator=generator, **self.network.values
+        )
+
+    def expected_weights(self) -> dict[str, torch.Tensor]:
+        """Names, shapes and types of the network's weights, without the weights themselves."""
+        with torch.device("meta"):
+            return dict(self.build_network().state_dict())
+
+
+def parse(data: Any) -> PolicyDescription:
+    """Reads a description, strictly.
+
+    Args:
+        data: Plain data.
+
+    Raises:
+        InputError: A key is missing or unknown, a value is of another type or out of bounds.
+    """
+    data = as_mapping(data, "the policy's description")
+    if data.get("format") != FORMAT or type(data.get("format_version")) is not int:
+        raise InputError(f"format={shown(data.get('format'))} is not that of a policy: {FORMAT}")
+    if data["format_version"] != FORMAT_VERSION:
+        raise InputError(
+            f"format_version={shown(data['format_version'])}: this program reads "
+            f"{FORMAT_VERSION}; use the version of drone_rl that wrote it"
+        )
+    if set(data) != set(_KEYS):
+        names = ", ".join(shown(key) for key in sorted(set(data) ^ set(_KEYS)))
+        raise InputError(
+            f"the policy's description has exactly {', '.join(_KEYS)}; not so: {names}"
+        )
+    chosen = Several(_ChoiceOf(TRANSFORMS), 0, MOST_TRANSFORMS).read(
+        data["transforms"], "transforms"
+    )
+    return PolicyDescription(
+        TaskSettings(**TASK.read(data["task"], "task")),
+        CameraSettings(**CAMERA.read(data["camera"], "camera")),
+        chosen,
+        _ChoiceOf(NETWORKS).read(data["network"], "network"),
+    )
+
+
+@dataclasses.dataclass(frozen=True)
+class _ChoiceOf:
+    """The kind of value that names a part and gives its parameters."""
+
+    parts: Mapping[str, Part]
+
+    def read(self, value: Any, where: str) -> Choice:
+        """See `drone_rl.utils.schema.Kind`."""
+        given = dict(as_mapping(value, where))
+        name = given.pop("name", None)
+        parameters: Record = find_part(self.parts, name, f"{where}.name").parameters
+        return Choice(str(name), parameters.read(given, where))
+
+
+def _listed(value: Any) -> Any:
+    """Tuples as lists, as JSON has them."""
+    return list(value) if isinstance(value, tuple) else value

@@ -1,0 +1,241 @@
+"""What a policy may consist of, by name: the one table of networks, transforms and their bounds.
+
+A file names a part and gives it values; only what stands here can be named. Programs add parts of
+their own with `register_network` and `register_transform`, in a module that an installed package
+names in the entry point group "drone_rl.policies"; a file can't.
+"""
+
+import dataclasses
+import functools
+from collections.abc import Callable, Mapping
+from importlib import metadata
+from typing import Any
+
+from torch import nn
+from torchrl.envs import CatFrames, RewardSum, StepCounter, Transform
+
+from drone_rl.envs import CropRows, GrayPixels, Resize, StandardizePixels
+from drone_rl.policies import MLP, OriginalCNN, SmallCNN
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.schema import Kind, Real, Record, Several, Whole, shown
+
+ENTRY_POINTS = "drone_rl.policies"
+"""Group of the modules that register parts of their own."""
+_LENGTH, _WIDTHS = Real(0.001, 10_000.0), Whole(1, 4096)
+TASK = Record(
+    {
+        "num_cubes": Whole(1, 100),
+        "first_distance": _LENGTH,
+        "spacing": _LENGTH,
+        "lateral_bound": Real(0.0, 10_000.0),
+        "vertical_bound": Real(0.0, 10_000.0),
+        "cube_size": _LENGTH,
+        "cube_color": Several(Real(0.0, 1.0), 3, 3),
+        "drone_size": _LENGTH,
+        "altitude": _LENGTH,
+        "step_length": _LENGTH,
+        "step_limit": Whole(1, 100_000),
+        "front_margin": _LENGTH,
+        "side_margin": _LENGTH,
+    }
+)
+"""Of `TaskSettings`, which checks besides whether the values go together."""
+CAMERA = Record(
+    {"width": Whole(1, 1024), "height": Whole(1, 1024), "horizontal_fov": Real(1.0, 170.0)}
+)
+"""Of `CameraSettings`."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Picture:
+    """What the next part gets to see of a frame."""
+
+    shape: tuple[int, ...]
+    """RGB bytes are (H, W, 3); floats are (C, H, W)."""
+    is_float: bool = False
+    """Whether these are float32 numbers, as networks want them."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Part:
+    """A registered network or transform."""
+
+    make: Callable[..., Any]
+    """Takes the parameters by name; a network's also takes shape, actions and generator."""
+    parameters: Record
+    """The parameters that a file gives, each with type and bounds."""
+    targets: tuple[str, ...]
+    """The `_target_`s of settings that mean this part."""
+    fixed: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    """Arguments that are always the same."""
+    change: Callable[[Picture, Mapping[str, Any]], Picture] = lambda picture, _: picture
+    """What a transform makes of a picture, given its parameters."""
+
+
+NETWORKS: dict[str, Part] = {}
+"""By name."""
+TRANSFORMS: dict[str, Part] = {}
+"""By name."""
+
+
+def register_network(
+    name: str, make: Callable[..., nn.Module], parameters: Mapping[str, Kind], *targets: str
+) -> None:
+    """Makes a network known to descriptions, in files too.
+
+    Args:
+        name: Which files give.
+        make: Called as `make(in_shape, num_actions, generator=..., **parameters)`.
+        parameters: Type and bounds of each, see `drone_rl.utils.schema`.
+        targets: `_target_`s that mean it; by default the place where it is defined.
+    """
+    NETWORKS[name] = Part(make, Record(parameters), targets or (_place(make),))
+
+
+def register_transform(
+    name: str,
+    make: Callable[..., Transform],
+    parameters: Mapping[str, Kind],
+    *targets: str,
+    fixed: Mapping[str, Any] | None = None,
+    change: Callable[[Picture, Mapping[str, Any]], Picture] = lambda picture, _: picture,
+) -> None:
+    """Makes a transform known to descriptions, in files too.
+
+    Args:
+        name: Which files give.
+        make: Called as `make(**parameters, **fixed)`.
+        parameters: Type and bounds of each, see `drone_rl.utils.schema`.
+        targets: `_target_`s that mean it; by default the place where it is defined.
+        fixed: Arguments that are always the same.
+        change: What it makes of a picture's shape; nothing by default.
+    """
+    TRANSFORMS[name] = Part(
+        make, Record(parameters), targets or (_place(make),), dict(fixed or {}), change
+    )
+
+
+def find_part(parts: Mapping[str, Part], name: object, where: str) -> Part:
+    """A registered part.
+
+    Raises:
+        InputError: There is none of that name.
+    """
+    if name not in list(parts):
+        load_entry_points()
+    if name not in list(parts):
+        raise InputError(f"{where}={shown(name)} is unknown; there are: {', '.join(parts)}")
+    return parts[str(name)]
+
+
+@functools.cache
+def load_entry_points() -> None:
+    """Imports what installed packages register; once, and only if something isn't known."""
+    for point in metadata.entry_points(group=ENTRY_POINTS):
+        point.load()
+
+
+def _place(make: Any) -> str:
+    return f"{make.__module__}.{make.__qualname__}"
+
+
+def _gray(picture: Picture, _: Mapping[str, Any]) -> Picture:
+    if picture.is_float or picture.shape[-1] != 3:
+        raise InputError("the transform gray needs the camera's own RGB; let it come first")
+    return Picture((1, *picture.shape[:2]), True)
+
+
+def _crop(picture: Picture, values: Mapping[str, Any]) -> Picture:
+    top, bottom, rows = values["top"], values["bottom"], picture.shape[-2]
+    if not top < bottom <= rows:
+        raise InputError(
+            f"the transform crop keeps rows {top} to {bottom} of {rows}; give top < bottom and at "
+            f"most {rows}"
+        )
+    return Picture((*picture.shape[:-2], bottom - top, picture.shape[-1]), picture.is_float)
+
+
+def _resize(picture: Picture, values: Mapping[str, Any]) -> Picture:
+    if not picture.is_float:
+        raise InputError("the transform resize needs floats; let gray come first")
+    return Picture((picture.shape[0], values["height"], values["width"]), True)
+
+
+def _stack(picture: Picture, values: Mapping[str, Any]) -> Picture:
+    return Picture((picture.shape[0] * values["N"], *picture.shape[1:]), picture.is_float)
+
+
+def _standardize(picture: Picture, _: Mapping[str, Any]) -> Picture:
+    return Picture(picture.shape, True)
+
+
+register_network(
+    "small_cnn",
+    SmallCNN,
+    {
+        "patch": Whole(1, 64),
+        "channels": Several(Whole(1, 512), 1, 8),
+        "hidden": Several(_WIDTHS, 0, 8),
+    },
+    *("drone_rl.policies.SmallCNN", "drone_rl.policies.cnn.SmallCNN"),
+)
+register_network(
+    "original_cnn",
+    OriginalCNN,
+    {"channels": Several(Whole(1, 512), 1, 8), "hidden": Several(_WIDTHS, 0, 8)},
+    *("drone_rl.policies.OriginalCNN", "drone_rl.policies.cnn.OriginalCNN"),
+)
+register_network(
+    "mlp",
+    MLP,
+    {"hidden": Several(_WIDTHS, 0, 8)},
+    *("drone_rl.policies.MLP", "drone_rl.policies.mlp.MLP"),
+)
+register_transform(
+    "gray",
+    GrayPixels,
+    {},
+    *("drone_rl.envs.transforms.GrayPixels", "drone_rl.envs.GrayPixels"),
+    change=_gray,
+)
+register_transform(
+    "standardize",
+    StandardizePixels,
+    {"mean": Real(-1000.0, 1000.0), "std": Real(1e-6, 1000.0)},
+    *("drone_rl.envs.transforms.StandardizePixels", "drone_rl.envs.StandardizePixels"),
+    change=_standardize,
+)
+register_transform(
+    "crop",
+    CropRows,
+    {"top": Whole(0, 1023), "bottom": Whole(1, 1024)},
+    *("drone_rl.envs.transforms.CropRows", "drone_rl.envs.CropRows"),
+    change=_crop,
+)
+register_transform(
+    "resize",
+    Resize,
+    {"height": Whole(1, 1024), "width": Whole(1, 1024)},
+    *("drone_rl.envs.transforms.Resize", "drone_rl.envs.Resize"),
+    change=_resize,
+)
+register_transform(
+    "stack",
+    CatFrames,
+    {"N": Whole(1, 16)},
+    *("torchrl.envs.CatFrames", "torchrl.envs.transforms.CatFrames"),
+    fixed={"dim": -3, "in_keys": ["pixels"]},
+    change=_stack,
+)
+register_transform(
+    "episode_reward",
+    RewardSum,
+    {},
+    *("torchrl.envs.RewardSum", "torchrl.envs.transforms.RewardSum"),
+)
+register_transform(
+    "step_count",
+    StepCounter,
+    {},
+    *("torchrl.envs.StepCounter", "torchrl.envs.transforms.StepCounter"),
+)

@@ -1,0 +1,99 @@
+"""Archives and arrays give what is in them, or one line; never more memory than they may."""
+
+import io
+import struct
+import zipfile
+
+import numpy as np
+import pytest
+
+from drone_rl.utils.archives import read_arrays, read_members
+from drone_rl.utils.errors import InputError
+
+
+def archive(members, method=zipfile.ZIP_STORED):
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", method) as target:
+        for name, data in members:
+            target.writestr(name, data)
+    return file.getvalue()
+
+
+def npy(shape, dtype="<f4", data=b"", by_column=False):
+    header = f"{{'descr': '{dtype}', 'fortran_order': {by_column}, 'shape': {shape}, }}".encode()
+    return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header) + 1) + header + b"\n" + data
+
+
+def test_members_come_in_order():
+    content = archive([("a", b"1"), ("b", b"22")])
+    assert list(read_members(content, "x", most=3)) == [("a", b"1"), ("b", b"22")]
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"no archive", "no whole archive"),
+        (archive([("a", b"1"), ("b", b"22")]), "more than 2 bytes"),
+        (archive([("a", b"")] * 10_001), "more than 10000 files"),
+        (archive([("a", b""), ("a", b"")]), "two files of one name"),
+        (archive([("a", b"11")], zipfile.ZIP_DEFLATED), "not accepted"),
+        (archive([("a", b"11")]).replace(b"11", b"12"), "no whole archive"),
+        (archive([("a", b"11")])[:-5], "no whole archive"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore:Duplicate name")
+def test_damaged_or_too_large(content, message):
+    with pytest.raises(InputError, match=message):
+        list(read_members(content, "x", most=2))
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        np.arange(6.0).reshape(2, 3),
+        np.asfortranarray(np.arange(6).reshape(2, 3)),
+        np.array("text"),
+        np.array(True),
+        np.zeros((0, 3), np.float16),
+        np.array(7),
+    ],
+)
+@pytest.mark.parametrize("save", [np.savez, np.savez_compressed])
+def test_arrays_come_back(tmp_path, value, save):
+    save(tmp_path / "a.npz", a=value)
+    found = read_arrays(tmp_path / "a.npz")["a"]
+    assert found.dtype == value.dtype
+    assert found.flags.writeable
+    np.testing.assert_array_equal(found, value)
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (npy((10**12,)), "which its bytes are not"),
+        (npy((2,), data=b"1234"), "which its bytes are not"),
+        (npy((1,), data=b"12345678"), "which its bytes are not"),
+        (npy((-1, -1), data=b"1234"), "no array"),
+        (npy((1,), dtype="|O", data=b"12345678"), "no array"),
+        (npy((1,), dtype="<c8", data=b"12345678"), "no array"),
+        (npy((2, 10**14), dtype="<f8"), "no array"),
+        (npy((10**12,) * 30, data=b"1234"), "which its bytes are not"),
+        (npy((0, 10**12)) + b"1", "which its bytes are not"),
+        (npy("x"), "no array"),
+        (b"\x93NUMPY\x09\x00", "no array"),
+        (b"", "no array"),
+        (b"\x93NUMPY\x01\x00\x10\x00" + b"(" * 16, "no array"),
+    ],
+)
+def test_arrays_that_lie(tmp_path, data, message):
+    (tmp_path / "a.npz").write_bytes(archive([("a.npy", data)]))
+    with pytest.raises(InputError, match=message):
+        read_arrays(tmp_path / "a.npz")
+
+
+def test_a_bomb_is_seen_by_its_directory(tmp_path):
+    bomb = archive([("a.npy", bytes(10**7))], zipfile.ZIP_DEFLATED)
+    assert len(bomb) < 20_000
+    (tmp_path / "a.npz").write_bytes(bomb)
+    with pytest.raises(InputError, match="more than 1000000 bytes"):
+        read_arrays(tmp_path / "a.npz", most=10**6)

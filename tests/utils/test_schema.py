@@ -1,0 +1,92 @@
+"""Each kind takes what it should, at its very bounds, and refuses the next value by name."""
+
+import pytest
+
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.schema import Maybe, Plain, Real, Record, Several, Text, Whole, shown
+
+
+@pytest.mark.parametrize(
+    ("kind", "value"),
+    [
+        (Whole(1, 3), 1),
+        (Whole(1, 3), 3),
+        (Real(-1, 2), 2.0),
+        (Real(-1, 2), -1.0),
+        (Text(3), "abc"),
+        (Maybe(Whole(1, 3)), None),
+        (Maybe(Whole(1, 3)), 2),
+        (Several(Whole(0, 9), 1, 2), (4, 5)),
+        (Record({"a": Whole(0, 1)}), {"a": 1}),
+        (Record({"a": Whole(0, 1)}, frozenset({"a"})), {}),
+        (Plain(most=3, deepest=2), {"a": [1, None]}),
+    ],
+)
+def test_what_is_taken(kind, value):
+    assert kind.read(value, "x") == value
+
+
+@pytest.mark.parametrize(
+    ("kind", "value", "message"),
+    [
+        (Whole(1, 3), 0, "x=0 is out of range"),
+        (Whole(1, 3), 4, "from 1 to 3"),
+        (Whole(0, 3), True, "x=True"),
+        (Whole(1, 3), 3.0, r"x=3\.0"),
+        (Whole(1, 3), "2", "x='2'"),
+        (Real(-1, 2), 2.1, r"x=2\.1"),
+        (Real(-1, 2), -1.1, r"x=-1\.1"),
+        (Real(-1, 2), float("nan"), "x=nan"),
+        (Real(-1, float("1e9")), 10**400, "x=1000"),
+        (Real(-1, 2), False, "x=False"),
+        (Text(3), "abcd", "at most 3"),
+        (Text(9), "a\nb", "printable"),
+        (Text(9), "a\x1b[0m", "printable"),
+        (Text(9), 5, "x=5"),
+        (Maybe(Whole(1, 3)), 4, "x=4"),
+        (Several(Whole(0, 9), 1, 2), [], "1 to 2 values"),
+        (Several(Whole(0, 9), 1, 2), [1, 2, 3], "1 to 2 values"),
+        (Several(Whole(0, 9), 1, 2), [1, 10], r"x\[1\]=10"),
+        (Several(Whole(0, 9), 1, 2), "12", "x='12'"),
+        (Record({"a": Whole(0, 1)}), {"a": 1, "b": 2}, "x.'b' is unknown"),
+        (Record({"a": Whole(0, 1)}), {}, r"x\.a is missing"),
+        (Record({"a": Whole(0, 1)}), {"a": 2}, r"x\.a=2"),
+        (Record({}), [], "x=\\(list\\) must be a mapping"),
+        (Record({}), {1: 2}, "must be a mapping"),
+        (Plain(most=3), [1, 2, 3, 4], "more than 3"),
+        (Plain(deepest=2), [[[1]]], "nested more than 2"),
+        (Plain(), [float("inf")], "finite"),
+        (Plain(), [object()], "type object"),
+        (Plain(), {"a\nb": 1}, "a name in x"),
+        (Plain(), ["a\nb"], "a text in x"),
+    ],
+)
+def test_what_is_refused(kind, value, message):
+    with pytest.raises(InputError, match=message) as error:
+        kind.read(value, "x")
+    assert "\n" not in str(error.value)
+
+
+def test_a_few_lists_that_hold_each_other_a_thousand_times_cost_nothing():
+    bomb = [0] * 1000
+    for _ in range(8):
+        bomb = [bomb] * 1000
+    with pytest.raises(InputError, match="more than 20000"):
+        Plain().read(bomb, "x")
+    endless = []
+    endless.append(endless)
+    with pytest.raises(InputError, match="nested"):
+        Plain().read(endless, "x")
+
+
+def test_numbers_become_floats_and_lists_tuples():
+    assert type(Real(0, 9).read(3, "x")) is float
+    assert Several(Real(0, 9), 0, 2).read([1, 2], "x") == (1.0, 2.0)
+
+
+def test_what_is_shown_is_short_and_on_one_line():
+    assert shown("a\n" * 1000).count("\n") == 0
+    assert len(shown("a" * 10**6)) <= 80
+    assert len(shown(10**400)) == 80
+    assert shown([1]) == "(list)"
+    assert shown(None) == "None"

@@ -1,0 +1,155 @@
+"""A description is strict, says everything, and builds what it says."""
+
+import copy
+
+import pytest
+import torch
+
+from drone_rl.utils.errors import InputError
+from drone_rl.zoo import parse
+
+DEFAULT = {
+    "format": "drone_rl policy",
+    "format_version": 2,
+    "task": {
+        "num_cubes": 3,
+        "first_distance": 15.0,
+        "spacing": 9.0,
+        "lateral_bound": 6.0,
+        "vertical_bound": 0.0,
+        "cube_size": 2.5,
+        "cube_color": [0.75, 0.12, 0.08],
+        "drone_size": 0.8,
+        "altitude": 2.5,
+        "step_length": 1.0,
+        "step_limit": 300,
+        "front_margin": 11.0,
+        "side_margin": 20.0,
+    },
+    "camera": {"width": 64, "height": 25, "horizontal_fov": 135.0},
+    "transforms": [{"name": "gray"}, {"name": "standardize", "mean": 0.53, "std": 0.21}],
+    "network": {"name": "small_cnn", "patch": 4, "channels": [16, 32], "hidden": [128]},
+}
+GRAY, STACK = {"name": "gray"}, {"name": "stack", "N": 2}
+
+
+def changed(where, value):
+    """The default with one value changed; a missing one is `...`."""
+    data, *keys = copy.deepcopy(DEFAULT), *where.split(".")
+    part = data
+    for key in keys[:-1]:
+        part = part[int(key) if key.isdigit() else key]
+    if value is ...:
+        del part[keys[-1]]
+    else:
+        part[int(keys[-1]) if keys[-1].isdigit() else keys[-1]] = value
+    return data
+
+
+def test_it_comes_back_as_it_was():
+    assert parse(DEFAULT).as_dict() == DEFAULT
+    assert parse(parse(DEFAULT).as_dict()) == parse(DEFAULT)
+
+
+def test_the_weights_are_known_before_there_are_any():
+    expected = parse(DEFAULT).expected_weights()
+    built = parse(DEFAULT).build_network(torch.Generator().manual_seed(0)).state_dict()
+    assert all(value.is_meta for value in expected.values())
+    assert {k: (v.shape, v.dtype) for k, v in expected.items()} == {
+        k: (v.shape, v.dtype) for k, v in built.items()
+    }
+
+
+@pytest.mark.parametrize(
+    ("camera", "transforms", "shape"),
+    [
+        ((25, 64), [GRAY], (1, 25, 64)),
+        ((36, 64), [GRAY, {"name": "crop", "top": 5, "bottom": 30}], (1, 25, 64)),
+        ((50, 100), [GRAY, {"name": "resize", "height": 13, "width": 20}], (1, 13, 20)),
+        (
+            (25, 64),
+            [GRAY, STACK, {"name": "episode_reward"}, {"name": "step_count"}],
+            (2, 25, 64),
+        ),
+    ],
+)
+def test_pictures_are_of_the_foretold_shape(camera, transforms, shape):
+    data = {**DEFAULT, "transforms": transforms}
+    data["camera"] = {"height": camera[0], "width": camera[1], "horizontal_fov": 90.0}
+    described = parse(data)
+    assert described.picture.shape == shape
+    env = described.build_env(1, seed=0, device="cpu")
+    assert tuple(env.reset()["pixels"].shape[1:]) == shape
+    env.close()
+
+
+@pytest.mark.parametrize(
+    ("where", "value", "message"),
+    [
+        ("format", "drone_rl checkpoint", "format='drone_rl checkpoint'"),
+        ("format_version", 3, "format_version=3"),
+        ("format_version", True, "format="),
+        ("format_version", ..., "format="),
+        ("more", 1, "not so: 'more'"),
+        ("task", ..., "not so: 'task'"),
+        ("task.num_cubes", 10**9, r"task\.num_cubes=1000000000"),
+        ("task.num_cubes", 3.0, r"num_cubes=3\.0"),
+        ("task.num_cubes", True, "num_cubes=True"),
+        ("task.num_cubes", 101, "from 1 to 100"),
+        ("task.step_limit", 0, "step_limit=0"),
+        ("task.step_limit", 100_001, "step_limit=100001"),
+        ("task.spacing", float("nan"), "spacing=nan"),
+        ("task.spacing", "${oc.env:HOME}", "spacing='"),
+        ("task.spacing", ..., r"task\.spacing is missing"),
+        ("task.wind", 1.0, "'wind' is unknown"),
+        ("task.cube_color", [0.1, 0.2], "cube_color"),
+        ("task.vertical_bound", 3.0, "never touches"),
+        ("camera.width", 4096, "width=4096"),
+        ("camera.width", 1024, None),
+        ("camera.horizontal_fov", 171, "horizontal_fov=171"),
+        ("transforms", [], "needs floats"),
+        ("transforms", {}, "transforms="),
+        ("transforms", [GRAY] * 17, "0 to 16 values"),
+        ("transforms", [GRAY, GRAY], "let it come first"),
+        ("transforms", [{"name": "crop", "top": 0, "bottom": 9}], "keeps rows 0 to 9 of 64|floats"),
+        ("transforms", [GRAY, {"name": "crop", "top": 9, "bottom": 9}], "9 to 9 of 25"),
+        ("transforms", [GRAY, {"name": "crop", "top": 0, "bottom": 26}], "0 to 26 of 25"),
+        ("transforms", [{"name": "resize", "height": 9, "width": 9}], "resize needs floats"),
+        ("transforms", [GRAY, {**STACK, "N": 17}], "N=17"),
+        ("transforms", [GRAY, {**STACK, "N": 16}, {**STACK, "N": 16}, {**STACK, "N": 16}], "shape"),
+        ("transforms.1.std", 0.0, r"transforms\[1\]\.std=0\.0"),
+        ("transforms.0.name", "exec", r"transforms\[0\]\.name='exec' is unknown"),
+        ("transforms.0._target_", "os.system", "'_target_' is unknown"),
+        ("network.name", "os.system", "network.name='os.system' is unknown"),
+        ("network.name", ["mlp"], r"network.name=\(list\) is unknown"),
+        ("network.name", ..., "network.name=None is unknown"),
+        ("network.hidden", [128] * 9, "0 to 8 values"),
+        ("network.hidden", [4097], r"hidden\[0\]=4097"),
+        ("network.hidden", [4096] * 3, "parameters"),
+        ("network.channels", [], "1 to 8 values"),
+        ("network.channels", [513], "513"),
+        ("network.patch", 26, "too small"),
+        ("network.bias", True, "'bias' is unknown"),
+    ],
+)
+def test_what_is_out_of_bounds_is_named(where, value, message):
+    if message is None:
+        parse(changed(where, value))  # at the bound
+        return
+    with pytest.raises(InputError, match=message) as error:
+        parse(changed(where, value))
+    assert "\n" not in str(error.value)
+
+
+def test_frames_are_bounded_as_a_whole():
+    camera = {"width": 1024, "height": 256, "horizontal_fov": 90.0}
+    network = {"name": "small_cnn", "patch": 64, "channels": [4], "hidden": []}
+    parse({**DEFAULT, "camera": camera, "network": network})
+    with pytest.raises(InputError, match="263168 pixels"):
+        parse({**DEFAULT, "camera": {**camera, "height": 257}, "network": network})
+
+
+@pytest.mark.parametrize("data", [None, [], "text", {}, {1: 2}])
+def test_what_is_no_description(data):
+    with pytest.raises(InputError):
+        parse(data)
