@@ -72,6 +72,7 @@ class DroneEnv(EnvBase):
         self._make_specs()
         self._pixels = self._pixel_spec().zero()
         self.set_seed(seed)
+        self.is_closed = False  # TorchRL takes every environment for closed until it is told
 
     def state_dict(self, *args: object, **kwargs: object) -> dict:
         """The worlds' random streams; enough to go on where every world is about to be reset."""

@@ -1,7 +1,11 @@
+import itertools
+
 import pytest
 import torch
 
 from drone_rl.collectors import EpisodeCollector, ThreadedCollector
+from drone_rl.envs import DroneEnv
+from drone_rl.evaluation import Oracle
 from drone_rl.sim.settings import TaskSettings
 from drone_rl.utils.errors import InputError
 
@@ -73,6 +77,79 @@ def test_stops_at_total_frames(make_pipeline):
     collector = EpisodeCollector(env, actor, total_frames=30)
     frames = sum(len(batch) for batch in collector)
     assert frames == collector.frames >= 30
+
+
+@pytest.fixture
+def seeing(make_pipeline):
+    """A collector whose policy reads the nested truth; three worlds, nothing is drawn."""
+    return EpisodeCollector(DroneEnv(3, SHORT, pixels=False), Oracle(SHORT))
+
+
+def test_what_a_policy_reads_is_there_at_every_step_and_kept(seeing):
+    batch = seeing.collect()
+    assert len(batch) > 3  # a second step needs the truth after the first
+    read = set(batch.keys(True, True)) - {"action", ("collector", "traj_ids")}
+    assert {key for key in read if key[0] != "next"} == set(Oracle(SHORT).in_keys)
+    first = batch["collector", "traj_ids"].diff(prepend=torch.tensor([-1])) > 0
+    drone, after = batch["info", "drone"], batch["next", "info", "cubes"][:, 0]
+    assert drone[first].tolist() == [[0.0, 0.0, SHORT.altitude]] * 3
+    steps = drone.diff(dim=0).abs().sum(-1)[~first[1:]]
+    torch.testing.assert_close(steps, torch.ones_like(steps))  # one metre a step
+    assert after[~first.roll(-1)].max() < 2  # all cubes end an episode
+
+
+def test_a_policy_may_read_the_reward(make_pipeline):
+    env, actor = make_pipeline(2, task=SHORT)
+    env.reset = lambda reset=env.reset: reset().set("reward", torch.zeros(2, 1))
+    actor.in_keys = [*actor.in_keys, "reward"]
+    seen = []
+    actor.register_forward_pre_hook(lambda _, args: seen.append(args[0]["reward"].shape[0]))
+    batch = EpisodeCollector(env, actor).collect()
+    assert sum(seen) == len(batch)
+
+
+def test_stops_before_a_batch_once_there_are_enough_frames(seeing):
+    def batches(total_frames):
+        seeing.env.set_seed(0)
+        collector = EpisodeCollector(seeing.env, seeing.actor, total_frames=total_frames)
+        return [len(batch) for batch in itertools.islice(collector, 3)]
+
+    first, *_ = without_number = [len(batch) for batch in itertools.islice(seeing, 3)]
+    assert len(without_number) == 3  # on and on
+    assert batches(-1) == without_number
+    assert batches(0) == []
+    assert batches(1) == batches(first) == [first]
+    assert batches(first + 1) == without_number[:2]
+
+
+def test_episodes_are_numbered_on_from_batch_to_batch(seeing):
+    ids = [set(seeing.collect()["collector", "traj_ids"].tolist()) for _ in range(3)]
+    assert ids == [{0, 1, 2}, {3, 4, 5}, {6, 7, 8}]
+    assert seeing.episodes == 9
+
+
+def test_episodes_of_one_step():
+    task = TaskSettings(num_cubes=1, first_distance=2.6, step_limit=1)
+    batch = EpisodeCollector(DroneEnv(3, task, pixels=False), Oracle(task)).collect()
+    assert batch["collector", "traj_ids"].tolist() == [0, 1, 2]
+    assert batch["next", "done"].all()
+
+
+def test_a_step_is_masked_only_once_some_world_has_ended(seeing):
+    masked, step = [], seeing.env.step
+    seeing.env.step = lambda state: masked.append("_step" in state) or step(state)
+    batch = seeing.collect()
+    shortest = int(batch["collector", "traj_ids"].bincount().min())
+    assert masked.index(True) == shortest
+    assert all(masked[shortest:])
+
+
+def test_shutdown_closes_the_worlds_and_may_come_twice(seeing):
+    seeing.collect()
+    assert not seeing.env.is_closed
+    seeing.shutdown()
+    assert seeing.env.is_closed
+    seeing.shutdown()
 
 
 def test_unbatched_environment_is_refused(make_pipeline):
