@@ -72,10 +72,9 @@ def standardised(reward: Tensor, done: Tensor, gamma: float) -> Tensor:
     padded, lengths = _pad(reward, done)
     returns = _discount(padded, gamma)
     alive = _alive(lengths, returns)
-    centred = (returns - _mean(returns, alive)) * alive
+    centred = returns - _mean(returns, alive)
     deviation = _mean(centred.square(), alive).sqrt()
-    flat = torch.where(deviation > ROUNDING, centred / deviation.clamp(min=ROUNDING), 0.0)
-    return _unpad(flat, lengths, reward)
+    return _unpad(torch.where(deviation > ROUNDING, centred / deviation, 0.0), lengths, reward)
 
 
 def linear_ramp(reward: Tensor, done: Tensor) -> Tensor:
@@ -125,10 +124,9 @@ def leave_one_out(reward: Tensor, done: Tensor, gamma: float) -> Tensor:
     """
     padded, lengths = _pad(reward, done)
     returns = _discount(padded, gamma)
-    alive = _alive(lengths, returns)
-    others = alive.sum(1, keepdim=True) - 1
+    others = _alive(lengths, returns).sum(1, keepdim=True) - 1
     baseline = (returns.sum(1, keepdim=True) - returns) / others.clamp(min=1)
-    return _unpad(torch.where(others > 0, returns - baseline, returns), lengths, reward)
+    return _unpad(returns - baseline, lengths, reward)
 
 
 def batch_normalised(reward: Tensor, done: Tensor, gamma: float) -> Tensor:

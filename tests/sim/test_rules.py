@@ -1,3 +1,5 @@
+import itertools
+
 import numpy as np
 import torch
 
@@ -29,6 +31,41 @@ def test_cubes_are_drawn_within_their_bounds_and_uniformly():
     assert abs(float(draws[..., 1].std()) - 6 / 3**0.5) < 0.1
 
 
+def test_codes_are_those_of_recorded_files():
+    assert [(a.name, a.value) for a in Action] == [("FORWARD", 0), ("LEFT", 1), ("RIGHT", 2)]
+    assert [(s.name, s.value) for s in Side] == [("LEFT", 0), ("AHEAD", 1), ("RIGHT", 2)]
+    ends = ("RUNNING", "ALL_CUBES", "FRONT_BOUNDARY", "SIDE_BOUNDARY", "STEP_LIMIT")
+    assert [(e.name, e.value) for e in EndReason] == [(n, i) for i, n in enumerate(ends)]
+
+
+def test_a_cube_stands_until_it_is_collected_or_passed_and_the_next_is_the_first_that_stands():
+    flags = torch.tensor(list(itertools.product([False, True], repeat=6)))
+    state = rules.start(SETTINGS, torch.zeros(64, 3, 3).double())
+    state.collected, state.passed = flags[:, :3], flags[:, 3:]
+    for collected, passed, present, following in zip(
+        state.collected.tolist(),
+        state.passed.tolist(),
+        state.present.tolist(),
+        state.next_cube.tolist(),
+        strict=True,
+    ):
+        stands = [not (c or p) for c, p in zip(collected, passed, strict=True)]
+        assert present == stands
+        assert following == ([*stands, True].index(True))
+
+
+def test_a_start_is_at_the_origin_with_everything_to_come():
+    settings = TaskSettings(altitude=4.0)
+    cubes = rules.draw_cubes(settings, np.random.RandomState(0))
+    state = rules.start(settings, [cubes, cubes + 1.0])
+    assert state.drone.tolist() == [[0.0, 0.0, 4.0]] * 2
+    assert torch.equal(state.cubes[1], cubes + 1.0)
+    assert not state.collected.any() and not state.passed.any()
+    assert state.steps.tolist() == state.end_reason.tolist() == [0, 0]
+    state.collected[0, 0] = True
+    assert not state.passed.any()  # no two fields share memory
+
+
 def test_moves_are_one_metre_forward_left_and_right():
     moves = rules.displacement(SETTINGS, torch.tensor([Action.FORWARD, Action.LEFT, Action.RIGHT]))
     assert moves.tolist() == [[1, 0, 0], [0, 1, 0], [0, -1, 0]]
@@ -39,6 +76,8 @@ def test_moves_are_one_metre_forward_left_and_right():
 def test_touching_collects_and_is_worth_one():
     state, reward = fly(at(1.0, 0.0, 0.0), 14.0, 0.0)
     assert reward.tolist() == [1.0]
+    assert reward.dtype == torch.float64
+    assert state.steps.tolist() == [1]
     assert state.collected.tolist() == [[True, False, False]]
     assert state.next_cube.tolist() == [1]
     _, again = fly(state, 14.0, 1.0)

@@ -33,6 +33,7 @@ def column(text, line):
     ("text", "line", "silent"),
     [
         ("|", 4, True),  # an annotation
+        ("*", 4, True),  # the sign between parameters
         ("3", 4, False),  # ... but not its default
         ("1.5", 4, False),
         ("| str", 4, True),

@@ -1,7 +1,7 @@
 """Which mutations are none: those that change no behaviour by design, and those that only crash.
 
 Left out are
-1. type annotations;
+1. type annotations, and the signs `*` and `/` that part the parameters of a function;
 2. `raise` statements and what is written to a log: their texts (whether the branch is taken at
    all is decided outside and stays in);
 3. bodies of `__repr__` and `__str__`;
@@ -27,6 +27,7 @@ KINDS = (
     {"Invert"},
     {"Not"},
 )
+SIGN = re.compile(r"(?:^|[(,])\s*([*/])(?=\s*[,)])")
 LOGS = re.compile(r"^(_log|log|logger|logging|warnings)\b")
 
 
@@ -44,8 +45,12 @@ def is_of_one_kind(operator: str) -> bool:
 
 def silent_spans(source: str) -> list[tuple[Position, Position]]:
     """Parts of a module in which no behaviour is written (rules 1 to 3), from start to end."""
-    tree = ast.parse(source)
-    return [_span(node) for node in _silent(tree)]
+    signs = (
+        ((number, found.start(1)), (number, found.end(1)))
+        for number, line in enumerate(source.splitlines(), 1)
+        for found in SIGN.finditer(line)
+    )
+    return [*signs, *(_span(node) for node in _silent(ast.parse(source)))]
 
 
 def is_within(position: Position, spans: list[tuple[Position, Position]]) -> bool:
