@@ -3,10 +3,11 @@
 import json
 import logging
 from pathlib import Path
+from typing import Any
 
 from omegaconf import DictConfig
 
-from drone_rl.sweeps import read_sweep
+from drone_rl.sweeps import Sweep, read_result, read_sweep
 from drone_rl.sweeps.page import write_picture, write_report
 from drone_rl.utils.errors import InputError
 
@@ -27,6 +28,8 @@ def run(config: DictConfig) -> tuple[int, None]:
     """Reports on a sweep, finished or not. Returns the exit status."""
     folder = _newest(Path(config.paths.outputs)) if config.folder == "latest" else config.folder
     sweep = read_sweep(Path(folder).absolute())
+    if config.judge:
+        _judge(sweep, config)
     page = write_report(sweep)
     print(_lines(json.loads((sweep.folder / "summary.json").read_text())))
     if config.picture is not None:
@@ -34,6 +37,21 @@ def run(config: DictConfig) -> tuple[int, None]:
         _log.info("picture: %s", config.picture)
     _log.info("written: %s", page)
     return 0, None
+
+
+def _judge(sweep: Sweep, config: DictConfig) -> None:
+    """Judges the last policies of all finished runs again; one that can't be is left as it is."""
+    from drone_rl.cli.judging import judge_run  # imports torch, which no other report needs
+
+    if config.episodes < 1:
+        raise InputError(f"episodes={config.episodes} must be 1 or more")
+    finished = [run for run in sweep.runs if read_result(run.folder) is not None]
+    for done, run in enumerate(finished, start=1):
+        try:
+            verdict = judge_run(run.folder, config.episodes, config.device)
+            _log.info("[%d/%d] %s: %s", done, len(finished), run.folder.name, verdict["kind"])
+        except InputError as error:
+            _log.warning("[%d/%d] %s not judged: %s", done, len(finished), run.folder.name, error)
 
 
 def _newest(outputs: Path) -> Path:
@@ -48,19 +66,16 @@ def _newest(outputs: Path) -> Path:
     return found[-1].parent
 
 
-def _lines(figures: dict) -> str:
-    """The figures of the groups, for a terminal."""
-    lines = [f"{figures[state]} {state}" for state in ("finished", "failed", "damaged")]
-    lines = [", ".join([*lines, f"{figures['unfinished']} unfinished"])]
+def _lines(figures: dict[str, Any]) -> str:
+    """The sentences of a sweep, for a terminal."""
+    told = figures["sentences"]
+    lines = [text for name, text in told.items() if name.startswith(("runs.", "verdicts."))]
     for group in figures["groups"]:
         choice = ", ".join(f"{k}={v}" for k, v in group.items() if isinstance(v, str))
-        kinds = ", ".join(f"{kind} {v['successes']}" for kind, v in group["verdicts"].items())
-        solved = group["solved"]["successes"]
-        lines.append(
-            f"{choice or 'all':44} solved {solved} of {group['finished']}; verdicts: {kinds}"
-        )
+        lines.append(f"{choice or 'all':44} {'; '.join(group['sentences'].values())}")
     lines += [f"run {r['run']} {r['state']}: {r['error']}" for r in figures["runs"] if r["error"]]
+    best = " ".join(text for name, text in told.items() if name.startswith("best."))
+    lines.append(f"best run: {best}")
     if figures["best"]:
-        lines.append(f"best run: {figures['best']['run']}; the same again: ")
-        lines.append(f"  {figures['best']['command']}")
+        lines.append(f"the same again: {figures['best']['command']}")
     return "\n".join(lines)

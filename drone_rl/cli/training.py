@@ -11,7 +11,8 @@ import torch
 from hydra.utils import instantiate
 from omegaconf import DictConfig, OmegaConf
 
-from drone_rl.cli.build import build_collector, load_trained, plain
+from drone_rl.cli.build import build_collector, plain
+from drone_rl.cli.judging import judge_to_choose
 from drone_rl.sweeps.pruning import PruneCallback
 from drone_rl.training import (
     CheckpointCallback,
@@ -24,9 +25,7 @@ from drone_rl.training import (
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import write_atomically
 from drone_rl.utils.provenance import provenance
-from drone_rl.utils.seeding import Stream
 from drone_rl.utils.settings import check_same_config
-from drone_rl.verdicts.judge import judge_policy
 from drone_rl.zoo import describe, read_checkpoint
 
 MAY_CHANGE = (
@@ -75,25 +74,14 @@ def train(config: DictConfig, folder: Path) -> tuple[int, float]:
     result = {"reason": reason, **dataclasses.asdict(trainer.progress)}
     result["num_cubes"] = config.task.num_cubes
     if config.evaluate_after and not reason.startswith("SIG"):
-        result["verdict"] = _judge(config, checkpoints.last_path)
+        episodes = config.evaluate_after
+        result["verdict"], _ = judge_to_choose(checkpoints.last_path, episodes, config.device)
     write_atomically(folder / "result.json", json.dumps(result, indent=2))
     _log.info("run folder: %s", folder)
     status = 128 + signal.Signals[reason].value if reason.startswith("SIG") else 0
     if status:
         _log.info("go on with: drone-rl train resume=%s", folder)
     return status, trainer.progress.running_cubes
-
-
-def _judge(config: DictConfig, path: Path) -> dict[str, Any]:
-    """How good the last parameters are, in worlds to choose by, which no report ever shows."""
-    episodes = config.evaluate_after
-    worlds = min(episodes, 250)
-    env, actor, _ = load_trained(
-        path, worlds, task={}, seed=0, device=config.device, stream=Stream.CHOICE
-    )
-    verdict = judge_policy(env, actor, episodes)
-    env.close()
-    return verdict.as_dict()
 
 
 def _build(

@@ -11,12 +11,19 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from drone_rl.sweeps.statistics import bootstrap_band, interquartile_mean, on_grid
-from drone_rl.sweeps.summary import Group, Row
+from drone_rl.sweeps.groups import FAILED, Group
+from drone_rl.sweeps.rows import Row
+from drone_rl.sweeps.statistics import median_band, on_grid
 from drone_rl.verdicts.kinds import KINDS
 
 FAVOURITE_AXIS = "optimiser.lr"
-COLORS = {"good": "tab:green", "one-sided": "tab:orange", "poor": "tab:red", "none of these": "0.5"}
+COLORS = {
+    "good": "tab:green",
+    "one-sided": "tab:orange",
+    "poor": "tab:red",
+    "none of these": "0.5",
+    FAILED: "tab:purple",
+}
 MAX_PANELS = 6
 UNIFORM = float(np.log(3))
 """Entropy of three actions of the same probability, nats."""
@@ -49,7 +56,7 @@ def lay_out(groups: Sequence[Group]) -> Layout:
 
 
 def draw_curves(layout: Layout) -> tuple[bytes, bytes]:
-    """Learning curves: interquartile mean over seeds with its bootstrap band."""
+    """Learning curves: the median over runs with its exact band, or of few runs each of them."""
     return _draw(layout, _curves, height=3.6)
 
 
@@ -69,7 +76,7 @@ def draw_entropies(layout: Layout) -> tuple[bytes, bytes]:
 
 
 def draw_costs(layout: Layout) -> tuple[bytes, bytes]:
-    """Frames to solve of every run that was solved, against the axis."""
+    """Frames to solve of every run, or what those had that never were, against the axis."""
     return _draw(layout, _costs, height=3.2)
 
 
@@ -114,28 +121,36 @@ def _picture(
 def _curves(axes: Axes, layout: Layout, groups: list[Group]) -> None:
     colors = colormaps["viridis"](np.linspace(0.1, 0.9, max(1, len(groups))))
     for group, color in zip(groups, colors, strict=True):
-        curves = [row.curve for row in group.finished if len(row.curve[0])]
-        if not curves:
+        end = max((row.frames for row in group.known), default=0.0)
+        if end == 0.0:
             continue
-        grid = np.linspace(0, max(x[-1] for x, _ in curves), 120)
-        values = np.stack([on_grid(x, y, grid) for x, y in curves])
-        lower, upper = bootstrap_band(values, resamples=400)
+        grid = np.linspace(0, end, 120)
+        values = np.stack([on_grid(*row.curve, grid) for row in group.known])
         label = _literal(group.choice.get(layout.axis or "", "all runs"))
-        axes.plot(grid, interquartile_mean(values), color=color, label=label)
-        axes.fill_between(grid, lower, upper, color=color, alpha=0.2, linewidth=0)
+        band = median_band(values)
+        if band is None:
+            axes.plot(grid, values.T, color=color, linewidth=0.8, label=[label, *_no_label(values)])
+        else:
+            axes.plot(grid, np.median(values, axis=0), color=color, label=label)
+            axes.fill_between(grid, *band, color=color, alpha=0.2, linewidth=0)
     axes.set(xlabel="frames", ylabel="running mean, share of cubes", ylim=(0, 1))
     if axes.get_legend_handles_labels()[0]:
         axes.legend(title=_literal(layout.axis or ""), fontsize=7, title_fontsize=7)
 
 
+def _no_label(values: NDArray) -> list[str]:
+    """For all lines but the first; what begins so is left out of a legend."""
+    return ["_"] * (len(values) - 1)
+
+
 def _verdicts(axes: Axes, layout: Layout, groups: list[Group]) -> None:
     places = _places(axes, layout, groups)
-    for i, kind in enumerate(KINDS):
+    for i, kind in enumerate(COLORS):
         shares = [group.verdicts[kind] for group in groups]
         known = [(x, s) for x, s in zip(places, shares, strict=True) if s["trials"]]
         if not any(s["successes"] for _, s in known):
             continue
-        x = _aside(axes, np.array([place for place, _ in known]), 0.08 * (i - 1.5))
+        x = _aside(axes, np.array([place for place, _ in known]), 0.08 * (i - 2))
         y, low, high = (np.array([s[k] for _, s in known]) for k in ("share", "lower95", "upper95"))
         error = np.abs([y - low, high - y])
         axes.errorbar(x, y, yerr=error, marker="o", markersize=4, capsize=2, color=COLORS[kind])
@@ -158,16 +173,17 @@ def _entropies(axes: Axes, layout: Layout, groups: list[Group]) -> None:
 def _dots(
     axes: Axes, layout: Layout, groups: list[Group], value: Callable[[Row], float | None]
 ) -> None:
-    """A dot for every run that was judged, those of like value side by side."""
+    """A dot for every run that was judged, hollow if not certainly; like values side by side."""
     for place, group in zip(_places(axes, layout, groups), groups, strict=True):
-        judged = [(value(row), row.verdict) for row in group.finished]
-        rows = [(y, kind) for y, kind in judged if y is not None and kind is not None]
+        judged = [(value(row), row) for row in group.finished if row.kind in KINDS]
+        rows = [(y, row) for y, row in judged if y is not None]
         heights = np.round([y for y, _ in rows], 1)
         for level in np.unique(heights):
             beside = [row for row, height in zip(rows, heights, strict=True) if height == level]
-            for i, (y, kind) in enumerate(sorted(beside, key=lambda r: KINDS.index(r[1]))):
+            for i, (y, row) in enumerate(sorted(beside, key=lambda r: KINDS.index(r[1].kind))):
                 x = _aside(axes, np.array([place]), 0.05 * (i - (len(beside) - 1) / 2))
-                axes.plot(x, [y], "o", markersize=4, color=COLORS[kind])
+                fill = "full" if row.is_certain else "none"
+                axes.plot(x, [y], "o", markersize=4, color=COLORS[row.kind], fillstyle=fill)
     _explain_colours(axes)
 
 
@@ -181,16 +197,19 @@ def _explain_colours(axes: Axes) -> None:
     figure = axes.get_figure()
     if figure is None or figure.legends:
         return
-    handles = [Line2D([], [], marker="o", color=COLORS[kind], label=kind) for kind in KINDS]
-    figure.legend(handles=handles, loc="outside upper center", ncols=len(KINDS), fontsize=8)
+    handles = [Line2D([], [], marker="o", color=COLORS[kind], label=kind) for kind in COLORS]
+    figure.legend(handles=handles, loc="outside upper center", ncols=len(COLORS), fontsize=8)
 
 
 def _costs(axes: Axes, layout: Layout, groups: list[Group]) -> None:
     for place, group in zip(_places(axes, layout, groups), groups, strict=True):
-        frames = [row.result["frames"] for row in group.finished if row.is_solved]
-        axes.plot([place] * len(frames), frames, "o", alpha=0.6, color="tab:blue")
+        for row in group.known:
+            shape, color = ("o", "tab:blue") if row.is_solved else ("^", "0.5")
+            color = COLORS["poor"] if row.state == FAILED else color
+            fill = "full" if row.is_solved else "none"
+            axes.plot([place], [row.frames], shape, alpha=0.6, color=color, fillstyle=fill)
         note = axes.annotate(
-            f"{len(frames)}/{len(group.finished)}",
+            f"{group.solved['successes']}/{group.solved['trials']}",
             (place, 1.0),
             xycoords=("data", "axes fraction"),
             ha="center",
@@ -198,8 +217,8 @@ def _costs(axes: Axes, layout: Layout, groups: list[Group]) -> None:
             fontsize=7,
         )
         note.set_in_layout(False)
-    solved = [row for group in layout.groups for row in group.finished if row.is_solved]
-    top = max((row.result["frames"] for row in solved), default=1)  # of all panels, which share it
+    frames = [row.frames for group in layout.groups for row in group.known]
+    top = max(frames, default=0.0) or 1.0  # of all panels, which share it
     axes.set(ylabel="frames to solve", ylim=(0, 1.2 * top))
 
 

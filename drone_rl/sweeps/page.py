@@ -2,19 +2,22 @@
 
 import base64
 import json
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
 import jinja2
+from markupsafe import Markup, escape
 
 from drone_rl.sweeps import figures
+from drone_rl.sweeps.groups import Group, make_groups
 from drone_rl.sweeps.manifest import Sweep
-from drone_rl.sweeps.summary import Group, Row, best_row, make_groups, read_rows, to_csv
+from drone_rl.sweeps.rows import read_rows
+from drone_rl.sweeps.summary import summarise_sweep, to_csv
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import write_atomically
-from drone_rl.verdicts.kinds import KINDS
 
 
 def write_report(sweep: Sweep) -> Path:
@@ -24,12 +27,12 @@ def write_report(sweep: Sweep) -> Path:
         The page.
     """
     rows = read_rows(sweep)
-    groups = make_groups(rows)
-    found = summarise_sweep(sweep, rows, groups)
+    found = summarise_sweep(sweep, rows)
     write_atomically(sweep.folder / "summary.csv", to_csv(rows))
     write_atomically(sweep.folder / "summary.json", json.dumps(found, indent=2))
+    pictures = _pictures(make_groups(rows), found["sentences"])
     page = sweep.folder / "report.html"
-    write_atomically(page, _render(sweep.folder.name, found, _pictures(groups)))
+    write_atomically(page, _render(sweep.folder.name, found, pictures))
     return page
 
 
@@ -44,73 +47,39 @@ def write_picture(sweep: Sweep, path: Path) -> None:
         InputError: No run of the sweep is finished and judged.
     """
     groups = make_groups(read_rows(sweep))
-    if not any(row.verdict for group in groups for row in group.finished):
+    if not any(row.kind for group in groups for row in group.finished):
         raise InputError(
             f"picture={path}: no run of {sweep.folder} is finished and judged yet; "
-            "sweep with evaluate_after=200"
+            "sweep with evaluate_after=200, or give judge=true"
         )
     path.parent.mkdir(parents=True, exist_ok=True)
     write_atomically(path, figures.draw_outcome(figures.lay_out(groups)))
 
 
-def summarise_sweep(sweep: Sweep, rows: Sequence[Row], groups: Sequence[Group]) -> dict[str, Any]:
-    """All figures as plain values."""
-    states = [row.state for row in rows]
-    best = best_row(rows)
-    return {
-        "command": sweep.command,
-        **{name: states.count(name) for name in ("finished", "failed", "damaged", "unfinished")},
-        "best": None if best is None else {**best.plain(), "command": best.run.repeat_command()},
-        "groups": [group.plain() for group in groups],
-        "runs": [row.plain() for row in rows],
-    }
-
-
-def _pictures(groups: Sequence[Group]) -> list[dict[str, str]]:
-    finished = [row for group in groups for row in group.finished]
-    if not finished:
+def _pictures(groups: Sequence[Group], sentences: Mapping[str, str]) -> list[dict[str, str]]:
+    ended = [row for group in groups for row in group.known]
+    if not ended:
         return []
     layout = figures.lay_out(groups)
-    pictures = [
-        _picture(
-            "Learning curves",
-            "Interquartile mean over seeds; band: 95% bootstrap over runs. A run that has stopped "
-            "counts as staying where it was.",
-            figures.draw_curves(layout),
-        ),
-        _picture(
-            "Frames to solve",
-            "Each dot a run that reached its target; above: how many did.",
-            figures.draw_costs(layout),
-        ),
-    ]
-    if any(row.verdict for row in finished):
-        verdicts = _picture(
-            "What policies came out",
-            "Share of runs by the verdict on their held-out episodes; bars: exact 95% "
-            "(Clopper-Pearson) intervals.",
-            figures.draw_verdicts(layout),
-        )
-        sides = _picture(
-            "Which side is lost",
-            "Each dot a run: the share of cubes that it collects of those on its right, less the "
-            "share of those on its left. At 1 it has lost the left, at -1 the right.",
-            figures.draw_sides(layout),
-        )
-        entropies = _picture(
-            "What can still change",
-            "Each dot a run: the mean entropy of its policy over the last updates; the line is "
-            "that of a policy which doesn't care. At 0 it never tries another action again, so "
-            "nothing can teach it one.",
-            figures.draw_entropies(layout),
-        )
-        pictures[1:1] = [verdicts, sides, entropies]
-    return pictures
+    drawn = [("Learning curves", "curves.", figures.draw_curves)]
+    if any(row.kind for row in ended):
+        drawn += [
+            ("What policies came out", "shares.", figures.draw_verdicts),
+            ("Which side is lost", "sides.", figures.draw_sides),
+            ("Entropy at the end", "entropies.", figures.draw_entropies),
+        ]
+    drawn += [("Frames to solve", "costs.", figures.draw_costs)]
+    return [_picture(title, _told(sentences, of), draw(layout)) for title, of, draw in drawn]
 
 
 def _picture(title: str, text: str, content: tuple[bytes, bytes]) -> dict[str, str]:
     light, dark = (f"data:image/png;base64,{base64.b64encode(c).decode()}" for c in content)
     return {"title": title, "text": text, "light": light, "dark": dark}
+
+
+def _told(sentences: Mapping[str, str], of: str) -> str:
+    """The sentences of one part of the page, as a paragraph."""
+    return " ".join(text for name, text in sentences.items() if name.startswith(of))
 
 
 def _render(name: str, found: dict[str, Any], pictures: list[dict[str, str]]) -> str:
@@ -121,19 +90,46 @@ def _render(name: str, found: dict[str, Any], pictures: list[dict[str, str]]) ->
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
     )
-    environment.filters["figure"] = _figure
+    environment.filters |= {"figure": _figure, "code": _code}
+    parts = ("runs", "verdicts", "best", "settings")
+    told = {part: _told(found["sentences"], f"{part}.") for part in parts}
     return environment.from_string(source).render(
-        name=name, figures=found, pictures=pictures, kinds=KINDS
+        name=name, figures=found, pictures=pictures, told=told
     )
 
 
 def _figure(value: object) -> str:
     """A cell of a table; what isn't known is left empty."""
+    if isinstance(value, dict) and "more_than" in value:
+        return _median(value)
     if isinstance(value, dict):
-        middle = value.get("share", value.get("iqm"))
-        if middle is None:
+        if value["share"] is None:
             return ""
-        return f"{middle:.2f} [{value['lower95']:.2f}, {value['upper95']:.2f}]"
+        certain = value.get("certain", value["successes"])
+        few = "" if certain == value["successes"] else f", {certain} certain"
+        count = f"{value['successes']}/{value['trials']}{few}"
+        return f"{count} [{value['lower95']:.2f}, {value['upper95']:.2f}]"
     if value is None:
         return ""
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    return _number(value) if isinstance(value, float) else str(value)
+
+
+def _median(value: Mapping[str, Any]) -> str:
+    """A median with its interval, or what it is more than; no interval of few runs."""
+    middle, beyond = value["median"], value["more_than"]
+    if middle is None and beyond is None:
+        return ""
+    text = _number(middle) if beyond is None else f">{_number(beyond)}"
+    if value["lower95"] is None:
+        return text
+    upper = "more" if value["upper95"] is None else _number(value["upper95"])
+    return f"{text} [{_number(value['lower95'])}, {upper}]"
+
+
+def _number(value: float) -> str:
+    return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.4g}"
+
+
+def _code(text: str) -> Markup:
+    """A sentence in which `commands` stand out, and nothing else is markup."""
+    return Markup(re.sub(r"`([^`]*)`", r"<code>\1</code>", str(escape(text))))

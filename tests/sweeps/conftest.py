@@ -7,6 +7,7 @@ import pytest
 
 from drone_rl.sweeps import Run, open_sweep, process
 from drone_rl.utils.intervals import proportion
+from drone_rl.verdicts.rule import Rule
 
 FAKE = """
 import json, pathlib, sys, time
@@ -36,40 +37,75 @@ def make_runs(tmp_path):
     ]
 
 
-def _verdict(left=20, right=20, of=20, cubes=3.0):
-    sides = {"left": left / of, "ahead": 1.0, "right": right / of}
-    flown = {
-        "episodes": 100,
-        "mean_cubes": cubes,
-        "success": proportion(100 if left == right == of else 0, 100),
-        "shares": {side: {"mean": share} for side, share in sides.items()},
+@pytest.fixture
+def make_verdict():
+    """A verdict by the present rule; a share of None is of cubes that were never offered."""
+    return _verdict
+
+
+def _verdict(kind="good", left=1.0, ahead=1.0, right=1.0, *, whole=1.0, certain=True, **others):
+    shares = {"all": whole, "left": left, "ahead": ahead, "right": right}
+    return {
+        "kind": kind,
+        "certain": certain,
+        "rule": Rule().text,
+        "error_rate": 0.05,
+        "greedy": {
+            "episodes": 200,
+            "success": proportion(round(200 * (whole or 0)), 200),
+            "shares": {name: {"mean": share} for name, share in shares.items()},
+        },
+        **others,
     }
-    return {"kind": "good" if left == right else "one-sided (right)", "greedy": flown}
+
+
+CURVE = (
+    "update,frames,seconds,train/running_cubes,loss/entropy\n1,500,1,0.3,1.0\n2,1000,2,1.5,0.5\n"
+)
 
 
 @pytest.fixture
-def sweep(tmp_path, make_runs):
+def begin_sweep(tmp_path, make_runs):
+    """A sweep of runs with the given settings, by what became of each.
+
+    A dictionary is what its result.json has beside, or instead of, that of a solved run; a text the
+    error with which it failed; None a run that has not ended.
+    """
+
+    def begin(outcomes):
+        runs = make_runs(*outcomes)
+        for run, outcome in zip(runs, outcomes.values(), strict=True):
+            run.folder.mkdir()
+            if outcome is not None:
+                (run.folder / "metrics.csv").write_text(CURVE)
+            if isinstance(outcome, str):
+                run.failure.write_text(json.dumps({"error": outcome}))
+            if isinstance(outcome, dict):
+                (run.folder / "result.json").write_text(json.dumps({**SOLVED, **outcome}))
+        return open_sweep(tmp_path, ["drone-rl", "train", "-m", "seed=0,1"], {"seed": 0}, runs)
+
+    return begin
+
+
+SOLVED = {
+    "reason": "solved",
+    "frames": 1000,
+    "episodes": 10,
+    "seconds": 2.0,
+    "running_cubes": 2.97,
+    "num_cubes": 3,
+}
+LEFT_LOST = _verdict("one-sided (right)", left=0.0, whole=0.6, certain=False)
+
+
+@pytest.fixture
+def sweep(begin_sweep):
     """Two learning rates by two seeds: three finished, one failed."""
-    rates = [
-        f"optimiser.lr={lr} seed={seed} logger=csv" for lr in ("1e-3", "1e-1") for seed in "01"
-    ]
-    runs = make_runs(*rates)
-    for run in runs:
-        run.folder.mkdir()
-        if run.number == 3:
-            run.failure.write_text(json.dumps({"status": 2, "error": "<b>NaN</b>"}))
-            continue
-        figures = _verdict() if run.number < 2 else _verdict(left=0, cubes=1.5)
-        result = {
-            "reason": "solved" if run.number < 2 else "frames",
-            "frames": 1000 * (run.number + 1),
-            "episodes": 10,
-            "seconds": 2.0,
-            "running_cubes": 2.97 - run.number,
-            "num_cubes": 3,
-            "verdict": figures,
+    return begin_sweep(
+        {
+            "optimiser.lr=1e-3 seed=0 logger=csv": {"verdict": _verdict()},
+            "optimiser.lr=1e-3 seed=1 logger=csv": {"verdict": _verdict(), "frames": 2000},
+            "optimiser.lr=1e-1 seed=0 logger=csv": {"verdict": LEFT_LOST, "reason": "frames"},
+            "optimiser.lr=1e-1 seed=1 logger=csv": "<b>NaN</b>",
         }
-        (run.folder / "result.json").write_text(json.dumps(result))
-        rows = "update,frames,train/running_cubes,loss/entropy\n1,500,0.3,1.0\n2,1000,1.5,0.5\n"
-        (run.folder / "metrics.csv").write_text(rows)
-    return open_sweep(tmp_path, ["drone-rl", "train", "-m", "seed=0,1"], {"seed": 0}, runs)
+    )

@@ -1,0 +1,198 @@
+"""The runs of a sweep as rows: what their files tell, whatever has become of them."""
+
+import contextlib
+import csv
+import dataclasses
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from drone_rl.sweeps.manifest import Sweep
+from drone_rl.sweeps.runs import Run, read_failure, read_result
+from drone_rl.sweeps.statistics import Array
+from drone_rl.verdicts.kinds import Kind
+from drone_rl.verdicts.rule import SIDES, Rule
+
+LAST_UPDATES = 20
+"""Updates at the end of a run over which the entropy is averaged."""
+NOT_OFFERED = "not offered"
+"""Stands for the share of cubes on a side where there were none."""
+
+
+@dataclasses.dataclass
+class Row:
+    """What is known of one run."""
+
+    run: Run
+    choice: dict[str, str]
+    """The swept settings and their values, the seed included."""
+    state: str
+    """"finished", "failed", "damaged" or "unfinished"."""
+    error: str | None = None
+    """Why it failed or is damaged."""
+    result: dict[str, Any] = dataclasses.field(default_factory=dict)
+    """`result.json`."""
+    curve: tuple[Array, Array] = (np.empty(0), np.empty(0))
+    """Frames, and the running mean as a share of the task's cubes; empty if the run failed, which
+    then counts as having learned nothing. Shape: (num_updates,) each."""
+    frames: float = 0.0
+    """What it had until it ended or failed."""
+    seconds: float = 0.0
+    """What it had until it ended or failed."""
+    entropy: float | None = None
+    """Mean entropy of the policy over the last updates, nats."""
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether it belongs into a share."""
+        return self.state != "unfinished"
+
+    @property
+    def is_solved(self) -> bool:
+        """Whether it reached the target."""
+        return self.result.get("reason") == "solved"
+
+    @property
+    def verdict(self) -> dict[str, Any] | None:
+        """What its last policy is, by the present rule; None if that was not judged."""
+        verdict = self.result.get("verdict")
+        return verdict if verdict is not None and verdict["rule"] == Rule().text else None
+
+    @property
+    def kind(self) -> str | None:
+        """One of `KINDS`, in which sides don't matter; None without a verdict."""
+        return None if self.verdict is None else Kind(self.verdict["kind"]).family
+
+    @property
+    def is_certain(self) -> bool:
+        """Whether its verdict rests on enough episodes."""
+        return self.verdict is not None and self.verdict["certain"]
+
+    @property
+    def has_older_verdict(self) -> bool:
+        """Whether it was judged, but by a rule that no longer holds."""
+        was_judged = "evaluation" in self.result or "verdict" in self.result
+        return was_judged and self.verdict is None
+
+    @property
+    def lean(self) -> float | None:
+        """Share of the cubes on the right that it collected minus that on the left."""
+        left, right = self.share("left"), self.share("right")
+        return None if left is None or right is None else right - left
+
+    @property
+    def final_share(self) -> float:
+        """The running mean at the end, as a share of the task's cubes; nothing if it failed."""
+        return self.result["running_cubes"] / self.result["num_cubes"] if self.result else 0.0
+
+    def share(self, of: str) -> float | None:
+        """Of the cubes "all", "left", "ahead" or "right", what its greedy policy collects.
+
+        None without a verdict, and if there were no such cubes.
+        """
+        return None if self.verdict is None else self.verdict["greedy"]["shares"][of]["mean"]
+
+    def plain(self) -> dict[str, Any]:
+        """One row of the table."""
+        verdict, judged = self.verdict, self.verdict is not None
+        sides = {side: self.share(side) for side in SIDES}
+        return {
+            "run": self.run.number,
+            **self.choice,
+            "state": self.state,
+            "verdict": verdict["kind"] if verdict else self._why_not_judged(),
+            "certain": self.is_certain if judged else None,
+            **{key: self.result.get(key) for key in ("reason", "frames", "episodes")},
+            "seconds": round(self.result["seconds"], 1) if self.result else None,
+            "running_cubes": self.result.get("running_cubes"),
+            "success": verdict["greedy"]["success"]["share"] if verdict else None,
+            "share": self.share("all"),
+            **{k: NOT_OFFERED if judged and v is None else v for k, v in sides.items()},
+            "entropy": self.entropy,
+            "error": self.error,
+            "folder": self.run.folder.name,
+        }
+
+    def _why_not_judged(self) -> str | None:
+        if self.has_older_verdict:
+            return "judged by an older rule: not counted"
+        return "not judged" if self.state == "finished" else None
+
+
+def read_rows(sweep: Sweep) -> list[Row]:
+    """One row for every run, whatever has become of it."""
+    choices = [_choice(run) for run in sweep.runs]
+    keys = list(dict.fromkeys(key for choice in choices for key in choice))
+    swept = [key for key in keys if len({choice.get(key) for choice in choices}) > 1]
+    return [
+        _read_row(run, {key: choice.get(key, "") for key in swept})
+        for run, choice in zip(sweep.runs, choices, strict=True)
+    ]
+
+
+def _choice(run: Run) -> dict[str, str]:
+    parts = (override.partition("=") for override in run.overrides)
+    return {key.lstrip("+"): value for key, _, value in parts if key != "trial"}
+
+
+def _read_row(run: Run, choice: dict[str, str]) -> Row:
+    result = read_result(run.folder)
+    error = read_failure(run)
+    if result is None:
+        row = Row(run, choice, "unfinished" if error is None else "failed", error)
+        with contextlib.suppress(OSError, ValueError, KeyError, TypeError):
+            if error is not None:  # before it failed it may have come some way, or none
+                _, (row.frames, row.seconds), row.entropy = _read_metrics(run.folder, 1)
+        return row
+    try:
+        _check_result(result)
+        curve, _, entropy = _read_metrics(run.folder, result["num_cubes"])
+        had = float(result["frames"]), float(result["seconds"])
+        row = Row(run, choice, "finished", None, result, curve, *had, entropy)
+        _check_verdict(row)
+        row.plain()
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        return Row(run, choice, "damaged", f"its files can't be read ({error!r})")
+    return row
+
+
+def _check_result(result: dict[str, Any]) -> None:
+    for key in ("frames", "episodes", "seconds", "running_cubes", "num_cubes"):
+        _check_number(key, result[key])
+    if result["num_cubes"] < 1:
+        raise ValueError(f"num_cubes is {result['num_cubes']}")
+
+
+def _check_verdict(row: Row) -> None:
+    if row.verdict is None:
+        return
+    if row.kind is None or not isinstance(row.verdict["certain"], bool):
+        raise ValueError(f"certain is {row.verdict['certain']!r}")
+    sides = {side: row.share(side) for side in SIDES}
+    offered = {side: share for side, share in sides.items() if share is not None}
+    greedy = row.verdict["greedy"]
+    figures = {"episodes": greedy["episodes"], "success": greedy["success"]["share"], **offered}
+    for name, value in {**figures, "all": row.share("all")}.items():
+        _check_number(name, value)
+    _check_number("error_rate", row.verdict["error_rate"])
+
+
+def _check_number(name: str, value: object) -> None:
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    if not is_number or not math.isfinite(value):
+        raise ValueError(f"{name} is {value!r}")
+
+
+def _read_metrics(
+    folder: Path, num_cubes: int
+) -> tuple[tuple[Array, Array], tuple[float, float], float | None]:
+    """The learning curve, frames and seconds until its end, and the entropy there."""
+    with (folder / "metrics.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    frames = np.array([float(row["frames"]) for row in rows])
+    cubes = np.array([float(row["train/running_cubes"]) for row in rows])
+    had = (float(rows[-1]["frames"]), float(rows[-1].get("seconds") or 0)) if rows else (0.0, 0.0)
+    last = [float(row["loss/entropy"]) for row in rows[-LAST_UPDATES:] if row.get("loss/entropy")]
+    return (frames, cubes / num_cubes), had, float(np.mean(last)) if last else None

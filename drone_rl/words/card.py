@@ -1,0 +1,78 @@
+"""What a policy's card may say. Evidence: the verdict and where it comes from, see `zoo.card`."""
+
+from drone_rl.words.licence import Evidence, Sentence
+
+_NUMBERS = {1: "one cube", 2: "two cubes", 3: "three cubes", 4: "four cubes", 5: "five cubes"}
+
+
+def _verdict(card: Evidence) -> str:
+    found = card["verdict"]
+    certain = f"certain, with a chance of error of at most {100 * found['error_rate']:g}%"
+    return (
+        f"**{found['kind']}** ({certain if found['certain'] else 'not certain'}): "
+        f"{found['sentence']}"
+    )
+
+
+def _reported(card: Evidence) -> str:
+    return (
+        f"All figures are of {card['verdict']['greedy']['episodes']:,} episodes in worlds to "
+        f"report on (seed {card['seed']}), which neither a training nor the choice in a sweep uses."
+    )
+
+
+def _chosen(card: Evidence) -> str:
+    chosen = card["chosen"]
+    text = f"It is one of the {chosen['runs']} runs of a sweep"
+    if chosen["episodes"] is None:
+        return f"{text}, in which it was not judged."
+    return f"{text}, which are compared by {chosen['episodes']} episodes in worlds to choose by."
+
+
+def _tested(card: Evidence) -> str:
+    task = card["task"]
+    cubes = _NUMBERS.get(task["num_cubes"], f"{task['num_cubes']} cubes")
+    return (
+        f"Tested with {cubes} of {task['cube_size']:g} m, up to {task['lateral_bound']:g} m to "
+        f"either side and {task['vertical_bound']:g} m up or down, in this task's look and light "
+        "only: nothing is known of other colours, light or sizes."
+    )
+
+
+SENTENCES = (
+    Sentence("card.verdict", "always", lambda c: True, _verdict),
+    Sentence(
+        "card.reported",
+        "the figures are from worlds to report on",
+        lambda c: c["worlds"] == "report",
+        _reported,
+    ),
+    Sentence(
+        "card.chosen",
+        "the run lies in a sweep's folder",
+        lambda c: c["chosen"] is not None,
+        _chosen,
+    ),
+    Sentence(
+        "card.not_chosen",
+        "the run does not lie in a sweep's folder",
+        lambda c: c["chosen"] is None,
+        lambda c: "Whether it was chosen among several trainings, and how, is not recorded.",
+    ),
+    Sentence("card.tested", "nothing else was tested", lambda c: True, _tested),
+    Sentence(
+        "card.greedy_only",
+        "no flights with drawn actions were made",
+        lambda c: c["verdict"]["sampled"] is None,
+        lambda c: "Flights with actions drawn by their probabilities were not made.",
+    ),
+    Sentence(
+        "card.use",
+        "always",
+        lambda c: True,
+        lambda c: (
+            "Intended use: to study what a policy sees and whether to trust it, in this simulator; "
+            "not for a real drone."
+        ),
+    ),
+)

@@ -1,0 +1,70 @@
+"""What is drawn: lines, bands and dots, as matplotlib holds them."""
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from drone_rl.sweeps import figures
+from drone_rl.sweeps.groups import make_groups
+from drone_rl.sweeps.rows import read_rows
+
+
+def drawn(draw, sweep):
+    """The axes of one panel with all groups."""
+    groups = make_groups(read_rows(sweep))
+    axes = Figure().subplots()
+    draw(axes, figures.lay_out(groups), groups)
+    return axes
+
+
+@pytest.mark.parametrize(("runs", "lines", "bands"), [(3, 3, 0), (5, 5, 0), (6, 1, 1)])
+def test_few_runs_are_lines_and_many_are_a_band(begin_sweep, runs, lines, bands):
+    axes = drawn(figures._curves, begin_sweep({f"seed={i}": {} for i in range(runs)}))
+    assert (len(axes.lines), len(axes.collections)) == (lines, bands)
+    assert axes.lines[0].get_ydata()[-1] == pytest.approx(0.5)  # 1.5 of 3 cubes
+
+
+def test_failed_runs_pull_the_median_down(begin_sweep):
+    sweep = begin_sweep({f"seed={i}": "NaN" for i in range(9)} | {"seed=9": {}})
+    assert not drawn(figures._curves, sweep).lines[0].get_ydata().any()
+
+
+def test_a_verdict_that_is_not_certain_is_a_hollow_dot(sweep):
+    fills = [dot.get_fillstyle() for dot in drawn(figures._entropies, sweep).lines[:-1]]
+    assert fills == ["full", "full", "none"]
+
+
+def test_a_run_that_met_no_cube_on_a_side_has_no_dot(begin_sweep, make_verdict):
+    sweep = begin_sweep({"seed=0": {"verdict": make_verdict(right=None)}, "seed=1": {}})
+    assert len(drawn(figures._sides, sweep).lines) == 1  # the line at 0
+
+
+def test_failures_have_a_share_of_their_own(sweep):
+    axes = drawn(figures._verdicts, sweep)
+    shares = {bar.lines[0].get_color(): bar.lines[0].get_ydata() for bar in axes.containers}
+    np.testing.assert_array_equal(shares[figures.COLORS["good"]], [1, 0])
+    np.testing.assert_array_equal(shares[figures.COLORS["one-sided"]], [0, 0.5])
+    np.testing.assert_array_equal(shares[figures.COLORS["failed"]], [0, 0.5])
+
+
+def test_runs_that_were_never_solved_are_open_triangles_at_what_they_had(sweep):
+    axes = drawn(figures._costs, sweep)
+    marks = [(d.get_marker(), d.get_fillstyle(), d.get_ydata()[0]) for d in axes.lines]
+    assert marks == [
+        ("o", "full", 1000),
+        ("o", "full", 2000),
+        ("^", "none", 1000),
+        ("^", "none", 1000),
+    ]
+    assert axes.lines[2].get_color() != axes.lines[3].get_color() == figures.COLORS["poor"]
+    assert [text.get_text() for text in axes.texts] == ["2/2", "0/2"]
+
+
+def test_costs_are_seen_beside_a_panel_without_any(begin_sweep):
+    sweep = begin_sweep({"a=1 optimiser.lr=1": {"frames": 2000}, "a=2 optimiser.lr=1": None})
+    solved, none = make_groups(read_rows(sweep))
+    layout = figures.Layout("optimiser.lr", {"first": [none], "second": [solved]})
+    first, second = Figure().subplots(1, 2, sharey=True)
+    figures._costs(first, layout, [none])
+    figures._costs(second, layout, [solved])
+    assert second.get_ylim() == (0, 1.2 * 2000)

@@ -1,0 +1,109 @@
+"""What the files of a run tell, and what they can't."""
+
+import json
+
+import pytest
+
+from drone_rl.sweeps.rows import read_rows
+
+
+def rewrite(sweep, number, **changed):
+    """Changes a run's result; what is None goes."""
+    path = sweep.folder / str(number) / "result.json"
+    result = {**json.loads(path.read_text()), **changed}
+    path.write_text(json.dumps({k: v for k, v in result.items() if v is not None}))
+
+
+def test_rows_tell_what_became_of_every_run(sweep):
+    rows = read_rows(sweep)
+    assert [row.state for row in rows] == ["finished", "finished", "finished", "failed"]
+    assert rows[0].choice == {"optimiser.lr": "1e-3", "seed": "0"}
+    assert [row.kind for row in rows] == ["good", "good", "one-sided", None]
+    assert [row.is_certain for row in rows] == [True, True, False, False]
+    assert [row.is_solved for row in rows] == [True, True, False, False]
+    assert rows[0].curve[1].tolist() == pytest.approx([0.1, 0.5])
+    assert [row.lean for row in rows] == [0.0, 0.0, 1.0, None]  # all of the right, none of the left
+    assert [row.entropy for row in rows] == [0.75] * 4  # of both updates
+
+
+def test_a_failed_run_keeps_what_it_had_and_learned_nothing(sweep):
+    failed = read_rows(sweep)[3]
+    assert (failed.frames, failed.seconds) == (1000, 2)
+    assert len(failed.curve[0]) == 0
+    assert failed.final_share == 0.0
+    assert failed.error == "<b>NaN</b>"
+    (sweep.folder / "3" / "metrics.csv").unlink()  # it may have failed before the first update
+    assert read_rows(sweep)[3].frames == 0
+
+
+def test_no_cubes_on_a_side_is_no_share_of_zero(sweep, make_verdict):
+    rewrite(sweep, 0, verdict=make_verdict(left=None))
+    row = read_rows(sweep)[0]
+    assert row.lean is None
+    assert row.plain()["left"] == "not offered"
+    assert row.plain()["right"] == 1.0
+    assert read_rows(sweep)[3].plain()["left"] is None  # not judged at all
+
+
+@pytest.mark.parametrize(
+    "older",
+    [{"verdict": None, "evaluation": {"mean_cubes": 3.0}}, {"verdict": {"rule": "of yore"}}],
+)
+def test_a_verdict_by_an_older_rule_is_said_and_not_counted(sweep, older):
+    rewrite(sweep, 0, **older)
+    row = read_rows(sweep)[0]
+    assert row.state == "finished"
+    assert row.verdict is row.kind is row.share("all") is None
+    assert row.has_older_verdict
+    assert row.plain()["verdict"] == "judged by an older rule: not counted"
+
+
+def test_a_run_without_a_verdict_says_so(sweep):
+    rewrite(sweep, 0, verdict=None)
+    row = read_rows(sweep)[0]
+    assert not row.has_older_verdict
+    assert row.plain()["verdict"] == "not judged"
+
+
+@pytest.mark.parametrize(
+    "broken",
+    [
+        {"frames": None},
+        {"num_cubes": None},
+        {"seconds": "long"},
+        {"running_cubes": float("nan")},
+        {"episodes": True},
+        {"num_cubes": 0},
+        {"verdict": "good"},
+        {"verdict": []},
+    ],
+)
+def test_an_incomplete_result_is_damaged(sweep, broken):
+    rewrite(sweep, 0, **broken)
+    rows = read_rows(sweep)
+    assert [row.state for row in rows] == ["damaged", "finished", "finished", "failed"]
+    assert "can't be read" in rows[0].error
+
+
+@pytest.mark.parametrize(
+    "broken",
+    [
+        {"kind": "splendid"},
+        {"certain": "yes"},
+        {"greedy": {}},
+        {"greedy": None},
+        {"error_rate": None},
+        {"whole": None},
+        {"left": "much"},
+    ],
+)
+def test_an_incomplete_verdict_is_damaged(sweep, make_verdict, broken):
+    rewrite(sweep, 0, verdict=make_verdict(**broken))
+    assert read_rows(sweep)[0].state == "damaged"
+
+
+def test_unreadable_metrics_are_damage_and_an_unreadable_result_must_be_made_again(sweep):
+    (sweep.folder / "0" / "metrics.csv").write_text("frames\nrubbish\n")
+    (sweep.folder / "1" / "result.json").write_text("{")
+    rows = read_rows(sweep)
+    assert [row.state for row in rows] == ["damaged", "unfinished", "finished", "failed"]
