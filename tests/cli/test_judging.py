@@ -73,7 +73,7 @@ def test_a_sweep_that_was_not_judged_can_be(sweep, in_process):  # noqa: F811
 
 
 def test_a_run_that_can_not_be_judged_leaves_the_others_alone(sweep, in_process):  # noqa: F811
-    (sweep.folder / "0" / "checkpoints" / "last.pt").unlink()
+    (sweep.folder / "0" / "checkpoints" / "last.pt").write_bytes(b"rubbish")
     done = in_process("sweep-report", sweep.folder, "judge=true", "episodes=8")
     assert done.returncode == 0, done.stderr
     assert "1 run finished and not judged" in done.stdout
