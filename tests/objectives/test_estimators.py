@@ -55,18 +55,67 @@ def test_time_baseline_resumes_from_its_state():
     assert torch.equal(first(data.clone())["return_to_go"], second(data.clone())["return_to_go"])
 
 
-def test_estimator_is_the_pure_function():
-    data = batch([0.0, 1.0, 1.0], [0, 1, 1])
-    expected = returns.reward_to_go(data["next", "reward"], data["next", "done"], 0.7)
-    assert torch.equal(RewardToGo(0.7)(data)["return_to_go"], expected)
+def test_time_baseline_of_episodes_longer_than_its_memory():
+    estimator = TimeBaseline(0.5, decay=0.5, max_steps=2)
+    long = batch([0.0, 0.0, 4.0], [0, 0, 1])  # returns 1, 2, 4
+    assert estimator(long)["return_to_go"].flatten().tolist() == [1.0, 2.0, 4.0]
+    assert estimator.baseline.tolist() == [1.0, 2.0] and estimator.seen.tolist() == [True, True]
+    assert estimator(long)["return_to_go"].flatten().tolist() == [0.0, 0.0, 4.0]
 
 
-@pytest.mark.parametrize("gamma", [-0.1, 1.1])
+def test_time_baseline_remembers_the_mean_over_episodes():
+    estimator = TimeBaseline(0.5, max_steps=3)
+    estimator(batch([0.0, 2.0, 3.0], [0, 1, 1]))  # returns 1, 2 and 3: means 2 and 2
+    assert estimator.baseline.tolist() == [2.0, 2.0, 0.0]
+    assert estimator.seen.tolist() == [True, True, False]
+
+
+PURE = {
+    "TotalReward": lambda r, d: returns.total_reward(r, d),
+    "RewardToGo": lambda r, d: returns.reward_to_go(r, d, 0.7),
+    "Standardised": lambda r, d: returns.standardised(r, d, 0.7),
+    "LinearRamp": lambda r, d: returns.linear_ramp(r, d),
+    "SuccessScaled": lambda r, d: returns.success_scaled(r, d, 0.7, 2.0),
+    "TimeBaseline": lambda r, d: returns.time_baseline(r, d, 0.7, torch.zeros(0)),
+    "LeaveOneOut": lambda r, d: returns.leave_one_out(r, d, 0.7),
+    "BatchNormalised": lambda r, d: returns.batch_normalised(r, d, 0.7),
+}
+
+
+@pytest.mark.parametrize("scale", [False, True])
+@pytest.mark.parametrize("name", NAMES)
+def test_estimator_is_the_pure_function(name, scale):
+    arguments = {} if name in ("TotalReward", "LinearRamp") else {"gamma": 0.7}
+    if name == "SuccessScaled":
+        arguments["max_reward"] = 2.0
+    data = batch([0.0, 1.0, 1.0, 0.0, 0.0, 3.0], [0, 1, 1, 0, 0, 1])
+    expected = PURE[name](data["next", "reward"], data["next", "done"])
+    found = getattr(objectives, name)(scale=scale, **arguments)(data)["return_to_go"]
+    assert torch.equal(found, returns.scale_to_unit(expected) if scale else expected)
+
+
+def test_defaults():
+    assert (TimeBaseline().gamma, TimeBaseline().decay) == (0.99, 0.9)
+    assert TimeBaseline().baseline.shape == TimeBaseline().seen.shape == (300,)
+    success = objectives.SuccessScaled()
+    assert (success.gamma, success.max_reward, success.scale) == (0.99, 3.0, False)
+    assert RewardToGo(0.0).gamma == 0.0 and RewardToGo(1.0).gamma == 1.0
+    assert TimeBaseline(decay=0.0).decay == 0.0
+
+
+def test_returns_carry_no_gradient():
+    data = batch([0.0, 1.0], [0, 1])
+    data["next", "reward"].requires_grad_()
+    assert not RewardToGo(0.5)(data)["return_to_go"].requires_grad
+
+
+@pytest.mark.parametrize("gamma", [-0.1, 1.0001])
 def test_bad_discount_is_refused(gamma):
     with pytest.raises(InputError, match="rate from 0 to 1"):
         RewardToGo(gamma)
 
 
-def test_bad_decay_is_refused():
-    with pytest.raises(InputError, match=r"decay=1\.0"):
-        TimeBaseline(decay=1.0)
+@pytest.mark.parametrize("decay", [1.0, -0.1])
+def test_bad_decay_is_refused(decay):
+    with pytest.raises(InputError, match=f"decay={decay}"):
+        TimeBaseline(decay=decay)

@@ -161,6 +161,34 @@ def test_constant_added_to_returns_leaves_the_expected_gradient_alone():
     torch.testing.assert_close(expected(0.0), expected(17.0), atol=1e-5, rtol=1e-5)
 
 
+def test_values_by_hand():
+    """Even odds: -log pi is log 2 at every step; returns 1, 2, 3, so 6 log 2 in all."""
+    _, actor = make()
+    batch = make_batch(3)
+    batch["return_to_go"] = torch.tensor([[1.0], [2.0], [3.0]])
+    log2 = torch.tensor(2.0).log().item()
+
+    def loss(**kwargs):
+        return ReinforceLoss(actor, **kwargs)(batch)
+
+    assert float(loss()["loss_actor"].detach()) == pytest.approx(2 * log2)
+    assert float(loss(reduction="sum")["loss_actor"].detach()) == pytest.approx(6 * log2)
+    each = loss(reduction="none", entropy_coeff=0.5)
+    assert each["loss_actor"].tolist() == pytest.approx([log2, 2 * log2, 3 * log2])
+    assert each["loss_entropy"].tolist() == pytest.approx([-0.5 * log2] * 3)
+    assert float(loss()["loss_entropy"].detach()) == 0.0
+    assert float(loss()["entropy"]) == pytest.approx(log2)
+
+
+def test_returns_are_constants_to_the_gradient():
+    network, actor = make()
+    batch = make_batch()
+    plain = gradient(ReinforceLoss(actor), network, batch)
+    batch["return_to_go"] = batch["return_to_go"].clone().requires_grad_()
+    assert torch.equal(gradient(ReinforceLoss(actor), network, batch), plain)
+    assert batch["return_to_go"].grad is None
+
+
 def test_stored_action_is_scored():
     _, actor = make()
     batch = make_batch()

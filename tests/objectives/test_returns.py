@@ -2,6 +2,8 @@
 
 import pytest
 import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from drone_rl.objectives import returns
 from drone_rl.utils.errors import InputError
@@ -63,10 +65,37 @@ def test_leave_one_out():
 
 
 def test_batch_normalised():
+    # mean 4.375 / 6, mean square 4.203125 / 6: each return less the one, over the deviation
+    mean = 4.375 / 6
+    std = (4.203125 / 6 - mean**2) ** 0.5
     values = returns.batch_normalised(REWARD, DONE, 0.5)
-    assert float(values.mean()) == pytest.approx(0.0, abs=1e-6)
-    assert float(values.square().mean()) == pytest.approx(1.0)
-    assert returns.batch_normalised(torch.ones(2, 1), torch.ones(2, 1).bool(), 0.5).abs().sum() == 0
+    check(values, [(g - mean) / std for g in TO_GO])
+    assert values[1] == values.max() > 1.2 and values[5] == values.min() < -1.7
+    constant = returns.batch_normalised(torch.ones(3, 1), torch.ones(3, 1).bool(), 0.5)
+    assert constant.tolist() == [[0.0], [0.0], [0.0]]
+
+
+@pytest.mark.parametrize("gap", [1e-7, 1e-5])
+def test_differences_of_rounding_are_nothing_and_larger_ones_count(gap):
+    """Returns 1 and 1 + gap: half of the gap is their deviation."""
+    reward = 1 + torch.tensor([[0.0], [gap]], dtype=torch.float64)
+    done, counts = torch.ones(2, 1, dtype=torch.bool), gap > returns.ROUNDING
+    expected = torch.tensor([[-1.0], [1.0]]) * counts
+    values = returns.batch_normalised(reward, done, 0.0)
+    torch.testing.assert_close(values, expected, atol=0.05, rtol=0)
+    values = returns.standardised(reward, torch.tensor([[False], [True]]), 0.0)
+    torch.testing.assert_close(values, expected, atol=0.05, rtol=0)
+    scaled = returns.scale_to_unit(torch.tensor([[-gap], [gap]]))
+    torch.testing.assert_close(scaled, expected)
+
+
+def test_equal_episodes_are_credited_with_nothing_at_any_scale():
+    """Three of 0.95: float32 makes 6e-8 of what is 0, which must not be scaled up to 1."""
+    reward = torch.tensor([0.0, 1.0] * 3)[:, None]
+    done = torch.tensor([False, True] * 3)[:, None]
+    credit = returns.leave_one_out(reward, done, 0.95)
+    assert 0 < credit.abs().max() < 1e-6
+    assert returns.scale_to_unit(credit).tolist() == [[0.0]] * 6
 
 
 def test_scale_to_unit_keeps_zero_and_sign():
@@ -94,14 +123,114 @@ ESTIMATORS = {
 }
 
 
-@pytest.mark.parametrize("name", ESTIMATORS)
-def test_flat_and_batched_are_the_same(name):
-    reward = torch.randint(0, 2, (3, 5, 1)).float()
-    done = torch.zeros(3, 5, 1, dtype=torch.bool)
-    done[:, -1] = True
-    done[1, 2] = True
-    flat = ESTIMATORS[name](reward.flatten(0, 1), done.flatten(0, 1))
-    torch.testing.assert_close(ESTIMATORS[name](reward, done).flatten(0, 1), flat)
+ALONE = ["total_reward", "reward_to_go", "standardised", "linear_ramp", "success_scaled"]
+"""Those that look at one episode at a time; `time_baseline` does so too."""
+HOMOGENEOUS = ["total_reward", "reward_to_go", "linear_ramp", "leave_one_out"]
+EPISODES = st.lists(
+    st.lists(st.integers(0, 12).map(lambda n: n / 4), min_size=1, max_size=5),
+    min_size=1,
+    max_size=4,
+)
+"""Rewards of up to four episodes; quarters, so that sums are exact."""
+QUICK = settings(max_examples=25, deadline=None)
+
+
+def flat(episodes):
+    reward = torch.tensor([r for episode in episodes for r in episode])[:, None]
+    done = torch.zeros(len(reward), 1, dtype=torch.bool)
+    done[torch.tensor([len(e) for e in episodes]).cumsum(0) - 1] = True
+    return reward, done
+
+
+def split(values, episodes):
+    return [v[:, 0].tolist() for v in values.split([len(e) for e in episodes])]
+
+
+@given(EPISODES)
+@QUICK
+def test_flat_and_batched_are_the_same(episodes):
+    """Rows of one length, each of whole episodes: here every row is all of them once more."""
+    reward, done = flat(episodes)
+    rows, ends = torch.stack([reward, 2 * reward]), torch.stack([done, done])
+    for name, estimate in ESTIMATORS.items():
+        one = estimate(rows.flatten(0, 1), ends.flatten(0, 1))
+        assert torch.equal(estimate(rows, ends).flatten(0, 1), one), name
+
+
+@given(EPISODES)
+@QUICK
+def test_episodes_are_credited_as_if_they_were_alone(episodes):
+    whole = flat(episodes)
+    for name in (*ALONE, "time_baseline"):
+        alone = torch.cat([ESTIMATORS[name](*flat([episode])) for episode in episodes])
+        torch.testing.assert_close(ESTIMATORS[name](*whole), alone, atol=1e-5, rtol=1e-5)
+
+
+@given(EPISODES.flatmap(lambda e: st.tuples(st.just(e), st.permutations(range(len(e))))))
+@QUICK
+def test_order_of_the_episodes_changes_nothing(drawn):
+    episodes, order = drawn
+    for estimate in ESTIMATORS.values():
+        before = split(estimate(*flat(episodes)), episodes)
+        shuffled = [episodes[i] for i in order]
+        after = split(estimate(*flat(shuffled)), shuffled)
+        for i, values in zip(order, after, strict=True):
+            assert values == pytest.approx(before[i], abs=1e-4)
+
+
+@given(EPISODES, st.sampled_from([0.25, 2.0, 8.0]))
+@QUICK
+def test_scaled_rewards_scale_returns_or_change_nothing(episodes, factor):
+    reward, done = flat(episodes)
+    for name in HOMOGENEOUS:
+        found, plain = ESTIMATORS[name](factor * reward, done), ESTIMATORS[name](reward, done)
+        torch.testing.assert_close(found, factor * plain, atol=1e-5, rtol=1e-5)
+    for name in ("standardised", "batch_normalised"):
+        found, plain = ESTIMATORS[name](factor * reward, done), ESTIMATORS[name](reward, done)
+        torch.testing.assert_close(found, plain, atol=1e-3, rtol=1e-3)
+
+
+@given(EPISODES, st.sampled_from([0.0, 0.5, 0.9, 1.0]))
+@QUICK
+def test_reward_to_go_is_its_recursion(episodes, gamma):
+    for values, rewards in zip(
+        split(returns.reward_to_go(*flat(episodes), gamma), episodes), episodes, strict=True
+    ):
+        following = [*values[1:], 0.0]
+        assert values == pytest.approx(
+            [r + gamma * g for r, g in zip(rewards, following, strict=True)], rel=1e-5
+        )
+
+
+@given(EPISODES)
+@QUICK
+def test_leave_one_out_is_the_deviation_from_the_mean_of_all_stretched(episodes):
+    """g - (sum - g) / (n - 1) = (g - mean) n / (n - 1), so at each time the sum is 0."""
+    to_go = split(returns.reward_to_go(*flat(episodes), 0.9), episodes)
+    found = split(returns.leave_one_out(*flat(episodes), 0.9), episodes)
+    for t in range(max(len(e) for e in episodes)):
+        alive = [i for i, e in enumerate(episodes) if len(e) > t]
+        n, mean = len(alive), sum(to_go[i][t] for i in alive) / len(alive)
+        for i in alive:
+            wanted = (to_go[i][t] - mean) * n / (n - 1) if n > 1 else to_go[i][t]
+            assert found[i][t] == pytest.approx(wanted, abs=1e-4)
+
+
+@given(EPISODES)
+@QUICK
+def test_standardised_has_mean_0_and_deviation_1_or_is_nothing(episodes):
+    for values in split(returns.standardised(*flat(episodes), 0.9), episodes):
+        square = sum(v * v for v in values) / len(values)
+        assert sum(values) == pytest.approx(0, abs=1e-3)
+        assert square == pytest.approx(1, abs=1e-3) or set(values) == {0.0}
+
+
+def test_episode_lengths():
+    done = torch.tensor([[0, 1, 1], [0, 0, 1]]).bool()[..., None]
+    assert returns.episode_lengths(done) == [2, 1, 3]
+    assert returns.episode_lengths(done[1]) == [3]
+    with pytest.raises(InputError):  # every row must end, not the last alone
+        returns.episode_lengths(done.flip(0, 1))
 
 
 @pytest.mark.parametrize("name", ESTIMATORS)
@@ -111,8 +240,9 @@ def test_unfinished_tail_is_refused(name):
 
 
 def test_shapes_are_checked():
-    with pytest.raises(ValueError, match="must both be"):
-        returns.total_reward(torch.zeros(3), torch.ones(3, dtype=torch.bool))
+    for shape in ((3,), (3, 2), (2, 1)):
+        with pytest.raises(ValueError, match="must both be"):
+            returns.total_reward(torch.zeros(shape), torch.ones(3, *shape[1:], dtype=torch.bool))
 
 
 def test_long_batches_do_not_take_a_python_step_a_frame():
