@@ -1,7 +1,10 @@
 import itertools
 
 import numpy as np
+import pytest
 import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from drone_rl.sim import rules
 from drone_rl.sim.rules import Action, EndReason, Side
@@ -13,12 +16,14 @@ SETTINGS = TaskSettings()  # drone and cubes touch up to 1.65 m on each axis
 def at(*ys, settings=SETTINGS):
     """One world whose cubes stand at these y."""
     x = settings.first_distance + settings.spacing * torch.arange(len(ys))
-    cubes = torch.stack([x, torch.tensor(ys), torch.full((len(ys),), settings.altitude)], -1)
-    return rules.start(settings, cubes.double()[None])
+    y, z = torch.tensor(ys).double(), torch.full((len(ys),), settings.altitude).double()
+    return rules.start(settings, torch.stack([x, y, z], -1)[None])
 
 
 def fly(state, x, y, settings=SETTINGS):
-    return rules.judge(settings, state, torch.tensor([[x, y, settings.altitude]]).double())
+    return rules.judge(
+        settings, state, torch.tensor([[x, y, settings.altitude]], dtype=torch.float64)
+    )
 
 
 def test_cubes_are_drawn_within_their_bounds_and_uniformly():
@@ -84,13 +89,45 @@ def test_touching_collects_and_is_worth_one():
     assert again.tolist() == [0.0]
 
 
-def test_touch_distance_is_exact():
-    near, reward = fly(at(1.65, 0.0, 0.0), 14.0, 0.0)
-    assert reward.item() == 1.0
-    far, reward = fly(at(1.66, 0.0, 0.0), 14.0, 0.0)
-    assert reward.item() == 0.0
-    assert not far.collected.any()
-    assert near.collected.any()
+def beyond(value):
+    """The next float64, away from zero."""
+    return float(np.nextafter(value, 2 * value))
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_touch_distance_is_exact(axis, sign):
+    """On each axis, from both sides: 1.65 m touches, the next float64 does not."""
+    for distance, touches in ((1.65, True), (beyond(1.65), False)):
+        cube = torch.zeros(1, 1, 3).double()
+        cube[..., axis] = sign * distance
+        state = rules.start(SETTINGS, cube)
+        state, reward = rules.judge(SETTINGS, state, torch.zeros(1, 3).double())
+        assert state.collected.item() == touches
+        assert reward.item() == float(touches)
+
+
+def test_touch_needs_all_three_axes():
+    corner = torch.tensor([[[1.6, -1.6, 1.6]]]).double()
+    assert rules.judge(SETTINGS, rules.start(SETTINGS, corner), torch.zeros(1, 3).double())[1] == 1
+    for axis in range(3):
+        aside = corner.clone()
+        aside[..., axis] *= 1.1
+        state = rules.start(SETTINGS, aside)
+        assert rules.judge(SETTINGS, state, torch.zeros(1, 3).double())[1] == 0
+
+
+def test_two_cubes_touched_at_once_are_worth_two():
+    cubes = torch.tensor([[[1.0, 0.0, 0.0], [1.5, 0.0, 0.0], [1.7, 0.0, 0.0]]]).double()
+    state, reward = rules.judge(SETTINGS, rules.start(SETTINGS, cubes), torch.zeros(1, 3).double())
+    assert reward.tolist() == [2.0] and reward.dtype == torch.float64
+    assert state.collected.tolist() == [[True, True, False]]
+
+
+def test_passed_is_strictly_behind():
+    for x, passed in ((15.0, False), (beyond(15.0), True)):
+        state, _ = fly(at(5.0, 0.0), x, 0.0)
+        assert state.passed.tolist() == [[passed, False]]
 
 
 def test_passed_cubes_vanish_without_reward():
@@ -120,19 +157,158 @@ def test_lateral_offset_is_unknown_until_a_cube_is_the_next_one():
     assert state.lateral[0, 1:].isnan().all()
 
 
+def test_side_is_ahead_up_to_exactly_the_touch_distance():
+    for y, side in ((1.65, Side.AHEAD), (beyond(1.65), Side.LEFT)):
+        for sign in (1, -1):
+            cubes = torch.tensor([[[15.0, sign * y, 0.0]]], dtype=torch.float64)
+            mirrored = {Side.LEFT: Side.RIGHT, Side.AHEAD: Side.AHEAD}[side] if sign < 0 else side
+            assert rules.start(SETTINGS, cubes).side.tolist() == [[mirrored]]
+
+
 def test_ends_in_the_order_of_algorithm_3():
     state = at(0.0, 0.0, 0.0)
     assert fly(state, 44.0, 0.0)[0].end_reason.item() == EndReason.RUNNING
-    assert fly(state, 45.0, 0.0)[0].end_reason.item() == EndReason.FRONT_BOUNDARY
-    assert fly(state, 0.0, 26.0)[0].end_reason.item() == EndReason.RUNNING
-    assert fly(state, 0.0, 27.0)[0].end_reason.item() == EndReason.SIDE_BOUNDARY
-    assert fly(state, 0.0, -27.0)[0].end_reason.item() == EndReason.SIDE_BOUNDARY
-    state.collected[:, :2] = True
-    done, _ = fly(state, 33.0, 0.0)
-    assert done.end_reason.item() == EndReason.ALL_CUBES
-    state.steps[:] = 299
-    assert fly(state, 0.0, 0.0)[0].end_reason.item() == EndReason.STEP_LIMIT
-    assert fly(state, 33.0, 0.0)[0].end_reason.item() == EndReason.ALL_CUBES
+    assert fly(state, beyond(44.0), 0.0)[0].end_reason.item() == EndReason.FRONT_BOUNDARY
+    assert fly(state, -100.0, 0.0)[0].end_reason.item() == EndReason.RUNNING
+    for y in (26.0, -26.0):
+        assert fly(state, 0.0, y)[0].end_reason.item() == EndReason.RUNNING
+        assert fly(state, 0.0, beyond(y))[0].end_reason.item() == EndReason.SIDE_BOUNDARY
+    for steps, reason in ((298, EndReason.RUNNING), (299, EndReason.STEP_LIMIT)):
+        state.steps[:] = steps
+        assert fly(state, 0.0, 0.0)[0].end_reason.item() == reason
+
+
+@pytest.mark.parametrize("coinciding", list(itertools.product([False, True], repeat=4)))
+def test_of_coinciding_ends_the_first_in_the_order_counts(coinciding):
+    all_cubes, front, side, limit = coinciding
+    state = at(0.0, 0.0, 0.0)
+    state.collected[:] = all_cubes
+    state.steps[:] = 299 if limit else 0
+    ended, _ = fly(state, 45.0 if front else 0.0, 27.0 if side else 0.0)
+    order = ("ALL_CUBES", "FRONT_BOUNDARY", "SIDE_BOUNDARY", "STEP_LIMIT")
+    expected = next((n for n, holds in zip(order, coinciding, strict=True) if holds), "RUNNING")
+    assert ended.end_reason.item() == EndReason[expected]
+
+
+def test_collecting_but_not_passing_every_cube_ends_the_episode():
+    state = at(0.0, 0.0)
+    state.collected[:, 0] = True
+    assert fly(state, 24.0, 0.0)[0].end_reason.item() == EndReason.ALL_CUBES
+    state.collected[:], state.passed[:] = False, True
+    assert fly(state, 26.0, 0.0)[0].end_reason.item() == EndReason.RUNNING
+
+
+def test_numbers_of_enumerations_are_those_of_files_and_policies():
+    assert [a.value for a in Action] == [0, 1, 2] and Action(1).name == "LEFT"
+    assert [s.name for s in Side] == ["LEFT", "AHEAD", "RIGHT"] and Side.LEFT == 0
+    names = ["RUNNING", "ALL_CUBES", "FRONT_BOUNDARY", "SIDE_BOUNDARY", "STEP_LIMIT"]
+    assert [EndReason(i).name for i in range(5)] == names
+
+
+def test_next_cube_is_the_first_that_stands_and_their_number_if_none_does():
+    state = at(0.0, 0.0, 0.0)
+    for collected, passed, index in (
+        ([0, 0, 0], [0, 0, 0], 0),
+        ([1, 0, 0], [0, 0, 0], 1),
+        ([0, 1, 0], [1, 0, 0], 2),
+        ([0, 1, 0], [0, 0, 0], 0),
+        ([1, 0, 1], [0, 1, 0], 3),
+    ):
+        state.collected, state.passed = torch.tensor([collected]) > 0, torch.tensor([passed]) > 0
+        assert state.next_cube.tolist() == [index]
+        assert state.present.tolist() == [
+            [not (c or p) for c, p in zip(collected, passed, strict=True)]
+        ]
+
+
+def test_a_start_is_at_the_altitude_with_nothing_done():
+    cubes = [torch.zeros(2, 3).double() + i for i in range(3)]
+    state = rules.start(TaskSettings(altitude=4.0), cubes)
+    assert state.drone.tolist() == [[0.0, 0.0, 4.0]] * 3 and state.drone.dtype == torch.float64
+    assert state.cubes[2].unique().tolist() == [2.0]
+    assert state.collected.shape == state.passed.shape == (3, 2)
+    assert not state.collected.any() and not state.passed.any()
+    assert state.collected is not state.passed
+    assert state.steps.tolist() == state.end_reason.tolist() == [0, 0, 0]
+    assert state.to("cpu").side.tolist() == state.side.tolist()
+
+
+def test_draws_are_those_of_the_stream_in_order():
+    """Lateral and vertical offset of each cube in turn; figures rest on these very worlds."""
+    task = TaskSettings(vertical_bound=1.0, num_cubes=2)
+    raw = np.random.RandomState(5).uniform(-1, 1, size=(2, 2))
+    expected = [[15.0, 6 * raw[0, 0], 2.5 + raw[0, 1]], [24.0, 6 * raw[1, 0], 2.5 + raw[1, 1]]]
+    assert rules.draw_cubes(task, np.random.RandomState(5)).tolist() == expected
+
+
+MOVES = st.lists(st.sampled_from(list(Action)), min_size=1, max_size=60)
+PLACES = st.lists(st.floats(-6, 6), min_size=1, max_size=3)
+QUICK = settings(max_examples=30, deadline=None)
+NEAR = TaskSettings(num_cubes=3, first_distance=4.0, spacing=4.0, front_margin=3.0)
+
+
+def flight(places, moves, task=NEAR):
+    """States and rewards of one world, from its start to the end of the moves."""
+    state, rewards = at(*places, settings=task), []
+    states = [state]
+    for move in moves:
+        drone = state.drone + rules.displacement(task, torch.tensor([move]))
+        state, reward = rules.judge(task, state, drone)
+        states.append(state)
+        rewards.append(reward.item())
+    return states, rewards
+
+
+@given(PLACES, MOVES)
+@QUICK
+def test_what_is_done_is_never_undone(places, moves):
+    states, rewards = flight(places, moves)
+    for before, after, reward in zip(states[:-1], states[1:], rewards, strict=True):
+        assert (before.collected <= after.collected).all()
+        assert (before.passed <= after.passed).all()
+        assert not (after.collected & after.passed).any()
+        assert reward == int(after.collected.sum() - before.collected.sum())
+        assert (
+            after.next_cube >= before.next_cube or not after.collected[0, : after.next_cube].all()
+        )
+        known = before.side >= 0
+        assert torch.equal(after.side[known], before.side[known])
+        assert torch.equal(after.lateral[known], before.lateral[known])
+        assert torch.equal(after.side < 0, after.lateral.isnan())
+        seen = torch.arange(len(places)) <= after.next_cube
+        assert torch.equal(after.side >= 0, (before.side >= 0) | seen)
+    assert states[-1].steps.item() == len(moves)
+
+
+@given(PLACES, MOVES)
+@QUICK
+def test_mirrored_worlds_under_mirrored_moves_are_mirrored(places, moves):
+    swapped = {Action.LEFT: Action.RIGHT, Action.RIGHT: Action.LEFT, Action.FORWARD: Action.FORWARD}
+    states, rewards = flight(places, moves)
+    mirrored, others = flight([-y for y in places], [swapped[m] for m in moves])
+    assert rewards == others
+    for one, two in zip(states, mirrored, strict=True):
+        assert torch.equal(one.collected, two.collected) and torch.equal(one.passed, two.passed)
+        assert torch.equal(one.end_reason, two.end_reason)
+        torch.testing.assert_close(two.lateral, -one.lateral, equal_nan=True)
+        turned = torch.where(one.side < 0, -1, 2 - one.side)
+        assert torch.equal(two.side, turned)
+        torch.testing.assert_close(two.drone, one.drone * torch.tensor([1.0, -1.0, 1.0]).double())
+
+
+@given(st.lists(PLACES.filter(lambda p: len(p) == 3), min_size=2, max_size=4), MOVES)
+@QUICK
+def test_worlds_know_nothing_of_each_other(worlds, moves):
+    alone = [flight(places, moves)[0][-1] for places in worlds]
+    cubes = torch.cat([at(*places, settings=NEAR).cubes for places in worlds])
+    state = rules.start(NEAR, cubes)
+    for move in moves:
+        step = rules.displacement(NEAR, torch.tensor([move] * len(worlds)))
+        state, _ = rules.judge(NEAR, state, state.drone + step)
+    for i, one in enumerate(alone):
+        for name, value in vars(one).items():
+            found = getattr(state, name)[[i]]
+            torch.testing.assert_close(found, value, equal_nan=True, rtol=0, atol=0)
 
 
 def test_always_left_leaves_after_27_steps_as_in_the_chapter():

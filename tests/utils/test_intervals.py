@@ -1,7 +1,12 @@
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import binom
 
 from drone_rl.utils.intervals import mean_bounds, median_bounds, proportion
+
+QUICK = settings(max_examples=30, deadline=None)
 
 
 def test_clopper_pearson_by_known_values():
@@ -54,3 +59,108 @@ def test_median_bounds_are_order_statistics():
     assert median_bounds(range(5)) is None  # 1 - 2 / 2**5 = 0.94
     assert median_bounds([5, 1, 2, 3, 4, np.inf]) == (1.0, np.inf)  # 1 - 2 / 2**6 = 0.97
     assert median_bounds(range(10)) == (1.0, 8.0)  # 1 - 2 * 11 / 2**10 = 0.98
+
+
+@pytest.mark.parametrize("trials", [1, 6, 15, 40])
+def test_proportion_covers_by_adding_up_all_outcomes(trials):
+    intervals = [proportion(k, trials) for k in range(trials + 1)]
+    for p in np.linspace(0, 1, 101):
+        held = [i["lower95"] <= p <= i["upper95"] for i in intervals]
+        assert binom.pmf(range(trials + 1), trials, p)[held].sum() >= 0.95 - 1e-12
+
+
+@given(st.integers(0, 60), st.integers(0, 60), st.floats(0.5, 0.999))
+@QUICK
+def test_proportion_is_monotone_and_its_own_mirror_image(successes, failures, confidence):
+    trials = successes + failures
+    here, mirrored = proportion(successes, trials), proportion(failures, trials)
+    assert here["lower95"] == pytest.approx(1 - mirrored["upper95"])
+    assert (here["successes"], here["trials"]) == (successes, trials)
+    if trials:
+        assert here["lower95"] <= here["share"] == successes / trials <= here["upper95"]
+    if failures:
+        more = proportion(successes + 1, trials)
+        assert more["lower95"] > here["lower95"] and more["upper95"] >= here["upper95"]
+    level = proportion(successes, trials, confidence)
+    assert (level["lower95"] <= here["lower95"]) or confidence < 0.95
+    assert (level["upper95"] <= here["upper95"]) or confidence > 0.95
+
+
+@pytest.mark.parametrize("trials", [1, 4, 13])
+def test_mean_bounds_of_shares_cover_by_adding_up_all_outcomes(trials):
+    rows = [np.repeat([1.0, 0.0], [k, trials - k]) for k in range(trials + 1)]
+    found = [mean_bounds(row) for row in rows]
+    for p in np.linspace(0.01, 0.99, 99):
+        held = [f["lower95"] <= p <= f["upper95"] for f in found]
+        assert binom.pmf(range(trials + 1), trials, p)[held].sum() >= 0.95
+
+
+VALUES = st.lists(st.floats(0, 1), min_size=1, max_size=12)
+
+
+@given(VALUES, st.floats(-5, 5), st.floats(0.1, 10))
+@QUICK
+def test_mean_bounds_know_no_unit_and_no_side(values, low, width):
+    z = np.array(values)
+    plain, moved = mean_bounds(z), mean_bounds(low + width * z, low, low + width)
+    for key in ("mean", "lower95", "upper95"):
+        assert moved[key] == pytest.approx(low + width * plain[key], abs=1e-6 * width)
+    mirrored = mean_bounds(1 - z)
+    assert mirrored["lower95"] == pytest.approx(1 - plain["upper95"], abs=1e-9)
+    assert plain["lower95"] <= plain["mean"] + 1e-9 and plain["mean"] <= plain["upper95"] + 1e-9
+    assert plain["mean"] == pytest.approx(z.mean()) and plain["count"] == len(values)
+
+
+@given(VALUES, st.integers(0, 11), st.floats(0, 1))
+@QUICK
+def test_mean_bounds_rise_with_each_value_and_narrow_with_less_confidence(values, place, raised):
+    z = np.array(values)
+    higher = z.copy()
+    higher[place % len(z)] = max(higher[place % len(z)], raised)
+    here, there = mean_bounds(z), mean_bounds(higher)
+    assert there["lower95"] >= here["lower95"] - 1e-9
+    assert there["upper95"] >= here["upper95"] - 1e-9
+    loose = mean_bounds(z, confidence=0.8)
+    assert here["lower95"] <= loose["lower95"] + 1e-12
+    assert loose["upper95"] <= here["upper95"] + 1e-12
+    assert here["upper95"] - here["lower95"] > loose["upper95"] - loose["lower95"]
+
+
+def test_mean_bounds_of_one_value_by_hand():
+    """Half of the capital is staked wholly, half by half: (1 / m + (1 + 1 / m) / 2) / 2 = 40."""
+    one = mean_bounds([1.0])
+    assert (one["lower95"], one["upper95"]) == (pytest.approx(1.5 / 79.5), 1.0)
+    assert mean_bounds([0.5])["lower95"] == pytest.approx(0.5 * 1.5 / 79.5)
+    assert mean_bounds([1.0], confidence=0.8)["lower95"] == pytest.approx(1.5 / 19.5)
+    zero = {"mean": 0.0, "lower95": 0.0, "upper95": pytest.approx(1 - 1.5 / 79.5), "count": 1}
+    assert mean_bounds([0.0]) == zero
+
+
+def test_mean_bounds_of_four_values_by_hand():
+    """Stakes 1 and 1/2, each with half of the capital: their mean reaches 40 at the lower end."""
+    lower = mean_bounds(np.ones(4))["lower95"]
+    assert (lower**-4 + (0.5 + 0.5 / lower) ** 4) / 2 == pytest.approx(40)
+    lower = mean_bounds(np.ones(17))["lower95"]  # beyond 16 values also 1/4 and 1/8
+    stakes = [1, 1 / 2, 1 / 4, 1 / 8]
+    assert sum((1 - s + s / lower) ** 17 for s in stakes) / 4 == pytest.approx(40)
+
+
+@pytest.mark.parametrize("wrong", [[float("nan")], [float("inf")], [-1e-6], [1 + 1e-6]])
+def test_mean_bounds_refuse_what_is_not_in_range(wrong):
+    with pytest.raises(ValueError, match="from 0"):
+        mean_bounds([0.5, *wrong])
+
+
+def test_rounding_errors_at_the_ends_are_in_range():
+    assert mean_bounds([1 + 1e-12, -1e-12])["mean"] == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("confidence", [0.9, 0.95])
+@pytest.mark.parametrize("count", range(1, 31))
+def test_median_bounds_are_the_narrowest_that_cover(count, confidence):
+    """The median lies outside ranks r and n + 1 - r with probability 2 P(Binomial(n, 1/2) < r)."""
+    found = median_bounds(range(count), confidence)
+    ranks = [
+        r for r in range(1, count // 2 + 1) if 2 * binom.cdf(r - 1, count, 0.5) <= 1 - confidence
+    ]
+    assert found == ((max(ranks) - 1, count - max(ranks)) if len(ranks) else None)

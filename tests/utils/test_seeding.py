@@ -1,6 +1,8 @@
 import numpy as np
 import pytest
 import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import (
@@ -31,6 +33,44 @@ def test_world_of_next_seed_is_no_world_of_this_one():
     this = {draws(world_random_state(0, world)) for world in range(100)}
     following = {draws(world_random_state(1, world)) for world in range(100)}
     assert not this & following
+
+
+def test_streams_have_the_numbers_on_which_all_figures_rest():
+    assert {s.name: s.value for s in Stream} == {
+        "WORLDS": 0,
+        "POLICY_INIT": 1,
+        "ACTIONS": 2,
+        "CHOICE": 3,
+        "REPORT": 4,
+    }
+    drawn = world_random_state(7, 2).uniform()
+    child = np.random.SeedSequence(7, spawn_key=(Stream.WORLDS, 2))
+    assert drawn == np.random.RandomState(np.random.PCG64(child)).uniform()
+    state = np.random.SeedSequence(7, spawn_key=(Stream.ACTIONS, 3)).generate_state(1, np.uint64)[0]
+    expected = torch.rand(2, generator=torch.Generator().manual_seed(int(state) // 2))
+    found = torch.rand(2, generator=torch_generator(7, Stream.ACTIONS, number=3))
+    assert torch.equal(found, expected)
+    default = torch_generator(7, Stream.ACTIONS).initial_seed()
+    assert default == torch_generator(7, Stream.ACTIONS, number=0).initial_seed()
+
+
+@given(st.integers(0, 2**40), st.integers(0, 2**20), st.sampled_from(list(Stream)))
+@settings(max_examples=30, deadline=None)
+def test_any_other_key_is_another_stream(seed, world, stream):
+    here = draws(world_random_state(seed, world, stream))
+    assert here == draws(world_random_state(seed, world, stream))
+    others = {draws(world_random_state(seed, world, other)) for other in Stream if other != stream}
+    others |= {draws(world_random_state(seed + 1, world, stream))}
+    others |= {draws(world_random_state(seed, world + 1, stream))}
+    assert here not in others and len(others) == len(Stream) + 1
+
+
+def test_worlds_of_choice_and_report_are_none_of_training():
+    seen = [
+        {draws(world_random_state(seed, world, stream)) for seed in range(3) for world in range(60)}
+        for stream in (Stream.WORLDS, Stream.CHOICE, Stream.REPORT)
+    ]
+    assert all(len(part) == 180 for part in seen) and len(set.union(*seen)) == 540
 
 
 def test_same_key_repeats():
