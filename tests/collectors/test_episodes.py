@@ -2,6 +2,10 @@ import itertools
 
 import pytest
 import torch
+from tensordict import TensorDict
+from tensordict.nn import TensorDictModule
+from torchrl.data import Binary, Categorical, Composite, Unbounded
+from torchrl.envs import EnvBase
 
 from drone_rl.collectors import EpisodeCollector, ThreadedCollector
 from drone_rl.envs import DroneEnv
@@ -10,6 +14,101 @@ from drone_rl.sim.settings import TaskSettings
 from drone_rl.utils.errors import InputError
 
 SHORT = TaskSettings(num_cubes=2, first_distance=3.0, spacing=3.0, step_limit=12, front_margin=3.0)
+
+
+class Scripted(EnvBase):
+    """World w has episodes of known lengths; each frame is numbered 100 w + 10 episode + step."""
+
+    LENGTHS = ((3, 1, 2), (1, 1, 4), (2, 5, 1))
+
+    def __init__(self):
+        super().__init__(batch_size=torch.Size([3]))
+        self.observation_spec = Composite(frame=Unbounded((3, 1)), shape=(3,))
+        self.action_spec = Categorical(1000, shape=(3,), dtype=torch.int64)
+        self.reward_spec = Unbounded((3, 1))
+        self.full_done_spec = Composite(done=Binary(1, (3, 1), dtype=torch.bool), shape=(3,))
+        self.episode, self.step_of = torch.full((3,), -1), torch.zeros(3).long()
+
+    def _frame(self):
+        return (100 * torch.arange(3) + 10 * self.episode + self.step_of).float()[:, None]
+
+    def _reset(self, tensordict=None, **kwargs):
+        self.episode, self.step_of = self.episode + 1, torch.zeros(3).long()
+        return TensorDict({"frame": self._frame(), "done": torch.zeros(3, 1).bool()}, [3])
+
+    def _step(self, tensordict):
+        reward = -tensordict["action"].float()[:, None]  # of the frame that was acted on
+        self.step_of = self.step_of + 1
+        lengths = torch.tensor([self.LENGTHS[w][int(self.episode[w])] for w in range(3)])
+        done = (self.step_of >= lengths)[:, None]
+        return TensorDict({"frame": self._frame(), "reward": reward, "done": done}, [3])
+
+    def _set_seed(self, seed):
+        pass
+
+
+def scripted(**kwargs):
+    """A collector whose actor answers each frame with its number."""
+    actor = TensorDictModule(lambda f: f[:, 0].long(), in_keys=["frame"], out_keys=["action"])
+    return EpisodeCollector(Scripted(), actor, keep=(("next", "frame"),), **kwargs)
+
+
+def test_every_frame_of_every_episode_is_there_once_in_order_and_beside_its_action():
+    collector = scripted()
+    for episode, first in ((0, 0), (1, 3), (2, 6)):
+        batch = collector.collect()
+        lengths = [Scripted.LENGTHS[w][episode] for w in range(3)]
+        frames = [100 * w + 10 * episode + t for w in range(3) for t in range(lengths[w])]
+        assert batch["frame"][:, 0].tolist() == batch["action"].tolist() == frames
+        assert batch["next", "reward"][:, 0].tolist() == [-f for f in frames]
+        assert batch["next", "frame"][:, 0].tolist() == [f + 1 for f in frames]
+        ends = [t == length - 1 for length in lengths for t in range(length)]
+        assert batch["next", "done"][:, 0].tolist() == ends
+        ids = [first + w for w in range(3) for _ in range(lengths[w])]
+        assert batch["collector", "traj_ids"].tolist() == ids
+    assert (collector.frames, collector.episodes) == (20, 9)
+
+
+def test_the_first_worlds_alone():
+    collector = scripted()
+    batch = collector.collect(2)
+    assert batch["frame"][:, 0].tolist() == [0, 1, 2, 100]
+    assert (collector.frames, collector.episodes) == (4, 2)
+    following = collector.collect(1)
+    assert following["frame"][:, 0].tolist() == [10]
+    assert following["collector", "traj_ids"].tolist() == [2]
+
+
+def test_total_frames_stops_before_the_batch_that_is_not_needed():
+    assert [len(batch) for batch in scripted(total_frames=6)] == [6]
+    assert [len(batch) for batch in scripted(total_frames=7)] == [6, 7]
+    assert [len(batch) for batch in scripted(total_frames=0)] == []
+
+
+def test_what_is_kept_and_what_is_not():
+    batch = scripted(keep_observations=False).collect()
+    assert set(batch.keys()) == {"action", "next", "collector"}
+    assert set(batch["next"].keys()) == {"reward", "done", "terminated", "frame"}
+    assert set(scripted().collect().keys()) == {"frame", "action", "next", "collector"}
+
+
+def test_state_goes_on_where_it_was():
+    first = scripted()
+    first.env.state_dict, first.env.load_state_dict = dict, lambda state: None
+    first.collect()
+    assert first.state_dict() == {"frames": 6, "episodes": 3, "worlds": {}}
+    second = scripted()
+    second.env.load_state_dict = lambda state: None
+    second.load_state_dict(first.state_dict())
+    assert (second.frames, second.episodes) == (6, 3)
+    assert second.collect()["collector", "traj_ids"].unique().tolist() == [3, 4, 5]
+
+
+def test_shutdown_closes_once():
+    collector = scripted()
+    collector.shutdown()
+    assert collector.env.is_closed
+    collector.shutdown()
 
 
 @pytest.fixture
@@ -184,6 +283,20 @@ def test_threads_join_in_order(make_pipeline):
     alone = EpisodeCollector(*make_pipeline(2, task=SHORT, num_shards=1)).collect()
     assert torch.equal(batch["pixels"][: len(alone)], alone["pixels"])
     joined.shutdown()
+
+
+def test_threads_carry_every_episode_of_every_collector_on():
+    joined = ThreadedCollector([scripted(), scripted()])
+    assert joined.actor is joined.collectors[0].actor
+    for episode in range(3):
+        alone = [w * 100 + episode * 10 for w in range(3)]
+        batch = joined.collect()
+        firsts = batch["frame"][:, 0][batch["frame"][:, 0] % 10 == 0].tolist()
+        assert firsts == alone * 2
+        assert int(batch["next", "done"].sum()) == 6
+    assert [c.frames for c in joined.collectors] == [20, 20]
+    joined.shutdown()
+    assert all(c.env.is_closed for c in joined.collectors)
 
 
 def test_threaded_state_round_trip(make_pipeline):

@@ -35,6 +35,39 @@ def test_exactly_as_many_episodes_as_asked_for():
     assert len(episodes.length) == 11
 
 
+def test_episodes_are_those_of_each_world_alone_in_order_and_the_first_of_them():
+    """Of 4 worlds, 10 episodes: three rounds, of which the last gives two worlds'."""
+    policy = Oracle(TaskSettings())
+    together = run_episodes(DroneEnv(4, pixels=False, seed=3), policy, 10)
+    alone = [
+        run_episodes(DroneEnv(1, pixels=False, seed=3, first_world=i), policy, 3) for i in range(4)
+    ]
+    for name, value in vars(together).items():
+        expected = torch.stack([getattr(one, name) for one in alone], 1).flatten(0, 1)[:10]
+        torch.testing.assert_close(value, expected, equal_nan=True, rtol=0, atol=0)
+    assert len(together.length.unique()) > 3  # no two alike, or order would not show
+
+
+def test_greedy_flies_by_the_mode_and_sampling_by_the_odds(make_pipeline):
+    """Odds of 0.4, 0.3 and 0.3: the mode flies straight on, 11 steps to the boundary."""
+    task = TaskSettings(num_cubes=1, first_distance=4.0, front_margin=6.5, step_limit=40)
+
+    def lengths(greedy):
+        env, actor = make_pipeline(16, task=task)
+        logits = actor.module[0].module.layers.logits
+        with torch.no_grad():
+            logits.weight.zero_()
+            logits.bias.copy_(torch.tensor([0.4, 0.3, 0.3]).log())
+        episodes = run_episodes(env, actor, 16, greedy=greedy)
+        missed = ~episodes.collected[:, 0]
+        return episodes.length[missed]
+
+    assert lengths(True).unique().tolist() == [11]
+    sampled = lengths(False).double()
+    assert len(sampled.unique()) > 3
+    assert 15 < float(sampled.mean()) < 40  # 11 / 0.4 = 27.5 less what hits a limit
+
+
 def test_the_kth_episode_is_the_same_world_whatever_the_policy():
     env = DroneEnv(8, TaskSettings(vertical_bound=1.0, altitude=5.0), pixels=False)
     start = env.state_dict()

@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from drone_rl.training import Callback, CheckpointCallback, NotANumberError, load_checkpoint
-from drone_rl.training.metrics import batch_metrics, episode_rewards, running_mean
+from drone_rl.training.metrics import episode_rewards, running_mean
 
 
 class At(Callback):
@@ -128,6 +128,67 @@ def test_minibatches_add_up_to_the_whole_batch(make_trainer, reduction):
     torch.testing.assert_close(*gradients)
 
 
+@pytest.mark.parametrize("size", [1, 3, 7, 10_000])
+def test_every_frame_is_learned_from_once(make_trainer, size):
+    """The estimator sees whole episodes, the loss every frame of them once, in order."""
+    trainer = make_trainer(minibatch_frames=size)
+    collected, estimated, learned = [], [], []
+    collect, estimate, lose = trainer.collector.collect, trainer.estimator, trainer.loss.forward
+
+    def spy(seen, function):
+        def call(*args):
+            found = function(*args)
+            seen.append((args[0] if args else found)["pixels"].clone())
+            return found
+
+        return call
+
+    trainer.collector.collect = spy(collected, collect)
+    trainer.estimator = spy(estimated, estimate)
+    trainer.loss.forward = spy(learned, lose)
+    trainer._update()
+    (batch,) = collected
+    assert len(estimated) == 1 and torch.equal(estimated[0], batch)
+    assert torch.equal(torch.cat(learned), batch)
+    assert max(len(chunk) for chunk in learned) <= size
+    assert (trainer.progress.frames, trainer.progress.episodes) == (len(batch), 8)
+
+
+def test_progress_counts_what_was_collected(make_trainer):
+    trainer, batches = make_trainer(total_frames=100), []
+    collect = trainer.collector.collect
+    trainer.collector.collect = lambda: batches.append(collect()) or batches[-1]
+    assert trainer.run() == "frames"
+    progress = trainer.progress
+    assert progress.updates == len(batches) and progress.frames == sum(len(b) for b in batches)
+    assert progress.frames - len(batches[-1]) < 100 <= progress.frames
+    assert progress.episodes == sum(int(b["next", "done"].sum()) for b in batches)
+    mean = 0.0
+    for batch in batches:
+        mean = running_mean(mean, episode_rewards(batch), 0.99)
+    assert progress.running_cubes == mean
+    assert progress.seconds > 0
+
+
+@pytest.mark.parametrize("reduction", ["mean", "sum"])
+def test_loss_terms_add_up_over_minibatches(make_trainer, reduction):
+    terms = []
+    for size in (10_000, 3):
+        trainer = make_trainer(minibatch_frames=size)
+        trainer.loss.reduction = reduction
+        terms.append(trainer._learn(trainer.estimator(trainer.collector.collect())))
+    assert terms[0] == pytest.approx(terms[1], rel=1e-4, abs=1e-6)
+    assert 0 < terms[0]["loss/entropy"] <= 0.6932
+
+
+def test_gradient_is_clipped_to_the_norm(make_trainer):
+    trainer = make_trainer(max_grad_norm=1e-3)
+    norm = trainer._learn(trainer.estimator(trainer.collector.collect()))["loss/grad_norm"]
+    assert norm > 1e-3  # as it was before
+    clipped = torch.cat([p.grad.flatten() for p in trainer.network.parameters()]).norm()
+    assert float(clipped) == pytest.approx(1e-3, rel=1e-3)
+
+
 def test_metrics_of_an_update(make_trainer):
     at = At(-1, None)
     make_trainer(callbacks=[at], max_grad_norm=1e-3).run()
@@ -135,31 +196,3 @@ def test_metrics_of_an_update(make_trainer):
     assert names | {"loss/entropy", "loss/grad_norm", "time/frames_per_second"} <= set(
         at.metrics[0]
     )
-
-
-def test_running_mean_by_hand():
-    assert running_mean(0.0, torch.tensor([1.0, 2.0]), 0.9) == pytest.approx(0.29)
-
-
-def test_episode_rewards_and_batch_metrics_by_hand():
-    from tensordict import TensorDict
-
-    batch = TensorDict(
-        {
-            "next": {
-                "reward": torch.tensor([0.0, 1.0, 1.0])[:, None],
-                "done": torch.tensor([0, 1, 1]).bool()[:, None],
-                "info": {"end_reason": torch.tensor([0, 2, 1])[:, None]},
-            }
-        },
-        [3],
-    )
-    assert episode_rewards(batch).tolist() == [1.0, 1.0]
-    assert batch_metrics(batch) == {
-        "train/cubes": 1.0,
-        "train/length": 1.5,
-        "end/all_cubes": 0.5,
-        "end/front_boundary": 0.5,
-        "end/side_boundary": 0.0,
-        "end/step_limit": 0.0,
-    }

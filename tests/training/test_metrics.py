@@ -1,0 +1,80 @@
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tensordict import TensorDict
+
+from drone_rl.sim.rules import EndReason
+from drone_rl.training.metrics import END_REASONS, batch_metrics, episode_rewards, running_mean
+
+
+def test_running_mean_by_hand():
+    assert running_mean(0.0, torch.tensor([1.0, 2.0]), 0.9) == pytest.approx(0.29)
+
+
+def test_episode_rewards_and_batch_metrics_by_hand():
+    batch = TensorDict(
+        {
+            "next": {
+                "reward": torch.tensor([0.0, 1.0, 1.0])[:, None],
+                "done": torch.tensor([0, 1, 1]).bool()[:, None],
+                "info": {"end_reason": torch.tensor([0, 2, 1])[:, None]},
+            }
+        },
+        [3],
+    )
+    assert episode_rewards(batch).tolist() == [1.0, 1.0]
+    assert batch_metrics(batch) == {
+        "train/cubes": 1.0,
+        "train/length": 1.5,
+        "end/all_cubes": 0.5,
+        "end/front_boundary": 0.5,
+        "end/side_boundary": 0.0,
+        "end/step_limit": 0.0,
+    }
+
+
+def test_names_of_the_ends_are_those_of_the_rules():
+    assert [EndReason[name.upper()].value for name in END_REASONS] == [1, 2, 3, 4]
+
+
+def make_batch(episodes):
+    reward = torch.tensor([float(r) for episode in episodes for r in episode])[:, None]
+    done = torch.zeros(len(reward), 1, dtype=torch.bool)
+    done[torch.tensor([len(e) for e in episodes]).cumsum(0) - 1] = True
+    return TensorDict({"next": {"reward": reward, "done": done}}, [len(reward)])
+
+
+EPISODES = st.lists(st.lists(st.integers(0, 3), min_size=1, max_size=6), min_size=1, max_size=6)
+
+
+@given(EPISODES)
+@settings(max_examples=40, deadline=None)
+def test_rewards_and_lengths_of_any_batch(episodes):
+    batch = make_batch(episodes)
+    rewards = [sum(e) for e in episodes]
+    assert episode_rewards(batch).tolist() == rewards
+    metrics = batch_metrics(batch)
+    assert metrics == {
+        "train/cubes": pytest.approx(sum(rewards) / len(rewards)),
+        "train/length": sum(len(e) for e in episodes) / len(episodes),
+    }
+
+
+@given(st.lists(st.floats(0, 3), max_size=8), st.floats(0, 3), st.floats(0, 1))
+@settings(max_examples=40, deadline=None)
+def test_running_mean_is_its_closed_form(values, old, decay):
+    """decay^n old + (1 - decay) sum of decay^(n - 1 - i) value_i; nothing changes nothing."""
+    n = len(values)
+    wanted = decay**n * old
+    wanted += (1 - decay) * sum(decay ** (n - 1 - i) * v for i, v in enumerate(values))
+    found = running_mean(old, torch.tensor(values, dtype=torch.float64), decay)
+    assert found == pytest.approx(wanted, abs=1e-9)
+
+
+def test_end_of_an_episode_is_read_at_its_last_frame():
+    batch = make_batch([[0, 1], [1, 1, 0], [0]])
+    reasons = torch.tensor([4, 1, 4, 4, 2, 3])[:, None]
+    batch["next", "info"] = TensorDict({"end_reason": reasons}, [6])
+    metrics = batch_metrics(batch)
+    assert [metrics[f"end/{name}"] for name in END_REASONS] == pytest.approx([1 / 3] * 3 + [0])
