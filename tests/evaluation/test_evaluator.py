@@ -2,10 +2,11 @@ import numpy as np
 import pytest
 import torch
 
+from drone_rl.collectors import EpisodeCollector
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation import ConstantPolicy, Oracle, RandomPolicy, run_episodes, summarise
 from drone_rl.evaluation.video import film_episode, write_video
-from drone_rl.sim.rules import Action
+from drone_rl.sim.rules import Action, EndReason
 from drone_rl.sim.settings import TaskSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import Stream
@@ -66,6 +67,30 @@ def test_greedy_flies_by_the_mode_and_sampling_by_the_odds(make_pipeline):
     sampled = lengths(False).double()
     assert len(sampled.unique()) > 3
     assert 15 < float(sampled.mean()) < 40  # 11 / 0.4 = 27.5 less what hits a limit
+
+
+@pytest.mark.parametrize(("number", "batches"), [(1, 1), (8, 1), (9, 2), (16, 2)])
+def test_no_batch_is_flown_in_vain_and_no_picture_kept(make_pipeline, monkeypatch, number, batches):
+    collected, collect = [], EpisodeCollector.collect
+    monkeypatch.setattr(
+        EpisodeCollector, "collect", lambda self: collected.append(collect(self)) or collected[-1]
+    )
+    task = TaskSettings(num_cubes=1, first_distance=4.0, step_limit=4)
+    env, actor = make_pipeline(8, task=task)
+    assert len(run_episodes(env, actor, number)) == number
+    assert len(collected) == batches
+    assert not any("pixels" in batch for batch in collected)
+
+
+def test_heights_are_metres_above_the_drone():
+    env = DroneEnv(4, TaskSettings(vertical_bound=1.0, altitude=5.0), pixels=False)
+    start = env.state_dict()
+    drawn = env.reset()["info", "cube_positions"][..., 2]
+    env.load_state_dict(start)
+    flown = run_episodes(env, ConstantPolicy(Action.FORWARD), 4)
+    torch.testing.assert_close(flown.height, drawn.double() - 5.0)
+    assert (flown.end_reason == EndReason.FRONT_BOUNDARY).any()
+    assert flown.length.max() == 45  # 44 is still within bounds
 
 
 def test_the_kth_episode_is_the_same_world_whatever_the_policy():

@@ -20,6 +20,13 @@ def test_clopper_pearson_by_known_values():
     assert (none["lower95"], none["upper95"]) == pytest.approx((0.0, 0.3085), abs=1e-4)
 
 
+def test_little_confidence_by_hand():
+    """The tail is 0.3 on either side."""
+    assert proportion(1, 1, confidence=0.4)["lower95"] == pytest.approx(0.3)
+    assert mean_bounds([1.0], confidence=0.4)["lower95"] == pytest.approx(1.5 / (2 / 0.3 - 0.5))
+    assert median_bounds(range(10), confidence=0.4) == (3.0, 6.0)  # 176 of 1024 are outside
+
+
 def test_share_of_nothing_is_unknown():
     result = proportion(0, 0)
     assert result["share"] is None
