@@ -43,7 +43,9 @@ def run(config: DictConfig) -> tuple[int, str]:
         found[name] = _explain(config, settings, name, path, folder / f"{number}_{_slug(name)}")
     report = write_report([folder / f"{i}_{_slug(n)}" for i, n in enumerate(names)], folder)
     for name, numbers in found.items():
-        print(f"{name}: {numbers['verdict']['kind']}. {numbers['verdict']['sentence']}")
+        verdict = numbers["verdict"]
+        certainty = "" if verdict["certain"] else " (not certain)"
+        print(f"{name}: {verdict['kind']}{certainty}. {verdict['sentence']}")
     _log.info("report: %s", report)
     refused = [
         n["verdict"]["exit_code"] or 12

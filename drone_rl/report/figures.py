@@ -30,6 +30,7 @@ def draw_all(explanation: Explanation) -> dict[str, Image.Image | Figure]:
         "class_model": class_model_grid([explanation]),
         "sequence": sequence(explanation),
         "truth": plots.truth_chart(explanation),
+        "heat": plots.heat_chart(explanation),
         "interventions": interventions(explanation),
         "response": plots.response_chart(explanation),
         "asymmetry": asymmetry(explanation),

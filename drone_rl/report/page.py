@@ -18,10 +18,10 @@ from PIL import Image
 from drone_rl.report import figures
 from drone_rl.report.explanation import ACTIONS, Explanation
 from drone_rl.utils.errors import InputError
-from drone_rl.words import report, truth
-from drone_rl.words.licence import say
+from drone_rl.words import advice, report, truth
+from drone_rl.words.licence import percent, say
 
-WORDS = {**report.SECTIONS, "truth": truth.SENTENCES}
+WORDS = {**advice.SECTIONS, **report.SECTIONS, "truth": truth.SENTENCES}
 """Sentences by the part of the page in which they stand."""
 
 
@@ -86,7 +86,7 @@ def _render(explanations: list[Explanation], sections: list[dict], class_models:
         autoescape=True,
         undefined=jinja2.StrictUndefined,
     )
-    environment.filters["percent"] = lambda x: "none" if x is None else f"{100 * x:.0f}%"
+    environment.filters["percent"] = _short
     # "<" is the one character by which a name could leave a script
     environment.filters["script"] = lambda x: jinja2.utils.markupsafe.Markup(
         json.dumps(x).replace("<", "\\u003c")
@@ -98,8 +98,14 @@ def _render(explanations: list[Explanation], sections: list[dict], class_models:
         sections=sections,
         class_models=class_models,
         actions=ACTIONS,
+        names=truth.NAMES,
         rule=explanations[0].numbers["verdict"]["rule"],
     )
+
+
+def _short(share: float) -> str:
+    """A share for a table."""
+    return percent(share).replace("less than ", "<").replace("more than ", ">")
 
 
 def _save(picture: Image.Image | Figure, path: Path | None) -> str:

@@ -1,33 +1,45 @@
 """Charts of an explanation's numbers."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import matplotlib
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
-import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from drone_rl.report.explanation import ACTIONS, Explanation
 from drone_rl.words.truth import NAMES
 
-COLORS = ("#4269d0", "#efb118", "#ff725c", "#6cc5b0", "#9c6b4e")
-_CHANCE = {"color": "#8b8f98", "marker": "|", "markersize": 16, "markeredgewidth": 2.5}
+_METHOD, _PLACEBO = "#4269d0", "#b4b8c0"
 
 
 def truth_chart(explanation: Explanation) -> Figure:
-    """Six views on whether the heat maps are true."""
-    methods = explanation.numbers["truth"]["methods"]
-    figure, axes = plt.subplots(2, 3, figsize=(13.5, 7.5), layout="constrained")
-    _pointing(axes[0, 0], methods)
-    _heat(axes[0, 1], methods)
-    _causal(axes[0, 2], methods)
-    random = explanation.numbers["truth"]["random_map"]
-    _curves(axes[1, 0], methods, random, "deletion", "lower is better")
-    _curves(axes[1, 1], methods, random, "insertion", "higher is better")
-    _randomisation(axes[1, 2], methods)
+    """Methods beside placebos: what they score, and the tests that a method must pass."""
+    truth = explanation.numbers["truth"]
+    figure, axes = plt.subplots(
+        1, 4, figsize=(17, 4.6), layout="constrained", width_ratios=(2, 1.3, 1.3, 1.3)
+    )
+    _scores(axes[0], truth)
+    _test(axes[1], truth, _hardest, 0.0, "score above its strongest placebo\n(must be above 0)")
+    _test(axes[2], truth, lambda m: m.get("pointing"), 0.0, "hits above chance\n(must be above 0)")
+    _test(
+        axes[3],
+        truth,
+        lambda m: m.get("likeness"),
+        0.5,
+        "likeness on shuffled weights\n(must be below 0.5)",
+    )
+    for axis in axes[2:]:
+        axis.set_yticklabels([])
+    return figure
+
+
+def heat_chart(explanation: Explanation) -> Figure:
+    """Where the heat of each method lies."""
+    figure, axis = plt.subplots(figsize=(9, 3.2), layout="constrained")
+    _heat(axis, explanation.numbers["truth"]["heat"])
     return figure
 
 
@@ -87,78 +99,69 @@ def _response_row(
     return image
 
 
-def _labels(methods: dict) -> list[str]:
-    return [NAMES.get(name, name) for name in methods]
+def _name(method: str) -> str:
+    return NAMES.get(method, method)
 
 
-def _pointing(axis: plt.Axes, methods: dict) -> None:
-    rows = np.arange(len(methods))[::-1]
-    for row, (name, found) in zip(rows, methods.items(), strict=True):
-        hit, chance = found["pointing"]["hit"], found["pointing"]["chance"]
-        if hit["mean"] is None:
-            axis.text(0.02, row, "no cube was ever in view", va="center")
+def _scores(axis: plt.Axes, truth: dict) -> None:
+    placebos = sorted(truth["placebos"].items(), key=lambda item: -(item[1]["mean"] or 0.0))
+    rows = [(_name(n), m["score"], _METHOD) for n, m in truth["methods"].items()]
+    rows += [(f"placebo: {n}", score, _PLACEBO) for n, score in placebos]
+    for y, (_, score, color) in enumerate(rows[::-1]):
+        if score["mean"] is None:
+            axis.text(0.02, y, "nothing moves the policy", va="center", fontsize=9)
             continue
-        axis.barh(row, hit["mean"], color=COLORS[len(methods) - 1 - row], height=0.6)
-        axis.plot([hit["lower95"], hit["upper95"]], [row, row], color="black", lw=1.5)
-        axis.plot(chance["mean"], row, **_CHANCE)
-        del name
-    axis.set(yticks=rows, yticklabels=_labels(methods), xlim=(0, 1))
+        axis.barh(y, score["mean"], color=color, height=0.65)
+        axis.plot([score["lower95"], score["upper95"]], [y, y], color="black", lw=1.5)
+    axis.axvline(0, color="#8b8f98", lw=1)
+    axis.set(yticks=range(len(rows)), yticklabels=[name for name, *_ in rows[::-1]], xlim=(-0.5, 1))
     axis.set_title(
-        "brightest pixel is on the next cube\n(gray mark: chance; line: 95%)", fontsize=11
+        "tells which patches move the policy\n(score; chance: 0; line: 95%)", fontsize=11
     )
 
 
-def _heat(axis: plt.Axes, methods: dict) -> None:
-    regions = list(next(iter(methods.values()))["heat"])
+def _hardest(method: dict) -> dict | None:
+    """The comparison with that placebo which the method beats least surely."""
+    found = method.get("placebos", {}).values()
+    return min(found, key=lambda b: -1.0 if b["lower"] is None else b["lower"], default=None)
+
+
+def _test(
+    axis: plt.Axes, truth: dict, of: Callable[[dict], dict | None], bar: float, title: str
+) -> None:
+    names = list(truth["methods"])[::-1]
+    for y, name in enumerate(names):
+        found = of(truth["methods"][name])
+        if found is None:
+            continue
+        if found["lower"] is None:
+            axis.text(bar, y, "too few flights", va="center", fontsize=9)
+            continue
+        axis.plot([found["lower"], found["upper"]], [y, y], color="black", lw=1.5)
+        axis.plot(found["median"], y, "o", color=_METHOD)
+    axis.axvline(bar, color="#c62828", ls="--", lw=1.2)
+    axis.set(
+        yticks=range(len(names)),
+        yticklabels=[_name(n) for n in names],
+        ylim=(-0.6, len(names) - 0.4),
+    )
+    axis.set_title(title, fontsize=11)
+
+
+def _heat(axis: plt.Axes, heat: dict) -> None:
+    regions = list(next(iter(heat.values())))
     shades = ("#d62728", "#ff9896", "#222222", "#8c9a7b", "#9ecae9")
-    rows = [*methods, None]
+    rows = [*heat, None]
     for y, name in zip(range(len(rows) - 1, -1, -1), rows, strict=True):
-        found = methods[name or next(iter(methods))]["heat"]
+        found = heat[name or next(iter(heat))]
         left = 0.0
         for region, shade in zip(regions, shades, strict=True):
             value = found[region]["share" if name else "chance"]["mean"] or 0.0
             label = region.replace("_", " ") if name is None else None
             axis.barh(y, value, left=left, color=shade, height=0.7, label=label)
             left += value
-    axis.set(yticks=range(len(rows)), yticklabels=["pixels (chance)", *_labels(methods)[::-1]])
+    axis.set(
+        yticks=range(len(rows)), yticklabels=["the pixels", *(_name(n) for n in [*heat][::-1])]
+    )
     axis.set_xlim(0, 1)
-    axis.set_title("where the heat lies", fontsize=11)
     axis.legend(loc="upper center", bbox_to_anchor=(0.5, -0.06), ncols=5, fontsize=8, frameon=False)
-
-
-def _causal(axis: plt.Axes, methods: dict) -> None:
-    rows = np.arange(len(methods))[::-1]
-    for row, found in zip(rows, methods.values(), strict=True):
-        causal = found["causal"]
-        if causal["correlation"] is None:
-            axis.text(0.02, row, "nothing varied", va="center")
-            continue
-        axis.barh(row, causal["correlation"], color=COLORS[len(methods) - 1 - row], height=0.6)
-        axis.plot([causal["lower95"], causal["upper95"]], [row, row], color="black", lw=1.5)
-    axis.axvline(0, color="#8b8f98", lw=2)
-    axis.set(yticks=rows, yticklabels=_labels(methods), xlim=(-0.5, 1))
-    axis.set_title("claims against what changes did:\nrank correlation (chance: 0)", fontsize=11)
-
-
-def _curves(axis: plt.Axes, methods: dict, random: dict, kind: str, title: str) -> None:
-    share = np.linspace(0, 100, len(random[kind]["curve"]))
-    for found, name, color in zip(methods.values(), methods, COLORS, strict=False):
-        label = f"{NAMES.get(name, name)}: {found['curves'][kind]['area']['mean']:.2f}"
-        axis.plot(share, found["curves"][kind]["curve"], color=color, label=label)
-    label = f"random order: {random[kind]['area']['mean']:.2f}"
-    axis.plot(share, random[kind]["curve"], color="#8b8f98", ls="--", label=label)
-    axis.set(xlabel="% of the pixels", ylabel="P(chosen action)", ylim=(-0.02, 1.02))
-    axis.set_title(f"{kind}: {title}", fontsize=11)
-    axis.legend(fontsize=8, title="area under the curve", title_fontsize=8)
-
-
-def _randomisation(axis: plt.Axes, methods: dict) -> None:
-    for (name, found), color in zip(methods.items(), COLORS, strict=False):
-        test = found["randomisation"]
-        axis.plot([1.0, *test["correlation"]], color=color, marker="o", label=NAMES.get(name, name))
-    layers = next(iter(methods.values()))["randomisation"]["layers"]
-    axis.set_xticks(range(len(layers) + 1), ["trained", *layers])
-    axis.axhline(0.5, color="#8b8f98", ls="--")
-    axis.set(ylabel="likeness to the trained map", ylim=(-1.05, 1.05))
-    axis.set_title("randomised from the last layer on:\na true map must change", fontsize=11)
-    axis.legend(fontsize=8, loc="lower left")

@@ -344,20 +344,7 @@ ASYMMETRY = (
     ),
 )
 
-SCOPE = (
-    Sentence(
-        "scope.one_look",
-        "no other look of the task was flown",
-        lambda e: not e.get("shifts"),
-        lambda e: (
-            "Tested in one look and one light only, those of its task: nothing here tests other "
-            "colours, light or sizes."
-        ),
-    ),
-)
-
 SECTIONS = {
-    "scope": SCOPE,
     "dataset": DATASET,
     "tsne": TSNE,
     "contradictions": CONTRADICTIONS,

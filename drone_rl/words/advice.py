@@ -1,0 +1,58 @@
+"""What to do about a verdict, and what it does not cover. Evidence: `explanation.json`."""
+
+from drone_rl.words.licence import Evidence, Sentence
+
+
+def _more(evidence: Evidence) -> str:
+    enough = evidence["verdict"]["enough"]
+    if enough is None:
+        return "What to do: fly many more episodes, or do not rely on it; this may stay open."
+    return f"What to do: fly more episodes (episodes={enough}) before relying on it."
+
+
+def _refuse(evidence: Evidence) -> str:
+    return (
+        "What to do: do not rely on it; require=good refuses it with exit status "
+        f"{evidence['verdict']['exit_code']}."
+    )
+
+
+def _is_good(evidence: Evidence) -> bool:
+    return evidence["verdict"]["kind"] == "good"
+
+
+def _is_certain(evidence: Evidence) -> bool:
+    return evidence["verdict"]["certain"]
+
+
+ADVICE = (
+    Sentence("advice.more", "the verdict is not certain", lambda e: not _is_certain(e), _more),
+    Sentence(
+        "advice.use",
+        "the policy is good, certainly",
+        lambda e: _is_certain(e) and _is_good(e),
+        lambda e: "What to do: rely on it in worlds like those tested, and in no others.",
+    ),
+    Sentence(
+        "advice.refuse",
+        "the policy is something else, certainly",
+        lambda e: _is_certain(e) and not _is_good(e),
+        _refuse,
+    ),
+)
+
+SCOPE = (
+    Sentence(
+        "scope.one_look",
+        "no other look of the task was flown",
+        lambda e: not e.get("shifts"),
+        lambda e: (
+            "Tested in one look and one light only, those of its task: nothing here tests other "
+            "colours, light or sizes."
+        ),
+    ),
+)
+
+SECTIONS = {"advice": ADVICE, "scope": SCOPE}
+"""Sentences by the part of the page in which they stand."""
+SENTENCES = (*ADVICE, *SCOPE)
