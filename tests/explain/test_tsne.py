@@ -129,6 +129,44 @@ def test_components_are_those_of_the_largest_variance():
     assert (tsne._principal_components(few[:, :50]) == np.eye(50)).all()
 
 
+@pytest.mark.parametrize("few", [True, False])
+def test_many_points_are_placed_by_approximate_methods(clusters, monkeypatch, few):
+    monkeypatch.setattr(tsne, "FEW", 120 if few else 119)
+    asked = {}
+
+    def build(**kwargs):
+        asked.update(kwargs)
+        raise NotImplementedError
+
+    monkeypatch.setattr(tsne.openTSNE, "TSNE", build)
+    with pytest.raises(NotImplementedError):
+        tsne.embed(clusters, perplexity=10, seed=1)
+    assert (asked["perplexity"], asked["random_state"], asked["initialization"]) == (10, 1, "pca")
+    methods = (asked["n_jobs"], asked["neighbors"], asked["negative_gradient_method"])
+    assert methods == ((1, "exact", "bh") if few else (tsne.num_cores(), "annoy", "fft"))
+
+
+def test_points_that_are_equal_are_moved_by_next_to_nothing():
+    points = np.repeat([[0.0, 4.0]], 200, 0)
+    moved = tsne._distinct(points, 0) - points
+    assert len(np.unique(moved)) == 400
+    assert moved.std() == pytest.approx(2e-6, rel=0.2)  # a millionth of the deviation, 2
+    assert tsne._distinct(np.zeros((200, 2)), 0).std() == pytest.approx(1e-12, rel=0.2)
+
+
+def test_smallest_and_largest_perplexity():
+    tsne.check_perplexity(1, 4)
+    tsne.check_perplexity(33, 100)
+    for perplexity, count in ((0.9, 100), (33.1, 100), (1, 3)):
+        with pytest.raises(InputError, match="does not fit"):
+            tsne.check_perplexity(perplexity, count)
+
+
+def test_features_that_are_not_finite_are_refused():
+    with pytest.raises(InputError, match="not finite"):
+        tsne.embed(np.full((40, 3), np.nan), perplexity=5)
+
+
 def test_identical_points_are_no_error():
     assert np.isfinite(tsne.embed(np.zeros((30, 4)), perplexity=5).points).all()
 
