@@ -10,11 +10,12 @@ from typing import Any
 import torch
 from omegaconf import DictConfig
 
-from drone_rl.bench.explain import bench_explain, bench_verdicts
+from drone_rl.bench.explain import bench_explain
 from drone_rl.bench.scaling import bench_scaling
 from drone_rl.bench.speed import bench_collector, bench_dm_control, bench_render
 from drone_rl.bench.sweeps import bench_kills, bench_ray, bench_sweeps
 from drone_rl.bench.training import bench_memory, bench_solve
+from drone_rl.bench.verdicts import bench_verdicts
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.provenance import provenance
 

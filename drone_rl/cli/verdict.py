@@ -29,7 +29,7 @@ def run(config: DictConfig) -> tuple[int, str]:
     folder = Path(HydraConfig.get().runtime.output_dir)
     rule = Rule(good_share=config.good_share)
     env, actor = _policy(config, min(config.num_envs, config.episodes))
-    draws = config.checkpoint not in BASELINES
+    draws = config.sampled and config.checkpoint not in BASELINES
     verdict = judge_policy(env, actor, config.episodes, rule=rule, sampled=draws)
     env.close()
     report = {"policy": config.checkpoint, **verdict.as_dict(), **provenance()}

@@ -135,27 +135,42 @@ def measure(
         rule: Thresholds.
         times: Counts every episode so often, to see what more of the same would tell.
     """
-    oracle, found = baselines["oracle"], []
+    told = observe(greedy, baselines, rule)
+    return tuple(estimate(i, np.tile(values, times), rule) for i, values in enumerate(told))
 
-    def mean(values: Tensor, low: float, high: float = 1.0) -> None:
-        bounds = mean_bounds(_repeat(values, times), low, high, rule.confidence)
-        found.append((bounds["mean"], bounds["lower95"], bounds["upper95"]))
 
-    mean(greedy.success - rule.good_share * oracle.success, -rule.good_share)
-    for side in Side:
-        offered = int(greedy.offered(side).sum())
-        share = proportion(times * offered, times * len(greedy), rule.confidence)
-        found.append((share["share"], share["lower95"], share["upper95"]))
-    for side in Side:
-        mean(greedy.side_share(side), 0.0)
+def observe(greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule) -> list[NDArray]:
+    """What each episode says of each of `QUANTITIES`: one value, or none.
+
+    Returns:
+        One array a quantity; those of "collected" have a value for each episode that offered such a
+        cube, the others one for each episode. Shape: (at most n,), float64.
+    """
+    oracle = baselines["oracle"]
+    told = [greedy.success - rule.good_share * oracle.success]
+    told += [greedy.offered(side).double() for side in Side]
+    told += [greedy.side_share(side) for side in Side]
     for name in LUCK:
-        hurdle = (1 - rule.luck_margin) * baselines[name].share + rule.luck_margin * oracle.share
-        mean(greedy.share - hurdle, -1.0)
-    return tuple(Quantity(*f, t) for f, t in zip(found, rule.thresholds, strict=True))
+        luck = (1 - rule.luck_margin) * baselines[name].share
+        told.append(greedy.share - luck - rule.luck_margin * oracle.share)
+    return [values.numpy() for values in told]
 
 
-def _repeat(values: Tensor, times: int) -> NDArray:
-    return np.tile(values.numpy(), times)
+def estimate(quantity: int, values: NDArray, rule: Rule) -> Quantity:
+    """One of `QUANTITIES` from what episodes say of it.
+
+    Args:
+        quantity: Its place among them.
+        values: As `observe` returns them.
+        rule: Thresholds.
+    """
+    name, thresholds = QUANTITIES[quantity], rule.thresholds[quantity]
+    if name.startswith("offered"):
+        share = proportion(int(values.sum()), len(values), rule.confidence)
+        return Quantity(share["share"], share["lower95"], share["upper95"], thresholds)
+    low = {"success": -rule.good_share, "collected": 0.0, "above": -1.0}[name.split()[0]]
+    mean = mean_bounds(values, low, 1.0, rule.confidence)
+    return Quantity(mean["mean"], mean["lower95"], mean["upper95"], thresholds)
 
 
 def _is_certain(found: tuple[Quantity, ...]) -> bool:
