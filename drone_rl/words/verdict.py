@@ -43,7 +43,7 @@ def _cubes(flights: Evidence) -> str:
     return percent(flights["shares"]["all"]["mean"])
 
 
-def _best_luck(evidence: Evidence) -> str:
+def best_luck(evidence: Evidence) -> str:
     """What sees nothing and collects most."""
     flown = evidence["baselines"]
     return max(_LUCK, key=lambda name: flown[name]["shares"]["all"]["mean"])
@@ -67,7 +67,7 @@ def _kind(evidence: Evidence) -> str:
 
 
 def _beside_luck(evidence: Evidence) -> str:
-    ours, theirs = evidence["greedy"], evidence["baselines"][_best_luck(evidence)]
+    ours, theirs = evidence["greedy"], evidence["baselines"][best_luck(evidence)]
     is_more = ours["shares"]["all"]["mean"] > theirs["shares"]["all"]["mean"]
     return "hardly better than" if is_more else "no better than"
 
@@ -91,7 +91,7 @@ def _shares(evidence: Evidence) -> str:
 
 
 def _baselines(evidence: Evidence) -> str:
-    flown, luck = evidence["baselines"], _best_luck(evidence)
+    flown, luck = evidence["baselines"], best_luck(evidence)
     return (
         f"In the same worlds it collects {_cubes(evidence['greedy'])} of all cubes, "
         f"{_LUCK[luck]} {_cubes(flown[luck])} and the oracle {_cubes(flown['oracle'])}."
