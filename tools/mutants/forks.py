@@ -46,6 +46,7 @@ OPTIONS = (
     "--tb=line",
     *("-p", "no:cacheprovider"),
     *("-p", "no:unraisableexception"),  # collects garbage of all libraries twice, for 1 s
+    *("-W", "ignore"),
     *("-m", "not render"),
 )
 

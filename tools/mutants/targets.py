@@ -13,10 +13,23 @@ TARGETS: dict[str, tuple[str, ...]] = {
     "evaluation/*": ("evaluation/test_{name}",),
     "verdicts/*": ("verdicts/test_{name}", "verdicts"),
     "sweeps/statistics": ("sweeps/test_statistics",),
-    "explain/truth": ("explain/test_truth",),
-    "explain/interventions": ("explain/test_interventions",),
-    "explain/response": ("explain/test_response",),
-    "explain/contradictions": ("explain/test_contradictions",),
+    **{
+        f"explain/{name}": (f"explain/test_{name}",)
+        for name in (
+            "truth",
+            "causal",
+            "trust",
+            "placebos",
+            "patches",
+            "alternatives",
+            "randomised",
+            "interventions",
+            "response",
+            "asymmetry",
+            "contradictions",
+            "loops",
+        )
+    },
 }
 """Names below drone_rl and below tests, without suffix; * is any name, {name} the module's."""
 
