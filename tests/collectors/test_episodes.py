@@ -85,6 +85,22 @@ def test_total_frames_stops_before_the_batch_that_is_not_needed():
     assert [len(batch) for batch in scripted(total_frames=0)] == []
 
 
+def test_goes_on_for_ever_by_default():
+    assert [len(batch) for batch in itertools.islice(scripted(), 3)] == [6, 7, 7]
+
+
+def test_nested_entries_are_read_and_kept_as_leaves():
+    """An actor that reads the truth, and one that writes a note beside its action."""
+    env = DroneEnv(2, SHORT, pixels=False)
+    assert EpisodeCollector(env, Oracle(SHORT)).collect()["next", "reward"].sum() > 0
+    actor = TensorDictModule(
+        lambda f: (f[:, 0].long(), f + 1), in_keys=["frame"], out_keys=["action", ("note", "more")]
+    )
+    batch = EpisodeCollector(Scripted(), actor, keep=()).collect()
+    assert torch.equal(batch["note", "more"], batch["frame"] + 1)
+    assert batch["frame"][:, 0].tolist() == [0, 1, 2, 100, 200, 201]
+
+
 def test_what_is_kept_and_what_is_not():
     batch = scripted(keep_observations=False).collect()
     assert set(batch.keys()) == {"action", "next", "collector"}

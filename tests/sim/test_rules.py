@@ -200,7 +200,8 @@ def test_collecting_but_not_passing_every_cube_ends_the_episode():
 
 def test_numbers_of_enumerations_are_those_of_files_and_policies():
     assert [a.value for a in Action] == [0, 1, 2] and Action(1).name == "LEFT"
-    assert [s.name for s in Side] == ["LEFT", "AHEAD", "RIGHT"] and Side.LEFT == 0
+    assert [s.name for s in Side] == ["LEFT", "AHEAD", "RIGHT"]
+    assert [s.value for s in Side] == [0, 1, 2]
     names = ["RUNNING", "ALL_CUBES", "FRONT_BOUNDARY", "SIDE_BOUNDARY", "STEP_LIMIT"]
     assert [EndReason(i).name for i in range(5)] == names
 
@@ -213,6 +214,7 @@ def test_next_cube_is_the_first_that_stands_and_their_number_if_none_does():
         ([0, 1, 0], [1, 0, 0], 2),
         ([0, 1, 0], [0, 0, 0], 0),
         ([1, 0, 1], [0, 1, 0], 3),
+        ([1, 0, 0], [1, 0, 0], 1),
     ):
         state.collected, state.passed = torch.tensor([collected]) > 0, torch.tensor([passed]) > 0
         assert state.next_cube.tolist() == [index]
