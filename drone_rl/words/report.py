@@ -71,7 +71,8 @@ def _faithful(evidence: Evidence) -> str:
         f"How faithful the maps are: of the {one['neighbours']} nearest here, "
         f"{percent(one['neighbours_kept'])} (features of layer {one['layer']}) and "
         f"{percent(two['neighbours_kept'])} (pixels) are among as many nearest in truth "
-        f"(chance: {percent(one['neighbours_chance'])}); trustworthiness "
+        f"(chance: {percent(one['neighbours_chance'])} and "
+        f"{percent(two['neighbours_chance'])}); trustworthiness "
         f"{one['trustworthiness']:.3f} and {two['trustworthiness']:.3f} of 1."
     )
 
