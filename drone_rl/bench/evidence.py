@@ -1,0 +1,225 @@
+"""Evidence as the program's files hold it, small and made by hand, for sentences to be tried on.
+
+Every entry that a sentence reads is there; nothing here was measured.
+"""
+
+import copy
+from collections.abc import Mapping
+from typing import Any
+
+Plain = dict[str, Any]
+
+
+def changed(evidence: Mapping[str, Any], changes: Mapping[str, Any]) -> Plain:
+    """A copy of evidence with some entries replaced.
+
+    Args:
+        evidence: Left as it is.
+        changes: New values by path, as "greedy.shares.left.mean" or "rows.0.share".
+    """
+    result: Plain = copy.deepcopy(dict(evidence))
+    for path, value in changes.items():
+        *way, last = path.split(".")
+        where: Any = result
+        for key in way:
+            where = where[int(key) if isinstance(where, list) else key]
+        where[int(last) if isinstance(where, list) else last] = value
+    return result
+
+
+def _mean(mean: float, lower: float, upper: float) -> Plain:
+    return {"mean": mean, "lower95": lower, "upper95": upper}
+
+
+def _share(successes: int, trials: int, lower: float, upper: float) -> Plain:
+    counts = {"successes": successes, "trials": trials}
+    return {"share": successes / trials, "lower95": lower, "upper95": upper, **counts}
+
+
+def _flights(success: float, left: float, ahead: float, right: float) -> Plain:
+    every = (left + ahead + right) / 3
+    shares = {"all": every, "left": left, "ahead": ahead, "right": right}
+    return {
+        "episodes": 400,
+        "success": {"share": success, "lower95": success - 0.02, "upper95": success + 0.02},
+        "shares": {name: {"mean": mean, "count": 300} for name, mean in shares.items()},
+    }
+
+
+def _row(by: str, value: str, failed: int, episodes: int) -> Plain:
+    share = failed / episodes
+    of = {"episodes": episodes, "failed": failed, "share": share}
+    return {"by": by, "value": value, **of, "lower95": share - 0.02, "upper95": share + 0.02}
+
+
+VERDICT: Plain = {
+    "kind": "none of these",
+    "certain": True,
+    "exit_code": 12,
+    "error_rate": 0.05,
+    "good_share": 0.9,
+    "enough": 400,
+    "greedy": _flights(0.6, 0.5, 1.0, 0.9),
+    "sampled": _flights(0.4, 0.4, 0.9, 0.8),
+    "drawing": _mean(-0.2, -0.3, -0.1),
+    "baselines": {
+        "random": _flights(0.03, 0.2, 0.4, 0.2),
+        "forward": _flights(0.02, 0.0, 1.0, 0.0),
+        "left": _flights(0.0, 0.0, 0.0, 0.0),
+        "right": _flights(0.0, 0.0, 0.0, 0.0),
+        "oracle": _flights(1.0, 1.0, 1.0, 1.0),
+    },
+    "failures": {
+        "rows": [_row("side", "left", 150, 300), _row("end", "step_limit", 40, 400)],
+        "largest": _row("side", "left", 150, 300),
+        "bound": _share(160, 400, 0.35, 0.45),
+    },
+}
+"""`verdict.json` of a policy that collects half of the cubes on its left."""
+
+
+def _method(trusted: bool, failed: list[str], score: float) -> Plain:
+    return {
+        "trusted": trusted,
+        "failed": failed,
+        "score": _mean(score, score - 0.1, score + 0.1),
+        "placebos": {
+            "ones": {"median": score, "lower": score - 0.1, "upper": score + 0.1},
+            "horizon": {"median": score - 0.2, "lower": score - 0.3, "upper": score},
+        },
+        "pointing": {"median": 0.3, "lower": 0.1, "upper": 0.5, "hit": 0.6, "chance": 0.1},
+    }
+
+
+def _objective(probabilities: list[float], highest: list[float]) -> Plain:
+    counts = {"starts": 8, "num_settings": 6}
+    return {"probabilities": probabilities, "highest": highest, **counts}
+
+
+def _places(side: str, height: float, blind: float, collected: int) -> Plain:
+    of = {"blind": blind, "collected": collected, "places": 72}
+    return {"side": side, "height": height, **of}
+
+
+_LEVEL = [
+    _places("left", 0.0, 0.6, 64), _places("ahead", 0.0, 0.0, 72), _places("right", 0.0, 0.5, 60),
+]  # fmt: skip
+HIGHER = [
+    _places("left", 1.2, 0.6, 50), _places("ahead", 1.2, 0.0, 72), _places("right", 1.2, 0.5, 40),
+]  # fmt: skip
+"""Rows of a response map for cubes above the drone."""
+EXPLANATION: Plain = {
+    "verdict": VERDICT,
+    "dataset": {
+        "frames": 600,
+        "episodes": 30,
+        "steps": 1300,
+        "action_shares": [0.8, 0.1, 0.1],
+        "entropy": _mean(0.1, 0.06, 0.2),
+        "cubes_collected": 60,
+    },
+    "tsne": {
+        name: {
+            "layer": "fc1",
+            "neighbours": 10,
+            "neighbours_kept": 0.8,
+            "neighbours_chance": 0.02,
+            "trustworthiness": 0.99,
+        }
+        for name in ("features", "pixels")
+    },
+    "contradictions": {
+        "frames": 600,
+        "pairs": 5,
+        "contradictions": 2,
+        "justified": 2,
+        "unknown": 1,
+        "worst_opposition": 0.7,
+    },
+    "loops": {
+        "loops": 4,
+        "longest": 9,
+        "frames_share": 0.02,
+        "episodes": _share(3, 30, 0.02, 0.27),
+    },
+    "class_model": {
+        "probability": _objective([0.9, 0.3, 0.9], [0.9, 0.3, 0.9]),
+        "logit": _objective([0.99, 0.4, 0.98], [0.99, 0.4, 0.98]),
+    },
+    "attribution": {
+        "layer": "relu2",
+        "film": {"heat_by": ["grad_cam", "grad_cam_logit", None, "grad_cam"]},
+    },
+    "truth": {
+        "trusted": "saliency",
+        "methods": {
+            "saliency": _method(True, [], 0.5),
+            "occlusion": _method(False, ["placebos", "pointing"], 0.1),
+        },
+        "placebos": {"ones": _mean(0.0, 0.0, 0.0), "horizon": _mean(0.3, 0.2, 0.4)},
+        "frames": 280,
+        "frames_unmoved": 20,
+        "outcomes": {
+            "flights": 60,
+            "follows": _mean(0.8, 0.6, 0.95),
+            "ground_changed": _mean(0.02, 0.0, 0.1),
+        },
+    },
+    "response": {"rows": _LEVEL, "blind_below": 0.1},
+    "asymmetry": {
+        "dataset": {"signed": _mean(-0.2, -0.3, -0.1), "absolute": _mean(0.3, 0.2, 0.4)},
+        "grid": {"absolute": 0.25},
+    },
+}
+"""`explanation.json` of that policy."""
+
+CARD: Plain = {
+    "verdict": {**VERDICT, "sentence": "It collects 60%."},
+    "worlds": "report",
+    "seed": 0,
+    "chosen": {"runs": 10, "episodes": 200},
+    "task": {"num_cubes": 3, "cube_size": 2.5, "lateral_bound": 6.0, "vertical_bound": 0.0},
+}
+"""What the card of an exported policy is made of."""
+
+_OF_SIX = {"certain": 4, **_share(6, 6, 0.5, 1.0)}
+GROUP: Plain = {
+    "ended": 6,
+    "failed": 0,
+    "damaged": 0,
+    "unfinished": 1,
+    "judged": 5,
+    "solved": _share(5, 6, 0.4, 1.0),
+    "frames_to_solve": {"more_than": None},
+    "verdicts": {"good": {**_OF_SIX, "successes": 5}},
+}
+"""One setting of a sweep."""
+_RUN = {"state": "finished", "verdict": "good", "certain": True, "entropy": 0.5}
+SWEEP: Plain = {
+    "finished": 6,
+    "failed": 1,
+    "damaged": 1,
+    "unfinished": 1,
+    "judged": 5,
+    "certain": 4,
+    "judged_by_older_rule": 1,
+    "never_judged": 1,
+    "judge_command": "drone-rl sweep-report",
+    "error_rates": [0.05],
+    "episodes": [200],
+    "sides_not_offered": 1,
+    "best": {
+        "run": 3, "verdict": "good", "certain": True, "share": 0.99, "episodes": 200, "equals": 1,
+        "report_command": "drone-rl verdict",
+    },
+    "groups": [
+        GROUP,
+        {**GROUP, "ended": 3, "solved": {"successes": 0}, "frames_to_solve": {"more_than": 9e4}},
+    ],
+    "runs": [
+        {**_RUN, "verdict": "one-sided (left)"}, {**_RUN, "verdict": "one-sided (right)"},
+        {**_RUN, "entropy": 0.001}, _RUN, _RUN, _RUN, {**_RUN, "state": "failed", "certain": None},
+        {**_RUN, "state": "damaged", "certain": None}, {**_RUN, "state": "unfinished"},
+    ],
+}  # fmt: skip
+"""`summary.json` of a small sweep with something of everything."""

@@ -1,0 +1,231 @@
+"""Does each sentence change or go when its evidence does? Liars are planted under every one."""
+
+import dataclasses
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from drone_rl.bench.evidence import CARD, EXPLANATION, GROUP, HIGHER, SWEEP, VERDICT, changed
+from drone_rl.words import advice, card, report, sweep, truth, verdict
+from drone_rl.words.licence import Sentence, said
+
+Changes = Mapping[str, Any]
+SPOKEN: dict[str, tuple[tuple[Sentence, ...], Mapping[str, Any]]] = {
+    "verdict": (verdict.SENTENCES, VERDICT),
+    "explanation": ((*advice.SENTENCES, *report.SENTENCES, *truth.SENTENCES), EXPLANATION),
+    "card": (card.SENTENCES, CARD),
+    "sweep": (sweep.SENTENCES, SWEEP),
+    "setting": (sweep.GROUP_SENTENCES, GROUP),
+}
+"""All sentences of the program, by what they are said of, with evidence of that kind."""
+NO_CLAIMS = {"card.use"}
+"""Sentences that say what is meant and not what was found."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Plant:
+    """A change of evidence that makes one sentence false."""
+
+    of: str
+    """A key of `SPOKEN`."""
+    name: str
+    """The sentence."""
+    lie: Changes
+    """What becomes of the evidence; see `changed`."""
+    given: Changes = dataclasses.field(default_factory=dict)
+    """What must be so before, so that the sentence is said."""
+
+    @property
+    def said(self) -> tuple[str | None, str | None]:
+        """What the sentence says before and after; None where it is not said."""
+        sentences, evidence = SPOKEN[self.of]
+        before = changed(evidence, self.given)
+        after = changed(before, self.lie)
+        return said(sentences, before).get(self.name), said(sentences, after).get(self.name)
+
+    @property
+    def is_flipped(self) -> bool:
+        """Whether it was said, and then no more or otherwise."""
+        before, after = self.said
+        return before is not None and before != after
+
+
+def _plants(of: str, plants: Iterable[tuple[Any, ...]]) -> list[Plant]:
+    return [Plant(of, *plant) for plant in plants]
+
+
+_ALL_LUCK = {"baselines.forward.success.share": 0.95}
+_SURE = {"failures.largest": None, "failures.bound.successes": 0}
+_OPEN = {"certain": False, "enough": 1600}
+_OF_VERDICTS = (
+    ("kind", {"certain": False}),
+    ("kind", {"kind": "good"}),
+    ("kind", {"kind": "one-sided (right)"}),
+    ("kind", {"greedy.shares.all.mean": 0.3}, {"kind": "poor", "greedy.shares.all.mean": 0.35}),
+    ("open", {"certain": True}, _OPEN),
+    ("open", {"enough": None}, _OPEN),
+    ("shares", {f"greedy.shares.{side}.mean": 1.0 for side in ("left", "ahead", "right")}),
+    ("shares", {"greedy.shares.left": {"mean": None, "count": 0}}),
+    ("baselines", _ALL_LUCK),
+    ("baselines", {"baselines.oracle.shares.all.mean": 0.7}),
+    ("pointless", {"baselines.forward.success.share": 0.3}, _ALL_LUCK),
+    ("hopeless", {"baselines.oracle.success.upper95": 0.6},
+     {"baselines.oracle.success.upper95": 0.4}),
+    ("failures.largest", {"failures.largest": None}),
+    ("failures.largest", {"failures.largest.value": "right"}),
+    ("failures.largest", {"failures.rows.1.lower95": 0.0}),
+    ("failures.never", {"failures.largest": VERDICT["failures"]["largest"]}, _SURE),
+    ("failures.never", {"failures.bound.upper95": 0.2}, _SURE),
+    ("drawing", {"drawing.upper95": 0.05}),
+    ("drawing", {"drawing": None}),
+)  # fmt: skip
+_CERTAIN_GOOD = {"verdict.kind": "good", "verdict.certain": True, "verdict.exit_code": 0}
+_NOT_CERTAIN = {"verdict.certain": False, "verdict.enough": 1600}
+_NO_PAIR = {"contradictions.pairs": 0}
+_NO_LOOP = {"loops.loops": 0, "loops.episodes.successes": 0}
+_ONE_ACTION = {"dataset.action_shares": [0.0, 1.0, 0.0]}
+_NO_LAYER = {"attribution.layer": None}
+_NO_SIDE = {"asymmetry.dataset.signed.upper95": 0.1}
+_ALL_HEIGHTS = {"response.rows": [*EXPLANATION["response"]["rows"], *HIGHER]}
+_LEFT_BLIND = "response.rows.0.blind"
+_OF_REPORTS = (
+    ("advice.more", {"verdict.certain": True}, _NOT_CERTAIN),
+    ("advice.more", {"verdict.enough": None}, _NOT_CERTAIN),
+    ("advice.use", {"verdict.certain": False}, _CERTAIN_GOOD),
+    ("advice.use", {"verdict.kind": "poor"}, _CERTAIN_GOOD),
+    ("advice.refuse", _CERTAIN_GOOD),
+    ("advice.refuse", {"verdict.exit_code": 10}),
+    ("scope.one_look", {"verdict": VERDICT, "shifts": {"colour": 12}}),
+    ("dataset.size", {"dataset.episodes": 31}),
+    ("dataset.actions", _ONE_ACTION),
+    ("dataset.one_action", {"dataset.action_shares": [0.001, 0.999, 0.0]}, _ONE_ACTION),
+    ("dataset.entropy", {"dataset.entropy.mean": None}),
+    ("dataset.entropy", {"dataset.entropy.upper95": 0.5}),
+    ("dataset.no_cube", {"dataset.cubes_collected": 1}, {"dataset.cubes_collected": 0}),
+    ("tsne.faithful", {"tsne.pixels.neighbours_kept": 0.3}),
+    ("tsne.unfaithful", {"tsne.pixels.neighbours_kept": 0.6}, {"tsne.pixels.neighbours_kept": 0.4}),
+    ("contradictions.none", {"contradictions.pairs": 1}, _NO_PAIR),
+    ("contradictions.pairs", _NO_PAIR),
+    ("contradictions.pairs", {"contradictions.unknown": 0, "contradictions.justified": 3}),
+    ("contradictions.worst", {"contradictions.contradictions": 0}),
+    ("loops.none", {"loops.loops": 1}, _NO_LOOP),
+    ("loops.none", {"loops.episodes.upper95": 0.3}, _NO_LOOP),
+    ("loops.some", _NO_LOOP),
+    ("loops.some", {"loops.episodes.successes": 4}),
+    ("class_model.reached", {"class_model.logit.probabilities": [0.99, 0.9, 0.98]}),
+    ("class_model.not_reached", {"class_model.probability.highest": [0.9, 0.8, 0.9]}),
+    ("class_model.not_reached", {"class_model.logit.highest": [0.99, 0.4, 0.2],
+                                 "class_model.probability.highest": [0.9, 0.3, 0.2]}),
+    ("attribution.layer", _NO_LAYER),
+    ("attribution.no_convolution", {"attribution.layer": "relu1"}, _NO_LAYER),
+    ("attribution.stand_in", {"attribution.film.heat_by": ["grad_cam", None]}),
+    ("attribution.no_heat", {"attribution.film.heat_by": ["grad_cam", "grad_cam_logit"]}),
+    ("response.collected", {"response.rows.0.collected": 3}),
+    ("response.collected", {f"response.rows.{i}.places": 0 for i in range(3)}),
+    ("response.heights", {"response.rows": EXPLANATION["response"]["rows"]}, _ALL_HEIGHTS),
+    ("response.blind", {_LEFT_BLIND: 0.0}),
+    ("response.blind", {_LEFT_BLIND: None}),
+    ("asymmetry.differs", {"asymmetry.dataset.absolute.mean": 0.01}),
+    ("asymmetry.prefers", _NO_SIDE),
+    ("asymmetry.prefers", {"asymmetry.dataset.signed": {"mean": 0.2, "lower95": 0.1,
+                                                        "upper95": 0.3}}),
+    ("asymmetry.undecided", {"asymmetry.dataset.signed.upper95": -0.01}, _NO_SIDE),
+)  # fmt: skip
+_NONE_TRUSTED = {
+    "truth.trusted": None,
+    "truth.methods.saliency.trusted": False,
+    "truth.methods.saliency.failed": ["likeness"],
+}
+_UNMOVED = {**_NONE_TRUSTED, "truth.frames": 0}
+_NOT_ALONG = {"truth.outcomes.follows.lower95": -0.1}
+_OF_MAPS = (
+    ("truth.trusted", _NONE_TRUSTED),
+    ("truth.trusted", {"truth.placebos.ones.mean": 0.9}),
+    ("truth.hits", _NONE_TRUSTED),
+    ("truth.hits", {"truth.methods.saliency.pointing.hit": 0.2}),
+    ("truth.none", {"truth.trusted": "saliency"}, _NONE_TRUSTED),
+    ("truth.none", {"truth.frames": 0}, _NONE_TRUSTED),
+    ("truth.refused", {"truth.methods.occlusion.trusted": True}),
+    ("truth.refused", {"truth.methods.occlusion.failed": ["random weights"]}),
+    ("truth.refused", {"truth.methods.occlusion.placebos.horizon.lower": 0.1}),
+    ("truth.unmoved", {"truth.frames": 5}, _UNMOVED),
+    ("truth.left_out", {"truth.frames_unmoved": 0}),
+    ("truth.follows", _NOT_ALONG),
+    ("truth.follows", {"truth.outcomes.follows.mean": 0.7}),
+    ("truth.follows_not", {"truth.outcomes.follows.lower95": 0.1}, _NOT_ALONG),
+    ("truth.ground", {"truth.outcomes.ground_changed.upper95": 0.4}),
+)
+_OTHER_RULE = {"verdict.certain": False}
+_OF_CARDS = (
+    ("card.verdict", _OTHER_RULE),
+    ("card.verdict", {"verdict.kind": "good"}),
+    ("card.reported", {"worlds": "choice"}),
+    ("card.chosen", {"chosen": None}),
+    ("card.chosen", {"chosen.episodes": None}),
+    ("card.not_chosen", {"chosen": {"runs": 3, "episodes": 200}}, {"chosen": None}),
+    ("card.tested", {"task.vertical_bound": 1.2}),
+    ("card.greedy_only", {"verdict.sampled": VERDICT["sampled"]}, {"verdict.sampled": None}),
+)
+_ALL_CERTAIN = {"certain": 5}
+_NOT_SOLVED = {"groups.0.solved.successes": 0}
+_NO_BEST = {"best": None}
+_NOT_JUDGED = {"judged": 0, "certain": 0}
+_NOTHING_ENDED = {"unfinished": 9, "finished": 0, "failed": 0, "damaged": 0}
+_OF_SWEEPS = (
+    ("runs.counts", {"failed": 2}),
+    ("runs.failed", {"failed": 0}),
+    ("runs.damaged", {"damaged": 0}),
+    ("runs.unfinished", {"unfinished": 0}),
+    ("runs.solved_none", {"groups.0.solved.successes": 1}, _NOT_SOLVED),
+    ("runs.few", {"groups.1.ended": 6}),
+    ("runs.censored", {"groups.1.frames_to_solve.more_than": None}),
+    ("verdicts.basis", _NOT_JUDGED),
+    ("verdicts.basis", {"episodes": [100, 200]}),
+    ("verdicts.certain", {"certain": 4}, _ALL_CERTAIN),
+    ("verdicts.certain", {"error_rates": [0.05, 0.2]}, _ALL_CERTAIN),
+    ("verdicts.not_certain", _ALL_CERTAIN),
+    ("verdicts.older_rule", {"judged_by_older_rule": 0}),
+    ("verdicts.missing", {"never_judged": 0}),
+    ("best.none", {"best": SWEEP["best"]}, _NO_BEST),
+    ("best.chosen", {"best.certain": False}),
+    ("best.chosen", _NO_BEST),
+    ("best.equals", {"best.equals": 0}),
+    ("best.flattered", {"judged": 1}),
+    ("best.report", _NO_BEST),
+    ("curves.band", {"groups.0.ended": 5}),
+    ("curves.runs", {"groups.1.ended": 6}),
+    ("curves.ends", {"finished": 0}),
+    ("curves.failed", {"failed": 0}),
+    ("shares.bars", _NOT_JUDGED),
+    ("sides.dots", {"sides_not_offered": 5}),
+    ("sides.lost_left", {"runs.1.verdict": "good"}),
+    ("sides.lost_right", {"runs.0.verdict": "good"}),
+    ("sides.not_offered", {"sides_not_offered": 0}),
+    ("entropies.dots", {"runs": [{**run, "entropy": None} for run in SWEEP["runs"]]}),
+    ("entropies.still", {"runs.2.entropy": 0.5}),
+    ("costs.dots", _NOT_SOLVED),
+    ("costs.open", {"groups.1.solved.successes": 2}),
+    ("settings.intervals", _NOTHING_ENDED),
+)
+_OF_SETTINGS = (
+    ("group.none", {"ended": 1}, {"ended": 0}),
+    ("group.solved", {"solved.successes": 6}),
+    ("group.verdicts", {"judged": 0}),
+    ("group.verdicts", {"verdicts.good.certain": 5}),
+    ("group.unknown", {"judged": 6}),
+    ("group.unfinished", {"unfinished": 0}),
+)
+PLANTS = (
+    *_plants("verdict", _OF_VERDICTS),
+    *_plants("explanation", (*_OF_REPORTS, *_OF_MAPS)),
+    *_plants("card", _OF_CARDS),
+    *_plants("sweep", _OF_SWEEPS),
+    *_plants("setting", _OF_SETTINGS),
+)
+
+
+def bench_sentences() -> dict[str, int]:
+    """How many of the planted changes turn or take the sentence that they make false."""
+    return {
+        "sentences_flipped": sum(plant.is_flipped for plant in PLANTS),
+        "sentences_total": len(PLANTS),
+    }
