@@ -3,14 +3,17 @@
 import logging
 import shlex
 from pathlib import Path
+from typing import Any
 
 from hydra.core.hydra_config import HydraConfig
 from omegaconf import DictConfig
 
 from drone_rl.cli.build import find_checkpoint, load_trained, policy_is_checkpoint
-from drone_rl.evaluation import run_episodes, summarise
+from drone_rl.sweeps import read_sweep
+from drone_rl.sweeps.rows import read_rows
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.overrides import read_overrides
+from drone_rl.verdicts.judge import judge_policy
 from drone_rl.zoo import COMMAND, export_policy
 
 prepare = policy_is_checkpoint
@@ -30,15 +33,32 @@ def run(config: DictConfig) -> tuple[int, str]:
     env, actor, state = load_trained(
         path, num_envs, task={}, seed=config.seed, device=config.device
     )
-    evaluation = summarise(run_episodes(env, actor, config.episodes))
-    env.close()
+    try:
+        verdict = judge_policy(env, actor, config.episodes).as_dict()
+    finally:
+        env.close()
+    command, chosen = _origin(path, state)
     target = Path(HydraConfig.get().runtime.output_dir) / f"{config.name}.safetensors"
-    command = config.command or state.get("command") or _training_command(path)
-    export_policy(target, state, command=command, evaluation=evaluation)
+    export_policy(
+        target,
+        state,
+        command=config.command or command,
+        verdict=verdict,
+        seed=config.seed,
+        chosen=chosen,
+    )
     _log.info("written: %s and %s", target, target.with_suffix(".md").name)
     return 0, str(target)
 
 
-def _training_command(path: Path) -> str:
-    """The command of the run that wrote a checkpoint, as Hydra noted it."""
-    return shlex.join(["drone-rl", "train", *read_overrides(path.absolute().parents[1])])
+def _origin(path: Path, state: dict[str, Any]) -> tuple[str, dict[str, Any] | None]:
+    """The command that trains the same once more, and the choice in a sweep, if it is of one."""
+    folder = path.absolute().parent.parent
+    if path.suffix == ".pt" and (folder.parent / "sweep.json").is_file():
+        rows = read_rows(read_sweep(folder.parent))
+        row = next((row for row in rows if row.run.folder == folder), None)
+        if row is not None:
+            episodes = None if row.verdict is None else row.verdict["greedy"]["episodes"]
+            return row.run.repeat_command(), {"runs": len(rows), "episodes": episodes}
+    noted = state.get("command") or shlex.join(["drone-rl", "train", *read_overrides(folder)])
+    return noted, state.get("chosen")

@@ -42,6 +42,15 @@ def _tested(card: Evidence) -> str:
 SENTENCES = (
     Sentence("card.verdict", "always", lambda c: True, _verdict),
     Sentence(
+        "card.intervals",
+        "always",
+        lambda c: True,
+        lambda c: (
+            "In brackets: 95% intervals that count episodes, whatever depends on what within one; "
+            "those of the failures hold all at once."
+        ),
+    ),
+    Sentence(
         "card.reported",
         "the figures are from worlds to report on",
         lambda c: c["worlds"] == "report",

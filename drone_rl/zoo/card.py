@@ -5,7 +5,6 @@ from typing import Any
 
 from drone_rl.words.card import SENTENCES
 from drone_rl.words.licence import said
-from drone_rl.words.verdict import best_luck
 
 Evidence = Mapping[str, Any]
 
@@ -34,7 +33,7 @@ def write_card(name: str, digest: str, about: Evidence) -> str:
 {_failures(about["verdict"]["failures"])}
 
 {points}
-- Trained by `{about["command"]}` in {about["progress"]["frames"]:,} frames; the settings are in \
+- Trained by `{about["command"]}` in {about["progress"]["frames"]:,} frames; its description is in \
 the file's metadata.
 - SHA-256 of `{name}.safetensors`: `{digest}`
 - revision {revision}; torch {packages["torch"]}, torchrl {packages["torchrl"]}, mujoco-warp \
@@ -44,12 +43,14 @@ the file's metadata.
 
 def _flights(verdict: Evidence) -> str:
     """Greedy and drawn actions, the best luck and the oracle side by side."""
-    luck = best_luck(verdict)
+    blind = dict(verdict["baselines"])
+    oracle = blind.pop("oracle")
+    luck = max(blind, key=lambda name: blind[name]["shares"]["all"]["mean"])
     flown = {
         "most probable actions": verdict["greedy"],
         "drawn actions": verdict["sampled"],
-        f"luck ({luck})": verdict["baselines"][luck],
-        "oracle": verdict["baselines"]["oracle"],
+        f"best luck ({luck})": blind[luck],
+        "oracle": oracle,
     }
     flown = {name: flights for name, flights in flown.items() if flights is not None}
     rows = [["", *flown], ["---"] * (1 + len(flown))]

@@ -15,6 +15,7 @@ from drone_rl.training import check_weights, load_checkpoint
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import parse_json, read_bytes
 from drone_rl.utils.schema import Kind, Maybe, Plain, Real, Record, Text, Whole, as_mapping, shown
+from drone_rl.zoo.card import write_card
 from drone_rl.zoo.description import FORMAT, MOST_PARAMETERS, parse
 from drone_rl.zoo.migration import describe
 
@@ -74,8 +75,14 @@ _ABOUT: dict[str, Kind] = {
     "progress": _PROGRESS,
     "provenance": _PROVENANCE,
     "command": COMMAND,
+    "verdict": Plain(),
+    "worlds": Text(20),
+    "seed": _COUNT,
+    "chosen": Maybe(Record({"runs": _COUNT, "episodes": Maybe(_COUNT)})),
     "evaluation": Plain(),
 }
+_NOT_IN_ALL = frozenset({"verdict", "worlds", "seed", "chosen", "evaluation"})
+"""Older files have an evaluation, newer ones a verdict and what it rests on."""
 
 
 def policy_names() -> list[str]:
@@ -101,7 +108,8 @@ def read_policy(path: Path) -> dict[str, Any]:
 
     Returns:
         "description" (see `drone_rl.zoo.parse`), "policy" (the weights), "progress", "provenance";
-        of an exported file also "command" and "evaluation", of a checkpoint all of its state.
+        of an exported file also "command" and what `export_policy` was given, unless it is old; of
+        a checkpoint all of its state.
 
     Raises:
         InputError: The file is missing, damaged or something else.
@@ -135,7 +143,13 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
 
 
 def export_policy(
-    path: Path, checkpoint: Mapping[str, Any], *, command: str, evaluation: Mapping[str, Any]
+    path: Path,
+    checkpoint: Mapping[str, Any],
+    *,
+    command: str,
+    verdict: Mapping[str, Any],
+    seed: int,
+    chosen: Mapping[str, Any] | None,
 ) -> None:
     """Writes a checkpoint's policy and its model card beside it.
 
@@ -143,7 +157,10 @@ def export_policy(
         path: Where to, ending in .safetensors; the card ends in .md.
         checkpoint: From `read_policy`.
         command: The training command.
-        evaluation: From `summarise`.
+        verdict: As in verdict.json, from worlds to report on.
+        seed: Root of these worlds' random streams.
+        chosen: "runs" of the sweep in which it was made, and "episodes" by which it was judged
+            there, if it was; None if it was made in no sweep.
 
     Raises:
         InputError: It can't be written.
@@ -153,11 +170,16 @@ def export_policy(
         "progress": checkpoint["progress"],
         "provenance": {k: origin[k] for k in ("versions", "git_revision")},
         "command": COMMAND.read(command, "command"),
-        "evaluation": evaluation,
+        "verdict": verdict,
+        "worlds": "report",
+        "seed": seed,
+        "chosen": chosen,
     }
     try:
         write_exported(path, checkpoint["policy"], checkpoint["description"], about)
-        path.with_suffix(".md").write_text(_card(path, about))
+        digest = hashlib.sha256(path.read_bytes()).hexdigest()
+        card = write_card(path.stem, digest, {**about, "task": checkpoint["description"]["task"]})
+        path.with_suffix(".md").write_text(card)
     except (OSError, SafetensorError) as error:
         raise InputError(f"policy {path} can't be written ({error})") from error
 
@@ -210,7 +232,7 @@ def _exported(content: bytes) -> dict[str, Any]:
     return {
         "description": found.as_dict(),
         "policy": check_weights(weights, found.expected_weights()),
-        **Record(_ABOUT).read(about, "about"),
+        **Record(_ABOUT, _NOT_IN_ALL).read(about, "about"),
     }
 
 
@@ -219,32 +241,3 @@ def _inner(metadata: Mapping[str, Any], key: str) -> Any:
     if not isinstance(text, str):
         raise InputError(f"its {key} is missing")
     return parse_json(text, f"its {key}")
-
-
-def _card(path: Path, about: Mapping[str, Any]) -> str:
-    evaluation = about["evaluation"]
-    rows = [("mean cubes", f"{evaluation['mean_cubes']:.3f}")]
-    success = evaluation["success"]
-    for name, found in {"all cubes": success, **evaluation["shares"]}.items():
-        value = found["share"] if found is success else found["mean"]
-        interval = f"{found['lower95']:.3f} to {found['upper95']:.3f}"
-        text = "not offered" if value is None else f"{value:.3f} (95%: {interval})"
-        rows.append((name if found is success else f"share collected: {name}", text))
-    table = "\n".join(f"| {name} | {value} |" for name, value in rows)
-    digest = hashlib.sha256(path.read_bytes()).hexdigest()
-    packages = about["provenance"]["versions"]
-    revision = about["provenance"]["git_revision"] or "unknown"
-    return f"""# {path.stem}
-
-Trained by `{about["command"]}` in {about["progress"]["frames"]:,} frames; its description is in the
-file's metadata. Evaluated on {evaluation["episodes"]:,} held-out episodes, greedy:
-
-| | |
-| --- | --- |
-{table}
-
-- SHA-256 of `{path.name}`: `{digest}`
-- revision {revision}; torch {packages["torch"]}, torchrl {packages["torchrl"]}, mujoco-warp
-  {packages["mujoco-warp"]}
-- intended use: an example for `drone-rl explain policy={path.stem}`; not for a real drone
-"""

@@ -64,6 +64,7 @@ def test_what_is_always_said():
     assert "nothing is known of other colours, light or sizes" in found["card.tested"]
     assert "not for a real drone" in found["card.use"]
     assert "not recorded" in found["card.not_chosen"]
+    assert "95% intervals that count episodes" in found["card.intervals"]
     assert "card.chosen" not in found
     assert "card.greedy_only" not in found
 

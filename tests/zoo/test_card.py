@@ -21,7 +21,7 @@ def test_a_card_names_policy_verdict_origin_and_digest():
 
 def test_flights_stand_side_by_side_with_the_best_luck_and_the_oracle():
     found = lines()
-    head = "|  | most probable actions | drawn actions | luck (forward) | oracle |"
+    head = "|  | most probable actions | drawn actions | best luck (forward) | oracle |"
     assert head in found
     row = found[found.index(head) + 3]
     assert row.startswith("| cubes collected | 0.900 (0.800 to 1.000) | 0.600 (")

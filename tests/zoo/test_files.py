@@ -19,16 +19,10 @@ from drone_rl.zoo import (
     policy_path,
     read_policy,
 )
+from tests.words.test_card import VERDICT
 from tests.zoo.test_description import DEFAULT
 
 DATA = Path(__file__).parents[1] / "data"
-SHARE = {"share": 0.5, "lower95": 0.4, "upper95": 0.6}
-EVALUATION = {
-    "mean_cubes": 1.5,
-    "episodes": 10,
-    "success": SHARE,
-    "shares": {"left": {"mean": None, "lower95": 0.0, "upper95": 1.0}},
-}
 DESCRIPTION = {
     **DEFAULT,
     "network": {"name": "small_cnn", "patch": 4, "channels": [2], "hidden": []},
@@ -53,7 +47,10 @@ ABOUT = {
     "progress": PROGRESS,
     "provenance": {"versions": {"torch": "1"}, "git_revision": None},
     "command": "drone-rl train",
-    "evaluation": EVALUATION,
+    "verdict": VERDICT,
+    "worlds": "report",
+    "seed": 5,
+    "chosen": {"runs": 3, "episodes": None},
 }
 
 
@@ -75,17 +72,19 @@ DAMAGED_DESCRIPTION = save(
 
 def test_what_is_exported_comes_back_without_traces_of_the_machine(tmp_path):
     path = tmp_path / "mine.safetensors"
-    export_policy(path, CHECKPOINT, command="drone-rl train", evaluation=EVALUATION)
+    origin = {"command": "drone-rl train", "seed": 5, "chosen": None}
+    export_policy(path, CHECKPOINT, verdict=VERDICT, **origin)
     found = load_exported(path)
     torch.testing.assert_close(found["policy"], WEIGHTS)
     assert found["description"] == DESCRIPTION
     assert found["progress"] == PROGRESS
-    assert found["command"] == "drone-rl train"
+    assert {key: found[key] for key in origin} == origin
+    assert (found["verdict"], found["worlds"]) == (VERDICT, "report")
     assert b"somebody" not in path.read_bytes()
     card = path.with_suffix(".md").read_text()
     assert hashlib.sha256(path.read_bytes()).hexdigest() in card
-    assert "1,234 frames" in card and "0.500 (95%: 0.400 to 0.600)" in card
-    assert "| share collected: left | not offered |" in card
+    assert "1,234 frames" in card and "**poor**" in card and "(seed 5)" in card
+    assert "three cubes of 2.5 m, up to 6 m" in card
 
 
 def test_a_checkpoint_is_read_by_its_description_alone(tmp_path):
@@ -132,6 +131,10 @@ def test_files_from_before_descriptions_are_translated(name):
         (exported(about={"progress": {**PROGRESS, "frames": -1}}), "frames=-1"),
         (exported(about={"provenance": {"versions": [], "git_revision": None}}), "versions"),
         (exported(about={"evaluation": {"a": "b\nc"}}), "a text in"),
+        (exported(about={"verdict": {"a": "b\nc"}}), "a text in"),
+        (exported(about={"worlds": "r" * 30}), "worlds"),
+        (exported(about={"seed": 0.5}), r"seed=0\.5"),
+        (exported(about={"chosen": {"runs": 3}}), r"chosen\.episodes is missing"),
         (exported({**WEIGHTS, "x": torch.zeros(1)}), "x' is .* absent by"),
         (exported({k: v.double() for k, v in WEIGHTS.items()}), "not float32"),
         (exported({k: v * float("nan") for k, v in WEIGHTS.items()}), "NaN"),
@@ -175,9 +178,11 @@ def test_the_three_policies_travel_with_their_cards():
         assert b"_target_" not in path.read_bytes()
 
 
-def test_each_is_what_its_name_says():
-    shares = {n: load_exported(policy_path(n))["evaluation"]["by_side"] for n in policy_names()}
-    assert min(side["lower95"] for side in shares["good"].values()) > 0.95
-    assert max(side["share"] for side in shares["poor"].values()) < 0.1
-    assert shares["right_and_forward"]["right"]["lower95"] >= 0.8
-    assert shares["right_and_forward"]["left"]["upper95"] <= 0.1
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [("good", "good"), ("poor", "poor"), ("right_and_forward", "one-sided (right)")],
+)
+def test_each_is_what_its_name_says(name, kind):
+    found = load_exported(policy_path(name))
+    assert (found["verdict"]["kind"], found["verdict"]["certain"]) == (kind, True)
+    assert (found["worlds"], found["verdict"]["greedy"]["episodes"]) == ("report", 1000)
