@@ -5,6 +5,7 @@ from typing import Any
 
 from drone_rl.words.card import SENTENCES
 from drone_rl.words.licence import said
+from drone_rl.words.verdict import best_luck
 
 Evidence = Mapping[str, Any]
 
@@ -43,14 +44,12 @@ the file's metadata.
 
 def _flights(verdict: Evidence) -> str:
     """Greedy and drawn actions, the best luck and the oracle side by side."""
-    blind = dict(verdict["baselines"])
-    oracle = blind.pop("oracle")
-    luck = max(blind, key=lambda name: blind[name]["shares"]["all"]["mean"])
+    luck = best_luck(verdict)
     flown = {
         "most probable actions": verdict["greedy"],
         "drawn actions": verdict["sampled"],
-        f"best luck ({luck})": blind[luck],
-        "oracle": oracle,
+        f"best luck ({luck})": verdict["baselines"][luck],
+        "oracle": verdict["baselines"]["oracle"],
     }
     flown = {name: flights for name, flights in flown.items() if flights is not None}
     rows = [["", *flown], ["---"] * (1 + len(flown))]

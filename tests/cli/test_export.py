@@ -1,0 +1,67 @@
+"""Where an exported policy says that it comes from."""
+
+import json
+
+import pytest
+
+from drone_rl.cli.export import _origin
+from drone_rl.sweeps import Run, Sweep
+from drone_rl.verdicts.rule import Rule
+
+METRICS = "frames,train/running_cubes\n100,1.5\n"
+FIGURES = {"frames": 100, "episodes": 9, "seconds": 1.0, "running_cubes": 1.5, "num_cubes": 3}
+GREEDY = {
+    "episodes": 200,
+    "success": {"share": 0.5},
+    "shares": {name: {"mean": 0.5} for name in ("all", "left", "ahead", "right")},
+}
+VERDICT = {
+    "kind": "poor",
+    "certain": True,
+    "rule": Rule().text,
+    "error_rate": 0.05,
+    "greedy": GREEDY,
+}
+
+
+@pytest.fixture
+def checkpoint(tmp_path):
+    """The last checkpoint of the second of three runs of a sweep."""
+    runs = [
+        Run(i, (f"seed={i}", "sweep=seeds", "trial=4"), tmp_path / f"run_{i}") for i in range(3)
+    ]
+    Sweep(tmp_path, "drone-rl train sweep=seeds", {}, runs).save()
+    folder = runs[1].folder
+    (folder / ".hydra").mkdir(parents=True)
+    (folder / ".hydra" / "overrides.yaml").write_text("[seed=1]")
+    (folder / "metrics.csv").write_text(METRICS)
+    return folder / "checkpoints" / "last.pt"
+
+
+def judged(checkpoint, **verdict):
+    result = {"reason": "frames", **FIGURES, "verdict": {**VERDICT, **verdict}}
+    (checkpoint.parents[1] / "result.json").write_text(json.dumps(result))
+
+
+def test_a_run_of_a_sweep_names_the_run_and_not_the_sweep(checkpoint):
+    judged(checkpoint)
+    command, chosen = _origin(checkpoint, {})
+    assert command == "drone-rl train seed=1 sweep=seeds hydra.mode=RUN"
+    assert chosen == {"runs": 3, "episodes": 200}
+
+
+def test_a_run_that_no_present_rule_has_judged_was_not_chosen_by_episodes(checkpoint):
+    assert _origin(checkpoint, {})[1] == {"runs": 3, "episodes": None}
+    judged(checkpoint, rule="of yore")
+    assert _origin(checkpoint, {})[1] == {"runs": 3, "episodes": None}
+
+
+def test_a_run_alone_is_named_by_its_own_settings(checkpoint):
+    (checkpoint.parents[2] / "sweep.json").unlink()
+    assert _origin(checkpoint, {}) == ("drone-rl train seed=1", None)
+
+
+def test_what_an_exported_file_says_of_its_origin_goes_on(checkpoint):
+    said = {"command": "drone-rl train seed=9", "chosen": {"runs": 7, "episodes": 20}}
+    found = _origin(checkpoint.with_suffix(".safetensors"), said)
+    assert found == (said["command"], said["chosen"])
