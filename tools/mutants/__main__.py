@@ -18,9 +18,9 @@ from tools.mutants.targets import find_targets
 
 ROOT = Path(__file__).resolve().parents[2]
 COPIED = ("drone_rl", "conf", "tests", "tools", "pyproject.toml", "README.md", "docs")
-PATIENCE = 4.0
-"""A mutant may take so many times as long as the tests take without it, and START_S."""
-START_S = 20.0
+PATIENCE = 3.0
+"""A mutant may take so many times the processor time of the tests without it, and START_S."""
+START_S = 5.0
 OUTCOMES = {"passed": "survived", "failed": "killed", "timeout": "timeout"}
 
 

@@ -6,6 +6,7 @@ import gc
 import importlib
 import importlib.abc
 import importlib.machinery
+import math
 import os
 import resource
 import shutil
@@ -37,6 +38,8 @@ LIBRARIES = (
     "jinja2",
     "_hypothesis_pytestplugin",
 )
+WAIT = 10.0
+"""Seconds that may pass for each of processor time; more is a deadlock."""
 MEMORY_BYTES = 6 << 30
 """A mutant that wants more is killed: a size that became a power, say."""
 OPTIONS = (
@@ -58,6 +61,7 @@ class Run:
     name: str
     tests: Sequence[str]
     limit_s: float
+    """Of processor time, which a busy machine does not use up; of patience WAIT times that."""
     module: str | None = None
     """Path of the mutated module below the tree; None for the tree as it is."""
     source: str = ""
@@ -71,6 +75,7 @@ class Outcome:
     status: str
     """"passed", "failed" (also a crash), or "timeout"."""
     seconds: float
+    """Of processor time."""
     output: str
 
 
@@ -114,12 +119,11 @@ def run_all(runs: Iterator[Run], tree: Path, scratch: Path, jobs: int) -> Iterat
 
 def _finished(running: dict[int, tuple[Run, float]], scratch: Path) -> Iterator[Outcome]:
     for pid, (run, begin) in list(running.items()):
-        seconds = time.monotonic() - begin
-        ended, code = os.waitpid(pid, os.WNOHANG)
-        late = not ended and seconds > run.limit_s
+        ended, code, used = os.wait4(pid, os.WNOHANG)
+        late = not ended and time.monotonic() - begin > WAIT * run.limit_s
         if late:
             os.killpg(pid, signal.SIGKILL)
-            os.waitpid(pid, 0)
+            _, code, used = os.wait4(pid, 0)
         elif ended:
             with contextlib.suppress(ProcessLookupError):  # what a test left behind
                 os.killpg(pid, signal.SIGKILL)
@@ -127,6 +131,8 @@ def _finished(running: dict[int, tuple[Run, float]], scratch: Path) -> Iterator[
             continue
         del running[pid]
         output = (scratch / f"{run.name}.txt").read_text(errors="replace")
+        seconds = used.ru_utime + used.ru_stime
+        late = late or (os.WIFSIGNALED(code) and seconds >= 0.9 * run.limit_s)
         status = "timeout" if late else "passed" if code == 0 else "failed"
         shutil.rmtree(scratch / run.name, ignore_errors=True)
         yield Outcome(run, status, seconds, output)
@@ -151,6 +157,8 @@ def _start(run: Run, tree: Path, scratch: Path) -> int:
 
 def _test(run: Run, tree: Path, temporary: Path) -> int:
     """Runs pytest in the child. Returns its exit status; 0 is that all tests passed."""
+    limit_s = math.ceil(run.limit_s)
+    resource.setrlimit(resource.RLIMIT_CPU, (limit_s, limit_s))
     resource.setrlimit(resource.RLIMIT_DATA, (MEMORY_BYTES, MEMORY_BYTES))
     os.chdir(tree)
     os.environ["PYTHONPATH"] = str(tree)  # for the processes that tests start
