@@ -36,6 +36,10 @@ def test_opposition_by_hand():
     assert opposition(sure_right, sure_left) == -1.0
     assert opposition(sure_left, forward) == 0.0
     assert opposition(np.array([0, 0.7, 0.3]), np.array([0, 0.4, 0.6])) == pytest.approx(0.3)
+    one, other = np.array([0.0, 0.9, 0.1]), np.array([0.2, 0.3, 0.5])  # 0.6 left, 0.4 right
+    assert opposition(one, other) == pytest.approx(0.4)
+    assert opposition(other, one) == pytest.approx(-0.4)
+    assert opposition(np.stack([one, other]), one).tolist() == [0.0, pytest.approx(-0.4)]
 
 
 LEFT, RIGHT = [0.0, 0.9, 0.1], [0.0, 0.1, 0.9]
@@ -70,6 +74,30 @@ def test_pictures_farther_apart_are_not_alike():
 def test_wishes_less_opposed_are_no_pair():
     data = fake([[0, 0]] * 2, [[0.8, 0.2, 0.0], [0.8, 0.01, 0.19]], [[5, 1]] * 2)
     assert find_pairs(data, alike=1.0) == []  # opposed by 0.19
+    data = fake([[0, 0]] * 2, [[0.8, 0.2, 0.0], [0.8, 0.0, 0.2]], [[5, 1]] * 2)
+    assert len(find_pairs(data, alike=1.0)) == 1  # by just 0.2
+
+
+def test_of_equally_opposed_pairs_the_more_alike_comes_first():
+    data = fake([[0], [3], [2]], [LEFT, RIGHT, RIGHT], [[5, 1]] * 3)
+    assert [(p.left, p.right) for p in find_pairs(data, alike=9.0)] == [(0, 2)]
+
+
+def test_pairs_are_found_across_more_frames_than_are_compared_at_once():
+    count = 1203
+    probs = np.tile([1.0, 0.0, 0.0], (count, 1))
+    probs[[2, 700, 1202]] = [RIGHT, LEFT, RIGHT]
+    data = fake(np.zeros((count, 1)), probs, [[5, 1]] * count)
+    data.arrays["observations"][2] = 1.0  # a little less alike
+    pairs = find_pairs(data, alike=1.0)
+    assert [(p.left, p.right, p.distance) for p in pairs] == [(700, 1202, 0.0)]
+
+
+def test_a_cube_stands_alike_up_to_one_metre():
+    data = fake([[0]] * 2, [LEFT, RIGHT], [[5, 1], [5, 2]])
+    assert find_pairs(data, alike=1.0)[0].kind == Kind.CONTRADICTION
+    data = fake([[0]] * 2, [LEFT, RIGHT], [[5, 1], [6.01, 1]])
+    assert find_pairs(data, alike=1.0)[0].kind == Kind.JUSTIFIED
 
 
 def test_each_frame_is_in_one_pair_and_the_most_opposed_comes_first():
@@ -93,8 +121,11 @@ def test_one_action_makes_no_pairs():
 
 
 def test_one_move_is_the_median_change_within_episodes():
-    # changes of 1, 2 and 6; that from one episode to the next, 90, does not count
-    data = fake([[0], [1], [3], [9], [99]], np.zeros((5, 3)), np.zeros((5, 2)))
-    data.arrays["episode"] = np.array([0, 0, 0, 0, 1])
-    assert one_move(data) == pytest.approx(2.0)
+    # root mean squares of 6, 1, 3 and, in the second episode, 4 and 5; what lies between the two
+    # episodes, 90, does not count
+    pictures = [[0, 0], [6, 6], [7, 7], [10, 4], [100, 100], [104, 104], [99, 99]]
+    data = fake(pictures, np.zeros((7, 3)), np.zeros((7, 2)), episode=[0, 0, 0, 0, 1, 1, 1])
+    assert one_move(data) == pytest.approx(4.0)
+    data.arrays["episode"][4:] = [1, 2, 3]
+    assert one_move(data) == pytest.approx(3.0)
     assert one_move(fake([[0]], np.zeros((1, 3)), np.zeros((1, 2)))) == 0.0

@@ -22,6 +22,22 @@ def test_loops_are_turns_without_progress():
     assert summary["longest"] == 5 and summary["frames_share"] == pytest.approx(9 / 17)
 
 
+def test_loops_at_the_first_and_at_the_last_frame():
+    loops = find_loops(flights([L, R, L, F, R, L, R], [0] * 7))
+    assert [(loop.first, loop.length, loop.reversals) for loop in loops] == [(0, 3, 2), (4, 3, 2)]
+    assert find_loops(flights([L, R], [0, 0])) == []  # one turn
+    assert len(find_loops(flights([L, R], [0, 0]), min_reversals=1)) == 1
+    assert find_loops(flights([L, R, L, R], [0, 0, 1, 1])) == []  # one in each of two episodes
+
+
+def test_episodes_with_a_loop_are_counted_once():
+    data = flights([L, R, L, F, L, R, L, F, F, F], [0] * 8 + [1] * 2)
+    summary = summarise_loops(data, find_loops(data))
+    assert summary["loops"] == 2 and summary["frames_share"] == pytest.approx(0.6)
+    assert (summary["episodes"]["successes"], summary["episodes"]["trials"]) == (1, 2)
+    assert summary["list"][1] == {"first": 4, "length": 3, "reversals": 2}
+
+
 def test_none_seen_is_not_never():
     summary = summarise_loops(flights([F] * 30, range(30)), [])
     assert summary["loops"] == summary["longest"] == 0

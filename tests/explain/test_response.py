@@ -1,4 +1,8 @@
+import inspect
+from types import SimpleNamespace
+
 import numpy as np
+import pytest
 import torch
 from torch import nn
 
@@ -6,6 +10,7 @@ from drone_rl.explain.hooks import probabilities
 from drone_rl.explain.response import (
     OutcomeMap,
     ResponseMap,
+    _places,
     outcome_map,
     response_map,
     summarise,
@@ -30,6 +35,29 @@ def test_a_place_on_the_grid_is_that_place_in_the_world(scenes, world):
     at = place_cube(scenes, torch.tensor([found.forward[1]]), torch.tensor([found.lateral[3]]))
     expected = probabilities(world[2], scenes.observe(at))[0].numpy()
     np.testing.assert_allclose(found.probabilities[0, 1, 3], expected, atol=1e-6)
+
+
+def test_places_reach_as_far_as_cubes_stand():
+    def ends(**settings):
+        worlds = SimpleNamespace(settings=TaskSettings(**settings))
+        height, *axes = _places(SimpleNamespace(worlds=worlds), 3, 5)
+        return [height.tolist(), *([axis[0].item(), axis[-1].item()] for axis in axes)]
+
+    near = pytest.approx([1.65 + 0.5, 15.0])  # half a step from touching
+    assert ends() == [[0.0], near, [12.0, -12.0]]
+    near = pytest.approx([1.65 + 0.2, 9.0])
+    task = {"step_length": 0.4, "first_distance": 9.0, "vertical_bound": 0.5}
+    assert ends(lateral_bound=4.0, **task) == [[-0.5, 0.0, 0.5], near, [8.0, -8.0]]
+    assert ends(lateral_bound=0.0)[2] == pytest.approx([3.3, -3.3])  # twice the reach of a touch
+
+
+def test_grids_are_odd_sideways_so_that_straight_ahead_is_on_them():
+    defaults = [
+        {k: v.default for k, v in inspect.signature(f).parameters.items() if k.startswith("num")}
+        for f in (response_map, outcome_map)
+    ]
+    fine, coarse = {"num_lateral": 41, "num_forward": 31}, {"num_lateral": 21, "num_forward": 8}
+    assert defaults == [fine, coarse]
 
 
 def test_heights_are_those_at_which_the_task_puts_cubes(make_pipeline):
