@@ -17,8 +17,8 @@ SPOKEN: dict[str, tuple[tuple[Sentence, ...], Mapping[str, Any]]] = {
     "setting": (sweep.GROUP_SENTENCES, GROUP),
 }
 """All sentences of the program, by what they are said of, with evidence of that kind."""
-NO_CLAIMS = {"card.use"}
-"""Sentences that say what is meant and not what was found."""
+NO_CLAIMS = {"card.intervals", "card.use"}
+"""Sentences that say what is meant or how to read, and not what was found."""
 
 
 @dataclasses.dataclass(frozen=True)
