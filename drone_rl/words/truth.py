@@ -63,7 +63,7 @@ def _reason(found: Mapping[str, Any], test: str) -> str:
     if test != "placebos":
         return _FAILED.get(test, test)
     unbeaten = [n for n, b in found["placebos"].items() if not _is_above(b["lower"], 0)]
-    more = f" and {len(unbeaten) - 1} others" if len(unbeaten) > 1 else ""
+    more = f" and {plural(len(unbeaten) - 1, 'other')}" if len(unbeaten) > 1 else ""
     return f"not surely better than the placebo {unbeaten[0]!r}{more}"
 
 
