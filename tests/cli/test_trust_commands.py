@@ -22,7 +22,7 @@ def test_explain_then_report(tmp_path):
     refused = drone_rl(
         "explain", "policy=poor", "require=good", *few, "hydra.run.dir=no", cwd=tmp_path
     )
-    assert refused.returncode == 10
+    assert refused.returncode == 13  # poor, but 8 episodes are too few to be certain
 
 
 @pytest.mark.parametrize(
