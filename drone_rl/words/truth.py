@@ -169,3 +169,6 @@ SENTENCES = (
     ),
     Sentence("truth.ground", "the ground was repainted in flights", _was_flown, _ground),
 )
+FINDINGS = tuple(sentence for sentence in SENTENCES if sentence.name != "truth.refused")
+REASONS = tuple(sentence for sentence in SENTENCES if sentence.name == "truth.refused")
+"""Why maps are not trusted, which is more than one wants to read at once."""
