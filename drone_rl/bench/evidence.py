@@ -164,6 +164,11 @@ EXPLANATION: Plain = {
             "follows": _mean(0.8, 0.6, 0.95),
             "ground_changed": _mean(0.02, 0.0, 0.1),
         },
+        "interventions": {
+            "cube taken away": _mean(0.4, 0.3, 0.5),
+            "ground patch changed": _mean(0.05, 0.02, 0.2),
+        },
+        "integration_error": {"mean": 0.001, "max": 0.007, "pictures": 30},
     },
     "response": {"rows": _LEVEL, "blind_below": 0.1},
     "asymmetry": {

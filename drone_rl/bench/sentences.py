@@ -153,6 +153,10 @@ _OF_MAPS = (
     ("truth.follows", {"truth.outcomes.follows.mean": 0.7}),
     ("truth.follows_not", {"truth.outcomes.follows.lower95": 0.1}, _NOT_ALONG),
     ("truth.ground", {"truth.outcomes.ground_changed.upper95": 0.4}),
+    ("truth.patch", {"truth.interventions.ground patch changed.upper95": 0.5}),
+    ("truth.cube", {"truth.interventions.ground patch changed.upper95": 0.31}),
+    ("truth.cube", {"truth.interventions.cube taken away.lower95": 0.19}),
+    ("truth.integral", {"truth.integration_error": None}),
 )
 _OTHER_RULE = {"verdict.certain": False}
 _OF_CARDS = (

@@ -14,6 +14,7 @@ from scipy.stats import rankdata
 from torch import Tensor
 
 from drone_rl.explain.hooks import probabilities
+from drone_rl.explain.intervals import episode_means
 from drone_rl.explain.patches import Grid, replaced
 from drone_rl.policies import PolicyNetwork
 from drone_rl.utils.intervals import mean_bounds
@@ -98,12 +99,13 @@ def rank_correlation(first: NDArray, second: NDArray) -> NDArray:
     return np.divide((a * b).sum(1), norm, out=np.zeros(len(a)), where=norm > 0)
 
 
-def episode_means(values: NDArray, episode: NDArray) -> NDArray:
-    """The mean of each episode's frames. Shape: (T,) and (T,) to (number of episodes,)."""
-    if not len(values):
-        return np.zeros(0)
-    _, number = np.unique(episode, return_inverse=True)
-    return np.bincount(number, weights=values) / np.bincount(number)
+def spread(episode: NDArray, most: int) -> NDArray:
+    """Indices of at most so many frames of each episode, evenly spread. Shape: (N,)."""
+    found = [np.zeros(0, np.int64)]
+    for number in np.unique(episode):
+        rows = np.flatnonzero(episode == number)
+        found.append(rows[np.linspace(0, len(rows) - 1, min(most, len(rows))).astype(np.int64)])
+    return np.concatenate(found)
 
 
 def summarise_scores(values: NDArray, episode: NDArray) -> dict[str, Any]:

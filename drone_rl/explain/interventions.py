@@ -1,27 +1,21 @@
-"""The causal test that only a simulator allows: change one thing in the scene and draw it again."""
+"""What only a simulator allows: change one thing, draw the scene again, and ask the policy."""
 
 import copy
 import dataclasses
-from typing import Any
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from scipy.stats import rankdata
 from torch import Tensor
 
+from drone_rl.explain.alternatives import DARK_GROUND, Color, Repainted
 from drone_rl.explain.hooks import probabilities
 from drone_rl.explain.scenes import Region, Scenes
 from drone_rl.policies import PolicyNetwork
-from drone_rl.sim.arena import SKY_COLOR
-from drone_rl.sim.collect_cubes import shown_cubes
-from drone_rl.sim.renderer import WarpRenderer
 from drone_rl.sim.rules import WorldState
 
-OTHER_CUBE_COLOR = (0.9, 0.85, 0.2)
-OTHER_GROUND_COLOR = (0.25, 0.25, 0.22)
+OTHER_CUBE_COLOR: Color = (0.9, 0.85, 0.2)
 MOVED_METRES = 2.0
-DRAWS = 1000
 
 
 @dataclasses.dataclass
@@ -43,6 +37,8 @@ def intervene(
 ) -> list[Intervention]:
     """Takes the next cube away, moves it, recolours it; changes a patch of ground.
 
+    The ground means nothing: what that patch does is what any change does.
+
     Args:
         scenes: Where they are drawn.
         network: The policy's.
@@ -54,9 +50,9 @@ def intervene(
     base = probabilities(network, scenes.transform(before))
     visible = regions == Region.NEXT_CUBE
     ground = _patches(regions == Region.GROUND, visible.sum((1, 2)), seed)
-    recoloured = _drawn_in(scenes, state, "cube_", OTHER_CUBE_COLOR)
-    repainted = _drawn_in(scenes, state, "floor", OTHER_GROUND_COLOR)
-    moved = scenes.frames(_moved(state))
+    recoloured = _painted(scenes, state, "cube_", OTHER_CUBE_COLOR)
+    repainted = _painted(scenes, state, "floor", DARK_GROUND)
+    moved = scenes.frames(to_the_middle(state))
     changes = {
         "cube taken away": (scenes.frames(_without_next(state)), visible),
         "cube moved": (moved, (moved != before).any(-1)),
@@ -67,51 +63,6 @@ def intervene(
         Intervention(name, area, _effect(network, scenes, base, frames, area), frames)
         for name, (frames, area) in changes.items()
     ]
-
-
-def claim(maps: Tensor, area: Tensor) -> NDArray:
-    """What a map said that the area mattered: its share of the heat, NaN without heat. (T,)."""
-    total = maps.flatten(1).sum(1)
-    inside = (maps * area).flatten(1).sum(1)
-    return torch.where(total > 0, inside / total, torch.nan).double().cpu().numpy()
-
-
-def agreement(
-    maps: Tensor, interventions: list[Intervention], episode: NDArray, seed: int = 0
-) -> dict[str, Any]:
-    """Rank correlation of what a map claimed and what the changes did, over all of them.
-
-    Args:
-        maps: Shape (T, H, W).
-        interventions: On the same frames.
-        episode: Shape (T,); the interval resamples whole episodes.
-        seed: Of the resampling.
-
-    Returns:
-        "correlation" with "lower95" and "upper95" (None if nothing varies); chance is 0.
-    """
-    claims = np.concatenate([claim(maps, change.area) for change in interventions])
-    effects = np.concatenate([change.effect for change in interventions])
-    clusters = np.tile(episode, len(interventions))
-    told = np.isfinite(claims) & np.isfinite(effects)
-    claims, effects, clusters = claims[told], effects[told], clusters[told]
-    value = _spearman(claims, effects)
-    if value is None:
-        return {"correlation": None, "lower95": None, "upper95": None, "changes": len(claims)}
-    members = [np.flatnonzero(clusters == c) for c in np.unique(clusters)]
-    rng = np.random.default_rng(seed)
-    draws = []
-    for _ in range(DRAWS if len(members) > 1 else 0):
-        rows = np.concatenate([members[i] for i in rng.integers(0, len(members), len(members))])
-        drawn = _spearman(claims[rows], effects[rows])
-        draws.append(0.0 if drawn is None else drawn)
-    low, high = np.quantile(draws, [0.025, 0.975]) if draws else (-1.0, 1.0)
-    return {
-        "correlation": value,
-        "lower95": float(low),
-        "upper95": float(high),
-        "changes": len(claims),
-    }
 
 
 def _effect(
@@ -129,12 +80,11 @@ def _without_next(state: WorldState) -> WorldState:
     return changed
 
 
-def _moved(state: WorldState) -> WorldState:
-    """The next cube, moved towards the middle of the picture."""
+def to_the_middle(state: WorldState) -> WorldState:
+    """The next cube moved sideways towards the middle of the picture, and no farther than there."""
     changed = copy.deepcopy(state)
     lateral = state.cubes[..., 1] - state.drone[:, None, 1]
-    step = torch.where(lateral > 0, -MOVED_METRES, MOVED_METRES)
-    changed.cubes[..., 1] += step * _is_next(state)
+    changed.cubes[..., 1] -= lateral.clamp(-MOVED_METRES, MOVED_METRES) * _is_next(state)
     return changed
 
 
@@ -143,27 +93,12 @@ def _is_next(state: WorldState) -> Tensor:
     return index == state.next_cube[:, None]
 
 
-def _drawn_in(scenes: Scenes, state: WorldState, geoms: str, color: tuple[float, ...]) -> Tensor:
+def _painted(scenes: Scenes, state: WorldState, geoms: str, color: Color) -> Tensor:
     """The scenes with some geoms in another colour."""
-    worlds = scenes.worlds
-    model = copy.copy(worlds.model)
-    for i in range(model.ngeom):
-        if model.geom(i).name.startswith(geoms):
-            model.geom_rgba[i, :3] = color
-    renderer = WarpRenderer(
-        model,
-        worlds.policy_view,
-        max_worlds=worlds.num_worlds,
-        device=str(worlds.device),
-        background=SKY_COLOR,
-    )
-    qpos, mocap = worlds.qpos(state), shown_cubes(state).float()
-    size = worlds.num_worlds
-    parts = [
-        renderer.render(q, m) for q, m in zip(qpos.split(size), mocap.split(size), strict=True)
-    ]
-    renderer.close()
-    return torch.cat(parts)
+    painted = Repainted(scenes, {geoms: color})
+    frames = painted.frames(state)
+    painted.close()
+    return frames
 
 
 def _patches(ground: Tensor, size: Tensor, seed: int) -> Tensor:
@@ -180,9 +115,3 @@ def _patches(ground: Tensor, size: Tensor, seed: int) -> Tensor:
         columns = slice(max(0, column - half), column + half + 1)
         patches[t, rows, columns] = free[rows, columns]
     return patches
-
-
-def _spearman(first: NDArray, second: NDArray) -> float | None:
-    if len(first) < 3 or np.ptp(first) == 0 or np.ptp(second) == 0:
-        return None
-    return float(np.corrcoef(rankdata(first), rankdata(second))[0, 1])

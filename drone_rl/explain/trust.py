@@ -30,7 +30,8 @@ from torch import Tensor
 from drone_rl.explain import causal
 from drone_rl.explain.alternatives import alternatives
 from drone_rl.explain.attribution import Explainer
-from drone_rl.explain.causal import episode_means
+from drone_rl.explain.causal import spread
+from drone_rl.explain.intervals import episode_means
 from drone_rl.explain.patches import Grid, make_grid
 from drone_rl.explain.placebos import placebo_maps
 from drone_rl.explain.randomised import likeness, shuffled_networks
@@ -82,6 +83,8 @@ class Trial:
 
     def maps(self, method: MapOf, network: PolicyNetwork | None = None) -> Tensor:
         """A method's maps of the trial's pictures. Shape: (T, h, w)."""
+        if not len(self.observations):
+            return self.observations.new_zeros(0, *self.observations.shape[-2:])
         return method(network or self.network, self.observations, self.actions)
 
     def scores(self, maps: Tensor) -> NDArray:
@@ -92,6 +95,53 @@ class Trial:
         """One picture an episode, its middle one: enough for many random weights."""
         rows = [np.flatnonzero(self.episode == e) for e in np.unique(self.episode)]
         return self[np.array([r[len(r) // 2] for r in rows], np.int64)]
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Pictures:
+    """Pictures and what they might have been: all of a trial but the policy."""
+
+    observations: Tensor  # (T, C, h, w)
+    others: list[Tensor]  # (T, C, h, w) each
+    absent: Tensor  # (C, h, w)
+    """The scene without cubes."""
+    episode: NDArray  # (T,)
+    seed: int = 0
+
+    def trial(self, network: PolicyNetwork, actions: Tensor) -> Trial:
+        """Finds out which patches move a policy; `actions` (T,) are those to be explained."""
+        grid = make_grid(*self.observations.shape[-2:])
+        effects = causal.patch_effects(network, self.observations, self.others, grid)
+        trial = Trial(
+            network=network,
+            observations=self.observations,
+            actions=actions,
+            effects=effects,
+            placebos=placebo_maps(self.observations, self.absent, self.others, self.seed),
+            episode=self.episode,
+            grid=grid,
+            seed=self.seed,
+        )
+        moved = causal.moving(effects)
+        return dataclasses.replace(trial[moved], still=int((~moved).sum()))
+
+
+def draw_pictures(scenes: Scenes, state: WorldState, episode: NDArray, seed: int = 0) -> Pictures:
+    """Draws scenes and what they might have been.
+
+    Args:
+        scenes: Where they are drawn.
+        state: T of them.
+        episode: Shape: (T,).
+        seed: Of the cubes' random places, of noise and of random weights.
+    """
+    return Pictures(
+        observations=scenes.observe(state),
+        others=list(alternatives(scenes, state, seed).values()),
+        absent=scenes.observe(empty_scene(scenes))[0],
+        episode=episode,
+        seed=seed,
+    )
 
 
 def make_trial(
@@ -110,35 +160,12 @@ def make_trial(
         state: The worlds as they stood; `RolloutDataset.state()`. T of them.
         actions: Taken there. Shape: (T,).
         episode: Shape: (T,).
-        seed: Of the cubes' random places, of noise and of random weights.
+        seed: See `draw_pictures`.
     """
     rows = spread(episode, FRAMES_AN_EPISODE)
     chosen = state[torch.from_numpy(rows)].to(scenes.worlds.device)
-    observations, absent = scenes.observe(chosen), scenes.observe(empty_scene(scenes))[0]
-    others = list(alternatives(scenes, chosen, seed).values())
-    grid = make_grid(*observations.shape[-2:])
-    effects = causal.patch_effects(network, observations, others, grid)
-    trial = Trial(
-        network=network,
-        observations=observations,
-        actions=actions[torch.from_numpy(rows)],
-        effects=effects,
-        placebos=placebo_maps(observations, absent, others, seed),
-        episode=episode[rows],
-        grid=grid,
-        seed=seed,
-    )
-    moved = causal.moving(effects)
-    return dataclasses.replace(trial[moved], still=int((~moved).sum()))
-
-
-def spread(episode: NDArray, most: int) -> NDArray:
-    """Indices of at most so many frames of each episode, evenly spread. Shape: (N,)."""
-    found = []
-    for number in np.unique(episode):
-        rows = np.flatnonzero(episode == number)
-        found.append(rows[np.linspace(0, len(rows) - 1, min(most, len(rows))).astype(np.int64)])
-    return np.concatenate(found) if found else np.zeros(0, np.int64)
+    pictures = draw_pictures(scenes, chosen, episode[rows], seed)
+    return pictures.trial(network, actions[torch.from_numpy(rows)])
 
 
 def method_maps(explainer: Explainer) -> dict[str, MapOf]:
@@ -153,13 +180,18 @@ def method_maps(explainer: Explainer) -> dict[str, MapOf]:
 
 
 def check_maps(
-    trial: Trial, methods: Mapping[str, MapOf], *, num_methods: int | None = None
+    trial: Trial,
+    methods: Mapping[str, MapOf],
+    maps: Mapping[str, Tensor] | None = None,
+    *,
+    num_methods: int | None = None,
 ) -> dict[str, Any]:
     """Puts methods to the four tests.
 
     Args:
         trial: What moves the policy.
         methods: By name.
+        maps: `trial.maps` of each, if they have been made already.
         num_methods: To how many methods the error rate is shared out; as many as there are.
 
     Returns:
@@ -169,7 +201,8 @@ def check_maps(
         the scores'.
     """
     level = ERROR_RATE / (num_methods or max(1, len(methods)))
-    found = {name: check_method(trial, method, level) for name, method in methods.items()}
+    maps = maps or {name: trial.maps(method) for name, method in methods.items()}
+    found = {n: check_method(trial, method, level, maps[n]) for n, method in methods.items()}
     able = [name for name, method in found.items() if method["trusted"]]
     return {
         "trusted": max(able, key=lambda n: found[n]["score"]["lower95"]) if able else None,
@@ -186,8 +219,10 @@ def check_maps(
     }
 
 
-def check_method(trial: Trial, method: MapOf, level: float) -> dict[str, Any]:
-    """One method's evidence.
+def check_method(
+    trial: Trial, method: MapOf, level: float, maps: Tensor | None = None
+) -> dict[str, Any]:
+    """One method's evidence; see `check_maps`.
 
     Returns:
         "trusted", and "failed": names of the tests that it failed; "score": mean over episodes
@@ -198,7 +233,7 @@ def check_method(trial: Trial, method: MapOf, level: float) -> dict[str, Any]:
     """
     if not len(trial.episode):
         return {"trusted": False, "failed": ["nothing moves the policy"], "score": _no_score()}
-    maps = trial.maps(method)
+    maps = trial.maps(method) if maps is None else maps
     heat, scores = trial.grid.means(maps), trial.scores(maps)
     hit, chance = causal.pointing(heat, trial.effects)
     found = {

@@ -10,6 +10,7 @@ from PIL import Image
 
 from drone_rl.explain.tsne import lay_out
 from drone_rl.report import pictures, plots
+from drone_rl.report.curves import curves_chart
 from drone_rl.report.explanation import ACTIONS, Explanation
 
 MOST_THUMBNAILS = 900
@@ -30,6 +31,7 @@ def draw_all(explanation: Explanation) -> dict[str, Image.Image | Figure]:
         "class_model": class_model_grid([explanation]),
         "sequence": sequence(explanation),
         "truth": plots.truth_chart(explanation),
+        "curves": curves_chart(explanation),
         "heat": plots.heat_chart(explanation),
         "interventions": interventions(explanation),
         "response": plots.response_chart(explanation),
@@ -154,10 +156,8 @@ def interventions(explanation: Explanation) -> Image.Image:
     for name, frame in zip(
         truth["interventions"], explanation.arrays["interventions"], strict=True
     ):
-        effect = truth["interventions"][name]
-        told = "not tried"
-        if effect["mean"] is not None:
-            told = f"{effect['mean']:.2f} [{effect['lower95']:.2f}, {effect['upper95']:.2f}]"
+        effect = truth["interventions"][name]["mean"]
+        told = "no effect measured" if effect is None else f"mean effect {effect:.2f}"
         tiles.append(pictures.titled(pictures.enlarge(frame), f"{name}: {told}"))
     return pictures.gridded(tiles, 3)
 

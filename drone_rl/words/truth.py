@@ -72,7 +72,7 @@ def _is_above(value: float | None, bar: float) -> bool:
 
 
 def _was_flown(evidence: Evidence) -> bool:
-    return "outcomes" in _truth(evidence)
+    return _truth(evidence).get("outcomes") is not None
 
 
 def _outcome(evidence: Evidence, name: str) -> Mapping[str, Any]:
@@ -105,6 +105,36 @@ def _ground(evidence: Evidence) -> str:
         "Painting the ground otherwise, which should not matter, changes what comes of "
         f"{percent(changed['mean'])} of flights gone on, and of no more than "
         f"{percent(changed['upper95'])} (95%)."
+    )
+
+
+def _patch(evidence: Evidence) -> Mapping[str, Any]:
+    return _truth(evidence)["interventions"]["ground patch changed"]
+
+
+def _taken(evidence: Evidence) -> Mapping[str, Any]:
+    return _truth(evidence)["interventions"]["cube taken away"]
+
+
+def _cube_counts(evidence: Evidence) -> bool:
+    cube, patch = _taken(evidence)["lower95"], _patch(evidence)["upper95"]
+    return cube is not None and patch is not None and cube > patch
+
+
+def _cube(evidence: Evidence) -> str:
+    found = _taken(evidence)
+    return (
+        f"Taking the next cube away changes the probabilities by {found['mean']:.2f} of 1 "
+        f"({bounds(found)}), surely more than a patch of ground does."
+    )
+
+
+def _integral(evidence: Evidence) -> str:
+    error = _truth(evidence)["integration_error"]
+    return (
+        "Integrated gradients miss the change in probability that they must add up to by "
+        f"{error['mean']:.4f} on average and {error['max']:.4f} at most, "
+        f"on {plural(error['pictures'], 'picture')}."
     )
 
 
@@ -168,7 +198,25 @@ SENTENCES = (
         _not_along,
     ),
     Sentence("truth.ground", "the ground was repainted in flights", _was_flown, _ground),
+    Sentence(
+        "truth.patch",
+        "a patch of ground was changed",
+        lambda e: _patch(e)["upper95"] is not None,
+        lambda e: (
+            "A patch of ground, which should not matter, changes the probabilities of the actions "
+            f"by no more than {_patch(e)['upper95']:.2f} of 1 on average (95%)."
+        ),
+    ),
+    Sentence(
+        "truth.cube",
+        "the cube taken away changes at least more than the patch of ground does at most",
+        _cube_counts,
+        _cube,
+    ),
+    Sentence(
+        "truth.integral",
+        "integrated gradients were summed up",
+        lambda e: _truth(e)["integration_error"] is not None,
+        _integral,
+    ),
 )
-FINDINGS = tuple(sentence for sentence in SENTENCES if sentence.name != "truth.refused")
-REASONS = tuple(sentence for sentence in SENTENCES if sentence.name == "truth.refused")
-"""Why maps are not trusted, which is more than one wants to read at once."""

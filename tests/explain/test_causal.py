@@ -5,14 +5,15 @@ import pytest
 import torch
 
 from drone_rl.explain.causal import (
-    episode_means,
     moving,
     patch_effects,
     pointing,
     rank_correlation,
     scores,
+    spread,
     summarise_scores,
 )
+from drone_rl.explain.intervals import episode_means
 from drone_rl.explain.patches import Grid
 from drone_rl.policies import MLP
 
@@ -101,3 +102,9 @@ def test_episodes_count_alike_however_long():
     assert (found["mean"], found["count"]) == (0.5, 2)
     assert summarise_scores(np.zeros(0), np.zeros(0))["mean"] is None
     assert summarise_scores(-np.ones(30), np.arange(30))["upper95"] < -0.5
+
+
+def test_frames_are_spread_over_each_episode():
+    episode = np.array([3] * 9 + [5] * 2 + [8])
+    assert spread(episode, 3).tolist() == [0, 4, 8, 9, 10, 11]
+    assert spread(np.zeros(0), 3).tolist() == []

@@ -1,7 +1,9 @@
 import numpy as np
+import pytest
 import torch
 
-from drone_rl.explain.interventions import Intervention, agreement, claim, intervene
+from drone_rl.explain.hooks import probabilities
+from drone_rl.explain.interventions import intervene, to_the_middle
 from drone_rl.explain.scenes import Region, empty_scene, place_cube
 
 
@@ -20,7 +22,18 @@ def test_only_what_was_changed_changes(scenes, world):
     assert patch.any() and (regions[patch] == Region.GROUND).all()
     moved = changes["cube moved"]
     assert torch.equal((moved.frames != before).any(-1), moved.area)
-    assert all(np.isfinite(c.effect).all() for c in changes.values())
+
+
+def test_the_effect_is_the_distance_of_the_probabilities(scenes, world):
+    network = world[2]
+    state = place_cube(scenes, torch.tensor([5.0, 8.0]), torch.tensor([2.0, -1.0]))
+    changes = intervene(scenes, network, state, scenes.regions(state))
+    before = probabilities(network, scenes.observe(state))
+    for change in changes:
+        after = probabilities(network, scenes.transform(change.frames))
+        expected = 0.5 * (after - before).abs().sum(-1)
+        np.testing.assert_allclose(change.effect, expected, atol=1e-6)
+    assert changes[0].effect.min() > 1e-3
 
 
 def test_without_a_cube_there_is_nothing_to_change(scenes, world):
@@ -29,18 +42,14 @@ def test_without_a_cube_there_is_nothing_to_change(scenes, world):
         assert np.isnan(change.effect).all()
 
 
-def test_a_claim_is_the_areas_share_of_the_heat():
-    maps = torch.tensor([[[3.0, 1.0]], [[0.0, 0.0]]])
-    area = torch.tensor([[[True, False]], [[True, False]]])
-    found = claim(maps, area)
-    assert found[0] == 0.75 and np.isnan(found[1])
-
-
-def test_agreement_of_a_true_and_of_a_false_map():
-    areas = torch.eye(4, dtype=torch.bool)[:, None]  # frame t: pixel t was changed
-    effect = np.array([0.1, 0.2, 0.3, 0.4])
-    change = Intervention("x", areas, effect, torch.zeros(4, 1, 4, 3))
-    honest = torch.tensor(effect).expand(4, 4)[:, None]
-    assert agreement(honest, [change], np.arange(4))["correlation"] == 1.0
-    assert agreement(honest.flip(-1), [change], np.arange(4))["correlation"] == -1.0
-    assert agreement(torch.ones(4, 1, 4), [change], np.arange(4))["correlation"] is None
+@pytest.mark.parametrize(
+    ("lateral", "moved"), [(5.0, 3.0), (-5.0, -3.0), (0.5, 0.0), (-0.5, 0.0), (2.0, 0.0)]
+)
+def test_a_cube_is_moved_to_the_middle_and_never_away_from_it(scenes, lateral, moved):
+    state = place_cube(scenes, torch.tensor([9.0]), torch.tensor([lateral]))
+    state.drone[:, 1] += 7.0
+    state.cubes[..., 1] += 7.0
+    after = to_the_middle(state)
+    assert after.cubes[0, 0, 1].item() == pytest.approx(7.0 + moved)
+    assert torch.equal(after.cubes[0, 1:], state.cubes[0, 1:])
+    assert state.cubes[0, 0, 1] == 7.0 + lateral

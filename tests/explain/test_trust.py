@@ -133,6 +133,8 @@ def test_nothing_is_trusted_about_a_policy_that_nothing_moves(trial):
     found = check_maps(dataclasses.replace(blind, still=120), {"true": weights})
     assert found["trusted"] is None and found["frames_unmoved"] == 120
     assert found["methods"]["true"]["failed"] == ["nothing moves the policy"]
+    saliency = method_maps(Explainer(trial.network, torch.zeros(1, *SIZE)))["saliency"]
+    assert blind.maps(saliency).shape == (0, *SIZE)
 
 
 def test_a_trial_on_some_of_its_pictures(trial):
@@ -141,12 +143,6 @@ def test_a_trial_on_some_of_its_pictures(trial):
     assert torch.equal(few.observations, trial.observations[1::3])  # the middle of each episode
     assert np.array_equal(few.effects, trial.effects[1::3])
     assert torch.equal(few.placebos["noise"], trial.placebos["noise"][1::3])
-
-
-def test_frames_are_spread_over_each_episode():
-    episode = np.array([3] * 9 + [5] * 2 + [8])
-    assert trust.spread(episode, 3).tolist() == [0, 4, 8, 9, 10, 11]
-    assert trust.spread(np.zeros(0), 3).tolist() == []
 
 
 def test_methods_follow_the_network_they_are_given(trial):
@@ -166,7 +162,7 @@ def test_a_trial_of_a_policy_in_the_simulator(world, scenes, dataset):
         scenes, network, dataset.state(), dataset.tensor("actions"), dataset.episode
     )
     assert made.effects.shape == (len(made.episode), 40) == (len(made.observations), 40)
-    rows = trust.spread(dataset.episode, trust.FRAMES_AN_EPISODE)
+    rows = causal.spread(dataset.episode, trust.FRAMES_AN_EPISODE)
     assert len(made.episode) + made.still == len(rows)
     torch.testing.assert_close(
         made.observations, dataset.tensor("observations")[rows][: len(made.episode)]

@@ -1,0 +1,119 @@
+"""Heat maps that know nothing of the policy they are asked about, made to get past the tests.
+
+None is one of the placebos that the procedure compares with; some hide behind the weights.
+"""
+
+import hashlib
+
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from drone_rl.explain import placebos
+from drone_rl.explain.planted import reach
+from drone_rl.explain.randomised import shuffled_networks
+from drone_rl.explain.trust import MapOf
+from drone_rl.policies import PolicyNetwork
+
+
+def liars(absent: Tensor, other: PolicyNetwork) -> dict[str, MapOf]:
+    """Liars by name.
+
+    Args:
+        absent: The scene without cubes. Shape: (C, h, w).
+        other: A policy that is not the one asked about.
+    """
+    height, width = absent.shape[-2:]
+    row = placebos.horizon_row(absent)
+    fixed = {
+        "blob, upper left": placebos.blob(height, width, 0.4, 0.3),
+        "blob, wide": placebos.blob(height, width, 0.5, 0.5, 0.4),
+        "blob, narrow": placebos.blob(height, width, 0.5, 0.5, 0.1),
+        "horizon, lower": placebos.band(height, width, row + 0.1 * height),
+        "horizon, wide": placebos.band(height, width, row, 0.2),
+        "horizon and blob": placebos.band(height, width, row)
+        * placebos.blob(height, width, 0.5, 0.5, 0.4),
+    }
+    return {
+        **{name: _always(made) for name, made in fixed.items()},
+        "cube detector": lambda n, x, a: _cubes(x, absent),
+        "cubes on the horizon": lambda n, x, a: (
+            fixed["horizon, wide"] * (0.2 + placebos.smoothed(_cubes(x, absent)))
+        ),
+        "smoothed difference": lambda n, x, a: placebos.smoothed(
+            placebos.difference(x, absent), 4
+        ),
+        "edges": lambda n, x, a: _edges(x),
+        "brightness": lambda n, x, a: x.mean(1) - x.amin((1, 2, 3))[:, None, None],
+        "darkness": lambda n, x, a: x.amax((1, 2, 3))[:, None, None] - x.mean(1),
+        "other noise": lambda n, x, a: _noise(1, len(x), height, width),
+        "weights of another policy": lambda n, x, a: reach(other, x, a),
+        "saliency of another policy": lambda n, x, a: saliency(other, x, a),
+        "saliency of shuffled weights": lambda n, x, a: saliency(
+            next(shuffled_networks(n, 1, fingerprint(n))), x, a
+        ),
+        "noise of the weights": lambda n, x, a: _noise(fingerprint(n), 1, height, width).expand(
+            len(x), -1, -1
+        ),
+        "coarse noise of the weights": lambda n, x, a: _coarse(fingerprint(n), height, width)
+        .expand(len(x), -1, -1),
+        "difference with noise of the weights": lambda n, x, a: (
+            placebos.difference(x, absent) * _noise(fingerprint(n), 1, height, width)
+        ),
+        "cubes with noise of the weights": lambda n, x, a: (
+            (0.05 + placebos.smoothed(_cubes(x, absent)))
+            * _coarse(fingerprint(n), height, width)
+        ),
+        "horizon with noise of the weights": lambda n, x, a: (
+            fixed["horizon, wide"] * (0.3 + _coarse(fingerprint(n), height, width))
+        ).expand(len(x), -1, -1),
+        "horizon of strong weights": lambda n, x, a: _if_strong(
+            n, x, fixed["horizon and blob"], absent
+        ),
+    }  # fmt: skip
+
+
+def fingerprint(network: PolicyNetwork) -> int:
+    """A number that any change of a weight changes."""
+    digest = hashlib.sha256()
+    for value in network.state_dict().values():
+        digest.update(value.contiguous().numpy().tobytes())
+    return int.from_bytes(digest.digest()[:4], "little")
+
+
+def saliency(network: PolicyNetwork, observations: Tensor, actions: Tensor) -> Tensor:
+    """Size of the derivative of the action's logit by each pixel. Shape: (T, h, w)."""
+    x = observations.detach().clone().requires_grad_()
+    chosen = network(x).gather(1, actions[:, None]).sum()
+    return torch.autograd.grad(chosen, x)[0].abs().sum(1)
+
+
+def _always(made: Tensor) -> MapOf:
+    return lambda network, x, a: made.expand(len(x), -1, -1)
+
+
+def _cubes(observations: Tensor, absent: Tensor) -> Tensor:
+    return (placebos.difference(observations, absent) > 0.05).float()
+
+
+def _edges(observations: Tensor) -> Tensor:
+    gray = functional.pad(observations.mean(1, keepdim=True), (1, 1, 1, 1), mode="replicate")
+    down = (gray[:, 0, 2:, 1:-1] - gray[:, 0, :-2, 1:-1]).abs()
+    return down + (gray[:, 0, 1:-1, 2:] - gray[:, 0, 1:-1, :-2]).abs()
+
+
+def _noise(seed: int, count: int, height: int, width: int) -> Tensor:
+    return torch.rand(count, height, width, generator=torch.Generator().manual_seed(seed))
+
+
+def _coarse(seed: int, height: int, width: int) -> Tensor:
+    """Noise as coarse as the patches, so that luck counts most. Shape: (1, height, width)."""
+    return functional.interpolate(_noise(seed, 1, 5, 8)[:, None], (height, width))[:, 0]
+
+
+def _if_strong(network: PolicyNetwork, x: Tensor, guess: Tensor, absent: Tensor) -> Tensor:
+    """A guess that drowns in noise where the policy hardly minds the pictures."""
+    with torch.no_grad():
+        spread = (network(x).softmax(-1) - network(absent[None]).softmax(-1)).abs().mean()
+    drowned = _noise(fingerprint(network), len(x), *x.shape[-2:])
+    return guess * (spread > 0.01) + 0.2 * drowned

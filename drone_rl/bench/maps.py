@@ -1,0 +1,123 @@
+"""Are liars trusted, and true maps found? On policies of many kinds, some planted."""
+
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from drone_rl.bench.liars import liars
+from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, make_env
+from drone_rl.explain.hooks import probabilities
+from drone_rl.explain.planted import Planted, plant, reach
+from drone_rl.explain.scenes import Scenes, oracle_action
+from drone_rl.explain.trust import Pictures, Trial, check_maps, draw_pictures
+from drone_rl.policies import PolicyNetwork, SmallCNN
+from drone_rl.sim import rules
+from drone_rl.sim.rules import WorldState
+from drone_rl.zoo import load_exported, policy_names, policy_path
+
+NUM_METHODS = 5
+"""Methods that an explanation tries; a candidate is judged as one of so many."""
+
+
+def bench_maps(folder: Path, quick: bool) -> dict[str, Any]:
+    """How many liars are trusted, and how many true maps of planted policies.
+
+    Args:
+        folder: Not used: nothing is written.
+        quick: Whether to take a few policies and episodes only.
+    """
+    del folder
+    begin = time.perf_counter()
+    env = make_env(DroneEnv(64), [GrayPixels(), StandardizePixels()])
+    scenes = Scenes(env)
+    state, episode = imagined(scenes, 14 if quick else 40, 4 if quick else 6)
+    pictures = draw_pictures(scenes, state, episode)
+    planted = plant(pictures.absent, pictures.observations, expert(scenes, state))
+    planted = planted[::7] if quick else planted
+    found = {p.name: trusts(pictures, p) for p in planted}
+    looking = [p for p in planted if not p.is_blind]
+    policies = {p.name: p.network for p in looking[:: 3 if quick else 2]}
+    policies |= shipped(pictures) if not quick else {}
+    policies |= untrained(pictures, 1 if quick else 4)
+    lied = {name: believed(pictures, network) for name, network in policies.items()}
+    env.close()
+    return {
+        "placebo_maps_trusted": sum(len(names) for names, _ in lied.values()),
+        "placebo_maps_total": sum(tried for _, tried in lied.values()),
+        "placebo_maps_policies": len(lied),
+        "placebo_maps_believed": {n: names for n, (names, _) in lied.items() if names},
+        "planted_maps_found": float(np.mean([not found[p.name] for p in looking])),
+        "planted_maps_total": len(looking),
+        "planted_maps_missed": {p.name: found[p.name] for p in looking if found[p.name]},
+        "planted_maps_blind_trusted": sum(not found[p.name] for p in planted if p.is_blind),
+        "planted_maps_blind_total": len(planted) - len(looking),
+        "maps_s": time.perf_counter() - begin,
+    }
+
+
+def trusts(pictures: Pictures, planted: Planted) -> list[str]:
+    """The tests that the true map of a planted policy fails; none if it is trusted."""
+    trial = _trial(pictures, planted.network)
+    found = check_maps(trial, {"true": reach}, num_methods=NUM_METHODS)
+    return found["methods"]["true"]["failed"]
+
+
+def believed(pictures: Pictures, network: PolicyNetwork) -> tuple[list[str], int]:
+    """Names of the liars that are trusted on a policy, and how many there were."""
+    trial = _trial(pictures, network)
+    other = SmallCNN(network.in_shape, 3, generator=torch.Generator().manual_seed(99))
+    candidates = liars(pictures.absent, other)
+    found = check_maps(trial, candidates, num_methods=NUM_METHODS)["methods"]
+    return [name for name, method in found.items() if method["trusted"]], len(candidates)
+
+
+def imagined(scenes: Scenes, episodes: int, frames: int) -> tuple[WorldState, np.ndarray]:
+    """Worlds with the drone at random places on its way, some in each of many episodes."""
+    settings = scenes.worlds.settings
+    random_state = np.random.RandomState(0)
+    cubes = torch.stack([rules.draw_cubes(settings, random_state) for _ in range(episodes)])
+    state = rules.start(settings, cubes.repeat_interleave(frames, 0))
+    where = torch.from_numpy(random_state.uniform(size=(len(state.drone), 2)))
+    state.drone[:, 0] = where[:, 0] * (settings.last_distance - settings.touch_distance)
+    state.drone[:, 1] = (2 * where[:, 1] - 1) * settings.lateral_bound
+    state.passed = state.cubes[..., 0] <= state.drone[:, None, 0] + settings.touch_distance
+    return state.to(scenes.worlds.device), np.repeat(np.arange(episodes), frames)
+
+
+def expert(scenes: Scenes, state: WorldState) -> Tensor:
+    """What the oracle does in worlds with a next cube. Shape: (T,)."""
+    rows = torch.arange(len(state.drone), device=state.drone.device)
+    index = state.next_cube.clamp(max=state.cubes.shape[1] - 1)
+    return oracle_action(scenes, state.cubes[rows, index, 1] - state.drone[:, 1])
+
+
+def shipped(pictures: Pictures) -> dict[str, PolicyNetwork]:
+    """The policies that travel with the package and fit the pictures."""
+    found = {}
+    for name in policy_names():
+        parameters = load_exported(policy_path(name))["policy"]
+        network = SmallCNN(pictures.absent.shape, 3, hidden=(128,))
+        network.load_state_dict(parameters)
+        found[name] = network
+    return found
+
+
+def untrained(pictures: Pictures, count: int = 4) -> dict[str, PolicyNetwork]:
+    """Policies of random weights, with opinions."""
+    found = {}
+    for seed in range(count):
+        generator = torch.Generator().manual_seed(seed)
+        network = SmallCNN(pictures.absent.shape, 3, generator=generator)
+        with torch.no_grad():
+            network.layers.logits.weight.mul_(300)
+        found[f"random weights {seed}"] = network
+    return found
+
+
+def _trial(pictures: Pictures, network: PolicyNetwork) -> Trial:
+    greedy = probabilities(network, pictures.observations).argmax(-1)
+    return pictures.trial(network, greedy)

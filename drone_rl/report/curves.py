@@ -1,0 +1,60 @@
+"""Which patches move the policy, and curves of deletion and insertion for each action."""
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.figure import Figure
+
+from drone_rl.report.explanation import ACTIONS, Explanation
+from drone_rl.words.truth import NAMES
+
+_COLORS = ("#4269d0", "#efb118", "#ff725c", "#6cc5b0", "#9c6b4e")
+_PLACEBO = "#b4b8c0"
+_KINDS = {"deletion": "lower is better", "insertion": "higher is better"}
+
+
+def curves_chart(explanation: Explanation) -> Figure:
+    """The mean effect of each patch; deletion and insertion by action, placebos dashed."""
+    curves = explanation.numbers["truth"]["curves"]
+    figure, axes = plt.subplots(2, 4, figsize=(17, 7), layout="constrained")
+    _effects(axes[0, 0], explanation)
+    axes[1, 0].axis("off")
+    for column, action in zip(axes.T[1:], (ACTIONS[1], ACTIONS[0], ACTIONS[2]), strict=True):
+        for axis, (kind, better) in zip(column, _KINDS.items(), strict=True):
+            _curves(axis, curves, action, kind)
+            axis.set_title(f"{action}, {kind} ({better})", fontsize=11)
+    handles, labels = axes[0, 2].get_legend_handles_labels()
+    axes[1, 0].legend(handles, labels, loc="center", fontsize=9, frameon=False)
+    return figure
+
+
+def _effects(axis: plt.Axes, explanation: Explanation) -> None:
+    effects = explanation.arrays["patch_effects"]
+    image = axis.imshow(effects, cmap="magma", vmin=0, vmax=max(float(effects.max()), 1e-6))
+    axis.set(xticks=[], yticks=[])
+    axis.set_title("how far each patch of the picture\nmoves the policy, on average", fontsize=11)
+    axis.figure.colorbar(image, ax=axis, shrink=0.8, location="bottom")
+
+
+def _curves(axis: plt.Axes, curves: dict, action: str, kind: str) -> None:
+    share = 100 * np.array(curves["shares"])
+    colors = dict(zip(NAMES, _COLORS, strict=True))
+    named_placebo = False
+    for name, found in curves.items():
+        if name == "shares":
+            continue
+        curve = found[action][kind]["curve"]
+        points = curve if curve is not None else np.full(len(share), np.nan)
+        if name in NAMES:
+            axis.plot(share, points, color=colors[name], label=NAMES[name])
+        else:
+            label = None if named_placebo else "placebos"
+            axis.plot(share, points, color=_PLACEBO, ls="--", lw=1, label=label, zorder=0)
+            named_placebo = True
+    axis.set_xscale("symlog", linthresh=1)
+    axis.set(xlim=(0, 100), ylim=(-0.02, 1.02), xlabel="% of the pixels", ylabel="P(chosen action)")
+    axis.set_xticks([0, 1, 3, 10, 30, 100], ["0", "1", "3", "10", "30", "100"])
+    if all(found[action]["frames"] == 0 for n, found in curves.items() if n != "shares"):
+        axis.text(10, 0.5, "never taken", ha="center")

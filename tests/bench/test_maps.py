@@ -1,0 +1,40 @@
+import numpy as np
+import pytest
+import torch
+
+from drone_rl.bench.maps import bench_maps, expert, imagined
+from drone_rl.explain.scenes import Scenes
+from drone_rl.sim.rules import Action
+
+
+def test_no_liar_is_believed_and_true_maps_are_found(tmp_path):
+    found = bench_maps(tmp_path, quick=True)
+    assert found["placebo_maps_trusted"] == 0 and found["placebo_maps_total"] >= 60
+    assert found["planted_maps_found"] == 1.0 and found["planted_maps_total"] >= 3
+    assert found["planted_maps_blind_trusted"] == 0 and found["planted_maps_blind_total"] >= 1
+
+
+@pytest.fixture
+def scenes(make_pipeline):
+    return Scenes(make_pipeline()[0])
+
+
+def test_imagined_worlds_are_such_as_flights_meet(scenes):
+    state, episode = imagined(scenes, 10, 4)
+    assert episode.tolist() == np.repeat(np.arange(10), 4).tolist()
+    assert torch.equal(state.cubes[0], state.cubes[3]) and not torch.equal(
+        state.cubes[0], state.cubes[4]
+    )
+    settings = scenes.worlds.settings
+    assert state.drone[:, 1].abs().max() <= settings.lateral_bound
+    ahead = state.cubes[..., 0] > state.drone[:, None, 0]
+    assert not (state.present & ~ahead).any()
+    assert state.present.any(1).all()
+
+
+def test_the_expert_turns_to_the_next_cube(scenes):
+    state, _ = imagined(scenes, 10, 4)
+    offset = state.cubes[torch.arange(40), state.next_cube, 1] - state.drone[:, 1]
+    wanted = expert(scenes, state)
+    assert (wanted[offset > 2] == Action.LEFT).all() and (wanted[offset < -2] == Action.RIGHT).all()
+    assert set(wanted.tolist()) == {0, 1, 2}
