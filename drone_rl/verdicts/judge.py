@@ -37,7 +37,7 @@ class Verdict:
     @property
     def exit_code(self) -> int:
         """The kind's if it is certain, else 13."""
-        return self.kind.exit_code if self.certain else NOT_CERTAIN
+        return self.evidence["exit_code"]
 
     @property
     def sentence(self) -> str:
