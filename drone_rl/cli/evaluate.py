@@ -79,10 +79,11 @@ def table(results: dict[str, dict[str, Any]]) -> str:
         rows.append((label, [str(r["ends"][reason]["successes"]) for r in results.values()]))
     rows.append(("mean length", [f"{r['mean_length']:.1f}" for r in results.values()]))
     rows.append(("episodes", [str(r["episodes"]) for r in results.values()]))
-    return "\n".join(f"{name:22}" + "".join(f"{v:>22}" for v in values) for name, values in rows)
+    return "\n".join(f"{name:21}" + "".join(f"{v:>18}" for v in values) for name, values in rows)
 
 
 def _interval(found: dict[str, Any], key: str) -> str:
     if found[key] is None:
         return "not offered"
-    return f"{found[key]:.3f} [{found['lower95']:.3f}, {found['upper95']:.3f}]"
+    share, low, high = (f"{100 * found[k]:.3g}" for k in (key, "lower95", "upper95"))
+    return f"{share}% [{low}, {high}]"

@@ -12,9 +12,9 @@ from drone_rl.cli.build import find_checkpoint, load_trained, policy_is_checkpoi
 from drone_rl.sweeps import read_sweep
 from drone_rl.sweeps.rows import read_rows
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.overrides import read_overrides
+from drone_rl.utils.overrides import COMMAND, read_overrides
 from drone_rl.verdicts.judge import judge_policy
-from drone_rl.zoo import COMMAND, export_policy
+from drone_rl.zoo import export_policy
 
 prepare = policy_is_checkpoint
 _log = logging.getLogger(__name__)

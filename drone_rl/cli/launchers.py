@@ -171,7 +171,7 @@ def _command() -> list[str]:
 def _job_return(run: Run) -> JobReturn:
     """What a sweeper gets to see of a run: the running mean of cubes, or None if it failed."""
     result = read_result(run.folder)
-    value = None if result is None else result.get("running_cubes")
+    value = None if result is None else _number(result.get("running_cubes"))
     job = JobReturn(
         overrides=list(run.overrides), working_dir=str(run.folder), status=JobStatus.COMPLETED
     )
@@ -183,7 +183,12 @@ def _outcome(run: Run) -> str:
     result = read_result(run.folder)
     if result is None:
         return f"failed: {read_failure(run) or 'for a reason unknown'}"
-    return f"{result['reason']}, running cubes {result['running_cubes']:.3f}"
+    return f"{result['reason']}, running cubes {_number(result.get('running_cubes'))}"
+
+
+def _number(value: object) -> float | None:
+    """A number out of a file, or none if it is something else there."""
+    return float(value) if isinstance(value, int | float) else None
 
 
 @contextmanager

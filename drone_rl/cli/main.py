@@ -93,7 +93,7 @@ def run_command(command: str, overrides: list[str]) -> int:
         try:
             status, value = stage.run(config)
         except InputError as error:  # one bad run of a sweep leaves the others alone
-            print(f"error: {error}", file=sys.stderr)
+            print(f"error: {_one_line(error)}", file=sys.stderr)
             status, value = 2, None
         statuses.append(status)
         if status > 128:  # a signal ends a whole sweep, not one run of it
@@ -148,7 +148,7 @@ def _one_line(error: BaseException) -> str:
     cause: BaseException | None = error
     while cause is not None:
         if isinstance(cause, InputError):
-            return str(cause)
+            return "".join(c if c.isprintable() else "?" for c in str(cause))
         cause = cause.__cause__ or cause.__context__
     text = " ".join(str(error).split()) or type(error).__name__
     if "is not in struct" in text or "Could not override" in text:

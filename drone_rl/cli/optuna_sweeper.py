@@ -4,6 +4,7 @@ Hydra's own Optuna plugin wants Optuna 2, and its runs can't be pruned.
 """
 
 import logging
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,8 @@ from omegaconf import DictConfig
 from drone_rl.sweeps import read_result
 from drone_rl.sweeps.search import import_optuna, next_trials, open_study, tell
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.files import refuse_links
+from drone_rl.utils.schema import shown
 
 _log = logging.getLogger(__name__)
 
@@ -82,6 +85,7 @@ class OptunaSweeper(Sweeper):
             )
         folder = Path(str(self.config.hydra.sweep.dir)).absolute()
         folder.mkdir(parents=True, exist_ok=True)
+        refuse_links(folder)
         study = open_study(folder, direction="maximize")
         for name, value in self.shared.items():
             study.set_user_attr(name, value)
@@ -92,6 +96,8 @@ class OptunaSweeper(Sweeper):
         done = optuna.trial.TrialState.is_finished
         while (left := self.num_trials - sum(done(t.state) for t in study.trials)) > 0:
             trials = next_trials(study, space, min(left, self.batch), self.seed)
+            for trial in trials:
+                check_params(trial.params, space)
             batch = [
                 [*fixed, *(f"{k}={v}" for k, v in t.params.items()), f"trial={t.number}"]
                 for t in trials
@@ -105,6 +111,20 @@ class OptunaSweeper(Sweeper):
         if complete:
             best = study.best_trial
             _log.info("best: run %d, %.3f cubes, %s", best.number, best.value, best.params)
+
+
+def check_params(params: Mapping[str, Any], space: Mapping[str, Any]) -> None:
+    """Refuses what a journal says of a trial unless this search could have drawn it.
+
+    Raises:
+        InputError: A setting is not among those that are searched, or its value out of range.
+    """
+    for name, value in params.items():
+        if name not in space or not space[name]._contains(space[name].to_internal_repr(value)):
+            raise InputError(
+                f"optuna.journal sets {shown(name)} to {shown(value)}, which this search never "
+                "draws; choose another folder"
+            )
 
 
 def distribution(override: Override) -> Any:

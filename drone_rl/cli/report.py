@@ -4,18 +4,29 @@ import logging
 from pathlib import Path
 
 from hydra.core.hydra_config import HydraConfig
+from jinja2 import TemplateError
 from omegaconf import DictConfig, ListConfig
 
 from drone_rl.report import write_report
 from drone_rl.utils.errors import InputError
 
+_INCOMPLETE = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, TemplateError)
+"""What becomes of a number that is missing or of another type, deep in the making of a report."""
 _log = logging.getLogger(__name__)
 
 
 def run(config: DictConfig) -> tuple[int, str]:
     """Makes a report from explanations. Returns the exit status and the report's path."""
     folders = _folders(config.explanations, Path(config.paths.outputs))
-    report = write_report(folders, Path(HydraConfig.get().runtime.output_dir))
+    try:
+        report = write_report(folders, Path(HydraConfig.get().runtime.output_dir))
+    except InputError:
+        raise
+    except _INCOMPLETE as error:
+        raise InputError(
+            f"explanations={config.explanations} do not hold what a report needs "
+            f"({type(error).__name__}: {str(error)[:200]}); run drone-rl explain again"
+        ) from error
     _log.info("report: %s", report)
     return 0, str(report)
 

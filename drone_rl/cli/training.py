@@ -25,6 +25,7 @@ from drone_rl.training import (
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import write_atomically
 from drone_rl.utils.provenance import provenance
+from drone_rl.utils.schema import Real
 from drone_rl.utils.settings import check_same_config
 from drone_rl.zoo import describe, read_checkpoint
 
@@ -41,6 +42,7 @@ MAY_CHANGE = (
 )
 """Settings that a resumed run may change: they don't enter into what is learned."""
 
+_BEST = Real(float("-inf"), 1e6)
 _log = logging.getLogger(__name__)
 
 
@@ -64,7 +66,7 @@ def train(config: DictConfig, folder: Path) -> tuple[int, float]:
     trainer, checkpoints = _build(config, folder, resolved)
     if state is not None:
         trainer.load_state_dict(state)
-        checkpoints.best = state["best"]
+        checkpoints.best = _BEST.read(state.get("best"), "the checkpoint's best")
     try:
         reason = trainer.run()
     except NotANumberError as error:

@@ -17,7 +17,9 @@ from torch import Tensor
 
 from drone_rl.explain.scenes import Region
 from drone_rl.sim.rules import Action, EndReason, WorldState
+from drone_rl.utils.archives import read_arrays
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.files import parse_json
 
 FLOWN = {
     "actions": "action taken: " + ", ".join(f"{a.value} {a.name.lower()}" for a in Action),
@@ -123,13 +125,14 @@ class RolloutDataset:
             InputError: It is missing, damaged or something else.
         """
         try:
-            with np.load(path, allow_pickle=False) as file:
-                entries = {name: file[name] for name in file.files}
-            meta = json.loads(str(entries.pop("meta")))
+            entries = read_arrays(Path(path))
+            meta = parse_json(str(entries.pop("meta")), f"{path}: meta")
             arrays = {name: entries.pop(name) for name in FIELDS}
             layers = {k: v for k, v in entries.items() if k.startswith("features/")}
-        except (OSError, ValueError, KeyError, EOFError) as error:
+            if len({value.shape[:1] for value in arrays.values()}) > 1:
+                raise InputError("its arrays are not of one length")
+        except (InputError, KeyError) as error:
             raise InputError(
                 f"data set {path} can't be read ({error}); record it again with drone-rl explain"
-            ) from error
+            ) from None
         return cls(arrays, {k.removeprefix("features/"): v for k, v in layers.items()}, meta)

@@ -1,17 +1,20 @@
 """An explanation's files, read back: plain numbers and arrays."""
 
 import dataclasses
-import json
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
+from drone_rl.utils.archives import read_arrays
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.files import parse_json, read_bytes, refuse_links
+from drone_rl.utils.schema import Text, as_mapping
 
 FORMAT = "drone_rl explanation"
 FORMAT_VERSION = 2
+MOST_BYTES = 2**26
+"""Of explanation.json."""
 ACTIONS = ("forward", "left", "right")
 """By number, as in the files."""
 
@@ -40,15 +43,22 @@ class Explanation:
             InputError: A file is missing, damaged, or of another version.
         """
         try:
-            numbers = json.loads((folder / "explanation.json").read_text())
-            with np.load(folder / "arrays.npz", allow_pickle=False) as file:
-                arrays = {name: file[name] for name in file.files}
-            with np.load(folder / "dataset.npz", allow_pickle=False) as file:
-                data = {name: file[name] for name in file.files if name != "meta"}
-        except (OSError, ValueError, KeyError, EOFError) as error:
+            refuse_links(folder, depth=1)
+            content = read_bytes(folder / "explanation.json", MOST_BYTES)
+            numbers = dict(
+                as_mapping(
+                    parse_json(content, "explanation.json", allow_nan=True), "explanation.json"
+                )
+            )
+            arrays = read_arrays(folder / "arrays.npz")
+            data = read_arrays(folder / "dataset.npz")
+            data.pop("meta", None)
+            if "name" in numbers:
+                Text(1000).read(numbers["name"], "name")
+        except (InputError, OSError) as error:
             raise InputError(
                 f"explanation {folder} can't be read ({error}); run drone-rl explain again"
-            ) from error
+            ) from None
         if numbers.get("format") != FORMAT or numbers.get("format_version") != FORMAT_VERSION:
             raise InputError(
                 f"{folder} holds no explanation of format version {FORMAT_VERSION}; "

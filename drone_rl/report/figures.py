@@ -156,8 +156,10 @@ def interventions(explanation: Explanation) -> Image.Image:
     for name, frame in zip(
         truth["interventions"], explanation.arrays["interventions"], strict=True
     ):
-        effect = truth["interventions"][name]["mean"]
-        told = "no effect measured" if effect is None else f"mean effect {effect:.2f}"
+        effect = truth["interventions"][name]
+        told = "not tried"
+        if effect["mean"] is not None:
+            told = f"{effect['mean']:.2f} [{effect['lower95']:.2f}, {effect['upper95']:.2f}]"
         tiles.append(pictures.titled(pictures.enlarge(frame), f"{name}: {told}"))
     return pictures.gridded(tiles, 3)
 

@@ -21,7 +21,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.words import advice, report, truth
 from drone_rl.words.licence import percent, say
 
-WORDS = {**advice.SECTIONS, **report.SECTIONS, "truth": truth.SENTENCES}
+WORDS = {**advice.SECTIONS, **report.SECTIONS, "truth": truth.FINDINGS, "reasons": truth.REASONS}
 """Sentences by the part of the page in which they stand."""
 
 

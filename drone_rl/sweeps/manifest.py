@@ -9,13 +9,35 @@ from typing import Any
 
 from drone_rl.sweeps.runs import Run
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import write_atomically
+from drone_rl.utils.files import read_json, refuse_links, write_atomically
+from drone_rl.utils.overrides import COMMAND, MOST_OVERRIDES, check_harmless
 from drone_rl.utils.provenance import provenance
+from drone_rl.utils.schema import Maybe, Plain, Record, Several, Text, Whole, as_mapping, shown
 from drone_rl.utils.settings import check_same_config
 
 FORMAT = "drone_rl sweep"
 MAY_CHANGE = ("resume", "logger", "paths", "trainer.checkpoint_interval_s")
 """Settings that may differ when a sweep is gone on with."""
+
+_RUN = Record(
+    {
+        "number": Whole(0, 10**6),
+        "overrides": Several(Text(500), 0, MOST_OVERRIDES),
+        "folder": Text(255),
+    }
+)
+_SWEEP = Record(
+    {
+        "format": Text(),
+        "command": COMMAND,
+        "settings": Plain(),
+        "runs": Several(_RUN, 0, 10_000),
+        "versions": Plain(),
+        "git_revision": Maybe(Text()),
+        "machine": Plain(),
+    }
+)
+"""Of `sweep.json`."""
 
 
 @dataclasses.dataclass
@@ -60,16 +82,31 @@ def read_sweep(folder: Path) -> Sweep:
             "give one that drone-rl train -m made, outputs/train/multiruns/..."
         )
     try:
-        content = json.loads(path.read_text())
+        refuse_links(folder)
+        content = _SWEEP.read(read_json(path, 2**25), "sweep")
         runs = [
-            Run(int(r["number"]), tuple(r["overrides"]), folder / r["folder"])
-            for r in content["runs"]
+            Run(
+                run["number"],
+                tuple(check_harmless(override, "a run") for override in run["overrides"]),
+                folder / _name(run["folder"]),
+            )
+            for run in content["runs"]
         ]
-        return Sweep(folder, content["command"], content["settings"], runs)
-    except (ValueError, KeyError, TypeError) as error:
+        if len({run.number for run in runs}) < len(runs):
+            raise InputError("two runs have one number")
+        settings = dict(as_mapping(content["settings"], "settings"))
+        return Sweep(folder, content["command"], settings, runs)
+    except InputError as error:
         raise InputError(
-            f"{path} is damaged ({type(error).__name__}); move the folder away and sweep again"
-        ) from error
+            f"{path} is damaged ({error}); move the folder away and sweep again"
+        ) from None
+
+
+def _name(folder: str) -> str:
+    """The name of a run's folder, which lies in the sweep's."""
+    if folder in ("", ".", "..") or "/" in folder:
+        raise InputError(f"a run's folder {shown(folder)} is not one in the sweep's")
+    return folder
 
 
 def open_sweep(
@@ -87,6 +124,7 @@ def open_sweep(
         InputError: The folder holds another sweep.
     """
     folder.mkdir(parents=True, exist_ok=True)
+    refuse_links(folder)
     if not (folder / "sweep.json").exists():
         _refuse_strangers(folder)
         sweep = Sweep(folder, shlex.join(command), dict(settings), list(runs))

@@ -3,6 +3,7 @@
 import contextlib
 import csv
 import dataclasses
+import io
 import math
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ import numpy as np
 from drone_rl.sweeps.manifest import Sweep
 from drone_rl.sweeps.runs import Run, read_failure, read_result
 from drone_rl.sweeps.statistics import Array
+from drone_rl.utils.files import read_bytes
 from drone_rl.verdicts.kinds import Kind
 from drone_rl.verdicts.rule import SIDES, Rule
 
@@ -142,7 +144,7 @@ def _read_row(run: Run, choice: dict[str, str]) -> Row:
     error = read_failure(run)
     if result is None:
         row = Row(run, choice, "unfinished" if error is None else "failed", error)
-        with contextlib.suppress(OSError, ValueError, KeyError, TypeError):
+        with contextlib.suppress(ValueError, KeyError, TypeError, csv.Error):
             if error is not None:  # before it failed it may have come some way, or none
                 _, (row.frames, row.seconds), row.entropy = _read_metrics(run.folder, 1)
         return row
@@ -153,7 +155,7 @@ def _read_row(run: Run, choice: dict[str, str]) -> Row:
         row = Row(run, choice, "finished", None, result, curve, *had, entropy)
         _check_verdict(row)
         row.plain()
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, csv.Error) as error:
         return Row(run, choice, "damaged", f"its files can't be read ({error!r})")
     return row
 
@@ -189,8 +191,8 @@ def _read_metrics(
     folder: Path, num_cubes: int
 ) -> tuple[tuple[Array, Array], tuple[float, float], float | None]:
     """The learning curve, frames and seconds until its end, and the entropy there."""
-    with (folder / "metrics.csv").open(newline="") as file:
-        rows = list(csv.DictReader(file))
+    text = read_bytes(folder / "metrics.csv", 2**26).decode()
+    rows = list(csv.DictReader(io.StringIO(text, newline="")))
     frames = np.array([float(row["frames"]) for row in rows])
     cubes = np.array([float(row["train/running_cubes"]) for row in rows])
     had = (float(rows[-1]["frames"]), float(rows[-1].get("seconds") or 0)) if rows else (0.0, 0.0)

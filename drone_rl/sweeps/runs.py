@@ -1,10 +1,13 @@
 """One run of a sweep, as its folder tells of it."""
 
 import dataclasses
-import json
 import shlex
 from pathlib import Path
 from typing import Any
+
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.files import parse_json, read_bytes, read_json
+from drone_rl.utils.schema import Text, as_mapping
 
 THREADS = {"OMP_NUM_THREADS": "1", "OMP_WAIT_POLICY": "PASSIVE"}
 """Environment of every run, in which those side by side don't fight for the cores.
@@ -51,19 +54,21 @@ class Run:
 def read_result(folder: Path) -> dict[str, Any] | None:
     """`result.json` of a run that came to its own end; None of one that must go on."""
     try:
-        result = json.loads((folder / "result.json").read_text())
-    except (OSError, ValueError):
+        content = read_bytes(folder / "result.json", 2**20)
+        result = dict(as_mapping(parse_json(content, "result", allow_nan=True), "result"))
+        reason = Text(100).read(result.get("reason"), "reason")
+    except InputError:
         return None
-    reason = result.get("reason") if isinstance(result, dict) else None
-    return None if not isinstance(reason, str) or reason.startswith("SIG") else result
+    return None if reason.startswith("SIG") else result
 
 
 def read_failure(run: Run) -> str | None:
     """The error of a run that failed; None if it did not."""
     try:
-        return str(json.loads(run.failure.read_text())["error"])
-    except (OSError, ValueError, KeyError, TypeError):
+        error = as_mapping(read_json(run.failure), "failure")["error"]
+    except (InputError, KeyError):
         return None
+    return "".join(c if c.isprintable() else " " for c in str(error)[:1000])
 
 
 def quoted(value: str) -> str:

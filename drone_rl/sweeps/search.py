@@ -79,4 +79,4 @@ def tell(study: Any, number: int, result: Mapping[str, Any] | None) -> None:
     elif result["reason"] == "pruned":
         study.tell(number, state=optuna.trial.TrialState.PRUNED)
     else:
-        study.tell(number, result["running_cubes"])
+        study.tell(number, float(result["running_cubes"]))

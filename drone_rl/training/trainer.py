@@ -16,6 +16,8 @@ from torch.nn.utils import clip_grad_norm_
 
 from drone_rl.training.callbacks import Callback
 from drone_rl.training.metrics import batch_metrics, episode_rewards, running_mean
+from drone_rl.training.restore import check_fits, check_optimiser
+from drone_rl.utils.errors import InputError
 
 
 class Collector(Protocol):
@@ -255,7 +257,28 @@ class Trainer:
         }
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
-        """Goes on from a `state_dict`."""
+        """Goes on from a `state_dict`, be it out of a file that nobody should trust.
+
+        Raises:
+            InputError: It is not one of such a training.
+        """
+        own = self.state_dict()
+        for key in own:
+            if key not in state:
+                raise InputError(f"the checkpoint has no {key}, so no training can go on from it")
+            if key != "optimiser":
+                check_fits(state[key], own[key], key)
+        check_optimiser(state["optimiser"], self.optimiser)
+        try:
+            self._take_over(state)
+        except (RuntimeError, ValueError, TypeError, LookupError, OverflowError) as error:
+            reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+            raise InputError(
+                f"the checkpoint does not fit this training ({reason}); go on from one of a run "
+                "with these settings, or start a new run"
+            ) from None
+
+    def _take_over(self, state: Mapping[str, Any]) -> None:
         self.network.load_state_dict(state["policy"])
         self.estimator.load_state_dict(state["estimator"])
         self.optimiser.load_state_dict(state["optimiser"])

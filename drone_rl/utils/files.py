@@ -157,7 +157,7 @@ def _open_lock(folder: Path) -> Any:
     return open(
         folder / ".lock",
         "ab",
-        opener=lambda path, flags: os.open(path, flags | os.O_NOFOLLOW, 0o644),
+        opener=lambda path, flags: os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK, 0o644),
     )
 
 

@@ -5,14 +5,16 @@ who wrote it, it may not.
 """
 
 import re
+import shlex
 from collections.abc import Collection
 from pathlib import Path
+from typing import Any
 
 import yaml
 
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import read_bytes
-from drone_rl.utils.schema import Several, Text, shown
+from drone_rl.utils.schema import Kind, Several, Text, shown
 
 MOST_OVERRIDES = 200
 """Settings of one run."""
@@ -31,6 +33,28 @@ _TAKEN_OVER = (
     rf"collector\.(num_envs|num_threads|num_cpus|max_lost_workers)={_SCALAR}",
 )
 """What a resumed run takes over: what is learned and how, chosen by name, in plain values."""
+
+
+class _Command:
+    """A training's command, which people may copy into a shell: it does what it seems to do."""
+
+    def read(self, value: Any, where: str) -> str:
+        """See `drone_rl.utils.schema.Kind`."""
+        text = Text(20_000).read(value, where)
+        try:
+            words = shlex.split(text)
+        except ValueError:
+            words = []
+        if words[:2] != ["drone-rl", "train"] or shlex.join(words) != text or "`" in text:
+            raise InputError(
+                f"{where}={shown(value)} is no training command; give drone-rl train and its "
+                "settings, each quoted as a shell wants it"
+            )
+        return text
+
+
+COMMAND: Kind = _Command()
+"""The kind of text that says how something was trained."""
 
 
 def check_harmless(override: str, where: str) -> str:

@@ -87,7 +87,9 @@ def _signed(evidence: Evidence) -> Evidence:
 def _prefers(evidence: Evidence) -> str:
     signed = _signed(evidence)
     side = "left" if signed["mean"] > 0 else "right"
-    return f"It prefers the {side}, by {abs(signed['mean']):.2f} in probability ({bounds(signed)})."
+    ends = sorted(abs(signed[end]) for end in ("lower95", "upper95"))
+    size = {"lower95": ends[0], "upper95": ends[1]}
+    return f"It prefers the {side}, by {abs(signed['mean']):.2f} in probability ({bounds(size)})."
 
 
 def _is_sure(evidence: Evidence) -> bool:

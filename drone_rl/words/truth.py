@@ -220,3 +220,6 @@ SENTENCES = (
         _integral,
     ),
 )
+FINDINGS = tuple(sentence for sentence in SENTENCES if sentence.name != "truth.refused")
+REASONS = tuple(sentence for sentence in SENTENCES if sentence.name == "truth.refused")
+"""Why maps are not trusted, which is more than one wants to read at once."""

@@ -2,7 +2,6 @@
 
 from drone_rl.zoo.description import PolicyDescription, parse
 from drone_rl.zoo.files import (
-    COMMAND,
     card_path,
     export_policy,
     load_exported,
@@ -15,7 +14,6 @@ from drone_rl.zoo.migration import describe
 from drone_rl.zoo.registry import register_network, register_transform
 
 __all__ = [
-    "COMMAND",
     "PolicyDescription",
     "card_path",
     "describe",

@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import shlex
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ from safetensors.torch import load, save_file
 from drone_rl.training import check_weights, load_checkpoint
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import parse_json, read_bytes
+from drone_rl.utils.overrides import COMMAND
 from drone_rl.utils.schema import Kind, Maybe, Plain, Real, Record, Text, Whole, as_mapping, shown
 from drone_rl.zoo.card import write_card
 from drone_rl.zoo.description import FORMAT, MOST_PARAMETERS, parse
@@ -43,26 +43,6 @@ class _Versions:
         return {key: Text(200).read(item, f"{where}.{key}") for key, item in versions.items()}
 
 
-class _Command:
-    """A training's command, which people may copy into a shell: it does what it seems to do."""
-
-    def read(self, value: Any, where: str) -> str:
-        """See `drone_rl.utils.schema.Kind`."""
-        text = Text().read(value, where)
-        try:
-            words = shlex.split(text)
-        except ValueError:
-            words = []
-        if words[:2] != ["drone-rl", "train"] or shlex.join(words) != text or "`" in text:
-            raise InputError(
-                f"{where}={shown(value)} is no training command; give drone-rl train and its "
-                "settings, each quoted as a shell wants it"
-            )
-        return text
-
-
-COMMAND: Kind = _Command()
-"""The kind of text that says how a policy was trained."""
 _PROVENANCE = Record(
     {
         "versions": _Versions(),

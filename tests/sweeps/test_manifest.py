@@ -52,3 +52,36 @@ def test_no_sweep_and_a_damaged_one(tmp_path):
     (tmp_path / "sweep.json").write_text(json.dumps({"runs": [{}]}))
     with pytest.raises(InputError, match="damaged"):
         read_sweep(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"command": "rm -rf ~"}, "no training command"),
+        ({"command": "drone-rl train; rm -rf ~"}, "no training command"),
+        ({"settings": [1]}, "must be a mapping"),
+        ({"plugins": []}, "'plugins' is unknown"),
+        ({"runs": [{"number": 0, "overrides": [], "folder": "../0"}]}, "not one in the sweep's"),
+        ({"runs": [{"number": 0, "overrides": [], "folder": "/tmp"}]}, "not one in the sweep's"),
+        ({"runs": [{"number": 0, "overrides": [], "folder": ".."}]}, "not one in the sweep's"),
+        ({"runs": [{"number": -1, "overrides": [], "folder": "0"}]}, "number=-1"),
+        ({"runs": [{"number": 0, "overrides": ["a._target_=b"], "folder": "0"}]}, "no plain"),
+        ({"runs": [{"number": 0, "overrides": "a", "folder": "0"}]}, "overrides='a'"),
+        ({"runs": [{"number": 0, "overrides": [], "folder": "0"}] * 2}, "two runs"),
+    ],
+)
+def test_a_sweep_that_nobody_began(tmp_path, make_runs, change, message):
+    begin(tmp_path, make_runs("a=1"))
+    path = tmp_path / "sweep.json"
+    path.write_text(json.dumps({**json.loads(path.read_text()), **change}))
+    with pytest.raises(InputError, match=message):
+        read_sweep(tmp_path)
+
+
+def test_a_run_that_is_a_link_leads_nowhere(tmp_path, make_runs):
+    begin(tmp_path, make_runs("a=1"))
+    (tmp_path / "0").symlink_to("/")
+    with pytest.raises(InputError, match="0 is a link"):
+        read_sweep(tmp_path)
+    with pytest.raises(InputError, match="0 is a link"):
+        begin(tmp_path, make_runs("a=1"))

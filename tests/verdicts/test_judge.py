@@ -1,7 +1,11 @@
+import dataclasses
 import json
 import math
 
 import pytest
+import torch
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation import Oracle
@@ -14,6 +18,7 @@ from drone_rl.verdicts.rule import QUANTITIES, Rule
 
 TASK = TaskSettings(num_cubes=2)
 LEFT, AHEAD, RIGHT = Side
+SHARED = HealthCheck.function_scoped_fixture
 LAYOUTS = [[LEFT, RIGHT], [RIGHT, LEFT], [AHEAD, LEFT], [RIGHT, AHEAD]]
 
 
@@ -133,3 +138,25 @@ def test_a_policy_is_flown_beside_its_baselines_and_repeats():
     assert math.isclose(
         first["skill"]["forward"]["mean"], 1 - first["baselines"]["forward"]["mean_cubes"]
     )
+
+
+def mirrored(episodes):
+    """The same episodes in a world where left is right."""
+    swap = torch.tensor([Side.RIGHT, Side.AHEAD, Side.LEFT])
+    side = torch.where(episodes.side < 0, -1, swap[episodes.side])
+    return dataclasses.replace(episodes, side=side, lateral=-episodes.lateral)
+
+
+@given(st.lists(st.tuples(st.sampled_from(LAYOUTS), st.booleans(), st.booleans()), min_size=1))
+@settings(
+    max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+def test_a_mirrored_flight_gets_the_mirrored_kind(make_episodes, make_baselines, drawn):
+    sides, hits = [row[0] for row in drawn] * 30, [row[1:] for row in drawn] * 30
+    ours = make_episodes(sides, hits)
+    baselines = make_baselines(ours)
+    theirs = {name: mirrored(flown) for name, flown in baselines.items()}
+    theirs["left"], theirs["right"] = theirs["right"], theirs["left"]
+    verdict, reflected = judge(ours, baselines, TASK), judge(mirrored(ours), theirs, TASK)
+    assert reflected.kind is verdict.kind.mirrored
+    assert reflected.certain == verdict.certain

@@ -111,7 +111,10 @@ def test_a_side_is_preferred_if_the_interval_says_so(lower, upper, name):
     }
     if name == "prefers":
         side = "left" if lower > 0 else "right"
-        assert f"prefers the {side}, by 0.20" in found["asymmetry.prefers"]
+        assert (
+            f"prefers the {side}, by 0.20 in probability (95%: 0.10 to 0.30)"
+            in found["asymmetry.prefers"]
+        )
 
 
 def test_every_section_of_the_page_says_something():

@@ -1,0 +1,168 @@
+"""`drone-rl bench truth`, hostile files: each is refused in one line, at once, with nothing done.
+
+All commands run as forks of one process that has imported everything, so that what is measured is
+the refusal alone.
+"""
+
+import importlib
+import json
+import logging
+import os
+import resource
+import signal
+import subprocess
+import sys
+import traceback
+from pathlib import Path
+from typing import Any
+
+SECRET = "the canary's secret 4711"
+"""Stands in the canary's file and in the environment; no command may tell it."""
+MOST_SECONDS = 2.0
+"""Of a refusal: processor time after the imports, which other work does not change."""
+MOST_MEMORY = 2**30
+"""Bytes by which a refusal may grow the process."""
+PATIENCE_S = 30
+"""Until a command counts as hung."""
+_MODULES = ("main", "verdict", "evaluate", "explain", "play", "export", "report", "train")
+_MORE = ("training", "sweep_report", "launchers")
+
+_log = logging.getLogger(__name__)
+
+
+def bench_hostile(folder: Path, quick: bool = False) -> dict[str, int]:
+    """Opens each of the hostile files with one of the commands that people would.
+
+    Args:
+        folder: An empty one, for the files.
+        quick: Makes no difference; all of it takes a minute or two.
+
+    Returns:
+        "hostile_refused" and "hostile_total".
+    """
+    del quick
+    outcomes = run_all(folder)
+    for outcome in outcomes:
+        if outcome["wrong"]:
+            _log.warning("%s: %s", outcome["name"], outcome["wrong"])
+    refused = sum(not outcome["wrong"] for outcome in outcomes)
+    return {"hostile_refused": refused, "hostile_total": len(outcomes)}
+
+
+def run_all(folder: Path, every: int = 1) -> list[dict[str, Any]]:
+    """Makes and opens them, in a process of their own.
+
+    Args:
+        folder: An empty one, for the files.
+        every: Opens only each so many-th.
+
+    Returns:
+        Of each its "name", "why", and "wrong", which says what is wrong; empty if it was refused.
+    """
+    environment = {
+        **os.environ,
+        "HOSTILE_SECRET": SECRET,
+        "OMP_NUM_THREADS": "1",
+        "PYTHONWARNINGS": "ignore",
+    }
+    command = [sys.executable, "-m", "drone_rl.bench.hostile", str(folder), str(every)]
+    subprocess.run(command, check=True, env=environment, stdin=subprocess.DEVNULL)
+    return json.loads((folder / "outcomes.json").read_text())
+
+
+def _main(folder: Path, every: int) -> None:
+    from drone_rl.bench.hostile_files import hostile_files
+
+    cases = hostile_files(folder / "files")[::every]
+    program = importlib.import_module("drone_rl.cli.main")
+    for name in (*_MODULES, *_MORE):
+        importlib.import_module(f"drone_rl.cli.{name}")
+    for name in ("hydra.core.plugins", "drone_rl.sweeps.page"):
+        importlib.import_module(name)
+    sys.modules["hydra.core.plugins"].Plugins.instance()  # looks through all packages, once
+    canary = _snapshot(folder / "files" / "canary")
+    outcomes = []
+    for number, (name, arguments, why) in enumerate(cases):
+        here = folder / "work" / str(number)
+        here.mkdir(parents=True)
+        wrong = _fork(program.main, arguments, here)
+        if not wrong and _snapshot(folder / "files" / "canary") != canary:
+            wrong = "it touched the canary"
+        outcomes.append({"name": name, "arguments": arguments, "why": why, "wrong": wrong})
+    (folder / "outcomes.json").write_text(json.dumps(outcomes, indent=1))
+
+
+def _fork(main: Any, arguments: list[str], here: Path) -> str:
+    """Runs one command. Returns what is wrong with how it ended, or an empty text."""
+    before = _resident_bytes()
+    child = os.fork()
+    if child == 0:
+        _become(main, arguments, here)
+    _, status, used = os.wait4(child, 0)
+    printed = (here / "stderr").read_text(errors="replace")
+    grown = used.ru_maxrss * 1024 - before
+    seconds = used.ru_utime + used.ru_stime
+    told = SECRET in printed or SECRET in (here / "stdout").read_text(errors="replace")
+    lines = printed.splitlines()
+    checks = {
+        f"ended by signal {os.WTERMSIG(status)}": os.WIFSIGNALED(status),
+        f"ended with status {os.waitstatus_to_exitcode(status)}: {printed[-300:]}": (
+            os.waitstatus_to_exitcode(status) != 2
+        ),
+        f"printed {printed[-300:]!r}": len(lines) != 1 or not lines[0].startswith("error: "),
+        f"took {seconds:.1f} s": seconds > MOST_SECONDS,
+        f"took {grown / 2**20:.0f} MiB": grown > MOST_MEMORY,
+        "told the secret": told or _tells(here),
+    }
+    return next((what for what, is_so in checks.items() if is_so), "")
+
+
+def _become(main: Any, arguments: list[str], here: Path) -> None:
+    """Turns this fork into the command, with limits on what it may take."""
+    status = 1
+    try:
+        os.chdir(here)
+        for number, name in ((1, "stdout"), (2, "stderr")):
+            target = os.open(name, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o644)
+            os.dup2(target, number)
+        sys.stdout, sys.stderr = os.fdopen(1, "w"), os.fdopen(2, "w")
+        limit = _address_bytes() + MOST_MEMORY
+        resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+        signal.alarm(PATIENCE_S)
+        sys.argv = ["drone-rl", *arguments]
+        main()
+        status = 0
+    except SystemExit as stop:
+        status = stop.code if isinstance(stop.code, int) else 1
+    except BaseException:
+        traceback.print_exc()
+    finally:
+        for stream in (sys.stdout, sys.stderr):
+            stream.flush()
+        os._exit(status)
+
+
+def _resident_bytes() -> int:
+    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+
+def _address_bytes() -> int:
+    return int(Path("/proc/self/statm").read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE")
+
+
+def _snapshot(folder: Path) -> dict[str, tuple]:
+    """All that lies under a folder, with contents and times of change."""
+    return {
+        str(path): (path.lstat().st_mtime_ns, path.read_bytes() if path.is_file() else b"")
+        for path in sorted([folder, *folder.rglob("*")])
+    }
+
+
+def _tells(here: Path) -> bool:
+    """Whether any file that a command left holds the secret."""
+    secret = SECRET.encode()
+    return any(secret in path.read_bytes() for path in here.rglob("*") if path.is_file())
+
+
+if __name__ == "__main__":
+    _main(Path(sys.argv[1]), int(sys.argv[2]))

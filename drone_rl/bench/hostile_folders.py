@@ -1,0 +1,183 @@
+"""Hostile folders: of runs to go on with, of sweeps and of explanations."""
+
+import io
+import json
+import os
+import shutil
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+import yaml
+
+Case = tuple[str, list[str], str]
+"""Name, arguments of `drone-rl`, and what would go wrong."""
+
+
+def hostile_folders(folder: Path, policy: bytes, state: Mapping[str, Any]) -> list[Case]:
+    """Makes the folders.
+
+    Args:
+        folder: Where to; has a folder `canary`.
+        policy: Content of an exported policy that would be accepted.
+        state: Of a checkpoint that could be flown.
+    """
+    del policy
+    return [*_runs(folder, state), *_sweeps(folder), *_explanations(folder)]
+
+
+def _runs(folder: Path, state: Mapping[str, Any]) -> list[Case]:
+    """Of trainings that are gone on with."""
+    canary = folder / "canary"
+    overrides: dict[str, Any] = {
+        "target": ["policy._target_=os.system"],
+        "nested_target": ["+optimiser.x={_target_:os.system}"],
+        "output": [f"hydra.run.dir={canary}"],
+        "hydra": ["hydra/job_logging=none"],
+        "paths": [f"paths.outputs={canary}"],
+        "logger": [f"logger.tensorboard.log_dir={canary}"],
+        "collector": ["collector.make=os.system"],
+        "cluster": ["collector=ray", "collector.address=ray://evil:1"],
+        "interpolation": ["task.spacing=${oc.env:HOSTILE_SECRET}"],
+        "path_as_choice": ["policy=../../canary/policy"],
+        "flag": ["--config-dir=/tmp"],
+        "no_texts": [{"a": 1}],
+        "no_list": "policy",
+        "many": ["seed=1"] * 1000,
+        "long": ["task.spacing=" + "9" * 10_000],
+        "lines": ["seed=1\nhydra.run.dir=x"],
+    }
+    found = []
+    for name, content in overrides.items():
+        run = _run(folder / f"resume_{name}", state)
+        (run / ".hydra" / "overrides.yaml").write_text(yaml.safe_dump(content))
+        found.append((run.name, ["train", f"resume={run}"], "settings out of a file"))
+    raw = {
+        "python_object": "- !!python/object/apply:os.system ['touch ran']\n",
+        "aliases": "a: &a [x]\nb: &b [*a,*a]\n" + "- *b\n" * 10,
+        "deep_yaml": "[" * 5000,
+    }
+    for name, text in raw.items():
+        run = _run(folder / f"resume_{name}", state)
+        (run / ".hydra" / "overrides.yaml").write_text(text)
+        found.append((run.name, ["train", f"resume={run}"], "YAML that does more than say"))
+    links = {"metrics.csv": "secret.txt", "run.yaml": "ran", ".lock": "ran", "tensorboard": "keep"}
+    for name, target in links.items():
+        run = _run(folder / f"resume_link_{name.strip('.').replace('.', '_')}", state)
+        (run / name).symlink_to(canary / target)
+        found.append((run.name, ["train", f"resume={run}"], "a link out of the folder"))
+    broken = {"no_state": state, "no_tensors": {**state, "optimiser": 5}, "list": [1]}
+    for name, content in broken.items():
+        run = _run(folder / f"resume_state_{name}", content)
+        (run / ".hydra" / "overrides.yaml").write_text("- experiment=smoke\n- logger=csv\n")
+        found.append((run.name, ["train", f"resume={run}"], "a state that fits no training"))
+    return found
+
+
+def _run(run: Path, state: Any) -> Path:
+    (run / ".hydra").mkdir(parents=True)
+    (run / "checkpoints").mkdir()
+    torch.save(state, run / "checkpoints" / "last.pt")
+    return run
+
+
+def _sweeps(folder: Path) -> list[Case]:
+    good = {
+        "format": "drone_rl sweep",
+        "command": "drone-rl train -m seed=0,1",
+        "settings": {},
+        "runs": [{"number": 0, "overrides": ["seed=0"], "folder": "0"}],
+        "versions": {},
+        "git_revision": None,
+        "machine": {},
+    }
+    contents: dict[str, Any] = {
+        "run_above": {"runs": [{**good["runs"][0], "folder": "../canary"}]},
+        "run_elsewhere": {"runs": [{**good["runs"][0], "folder": str(folder / "canary")}]},
+        "run_dots": {"runs": [{**good["runs"][0], "folder": ".."}]},
+        "command": {"command": f"touch {folder}/canary/ran"},
+        "command_list": {"command": "drone-rl train; rm -rf ~"},
+        "target": {"runs": [{**good["runs"][0], "overrides": ["policy._target_=os.system"]}]},
+        "flag": {"runs": [{**good["runs"][0], "overrides": ["--config-dir=/tmp"]}]},
+        "output": {"runs": [{**good["runs"][0], "overrides": ["hydra.run.dir=/tmp/x"]}]},
+        "number": {"runs": [{**good["runs"][0], "number": 10**18}]},
+        "twice": {"runs": [good["runs"][0]] * 2},
+        "no_runs": {"runs": 5},
+        "no_texts": {"runs": [{**good["runs"][0], "overrides": [{"a": 1}]}]},
+        "more": {"plugins": ["os.system"]},
+        "settings": {"settings": _deep(100)},
+    }
+    texts = {name: json.dumps({**good, **change}) for name, change in contents.items()}
+    texts |= {"deep": "[" * 10**5, "huge": '{"runs": 1' + "0" * 5000 + "}", "cut": '{"runs": ['}
+    found = []
+    for i, (name, text) in enumerate(texts.items()):
+        sweep = folder / f"sweep_{name}"
+        sweep.mkdir()
+        (sweep / "sweep.json").write_text(text)
+        again = ["train", "-m", "seed=0,1", "hydra/launcher=local", f"hydra.sweep.dir={sweep}"]
+        report = ["sweep-report", f"folder={sweep}"]
+        found.append((sweep.name, again if i % 3 == 0 else report, "a sweep's own file"))
+    for name, make in {"pipe": os.mkfifo, "link": _link_to(folder / "canary")}.items():
+        sweep = folder / f"sweep_{name}"
+        sweep.mkdir()
+        (sweep / "sweep.json").write_text(json.dumps(good))
+        make(sweep / "0")
+        found.append((sweep.name, ["sweep-report", f"folder={sweep}"], "a run that is no folder"))
+    return found
+
+
+def _explanations(folder: Path) -> list[Case]:
+    def numbers(**changes: Any) -> str:
+        return json.dumps({"format": "drone_rl explanation", "format_version": 2, **changes})
+
+    arrays = {"a": np.zeros(3)}
+    kinds: dict[str, tuple[str, bytes]] = {
+        "missing_numbers": (numbers(name="x"), _npz(arrays)),
+        "future": (numbers(format_version=99), _npz(arrays)),
+        "list": ("[1]", _npz(arrays)),
+        "deep": ("[" * 10**5, _npz(arrays)),
+        "huge": (numbers(name="x").replace("2", "2" * 5000), _npz(arrays)),
+        "name": (numbers(name="../../canary/\n\x1b[2J"), _npz(arrays)),
+        "objects": (numbers(name="x"), _npz({"a": np.array([folder], dtype=object)})),
+        "bomb": (numbers(name="x"), _npz({"a": np.zeros(2**27)})),
+        "no_archive": (numbers(name="x"), b"PK\x03\x04 and so on"),
+        "giant": (numbers(name="x"), _lying(_npz({"a": np.zeros(3)}))),
+    }
+    found = []
+    for name, (text, archive) in kinds.items():
+        here = folder / f"explanation_{name}"
+        here.mkdir()
+        (here / "explanation.json").write_text(text)
+        for file in ("arrays.npz", "dataset.npz"):
+            (here / file).write_bytes(archive)
+        found.append((here.name, ["report", f"explanations={here}"], "an explanation's files"))
+    for name, make in {"pipe": os.mkfifo, "zeros": _link_to(Path("/dev/zero"))}.items():
+        here = folder / f"explanation_{name}"
+        shutil.copytree(folder / "explanation_missing_numbers", here)
+        (here / "arrays.npz").unlink()
+        make(here / "arrays.npz")
+        found.append((here.name, ["report", f"explanations={here}"], "no plain file"))
+    return found
+
+
+def _npz(arrays: Mapping[str, np.ndarray]) -> bytes:
+    file = io.BytesIO()
+    np.savez_compressed(file, **arrays)
+    return file.getvalue()
+
+
+def _lying(archive: bytes) -> bytes:
+    """An array whose header asks for terabytes."""
+    file = io.BytesIO()
+    np.savez(file, a=np.zeros(3))
+    return file.getvalue().replace(b"(3,)", b"(3" + b"9" * 11 + b",)")[: 10**6] + archive[:0]
+
+
+def _link_to(target: Path) -> Callable[[Path], None]:
+    return lambda path: path.symlink_to(target)
+
+
+def _deep(levels: int) -> list:
+    return [_deep(levels - 1)] if levels else []

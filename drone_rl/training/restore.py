@@ -1,0 +1,104 @@
+"""Whether a saved state is one of this training, before anything of it is taken over."""
+
+import copy
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.schema import shown
+
+MAY_DIFFER = ("lr", "initial_lr", "_last_lr", "base_lrs")
+"""Numbers that a scheduler changes."""
+
+
+def check_fits(saved: Any, own: Any, where: str) -> None:
+    """Refuses a state that is not built as this training's own.
+
+    Args:
+        saved: Out of a file.
+        own: The training's own state of the same thing; what is None is not known yet.
+        where: Its name, for people.
+
+    Raises:
+        InputError: A name, type, shape or length differs, or a number is not finite; it is named.
+    """
+    if isinstance(own, Tensor):
+        _check_tensor(saved, own, where)
+    elif isinstance(own, Mapping):
+        if not isinstance(saved, Mapping) or set(saved) != set(own):
+            raise _misfit(where, "has other names in it")
+        for key, value in own.items():
+            check_fits(saved[key], value, f"{where}.{key}")
+    elif isinstance(own, list | tuple):
+        _check_list(saved, own, where)
+    elif own is not None:
+        _check_value(saved, own, where)
+
+
+def check_optimiser(saved: Any, optimiser: torch.optim.Optimizer) -> None:
+    """Refuses an optimiser's state that is not one of this optimiser after steps, or before any.
+
+    Raises:
+        InputError: See `check_fits`; also if a hyperparameter is another.
+    """
+    own = _after_a_step(optimiser)
+    if isinstance(saved, Mapping) and saved.get("state") == {}:
+        own["state"] = {}
+    check_fits(saved, own, "optimiser")
+    for mine, theirs in zip(own["param_groups"], saved["param_groups"], strict=True):
+        for key in mine:
+            if key not in MAY_DIFFER and _plain(mine[key]) != _plain(theirs[key]):
+                raise _misfit(
+                    f"optimiser.{key}", f"is {shown(theirs[key])}, not {shown(mine[key])}"
+                )
+
+
+def _after_a_step(optimiser: torch.optim.Optimizer) -> dict[str, Any]:
+    """What a state looks like: that of a copy, whose copied parameters are stepped once by 0."""
+    again = copy.deepcopy(optimiser)
+    for group in again.param_groups:
+        for parameter in group["params"]:
+            parameter.grad = torch.zeros_like(parameter)
+    again.step()
+    return again.state_dict()
+
+
+def _check_list(saved: Any, own: Sequence[Any], where: str) -> None:
+    if not isinstance(saved, list | tuple) or len(saved) != len(own):
+        raise _misfit(where, f"is not a list of {len(own)}")
+    for i, (one, other) in enumerate(zip(saved, own, strict=True)):
+        check_fits(one, other, f"{where}[{i}]")
+
+
+def _check_value(saved: Any, own: Any, where: str) -> None:
+    """A whole number for one, a finite number for one, and anything else as it is."""
+    if type(own) is int:
+        fits = type(saved) is int
+    elif type(own) is float:
+        fits = type(saved) in (int, float) and math.isfinite(saved)
+    else:
+        fits = type(saved) is type(own) and saved == own
+    if not fits:
+        raise _misfit(where, f"is {shown(saved)}, but here it is {shown(own)}")
+
+
+def _check_tensor(saved: Any, own: Tensor, where: str) -> None:
+    if not isinstance(saved, Tensor) or (saved.shape, saved.dtype) != (own.shape, own.dtype):
+        raise _misfit(where, f"is not of shape {tuple(own.shape)} and {own.dtype}")
+    if saved.is_floating_point() and not bool(torch.isfinite(saved).all()):
+        raise _misfit(where, "holds NaN or infinity")
+
+
+def _misfit(where: str, what: str) -> InputError:
+    return InputError(
+        f"the checkpoint does not fit this training: {where} {what}; go on from the checkpoint of "
+        "a run with these settings, or start a new run"
+    )
+
+
+def _plain(value: Any) -> Any:
+    return list(value) if isinstance(value, tuple) else value

@@ -1,0 +1,97 @@
+"""A state that a training did not write is refused by name before anything of it is taken over."""
+
+import copy
+
+import pytest
+import torch
+from torch import nn
+
+from drone_rl.training.restore import check_fits, check_optimiser
+from drone_rl.utils.errors import InputError
+
+OWN = {"a": torch.zeros(2), "b": [1, 0.5], "c": None, "d": "x", "e": True, "f": {}}
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{}, {"a": torch.ones(2)}, {"b": (2, 3)}, {"b": [1, 2.5]}, {"c": object()}],
+)
+def test_what_fits(change):
+    check_fits({**OWN, **change}, OWN, "state")
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"a": torch.zeros(3)}, r"state\.a is not of shape \(2,\)"),
+        ({"a": torch.zeros(2).double()}, "torch.float32"),
+        ({"a": [0.0, 0.0]}, r"state\.a"),
+        ({"a": torch.tensor([0.0, float("nan")])}, "holds NaN"),
+        ({"b": [1]}, "not a list of 2"),
+        ({"b": [True, 0.5]}, r"b\[0\] is True"),
+        ({"b": [1.0, 0.5]}, r"b\[0\] is 1\.0"),
+        ({"b": [1, "x"]}, r"b\[1\] is 'x'"),
+        ({"b": [1, float("inf")]}, r"b\[1\] is inf"),
+        ({"d": "y"}, "d is 'y'"),
+        ({"e": 1}, "e is 1"),
+        ({"f": {"g": 1}}, "other names"),
+        ({"h": 1}, "state has other names"),
+    ],
+)
+def test_what_does_not(change, message):
+    with pytest.raises(InputError, match=message):
+        check_fits({**OWN, **change}, OWN, "state")
+
+
+def stepped(kind=torch.optim.Adam, **settings):
+    torch.manual_seed(0)
+    network = nn.Linear(2, 1)
+    optimiser = kind(network.parameters(), lr=0.1, **settings)
+    network(torch.ones(1, 2)).sum().backward()
+    optimiser.step()
+    return network, optimiser
+
+
+@pytest.mark.parametrize("kind", [torch.optim.Adam, torch.optim.SGD, torch.optim.RMSprop])
+def test_an_optimisers_own_state_fits_before_and_after_steps(kind):
+    network, optimiser = stepped(kind)
+    before = {k: v.clone() for k, v in network.state_dict().items()}
+    check_optimiser(optimiser.state_dict(), optimiser)
+    fresh = kind(nn.Linear(2, 1).parameters(), lr=0.1)
+    check_optimiser(fresh.state_dict(), fresh)
+    check_optimiser(optimiser.state_dict(), fresh)
+    assert all(torch.equal(before[k], v) for k, v in network.state_dict().items())
+    assert not fresh.state_dict()["state"]
+
+
+def test_the_rate_may_be_another_and_nothing_else():
+    _, optimiser = stepped()
+    state = copy.deepcopy(optimiser.state_dict())
+    state["param_groups"][0]["lr"] = 0.05
+    check_optimiser(state, optimiser)
+    state["param_groups"][0]["betas"] = (0.5, 0.5)
+    with pytest.raises(InputError, match=r"optimiser\.betas"):
+        check_optimiser(state, optimiser)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda s: s["state"][0].update(exp_avg=torch.zeros(5)), "exp_avg"),
+        (lambda s: s["state"][0].update(more=1), "other names"),
+        (lambda s: s["state"].pop(0), "other names"),
+        (lambda s: s["param_groups"][0].update(capturable=True), "capturable"),
+        (lambda s: s["param_groups"][0].update(lr="0.1"), "lr"),
+        (lambda s: s["param_groups"][0].update(params=[1, 0]), "params"),
+        (lambda s: s["param_groups"].append({}), "list of 1"),
+        (lambda s: s.clear(), "other names"),
+    ],
+)
+def test_an_optimisers_state_that_is_not_its_own(change, message):
+    _, optimiser = stepped()
+    state = copy.deepcopy(optimiser.state_dict())
+    change(state)
+    with pytest.raises(InputError, match=message):
+        check_optimiser(state, optimiser)
+    with pytest.raises(InputError):
+        check_optimiser(5, optimiser)
