@@ -68,7 +68,7 @@ def hostile_files(folder: Path) -> list[tuple[str, list[str], str]]:
     (canary / "keep").mkdir()
     (canary / "keep" / "me.txt").write_text("keep me")
     cases = [*_exported(folder), *_old(folder), *_checkpoints(folder), *_no_files(folder)]
-    return [*cases, *hostile_folders(folder, exported(), checkpoint_state())]
+    return [*cases, *hostile_folders(folder, checkpoint_state())]
 
 
 def weights() -> dict[str, torch.Tensor]:

@@ -4,6 +4,7 @@ import io
 import json
 import os
 import shutil
+import zipfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -16,15 +17,13 @@ Case = tuple[str, list[str], str]
 """Name, arguments of `drone-rl`, and what would go wrong."""
 
 
-def hostile_folders(folder: Path, policy: bytes, state: Mapping[str, Any]) -> list[Case]:
+def hostile_folders(folder: Path, state: Mapping[str, Any]) -> list[Case]:
     """Makes the folders.
 
     Args:
         folder: Where to; has a folder `canary`.
-        policy: Content of an exported policy that would be accepted.
         state: Of a checkpoint that could be flown.
     """
-    del policy
     return [*_runs(folder, state), *_sweeps(folder), *_explanations(folder)]
 
 
@@ -143,7 +142,7 @@ def _explanations(folder: Path) -> list[Case]:
         "objects": (numbers(name="x"), _npz({"a": np.array([folder], dtype=object)})),
         "bomb": (numbers(name="x"), _npz({"a": np.zeros(2**27)})),
         "no_archive": (numbers(name="x"), b"PK\x03\x04 and so on"),
-        "giant": (numbers(name="x"), _lying(_npz({"a": np.zeros(3)}))),
+        "giant": (numbers(name="x"), _lying()),
     }
     found = []
     for name, (text, archive) in kinds.items():
@@ -168,11 +167,16 @@ def _npz(arrays: Mapping[str, np.ndarray]) -> bytes:
     return file.getvalue()
 
 
-def _lying(archive: bytes) -> bytes:
+def _lying() -> bytes:
     """An array whose header asks for terabytes."""
     file = io.BytesIO()
     np.savez(file, a=np.zeros(3))
-    return file.getvalue().replace(b"(3,)", b"(3" + b"9" * 11 + b",)")[: 10**6] + archive[:0]
+    with zipfile.ZipFile(file) as archive:
+        content = archive.read("a.npy").replace(b"(3,), }         ", b"(399999999999,), }")
+    made = io.BytesIO()
+    with zipfile.ZipFile(made, "w") as archive:
+        archive.writestr("a.npy", content)
+    return made.getvalue()
 
 
 def _link_to(target: Path) -> Callable[[Path], None]:

@@ -11,7 +11,7 @@ from optuna.distributions import (  # noqa: E402
     IntDistribution,
 )
 
-from drone_rl.cli.optuna_sweeper import OptunaSweeper, distribution  # noqa: E402
+from drone_rl.cli.optuna_sweeper import OptunaSweeper, check_params, distribution  # noqa: E402
 from drone_rl.utils.errors import InputError  # noqa: E402
 
 
@@ -35,3 +35,11 @@ def test_numbers_below_one_are_refused():
     settings = {"seed": 0, "prune": True, "startup_trials": 1, "report_frames": 1, "params": {}}
     with pytest.raises(InputError, match="num_trials=0"):
         OptunaSweeper(num_trials=0, batch=1, **settings)
+
+
+def test_a_journal_sets_only_what_is_searched():
+    space = {"a": FloatDistribution(0.0, 1.0), "b": CategoricalDistribution(["x", "y"])}
+    check_params({"a": 0.5, "b": "x"}, space)
+    for params in ({"policy._target_": "os.system"}, {"a": 2.0}):
+        with pytest.raises(InputError, match="never draws"):
+            check_params(params, space)
