@@ -98,3 +98,7 @@ def test_a_few_sure_failures_are_not_the_largest(make_episodes):
     largest = failure_table(make_episodes(sides, hits), TASK)["largest"]
     assert (largest["by"], largest["value"]) != ("side", "ahead")
     assert largest["failed"] >= 70
+
+
+def test_ordinals_go_on_beyond_their_names():
+    assert [ordinal(i) for i in (0, 8, 9, 10)] == ["first", "ninth", "10th", "11th"]

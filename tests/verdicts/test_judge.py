@@ -12,7 +12,7 @@ from drone_rl.evaluation import Oracle
 from drone_rl.sim.rules import Side
 from drone_rl.sim.settings import TaskSettings
 from drone_rl.utils.intervals import mean_bounds, proportion
-from drone_rl.verdicts.judge import judge, judge_policy, measure
+from drone_rl.verdicts.judge import judge, judge_policy, measure, observe
 from drone_rl.verdicts.kinds import Kind
 from drone_rl.verdicts.rule import QUANTITIES, Rule
 
@@ -60,6 +60,33 @@ def test_few_episodes_prove_nothing(judged):
     assert (verdict.kind, verdict.certain, verdict.exit_code) == (Kind.GOOD, False, 13)
     assert verdict.evidence["enough"] == 100
     assert judged(lambda i, side: True, number=100).exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("number", "missed", "enough"),
+    [
+        (40, None, 2 * 40),
+        (28, None, 3 * 28),
+        (16, None, 5 * 16),
+        (8, None, 10 * 8),
+        (4, None, 20 * 4),
+        (100, 13, 50 * 100),  # one episode in thirteen
+        (40, 14, 100 * 40),
+    ],
+)
+def test_how_many_episodes_would_be_enough(judged, number, missed, enough):
+    verdict = judged(lambda i, side: missed is None or i % missed > 0, number=number)
+    assert (verdict.certain, verdict.evidence["enough"]) == (False, enough)
+
+
+def test_luck_is_measured_on_the_way_to_what_the_oracle_gets(make_episodes, make_baselines):
+    episodes = make_episodes([[LEFT, LEFT], [AHEAD, AHEAD]], [[1, 1], [1, 0]])
+    baselines = make_baselines(episodes)
+    baselines["oracle"] = make_episodes([[LEFT, LEFT], [AHEAD, AHEAD]], [[1, 0], [0, 0]])
+    told = dict(zip(QUANTITIES, observe(episodes, baselines, Rule()), strict=True))
+    assert told["success"].tolist() == [1.0, 0.0]  # the oracle never succeeds
+    assert told["above random"].tolist() == pytest.approx([1 - 1 / 6 * 0.5, 0.5])
+    assert told["above forward"].tolist() == pytest.approx([1 - 1 / 6 * 0.5, 0.5 - 5 / 6])
 
 
 def test_exactly_at_the_threshold_is_not_good_and_never_certain(judged):

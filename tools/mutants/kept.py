@@ -41,7 +41,7 @@ def row(mutant: Mutant, root: Path, outcome: str, reasons: dict[str, str]) -> di
 def equivalents() -> dict[str, str]:
     """Reasons why a mutant changes nothing, by its id, from equivalents.toml."""
     listed = tomllib.loads((HERE / "equivalents.toml").read_text())
-    return {id_: entry["reason"] for entry in listed["equivalent"] for id_ in entry["ids"]}
+    return {id_: entry["reason"] for entry in listed.get("equivalent", []) for id_ in entry["ids"]}
 
 
 def score(rows: list[dict[str, Any]]) -> float:
