@@ -1,13 +1,20 @@
+import math
+
 import torch
 
 from drone_rl.explain.alternatives import (
-    PLACEMENTS,
+    BRIGHT_GROUND,
+    BRIGHT_SKY,
+    DARK_GROUND,
+    DARK_SKY,
     Repainted,
     alternatives,
     cubes_elsewhere,
     without_cubes,
 )
-from drone_rl.explain.scenes import Region, empty_scene, place_cube
+from drone_rl.explain.scenes import Region, Scenes, empty_scene, place_cube
+from drone_rl.sim.arena import FLOOR_COLOR, SKY_COLOR
+from drone_rl.sim.settings import TaskSettings
 
 
 def test_what_the_simulator_draws_otherwise(scenes, world):
@@ -16,7 +23,10 @@ def test_what_the_simulator_draws_otherwise(scenes, world):
     state = scenes.worlds.state
     before = state.passed.clone()
     found = alternatives(scenes, state)
-    assert len(found) == PLACEMENTS + 3
+    assert list(found) == [
+        "no cubes", "cubes elsewhere 0", "cubes elsewhere 1", "cubes elsewhere 2",
+        "darker", "brighter",
+    ]  # fmt: skip
     x, empty = scenes.observe(state), scenes.observe(empty_scene(scenes))
     torch.testing.assert_close(found["no cubes"], empty.expand_as(x))
     assert (found["darker"][:, 0, -1] < x[:, 0, -1]).all()  # the ground
@@ -27,6 +37,30 @@ def test_what_the_simulator_draws_otherwise(scenes, world):
     torch.testing.assert_close(scenes.observe(state), x)  # the worlds are as they were
     again = alternatives(scenes, state)
     assert all(torch.equal(found[name], again[name]) for name in found)
+
+
+def test_other_colours_are_darker_and_brighter_than_the_arenas():
+    for dark, color, bright in (
+        (DARK_GROUND, FLOOR_COLOR, BRIGHT_GROUND),
+        (DARK_SKY, SKY_COLOR, BRIGHT_SKY),
+    ):
+        for low, middle, high in zip(dark, color, bright, strict=True):
+            assert 0.2 < low < middle < high < 1.0  # still grounds and skies, no black or white
+
+
+def test_cubes_elsewhere_stand_where_cubes_can_stand(make_pipeline):
+    """In view, from where one just fits before the camera to where the first one stands."""
+    scenes = Scenes(make_pipeline(2, task=TaskSettings(vertical_bound=1.0, altitude=4.0))[0])
+    state = place_cube(scenes, torch.full((400,), 9.0), torch.zeros(400))
+    state.drone[:] = torch.tensor([5.0, -2.0, 4.0])
+    moved = cubes_elsewhere(scenes, state, torch.Generator().manual_seed(0))
+    ahead, aside, up = (moved.cubes - state.drone[:, None]).flatten(0, 1).unbind(-1)
+    nearest, edge = 1.65 + 2.5, math.tan(math.radians(scenes.worlds.camera.horizontal_fov / 2))
+    assert nearest <= ahead.min() < nearest + 0.5 and 14.5 < ahead.max() <= 15.0
+    slope = aside / ahead
+    assert -edge <= slope.min() < -0.95 * edge and 0.95 * edge < slope.max() <= edge
+    assert abs(slope.mean()) < 0.2 * edge and (aside.abs() <= 12.0 + 1e-9).all()
+    assert -1.0 <= up.min() < -0.9 and 0.9 < up.max() <= 1.0 and abs(up.mean()) < 0.15
 
 
 def test_cubes_elsewhere_are_in_view(scenes):

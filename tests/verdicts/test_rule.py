@@ -115,3 +115,19 @@ def test_the_rule_in_words_has_its_numbers():
     assert all(
         part in text for part in ("more than 80% of the oracle's", "70%", "30%", "5%", "17%")
     )
+
+
+def test_the_text_says_every_number():
+    shares = {"good_share": 0.81, "side_share": 0.62, "other_share": 0.23, "offered_share": 0.14}
+    text = Rule(**shares, luck_margin=0.35, error_rate=0.06).text
+    for share in ("81% of the oracle's", "than 62% of", "23% on", "14% of episodes", "35% of the"):
+        assert share in text
+    assert "94% probability" in text
+
+
+@pytest.mark.parametrize(
+    "value", [-0.5, 0, 0.0, 1, 1.0, 1.5, float("nan"), float("inf"), True, "x"]
+)
+def test_no_share_is_refused_by_its_name(value):
+    with pytest.raises(InputError, match="good_share="):
+        Rule(good_share=value)

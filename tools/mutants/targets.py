@@ -19,6 +19,8 @@ TARGETS: dict[str, tuple[str, ...]] = {
             "truth",
             "causal",
             "trust",
+            "curves",
+            "outcomes",
             "placebos",
             "patches",
             "alternatives",
