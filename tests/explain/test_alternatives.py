@@ -59,6 +59,8 @@ def test_cubes_elsewhere_stand_where_cubes_can_stand(make_pipeline):
     assert nearest <= ahead.min() < nearest + 0.5 and 14.5 < ahead.max() <= 15.0
     slope = aside / ahead
     assert -edge <= slope.min() < -0.95 * edge and 0.95 * edge < slope.max() <= edge
+    drawn = torch.stack([ahead, slope, up])[:, slope.abs() < 0.5 * edge]
+    assert (torch.corrcoef(drawn) - torch.eye(3)).abs().max() < 0.2  # independent of one another
     assert abs(slope.mean()) < 0.2 * edge and (aside.abs() <= 12.0 + 1e-9).all()
     assert -1.0 <= up.min() < -0.9 and 0.9 < up.max() <= 1.0 and abs(up.mean()) < 0.15
 

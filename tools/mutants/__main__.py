@@ -44,6 +44,8 @@ def main() -> int:
         done = dict(database.results)
     reasons = kept.equivalents()
     rows = [kept.row(m, tree, done[m.job].output or "", reasons) for m in sample]
+    if options.again:
+        rows = kept.merge(options.again, head["modules"], rows)
     kept.write(options.out, {**head, "listed": listed}, rows)
     _report(rows, reasons)
     return 0
@@ -55,7 +57,7 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--sample", type=int, default=600, help="how many mutants")
     parser.add_argument("--jobs", type=int, default=2, help="processes at once")
     parser.add_argument("--only", nargs="*", default=[], help="modules, by a part of their path")
-    parser.add_argument("--again", type=Path, help="a kept list: run only its survivors")
+    parser.add_argument("--again", type=Path, help="a kept list: its survivors only, now")
     parser.add_argument("--out", type=Path, default=ROOT / "docs" / "mutants.json")
     parser.add_argument("--work", type=Path, default=ROOT / "outputs" / "mutants")
     options = parser.parse_args()

@@ -51,6 +51,26 @@ def score(rows: list[dict[str, Any]]) -> float:
     return killed / max(1, killed + counts["survived"])
 
 
+def merge(path: Path, modules: dict[str, str], rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """A kept list after its survivors were run again, with tests that were added since.
+
+    What was killed stays so: it is for the reviewer of the tests to see that none was taken away.
+
+    Args:
+        path: The kept list.
+        modules: Hashes of the modules as they are.
+        rows: Of the survivors' second run.
+
+    Raises:
+        ValueError: A module has changed since, so that its mutants are others.
+    """
+    old = json.loads(path.read_text())
+    if old["modules"] != modules:
+        raise ValueError(f"modules have changed since {path} was made; run all mutants")
+    again = {row["id"]: row for row in rows}
+    return [again.get(row["id"], row) for row in old["mutants"]]
+
+
 def hashes(root: Path, paths: list[str]) -> dict[str, str]:
     """SHA-256 of files; a folder counts by its Python files."""
     files = {
