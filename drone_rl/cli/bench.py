@@ -10,8 +10,13 @@ from typing import Any
 import torch
 from omegaconf import DictConfig
 
+from drone_rl.bench.coverage import bench_coverage
 from drone_rl.bench.explain import bench_explain
+from drone_rl.bench.hostile import bench_hostile
+from drone_rl.bench.maps import bench_maps
+from drone_rl.bench.mutants import bench_mutants
 from drone_rl.bench.scaling import bench_scaling
+from drone_rl.bench.sentences import bench_sentences
 from drone_rl.bench.speed import bench_collector, bench_dm_control, bench_render
 from drone_rl.bench.sweeps import bench_kills, bench_ray, bench_sweeps
 from drone_rl.bench.training import bench_memory, bench_solve
@@ -21,17 +26,22 @@ from drone_rl.utils.provenance import provenance
 
 MAIN_JOB = ("render", "collector", "dm_control", "scaling", "memory", "solve")
 """What `--quick` runs when nothing is named: in a minute or little more."""
-NAMES = (*MAIN_JOB, "explain", "verdicts", "sweeps", "kills", "ray")
+TRUTH = ("coverage", "sentences", "hostile", "maps", "explain", "verdicts", "mutants")
+"""What `drone-rl bench truth` runs: whether what the program says holds against an adversary."""
+NAMES = (*MAIN_JOB, *TRUTH, "sweeps", "kills", "ray")
+GROUPS = {"truth": TRUTH}
+"""Several benchmarks under one name."""
 _log = logging.getLogger(__name__)
 
 
 def prepare(overrides: list[str]) -> list[str]:
     """Makes `drone-rl bench collector --quick` mean `only=[collector] quick=true`."""
-    names = [o for o in overrides if o in NAMES]
-    kept = [o for o in overrides if o not in (*NAMES, "--quick")]
+    names = [name for o in overrides for name in GROUPS.get(o, (o,)) if name in NAMES]
+    kept = [o for o in overrides if o not in (*NAMES, *GROUPS, "--quick")]
     for override in kept:
         if "=" not in override and not override.startswith("-"):
-            raise InputError(f"benchmark {override!r} is unknown; use some of: {', '.join(NAMES)}")
+            known = ", ".join((*GROUPS, *NAMES))
+            raise InputError(f"benchmark {override!r} is unknown; use some of: {known}")
     quick = "--quick" in overrides
     if quick and not names and not any(o.startswith("only=") for o in kept):
         names = list(MAIN_JOB)
@@ -73,9 +83,20 @@ def _benchmarks(config: DictConfig, folder: Path) -> dict[str, Callable[[], dict
         "scaling": lambda: bench_scaling(folder, device, quick),
         "memory": lambda: bench_memory(runs, config.memory_frames, device, quick),
         "solve": lambda: bench_solve(runs, list(config.seeds), config.episodes, device, quick),
+        "coverage": lambda: bench_coverage(quick),
+        "sentences": lambda: bench_sentences(),
+        "hostile": lambda: bench_hostile(_made(runs / "hostile"), quick),
+        "maps": lambda: bench_maps(runs, quick),
+        "mutants": lambda: bench_mutants(),
         "explain": lambda: bench_explain(runs, quick),
         "verdicts": lambda: bench_verdicts(runs, device, quick),
         "sweeps": lambda: bench_sweeps(runs, device, quick),
         "kills": lambda: bench_kills(runs, device, quick),
         "ray": lambda: bench_ray(runs, device, quick),
     }
+
+
+def _made(folder: Path) -> Path:
+    """The folder, which is there now."""
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
