@@ -151,6 +151,12 @@ def test_frames_are_in_order_and_follow_from_the_actions(collector):
         assert episode["next", "info", "end_reason"][-1] > 0
 
 
+def test_collecting_keeps_no_graph(collector):
+    batch = collector.collect()
+    assert batch["logits"].numel() > 0
+    assert not any(value.requires_grad for value in batch.values(True, True))
+
+
 def test_each_action_was_taken_on_the_frame_beside_it(make_pipeline):
     env, actor = make_pipeline(3, task=SHORT)
     batch = EpisodeCollector(env, actor).collect()

@@ -61,6 +61,19 @@ def test_rounding_errors_are_no_heat_and_no_effect():
     assert scores(heat, effects).tolist() == [0.0, 0.0]
 
 
+def test_heat_has_no_unit_and_effects_that_differ_by_rounding_are_equal():
+    effects = np.array([[0.1, 0.2, 0.3 - 1e-12, 0.3 + 1e-12]])
+    heat = np.array([[1.0, 2.0, 3.0, 3.0]])
+    for unit in (1e-9, 1.0, 1e9):
+        np.testing.assert_allclose(scores(unit * heat, effects), [1.0])
+        assert pointing(unit * heat, effects)[0].tolist() == [1.0]
+
+
+def test_a_map_without_heat_points_nowhere_more_than_anywhere():
+    hit, chance = pointing(np.zeros((1, 20)), np.array([[0.5] + [0.1] * 18 + [0.4]]))
+    assert hit[0] == chance[0] == 0.1
+
+
 def test_a_map_of_ones_scores_nothing_whatever_the_policy(network):
     x = torch.rand(20, 1, 2, 2)
     effects = patch_effects(network, x, [torch.rand(20, 1, 2, 2)], GRID)
@@ -78,6 +91,11 @@ def test_pointing_by_hand():
     assert ones[0] == ones[1] == 0.1  # a map of ones hits as chance does
 
 
+def test_of_few_patches_one_moves_the_policy_most():
+    hit, chance = pointing(np.eye(5)[3:], np.array([[0.1, 0.2, 0.3, 0.4, 0.5]] * 2))
+    assert (hit.tolist(), chance.tolist()) == ([0, 1], [0.2, 0.2])
+
+
 def test_pointing_where_patches_tie():
     hit, chance = pointing(np.eye(20)[:2], np.array([[0.3] * 5 + [0.0] * 15] * 2))
     assert (hit.tolist(), chance.tolist()) == ([1, 1], [0.25, 0.25])
@@ -93,6 +111,8 @@ def test_rank_correlation_by_hand():
     first = np.array([[1, 2, 3, 4], [1, 2, 3, 4], [5, 5, 5, 5]], float)
     second = np.array([[10, 20, 30, 40], [4, 3, 2, 1], [1, 2, 3, 4]], float)
     np.testing.assert_allclose(rank_correlation(first, second), [1.0, -1.0, 0.0])
+    two = np.array([[1.0, 2.0], [2.0, 1.0]])
+    np.testing.assert_allclose(rank_correlation(two, two[:1]), [1.0, -1.0])
 
 
 def test_episodes_count_alike_however_long():

@@ -1,9 +1,11 @@
+import dataclasses
+
 import numpy as np
 import pytest
 
 from drone_rl.explain.contradictions import (
-    LISTED,
     Kind,
+    Pair,
     find_pairs,
     one_move,
     opposition,
@@ -106,12 +108,17 @@ def test_each_frame_is_in_one_pair_and_the_most_opposed_comes_first():
     assert [(p.left, p.right) for p in pairs] == [(1, 2)]
 
 
-def test_all_pairs_are_counted_and_some_are_listed():
-    count = 2 * LISTED + 10
-    data = fake(np.zeros((count, 2)), [LEFT, RIGHT] * (count // 2), [[5, 1]] * count)
+def test_all_pairs_are_counted_and_fifty_are_listed():
+    data = fake(np.zeros((110, 2)), [LEFT, RIGHT] * 55, [[5, 1]] * 110)
     summary = summarise_pairs(find_pairs(data, alike=1.0), data, 1.0)
-    assert summary["pairs"] == summary["contradictions"] == LISTED + 5
-    assert len(summary["list"]) == LISTED
+    assert summary["pairs"] == summary["contradictions"] == 55
+    assert len(summary["list"]) == 50
+
+
+def test_a_pair_is_a_fact():
+    pair = Pair(0, 1, 0.5, 0.5, Kind.UNKNOWN)
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        pair.kind = Kind.CONTRADICTION
 
 
 def test_one_action_makes_no_pairs():

@@ -51,6 +51,8 @@ def test_actions_are_told_apart_and_episodes_count_alike(network):
 def test_steps_are_as_fine_as_a_far_cube():
     assert SHARES[0] == 0.0 and SHARES[-1] == 1.0
     assert max(np.diff(SHARES)[:6]) < 0.026
+    assert list(SHARES) == sorted(set(SHARES))
+    assert SHARES[1] == 0.01 and max(np.diff(SHARES)) <= 0.2 + 1e-9
 
 
 def test_without_pictures_there_are_no_curves(network):

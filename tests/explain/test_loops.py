@@ -30,6 +30,10 @@ def test_loops_at_the_first_and_at_the_last_frame():
     assert find_loops(flights([L, R, L, R], [0, 0, 1, 1])) == []  # one in each of two episodes
 
 
+def test_without_frames_there_are_no_loops():
+    assert find_loops(flights([], [])) == []
+
+
 def test_episodes_with_a_loop_are_counted_once():
     data = flights([L, R, L, F, L, R, L, F, F, F], [0] * 8 + [1] * 2)
     summary = summarise_loops(data, find_loops(data))

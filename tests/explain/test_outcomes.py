@@ -6,6 +6,7 @@ from torch import nn
 from drone_rl.explain.outcomes import (
     PATIENCE,
     Flights,
+    _remember,
     differ,
     fly,
     followed,
@@ -110,6 +111,23 @@ def test_patience_ends(scenes, monkeypatch):
     state = place_cube(scenes, torch.tensor([9.0]), torch.tensor([0.0]))
     flown = fly(scenes, Always(Action.FORWARD), state, state.next_cube)
     assert (flown.collected.tolist(), flown.decided.tolist()) == ([False], [3])
+
+
+def test_no_flights_have_no_steps(scenes):
+    state = empty_scene(scenes)[torch.arange(0)]
+    flown = fly(scenes, Always(Action.FORWARD), state, state.next_cube)
+    assert (flown.actions.shape, flown.lateral.shape) == ((0, 0), (0, 1))
+    assert (len(flown.collected), len(flown.decided)) == (0, 0)
+
+
+def test_the_last_pictures_of_those_that_fly_are_remembered():
+    first, second, third = (torch.full((2, 4, 5, 3), value) for value in (1, 2, 3))
+    assert _remember([], first, torch.tensor([0, 2]), 3, 0) == []
+    earlier = _remember([], first, torch.tensor([0, 2]), 3, 2)
+    assert [p[:, 0, 0, 0].tolist() for p in earlier] == [[1, 0, 1]]
+    earlier = _remember(earlier, second, torch.tensor([1, 2]), 3, 2)
+    earlier = _remember(earlier, third, torch.tensor([0, 1]), 3, 2)
+    assert [p[:, 0, 0, 0].tolist() for p in earlier] == [[0, 2, 2], [3, 3, 0]]
 
 
 def flights(decided, lateral, actions=((0,),)):
