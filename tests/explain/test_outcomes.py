@@ -1,3 +1,5 @@
+import dataclasses
+
 import numpy as np
 import pytest
 import torch
@@ -132,6 +134,11 @@ def test_the_last_pictures_of_those_that_fly_are_remembered():
 
 def flights(decided, lateral, actions=((0,),)):
     return Flights(np.array([True]), np.array([decided]), np.array([lateral]), np.array(actions))
+
+
+def test_flights_are_facts():
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        flights(1, [0.0, 1.0]).decided = 0
 
 
 def test_following_by_hand():

@@ -1,3 +1,6 @@
+import dataclasses
+import math
+
 import pytest
 import torch
 
@@ -24,10 +27,41 @@ def test_patches_are_equal_apart_and_inside(size):
     assert min(20, size[0] * size[1]) <= grid.count <= 64 or size == (1, 7)
 
 
+SIZES = [(25, 64), (13, 32), (38, 96), (8, 8), (1, 7), (7, 1), (3, 200), (37, 65), (43, 111)]
+
+
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("patches", [40, 12])
+def test_no_grid_is_better(size, patches):
+    """What is lost weighs 4, a wrong number 1 and a long patch half, each as a logarithm."""
+    height, width = size
+
+    def cost(grid):
+        covered = grid.count * grid.height * grid.width / (height * width)
+        wrong, long = math.log(grid.count / patches), math.log(grid.width / grid.height)
+        return 4 * (1 - covered) + abs(wrong) + 0.5 * abs(long)
+
+    all_grids = [
+        Grid(height // rows, width // columns, rows, columns)
+        for rows in range(1, height + 1)
+        for columns in range(1, width + 1)
+        if rows * columns <= 2 * patches
+    ]
+    found = make_grid(height, width, patches)
+    assert cost(found) == pytest.approx(min(map(cost, all_grids)))
+    assert found.top == (height - found.rows * found.height) // 2
+    assert found.left == (width - found.columns * found.width) // 2
+
+
 def test_what_does_not_fit_is_left_out_on_both_sides():
     assert Grid(2, 2, 1, 2, top=1, left=1).span(1) == (slice(1, 3), slice(3, 5))
     masks = Grid(2, 2, 1, 2, top=1, left=1).masks((4, 6))
     assert masks[1].nonzero().tolist() == [[1, 3], [1, 4], [2, 3], [2, 4]]
+
+
+def test_a_grid_is_a_fact():
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        make_grid(25, 64).rows = 3
 
 
 def test_means_by_hand():

@@ -1,6 +1,16 @@
+import math
+
+import pytest
 import torch
 
-from drone_rl.explain.placebos import band, blob, horizon_row, placebo_maps, smoothed
+from drone_rl.explain.placebos import (
+    band,
+    blob,
+    difference,
+    horizon_row,
+    placebo_maps,
+    smoothed,
+)
 
 
 def test_placebos_by_hand():
@@ -35,3 +45,52 @@ def test_smoothing_keeps_an_even_map_and_spreads_a_point():
     point[0, 4, 20] = 1.0
     assert torch.isclose(smoothed(point).sum(), torch.tensor(1.0))
     assert 0 < smoothed(point).max() < 0.5
+
+
+def test_a_blob_by_hand():
+    """Pixels are at (0.25, 0.75) of the height and (0.125, 0.375, ...) of the width."""
+    made = blob(2, 4, 0.5, 0.25)
+    assert made[0, 0].item() == pytest.approx(math.exp(-(0.25**2 + 0.125**2) / (2 * 0.2**2)))
+    assert made[1, 3].item() == pytest.approx(math.exp(-(0.25**2 + 0.625**2) / (2 * 0.2**2)))
+    assert blob(1, 1, 0.0, 0.5, 0.5).item() == pytest.approx(math.exp(-0.5))
+
+
+def test_a_band_by_hand():
+    made = band(20, 3, 4.5)
+    assert made.shape == (20, 3) and (made == made[:, :1]).all()
+    # a tenth of the height, two rows, is the deviation
+    assert made[6, 0].item() == pytest.approx(math.exp(-(0.75**2) / 2))
+    assert band(10, 3, 4.0, 0.2)[8, 0].item() == pytest.approx(math.exp(-2))
+
+
+def test_the_horizon_is_the_greatest_change_whatever_its_sign():
+    absent = torch.zeros(2, 6, 4)
+    absent[0, 4:], absent[1, 4:] = 1.0, -1.0  # darker in one channel, brighter in the other
+    absent[0, 1:4] = 0.3
+    assert horizon_row(absent) == 3.5
+
+
+def test_differences_add_up_over_channels():
+    x, absent = torch.tensor([[[[1.0]], [[-2.0]]]]), torch.tensor([[[0.5]], [[1.0]]])
+    assert difference(x, absent).tolist() == [[[3.5]]]
+
+
+@pytest.mark.parametrize(("width", "box"), [(10, 3), (39, 3), (40, 5), (64, 7)])
+def test_smoothing_by_hand(width, box):
+    point = torch.zeros(1, 25, width)
+    point[0, 12, width // 2] = 1.0
+    once, twice = smoothed(point, 1)[0], smoothed(point)[0]
+    assert int((once > 0).sum()) == box**2
+    assert once.max().item() == pytest.approx(1 / box**2)
+    assert twice[12, width // 2].item() == pytest.approx(1 / box**2)  # box of 1 / box each way
+    assert int((twice[12] > 1e-9).sum()) == min(2 * box - 1, width)
+    corner = torch.zeros(1, 25, width)
+    corner[0, 0, 0] = 1.0  # beyond the border goes on what is at the border
+    assert smoothed(corner, 1)[0, 0, 0].item() == pytest.approx((box // 2 + 1) ** 2 / box**2)
+
+
+def test_noise_repeats_with_its_seed():
+    x = torch.zeros(2, 1, 6, 10)
+    noise = [placebo_maps(x, x[0], [x], seed)["noise"] for seed in (0, 0, 1)]
+    assert torch.equal(noise[0], noise[1]) and not torch.equal(noise[0], noise[2])
+    assert torch.equal(placebo_maps(x, x[0], [x])["noise"], noise[0])

@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 import torch
 
 from drone_rl.explain.randomised import likeness, shuffled_networks
@@ -51,3 +52,13 @@ def test_maps_that_are_the_same_everywhere_are_alike():
 def test_rounding_errors_are_no_heat():
     first = torch.tensor([[[1.0, 2.0, 1e-9, 0.0]]])
     assert likeness(first, torch.tensor([[[2.0, 1.0, 0.0, 1e-9]]])).tolist() == [-1.0]
+
+
+@pytest.mark.parametrize("unit", [1e-4, 1.0, 1e4])
+def test_heat_has_no_unit(unit):
+    first = unit * torch.tensor([[[1.0, 2.0, 1e-8, 0.0]]]).double()
+    second = torch.tensor([[[2.0, 1.0, 0.0, 1e-8]]]).double()
+    assert likeness(first, second) == likeness(second, first) == -1.0
+    even = unit * torch.tensor([[[1.0, 1.0 + 1e-9]]]).double()
+    odd = torch.tensor([[[1.0 + 1e-9, 1.0]]]).double()
+    assert likeness(even, odd) == likeness(odd, even) == 1.0  # the same everywhere

@@ -10,7 +10,14 @@ from drone_rl.explain import causal, trust
 from drone_rl.explain.attribution import Explainer
 from drone_rl.explain.patches import Grid
 from drone_rl.explain.placebos import placebo_maps
-from drone_rl.explain.trust import Trial, check_maps, check_method, method_maps, random_weights
+from drone_rl.explain.trust import (
+    Pictures,
+    Trial,
+    check_maps,
+    check_method,
+    method_maps,
+    random_weights,
+)
 from drone_rl.policies import MLP
 
 LEVEL = 0.01
@@ -137,6 +144,22 @@ def test_nothing_is_trusted_about_a_policy_that_nothing_moves(trial):
     assert blind.maps(saliency).shape == (0, *SIZE)
 
 
+def test_a_trial_is_a_fact(trial):
+    assert (trial.seed, trial.still) == (0, 0)
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        trial.still = 1
+    with pytest.raises(TypeError):  # nine fields, told apart by name alone
+        Trial(*vars(trial).values())
+    pictures = Pictures(
+        observations=trial.observations, others=[], absent=trial.observations[0], episode=[]
+    )
+    assert pictures.seed == 0
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        pictures.seed = 1
+    with pytest.raises(TypeError):
+        Pictures(*vars(pictures).values())
+
+
 def test_a_trial_on_some_of_its_pictures(trial):
     few = trial.thinned()
     assert few.episode.tolist() == list(range(40))
@@ -161,6 +184,7 @@ def test_a_trial_of_a_policy_in_the_simulator(world, scenes, dataset):
     made = trust.make_trial(
         scenes, network, dataset.state(), dataset.tensor("actions"), dataset.episode
     )
+    assert made.seed == 0
     assert made.effects.shape == (len(made.episode), 40) == (len(made.observations), 40)
     rows = causal.spread(dataset.episode, trust.FRAMES_AN_EPISODE)
     assert len(made.episode) + made.still == len(rows)
