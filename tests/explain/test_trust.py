@@ -82,6 +82,43 @@ def test_the_best_of_those_that_pass_is_trusted(trial):
     assert check_maps(trial, {"true": weights, "blurred": blurred})["trusted"] == "true"
 
 
+def test_the_best_is_the_one_that_is_surely_good(trial, monkeypatch):
+    scores = {"sure": (0.5, 0.6), "perhaps": (0.1, 0.9), "no": (0.8, 0.9)}
+
+    def checked(trial, method, level, maps):
+        low, high = scores[method]
+        return {"trusted": method != "no", "score": {"lower95": low, "upper95": high}}
+
+    monkeypatch.setattr(trust, "check_method", checked)
+    methods = {name: name for name in scores}
+    assert check_maps(trial, methods, maps=methods)["trusted"] == "sure"
+
+
+@pytest.mark.parametrize(
+    ("likeness", "passed"),
+    [
+        ({"upper": 0.49, "seeds": [-0.9, 0.49]}, True),
+        ({"upper": 0.49, "seeds": [-0.9, 0.5]}, False),  # with some weights it is alike
+        ({"upper": 0.5, "seeds": [0.1, 0.2]}, False),
+        ({"upper": None, "seeds": [0.1, 0.2]}, False),  # too few episodes
+    ],
+)
+def test_likeness_is_of_all_seeds_together_and_of_each(likeness, passed):
+    bound = {"lower": 0.1}
+    found = trust._tests({"placebos": {"a": bound}, "pointing": bound, "likeness": likeness})
+    assert found == {"placebos": True, "pointing": True, "likeness": passed}
+
+
+def test_a_bound_of_nothing_is_no_gain():
+    likeness = {"upper": 0.0, "seeds": [0.0]}
+    for lower in (0.0, -0.1, None):
+        bounds = {"a": {"lower": 0.1}, "b": {"lower": lower}}
+        found = trust._tests(
+            {"placebos": bounds, "pointing": {"lower": lower}, "likeness": likeness}
+        )
+        assert found == {"placebos": False, "pointing": False, "likeness": True}
+
+
 def test_placebos_are_not_trusted(trial):
     liars = {name: lambda n, x, a, m=maps: m for name, maps in trial.placebos.items()}
     found = check_maps(
@@ -121,7 +158,7 @@ def test_a_map_that_hides_behind_noise_of_the_weights_is_not_trusted(trial):
 
 def test_random_weights_are_as_good_when_they_score_as_much(trial):
     found = random_weights(trial, lambda n, x, a: trial.placebos["ones"][: len(x)], LEVEL)
-    assert (found["score"], found["tried"], found["as_good"]) == (0.0, 1, 1)
+    assert found == {"score": 0.0, "best": 0.0, "mean": 0.0, "tried": 1, "as_good": 1}
 
 
 def test_a_map_without_heat_is_not_trusted(trial):

@@ -15,6 +15,14 @@ def test_pointing_game_by_hand():
     assert found["maps_without_heat"] == 1
 
 
+@pytest.mark.parametrize("unit", [0.01, 1.0, 100.0])
+def test_pointing_has_no_unit(unit):
+    maps = unit * np.array([[[9, 1], [0, 0]], [[9, 9], [1, 0]], [[0, 0], [0, 0]]], float)
+    found = pointing_game(maps, REGIONS, np.array([0, 1, 2]))
+    assert found["hit"]["mean"] == pytest.approx(2 / 3)
+    assert found["maps_without_heat"] == 1
+
+
 def test_frames_without_the_cube_do_not_count():
     regions = REGIONS.copy()
     regions[1:] = Region.SKY

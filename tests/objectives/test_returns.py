@@ -260,3 +260,13 @@ def test_long_batches_do_not_take_a_python_step_a_frame():
     finally:
         returns._discount = original
     assert calls == [130]
+
+
+def test_what_is_just_a_rounding_error_is_nothing():
+    just = torch.tensor([[-returns.ROUNDING], [returns.ROUNDING]])
+    assert just.square().mean().sqrt() == torch.tensor(returns.ROUNDING)  # exact in float32
+    ends, one = torch.tensor([[True], [True]]), torch.tensor([[False], [True]])
+    assert returns.scale_to_unit(just).tolist() == [[0.0], [0.0]]
+    assert returns.batch_normalised(just, ends, 0.0).tolist() == [[0.0], [0.0]]
+    assert returns.standardised(just, one, 0.0).tolist() == [[0.0], [0.0]]
+    assert returns.scale_to_unit(2 * just).tolist() == [[-1.0], [1.0]]
