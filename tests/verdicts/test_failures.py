@@ -102,3 +102,20 @@ def test_a_few_sure_failures_are_not_the_largest(make_episodes):
 
 def test_ordinals_go_on_beyond_their_names():
     assert [ordinal(i) for i in (0, 8, 9, 10)] == ["first", "ninth", "10th", "11th"]
+
+
+def test_a_third_of_the_bound_is_still_level(make_episodes):
+    task = TaskSettings(num_cubes=1, vertical_bound=0.75)
+    episodes = make_episodes([[AHEAD]] * 4, [[0], [1], [1], [1]])
+    episodes.height = torch.tensor([[0.25], [-0.25], [0.26], [-0.26]]).double()
+    table = failure_table(episodes, task)
+    assert row(table, "height", "level") == (2, 1)
+    assert row(table, "height", "higher") == row(table, "height", "lower") == (1, 0)
+
+
+def test_the_largest_weighs_many_failures_against_a_large_share(make_episodes):
+    """100 of 300 on the left and 30 of 40 on the right are 130 of 340 that are as far aside."""
+    sides = [[LEFT]] * 300 + [[RIGHT]] * 40 + [[AHEAD]] * 660
+    hits = [[i >= 100] for i in range(300)] + [[i >= 30] for i in range(40)] + [[1]] * 660
+    largest = failure_table(make_episodes(sides, hits), TASK)["largest"]
+    assert (largest["by"], largest["failed"], largest["episodes"]) == ("sideways", 130, 340)

@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from drone_rl.envs import DroneEnv
-from drone_rl.evaluation import Oracle
+from drone_rl.evaluation import Oracle, run_episodes
 from drone_rl.sim.rules import Side
 from drone_rl.sim.settings import TaskSettings
 from drone_rl.utils.intervals import mean_bounds, proportion
@@ -187,3 +187,21 @@ def test_a_mirrored_flight_gets_the_mirrored_kind(make_episodes, make_baselines,
     verdict, reflected = judge(ours, baselines, TASK), judge(mirrored(ours), theirs, TASK)
     assert reflected.kind is verdict.kind.mirrored
     assert reflected.certain == verdict.certain
+
+
+def test_a_policy_is_flown_greedily_and_with_drawn_actions_in_the_same_worlds(monkeypatch):
+    flown = []
+
+    def run(env, actor, episodes, *, greedy=True):
+        flown.append((greedy, episodes, env.state_dict()))
+        return run_episodes(env, actor, episodes, greedy=greedy)
+
+    monkeypatch.setattr("drone_rl.verdicts.judge.run_episodes", run)
+    task = TaskSettings(num_cubes=1)
+    env = DroneEnv(2, task, pixels=False)
+    before = env.state_dict()
+    judge_policy(env, Oracle(task), 3)
+    assert flown == [(True, 3, before), (False, 3, before)]
+    flown.clear()
+    judge_policy(env, Oracle(task), 3, sampled=False)
+    assert [greedy for greedy, *_ in flown] == [True]
