@@ -18,6 +18,7 @@ def checkout(tmp_path):
     kept = {
         "revision": "abc",
         "modules": {"module.py": digest},
+        "first_score": 0.6,
         "score": 1.0,  # what a list claims of itself is not believed
         "mutants": [{"outcome": outcome} for outcome in OUTCOMES],
     }
@@ -28,6 +29,7 @@ def checkout(tmp_path):
 def test_equivalent_mutants_count_neither_way_and_timeouts_are_killed(checkout):
     assert bench_mutants(checkout) == {
         "mutation_score": 0.75,
+        "mutation_score_at_first_sight": 0.6,
         "mutants_sampled": 6,
         "mutants_killed": 3,
         "mutants_equivalent": 2,

@@ -59,6 +59,6 @@ def test_heat_has_no_unit(unit):
     first = unit * torch.tensor([[[1.0, 2.0, 1e-8, 0.0]]]).double()
     second = torch.tensor([[[2.0, 1.0, 0.0, 1e-8]]]).double()
     assert likeness(first, second) == likeness(second, first) == -1.0
-    even = unit * torch.tensor([[[1.0, 1.0 + 1e-9]]]).double()
-    odd = torch.tensor([[[1.0 + 1e-9, 1.0]]]).double()
+    even = unit * torch.tensor([[[1.0, 1.0 + 1e-9]]], dtype=torch.float64)
+    odd = torch.tensor([[[1.0 + 1e-9, 1.0]]], dtype=torch.float64)
     assert likeness(even, odd) == likeness(odd, even) == 1.0  # the same everywhere

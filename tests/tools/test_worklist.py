@@ -98,3 +98,17 @@ def test_hashes_are_those_of_files_and_of_folders(tree):
     found = kept.hashes(tree, ["module.py", "tests"])
     assert list(found) == ["module.py", "tests/test_a.py"]
     assert found["tests/test_a.py"].startswith("e3b0c44298fc")  # SHA-256 of nothing
+
+
+def test_a_list_whose_survivors_were_run_again(tree):
+    outcomes = {"a": "killed", "b": "survived", "c": "survived"}
+    first = [{"id": i, "module": "m", "line": 1, "outcome": o} for i, o in outcomes.items()]
+    kept.write(tree / "first.json", {"modules": {"m": "1"}}, first)
+    again = [{**first[1], "outcome": "killed"}, first[2]]
+    rows, score = kept.merge(tree / "first.json", {"m": "1"}, again)
+    assert [row["outcome"] for row in rows] == ["killed", "killed", "survived"]
+    assert score == pytest.approx(1 / 3)  # at first sight
+    kept.write(tree / "second.json", {"modules": {"m": "1"}, "first_score": score}, rows)
+    assert kept.merge(tree / "second.json", {"m": "1"}, [])[1] == pytest.approx(1 / 3)
+    with pytest.raises(ValueError, match="modules have changed"):
+        kept.merge(tree / "first.json", {"m": "2"}, again)

@@ -45,7 +45,8 @@ def main() -> int:
     reasons = kept.equivalents()
     rows = [kept.row(m, tree, done[m.job].output or "", reasons) for m in sample]
     if options.again:
-        rows = kept.merge(options.again, head["modules"], rows)
+        rows, first = kept.merge(options.again, head["modules"], rows)
+        head["first_score"] = first
     kept.write(options.out, {**head, "listed": listed}, rows)
     _report(rows, reasons)
     return 0

@@ -51,7 +51,9 @@ def score(rows: list[dict[str, Any]]) -> float:
     return killed / max(1, killed + counts["survived"])
 
 
-def merge(path: Path, modules: dict[str, str], rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+def merge(
+    path: Path, modules: dict[str, str], rows: list[dict[str, Any]]
+) -> tuple[list[dict[str, Any]], float]:
     """A kept list after its survivors were run again, with tests that were added since.
 
     What was killed stays so: it is for the reviewer of the tests to see that none was taken away.
@@ -61,6 +63,10 @@ def merge(path: Path, modules: dict[str, str], rows: list[dict[str, Any]]) -> li
         modules: Hashes of the modules as they are.
         rows: Of the survivors' second run.
 
+    Returns:
+        All rows, and the score at first sight of the sample, before a test was written for it:
+        what a sample drawn anew would get, about.
+
     Raises:
         ValueError: A module has changed since, so that its mutants are others.
     """
@@ -68,7 +74,8 @@ def merge(path: Path, modules: dict[str, str], rows: list[dict[str, Any]]) -> li
     if old["modules"] != modules:
         raise ValueError(f"modules have changed since {path} was made; run all mutants")
     again = {row["id"]: row for row in rows}
-    return [again.get(row["id"], row) for row in old["mutants"]]
+    merged = [again.get(row["id"], row) for row in old["mutants"]]
+    return merged, old.get("first_score", old["score"])
 
 
 def hashes(root: Path, paths: list[str]) -> dict[str, str]:
