@@ -15,8 +15,8 @@ def bench_mutants(root: Path = ROOT) -> dict[str, Any]:
     """Reads docs/mutants.json, the list that `make mutants` keeps, and counts it again.
 
     Its survivors may have been run again, with tests written for them; the score at first sight is
-    the one from before. A mutant whose tests ran into the time limit counts as killed. Equivalent ones, each listed
-    with its reason, count neither way.
+    the one from before. A mutant whose tests ran into the time limit counts as killed. Equivalent
+    ones, each listed with its reason, count neither way.
 
     Args:
         root: The checkout.
