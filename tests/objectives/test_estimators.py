@@ -119,3 +119,10 @@ def test_bad_discount_is_refused(gamma):
 def test_bad_decay_is_refused(decay):
     with pytest.raises(InputError, match=f"decay={decay}"):
         TimeBaseline(decay=decay)
+
+
+def test_little_memory_by_hand():
+    estimator = TimeBaseline(0.5, decay=0.25, max_steps=1)
+    for reward in (4.0, 8.0):
+        estimator(batch([reward], [1]))
+    assert estimator.baseline.tolist() == [0.25 * 4 + 0.75 * 8]

@@ -141,6 +141,13 @@ def test_other_worlds_are_no_baseline(make_episodes, make_baselines):
         judge(ours, make_baselines(ours), TASK, sampled=ours[:1])
 
 
+def test_one_other_world_is_enough_to_be_no_baseline(make_episodes, make_baselines):
+    ours = make_episodes([[LEFT, LEFT]] * 3, [[1, 1]] * 3)
+    theirs = make_episodes([[LEFT, LEFT]] * 2 + [[RIGHT, LEFT]], [[1, 1]] * 3)
+    with pytest.raises(ValueError, match="different worlds"):
+        judge(ours, make_baselines(theirs), TASK)
+
+
 def test_sampled_flights_are_compared_pair_by_pair(judged, make_episodes):
     sides = [LAYOUTS[i % 4] for i in range(400)]
     drawn = make_episodes(sides, [[i % 2 == 0] * 2 for i in range(400)])
