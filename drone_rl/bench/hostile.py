@@ -65,6 +65,7 @@ def run_all(folder: Path, every: int = 1) -> list[dict[str, Any]]:
         "OMP_NUM_THREADS": "1",
         "PYTHONWARNINGS": "ignore",
     }
+    folder = folder.absolute()  # each case has a folder of its own, from where it opens them
     command = [sys.executable, "-m", "drone_rl.bench.hostile", str(folder), str(every)]
     subprocess.run(command, check=True, env=environment, stdin=subprocess.DEVNULL)
     return json.loads((folder / "outcomes.json").read_text())

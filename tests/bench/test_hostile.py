@@ -3,6 +3,7 @@
 import os
 import re
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -111,3 +112,12 @@ def test_counts(tmp_path, monkeypatch):
         "hostile_refused": 1,
         "hostile_total": 2,
     }
+
+
+def test_a_folder_of_any_name_is_opened_from_everywhere(tmp_path, monkeypatch):
+    told = []
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(hostile.subprocess, "run", lambda command, **_: told.append(command))
+    (tmp_path / "outcomes.json").write_text("[]")
+    hostile.run_all(Path("."), 3)
+    assert told[0][-2:] == [str(tmp_path), "3"]
