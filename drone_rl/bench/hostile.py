@@ -30,17 +30,15 @@ _MORE = ("training", "sweep_report", "launchers")
 _log = logging.getLogger(__name__)
 
 
-def bench_hostile(folder: Path, quick: bool = False) -> dict[str, int]:
+def bench_hostile(folder: Path) -> dict[str, int]:
     """Opens each of the hostile files with one of the commands that people would.
 
     Args:
-        folder: An empty one, for the files.
-        quick: Makes no difference; all of it takes a minute or two.
+        folder: An empty one, for the files; made if need be.
 
     Returns:
         "hostile_refused" and "hostile_total".
     """
-    del quick
     outcomes = run_all(folder)
     for outcome in outcomes:
         if outcome["wrong"]:
@@ -53,7 +51,7 @@ def run_all(folder: Path, every: int = 1) -> list[dict[str, Any]]:
     """Makes and opens them, in a process of their own.
 
     Args:
-        folder: An empty one, for the files.
+        folder: An empty one, for the files; made if need be.
         every: Opens only each so many-th.
 
     Returns:
@@ -66,6 +64,7 @@ def run_all(folder: Path, every: int = 1) -> list[dict[str, Any]]:
         "PYTHONWARNINGS": "ignore",
     }
     folder = folder.absolute()  # each case has a folder of its own, from where it opens them
+    folder.mkdir(parents=True, exist_ok=True)
     command = [sys.executable, "-m", "drone_rl.bench.hostile", str(folder), str(every)]
     subprocess.run(command, check=True, env=environment, stdin=subprocess.DEVNULL)
     return json.loads((folder / "outcomes.json").read_text())

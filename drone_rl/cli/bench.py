@@ -85,7 +85,7 @@ def _benchmarks(config: DictConfig, folder: Path) -> dict[str, Callable[[], dict
         "solve": lambda: bench_solve(runs, list(config.seeds), config.episodes, device, quick),
         "coverage": lambda: bench_coverage(quick),
         "sentences": lambda: bench_sentences(),
-        "hostile": lambda: bench_hostile(_made(runs / "hostile"), quick),
+        "hostile": lambda: bench_hostile(runs / "hostile"),
         "maps": lambda: bench_maps(runs, quick),
         "mutants": lambda: bench_mutants(),
         "explain": lambda: bench_explain(runs, quick),
@@ -94,9 +94,3 @@ def _benchmarks(config: DictConfig, folder: Path) -> dict[str, Callable[[], dict
         "kills": lambda: bench_kills(runs, device, quick),
         "ray": lambda: bench_ray(runs, device, quick),
     }
-
-
-def _made(folder: Path) -> Path:
-    """The folder, which is there now."""
-    folder.mkdir(parents=True, exist_ok=True)
-    return folder
