@@ -15,6 +15,7 @@ from drone_rl.explain.attribution import Explainer
 from drone_rl.explain.dataset import RolloutDataset
 from drone_rl.explain.hooks import feature_layer, features
 from drone_rl.explain.recording import draw, fly, spread
+from drone_rl.explain.response import ResponseMap, response_map
 from drone_rl.explain.scenes import Scenes, empty_scene
 from drone_rl.explain.settings import ExplainSettings
 from drone_rl.policies import PolicyNetwork, make_actor
@@ -94,3 +95,8 @@ class Context:
     def frame_maps(self) -> dict[str, Tensor]:
         """The same, put back to where they are in the camera's frame: (T, H, W)."""
         return {name: self.scenes.to_frame(maps) for name, maps in self.maps.items()}
+
+    @functools.cached_property
+    def response(self) -> ResponseMap:
+        """What it does about one cube at each place of a grid."""
+        return response_map(self.scenes, self.network)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from torchrl.envs import TransformedEnv
 
 from drone_rl.explain.context import Context
-from drone_rl.explain.sections import SECTIONS, Section
+from drone_rl.explain.sections import Section, find_sections
 from drone_rl.explain.settings import ExplainSettings
 from drone_rl.policies import PolicyNetwork
 from drone_rl.utils.errors import InputError
@@ -32,7 +32,7 @@ def explain_policy(
     name: str,
     provenance: dict[str, Any],
     tell: Callable[[str], None] = lambda _: None,
-    sections: Mapping[str, Section] = SECTIONS,
+    sections: Mapping[str, Section] | None = None,
 ) -> dict[str, Any]:
     """Computes everything about one policy and writes it to a folder.
 
@@ -44,7 +44,8 @@ def explain_policy(
         name: Of the policy, for people.
         provenance: Where it comes from, as plain values.
         tell: Called with what is being done.
-        sections: What to compute, in this order, which changes nothing but the time of each.
+        sections: What to compute, in this order, which changes nothing but the time of each; all
+            of `explain/sections` by default.
 
     Returns:
         The numbers, as in `explanation.json`.
@@ -56,12 +57,12 @@ def explain_policy(
     numbers: dict[str, Any] = {}
     arrays: dict[str, NDArray] = {}
     seconds: dict[str, float] = {}
-    for title, section in sections.items():
-        tell(title)
+    for title, section in (find_sections() if sections is None else sections).items():
+        tell(title.replace("_", " "))
         began = time.perf_counter()
-        found, drawn = section(context)
-        numbers |= found
-        arrays |= drawn
+        its_numbers, its_arrays = section(context)
+        numbers |= its_numbers
+        arrays |= its_arrays
         seconds[title] = round(time.perf_counter() - began, 2)
     written = {
         "format": "drone_rl explanation",

@@ -142,7 +142,7 @@ def faithfulness(originals: NDArray, points: NDArray, k: int = NEIGHBOURS) -> Fa
     )
 
 
-def lay_out(points: NDArray, columns: int, rows: int) -> NDArray:
+def snap_to_grid(points: NDArray, columns: int, rows: int) -> NDArray:
     """Puts each point on a cell of its own, as near as can be to where it lies.
 
     Args:

@@ -1,12 +1,10 @@
 """Which patches move the policy, and curves of deletion and insertion for each action."""
 
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from drone_rl.report import pictures
 from drone_rl.report.explanation import ACTIONS, Explanation
 from drone_rl.words.truth import NAMES
 
@@ -18,10 +16,12 @@ _KINDS = {"deletion": "lower is better", "insertion": "higher is better"}
 def curves_chart(explanation: Explanation) -> Figure:
     """The mean effect of each patch; deletion and insertion by action, placebos dashed."""
     curves = explanation.numbers["truth"]["curves"]
-    figure, axes = plt.subplots(2, 4, figsize=(17, 7), layout="constrained")
+    figure = Figure(figsize=(17, 7), layout="constrained")
+    axes = figure.subplots(2, 4)
     _effects(axes[0, 0], explanation)
     axes[1, 0].axis("off")
-    for column, action in zip(axes.T[1:], (ACTIONS[1], ACTIONS[0], ACTIONS[2]), strict=True):
+    shown = [ACTIONS[action] for action in pictures.LEFT_TO_RIGHT]
+    for column, action in zip(axes.T[1:], shown, strict=True):
         for axis, (kind, better) in zip(column, _KINDS.items(), strict=True):
             _curves(axis, curves, action, kind)
             axis.set_title(f"{action}, {kind} ({better})", fontsize=11)
@@ -30,7 +30,7 @@ def curves_chart(explanation: Explanation) -> Figure:
     return figure
 
 
-def _effects(axis: plt.Axes, explanation: Explanation) -> None:
+def _effects(axis: Axes, explanation: Explanation) -> None:
     effects = explanation.arrays["patch_effects"]
     image = axis.imshow(effects, cmap="magma", vmin=0, vmax=max(float(effects.max()), 1e-6))
     axis.set(xticks=[], yticks=[])
@@ -38,7 +38,7 @@ def _effects(axis: plt.Axes, explanation: Explanation) -> None:
     axis.figure.colorbar(image, ax=axis, shrink=0.8, location="bottom")
 
 
-def _curves(axis: plt.Axes, curves: dict, action: str, kind: str) -> None:
+def _curves(axis: Axes, curves: dict, action: str, kind: str) -> None:
     share = 100 * np.array(curves["shares"])
     colors = dict(zip(NAMES, _COLORS, strict=True))
     named_placebo = False

@@ -13,6 +13,8 @@ from drone_rl.utils.schema import Text, as_mapping
 
 FORMAT = "drone_rl explanation"
 FORMAT_VERSION = 2
+FRAME = frozenset({"format", "format_version", "name", "settings", "seconds", "provenance"})
+"""Entries of explanation.json that are no section's."""
 MOST_BYTES = 2**26
 """Of explanation.json."""
 ACTIONS = ("forward", "left", "right")

@@ -1,28 +1,20 @@
 """From explanations to one HTML file that needs nothing else."""
 
-import base64
-import csv
-import io
+import dataclasses
 import json
-import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import imageio.v3 as iio
 import jinja2
-import matplotlib.pyplot as plt
-from matplotlib.figure import Figure
-from PIL import Image
+from markupsafe import Markup
 
-from drone_rl.report import figures
-from drone_rl.report.explanation import ACTIONS, Explanation
+from drone_rl.report.explanation import FRAME, Explanation
+from drone_rl.report.part import Drawn, Part, find_parts
+from drone_rl.report.saving import save_drawn, save_numbers, save_rows
 from drone_rl.utils.errors import InputError
-from drone_rl.words import advice, report, truth
+from drone_rl.utils.files import to_file_name
 from drone_rl.words.licence import percent, say
-
-WORDS = {**advice.SECTIONS, **report.SECTIONS, "truth": truth.FINDINGS, "reasons": truth.REASONS}
-"""Sentences by the part of the page in which they stand."""
 
 
 def write_report(folders: Sequence[Path], target: Path) -> Path:
@@ -38,16 +30,14 @@ def write_report(folders: Sequence[Path], target: Path) -> Path:
     Raises:
         InputError: An explanation can't be read or the report can't be written.
     """
-    explanations = [Explanation.load(folder) for folder in folders]
+    policies = [
+        Policy(explanation, target / "figures", f"{number}_{to_file_name(explanation.name)}")
+        for number, explanation in enumerate(Explanation.load(folder) for folder in folders)
+    ]
     try:
         (target / "figures").mkdir(parents=True, exist_ok=True)
-        sections = [
-            _section(explanation, target / "figures", f"{i}_{_slug(explanation.name)}")
-            for i, explanation in enumerate(explanations)
-        ]
-        shared = _save(figures.class_model_grid(explanations), target / "figures" / "class_models")
         path = target / "report.html"
-        path.write_text(_render(explanations, sections, shared), encoding="utf-8")
+        path.write_text(_render(policies), encoding="utf-8")
     except OSError as error:
         raise InputError(
             f"report in {target} can't be written ({error.strerror}); choose another folder"
@@ -55,52 +45,79 @@ def write_report(folders: Sequence[Path], target: Path) -> Path:
     return path
 
 
-def _section(explanation: Explanation, folder: Path, prefix: str) -> dict[str, Any]:
-    """One policy's figures, saved and as data URIs, its numbers and its sentences."""
-    drawn = figures.draw_all(explanation)
-    pictures = {
-        name: _save(picture, folder / f"{prefix}_{name}") for name, picture in drawn.items()
-    }
-    for name, rows in figures.tables(explanation).items():
-        with open(folder / f"{prefix}_{name}.csv", "w", newline="", encoding="utf-8") as file:
-            csv.writer(file).writerows(rows)
-    for name, numbers in figures.numbers(explanation).items():
-        (folder / f"{prefix}_{name}.json").write_text(json.dumps(numbers, indent=1))
-    video = folder / f"{prefix}_episode.mp4"
-    iio.imwrite(video, figures.episode_video(explanation), fps=8, codec="libx264")
-    return {
-        "name": explanation.name,
-        "numbers": explanation.numbers,
-        "pictures": pictures,
-        "video": _uri(video.read_bytes(), "video/mp4"),
-        "sprite": _save(figures.sprite(explanation), None),
-        "points": figures.points(explanation),
-        "words": {name: say(may, explanation.numbers) for name, may in WORDS.items()},
-        "provenance": json.dumps(explanation.numbers["provenance"], indent=1),
-    }
+@dataclasses.dataclass(frozen=True)
+class Policy:
+    """One explanation on its way to the page."""
+
+    explanation: Explanation
+    folder: Path
+    """Of the figures."""
+    prefix: str
+    """Of the names of its files."""
+
+    def show(self, part: Part) -> dict[str, Any]:
+        """Saves what a part makes of this policy; returns what the part's template needs."""
+        for name, rows in part.tables(self.explanation).items():
+            save_rows(rows, self.folder / f"{self.prefix}_{name}")
+        for name in part.needs:
+            save_numbers(self.explanation.numbers[name], self.folder / f"{self.prefix}_{name}")
+        return {
+            "name": self.explanation.name,
+            "numbers": self.explanation.numbers,
+            "pictures": _save(part.draw(self.explanation), self.folder, f"{self.prefix}_"),
+            "words": {n: say(may, self.explanation.numbers) for n, may in part.words.items()},
+            "extras": part.extras(self.explanation),
+        }
 
 
-def _render(explanations: list[Explanation], sections: list[dict], class_models: str) -> str:
+def _render(policies: Sequence[Policy]) -> str:
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("drone_rl.report"),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
     )
-    environment.filters["percent"] = _short
-    # "<" is the one character by which a name could leave a script
-    environment.filters["script"] = lambda x: jinja2.utils.markupsafe.Markup(
-        json.dumps(x).replace("<", "\\u003c")
-    )
+    environment.filters |= {"percent": _short, "script": _script, "json": _json}
+    several = len(policies) > 1
     return environment.get_template("report.html").render(
-        title="Can these policies be trusted?"
-        if len(sections) > 1
-        else "Can this policy be trusted?",
-        sections=sections,
-        class_models=class_models,
-        actions=ACTIONS,
-        names=truth.NAMES,
-        rule=explanations[0].numbers["verdict"]["rule"],
+        title="Can these policies be trusted?" if several else "Can this policy be trusted?",
+        parts=_parts(environment, policies),
+        policies=[policy.explanation for policy in policies],
     )
+
+
+def _parts(environment: jinja2.Environment, policies: Sequence[Policy]) -> list[dict[str, Any]]:
+    """Everything that is in the explanations, in the order of the page."""
+    known = find_parts()
+    parts = [
+        {"id": name, "title": part.title, "label": part.label, "html": html}
+        for name, part in known.items()
+        if (html := _part(environment.get_template(f"sections/{name}.html"), part, policies))
+    ]
+    others = [(p.explanation, _others(p.explanation, known.values())) for p in policies]
+    if any(keys for _, keys in others):
+        html = Markup(environment.get_template("others.html").render(others=others))
+        parts.append({"id": "others", "title": "Other numbers", "label": "Others", "html": html})
+    return parts
+
+
+def _others(explanation: Explanation, parts: Iterable[Part]) -> list[str]:
+    """Entries that no part shows, such as those of a newer version."""
+    shown = FRAME.union(*(part.needs for part in parts if part.fits(explanation)))
+    return sorted(explanation.numbers.keys() - shown)
+
+
+def _part(template: jinja2.Template, part: Part, policies: Sequence[Policy]) -> Markup | None:
+    """One part with all policies that have it; None where none has."""
+    fitting = [policy for policy in policies if part.fits(policy.explanation)]
+    if not fitting:
+        return None
+    together = part.compare([policy.explanation for policy in fitting])
+    shared = _save(together, fitting[0].folder, "")
+    return Markup(template.render(policies=[p.show(part) for p in fitting], shared=shared))
+
+
+def _save(drawn: Drawn, folder: Path, prefix: str) -> Mapping[str, str]:
+    return {name: save_drawn(one, folder / f"{prefix}{name}") for name, one in drawn.items()}
 
 
 def _short(share: float) -> str:
@@ -108,22 +125,10 @@ def _short(share: float) -> str:
     return percent(share).replace("less than ", "<").replace("more than ", ">")
 
 
-def _save(picture: Image.Image | Figure, path: Path | None) -> str:
-    """Saves a PNG (unless `path` is None) and returns it as a data URI."""
-    buffer = io.BytesIO()
-    if isinstance(picture, Figure):
-        picture.savefig(buffer, format="png", dpi=90, metadata={"Software": None})
-        plt.close(picture)
-    else:
-        picture.save(buffer, "png", optimize=True)
-    if path is not None:
-        path.with_name(path.name + ".png").write_bytes(buffer.getvalue())
-    return _uri(buffer.getvalue(), "image/png")
+def _json(value: Any) -> str:
+    return json.dumps(value, indent=1)
 
 
-def _uri(content: bytes, kind: str) -> str:
-    return f"data:{kind};base64,{base64.b64encode(content).decode()}"
-
-
-def _slug(name: str) -> str:
-    return re.sub(r"[^A-Za-z0-9_-]+", "_", name).strip("_")[-60:] or "policy"
+def _script(value: Any) -> Markup:
+    """Plain values within a script: "<" is the one character by which a name could leave it."""
+    return Markup(json.dumps(value).replace("<", "\\u003c"))

@@ -1,6 +1,6 @@
 """Pictures made of the policy's own frames: tinted, heated, in rows, with the indicator."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib import colormaps
@@ -9,6 +9,8 @@ from PIL import Image, ImageDraw, ImageFont
 
 TINTS = {0: (214, 39, 40), 1: (44, 160, 44), 2: (31, 96, 200)}
 """Red forward, green left, blue right, as in Figs. 7 and 8."""
+LEFT_TO_RIGHT = (1, 0, 2)
+"""The order in which actions are shown: left, forward, right."""
 BACKGROUND, INK, MUTED, CHOSEN = (255, 255, 255), (30, 32, 36), (150, 156, 166), (214, 39, 40)
 SCALE = 5
 """Screen pixels to one of the policy's in a single picture."""
@@ -86,6 +88,19 @@ def explained_frame(
     plain, hot = enlarge(frame), enlarge(heated(frame, heat))
     bars = indicator(probabilities, chosen, plain.width)
     return stacked([titled(plain, captions[0]), titled(hot, captions[1]), bars])
+
+
+def probed_frame(data: Mapping[str, NDArray], frame: int, caption: str) -> Image.Image:
+    """A frame of the data set under a caption, with what the policy made of it.
+
+    Args:
+        data: With "frames" (T, H, W, 3), "actions" (T,) and "probabilities" (T, num_actions).
+        frame: Which of the T.
+        caption: Over the picture.
+    """
+    plain = titled(enlarge(data["frames"][frame]), caption)
+    bars = indicator(data["probabilities"][frame], int(data["actions"][frame]), plain.width)
+    return stacked([plain, bars])
 
 
 def enlarge(frame: NDArray, scale: int = SCALE) -> Image.Image:

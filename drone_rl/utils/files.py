@@ -5,6 +5,7 @@ import errno
 import fcntl
 import json
 import os
+import re
 import stat
 import time
 from collections.abc import Iterator
@@ -110,6 +111,11 @@ def refuse_links(folder: Path, depth: int = 3) -> None:
             )
         if depth > 1 and entry.is_dir(follow_symlinks=False):
             refuse_links(Path(entry.path), depth - 1)
+
+
+def to_file_name(name: str) -> str:
+    """A name that people gave, such as a path, as the name of one file on any system."""
+    return re.sub(r"[^A-Za-z0-9_-]+", "_", name).strip("_")[-60:] or "policy"
 
 
 def write_atomically(path: Path, content: str | bytes) -> None:

@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from drone_rl.explain.explanation import explain_policy
-from drone_rl.explain.sections import SECTIONS
+from drone_rl.explain.sections import find_sections
 from drone_rl.explain.settings import ExplainSettings
 from drone_rl.policies import MLP
 from drone_rl.utils.errors import InputError
@@ -20,11 +20,11 @@ def explain(env, network, folder, settings=SMALL, **kwargs):
 
 @pytest.mark.slow
 def test_everything_is_written_and_the_order_of_sections_changes_nothing(make_pipeline, tmp_path):
-    contents = []
-    for name, order in (("a", list(SECTIONS)), ("b", list(SECTIONS)[::-1])):
+    contents, found = [], find_sections()
+    for name, order in (("a", list(found)), ("b", list(found)[::-1])):
         env, actor = make_pipeline(num_envs=4, seed=2)
         network = actor.module[0].module
-        sections = {title: SECTIONS[title] for title in order}
+        sections = {title: found[title] for title in order}
         explain(env, network, tmp_path / name, sections=sections)
         numbers = json.loads((tmp_path / name / "explanation.json").read_text())
         del numbers["seconds"]

@@ -177,7 +177,7 @@ def test_perplexity_that_does_not_fit_is_refused(clusters):
 
 
 def test_every_thumbnail_has_a_cell_of_its_own(embedding):
-    cells = tsne.lay_out(embedding.points, columns=16, rows=10)
+    cells = tsne.snap_to_grid(embedding.points, columns=16, rows=10)
     assert len(np.unique(cells, axis=0)) == 120
-    corner = tsne.lay_out(np.array([[0.0, 0.0], [1.0, 1.0]]), columns=3, rows=2)
+    corner = tsne.snap_to_grid(np.array([[0.0, 0.0], [1.0, 1.0]]), columns=3, rows=2)
     assert corner.tolist() == [[0, 0], [2, 1]]

@@ -2,10 +2,12 @@ import csv
 import html
 import json
 import re
+import shutil
 
 import pytest
 
 from drone_rl.report import write_report
+from drone_rl.report.part import find_parts
 from drone_rl.utils.errors import InputError
 from tests.report.conftest import NASTY
 
@@ -13,6 +15,21 @@ from tests.report.conftest import NASTY
 @pytest.fixture(scope="session")
 def report(explanations, tmp_path_factory):
     return write_report(explanations, tmp_path_factory.mktemp("report"))
+
+
+@pytest.fixture
+def changed(explanations, tmp_path):
+    """Copies an explanation with entries added or (None) taken away."""
+
+    def build(**entries):
+        folder = tmp_path / "changed"
+        shutil.copytree(explanations[1], folder)
+        numbers = json.loads((folder / "explanation.json").read_text()) | entries
+        kept = {key: value for key, value in numbers.items() if value is not None}
+        (folder / "explanation.json").write_text(json.dumps(kept))
+        return folder
+
+    return build
 
 
 def test_one_file_that_asks_for_nothing(report):
@@ -29,12 +46,13 @@ def test_names_and_paths_are_escaped(report):
     assert page.count("</script>") == 1
 
 
-def test_summary_and_verdict_come_first(report):
+def test_every_part_is_there_in_order_with_a_link_to_it(report):
     page = report.read_text()
-    order = ["summary", "tsne", "flaws", "class-models", "attribution", "truth", "response"]
-    found = [page.index(f'<section id="{name}">') for name in [*order, "asymmetry", "provenance"]]
-    assert found == sorted(found)
-    assert page.index("of the cubes") < found[1]
+    order = [*find_parts(), "provenance"]
+    assert re.findall(r'<section id="([^"]+)">', page) == order
+    assert re.findall(r'<a href="#([^"]+)">', page) == order
+    assert order[0] == "evaluation"
+    assert page.index("of the cubes") < page.index('<section id="dataset">')
 
 
 def test_figures_are_saved_with_their_numbers(report):
@@ -48,6 +66,26 @@ def test_figures_are_saved_with_their_numbers(report):
     assert total == pytest.approx(1, abs=1e-3)
     assert "trusted" in json.loads((figures / "1_second_truth.json").read_text())
     assert (figures / "1_second_episode.mp4").stat().st_size > 0
+
+
+def test_what_is_missing_is_left_out(changed, tmp_path):
+    gone = ("tsne", "truth", "attribution", "response", "class_model", "contradictions")
+    page = write_report([changed(**dict.fromkeys(gone))], tmp_path).read_text()
+    shown = ["evaluation", "dataset", "asymmetry", "provenance"]
+    assert re.findall(r'<section id="([^"]+)">', page) == [*shown[:3], "others", shown[3]]
+    assert "<summary>loops</summary>" in page  # half of a part that needs contradictions, too
+
+
+def test_what_no_part_shows_is_laid_out_plainly_and_names_no_file(changed, tmp_path):
+    parts = ("verdict", "tsne", "truth", "attribution", "response", "class_model", "loops")
+    key = "../../<b>tides"
+    folder = changed(**dict.fromkeys(parts), contradictions=None, **{key: {"height": 3.25}})
+    page = write_report([folder], tmp_path / "x" / "y").read_text()
+    assert "<b>tides" not in page
+    assert html.escape(key) in page and "&#34;height&#34;: 3.25" in page
+    written = {path.name for path in (tmp_path / "x" / "y").rglob("*") if path.is_file()}
+    stems = {name.rpartition(".")[0] for name in written}
+    assert stems == {"report", "0_second_dataset", "0_second_asymmetry"}
 
 
 def test_a_damaged_explanation_is_refused(tmp_path):

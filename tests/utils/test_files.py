@@ -14,6 +14,7 @@ from drone_rl.utils.files import (
     read_bytes,
     read_json,
     refuse_links,
+    to_file_name,
     write_atomically,
 )
 
@@ -125,3 +126,16 @@ def test_a_folder_with_a_link_in_it_is_refused(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(InputError, match="pipe is a link or a device"):
         refuse_links(tmp_path, depth=1)
+
+
+@pytest.mark.parametrize(
+    ("name", "file_name"),
+    [
+        ("outputs/train/run 3", "outputs_train_run_3"),
+        ("../..", "policy"),
+        ("a" * 70 + "/b", "a" * 58 + "_b"),
+        ("good-1_x", "good-1_x"),
+    ],
+)
+def test_a_name_becomes_that_of_one_file(name, file_name):
+    assert to_file_name(name) == file_name

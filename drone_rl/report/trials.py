@@ -1,15 +1,11 @@
-"""Charts of an explanation's numbers."""
+"""Charts of the tests that heat maps are put to, and of where the heat lies."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
-from drone_rl.report.explanation import ACTIONS, Explanation
+from drone_rl.report.explanation import Explanation
 from drone_rl.words.truth import NAMES
 
 _METHOD, _PLACEBO = "#4269d0", "#b4b8c0"
@@ -18,9 +14,8 @@ _METHOD, _PLACEBO = "#4269d0", "#b4b8c0"
 def truth_chart(explanation: Explanation) -> Figure:
     """Methods beside placebos: what they score, and the tests that a method must pass."""
     truth = explanation.numbers["truth"]
-    figure, axes = plt.subplots(
-        1, 4, figsize=(17, 4.6), layout="constrained", width_ratios=(2, 1.3, 1.3, 1.3)
-    )
+    figure = Figure(figsize=(17, 4.6), layout="constrained")
+    axes = figure.subplots(1, 4, width_ratios=(2, 1.3, 1.3, 1.3))
     _scores(axes[0], truth)
     _test(axes[1], truth, _hardest, 0.0, "score above its strongest placebo\n(must be above 0)")
     _test(axes[2], truth, lambda m: m.get("pointing"), 0.0, "hits above chance\n(must be above 0)")
@@ -38,72 +33,16 @@ def truth_chart(explanation: Explanation) -> Figure:
 
 def heat_chart(explanation: Explanation) -> Figure:
     """Where the heat of each method lies."""
-    figure, axis = plt.subplots(figsize=(9, 3.2), layout="constrained")
-    _heat(axis, explanation.numbers["truth"]["heat"])
+    figure = Figure(figsize=(9, 3.2), layout="constrained")
+    _heat(figure.subplots(), explanation.numbers["truth"]["heat"])
     return figure
-
-
-def response_chart(explanation: Explanation) -> Figure:
-    """Probability of each action by where the cube stands, the chosen action, what comes of it.
-
-    A row for each height at which cubes stand, the highest on top.
-    """
-    arrays = explanation.arrays
-    heights = arrays["response_height"]
-    figure, axes = plt.subplots(
-        len(heights), 5, figsize=(16, 3.9 * len(heights)), layout="constrained", squeeze=False,
-        sharex=True, sharey=True,
-    )  # fmt: skip
-    for layer, row in zip(range(len(heights)), axes[::-1], strict=True):
-        image = _response_row(row, arrays, layer)
-        level = f", cube {heights[layer]:+g} m" if len(heights) > 1 else ""
-        row[0].set_ylabel(f"metres ahead{level}")
-    figure.colorbar(image, ax=axes[:, :3], shrink=0.8, label="probability")
-    for axis in axes[-1]:
-        axis.set_xlabel("metres to the left (+) or right (-)", fontsize=9)
-    for axis, labels in ((axes[-1, 3], (_SHADES, ACTIONS)), (axes[-1, 4], _OUTCOMES)):
-        handles = [matplotlib.patches.Patch(color=c, label=n) for c, n in zip(*labels, strict=True)]
-        axis.legend(
-            handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3, fontsize=8,
-            frameon=False,
-        )  # fmt: skip
-    return figure
-
-
-_SHADES = ("#d62728", "#2ca02c", "#1f60c8")
-_OUTCOMES = (("#d9d9de", "#4269d0"), ("cube missed", "cube collected"))
-
-
-def _response_row(
-    axes: Sequence[plt.Axes], arrays: dict[str, NDArray], layer: int
-) -> matplotlib.image.AxesImage:
-    """The five maps of one height; returns one of the probabilities."""
-    forward, lateral = arrays["response_forward"], arrays["response_lateral"]
-    probabilities = arrays["response_probabilities"][layer]
-    extent = (lateral[0], lateral[-1], forward[0], forward[-1])
-    style = {"extent": extent, "origin": "lower", "aspect": "auto", "interpolation": "nearest"}
-    for axis, action in zip(axes, (1, 0, 2), strict=False):
-        image = axis.imshow(probabilities[..., action], vmin=0, vmax=1, cmap="viridis", **style)
-        axis.set_title(f"P({ACTIONS[action]})")
-    shades = matplotlib.colors.ListedColormap(_SHADES)
-    axes[3].imshow(probabilities.argmax(-1), vmin=0, vmax=2, cmap=shades, **style)
-    axes[3].set_title("most probable action\n(in the white line: blind)", fontsize=10)
-    blind = arrays["response_blind"][layer]
-    if blind.any():
-        axes[3].contour(
-            lateral, forward, blind.astype(float), levels=[0.5], colors="white", linewidths=2.5
-        )
-    ends = matplotlib.colors.ListedColormap(_OUTCOMES[0])
-    axes[4].imshow(arrays["outcome_collected"][layer], vmin=0, vmax=1, cmap=ends, **style)
-    axes[4].set_title("what comes of it", fontsize=10)
-    return image
 
 
 def _name(method: str) -> str:
     return NAMES.get(method, method)
 
 
-def _scores(axis: plt.Axes, truth: dict) -> None:
+def _scores(axis: Axes, truth: dict) -> None:
     placebos = sorted(truth["placebos"].items(), key=lambda item: -(item[1]["mean"] or 0.0))
     rows = [(_name(n), m["score"], _METHOD) for n, m in truth["methods"].items()]
     rows += [(f"placebo: {n}", score, _PLACEBO) for n, score in placebos]
@@ -127,7 +66,7 @@ def _hardest(method: dict) -> dict | None:
 
 
 def _test(
-    axis: plt.Axes, truth: dict, of: Callable[[dict], dict | None], bar: float, title: str
+    axis: Axes, truth: dict, of: Callable[[dict], dict | None], bar: float, title: str
 ) -> None:
     names = list(truth["methods"])[::-1]
     for y, name in enumerate(names):
@@ -148,7 +87,7 @@ def _test(
     axis.set_title(title, fontsize=11)
 
 
-def _heat(axis: plt.Axes, heat: dict) -> None:
+def _heat(axis: Axes, heat: dict) -> None:
     regions = list(next(iter(heat.values())))
     shades = ("#d62728", "#ff9896", "#222222", "#8c9a7b", "#9ecae9")
     rows = [*heat, None]

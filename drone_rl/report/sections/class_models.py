@@ -1,0 +1,37 @@
+"""The picture that each action is waiting for (Figs. 10 to 12)."""
+
+from collections.abc import Sequence
+
+from PIL import Image
+
+from drone_rl.report import pictures
+from drone_rl.report.explanation import ACTIONS, Explanation
+from drone_rl.report.part import Part
+from drone_rl.words.report import CLASS_MODEL
+
+
+def grid(explanations: Sequence[Explanation]) -> Image.Image:
+    """Actions across, policies and objectives down, the probability reached over each picture."""
+    tiles = []
+    for explanation in explanations:
+        who = f"{explanation.name[:18]}: " if len(explanations) > 1 else ""
+        statistics = explanation.numbers["class_model"]["statistics"]
+        for objective in ("probability", "logit"):
+            reached = explanation.numbers["class_model"][objective]["probabilities"]
+            shown = explanation.arrays[f"class_model_{objective}"]
+            for action in pictures.LEFT_TO_RIGHT:
+                gray = pictures.gray_picture(shown[action], statistics["low"], statistics["high"])
+                caption = f"{who}{ACTIONS[action]} {reached[action]:.3f} (by {objective})"
+                tiles.append(pictures.titled(pictures.enlarge(gray), caption))
+    return pictures.gridded(tiles, 3)
+
+
+PART = Part(
+    title="The picture that each action is waiting for (class models)",
+    label="Class models",
+    place=50,
+    needs=("class_model",),
+    words={"class_model": CLASS_MODEL},
+    draw=lambda explanation: {"class_model": grid([explanation])},
+    compare=lambda explanations: {"class_models": grid(explanations)},
+)

@@ -1,0 +1,19 @@
+"""The verdict, the flights it rests on, and how the policy fails."""
+
+from drone_rl.report.part import Part
+from drone_rl.words.advice import ADVICE, SCOPE
+from drone_rl.words.truth import NAMES
+
+PART = Part(
+    title="Verdict",
+    label="Verdict",
+    place=10,
+    needs=("verdict",),
+    words={"advice": ADVICE, "scope": SCOPE},
+    extras=lambda explanation: {"trusted": _trusted(explanation.numbers.get("truth"))},
+)
+
+
+def _trusted(truth: dict | None) -> str:
+    """The heat map to trust, as people call it."""
+    return NAMES.get(truth["trusted"], "none") if truth else "none was tested"

@@ -1,0 +1,105 @@
+"""What it does about one cube, wherever that stands."""
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
+from matplotlib.patches import Patch
+from numpy.typing import NDArray
+
+from drone_rl.report import pictures
+from drone_rl.report.explanation import ACTIONS, Explanation
+from drone_rl.report.part import Part, Rows
+from drone_rl.words.response import RESPONSE
+
+_SHADES = ("#d62728", "#2ca02c", "#1f60c8")
+_OUTCOMES = (("#d9d9de", "#4269d0"), ("cube missed", "cube collected"))
+
+
+def response_chart(explanation: Explanation) -> Figure:
+    """Probability of each action by where the cube stands, the chosen action, what comes of it.
+
+    A row for each height at which cubes stand, the highest on top.
+    """
+    arrays = explanation.arrays
+    heights = arrays["response_height"]
+    figure = Figure(figsize=(16, 3.9 * len(heights)), layout="constrained")
+    axes = figure.subplots(len(heights), 5, squeeze=False, sharex=True, sharey=True)
+    image = None
+    for layer, row in zip(range(len(heights)), axes[::-1], strict=True):
+        image = _row(row, arrays, layer)
+        level = f", cube {heights[layer]:+g} m" if len(heights) > 1 else ""
+        row[0].set_ylabel(f"metres ahead{level}")
+    figure.colorbar(image, ax=axes[:, :3], shrink=0.8, label="probability")
+    for axis in axes[-1]:
+        axis.set_xlabel("metres to the left (+) or right (-)", fontsize=9)
+    for axis, labels in ((axes[-1, 3], (_SHADES, ACTIONS)), (axes[-1, 4], _OUTCOMES)):
+        handles = [Patch(color=c, label=n) for c, n in zip(*labels, strict=True)]
+        axis.legend(
+            handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3, fontsize=8,
+            frameon=False,
+        )  # fmt: skip
+    return figure
+
+
+def _row(axes: Sequence[Axes], arrays: dict[str, NDArray], layer: int) -> AxesImage:
+    """The five maps of one height; returns one of the probabilities."""
+    forward, lateral = arrays["response_forward"], arrays["response_lateral"]
+    probabilities = arrays["response_probabilities"][layer]
+    extent = (lateral[0], lateral[-1], forward[0], forward[-1])
+    style: dict[str, Any] = {
+        "extent": extent, "origin": "lower", "aspect": "auto", "interpolation": "nearest",
+    }  # fmt: skip
+    for axis, action in zip(axes, pictures.LEFT_TO_RIGHT, strict=False):
+        image = axis.imshow(probabilities[..., action], vmin=0, vmax=1, cmap="viridis", **style)
+        axis.set_title(f"P({ACTIONS[action]})")
+    axes[3].imshow(probabilities.argmax(-1), vmin=0, vmax=2, cmap=ListedColormap(_SHADES), **style)
+    axes[3].set_title("most probable action\n(in the white line: blind)", fontsize=10)
+    blind = arrays["response_blind"][layer]
+    if blind.any():
+        axes[3].contour(
+            lateral, forward, blind.astype(float), levels=[0.5], colors="white", linewidths=2.5
+        )
+    ends = ListedColormap(_OUTCOMES[0])
+    axes[4].imshow(arrays["outcome_collected"][layer], vmin=0, vmax=1, cmap=ends, **style)
+    axes[4].set_title("what comes of it", fontsize=10)
+    return image
+
+
+def tables(explanation: Explanation) -> dict[str, Rows]:
+    """What it does, and what comes of it, at each place."""
+    arrays = explanation.arrays
+    place = ["metres_up", "metres_ahead", "metres_left"]
+    does: list[list[Any]] = [[*place, *(f"p_{a}" for a in ACTIONS), "needed", "blind"]]
+    for at, where in _grid(arrays, "response"):
+        shares = arrays["response_probabilities"][at].round(5).tolist()
+        needed = ACTIONS[int(arrays["response_oracle"][at[-1]])]
+        does.append([*where, *shares, needed, int(arrays["response_blind"][at])])
+    comes: list[list[Any]] = [[*place, "collected"]]
+    for at, where in _grid(arrays, "outcome"):
+        comes.append([*where, int(arrays["outcome_collected"][at])])
+    return {"response": does, "outcomes": comes}
+
+
+def _grid(
+    arrays: dict[str, NDArray], name: str
+) -> Iterator[tuple[tuple[int, ...], tuple[float, ...]]]:
+    """Every index of a map with its place in metres: up, ahead, to the left."""
+    axes = [arrays[f"{name}_{axis}"] for axis in ("height", "forward", "lateral")]
+    for at in np.ndindex(*(len(axis) for axis in axes)):
+        yield at, tuple(round(float(axis[i]), 3) for axis, i in zip(axes, at, strict=True))
+
+
+PART = Part(
+    title="What it does about a cube, wherever that stands",
+    label="Response map",
+    place=80,
+    needs=("response",),
+    words={"response": RESPONSE},
+    draw=lambda explanation: {"response": response_chart(explanation)},
+    tables=tables,
+)
