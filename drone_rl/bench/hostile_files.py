@@ -43,7 +43,7 @@ DESCRIPTION: dict[str, Any] = {
     "network": {"name": "small_cnn", "patch": 4, "channels": [2], "hidden": []},
 }
 """A policy that would be accepted."""
-_PROGRESS = {"frames": 1, "episodes": 1, "updates": 1, "seconds": 1.0, "running_cubes": 0.5}
+_PROGRESS = {"frames": 1, "episodes": 1, "updates": 1, "seconds": 1.0, "running_reward": 0.5}
 _ORIGIN = {"versions": {"torch": "2"}, "git_revision": None}
 ABOUT = {
     "progress": _PROGRESS,

@@ -169,9 +169,9 @@ def _command() -> list[str]:
 
 
 def _job_return(run: Run) -> JobReturn:
-    """What a sweeper gets to see of a run: the running mean of cubes, or None if it failed."""
+    """What a sweeper gets to see of a run: the running mean of rewards, or None if it failed."""
     result = read_result(run.folder)
-    value = None if result is None else _number(result.get("running_cubes"))
+    value = None if result is None else _number(result.get("running_reward"))
     job = JobReturn(
         overrides=list(run.overrides), working_dir=str(run.folder), status=JobStatus.COMPLETED
     )
@@ -183,7 +183,7 @@ def _outcome(run: Run) -> str:
     result = read_result(run.folder)
     if result is None:
         return f"failed: {read_failure(run) or 'for a reason unknown'}"
-    return f"{result['reason']}, running cubes {_number(result.get('running_cubes'))}"
+    return f"{result['reason']}, running reward {_number(result.get('running_reward'))}"
 
 
 def _number(value: object) -> float | None:

@@ -20,6 +20,7 @@ from drone_rl.training import (
     LoggerCallback,
     NotANumberError,
     ProgressCallback,
+    ReinforceLearner,
     Trainer,
 )
 from drone_rl.utils.errors import InputError
@@ -54,7 +55,7 @@ def train(config: DictConfig, folder: Path) -> tuple[int, float]:
         folder: Of the run.
 
     Returns:
-        Exit status and the running mean of cubes.
+        Exit status and the running mean of rewards.
 
     Raises:
         InputError: A setting is unusable, or learning broke down.
@@ -83,7 +84,7 @@ def train(config: DictConfig, folder: Path) -> tuple[int, float]:
     status = 128 + signal.Signals[reason].value if reason.startswith("SIG") else 0
     if status:
         _log.info("go on with: drone-rl train resume=%s", folder)
-    return status, trainer.progress.running_cubes
+    return status, trainer.progress.running_reward
 
 
 def _build(
@@ -110,11 +111,15 @@ def _build(
     searching = [] if config.trial is None else [PruneCallback(folder.parent, config.trial)]
     trainer = Trainer(
         collector=collector,
-        network=network,
-        estimator=instantiate(config.returns).to(config.device),
-        loss=instantiate(config.objective)(collector.actor).to(config.device),
-        optimiser=optimiser,
-        scheduler=instantiate(config.scheduler)(optimiser),
+        learner=ReinforceLearner(
+            network=network,
+            estimator=instantiate(config.returns).to(config.device),
+            loss=instantiate(config.objective)(collector.actor).to(config.device),
+            optimiser=optimiser,
+            scheduler=instantiate(config.scheduler)(optimiser),
+            max_grad_norm=settings.pop("max_grad_norm"),
+            minibatch_frames=settings.pop("minibatch_frames"),
+        ),
         callbacks=[
             CsvCallback(folder / "metrics.csv"),
             LoggerCallback(loggers),

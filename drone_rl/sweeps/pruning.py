@@ -32,6 +32,6 @@ class PruneCallback(Callback):
         if step == 0 or step in self._reported:
             return
         self._reported.add(step)
-        self._trial.report(trainer.progress.running_cubes, step)
+        self._trial.report(trainer.progress.running_reward, step)
         if self._prunes and self._trial.should_prune():
             trainer.stop_request = "pruned"

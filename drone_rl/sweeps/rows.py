@@ -14,6 +14,7 @@ from drone_rl.sweeps.manifest import Sweep
 from drone_rl.sweeps.runs import Run, read_failure, read_result
 from drone_rl.sweeps.statistics import Array
 from drone_rl.utils.files import read_bytes
+from drone_rl.utils.former_names import with_present_names
 from drone_rl.verdicts.kinds import Kind
 from drone_rl.verdicts.rule import SIDES, Rule
 
@@ -87,7 +88,7 @@ class Row:
     @property
     def final_share(self) -> float:
         """The running mean at the end, as a share of the task's cubes; nothing if it failed."""
-        return self.result["running_cubes"] / self.result["num_cubes"] if self.result else 0.0
+        return self.result["running_reward"] / self.result["num_cubes"] if self.result else 0.0
 
     def share(self, of: str) -> float | None:
         """Of the cubes "all", "left", "ahead" or "right", what its greedy policy collects.
@@ -108,7 +109,7 @@ class Row:
             "certain": self.is_certain if judged else None,
             **{key: self.result.get(key) for key in ("reason", "frames", "episodes")},
             "seconds": round(self.result["seconds"], 1) if self.result else None,
-            "running_cubes": self.result.get("running_cubes"),
+            "running_reward": self.result.get("running_reward"),
             "success": verdict["greedy"]["success"]["share"] if verdict else None,
             "share": self.share("all"),
             **{k: NOT_OFFERED if judged and v is None else v for k, v in sides.items()},
@@ -161,7 +162,7 @@ def _read_row(run: Run, choice: dict[str, str]) -> Row:
 
 
 def _check_result(result: dict[str, Any]) -> None:
-    for key in ("frames", "episodes", "seconds", "running_cubes", "num_cubes"):
+    for key in ("frames", "episodes", "seconds", "running_reward", "num_cubes"):
         _check_number(key, result[key])
     if result["num_cubes"] < 1:
         raise ValueError(f"num_cubes is {result['num_cubes']}")
@@ -192,9 +193,9 @@ def _read_metrics(
 ) -> tuple[tuple[Array, Array], tuple[float, float], float | None]:
     """The learning curve, frames and seconds until its end, and the entropy there."""
     text = read_bytes(folder / "metrics.csv", 2**26).decode()
-    rows = list(csv.DictReader(io.StringIO(text, newline="")))
+    rows = [with_present_names(row) for row in csv.DictReader(io.StringIO(text, newline=""))]
     frames = np.array([float(row["frames"]) for row in rows])
-    cubes = np.array([float(row["train/running_cubes"]) for row in rows])
+    rewards = np.array([float(row["train/running_reward"]) for row in rows])
     had = (float(rows[-1]["frames"]), float(rows[-1].get("seconds") or 0)) if rows else (0.0, 0.0)
     last = [float(row["loss/entropy"]) for row in rows[-LAST_UPDATES:] if row.get("loss/entropy")]
-    return (frames, cubes / num_cubes), had, float(np.mean(last)) if last else None
+    return (frames, rewards / num_cubes), had, float(np.mean(last)) if last else None

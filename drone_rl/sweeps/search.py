@@ -70,7 +70,7 @@ def next_trials(study: Any, space: Mapping[str, Any], count: int, seed: int) -> 
 
 
 def tell(study: Any, number: int, result: Mapping[str, Any] | None) -> None:
-    """Notes what became of a trial: its running mean of cubes, that it was pruned or failed."""
+    """Notes what became of a trial: its running mean of rewards, that it was pruned or failed."""
     optuna = import_optuna()
     if study.trials[number].state != optuna.trial.TrialState.RUNNING:
         return
@@ -79,4 +79,4 @@ def tell(study: Any, number: int, result: Mapping[str, Any] | None) -> None:
     elif result["reason"] == "pruned":
         study.tell(number, state=optuna.trial.TrialState.PRUNED)
     else:
-        study.tell(number, float(result["running_cubes"]))
+        study.tell(number, float(result["running_reward"]))

@@ -8,16 +8,15 @@ import sys
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from torchrl.record.loggers import Logger
 from tqdm import tqdm
 
 from drone_rl.training.checkpoint import save_checkpoint
+from drone_rl.training.progress import Training
 from drone_rl.utils.errors import InputError
-
-if TYPE_CHECKING:
-    from drone_rl.training.trainer import Trainer
+from drone_rl.utils.former_names import FORMER_NAMES
 
 _log = logging.getLogger(__name__)
 
@@ -25,16 +24,16 @@ _log = logging.getLogger(__name__)
 class Callback:
     """Hooks of the training loop; override those of interest."""
 
-    def on_start(self, trainer: "Trainer") -> None:
+    def on_start(self, training: Training) -> None:
         """Before the first update of this process."""
 
-    def on_update(self, trainer: "Trainer", metrics: Mapping[str, float]) -> None:
+    def on_update(self, training: Training, metrics: Mapping[str, float]) -> None:
         """After each update."""
 
-    def on_end(self, trainer: "Trainer", reason: str) -> None:
+    def on_end(self, training: Training, reason: str) -> None:
         """After the last update, whyever it was the last."""
 
-    def on_failure(self, trainer: "Trainer") -> None:
+    def on_failure(self, training: Training) -> None:
         """When an update failed; the parameters are those before it."""
 
 
@@ -72,7 +71,7 @@ class CheckpointCallback(Callback):
         """The best checkpoint."""
         return self.folder / "best.pt"
 
-    def on_start(self, trainer: "Trainer") -> None:
+    def on_start(self, training: Training) -> None:
         """Makes sure, before any work is done, that there is a place to save to."""
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
@@ -82,23 +81,23 @@ class CheckpointCallback(Callback):
                 "choose another with hydra.run.dir=..."
             ) from error
         if not self.last_path.exists():
-            self._save(trainer)
+            self._save(training)
 
-    def on_update(self, trainer: "Trainer", metrics: Mapping[str, float]) -> None:
+    def on_update(self, training: Training, metrics: Mapping[str, float]) -> None:
         """Notes the best state of all updates; saves when the interval has passed."""
-        if trainer.progress.running_cubes > self.best:
-            self.best = trainer.progress.running_cubes
-            self._best_state = copy.deepcopy(trainer.state_dict())
+        if training.progress.running_reward > self.best:
+            self.best = training.progress.running_reward
+            self._best_state = copy.deepcopy(training.state_dict())
         if time.monotonic() - self._saved_at >= self.interval_s:
-            self._save(trainer)
+            self._save(training)
 
-    def on_end(self, trainer: "Trainer", reason: str) -> None:
+    def on_end(self, training: Training, reason: str) -> None:
         """Saves the final state."""
-        self._save(trainer)
+        self._save(training)
 
-    def _save(self, trainer: "Trainer") -> None:
+    def _save(self, training: Training) -> None:
         shared = {"best": self.best, **self.extra}
-        state = trainer.state_dict()
+        state = training.state_dict()
         save_checkpoint(self.last_path, {**state, **shared})
         if self._best_state is not None or not self.best_path.exists():
             save_checkpoint(self.best_path, {**(self._best_state or state), **shared})
@@ -113,22 +112,23 @@ class CsvCallback(Callback):
         """Sets the file."""
         self.path = Path(path)
 
-    def on_start(self, trainer: "Trainer") -> None:
+    def on_start(self, training: Training) -> None:
         """Keeps the rows up to the state that training goes on from."""
         if not self.path.exists():
             return
         with self.path.open(newline="") as file:
             rows = [r for r in csv.reader(file)]
         whole = [r for r in rows[1:] if len(r) == len(rows[0])]  # the last may be cut short
-        kept = rows[:1] + [r for r in whole if int(r[0]) <= trainer.progress.updates]
+        header = [[FORMER_NAMES.get(name, name) for name in row] for row in rows[:1]]
+        kept = header + [r for r in whole if int(r[0]) <= training.progress.updates]
         temporary = self.path.with_suffix(".tmp")
         with temporary.open("w", newline="") as file:
             csv.writer(file).writerows(kept)
         os.replace(temporary, self.path)
 
-    def on_update(self, trainer: "Trainer", metrics: Mapping[str, float]) -> None:
+    def on_update(self, training: Training, metrics: Mapping[str, float]) -> None:
         """Appends a row."""
-        progress = trainer.progress
+        progress = training.progress
         counters = {
             "update": progress.updates,
             "frames": progress.frames,
@@ -150,11 +150,11 @@ class LoggerCallback(Callback):
         """Sets the loggers."""
         self.loggers = list(loggers)
 
-    def on_update(self, trainer: "Trainer", metrics: Mapping[str, float]) -> None:
+    def on_update(self, training: Training, metrics: Mapping[str, float]) -> None:
         """Logs each metric."""
         for logger in self.loggers:
             for name, value in metrics.items():
-                logger.log_scalar(name, value, step=trainer.progress.frames)
+                logger.log_scalar(name, value, step=training.progress.frames)
 
 
 class ProgressCallback(Callback):
@@ -166,24 +166,24 @@ class ProgressCallback(Callback):
         self._bar: tqdm | None = None
         self._said_at = 0.0
 
-    def on_start(self, trainer: "Trainer") -> None:
+    def on_start(self, training: Training) -> None:
         """Opens the bar at the frames already done."""
         self._said_at = time.monotonic()
         if sys.stderr.isatty():
-            total, done = trainer.total_frames, trainer.progress.frames
+            total, done = training.total_frames, training.progress.frames
             self._bar = tqdm(total=total, initial=done, unit="frame", unit_scale=True)
 
-    def on_update(self, trainer: "Trainer", metrics: Mapping[str, float]) -> None:
+    def on_update(self, training: Training, metrics: Mapping[str, float]) -> None:
         """Moves the bar."""
-        progress = trainer.progress
-        text = f"episodes {progress.episodes}, running cubes {progress.running_cubes:.2f}"
+        progress = training.progress
+        text = f"episodes {progress.episodes}, running reward {progress.running_reward:.2f}"
         if self._bar is not None:
             self._bar.set_postfix_str(text, refresh=False)
             self._bar.update(progress.frames - self._bar.n)
         elif time.monotonic() - self._said_at >= self.interval_s:
             self._said_at = time.monotonic()
             rate = metrics["time/frames_per_second"]
-            left = max(0, trainer.total_frames - progress.frames) / rate
+            left = max(0, training.total_frames - progress.frames) / rate
             _log.info(
                 "frames %d, %s, %.0f frames/s, at most %.0f s left",
                 progress.frames,
@@ -192,20 +192,20 @@ class ProgressCallback(Callback):
                 left,
             )
 
-    def on_end(self, trainer: "Trainer", reason: str) -> None:
+    def on_end(self, training: Training, reason: str) -> None:
         """Closes the bar and says how it ended."""
         self._close()
-        progress = trainer.progress
+        progress = training.progress
         _log.info(
-            "stopped (%s) after %d frames, %d episodes, %.1f s: running cubes %.3f",
+            "stopped (%s) after %d frames, %d episodes, %.1f s: running reward %.3f",
             reason,
             progress.frames,
             progress.episodes,
             progress.seconds,
-            progress.running_cubes,
+            progress.running_reward,
         )
 
-    def on_failure(self, trainer: "Trainer") -> None:
+    def on_failure(self, training: Training) -> None:
         """Closes the bar."""
         self._close()
 

@@ -12,6 +12,7 @@ import torch
 from drone_rl.training.unpickling import MOST_BYTES, ForeignError, unpickle
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import read_bytes
+from drone_rl.utils.former_names import with_present_names
 from drone_rl.utils.schema import shown
 
 FORMAT = "drone_rl checkpoint"
@@ -82,4 +83,6 @@ def load_checkpoint(path: str | Path) -> dict[str, Any]:
             f"checkpoint {path} has format version {shown(version)}, this program reads "
             f"{' and '.join(map(str, READABLE))}; use the version of drone_rl that wrote it"
         )
+    if isinstance(state.get("progress"), Mapping):
+        state["progress"] = with_present_names(state["progress"])
     return state

@@ -1,15 +1,35 @@
-"""What a training says of itself: pure functions of batches of complete episodes."""
+"""What a training says of itself: pure functions of batches."""
 
 import torch
 from tensordict import TensorDictBase
 from torch import Tensor
 
+from drone_rl.utils.errors import InputError
+
 END_REASONS = ("all_cubes", "front_boundary", "side_boundary", "step_limit")
 
 
 def episode_rewards(batch: TensorDictBase) -> Tensor:
-    """Reward of each episode, in the batch's order. Shape: (num_episodes,)."""
-    ends = batch["next", "done"].flatten().nonzero()[:, 0]
+    """Reward of each episode that ends in a batch, in the batch's order. Shape: (num_episodes,).
+
+    Args:
+        batch: Rows of complete episodes; or pieces of fixed length with ("next",
+            "episode_reward"), which TorchRL's transform `RewardSum` writes, since the first part
+            of an episode may lie in an earlier batch. Shape: (*batch, T).
+
+    Raises:
+        InputError: An episode is not complete and its reward so far not known.
+    """
+    done = batch["next", "done"]
+    totals = batch.get(("next", "episode_reward"), None)
+    if totals is not None:
+        return totals[done].double()
+    if not bool(done[..., -1, :].all()):
+        raise InputError(
+            "a batch ends within an episode, whose reward is not known; collect complete episodes "
+            "or put TorchRL's RewardSum behind the environment"
+        )
+    ends = done.flatten().nonzero()[:, 0]
     cumulative = batch["next", "reward"].flatten().double().cumsum(0)[ends]
     return torch.diff(cumulative, prepend=cumulative.new_zeros(1))
 
@@ -22,16 +42,18 @@ def running_mean(old: float, values: Tensor, decay: float) -> float:
 
 
 def batch_metrics(batch: TensorDictBase) -> dict[str, float]:
-    """Means over the episodes of a batch, and the shares of the reasons why they ended."""
+    """Means over the episodes that end in a batch, and the shares of the reasons why.
+
+    NaN where none ends.
+    """
     rewards = episode_rewards(batch)
-    done = batch["next", "done"].flatten()
     metrics = {
-        "train/cubes": float(rewards.mean()),
-        "train/length": len(batch) / len(rewards),
+        "train/reward": float(rewards.mean()),
+        "train/length": batch.numel() / len(rewards) if len(rewards) else float("nan"),
     }
     reasons = batch.get(("next", "info", "end_reason"), None)
     if reasons is not None:
-        final = reasons.flatten()[done]
+        final = reasons[batch["next", "done"]]
         for i, name in enumerate(END_REASONS, start=1):
             metrics[f"end/{name}"] = float((final == i).float().mean())
     return metrics

@@ -13,6 +13,7 @@ from safetensors.torch import load, save_file
 from drone_rl.training import check_weights, load_checkpoint
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import parse_json, read_bytes
+from drone_rl.utils.former_names import with_present_names
 from drone_rl.utils.overrides import COMMAND
 from drone_rl.utils.schema import Kind, Maybe, Plain, Real, Record, Text, Whole, as_mapping, shown
 from drone_rl.zoo.card import write_card
@@ -29,7 +30,7 @@ _PROGRESS = Record(
         "episodes": _COUNT,
         "updates": _COUNT,
         "seconds": Real(0.0, 1e12),
-        "running_cubes": Real(-1e6, 1e6),
+        "running_reward": Real(-1e6, 1e6),
     }
 )
 
@@ -202,6 +203,8 @@ def _exported(content: bytes) -> dict[str, Any]:
             raise InputError(f"the weights {shown(name)} are not float32")
     is_old = "description" not in metadata
     about = dict(as_mapping(_inner(metadata, "about"), "about"))
+    if "progress" in about:
+        about["progress"] = with_present_names(as_mapping(about["progress"], "progress"))
     found = (
         describe(about.pop("config", None)) if is_old else parse(_inner(metadata, "description"))
     )

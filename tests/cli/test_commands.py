@@ -102,7 +102,7 @@ def test_killed_and_resumed_is_bit_for_bit_the_uninterrupted(tmp_path):
         load_checkpoint(tmp_path / name / "checkpoints" / "last.pt") for name in ("whole", "half")
     )
     assert all(torch.equal(one["policy"][k], two["policy"][k]) for k in one["policy"])
-    assert one["progress"]["running_cubes"] == two["progress"]["running_cubes"]
+    assert one["progress"]["running_reward"] == two["progress"]["running_reward"]
     rows = [metrics.read_text().splitlines() for metrics in tmp_path.glob("*/metrics.csv")]
     assert len(rows[0]) == len(rows[1])
 

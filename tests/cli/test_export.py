@@ -8,8 +8,8 @@ from drone_rl.cli.export import _origin
 from drone_rl.sweeps import Run, Sweep
 from drone_rl.verdicts.rule import Rule
 
-METRICS = "frames,train/running_cubes\n100,1.5\n"
-FIGURES = {"frames": 100, "episodes": 9, "seconds": 1.0, "running_cubes": 1.5, "num_cubes": 3}
+METRICS = "frames,train/running_reward\n100,1.5\n"
+FIGURES = {"frames": 100, "episodes": 9, "seconds": 1.0, "running_reward": 1.5, "num_cubes": 3}
 GREEDY = {
     "episodes": 200,
     "success": {"share": 0.5},

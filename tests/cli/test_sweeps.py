@@ -55,7 +55,7 @@ def test_a_killed_sweep_ends_as_one_that_never_was(sweep, tmp_path):
         load_checkpoint(folder / "checkpoints" / "last.pt") for folder in (run, tmp_path / "alone")
     )
     assert all(torch.equal(one["policy"][k], two["policy"][k]) for k in one["policy"])
-    assert one["progress"]["running_cubes"] == two["progress"]["running_cubes"]
+    assert one["progress"]["running_reward"] == two["progress"]["running_reward"]
     assert len((run / "metrics.csv").read_text().splitlines()) == len(
         (tmp_path / "alone" / "metrics.csv").read_text().splitlines()
     )

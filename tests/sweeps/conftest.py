@@ -20,7 +20,7 @@ with (folder / "starts").open("a") as file:
 time.sleep(float(arguments.get("sleep", 0)))
 if arguments.get("fail") == "true":
     sys.exit("error: fail=true is a mistake")
-(folder / "result.json").write_text(json.dumps({"reason": "solved", "running_cubes": 1.0}))
+(folder / "result.json").write_text(json.dumps({"reason": "solved", "running_reward": 1.0}))
 """
 
 
@@ -60,7 +60,7 @@ def _verdict(kind="good", left=1.0, ahead=1.0, right=1.0, *, whole=1.0, certain=
 
 
 CURVE = (
-    "update,frames,seconds,train/running_cubes,loss/entropy\n1,500,1,0.3,1.0\n2,1000,2,1.5,0.5\n"
+    "update,frames,seconds,train/running_reward,loss/entropy\n1,500,1,0.3,1.0\n2,1000,2,1.5,0.5\n"
 )
 
 
@@ -92,7 +92,7 @@ SOLVED = {
     "frames": 1000,
     "episodes": 10,
     "seconds": 2.0,
-    "running_cubes": 2.97,
+    "running_reward": 2.97,
     "num_cubes": 3,
 }
 LEFT_LOST = _verdict("one-sided (right)", left=0.0, whole=0.6, certain=False)

@@ -70,7 +70,7 @@ def test_a_run_that_another_process_works_on_is_waited_for(make_runs):
         thread.start()
         time.sleep(0.5)
         assert not statuses
-        result = {"reason": "solved", "running_cubes": 2.0}
+        result = {"reason": "solved", "running_reward": 2.0}
         (run.folder / "result.json").write_text(json.dumps(result))
     thread.join(10)
     assert statuses == [0]
@@ -81,7 +81,7 @@ def test_a_process_that_came_too_late_is_no_failure(make_runs):
     (run,) = make_runs("fail=true")
     process = RunProcess(run)
     assert process.poll() is None
-    result = {"reason": "solved", "running_cubes": 2.0}
+    result = {"reason": "solved", "running_reward": 2.0}
     (run.folder / "result.json").write_text(json.dumps(result))  # by an earlier sweep's process
     assert process.wait() == 0
     assert read_failure(run) is None

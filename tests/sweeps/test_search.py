@@ -33,7 +33,7 @@ def test_a_killed_search_goes_on_with_the_trials_it_had_begun(tmp_path):
     first = next_trials(begin(tmp_path), SPACE, 3, seed=0)
     study = begin(tmp_path)  # a new process
     assert params(next_trials(study, SPACE, 3, seed=0)) == params(first)
-    tell(study, 1, {"reason": "frames", "running_cubes": 2.0})
+    tell(study, 1, {"reason": "frames", "running_reward": 2.0})
     assert [t.number for t in next_trials(study, SPACE, 3, seed=0)] == [0, 1, 2]
 
 
@@ -43,7 +43,7 @@ def test_the_same_results_lead_to_the_same_questions(tmp_path):
         study = begin(tmp_path / name)
         for number in (0, 1):
             next_trials(study, SPACE, 1, seed=0)
-            tell(study, number, {"reason": "frames", "running_cubes": float(number)})
+            tell(study, number, {"reason": "frames", "running_reward": float(number)})
         asked.append(params(next_trials(study, SPACE, 2, seed=0)))
     assert asked[0] == asked[1]
 
@@ -51,8 +51,8 @@ def test_the_same_results_lead_to_the_same_questions(tmp_path):
 def test_what_became_of_a_run_is_told(tmp_path):
     study = begin(tmp_path)
     next_trials(study, SPACE, 3, seed=0)
-    tell(study, 0, {"reason": "solved", "running_cubes": 2.97})
-    tell(study, 1, {"reason": "pruned", "running_cubes": 0.1})
+    tell(study, 0, {"reason": "solved", "running_reward": 2.97})
+    tell(study, 1, {"reason": "pruned", "running_reward": 0.1})
     tell(study, 2, None)
     tell(study, 2, None)
     assert [t.state.name for t in study.trials] == ["COMPLETE", "PRUNED", "FAIL"]
@@ -66,13 +66,13 @@ def test_a_run_below_the_median_is_stopped(tmp_path, prune, reason):
     reasons = []
     for number, cubes in ((0, 2.0), (1, 0.5)):
         trainer = SimpleNamespace(
-            progress=SimpleNamespace(frames=0, running_cubes=cubes), stop_request=""
+            progress=SimpleNamespace(frames=0, running_reward=cubes), stop_request=""
         )
         callback = PruneCallback(tmp_path, number)
         for frames in (50, 120, 130, 250):
             trainer.progress.frames = frames
             callback.on_update(trainer, {})
         reasons.append(trainer.stop_request)
-        tell(study, number, {"reason": trainer.stop_request or "frames", "running_cubes": cubes})
+        tell(study, number, {"reason": trainer.stop_request or "frames", "running_reward": cubes})
     assert reasons == ["", reason]
     assert list(study.trials[0].intermediate_values) == [1, 2]

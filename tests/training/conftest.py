@@ -8,7 +8,7 @@ from torchrl.data import Categorical
 
 from drone_rl.objectives import ReinforceLoss, TimeBaseline
 from drone_rl.policies import make_actor
-from drone_rl.training import Trainer
+from drone_rl.training import ReinforceLearner, Trainer
 
 
 class Bandit:
@@ -18,6 +18,10 @@ class Bandit:
         self.actor, self.episodes = actor, episodes
         self.generator = torch.Generator().manual_seed(seed)
         self.is_open = True
+
+    def __iter__(self):
+        while True:
+            yield self.collect()
 
     @torch.no_grad()
     def collect(self):
@@ -43,7 +47,9 @@ class Bandit:
 
 @pytest.fixture
 def make_trainer():
-    def build(seed=0, **kwargs):
+    """Trainers of a REINFORCE learner; settings of the learner are among the arguments."""
+
+    def build(seed=0, *, max_grad_norm=None, minibatch_frames=512, **kwargs):
         network = nn.Linear(4, 2)
         nn.init.normal_(network.weight, generator=torch.Generator().manual_seed(seed))
         nn.init.zeros_(network.bias)
@@ -53,11 +59,15 @@ def make_trainer():
         settings = {"target": None, "total_frames": 200, **kwargs}
         return Trainer(
             collector=Bandit(actor, seed=seed),
-            network=network,
-            estimator=TimeBaseline(0.9, max_steps=4),
-            loss=ReinforceLoss(actor),
-            optimiser=optimiser,
-            scheduler=torch.optim.lr_scheduler.StepLR(optimiser, 2, 0.9),
+            learner=ReinforceLearner(
+                network=network,
+                estimator=TimeBaseline(0.9, max_steps=4),
+                loss=ReinforceLoss(actor),
+                optimiser=optimiser,
+                scheduler=torch.optim.lr_scheduler.StepLR(optimiser, 2, 0.9),
+                max_grad_norm=max_grad_norm,
+                minibatch_frames=minibatch_frames,
+            ),
             generators={"actions": actions},
             **settings,
         )

@@ -24,8 +24,8 @@ def test_newest_and_best_are_kept(make_trainer, tmp_path):
     trainer.run()
     last, best = (load_checkpoint(tmp_path / name) for name in ("last.pt", "best.pt"))
     assert last["progress"]["updates"] == trainer.progress.updates
-    assert best["progress"]["running_cubes"] >= last["progress"]["running_cubes"]
-    assert best["best"] == best["progress"]["running_cubes"]
+    assert best["progress"]["running_reward"] >= last["progress"]["running_reward"]
+    assert best["best"] == best["progress"]["running_reward"]
 
 
 def test_first_checkpoint_is_there_before_the_first_update(make_trainer, tmp_path):
@@ -45,8 +45,8 @@ def test_one_row_an_update(make_trainer, tmp_path):
     trainer.run()
     table = rows(tmp_path / "metrics.csv")
     assert [int(r["update"]) for r in table] == list(range(1, trainer.progress.updates + 1))
-    assert float(table[-1]["train/running_cubes"]) == pytest.approx(
-        trainer.progress.running_cubes, rel=1e-4
+    assert float(table[-1]["train/running_reward"]) == pytest.approx(
+        trainer.progress.running_reward, rel=1e-4
     )
 
 
@@ -64,15 +64,25 @@ def test_resumed_run_repeats_no_row_and_loses_none(make_trainer, tmp_path):
     assert updates == list(range(1, resumed.progress.updates + 1))
 
 
+def test_columns_of_an_older_run_are_named_anew(make_trainer, tmp_path):
+    path = tmp_path / "metrics.csv"
+    first = make_trainer(callbacks=[CsvCallback(path)], total_frames=100)
+    first.run()
+    present = path.read_text()
+    path.write_text(present.replace("running_reward", "running_cubes").replace("/reward", "/cubes"))
+    CsvCallback(path).on_start(first)
+    assert path.read_text().splitlines() == present.splitlines()
+
+
 def test_any_torchrl_logger(make_trainer, tmp_path):
     logger = CSVLogger("run", log_dir=str(tmp_path))
     make_trainer(callbacks=[LoggerCallback([logger])]).run()
-    assert list(tmp_path.glob("run/scalars/**/*cubes*.csv"))
+    assert list(tmp_path.glob("run/scalars/**/*reward*.csv"))
 
 
 def test_lines_instead_of_a_bar_where_there_is_no_terminal(make_trainer, caplog):
     caplog.set_level(logging.INFO)
     make_trainer(callbacks=[ProgressCallback(interval_s=0.0)]).run()
     lines = [r.getMessage() for r in caplog.records]
-    assert any("running cubes" in line and "frames/s" in line for line in lines)
+    assert any("running reward" in line and "frames/s" in line for line in lines)
     assert "stopped (frames)" in lines[-1]

@@ -6,6 +6,7 @@ from tensordict import TensorDict
 
 from drone_rl.sim.rules import EndReason
 from drone_rl.training.metrics import END_REASONS, batch_metrics, episode_rewards, running_mean
+from drone_rl.utils.errors import InputError
 
 
 def test_running_mean_by_hand():
@@ -25,7 +26,7 @@ def test_episode_rewards_and_batch_metrics_by_hand():
     )
     assert episode_rewards(batch).tolist() == [1.0, 1.0]
     assert batch_metrics(batch) == {
-        "train/cubes": 1.0,
+        "train/reward": 1.0,
         "train/length": 1.5,
         "end/all_cubes": 0.5,
         "end/front_boundary": 0.5,
@@ -36,6 +37,36 @@ def test_episode_rewards_and_batch_metrics_by_hand():
 
 def test_names_of_the_ends_are_those_of_the_rules():
     assert [EndReason[name.upper()].value for name in END_REASONS] == [1, 2, 3, 4]
+
+
+def test_pieces_of_episodes_by_their_sums_so_far():
+    """Two worlds, three steps: one episode began before, and one goes on after."""
+    batch = TensorDict(
+        {
+            "next": {
+                "reward": torch.tensor([[1.0, 0.0, 1.0], [0.0, 1.0, 0.0]])[..., None],
+                "episode_reward": torch.tensor([[3.0, 3.0, 1.0], [0.0, 1.0, 1.0]])[..., None],
+                "done": torch.tensor([[0, 1, 0], [0, 0, 1]]).bool()[..., None],
+                "info": {"end_reason": torch.tensor([[0, 3, 0], [0, 0, 4]])[..., None]},
+            }
+        },
+        [2, 3],
+    )
+    assert episode_rewards(batch).tolist() == [3.0, 1.0]
+    metrics = batch_metrics(batch)
+    assert (metrics["train/reward"], metrics["train/length"]) == (2.0, 3.0)
+    assert (metrics["end/side_boundary"], metrics["end/all_cubes"]) == (0.5, 0.0)
+    del batch["next", "episode_reward"]
+    with pytest.raises(InputError, match="RewardSum"):
+        episode_rewards(batch)
+
+
+def test_no_episode_ends():
+    batch = make_batch([[0.0, 1.0]])
+    batch["next", "episode_reward"] = batch["next", "reward"]
+    batch["next", "done"][:] = False
+    assert episode_rewards(batch).tolist() == []
+    assert all(value != value for value in batch_metrics(batch).values())  # NaN
 
 
 def make_batch(episodes):
@@ -56,7 +87,7 @@ def test_rewards_and_lengths_of_any_batch(episodes):
     assert episode_rewards(batch).tolist() == rewards
     metrics = batch_metrics(batch)
     assert metrics == {
-        "train/cubes": pytest.approx(sum(rewards) / len(rewards)),
+        "train/reward": pytest.approx(sum(rewards) / len(rewards)),
         "train/length": sum(len(e) for e in episodes) / len(episodes),
     }
 

@@ -31,7 +31,7 @@ WEIGHTS = {
     name: torch.arange(float(value.numel())).reshape(value.shape)
     for name, value in parse(DESCRIPTION).expected_weights().items()
 }
-PROGRESS = {"frames": 1234, "episodes": 9, "updates": 3, "seconds": 0.5, "running_cubes": 1.0}
+PROGRESS = {"frames": 1234, "episodes": 9, "updates": 3, "seconds": 0.5, "running_reward": 1.0}
 CHECKPOINT = {
     "policy": WEIGHTS,
     "config": {"paths": {"outputs": "/home/somebody"}},
@@ -98,6 +98,7 @@ def test_a_checkpoint_is_read_by_its_description_alone(tmp_path):
 @pytest.mark.parametrize("name", ["old_policy.safetensors", "old_checkpoint.pt"])
 def test_files_from_before_descriptions_are_translated(name):
     found = read_policy(DATA / name)
+    assert "running_reward" in found["progress"]
     assert found["description"]["task"]["num_cubes"] == 1
     assert found["description"]["camera"]["width"] == 32
     assert [t["name"] for t in found["description"]["transforms"]] == ["gray", "standardize"]

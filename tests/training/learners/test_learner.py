@@ -1,0 +1,144 @@
+"""A second learner fits: a critic, batches of fixed length and two passes over each."""
+
+import pytest
+import torch
+from tensordict import TensorDict
+from tensordict.nn import TensorDictModule
+from torch import nn
+from torchrl.collectors import Collector
+from torchrl.envs import RewardSum, TransformedEnv
+from torchrl.modules import ProbabilisticActor
+
+from drone_rl.envs.three_state import ThreeStateEnv
+from drone_rl.policies.actor import SeededCategorical
+from drone_rl.training import CheckpointCallback, NotANumberError, Trainer, load_checkpoint
+from drone_rl.training.learners import check_batch, check_finite
+from drone_rl.utils.errors import InputError
+
+GAMMA, PASSES = 0.9, 2
+
+
+class CriticLearner:
+    """One-step actor-critic that bootstraps where an episode goes on or was cut."""
+
+    in_keys = ("observation", "action", *(("next", k) for k in ("observation", "reward")))
+
+    def __init__(self, actor):
+        self.actor, self.critic = actor, nn.Linear(3, 1)
+        parameters = [*actor.parameters(), *self.critic.parameters()]
+        self.optimiser = torch.optim.Adam(parameters, lr=0.05)
+
+    def update(self, batch):
+        for _ in range(PASSES):
+            value = self.critic(batch["observation"])
+            following = self.critic(batch["next", "observation"]).detach()
+            goes_on = (~batch["next", "terminated"]).float()
+            error = batch["next", "reward"] + GAMMA * goes_on * following - value
+            log_prob = self.actor.get_dist(batch).log_prob(batch["action"])
+            losses = {
+                "actor": -(log_prob * error[..., 0].detach()).mean(),
+                "critic": error.square().mean(),
+            }
+            for name, loss in losses.items():
+                check_finite(loss, name)
+            self.optimiser.zero_grad()
+            sum(losses.values()).backward()
+            self.optimiser.step()
+        return {f"loss/{name}": float(loss.detach()) for name, loss in losses.items()}
+
+    def state_dict(self):
+        return {
+            "policy": self.actor.state_dict(),
+            "critic": self.critic.state_dict(),
+            "optimiser": self.optimiser.state_dict(),
+        }
+
+    def check_state(self, state):
+        pass
+
+    def load_state_dict(self, state):
+        self.actor.load_state_dict(state["policy"])
+        self.critic.load_state_dict(state["critic"])
+        self.optimiser.load_state_dict(state["optimiser"])
+
+
+def make_actor():
+    torch.manual_seed(0)
+    env = ThreeStateEnv(4)
+    return ProbabilisticActor(
+        TensorDictModule(nn.Linear(3, 2), in_keys=["observation"], out_keys=["logits"]),
+        in_keys=["logits"],
+        spec=env.action_spec,
+        distribution_class=SeededCategorical,
+    )
+
+
+@pytest.fixture
+def trainer(tmp_path):
+    """On TorchRL's own collector: 4 worlds, 5 steps of each a batch, episodes of up to 3."""
+    actor = make_actor()
+    collector = Collector(
+        TransformedEnv(ThreeStateEnv(4), RewardSum()), actor, frames_per_batch=20, total_frames=-1
+    )
+    yield Trainer(
+        collector=collector,
+        learner=CriticLearner(actor),
+        callbacks=[CheckpointCallback(tmp_path)],
+        target=None,
+        total_frames=4000,
+    )
+    collector.shutdown()
+
+
+def leaving(learner):
+    """Probability of the action that earns something, in state 0."""
+    start = TensorDict({"observation": torch.tensor([1.0, 0.0, 0.0])}, [])
+    return float(learner.actor.get_dist(start).probs[1])
+
+
+def test_a_critic_learns_from_pieces_of_episodes(trainer, tmp_path):
+    before = leaving(trainer.learner)
+    assert trainer.run() == "frames"
+    assert leaving(trainer.learner) > max(before, 0.9)
+    progress = trainer.progress
+    assert (progress.frames, progress.updates) == (4000, 200)
+    assert 4000 / 3 - 4 <= progress.episodes <= 4000
+    assert 0.5 < progress.running_reward < 0.95  # at best 0.75
+    state = load_checkpoint(tmp_path / "last.pt")
+    assert {"policy", "critic", "optimiser", "progress"} <= set(state)
+    again = CriticLearner(make_actor())
+    again.load_state_dict(state)
+    assert leaving(again) == leaving(trainer.learner)
+
+
+def test_training_ends_with_its_collector(trainer):
+    batches = [next(iter(trainer.collector)) for _ in range(2)]
+    trainer.collector = batches
+    trainer.collector = type("Two", (list,), {"state_dict": dict})(batches)
+    assert trainer.run() == "frames"
+    assert (trainer.progress.updates, trainer.progress.frames) == (2, 40)
+
+
+def test_batch_without_what_the_learner_needs(trainer):
+    batch = next(iter(trainer.collector))
+    check_batch(batch, trainer.learner)
+    del batch["next", "observation"]
+    message = r"no entry \('next', 'observation'\), which CriticLearner learns from"
+    with pytest.raises(InputError, match=message):
+        check_batch(batch, trainer.learner)
+
+
+def test_pieces_of_episodes_need_their_sums(trainer):
+    batch = next(iter(trainer.collector))
+    del batch["next", "episode_reward"]
+    trainer.collector = type("One", (list,), {"state_dict": dict})([batch])
+    batch["next", "done"][:, -1] = False
+    with pytest.raises(InputError, match="RewardSum"):
+        trainer.run()
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), -float("inf")])
+def test_no_number(value):
+    check_finite(torch.zeros(2), "loss")
+    with pytest.raises(NotANumberError, match=r"^loss is NaN or infinite$"):
+        check_finite(torch.tensor([0.0, value]), "loss")

@@ -1,0 +1,123 @@
+"""One step of the optimiser, whatever the size of a batch and of its chunks."""
+
+import copy
+
+import pytest
+import torch
+
+from drone_rl.training import NotANumberError
+from drone_rl.utils.errors import InputError
+
+
+@pytest.mark.parametrize("reduction", ["mean", "sum"])
+def test_minibatches_add_up_to_the_whole_batch(make_trainer, reduction):
+    gradients = []
+    for size in (10_000, 3):
+        trainer = make_trainer(minibatch_frames=size)
+        learner = trainer.learner
+        learner.loss.reduction = reduction
+        learner.optimiser.step = lambda: None
+        learner.update(trainer.collector.collect())
+        gradients.append(learner.network.weight.grad.clone())
+    torch.testing.assert_close(*gradients)
+
+
+@pytest.mark.parametrize("size", [1, 3, 7, 10_000])
+def test_every_frame_is_learned_from_once(make_trainer, size):
+    """The estimator sees whole episodes, the loss every frame of them once, in order."""
+    trainer = make_trainer(minibatch_frames=size)
+    learner, batch = trainer.learner, trainer.collector.collect()
+    estimated, learned = [], []
+
+    def spy(seen, function):
+        def call(*args):
+            found = function(*args)
+            seen.append(args[0]["pixels"].clone())
+            return found
+
+        return call
+
+    learner.estimator = spy(estimated, learner.estimator)
+    learner.loss.forward = spy(learned, learner.loss.forward)
+    learner.update(batch)
+    assert len(estimated) == 1 and torch.equal(estimated[0], batch["pixels"])
+    assert torch.equal(torch.cat(learned), batch["pixels"])
+    assert max(len(chunk) for chunk in learned) <= size
+
+
+@pytest.mark.parametrize("reduction", ["mean", "sum"])
+def test_loss_terms_add_up_over_minibatches(make_trainer, reduction):
+    terms = []
+    for size in (10_000, 3):
+        trainer = make_trainer(minibatch_frames=size)
+        trainer.learner.loss.reduction = reduction
+        terms.append(trainer.learner.update(trainer.collector.collect()))
+    assert terms[0] == pytest.approx(terms[1], rel=1e-4, abs=1e-6)
+    assert 0 < terms[0]["loss/entropy"] <= 0.6932
+
+
+def test_gradient_is_clipped_to_the_norm(make_trainer):
+    trainer = make_trainer(max_grad_norm=1e-3)
+    norm = trainer.learner.update(trainer.collector.collect())["loss/grad_norm"]
+    assert norm > 1e-3  # as it was before
+    clipped = torch.cat([p.grad.flatten() for p in trainer.learner.network.parameters()]).norm()
+    assert float(clipped) == pytest.approx(1e-3, rel=1e-3)
+
+
+def test_what_a_batch_must_hold(make_trainer):
+    """What the loss reads and the estimator does not write."""
+    wanted = {("next", "reward"), ("next", "done"), "action", "pixels"}
+    assert set(make_trainer().learner.in_keys) == wanted
+
+
+def test_a_step_by_hand(make_trainer):
+    """One frame, return 2: the gradient of -2 log p(a) is 2 (p - onehot(a)), and SGD follows it."""
+    learner = make_trainer().learner
+    learner.optimiser = torch.optim.SGD(learner.network.parameters(), lr=0.5)
+    learner.scheduler = None
+    frame = torch.tensor([[1.0, 0.0, 0.0, 0.0]])
+    before = learner.network.bias.detach().clone()
+    p = learner.network(frame).softmax(-1)[0].detach()
+    batch = make_trainer().collector.collect()[:1]
+    batch.update({"pixels": frame, "action": torch.tensor([1])})
+    batch["next"] = {"reward": torch.tensor([[2.0]]), "done": torch.tensor([[True]])}
+    metrics = learner.update(batch)
+    step = -0.5 * 2 * (p - torch.tensor([0.0, 1.0]))
+    torch.testing.assert_close(learner.network.bias.detach() - before, step)
+    assert metrics["loss/loss_actor"] == pytest.approx(float(-2 * p[1].log()))
+    assert metrics["train/learning_rate"] == 0.5
+
+
+def test_rate_told_is_that_of_the_next_step(make_trainer):
+    trainer = make_trainer()
+    rates = [
+        trainer.learner.update(trainer.collector.collect())["train/learning_rate"] for _ in range(4)
+    ]
+    assert rates == pytest.approx([0.05, 0.045, 0.045, 0.0405])
+
+
+def test_not_a_number_changes_nothing(make_trainer):
+    trainer = make_trainer()
+    learner, batch = trainer.learner, trainer.collector.collect()
+    before = copy.deepcopy(learner.network.state_dict())
+    batch["pixels"][3] = float("nan")
+    with pytest.raises(NotANumberError, match=r"^loss_actor is NaN or infinite$"):
+        learner.update(batch)
+    assert all(torch.equal(before[k], v) for k, v in learner.network.state_dict().items())
+    assert all(p.grad is None for p in learner.network.parameters())
+
+
+@pytest.mark.parametrize(
+    ("part", "value", "message"),
+    [
+        ("policy", {"weight": torch.zeros(2, 4)}, "policy has other names"),
+        ("estimator", {"baseline": torch.zeros(4), "seen": torch.zeros(4)}, r"estimator\.seen"),
+        ("optimiser", {}, "optimiser has other names"),
+        ("scheduler", None, "scheduler has other names"),
+    ],
+)
+def test_state_of_another_learner_is_refused(make_trainer, part, value, message):
+    learner = make_trainer().learner
+    with pytest.raises(InputError, match=message):
+        learner.check_state({**learner.state_dict(), part: value})
+    learner.check_state(learner.state_dict())
