@@ -6,7 +6,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: demo test check format bench mutants clean
+.PHONY: demo test check format bench readme keep stale count mutants clean
 
 $(STAMP): pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
@@ -32,8 +32,17 @@ format: $(STAMP)
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
+# Goes on where it stopped; `drone-rl bench NAME` measures one again.
 bench: $(STAMP)
 	$(BIN)/drone-rl bench
+
+# The tables and the diagram of README.md; with the newest figures; which figures are old.
+readme: $(STAMP)
+	@$(BIN)/python -m tools.readme
+keep: $(STAMP)
+	@$(BIN)/python -m tools.readme keep
+stale: $(STAMP)
+	@$(BIN)/python -m tools.readme stale
 
 # Mutation testing: about 25 minutes on two cores; goes on where it was stopped.
 mutants: $(STAMP)

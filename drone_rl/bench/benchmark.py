@@ -1,0 +1,59 @@
+"""A benchmark: what it runs, and the code that its figures are of."""
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import torch
+
+Figures = Mapping[str, Any]
+"""Plain values by key. No two benchmarks make the same key."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Setup:
+    """Where and how thoroughly to measure."""
+
+    folder: Path
+    """Of the results; runs of commands are kept below it."""
+    quick: bool
+    """Whether a rough figure will do."""
+    device: str
+    """Where worlds are drawn and policies run: cpu, cuda or cuda:N."""
+    num_envs: int
+    """Worlds in a batch of the speed benchmarks; a quick one takes 64."""
+    seeds: tuple[int, ...]
+    """Of the trainings that are timed."""
+    episodes: int
+    """Held-out ones of each trained policy."""
+    memory_frames: int
+    """Over which memory must stay flat."""
+
+    @property
+    def worlds(self) -> int:
+        """Worlds in a batch."""
+        return 64 if self.quick else self.num_envs
+
+    @property
+    def threads(self) -> int:
+        """That draw."""
+        return 1 if self.device.startswith("cuda") else torch.get_num_threads()
+
+    @property
+    def runs(self) -> Path:
+        """Folder of what commands leave."""
+        return self.folder / "runs"
+
+
+@dataclasses.dataclass(frozen=True)
+class Benchmark:
+    """One that runs alone."""
+
+    run: Callable[[Setup], Figures]
+    """Measures."""
+    group: str
+    """Those that are run by one name."""
+    measures: tuple[str, ...]
+    """Packages and modules below drone_rl, and conf, that decide its figures: when one changes, the
+    figures are old."""

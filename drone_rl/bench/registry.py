@@ -1,0 +1,118 @@
+"""All benchmarks, by name."""
+
+from collections.abc import Iterable
+
+from drone_rl.bench.benchmark import Benchmark
+from drone_rl.bench.coverage import bench_coverage
+from drone_rl.bench.explain import bench_explain
+from drone_rl.bench.hostile import bench_hostile
+from drone_rl.bench.maps import bench_maps
+from drone_rl.bench.mutants import bench_mutants
+from drone_rl.bench.scaling import bench_scaling
+from drone_rl.bench.sentences import bench_sentences
+from drone_rl.bench.speed import bench_collector, bench_dm_control, bench_render
+from drone_rl.bench.sweeps import bench_kills, bench_ray, bench_sweeps
+from drone_rl.bench.training import bench_memory, bench_solve
+from drone_rl.bench.verdicts import bench_verdicts
+from drone_rl.utils.errors import InputError
+
+_DRAWING = ("sim", "envs")
+_COLLECTING = (*_DRAWING, "policies", "collectors")
+_TRAINING = (*_COLLECTING, "objectives", "training")
+_JUDGING = (*_DRAWING, "policies", "evaluation", "verdicts")
+_EXPLAINING = (*_JUDGING, "explain")
+
+BENCHMARKS: dict[str, Benchmark] = {
+    "render": Benchmark(
+        lambda s: bench_render(s.worlds, s.device, s.quick), "main", (*_DRAWING, "bench/speed")
+    ),
+    "collector": Benchmark(
+        lambda s: bench_collector(s.worlds, s.threads, s.device, s.quick),
+        "main",
+        (*_COLLECTING, "bench/speed"),
+    ),
+    "dm_control": Benchmark(
+        lambda s: bench_dm_control(s.worlds, s.device, s.quick),
+        "main",
+        (*_DRAWING, "bench/speed", "bench/dm_control"),
+    ),
+    "scaling": Benchmark(
+        lambda s: bench_scaling(s.folder, s.device, s.quick), "main", (*_DRAWING, "bench/scaling")
+    ),
+    "memory": Benchmark(
+        lambda s: bench_memory(s.runs, s.memory_frames, s.device, s.quick),
+        "main",
+        (*_TRAINING, "conf", "bench/training"),
+    ),
+    "solve": Benchmark(
+        lambda s: bench_solve(s.runs, s.seeds, s.episodes, s.device, s.quick),
+        "main",
+        (*_TRAINING, "evaluation", "conf", "bench/training"),
+    ),
+    "coverage": Benchmark(
+        lambda s: bench_coverage(s.quick),
+        "truth",
+        ("utils/intervals", "verdicts", "bench/coverage", "bench/simulated"),
+    ),
+    "sentences": Benchmark(
+        lambda s: bench_sentences(), "truth", ("words", "bench/sentences", "bench/evidence")
+    ),
+    "hostile": Benchmark(
+        lambda s: bench_hostile(s.runs / "hostile"),
+        "truth",
+        ("utils", "zoo", "training", "sweeps", "report", "bench/hostile", "bench/hostile_files",
+         "bench/hostile_folders"),
+    ),
+    "maps": Benchmark(
+        lambda s: bench_maps(s.runs, s.quick),
+        "truth",
+        (*_EXPLAINING, "bench/maps", "bench/liars"),
+    ),
+    "explain": Benchmark(
+        lambda s: bench_explain(s.runs, s.quick),
+        "truth",
+        (*_EXPLAINING, "report", "conf", "bench/explain"),
+    ),
+    "verdicts": Benchmark(
+        lambda s: bench_verdicts(s.runs, s.device, s.quick),
+        "truth",
+        (*_JUDGING, "bench/verdicts", "bench/scripted"),
+    ),
+    "mutants": Benchmark(lambda s: bench_mutants(), "truth", ("bench/mutants",)),
+    "sweeps": Benchmark(
+        lambda s: bench_sweeps(s.runs, s.device, s.quick),
+        "many",
+        (*_TRAINING, "sweeps", "conf", "bench/sweeps"),
+    ),
+    "kills": Benchmark(
+        lambda s: bench_kills(s.runs, s.device, s.quick),
+        "many",
+        (*_TRAINING, "sweeps", "conf", "bench/sweeps"),
+    ),
+    "ray": Benchmark(
+        lambda s: bench_ray(s.runs, s.device, s.quick),
+        "many",
+        (*_COLLECTING, "conf", "bench/sweeps"),
+    ),
+}  # fmt: skip
+GROUPS = tuple(dict.fromkeys(benchmark.group for benchmark in BENCHMARKS.values()))
+"""Names of several at once: the main job, whether what is said is true, many trainings."""
+
+
+def find_benchmarks(words: Iterable[str]) -> list[str]:
+    """The benchmarks that words name, each once, in the order of the words.
+
+    Args:
+        words: Names of benchmarks and of groups.
+
+    Raises:
+        InputError: A word names neither.
+    """
+    names: dict[str, None] = {}
+    for word in words:
+        named = [n for n, b in BENCHMARKS.items() if word in (n, b.group)]
+        if not named:
+            known = ", ".join((*GROUPS, *BENCHMARKS))
+            raise InputError(f"benchmark {word!r} is unknown; use some of: {known}")
+        names |= dict.fromkeys(named)
+    return list(names)

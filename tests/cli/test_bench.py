@@ -1,0 +1,22 @@
+import pytest
+
+from drone_rl.cli.bench import prepare
+
+
+@pytest.mark.parametrize(
+    ("words", "overrides"),
+    [
+        ([], []),
+        (["render", "seeds=[1]"], ["seeds=[1]", "only=[render]"]),
+        (["render", "--quick"], ["only=[render]", "quick=true"]),
+        (["only=[ray]", "--quick"], ["only=[ray]", "quick=true"]),
+        (["--help"], ["--help"]),
+        (
+            ["--quick"],
+            ["only=[render,collector,dm_control,scaling,memory,solve]", "quick=true"],
+        ),
+        (["many"], ["only=[sweeps,kills,ray]"]),
+    ],
+)
+def test_names_and_quick_stand_for_settings(words, overrides):
+    assert prepare(words) == overrides

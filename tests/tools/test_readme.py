@@ -1,0 +1,122 @@
+"""README's tables and diagram are those of the files that they are made from."""
+
+import json
+
+import pytest
+
+from drone_rl.bench.benchmark import Benchmark
+from drone_rl.bench.ledger import Ledger, Origin, digest_code, make_origin
+from tools.readme.__main__ import ROOT, keep, main, make_readme
+from tools.readme.blocks import replace_blocks
+from tools.readme.layers import draw_layers
+from tools.readme.stale import tell_ages
+from tools.readme.tables import MAIN, TRUTH, UNKNOWN, Row, make_table
+
+
+def test_it_is_made_of_todays_figures_and_contracts():
+    assert make_readme(ROOT) == (ROOT / "README.md").read_text(), "run make readme"
+
+
+def test_a_changed_figure_changes_it(tmp_path):
+    for name in ("README.md", "pyproject.toml", "docs/results.json"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text((ROOT / name).read_text())
+    path = tmp_path / "docs" / "results.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"sweep_speedup": 1.234}))
+    assert "| 1.23 times | 1.6 times |" in make_readme(tmp_path)
+
+
+def test_blocks_are_replaced_and_nothing_else():
+    text = "a\n<!-- made: x -->\nold\n<!-- /made -->\nb\n<!-- made: y -->\n<!-- /made -->\n"
+    made = "a\n<!-- made: x -->\n1\n2\n<!-- /made -->\nb\n<!-- made: y -->\n3\n<!-- /made -->\n"
+    assert replace_blocks(text, {"x": "1\n2\n", "y": "3"}) == made
+    assert replace_blocks(made, {"x": "1\n2", "y": "3"}) == made
+
+
+@pytest.mark.parametrize("blocks", [{}, {"x": "", "z": ""}])
+def test_a_block_that_nobody_makes_or_marks_is_an_error(blocks):
+    with pytest.raises(ValueError, match="marks blocks"):
+        replace_blocks("<!-- made: x -->\n<!-- /made -->", blocks)
+
+
+def test_a_figure_that_is_missing_leaves_its_cell_unmeasured():
+    rows = (Row("tide", lambda f: f"{f['tide_m']:.1f} m", "3 m"),)
+    assert make_table(rows, {"tide_m": 2.96}).splitlines()[2:] == ["| tide | 3.0 m | 3 m |"]
+    assert f"| tide | {UNKNOWN} | 3 m |" in make_table(rows, {})
+
+
+def test_rows_say_what_the_figures_are():
+    figures = {
+        "time_to_solve_s": [30.0, 20.4, 25.0, 21.0, 40.6],
+        "success_lower95": [0.996, 0.991],
+        "peak_memory_mib": 1023.6,
+        "verdicts_right": 44,
+        "verdicts_certain": 45,
+        "verdicts_total": 55,
+        "planted_maps_found": 26 / 27,
+        "planted_maps_total": 27,
+        "launcher_overhead": 0.0794,
+    }
+    text = make_table(MAIN, figures) + make_table(TRUTH, figures)
+    for cell in ("20 to 41, median 25", "0.991", "1024 MiB", "44 of 45 certain, of 55", "7.9%"):
+        assert f"| {cell} |" in text
+    assert "| 26 of 27 |" in text
+
+
+def test_layers_side_by_side_are_one_box_and_what_is_forbidden_is_told():
+    drawn = draw_layers(
+        [
+            {"type": "layers", "name": "order", "layers": ["top", "left | right", "base"]},
+            {
+                "type": "forbidden",
+                "name": "no water inside",
+                "source_modules": ["drone_rl.top", "drone_rl.left"],
+                "forbidden_modules": ["sea", "rain"],
+            },
+        ]
+    )
+    assert "  left[left, right]\n" in drawn
+    assert "  top --> left --> base\n" in drawn
+    assert drawn.endswith("- No water inside: in top, left, no sea, rain.")
+
+
+@pytest.fixture
+def measured(tmp_path):
+    """A ledger of three benchmarks, one of them of today's code."""
+    (tmp_path / "sim.py").write_text("1")
+    code = digest_code(["sim"], tmp_path)
+    ledger = Ledger(tmp_path / "r.json")
+    for name, of in (("new", code), ("old", "abc"), ("unknown", None)):
+        origin = Origin(
+            revision="0123456789abcdef", date="2026-11-21", machine="m", code=of, settings={},
+            keys=(),
+        )  # fmt: skip
+        ledger.add(name, {f"{name}_s": 1.0}, origin)
+    return ledger, tmp_path
+
+
+def test_figures_older_than_their_code_are_named(measured):
+    ledger, package = measured
+    names = ("new", "old", "unknown", "never")
+    benchmarks = {name: Benchmark(lambda _: {}, "tests", ("sim",)) for name in names}
+    since = "measured 2026-11-21 at 0123456789ab, "
+    assert list(tell_ages(benchmarks, ledger, package)) == [
+        f"new: {since}of today's code",
+        f"old: {since}OLDER than what it measures (sim)",
+        f"unknown: {since}of code that was not noted",
+        "never: never measured",
+    ]
+
+
+def test_newer_figures_replace_those_of_their_benchmarks_alone(measured, tmp_path):
+    kept, _ = measured
+    newest = Ledger(tmp_path / "newest.json")
+    newest.add("old", {"old_s": 2.0}, make_origin("def", {}))
+    assert keep(newest.path, kept.path) == ["old"]
+    assert Ledger(kept.path).figures == {"new_s": 1.0, "unknown_s": 1.0, "old_s": 2.0}
+    assert Ledger(kept.path).origins["old"].code == "def"
+
+
+def test_an_unknown_word_is_an_error(capsys):
+    assert main(["fresh"]) == 2
+    assert "'fresh' is unknown" in capsys.readouterr().err
