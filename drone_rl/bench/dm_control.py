@@ -13,8 +13,8 @@ import numpy as np
 from dm_control import composer
 from dm_control.mujoco import engine
 
-from drone_rl.sim.collect_cubes import CollectCubes
-from drone_rl.sim.drone import hide_drone
+from drone_rl.sim.composer_task import ComposerTask
+from drone_rl.sim.entities.drone import hide_drone
 
 QUALITIES = ("default", "tuned")
 _PLAIN = dict.fromkeys(("shadow", "reflection", "skybox", "fog", "haze"), False)
@@ -26,7 +26,7 @@ def default_rate(seconds: float) -> float:
     Shadows from a shadow map of 4096 texels and 4 samples a pixel, as in a dm_control scene in
     which nobody has touched the quality settings.
     """
-    task = CollectCubes()
+    task = ComposerTask()
     root = task.root_entity.mjcf_model
     root.find("light", "sun").castshadow = True
     del root.visual.quality.shadowsize
@@ -40,7 +40,7 @@ def tuned_rate(seconds: float) -> float:
     No shadows, one sample a pixel, all scene flags off, and one camera kept instead of one made for
     every picture.
     """
-    task = CollectCubes(pixels=False)
+    task = ComposerTask(pixels=False)
     root = task.root_entity.mjcf_model
     root.visual.quality.set_attributes(offsamples=0, shadowsize=0)
     env = _environment(task)
@@ -55,7 +55,7 @@ def tuned_rate(seconds: float) -> float:
     )
 
 
-def _environment(task: CollectCubes) -> composer.Environment:
+def _environment(task: ComposerTask) -> composer.Environment:
     return composer.Environment(
         task,
         random_state=0,

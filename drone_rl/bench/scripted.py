@@ -10,8 +10,9 @@ from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 from torchrl.envs.utils import ExplorationType, exploration_type
 
-from drone_rl.sim.rules import Action, Side
+from drone_rl.sim.actions import Move
 from drone_rl.sim.settings import TaskSettings
+from drone_rl.sim.tasks.collect_cubes.rules import Side
 
 
 @dataclasses.dataclass
@@ -48,42 +49,42 @@ Condition = Callable[[Sight], Tensor]
 def seek(sight: Sight) -> Tensor:
     """Lines up with the next cube, then flies at it, as the oracle does."""
     tolerance = max(0.5, 0.5 * sight.touch)
-    right = torch.where(sight.lateral < -tolerance, Action.RIGHT.value, Action.FORWARD.value)
-    return torch.where(sight.lateral > tolerance, Action.LEFT.value, right)
+    right = torch.where(sight.lateral < -tolerance, Move.RIGHT.value, Move.FORWARD.value)
+    return torch.where(sight.lateral > tolerance, Move.LEFT.value, right)
 
 
 def straight(sight: Sight) -> Tensor:
     """Flies on."""
-    return torch.full_like(sight.number, Action.FORWARD)
+    return torch.full_like(sight.number, Move.FORWARD)
 
 
 def leave(sight: Sight) -> Tensor:
     """Flies left, out of the field in the end."""
-    return torch.full_like(sight.number, Action.LEFT)
+    return torch.full_like(sight.number, Move.LEFT)
 
 
 def dither(sight: Sight) -> Tensor:
     """Goes left and right in turn for ever."""
-    return torch.where(sight.y.round() % 2 == 0, Action.LEFT.value, Action.RIGHT.value)
+    return torch.where(sight.y.round() % 2 == 0, Move.LEFT.value, Move.RIGHT.value)
 
 
 def dodge(sight: Sight) -> Tensor:
     """Flies around the next cube."""
     is_near = sight.lateral.abs() <= sight.touch + 0.5
-    return torch.where(is_near, Action.LEFT.value, Action.FORWARD.value)
+    return torch.where(is_near, Move.LEFT.value, Move.FORWARD.value)
 
 
 def avoid(sight: Sight) -> Tensor:
     """Turns the wrong way, and flies on when well beside the cube."""
-    away = torch.where(sight.lateral > 0, Action.RIGHT.value, Action.LEFT.value)
-    return torch.where(sight.lateral.abs() < 5.0, away, Action.FORWARD.value)
+    away = torch.where(sight.lateral > 0, Move.RIGHT.value, Move.LEFT.value)
+    return torch.where(sight.lateral.abs() < 5.0, away, Move.FORWARD.value)
 
 
 def zigzag(sight: Sight) -> Tensor:
     """Lines up, then goes forward in every second step only, and over to the other side between."""
-    over = torch.where(sight.lateral > 0, Action.LEFT.value, Action.RIGHT.value)
+    over = torch.where(sight.lateral > 0, Move.LEFT.value, Move.RIGHT.value)
     is_turn = (sight.x.round() + sight.y.round()) % 2 == 0
-    lined_up = torch.where(is_turn, over, Action.FORWARD.value)
+    lined_up = torch.where(is_turn, over, Move.FORWARD.value)
     return torch.where(sight.lateral.abs() <= 1.0, lined_up, seek(sight))
 
 
@@ -143,15 +144,15 @@ class ScriptedPolicy(TensorDictModuleBase):
             touch=self.touch,
         )
         action = self.pilot.choose(sight)
-        action = torch.where(sight.number > last, Action.FORWARD.value, action)
+        action = torch.where(sight.number > last, Move.FORWARD.value, action)
         return tensordict.set("action", self._draw(action))
 
     def _draw(self, action: Tensor) -> Tensor:
         if self.pilot.confidence == 1 or exploration_type() != ExplorationType.RANDOM:
             return action
-        shift = torch.randint(1, len(Action), action.shape, generator=self.generator)
+        shift = torch.randint(1, len(Move), action.shape, generator=self.generator)
         keeps = torch.rand(action.shape, generator=self.generator) < self.pilot.confidence
-        return torch.where(keeps, action, (action + shift) % len(Action))
+        return torch.where(keeps, action, (action + shift) % len(Move))
 
 
 def _fraction(y: Tensor) -> Tensor:

@@ -15,7 +15,7 @@ import torch
 from numpy.typing import NDArray
 
 from drone_rl.evaluation import Episodes
-from drone_rl.sim.rules import Side
+from drone_rl.sim.tasks.collect_cubes.rules import Side
 from drone_rl.verdicts.judge import estimate, observe
 from drone_rl.verdicts.kinds import Kind
 from drone_rl.verdicts.luck import BASELINES

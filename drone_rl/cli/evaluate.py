@@ -50,7 +50,7 @@ def _fly(config: DictConfig, path: Path) -> tuple[dict[str, dict[str, Any]], dic
         seed=config.seed,
         device=config.device,
     )
-    worlds, task = env.base_env.state_dict(), env.base_env.worlds.settings
+    worlds, task = env.base_env.state_dict(), env.base_env.worlds.task.settings
     flown = {"greedy": run_episodes(env, actor, config.episodes)}
     env.base_env.load_state_dict(worlds)
     flown["sampled"] = run_episodes(env, actor, config.episodes, greedy=False)

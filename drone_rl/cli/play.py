@@ -13,7 +13,7 @@ from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 from drone_rl.cli.build import find_checkpoint, load_trained, plain, policy_is_checkpoint
 from drone_rl.evaluation.video import film_episode, write_video
-from drone_rl.sim.collect_cubes import make_environment
+from drone_rl.sim.composer_task import make_environment
 from drone_rl.utils.errors import InputError
 
 prepare = policy_is_checkpoint
@@ -57,7 +57,7 @@ def _view(config: DictConfig, path: Path) -> None:
     task = plain(config.task)
     env, actor, _ = load_trained(path, 1, task=task, seed=config.seed, device=config.device)
     worlds = env.base_env.worlds
-    shown = make_environment(worlds.settings, worlds.camera, pixels=False, random_state=config.seed)
+    shown = make_environment(worlds.task, worlds.camera, pixels=False, random_state=config.seed)
     kind = ExplorationType.DETERMINISTIC if config.greedy else ExplorationType.RANDOM
 
     @torch.no_grad()

@@ -1,16 +1,21 @@
-"""Many worlds of cube collection as one TorchRL environment."""
+"""Many worlds of a task as one TorchRL environment."""
+
+from typing import Any
 
 import numpy as np
 import torch
 from tensordict import TensorDict, TensorDictBase
 from torch import Tensor
-from torchrl.data import Binary, Bounded, Categorical, Composite, Unbounded
+from torchrl.data import Binary, Bounded, Categorical, Composite, TensorSpec, Unbounded
 from torchrl.envs import EnvBase
 
-from drone_rl.sim.renderer import check_device
-from drone_rl.sim.rules import Action, EndReason, WorldState
+from drone_rl.sim.actions import Entry
+from drone_rl.sim.dynamics import Dynamics
+from drone_rl.sim.rendering import WarpRenderer, check_device
+from drone_rl.sim.rendering.renderer import MakeRenderer
 from drone_rl.sim.settings import CameraSettings, TaskSettings
-from drone_rl.sim.worlds import CubeWorlds
+from drone_rl.sim.tasks import Task
+from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import Stream, get_state, set_state, world_random_state
 
@@ -18,9 +23,9 @@ from drone_rl.utils.seeding import Stream, get_state, set_state, world_random_st
 class DroneEnv(EnvBase):
     """`num_envs` drones, each in a world of its own, stepped and drawn as one batch.
 
-    Observation "pixels": uint8, shape (num_envs, height, width, 3). Action: `rules.Action`. The
-    nested "info" holds the ground truth: cubes collected, which, on which side and how far aside,
-    why the episode ended, and all positions (metres, world frame).
+    Observation "pixels": uint8, shape (num_envs, height, width, 3). Action: one of
+    the dynamics'. The nested "info" holds the truth, as the task tells it (`Task.entries`), and the
+    drone's pose: "drone" (metres) and "attitude" (quaternion w, x, y, z), world frame.
 
     Only what is asked for is computed: a reset draws only the worlds that are reset, and worlds
     outside a step's "_step" mask (TorchRL's partial steps) are neither moved nor drawn; their rows
@@ -33,7 +38,7 @@ class DroneEnv(EnvBase):
     def __init__(
         self,
         num_envs: int,
-        task: TaskSettings | None = None,
+        task: TaskSettings | Task[Any] | None = None,
         camera: CameraSettings | None = None,
         *,
         seed: int = 0,
@@ -42,12 +47,14 @@ class DroneEnv(EnvBase):
         num_shards: int | None = None,
         pixels: bool = True,
         device: str = "cpu",
+        dynamics: Dynamics | None = None,
+        renderer: MakeRenderer = WarpRenderer,
     ) -> None:
         """Builds the worlds.
 
         Args:
             num_envs: How many.
-            task: Cubes, moves and boundaries.
+            task: What there is to do; the settings of cube collection will do.
             camera: The policy's camera.
             seed: Root of all the worlds' random streams.
             stream: What the worlds are for; training and evaluation never share one.
@@ -55,6 +62,8 @@ class DroneEnv(EnvBase):
             num_shards: Threads that draw; the number of cores by default.
             pixels: Whether to draw and observe; policies that read the truth don't need it.
             device: "cpu", "cuda" or "cuda:N".
+            dynamics: How the drones move; the task's own choice by default.
+            renderer: What makes the one that draws.
 
         Raises:
             InputError: A setting is out of range.
@@ -63,7 +72,15 @@ class DroneEnv(EnvBase):
             raise InputError(f"num_envs={num_envs} is out of range; give a whole number from 1")
         check_device(device)
         super().__init__(device=torch.device(device), batch_size=torch.Size([num_envs]))
-        self.worlds = CubeWorlds(num_envs, task, camera, device=device, num_shards=num_shards)
+        self.worlds = Worlds(
+            num_envs,
+            task,
+            camera,
+            dynamics=dynamics,
+            renderer=renderer,
+            device=device,
+            num_shards=num_shards,
+        )
         self.pixels = pixels
         if pixels:
             self.worlds.prepare()
@@ -105,21 +122,16 @@ class DroneEnv(EnvBase):
         super().close(raise_if_closed=raise_if_closed)
 
     def _make_specs(self) -> None:
-        n, cubes = self.batch_size[0], self.worlds.settings.num_cubes
-        info = Composite(
-            cubes=Bounded(0, cubes, (n, 1), dtype=torch.int64),
-            collected=Binary(cubes, (n, cubes), dtype=torch.bool),
-            side=Bounded(-1, 2, (n, cubes), dtype=torch.int64),
-            lateral=Unbounded((n, cubes), dtype=torch.float64),
-            next_cube=Bounded(0, cubes, (n, 1), dtype=torch.int64),
-            end_reason=Bounded(0, len(EndReason) - 1, (n, 1), dtype=torch.int64),
-            drone=Unbounded((n, 3)),
-            cube_positions=Unbounded((n, cubes, 3)),
-            shape=(n,),
-        )
+        n = self.batch_size[0]
+        entries = {name: _spec(entry, n) for name, entry in self.worlds.task.entries.items()}
+        pose = {"drone": Unbounded((n, 3)), "attitude": Unbounded((n, 4))}
+        info = Composite({**entries, **pose}, shape=(n,))
         observed = {"pixels": self._pixel_spec(), "info": info} if self.pixels else {"info": info}
         self.observation_spec = Composite(observed, shape=(n,)).to(self.device)
-        self.action_spec = Categorical(len(Action), shape=(n,), dtype=torch.int64).to(self.device)
+        action = _spec(self.worlds.dynamics.actions.entry, n)
+        if action.dtype == torch.int64:
+            action = Categorical(int(action.high.max()) + 1, shape=action.shape, dtype=torch.int64)
+        self.action_spec = action.to(self.device)
         self.reward_spec = Unbounded((n, 1)).to(self.device)
         done = {name: Binary(1, (n, 1), dtype=torch.bool) for name in _DONE_KEYS}
         self.full_done_spec = Composite(**done, shape=(n,)).to(self.device)
@@ -150,8 +162,8 @@ class DroneEnv(EnvBase):
         reward[worlds, 0] = self.worlds.step(worlds, action[worlds]).float()
         self._draw(worlds)
         reason = self.worlds.state.end_reason[:, None]
-        truncated = reason == EndReason.STEP_LIMIT
-        done = reason != EndReason.RUNNING
+        truncated = reason == self.worlds.task.truncation
+        done = reason != 0
         flags = {"done": done, "terminated": done & ~truncated, "truncated": truncated}
         return self._observe({"reward": reward, **flags})
 
@@ -169,7 +181,10 @@ class DroneEnv(EnvBase):
 
     def _observe(self, entries: dict[str, Tensor]) -> TensorDict:
         pixels = {"pixels": self._pixels} if self.pixels else {}
-        info = _info(self.worlds.state, self.batch_size)
+        state = self.worlds.state
+        pose = {"drone": state.body.position.float(), "attitude": state.body.attitude.float()}
+        truth = {**self.worlds.task.info(state), **pose}
+        info = TensorDict(truth, self.batch_size, device=self.device)
         return TensorDict({**pixels, "info": info, **entries}, self.batch_size, device=self.device)
 
     def _indices(self, mask: Tensor | None) -> Tensor:
@@ -184,18 +199,11 @@ class DroneEnv(EnvBase):
 _DONE_KEYS = ("done", "terminated", "truncated")
 
 
-def _info(state: WorldState, batch_size: torch.Size) -> TensorDict:
-    return TensorDict(
-        {
-            "cubes": state.collected.sum(-1, keepdim=True),
-            "collected": state.collected.clone(),
-            "side": state.side.clone(),
-            "lateral": state.lateral.clone(),
-            "next_cube": state.next_cube[:, None],
-            "end_reason": state.end_reason[:, None].clone(),
-            "drone": state.drone.float(),
-            "cube_positions": state.cubes.float(),
-        },
-        batch_size,
-        device=state.drone.device,
-    )
+def _spec(entry: Entry, num_envs: int) -> TensorSpec:
+    """What is known of an entry, for a batch."""
+    shape = (num_envs, *entry.shape)
+    if entry.dtype == torch.bool:
+        return Binary(shape[-1], shape, dtype=torch.bool)
+    if entry.low is None or entry.high is None:
+        return Unbounded(shape, dtype=entry.dtype)
+    return Bounded(entry.low, entry.high, shape, dtype=entry.dtype)

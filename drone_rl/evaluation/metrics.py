@@ -9,7 +9,7 @@ from typing import Any
 
 from torch import Tensor
 
-from drone_rl.sim.rules import EndReason, Side
+from drone_rl.sim.tasks.collect_cubes.rules import EndReason, Side
 from drone_rl.utils.intervals import mean_bounds, proportion
 
 ENDS = tuple(reason for reason in EndReason if reason is not EndReason.RUNNING)

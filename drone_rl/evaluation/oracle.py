@@ -4,7 +4,7 @@ import torch
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 
-from drone_rl.sim.rules import Action
+from drone_rl.sim.actions import Move
 from drone_rl.sim.settings import TaskSettings
 
 
@@ -29,10 +29,10 @@ class Oracle(TensorDictModuleBase):
         nearest = index.clamp(max=cubes.shape[-2] - 1)
         rows = nearest[..., None].expand(*index.shape[:-1], 1, 3)
         offset = cubes.gather(-2, rows)[..., 0, 1] - drone[..., 1]
-        action = torch.full_like(index[..., 0], Action.FORWARD)
-        action[offset > self.tolerance] = Action.LEFT
-        action[offset < -self.tolerance] = Action.RIGHT
-        action[left[..., 0]] = Action.FORWARD
+        action = torch.full_like(index[..., 0], Move.FORWARD)
+        action[offset > self.tolerance] = Move.LEFT
+        action[offset < -self.tolerance] = Move.RIGHT
+        action[left[..., 0]] = Move.FORWARD
         return tensordict.set("action", action)
 
 
@@ -62,7 +62,7 @@ class RandomPolicy(TensorDictModuleBase):
 class ConstantPolicy(TensorDictModuleBase):
     """Takes the same action whatever happens."""
 
-    def __init__(self, action: Action) -> None:
+    def __init__(self, action: Move) -> None:
         """Sets the action.
 
         Args:

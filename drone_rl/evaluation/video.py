@@ -13,14 +13,15 @@ from torch import Tensor
 from torchrl.envs import TransformedEnv
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
-from drone_rl.sim.cameras import CHASE
-from drone_rl.sim.rules import Action, EndReason
+from drone_rl.sim.actions import Move
+from drone_rl.sim.entities.cameras import CHASE
+from drone_rl.sim.tasks.collect_cubes.rules import EndReason
 from drone_rl.utils.errors import InputError
 
 PANEL_HEIGHT, PANEL_WIDTH = 360, 640
 FRAMES_PER_SECOND = 10
 _BACKGROUND, _TEXT, _CHOSEN, _BAR = (24, 26, 31), (235, 235, 240), (226, 74, 51), (120, 130, 150)
-_BARS = (Action.LEFT, Action.FORWARD, Action.RIGHT)
+_BARS = (Move.LEFT, Move.FORWARD, Move.RIGHT)
 """The order in which the actions are drawn: as the drone would go."""
 
 
@@ -116,9 +117,9 @@ def _compose(
 
 def _draw_bars(draw: ImageDraw.ImageDraw, font: ImageFont.ImageFont, acted: TensorDictBase) -> None:
     """One bar an action, as long as it is probable; the chosen one in red (as in Fig. 13)."""
-    chosen = Action(int(acted["action"][0]))
+    chosen = Move(int(acted["action"][0]))
     logits = acted.get("logits", None)
-    probability = torch.eye(len(Action))[chosen] if logits is None else logits[0].softmax(-1)
+    probability = torch.eye(len(Move))[chosen] if logits is None else logits[0].softmax(-1)
     for i, action in enumerate(_BARS):
         x, y = 300 + 320 * i, PANEL_HEIGHT + 10
         share = float(probability[action])

@@ -4,7 +4,6 @@ They are what a patch of a picture is replaced by, to find out whether the polic
 is something that no policy ever met, these are pictures like its own.
 """
 
-import copy
 import dataclasses
 import math
 
@@ -12,57 +11,15 @@ import torch
 from torch import Tensor
 
 from drone_rl.explain.scenes import Scenes
-from drone_rl.sim.arena import SKY_COLOR
-from drone_rl.sim.collect_cubes import shown_cubes
-from drone_rl.sim.renderer import WarpRenderer
-from drone_rl.sim.rules import WorldState
+from drone_rl.sim.meaning import Meaning
+from drone_rl.sim.rendering import Appearance
+from drone_rl.sim.tasks.collect_cubes.rules import WorldState
 
-Color = tuple[float, float, float]
-DARK_GROUND: Color = (0.25, 0.25, 0.22)
-DARK_SKY: Color = (0.3, 0.36, 0.45)
-BRIGHT_GROUND: Color = (0.75, 0.78, 0.7)
-BRIGHT_SKY: Color = (0.9, 0.93, 0.97)
+DARK_GROUND = Appearance(colors={Meaning.GROUND: (0.25, 0.25, 0.22)})
+DARK = Appearance(colors={**DARK_GROUND.colors, Meaning.SKY: (0.3, 0.36, 0.45)})
+BRIGHT = Appearance(colors={Meaning.GROUND: (0.75, 0.78, 0.7), Meaning.SKY: (0.9, 0.93, 0.97)})
 PLACEMENTS = 3
 """Random placements of all the cubes."""
-
-
-class Repainted:
-    """The same worlds in other colours."""
-
-    def __init__(
-        self, scenes: Scenes, colors: dict[str, Color], background: Color = SKY_COLOR
-    ) -> None:
-        """Prepares a renderer.
-
-        Args:
-            scenes: Whose worlds are painted; they stay as they are.
-            colors: Red, green, blue in [0, 1] of the geoms whose names start so, such as "floor".
-            background: The sky's colour.
-        """
-        self._worlds = scenes.worlds
-        model = copy.copy(self._worlds.model)
-        for i in range(model.ngeom):
-            for start, color in colors.items():
-                if model.geom(i).name.startswith(start):
-                    model.geom_rgba[i, :3] = color
-        self._renderer = WarpRenderer(
-            model,
-            self._worlds.policy_view,
-            max_worlds=self._worlds.num_worlds,
-            device=str(self._worlds.device),
-            background=background,
-        )
-
-    def frames(self, state: WorldState) -> Tensor:
-        """RGB pictures. Shape: (T, H, W, 3), uint8."""
-        size = self._worlds.num_worlds
-        qpos, cubes = self._worlds.qpos(state), shown_cubes(state).float()
-        pairs = zip(qpos.split(size), cubes.split(size), strict=True)
-        return torch.cat([self._renderer.render(q, c) for q, c in pairs])
-
-    def close(self) -> None:
-        """Ends the renderer's threads."""
-        self._renderer.close()
 
 
 def alternatives(scenes: Scenes, state: WorldState, seed: int = 0) -> dict[str, Tensor]:
@@ -81,13 +38,8 @@ def alternatives(scenes: Scenes, state: WorldState, seed: int = 0) -> dict[str, 
     found = {"no cubes": scenes.observe(without_cubes(state))}
     for i in range(PLACEMENTS):
         found[f"cubes elsewhere {i}"] = scenes.observe(cubes_elsewhere(scenes, state, generator))
-    for name, ground, sky in (
-        ("darker", DARK_GROUND, DARK_SKY),
-        ("brighter", BRIGHT_GROUND, BRIGHT_SKY),
-    ):
-        painted = Repainted(scenes, {"floor": ground}, sky)
-        found[name] = scenes.transform(painted.frames(state))
-        painted.close()
+    for name, appearance in (("darker", DARK), ("brighter", BRIGHT)):
+        found[name] = scenes.transform(scenes.frames(state, appearance))
     return found
 
 
@@ -102,7 +54,7 @@ def cubes_elsewhere(scenes: Scenes, state: WorldState, generator: torch.Generato
     All columns of the picture alike; ahead from where a cube just fits before the camera to where
     the first one stands at the start; no farther sideways than cube and drone ever are.
     """
-    settings, camera = scenes.worlds.settings, scenes.worlds.camera
+    settings, camera = scenes.worlds.task.settings, scenes.worlds.camera
     draw = torch.rand(*state.cubes.shape, generator=generator, dtype=torch.float64)
     edge = math.tan(math.radians(camera.horizontal_fov / 2))
     slope = (2 * draw[..., 1] - 1) * edge

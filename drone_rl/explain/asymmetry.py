@@ -10,7 +10,7 @@ from drone_rl.explain.hooks import probabilities
 from drone_rl.explain.intervals import mean_interval
 from drone_rl.explain.response import MIRRORED, ResponseMap
 from drone_rl.policies import PolicyNetwork
-from drone_rl.sim.rules import Action
+from drone_rl.sim.actions import Move
 
 
 def asymmetry(network: PolicyNetwork, observations: Tensor, episode: NDArray) -> dict[str, Any]:
@@ -28,7 +28,7 @@ def asymmetry(network: PolicyNetwork, observations: Tensor, episode: NDArray) ->
     """
     here = probabilities(network, observations)
     there = probabilities(network, observations.flip(-1))[:, MIRRORED]
-    signed = (here - there)[:, Action.LEFT].double().cpu().numpy()
+    signed = (here - there)[:, Move.LEFT].double().cpu().numpy()
     distance = 0.5 * (here - there).abs().sum(-1).double().cpu().numpy()
     worst = np.argsort(-distance, kind="stable")[:8]
     return {
@@ -45,7 +45,7 @@ def grid_asymmetry(response: ResponseMap) -> dict[str, Any]:
     distance = 0.5 * np.abs(difference).sum(-1)
     at = np.unravel_index(distance.argmax(), distance.shape)
     return {
-        "signed": float(difference[..., Action.LEFT].mean()),
+        "signed": float(difference[..., Move.LEFT].mean()),
         "absolute": float(distance.mean()),
         "worst": {
             "distance": float(distance.max()),

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
 from drone_rl.explain.dataset import RolloutDataset
-from drone_rl.sim.rules import Action
+from drone_rl.sim.actions import Move
 
 ALIKE_METRES = 1.0
 """Next cubes stand alike if their places seen from the drone differ by at most this."""
@@ -49,7 +49,7 @@ def opposition(probabilities: NDArray, others: NDArray) -> NDArray:
     """How opposed two policies' wishes are: the lesser of the swings to the left and to the right.
 
     Args:
-        probabilities: Shape (*, 3), by `Action`.
+        probabilities: Shape (*, 3), by `Move`.
         others: Shape (*, 3).
 
     Returns:
@@ -57,7 +57,7 @@ def opposition(probabilities: NDArray, others: NDArray) -> NDArray:
         one that wants left. Shape: (*).
     """
     swing = probabilities - others
-    to_left, to_right = swing[..., Action.LEFT], -swing[..., Action.RIGHT]
+    to_left, to_right = swing[..., Move.LEFT], -swing[..., Move.RIGHT]
     agreed = np.sign(to_left) == np.sign(to_right)
     return np.where(agreed, np.sign(to_left) * np.minimum(np.abs(to_left), np.abs(to_right)), 0.0)
 

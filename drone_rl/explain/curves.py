@@ -14,7 +14,7 @@ from torch import Tensor
 from drone_rl.explain.hooks import probabilities
 from drone_rl.explain.intervals import episode_means
 from drone_rl.policies import PolicyNetwork
-from drone_rl.sim.rules import Action
+from drone_rl.sim.actions import Move
 from drone_rl.utils.intervals import mean_bounds
 
 SHARES = (0.0, 0.01, 0.02, 0.03, 0.05, 0.075, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0)
@@ -52,7 +52,7 @@ def deletion_insertion(
             changed = torch.where(taken, absent, observations)
             curves[name].append(probabilities(network, changed).gather(1, actions[:, None])[:, 0])
     found = {}
-    for action in Action:
+    for action in Move:
         rows = (actions == action).numpy()
         found[action.name.lower()] = {
             "frames": int(rows.sum()),

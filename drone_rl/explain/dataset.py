@@ -16,13 +16,15 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from drone_rl.explain.scenes import Region
-from drone_rl.sim.rules import Action, EndReason, WorldState
+from drone_rl.sim.actions import Move
+from drone_rl.sim.dynamics import BodyState
+from drone_rl.sim.tasks.collect_cubes.rules import EndReason, WorldState
 from drone_rl.utils.archives import read_arrays
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import parse_json
 
 FLOWN = {
-    "actions": "action taken: " + ", ".join(f"{a.value} {a.name.lower()}" for a in Action),
+    "actions": "action taken: " + ", ".join(f"{a.value} {a.name.lower()}" for a in Move),
     "rewards": "reward of the action, float32 (T,)",
     "drone": "position before the action, metres, world frame: x forward, y left, z up (T, 3)",
     "cubes": "positions of the cubes, metres, in order of x (T, C, 3)",
@@ -86,7 +88,7 @@ class RolloutDataset:
         """The worlds as they stood, ready to be changed and drawn again."""
         present, collected = self.tensor("present"), self.tensor("collected")
         return WorldState(
-            drone=self.tensor("drone").double(),
+            body=BodyState.at_rest(self.tensor("drone").double()),
             cubes=self.tensor("cubes").double(),
             collected=collected,
             passed=~present & ~collected,

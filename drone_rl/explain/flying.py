@@ -6,8 +6,8 @@ from torch import Tensor
 from drone_rl.explain.hooks import probabilities
 from drone_rl.explain.scenes import Scenes
 from drone_rl.policies import PolicyNetwork
-from drone_rl.sim import rules
-from drone_rl.sim.rules import Action, EndReason, WorldState
+from drone_rl.sim.actions import Move
+from drone_rl.sim.tasks.collect_cubes.rules import EndReason, WorldState
 
 
 @torch.no_grad()
@@ -25,20 +25,17 @@ def fly_on(scenes: Scenes, network: PolicyNetwork, state: WorldState) -> WorldSt
     Returns:
         How they ended; `end_reason` is RUNNING where no cube was left. Shape: that of `state`.
     """
-    settings = scenes.worlds.settings
     done = state[torch.arange(len(state.drone), device=state.drone.device)]
     flying = torch.arange(len(state.drone), device=state.drone.device)
-    now, last, earlier = state, torch.full_like(flying, Action.FORWARD), []
+    now, last, earlier = state, torch.full_like(flying, Move.FORWARD), []
     while len(flying):
         frames = scenes.frames(now)
         action = probabilities(network, scenes.transform(frames, earlier)).argmax(-1)
-        now, reward = rules.judge(
-            settings, now, now.drone + rules.displacement(settings, action.to(now.drone.device))
-        )
+        now, reward = scenes.worlds.advance(now, action.to(now.drone.device))
         if not scenes.memory:
             now.end_reason[_turned_back(last, action)] = EndReason.STEP_LIMIT
         done[flying] = now
-        last = action.where(reward == 0, Action.FORWARD)  # a cube less is another scene
+        last = action.where(reward == 0, Move.FORWARD)  # a cube less is another scene
         on = (now.end_reason == EndReason.RUNNING) & now.present.any(-1)
         earlier = [*earlier, frames][-scenes.memory :] if scenes.memory else []
         now, flying, last = now[on], flying[on], last[on]
@@ -48,4 +45,4 @@ def fly_on(scenes: Scenes, network: PolicyNetwork, state: WorldState) -> WorldSt
 
 def _turned_back(last: Tensor, action: Tensor) -> Tensor:
     """Whether an action undoes the one before. Shape: (T,), bool."""
-    return (last != Action.FORWARD) & (action != Action.FORWARD) & (last != action)
+    return (last != Move.FORWARD) & (action != Move.FORWARD) & (last != action)

@@ -8,13 +8,15 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from drone_rl.explain.alternatives import DARK_GROUND, Color, Repainted
+from drone_rl.explain.alternatives import DARK_GROUND
 from drone_rl.explain.hooks import probabilities
 from drone_rl.explain.scenes import Region, Scenes
 from drone_rl.policies import PolicyNetwork
-from drone_rl.sim.rules import WorldState
+from drone_rl.sim.meaning import Meaning
+from drone_rl.sim.rendering import Appearance
+from drone_rl.sim.tasks.collect_cubes.rules import WorldState
 
-OTHER_CUBE_COLOR: Color = (0.9, 0.85, 0.2)
+OTHER_CUBES = Appearance(colors={Meaning.TARGET: (0.9, 0.85, 0.2)})
 MOVED_METRES = 2.0
 
 
@@ -50,8 +52,8 @@ def intervene(
     base = probabilities(network, scenes.transform(before))
     visible = regions == Region.NEXT_CUBE
     ground = _patches(regions == Region.GROUND, visible.sum((1, 2)), seed)
-    recoloured = _painted(scenes, state, "cube_", OTHER_CUBE_COLOR)
-    repainted = _painted(scenes, state, "floor", DARK_GROUND)
+    recoloured = scenes.frames(state, OTHER_CUBES)
+    repainted = scenes.frames(state, DARK_GROUND)
     moved = scenes.frames(to_the_middle(state))
     changes = {
         "cube taken away": (scenes.frames(_without_next(state)), visible),
@@ -91,14 +93,6 @@ def to_the_middle(state: WorldState) -> WorldState:
 def _is_next(state: WorldState) -> Tensor:
     index = torch.arange(state.cubes.shape[1], device=state.drone.device)
     return index == state.next_cube[:, None]
-
-
-def _painted(scenes: Scenes, state: WorldState, geoms: str, color: Color) -> Tensor:
-    """The scenes with some geoms in another colour."""
-    painted = Repainted(scenes, {geoms: color})
-    frames = painted.frames(state)
-    painted.close()
-    return frames
 
 
 def _patches(ground: Tensor, size: Tensor, seed: int) -> Tensor:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from drone_rl.explain.dataset import RolloutDataset
-from drone_rl.sim.rules import Action
+from drone_rl.sim.actions import Move
 from drone_rl.utils.intervals import proportion
 
 
@@ -33,10 +33,10 @@ def find_loops(dataset: RolloutDataset, min_reversals: int = 2) -> list[Loop]:
     loops, start = [], 0
     for t in range(1, len(actions) + 1):
         ends = t == len(actions) or episode[t] != episode[start]
-        if not ends and actions[t] != Action.FORWARD and actions[start] != Action.FORWARD:
+        if not ends and actions[t] != Move.FORWARD and actions[start] != Move.FORWARD:
             continue
         moves = actions[start:t]
-        if actions[start] != Action.FORWARD:
+        if actions[start] != Move.FORWARD:
             reversals = int((moves[1:] != moves[:-1]).sum())
             if reversals >= min_reversals:
                 loops.append(Loop(start, len(moves), reversals))

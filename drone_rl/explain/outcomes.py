@@ -6,7 +6,6 @@ flights are compared with what they would have been, each with the others from t
 
 import copy
 import dataclasses
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -14,14 +13,14 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from drone_rl.explain.alternatives import DARK_GROUND, Repainted
+from drone_rl.explain.alternatives import DARK_GROUND
 from drone_rl.explain.causal import spread
 from drone_rl.explain.hooks import probabilities
 from drone_rl.explain.intervals import episode_means
 from drone_rl.explain.scenes import Scenes
 from drone_rl.policies import PolicyNetwork
-from drone_rl.sim import rules
-from drone_rl.sim.rules import EndReason, WorldState
+from drone_rl.sim.rendering import Appearance
+from drone_rl.sim.tasks.collect_cubes.rules import EndReason, WorldState
 from drone_rl.utils.intervals import mean_bounds
 
 MOVED_METRES = 2.0
@@ -74,9 +73,7 @@ def outcomes(
         "taken away": taken_away(start),
     }
     flown = {name: fly(scenes, network, s, target) for name, s in variants.items()}
-    painted = Repainted(scenes, {"floor": DARK_GROUND})
-    repainted = fly(scenes, network, start, target, painted.frames)
-    painted.close()
+    repainted = fly(scenes, network, start, target, DARK_GROUND)
     was, left, right = (flown[n] for n in ("as it was", "moved left", "moved right"))
     moved = (left.collected.astype(float) + right.collected) / 2
 
@@ -99,7 +96,7 @@ def fly(
     network: PolicyNetwork,
     state: WorldState,
     target: Tensor,
-    frames: Callable[[WorldState], Tensor] | None = None,
+    appearance: Appearance | None = None,
 ) -> Flights:
     """Flies on, taking the most probable action, until one cube of each world is decided.
 
@@ -108,9 +105,8 @@ def fly(
         network: The policy's.
         state: Where the flights begin; a policy with a memory remembers the first picture alone.
         target: The cube of each world. Shape: (N,).
-        frames: What draws worlds; the scenes by default.
+        appearance: How the worlds look; as the task has it by default.
     """
-    settings, frames = scenes.worlds.settings, frames or scenes.frames
     world = torch.arange(len(target), device=target.device)
     now, on = state[world], torch.ones_like(target, dtype=torch.bool)
     decided, lateral, actions = torch.zeros_like(target), [now.drone[:, 1]], []
@@ -119,13 +115,11 @@ def fly(
         if not on.any():
             break
         flying = on.nonzero()[:, 0]
-        seen = frames(now[flying])
+        seen = scenes.frames(now[flying], appearance)
         past = [pictures[flying] for pictures in earlier]
         action = torch.full_like(target, -1)
         action[flying] = probabilities(network, scenes.transform(seen, past)).argmax(-1)
-        here = now[flying]
-        there = here.drone + rules.displacement(settings, action[flying])
-        now[flying] = rules.judge(settings, here, there)[0]
+        now[flying] = scenes.worlds.advance(now[flying], action[flying])[0]
         decided[flying] += 1
         actions.append(action)
         lateral.append(now.drone[:, 1].clone())

@@ -12,17 +12,17 @@ from drone_rl.explain.flying import fly_on
 from drone_rl.explain.hooks import probabilities
 from drone_rl.explain.scenes import Scenes, empty_scene, oracle_action, place_cube
 from drone_rl.policies import PolicyNetwork
-from drone_rl.sim.rules import Action
+from drone_rl.sim.actions import Move
 
 BLIND = 0.1
 """A policy is blind to a cube that changes its action probabilities by less than this."""
-MIRRORED = (Action.FORWARD, Action.RIGHT, Action.LEFT)
+MIRRORED = (Move.FORWARD, Move.RIGHT, Move.LEFT)
 """What each action becomes in a mirror."""
 
 
 @dataclasses.dataclass
 class ResponseMap:
-    """Action probabilities for one cube at every place of a grid: Z up, F ahead, L sideways."""
+    """Move probabilities for one cube at every place of a grid: Z up, F ahead, L sideways."""
 
     height: NDArray  # (Z,)
     """Metres above the drone."""
@@ -31,7 +31,7 @@ class ResponseMap:
     lateral: NDArray  # (L,)
     """Metres to its left."""
     probabilities: NDArray  # (Z, F, L, 3)
-    """By `Action`."""
+    """By `Move`."""
     without_cube: NDArray  # (3,)
     """The same for the scene without a cube."""
     oracle: NDArray  # (L,)
@@ -46,7 +46,7 @@ class ResponseMap:
     def blind(self) -> NDArray:
         """Where the cube calls for a turn and the policy doesn't notice it. Shape: (Z, F, L)."""
         change = 0.5 * np.abs(self.probabilities - self.without_cube).sum(-1)
-        calls = self.oracle != Action.FORWARD
+        calls = self.oracle != Move.FORWARD
         return (change < BLIND) & calls & (self.action != self.oracle)
 
 
@@ -129,7 +129,7 @@ def summarise(response: ResponseMap, outcome: OutcomeMap) -> dict[str, Any]:
     rows = []
     for layer, height in enumerate(response.height.tolist()):
         for side, action in (
-            ("left", Action.LEFT), ("ahead", Action.FORWARD), ("right", Action.RIGHT),
+            ("left", Move.LEFT), ("ahead", Move.FORWARD), ("right", Move.RIGHT),
         ):  # fmt: skip
             blind = response.blind[layer][:, response.oracle == action]
             collected = outcome.collected[layer][:, outcome.oracle == action]
@@ -151,7 +151,7 @@ def _places(scenes: Scenes, num_forward: int, num_lateral: int) -> tuple[Tensor,
     Ahead: from all but touching to where an episode's first cube stands. Sideways: symmetric, as
     far as a next cube ever stands. Up: where the task places them; level, lowest and highest.
     """
-    settings = scenes.worlds.settings
+    settings = scenes.worlds.task.settings
     reach = 2.0 * settings.lateral_bound or settings.touch_distance * 2
     nearest = settings.touch_distance + 0.5 * settings.step_length
     bound = settings.vertical_bound

@@ -9,9 +9,11 @@ from torch.nn import functional
 from torchrl.envs import CatFrames, Transform, TransformedEnv
 
 from drone_rl.envs import CropRows
-from drone_rl.sim import rules
-from drone_rl.sim.rules import WorldState
-from drone_rl.sim.worlds import CubeWorlds
+from drone_rl.sim.actions import Move
+from drone_rl.sim.rendering import Appearance
+from drone_rl.sim.tasks.collect_cubes import rules
+from drone_rl.sim.tasks.collect_cubes.rules import WorldState
+from drone_rl.sim.worlds import Worlds
 
 
 class Region(enum.IntEnum):
@@ -33,16 +35,16 @@ class Scenes:
 
     def __init__(self, env: TransformedEnv) -> None:
         """Borrows the worlds and the transforms of an environment."""
-        self.worlds: CubeWorlds = env.base_env.worlds
+        self.worlds: Worlds = env.base_env.worlds
         pipeline: Iterable[Transform] = env.transform  # type: ignore[assignment]
         self._transforms = [t for t in pipeline if "pixels" in (t.in_keys or [])]
         stacks = [t.N for t in self._transforms if isinstance(t, CatFrames)]
         self.memory: int = max(stacks, default=1) - 1
         """Pictures before the present one that the policy gets."""
 
-    def frames(self, state: WorldState) -> Tensor:
+    def frames(self, state: WorldState, appearance: Appearance | None = None) -> Tensor:
         """RGB pictures. Shape: (T, H, W, 3), uint8."""
-        return self.worlds.render(state)
+        return self.worlds.render(state, appearance=appearance)
 
     def depth(self, state: WorldState) -> Tensor:
         """Metres along the optical axis, 0 for the sky. Shape: (T, H, W)."""
@@ -103,8 +105,8 @@ class Scenes:
         The horizon is the lowest row of sky and the highest of ground, where they meet.
         """
         geoms = self.worlds.render(state, self.worlds.view(modality="segmentation")).long()
-        cube_of = self._cube_of_geom(geoms.device)
-        cube = cube_of[geoms]  # geom -1 (the sky) reads the last entry
+        props = torch.tensor([*self.worlds.scene.props, -1], device=geoms.device)
+        cube = props[geoms]  # geom -1 (the sky) reads the last entry
         next_cube = state.next_cube[:, None, None]
         regions = torch.full_like(cube, Region.GROUND)
         sky = geoms < 0
@@ -113,13 +115,6 @@ class Scenes:
         regions[cube >= 0] = Region.OTHER_CUBE
         regions[(cube >= 0) & (cube == next_cube)] = Region.NEXT_CUBE
         return regions.to(torch.uint8)
-
-    def _cube_of_geom(self, device: torch.device) -> Tensor:
-        """Cube of each geom, -1 for what is none; one more entry for the sky."""
-        model = self.worlds.model
-        names = [model.geom(i).name for i in range(model.ngeom)]
-        cubes = [int(n[5:].split("/")[0]) if n.startswith("cube_") else -1 for n in names]
-        return torch.tensor([*cubes, -1], device=device)
 
 
 def _border(sky: Tensor, ground: Tensor) -> Tensor:
@@ -137,7 +132,7 @@ def place_cube(scenes: Scenes, forward: Tensor, lateral: Tensor, height: float =
         lateral: Metres to its left. Shape: (T,).
         height: Metres above it.
     """
-    settings = scenes.worlds.settings
+    settings = scenes.worlds.task.settings
     count, cubes = len(forward), settings.num_cubes
     places = torch.zeros(count, cubes, 3, dtype=torch.float64)
     places[:, 0, 0], places[:, 0, 1] = forward.double(), lateral.double()
@@ -159,8 +154,8 @@ def oracle_action(scenes: Scenes, lateral: Tensor) -> Tensor:
 
     Flying straight on touches a cube within the touch distance; any other calls for a turn.
     """
-    tolerance = scenes.worlds.settings.touch_distance
-    action = torch.full_like(lateral, rules.Action.FORWARD, dtype=torch.int64)
-    action[lateral > tolerance] = rules.Action.LEFT
-    action[lateral < -tolerance] = rules.Action.RIGHT
+    tolerance = scenes.worlds.task.settings.touch_distance
+    action = torch.full_like(lateral, Move.FORWARD, dtype=torch.int64)
+    action[lateral > tolerance] = Move.LEFT
+    action[lateral < -tolerance] = Move.RIGHT
     return action

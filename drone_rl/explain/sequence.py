@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drone_rl.explain.dataset import RolloutDataset
-from drone_rl.sim.rules import EndReason
+from drone_rl.sim.tasks.collect_cubes.rules import EndReason
 
 COUNT = 6
 """Frames in a sequence, as in Figs. 13 to 15."""

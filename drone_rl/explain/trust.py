@@ -37,7 +37,7 @@ from drone_rl.explain.placebos import placebo_maps
 from drone_rl.explain.randomised import likeness, shuffled_networks
 from drone_rl.explain.scenes import Scenes, empty_scene
 from drone_rl.policies import PolicyNetwork
-from drone_rl.sim.rules import WorldState
+from drone_rl.sim.tasks.collect_cubes.rules import WorldState
 from drone_rl.utils.intervals import median_bounds
 
 MapOf = Callable[[PolicyNetwork, Tensor, Tensor], Tensor]

@@ -1,62 +1,61 @@
-"""Many worlds of the cube collection task at once: the rules in torch, the pictures by Warp."""
+"""Many worlds of a task at once: rules and motion in torch, pictures by a renderer."""
 
 from collections.abc import Sequence
+from typing import Any
 
-import mujoco
 import numpy as np
 import torch
-from dm_control import mjcf
 from torch import Tensor
 
-from drone_rl.sim import rules
-from drone_rl.sim.arena import SKY_COLOR
-from drone_rl.sim.cameras import FRONT_CENTER
-from drone_rl.sim.collect_cubes import CollectCubes, shown_cubes
-from drone_rl.sim.renderer import Modality, View, WarpRenderer
+from drone_rl.sim.composer_task import ComposerTask
+from drone_rl.sim.dynamics import Dynamics
+from drone_rl.sim.entities.cameras import FRONT_CENTER
+from drone_rl.sim.rendering import Appearance, Modality, Poses, View, WarpRenderer
+from drone_rl.sim.rendering.renderer import MakeRenderer
 from drone_rl.sim.settings import CameraSettings, TaskSettings
+from drone_rl.sim.tasks import State, Task, as_task
 
 
-def compile_model(settings: TaskSettings, camera: CameraSettings) -> mujoco.MjModel:
-    """Compiles the very model that the dm_control task simulates."""
-    task = CollectCubes(settings, camera, pixels=False)
-    return mjcf.Physics.from_mjcf_model(task.root_entity.mjcf_model).model.ptr
-
-
-class CubeWorlds:
-    """`num_worlds` worlds that step, reset and are drawn together, or any of them alone.
-
-    Computer-vision mode (Table 1): an action sets the drone's pose. Flight physics would replace
-    the one line of `step` that moves the drone, and `qpos` with it.
-    """
+class Worlds:
+    """`num_worlds` worlds that step, reset and are drawn together, or any of them alone."""
 
     def __init__(
         self,
         num_worlds: int,
-        settings: TaskSettings | None = None,
+        task: TaskSettings | Task[Any] | None = None,
         camera: CameraSettings | None = None,
         *,
+        dynamics: Dynamics | None = None,
+        renderer: MakeRenderer = WarpRenderer,
         device: str = "cpu",
         num_shards: int | None = None,
     ) -> None:
-        """Compiles the model and prepares the policy's camera.
+        """Compiles the model.
 
         Args:
             num_worlds: How many.
-            settings: The task's.
+            task: What there is to do; cube collection as in the original study by default.
             camera: The policy's.
+            dynamics: How the drones move; the task's own choice by default.
+            renderer: What makes the one that draws.
             device: "cpu", "cuda" or "cuda:N".
-            num_shards: See `WarpRenderer`.
+            num_shards: See `MakeRenderer`.
         """
         self.num_worlds = num_worlds
-        self.settings = settings or TaskSettings()
+        self.task = as_task(task)
         self.camera = camera or CameraSettings()
+        self.dynamics = dynamics or self.task.make_dynamics()
         self.device = torch.device(device)
-        self.model = compile_model(self.settings, self.camera)
-        self._num_shards = num_shards
-        self._renderers: dict[View, WarpRenderer] = {}
+        self._every = torch.arange(num_worlds, device=self.device)
+        self.scene = ComposerTask(
+            self.task, self.camera, dynamics=self.dynamics, pixels=False
+        ).compile()
+        self._renderer = renderer(
+            self.scene, num_worlds=num_worlds, num_shards=num_shards, device=device
+        )
         self.policy_view = self.view()
-        places = torch.zeros(num_worlds, self.settings.num_cubes, 3, dtype=torch.float64)
-        self.state = rules.start(self.settings, places).to(self.device)
+        drawn = self.task.draw(np.random.RandomState(0))
+        self.state = self.start(torch.zeros_like(drawn).expand(num_worlds, *drawn.shape).clone())
 
     def view(
         self,
@@ -75,78 +74,70 @@ class CubeWorlds:
             show_drone=show_drone,
         )
 
+    def start(self, drawn: Tensor) -> State:
+        """States at the start of episodes, be they these worlds' or imagined ones.
+
+        Args:
+            drawn: What is random about each, as `Task.draw` returns it. First dimension: worlds.
+        """
+        origin = torch.tensor(self.task.origin, dtype=torch.float64).repeat(len(drawn), 1)
+        return self.task.start(drawn, self.dynamics.start(origin)).to(self.device)
+
     def reset(self, worlds: Tensor, random_states: Sequence[np.random.RandomState]) -> None:
         """Starts new episodes.
 
         Args:
             worlds: Indices of the worlds. Shape: (k,).
-            random_states: One a world, from which its cubes are drawn.
+            random_states: One a world, from which its episode is drawn.
         """
-        cubes = [rules.draw_cubes(self.settings, random_state) for random_state in random_states]
-        self.state[worlds] = rules.start(self.settings, cubes).to(self.device)
+        if len(worlds):
+            self.state[worlds] = self.start(torch.stack([self.task.draw(r) for r in random_states]))
 
     def step(self, worlds: Tensor, action: Tensor) -> Tensor:
         """Moves the drones of some worlds and applies the rules.
 
         Args:
             worlds: Indices of the worlds. Shape: (k,).
-            action: `rules.Action` of each. Shape: (k,).
+            action: One of the dynamics' actions for each. Shape: (k, *).
 
         Returns:
             Reward. Shape: (k,), float64.
         """
-        everyone = len(worlds) == self.num_worlds
-        state = self.state if everyone else self.state[worlds]
-        drone = state.drone + rules.displacement(self.settings, action)
-        state, reward = rules.judge(self.settings, state, drone)
+        everyone = torch.equal(worlds, self._every)
+        state, reward = self.advance(self.state if everyone else self.state[worlds], action)
         if everyone:
             self.state = state
         else:
             self.state[worlds] = state
         return reward
 
-    def render(self, state: rules.WorldState, view: View | None = None) -> Tensor:
+    def advance(self, state: State, action: Tensor) -> tuple[State, Tensor]:
+        """What becomes of worlds, be they these or imagined ones, and the reward of each."""
+        return self.task.judge(state, self.dynamics.step(state.body, action))
+
+    def render(
+        self, state: State, view: View | None = None, appearance: Appearance | None = None
+    ) -> Tensor:
         """Draws worlds, be they these or imagined ones.
 
         Args:
             state: What to draw; any number of worlds.
             view: The policy's camera by default.
+            appearance: How they look; as the task has it by default.
 
         Returns:
-            See `WarpRenderer.render`. First dimension: the state's worlds.
+            See `Renderer.render`. First dimension: the state's worlds.
         """
-        renderer = self._renderer(view or self.policy_view)
-        qpos, mocap_pos = self.qpos(state), shown_cubes(state).float()
-        parts = [
-            renderer.render(q, m)
-            for q, m in zip(
-                qpos.split(self.num_worlds), mocap_pos.split(self.num_worlds), strict=True
-            )
-        ]
-        return parts[0] if len(parts) == 1 else torch.cat(parts)
+        return self._renderer.render(view or self.policy_view, self.poses(state), appearance)
 
-    def qpos(self, state: rules.WorldState) -> Tensor:
-        """Generalised positions: the drone's place and an upright attitude. Shape: (k, 7)."""
-        upright = state.drone.new_tensor([1.0, 0.0, 0.0, 0.0]).expand(len(state.drone), 4)
-        return torch.cat([state.drone, upright], dim=-1).float()
-
-    def close(self) -> None:
-        """Ends the renderers' threads."""
-        for renderer in self._renderers.values():
-            renderer.close()
+    def poses(self, state: State) -> Poses:
+        """Where a renderer must draw everything."""
+        return Poses(state.body.position, state.body.attitude, self.task.places(state))
 
     def prepare(self, view: View | None = None) -> None:
-        """Makes a renderer and its kernels ready, which the first picture would do otherwise."""
-        self._renderer(view or self.policy_view)
+        """Makes the renderer ready for a view, which its first picture would do otherwise."""
+        self._renderer.prepare(view or self.policy_view)
 
-    def _renderer(self, view: View) -> WarpRenderer:
-        if view not in self._renderers:
-            self._renderers[view] = WarpRenderer(
-                self.model,
-                view,
-                max_worlds=self.num_worlds,
-                num_shards=self._num_shards,
-                device=str(self.device),
-                background=SKY_COLOR,
-            )
-        return self._renderers[view]
+    def close(self) -> None:
+        """Ends the renderer."""
+        self._renderer.close()

@@ -13,8 +13,8 @@ import torch
 from torch import Tensor
 
 from drone_rl.evaluation.metrics import ENDS, Episodes
-from drone_rl.sim.rules import EndReason, Side
 from drone_rl.sim.settings import TaskSettings
+from drone_rl.sim.tasks.collect_cubes.rules import EndReason, Side
 from drone_rl.utils.intervals import proportion
 
 EXPECTED_END = "front_boundary"

@@ -11,8 +11,8 @@ from torch import Tensor
 from torchrl.envs import EnvBase
 
 from drone_rl.evaluation import Episodes, run_episodes, summarise
-from drone_rl.sim.rules import Side
 from drone_rl.sim.settings import TaskSettings
+from drone_rl.sim.tasks.collect_cubes.rules import Side
 from drone_rl.utils.intervals import mean_bounds, proportion
 from drone_rl.verdicts.failures import failure_table
 from drone_rl.verdicts.kinds import NOT_CERTAIN, Kind
@@ -68,7 +68,7 @@ def judge_policy(
             to draw from need not.
     """
     base = getattr(env, "base_env", env)
-    worlds, task = base.state_dict(), base.worlds.settings
+    worlds, task = base.state_dict(), base.worlds.task.settings
     greedy = run_episodes(env, actor, episodes)
     drawn = None
     if sampled:

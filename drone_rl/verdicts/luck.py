@@ -7,7 +7,7 @@ from tensordict.nn import TensorDictModuleBase
 
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation import ConstantPolicy, Episodes, Oracle, RandomPolicy, run_episodes
-from drone_rl.sim.rules import Action
+from drone_rl.sim.actions import Move
 from drone_rl.sim.settings import TaskSettings
 from drone_rl.utils.seeding import Stream, torch_generator
 from drone_rl.verdicts.rule import LUCK
@@ -30,8 +30,8 @@ def make_baseline(
     if name == "oracle":
         return Oracle(task)
     if name == "random":
-        return RandomPolicy(len(Action), generator)
-    return ConstantPolicy(Action[name.upper()])
+        return RandomPolicy(len(Move), generator)
+    return ConstantPolicy(Move[name.upper()])
 
 
 def fly_baselines(

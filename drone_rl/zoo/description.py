@@ -14,7 +14,7 @@ from torchrl.envs import TransformedEnv
 
 from drone_rl.envs import DroneEnv, make_env
 from drone_rl.policies import PolicyNetwork
-from drone_rl.sim.rules import Action
+from drone_rl.sim.actions import Move
 from drone_rl.sim.settings import CameraSettings, TaskSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Record, Several, as_mapping, shown
@@ -125,9 +125,7 @@ class PolicyDescription:
             generator: Source of the initial weights; torch's global one by default.
         """
         part = NETWORKS[self.network.name]
-        return part.make(
-            self.picture.shape, len(Action), generator=generator, **self.network.values
-        )
+        return part.make(self.picture.shape, len(Move), generator=generator, **self.network.values)
 
     def expected_weights(self) -> dict[str, torch.Tensor]:
         """Names, shapes and types of the network's weights, without the weights themselves."""

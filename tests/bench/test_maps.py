@@ -4,7 +4,7 @@ import torch
 
 from drone_rl.bench.maps import bench_maps, expert, imagined
 from drone_rl.explain.scenes import Scenes
-from drone_rl.sim.rules import Action
+from drone_rl.sim.actions import Move
 
 
 def test_no_liar_is_believed_and_true_maps_are_found(tmp_path):
@@ -25,7 +25,7 @@ def test_imagined_worlds_are_such_as_flights_meet(scenes):
     assert torch.equal(state.cubes[0], state.cubes[3]) and not torch.equal(
         state.cubes[0], state.cubes[4]
     )
-    settings = scenes.worlds.settings
+    settings = scenes.worlds.task.settings
     assert state.drone[:, 1].abs().max() <= settings.lateral_bound
     ahead = state.cubes[..., 0] > state.drone[:, None, 0]
     assert not (state.present & ~ahead).any()
@@ -36,5 +36,5 @@ def test_the_expert_turns_to_the_next_cube(scenes):
     state, _ = imagined(scenes, 10, 4)
     offset = state.cubes[torch.arange(40), state.next_cube, 1] - state.drone[:, 1]
     wanted = expert(scenes, state)
-    assert (wanted[offset > 2] == Action.LEFT).all() and (wanted[offset < -2] == Action.RIGHT).all()
+    assert (wanted[offset > 2] == Move.LEFT).all() and (wanted[offset < -2] == Move.RIGHT).all()
     assert set(wanted.tolist()) == {0, 1, 2}

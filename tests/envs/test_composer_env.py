@@ -3,7 +3,7 @@ import torch
 from torchrl.envs.utils import check_env_specs
 
 from drone_rl.envs.composer_env import ComposerEnv
-from drone_rl.sim.collect_cubes import make_environment
+from drone_rl.sim.composer_task import make_environment
 from drone_rl.sim.settings import TaskSettings
 
 SHORT = TaskSettings(step_limit=32)

@@ -3,8 +3,8 @@ import torch
 from torchrl.envs.utils import check_env_specs
 
 from drone_rl.envs import DroneEnv
-from drone_rl.sim.rules import EndReason
 from drone_rl.sim.settings import TaskSettings
+from drone_rl.sim.tasks.collect_cubes.rules import EndReason
 from drone_rl.utils.errors import InputError
 
 SHORT = TaskSettings(num_cubes=1, first_distance=3.0, step_limit=5, front_margin=3.0)

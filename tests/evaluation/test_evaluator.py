@@ -6,8 +6,9 @@ from drone_rl.collectors import EpisodeCollector
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation import ConstantPolicy, Oracle, RandomPolicy, run_episodes, summarise
 from drone_rl.evaluation.video import film_episode, write_video
-from drone_rl.sim.rules import Action, EndReason
+from drone_rl.sim.actions import Move
 from drone_rl.sim.settings import TaskSettings
+from drone_rl.sim.tasks.collect_cubes.rules import EndReason
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import Stream
 
@@ -32,7 +33,7 @@ def test_random_policy_collects_what_the_original_studys_did():
 
 def test_exactly_as_many_episodes_as_asked_for():
     env = DroneEnv(8, pixels=False)
-    episodes = run_episodes(env, Oracle(env.worlds.settings), 11)
+    episodes = run_episodes(env, Oracle(env.worlds.task.settings), 11)
     assert len(episodes.length) == 11
 
 
@@ -87,7 +88,7 @@ def test_heights_are_metres_above_the_drone():
     start = env.state_dict()
     drawn = env.reset()["info", "cube_positions"][..., 2]
     env.load_state_dict(start)
-    flown = run_episodes(env, ConstantPolicy(Action.FORWARD), 4)
+    flown = run_episodes(env, ConstantPolicy(Move.FORWARD), 4)
     torch.testing.assert_close(flown.height, drawn.double() - 5.0)
     assert (flown.end_reason == EndReason.FRONT_BOUNDARY).any()
     assert flown.length.max() == 45  # 44 is still within bounds
@@ -97,7 +98,7 @@ def test_the_kth_episode_is_the_same_world_whatever_the_policy():
     env = DroneEnv(8, TaskSettings(vertical_bound=1.0, altitude=5.0), pixels=False)
     start = env.state_dict()
     flown = []
-    for policy in (Oracle(env.worlds.settings), ConstantPolicy(Action.LEFT)):
+    for policy in (Oracle(env.worlds.task.settings), ConstantPolicy(Move.LEFT)):
         env.load_state_dict(start)
         flown.append(run_episodes(env, policy, 20))
     ours, theirs = flown

@@ -3,17 +3,17 @@ import math
 import torch
 
 from drone_rl.explain.alternatives import (
-    BRIGHT_GROUND,
-    BRIGHT_SKY,
+    BRIGHT,
+    DARK,
     DARK_GROUND,
-    DARK_SKY,
-    Repainted,
     alternatives,
     cubes_elsewhere,
     without_cubes,
 )
 from drone_rl.explain.scenes import Region, Scenes, empty_scene, place_cube
-from drone_rl.sim.arena import FLOOR_COLOR, SKY_COLOR
+from drone_rl.sim.entities.arena import FLOOR_COLOR, SKY_COLOR
+from drone_rl.sim.meaning import Meaning
+from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.settings import TaskSettings
 
 
@@ -40,11 +40,9 @@ def test_what_the_simulator_draws_otherwise(scenes, world):
 
 
 def test_other_colours_are_darker_and_brighter_than_the_arenas():
-    for dark, color, bright in (
-        (DARK_GROUND, FLOOR_COLOR, BRIGHT_GROUND),
-        (DARK_SKY, SKY_COLOR, BRIGHT_SKY),
-    ):
-        for low, middle, high in zip(dark, color, bright, strict=True):
+    assert DARK_GROUND.colors == {Meaning.GROUND: DARK.colors[Meaning.GROUND]}
+    for thing, color in ((Meaning.GROUND, FLOOR_COLOR), (Meaning.SKY, SKY_COLOR)):
+        for low, middle, high in zip(DARK.colors[thing], color, BRIGHT.colors[thing], strict=True):
             assert 0.2 < low < middle < high < 1.0  # still grounds and skies, no black or white
 
 
@@ -79,9 +77,8 @@ def test_cubes_elsewhere_are_in_view(scenes):
 
 def test_only_the_named_colours_change(scenes):
     state = place_cube(scenes, torch.tensor([6.0]), torch.tensor([2.0]))
-    painted = Repainted(scenes, {"floor": (0.1, 0.1, 0.1)})
-    regions, before, after = scenes.regions(state), scenes.frames(state), painted.frames(state)
-    painted.close()
+    regions, before = scenes.regions(state), scenes.frames(state)
+    after = scenes.frames(state, Appearance(colors={Meaning.GROUND: (0.1, 0.1, 0.1)}))
     changed = (before != after).any(-1)
     ground = (regions == Region.GROUND) | (regions == Region.HORIZON)
     assert changed[regions == Region.GROUND].all()

@@ -5,7 +5,7 @@ import torch
 from drone_rl.explain.asymmetry import asymmetry, grid_asymmetry
 from drone_rl.explain.response import ResponseMap
 from drone_rl.policies import MLP
-from drone_rl.sim.rules import Action
+from drone_rl.sim.actions import Move
 
 
 def sides(bias):
@@ -13,8 +13,8 @@ def sides(bias):
     network = MLP((1, 1, 4), 3, hidden=())
     with torch.no_grad():
         network.layers.logits.weight.zero_()
-        network.layers.logits.weight[Action.LEFT, :2] = 1.0
-        network.layers.logits.weight[Action.RIGHT, 2:] = 1.0
+        network.layers.logits.weight[Move.LEFT, :2] = 1.0
+        network.layers.logits.weight[Move.RIGHT, 2:] = 1.0
         network.layers.logits.bias.copy_(torch.tensor([0.0, 0.0, bias]))
     return network
 

@@ -6,10 +6,11 @@ from torchrl.envs import CatFrames
 from drone_rl.envs import DroneEnv, GrayPixels, make_env
 from drone_rl.explain.flying import fly_on
 from drone_rl.explain.scenes import Scenes, place_cube
-from drone_rl.sim.rules import Action, EndReason
+from drone_rl.sim.actions import Move
 from drone_rl.sim.settings import TaskSettings
+from drone_rl.sim.tasks.collect_cubes.rules import EndReason
 
-F, L, R = Action.FORWARD, Action.LEFT, Action.RIGHT
+F, L, R = Move.FORWARD, Move.LEFT, Move.RIGHT
 
 
 class Always(nn.Module):
@@ -31,7 +32,7 @@ def scenes(make_pipeline):
 
 
 def test_straight_on_collects_what_it_touches(scenes):
-    reach = scenes.worlds.settings.touch_distance  # 1.65 m
+    reach = scenes.worlds.task.settings.touch_distance  # 1.65 m
     starts = place_cube(
         scenes, torch.tensor([5.0, 5.0, 5.0]), torch.tensor([0, reach, reach + 0.1])
     )

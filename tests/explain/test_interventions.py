@@ -5,13 +5,14 @@ import torch
 from drone_rl.explain.alternatives import DARK_GROUND
 from drone_rl.explain.hooks import probabilities
 from drone_rl.explain.interventions import (
-    OTHER_CUBE_COLOR,
+    OTHER_CUBES,
     _patches,
     intervene,
     to_the_middle,
 )
 from drone_rl.explain.scenes import Region, empty_scene, place_cube
-from drone_rl.sim.arena import FLOOR_COLOR
+from drone_rl.sim.entities.arena import FLOOR_COLOR
+from drone_rl.sim.meaning import Meaning
 from drone_rl.sim.settings import TaskSettings
 
 
@@ -81,9 +82,9 @@ def test_a_patch_of_ground_is_a_square_of_about_as_many_pixels():
 
 
 def test_other_colours_are_colours_unlike_the_cubes_and_the_grounds():
-    cube = TaskSettings().cube_color
-    for other, usual in ((OTHER_CUBE_COLOR, cube), (DARK_GROUND, FLOOR_COLOR)):
+    yellow, dark = OTHER_CUBES.colors[Meaning.TARGET], DARK_GROUND.colors[Meaning.GROUND]
+    for other, usual in ((yellow, TaskSettings().cube_color), (dark, FLOOR_COLOR)):
         assert all(0.0 <= part <= 1.0 for part in other)
         assert max(abs(a - b) for a, b in zip(other, usual, strict=True)) > 0.2
-    red, green, blue = OTHER_CUBE_COLOR
-    assert min(red, green) > 0.5 > blue  # yellow
+    red, green, blue = yellow
+    assert min(red, green) > 0.5 > blue

@@ -17,7 +17,7 @@ from drone_rl.explain.outcomes import (
     taken_away,
 )
 from drone_rl.explain.scenes import empty_scene, place_cube
-from drone_rl.sim.rules import Action
+from drone_rl.sim.actions import Move
 
 
 class Follower(nn.Module):
@@ -32,7 +32,7 @@ class Follower(nn.Module):
         columns = torch.arange(x.shape[-1]) - (x.shape[-1] - 1) / 2
         middle = (heat * columns).sum(1) / heat.sum(1).clamp_min(1e-9)
         logits = torch.zeros(len(x), 3)
-        logits[:, Action.LEFT], logits[:, Action.RIGHT] = -middle - 4, middle - 4
+        logits[:, Move.LEFT], logits[:, Move.RIGHT] = -middle - 4, middle - 4
         return logits
 
 
@@ -67,15 +67,15 @@ def test_a_policy_that_looks_follows_the_cube_and_gets_it(scenes, starts, follow
     assert abs(found["missed_when_moved"]["mean"]) < 0.1
 
 
-@pytest.mark.parametrize("action", list(Action))
+@pytest.mark.parametrize("action", list(Move))
 def test_a_policy_that_does_not_look_follows_nothing(scenes, starts, action):
     found = outcomes(scenes, Always(action), starts, np.arange(12))
     assert found["follows"]["mean"] == 0.0
     assert found["path_changed"]["mean"] == found["ground_changed"]["mean"] == 0.0
     assert found["ground_changed"]["upper95"] < 0.5  # twelve flights show no more than that
     # straight on gets what stands ahead; moved by 2 m, half of that leaves the way
-    if action is Action.FORWARD:
-        ahead = (starts.cubes[:, 0, 1].abs() <= scenes.worlds.settings.touch_distance).float()
+    if action is Move.FORWARD:
+        ahead = (starts.cubes[:, 0, 1].abs() <= scenes.worlds.task.settings.touch_distance).float()
         assert found["collected"]["as it was"]["mean"] == pytest.approx(float(ahead.mean()))
     else:
         assert found["collected"]["as it was"]["mean"] < 0.5
@@ -89,7 +89,7 @@ def test_a_policy_that_minds_the_ground_gets_another_outcome(scenes, starts):
             logits[dark] = torch.tensor([0.0, 1.0, 0.0])
             return logits
 
-    network = Afraid(Action.FORWARD)
+    network = Afraid(Move.FORWARD)
     network.level = float(scenes.observe(starts)[0, 0, -1, 0]) - 0.3
     ahead = place_cube(scenes, torch.full((6,), 9.0), torch.zeros(6))
     found = outcomes(scenes, network, ahead, np.arange(6))
@@ -99,25 +99,25 @@ def test_a_policy_that_minds_the_ground_gets_another_outcome(scenes, starts):
 
 def test_flights_end_when_the_cube_is_decided(scenes):
     state = place_cube(scenes, torch.tensor([5.0, 5.0]), torch.tensor([0.0, 4.0]))
-    flown = fly(scenes, Always(Action.FORWARD), state, state.next_cube)
+    flown = fly(scenes, Always(Move.FORWARD), state, state.next_cube)
     # touched at 5 - 1.65, that is after four steps; passed after six
     assert (flown.collected.tolist(), flown.decided.tolist()) == ([True, False], [4, 6])
     assert flown.actions.tolist() == [[0, 0, 0, 0, -1, -1], [0] * 6]
     assert flown.lateral.shape == (2, 7) and (flown.lateral == 0).all()
-    dither = fly(scenes, Always(Action.LEFT), state, state.next_cube)
+    dither = fly(scenes, Always(Move.LEFT), state, state.next_cube)
     assert (dither.decided < PATIENCE).all() and not dither.collected.any()  # out at the side
 
 
 def test_patience_ends(scenes, monkeypatch):
     monkeypatch.setattr("drone_rl.explain.outcomes.PATIENCE", 3)
     state = place_cube(scenes, torch.tensor([9.0]), torch.tensor([0.0]))
-    flown = fly(scenes, Always(Action.FORWARD), state, state.next_cube)
+    flown = fly(scenes, Always(Move.FORWARD), state, state.next_cube)
     assert (flown.collected.tolist(), flown.decided.tolist()) == ([False], [3])
 
 
 def test_no_flights_have_no_steps(scenes):
     state = empty_scene(scenes)[torch.arange(0)]
-    flown = fly(scenes, Always(Action.FORWARD), state, state.next_cube)
+    flown = fly(scenes, Always(Move.FORWARD), state, state.next_cube)
     assert (flown.actions.shape, flown.lateral.shape) == ((0, 0), (0, 1))
     assert (len(flown.collected), len(flown.decided)) == (0, 0)
 

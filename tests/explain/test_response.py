@@ -17,6 +17,7 @@ from drone_rl.explain.response import (
 )
 from drone_rl.explain.scenes import Scenes, place_cube
 from drone_rl.sim.settings import TaskSettings
+from drone_rl.sim.tasks import CollectCubes
 
 IDLE, LEFT = [1.0, 0.0, 0.0], [0.1, 0.9, 0.0]
 
@@ -39,7 +40,7 @@ def test_a_place_on_the_grid_is_that_place_in_the_world(scenes, world):
 
 def test_places_reach_as_far_as_cubes_stand():
     def ends(**settings):
-        worlds = SimpleNamespace(settings=TaskSettings(**settings))
+        worlds = SimpleNamespace(task=CollectCubes(TaskSettings(**settings)))
         height, *axes = _places(SimpleNamespace(worlds=worlds), 3, 5)
         return [height.tolist(), *([axis[0].item(), axis[-1].item()] for axis in axes)]
 

@@ -2,7 +2,7 @@ import torch
 
 from drone_rl.envs import CropRows, DroneEnv, GrayPixels, Resize, make_env
 from drone_rl.explain.scenes import Region, Scenes, empty_scene, oracle_action, place_cube
-from drone_rl.sim.rules import Action
+from drone_rl.sim.actions import Move
 from drone_rl.sim.settings import CameraSettings
 
 
@@ -40,7 +40,7 @@ def test_depth_is_the_cubes_distance(scenes):
 
 def test_the_oracle_turns_towards_the_cube(scenes):
     lateral = torch.tensor([3.0, 0.5, -3.0])
-    expected = [Action.LEFT, Action.FORWARD, Action.RIGHT]
+    expected = [Move.LEFT, Move.FORWARD, Move.RIGHT]
     assert oracle_action(scenes, lateral).tolist() == expected
 
 

@@ -2,7 +2,7 @@ import numpy as np
 
 from drone_rl.explain.dataset import RolloutDataset
 from drone_rl.explain.sequence import key_frames
-from drone_rl.sim.rules import EndReason
+from drone_rl.sim.tasks.collect_cubes.rules import EndReason
 
 
 def fake(length, collects=(), misses=(), end=EndReason.ALL_CUBES):

@@ -3,10 +3,12 @@
 import numpy as np
 import torch
 
-from drone_rl.sim.collect_cubes import make_environment
-from drone_rl.sim.rules import EndReason
+from drone_rl.sim.actions import Move
+from drone_rl.sim.composer_task import make_environment
+from drone_rl.sim.meaning import Meaning
 from drone_rl.sim.settings import TaskSettings
-from drone_rl.sim.worlds import CubeWorlds
+from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.seeding import world_random_state
 
 
@@ -17,7 +19,7 @@ def test_same_seed_and_actions_give_the_same_poses_rewards_and_ends():
     for seed in range(6):
         env = make_environment(settings, pixels=False, random_state=world_random_state(seed, 0))
         random_state = world_random_state(seed, 0)
-        worlds = CubeWorlds(1, settings)
+        worlds = Worlds(1, settings)
         for _ in range(3):  # episodes of the same world follow one another alike
             timestep = env.reset()
             worlds.reset(torch.arange(1), [random_state])
@@ -26,21 +28,41 @@ def test_same_seed_and_actions_give_the_same_poses_rewards_and_ends():
                 timestep = env.step(action)
                 reward = worlds.step(torch.arange(1), torch.tensor([action]))
                 assert timestep.reward == reward.item()
-                for name, value in vars(env.task.state).items():
+                one, many = vars(env.task.state).copy(), vars(worlds.state).copy()
+                for state in (one, many):
+                    state |= vars(state.pop("body"))
+                for name, value in one.items():
                     same = {"rtol": 0, "atol": 0, "equal_nan": True, "msg": name}
-                    torch.testing.assert_close(value, getattr(worlds.state, name), **same)
+                    torch.testing.assert_close(value, many[name], **same)
                 position, _ = env.task.drone.get_pose(env.physics)
                 np.testing.assert_array_equal(position, worlds.state.drone[0].numpy())
             ends.add(EndReason(worlds.state.end_reason.item()))
     assert len(ends) >= 2
 
 
-def test_qpos_is_the_dm_control_models():
+def test_the_scene_is_the_dm_control_model_and_knows_what_its_geoms_mean():
     env = make_environment(pixels=False, random_state=world_random_state(0, 0))
-    worlds = CubeWorlds(1)
     env.reset()
-    worlds.reset(torch.arange(1), [world_random_state(0, 0)])
-    np.testing.assert_allclose(worlds.qpos(worlds.state)[0].numpy(), env.physics.data.qpos)
-    assert worlds.model.nq == env.physics.model.nq
-    names = [worlds.model.geom(i).name for i in range(worlds.model.ngeom)]
-    assert names == [env.physics.model.geom(i).name for i in range(env.physics.model.ngeom)]
+    worlds = Worlds(1)
+    model, physics = worlds.scene.model, env.physics.model
+    names = [model.geom(i).name for i in range(model.ngeom)]
+    assert names == [physics.geom(i).name for i in range(physics.ngeom)]
+    found = dict(
+        zip(names, zip(worlds.scene.meanings, worlds.scene.props, strict=True), strict=True)
+    )
+    assert found.pop("floor") == (Meaning.GROUND, -1)
+    for i in range(3):
+        assert found.pop(f"cube_{i}/geom") == (Meaning.TARGET, i)
+    assert found.pop("drone/hull") == (Meaning.DRONE, -1)
+    assert set(found.values()) == {(Meaning.DRONE, -1)} and len(found) == 4  # the rotors
+
+
+def test_only_all_worlds_in_their_order_are_stepped_as_a_whole():
+    worlds, turned = Worlds(2), Worlds(2)
+    for each in (worlds, turned):
+        each.reset(torch.arange(2), [world_random_state(0, i) for i in range(2)])
+    worlds.step(torch.arange(2), torch.tensor([Move.LEFT, Move.FORWARD]))
+    turned.step(torch.tensor([1, 0]), torch.tensor([Move.FORWARD, Move.LEFT]))
+    assert worlds.state.drone.tolist() == [[0.0, 1.0, 2.5], [1.0, 0.0, 2.5]]
+    assert torch.equal(worlds.state.drone, turned.state.drone)
+    assert torch.equal(worlds.state.cubes, turned.state.cubes)

@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from drone_rl.evaluation import Episodes
-from drone_rl.sim.rules import EndReason, Side
+from drone_rl.sim.tasks.collect_cubes.rules import EndReason, Side
 from drone_rl.verdicts.luck import BASELINES
 
 METRES = {Side.LEFT: 4.0, Side.AHEAD: 0.0, Side.RIGHT: -4.0}

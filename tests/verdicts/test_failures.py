@@ -1,8 +1,8 @@
 import pytest
 import torch
 
-from drone_rl.sim.rules import EndReason, Side
 from drone_rl.sim.settings import TaskSettings
+from drone_rl.sim.tasks.collect_cubes.rules import EndReason, Side
 from drone_rl.utils.intervals import proportion
 from drone_rl.verdicts.failures import failure_table, ordinal, sideways_edges
 

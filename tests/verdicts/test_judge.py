@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation import Oracle, run_episodes
-from drone_rl.sim.rules import Side
 from drone_rl.sim.settings import TaskSettings
+from drone_rl.sim.tasks.collect_cubes.rules import Side
 from drone_rl.utils.intervals import mean_bounds, proportion
 from drone_rl.verdicts.judge import judge, judge_policy, measure, observe
 from drone_rl.verdicts.kinds import Kind

@@ -3,9 +3,9 @@ import torch
 
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation import ConstantPolicy, Oracle, RandomPolicy, run_episodes
-from drone_rl.sim.rules import Action
+from drone_rl.sim.actions import Move
 from drone_rl.sim.settings import TaskSettings
-from drone_rl.sim.worlds import CubeWorlds
+from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.seeding import Stream, torch_generator
 from drone_rl.verdicts.luck import BASELINES, fly_baselines
 
@@ -16,12 +16,12 @@ TASK = TaskSettings(num_cubes=1)
 def policies():
     """What each baseline is; luck has a random stream of its own, which no policy's actions use."""
     generator = torch_generator(0, Stream.ACTIONS, number=1)
-    fixed = {action.name.lower(): ConstantPolicy(action) for action in Action}
+    fixed = {action.name.lower(): ConstantPolicy(action) for action in Move}
     return {"oracle": Oracle(TASK), "random": RandomPolicy(3, generator), **fixed}
 
 
 def test_baselines_are_flown_in_the_same_worlds_one_by_one(policies, monkeypatch):
-    monkeypatch.setattr(CubeWorlds, "render", lambda *args: pytest.fail("nobody looks"))
+    monkeypatch.setattr(Worlds, "render", lambda *args: pytest.fail("nobody looks"))
     env = DroneEnv(4, TASK, pixels=False, seed=5)
     worlds = env.state_dict()
     flown = fly_baselines(4, TASK, worlds, 6)

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 TARGETS: dict[str, tuple[str, ...]] = {
-    "sim/rules": ("sim/test_rules", "sim/test_worlds"),
+    "sim/tasks/collect_cubes/rules": ("sim/tasks/collect_cubes/test_rules", "sim/test_worlds"),
     "objectives/returns": ("objectives/test_returns",),
     "objectives/estimators": ("objectives/test_estimators",),
     "objectives/reinforce": ("objectives/test_reinforce",),

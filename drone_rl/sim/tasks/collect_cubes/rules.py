@@ -1,8 +1,7 @@
 """The rules of cube collection, written once for one world and for thousands.
 
 Pure functions of tensors whose first dimension counts worlds. They know nothing of how the drone
-came to its position: computer-vision mode calls `displacement`, flight physics will not, and both
-hand the new position to `judge` (chapter, Algorithms 1 to 3).
+came to where it is: `judge` is handed its new state by any dynamics (chapter, Algorithms 1 to 3).
 
 World frame, metres: x forward, y left, z up.
 """
@@ -15,15 +14,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from drone_rl.sim.batch import Batch
+from drone_rl.sim.dynamics.body import BodyState
 from drone_rl.sim.settings import TaskSettings
-
-
-class Action(enum.IntEnum):
-    """The three moves of section 4."""
-
-    FORWARD = 0
-    LEFT = 1
-    RIGHT = 2
 
 
 class Side(enum.IntEnum):
@@ -44,16 +37,12 @@ class EndReason(enum.IntEnum):
     STEP_LIMIT = 4
 
 
-MOVES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0))
-"""Unit move of each `Action`, world frame."""
-
-
 @dataclasses.dataclass
-class WorldState:
+class WorldState(Batch):
     """The whole state of `num_worlds` worlds; `C` is the number of cubes."""
 
-    drone: Tensor  # (num_worlds, 3) float64
-    """Position of the drone, metres."""
+    body: BodyState
+    """The drone's."""
     cubes: Tensor  # (num_worlds, C, 3) float64
     """Positions at which the cubes were placed, metres, in the order of their x."""
     collected: Tensor  # (num_worlds, C) bool
@@ -69,18 +58,10 @@ class WorldState:
     end_reason: Tensor  # (num_worlds,) int64
     """`EndReason` of each world."""
 
-    def __getitem__(self, worlds: Tensor) -> "WorldState":
-        """Returns the state of some worlds (a copy)."""
-        return WorldState(**{k: v[worlds] for k, v in vars(self).items()})
-
-    def __setitem__(self, worlds: Tensor, state: "WorldState") -> None:
-        """Overwrites the state of some worlds."""
-        for name, value in vars(self).items():
-            value[worlds] = getattr(state, name)
-
-    def to(self, device: torch.device | str) -> "WorldState":
-        """Returns the state on another device."""
-        return WorldState(**{k: v.to(device) for k, v in vars(self).items()})
+    @property
+    def drone(self) -> Tensor:
+        """Position of the drone, metres. Shape: (num_worlds, 3)."""
+        return self.body.position
 
     @property
     def present(self) -> Tensor:
@@ -105,18 +86,27 @@ def draw_cubes(settings: TaskSettings, random_state: np.random.RandomState) -> T
     return torch.from_numpy(np.column_stack([x, offsets]))
 
 
-def start(settings: TaskSettings, cubes: Sequence[Tensor] | Tensor) -> WorldState:
-    """The state at the start of an episode, with the drone at its origin.
+def origin(settings: TaskSettings) -> tuple[float, float, float]:
+    """Where the drone starts, metres."""
+    return (0.0, 0.0, settings.altitude)
+
+
+def start(
+    settings: TaskSettings, cubes: Sequence[Tensor] | Tensor, body: BodyState | None = None
+) -> WorldState:
+    """The state at the start of an episode.
 
     Args:
         settings: The task's.
         cubes: Positions of the cubes, metres. Shape: (num_worlds, num_cubes, 3).
+        body: The drone's; at rest at its origin by default.
     """
     cubes = torch.stack(list(cubes)) if not isinstance(cubes, Tensor) else cubes
-    num_worlds, num_cubes, _ = cubes.shape
-    no_cube = cubes.new_zeros(num_worlds, num_cubes, dtype=torch.bool)
+    if body is None:
+        body = BodyState.at_rest(cubes.new_tensor(origin(settings)).repeat(len(cubes), 1))
+    no_cube = torch.zeros_like(cubes[..., 0], dtype=torch.bool)
     state = WorldState(
-        drone=cubes.new_tensor([0.0, 0.0, settings.altitude]).repeat(num_worlds, 1),
+        body=body,
         cubes=cubes,
         collected=no_cube,
         passed=no_cube.clone(),
@@ -129,21 +119,7 @@ def start(settings: TaskSettings, cubes: Sequence[Tensor] | Tensor) -> WorldStat
     return state
 
 
-def displacement(settings: TaskSettings, action: Tensor) -> Tensor:
-    """How far an action moves the drone in computer-vision mode, metres, world frame.
-
-    Args:
-        settings: The task's.
-        action: `Action` indices. Shape: (num_worlds,).
-
-    Returns:
-        Shape: (num_worlds, 3), float64.
-    """
-    moves = torch.tensor(MOVES, dtype=torch.float64, device=action.device)
-    return moves[action] * settings.step_length
-
-
-def judge(settings: TaskSettings, state: WorldState, drone: Tensor) -> tuple[WorldState, Tensor]:
+def judge(settings: TaskSettings, state: WorldState, body: BodyState) -> tuple[WorldState, Tensor]:
     """Applies Algorithms 1 and 3 after the drone has moved.
 
     A touched cube is collected and worth 1; a cube left behind vanishes; the episode ends when all
@@ -152,17 +128,18 @@ def judge(settings: TaskSettings, state: WorldState, drone: Tensor) -> tuple[Wor
     Args:
         settings: The task's.
         state: Before the move.
-        drone: Position after the move, metres. Shape: (num_worlds, 3).
+        body: The drone after the move.
 
     Returns:
         The new state and the reward. Reward shape: (num_worlds,), float64.
     """
+    drone = body.position
     away = (drone[:, None] - state.cubes).abs().amax(-1)  # (num_worlds, C)
     touched = state.present & (away <= settings.touch_distance)
     collected = state.collected | touched
     passed = state.passed | (~collected & (drone[:, None, 0] > state.cubes[..., 0]))
     new = dataclasses.replace(
-        state, drone=drone, collected=collected, passed=passed, steps=state.steps + 1
+        state, body=body, collected=collected, passed=passed, steps=state.steps + 1
     )
     new.side, new.lateral = _sightings(settings, new)
     new.end_reason = _end_reason(settings, new)

@@ -2,10 +2,12 @@ import numpy as np
 import pytest
 from dm_control import composer
 
-from drone_rl.sim import cameras
-from drone_rl.sim.collect_cubes import VANISHED_DEPTH, CollectCubes, make_environment
-from drone_rl.sim.rules import Action, EndReason
+from drone_rl.sim.actions import Move
+from drone_rl.sim.composer_task import ComposerTask, make_environment
+from drone_rl.sim.entities import cameras
 from drone_rl.sim.settings import TaskSettings
+from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.sim.tasks.collect_cubes.task import VANISHED_DEPTH
 
 
 @pytest.fixture
@@ -19,7 +21,7 @@ def test_runs_under_plain_composer_environment(env):
     assert timestep.first()
     assert env.action_spec().num_values == 3
     while not timestep.last():
-        timestep = env.step(Action.FORWARD)
+        timestep = env.step(Move.FORWARD)
         for name, spec in env.observation_spec().items():
             spec.validate(timestep.observation[name])
     assert timestep.observation["end_reason"].item() == EndReason.FRONT_BOUNDARY
@@ -31,7 +33,7 @@ def test_step_limit_truncates_with_discount_one():
     env = make_environment(TaskSettings(step_limit=32), pixels=False, random_state=0)
     timestep = env.reset()
     for step in range(32):
-        timestep = env.step(Action.LEFT if step % 2 else Action.RIGHT)
+        timestep = env.step(Move.LEFT if step % 2 else Move.RIGHT)
     assert timestep.last()
     assert timestep.discount == 1.0
     assert timestep.observation["end_reason"].item() == EndReason.STEP_LIMIT
@@ -42,7 +44,7 @@ def test_drone_moved_by_hand_collects(env):
     task, physics = env.task, env.physics
     cube = task.state.cubes[0, 0].numpy()
     task.drone.set_pose(physics, cube - (1.0, 0.0, 0.0), (1, 0, 0, 0))
-    timestep = env.step(Action.FORWARD)
+    timestep = env.step(Move.FORWARD)
     assert timestep.reward == 1.0
     assert timestep.observation["cubes"].item() == 1
     assert timestep.observation["collected"].tolist() == [True, False, False]
@@ -52,14 +54,14 @@ def test_collected_cube_is_out_of_sight(env):
     env.reset()
     place = env.task.state.cubes[0, 0].numpy()
     env.task.drone.set_pose(env.physics, place - (1.0, 0.0, 0.0), (1, 0, 0, 0))
-    env.step(Action.FORWARD)
+    env.step(Move.FORWARD)
     shown = env.physics.bind(env.task.root_entity.mjcf_model.find("geom", "cube_0/geom")).xpos
     assert shown[2] == pytest.approx(place[2] - VANISHED_DEPTH)
 
 
 def test_physics_does_not_move_the_drone(env):
     env.reset()
-    for action in (Action.FORWARD, Action.FORWARD, Action.LEFT, Action.RIGHT, Action.RIGHT):
+    for action in (Move.FORWARD, Move.FORWARD, Move.LEFT, Move.RIGHT, Move.RIGHT):
         env.step(action)
     position, quaternion = env.task.drone.get_pose(env.physics)
     np.testing.assert_allclose(position, (2.0, -1.0, 2.5), atol=1e-12)
@@ -78,14 +80,14 @@ def test_resets_differ_and_seeds_repeat():
 
 
 def test_five_cameras_with_airsims_names():
-    model = CollectCubes(pixels=False).drone.mjcf_model
+    model = ComposerTask(pixels=False).drone.mjcf_model
     names = [spec.name for spec in cameras.DRONE_CAMERAS]
     assert names == ["front_center", "front_right", "front_left", "bottom_center", "back_center"]
     assert all(model.find("camera", name) is not None for name in names)
 
 
 def test_observables_are_off_until_a_task_enables_them():
-    from drone_rl.sim.drone import Drone
+    from drone_rl.sim.entities.drone import Drone
     from drone_rl.sim.settings import CameraSettings
 
     drone = Drone(size=0.8, camera=CameraSettings())

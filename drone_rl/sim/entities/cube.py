@@ -2,9 +2,13 @@
 
 from dm_control import composer, mjcf
 
+from drone_rl.sim.meaning import Meaning
+
 
 class Cube(composer.Entity):
     """A cube that is seen but never pushes: touching is a rule, not a contact."""
+
+    meaning = Meaning.TARGET
 
     def _build(self, size: float, color: tuple[float, float, float], name: str = "cube") -> None:
         """Makes the cube.

@@ -4,7 +4,8 @@ from dm_control import composer, mjcf
 from dm_control.composer.observation import observable
 from dm_control.mujoco import engine
 
-from drone_rl.sim import cameras
+from drone_rl.sim.entities import cameras
+from drone_rl.sim.meaning import Meaning
 from drone_rl.sim.settings import CameraSettings
 
 BODY_GROUP = 1
@@ -40,6 +41,8 @@ class DroneObservables(composer.Observables):
 
 class Drone(composer.Entity):
     """A quadrotor's shape with AirSim's five cameras."""
+
+    meaning = Meaning.DRONE
 
     def _build(self, size: float, camera: CameraSettings, name: str = "drone") -> None:
         """Makes the drone.

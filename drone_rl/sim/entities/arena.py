@@ -2,6 +2,8 @@
 
 from dm_control import composer
 
+from drone_rl.sim.meaning import Meaning
+
 SKY_COLOR = (0.62, 0.74, 0.92)
 """Red, green, blue of everything that is neither floor, cube nor drone."""
 FLOOR_COLOR = (0.5, 0.54, 0.48)
@@ -11,10 +13,12 @@ DRAW_DISTANCE = 200.0
 """Metres beyond which nothing is drawn."""
 
 
-class CubeArena(composer.Arena):
+class Field(composer.Arena):
     """A flat floor under an even sky, lit by one sun."""
 
-    def _build(self, name: str = "cube_arena") -> None:
+    meaning = Meaning.GROUND
+
+    def _build(self, name: str = "field") -> None:
         super()._build(name=name)
         root = self._mjcf_root
         root.statistic.extent = 1.0

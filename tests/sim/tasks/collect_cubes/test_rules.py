@@ -6,9 +6,11 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drone_rl.sim import rules
-from drone_rl.sim.rules import Action, EndReason, Side
+from drone_rl.sim.actions import Move
+from drone_rl.sim.dynamics import BodyState, ComputerVision
 from drone_rl.sim.settings import TaskSettings
+from drone_rl.sim.tasks.collect_cubes import rules
+from drone_rl.sim.tasks.collect_cubes.rules import EndReason, Side
 
 SETTINGS = TaskSettings()  # drone and cubes touch up to 1.65 m on each axis
 
@@ -20,10 +22,19 @@ def at(*ys, settings=SETTINGS):
     return rules.start(settings, torch.stack([x, y, z], -1)[None])
 
 
+def body(*place):
+    """One drone at rest."""
+    return BodyState.at_rest(torch.tensor([place], dtype=torch.float64))
+
+
 def fly(state, x, y, settings=SETTINGS):
-    return rules.judge(
-        settings, state, torch.tensor([[x, y, settings.altitude]], dtype=torch.float64)
-    )
+    return rules.judge(settings, state, body(x, y, settings.altitude))
+
+
+def move(task, state, action):
+    """Flies all worlds in computer-vision mode."""
+    moves = torch.tensor([action] * len(state))
+    return rules.judge(task, state, ComputerVision(task.step_length).step(state.body, moves))
 
 
 def test_cubes_are_drawn_within_their_bounds_and_uniformly():
@@ -37,7 +48,7 @@ def test_cubes_are_drawn_within_their_bounds_and_uniformly():
 
 
 def test_codes_are_those_of_recorded_files():
-    assert [(a.name, a.value) for a in Action] == [("FORWARD", 0), ("LEFT", 1), ("RIGHT", 2)]
+    assert [(a.name, a.value) for a in Move] == [("FORWARD", 0), ("LEFT", 1), ("RIGHT", 2)]
     assert [(s.name, s.value) for s in Side] == [("LEFT", 0), ("AHEAD", 1), ("RIGHT", 2)]
     ends = ("RUNNING", "ALL_CUBES", "FRONT_BOUNDARY", "SIDE_BOUNDARY", "STEP_LIMIT")
     assert [(e.name, e.value) for e in EndReason] == [(n, i) for i, n in enumerate(ends)]
@@ -71,13 +82,6 @@ def test_a_start_is_at_the_origin_with_everything_to_come():
     assert not state.passed.any()  # no two fields share memory
 
 
-def test_moves_are_one_metre_forward_left_and_right():
-    moves = rules.displacement(SETTINGS, torch.tensor([Action.FORWARD, Action.LEFT, Action.RIGHT]))
-    assert moves.tolist() == [[1, 0, 0], [0, 1, 0], [0, -1, 0]]
-    half = rules.displacement(TaskSettings(step_length=0.5), torch.tensor([Action.LEFT]))
-    assert half.tolist() == [[0, 0.5, 0]]
-
-
 def test_touching_collects_and_is_worth_one():
     state, reward = fly(at(1.0, 0.0, 0.0), 14.0, 0.0)
     assert reward.tolist() == [1.0]
@@ -102,24 +106,24 @@ def test_touch_distance_is_exact(axis, sign):
         cube = torch.zeros(1, 1, 3).double()
         cube[..., axis] = sign * distance
         state = rules.start(SETTINGS, cube)
-        state, reward = rules.judge(SETTINGS, state, torch.zeros(1, 3).double())
+        state, reward = rules.judge(SETTINGS, state, body(0, 0, 0))
         assert state.collected.item() == touches
         assert reward.item() == float(touches)
 
 
 def test_touch_needs_all_three_axes():
     corner = torch.tensor([[[1.6, -1.6, 1.6]]]).double()
-    assert rules.judge(SETTINGS, rules.start(SETTINGS, corner), torch.zeros(1, 3).double())[1] == 1
+    assert rules.judge(SETTINGS, rules.start(SETTINGS, corner), body(0, 0, 0))[1] == 1
     for axis in range(3):
         aside = corner.clone()
         aside[..., axis] *= 1.1
         state = rules.start(SETTINGS, aside)
-        assert rules.judge(SETTINGS, state, torch.zeros(1, 3).double())[1] == 0
+        assert rules.judge(SETTINGS, state, body(0, 0, 0))[1] == 0
 
 
 def test_two_cubes_touched_at_once_are_worth_two():
     cubes = torch.tensor([[[1.0, 0.0, 0.0], [1.5, 0.0, 0.0], [1.7, 0.0, 0.0]]]).double()
-    state, reward = rules.judge(SETTINGS, rules.start(SETTINGS, cubes), torch.zeros(1, 3).double())
+    state, reward = rules.judge(SETTINGS, rules.start(SETTINGS, cubes), body(0, 0, 0))
     assert reward.tolist() == [2.0] and reward.dtype == torch.float64
     assert state.collected.tolist() == [[True, True, False]]
 
@@ -199,7 +203,7 @@ def test_collecting_but_not_passing_every_cube_ends_the_episode():
 
 
 def test_numbers_of_enumerations_are_those_of_files_and_policies():
-    assert [a.value for a in Action] == [0, 1, 2] and Action(1).name == "LEFT"
+    assert [a.value for a in Move] == [0, 1, 2] and Move(1).name == "LEFT"
     assert [s.name for s in Side] == ["LEFT", "AHEAD", "RIGHT"]
     assert [s.value for s in Side] == [0, 1, 2]
     names = ["RUNNING", "ALL_CUBES", "FRONT_BOUNDARY", "SIDE_BOUNDARY", "STEP_LIMIT"]
@@ -243,7 +247,7 @@ def test_draws_are_those_of_the_stream_in_order():
     assert rules.draw_cubes(task, np.random.RandomState(5)).tolist() == expected
 
 
-MOVES = st.lists(st.sampled_from(list(Action)), min_size=1, max_size=60)
+MOVES = st.lists(st.sampled_from(list(Move)), min_size=1, max_size=60)
 PLACES = st.lists(st.floats(-6, 6), min_size=1, max_size=3)
 QUICK = settings(max_examples=30, deadline=None)
 NEAR = TaskSettings(num_cubes=3, first_distance=4.0, spacing=4.0, front_margin=3.0)
@@ -253,9 +257,8 @@ def flight(places, moves, task=NEAR):
     """States and rewards of one world, from its start to the end of the moves."""
     state, rewards = at(*places, settings=task), []
     states = [state]
-    for move in moves:
-        drone = state.drone + rules.displacement(task, torch.tensor([move]))
-        state, reward = rules.judge(task, state, drone)
+    for action in moves:
+        state, reward = move(task, state, action)
         states.append(state)
         rewards.append(reward.item())
     return states, rewards
@@ -285,7 +288,7 @@ def test_what_is_done_is_never_undone(places, moves):
 @given(PLACES, MOVES)
 @QUICK
 def test_mirrored_worlds_under_mirrored_moves_are_mirrored(places, moves):
-    swapped = {Action.LEFT: Action.RIGHT, Action.RIGHT: Action.LEFT, Action.FORWARD: Action.FORWARD}
+    swapped = {Move.LEFT: Move.RIGHT, Move.RIGHT: Move.LEFT, Move.FORWARD: Move.FORWARD}
     states, rewards = flight(places, moves)
     mirrored, others = flight([-y for y in places], [swapped[m] for m in moves])
     assert rewards == others
@@ -304,20 +307,20 @@ def test_worlds_know_nothing_of_each_other(worlds, moves):
     alone = [flight(places, moves)[0][-1] for places in worlds]
     cubes = torch.cat([at(*places, settings=NEAR).cubes for places in worlds])
     state = rules.start(NEAR, cubes)
-    for move in moves:
-        step = rules.displacement(NEAR, torch.tensor([move] * len(worlds)))
-        state, _ = rules.judge(NEAR, state, state.drone + step)
+    for action in moves:
+        state, _ = move(NEAR, state, action)
     for i, one in enumerate(alone):
-        for name, value in vars(one).items():
-            found = getattr(state, name)[[i]]
-            torch.testing.assert_close(found, value, equal_nan=True, rtol=0, atol=0)
+        found, expected = vars(state[torch.tensor([i])]), vars(one)
+        for record in (found, expected):
+            record |= vars(record.pop("body"))
+        for name, value in expected.items():
+            torch.testing.assert_close(found[name], value, equal_nan=True, rtol=0, atol=0)
 
 
 def test_always_left_leaves_after_27_steps_as_in_the_chapter():
     state, steps = at(0.0, 0.0, 0.0), 0
     while state.end_reason.item() == EndReason.RUNNING:
-        drone = state.drone + rules.displacement(SETTINGS, torch.tensor([Action.LEFT]))
-        state, _ = rules.judge(SETTINGS, state, drone)
+        state, _ = move(SETTINGS, state, Move.LEFT)
         steps += 1
     assert (steps, state.end_reason.item()) == (27, EndReason.SIDE_BOUNDARY)
 

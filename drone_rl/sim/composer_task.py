@@ -1,0 +1,186 @@
+"""Any task as dm_control knows it: one world, drawn by OpenGL, its rules a batch of one."""
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import torch
+from dm_control import composer, mjcf
+from dm_control.composer.observation import observable
+from dm_env import specs
+
+from drone_rl.sim.dynamics import BodyState, Dynamics
+from drone_rl.sim.entities.arena import SKY_COLOR, Field
+from drone_rl.sim.entities.drone import Drone
+from drone_rl.sim.meaning import Meaning
+from drone_rl.sim.rendering.scene import Scene
+from drone_rl.sim.settings import CameraSettings, TaskSettings
+from drone_rl.sim.tasks import State, Task, as_task
+
+CONTROL_TIMESTEP_S = 0.1
+"""Simulated time of one step, seconds. Computer-vision mode has no physics to depend on it."""
+
+
+class ComposerTask(composer.Task):
+    """Puts a task's props and the drone into a field, and moves them as its rules say.
+
+    The drone's motion is its dynamics' business: MuJoCo knows neither gravity nor contacts here.
+    The discount is 0 where an episode terminates and 1 where it is truncated.
+    """
+
+    def __init__(
+        self,
+        task: TaskSettings | Task[Any] | None = None,
+        camera: CameraSettings | None = None,
+        *,
+        dynamics: Dynamics | None = None,
+        pixels: bool = True,
+    ) -> None:
+        """Assembles the world.
+
+        Args:
+            task: What there is to do; cube collection as in the original study by default.
+            camera: Picture size and field of view; 64x25 pixels and 135 degrees by default.
+            dynamics: How the drone moves; computer-vision mode by default.
+            pixels: Whether to observe the front-center camera, which needs OpenGL.
+        """
+        self.rules = as_task(task)
+        self.dynamics = dynamics or self.rules.make_dynamics()
+        self.camera = camera or CameraSettings()
+        self._arena = Field()
+        self._arena.mjcf_model.option.gravity = (0, 0, 0)
+        self._drone = Drone(size=self.rules.drone_size, camera=self.camera)
+        self._arena.add_free_entity(self._drone)
+        self._props = self.rules.make_props()
+        self._frames = [self._arena.attach(prop) for prop in self._props]
+        for frame in self._frames:
+            frame.mocap = True
+        self._reward = 0.0
+        self._begin(np.random.RandomState(0))
+        self._drone.observables.front_center.enabled = pixels
+        self._task_observables = {
+            name: observable.Generic(lambda _, name=name: self._read(name))
+            for name in self.rules.observed
+        }
+        for info in self._task_observables.values():
+            info.enabled = True
+        self.set_timesteps(CONTROL_TIMESTEP_S, CONTROL_TIMESTEP_S)
+
+    @property
+    def root_entity(self) -> Field:
+        """The arena."""
+        return self._arena
+
+    @property
+    def drone(self) -> Drone:
+        """The drone."""
+        return self._drone
+
+    @property
+    def state(self) -> State:
+        """State of the running episode, as a batch of one world."""
+        return self._state
+
+    @property
+    def task_observables(self) -> dict[str, observable.Generic]:
+        """What `Task.info` tells of `Task.observed`, such as why the episode ended."""
+        return self._task_observables
+
+    def action_spec(self, physics: mjcf.Physics) -> specs.Array:
+        """One of the dynamics' actions."""
+        del physics
+        entry = self.dynamics.actions.entry
+        if entry.dtype == torch.int64 and entry.high is not None:
+            return specs.DiscreteArray(int(entry.high) + 1, name="action")
+        low, high = (-np.inf if v is None else v for v in (entry.low, entry.high))
+        return specs.BoundedArray(entry.shape, np.float64, low, high, name="action")
+
+    def compile(self) -> Scene:
+        """The very model that dm_control simulates, with what its geoms mean."""
+        physics = mjcf.Physics.from_mjcf_model(self._arena.mjcf_model)
+        model = physics.model.ptr
+        meanings, props = [Meaning.GROUND] * model.ngeom, [-1] * model.ngeom
+        for number, entity in [(-1, self._drone), *enumerate(self._props)]:
+            for geom in physics.bind(entity.mjcf_model.find_all("geom")).element_id:
+                meanings[geom], props[geom] = entity.meaning, number
+        return Scene(model, tuple(meanings), tuple(props), SKY_COLOR)
+
+    def initialize_episode(
+        self, physics: mjcf.Physics, random_state: np.random.RandomState
+    ) -> None:
+        """Puts the drone at its origin and everything else where it is drawn."""
+        self._begin(random_state)
+        self._show(physics)
+
+    def before_step(
+        self, physics: mjcf.Physics, action: np.ndarray, random_state: np.random.RandomState
+    ) -> None:
+        """Moves the drone from wherever it is now."""
+        del random_state
+        given = torch.as_tensor(action).reshape(1, *self.dynamics.actions.entry.shape)
+        moved = self.dynamics.step(
+            self._found(physics), given.to(self.dynamics.actions.entry.dtype)
+        )
+        self._state.body = moved
+        self._show(physics)
+
+    def after_step(self, physics: mjcf.Physics, random_state: np.random.RandomState) -> None:
+        """Applies the rules at the place where the drone now is."""
+        del random_state
+        self._state, reward = self.rules.judge(self._state, self._found(physics))
+        self._reward = float(reward)
+        self._show(physics)
+        physics.forward()  # what is observed next must not show things that have just vanished
+
+    def get_reward(self, physics: mjcf.Physics) -> float:
+        """What the last step earned."""
+        del physics
+        return self._reward
+
+    def should_terminate_episode(self, physics: mjcf.Physics) -> bool:
+        """Whether the episode has ended, for whatever reason."""
+        del physics
+        return int(self._state.end_reason) != 0
+
+    def get_discount(self, physics: mjcf.Physics) -> float:
+        """0 where the episode terminated, 1 where it goes on or was truncated."""
+        del physics
+        return 1.0 if int(self._state.end_reason) in (0, self.rules.truncation) else 0.0
+
+    def _begin(self, random_state: np.random.RandomState) -> None:
+        origin = torch.tensor([self.rules.origin], dtype=torch.float64)
+        drawn = self.rules.draw(random_state)
+        self._state = self.rules.start(drawn[None], self.dynamics.start(origin))
+        self._reward = 0.0
+
+    def _found(self, physics: mjcf.Physics) -> BodyState:
+        """The drone where MuJoCo has it: its pose may have been set by hand."""
+        pose = [torch.from_numpy(np.array(p))[None] for p in self._drone.get_pose(physics)]
+        return dataclasses.replace(self._state.body, position=pose[0], attitude=pose[1])
+
+    def _show(self, physics: mjcf.Physics) -> None:
+        """Puts the drone and the props where the state has them."""
+        body = self._state.body
+        self._drone.set_pose(physics, body.position[0].numpy(), body.attitude[0].numpy())
+        for frame, place in zip(self._frames, self.rules.places(self._state)[0], strict=True):
+            physics.bind(frame).mocap_pos = place.numpy()
+
+    def _read(self, name: str) -> np.ndarray:
+        return self.rules.info(self._state)[name][0].numpy()
+
+
+def make_environment(
+    task: TaskSettings | Task[Any] | None = None,
+    camera: CameraSettings | None = None,
+    *,
+    dynamics: Dynamics | None = None,
+    pixels: bool = True,
+    random_state: np.random.RandomState | int | None = None,
+) -> composer.Environment:
+    """The task as a plain dm_control environment, for its viewer and other users of `dm_env`."""
+    return composer.Environment(
+        ComposerTask(task, camera, dynamics=dynamics, pixels=pixels),
+        random_state=random_state,
+        strip_singleton_obs_buffer_dim=True,
+        recompile_mjcf_every_episode=False,
+    )

@@ -1,0 +1,39 @@
+"""Where a drone is, how it is turned, and how fast it moves and turns."""
+
+import dataclasses
+from typing import Self
+
+import torch
+from torch import Tensor
+
+from drone_rl.sim.batch import Batch
+
+LEVEL = (1.0, 0.0, 0.0, 0.0)
+"""The attitude of a drone that is level and looks forward, quaternion (w, x, y, z)."""
+
+
+@dataclasses.dataclass
+class BodyState(Batch):
+    """The bodies of `num_worlds` drones. World frame (x forward, y left, z up), SI units."""
+
+    position: Tensor  # (num_worlds, 3) float64
+    """Metres."""
+    attitude: Tensor  # (num_worlds, 4) float64
+    """Unit quaternion (w, x, y, z) that turns the body's frame into the world's."""
+    velocity: Tensor  # (num_worlds, 3) float64
+    """Metres a second."""
+    angular_velocity: Tensor  # (num_worlds, 3) float64
+    """Radians a second."""
+
+    @classmethod
+    def at_rest(cls, position: Tensor, attitude: Tensor | None = None) -> Self:
+        """Bodies that don't move.
+
+        Args:
+            position: Metres. Shape: (num_worlds, 3), float64.
+            attitude: Level by default. Shape: (num_worlds, 4), float64.
+        """
+        if attitude is None:
+            attitude = position.new_tensor(LEVEL).repeat(len(position), 1)
+        still = torch.zeros_like(position)
+        return cls(position, attitude, still, still.clone())

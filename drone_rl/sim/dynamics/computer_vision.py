@@ -1,0 +1,36 @@
+"""Computer-vision mode (Table 1): an action sets the drone's pose, and there are no forces."""
+
+import dataclasses
+
+import torch
+from torch import Tensor
+
+from drone_rl.sim.actions import MOVES
+from drone_rl.sim.dynamics.body import BodyState
+
+DIRECTIONS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0))
+"""Unit vector of each of `MOVES`, world frame."""
+
+
+class ComputerVision:
+    """Moves a step forward, to the left or to the right, at once and without turning."""
+
+    actions = MOVES
+
+    def __init__(self, step_length: float = 1.0) -> None:
+        """Sets how far a move goes.
+
+        Args:
+            step_length: Metres.
+        """
+        self.step_length = step_length
+        self._moves = torch.tensor(DIRECTIONS, dtype=torch.float64) * step_length
+
+    def start(self, position: Tensor) -> BodyState:
+        """Drones that are level and at rest."""
+        return BodyState.at_rest(position)
+
+    def step(self, body: BodyState, action: Tensor) -> BodyState:
+        """The same drones a move farther on."""
+        moves = self._moves.to(action.device)
+        return dataclasses.replace(body, position=body.position + moves[action])

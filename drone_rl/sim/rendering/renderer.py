@@ -1,0 +1,74 @@
+"""What a renderer must offer: pictures of worlds that it does not hold."""
+
+import dataclasses
+from typing import Protocol
+
+from torch import Tensor
+
+from drone_rl.sim.batch import Batch
+from drone_rl.sim.rendering.appearance import Appearance
+from drone_rl.sim.rendering.scene import Scene
+from drone_rl.sim.rendering.view import View
+
+
+@dataclasses.dataclass
+class Poses(Batch):
+    """Where everything that moves is. Metres, world frame."""
+
+    position: Tensor  # (num_worlds, 3)
+    """Of the drone."""
+    attitude: Tensor  # (num_worlds, 4)
+    """Of the drone, unit quaternion (w, x, y, z)."""
+    props: Tensor  # (num_worlds, num_props, 3)
+    """Of the task's props, in its order."""
+
+
+class Renderer(Protocol):
+    """Draws worlds of one scene."""
+
+    def prepare(self, view: View) -> None:
+        """Makes everything ready for a view, which the first picture would do otherwise.
+
+        Raises:
+            InputError: It can't draw such a view; the message says what it can draw.
+        """
+        ...
+
+    def render(self, view: View, poses: Poses, appearance: Appearance | None = None) -> Tensor:
+        """Draws any number of worlds.
+
+        Args:
+            view: What is asked for.
+            poses: Where everything is.
+            appearance: How it looks; as in the model by default.
+
+        Returns:
+            By modality: "rgb" uint8 (num_worlds, H, W, 3); "depth" float32 (num_worlds, H, W),
+            metres along the optical axis, 0 where nothing is hit; "segmentation" int32
+            (num_worlds, H, W), number of the geom, -1 where nothing is hit.
+
+        Raises:
+            InputError: It can't draw such a view.
+        """
+        ...
+
+    def close(self) -> None:
+        """Ends what it has started."""
+        ...
+
+
+class MakeRenderer(Protocol):
+    """Makes a renderer of a scene."""
+
+    def __call__(
+        self, scene: Scene, *, num_worlds: int, num_shards: int | None, device: str
+    ) -> Renderer:
+        """Makes it.
+
+        Args:
+            scene: What will be drawn.
+            num_worlds: About how many worlds are drawn in a call.
+            num_shards: Shares of the batch, each on a thread; as it sees fit by default.
+            device: Where pictures are wanted: "cpu", "cuda" or "cuda:N".
+        """
+        ...

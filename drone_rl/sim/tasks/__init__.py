@@ -1,0 +1,16 @@
+"""What there is to do in a world, and what can be asked about it."""
+
+from typing import Any
+
+from drone_rl.sim.settings import TaskSettings
+from drone_rl.sim.tasks.collect_cubes import CollectCubes
+from drone_rl.sim.tasks.task import Prop, State, Task
+
+__all__ = ["CollectCubes", "Prop", "State", "Task", "as_task"]
+
+
+def as_task(task: TaskSettings | Task[Any] | None) -> Task[Any]:
+    """The task of some settings; the original study's by default."""
+    if task is None or isinstance(task, TaskSettings):
+        return CollectCubes(task)
+    return task

@@ -1,0 +1,5 @@
+"""Collect the cubes (chapter, section 4)."""
+
+from drone_rl.sim.tasks.collect_cubes.task import CollectCubes
+
+__all__ = ["CollectCubes"]

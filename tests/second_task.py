@@ -1,0 +1,111 @@
+"""A small second task, which shows that whatever knows a task knows none in particular.
+
+Fly past posts that stand beside the way and touch none: a post that is passed earns 1, a touched
+one ends the episode. Nothing is collected and nothing vanishes.
+"""
+
+import dataclasses
+import enum
+
+import torch
+from torch import Tensor
+
+from drone_rl.sim.actions import Entry
+from drone_rl.sim.batch import Batch
+from drone_rl.sim.dynamics import BodyState, ComputerVision
+from drone_rl.sim.entities.cube import Cube
+from drone_rl.sim.meaning import Meaning
+
+NUM_POSTS = 2
+REACH = 1.0
+"""Metres along an axis up to which drone and post touch."""
+
+
+class End(enum.IntEnum):
+    """Why an episode ended."""
+
+    RUNNING = 0
+    THROUGH = 1
+    TOUCHED = 2
+    TIME = 3
+
+
+@dataclasses.dataclass
+class PostsState(Batch):
+    """Worlds with posts."""
+
+    body: BodyState
+    posts: Tensor  # (num_worlds, NUM_POSTS, 3) float64
+    passed: Tensor  # (num_worlds, NUM_POSTS) bool
+    steps: Tensor
+    end_reason: Tensor
+
+
+class Post(Cube):
+    """A box that must not be touched."""
+
+    meaning = Meaning.OBSTACLE
+
+
+class Posts:
+    """The task."""
+
+    name = "posts"
+    ends = End
+    truncation = End.TIME
+    observed = ("passed", "end_reason")
+    largest_reward = float(NUM_POSTS)
+    drone_size = 0.5
+    origin = (0.0, 0.0, 1.0)
+
+    @property
+    def entries(self):
+        """Which posts are passed, on which side they stand, and the end."""
+        return {
+            "passed": Entry((NUM_POSTS,), torch.bool),
+            "end_reason": Entry((1,), torch.int64, 0, len(End) - 1),
+        }
+
+    def make_dynamics(self):
+        """Steps of a metre."""
+        return ComputerVision()
+
+    def make_props(self):
+        """The posts."""
+        return [Post(1.0, (0.1, 0.1, 0.6), name=f"post_{i}") for i in range(NUM_POSTS)]
+
+    def draw(self, random_state):
+        """A side for each post: 1 to the left, -1 to the right."""
+        return torch.from_numpy(random_state.choice([-1.0, 1.0], size=NUM_POSTS))
+
+    def start(self, drawn, body):
+        """Posts stand 3 m and 6 m ahead, 1.5 m aside."""
+        ahead = 3.0 * torch.arange(1, NUM_POSTS + 1, dtype=torch.float64)
+        posts = torch.stack([ahead.expand_as(drawn), 1.5 * drawn, torch.ones_like(drawn)], -1)
+        return PostsState(
+            body=body,
+            posts=posts,
+            passed=drawn > 2.0,
+            steps=torch.zeros(len(drawn), dtype=torch.int64),
+            end_reason=torch.zeros(len(drawn), dtype=torch.int64),
+        )
+
+    def judge(self, state, body):
+        """A reward for each post that is now behind the drone."""
+        away = (body.position[:, None] - state.posts).abs().amax(-1)
+        passed = state.passed | (body.position[:, None, 0] > state.posts[..., 0])
+        steps = state.steps + 1
+        end = torch.zeros_like(steps).masked_fill(steps >= 12, End.TIME)
+        end = end.masked_fill((away <= REACH).any(-1), End.TOUCHED)
+        end = end.masked_fill(passed.all(-1), End.THROUGH)
+        reward = (passed & ~state.passed).sum(-1, dtype=torch.float64)
+        new = dataclasses.replace(state, body=body, passed=passed, steps=steps, end_reason=end)
+        return new, reward
+
+    def places(self, state):
+        """Where the posts are."""
+        return state.posts
+
+    def info(self, state):
+        """See `entries`."""
+        return {"passed": state.passed.clone(), "end_reason": state.end_reason[:, None].clone()}

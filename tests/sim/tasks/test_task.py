@@ -1,0 +1,71 @@
+"""A second task fits wherever cube collection does."""
+
+import torch
+from torchrl.envs.utils import check_env_specs
+
+from drone_rl.envs import DroneEnv
+from drone_rl.envs.composer_env import ComposerEnv
+from drone_rl.sim.composer_task import make_environment
+from drone_rl.sim.meaning import Meaning
+from drone_rl.sim.settings import TaskSettings
+from drone_rl.sim.tasks import CollectCubes, as_task
+from drone_rl.sim.worlds import Worlds
+from drone_rl.utils.seeding import world_random_state
+from tests.second_task import End, Posts
+
+
+def test_settings_are_those_of_cube_collection():
+    assert isinstance(as_task(None), CollectCubes)
+    assert as_task(TaskSettings(num_cubes=2)).settings.num_cubes == 2
+    task = Posts()
+    assert as_task(task) is task
+
+
+def test_both_simulators_play_it_alike():
+    env = make_environment(Posts(), pixels=False, random_state=world_random_state(3, 0))
+    worlds = Worlds(1, Posts())
+    stream, ends = world_random_state(3, 0), set()
+    for actions in ([0] * 9, [1, 0, 0, 0, 0, 0], [2, 0, 0, 0, 0, 0], [1, 2] * 6):
+        timestep = env.reset()
+        worlds.reset(torch.arange(1), [stream])
+        for action in actions:
+            timestep = env.step(action)
+            reward = worlds.step(torch.arange(1), torch.tensor([action]))
+            assert timestep.reward == reward.item()
+            assert torch.equal(env.task.state.posts, worlds.state.posts)
+            assert timestep.observation["passed"].tolist() == worlds.state.passed[0].tolist()
+            if timestep.last():
+                break
+        end = End(worlds.state.end_reason.item())
+        assert timestep.last() == (end != End.RUNNING)
+        assert timestep.discount == (0.0 if end in (End.THROUGH, End.TOUCHED) else 1.0)
+        ends.add(end)
+    assert ends == {End.THROUGH, End.TOUCHED, End.TIME}
+    worlds.close()
+
+
+def test_its_things_are_drawn_and_have_its_meanings():
+    worlds = Worlds(1, Posts())
+    state = worlds.start(torch.tensor([[1.0, -1.0]], dtype=torch.float64))
+    seen = worlds.render(state, worlds.view(modality="segmentation"))[0]
+    props = torch.tensor([*worlds.scene.props, -1])[seen.long()]
+    columns = [(props == i).any(0).nonzero()[:, 0] for i in range(2)]
+    assert columns[0].max() < 32 <= columns[1].min()  # the first to the left, the second right
+    assert [m.name for m in worlds.scene.meanings].count("OBSTACLE") == 2
+    assert not worlds.scene.geoms(Meaning.TARGET)
+    worlds.close()
+
+
+def test_torchrl_sees_what_it_tells():
+    env = DroneEnv(4, Posts(), pixels=False)
+    check_env_specs(env)
+    assert set(env.observation_spec["info"].keys()) == {"passed", "end_reason", "drone", "attitude"}
+    straight = env.rollout(12, policy=lambda td: td.set("action", torch.zeros(4).long()))
+    assert straight["next", "reward"].sum(1).tolist() == [[2.0]] * 4
+    assert straight["next", "terminated"][:, -1].all() and straight.shape[1] == 7
+    env.reset()
+    turns = iter([1, 2] * 6)
+    waiting = env.rollout(20, policy=lambda td: td.set("action", torch.full((4,), next(turns))))
+    assert waiting["next", "truncated"][:, -1].all() and waiting.shape[1] == 12
+    env.close()
+    check_env_specs(ComposerEnv(make_environment(Posts(), pixels=False, random_state=0)))

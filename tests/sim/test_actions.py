@@ -1,0 +1,99 @@
+import numpy as np
+import pytest
+import torch
+
+from drone_rl.sim.actions import MOVES, DiscreteActions, Move
+
+FIVE = DiscreteActions(
+    names=("up", "down", "left", "right", "stay"),
+    mirrored=(0, 1, 3, 2, 4),
+    opposite=(1, 0, 3, 2, 4),
+    left=2,
+    order=(2, 0, 4, 1, 3),
+    arrows=((0, 1), (0, -1), (-1, 0), (1, 0), (0, 0)),
+    colors=((1, 0, 0),) * 5,
+)
+"""A set of another size, with two pairs that undo each other and one pair of mirror images."""
+
+
+def test_numbers_of_the_moves_are_those_of_files_and_policies():
+    assert [(move.name, move.value) for move in Move] == [("FORWARD", 0), ("LEFT", 1), ("RIGHT", 2)]
+    assert MOVES.names == ("forward", "left", "right")
+    assert (MOVES.left, MOVES.right, MOVES.order) == (1, 2, (1, 0, 2))
+    assert (len(MOVES), len(FIVE), FIVE.right) == (3, 5, 3)
+    assert MOVES.entry == ((), torch.int64, 0, 2)
+
+
+def test_a_wish_is_the_softmax_and_the_chosen_action_its_peak():
+    outputs = torch.tensor([[0.0, 0.0, 0.0, 0.0, 4.0**0.5], [1.0, 2.0, 0.0, 0.0, 0.0]])
+    wish = FIVE.wish(outputs)
+    torch.testing.assert_close(wish.sum(-1), torch.ones(2))
+    assert wish[0, 4] / wish[0, 0] == pytest.approx(np.exp(2.0))
+    assert FIVE.chosen(wish).tolist() == [4, 1]
+
+
+@pytest.mark.parametrize("kind", [torch.tensor, np.array])
+def test_the_mirror_swaps_left_and_right_alone(kind):
+    wish = kind([[0.1, 0.2, 0.3, 0.4, 0.0], [0.0, 0.0, 1.0, 0.0, 0.0]])
+    assert FIVE.mirror(wish).tolist() == [wish[0, [0, 1, 3, 2, 4]].tolist(), [0, 0, 0, 1, 0]]
+    assert FIVE.mirror(FIVE.mirror(wish)).tolist() == wish.tolist()
+    assert FIVE.leaning(wish).tolist() == [wish[0, 2], 1.0]
+
+
+@pytest.mark.parametrize("kind", [torch.tensor, np.array])
+def test_the_distance_of_wishes_is_their_total_variation(kind):
+    wish = kind([[0.5, 0.5, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0, 0.0]])
+    other = kind([[0.25, 0.5, 0.25, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 1.0]])
+    assert FIVE.distance(wish, other).tolist() == [0.25, 1.0]
+    assert FIVE.distance(wish, wish).tolist() == [0.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("wish", "other", "expected"),
+    [
+        ((0, 0, 1, 0, 0), (0, 0, 0, 1, 0), 1.0),  # surely left, surely right
+        ((0, 0, 0, 1, 0), (0, 0, 1, 0, 0), -1.0),  # the other one leans left
+        ((0, 0, 0.6, 0.4, 0), (0, 0, 0.5, 0.5, 0), 0.1),
+        ((0, 0, 0.6, 0.1, 0.3), (0, 0, 0.4, 0.6, 0), 0.2),  # the lesser of 0.2 and 0.5
+        ((0, 0, 0.6, 0.3, 0.1), (1, 0, 0, 0, 0), 0.0),  # both rise: no opposition
+        ((1, 0, 0, 0, 0), (0, 1, 0, 0, 0), 0.0),  # up and down are no sides
+    ],
+)
+def test_opposition_is_the_lesser_swing_between_left_and_right(wish, other, expected):
+    assert FIVE.opposition(np.array(wish), np.array(other)) == pytest.approx(expected)
+
+
+def test_what_undoes_what():
+    action = torch.tensor([1, 0, 3, 2, 4, 2, 0])
+    before = torch.tensor([0, 1, 2, 3, 4, 2, 2])
+    assert FIVE.undoes(action, before).tolist() == [True] * 4 + [False] * 3
+    assert FIVE.can_be_undone(torch.arange(5)).tolist() == [True] * 4 + [False]
+    assert MOVES.can_be_undone(torch.arange(3)).tolist() == [False, True, True]
+
+
+def test_a_report_gets_plain_values():
+    assert MOVES.as_dict() == {
+        "names": ["forward", "left", "right"],
+        "order": [1, 0, 2],
+        "arrows": [[0.0, 1.0], [-1.0, 0.0], [1.0, 0.0]],
+        "mirrored": [0, 2, 1],
+        "left": 1,
+        "colors": [[214, 39, 40], [44, 160, 44], [31, 96, 200]],
+    }
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"mirrored": (1, 2, 0)}, "mirrored"),
+        ({"mirrored": (0, 0, 0)}, "mirrored"),
+        ({"opposite": (1, 2, 0)}, "opposite"),
+        ({"order": (0, 1, 1)}, "order"),
+        ({"colors": ((0, 0, 0),)}, "colour"),
+        ({"left": 0}, "left"),
+    ],
+)
+def test_a_set_that_contradicts_itself_is_refused(change, message):
+    given = {name: getattr(MOVES, name) for name in MOVES.__dataclass_fields__}
+    with pytest.raises(ValueError, match=message):
+        DiscreteActions(**{**given, **change})
