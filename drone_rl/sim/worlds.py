@@ -10,8 +10,9 @@ from torch import Tensor
 from drone_rl.sim.composer_task import ComposerTask
 from drone_rl.sim.dynamics import Dynamics
 from drone_rl.sim.entities.cameras import FRONT_CENTER
-from drone_rl.sim.rendering import Appearance, Modality, Poses, View, WarpRenderer
+from drone_rl.sim.rendering import Appearance, Poses, View, WarpRenderer
 from drone_rl.sim.rendering.renderer import MakeRenderer
+from drone_rl.sim.rendering.view import Modality
 from drone_rl.sim.settings import CameraSettings, TaskSettings
 from drone_rl.sim.tasks import State, Task, as_task
 

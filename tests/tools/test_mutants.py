@@ -79,16 +79,20 @@ def test_each_target_is_there_and_has_tests_of_its_own_first():
     found = find_targets(ROOT)
     assert {f"drone_rl/{name}.py" for name in TARGETS if "*" not in name} <= set(found)
     assert all(tests for tests in found.values())
-    assert found["drone_rl/sim/rules.py"][0] == "tests/sim/test_rules.py"
+    assert (
+        found["drone_rl/sim/tasks/collect_cubes/rules.py"][0]
+        == "tests/sim/tasks/collect_cubes/test_rules.py"
+    )
     assert "drone_rl/evaluation/metrics.py" in found
     assert "drone_rl/evaluation/video.py" not in found
     assert not any(name.endswith("__init__.py") for name in found)
 
 
 def test_a_target_that_has_gone_or_has_no_tests_is_an_error(tmp_path):
-    with pytest.raises(ValueError, match="no module is called sim/rules"):
+    with pytest.raises(ValueError, match="no module is called sim/tasks/collect_cubes/rules"):
         find_targets(tmp_path)
-    (tmp_path / "drone_rl" / "sim").mkdir(parents=True)
-    (tmp_path / "drone_rl" / "sim" / "rules.py").write_text("")
+    module = tmp_path / "drone_rl" / "sim" / "tasks" / "collect_cubes" / "rules.py"
+    module.parent.mkdir(parents=True)
+    module.write_text("")
     with pytest.raises(ValueError, match="none of its tests"):
         find_targets(tmp_path)

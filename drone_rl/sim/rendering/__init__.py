@@ -3,12 +3,11 @@
 from drone_rl.sim.rendering.appearance import Appearance
 from drone_rl.sim.rendering.renderer import Poses, Renderer
 from drone_rl.sim.rendering.scene import Scene
-from drone_rl.sim.rendering.view import Modality, View
+from drone_rl.sim.rendering.view import View
 from drone_rl.sim.rendering.warp import WarpRenderer, check_device
 
 __all__ = [
     "Appearance",
-    "Modality",
     "Poses",
     "Renderer",
     "Scene",
