@@ -1,3 +1,6 @@
+# pyright: reportOptionalMemberAccess=false, reportAttributeAccessIssue=false
+# pyright: reportArgumentType=false
+# (dm_control's models of XML are untyped.)
 """dm_control's own pixel path, for comparison: one world, drawn by OpenGL.
 
 Run as a program (`python -m drone_rl.bench.dm_control QUALITY SECONDS`) with MUJOCO_GL=egl, since

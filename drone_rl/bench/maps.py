@@ -113,7 +113,7 @@ def untrained(pictures: Pictures, count: int = 4) -> dict[str, PolicyNetwork]:
         generator = torch.Generator().manual_seed(seed)
         network = SmallCNN(pictures.absent.shape, 3, generator=generator)
         with torch.no_grad():
-            network.layers.logits.weight.mul_(300)
+            network.layers.get_parameter("logits.weight").mul_(300)
         found[f"random weights {seed}"] = network
     return found
 

@@ -120,7 +120,8 @@ class ScriptedPolicy(TensorDictModuleBase):
         """
         super().__init__()
         names = ("drone", "cube_positions", "next_cube", "side")
-        self.in_keys = [("info", name) for name in names]
+        # tensordict's annotation knows no keys of two strings
+        self.in_keys = [("info", n) for n in names]  # pyright: ignore[reportAttributeAccessIssue]
         self.out_keys = ["action"]
         self.pilot, self.generator = pilot, generator
         self.touch = pilot.settings.touch_distance

@@ -50,7 +50,7 @@ class Context:
     def restart(self) -> TensorDictModuleBase:
         """Puts the worlds back to their first episodes; returns an actor with a fresh stream."""
         self.env.base_env.load_state_dict(self._start)
-        generator = torch_generator(self.settings.seed, Stream.REPORT, device=self.env.device)
+        generator = torch_generator(self.settings.seed, Stream.REPORT, device=self.device)
         return make_actor(self.network, self.env.action_spec, generator)
 
     @functools.cached_property
@@ -69,6 +69,11 @@ class Context:
         """The frames that are analysed, spread over all flights."""
         rows = spread(self.flights.episode, self.settings.frames)
         return draw(self.flights, rows, self.scenes, self.network, (self.layer,))
+
+    @property
+    def device(self) -> str:
+        """Where the worlds are."""
+        return str(self.env.device)
 
     @property
     def episode(self) -> NDArray:

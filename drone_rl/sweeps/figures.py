@@ -183,7 +183,7 @@ def _dots(
             for i, (y, row) in enumerate(sorted(beside, key=lambda r: KINDS.index(r[1].kind))):
                 x = _aside(axes, np.array([place]), 0.05 * (i - (len(beside) - 1) / 2))
                 fill = "full" if row.is_certain else "none"
-                axes.plot(x, [y], "o", markersize=4, color=COLORS[row.kind], fillstyle=fill)
+                axes.plot(x, [y], "o", markersize=4, color=COLORS[str(row.kind)], fillstyle=fill)
     _explain_colours(axes)
 
 

@@ -117,9 +117,12 @@ def _figure(value: object) -> str:
 def _median(value: Mapping[str, Any]) -> str:
     """A median with its interval, or what it is more than; no interval of few runs."""
     middle, beyond = value["median"], value["more_than"]
-    if middle is None and beyond is None:
+    if beyond is not None:
+        text = f">{_number(beyond)}"
+    elif middle is not None:
+        text = _number(middle)
+    else:
         return ""
-    text = _number(middle) if beyond is None else f">{_number(beyond)}"
     if value["lower95"] is None:
         return text
     upper = "more" if value["upper95"] is None else _number(value["upper95"])

@@ -7,7 +7,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
-from matplotlib.image import AxesImage
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
@@ -29,12 +28,11 @@ def response_chart(explanation: Explanation) -> Figure:
     heights = arrays["response_height"]
     figure = Figure(figsize=(16, 3.9 * len(heights)), layout="constrained")
     axes = figure.subplots(len(heights), 5, squeeze=False, sharex=True, sharey=True)
-    image = None
     for layer, row in zip(range(len(heights)), axes[::-1], strict=True):
-        image = _row(row, arrays, layer)
+        _draw_row(row, arrays, layer)
         level = f", cube {heights[layer]:+g} m" if len(heights) > 1 else ""
         row[0].set_ylabel(f"metres ahead{level}")
-    figure.colorbar(image, ax=axes[:, :3], shrink=0.8, label="probability")
+    figure.colorbar(axes[0, 0].images[0], ax=axes[:, :3], shrink=0.8, label="probability")
     for axis in axes[-1]:
         axis.set_xlabel("metres to the left (+) or right (-)", fontsize=9)
     for axis, labels in ((axes[-1, 3], (_SHADES, ACTIONS)), (axes[-1, 4], _OUTCOMES)):
@@ -46,8 +44,8 @@ def response_chart(explanation: Explanation) -> Figure:
     return figure
 
 
-def _row(axes: Sequence[Axes], arrays: dict[str, NDArray], layer: int) -> AxesImage:
-    """The five maps of one height; returns one of the probabilities."""
+def _draw_row(axes: Sequence[Axes], arrays: dict[str, NDArray], layer: int) -> None:
+    """The five maps of one height."""
     forward, lateral = arrays["response_forward"], arrays["response_lateral"]
     probabilities = arrays["response_probabilities"][layer]
     extent = (lateral[0], lateral[-1], forward[0], forward[-1])
@@ -55,7 +53,7 @@ def _row(axes: Sequence[Axes], arrays: dict[str, NDArray], layer: int) -> AxesIm
         "extent": extent, "origin": "lower", "aspect": "auto", "interpolation": "nearest",
     }  # fmt: skip
     for axis, action in zip(axes, pictures.LEFT_TO_RIGHT, strict=False):
-        image = axis.imshow(probabilities[..., action], vmin=0, vmax=1, cmap="viridis", **style)
+        axis.imshow(probabilities[..., action], vmin=0, vmax=1, cmap="viridis", **style)
         axis.set_title(f"P({ACTIONS[action]})")
     axes[3].imshow(probabilities.argmax(-1), vmin=0, vmax=2, cmap=ListedColormap(_SHADES), **style)
     axes[3].set_title("most probable action\n(in the white line: blind)", fontsize=10)
@@ -67,7 +65,6 @@ def _row(axes: Sequence[Axes], arrays: dict[str, NDArray], layer: int) -> AxesIm
     ends = ListedColormap(_OUTCOMES[0])
     axes[4].imshow(arrays["outcome_collected"][layer], vmin=0, vmax=1, cmap=ends, **style)
     axes[4].set_title("what comes of it", fontsize=10)
-    return image
 
 
 def tables(explanation: Explanation) -> dict[str, Rows]:
