@@ -44,6 +44,10 @@ keep: $(STAMP)
 stale: $(STAMP)
 	@$(BIN)/python -m tools.readme stale
 
+# Lines of test for a line of code; modules without a test of their own name.
+count: $(STAMP)
+	@$(BIN)/python -m tools.mirror
+
 # Mutation testing: about 25 minutes on two cores; goes on where it was stopped.
 mutants: $(STAMP)
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[$(EXTRAS),mutants]'

@@ -83,8 +83,7 @@ def _write(
     try:
         folder.mkdir(parents=True, exist_ok=True)
         context.dataset.save(folder / "dataset.npz", context.flights)
-        # numpy's annotation takes any name for allow_pickle
-        np.savez_compressed(folder / "arrays.npz", **arrays)  # pyright: ignore[reportArgumentType]
+        np.savez_compressed(folder / "arrays.npz", **arrays)
         (folder / "explanation.json").write_text(json.dumps(numbers, indent=1))
     except OSError as error:
         raise InputError(

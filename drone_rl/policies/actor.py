@@ -1,5 +1,7 @@
 """From a network to an actor: logits to actions."""
 
+from typing import Any
+
 import torch
 from tensordict import TensorDictBase
 from tensordict.nn import InteractionType, TensorDictModule, dispatch
@@ -57,7 +59,8 @@ class CategoricalActor(ProbabilisticActor):
         **kwargs: object,
     ) -> TensorDictBase:
         """Writes logits and actions."""
-        network, head = self.module
+        parts: Any = self.module  # torch's modules are annotated to hold anything
+        network, head = parts
         how = exploration_type() or head.default_interaction_type
         straight = how in (ExplorationType.RANDOM, ExplorationType.DETERMINISTIC)
         if tensordict_out is not None or kwargs or not straight:

@@ -10,8 +10,9 @@ import jinja2
 from markupsafe import Markup
 
 from drone_rl.report.explanation import FRAME, Explanation
-from drone_rl.report.part import Drawn, Part, find_parts
+from drone_rl.report.part import Drawn, Part
 from drone_rl.report.saving import save_drawn, save_numbers, save_rows
+from drone_rl.report.sections import find_parts
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import to_file_name
 from drone_rl.words.licence import percent, say

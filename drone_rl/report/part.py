@@ -6,8 +6,6 @@ page finds it. What no part shows is laid out plainly all the same.
 """
 
 import dataclasses
-import importlib
-import pkgutil
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -15,7 +13,6 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
 
-from drone_rl.report import sections
 from drone_rl.report.explanation import Explanation
 from drone_rl.words.licence import Sentence
 
@@ -55,10 +52,3 @@ class Part:
     def fits(self, explanation: Explanation) -> bool:
         """Whether an explanation holds what this part shows."""
         return all(explanation.numbers.get(key) is not None for key in self.needs)
-
-
-def find_parts() -> dict[str, Part]:
-    """All parts by the names of their modules, in the order of the page."""
-    names = [module.name for module in pkgutil.iter_modules(sections.__path__)]
-    parts = {n: importlib.import_module(f"{sections.__name__}.{n}").PART for n in names}
-    return dict(sorted(parts.items(), key=lambda item: (item[1].place, item[0])))

@@ -7,7 +7,7 @@ import shutil
 import pytest
 
 from drone_rl.report import write_report
-from drone_rl.report.part import find_parts
+from drone_rl.report.sections import find_parts
 from drone_rl.utils.errors import InputError
 from tests.report.conftest import NASTY
 

@@ -7,7 +7,8 @@ import pytest
 from drone_rl.explain.sections import find_sections
 from drone_rl.report import sections
 from drone_rl.report.explanation import Explanation
-from drone_rl.report.part import Part, find_parts
+from drone_rl.report.part import Part
+from drone_rl.report.sections import find_parts
 
 
 def part(**kwargs):
