@@ -60,17 +60,3 @@ def test_an_unknown_layer_is_refused_before_any_work(make_pipeline, tmp_path):
     with pytest.raises(InputError, match=r"layer=conv7 .* choose from: conv1"):
         explain(env, actor.module[0].module, tmp_path / "x", settings)
     assert not (tmp_path / "x").exists()
-
-
-@pytest.mark.parametrize(
-    ("wrong", "message"),
-    [
-        ({"frames": 29}, r"frames=29 .* give 30 \(data_episodes\) or more"),
-        ({"data_episodes": 29}, "data_episodes=29"),
-        ({"episodes": 0}, "episodes=0"),
-        ({"perplexity": 300.0}, "perplexity=300 does not fit 600 points; give 1 to 199"),
-    ],
-)
-def test_settings_out_of_range_are_refused(wrong, message):
-    with pytest.raises(InputError, match=message):
-        ExplainSettings(**wrong)

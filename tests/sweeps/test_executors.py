@@ -1,17 +1,15 @@
 """Runs are begun, gone on with, left alone or given up, each without harm to the others."""
 
 import json
-import threading
 import time
 
 import pytest
 
 from drone_rl.sweeps import LocalExecutor, read_result
 from drone_rl.sweeps.executors import RayExecutor, SlurmExecutor
-from drone_rl.sweeps.process import RunProcess, finish_run
+from drone_rl.sweeps.process import finish_run
 from drone_rl.sweeps.runs import quoted, read_failure
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import folder_lock
 
 pytestmark = pytest.mark.usefixtures("fake_training")
 
@@ -44,47 +42,6 @@ def test_finished_runs_are_left_alone_and_half_finished_ones_resumed(make_runs):
     (runs[2].folder / "result.json").write_text("{cut sho")
     list(LocalExecutor(2).finish(runs))
     assert [starts(run) for run in runs] == [["begun"], ["resumed"], ["begun"]]
-
-
-def test_a_run_that_was_stopped_is_not_finished(make_runs):
-    (run,) = make_runs("seed=0")
-    run.folder.mkdir()
-    (run.folder / "result.json").write_text(json.dumps({"reason": "SIGTERM"}))
-    assert read_result(run.folder) is None
-
-
-def test_a_failure_is_forgotten_when_the_run_succeeds(make_runs):
-    (run,) = make_runs("seed=0")
-    run.folder.mkdir()
-    run.failure.write_text(json.dumps({"error": "no space left"}))
-    assert finish_run(run) == 0
-    assert read_failure(run) is None
-
-
-def test_a_run_that_another_process_works_on_is_waited_for(make_runs):
-    (run,) = make_runs("seed=0")
-    run.folder.mkdir()
-    statuses = []
-    with folder_lock(run.folder):
-        thread = threading.Thread(target=lambda: statuses.append(finish_run(run)))
-        thread.start()
-        time.sleep(0.5)
-        assert not statuses
-        result = {"reason": "solved", "running_reward": 2.0}
-        (run.folder / "result.json").write_text(json.dumps(result))
-    thread.join(10)
-    assert statuses == [0]
-    assert not (run.folder / "starts").exists()
-
-
-def test_a_process_that_came_too_late_is_no_failure(make_runs):
-    (run,) = make_runs("fail=true")
-    process = RunProcess(run)
-    assert process.poll() is None
-    result = {"reason": "solved", "running_reward": 2.0}
-    (run.folder / "result.json").write_text(json.dumps(result))  # by an earlier sweep's process
-    assert process.wait() == 0
-    assert read_failure(run) is None
 
 
 def test_interrupting_a_sweep_stops_its_runs(make_runs):

@@ -1,12 +1,9 @@
 """The search's study: it repeats, goes on after a kill, and stops the hopeless."""
 
-from types import SimpleNamespace
-
 import pytest
 
 optuna = pytest.importorskip("optuna", reason="pip install 'drone-rl[optuna]'")
 
-from drone_rl.sweeps.pruning import PruneCallback  # noqa: E402
 from drone_rl.sweeps.search import next_trials, open_study, tell  # noqa: E402
 
 SPACE = {"optimiser.lr": optuna.distributions.FloatDistribution(1e-4, 1e-1, log=True)}
@@ -57,22 +54,3 @@ def test_what_became_of_a_run_is_told(tmp_path):
     tell(study, 2, None)
     assert [t.state.name for t in study.trials] == ["COMPLETE", "PRUNED", "FAIL"]
     assert study.best_value == 2.97
-
-
-@pytest.mark.parametrize(("prune", "reason"), [(True, "pruned"), (False, "")])
-def test_a_run_below_the_median_is_stopped(tmp_path, prune, reason):
-    study = begin(tmp_path, prune=prune)
-    next_trials(study, SPACE, 2, seed=0)
-    reasons = []
-    for number, cubes in ((0, 2.0), (1, 0.5)):
-        trainer = SimpleNamespace(
-            progress=SimpleNamespace(frames=0, running_reward=cubes), stop_request=""
-        )
-        callback = PruneCallback(tmp_path, number)
-        for frames in (50, 120, 130, 250):
-            trainer.progress.frames = frames
-            callback.on_update(trainer, {})
-        reasons.append(trainer.stop_request)
-        tell(study, number, {"reason": trainer.stop_request or "frames", "running_reward": cubes})
-    assert reasons == ["", reason]
-    assert list(study.trials[0].intermediate_values) == [1, 2]

@@ -3,9 +3,7 @@
 That each sentence goes or turns with its evidence: tests/bench/test_sentences.py.
 """
 
-import pytest
-
-from drone_rl.bench.evidence import EXPLANATION, HIGHER, changed
+from drone_rl.bench.evidence import EXPLANATION, changed
 from drone_rl.words.licence import said
 from drone_rl.words.report import SECTIONS, SENTENCES
 
@@ -66,55 +64,6 @@ def test_empty_maps_are_counted_and_no_reason_is_made_up():
     assert found["attribution.stand_in"].startswith("On 1 of the 4 steps shown")
     assert found["attribution.no_heat"] == "On 1 of the 4 steps shown there is no heat at all."
     assert "because" not in " ".join(found.values())
-
-
-def test_outcomes_are_counted_and_blindness_is_told_of_both_sides():
-    found = speak()
-    assert found["response.collected"].endswith(
-        "from 64 of 72 places on its left, 72 of 72 places ahead and 60 of 72 places on its right."
-    )
-    assert (
-        "60% of the places on the left and 50% of the places on the right"
-        in found["response.blind"]
-    )
-    assert "response.heights" not in found
-
-
-def test_places_that_are_not_there_are_not_told():
-    assert "ahead" not in speak(response__rows__1__places=0)["response.collected"]
-
-
-def test_other_heights_are_told_where_cubes_stand_there():
-    found = speak(response__rows=[*EXPLANATION["response"]["rows"], *HIGHER])
-    assert found["response.heights"] == (
-        "Where the cube stands 1.2 m higher: from 50 of 72 places on its left, 72 of 72 places "
-        "ahead and 40 of 72 places on its right."
-    )
-    assert "64 of 72" in found["response.collected"]  # still those at its own height
-
-
-@pytest.mark.parametrize(
-    ("lower", "upper", "name"),
-    [
-        (-0.3, -0.1, "prefers"),
-        (0.1, 0.3, "prefers"),
-        (-0.1, 0.3, "undecided"),
-        (0.0, 0.3, "undecided"),
-        (-0.3, 0.0, "undecided"),
-    ],
-)
-def test_a_side_is_preferred_if_the_interval_says_so(lower, upper, name):
-    signed = {"mean": (lower + upper) / 2, "lower95": lower, "upper95": upper}
-    found = speak(asymmetry__dataset__signed=signed)
-    assert {n for n in found if n in ("asymmetry.prefers", "asymmetry.undecided")} == {
-        f"asymmetry.{name}"
-    }
-    if name == "prefers":
-        side = "left" if lower > 0 else "right"
-        assert (
-            f"prefers the {side}, by 0.20 in probability (95%: 0.10 to 0.30)"
-            in found["asymmetry.prefers"]
-        )
 
 
 def test_every_section_of_the_page_says_something():
