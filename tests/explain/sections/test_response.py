@@ -1,0 +1,26 @@
+from types import SimpleNamespace
+
+import numpy as np
+
+from drone_rl.explain.response import OutcomeMap, ResponseMap, summarise
+from drone_rl.explain.sections import response
+
+
+def test_every_field_of_both_maps_is_kept(monkeypatch):
+    axes = {"height": np.zeros(1), "forward": np.arange(2.0), "lateral": np.array([-4.0, 0, 4])}
+    ahead = np.zeros((1, 2, 3, 3))
+    ahead[..., 0] = 1.0
+    oracle = np.array([2, 0, 1])
+    does = ResponseMap(
+        **axes, probabilities=ahead, without_cube=np.array([1.0, 0, 0]), oracle=oracle
+    )
+    comes = OutcomeMap(**axes, oracle=oracle, collected=np.array([[[False, True, False]] * 2]))
+    monkeypatch.setattr(response, "outcome_map", lambda scenes, network: comes)
+    context = SimpleNamespace(response=does, scenes=None, network=None)
+    numbers, arrays = response.section(context)
+    assert numbers == {"response": summarise(does, comes)}
+    assert arrays["response_probabilities"] is ahead
+    assert arrays["outcome_collected"] is comes.collected
+    assert arrays["response_blind"].tolist() == [[[True, False, True]] * 2]
+    names = ("height", "forward", "lateral")
+    assert {f"{kind}_{n}" for kind in ("response", "outcome") for n in names} <= arrays.keys()

@@ -1,0 +1,86 @@
+"""Pictures pixel by pixel, of frames made by hand."""
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from drone_rl.report import pictures
+from drone_rl.report.pictures import BACKGROUND, CHOSEN, MUTED, SCALE, TINTS
+
+BLACK = np.zeros((4, 6, 3), np.uint8)
+
+
+def colors(picture):
+    return {color for _, color in picture.getcolors(1 << 20)}
+
+
+def test_a_tint_is_mixed_in():
+    assert pictures.tint(BLACK, 0, strength=0.5)[0, 0].tolist() == [c // 2 for c in TINTS[0]]
+    assert (pictures.tint(BLACK + 100, 1, strength=0.0) == 100).all()
+
+
+def test_heat_without_a_peak_leaves_the_frame_in_gray():
+    frame = BLACK + np.array([30, 60, 90], np.uint8)
+    assert (pictures.heated(frame, np.zeros((4, 6))) == 45).all()  # three quarters of the mean
+
+
+def test_the_hottest_pixel_is_the_brightest():
+    heat = np.zeros((4, 6))
+    heat[2, 3] = 0.01  # its size does not count, its place does
+    lit = pictures.heated(BLACK, heat).sum(-1)
+    assert np.unravel_index(lit.argmax(), lit.shape) == (2, 3)
+    assert len(np.unique(np.delete(lit.ravel(), 2 * 6 + 3))) == 1
+
+
+def test_thumbnails_stand_on_their_cells():
+    frames = np.stack([BLACK, BLACK])
+    picture = pictures.thumbnails(frames, np.array([0, 2]), np.array([[0, 0], [2, 1]]))
+    assert picture.size == (3 * 6, 2 * 4)
+    of = {action: tuple(pictures.tint(BLACK, action)[0, 0].tolist()) for action in (0, 2)}
+    assert picture.getpixel((5, 3)) == of[0]
+    assert picture.getpixel((12, 4)) == of[2]
+    assert picture.getpixel((6, 0)) == BACKGROUND
+
+
+@pytest.mark.parametrize("chosen", [0, 1, 2])
+def test_bars_are_as_long_as_they_are_probable_and_the_chosen_one_is_red(chosen):
+    def pixels(probabilities, color):
+        bars = np.asarray(pictures.indicator(probabilities, chosen, 300))
+        return int((bars == color).all(-1).sum())
+
+    sure = [0.0, 0.0, 0.0]
+    sure[chosen] = 1.0
+    half = [0.5 * p for p in sure]
+    assert pixels(sure, CHOSEN) == pytest.approx(2 * pixels(half, CHOSEN), rel=0.1)
+    assert pixels(sure, MUTED) < pixels([1 - p for p in sure], MUTED)
+
+
+def test_pictures_are_enlarged_captioned_stacked_and_gridded():
+    picture = pictures.enlarge(BLACK)
+    assert picture.size == (6 * SCALE, 4 * SCALE)
+    titled = pictures.titled(picture, "a caption")
+    assert titled.size == (6 * SCALE, 4 * SCALE + 22)
+    assert len(colors(titled)) > 2  # paper, frame, ink
+    assert pictures.stacked([picture, titled], gap=3).size == (30, 20 + 3 + 42)
+    assert pictures.gridded([picture] * 5, columns=2, gap=10).size == (30 + 10 + 30, 3 * 20 + 20)
+
+
+def test_a_gray_picture_shows_the_newest_channel_between_its_bounds():
+    observation = np.stack([np.full((1, 3), 9.0), np.array([[-1.0, 0.5, 2.0]])])
+    gray = pictures.gray_picture(observation, low=0.0, high=1.0)
+    assert gray[0, :, 0].tolist() == [0, 127, 255]
+    assert (gray == gray[..., :1]).all()
+
+
+def test_a_probed_frame_has_its_own_bars():
+    data = {
+        "frames": np.stack([BLACK, BLACK + 255]),
+        "actions": np.array([0, 1]),
+        "probabilities": np.array([[1.0, 0.0, 0.0], [0.2, 0.5, 0.3]]),
+    }
+    white = pictures.probed_frame(data, 1, "x")
+    bars = pictures.indicator([0.2, 0.5, 0.3], 1, 6 * SCALE)
+    assert isinstance(white, Image.Image)
+    assert white.size == (30, 42 + 3 + bars.height)
+    assert white.getpixel((1, 30)) == (255, 255, 255)
+    assert list(white.crop((0, 45, 30, 45 + bars.height)).getdata()) == list(bars.getdata())
