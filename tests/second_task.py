@@ -10,11 +10,12 @@ import enum
 import torch
 from torch import Tensor
 
-from drone_rl.sim.actions import Entry
+from drone_rl.sim.actions import MOVES, Entry
 from drone_rl.sim.batch import Batch
 from drone_rl.sim.dynamics import BodyState, ComputerVision
 from drone_rl.sim.entities.cube import Cube
 from drone_rl.sim.meaning import Meaning
+from drone_rl.sim.tasks import Goals, OracleRule
 
 NUM_POSTS = 2
 REACH = 1.0
@@ -54,6 +55,13 @@ class Posts:
     ends = End
     truncation = End.TIME
     observed = ("passed", "end_reason")
+    goal = "post"
+    success_end = End.THROUGH
+    expected_end = End.TIME
+    strata = ("left", "right")
+    luck = ("random", "forward")
+    scored = ("passed", "sides")
+    oracle = OracleRule(("end_reason",), lambda end: torch.zeros_like(end[..., 0]), MOVES)
     largest_reward = float(NUM_POSTS)
     drone_size = 0.5
     origin = (0.0, 0.0, 1.0)
@@ -63,6 +71,7 @@ class Posts:
         """Which posts are passed, on which side they stand, and the end."""
         return {
             "passed": Entry((NUM_POSTS,), torch.bool),
+            "sides": Entry((NUM_POSTS,), torch.int64, 0, 1),
             "end_reason": Entry((1,), torch.int64, 0, len(End) - 1),
         }
 
@@ -108,4 +117,18 @@ class Posts:
 
     def info(self, state):
         """See `entries`."""
-        return {"passed": state.passed.clone(), "end_reason": state.end_reason[:, None].clone()}
+        return {
+            "passed": state.passed.clone(),
+            "sides": (state.posts[..., 1] < 0).long(),
+            "end_reason": state.end_reason[:, None].clone(),
+        }
+
+    def score(self, info):
+        """Each post is a goal; all come up at once."""
+        sides = info["sides"]
+        return Goals(reached=info["passed"], stratum=sides, world=sides.double())
+
+    def classes(self, goals):
+        """By the side on which a post stands."""
+        for number, name in enumerate(self.strata):
+            yield "side", name, goals.stratum == number

@@ -15,11 +15,12 @@ import torch
 from numpy.typing import NDArray
 
 from drone_rl.evaluation import Episodes
+from drone_rl.sim.tasks import CollectCubes, Goals
 from drone_rl.sim.tasks.collect_cubes.rules import Side
 from drone_rl.verdicts.judge import estimate, observe
 from drone_rl.verdicts.kinds import Kind
 from drone_rl.verdicts.luck import BASELINES
-from drone_rl.verdicts.rule import QUANTITIES, Quantity, Rule, decide, kinds_within
+from drone_rl.verdicts.rule import Quantity, Rule, decide, kinds_within
 
 L, A, R = Side
 Type = tuple[tuple[Side, ...], tuple[int, ...]]
@@ -27,7 +28,7 @@ Type = tuple[tuple[Side, ...], tuple[int, ...]]
 SHIFTS = (-0.03, 0.0, 0.03)
 """How far beside a threshold a policy lies."""
 EPISODES = (400, 1600)
-_RULE = Rule()
+_RULE, _TASK = Rule(), CollectCubes()
 
 
 @dataclasses.dataclass(frozen=True)
@@ -53,7 +54,7 @@ class Simulated:
     @property
     def kind(self) -> Kind:
         """What it is in truth."""
-        return decide([self._truth(i).level for i in range(len(QUANTITIES))])
+        return decide([self._truth(i).level for i in range(len(_RULE.quantities))])
 
     def _truth(self, quantity: int) -> Quantity:
         values, thresholds = self.told[quantity], _RULE.thresholds[quantity]
@@ -185,7 +186,7 @@ def _observe(kind: Type, lucky: float) -> list[float]:
     flown = {name: _episode(sides, [0] * len(sides)) for name in BASELINES}
     flown["oracle"] = _episode(sides, [1] * len(sides))
     told = [float(v[0]) if len(v) else np.nan for v in observe(ours, flown, _RULE)]
-    straight = QUANTITIES.index("above forward")
+    straight = _RULE.quantities.index("above forward")
     told[straight] -= (1 - _RULE.luck_margin) * lucky
     return told
 
@@ -193,10 +194,12 @@ def _observe(kind: Type, lucky: float) -> list[float]:
 def _episode(sides: tuple[Side, ...], hits: Any) -> Episodes:
     side = torch.tensor([[int(s) for s in sides]])
     return Episodes(
-        collected=torch.tensor([list(hits)], dtype=torch.bool),
-        side=side,
-        lateral=torch.zeros(side.shape, dtype=torch.float64),
-        height=torch.zeros(side.shape, dtype=torch.float64),
+        task=_TASK,
+        goals=Goals(
+            reached=torch.tensor([list(hits)], dtype=torch.bool),
+            stratum=side,
+            world=torch.zeros(1, 1),
+        ),
         end_reason=torch.ones(1, dtype=torch.int64),
         length=torch.ones(1, dtype=torch.int64),
     )

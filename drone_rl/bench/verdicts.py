@@ -76,7 +76,7 @@ def _verdict(pilot: Pilot, episodes: int, seed: int) -> dict[str, Any]:
     task = pilot.settings
     env = _worlds(task, seed)
     flown = run_episodes(env, ScriptedPolicy(pilot, torch.Generator().manual_seed(seed)), episodes)
-    return judge(flown, _baselines(task, episodes, seed), task).as_dict()
+    return judge(flown, _baselines(task, episodes, seed)).as_dict()
 
 
 @functools.cache

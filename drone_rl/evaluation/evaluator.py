@@ -8,8 +8,6 @@ from torchrl.envs.utils import ExplorationType, set_exploration_type
 from drone_rl.collectors import EpisodeCollector
 from drone_rl.evaluation.metrics import Episodes
 
-_KEPT = ("collected", "side", "lateral", "end_reason", "cube_positions", "drone")
-
 
 def run_episodes(
     env: EnvBase, actor: TensorDictModuleBase, num_episodes: int, *, greedy: bool = True
@@ -28,7 +26,8 @@ def run_episodes(
     Returns:
         The episodes, on the CPU.
     """
-    keep = tuple(("next", "info", name) for name in _KEPT)
+    task = getattr(env, "base_env", env).worlds.task
+    keep = tuple(("next", "info", name) for name in (*task.scored, "end_reason"))
     collector = EpisodeCollector(env, actor, keep=keep, keep_observations=False)
     kind = ExplorationType.DETERMINISTIC if greedy else ExplorationType.RANDOM
     finals, lengths, count = [], [], 0
@@ -41,10 +40,8 @@ def run_episodes(
             count += len(lengths[-1])
     info = torch.cat(finals)[:num_episodes].cpu()
     return Episodes(
-        collected=info["collected"],
-        side=info["side"],
-        lateral=info["lateral"],
-        height=(info["cube_positions"][..., 2] - info["drone"][:, None, 2]).double(),
+        task=task,
+        goals=task.score(info),
         end_reason=info["end_reason"][:, 0],
         length=torch.cat(lengths)[:num_episodes].cpu(),
     )

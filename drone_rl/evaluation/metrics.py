@@ -1,6 +1,6 @@
 """How good a policy is: pure functions of finished episodes, each of which counts once.
 
-An episode's cubes depend on one another: who leaves after the first cube misses all the others.
+An episode's goals depend on one another: who leaves after the first cube misses all the others.
 So every interval rests on one value an episode.
 """
 
@@ -9,27 +9,19 @@ from typing import Any
 
 from torch import Tensor
 
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason, Side
+from drone_rl.sim.tasks import Goals, Task
 from drone_rl.utils.intervals import mean_bounds, proportion
-
-ENDS = tuple(reason for reason in EndReason if reason is not EndReason.RUNNING)
-"""How an episode can end."""
 
 
 @dataclasses.dataclass
 class Episodes:
-    """Finished episodes; `n` is their number, `C` the number of cubes."""
+    """`n` finished episodes of a task."""
 
-    collected: Tensor  # (n, C) bool
-    """Which cubes were collected."""
-    side: Tensor  # (n, C) int64
-    """`Side` of each cube when it became the next one; -1 if it never did."""
-    lateral: Tensor  # (n, C) float64
-    """Metres to the left of the drone at which it stood then; NaN if it never did."""
-    height: Tensor  # (n, C) float64
-    """Metres by which each cube stands higher than the drone."""
+    task: Task[Any]
+    goals: Goals
+    """What was to do in them, and what was done."""
     end_reason: Tensor  # (n,) int64
-    """`EndReason` of each."""
+    """Why each ended, one of the task's ends."""
     length: Tensor  # (n,) int64
     """Steps of each."""
 
@@ -39,59 +31,62 @@ class Episodes:
 
     def __getitem__(self, rows: slice | Tensor) -> "Episodes":
         """Returns some of the episodes."""
-        return Episodes(**{name: value[rows] for name, value in vars(self).items()})
+        return Episodes(self.task, self.goals[rows], self.end_reason[rows], self.length[rows])
 
     @property
     def success(self) -> Tensor:
-        """1 where every cube was collected, else 0. Shape: (n,), float64."""
-        return self.collected.all(-1).double()
+        """1 where every goal was reached, else 0. Shape: (n,), float64."""
+        return self.goals.reached.all(-1).double()
 
     @property
     def share(self) -> Tensor:
-        """Each episode's share of cubes collected; the never reached are missed. Shape: (n,)."""
-        return self.collected.double().mean(-1)
+        """Each episode's share of goals reached; those that never came up are missed. (n,)."""
+        return self.goals.reached.double().mean(-1)
 
-    def offered(self, side: Side) -> Tensor:
-        """Episodes in which some cube became the next one on this side. Shape: (n,), bool."""
-        return (self.side == side).any(-1)
+    def offered(self, stratum: int) -> Tensor:
+        """Episodes in which some goal came up in this stratum. Shape: (n,), bool."""
+        return (self.goals.stratum == stratum).any(-1)
 
-    def side_share(self, side: Side) -> Tensor:
-        """The share of the cubes on a side that each episode that offered one collected.
+    def stratum_share(self, stratum: int) -> Tensor:
+        """The share of the goals of a stratum that each episode that offered one reached.
 
         Returns:
             Shape: (number of such episodes,), float64.
         """
-        cubes = (self.side == side)[self.offered(side)]
-        return (cubes & self.collected[self.offered(side)]).sum(-1).double() / cubes.sum(-1)
+        offered = self.offered(stratum)
+        there = (self.goals.stratum == stratum)[offered]
+        return (there & self.goals.reached[offered]).sum(-1).double() / there.sum(-1)
 
 
 def summarise(episodes: Episodes) -> dict[str, Any]:
     """The figures of an evaluation, as plain values, with intervals that count episodes.
 
-    "success" is the share of episodes in which every cube was collected. "shares" are means over
-    episodes of the share of cubes that an episode collected: of all, and of those that became the
-    next one on a side, over the episodes that offered such a cube; a mean of None says that none
-    was offered. Cubes that never became the next one ("never_reached") count among all as missed.
+    "success" is the share of episodes in which every goal (cube) was reached. "shares" are means
+    over episodes of the share of cubes that an episode collected: of all, and of those that came up
+    in a stratum (on a side), over the episodes that offered such a cube; a mean of None says that
+    none was offered. Cubes that never came up ("never_reached") count among all as missed.
     """
-    shares = {"all": _share(episodes.share, episodes.collected.numel())}
-    for side in Side:
-        cubes = int((episodes.side == side).sum())
-        shares[side.name.lower()] = _share(episodes.side_share(side), cubes)
+    goals, task = episodes.goals, episodes.task
+    shares = {"all": _share(episodes.share, goals.reached.numel())}
+    for number, name in enumerate(task.strata):
+        count = int((goals.stratum == number).sum())
+        shares[name] = _share(episodes.stratum_share(number), count)
     ends = {
         reason.name.lower(): proportion(int((episodes.end_reason == reason).sum()), len(episodes))
-        for reason in ENDS
+        for reason in task.ends
+        if reason != 0
     }
     return {
         "episodes": len(episodes),
         "success": proportion(int(episodes.success.sum()), len(episodes)),
         "shares": shares,
-        "never_reached": mean_bounds((episodes.side < 0).double().mean(-1)),
+        "never_reached": mean_bounds((goals.stratum < 0).double().mean(-1)),
         "ends": ends,
-        "mean_cubes": float(episodes.collected.sum(-1).double().mean()),
+        "mean_cubes": float(goals.reached.sum(-1).double().mean()),
         "mean_length": float(episodes.length.double().mean()),
         "max_length": int(episodes.length.max()),
     }
 
 
-def _share(values: Tensor, cubes: int) -> dict[str, Any]:
-    return {**mean_bounds(values), "cubes": cubes}
+def _share(values: Tensor, count: int) -> dict[str, Any]:
+    return {**mean_bounds(values), "cubes": count}

@@ -1,39 +1,51 @@
-"""A hand-written policy that reads the true positions: the best that can be hoped for."""
+"""Policies that see no picture: one that knows the truth, and those that know nothing."""
+
+from typing import Any
 
 import torch
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 
-from drone_rl.sim.actions import Move
+from drone_rl.sim.actions import Actions
 from drone_rl.sim.settings import TaskSettings
+from drone_rl.sim.tasks import Task, as_task
+from drone_rl.utils.errors import InputError
 
 
 class Oracle(TensorDictModuleBase):
-    """Lines up with the next cube sideways, then flies forward. Sees no picture."""
+    """Acts by the true positions: the best that can be hoped for."""
 
-    def __init__(self, settings: TaskSettings) -> None:
-        """Learns how near is near enough.
+    def __init__(self, task: TaskSettings | Task[Any], actions: Actions | None = None) -> None:
+        """Learns the task's rule.
 
         Args:
-            settings: The task's.
+            task: The task, or the settings of cube collection.
+            actions: What it may do; the actions of the task's own choice of dynamics by default.
+
+        Raises:
+            InputError: The task has no oracle, or none that acts so.
         """
         super().__init__()
-        self.in_keys = [("info", "drone"), ("info", "cube_positions"), ("info", "next_cube")]
+        task = as_task(task)
+        rule = task.oracle
+        if rule is None:
+            raise InputError(
+                f"task={task.name} has no oracle; choose a task that has one, or give this one "
+                "a rule that knows the truth (Task.oracle)"
+            )
+        if actions is not None and actions.names != rule.actions.names:
+            raise InputError(
+                f"the oracle of task={task.name} acts by {', '.join(rule.actions.names)}, these "
+                f"drones by {', '.join(actions.names)}; choose dynamics that it can fly"
+            )
+        self.rule = rule
+        self.in_keys = [("info", name) for name in rule.reads]
         self.out_keys = ["action"]
-        self.tolerance = max(0.5 * settings.step_length, 0.5 * settings.touch_distance)
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Writes the action of each world."""
-        drone, cubes, index = (tensordict.get(key) for key in self.in_keys)
-        left = index >= cubes.shape[-2]  # no cube stands any more
-        nearest = index.clamp(max=cubes.shape[-2] - 1)
-        rows = nearest[..., None].expand(*index.shape[:-1], 1, 3)
-        offset = cubes.gather(-2, rows)[..., 0, 1] - drone[..., 1]
-        action = torch.full_like(index[..., 0], Move.FORWARD)
-        action[offset > self.tolerance] = Move.LEFT
-        action[offset < -self.tolerance] = Move.RIGHT
-        action[left[..., 0]] = Move.FORWARD
-        return tensordict.set("action", action)
+        known = [tensordict.get(key) for key in self.in_keys]
+        return tensordict.set("action", self.rule.act(*known))
 
 
 class RandomPolicy(TensorDictModuleBase):
@@ -62,7 +74,7 @@ class RandomPolicy(TensorDictModuleBase):
 class ConstantPolicy(TensorDictModuleBase):
     """Takes the same action whatever happens."""
 
-    def __init__(self, action: Move) -> None:
+    def __init__(self, action: int) -> None:
         """Sets the action.
 
         Args:

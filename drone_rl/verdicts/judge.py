@@ -5,19 +5,18 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 from torchrl.envs import EnvBase
 
 from drone_rl.evaluation import Episodes, run_episodes, summarise
-from drone_rl.sim.settings import TaskSettings
-from drone_rl.sim.tasks.collect_cubes.rules import Side
 from drone_rl.utils.intervals import mean_bounds, proportion
 from drone_rl.verdicts.failures import failure_table
 from drone_rl.verdicts.kinds import NOT_CERTAIN, Kind
-from drone_rl.verdicts.luck import BASELINES, fly_baselines
-from drone_rl.verdicts.rule import LUCK, QUANTITIES, Quantity, Rule, decide, kinds_within
+from drone_rl.verdicts.luck import fly_baselines
+from drone_rl.verdicts.rule import Quantity, Rule, decide, kinds_within
 from drone_rl.words.licence import say
 from drone_rl.words.verdict import SENTENCES
 
@@ -68,21 +67,21 @@ def judge_policy(
             to draw from need not.
     """
     base = getattr(env, "base_env", env)
-    worlds, task = base.state_dict(), base.worlds.task.settings
+    state, worlds = base.state_dict(), base.worlds
     greedy = run_episodes(env, actor, episodes)
     drawn = None
     if sampled:
-        base.load_state_dict(worlds)
+        base.load_state_dict(state)
         drawn = run_episodes(env, actor, episodes, greedy=False)
-    num_worlds, device = env.batch_size[0], str(base.worlds.device)
-    baselines = fly_baselines(num_worlds, task, worlds, episodes, device)
-    return judge(greedy, baselines, task, rule=rule, sampled=drawn)
+    baselines = fly_baselines(
+        env.batch_size[0], worlds.task, state, episodes, str(worlds.device), worlds.dynamics
+    )
+    return judge(greedy, baselines, rule=rule, sampled=drawn)
 
 
 def judge(
     greedy: Episodes,
     baselines: Mapping[str, Episodes],
-    task: TaskSettings,
     *,
     rule: Rule | None = None,
     sampled: Episodes | None = None,
@@ -91,19 +90,20 @@ def judge(
 
     Args:
         greedy: The policy's episodes, each with the most probable actions.
-        baselines: Those of each of `BASELINES`, the k-th in the same world as the policy's.
-        task: The task that all were flown in.
+        baselines: Those of the task's luck and of the oracle, the k-th in the same world as the
+            policy's.
         rule: Thresholds.
         sampled: The policy's episodes with drawn actions, in the same worlds.
 
     Raises:
         ValueError: They were flown in different worlds.
     """
-    rule = rule or Rule()
+    task = greedy.task
+    rule = dataclasses.replace(rule or Rule(), strata=task.strata, luck=task.luck)
     _check_pairs(greedy, [*baselines.values(), *([] if sampled is None else [sampled])])
     found = measure(greedy, baselines, rule)
-    kind = decide([quantity.level for quantity in found])
-    certain = _is_certain(found)
+    kind = decide([quantity.level for quantity in found], len(rule.strata))
+    certain = _is_certain(found, rule)
     evidence = {
         "kind": kind.value,
         "certain": certain,
@@ -111,14 +111,14 @@ def judge(
         "rule": rule.text,
         "error_rate": rule.error_rate,
         "good_share": rule.good_share,
-        "num_cubes": greedy.collected.shape[-1],
+        "num_cubes": greedy.goals.reached.shape[-1],
         "greedy": summarise(greedy),
         "sampled": None if sampled is None else summarise(sampled),
-        "baselines": {name: summarise(baselines[name]) for name in BASELINES},
-        "skill": {name: _gain(greedy.share, baselines[name].share) for name in BASELINES},
+        "baselines": {name: summarise(flown) for name, flown in baselines.items()},
+        "skill": {name: _gain(greedy.share, flown.share) for name, flown in baselines.items()},
         "drawing": None if sampled is None else _gain(sampled.success, greedy.success),
-        "failures": failure_table(greedy, task),
-        "quantities": {name: q._asdict() for name, q in zip(QUANTITIES, found, strict=True)},
+        "failures": failure_table(greedy),
+        "quantities": {name: q._asdict() for name, q in zip(rule.quantities, found, strict=True)},
         "enough": len(greedy) if certain else _enough(greedy, baselines, rule),
     }
     return Verdict(kind, certain, evidence)
@@ -127,7 +127,7 @@ def judge(
 def measure(
     greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule, times: int = 1
 ) -> tuple[Quantity, ...]:
-    """The rule's `QUANTITIES` with intervals that hold all at once.
+    """The rule's quantities with intervals that hold all at once.
 
     Args:
         greedy: The policy's episodes.
@@ -140,7 +140,7 @@ def measure(
 
 
 def observe(greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule) -> list[NDArray]:
-    """What each episode says of each of `QUANTITIES`: one value, or none.
+    """What each episode says of each of the rule's quantities: one value, or none.
 
     Returns:
         One array a quantity; those of "collected" have a value for each episode that offered such a
@@ -148,23 +148,24 @@ def observe(greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule) -> 
     """
     oracle = baselines["oracle"]
     told = [greedy.success - rule.good_share * oracle.success]
-    told += [greedy.offered(side).double() for side in Side]
-    told += [greedy.side_share(side) for side in Side]
-    for name in LUCK:
+    strata = range(len(rule.strata))
+    told += [greedy.offered(stratum).double() for stratum in strata]
+    told += [greedy.stratum_share(stratum) for stratum in strata]
+    for name in rule.luck:
         luck = (1 - rule.luck_margin) * baselines[name].share
         told.append(greedy.share - luck - rule.luck_margin * oracle.share)
     return [values.numpy() for values in told]
 
 
 def estimate(quantity: int, values: NDArray, rule: Rule) -> Quantity:
-    """One of `QUANTITIES` from what episodes say of it.
+    """One of the rule's quantities from what episodes say of it.
 
     Args:
         quantity: Its place among them.
         values: As `observe` returns them.
         rule: Thresholds.
     """
-    name, thresholds = QUANTITIES[quantity], rule.thresholds[quantity]
+    name, thresholds = rule.quantities[quantity], rule.thresholds[quantity]
     if name.startswith("offered"):
         share = proportion(int(values.sum()), len(values), rule.confidence)
         return Quantity(share["share"], share["lower95"], share["upper95"], thresholds)
@@ -173,14 +174,15 @@ def estimate(quantity: int, values: NDArray, rule: Rule) -> Quantity:
     return Quantity(mean["mean"], mean["lower95"], mean["upper95"], thresholds)
 
 
-def _is_certain(found: tuple[Quantity, ...]) -> bool:
-    return len(kinds_within(tuple(quantity.levels for quantity in found))) == 1
+def _is_certain(found: tuple[Quantity, ...], rule: Rule) -> bool:
+    box = tuple(quantity.levels for quantity in found)
+    return len(kinds_within(box, len(rule.strata))) == 1
 
 
 def _enough(greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule) -> int | None:
     """Roughly how many episodes would do if they went on like this; None for very many."""
     for times in MANY:
-        if _is_certain(measure(greedy, baselines, rule, times)):
+        if _is_certain(measure(greedy, baselines, rule, times), rule):
             return times * len(greedy)
     return None
 
@@ -191,8 +193,6 @@ def _gain(ours: Tensor, theirs: Tensor) -> dict[str, Any]:
 
 
 def _check_pairs(greedy: Episodes, others: list[Episodes]) -> None:
-    """The first cube is seen from the same place by all, so it tells worlds apart."""
     for other in others:
-        same = len(other) == len(greedy)
-        if not (same and bool((other.lateral[:, 0] == greedy.lateral[:, 0]).all())):
+        if not torch.equal(other.goals.world, greedy.goals.world):
             raise ValueError("policy and baselines were flown in different worlds; pair them")

@@ -7,35 +7,51 @@ from tensordict.nn import TensorDictModuleBase
 
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation import ConstantPolicy, Episodes, Oracle, RandomPolicy, run_episodes
-from drone_rl.sim.actions import Move
+from drone_rl.sim.actions import Actions
+from drone_rl.sim.dynamics import Dynamics
 from drone_rl.sim.settings import TaskSettings
+from drone_rl.sim.tasks import Task, as_task
 from drone_rl.utils.seeding import Stream, torch_generator
 from drone_rl.verdicts.rule import LUCK
 
 BASELINES = (*LUCK, "oracle")
-"""Policies that see no picture."""
+"""Policies that see no picture, of cube collection."""
 _LUCK_SEED = 0
 
 
 def make_baseline(
-    name: str, task: TaskSettings, generator: torch.Generator
+    name: str,
+    task: TaskSettings | Task[Any],
+    generator: torch.Generator,
+    actions: Actions | None = None,
 ) -> TensorDictModuleBase:
-    """One of `BASELINES`.
+    """A policy that sees no picture.
 
     Args:
-        name: Which.
-        task: The settings that the oracle knows.
+        name: "oracle" or one of the task's luck.
+        task: The task, which the oracle knows.
         generator: Source of random actions.
+        actions: What can be done; by the task's own choice of dynamics by default.
+
+    Raises:
+        InputError: The task has no oracle.
     """
+    task = as_task(task)
+    actions = actions or task.make_dynamics().actions
     if name == "oracle":
-        return Oracle(task)
+        return Oracle(task, actions)
     if name == "random":
-        return RandomPolicy(len(Move), generator)
-    return ConstantPolicy(Move[name.upper()])
+        return RandomPolicy(len(actions.names), generator)
+    return ConstantPolicy(actions.names.index(name))
 
 
 def fly_baselines(
-    num_worlds: int, task: TaskSettings, worlds: dict[str, Any], episodes: int, device: str = "cpu"
+    num_worlds: int,
+    task: TaskSettings | Task[Any],
+    worlds: dict[str, Any],
+    episodes: int,
+    device: str = "cpu",
+    dynamics: Dynamics | None = None,
 ) -> dict[str, Episodes]:
     """Every baseline's episodes, the k-th of each in the same world.
 
@@ -45,12 +61,18 @@ def fly_baselines(
         worlds: `DroneEnv.state_dict` from before the policy's first episode.
         episodes: How many.
         device: Where to run.
+        dynamics: How the policy's drones move; the task's own choice by default.
+
+    Raises:
+        InputError: The task has no oracle.
     """
-    env = DroneEnv(num_worlds, task, pixels=False, device=device)
+    task = as_task(task)
+    env = DroneEnv(num_worlds, task, pixels=False, device=device, dynamics=dynamics)
+    actions = env.worlds.dynamics.actions
     generator = torch_generator(_LUCK_SEED, Stream.ACTIONS, number=1, device=env.device)
     flown = {}
-    for name in BASELINES:
+    for name in (*task.luck, "oracle"):
         env.load_state_dict(worlds)
-        flown[name] = run_episodes(env, make_baseline(name, task, generator), episodes)
+        flown[name] = run_episodes(env, make_baseline(name, task, generator, actions), episodes)
     env.close()
     return flown

@@ -16,15 +16,9 @@ from drone_rl.utils.errors import InputError
 from drone_rl.verdicts.kinds import Kind
 
 SIDES = ("left", "ahead", "right")
+"""Strata of cube collection."""
 LUCK = ("random", "forward", "left", "right")
-"""Policies that see nothing: any action alike, and each action always."""
-QUANTITIES = (
-    "success",
-    *(f"offered {side}" for side in SIDES),
-    *(f"collected {side}" for side in SIDES),
-    *(f"above {name}" for name in LUCK),
-)
-"""All that the rule looks at, in order."""
+"""Its policies that see nothing: any action alike, and each action always."""
 TOLERANCE = 1e-9
 """Rounding of a mean; who exceeds a threshold by no more stands on it."""
 
@@ -49,10 +43,16 @@ class Rule:
     """A poor policy is no farther than this part of the way from luck to the oracle."""
     error_rate: float = 0.05
     """Largest probability of being certain and wrong."""
+    strata: tuple[str, ...] = SIDES
+    """The task's, from left to right; one-sided policies differ between first and last."""
+    luck: tuple[str, ...] = LUCK
+    """The task's."""
 
     def __post_init__(self) -> None:
         """Refuses what no policy could meet or miss."""
         for field in dataclasses.fields(self):
+            if field.type is not float:
+                continue
             value = getattr(self, field.name)
             is_number = isinstance(value, int | float) and not isinstance(value, bool)
             if not is_number or not math.isfinite(value) or not 0 < value < 1:
@@ -65,16 +65,26 @@ class Rule:
             )
 
     @property
+    def quantities(self) -> tuple[str, ...]:
+        """Names of all that the rule looks at, in order."""
+        return (
+            "success",
+            *(f"offered {stratum}" for stratum in self.strata),
+            *(f"collected {stratum}" for stratum in self.strata),
+            *(f"above {name}" for name in self.luck),
+        )
+
+    @property
     def thresholds(self) -> tuple[tuple[float, ...], ...]:
-        """Of each of `QUANTITIES`, in rising order."""
-        sides = [(self.other_share, self.side_share)] * len(SIDES)
-        offered = [(self.offered_share,)] * len(SIDES)
-        return ((0.0,), *offered, *sides, *[(0.0,)] * len(LUCK))
+        """Of each of `quantities`, in rising order."""
+        shares = [(self.other_share, self.side_share)] * len(self.strata)
+        offered = [(self.offered_share,)] * len(self.strata)
+        return ((0.0,), *offered, *shares, *[(0.0,)] * len(self.luck))
 
     @property
     def confidence(self) -> float:
         """Of each quantity's interval, so that all of them hold at once (Bonferroni)."""
-        return 1.0 - self.error_rate / len(QUANTITIES)
+        return 1.0 - self.error_rate / len(self.quantities)
 
     @property
     def text(self) -> str:
@@ -118,28 +128,35 @@ def level(value: float, thresholds: Iterable[float]) -> int:
     return sum(value > threshold for threshold in thresholds)
 
 
-def decide(levels: Sequence[int]) -> Kind:
-    """The kind, by the level of each of `QUANTITIES`."""
+def decide(levels: Sequence[int], num_strata: int = len(SIDES)) -> Kind:
+    """The kind.
+
+    Args:
+        levels: Of each of `Rule.quantities`.
+        num_strata: How many strata are among them.
+    """
     success, *rest = levels
-    offered, shares, above_luck = rest[:3], rest[3:6], rest[6:]
+    offered, shares = rest[:num_strata], rest[num_strata : 2 * num_strata]
+    above_luck = rest[2 * num_strata :]
     if success and all(
         share == 2 or not there for there, share in zip(offered, shares, strict=True)
     ):
         return Kind.GOOD
-    if offered[0] and offered[2]:
-        if (shares[0], shares[2]) == (0, 2):
+    if offered[0] and offered[-1]:
+        if (shares[0], shares[-1]) == (0, 2):
             return Kind.ONE_SIDED_RIGHT
-        if (shares[0], shares[2]) == (2, 0):
+        if (shares[0], shares[-1]) == (2, 0):
             return Kind.ONE_SIDED_LEFT
     return Kind.NONE if all(above_luck) else Kind.POOR
 
 
 @functools.lru_cache(maxsize=4096)
-def kinds_within(box: tuple[tuple[int, int], ...]) -> frozenset[Kind]:
+def kinds_within(box: tuple[tuple[int, int], ...], num_strata: int = len(SIDES)) -> frozenset[Kind]:
     """The kinds of all cells of a box.
 
     Args:
-        box: The least and the greatest level of each of `QUANTITIES`.
+        box: The least and the greatest level of each of `Rule.quantities`.
+        num_strata: How many strata are among them.
     """
     pieces = [range(low, high + 1) for low, high in box]
-    return frozenset(decide(cell) for cell in itertools.product(*pieces))
+    return frozenset(decide(cell, num_strata) for cell in itertools.product(*pieces))

@@ -113,7 +113,7 @@ def test_kind_certainty_and_sentence(name):
     kind, certain, phrases = WANTED[name]
     task = PILOTS[name].settings
     drawn = fly(name, greedy=False) if PILOTS[name].confidence < 1 else None
-    verdict = judge(fly(name), baselines(task), task, sampled=drawn)
+    verdict = judge(fly(name), baselines(task), sampled=drawn)
     assert (verdict.kind.value, verdict.certain) == (kind, certain), verdict.sentence
     assert all(phrase in verdict.sentence for phrase in phrases), verdict.sentence
     assert 2 <= verdict.sentence.count(". ") + 1 <= 5, verdict.sentence
@@ -123,7 +123,7 @@ def test_seeking_is_what_the_oracle_does():
     task = PILOTS["all cubes"].settings
     ours, theirs = fly("all cubes"), baselines(task)["oracle"]
     assert torch.equal(ours.length, theirs.length)
-    assert torch.equal(ours.collected, theirs.collected)
+    assert torch.equal(ours.goals.reached, theirs.goals.reached)
 
 
 def test_slow_is_slow_and_dithering_endless():

@@ -4,7 +4,7 @@ import pytest
 from drone_rl.bench import simulated
 from drone_rl.bench.simulated import A, L, R, Simulated, _join, _mixture, judge_samples, policies
 from drone_rl.verdicts.kinds import Kind
-from drone_rl.verdicts.rule import QUANTITIES
+from drone_rl.verdicts.rule import Rule
 
 
 def sampled(policy, episodes, draws):
@@ -22,7 +22,7 @@ def test_types_and_their_probabilities():
 
 def test_what_a_type_says_of_each_quantity():
     policy = Simulated({((L, A), (1, 0)): 1.0}, lucky=0.3)
-    told = dict(zip(QUANTITIES, (float(values[0]) for values in policy.told), strict=True))
+    told = dict(zip(Rule().quantities, (float(values[0]) for values in policy.told), strict=True))
     assert told["success"] == pytest.approx(-0.9)
     assert (told["offered left"], told["offered right"]) == (1.0, 0.0)
     assert (told["collected left"], told["collected ahead"]) == (1.0, 0.0)

@@ -44,8 +44,9 @@ def test_episodes_are_those_of_each_world_alone_in_order_and_the_first_of_them()
     alone = [
         run_episodes(DroneEnv(1, pixels=False, seed=3, first_world=i), policy, 3) for i in range(4)
     ]
-    for name, value in vars(together).items():
-        expected = torch.stack([getattr(one, name) for one in alone], 1).flatten(0, 1)[:10]
+    for name, value in {**vars(together.goals), "length": together.length}.items():
+        each = [getattr(one if name == "length" else one.goals, name) for one in alone]
+        expected = torch.stack(each, 1).flatten(0, 1)[:10]
         torch.testing.assert_close(value, expected, equal_nan=True, rtol=0, atol=0)
     assert len(together.length.unique()) > 3  # no two alike, or order would not show
 
@@ -61,7 +62,7 @@ def test_greedy_flies_by_the_mode_and_sampling_by_the_odds(make_pipeline):
             logits.weight.zero_()
             logits.bias.copy_(torch.tensor([0.4, 0.3, 0.3]).log())
         episodes = run_episodes(env, actor, 16, greedy=greedy)
-        missed = ~episodes.collected[:, 0]
+        missed = ~episodes.goals.reached[:, 0]
         return episodes.length[missed]
 
     assert lengths(True).unique().tolist() == [11]
@@ -89,7 +90,7 @@ def test_heights_are_metres_above_the_drone():
     drawn = env.reset()["info", "cube_positions"][..., 2]
     env.load_state_dict(start)
     flown = run_episodes(env, ConstantPolicy(Move.FORWARD), 4)
-    torch.testing.assert_close(flown.height, drawn.double() - 5.0)
+    torch.testing.assert_close(flown.goals.height, drawn.double() - 5.0)
     assert (flown.end_reason == EndReason.FRONT_BOUNDARY).any()
     assert flown.length.max() == 45  # 44 is still within bounds
 
@@ -101,11 +102,12 @@ def test_the_kth_episode_is_the_same_world_whatever_the_policy():
     for policy in (Oracle(env.worlds.task.settings), ConstantPolicy(Move.LEFT)):
         env.load_state_dict(start)
         flown.append(run_episodes(env, policy, 20))
-    ours, theirs = flown
+    ours, theirs = (episodes.goals for episodes in flown)
+    assert torch.equal(ours.world, theirs.world)
     assert torch.equal(ours.lateral[:, 0], theirs.lateral[:, 0])
     assert torch.equal(ours.height, theirs.height)  # of all cubes
     assert len(ours.height.unique()) == 60
-    assert not torch.equal(ours.collected, theirs.collected)
+    assert not torch.equal(ours.reached, theirs.reached)
     assert theirs.lateral[:, 1:].isnan().all()  # never reached
 
 

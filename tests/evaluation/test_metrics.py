@@ -2,20 +2,22 @@ import pytest
 import torch
 
 from drone_rl.evaluation import Episodes, summarise
+from drone_rl.sim.tasks import CollectCubes, Goals
 from drone_rl.sim.tasks.collect_cubes.rules import Side
 from drone_rl.utils.intervals import mean_bounds, proportion
-
-NAN = torch.nan
+from tests.second_task import End, Posts
 
 
 @pytest.fixture
 def episodes():
     """Three episodes of two cubes; the last one never came to its second cube."""
     return Episodes(
-        collected=torch.tensor([[True, True], [True, False], [False, False]]),
-        side=torch.tensor([[0, 0], [0, 0], [2, -1]]),
-        lateral=torch.tensor([[5.0, 2.0], [2.0, 3.0], [-4.0, NAN]]),
-        height=torch.zeros(3, 2),
+        task=CollectCubes(),
+        goals=Goals(
+            reached=torch.tensor([[True, True], [True, False], [False, False]]),
+            stratum=torch.tensor([[0, 0], [0, 0], [2, -1]]),
+            world=torch.tensor([[5.0], [2.0], [-4.0]]),
+        ),
         end_reason=torch.tensor([1, 2, 4]),
         length=torch.tensor([10, 20, 60]),
     )
@@ -47,10 +49,12 @@ def test_dependent_cubes_don_t_make_an_interval_narrower():
     common = {"end_reason": torch.ones(100).long(), "length": torch.ones(100).long()}
     alike = [
         Episodes(
-            collected=whole[:, None].expand(100, cubes),
-            side=torch.zeros(100, cubes).long(),
-            lateral=torch.ones(100, cubes),
-            height=torch.zeros(100, cubes),
+            task=CollectCubes(),
+            goals=Goals(
+                reached=whole[:, None].expand(100, cubes),
+                stratum=torch.zeros(100, cubes).long(),
+                world=torch.zeros(100, 1),
+            ),
             **common,
         )
         for cubes in (1, 3)
@@ -63,5 +67,22 @@ def test_dependent_cubes_don_t_make_an_interval_narrower():
 def test_rows_can_be_chosen(episodes):
     assert len(episodes[1:]) == 2
     assert episodes[torch.tensor([2])].offered(Side.RIGHT).tolist() == [True]
-    assert episodes.side_share(Side.LEFT).tolist() == [1.0, 0.5]
+    assert episodes.stratum_share(Side.LEFT).tolist() == [1.0, 0.5]
     assert episodes.success.tolist() == [1.0, 0.0, 0.0]
+    assert episodes[1:].goals.world.tolist() == [[2.0], [-4.0]]
+
+
+def test_another_task_has_strata_and_ends_of_its_own():
+    goals = Goals(
+        reached=torch.tensor([[True, True], [False, False]]),
+        stratum=torch.tensor([[0, 1], [1, -1]]),
+        world=torch.zeros(2, 1),
+    )
+    flown = Episodes(Posts(), goals, torch.tensor([End.THROUGH, End.TOUCHED]), torch.ones(2).long())
+    summary = summarise(flown)
+    assert {n: e["successes"] for n, e in summary["ends"].items()} == {
+        "through": 1, "touched": 1, "time": 0,
+    }  # fmt: skip
+    assert {n: s["mean"] for n, s in summary["shares"].items()} == {
+        "all": 0.5, "left": 1.0, "right": 0.5,
+    }  # fmt: skip

@@ -8,15 +8,16 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from drone_rl.envs import DroneEnv
-from drone_rl.evaluation import Oracle, run_episodes
+from drone_rl.evaluation import ConstantPolicy, Oracle, run_episodes
+from drone_rl.sim.actions import Move
 from drone_rl.sim.settings import TaskSettings
 from drone_rl.sim.tasks.collect_cubes.rules import Side
 from drone_rl.utils.intervals import mean_bounds, proportion
 from drone_rl.verdicts.judge import judge, judge_policy, measure, observe
 from drone_rl.verdicts.kinds import Kind
-from drone_rl.verdicts.rule import QUANTITIES, Rule
+from drone_rl.verdicts.rule import Rule
+from tests.second_task import Posts
 
-TASK = TaskSettings(num_cubes=2)
 LEFT, AHEAD, RIGHT = Side
 SHARED = HealthCheck.function_scoped_fixture
 LAYOUTS = [[LEFT, RIGHT], [RIGHT, LEFT], [AHEAD, LEFT], [RIGHT, AHEAD]]
@@ -29,7 +30,7 @@ def judged(make_episodes, make_baselines):
     def judged(hits, number=400, **kwargs):
         sides = [LAYOUTS[i % 4] for i in range(number)]
         episodes = make_episodes(sides, [[hits(i, s) for s in row] for i, row in enumerate(sides)])
-        return judge(episodes, make_baselines(episodes), TASK, **kwargs)
+        return judge(episodes, make_baselines(episodes), **kwargs)
 
     return judged
 
@@ -83,7 +84,7 @@ def test_luck_is_measured_on_the_way_to_what_the_oracle_gets(make_episodes, make
     episodes = make_episodes([[LEFT, LEFT], [AHEAD, AHEAD]], [[1, 1], [1, 0]])
     baselines = make_baselines(episodes)
     baselines["oracle"] = make_episodes([[LEFT, LEFT], [AHEAD, AHEAD]], [[1, 0], [0, 0]])
-    told = dict(zip(QUANTITIES, observe(episodes, baselines, Rule()), strict=True))
+    told = dict(zip(Rule().quantities, observe(episodes, baselines, Rule()), strict=True))
     assert told["success"].tolist() == [1.0, 0.0]  # the oracle never succeeds
     assert told["above random"].tolist() == pytest.approx([1 - 1 / 6 * 0.5, 0.5])
     assert told["above forward"].tolist() == pytest.approx([1 - 1 / 6 * 0.5, 0.5 - 5 / 6])
@@ -100,7 +101,7 @@ def test_exactly_at_the_threshold_is_not_good_and_never_certain(judged):
 def test_quantities_by_hand(make_episodes, make_baselines):
     episodes = make_episodes([[LEFT, LEFT], [LEFT, RIGHT], [AHEAD, -1]], [[1, 1], [1, 0], [0, 0]])
     baselines, rule = make_baselines(episodes), Rule()
-    found = dict(zip(QUANTITIES, measure(episodes, baselines, rule), strict=True))
+    found = dict(zip(Rule().quantities, measure(episodes, baselines, rule), strict=True))
     success = mean_bounds([0.1, -0.9, -0.9], -0.9, 1.0, rule.confidence)
     assert found["success"][:3] == tuple(success[k] for k in ("mean", "lower95", "upper95"))
     offered = proportion(2, 3, rule.confidence)
@@ -126,7 +127,7 @@ def test_more_of_the_same_is_known_better(make_episodes, make_baselines):
 
 def test_what_was_not_offered_is_no_failure(make_episodes, make_baselines):
     episodes = make_episodes([[AHEAD, AHEAD]] * 400, [[1, 1]] * 400)
-    verdict = judge(episodes, make_baselines(episodes), TASK)
+    verdict = judge(episodes, make_baselines(episodes))
     assert (verdict.kind, verdict.certain) == (Kind.GOOD, True)
     assert verdict.evidence["greedy"]["shares"]["left"]["mean"] is None
     assert "0%" not in verdict.sentence.replace("100%", "")
@@ -136,16 +137,16 @@ def test_other_worlds_are_no_baseline(make_episodes, make_baselines):
     ours = make_episodes([[LEFT, LEFT]] * 2, [[1, 1]] * 2)
     theirs = make_episodes([[RIGHT, LEFT]] * 2, [[1, 1]] * 2)
     with pytest.raises(ValueError, match="different worlds"):
-        judge(ours, make_baselines(theirs), TASK)
+        judge(ours, make_baselines(theirs))
     with pytest.raises(ValueError, match="different worlds"):
-        judge(ours, make_baselines(ours), TASK, sampled=ours[:1])
+        judge(ours, make_baselines(ours), sampled=ours[:1])
 
 
 def test_one_other_world_is_enough_to_be_no_baseline(make_episodes, make_baselines):
     ours = make_episodes([[LEFT, LEFT]] * 3, [[1, 1]] * 3)
     theirs = make_episodes([[LEFT, LEFT]] * 2 + [[RIGHT, LEFT]], [[1, 1]] * 3)
     with pytest.raises(ValueError, match="different worlds"):
-        judge(ours, make_baselines(theirs), TASK)
+        judge(ours, make_baselines(theirs))
 
 
 def test_sampled_flights_are_compared_pair_by_pair(judged, make_episodes):
@@ -177,8 +178,10 @@ def test_a_policy_is_flown_beside_its_baselines_and_repeats():
 def mirrored(episodes):
     """The same episodes in a world where left is right."""
     swap = torch.tensor([Side.RIGHT, Side.AHEAD, Side.LEFT])
-    side = torch.where(episodes.side < 0, -1, swap[episodes.side])
-    return dataclasses.replace(episodes, side=side, lateral=-episodes.lateral)
+    goals = episodes.goals
+    side = torch.where(goals.stratum < 0, -1, swap[goals.stratum])
+    turned = {"stratum": side, "lateral": -goals.lateral, "world": -goals.world}
+    return dataclasses.replace(episodes, goals=dataclasses.replace(goals, **turned))
 
 
 @given(st.lists(st.tuples(st.sampled_from(LAYOUTS), st.booleans(), st.booleans()), min_size=1))
@@ -191,9 +194,24 @@ def test_a_mirrored_flight_gets_the_mirrored_kind(make_episodes, make_baselines,
     baselines = make_baselines(ours)
     theirs = {name: mirrored(flown) for name, flown in baselines.items()}
     theirs["left"], theirs["right"] = theirs["right"], theirs["left"]
-    verdict, reflected = judge(ours, baselines, TASK), judge(mirrored(ours), theirs, TASK)
+    verdict, reflected = judge(ours, baselines), judge(mirrored(ours), theirs)
     assert reflected.kind is verdict.kind.mirrored
     assert reflected.certain == verdict.certain
+
+
+def test_another_task_is_judged_by_its_own_strata_and_luck():
+    env = DroneEnv(20, Posts(), pixels=False)
+    straight = judge_policy(env, ConstantPolicy(Move.FORWARD), 200, sampled=False)
+    assert (straight.kind, straight.certain) == (Kind.GOOD, True)
+    evidence = straight.evidence
+    assert list(evidence["quantities"]) == [
+        "success", "offered left", "offered right", "collected left", "collected right",
+        "above random", "above forward",
+    ]  # fmt: skip
+    assert list(evidence["baselines"]) == ["random", "forward", "oracle"]
+    leaving = judge_policy(env, ConstantPolicy(Move.LEFT), 200, sampled=False)
+    assert (leaving.kind, leaving.certain) == (Kind.POOR, True)
+    assert leaving.evidence["failures"]["largest"]["value"] in ("left", "right")
 
 
 def test_a_policy_is_flown_greedily_and_with_drawn_actions_in_the_same_worlds(monkeypatch):

@@ -1,3 +1,5 @@
+from types import SimpleNamespace
+
 import pytest
 import torch
 
@@ -6,8 +8,10 @@ from drone_rl.evaluation import ConstantPolicy, Oracle, RandomPolicy, run_episod
 from drone_rl.sim.actions import Move
 from drone_rl.sim.settings import TaskSettings
 from drone_rl.sim.worlds import Worlds
+from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import Stream, torch_generator
 from drone_rl.verdicts.luck import BASELINES, fly_baselines
+from tests.second_task import Posts
 
 TASK = TaskSettings(num_cubes=1)
 
@@ -29,6 +33,31 @@ def test_baselines_are_flown_in_the_same_worlds_one_by_one(policies, monkeypatch
     for name, episodes in flown.items():
         env.load_state_dict(worlds)
         expected = run_episodes(env, policies[name], 6)
-        for field, values in vars(expected).items():
-            assert torch.equal(getattr(episodes, field).nan_to_num(), values.nan_to_num()), name
+        assert torch.equal(episodes.length, expected.length), name
+        for field, values in vars(expected.goals).items():
+            found = getattr(episodes.goals, field)
+            assert torch.equal(found.nan_to_num(), values.nan_to_num()), (name, field)
     assert len(flown["oracle"]) == 6 and flown["oracle"].success.all()
+
+
+def test_another_task_has_luck_of_its_own():
+    env = DroneEnv(4, Posts(), pixels=False, seed=5)
+    flown = fly_baselines(4, Posts(), env.state_dict(), 8)
+    assert tuple(flown) == ("random", "forward", "oracle")
+    assert flown["oracle"].success.all() and flown["forward"].success.all()
+    assert flown["random"].success.mean() < 0.5
+
+
+def test_a_task_without_an_oracle_says_so_in_one_line():
+    class Blind(Posts):
+        name, oracle = "fog", None
+
+    env = DroneEnv(2, Blind(), pixels=False)
+    with pytest.raises(InputError, match="task=fog has no oracle; choose a task that has one"):
+        fly_baselines(2, Blind(), env.state_dict(), 2)
+
+
+def test_an_oracle_flies_no_dynamics_that_it_does_not_know():
+    actions = SimpleNamespace(names=("throttle", "pitch"))
+    with pytest.raises(InputError, match="acts by forward, left, right, these drones by throttle"):
+        Oracle(TASK, actions)

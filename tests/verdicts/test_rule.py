@@ -4,9 +4,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from drone_rl.sim.tasks import CollectCubes
 from drone_rl.utils.errors import InputError
 from drone_rl.verdicts.kinds import Kind
-from drone_rl.verdicts.rule import LUCK, QUANTITIES, Quantity, Rule, decide, kinds_within, level
+from drone_rl.verdicts.rule import LUCK, SIDES, Quantity, Rule, decide, kinds_within, level
 
 RULE = Rule()
 LEVELS = [st.integers(0, len(t)) for t in RULE.thresholds]
@@ -52,7 +53,7 @@ def test_an_interval_reaches_every_level_that_it_touches():
 
 
 def test_thresholds_of_every_quantity():
-    thresholds = dict(zip(QUANTITIES, RULE.thresholds, strict=True))
+    thresholds = dict(zip(RULE.quantities, RULE.thresholds, strict=True))
     assert thresholds["success"] == (0.0,)
     assert thresholds["offered ahead"] == (0.05,)
     assert thresholds["collected left"] == (0.3, 0.7)
@@ -76,15 +77,15 @@ def test_every_cell_is_seen(box, data):
 def test_a_mirrored_policy_gets_the_mirrored_kind(found):
     swapped = list(found)
     for a, b in (("offered", "offered"), ("collected", "collected"), ("above", "above")):
-        left, right = QUANTITIES.index(f"{a} left"), QUANTITIES.index(f"{b} right")
+        left, right = RULE.quantities.index(f"{a} left"), RULE.quantities.index(f"{b} right")
         swapped[left], swapped[right] = swapped[right], swapped[left]
     assert decide(swapped) is decide(found).mirrored
 
 
-@given(st.tuples(*LEVELS), st.integers(0, len(QUANTITIES) - 1))
+@given(st.tuples(*LEVELS), st.integers(0, len(RULE.quantities) - 1))
 def test_more_success_keeps_a_good_policy_good_and_makes_none_poor(found, which):
     """Sides that are offered more often are a harder task, and are left alone."""
-    if QUANTITIES[which].startswith("offered"):
+    if RULE.quantities[which].startswith("offered"):
         return
     better = list(found)
     better[which] = len(RULE.thresholds[which])
@@ -131,3 +132,30 @@ def test_the_text_says_every_number():
 def test_no_share_is_refused_by_its_name(value):
     with pytest.raises(InputError, match="good_share="):
         Rule(good_share=value)
+
+
+def test_the_strata_and_luck_of_the_rule_are_those_of_cube_collection():
+    assert CollectCubes.strata == SIDES and CollectCubes.luck == LUCK
+    assert (RULE.strata, RULE.luck) == (SIDES, LUCK)
+
+
+@pytest.mark.parametrize(
+    ("levels", "kind"),
+    [
+        ((1, 1, 1, 2, 2, 1), Kind.GOOD),
+        ((0, 1, 1, 0, 2, 1), Kind.ONE_SIDED_RIGHT),
+        ((0, 1, 1, 2, 0, 1), Kind.ONE_SIDED_LEFT),
+        ((0, 1, 0, 2, 0, 1), Kind.NONE),
+        ((0, 1, 1, 1, 1, 0), Kind.POOR),
+    ],
+)
+def test_a_task_may_have_two_strata_and_one_luck(levels, kind):
+    """Success, two offered, two reached, one luck."""
+    assert decide(levels, 2) is kind
+    assert kinds_within(tuple((level, level) for level in levels), 2) == {kind}
+    rule = Rule(strata=("left", "right"), luck=("random",))
+    assert rule.quantities == (
+        "success", "offered left", "offered right", "collected left", "collected right",
+        "above random",
+    )  # fmt: skip
+    assert len(rule.thresholds) == 6 and rule.confidence == 1 - 0.05 / 6

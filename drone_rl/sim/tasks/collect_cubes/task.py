@@ -1,17 +1,21 @@
 """The task as simulators know it: rules and entities together."""
 
-from collections.abc import Mapping
+import functools
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 import torch
 from torch import Tensor
 
-from drone_rl.sim.actions import Entry
+from drone_rl.sim.actions import MOVES, Entry
 from drone_rl.sim.dynamics import BodyState, ComputerVision
 from drone_rl.sim.entities.cube import Cube
 from drone_rl.sim.settings import TaskSettings
 from drone_rl.sim.tasks.collect_cubes import rules
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason, WorldState
+from drone_rl.sim.tasks.collect_cubes.goals import CubeGoals, classes
+from drone_rl.sim.tasks.collect_cubes.oracle import READS, line_up
+from drone_rl.sim.tasks.collect_cubes.rules import EndReason, Side, WorldState
+from drone_rl.sim.tasks.judgeable import OracleRule
 
 VANISHED_DEPTH = 100.0
 """Metres below its place at which a vanished cube is kept, out of sight under the floor."""
@@ -24,6 +28,12 @@ class CollectCubes:
     ends = EndReason
     truncation = EndReason.STEP_LIMIT
     observed = ("cubes", "collected", "side", "end_reason")
+    goal = "cube"
+    success_end = EndReason.ALL_CUBES
+    expected_end = EndReason.FRONT_BOUNDARY
+    strata = tuple(side.name.lower() for side in Side)
+    luck = ("random", "forward", "left", "right")
+    scored = ("collected", "side", "lateral", "cube_positions", "drone")
 
     def __init__(self, settings: TaskSettings | None = None) -> None:
         """Takes the settings.
@@ -59,7 +69,7 @@ class CollectCubes:
         return {
             "cubes": Entry((1,), torch.int64, 0, cubes),
             "collected": Entry((cubes,), torch.bool),
-            "side": Entry((cubes,), torch.int64, -1, len(rules.Side) - 1),
+            "side": Entry((cubes,), torch.int64, -1, len(Side) - 1),
             "lateral": Entry((cubes,), torch.float64),
             "next_cube": Entry((1,), torch.int64, 0, cubes),
             "end_reason": Entry((1,), torch.int64, 0, len(EndReason) - 1),
@@ -103,3 +113,22 @@ class CollectCubes:
             "end_reason": state.end_reason[:, None].clone(),
             "cube_positions": state.cubes.float(),
         }
+
+    @property
+    def oracle(self) -> OracleRule:
+        """Lines up with the next cube, then flies at it."""
+        return OracleRule(READS, functools.partial(line_up, self.settings), MOVES)
+
+    def score(self, info: Mapping[str, Tensor]) -> CubeGoals:
+        """Each cube is a goal, which is reached by collecting it."""
+        return CubeGoals(
+            reached=info["collected"],
+            stratum=info["side"],
+            world=info["cube_positions"].flatten(1),
+            lateral=info["lateral"],
+            height=(info["cube_positions"][..., 2] - info["drone"][:, None, 2]).double(),
+        )
+
+    def classes(self, goals: CubeGoals) -> Iterator[tuple[str, str, Tensor]]:
+        """By number, side, sideways distance and height."""
+        return classes(self.settings, goals)

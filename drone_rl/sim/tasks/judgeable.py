@@ -1,0 +1,80 @@
+"""What verdicts must know of a task: its goals, what luck and knowledge get, how goals differ."""
+
+import dataclasses
+import enum
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, NamedTuple, Protocol
+
+from torch import Tensor
+
+from drone_rl.sim.actions import Actions
+from drone_rl.sim.batch import Batch
+
+
+@dataclasses.dataclass
+class Goals(Batch):
+    """What `n` finished episodes had to do: `C` goals each, in the order in which they come up."""
+
+    reached: Tensor  # (n, C) bool
+    """Which of them were reached."""
+    stratum: Tensor  # (n, C) int64
+    """Where each stood when it came up, one of `Judgeable.strata`; -1 if it never did."""
+    world: Tensor  # (n, k)
+    """What was drawn for each episode; it tells worlds apart whatever was done in them."""
+
+
+class OracleRule(NamedTuple):
+    """The best way to act for those who know the truth."""
+
+    reads: tuple[str, ...]
+    """Entries of the information that it looks at."""
+    act: Callable[..., Tensor]
+    """Actions of them. Each shape: (num_worlds, *); the actions': (num_worlds,), then the
+    entry's."""
+    actions: Actions
+    """What it acts with."""
+
+
+class Judgeable(Protocol):
+    """How good an episode was. An episode is a success if all its goals are reached."""
+
+    name: str
+    """What people call the task."""
+    goal: str
+    """What people call one of its goals."""
+    ends: type[enum.IntEnum]
+    """Why an episode ends; 0 says that it goes on."""
+    success_end: int
+    """The one of `ends` that says that all goals are reached."""
+    expected_end: int
+    """How an episode ends in which a goal was missed and nothing else went wrong."""
+    strata: tuple[str, ...]
+    """Where a goal can stand, from left to right: verdicts count each apart."""
+    luck: tuple[str, ...]
+    """What needs no eyes: "random", and names of actions that are taken always."""
+    scored: tuple[str, ...]
+    """Entries of an episode's last information from which `score` makes its goals."""
+
+    @property
+    def oracle(self) -> OracleRule | None:
+        """How one acts who knows the truth; None if nobody knows."""
+        ...
+
+    def score(self, info: Mapping[str, Tensor]) -> Goals:
+        """What became of the goals.
+
+        Args:
+            info: The entries `scored` at the ends of episodes. Shapes: (n, *).
+        """
+        ...
+
+    def classes(self, goals: Any) -> Iterator[tuple[str, str, Tensor]]:
+        """Classes of goals that failure tables count by.
+
+        Args:
+            goals: From `score`.
+
+        Yields:
+            What is looked at, its value, and which goals have it. Shape of these: (n, C), bool.
+        """
+        ...
