@@ -3,11 +3,11 @@
 from pathlib import Path
 
 TARGETS: dict[str, tuple[str, ...]] = {
+    "sim/tasks/collect_cubes/rules": ("sim/tasks/collect_cubes/test_rules", "sim/test_worlds"),
     "sim/tasks/collect_cubes/goals": (
         "sim/tasks/collect_cubes/test_goals",
         "verdicts/test_failures",
     ),
-    "sim/tasks/collect_cubes/rules": ("sim/tasks/collect_cubes/test_rules", "sim/test_worlds"),
     "objectives/returns": ("objectives/test_returns",),
     "objectives/estimators": ("objectives/test_estimators",),
     "objectives/reinforce": ("objectives/test_reinforce",),
