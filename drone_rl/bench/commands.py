@@ -2,12 +2,11 @@
 
 import os
 import subprocess
-import sys
 import time
 from collections.abc import Mapping
 from pathlib import Path
 
-PROGRAM = (sys.executable, "-m", "drone_rl.cli.main")
+from drone_rl.sweeps.process import PROGRAM
 
 
 def call(

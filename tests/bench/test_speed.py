@@ -1,0 +1,77 @@
+"""What the benchmarks of speed divide by what, with rates made by hand."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from drone_rl.bench import speed
+
+
+@pytest.fixture
+def worlds(monkeypatch):
+    """Worlds of which nothing is drawn; tells whether they were closed."""
+    env = SimpleNamespace(
+        closed=False, worlds=SimpleNamespace(state=None, render=lambda s: "frames")
+    )
+    env.reset = lambda: None
+    env.close = lambda: setattr(env, "closed", True)
+    monkeypatch.setattr(speed, "make_worlds", lambda num_envs, device: env)
+    monkeypatch.setattr(speed, "random_walk", lambda env, steps: 2 * steps)
+    return env
+
+
+def test_raw_drawing(worlds, monkeypatch):
+    monkeypatch.setattr(speed, "rate", lambda work, seconds: work() * seconds)
+    assert speed.bench_render(2, "cpu", quick=True) == {"raw_render_fps": 12.0}
+    assert worlds.closed
+
+
+def test_collecting_over_drawing(worlds, monkeypatch):
+    collector = SimpleNamespace(collect=lambda: "batch", shutdown=lambda: None)
+    monkeypatch.setattr(speed, "default_collector", lambda n, threads, device: collector)
+    calls = []
+
+    def paired(first, second, seconds, rounds):
+        calls.append((first(), second(), seconds, rounds))
+        return 6.0, 8.0, 0.7
+
+    monkeypatch.setattr(speed, "paired", paired)
+    assert speed.bench_collector(2, 1, "cpu", quick=False) == {
+        "collector_fps": 6.0,
+        "raw_render_beside_collector_fps": 8.0,
+        "collector_over_raw": 0.7,
+    }
+    assert calls == [(5, 6, 4.0, 9)]  # letters of "batch" and "frames"
+    assert worlds.closed
+
+
+@pytest.mark.parametrize(("single", "ratio"), [(4.0, 5.0), (None, None)])
+def test_batched_over_dm_control(worlds, monkeypatch, single, ratio):
+    monkeypatch.setattr(speed, "rate", lambda work, seconds: float(work()))
+    monkeypatch.setattr(speed, "_dm_control_rate", lambda quality, seconds: single)
+    found = speed.bench_dm_control(2, "cpu", quick=True)
+    assert found == {
+        "dm_control_fps": single,
+        "batched_over_dm_control": ratio,
+        "dm_control_tuned_fps": single,
+        "batched_over_dm_control_tuned": ratio,
+        "batched_env_fps": 20.0,
+    }
+
+
+@pytest.mark.parametrize(
+    ("status", "printed", "frames"),
+    [(0, 'noise\n{"frames_per_second": 7.5}\n', 7.5), (1, "", None)],
+)
+def test_the_rate_of_dm_control_is_that_of_a_process_of_its_own(
+    monkeypatch, status, printed, frames
+):
+    calls = []
+
+    def run(command, **kwargs):
+        calls.append((command[-2:], kwargs["env"]["MUJOCO_GL"]))
+        return SimpleNamespace(returncode=status, stdout=printed)
+
+    monkeypatch.setattr(speed.subprocess, "run", run)
+    assert speed._dm_control_rate("tuned", 0.5) == frames
+    assert calls == [(["tuned", "0.5"], "egl")]
