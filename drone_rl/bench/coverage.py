@@ -115,8 +115,8 @@ def _means(quick: bool) -> Iterator[dict[str, Any]]:
     for name, outcome in OUTCOMES.items():
 
         def holds(values: NDArray, of: Outcome = outcome) -> bool:
-            found = mean_bounds(values, of.low, of.high)
-            return found["lower95"] - 1e-12 <= of.mean <= found["upper95"] + 1e-12
+            interval = mean_bounds(values, of.low, of.high)
+            return interval["lower95"] - 1e-12 <= of.mean <= interval["upper95"] + 1e-12
 
         for episodes in SIZES[len(outcome.values)][: 3 if quick else None]:
             yield _row("mean", name, episodes, coverage(outcome, episodes, holds))
@@ -125,8 +125,8 @@ def _means(quick: bool) -> Iterator[dict[str, Any]]:
 def _proportions(quick: bool) -> Iterator[dict[str, Any]]:
     """Over all true shares: coverage is least beside the ends of the intervals."""
     for episodes in SIZES[2][: 3 if quick else None]:
-        found = [proportion(k, episodes) for k in range(episodes + 1)]
-        low, high = (np.array([f[end] for f in found]) for end in ("lower95", "upper95"))
+        intervals = [proportion(k, episodes) for k in range(episodes + 1)]
+        low, high = (np.array([f[end] for f in intervals]) for end in ("lower95", "upper95"))
         ends = np.concatenate([low, high])
         truths = np.concatenate([ends - 1e-9, ends + 1e-9]).clip(0.0, 1.0)[:, None]
         held = (low <= truths) & (truths <= high)

@@ -102,7 +102,7 @@ def _fork(main: Any, arguments: list[str], here: Path) -> str:
     printed = (here / "stderr").read_text(errors="replace")
     grown = used.ru_maxrss * 1024 - before
     seconds = used.ru_utime + used.ru_stime
-    told = SECRET in printed or SECRET in (here / "stdout").read_text(errors="replace")
+    is_leaked = SECRET in printed or SECRET in (here / "stdout").read_text(errors="replace")
     lines = printed.splitlines()
     checks = {
         f"ended by signal {os.WTERMSIG(status)}": os.WIFSIGNALED(status),
@@ -112,7 +112,7 @@ def _fork(main: Any, arguments: list[str], here: Path) -> str:
         f"printed {printed[-300:]!r}": len(lines) != 1 or not lines[0].startswith("error: "),
         f"took {seconds:.1f} s": seconds > MOST_SECONDS,
         f"took {grown / 2**20:.0f} MiB": grown > MOST_MEMORY,
-        "told the secret": told or _tells(here),
+        "told the secret": is_leaked or _tells(here),
     }
     return next((what for what, is_so in checks.items() if is_so), "")
 

@@ -196,7 +196,7 @@ def _old(folder: Path) -> list[tuple[str, list[str], str]]:
         "instantiate": {"_target_": "hydra.utils.call", "_args_": [{"_target_": "os.system"}]},
         "interpolation": {"_target_": "drone_rl.policies.${oc.env:HOSTILE_SECRET}"},
     }
-    found = []
+    cases = []
     for name, part in parts.items():
         for where in ("policy", "task", "gray"):
             transforms = {"gray": part} if where == "gray" else config["transforms"]
@@ -210,9 +210,9 @@ def _old(folder: Path) -> list[tuple[str, list[str], str]]:
                 "about": json.dumps({**ABOUT, "config": hostile}),
             }
             content = save(weights(), texts)
-            found.append(_policy(folder, f"old_{where}_{name}.safetensors", content))
+            cases.append(_policy(folder, f"old_{where}_{name}.safetensors", content))
     first = checkpoint_state(format_version=1, config={**config, "policy": parts["system"]})
-    return [*found, _policy(folder, "old_checkpoint.pt", _saved(first))]
+    return [*cases, _policy(folder, "old_checkpoint.pt", _saved(first))]
 
 
 def _checkpoints(folder: Path) -> list[tuple[str, list[str], str]]:
@@ -268,13 +268,13 @@ def _no_files(folder: Path) -> list[tuple[str, list[str], str]]:
         "sparse": _sparse,
         "secret": lambda path: path.symlink_to(folder / "canary" / "secret.txt"),
     }
-    found = []
+    cases = []
     for name, make in makers.items():
         for ending in ("pt", "safetensors"):
             path = here / f"{name}.{ending}"
             make(path)
-            found.append((f"no_file_{path.name}", _command(path, len(found)), "no plain file"))
-    return found
+            cases.append((f"no_file_{path.name}", _command(path, len(cases)), "no plain file"))
+    return cases
 
 
 def _policy(folder: Path, name: str, content: bytes) -> tuple[str, list[str], str]:

@@ -48,11 +48,11 @@ def _runs(folder: Path, state: Mapping[str, Any]) -> list[Case]:
         "long": ["task.spacing=" + "9" * 10_000],
         "lines": ["seed=1\nhydra.run.dir=x"],
     }
-    found = []
+    cases = []
     for name, content in overrides.items():
         run = _run(folder / f"resume_{name}", state)
         (run / ".hydra" / "overrides.yaml").write_text(yaml.safe_dump(content))
-        found.append((run.name, ["train", f"resume={run}"], "settings out of a file"))
+        cases.append((run.name, ["train", f"resume={run}"], "settings out of a file"))
     raw = {
         "python_object": "- !!python/object/apply:os.system ['touch ran']\n",
         "aliases": "a: &a [x]\nb: &b [*a,*a]\n" + "- *b\n" * 10,
@@ -61,18 +61,18 @@ def _runs(folder: Path, state: Mapping[str, Any]) -> list[Case]:
     for name, text in raw.items():
         run = _run(folder / f"resume_{name}", state)
         (run / ".hydra" / "overrides.yaml").write_text(text)
-        found.append((run.name, ["train", f"resume={run}"], "YAML that does more than say"))
+        cases.append((run.name, ["train", f"resume={run}"], "YAML that does more than say"))
     links = {"metrics.csv": "secret.txt", "run.yaml": "ran", ".lock": "ran", "tensorboard": "keep"}
     for name, target in links.items():
         run = _run(folder / f"resume_link_{name.strip('.').replace('.', '_')}", state)
         (run / name).symlink_to(canary / target)
-        found.append((run.name, ["train", f"resume={run}"], "a link out of the folder"))
+        cases.append((run.name, ["train", f"resume={run}"], "a link out of the folder"))
     broken = {"no_state": state, "no_tensors": {**state, "optimiser": 5}, "list": [1]}
     for name, content in broken.items():
         run = _run(folder / f"resume_state_{name}", content)
         (run / ".hydra" / "overrides.yaml").write_text("- experiment=smoke\n- logger=csv\n")
-        found.append((run.name, ["train", f"resume={run}"], "a state that fits no training"))
-    return found
+        cases.append((run.name, ["train", f"resume={run}"], "a state that fits no training"))
+    return cases
 
 
 def _run(run: Path, state: Any) -> Path:
@@ -110,21 +110,21 @@ def _sweeps(folder: Path) -> list[Case]:
     }
     texts = {name: json.dumps({**good, **change}) for name, change in contents.items()}
     texts |= {"deep": "[" * 10**5, "huge": '{"runs": 1' + "0" * 5000 + "}", "cut": '{"runs": ['}
-    found = []
+    cases = []
     for i, (name, text) in enumerate(texts.items()):
         sweep = folder / f"sweep_{name}"
         sweep.mkdir()
         (sweep / "sweep.json").write_text(text)
         again = ["train", "-m", "seed=0,1", "hydra/launcher=local", f"hydra.sweep.dir={sweep}"]
         report = ["sweep-report", f"folder={sweep}"]
-        found.append((sweep.name, again if i % 3 == 0 else report, "a sweep's own file"))
+        cases.append((sweep.name, again if i % 3 == 0 else report, "a sweep's own file"))
     for name, make in {"pipe": os.mkfifo, "link": _link_to(folder / "canary")}.items():
         sweep = folder / f"sweep_{name}"
         sweep.mkdir()
         (sweep / "sweep.json").write_text(json.dumps(good))
         make(sweep / "0")
-        found.append((sweep.name, ["sweep-report", f"folder={sweep}"], "a run that is no folder"))
-    return found
+        cases.append((sweep.name, ["sweep-report", f"folder={sweep}"], "a run that is no folder"))
+    return cases
 
 
 def _explanations(folder: Path) -> list[Case]:
@@ -144,21 +144,21 @@ def _explanations(folder: Path) -> list[Case]:
         "no_archive": (numbers(name="x"), b"PK\x03\x04 and so on"),
         "giant": (numbers(name="x"), _lying()),
     }
-    found = []
+    cases = []
     for name, (text, archive) in kinds.items():
         here = folder / f"explanation_{name}"
         here.mkdir()
         (here / "explanation.json").write_text(text)
         for file in ("arrays.npz", "dataset.npz"):
             (here / file).write_bytes(archive)
-        found.append((here.name, ["report", f"explanations={here}"], "an explanation's files"))
+        cases.append((here.name, ["report", f"explanations={here}"], "an explanation's files"))
     for name, make in {"pipe": os.mkfifo, "zeros": _link_to(Path("/dev/zero"))}.items():
         here = folder / f"explanation_{name}"
         shutil.copytree(folder / "explanation_missing_numbers", here)
         (here / "arrays.npz").unlink()
         make(here / "arrays.npz")
-        found.append((here.name, ["report", f"explanations={here}"], "no plain file"))
-    return found
+        cases.append((here.name, ["report", f"explanations={here}"], "no plain file"))
+    return cases
 
 
 def _npz(arrays: Mapping[str, np.ndarray]) -> bytes:

@@ -38,7 +38,7 @@ def bench_maps(folder: Path, quick: bool) -> dict[str, Any]:
     pictures = draw_pictures(scenes, state, episode)
     planted = plant(pictures.absent, pictures.observations, expert(scenes, state))
     planted = planted[::7] if quick else planted
-    found = {p.name: trusts(pictures, p) for p in planted}
+    missing = {p.name: trusts(pictures, p) for p in planted}
     looking = [p for p in planted if not p.is_blind]
     policies = {p.name: p.network for p in looking[:: 3 if quick else 2]}
     policies |= shipped(pictures) if not quick else {}
@@ -50,10 +50,10 @@ def bench_maps(folder: Path, quick: bool) -> dict[str, Any]:
         "placebo_maps_total": sum(tried for _, tried in lied.values()),
         "placebo_maps_policies": len(lied),
         "placebo_maps_believed": {n: names for n, (names, _) in lied.items() if names},
-        "planted_maps_found": float(np.mean([not found[p.name] for p in looking])),
+        "planted_maps_found": float(np.mean([not missing[p.name] for p in looking])),
         "planted_maps_total": len(looking),
-        "planted_maps_missed": {p.name: found[p.name] for p in looking if found[p.name]},
-        "planted_maps_blind_trusted": sum(not found[p.name] for p in planted if p.is_blind),
+        "planted_maps_missed": {p.name: missing[p.name] for p in looking if missing[p.name]},
+        "planted_maps_blind_trusted": sum(not missing[p.name] for p in planted if p.is_blind),
         "planted_maps_blind_total": len(planted) - len(looking),
         "maps_s": time.perf_counter() - begin,
     }
@@ -62,8 +62,8 @@ def bench_maps(folder: Path, quick: bool) -> dict[str, Any]:
 def trusts(pictures: Pictures, planted: Planted) -> list[str]:
     """The tests that the true map of a planted policy fails; none if it is trusted."""
     trial = _trial(pictures, planted.network)
-    found = check_maps(trial, {"true": reach}, num_methods=NUM_METHODS)
-    return found["methods"]["true"]["failed"]
+    checks = check_maps(trial, {"true": reach}, num_methods=NUM_METHODS)
+    return checks["methods"]["true"]["failed"]
 
 
 def believed(pictures: Pictures, network: PolicyNetwork) -> tuple[list[str], int]:
@@ -71,8 +71,8 @@ def believed(pictures: Pictures, network: PolicyNetwork) -> tuple[list[str], int
     trial = _trial(pictures, network)
     other = SmallCNN(network.in_shape, 3, generator=torch.Generator().manual_seed(99))
     candidates = liars(pictures.absent, other)
-    found = check_maps(trial, candidates, num_methods=NUM_METHODS)["methods"]
-    return [name for name, method in found.items() if method["trusted"]], len(candidates)
+    methods = check_maps(trial, candidates, num_methods=NUM_METHODS)["methods"]
+    return [name for name, method in methods.items() if method["trusted"]], len(candidates)
 
 
 def imagined(scenes: Scenes, episodes: int, frames: int) -> tuple[WorldState, np.ndarray]:
@@ -97,25 +97,25 @@ def expert(scenes: Scenes, state: WorldState) -> Tensor:
 
 def shipped(pictures: Pictures) -> dict[str, PolicyNetwork]:
     """The policies that travel with the package and fit the pictures."""
-    found = {}
+    networks = {}
     for name in policy_names():
         parameters = load_exported(policy_path(name))["policy"]
         network = SmallCNN(pictures.absent.shape, 3, hidden=(128,))
         network.load_state_dict(parameters)
-        found[name] = network
-    return found
+        networks[name] = network
+    return networks
 
 
 def untrained(pictures: Pictures, count: int = 4) -> dict[str, PolicyNetwork]:
     """Policies of random weights, with opinions."""
-    found = {}
+    networks = {}
     for seed in range(count):
         generator = torch.Generator().manual_seed(seed)
         network = SmallCNN(pictures.absent.shape, 3, generator=generator)
         with torch.no_grad():
             network.layers.get_parameter("logits.weight").mul_(300)
-        found[f"random weights {seed}"] = network
-    return found
+        networks[f"random weights {seed}"] = network
+    return networks
 
 
 def _trial(pictures: Pictures, network: PolicyNetwork) -> Trial:

@@ -34,9 +34,9 @@ def bench_mutants(root: Path = ROOT) -> dict[str, Any]:
         raise InputError(f"changed since the last `make mutants`: {', '.join(stale)}; run it again")
     counts = Counter(mutant["outcome"] for mutant in kept["mutants"])
     killed = counts["killed"] + counts["timeout"]
-    told = killed + counts["survived"]
+    judged = killed + counts["survived"]
     return {
-        "mutation_score": killed / told if told else None,
+        "mutation_score": killed / judged if judged else None,
         "mutation_score_at_first_sight": kept.get("first_score", kept["score"]),
         "mutants_sampled": len(kept["mutants"]),
         "mutants_killed": killed,

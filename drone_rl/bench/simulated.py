@@ -41,7 +41,7 @@ class Simulated:
     """Share of the cubes that flying straight on collects in every episode."""
 
     @functools.cached_property
-    def told(self) -> list[NDArray]:
+    def observed(self) -> list[NDArray]:
         """What each type of episode says of each quantity; NaN if nothing. Shape: (types,)."""
         each = [_observe(kind, self.lucky) for kind in self.types]
         return [np.array(values) for values in zip(*each, strict=True)]
@@ -57,7 +57,7 @@ class Simulated:
         return decide([self._truth(i).level for i in range(len(_RULE.quantities))])
 
     def _truth(self, quantity: int) -> Quantity:
-        values, thresholds = self.told[quantity], _RULE.thresholds[quantity]
+        values, thresholds = self.observed[quantity], _RULE.thresholds[quantity]
         speaks = ~np.isnan(values)
         if not self.shares[speaks].sum():
             return Quantity(None, 0.0, 1.0, thresholds)
@@ -67,7 +67,7 @@ class Simulated:
 
 def policies() -> dict[str, Simulated]:
     """Policies at and around each threshold of the rule, and at two at once."""
-    found: dict[str, Simulated] = {}
+    policies: dict[str, Simulated] = {}
     for shift in SHIFTS:
         made = {
             "all or nothing, success": _mixture(0.9 + shift, (L, R), (1, 1), (0, 0)),
@@ -101,8 +101,8 @@ def policies() -> dict[str, Simulated]:
                 (1 / 3, _mixture(0.7 + shift, (A, L), (1, 1), (0, 1))),
             ),
         }
-        found |= {f"{name} {shift:+.2f}": policy for name, policy in made.items()}
-    return found
+        policies |= {f"{name} {shift:+.2f}": policy for name, policy in made.items()}
+    return policies
 
 
 def bench_false_certain(quick: bool) -> dict[str, Any]:
@@ -136,7 +136,7 @@ def judge_samples(policy: Simulated, counts: NDArray) -> list[Kind | None]:
     def levels(quantity: int, *row: int) -> tuple[int, int]:
         return estimate(quantity, np.repeat(merged[quantity][0], row), _RULE).levels
 
-    merged = [_merge(values) for values in policy.told]
+    merged = [_merge(values) for values in policy.observed]
     kinds = []
     for sample in counts:
         box = tuple(
@@ -185,10 +185,10 @@ def _observe(kind: Type, lucky: float) -> list[float]:
     ours = _episode(sides, hits)
     flown = {name: _episode(sides, [0] * len(sides)) for name in BASELINES}
     flown["oracle"] = _episode(sides, [1] * len(sides))
-    told = [float(v[0]) if len(v) else np.nan for v in observe(ours, flown, _RULE)]
+    observed = [float(v[0]) if len(v) else np.nan for v in observe(ours, flown, _RULE)]
     straight = _RULE.quantities.index("above forward")
-    told[straight] -= (1 - _RULE.luck_margin) * lucky
-    return told
+    observed[straight] -= (1 - _RULE.luck_margin) * lucky
+    return observed
 
 
 def _episode(sides: tuple[Side, ...], hits: Any) -> Episodes:

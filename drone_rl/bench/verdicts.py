@@ -42,24 +42,24 @@ def bench_verdicts(folder: Path, device: str, quick: bool) -> dict[str, Any]:
         quick: Whether to judge a few policies only, by few episodes.
     """
     pilots = dict(list(PILOTS.items())[:3]) if quick else PILOTS
-    found = {name: _judge_pilot(pilot, quick) for name, pilot in pilots.items()}
+    verdicts = {name: _judge_pilot(pilot, quick) for name, pilot in pilots.items()}
     for name, policy in _policies(folder, device, quick):
-        found[name] = _judge_policy(folder / f"judge_{len(found)}", policy, device, quick)
-    return count(found)
+        verdicts[name] = _judge_policy(folder / f"judge_{len(verdicts)}", policy, device, quick)
+    return count(verdicts)
 
 
-def count(found: dict[str, dict[str, Any]]) -> dict[str, Any]:
+def count(verdicts: dict[str, dict[str, Any]]) -> dict[str, Any]:
     """How many verdicts are certain, and how many of these are right.
 
     Args:
-        found: Of each policy "kind" and "certain" by the verdict, and what it "is".
+        verdicts: Of each policy "kind" and "certain" by the verdict, and what it "is".
     """
-    certain = [entry for entry in found.values() if entry["certain"]]
+    certain = [entry for entry in verdicts.values() if entry["certain"]]
     return {
         "verdicts_right": sum(entry["kind"] == entry["is"] for entry in certain),
         "verdicts_certain": len(certain),
-        "verdicts_total": len(found),
-        "verdicts": found,
+        "verdicts_total": len(verdicts),
+        "verdicts": verdicts,
     }
 
 

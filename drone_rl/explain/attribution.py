@@ -96,8 +96,8 @@ class Explainer:
     def saliency(self, observations: Tensor, actions: Tensor) -> Tensor:
         """Size of the probability's derivative by each pixel. Shape: (T, H, W)."""
         method = Saliency(self._forward("probability"))
-        found = _in_batches(lambda x, a: method.attribute(x, target=a), observations, actions)
-        return found.abs().sum(1)
+        attributed = _in_batches(lambda x, a: method.attribute(x, target=a), observations, actions)
+        return attributed.abs().sum(1)
 
     def integrated_gradients(self, observations: Tensor, actions: Tensor) -> Tensor:
         """Size of the path integral from the empty scene to the picture. Shape: (T, H, W)."""

@@ -157,8 +157,8 @@ def best_start(probabilities: Tensor, roughness: Tensor) -> int:
         probabilities: The policy's of the action. Shape: (starts,).
         roughness: Shape: (starts,).
     """
-    able = probabilities >= probabilities.max() - AS_PROBABLE
-    return int(roughness.masked_fill(~able, float("inf")).argmin())
+    as_probable = probabilities >= probabilities.max() - AS_PROBABLE
+    return int(roughness.masked_fill(~as_probable, float("inf")).argmin())
 
 
 def visualise(
@@ -184,14 +184,14 @@ def visualise(
     pictures = start.repeat(num_actions, 1, 1, 1)
     action = torch.arange(num_actions).repeat_interleave(settings.starts)
     ascend = _ascend_fourier if settings.parameterisation == "fourier" else _ascend_pixels
-    found = ascend(network, pictures, action, statistics, settings, generator)
+    reached = ascend(network, pictures, action, statistics, settings, generator)
     with torch.no_grad():
-        each = network(found).softmax(-1).gather(1, action[:, None])[:, 0]
+        each = network(reached).softmax(-1).gather(1, action[:, None])[:, 0]
     by_action = (num_actions, settings.starts)
     return Attempts(
-        pictures=found.view(*by_action, *shape),
+        pictures=reached.view(*by_action, *shape),
         probabilities=each.view(by_action),
-        roughness=(_differences(found) / max(statistics.roughness, 1e-12)).view(by_action),
+        roughness=(_differences(reached) / max(statistics.roughness, 1e-12)).view(by_action),
         settings=settings,
     )
 

@@ -18,9 +18,9 @@ def episode_means(values: NDArray, episode: NDArray) -> NDArray:
     Returns:
         Shape: (E,), the episodes in which some frame does.
     """
-    told = np.isfinite(values)
-    _, number = np.unique(episode[told], return_inverse=True)
-    totals = np.bincount(number, weights=values[told].astype(np.float64))
+    known = np.isfinite(values)
+    _, number = np.unique(episode[known], return_inverse=True)
+    totals = np.bincount(number, weights=values[known].astype(np.float64))
     return totals / np.bincount(number)
 
 
@@ -43,11 +43,11 @@ def mean_interval(
     """
     means = episode_means(values, episode)
     bounds = mean_bounds(means, low, high)
-    told = bounds["mean"] is not None
+    known = bounds["mean"] is not None
     return {
         "mean": bounds["mean"],
-        "lower95": bounds["lower95"] if told else None,
-        "upper95": bounds["upper95"] if told else None,
+        "lower95": bounds["lower95"] if known else None,
+        "upper95": bounds["upper95"] if known else None,
         "frames": int(np.isfinite(values).sum()),
         "episodes": len(means),
     }

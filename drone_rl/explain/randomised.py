@@ -52,11 +52,11 @@ def likeness(first: Tensor, second: Tensor) -> NDArray:
         Shape: (T,); 1 where both are the same everywhere, or one has no heat at all: that shows no
         dependence on anything.
     """
-    found = np.ones(len(first))
+    likeness = np.ones(len(first))
     pairs = zip(first.flatten(1).double().numpy(), second.flatten(1).double().numpy(), strict=True)
     for t, (a, b) in enumerate(pairs):
         if a.max() > 0 and b.max() > 0:
-            told = (a > NO_HEAT * a.max()) | (b > NO_HEAT * b.max())
-            if max(np.ptp(a[told]) / a.max(), np.ptp(b[told]) / b.max()) > NO_HEAT:
-                found[t] = rank_correlation(a[None, told], b[None, told])[0]
-    return found
+            hot = (a > NO_HEAT * a.max()) | (b > NO_HEAT * b.max())
+            if max(np.ptp(a[hot]) / a.max(), np.ptp(b[hot]) / b.max()) > NO_HEAT:
+                likeness[t] = rank_correlation(a[None, hot], b[None, hot])[0]
+    return likeness

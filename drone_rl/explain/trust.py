@@ -202,11 +202,11 @@ def check_maps(
     """
     level = ERROR_RATE / (num_methods or max(1, len(methods)))
     maps = maps or {name: trial.maps(method) for name, method in methods.items()}
-    found = {n: check_method(trial, method, level, maps[n]) for n, method in methods.items()}
-    able = [name for name, method in found.items() if method["trusted"]]
+    results = {n: check_method(trial, method, level, maps[n]) for n, method in methods.items()}
+    trusted = [name for name, method in results.items() if method["trusted"]]
     return {
-        "trusted": max(able, key=lambda n: found[n]["score"]["lower95"]) if able else None,
-        "methods": found,
+        "trusted": max(trusted, key=lambda n: results[n]["score"]["lower95"]) if trusted else None,
+        "methods": results,
         "placebos": {
             name: causal.summarise_scores(trial.scores(maps), trial.episode)
             for name, maps in trial.placebos.items()
@@ -236,7 +236,7 @@ def check_method(
     maps = trial.maps(method) if maps is None else maps
     heat, scores = trial.grid.means(maps), trial.scores(maps)
     hit, chance = causal.pointing(heat, trial.effects)
-    found = {
+    result = {
         "score": causal.summarise_scores(scores, trial.episode),
         "placebos": {
             name: _typical(scores - trial.scores(placebo), trial.episode, level)
@@ -250,11 +250,11 @@ def check_method(
         "likeness": _alike(trial, method, level),
         "maps_without_heat": int((maps.flatten(1).amax(1) <= 0).sum()),
     }
-    failed = [name for name, is_passed in _tests(found).items() if not is_passed]
+    failed = [name for name, is_passed in _tests(result).items() if not is_passed]
     if not failed:
-        found["random_weights"] = random_weights(trial, method, level)
-        failed = [] if found["random_weights"]["as_good"] == 0 else ["random weights"]
-    return {"trusted": not failed, "failed": failed, **found}
+        result["random_weights"] = random_weights(trial, method, level)
+        failed = [] if result["random_weights"]["as_good"] == 0 else ["random weights"]
+    return {"trusted": not failed, "failed": failed, **result}
 
 
 def random_weights(trial: Trial, method: MapOf, level: float) -> dict[str, Any]:
@@ -282,12 +282,12 @@ def random_weights(trial: Trial, method: MapOf, level: float) -> dict[str, Any]:
     }
 
 
-def _tests(found: dict[str, Any]) -> dict[str, bool]:
+def _tests(result: dict[str, Any]) -> dict[str, bool]:
     """Whether each test but that of random weights is passed."""
-    alike = found["likeness"]
+    alike = result["likeness"]
     return {
-        "placebos": all(_above(b["lower"], 0.0) for b in found["placebos"].values()),
-        "pointing": _above(found["pointing"]["lower"], 0.0),
+        "placebos": all(_above(b["lower"], 0.0) for b in result["placebos"].values()),
+        "pointing": _above(result["pointing"]["lower"], 0.0),
         "likeness": alike["upper"] is not None
         and alike["upper"] < MOST_ALIKE
         and max(alike["seeds"]) < MOST_ALIKE,

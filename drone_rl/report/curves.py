@@ -42,10 +42,10 @@ def _curves(axis: Axes, curves: dict, action: str, kind: str) -> None:
     share = 100 * np.array(curves["shares"])
     colors = dict(zip(NAMES, _COLORS, strict=True))
     named_placebo = False
-    for name, found in curves.items():
+    for name, curve_of in curves.items():
         if name == "shares":
             continue
-        curve = found[action][kind]["curve"]
+        curve = curve_of[action][kind]["curve"]
         points = curve if curve is not None else np.full(len(share), np.nan)
         if name in NAMES:
             axis.plot(share, points, color=colors[name], label=NAMES[name])
@@ -56,5 +56,5 @@ def _curves(axis: Axes, curves: dict, action: str, kind: str) -> None:
     axis.set_xscale("symlog", linthresh=1)
     axis.set(xlim=(0, 100), ylim=(-0.02, 1.02), xlabel="% of the pixels", ylabel="P(chosen action)")
     axis.set_xticks([0, 1, 3, 10, 30, 100], ["0", "1", "3", "10", "30", "100"])
-    if all(found[action]["frames"] == 0 for n, found in curves.items() if n != "shares"):
+    if all(curve_of[action]["frames"] == 0 for n, curve_of in curves.items() if n != "shares"):
         axis.text(10, 0.5, "never taken", ha="center")

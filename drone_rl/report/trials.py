@@ -61,8 +61,8 @@ def _scores(axis: Axes, truth: dict) -> None:
 
 def _hardest(method: dict) -> dict | None:
     """The comparison with that placebo which the method beats least surely."""
-    found = method.get("placebos", {}).values()
-    return min(found, key=lambda b: -1.0 if b["lower"] is None else b["lower"], default=None)
+    comparisons = method.get("placebos", {}).values()
+    return min(comparisons, key=lambda b: -1.0 if b["lower"] is None else b["lower"], default=None)
 
 
 def _test(
@@ -70,14 +70,14 @@ def _test(
 ) -> None:
     names = list(truth["methods"])[::-1]
     for y, name in enumerate(names):
-        found = of(truth["methods"][name])
-        if found is None:
+        test = of(truth["methods"][name])
+        if test is None:
             continue
-        if found["lower"] is None:
+        if test["lower"] is None:
             axis.text(bar, y, "too few flights", va="center", fontsize=9)
             continue
-        axis.plot([found["lower"], found["upper"]], [y, y], color="black", lw=1.5)
-        axis.plot(found["median"], y, "o", color=_METHOD)
+        axis.plot([test["lower"], test["upper"]], [y, y], color="black", lw=1.5)
+        axis.plot(test["median"], y, "o", color=_METHOD)
     axis.axvline(bar, color="#c62828", ls="--", lw=1.2)
     axis.set(
         yticks=range(len(names)),
@@ -92,10 +92,10 @@ def _heat(axis: Axes, heat: dict) -> None:
     shades = ("#d62728", "#ff9896", "#222222", "#8c9a7b", "#9ecae9")
     rows = [*heat, None]
     for y, name in zip(range(len(rows) - 1, -1, -1), rows, strict=True):
-        found = heat[name or next(iter(heat))]
+        shares = heat[name or next(iter(heat))]
         left = 0.0
         for region, shade in zip(regions, shades, strict=True):
-            value = found[region]["share" if name else "chance"]["mean"] or 0.0
+            value = shares[region]["share" if name else "chance"]["mean"] or 0.0
             label = region.replace("_", " ") if name is None else None
             axis.barh(y, value, left=left, color=shade, height=0.7, label=label)
             left += value

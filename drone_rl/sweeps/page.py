@@ -27,12 +27,12 @@ def write_report(sweep: Sweep) -> Path:
         The page.
     """
     rows = read_rows(sweep)
-    found = summarise_sweep(sweep, rows)
+    summary = summarise_sweep(sweep, rows)
     write_atomically(sweep.folder / "summary.csv", to_csv(rows))
-    write_atomically(sweep.folder / "summary.json", json.dumps(found, indent=2))
-    pictures = _pictures(make_groups(rows), found["sentences"])
+    write_atomically(sweep.folder / "summary.json", json.dumps(summary, indent=2))
+    pictures = _pictures(make_groups(rows), summary["sentences"])
     page = sweep.folder / "report.html"
-    write_atomically(page, _render(sweep.folder.name, found, pictures))
+    write_atomically(page, _render(sweep.folder.name, summary, pictures))
     return page
 
 
@@ -69,7 +69,7 @@ def _pictures(groups: Sequence[Group], sentences: Mapping[str, str]) -> list[dic
             ("Entropy at the end", "entropies.", figures.draw_entropies),
         ]
     drawn += [("Frames to solve", "costs.", figures.draw_costs)]
-    return [_picture(title, _told(sentences, of), draw(layout)) for title, of, draw in drawn]
+    return [_picture(title, _paragraph(sentences, of), draw(layout)) for title, of, draw in drawn]
 
 
 def _picture(title: str, text: str, content: tuple[bytes, bytes]) -> dict[str, str]:
@@ -77,12 +77,12 @@ def _picture(title: str, text: str, content: tuple[bytes, bytes]) -> dict[str, s
     return {"title": title, "text": text, "light": light, "dark": dark}
 
 
-def _told(sentences: Mapping[str, str], of: str) -> str:
+def _paragraph(sentences: Mapping[str, str], of: str) -> str:
     """The sentences of one part of the page, as a paragraph."""
     return " ".join(text for name, text in sentences.items() if name.startswith(of))
 
 
-def _render(name: str, found: dict[str, Any], pictures: list[dict[str, str]]) -> str:
+def _render(name: str, summary: dict[str, Any], pictures: list[dict[str, str]]) -> str:
     source = resources.files("drone_rl.sweeps").joinpath("templates/report.html").read_text()
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("drone_rl.report"),  # the style that all reports share
@@ -92,9 +92,9 @@ def _render(name: str, found: dict[str, Any], pictures: list[dict[str, str]]) ->
     )
     environment.filters |= {"figure": _figure, "code": _code}
     parts = ("runs", "verdicts", "best", "settings")
-    told = {part: _told(found["sentences"], f"{part}.") for part in parts}
+    texts = {part: _paragraph(summary["sentences"], f"{part}.") for part in parts}
     return environment.from_string(source).render(
-        name=name, figures=found, pictures=pictures, told=told
+        name=name, figures=summary, pictures=pictures, texts=texts
     )
 
 

@@ -94,6 +94,6 @@ def _error(lines: list[str], status: int) -> str:
     """The line of a log that says why a run failed."""
     if status < 0:
         return f"ended by signal {signal.Signals(-status).name}"
-    told = [line.removeprefix("error: ") for line in lines if line.startswith("error: ")]
-    said = told or [line for line in lines if line.strip()]
-    return said[-1].strip() if said else f"ended with status {status}"
+    reasons = [line.removeprefix("error: ") for line in lines if line.startswith("error: ")]
+    words = reasons or [line for line in lines if line.strip()]
+    return words[-1].strip() if words else f"ended with status {status}"

@@ -25,7 +25,7 @@ def summarise_sweep(sweep: Sweep, rows: Sequence[Row]) -> dict[str, Any]:
     judged = [row.verdict for row in rows if row.verdict is not None]
     older = sum(row.has_older_verdict for row in rows)
     groups = make_groups(rows)
-    found = {
+    summary = {
         "command": sweep.command,
         "judge_command": _command("sweep-report", f"folder={_literal(sweep.folder)}", "judge=true"),
         **{name: states.count(name) for name in STATES},
@@ -40,7 +40,7 @@ def summarise_sweep(sweep: Sweep, rows: Sequence[Row]) -> dict[str, Any]:
         "groups": [_group(group) for group in groups],
         "runs": [row.plain() for row in rows],
     }
-    return {**found, "sentences": said(words.SENTENCES, found)}
+    return {**summary, "sentences": said(words.SENTENCES, summary)}
 
 
 def best_rows(rows: Sequence[Row]) -> list[Row]:

@@ -70,10 +70,10 @@ def parse_json(content: bytes | str, where: str, *, allow_nan: bool = False) -> 
     """
 
     def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-        found = dict(pairs)
-        if len(found) < len(pairs):
+        mapping = dict(pairs)
+        if len(mapping) < len(pairs):
             raise ValueError("a name stands there twice")
-        return found
+        return mapping
 
     def whole(digits: str) -> int:
         if len(digits) > _LONGEST_NUMBER:

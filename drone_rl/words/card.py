@@ -6,11 +6,11 @@ _NUMBERS = {1: "one cube", 2: "two cubes", 3: "three cubes", 4: "four cubes", 5:
 
 
 def _verdict(card: Evidence) -> str:
-    found = card["verdict"]
-    certain = f"certain, with a chance of error of at most {100 * found['error_rate']:g}%"
+    verdict = card["verdict"]
+    certain = f"certain, with a chance of error of at most {100 * verdict['error_rate']:g}%"
     return (
-        f"**{found['kind']}** ({certain if found['certain'] else 'not certain'}): "
-        f"{found['sentence']}"
+        f"**{verdict['kind']}** ({certain if verdict['certain'] else 'not certain'}): "
+        f"{verdict['sentence']}"
     )
 
 

@@ -4,14 +4,14 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 
-def bounds(found: Mapping[str, Any], show: Callable[[float], str] = "{:.2f}".format) -> str:
+def bounds(interval: Mapping[str, Any], show: Callable[[float], str] = "{:.2f}".format) -> str:
     """The 95% interval of a number."""
-    return f"95%: {show(found['lower95'])} to {show(found['upper95'])}"
+    return f"95%: {show(interval['lower95'])} to {show(interval['upper95'])}"
 
 
-def among(found: Mapping[str, Any]) -> str:
+def among(share: Mapping[str, Any]) -> str:
     """A share as a count of so many."""
-    return f"{found['successes']} of {found['trials']}"
+    return f"{share['successes']} of {share['trials']}"
 
 
 def listed(parts: Sequence[str], last: str = "and") -> str:

@@ -53,16 +53,16 @@ def _hits(evidence: Evidence) -> str:
 def _refused(evidence: Evidence) -> list[str]:
     """Why each method that may not be trusted is not, by the tests that it failed."""
     return [
-        f"{NAMES.get(name, name)} ({'; '.join(_reason(found, test) for test in found['failed'])})"
-        for name, found in _truth(evidence)["methods"].items()
-        if not found["trusted"]
+        f"{NAMES.get(name, name)} ({'; '.join(_reason(result, test) for test in result['failed'])})"
+        for name, result in _truth(evidence)["methods"].items()
+        if not result["trusted"]
     ]
 
 
-def _reason(found: Mapping[str, Any], test: str) -> str:
+def _reason(result: Mapping[str, Any], test: str) -> str:
     if test != "placebos":
         return _FAILED.get(test, test)
-    unbeaten = [n for n, b in found["placebos"].items() if not _is_above(b["lower"], 0)]
+    unbeaten = [n for n, b in result["placebos"].items() if not _is_above(b["lower"], 0)]
     more = f" and {plural(len(unbeaten) - 1, 'other')}" if len(unbeaten) > 1 else ""
     return f"not surely better than the placebo {unbeaten[0]!r}{more}"
 
@@ -122,10 +122,10 @@ def _cube_counts(evidence: Evidence) -> bool:
 
 
 def _cube(evidence: Evidence) -> str:
-    found = _taken(evidence)
+    change = _taken(evidence)
     return (
-        f"Taking the next cube away changes the probabilities by {found['mean']:.2f} of 1 "
-        f"({bounds(found)}), surely more than a patch of ground does."
+        f"Taking the next cube away changes the probabilities by {change['mean']:.2f} of 1 "
+        f"({bounds(change)}), surely more than a patch of ground does."
     )
 
 

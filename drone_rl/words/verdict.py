@@ -157,8 +157,8 @@ def _never(evidence: Evidence) -> str:
 
 
 def _differs(evidence: Evidence) -> bool:
-    found = evidence["drawing"]
-    return found is not None and (found["lower95"] > 0 or found["upper95"] < 0)
+    difference = evidence["drawing"]
+    return difference is not None and (difference["lower95"] > 0 or difference["upper95"] < 0)
 
 
 def _drawing(evidence: Evidence) -> str:

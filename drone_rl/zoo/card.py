@@ -20,11 +20,11 @@ def write_card(name: str, digest: str, about: Evidence) -> str:
             verdict.json), "worlds" (the stream of worlds that it rests on), "seed" (theirs),
             "chosen" (None, or "runs" and "episodes" of the sweep in which it was made), "task".
     """
-    told = said(SENTENCES, about)
-    verdict = told.pop("card.verdict")
+    sentences = said(SENTENCES, about)
+    verdict = sentences.pop("card.verdict")
     packages = about["provenance"]["versions"]
     revision = about["provenance"]["git_revision"] or "unknown"
-    points = "\n".join(f"- {text}" for text in told.values())
+    points = "\n".join(f"- {text}" for text in sentences.values())
     return f"""# {name}
 
 {verdict}

@@ -111,10 +111,10 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
                 raise InputError(f"it has no {key}")
         state["config"] = Plain().read(as_mapping(state["config"], "config"), "config")
         is_old = state["format_version"] == 1
-        found = describe(state["config"]) if is_old else parse(state.get("description"))
+        description = describe(state["config"]) if is_old else parse(state.get("description"))
         checked = {
-            "description": found.as_dict(),
-            "policy": check_weights(state["policy"], found.expected_weights()),
+            "description": description.as_dict(),
+            "policy": check_weights(state["policy"], description.expected_weights()),
             "progress": _PROGRESS.read(state["progress"], "progress"),
             "provenance": _PROVENANCE.read(state["provenance"], "provenance"),
         }
@@ -205,7 +205,7 @@ def _exported(content: bytes) -> dict[str, Any]:
     about = dict(as_mapping(_inner(metadata, "about"), "about"))
     if "progress" in about:
         about["progress"] = with_present_names(as_mapping(about["progress"], "progress"))
-    found = (
+    description = (
         describe(about.pop("config", None)) if is_old else parse(_inner(metadata, "description"))
     )
     try:
@@ -213,8 +213,8 @@ def _exported(content: bytes) -> dict[str, Any]:
     except (SafetensorError, ValueError, KeyError, TypeError, RuntimeError) as error:
         raise InputError(f"its weights are damaged ({str(error)[:100]})") from None
     return {
-        "description": found.as_dict(),
-        "policy": check_weights(weights, found.expected_weights()),
+        "description": description.as_dict(),
+        "policy": check_weights(weights, description.expected_weights()),
         **Record(_ABOUT, _NOT_IN_ALL).read(about, "about"),
     }
 

@@ -22,13 +22,15 @@ def test_types_and_their_probabilities():
 
 def test_what_a_type_says_of_each_quantity():
     policy = Simulated({((L, A), (1, 0)): 1.0}, lucky=0.3)
-    told = dict(zip(Rule().quantities, (float(values[0]) for values in policy.told), strict=True))
-    assert told["success"] == pytest.approx(-0.9)
-    assert (told["offered left"], told["offered right"]) == (1.0, 0.0)
-    assert (told["collected left"], told["collected ahead"]) == (1.0, 0.0)
-    assert np.isnan(told["collected right"])
-    assert told["above random"] == pytest.approx(0.5 - 1 / 6)
-    assert told["above forward"] == pytest.approx(0.5 - 1 / 6 - 5 / 6 * 0.3)
+    observed = dict(
+        zip(Rule().quantities, (float(values[0]) for values in policy.observed), strict=True)
+    )
+    assert observed["success"] == pytest.approx(-0.9)
+    assert (observed["offered left"], observed["offered right"]) == (1.0, 0.0)
+    assert (observed["collected left"], observed["collected ahead"]) == (1.0, 0.0)
+    assert np.isnan(observed["collected right"])
+    assert observed["above random"] == pytest.approx(0.5 - 1 / 6)
+    assert observed["above forward"] == pytest.approx(0.5 - 1 / 6 - 5 / 6 * 0.3)
 
 
 def test_policies_lie_on_every_threshold_and_on_both_sides_of_it():

@@ -15,9 +15,9 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
     numbers: dict[str, Any] = {"statistics": dataclasses.asdict(statistics)}
     arrays = {}
     for objective in ("probability", "logit"):
-        found = class_model.search(
+        search = class_model.search(
             context.network, statistics, objective, seed=context.settings.seed
         )
-        arrays[f"class_model_{objective}"] = found.pictures.numpy()
-        numbers[objective] = found.summary()
+        arrays[f"class_model_{objective}"] = search.pictures.numpy()
+        numbers[objective] = search.summary()
     return {"class_model": numbers}, arrays

@@ -17,11 +17,11 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
         ("features", data.features[context.layer]),
         ("pixels", data.observations),
     ):
-        found = tsne.embed(originals, perplexity=settings.perplexity, seed=settings.seed)
-        arrays[f"tsne_{name}"] = found.points
+        embedding = tsne.embed(originals, perplexity=settings.perplexity, seed=settings.seed)
+        arrays[f"tsne_{name}"] = embedding.points
         numbers[name] = {
             "layer": context.layer if name == "features" else None,
             "perplexity": settings.perplexity,
-            **dataclasses.asdict(found.faithfulness),
+            **dataclasses.asdict(embedding.faithfulness),
         }
     return {"tsne": numbers}, arrays
