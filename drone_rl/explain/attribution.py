@@ -89,6 +89,7 @@ class Explainer:
 
         def attribute(x: Tensor, a: Tensor) -> Tensor:
             coarse = method.attribute(x, target=a, relu_attributions=True)
+            assert isinstance(coarse, Tensor)  # a tuple of them only where x is one
             return functional.interpolate(coarse, x.shape[-2:], mode="bilinear")
 
         return _in_batches(attribute, observations, actions).sum(1)

@@ -178,7 +178,7 @@ def visualise(
     """
     generator = torch.Generator().manual_seed(seed)
     shape = network.in_shape
-    num_actions = int(network.layers[-1].out_features)
+    num_actions = network.num_actions
     starts = torch.rand(settings.starts, *shape, generator=generator)
     start = statistics.low + (statistics.high - statistics.low) * starts
     pictures = start.repeat(num_actions, 1, 1, 1)

@@ -113,7 +113,8 @@ class RolloutDataset:
         if flights is not None:
             more |= {f"flights/{name}": flights.arrays[name] for name in FLOWN}
         try:
-            np.savez_compressed(path, meta=json.dumps(described), **self.arrays, **more)
+            arrays: dict[str, Any] = {**self.arrays, **more}  # or numpy's allow_pickle is in doubt
+            np.savez_compressed(path, meta=json.dumps(described), **arrays)
         except OSError as error:
             raise InputError(
                 f"data set {path} can't be written ({error.strerror}); choose another folder"

@@ -28,7 +28,7 @@ def shuffled_networks(network: PolicyNetwork, count: int, seed: int = 0) -> Iter
         other = copy.deepcopy(network)
         for layer in other.layers:
             if isinstance(layer, nn.Conv2d | nn.Linear):
-                for parameter in (layer.weight, layer.bias):
+                for parameter in layer.parameters(recurse=False):
                     _shuffle(parameter, generator)
         yield other
 

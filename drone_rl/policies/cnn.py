@@ -13,7 +13,10 @@ Weighted = nn.Conv2d | nn.Linear
 
 
 class PolicyNetwork(nn.Module):
-    """Layers from a picture to one logit an action; any number of leading batch dimensions."""
+    """Layers from a picture to one logit an action; any number of leading batch dimensions.
+
+    The last layer is linear and called "logits".
+    """
 
     def __init__(
         self,
@@ -36,6 +39,11 @@ class PolicyNetwork(nn.Module):
                 initialise(layer, layer is self.layers[-1])
         # twice as fast on a CPU; torch's annotations lack it
         self.layers.to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
+
+    @property
+    def num_actions(self) -> int:
+        """Number of logits."""
+        return len(self.layers.get_parameter("logits.weight"))
 
     def forward(self, pixels: Tensor) -> Tensor:
         """Pictures (*, C, H, W) to logits (*, num_actions).

@@ -12,6 +12,7 @@ NETWORKS = [OriginalCNN, SmallCNN, MLP]
 @pytest.mark.parametrize("shape", [(1, 25, 64), (3, 40, 33), (2, 100, 256)])
 def test_sizes_follow_from_the_picture(network, shape):
     net = network(shape, 3)
+    assert net.num_actions == 3
     assert net(torch.zeros(5, *shape)).shape == (5, 3)
     assert net(torch.zeros(shape)).shape == (3,)
     assert net(torch.zeros(2, 4, *shape)).shape == (2, 4, 3)
