@@ -1,6 +1,7 @@
 """README's tables and diagram are those of the files that they are made from."""
 
 import json
+import re
 
 import pytest
 
@@ -8,7 +9,7 @@ from drone_rl.bench.benchmark import Benchmark
 from drone_rl.bench.ledger import Ledger, Origin, digest_code, make_origin
 from tools.readme.__main__ import ROOT, keep, main, make_readme
 from tools.readme.blocks import replace_blocks
-from tools.readme.layers import draw_layers
+from tools.readme.layers import draw_layers, list_packages
 from tools.readme.stale import tell_ages
 from tools.readme.tables import MAIN, TRUTH, UNKNOWN, Row, make_table
 
@@ -17,10 +18,18 @@ def test_it_is_made_of_todays_figures_and_contracts():
     assert make_readme(ROOT) == (ROOT / "README.md").read_text(), "run make readme"
 
 
+def test_files_and_folders_that_it_names_are_there():
+    text = (ROOT / "README.md").read_text()
+    named = set(re.findall(r"`((?:[a-z_]+/)+(?:[a-z_]+\.py)?)`", text))
+    missing = {n for n in named if not any((ROOT / top / n).exists() for top in ("drone_rl", ""))}
+    assert {n for n in missing if not n.startswith("outputs/")} == set()
+
+
 def test_a_changed_figure_changes_it(tmp_path):
     for name in ("README.md", "pyproject.toml", "docs/results.json"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text((ROOT / name).read_text())
+    (tmp_path / "drone_rl").symlink_to(ROOT / "drone_rl")
     path = tmp_path / "docs" / "results.json"
     path.write_text(json.dumps(json.loads(path.read_text()) | {"sweep_speedup": 1.234}))
     assert "| 1.23 times | 1.6 times |" in make_readme(tmp_path)
@@ -78,6 +87,22 @@ def test_layers_side_by_side_are_one_box_and_what_is_forbidden_is_told():
     assert "  left[left, right]\n" in drawn
     assert "  top --> left --> base\n" in drawn
     assert drawn.endswith("- No water inside: in top, left, no sea, rain.")
+
+
+def test_packages_are_listed_from_the_top_each_with_those_within_it(tmp_path):
+    texts = {"base/__init__": "Low.", "top/__init__": "High.\n\nMore", "top/a/__init__": "In"}
+    for name, text in texts.items():
+        path = tmp_path / f"{name}.py"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(f'"""{text}"""\n')
+    (tmp_path / "left.py").write_text('"""A module."""\n')
+    contracts = [{"type": "layers", "name": "order", "layers": ["top", "left", "base"]}]
+    assert list_packages(contracts, tmp_path).splitlines()[2:] == [
+        "| `top/` | High |",
+        "| `top/a/` | In |",
+        "| `left.py` | A module |",
+        "| `base/` | Low |",
+    ]
 
 
 @pytest.fixture

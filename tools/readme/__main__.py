@@ -5,7 +5,7 @@ from pathlib import Path
 
 from drone_rl.bench.ledger import Ledger
 from tools.readme.blocks import replace_blocks
-from tools.readme.layers import draw_layers, read_contracts
+from tools.readme.layers import draw_layers, list_packages, read_contracts
 from tools.readme.stale import tell_ages
 from tools.readme.tables import MAIN, TRUTH, make_table
 
@@ -16,10 +16,12 @@ MEASURED = ROOT / "outputs" / "bench" / "results.json"
 def make_readme(root: Path) -> str:
     """README.md as it should be."""
     figures = Ledger(root / "docs" / "results.json").figures
+    contracts = read_contracts(root)
     blocks = {
         "truth": make_table(TRUTH, figures),
         "main": make_table(MAIN, figures),
-        "layers": draw_layers(read_contracts(root)),
+        "packages": list_packages(contracts, root / "drone_rl"),
+        "layers": draw_layers(contracts),
     }
     return replace_blocks((root / "README.md").read_text(), blocks)
 

@@ -1,5 +1,6 @@
-"""The house as a diagram: which package may import which, from the import contracts."""
+"""The house: what each package holds, and which may import which, from the import contracts."""
 
+import ast
 import tomllib
 from collections.abc import Iterable
 from pathlib import Path
@@ -12,15 +13,46 @@ def read_contracts(root: Path) -> list[dict[str, Any]]:
         return tomllib.load(file)["tool"]["importlinter"]["contracts"]
 
 
+def list_packages(contracts: Iterable[dict[str, Any]], package: Path) -> str:
+    """A table in Markdown: each package and those within it, by their docstrings' first lines.
+
+    Args:
+        contracts: The import contracts, whose layers give the order.
+        package: The folder drone_rl.
+    """
+    paths = []
+    for name in (name for row in _layers(contracts) for name in row):
+        inner = sorted(file.parent for file in (package / name).glob("*/__init__.py"))
+        paths += [package / name, *inner]
+    rows = [f"| `{_name(path, package)}` | {_first_line(path)} |" for path in paths]
+    return "\n".join(["| package | holds |", "| --- | --- |", *rows])
+
+
 def draw_layers(contracts: Iterable[dict[str, Any]]) -> str:
     """The contract of layers as a Mermaid diagram, and under it what the others forbid."""
-    layers = next(c["layers"] for c in contracts if c["type"] == "layers")
-    rows = [[name.strip() for name in layer.split("|")] for layer in layers]
+    rows = _layers(contracts)
     boxes = [f"  {names[0]}[{', '.join(names)}]" for names in rows]
     chain = " --> ".join(names[0] for names in rows)
     lines = ["```mermaid", "flowchart TD", *boxes, f"  {chain}", "```", ""]
     forbidden = [c for c in contracts if c["type"] == "forbidden"]
     return "\n".join([*lines, *(_sentence(c) for c in forbidden)])
+
+
+def _layers(contracts: Iterable[dict[str, Any]]) -> list[list[str]]:
+    """Names of packages, from the top; those of one row side by side."""
+    layers = next(c["layers"] for c in contracts if c["type"] == "layers")
+    return [[name.strip() for name in layer.split("|")] for layer in layers]
+
+
+def _name(path: Path, package: Path) -> str:
+    return f"{path.relative_to(package)}{'/' if path.is_dir() else '.py'}"
+
+
+def _first_line(path: Path) -> str:
+    """What a package, or a module in place of one, says of itself."""
+    file = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+    text = ast.get_docstring(ast.parse(file.read_text())) or ""
+    return text.partition("\n")[0].rstrip(".")
 
 
 def _sentence(contract: dict[str, Any]) -> str:
