@@ -6,7 +6,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import drone_rl
+from tools.mirror import modules_without_test
 
 ROOT = Path(__file__).parents[1]
 
@@ -46,3 +49,10 @@ def test_imports_do_no_work():
 def test_no_module_is_too_long():
     lengths = {p: len(p.read_text().splitlines()) for p in (ROOT / "drone_rl").rglob("*.py")}
     assert max(lengths.values()) <= 400, max(lengths, key=lengths.get)
+
+
+@pytest.mark.parametrize(
+    "package", ["explain", "policies", "report", "sweeps", "utils", "verdicts", "words"]
+)
+def test_every_module_has_a_test_of_its_own_name(package):
+    assert [m for m in modules_without_test(ROOT) if m.startswith(f"{package}/")] == []
