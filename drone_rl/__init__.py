@@ -1,3 +1,71 @@
-"""Train, evaluate and audit vision policies of a drone, with pip alone."""
+"""Train, evaluate and audit vision policies of a drone, with pip alone.
+
+What is listed here is imported when it is first used, so that `import drone_rl` is quick.
+"""
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from drone_rl.api.environment import make_env
+    from drone_rl.api.explaining import Explanations, explain
+    from drone_rl.api.judging import Evaluation, Judgement, evaluate, judge
+    from drone_rl.api.policy import Policy, load_policy
+    from drone_rl.api.training import Training, train
+    from drone_rl.explain.settings import ExplainSettings
+    from drone_rl.settings.judging import EvaluateSettings, JudgeSettings
+    from drone_rl.settings.training import TrainerSettings, TrainSettings
+    from drone_rl.sim.settings import CameraSettings, TaskSettings
+    from drone_rl.utils.errors import InputError
 
 __version__ = "0.1.0"
+
+_PLACES = {
+    "api.environment": ("make_env",),
+    "api.explaining": ("Explanations", "explain"),
+    "api.judging": ("Evaluation", "Judgement", "evaluate", "judge"),
+    "api.policy": ("Policy", "load_policy"),
+    "api.training": ("Training", "train"),
+    "explain.settings": ("ExplainSettings",),
+    "settings.judging": ("EvaluateSettings", "JudgeSettings"),
+    "settings.training": ("TrainSettings", "TrainerSettings"),
+    "sim.settings": ("CameraSettings", "TaskSettings"),
+    "utils.errors": ("InputError",),
+}
+_HOMES = {name: f"drone_rl.{module}" for module, names in _PLACES.items() for name in names}
+
+__all__ = [
+    "CameraSettings",
+    "EvaluateSettings",
+    "Evaluation",
+    "ExplainSettings",
+    "Explanations",
+    "InputError",
+    "JudgeSettings",
+    "Judgement",
+    "Policy",
+    "TaskSettings",
+    "TrainSettings",
+    "TrainerSettings",
+    "Training",
+    "evaluate",
+    "explain",
+    "judge",
+    "load_policy",
+    "make_env",
+    "train",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Imports a public name when it is first asked for."""
+    if name not in _HOMES:
+        raise AttributeError(f"module 'drone_rl' has no attribute {name!r}")
+    value = getattr(importlib.import_module(_HOMES[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """Returns all public names, imported or not."""
+    return [*globals(), *__all__]

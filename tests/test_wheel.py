@@ -20,8 +20,9 @@ def test_wheel_carries_the_configuration_and_runs_without_the_checkout(tmp_path)
     assert "drone_rl/py.typed" in names
     assert "drone_rl/report/templates/report.html" in names
     assert {f"drone_rl/zoo/{n}.safetensors" for n in ("good", "poor", "right_and_forward")} <= names
-    code = "import sys; sys.path.insert(0, 'site'); from drone_rl.cli import main as m; "
-    code += "assert str(m.conf_dir()).endswith('site/drone_rl/conf'), m.conf_dir(); m.main()"
+    code = "import sys; sys.path.insert(0, 'site'); from drone_rl.cli.main import main; "
+    code += "from drone_rl.hydra_app.composition import conf_dir; "
+    code += "assert str(conf_dir()).endswith('site/drone_rl/conf'), conf_dir(); main()"
     command = [sys.executable, "-c", code, "train", "--cfg", "job"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

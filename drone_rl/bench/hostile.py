@@ -25,7 +25,7 @@ MOST_MEMORY = 2**30
 PATIENCE_S = 30
 """Until a command counts as hung."""
 _MODULES = ("main", "verdict", "evaluate", "explain", "play", "export", "report", "train")
-_MORE = ("training", "sweep_report", "launchers")
+_MORE = ("cli.sweep_report", "api.training", "api.judging", "api.filming", "api.exporting")
 
 _log = logging.getLogger(__name__)
 
@@ -75,8 +75,8 @@ def _main(folder: Path, every: int) -> None:
 
     cases = hostile_files(folder / "files")[::every]
     program = importlib.import_module("drone_rl.cli.main")
-    for name in (*_MODULES, *_MORE):
-        importlib.import_module(f"drone_rl.cli.{name}")
+    for name in (*(f"cli.{module}" for module in _MODULES), *_MORE):
+        importlib.import_module(f"drone_rl.{name}")
     for name in ("hydra.core.plugins", "drone_rl.sweeps.page"):
         importlib.import_module(name)
     sys.modules["hydra.core.plugins"].Plugins.instance()  # looks through all packages, once

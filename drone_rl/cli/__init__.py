@@ -1,1 +1,1 @@
-"""The command line: composes settings, builds the parts, connects them."""
+"""The command line: what each command can be told, and which function of `drone_rl` does it."""

@@ -1,99 +1,58 @@
 """`drone-rl explain`."""
 
+import dataclasses
 import logging
-import re
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-import torch
-from hydra.core.hydra_config import HydraConfig
-from omegaconf import DictConfig, ListConfig
-
-from drone_rl.cli.build import find_checkpoint, load_trained, plain, policy_is_checkpoint
-from drone_rl.explain.explanation import explain_policy
+import drone_rl
 from drone_rl.explain.settings import ExplainSettings
-from drone_rl.report import write_report
-from drone_rl.utils.errors import InputError
-from drone_rl.utils.provenance import provenance
+from drone_rl.hydra_app.names import policies as prepare  # noqa: F401 -- of what was typed
+from drone_rl.settings.changes import TaskChanges, no_changes
+from drone_rl.settings.paths import PathsSettings
+from drone_rl.utils.schema import Listed, OneOf, Whole
 from drone_rl.verdicts.kinds import Kind
 
-prepare = policy_is_checkpoint
 _log = logging.getLogger(__name__)
 
 
-def run(config: DictConfig) -> tuple[int, str]:
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Command(ExplainSettings):
+    """What `drone-rl explain` can be told."""
+
+    policy: Annotated[Any, Listed("policy")] = ("latest",)
+    """Whom to explain, one or several, see `drone_rl.load_policy`."""
+    num_envs: Annotated[int, Whole(1)] = 128
+    """Worlds in one batch; bounds memory."""
+    require: Annotated[str, OneOf(tuple(Kind))] | None = None
+    """Refuse (exit status 10 to 13) a policy whose verdict is not this; none accepts all."""
+    task: TaskChanges = no_changes()
+    """What to change of the policy's task."""
+    paths: PathsSettings = PathsSettings()
+    """Folders."""
+
+
+def run(settings: Command, folder: Path) -> tuple[int, str]:
     """Explains policies and reports on them. Returns the exit status and the report's path."""
-    torch.set_num_threads(1)  # the same file on every machine; pictures this small gain nothing
-    which = config.checkpoint
-    names = list(which) if isinstance(which, ListConfig) else [which]
-    if not names or len(set(names)) < len(names):
-        raise InputError(f"policy={names} must name one or more policies, each once")
-    kinds = [kind.value for kind in Kind]
-    if config.require is not None and config.require not in kinds:
-        raise InputError(f"require={config.require} is unknown; choose from: {', '.join(kinds)}")
-    settings = ExplainSettings(
-        **{k: config[k] for k in ExplainSettings.__dataclass_fields__ if k in config}
+    from drone_rl.api.explaining import explain
+    from drone_rl.api.progress import log
+
+    loaded = [drone_rl.load_policy(p, outputs=settings.paths.outputs) for p in settings.policy]
+    done = explain(
+        [policy.in_task(**settings.task) for policy in loaded],
+        settings.narrowed(ExplainSettings),
+        folder=folder,
+        num_envs=settings.num_envs,
+        progress=log,
     )
-    if config.num_envs < 1:
-        raise InputError(f"num_envs={config.num_envs} is out of range; give 1 or more")
-    paths = [find_checkpoint(name, config.paths.outputs) for name in names]
-    folder = Path(HydraConfig.get().runtime.output_dir)
-    found = {}
-    for number, (name, path) in enumerate(zip(names, paths, strict=True)):
-        found[name] = _explain(config, settings, name, path, folder / f"{number}_{_slug(name)}")
-    report = write_report([folder / f"{i}_{_slug(n)}" for i, n in enumerate(names)], folder)
-    for name, numbers in found.items():
-        verdict = numbers["verdict"]
-        certainty = "" if verdict["certain"] else " (not certain)"
-        print(f"{name}: {verdict['kind']}{certainty}. {verdict['sentence']}")
-    _log.info("report: %s", report)
-    refused = [
-        n["verdict"]["exit_code"] or 12
-        for n in found.values()
-        if config.require is not None
-        and not (n["verdict"]["certain"] and config.require == n["verdict"]["kind"])
-    ]
-    return max(refused, default=0), str(report)
+    print(done)
+    _log.info("report: %s", done.report)
+    verdicts = [numbers["verdict"] for numbers in done.numbers.values()]
+    refused = [] if settings.require is None else _refused(verdicts, settings.require)
+    return max(refused, default=0), str(done.report)
 
 
-def _explain(
-    config: DictConfig, settings: ExplainSettings, name: str, path: Path, folder: Path
-) -> dict[str, Any]:
-    env, actor, state = load_trained(
-        path,
-        config.num_envs,
-        task=plain(config.task),
-        seed=config.seed,
-        device="cpu",
-    )
-    origin = {
-        "policy": str(path),
-        "trained": {
-            "description": state["description"],
-            "progress": state["progress"],
-            "provenance": state["provenance"],
-            "command": state.get("command"),
-        },
-        **provenance(),
-    }
-    try:
-        return explain_policy(
-            env,
-            actor.module[0].module,
-            folder,
-            settings,
-            name=_title(name, path),
-            provenance=origin,
-            tell=lambda title: _log.info("%s: %s", name, title),
-        )
-    finally:
-        env.close()
-
-
-def _title(name: str, path: Path) -> str:
-    """What people call the policy: a run is known by its folder."""
-    return path.parents[1].name if path.suffix == ".pt" and len(path.parents) > 1 else name
-
-
-def _slug(name: str) -> str:
-    return re.sub(r"[^A-Za-z0-9_-]+", "_", name).strip("_")[-60:] or "policy"
+def _refused(verdicts: list[dict[str, Any]], required: str) -> list[int]:
+    """Exit statuses of the verdicts that are another kind, or are not certain."""
+    other = [v for v in verdicts if not (v["certain"] and v["kind"] == required)]
+    return [verdict["exit_code"] or Kind.NONE.exit_code for verdict in other]

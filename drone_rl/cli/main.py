@@ -1,11 +1,7 @@
-"""`drone-rl <command> [setting=value ...]`: finds the command, runs it under Hydra."""
+"""`drone-rl <command> [setting=value ...]`: finds the command and runs it."""
 
 import importlib
-import os
 import sys
-import warnings
-from collections.abc import Callable
-from pathlib import Path
 
 USAGE = """\
 drone-rl: a drone learns to fly from its camera, and you learn whether to trust it.
@@ -33,24 +29,8 @@ examples
   drone-rl explain policy=good         explain a policy that travels with the package
   drone-rl COMMAND --help              every setting of a command
 """
-COMMANDS = (
-    "train",
-    "evaluate",
-    "play",
-    "explain",
-    "report",
-    "verdict",
-    "export",
-    "sweep-report",
-    "bench",
-)
-
-
-def conf_dir() -> Path:
-    """The configuration: of the checkout, or the copy inside an installed wheel."""
-    package = Path(__file__).resolve().parents[1]
-    beside = package.parent / "conf"
-    return beside if (beside / "train.yaml").is_file() else package / "conf"
+_POLICIES = ("train", "evaluate", "play", "explain", "report", "verdict", "export")
+COMMANDS = (*_POLICIES, "sweep-report", "bench")
 
 
 def main() -> None:
@@ -59,103 +39,24 @@ def main() -> None:
     if not args or args[0] in ("-h", "--help", "help"):
         print(USAGE)
         return
-    command, overrides = args[0], args[1:]
-    if command == "demo":
-        sys.exit(_guarded(_demo, overrides))
-    if command not in COMMANDS:
-        sys.exit(f"error: command {command!r} is unknown; use one of: demo, {', '.join(COMMANDS)}")
-    sys.exit(_guarded(lambda o: run_command(command, o), overrides))
+    name, overrides = args[0], args[1:]
+    if name not in ("demo", *COMMANDS):
+        sys.exit(f"error: command {name!r} is unknown; use one of: demo, {', '.join(COMMANDS)}")
+    from drone_rl.hydra_app.messages import guarded  # usage and typing errors don't wait for Hydra
+
+    steps = [("train", overrides), ("evaluate", []), ("explain", [])]
+    sys.exit(guarded(lambda: _run_all(steps if name == "demo" else [(name, overrides)])))
 
 
-def run_command(command: str, overrides: list[str]) -> int:
-    """Composes the settings of one command and runs it.
+def _run_all(steps: list[tuple[str, list[str]]]) -> int:
+    """One command after the other, until one fails."""
+    from drone_rl.hydra_app.composition import run_command
 
-    Args:
-        command: One of `COMMANDS`.
-        overrides: As on the command line.
-
-    Returns:
-        Exit status.
-    """
-    import hydra
-
-    from drone_rl.configs import register_configs
-    from drone_rl.utils.errors import InputError
-
-    name = command.replace("-", "_")
-    stage = importlib.import_module(f"drone_rl.cli.{name}")
-    overrides = getattr(stage, "prepare", lambda o: o)(overrides)
-    register_configs()
-    getattr(stage, "register", lambda: None)()
-    statuses: list[int] = []
-
-    def job(config: object) -> object:
-        try:
-            status, value = stage.run(config)
-        except InputError as error:  # one bad run of a sweep leaves the others alone
-            print(f"error: {_one_line(error)}", file=sys.stderr)
-            status, value = 2, None
-        statuses.append(status)
-        if status > 128:  # a signal ends a whole sweep, not one run of it
-            sys.exit(status)
-        return value
-
-    job.__module__ = stage.__name__
-    job.statuses = statuses  # where a launcher that runs jobs elsewhere notes how they ended
-    wrapped = hydra.main(version_base="1.3", config_path=str(conf_dir()), config_name=name)(job)
-    argv = sys.argv
-    sys.argv = [f"drone-rl {command}", *overrides]
-    try:
-        wrapped()
-    finally:
-        sys.argv = argv
-    return max(statuses, default=0)
-
-
-def _demo(overrides: list[str]) -> int:
-    """The main job end to end: `make demo`."""
-    status = run_command("train", overrides)
-    return status or run_command("evaluate", []) or run_command("explain", [])
-
-
-def _guarded(command: Callable[[list[str]], int], overrides: list[str]) -> int:
-    """Turns the user's mistakes into one line each; bugs keep their traceback."""
-    os.environ["HYDRA_FULL_ERROR"] = "1"  # let Hydra's own errors through to be shortened here
-    warnings.filterwarnings("ignore", message=".*DISPLAY.*")  # dm_control looks for a screen
-    warnings.filterwarnings("ignore", message=".*GLFW.*")
-    warnings.filterwarnings(
-        "ignore", message=".*WeightUpdaterBase.*"
-    )  # torchrl, of its own classes
-    from hydra.errors import HydraException
-    from omegaconf.errors import OmegaConfBaseException
-
-    from drone_rl.utils.errors import InputError
-
-    try:
-        return command(overrides)
-    except KeyboardInterrupt:
-        print("error: interrupted", file=sys.stderr)
-        return 130
-    except (InputError, HydraException, OmegaConfBaseException, OSError) as error:
-        print(f"error: {_one_line(error)}", file=sys.stderr)
-        return 2
-
-
-def _one_line(error: BaseException) -> str:
-    """The most telling message of an error and its causes, on one line."""
-    from drone_rl.utils.errors import InputError
-
-    cause: BaseException | None = error
-    while cause is not None:
-        if isinstance(cause, InputError):
-            return "".join(c if c.isprintable() else "?" for c in str(cause))
-        cause = cause.__cause__ or cause.__context__
-    text = " ".join(str(error).split()) or type(error).__name__
-    if "is not in struct" in text or "Could not override" in text:
-        text += "; see drone-rl COMMAND --help for the names that exist"
-    if "does not support sweep type" in text:
-        text += "; to search an interval, add hydra/sweeper=optuna"
-    return text
+    for name, overrides in steps:
+        command = importlib.import_module(f"drone_rl.cli.{name.replace('-', '_')}")
+        if status := run_command(name.replace("-", "_"), command, overrides):
+            return status
+    return 0
 
 
 if __name__ == "__main__":

@@ -1,20 +1,37 @@
 """`drone-rl sweep-report`."""
 
-import json
+import dataclasses
 import logging
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated
 
-from omegaconf import DictConfig
-
-from drone_rl.sweeps import Sweep, read_result, read_sweep
-from drone_rl.sweeps.page import write_picture, write_report
-from drone_rl.utils.errors import InputError
+from drone_rl.settings.paths import PathsSettings
+from drone_rl.utils.schema import Whole
+from drone_rl.utils.settings import Settings
 
 _log = logging.getLogger(__name__)
 
 
-def prepare(overrides: list[str]) -> list[str]:
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Command(Settings):
+    """What `drone-rl sweep-report` can be told."""
+
+    folder: str = "latest"
+    """Folder of the sweep, or latest for the newest one."""
+    picture: str | None = None
+    """PNG to write, too, of what policies came out, lost sides and entropies; none for none."""
+    judge: bool = False
+    """Whether to judge the last.pt of every finished run again, by the present rule."""
+    episodes: Annotated[int, Whole(1)] = 200
+    """Episodes of such a verdict, in worlds to choose by."""
+    device: str = "cpu"
+    """Where these are flown: cpu, cuda or cuda:N."""
+    paths: PathsSettings = PathsSettings()
+    """Folders."""
+
+
+def prepare(overrides: Sequence[str]) -> list[str]:
     """Makes `drone-rl sweep-report FOLDER` mean `folder=FOLDER`."""
     from drone_rl.sweeps.runs import quoted
 
@@ -24,58 +41,19 @@ def prepare(overrides: list[str]) -> list[str]:
     ]
 
 
-def run(config: DictConfig) -> tuple[int, None]:
+def run(settings: Command, folder: Path) -> tuple[int, None]:
     """Reports on a sweep, finished or not. Returns the exit status."""
-    folder = _newest(Path(config.paths.outputs)) if config.folder == "latest" else config.folder
-    sweep = read_sweep(Path(folder).absolute())
-    if config.judge:
-        _judge(sweep, config)
-    page = write_report(sweep)
-    print(_lines(json.loads((sweep.folder / "summary.json").read_text())))
-    if config.picture is not None:
-        write_picture(sweep, Path(config.picture))
-        _log.info("picture: %s", config.picture)
+    from drone_rl.api.sweeping import find_sweep, judge_sweep, report_sweep
+    from drone_rl.sweeps.page import write_picture
+
+    del folder
+    sweep = find_sweep(settings.folder, settings.paths.outputs)
+    if settings.judge:
+        judge_sweep(sweep, settings.episodes, settings.device)
+    page, lines = report_sweep(sweep)
+    print(lines)
+    if settings.picture is not None:
+        write_picture(sweep, Path(settings.picture))
+        _log.info("picture: %s", settings.picture)
     _log.info("written: %s", page)
     return 0, None
-
-
-def _judge(sweep: Sweep, config: DictConfig) -> None:
-    """Judges the last policies of all finished runs again; one that can't be is left as it is."""
-    from drone_rl.cli.judging import judge_run  # imports torch, which no other report needs
-
-    if config.episodes < 1:
-        raise InputError(f"episodes={config.episodes} must be 1 or more")
-    finished = [run for run in sweep.runs if read_result(run.folder) is not None]
-    for done, run in enumerate(finished, start=1):
-        try:
-            verdict = judge_run(run.folder, config.episodes, config.device)
-            _log.info("[%d/%d] %s: %s", done, len(finished), run.folder.name, verdict["kind"])
-        except InputError as error:
-            _log.warning("[%d/%d] %s not judged: %s", done, len(finished), run.folder.name, error)
-
-
-def _newest(outputs: Path) -> Path:
-    found = sorted(
-        outputs.glob("train/multiruns/*/sweep.json"), key=lambda path: path.stat().st_mtime
-    )
-    if not found:
-        raise InputError(
-            f"folder=latest, but there is no sweep under {outputs}/train/multiruns; "
-            "run drone-rl train -m first or give the folder of a sweep"
-        )
-    return found[-1].parent
-
-
-def _lines(figures: dict[str, Any]) -> str:
-    """The sentences of a sweep, for a terminal."""
-    told = figures["sentences"]
-    lines = [text for name, text in told.items() if name.startswith(("runs.", "verdicts."))]
-    for group in figures["groups"]:
-        choice = ", ".join(f"{k}={v}" for k, v in group.items() if isinstance(v, str))
-        lines.append(f"{choice or 'all':44} {'; '.join(group['sentences'].values())}")
-    lines += [f"run {r['run']} {r['state']}: {r['error']}" for r in figures["runs"] if r["error"]]
-    best = " ".join(text for name, text in told.items() if name.startswith("best."))
-    lines.append(f"best run: {best}")
-    if figures["best"]:
-        lines.append(f"the same again: {figures['best']['command']}")
-    return "\n".join(lines)

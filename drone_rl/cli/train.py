@@ -1,17 +1,35 @@
 """`drone-rl train`: one run, or the sweep of many, which needs none of the heavy libraries."""
 
+import dataclasses
+import logging
+import signal
 from pathlib import Path
+from typing import Annotated
 
-from hydra.core.hydra_config import HydraConfig
-from omegaconf import DictConfig
+import drone_rl
+from drone_rl.hydra_app.launchers import LocalLauncher, RayLauncher, SlurmLauncher, register_plugins
+from drone_rl.hydra_app.optuna_sweeper import OptunaSweeper
+from drone_rl.hydra_app.resuming import complete as prepare  # noqa: F401 -- of what was typed
+from drone_rl.settings.loggers import Logger, Tensorboard
+from drone_rl.settings.paths import PathsSettings
+from drone_rl.settings.training import TrainSettings
+from drone_rl.utils.schema import Instance, Several, Whole
 
-from drone_rl.cli.launchers import LocalLauncher, RayLauncher, SlurmLauncher, register_plugins
-from drone_rl.cli.optuna_sweeper import OptunaSweeper
-from drone_rl.sweeps.naming import is_sweep, sweep_name
-from drone_rl.sweeps.runs import quoted
-from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import folder_lock, refuse_links
-from drone_rl.utils.overrides import taken_over
+_log = logging.getLogger(__name__)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Command(TrainSettings):
+    """What `drone-rl train` can be told."""
+
+    logger: Annotated[tuple[Logger, ...], Several(Instance(Logger), 0, 16)] = (Tensorboard(),)
+    """Where metrics go besides metrics.csv."""
+    paths: PathsSettings = PathsSettings()
+    """Folders."""
+    resume: str | None = None
+    """Folder of a run to go on with (its own settings are taken over); none starts a new one."""
+    trial: Annotated[int, Whole(0)] | None = None
+    """Number of this run in the search of hydra/sweeper=optuna, which sets it; none for none."""
 
 
 def register() -> None:
@@ -19,30 +37,23 @@ def register() -> None:
     register_plugins(LocalLauncher, SlurmLauncher, RayLauncher, OptunaSweeper)
 
 
-def prepare(overrides: list[str]) -> list[str]:
-    """Makes `resume=FOLDER` mean: the settings of that run, and its folder; names a sweep's."""
-    if is_sweep(overrides):
-        if any(o.startswith("hydra.sweep.dir=") for o in overrides):
-            return overrides
-        parent = "${paths.outputs}/${hydra.job.config_name}/multiruns"
-        return [*overrides, f"hydra.sweep.dir={parent}/{sweep_name(overrides)}"]
-    folders = [o.split("=", 1)[1] for o in overrides if o.startswith("resume=")]
-    if not folders or folders[-1] in ("", "null"):
-        return overrides
-    if any(o.startswith("hydra.run.dir=") for o in overrides):
-        return overrides  # a sweep gives all settings itself
-    folder = Path(folders[-1])
-    if not (folder / "checkpoints" / "last.pt").is_file():
-        raise InputError(f"resume={folder} has no checkpoints/last.pt; give the folder of a run")
-    refuse_links(folder)
-    kept = taken_over(folder, overrides)
-    return [*kept, *overrides, "hydra.mode=RUN", f"hydra.run.dir={quoted(str(folder))}"]
+def run(settings: Command, folder: Path) -> tuple[int, float]:
+    """Trains one policy. Returns the exit status and the running mean of rewards."""
+    from drone_rl.api.progress import silent  # slow to import; a sweep leaves it to its runs
+    from drone_rl.sweeps.pruning import PruneCallback
+    from drone_rl.training import LoggerCallback, ProgressCallback
 
-
-def run(config: DictConfig) -> tuple[int, float]:
-    """Trains one policy. Returns the exit status and the running mean of cubes."""
-    from drone_rl.cli.training import train  # slow to import; a sweep leaves it to its runs
-
-    folder = Path(HydraConfig.get().runtime.output_dir)
-    with folder_lock(folder):
-        return train(config, folder)
+    loggers = LoggerCallback([logger.make() for logger in settings.logger])
+    searching = [] if settings.trial is None else [PruneCallback(folder.parent, settings.trial)]
+    done = drone_rl.train(
+        settings.narrowed(TrainSettings),
+        folder=folder,
+        resume=settings.resume is not None,
+        callbacks=[loggers, ProgressCallback(), *searching],
+        progress=silent,
+    )
+    _log.info("run folder: %s", folder)
+    if not done.reason.startswith("SIG"):
+        return 0, done.running_reward
+    _log.info("go on with: drone-rl train resume=%s", folder)
+    return 128 + signal.Signals[done.reason].value, done.running_reward

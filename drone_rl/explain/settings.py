@@ -1,50 +1,60 @@
 """What an explanation computes, checked before anything is computed."""
 
 import dataclasses
+from typing import Annotated
 
-from drone_rl.explain import tsne
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.schema import Real, Whole
+from drone_rl.utils.settings import Settings
 
 MIN_EPISODES = 30
 """Fewer flights than this tell next to nothing of others."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class ExplainSettings:
+class ExplainSettings(Settings):
     """What to compute.
 
     Raises:
         InputError: A value is out of range.
     """
 
-    frames: int = 600
+    frames: Annotated[int, Whole(1)] = 600
     """Frames that are analysed, spread evenly over the flights of the data set."""
-    data_episodes: int = MIN_EPISODES
+    data_episodes: Annotated[int, Whole(MIN_EPISODES)] = MIN_EPISODES
     """Whole flights in the data set, at least."""
-    episodes: int = 400
+    episodes: Annotated[int, Whole(1)] = 400
     """Episodes on which the verdict rests."""
-    good_share: float = 0.9
+    good_share: Annotated[float, Real(0.0, 1.0, is_above=True, is_below=True)] = 0.9
     """A good policy succeeds in more than this share of the oracle's episodes."""
     layer: str | None = None
     """Layer whose features are embedded; the last one before the logits by default."""
     grad_cam_layer: str | None = None
     """Layer that Grad-CAM looks at; the last convolution's nonlinearity by default."""
-    perplexity: float = 30.0
+    perplexity: Annotated[float, Real(1.0)] = 30.0
     """Of t-SNE."""
-    seed: int = 0
+    seed: Annotated[int, Whole(0)] = 0
     """Of everything that is drawn."""
 
-    def __post_init__(self) -> None:
+    def check(self) -> None:
         """Refuses what shows nothing."""
-        if self.data_episodes < MIN_EPISODES:
-            raise InputError(
-                f"data_episodes={self.data_episodes} shows too little; give {MIN_EPISODES} or more"
-            )
         if self.frames < self.data_episodes:
             raise InputError(
                 f"frames={self.frames} is less than one of each flight; give "
                 f"{self.data_episodes} (data_episodes) or more"
             )
-        if self.episodes < 1:
-            raise InputError(f"episodes={self.episodes} is out of range; give 1 or more")
-        tsne.check_perplexity(self.perplexity, self.frames)
+        check_perplexity(self.perplexity, self.frames)
+
+
+def check_perplexity(perplexity: float, count: int) -> None:
+    """Refuses a perplexity that so few points can't have.
+
+    Raises:
+        InputError: It is out of range.
+    """
+    largest = (count - 1) // 3
+    if not 1 <= perplexity <= largest:
+        raise InputError(
+            f"perplexity={perplexity:g} does not fit {count} points; give 1 to {largest} or "
+            "record more frames"
+        )

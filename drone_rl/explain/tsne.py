@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
 
+from drone_rl.explain.settings import check_perplexity
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.provenance import num_cores
 
@@ -95,20 +96,6 @@ def embed(originals: NDArray, *, perplexity: float = 30.0, seed: int = 0) -> Emb
     ).fit(_distinct(reduced, seed))
     points = np.array(model)
     return Embedding(points, faithfulness(centred, points), mean, components, model)
-
-
-def check_perplexity(perplexity: float, count: int) -> None:
-    """Refuses a perplexity that so few points can't have.
-
-    Raises:
-        InputError: It is out of range.
-    """
-    largest = (count - 1) // 3
-    if not 1 <= perplexity <= largest:
-        raise InputError(
-            f"perplexity={perplexity:g} does not fit {count} points; give 1 to {largest} or "
-            "record more frames"
-        )
 
 
 def faithfulness(originals: NDArray, points: NDArray, k: int = NEIGHBOURS) -> Faithfulness:

@@ -7,13 +7,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from drone_rl.settings.comparison import check_same_config
 from drone_rl.sweeps.runs import Run
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import read_json, refuse_links, write_atomically
 from drone_rl.utils.overrides import COMMAND, MOST_OVERRIDES, check_harmless
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.schema import Maybe, Plain, Record, Several, Text, Whole, as_mapping, shown
-from drone_rl.utils.settings import check_same_config
 
 FORMAT = "drone_rl sweep"
 MAY_CHANGE = ("resume", "logger", "paths", "trainer.checkpoint_interval_s")

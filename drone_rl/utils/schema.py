@@ -5,6 +5,7 @@ Each kind has one method, `read(value, where)`, that returns the value or refuse
 
 import dataclasses
 import math
+import sys
 from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
@@ -39,15 +40,13 @@ class Whole:
     """A whole number; neither true nor 3.0 is one."""
 
     low: int
-    high: int
+    high: float = math.inf
 
     def read(self, value: Any, where: str) -> int:
         """See `Kind`."""
         if type(value) is not int or not self.low <= value <= self.high:
-            raise InputError(
-                f"{where}={shown(value)} is out of range; give a whole number from {self.low} to "
-                f"{self.high}"
-            )
+            span = f"of {self.low} or more" if self.high == math.inf else _span(self.low, self.high)
+            raise InputError(f"{where}={shown(value)} is out of range; give a whole number {span}")
         return value
 
 
@@ -56,16 +55,70 @@ class Real:
     """A finite number."""
 
     low: float
-    high: float
+    high: float = math.inf
+    is_above: bool = False
+    """Whether it must be greater than `low`, not only as great."""
+    is_below: bool = False
+    """Whether it must be less than `high`."""
 
     def read(self, value: Any, where: str) -> float:
         """See `Kind`."""
-        if type(value) not in (int, float) or not self.low <= value <= self.high:
+        if type(value) not in (int, float) or not self._holds(value):
             raise InputError(
-                f"{where}={shown(value)} is out of range; give a number from {self.low:g} to "
-                f"{self.high:g}"
+                f"{where}={shown(value)} is out of range; give a number {self._range()}"
             )
         return float(value)
+
+    def _holds(self, value: float) -> bool:
+        if not abs(value) <= sys.float_info.max:
+            return False
+        above = value > self.low if self.is_above else value >= self.low
+        return above and (value < self.high if self.is_below else value <= self.high)
+
+    def _range(self) -> str:
+        low, high = f"{self.low:g}", f"{self.high:g}"
+        if self.high == math.inf:
+            return f"above {low}" if self.is_above else f"of {low} or more"
+        if self.is_above:
+            return f"above {low} and below {high}" if self.is_below else f"above {low} up to {high}"
+        return f"from {low} to below {high}" if self.is_below else _span(low, high)
+
+
+@dataclasses.dataclass(frozen=True)
+class Flag:
+    """True or false."""
+
+    def read(self, value: Any, where: str) -> bool:
+        """See `Kind`."""
+        if type(value) is not bool:
+            raise InputError(f"{where}={shown(value)} is neither true nor false; give one of them")
+        return value
+
+
+@dataclasses.dataclass(frozen=True)
+class OneOf:
+    """One of some texts."""
+
+    names: tuple[str, ...]
+
+    def read(self, value: Any, where: str) -> str:
+        """See `Kind`."""
+        if not isinstance(value, str) or value not in self.names:
+            raise InputError(f"{where}={shown(value)} is unknown; give {', '.join(self.names)}")
+        return value
+
+
+@dataclasses.dataclass(frozen=True)
+class Instance:
+    """An object of a class."""
+
+    of: type
+
+    def read(self, value: Any, where: str) -> Any:
+        """See `Kind`."""
+        if not isinstance(value, self.of):
+            raise InputError(f"{where}={shown(value)} is no {self.of.__name__}; give one")
+        return value
 
 
 @dataclasses.dataclass(frozen=True)
@@ -111,6 +164,25 @@ class Several:
                 f"{self.most} values"
             )
         return tuple(self.kind.read(item, f"{where}[{i}]") for i, item in enumerate(value))
+
+
+@dataclasses.dataclass(frozen=True)
+class Listed:
+    """One text or a list of them, as a tuple."""
+
+    what: str
+    """What each names."""
+    most: int = 1000
+
+    def read(self, value: Any, where: str) -> tuple[str, ...]:
+        """See `Kind`."""
+        items = [value] if isinstance(value, str) else value
+        is_list = isinstance(items, list | tuple) and 0 < len(items) <= self.most
+        if not is_list or len({*map(str, items)}) < len(items):
+            raise InputError(
+                f"{where}={shown(value)} must name a {self.what}, or a list of them, each once"
+            )
+        return tuple(Text().read(item, where) for item in items)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -179,6 +251,10 @@ def shown(value: Any) -> str:
         return f"({type(value).__name__})"
     text = repr(value[:80] if isinstance(value, str) else value)
     return text if len(text) <= 80 else f"{text[:77]}..."
+
+
+def _span(low: object, high: object) -> str:
+    return f"from {low} to {high}"
 
 
 def _inside(item: Any, where: str) -> Sequence[Any]:

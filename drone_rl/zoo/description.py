@@ -18,7 +18,8 @@ from drone_rl.sim.actions import Move
 from drone_rl.sim.settings import CameraSettings, TaskSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Record, Several, as_mapping, shown
-from drone_rl.zoo.registry import CAMERA, NETWORKS, TASK, TRANSFORMS, Part, Picture, find_part
+from drone_rl.utils.settings import plain
+from drone_rl.zoo.registry import NETWORKS, TRANSFORMS, Part, Picture, find_part
 
 FORMAT = "drone_rl policy"
 FORMAT_VERSION = 2
@@ -41,7 +42,7 @@ class Choice:
 
     def as_dict(self) -> dict[str, Any]:
         """As in files."""
-        return {"name": self.name, **{k: _listed(v) for k, v in self.values.items()}}
+        return {"name": self.name, **{k: plain(v) for k, v in self.values.items()}}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -91,8 +92,8 @@ class PolicyDescription:
         return {
             "format": FORMAT,
             "format_version": FORMAT_VERSION,
-            "task": {k: _listed(v) for k, v in dataclasses.asdict(self.task).items()},
-            "camera": dataclasses.asdict(self.camera),
+            "task": self.task.values(),
+            "camera": self.camera.values(),
             "transforms": [choice.as_dict() for choice in self.transforms],
             "network": self.network.as_dict(),
         }
@@ -159,8 +160,8 @@ def parse(data: Any) -> PolicyDescription:
         data["transforms"], "transforms"
     )
     return PolicyDescription(
-        TaskSettings(**TASK.read(data["task"], "task")),
-        CameraSettings(**CAMERA.read(data["camera"], "camera")),
+        TaskSettings.read(data["task"], "task"),
+        CameraSettings.read(data["camera"], "camera"),
         chosen,
         _ChoiceOf(NETWORKS).read(data["network"], "network"),
     )
@@ -178,8 +179,3 @@ class _ChoiceOf:
         name = given.pop("name", None)
         parameters: Record = find_part(self.parts, name, f"{where}.name").parameters
         return Choice(str(name), parameters.read(given, where))
-
-
-def _listed(value: Any) -> Any:
-    """Tuples as lists, as JSON has them."""
-    return list(value) if isinstance(value, tuple) else value

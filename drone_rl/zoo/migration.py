@@ -29,13 +29,15 @@ def describe(config: Any) -> PolicyDescription:
     """The policy that a training's settings ask for.
 
     Args:
-        config: Plain settings with "task", "camera", "transforms" and "policy".
+        config: Plain settings with "task", "camera", "transforms" and "network", which until
+            version 0.1 was called "policy".
 
     Raises:
         InputError: A part isn't registered, or a value is out of bounds.
     """
     config = as_mapping(config, "config")
-    for key in ("task", "camera", "transforms", "policy"):
+    network = "policy" if "policy" in config else "network"
+    for key in ("task", "camera", "transforms", network):
         if key not in config:
             raise InputError(f"config.{key} is missing; use a file that drone-rl train wrote")
     transforms = as_mapping(config["transforms"], "transforms")
@@ -49,7 +51,7 @@ def describe(config: Any) -> PolicyDescription:
                 for key, value in transforms.items()
                 if value is not None
             ],
-            "network": _choice(NETWORKS, config["policy"], "policy"),
+            "network": _choice(NETWORKS, config[network], network),
         }
     )
 

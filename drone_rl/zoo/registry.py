@@ -14,36 +14,24 @@ from typing import Any
 from torch import nn
 from torchrl.envs import CatFrames, RewardSum, StepCounter, Transform
 
-from drone_rl.envs import CropRows, GrayPixels, Resize, StandardizePixels
+from drone_rl import envs
 from drone_rl.policies import MLP, OriginalCNN, SmallCNN
+from drone_rl.settings.networks import Mlp, OriginalCnn, SmallCnn
+from drone_rl.settings.transforms import (
+    Crop,
+    EpisodeReward,
+    Gray,
+    Resize,
+    Stack,
+    Standardize,
+    StepCount,
+)
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import Kind, Real, Record, Several, Whole, shown
+from drone_rl.utils.schema import Kind, Record, shown
+from drone_rl.utils.settings import kinds_of
 
 ENTRY_POINTS = "drone_rl.policies"
 """Group of the modules that register parts of their own."""
-_LENGTH, _WIDTHS = Real(0.001, 10_000.0), Whole(1, 4096)
-TASK = Record(
-    {
-        "num_cubes": Whole(1, 100),
-        "first_distance": _LENGTH,
-        "spacing": _LENGTH,
-        "lateral_bound": Real(0.0, 10_000.0),
-        "vertical_bound": Real(0.0, 10_000.0),
-        "cube_size": _LENGTH,
-        "cube_color": Several(Real(0.0, 1.0), 3, 3),
-        "drone_size": _LENGTH,
-        "altitude": _LENGTH,
-        "step_length": _LENGTH,
-        "step_limit": Whole(1, 100_000),
-        "front_margin": _LENGTH,
-        "side_margin": _LENGTH,
-    }
-)
-"""Of `TaskSettings`, which checks besides whether the values go together."""
-CAMERA = Record(
-    {"width": Whole(1, 1024), "height": Whole(1, 1024), "horizontal_fov": Real(1.0, 170.0)}
-)
-"""Of `CameraSettings`."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -170,72 +158,52 @@ def _standardize(picture: Picture, _: Mapping[str, Any]) -> Picture:
 
 
 register_network(
-    "small_cnn",
-    SmallCNN,
-    {
-        "patch": Whole(1, 64),
-        "channels": Several(Whole(1, 512), 1, 8),
-        "hidden": Several(_WIDTHS, 0, 8),
-    },
-    *("drone_rl.policies.SmallCNN", "drone_rl.policies.cnn.SmallCNN"),
+    "small_cnn", SmallCNN, kinds_of(SmallCnn), SmallCnn.target, "drone_rl.policies.cnn.SmallCNN"
 )
 register_network(
     "original_cnn",
     OriginalCNN,
-    {"channels": Several(Whole(1, 512), 1, 8), "hidden": Several(_WIDTHS, 0, 8)},
-    *("drone_rl.policies.OriginalCNN", "drone_rl.policies.cnn.OriginalCNN"),
+    kinds_of(OriginalCnn),
+    *(OriginalCnn.target, "drone_rl.policies.cnn.OriginalCNN"),
 )
-register_network(
-    "mlp",
-    MLP,
-    {"hidden": Several(_WIDTHS, 0, 8)},
-    *("drone_rl.policies.MLP", "drone_rl.policies.mlp.MLP"),
-)
+register_network("mlp", MLP, kinds_of(Mlp), Mlp.target, "drone_rl.policies.mlp.MLP")
 register_transform(
     "gray",
-    GrayPixels,
-    {},
-    *("drone_rl.envs.transforms.GrayPixels", "drone_rl.envs.GrayPixels"),
+    envs.GrayPixels,
+    kinds_of(Gray),
+    *(Gray.target, "drone_rl.envs.GrayPixels"),
     change=_gray,
 )
 register_transform(
     "standardize",
-    StandardizePixels,
-    {"mean": Real(-1000.0, 1000.0), "std": Real(1e-6, 1000.0)},
-    *("drone_rl.envs.transforms.StandardizePixels", "drone_rl.envs.StandardizePixels"),
+    envs.StandardizePixels,
+    kinds_of(Standardize),
+    *(Standardize.target, "drone_rl.envs.StandardizePixels"),
     change=_standardize,
 )
 register_transform(
-    "crop",
-    CropRows,
-    {"top": Whole(0, 1023), "bottom": Whole(1, 1024)},
-    *("drone_rl.envs.transforms.CropRows", "drone_rl.envs.CropRows"),
-    change=_crop,
+    "crop", envs.CropRows, kinds_of(Crop), Crop.target, "drone_rl.envs.CropRows", change=_crop
 )
 register_transform(
-    "resize",
-    Resize,
-    {"height": Whole(1, 1024), "width": Whole(1, 1024)},
-    *("drone_rl.envs.transforms.Resize", "drone_rl.envs.Resize"),
-    change=_resize,
+    "resize", envs.Resize, kinds_of(Resize), Resize.target, "drone_rl.envs.Resize", change=_resize
 )
 register_transform(
     "stack",
     CatFrames,
-    {"N": Whole(1, 16)},
-    *("torchrl.envs.CatFrames", "torchrl.envs.transforms.CatFrames"),
+    kinds_of(Stack),
+    *(Stack.target, "torchrl.envs.transforms.CatFrames"),
     fixed={"dim": -3, "in_keys": ["pixels"]},
     change=_stack,
 )
 register_transform(
     "episode_reward",
     RewardSum,
-    {},
-    *("torchrl.envs.RewardSum", "torchrl.envs.transforms.RewardSum"),
+    kinds_of(EpisodeReward),
+    *(EpisodeReward.target, "torchrl.envs.transforms.RewardSum"),
 )
 register_transform(
     "step_count",
     StepCounter,
-    {},
-    *("torchrl.envs.StepCounter", "torchrl.envs.transforms.StepCounter"),
+    kinds_of(StepCount),
+    *(StepCount.target, "torchrl.envs.transforms.StepCounter"),
 )

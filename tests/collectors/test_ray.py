@@ -4,16 +4,18 @@ import logging
 
 import pytest
 import torch
-from hydra import compose, initialize_config_dir
 
-from drone_rl.cli.build import build_collector
-from drone_rl.cli.main import conf_dir
-from drone_rl.configs import register_configs
+from drone_rl.api.collecting import build_collector
+from drone_rl.settings.collecting import Ray, Threads
+from drone_rl.settings.training import TrainSettings
+from drone_rl.sim.settings import TaskSettings
 from drone_rl.training.metrics import episode_rewards
 from drone_rl.utils.errors import InputError
 
 pytestmark = pytest.mark.slow
 ray = pytest.importorskip("ray", reason="pip install 'drone-rl[ray]'")
+
+TASK = TaskSettings(num_cubes=1, first_distance=8.0, step_limit=60)
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -23,23 +25,20 @@ def cluster():
     ray.shutdown()
 
 
-def build(*overrides):
-    register_configs()
-    with initialize_config_dir(str(conf_dir()), version_base="1.3"):
-        settings = ["experiment=smoke", "logger=csv", "collector.num_envs=6", *overrides]
-        return build_collector(compose("train", settings))[0]
+def build(collector):
+    return build_collector(TrainSettings(task=TASK, collector=collector)).collector
 
 
 @pytest.fixture
 def on_ray():
-    collector = build("collector=ray")
+    collector = build(Ray(num_envs=6))
     yield collector
     collector.shutdown()
 
 
 @pytest.fixture
 def on_threads():
-    collector = build("collector.num_threads=2")
+    collector = build(Threads(num_envs=6))
     yield collector
     collector.shutdown()
 
@@ -72,4 +71,4 @@ def test_same_complete_episodes_as_on_threads_and_a_killed_worker_changes_nothin
 
 def test_more_workers_than_cores():
     with pytest.raises(InputError, match=r"num_threads=4.*more than the cluster's 2 cores"):
-        build("collector=ray", "collector.num_threads=4")
+        build(Ray(num_envs=6, num_threads=4))

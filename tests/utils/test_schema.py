@@ -3,7 +3,20 @@
 import pytest
 
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import Maybe, Plain, Real, Record, Several, Text, Whole, shown
+from drone_rl.utils.schema import (
+    Flag,
+    Instance,
+    Listed,
+    Maybe,
+    OneOf,
+    Plain,
+    Real,
+    Record,
+    Several,
+    Text,
+    Whole,
+    shown,
+)
 
 
 @pytest.mark.parametrize(
@@ -13,6 +26,16 @@ from drone_rl.utils.schema import Maybe, Plain, Real, Record, Several, Text, Who
         (Whole(1, 3), 3),
         (Real(-1, 2), 2.0),
         (Real(-1, 2), -1.0),
+        (Whole(1), 10**30),
+        (Real(0), 1e300),
+        (Real(0, 1, is_above=True), 1.0),
+        (Real(0, 1, is_above=True), 1e-300),
+        (Real(0, 1, is_below=True), 0.0),
+        (Flag(), True),
+        (Flag(), False),
+        (OneOf(("a", "b")), "b"),
+        (Instance(bytes), b"x"),
+        (Listed("policy"), ("a", "b")),
         (Text(3), "abc"),
         (Maybe(Whole(1, 3)), None),
         (Maybe(Whole(1, 3)), 2),
@@ -39,6 +62,24 @@ def test_what_is_taken(kind, value):
         (Real(-1, 2), float("nan"), "x=nan"),
         (Real(-1, float("1e9")), 10**400, "x=1000"),
         (Real(-1, 2), False, "x=False"),
+        (Whole(1), 0, "give a whole number of 1 or more"),
+        (Real(0), -1e-9, "give a number of 0 or more"),
+        (Real(0), float("inf"), "x=inf"),
+        (Real(0), 10**400, "x=1000"),
+        (Real(0, is_above=True), 0, "give a number above 0$"),
+        (Real(0, 1, is_above=True), 0.0, "above 0 up to 1"),
+        (Real(0, 1, is_above=True, is_below=True), 1, "above 0 and below 1"),
+        (Real(0, 1, is_below=True), 1, "from 0 to below 1"),
+        (Flag(), 1, "x=1 is neither true nor false"),
+        (Flag(), "true", "x='true'"),
+        (OneOf(("a", "b")), "c", "x='c' is unknown; give a, b"),
+        (OneOf(("1", "b")), 1, "x=1 is unknown"),
+        (Instance(bytes), "x", "x='x' is no bytes"),
+        (Listed("policy"), [], "must name a policy"),
+        (Listed("policy"), ["a", "a"], "each once"),
+        (Listed("policy", most=1), ["a", "b"], "or a list"),
+        (Listed("policy"), 3, "x=3 must name"),
+        (Listed("policy"), [3], "x=3 is no text"),
         (Text(3), "abcd", "at most 3"),
         (Text(9), "a\nb", "printable"),
         (Text(9), "a\x1b[0m", "printable"),
@@ -77,6 +118,10 @@ def test_a_few_lists_that_hold_each_other_a_thousand_times_cost_nothing():
     endless.append(endless)
     with pytest.raises(InputError, match="nested"):
         Plain().read(endless, "x")
+
+
+def test_one_text_is_a_list_of_it():
+    assert Listed("policy").read("good", "x") == ("good",)
 
 
 def test_numbers_become_floats_and_lists_tuples():

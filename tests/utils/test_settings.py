@@ -1,13 +1,94 @@
+"""Settings are checked wherever they come from, and a message begins with their name."""
+
+import dataclasses
+from typing import Annotated
+
 import pytest
 
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.settings import check_same_config
+from drone_rl.utils.schema import Real, Several, Whole
+from drone_rl.utils.settings import Settings, below, kinds_of, plain, snake_case, types_of
 
 
-def test_changed_config_is_named_with_both_values():
-    saved = {"seed": 0, "optimiser": {"lr": 0.1}, "trainer": {"total_frames": 10}}
-    check_same_config(saved, {**saved, "trainer": {"total_frames": 99}}, ["trainer.total_frames"])
-    with pytest.raises(InputError, match=r"optimiser.lr=0.2: .* optimiser.lr=0.1"):
-        check_same_config(saved, {**saved, "optimiser": {"lr": 0.2}}, ["trainer.total_frames"])
-    with pytest.raises(InputError, match="extra=1"):
-        check_same_config(saved, {**saved, "extra": 1}, [])
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Inner(Settings):
+    x: Annotated[int, Whole(0, 9)] = 1
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Outer(Settings):
+    count: Annotated[int, Whole(1, 3)] = 2
+    size: Annotated[float, Real(0.0, 1.0)] | None = None
+    widths: Annotated[tuple[int, ...], Several(Whole(1, 9), 0, 2)] = (4,)
+    is_on: bool = False
+    name: str = "a"
+    inner: Inner = Inner()
+
+    def check(self):
+        if self.is_on and self.size is None:
+            raise InputError("size=None needs a value; give one")
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class More(Outer):
+    extra: str = "z"
+
+
+def test_values_take_their_types():
+    made = Outer(size=1, widths=[1, 2])
+    assert (made.size, type(made.size), made.widths) == (1.0, float, (1, 2))
+    assert made.values() == {
+        **{"count": 2, "size": 1.0, "widths": [1, 2]},
+        **{"is_on": False, "name": "a", "inner": {"x": 1}},
+    }
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"count": 0}, "count=0 is out of range"),
+        ({"count": "2"}, "count='2' is out of range"),
+        ({"size": "x"}, "size='x' is out of range"),
+        ({"widths": [1, 2, 3]}, r"widths=\(list\) is out of range"),
+        ({"is_on": 1}, "is_on=1 is neither true nor false"),
+        ({"name": 5}, "name=5 is no text"),
+        ({"inner": 3}, "inner=3 is no Inner"),
+        ({"is_on": True}, "size=None needs a value"),
+        ({"unheard": 1}, "unheard is unknown; there are: count, size"),
+    ],
+)
+def test_mistakes_begin_with_the_name(change, message):
+    with pytest.raises(InputError, match=f"^{message}"):
+        Outer().replace(**change)
+
+
+def test_settings_read_from_a_file_are_complete():
+    whole = {"x": 3}
+    assert Inner.read(whole, "inner") == Inner(x=3)
+    for data in ({}, {"x": 3, "y": 1}, {"x": 10}, [1]):
+        with pytest.raises(InputError, match=r"^inner"):
+            Inner.read(data, "inner")
+
+
+def test_what_was_added_is_left_out_where_it_is_not_known():
+    assert More(count=3, extra="y").narrowed(Outer) == Outer(count=3)
+    assert type(More().narrowed(Outer)) is Outer
+
+
+def test_the_place_is_put_before_the_name():
+    with pytest.raises(InputError, match=r"^a\.b\.x=10 "), below("a"), below("b"):
+        Inner(x=10)
+
+
+def test_kinds_and_types_of_each_field():
+    assert kinds_of(Inner) == {"x": Whole(0, 9)}
+    assert types_of(Outer) == {
+        **{"count": int, "size": float | None, "widths": tuple[int, ...]},
+        **{"is_on": bool, "name": str, "inner": Inner},
+    }
+
+
+def test_names_of_files_and_plain_values():
+    assert [snake_case(c) for c in (Inner, Outer)] == ["inner", "outer"]
+    assert snake_case(type("SmallCnn", (), {})) == "small_cnn"
+    assert plain({"a": (1, (2,)), "b": Inner()}) == {"a": [1, [2]], "b": {"x": 1}}

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from drone_rl.cli.export import _origin
+from drone_rl.api.exporting import origin_of
 from drone_rl.sweeps import Run, Sweep
 from drone_rl.verdicts.rule import Rule
 
@@ -45,23 +45,23 @@ def judged(checkpoint, **verdict):
 
 def test_a_run_of_a_sweep_names_the_run_and_not_the_sweep(checkpoint):
     judged(checkpoint)
-    command, chosen = _origin(checkpoint, {})
+    command, chosen = origin_of(checkpoint, {})
     assert command == "drone-rl train seed=1 sweep=seeds hydra.mode=RUN"
     assert chosen == {"runs": 3, "episodes": 200}
 
 
 def test_a_run_that_no_present_rule_has_judged_was_not_chosen_by_episodes(checkpoint):
-    assert _origin(checkpoint, {})[1] == {"runs": 3, "episodes": None}
+    assert origin_of(checkpoint, {})[1] == {"runs": 3, "episodes": None}
     judged(checkpoint, rule="of yore")
-    assert _origin(checkpoint, {})[1] == {"runs": 3, "episodes": None}
+    assert origin_of(checkpoint, {})[1] == {"runs": 3, "episodes": None}
 
 
 def test_a_run_alone_is_named_by_its_own_settings(checkpoint):
     (checkpoint.parents[2] / "sweep.json").unlink()
-    assert _origin(checkpoint, {}) == ("drone-rl train seed=1", None)
+    assert origin_of(checkpoint, {}) == ("drone-rl train seed=1", None)
 
 
 def test_what_an_exported_file_says_of_its_origin_goes_on(checkpoint):
     said = {"command": "drone-rl train seed=9", "chosen": {"runs": 7, "episodes": 20}}
-    found = _origin(checkpoint.with_suffix(".safetensors"), said)
+    found = origin_of(checkpoint.with_suffix(".safetensors"), said)
     assert found == (said["command"], said["chosen"])

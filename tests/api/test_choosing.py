@@ -5,8 +5,8 @@ import shutil
 
 import pytest
 
-from drone_rl.cli import judging
-from drone_rl.cli.judging import judge_run, judge_to_choose
+from drone_rl.api.choosing import judge_run, judge_to_choose
+from drone_rl.api.policy import Policy
 from drone_rl.sweeps import Run, Sweep
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import Stream
@@ -32,15 +32,14 @@ def sweep(trained):
 def test_the_worlds_are_those_to_choose_by(trained, monkeypatch):
     asked = {}
 
-    def note(*args, **kwargs):
-        asked.update(kwargs)
+    def note(self, num_envs, **kwargs):
+        asked.update(kwargs, num_envs=num_envs)
         raise InputError("enough")
 
-    monkeypatch.setattr(judging, "load_trained", note)
+    monkeypatch.setattr(Policy, "make_env", note)
     with pytest.raises(InputError, match="enough"):
         judge_to_choose(trained / "checkpoints" / "last.pt", 5, "cpu")
-    assert asked["stream"] is Stream.CHOICE
-    assert (asked["seed"], asked["task"]) == (0, {})
+    assert asked == {"stream": Stream.CHOICE, "device": "cpu", "num_envs": 5}
 
 
 def test_a_run_keeps_its_verdict_beside_its_result(trained):

@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from drone_rl.cli.build import load_trained
+from drone_rl.api.policy import load_policy
 from drone_rl.sweeps import read_result
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock, write_atomically
@@ -26,12 +26,11 @@ def judge_to_choose(path: Path, episodes: int, device: str) -> tuple[dict[str, A
     Raises:
         InputError: The checkpoint is unusable.
     """
-    worlds = min(episodes, 250)
-    env, actor, state = load_trained(
-        path, worlds, task={}, seed=0, device=device, stream=Stream.CHOICE
-    )
+    policy = load_policy(path)
+    env = policy.make_env(min(episodes, 250), stream=Stream.CHOICE, device=device)
     try:
-        return judge_policy(env, actor, episodes).as_dict(), state["progress"]
+        actor = policy.make_actor(env, stream=Stream.CHOICE)
+        return judge_policy(env, actor, episodes).as_dict(), policy.state["progress"]
     finally:
         env.close()
 

@@ -1,0 +1,111 @@
+"""A training's worlds shared out to workers, with the network that all of them fly by."""
+
+import functools
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import torch
+
+from drone_rl.collectors import EpisodeCollector, ThreadedCollector
+from drone_rl.policies import PolicyNetwork, make_actor
+from drone_rl.settings.collecting import Ray
+from drone_rl.settings.configuration import as_config, from_config
+from drone_rl.settings.training import TrainSettings
+from drone_rl.settings.variant import locate
+from drone_rl.utils.seeding import Stream, torch_generator
+from drone_rl.zoo import describe
+
+if TYPE_CHECKING:
+    from drone_rl.collectors.ray import RayEpisodeCollector
+
+
+class Collecting(NamedTuple):
+    """What a training collects with."""
+
+    collector: "ThreadedCollector | RayEpisodeCollector"
+    network: PolicyNetwork
+    generators: dict[str, torch.Generator]
+    """Random streams of this process, by name."""
+
+
+def build_collector(settings: TrainSettings) -> Collecting:
+    """The collector that the settings ask for, over worlds that fly by an untrained network.
+
+    Raises:
+        InputError: There is no such device, or an extra isn't installed.
+    """
+    return locate(settings.collector.target)(settings)
+
+
+def threaded_collector(settings: TrainSettings) -> Collecting:
+    """`Threads`: the workers are threads of this process."""
+    shares = _shares(settings, is_one=settings.device.startswith("cuda"))
+    network, collectors, generators = None, [], {}
+    for i in range(len(shares)):
+        collector, network, actions = build_share(settings, shares, i, network)
+        collectors.append(collector)
+        generators[f"actions_{i}"] = actions
+    assert network is not None  # there is at least one share
+    return Collecting(ThreadedCollector(collectors), network, generators)
+
+
+def ray_collector(settings: TrainSettings) -> Collecting:
+    """`Ray`: the workers are processes of a Ray cluster."""
+    from drone_rl.collectors.ray import RayEpisodeCollector  # slow to import, seldom needed
+
+    asked = settings.collector
+    assert isinstance(asked, Ray)
+    shares = _shares(settings)
+    local, network, _ = build_share(settings, [1], 0)
+    local.shutdown()
+    config = as_config(settings)
+    makers = [functools.partial(_remote_share, config, shares, i) for i in range(len(shares))]
+    collector = RayEpisodeCollector(
+        makers,
+        local.actor,
+        network,
+        address=asked.address,
+        num_cpus=asked.num_cpus,
+        max_lost_workers=asked.max_lost_workers,
+        device=settings.device,
+    )
+    return Collecting(collector, network, {})
+
+
+def build_share(
+    settings: TrainSettings, shares: list[int], number: int, network: PolicyNetwork | None = None
+) -> tuple[EpisodeCollector, PolicyNetwork, torch.Generator]:
+    """One worker's worlds, with the network that all share, and the stream of its actions.
+
+    Args:
+        settings: The training's.
+        shares: Worlds of each worker.
+        number: Of this worker.
+        network: That of the other workers; None makes it.
+    """
+    description, seed = describe(as_config(settings)), settings.seed
+    env = description.build_env(
+        shares[number],
+        seed=seed,
+        device=settings.device,
+        first_world=sum(shares[:number]),
+        num_shards=1,
+    )
+    if network is None:
+        network = description.build_network(torch_generator(seed, Stream.POLICY_INIT))
+        network = network.to(env.device)
+    actions = torch_generator(seed, Stream.ACTIONS, number=number, device=env.device)
+    return EpisodeCollector(env, make_actor(network, env.action_spec, actions)), network, actions
+
+
+def _remote_share(
+    config: dict[str, Any], shares: list[int], number: int
+) -> tuple[EpisodeCollector, PolicyNetwork, torch.Generator]:
+    """`build_share` from what can be sent."""
+    return build_share(from_config(TrainSettings, config), shares, number)
+
+
+def _shares(settings: TrainSettings, is_one: bool = False) -> list[int]:
+    """Worlds of each worker."""
+    worlds = settings.collector.num_envs
+    workers = 1 if is_one else min(worlds, settings.collector.num_threads)
+    return [worlds // workers + (i < worlds % workers) for i in range(workers)]

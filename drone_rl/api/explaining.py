@@ -1,0 +1,125 @@
+"""Explanations of policies, side by side in one report."""
+
+import dataclasses
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from drone_rl.api.policy import Policy, load_policy
+from drone_rl.api.progress import Bar, Progress
+from drone_rl.api.showing import page
+from drone_rl.explain.explanation import explain_policy
+from drone_rl.explain.settings import ExplainSettings
+from drone_rl.report import write_report
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.files import to_file_name
+from drone_rl.utils.provenance import provenance
+
+
+@dataclasses.dataclass(frozen=True)
+class Explanations:
+    """What policies see, whether to trust them, and the report that shows it."""
+
+    folder: Path
+    """Holds a folder for each policy and the report."""
+    report: Path
+    """One HTML file that needs nothing else."""
+    numbers: dict[str, dict[str, Any]]
+    """As in `explanation.json`, by the names that were given."""
+
+    def __str__(self) -> str:
+        """A line for each verdict."""
+        lines = []
+        for name, numbers in self.numbers.items():
+            verdict = numbers["verdict"]
+            certainty = "" if verdict["certain"] else " (not certain)"
+            lines.append(f"{name}: {verdict['kind']}{certainty}. {verdict['sentence']}")
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        return page(self.report.read_text(encoding="utf-8"))
+
+
+def explain(
+    policies: str | Path | Policy | Sequence[str | Path | Policy],
+    settings: ExplainSettings | None = None,
+    *,
+    folder: str | Path = "outputs/explain/notebook",
+    num_envs: int = 128,
+    progress: Progress | None = None,
+    **changes: Any,
+) -> Explanations:
+    """Shows what policies see, and whether to trust them.
+
+    Args:
+        policies: One or several: policies, or what `load_policy` takes.
+        settings: What to compute.
+        folder: Where explanations and report go.
+        num_envs: Worlds in one batch; bounds memory.
+        progress: Told of what is being done; a bar by default.
+        changes: Settings to change, as in `explain("good", frames=100)`.
+
+    Raises:
+        InputError: A policy or a setting is unusable.
+    """
+    settings = (settings or ExplainSettings()).replace(**changes)
+    if num_envs < 1:
+        raise InputError(f"num_envs={num_envs} is out of range; give 1 or more")
+    chosen = _named(policies)
+    folder, progress = Path(folder), progress or Bar()
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)  # the same file on every machine; pictures this small gain nothing
+    try:
+        folders = {n: folder / f"{i}_{to_file_name(n)}" for i, n in enumerate(chosen)}
+        numbers = {
+            name: _explain(policy, settings, folders[name], num_envs, progress)
+            for name, policy in chosen.items()
+        }
+    finally:
+        torch.set_num_threads(threads)
+    progress("report")
+    report = write_report(list(folders.values()), folder)
+    progress("explained", 1, 1)
+    return Explanations(folder, report, numbers)
+
+
+def _named(policies: str | Path | Policy | Sequence[str | Path | Policy]) -> dict[str, Policy]:
+    """The policies by their names or, where some share one, by their files."""
+    several = [policies] if isinstance(policies, str | Path | Policy) else list(policies)
+    loaded = [p if isinstance(p, Policy) else load_policy(p) for p in several]
+    names = [policy.name for policy in loaded]
+    if len(set(names)) < len(names):
+        names = [str(policy.path) for policy in loaded]
+    if not names or len(set(names)) < len(names):
+        raise InputError(f"policy={names} must name one or more policies, each once")
+    return dict(zip(names, loaded, strict=True))
+
+
+def _explain(
+    policy: Policy, settings: ExplainSettings, folder: Path, num_envs: int, progress: Progress
+) -> dict[str, Any]:
+    env = policy.make_env(num_envs, seed=settings.seed)
+    origin = {
+        "policy": str(policy.path),
+        "trained": {
+            "description": policy.state["description"],
+            "progress": policy.state["progress"],
+            "provenance": policy.state["provenance"],
+            "command": policy.state.get("command"),
+        },
+        **provenance(),
+    }
+    try:
+        return explain_policy(
+            env,
+            policy.make_network(),
+            folder,
+            settings,
+            name=policy.name,
+            provenance=origin,
+            tell=lambda title: progress(f"{policy.name}: {title}"),
+        )
+    finally:
+        env.close()

@@ -1,0 +1,213 @@
+"""Evaluations and verdicts, as objects that show themselves."""
+
+import dataclasses
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from tensordict.nn import TensorDictModuleBase
+from torchrl.envs import EnvBase
+
+from drone_rl.api.policy import Policy, load_policy
+from drone_rl.api.progress import Bar, Progress
+from drone_rl.api.showing import paragraph, table
+from drone_rl.envs import DroneEnv
+from drone_rl.evaluation import run_episodes, summarise
+from drone_rl.settings.changes import Changes
+from drone_rl.settings.judging import EvaluateSettings, FlightSettings, JudgeSettings
+from drone_rl.sim.settings import TaskSettings
+from drone_rl.utils.provenance import provenance
+from drone_rl.utils.seeding import Stream, torch_generator
+from drone_rl.verdicts.judge import Verdict, judge_policy
+from drone_rl.verdicts.luck import BASELINES, fly_baselines, make_baseline
+from drone_rl.verdicts.rule import Rule
+
+
+@dataclasses.dataclass(frozen=True)
+class Evaluation:
+    """How good a policy is, and luck and the oracle beside it, in the same worlds."""
+
+    policy: Policy
+    settings: EvaluateSettings
+    flown: dict[str, dict[str, Any]]
+    """Figures of all that was flown, by name, see `drone_rl.evaluation.summarise`: "greedy",
+    "sampled" and the baselines."""
+
+    @property
+    def success(self) -> float:
+        """Share of greedy episodes in which all was collected."""
+        return self.flown["greedy"]["success"]["share"]
+
+    def rows(self) -> list[list[str]]:
+        """The figures side by side, as texts: names, then a row for each figure."""
+        flown = self.flown.values()
+        rows = [["", *self.flown]]
+        rows.append(["all cubes", *(_interval(f["success"], "share") for f in flown)])
+        rows.append(["mean cubes", *(f"{f['mean_cubes']:.3f}" for f in flown)])
+        for name in self.flown["greedy"]["shares"]:
+            cells = (_interval(f["shares"][name], "mean") for f in flown)
+            rows.append([f"share {name}", *cells])
+        rows.append(["never reached", *(f"{f['never_reached']['mean']:.3f}" for f in flown)])
+        for reason in self.flown["greedy"]["ends"]:
+            cells = (str(f["ends"][reason]["successes"]) for f in flown)
+            rows.append([f"ended: {reason.replace('_', ' ')}", *cells])
+        rows.append(["mean length", *(f"{f['mean_length']:.1f}" for f in flown)])
+        rows.append(["episodes", *(str(f["episodes"]) for f in flown)])
+        return rows
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values, as in `evaluation.json`."""
+        return {
+            "policy": str(self.policy.path),
+            "seed": self.settings.seed,
+            **self.flown,
+            **provenance(),
+            "trained": self.policy.state["progress"],
+        }
+
+    def __str__(self) -> str:
+        """The table for a terminal."""
+        lines = ((name, "".join(f"{v:>18}" for v in values)) for name, *values in self.rows())
+        return "\n".join(f"{name:21}{values}" for name, values in lines)
+
+    def _repr_html_(self) -> str:
+        head, *rows = self.rows()
+        return table(head, rows)
+
+
+@dataclasses.dataclass(frozen=True)
+class Judgement:
+    """A verdict, of whom, and by what."""
+
+    name: str
+    settings: JudgeSettings
+    verdict: Verdict
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values, as in `verdict.json`."""
+        return {"policy": self.name, **self.verdict.as_dict(), **provenance()}
+
+    def save(self, path: Path) -> None:
+        """Writes `verdict.json`."""
+        path.write_text(json.dumps(self.as_dict(), indent=2))
+
+    def __str__(self) -> str:
+        """One line."""
+        certainty = "" if self.verdict.certain else " (not certain)"
+        return f"{self.verdict.kind.value}{certainty}: {self.verdict.sentence}"
+
+    def _repr_html_(self) -> str:
+        quantities = self.verdict.as_dict()["quantities"]
+        rows = [
+            [name, *("" if q[k] is None else f"{q[k]:.3f}" for k in ("value", "lower", "upper"))]
+            for name, q in quantities.items()
+        ]
+        return paragraph(str(self)) + table(["quantity", "value", "lower", "upper"], rows)
+
+
+def evaluate(
+    policy: str | Path | Policy,
+    settings: EvaluateSettings | None = None,
+    *,
+    progress: Progress | None = None,
+    **changes: Any,
+) -> Evaluation:
+    """Flies a policy, greedily and with drawn actions, and the baselines, in unseen worlds.
+
+    Args:
+        policy: The policy, or what `load_policy` takes.
+        settings: How.
+        progress: Told of what is being flown; a bar by default.
+        changes: Settings to change, as in `evaluate("good", episodes=200)`.
+
+    Raises:
+        InputError: The policy or a setting is unusable.
+    """
+    settings = (settings or EvaluateSettings()).replace(**changes)
+    progress = progress or Bar()
+    policy = policy if isinstance(policy, Policy) else load_policy(policy)
+    env, actor = _pilot(policy, settings)
+    worlds, task, episodes = env.base_env.state_dict(), policy.task, settings.episodes
+    steps = 3 if settings.baselines else 2
+    progress("most probable actions", 0, steps)
+    flown = {"greedy": run_episodes(env, actor, episodes)}
+    env.base_env.load_state_dict(worlds)
+    progress("drawn actions", 1, steps)
+    flown["sampled"] = run_episodes(env, actor, episodes, greedy=False)
+    if settings.baselines:
+        progress("luck and the oracle", 2, steps)
+        flown |= fly_baselines(env.batch_size[0], task, worlds, episodes, settings.device)
+    env.close()
+    progress("evaluated", steps, steps)
+    return Evaluation(policy, settings, {name: summarise(e) for name, e in flown.items()})
+
+
+def judge(
+    policy: str | Path | Policy,
+    settings: JudgeSettings | None = None,
+    *,
+    task: Mapping[str, Any] | None = None,
+    outputs: str | Path = "outputs",
+    progress: Progress | None = None,
+    **changes: Any,
+) -> Judgement:
+    """Good, poor, one-sided or none of these, and whether that is certain.
+
+    Args:
+        policy: The policy, what `load_policy` takes, or a baseline: "random", "forward", "left",
+            "right" or "oracle".
+        settings: How it is judged.
+        task: What to change of the policy's task or, for a baseline, of the default one.
+        outputs: Folder under which runs are kept.
+        progress: Told of what is being done; a bar by default.
+        changes: Settings to change, as in `judge("good", episodes=1000)`.
+
+    Raises:
+        InputError: The policy or a setting is unusable.
+    """
+    settings = (settings or JudgeSettings()).replace(**changes)
+    progress = progress or Bar()
+    progress("policy, luck and oracle", 0, 1)
+    name = policy.name if isinstance(policy, Policy) else str(policy)
+    changed = Changes(TaskSettings).read(task or {}, "task")
+    if policy in BASELINES:
+        env, actor = _baseline(name, TaskSettings(**changed), settings)
+    else:
+        loaded = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
+        env, actor = _pilot(loaded.in_task(**changed), settings)
+    draws = settings.sampled and policy not in BASELINES
+    rule = Rule(good_share=settings.good_share)
+    verdict = judge_policy(env, actor, settings.episodes, rule=rule, sampled=draws)
+    env.close()
+    progress("judged", 1, 1)
+    return Judgement(name, settings, verdict)
+
+
+def _pilot(policy: Policy, settings: FlightSettings) -> tuple[Any, TensorDictModuleBase]:
+    """Unseen worlds and the policy in them."""
+    env = policy.make_env(settings.num_worlds, seed=settings.seed, device=settings.device)
+    return env, policy.make_actor(env, seed=settings.seed)
+
+
+def _baseline(
+    name: str, task: TaskSettings, settings: FlightSettings
+) -> tuple[EnvBase, TensorDictModuleBase]:
+    """The same worlds and one that sees no picture."""
+    env = DroneEnv(
+        settings.num_worlds,
+        task,
+        seed=settings.seed,
+        stream=Stream.REPORT,
+        pixels=False,
+        device=settings.device,
+    )
+    generator = torch_generator(settings.seed, Stream.ACTIONS, device=env.device)
+    return env, make_baseline(name, task, generator)
+
+
+def _interval(figure: dict[str, Any], key: str) -> str:
+    if figure[key] is None:
+        return "not offered"
+    share, low, high = (f"{100 * figure[k]:.3g}" for k in (key, "lower95", "upper95"))
+    return f"{share}% [{low}, {high}]"

@@ -1,0 +1,44 @@
+"""Tables and figures as HTML, for results that show themselves in a notebook."""
+
+import base64
+import html
+import io
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A table; every text is escaped.
+
+    Args:
+        head: Of the columns.
+        rows: Texts, as many as there are columns.
+    """
+    cells = "".join(f"<th>{html.escape(text)}</th>" for text in head)
+    lines = "".join(
+        f"<tr>{''.join(f'<td>{html.escape(text)}</td>' for text in row)}</tr>" for row in rows
+    )
+    return f"<table><thead><tr>{cells}</tr></thead><tbody>{lines}</tbody></table>"
+
+
+def paragraph(text: str) -> str:
+    """A paragraph, escaped."""
+    return f"<p>{html.escape(text)}</p>"
+
+
+def picture(figure: "Figure") -> str:
+    """A figure as an image that needs no file."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=90)
+    return f'<img src="data:image/png;base64,{base64.b64encode(buffer.getvalue()).decode()}">'
+
+
+def page(document: str, height: int = 800) -> str:
+    """A whole HTML page inside another one, where its style and scripts touch nothing else."""
+    return (
+        f'<iframe srcdoc="{html.escape(document)}" style="width: 100%; height: {height}px; '
+        'border: 0"></iframe>'
+    )

@@ -1,0 +1,234 @@
+"""One training from its settings to its result."""
+
+import csv
+import dataclasses
+import json
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import torch
+import yaml
+from torch import nn
+
+from drone_rl.api.choosing import judge_to_choose
+from drone_rl.api.collecting import build_collector
+from drone_rl.api.policy import Policy, load_policy
+from drone_rl.api.progress import Bar, Progress
+from drone_rl.api.showing import picture, table
+from drone_rl.settings.comparison import check_same_config, modern
+from drone_rl.settings.configuration import as_config, from_config
+from drone_rl.settings.training import TrainSettings
+from drone_rl.sim.tasks import as_task
+from drone_rl.training import (
+    Callback,
+    CheckpointCallback,
+    CsvCallback,
+    NotANumberError,
+    ReinforceLearner,
+    Trainer,
+)
+from drone_rl.training.progress import Training as Running
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.files import folder_lock, write_atomically
+from drone_rl.utils.provenance import provenance
+from drone_rl.utils.schema import Real
+from drone_rl.utils.settings import kinds_of
+from drone_rl.zoo import describe, read_checkpoint
+
+MAY_CHANGE = (
+    "trainer.total_frames",
+    "trainer.total_episodes",
+    "trainer.target_share",
+    "trainer.checkpoint_interval_s",
+    "evaluate_after",
+)
+"""Settings that a resumed run may change: they don't enter into what is learned."""
+_BEST = Real(float("-inf"), 1e6)
+
+
+@dataclasses.dataclass(frozen=True)
+class Training:
+    """What a training left, in its folder."""
+
+    folder: Path
+    reason: str
+    """Why it stopped: "solved", "frames", "episodes" or a signal's name."""
+    result: dict[str, Any]
+    """Plain values, as in `result.json`."""
+
+    @property
+    def running_reward(self) -> float:
+        """Running mean of the episodes' rewards at the end."""
+        return self.result["running_reward"]
+
+    @property
+    def policy(self) -> Policy:
+        """The last policy."""
+        return load_policy(self.folder)
+
+    def metrics(self) -> dict[str, list[float]]:
+        """Each column of `metrics.csv`, one value an update."""
+        with (self.folder / "metrics.csv").open(newline="") as file:
+            head, *rows = csv.reader(file)
+        columns = zip(head, zip(*rows, strict=True), strict=True)
+        return {name: [float(value) for value in column] for name, column in columns}
+
+    def _repr_html_(self) -> str:
+        from matplotlib.figure import Figure  # slow to import; only a notebook needs it
+
+        columns = self.metrics()
+        figure = Figure(figsize=(6, 3), layout="constrained")
+        axes = figure.add_subplot(xlabel="frames", ylabel="running mean of rewards")
+        axes.plot(columns["frames"], columns["train/running_reward"])
+        values = {k: v for k, v in self.result.items() if not isinstance(v, dict)}
+        rows = [[k, f"{v:.4g}" if isinstance(v, float) else str(v)] for k, v in values.items()]
+        return table(["training", str(self.folder)], rows) + picture(figure)
+
+
+def train(
+    settings: TrainSettings | None = None,
+    *,
+    folder: str | Path | None = None,
+    resume: bool = False,
+    callbacks: Sequence[Callback] = (),
+    progress: Progress | None = None,
+    **changes: Any,
+) -> Training:
+    """Trains one policy, or goes on with it.
+
+    Args:
+        settings: What is learned, how, and for how long; those of the run if it is resumed.
+        folder: Where everything is left; by default a new one under outputs/train/runs.
+        resume: Whether to go on with the run that is in the folder, bit for bit.
+        callbacks: Told of every update, besides those that write checkpoints and metrics.
+        progress: Told of how far it is; a bar by default.
+        changes: Settings to change, as in `train(seed=1, task=TaskSettings(num_cubes=5))`.
+
+    Raises:
+        InputError: A setting is unusable, or learning broke down.
+    """
+    folder = _new_folder() if folder is None else Path(folder)
+    state = read_checkpoint(folder / "checkpoints" / "last.pt") if resume else None
+    if settings is None:
+        settings = TrainSettings() if state is None else _settings_of(state["config"])
+    settings = settings.replace(**changes)
+    if state is not None:
+        check_same_config(_own(state["config"]), as_config(settings), MAY_CHANGE)
+    folder.mkdir(parents=True, exist_ok=True)
+    with folder_lock(folder):
+        told = [*callbacks, _Tell(progress or Bar())]
+        trainer, checkpoints = _build(settings, folder, told)
+        if state is not None:
+            trainer.load_state_dict(state)
+            checkpoints.best = _BEST.read(state.get("best"), "the checkpoint's best")
+        return _run(settings, folder, trainer, checkpoints)
+
+
+def _run(
+    settings: TrainSettings, folder: Path, trainer: Trainer, checkpoints: CheckpointCallback
+) -> Training:
+    try:
+        reason = trainer.run()
+    except NotANumberError as error:
+        raise InputError(f"{error}; the last good checkpoint is {checkpoints.last_path}") from error
+    finally:
+        trainer.collector.shutdown()
+    result = {"reason": reason, **dataclasses.asdict(trainer.progress)}
+    result["num_cubes"] = settings.task.num_cubes
+    if settings.evaluate_after and not reason.startswith("SIG"):
+        last, episodes = checkpoints.last_path, settings.evaluate_after
+        result["verdict"], _ = judge_to_choose(last, episodes, settings.device)
+    write_atomically(folder / "result.json", json.dumps(result, indent=2))
+    return Training(folder, reason, result)
+
+
+def _build(
+    settings: TrainSettings, folder: Path, callbacks: Sequence[Callback]
+) -> tuple[Trainer, CheckpointCallback]:
+    config, origin = as_config(settings), provenance()
+    description = describe(config).as_dict()
+    # sums depend on how many threads make them: on as many everywhere, whatever the machine has
+    torch.set_num_threads(settings.collector.num_threads)
+    collector, network, generators = build_collector(settings)
+    noted = {"config": config, "description": description, **origin}
+    (folder / "run.yaml").write_text(yaml.safe_dump(noted, sort_keys=False))
+    limits = settings.trainer
+    checkpoints = CheckpointCallback(
+        folder / "checkpoints",
+        interval_s=limits.checkpoint_interval_s,
+        extra={"config": config, "description": description, "provenance": origin},
+    )
+    share = limits.target_share
+    trainer = Trainer(
+        collector=collector,
+        learner=_learner(settings, network, collector.actor),
+        callbacks=[CsvCallback(folder / "metrics.csv"), checkpoints, *callbacks],
+        generators=generators,
+        target=None if share is None else share * as_task(settings.task).largest_reward,
+        total_frames=limits.total_frames,
+        total_episodes=limits.total_episodes,
+        running_decay=limits.running_decay,
+    )
+    return trainer, checkpoints
+
+
+def _learner(settings: TrainSettings, network: nn.Module, actor: nn.Module) -> ReinforceLearner:
+    optimiser = settings.optimiser.make(network.parameters())
+    return ReinforceLearner(
+        network=network,
+        estimator=settings.returns.make().to(settings.device),
+        loss=settings.objective.make(actor).to(settings.device),
+        optimiser=optimiser,
+        scheduler=settings.scheduler.make(optimiser),
+        max_grad_norm=settings.trainer.max_grad_norm,
+        minibatch_frames=settings.trainer.minibatch_frames,
+    )
+
+
+class _Tell(Callback):
+    """Passes on how far a training is."""
+
+    def __init__(self, progress: Progress) -> None:
+        """Takes whom to tell."""
+        self.progress = progress
+
+    def on_update(self, trainer: Running, metrics: Mapping[str, float]) -> None:
+        """Tells the running mean and the frames."""
+        done = trainer.progress
+        text = f"running reward {done.running_reward:.2f}, {done.episodes} episodes"
+        self.progress(text, done.frames, trainer.total_frames)
+
+    def on_end(self, trainer: Running, reason: str) -> None:
+        """Tells that it is over, and why."""
+        frames = trainer.progress.frames
+        self.progress(f"stopped: {reason}", frames, frames)
+
+
+def _own(config: Mapping[str, Any]) -> dict[str, Any]:
+    """What a checkpoint's configuration says of the training itself, in today's words."""
+    return {k: v for k, v in modern(config).items() if k in kinds_of(TrainSettings)}
+
+
+def _settings_of(config: Mapping[str, Any]) -> TrainSettings:
+    """The settings that a checkpoint was made with; only such as name parts of our own.
+
+    Raises:
+        InputError: It names another part, which a file may not.
+    """
+    settings = from_config(TrainSettings, _own(config))
+    parts = (settings.network, settings.returns, settings.objective, settings.optimiser)
+    for part in (*parts, settings.scheduler, settings.collector, *settings.transforms):
+        if not part.is_known:
+            raise InputError(
+                f"the checkpoint names {part.target}, which a file may not; give the settings, too"
+            )
+    return settings
+
+
+def _new_folder() -> Path:
+    """Named by when it begins, like those of `drone-rl train`."""
+    now = time.time()
+    stamp = time.strftime("%Y-%m-%d_%H-%M-%S", time.localtime(now))
+    return Path("outputs/train/runs") / f"{stamp}-{int(now % 1 * 1e6):06d}"

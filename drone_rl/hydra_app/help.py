@@ -1,0 +1,106 @@
+"""`drone-rl COMMAND --help`: every setting with its value and the comment that explains it."""
+
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import yaml
+from hydra import compose, initialize_config_dir
+from hydra.core.global_hydra import GlobalHydra
+from omegaconf import OmegaConf
+
+_KNOB = re.compile(r"(?P<indent> *)(?P<name>[A-Za-z_]\w*):(?= |$)")
+_EXAMPLES = """\
+examples
+  drone-rl train seed=1 optimiser.lr=2e-3        change settings
+  drone-rl train experiment=smoke                a ready-made set of settings
+  drone-rl train -m seed=0,1,2                   several runs, side by side
+  drone-rl evaluate policy=latest                test the newest policy on unseen worlds"""
+
+
+def show_help(command: str, conf: Path, overrides: Sequence[str]) -> None:
+    """Prints what a command can be told, as it would be used now.
+
+    Args:
+        command: Name of its file in conf/.
+        conf: That folder.
+        overrides: As on the command line; those that are flags say nothing.
+    """
+    told = [o for o in overrides if not o.startswith("-")]
+    GlobalHydra.instance().clear()
+    with initialize_config_dir(str(conf), version_base="1.3"):
+        full = compose(command, told, return_hydra_config=True)
+        config = compose(command, told)
+    chosen = {k: v for k, v in full.hydra.runtime.choices.items() if "/" not in k and "@" not in k}
+    values = OmegaConf.to_container(config, resolve=False)
+    print(f"drone-rl {command.replace('_', '-')} [setting=value ...]\n")
+    print((conf / f"{command}.yaml").read_text().split("\ndefaults:")[0], end="\n\n")
+    print("Groups, each chosen by the name of a file:")
+    for group in chosen:
+        files = sorted(path.stem for path in (conf / group).glob("*.yaml"))
+        if files and group not in ("hydra", "paths"):
+            print(f"  {group}: {', '.join(files)}")
+    print("\nSettings, as they would be used now:")
+    for line in explained(values, comments(command, conf, chosen)):
+        print(f"  {line}")
+    print(f"\n{_EXAMPLES}")
+
+
+def explained(values: Any, meanings: dict[str, str], prefix: str = "") -> Iterator[str]:
+    """Settings as lines of YAML, each below its comment."""
+    indent = "  " * prefix.count(".")
+    for name, value in values.items():
+        if name == "_target_":
+            continue
+        meaning = meanings.get(prefix + name)
+        if meaning:
+            yield from (f"{indent}# {line}" for line in meaning.splitlines())
+        if isinstance(value, dict) and value:
+            yield f"{indent}{name}:"
+            yield from explained(value, meanings, f"{prefix}{name}.")
+        else:
+            shown = yaml.safe_dump(value, default_flow_style=True, width=1000)
+            yield f"{indent}{name}: {shown.splitlines()[0]}"
+
+
+def comments(command: str, conf: Path, chosen: dict[str, str | None]) -> dict[str, str]:
+    """The comment above each setting, by its dotted name.
+
+    Args:
+        command: Name of its file in conf/.
+        conf: That folder.
+        chosen: The file of each group.
+    """
+    found = {f"task.{k}": v for k, v in read_comments(conf / "task" / "collect_cubes.yaml").items()}
+    for group, name in chosen.items():
+        for path in _with_parents(conf / group / f"{name}.yaml"):
+            found |= {f"{group}.{key}": text for key, text in read_comments(path).items()}
+    return found | read_comments(conf / f"{command}.yaml")
+
+
+def read_comments(path: Path) -> dict[str, str]:
+    """The comment above each setting of one file, by its dotted name within it."""
+    found, above, where = {}, [], []
+    for line in path.read_text().splitlines():
+        knob = _KNOB.match(line)
+        if line.lstrip().startswith("#"):
+            above.append(line.strip().lstrip("#").strip())
+        elif knob and knob["name"] != "defaults":
+            where = [*where[: len(knob["indent"]) // 2], knob["name"]]
+            if above:
+                found[".".join(where)] = "\n".join(above)
+            above = []
+        else:
+            above = []
+    return found
+
+
+def _with_parents(path: Path) -> Iterator[Path]:
+    """The files that a file starts from, the first ones first, and itself."""
+    if not path.is_file():
+        return
+    for entry in (yaml.safe_load(path.read_text()) or {}).get("defaults", ()):
+        if isinstance(entry, str) and entry != "_self_":
+            yield from _with_parents(path.with_name(f"{entry}.yaml"))
+    yield path

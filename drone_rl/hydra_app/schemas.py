@@ -1,0 +1,89 @@
+"""Types for Hydra, made from the settings: what is misspelt or mistyped dies when it composes."""
+
+import dataclasses
+import types
+import typing
+from typing import Any
+
+from hydra.core.config_store import ConfigStore
+from omegaconf import MISSING
+
+from drone_rl.settings.changes import Changes
+from drone_rl.settings.collecting import Collector
+from drone_rl.settings.learning import Objective, Optimiser, Scheduler
+from drone_rl.settings.loggers import Logger
+from drone_rl.settings.networks import Network
+from drone_rl.settings.paths import PathsSettings
+from drone_rl.settings.returns import Returns
+from drone_rl.settings.training import TrainerSettings
+from drone_rl.settings.transforms import Transform
+from drone_rl.settings.variant import Variant
+from drone_rl.sim.settings import CameraSettings, TaskSettings
+from drone_rl.utils.settings import Settings, kinds_of, snake_case, types_of
+
+GROUPS: dict[str, type[Settings]] = {
+    "task": TaskSettings,
+    "camera": CameraSettings,
+    "trainer": TrainerSettings,
+    "paths": PathsSettings,
+}
+"""Groups whose files start from the schema `base_<group>`."""
+PARTS: dict[str, type[Variant]] = {
+    "network": Network,
+    "returns": Returns,
+    "objective": Objective,
+    "optimiser": Optimiser,
+    "scheduler": Scheduler,
+    "collector": Collector,
+}
+"""Groups whose files start from the schema of a variant, `base_<its name>`."""
+SEVERAL: dict[str, type[Variant]] = {"transforms": Transform, "logger": Logger}
+"""Groups whose files name several variants, each by `schema@<name>: <the variant's name>`."""
+
+
+def register_schemas(**commands: type[Settings]) -> None:
+    """Tells Hydra the schemas; called before it composes.
+
+    Args:
+        commands: The settings of each command, by the name of its file.
+    """
+    store = ConfigStore.instance()
+    for group, settings in GROUPS.items():
+        store.store(group=group, name=f"base_{group}", node=schema_of(settings))
+    for group, part in PARTS.items():
+        for variant in part.variants():
+            store.store(group=group, name=f"base_{snake_case(variant)}", node=schema_of(variant))
+    for group, part in SEVERAL.items():
+        for variant in part.variants():
+            name = snake_case(variant)
+            store.store(group=f"{group}/schema", name=name, node=schema_of(variant))
+    for command, settings in commands.items():
+        store.store(name=f"base_{command}", node=schema_of(settings))
+
+
+def schema_of(cls: type[Settings]) -> type:
+    """A dataclass of the same fields with no defaults, for those are in conf/."""
+    target = [("_target_", str, cls.target)] if issubclass(cls, Variant) else []
+    fields = [(name, *_field(cls, name)) for name in types_of(cls)]
+    return dataclasses.make_dataclass(f"{cls.__name__}Schema", [*target, *fields])
+
+
+def _field(cls: type[Settings], name: str) -> tuple[Any, Any]:
+    """A type that Hydra knows, and the value before any file gives one."""
+    kind, hint = kinds_of(cls)[name], types_of(cls)[name]
+    if isinstance(kind, Changes):
+        changes = [(n, _simple(h) | None, None) for n, h in types_of(kind.of).items()]
+        schema = dataclasses.make_dataclass(f"{kind.of.__name__}Changes", changes)
+        return schema, dataclasses.field(default_factory=schema)
+    return _simple(hint), MISSING
+
+
+def _simple(hint: Any) -> Any:
+    """The type itself if it is made of numbers, texts and truth values, else any."""
+    arguments = typing.get_args(hint)
+    if typing.get_origin(hint) is tuple:
+        return hint if set(arguments) <= {int, float, str, ...} else Any
+    if typing.get_origin(hint) in (typing.Union, types.UnionType):
+        inner = [argument for argument in arguments if argument is not types.NoneType]
+        return hint if len(inner) == 1 and _simple(inner[0]) is not Any else Any
+    return hint if hint in (int, float, str, bool) else Any

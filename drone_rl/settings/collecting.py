@@ -1,0 +1,38 @@
+"""How batches of episodes are collected, and on what."""
+
+import dataclasses
+from typing import Annotated, ClassVar
+
+from drone_rl.settings.variant import Variant
+from drone_rl.utils.schema import Real, Whole
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Collector(Variant):
+    """Which workers, and how many."""
+
+    num_envs: Annotated[int, Whole(1)] = 64
+    """Worlds, each with one episode in a batch."""
+    num_threads: Annotated[int, Whole(1)] = 2
+    """Groups of worlds collected at the same time, each on a thread or worker of its own: the cores
+    to use. Each draws its actions from its own stream: this is part of what a seed means."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Threads(Collector):
+    """Batches of complete episodes from threads of this process."""
+
+    target: ClassVar[str] = "drone_rl.api.collecting.threaded_collector"
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Ray(Collector):
+    """Batches of complete episodes from workers on a Ray cluster."""
+
+    target: ClassVar[str] = "drone_rl.api.collecting.ray_collector"
+    address: str | None = None
+    """Of the cluster, such as auto or ray://host:10001; none starts one on this machine."""
+    num_cpus: Annotated[float, Real(0.0, is_above=True)] = 1.0
+    """Cores that a worker takes of the cluster."""
+    max_lost_workers: Annotated[int, Whole(0)] = 10
+    """Workers that may be lost, and replaced, before training stops."""

@@ -1,0 +1,88 @@
+"""Whether what is gone on with is still the same, whichever version began it."""
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from drone_rl.utils.errors import InputError
+
+_MOVED = {
+    "drone_rl.cli.build.threaded_collector": "drone_rl.api.collecting.threaded_collector",
+    "drone_rl.cli.build.ray_collector": "drone_rl.api.collecting.ray_collector",
+}
+
+
+def modern(config: Mapping[str, Any]) -> dict[str, Any]:
+    """A training's configuration in today's words.
+
+    Until version 0.1 the group of networks was called policy, the collector's maker stood under
+    "make", and settings told Hydra how to make things (`_partial_`, and `_target_` of task and
+    camera).
+
+    Args:
+        config: Of any version, as it stands in a checkpoint or a sweep's folder.
+    """
+    groups = {k: _without(v, "_partial_") for k, v in config.items()}
+    if "policy" in groups:
+        groups["network"] = groups.pop("policy")
+    for name in ("task", "camera"):
+        if name in groups:
+            groups[name] = _without(groups[name], "_target_")
+    collector = groups.get("collector")
+    if isinstance(collector, Mapping) and "make" in collector:
+        maker = collector["make"]
+        moved = _MOVED.get(maker, maker) if isinstance(maker, str) else maker
+        groups["collector"] = {"_target_": moved, **_without(collector, "make")}
+    for steps in [s for s in (groups.get("transforms"),) if isinstance(s, Mapping)]:
+        fixed = {"CatFrames": ("dim", "in_keys")}
+        groups["transforms"] = {
+            name: _without(step, *fixed.get(_last(step), ())) for name, step in steps.items()
+        }
+    return groups
+
+
+def check_same_config(
+    saved: Mapping[str, Any], now: Mapping[str, Any], may_change: Iterable[str]
+) -> None:
+    """Refuses to go on under another configuration.
+
+    Args:
+        saved: The configuration that it was begun with, of any version.
+        now: The one asked for.
+        may_change: Dotted keys, and groups of them, that don't change what is learned.
+
+    Raises:
+        InputError: A setting differs; it is named with both values.
+    """
+    allowed = tuple(may_change)
+    before, after = _flatten(modern(saved)), _flatten(modern(now))
+    for key in sorted(before.keys() | after.keys()):
+        if any(key == name or key.startswith(f"{name}.") for name in allowed):
+            continue
+        old, new = before.get(key, "absent"), after.get(key, "absent")
+        if old != new:
+            raise InputError(
+                f"can't resume with {key}={new}: the run was started with {key}={old}; "
+                "leave it as it was or start a new run"
+            )
+
+
+def _without(group: Any, *names: str) -> Any:
+    if not isinstance(group, Mapping):
+        return group
+    return {name: value for name, value in group.items() if name not in names}
+
+
+def _last(step: Any) -> str:
+    """The last word of what makes a part."""
+    target = step.get("_target_") if isinstance(step, Mapping) else None
+    return target.rpartition(".")[2] if isinstance(target, str) else ""
+
+
+def _flatten(config: Any, prefix: str = "") -> dict[str, Any]:
+    if isinstance(config, Mapping) and config:
+        return {
+            k: v
+            for name, value in config.items()
+            for k, v in _flatten(value, f"{prefix}{name}.").items()
+        }
+    return {prefix.removesuffix("."): list(config) if isinstance(config, tuple) else config}

@@ -1,0 +1,48 @@
+"""What an evaluation and a verdict can be told."""
+
+import dataclasses
+from typing import Annotated
+
+from drone_rl.utils.schema import Real, Whole
+from drone_rl.utils.settings import Settings
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class FlightSettings(Settings):
+    """How many episodes are flown, in which worlds, and where."""
+
+    episodes: Annotated[int, Whole(1)] = 1000
+    """Held-out episodes, each in a world of its own; the same worlds for all that is flown."""
+    seed: Annotated[int, Whole(0)] = 0
+    """Root of the held-out worlds' random streams; training never draws from these."""
+    num_envs: Annotated[int, Whole(1)] = 250
+    """Worlds in one batch; bounds memory."""
+    device: str = "cpu"
+    """Where worlds are drawn and the policy runs: cpu, cuda or cuda:N."""
+
+    @property
+    def num_worlds(self) -> int:
+        """Worlds in a batch, of which none flies in vain."""
+        return min(self.num_envs, self.episodes)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class EvaluateSettings(FlightSettings):
+    """How a policy is evaluated."""
+
+    baselines: bool = True
+    """Whether to evaluate luck (random actions, each action always) and the oracle beside it."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class JudgeSettings(FlightSettings):
+    """How a policy is judged."""
+
+    episodes: Annotated[int, Whole(1)] = 400
+    """Held-out episodes, flown greedily, with drawn actions and by luck and the oracle alike."""
+    num_envs: Annotated[int, Whole(1)] = 128
+    """Worlds in one batch; bounds memory."""
+    sampled: bool = True
+    """Whether to fly the policy with drawn actions, too; told beside the verdict."""
+    good_share: Annotated[float, Real(0.0, 1.0, is_above=True, is_below=True)] = 0.9
+    """A good policy succeeds in more than this share of the oracle's episodes."""

@@ -1,0 +1,69 @@
+"""Everything that a training can be told."""
+
+import dataclasses
+from typing import Annotated
+
+from drone_rl.settings.collecting import Collector, Threads
+from drone_rl.settings.learning import Adam, Constant, Objective, Optimiser, Reinforce, Scheduler
+from drone_rl.settings.networks import Network, SmallCnn
+from drone_rl.settings.returns import LeaveOneOut, Returns
+from drone_rl.settings.transforms import Gray, Standardize, Transform
+from drone_rl.sim.settings import CameraSettings, TaskSettings
+from drone_rl.utils.schema import Instance, Real, Several, Whole
+from drone_rl.utils.settings import Settings
+
+MOST_TRANSFORMS = 16
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class TrainerSettings(Settings):
+    """How long to train and when to stop."""
+
+    total_frames: Annotated[int, Whole(1)] = 2_000_000
+    """Stop once this many frames were collected."""
+    total_episodes: Annotated[int, Whole(1)] | None = None
+    """Stop once this many episodes were collected; none for no limit."""
+    target_share: Annotated[float, Real(0.0, 1.0, is_above=True)] | None = 0.99
+    """Stop once the running mean reaches this share of the greatest reward; none for never."""
+    running_decay: Annotated[float, Real(0.0, 1.0, is_below=True)] = 0.99
+    """Weight of the old value in the running mean, per episode: 0.99 looks back about 100."""
+    max_grad_norm: Annotated[float, Real(0.0, is_above=True)] | None = None
+    """Clip the gradient to this norm; none for no clipping."""
+    minibatch_frames: Annotated[int, Whole(1)] = 512
+    """Frames in one forward and backward pass; bounds memory, changes nothing else."""
+    checkpoint_interval_s: Annotated[float, Real(0.0)] = 15.0
+    """Seconds between two checkpoints."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class TrainSettings(Settings):
+    """One training: what is learned, how, and for how long."""
+
+    task: TaskSettings = TaskSettings()
+    """What the drone has to do."""
+    camera: CameraSettings = CameraSettings()
+    """The picture that the drone takes."""
+    transforms: Annotated[
+        tuple[Transform, ...], Several(Instance(Transform), 0, MOST_TRANSFORMS)
+    ] = (Gray(), Standardize())
+    """What becomes of the picture, in this order."""
+    network: Network = SmallCnn()
+    """From picture to logits."""
+    returns: Returns = LeaveOneOut()
+    """What a step is worth."""
+    objective: Objective = Reinforce()
+    """What is made smaller."""
+    optimiser: Optimiser = Adam()
+    """How."""
+    scheduler: Scheduler = Constant()
+    """The course of the learning rate."""
+    collector: Collector = Threads()
+    """Where episodes come from."""
+    trainer: TrainerSettings = TrainerSettings()
+    """How long, and when to stop."""
+    seed: Annotated[int, Whole(0)] = 0
+    """Root of every random stream: worlds, actions, initial weights."""
+    device: str = "cpu"
+    """Where worlds are drawn and policies run: cpu, cuda or cuda:N."""
+    evaluate_after: Annotated[int, Whole(0)] = 0
+    """Episodes, in worlds to choose by, of the verdict at the end; 0 for none."""

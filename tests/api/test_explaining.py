@@ -1,0 +1,47 @@
+"""Explanations in Python; what they hold is tested in tests/explain."""
+
+import dataclasses
+from pathlib import Path
+
+import pytest
+
+import drone_rl
+from drone_rl.api.explaining import Explanations, _named, explain
+from drone_rl.utils.errors import InputError
+
+
+def test_policies_of_the_same_name_go_by_their_files():
+    good = drone_rl.load_policy("good")
+    other = dataclasses.replace(good, path=Path("elsewhere.safetensors"))
+    assert list(_named([good, "poor"])) == ["good", "poor"]
+    assert list(_named(good)) == ["good"]
+    assert list(_named([good, other])) == [str(good.path), "elsewhere.safetensors"]
+
+
+@pytest.mark.parametrize("policies", [[], ["good", "good"]])
+def test_each_policy_is_explained_once(policies):
+    with pytest.raises(InputError, match="each once"):
+        _named(policies)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"frames": 3}, "frames=3 is less than one of each flight"),
+        ({"frames": "x"}, "frames='x' is out of range"),
+        ({"perplexity": 500}, "perplexity=500 does not fit"),
+        ({"num_envs": 0}, "num_envs=0"),
+        ({"wind": 0}, "wind is unknown"),
+    ],
+)
+def test_mistakes_name_the_argument(change, message, tmp_path):
+    with pytest.raises(InputError, match=f"^{message}"):
+        explain("good", folder=tmp_path, **change)
+
+
+def test_they_show_their_report(tmp_path):
+    (tmp_path / "report.html").write_text("<h1>trusted?</h1>")
+    verdict = {"kind": "good", "certain": False, "sentence": "It does."}
+    shown = Explanations(tmp_path, tmp_path / "report.html", {"x": {"verdict": verdict}})
+    assert str(shown) == "x: good (not certain). It does."
+    assert shown._repr_html_().startswith('<iframe srcdoc="&lt;h1&gt;trusted?')

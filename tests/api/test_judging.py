@@ -1,0 +1,87 @@
+"""Evaluations and verdicts in Python, and how they show themselves."""
+
+import pytest
+
+import drone_rl
+from drone_rl.api.judging import Evaluation
+from drone_rl.api.progress import silent
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.intervals import mean_bounds, proportion
+
+
+@pytest.fixture(scope="module")
+def good():
+    return drone_rl.load_policy("good")
+
+
+def test_an_evaluation_in_python(good):
+    said = []
+
+    def note(text, done=0, total=0):
+        said.append((text, done, total))
+
+    done = drone_rl.evaluate(good.in_task(num_cubes=2), episodes=6, num_envs=4, progress=note)
+    assert set(done.flown) == {"greedy", "sampled", "random", "forward", "left", "right", "oracle"}
+    assert done.flown["oracle"]["mean_cubes"] == 2.0
+    assert done.success == done.flown["greedy"]["success"]["share"]
+    assert done.as_dict()["trained"]["frames"] > 0
+    assert said[0] == ("most probable actions", 0, 3)
+    assert said[-1] == ("evaluated", 3, 3)
+    assert "<td>all cubes</td>" in done._repr_html_()
+
+
+def test_without_baselines_there_are_none(good):
+    done = drone_rl.evaluate(good, episodes=2, baselines=False, progress=silent)
+    assert set(done.flown) == {"greedy", "sampled"}
+
+
+def test_a_verdict_in_python(good):
+    few = drone_rl.judge(good, episodes=8, sampled=False, progress=silent)
+    assert (few.verdict.kind, few.verdict.certain) == ("good", False)
+    assert str(few).startswith("good (not certain): ")
+    assert few.as_dict()["policy"] == "good"
+    assert "<td>success</td>" in few._repr_html_()
+
+
+def test_a_verdict_on_luck_in_another_task():
+    done = drone_rl.judge("left", task={"num_cubes": 1}, episodes=200, progress=silent)
+    assert done.verdict.kind == "poor"
+    assert done.as_dict()["num_cubes"] == 1
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"episodes": 0}, "episodes=0 is out of range"),
+        ({"episodes": "many"}, "episodes='many'"),
+        ({"good_share": 1.0}, "good_share=1.0 is out of range; give a number above 0 and below 1"),
+        ({"task": {"num_cubes": 0}}, "task.num_cubes=0"),
+        ({"wind": 1}, "wind is unknown; there are: episodes"),
+    ],
+)
+def test_mistakes_name_the_argument(change, message):
+    with pytest.raises(InputError, match=f"^{message}"):
+        drone_rl.judge("random", progress=silent, **change)
+
+
+def test_the_table_of_an_evaluation(good):
+    def flown(success, left):
+        return {
+            "success": proportion(*success),
+            "shares": {s: mean_bounds(left) for s in ("all", "left", "ahead", "right")},
+            "ends": {"step_limit": proportion(1, 4)},
+            "never_reached": mean_bounds([0.25]),
+            "mean_cubes": 1.5,
+            "mean_length": 40.0,
+            "episodes": 4,
+        }
+
+    figures = {"greedy": flown((1, 4), [0.5] * 100), "oracle": flown((4, 4), [])}
+    rows = str(Evaluation(good, drone_rl.EvaluateSettings(), figures)).splitlines()
+    assert rows[0].split() == ["greedy", "oracle"]
+    assert rows[1].split("  ")[0] == "all cubes"
+    assert "25% [0.631, 80.6]" in rows[1]
+    assert "100% [39.8, 100]" in rows[1]
+    assert "share left" in rows[4] and rows[4].endswith("not offered")
+    assert rows[8].split() == ["ended:", "step", "limit", "1", "1"]
+    assert len({len(row) for row in rows}) == 1

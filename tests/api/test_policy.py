@@ -1,0 +1,69 @@
+"""Policies by name, by file, by run; in a changed task."""
+
+import os
+import shutil
+
+import pytest
+import torch
+
+import drone_rl
+from drone_rl.api.policy import find_policy
+from drone_rl.utils.errors import InputError
+from drone_rl.zoo import policy_path
+
+
+def test_a_policy_that_travels_with_the_package():
+    policy = drone_rl.load_policy("good")
+    assert (policy.name, policy.task.num_cubes) == ("good", 3)
+    assert policy.path == policy_path("good")
+    shown = policy._repr_html_()
+    assert "<td>network</td>" in shown
+    assert "small_cnn" in shown
+
+
+def test_a_changed_task_changes_the_worlds_alone():
+    policy = drone_rl.load_policy("good")
+    other = policy.in_task(num_cubes=5, spacing=None)
+    assert (other.task.num_cubes, other.task.spacing) == (5, policy.task.spacing)
+    assert policy.task.num_cubes == 3
+    env = other.make_env(2)
+    assert env.reset()["info", "cube_positions"].shape == (2, 5, 3)
+    actor = other.make_actor(env)
+    assert actor(env.reset())["action"].shape == (2,)
+    env.close()
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"num_cubes": 0}, "task.num_cubes=0 is out of range"),
+        ({"wind": 1}, "task.wind is unknown"),
+        ({"step_limit": 5}, "task.step_limit=5 ends every episode"),
+    ],
+)
+def test_a_task_that_can_not_be(changes, message):
+    with pytest.raises(InputError, match=f"^{message}"):
+        drone_rl.load_policy("good").in_task(**changes)
+
+
+def test_its_network_has_its_weights():
+    policy = drone_rl.load_policy("poor")
+    weights = policy.make_network().state_dict()
+    assert all(torch.equal(weights[k], v) for k, v in policy.state["policy"].items())
+
+
+def test_what_latest_and_a_folder_mean(tmp_path):
+    runs = tmp_path / "train" / "runs"
+    for number, name in enumerate(("b", "a")):
+        (runs / name / "checkpoints").mkdir(parents=True)
+        shutil.copy(policy_path("good"), runs / name / "checkpoints" / "last.pt")
+        os.utime(runs / name / "checkpoints" / "last.pt", (number, number))
+    assert find_policy("latest", tmp_path) == runs / "a" / "checkpoints" / "last.pt"
+    assert find_policy(runs / "b") == runs / "b" / "checkpoints" / "last.pt"
+
+
+def test_what_is_not_there(tmp_path):
+    with pytest.raises(InputError, match="policy=latest, but there is no run"):
+        drone_rl.load_policy("latest", outputs=tmp_path)
+    with pytest.raises(InputError, match=r"policy=nobody does not exist.*good, poor"):
+        drone_rl.load_policy("nobody")

@@ -1,0 +1,91 @@
+"""A training in Python is that of the command line, and goes on bit for bit."""
+
+import json
+
+import pytest
+import torch
+import yaml
+
+import drone_rl
+from drone_rl.api.progress import silent
+from drone_rl.settings.collecting import Threads
+from drone_rl.settings.training import TrainerSettings, TrainSettings
+from drone_rl.sim.settings import TaskSettings
+from drone_rl.utils.errors import InputError
+
+TINY = TrainSettings(
+    task=TaskSettings(num_cubes=1, first_distance=8.0, step_limit=60),
+    collector=Threads(num_envs=4),
+    trainer=TrainerSettings(total_frames=300),
+)
+
+
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory):
+    said = []
+    folder = tmp_path_factory.mktemp("run") / "mine"
+
+    def note(text, done=0, total=0):
+        said.append((text, done, total))
+
+    return drone_rl.train(TINY, folder=folder, progress=note), said
+
+
+def weights(folder):
+    return drone_rl.load_policy(folder).state["policy"]
+
+
+def test_it_leaves_what_the_command_line_leaves(trained):
+    done, said = trained
+    assert done.reason == "frames"
+    assert {p.name for p in done.folder.iterdir() if p.suffix} == {
+        *("metrics.csv", "result.json", "run.yaml"),
+    }
+    assert json.loads((done.folder / "result.json").read_text()) == done.result
+    noted = yaml.safe_load((done.folder / "run.yaml").read_text())
+    assert noted["config"]["task"]["num_cubes"] == 1
+    assert noted["description"]["network"]["name"] == "small_cnn"
+    assert said[-1][0] == "stopped: frames"
+    assert done.policy.name == "mine"
+
+
+def test_it_shows_itself(trained):
+    done, _ = trained
+    assert done.metrics()["frames"][-1] == done.result["frames"]
+    assert done.running_reward == done.result["running_reward"]
+    shown = done._repr_html_()
+    assert "<td>reason</td><td>frames</td>" in shown
+    assert "data:image/png;base64," in shown
+
+
+def test_stopped_and_resumed_is_the_uninterrupted(trained, tmp_path):
+    longer = TINY.trainer.replace(total_frames=900)
+    whole = drone_rl.train(TINY, folder=tmp_path / "whole", trainer=longer, progress=silent)
+    half = drone_rl.train(TINY, folder=tmp_path / "half", progress=silent)
+    assert half.result["frames"] < 900
+    again = drone_rl.train(folder=half.folder, resume=True, trainer=longer, progress=silent)
+    assert again.result["frames"] == whole.result["frames"]
+    one, two = weights(whole.folder), weights(again.folder)
+    assert all(torch.equal(one[name], two[name]) for name in one)
+
+
+def test_a_resumed_run_learns_as_it_did(trained):
+    done, _ = trained
+    with pytest.raises(InputError, match=r"can't resume with seed=5: .* seed=0"):
+        drone_rl.train(TINY, folder=done.folder, resume=True, seed=5)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"seed": -1}, "seed=-1 is out of range; give a whole number of 0 or more"),
+        ({"task": {"num_cubes": 1}}, r"task=\(dict\) is no TaskSettings"),
+        ({"returns": 3}, "returns=3 is no Returns"),
+        ({"transforms": (3,)}, r"transforms\[0\]=3 is no Transform"),
+        ({"wind": 3}, "wind is unknown; there are: task, camera"),
+    ],
+)
+def test_mistakes_name_the_argument(change, message, tmp_path):
+    with pytest.raises(InputError, match=f"^{message}"):
+        drone_rl.train(folder=tmp_path, **change)
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,52 @@
+"""A part that comes in variants."""
+
+import dataclasses
+import datetime
+from typing import Annotated, ClassVar
+
+import pytest
+
+from drone_rl.settings.changes import Changes
+from drone_rl.settings.networks import Mlp, Network, OriginalCnn, SmallCnn
+from drone_rl.settings.returns import Returns
+from drone_rl.settings.variant import Variant, locate
+from drone_rl.sim.settings import TaskSettings
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.schema import Whole
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Day(Variant):
+    target: ClassVar[str] = "datetime.timedelta"
+    days: Annotated[int, Whole(0)] = 2
+
+
+def test_a_variant_makes_what_it_stands_for():
+    assert Day(days=3).make() == datetime.timedelta(days=3)
+    assert Day().make(hours=1) == datetime.timedelta(days=2, hours=1)
+
+
+def test_the_variants_of_a_part():
+    assert set(Network.variants()) == {SmallCnn, OriginalCnn, Mlp}
+    assert "_Discounted" not in {variant.__name__ for variant in Returns.variants()}
+    assert len(Returns.variants()) == 8
+    assert SmallCnn().name == "small_cnn"
+
+
+def test_what_is_made_is_imported_only_then():
+    with pytest.raises(InputError, match=r"_target_=no\.such can't be imported"):
+        locate("no.such")
+    with pytest.raises(InputError, match="can't be imported"):
+        locate("os.no_such")
+    with pytest.raises(InputError, match="can't be imported"):
+        locate("")
+    assert locate("os.path").__name__ == "posixpath"
+
+
+def test_some_settings_of_a_task():
+    kind = Changes(TaskSettings)
+    assert kind.read({"num_cubes": 5, "spacing": None}, "task") == {"num_cubes": 5}
+    with pytest.raises(InputError, match=r"^task\.num_cubes=0"):
+        kind.read({"num_cubes": 0}, "task")
+    with pytest.raises(InputError, match=r"^task\.num_cubs is unknown"):
+        kind.read({"num_cubs": 1}, "task")

@@ -1,0 +1,25 @@
+"""`import drone_rl` is quick and offers all that it lists."""
+
+import subprocess
+import sys
+
+import pytest
+
+import drone_rl
+
+
+def test_everything_that_is_listed_is_there():
+    for name in set(drone_rl.__all__) - {"explain"}:  # a package of that name is still there
+        assert getattr(drone_rl, name).__name__ == name
+        assert name in dir(drone_rl)
+    assert set(drone_rl._HOMES) == set(drone_rl.__all__)
+
+
+def test_what_is_not_there():
+    with pytest.raises(AttributeError, match="no attribute 'fly'"):
+        drone_rl.fly  # noqa: B018
+
+
+def test_nothing_heavy_is_imported():
+    code = "import sys, drone_rl; assert not {'torch', 'numpy', 'hydra'} & set(sys.modules)"
+    subprocess.run([sys.executable, "-c", code], check=True)
