@@ -6,6 +6,8 @@ What is listed here is imported when it is first used, so that `import drone_rl`
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from drone_rl.utils.garbage import collecting_no_garbage
+
 if TYPE_CHECKING:
     from drone_rl.api.environment import make_env
     from drone_rl.api.explaining import Explanations, explain
@@ -61,7 +63,8 @@ def __getattr__(name: str) -> Any:
     """Imports a public name when it is first asked for."""
     if name not in _HOMES:
         raise AttributeError(f"module 'drone_rl' has no attribute {name!r}")
-    value = getattr(importlib.import_module(_HOMES[name]), name)
+    with collecting_no_garbage():
+        value = getattr(importlib.import_module(_HOMES[name]), name)
     globals()[name] = value
     return value
 

@@ -11,6 +11,7 @@ from drone_rl.bench.mutants import bench_mutants
 from drone_rl.bench.scaling import bench_scaling
 from drone_rl.bench.sentences import bench_sentences
 from drone_rl.bench.speed import bench_collector, bench_dm_control, bench_render
+from drone_rl.bench.startup import bench_startup
 from drone_rl.bench.sweeps import bench_kills, bench_ray, bench_sweeps
 from drone_rl.bench.training import bench_memory, bench_solve
 from drone_rl.bench.verdicts import bench_verdicts
@@ -93,6 +94,11 @@ BENCHMARKS: dict[str, Benchmark] = {
         lambda s: bench_ray(s.runs, s.device, s.quick),
         "many",
         (*_COLLECTING, "conf", "bench/sweeps"),
+    ),
+    "startup": Benchmark(
+        lambda s: bench_startup(s.runs / "startup", s.device, s.quick),
+        "room",
+        (*_TRAINING, "verdicts", "api", "settings", "hydra_app", "cli", "conf", "bench/startup"),
     ),
 }  # fmt: skip
 GROUPS = tuple(dict.fromkeys(benchmark.group for benchmark in BENCHMARKS.values()))

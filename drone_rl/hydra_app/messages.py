@@ -8,6 +8,7 @@ from hydra.errors import HydraException
 from omegaconf.errors import OmegaConfBaseException
 
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.quiet import ignore_noise
 
 MISTAKES = (InputError, HydraException, OmegaConfBaseException, OSError)
 """What a user can be blamed for; all else is a bug of ours and keeps its traceback."""
@@ -16,6 +17,7 @@ MISTAKES = (InputError, HydraException, OmegaConfBaseException, OSError)
 def guarded(command: Callable[[], int]) -> int:
     """Runs a command; a mistake becomes one line and an exit status of 2, Ctrl-C one of 130."""
     os.environ["HYDRA_FULL_ERROR"] = "1"  # let Hydra's own errors through to be shortened here
+    ignore_noise()
     try:
         return command()
     except KeyboardInterrupt:

@@ -40,7 +40,7 @@ class JudgeSettings(FlightSettings):
 
     episodes: Annotated[int, Whole(1)] = 400
     """Held-out episodes, flown greedily, with drawn actions and by luck and the oracle alike."""
-    num_envs: Annotated[int, Whole(1)] = 128
+    num_envs: Annotated[int, Whole(1)] = 400
     """Worlds in one batch; bounds memory."""
     sampled: bool = True
     """Whether to fly the policy with drawn actions, too; told beside the verdict."""

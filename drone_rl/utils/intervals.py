@@ -5,8 +5,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import betaincinv
-from scipy.stats import binom
+from scipy.special import bdtr, betaincinv  # scipy.stats would take half a second to import
 
 
 def proportion(successes: int, trials: int, confidence: float = 0.95) -> dict[str, Any]:
@@ -99,7 +98,8 @@ def median_bounds(values: ArrayLike, confidence: float = 0.95) -> tuple[float, f
         (fewer than six values at 95%).
     """
     ordered = np.sort(np.asarray(values, np.float64).ravel())
-    rank = int(binom.ppf((1.0 - confidence) / 2, len(ordered), 0.5)) if len(ordered) else 0
+    below = bdtr(np.arange(len(ordered) + 1), len(ordered), 0.5)  # as many lie below the median
+    rank = int(np.searchsorted(below, (1.0 - confidence) / 2)) if len(ordered) else 0
     if rank < 1:
         return None
     return float(ordered[rank - 1]), float(ordered[-rank])

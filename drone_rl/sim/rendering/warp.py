@@ -9,6 +9,7 @@ shard of the batch a core, each with its own buffers, on a pool of threads.
 """
 
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 
 import mujoco
 import torch
@@ -22,6 +23,7 @@ from drone_rl.sim.rendering.view import View
 from drone_rl.sim.rendering.warp_shard import RECORDING, Shard
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.provenance import num_cores
+from drone_rl.utils.quiet import standard_error_closed
 
 DRAWN = ("rgb", "depth", "segmentation")
 """Modalities that it knows."""
@@ -53,6 +55,8 @@ class WarpRenderer:
         check_device(device)
         quiet = wp.LOG_ERROR if device == "cpu" else wp.LOG_WARNING  # no word about missing CUDA
         wp.config.log_level = max(wp.config.log_level, quiet)
+        with standard_error_closed() if device == "cpu" else nullcontext():
+            wp.init()  # its native part says that there is no CUDA, whatever the level
         self.scene = scene
         self.device = torch.device(device)
         wanted = 1 if self.device.type == "cuda" else num_shards or num_cores()

@@ -1,0 +1,33 @@
+import os
+import subprocess
+import sys
+import warnings
+
+from drone_rl.utils.quiet import ignore_noise, standard_error_closed
+
+
+def test_nothing_gets_through_to_standard_error_until_it_is_open_again(capfd):
+    with standard_error_closed():
+        os.write(2, b"from below")
+    os.write(2, b"again")
+    assert capfd.readouterr().err == "again"
+
+
+def test_what_no_user_can_do_anything_about():
+    code = (
+        "import logging, warnings; from drone_rl.utils.quiet import ignore_noise\n"
+        "logging.basicConfig(level='INFO', format='%(message)s'); ignore_noise()\n"
+        "from absl import logging as absl\n"
+        "warnings.warn('GLFWError: no X11'); warnings.warn('the DISPLAY is missing')\n"
+        "absl.info('an OpenGL backend'); logging.info('ours'); absl.warning('a warning')\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stderr.splitlines() == ["ours", "a warning"]
+
+
+def test_other_warnings_are_left():
+    with warnings.catch_warnings(record=True) as seen:
+        warnings.simplefilter("always")
+        ignore_noise()
+        warnings.warn("about a tensor", stacklevel=1)
+    assert len(seen) == 1
