@@ -32,6 +32,7 @@ from drone_rl.training import (
 from drone_rl.training.progress import Training as Running
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock, write_atomically
+from drone_rl.utils.memory import bound_kernels
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.schema import Real
 from drone_rl.utils.settings import kinds_of
@@ -151,6 +152,7 @@ def _build(
     description = describe(config).as_dict()
     # sums depend on how many threads make them: on as many everywhere, whatever the machine has
     torch.set_num_threads(settings.collector.num_threads)
+    bound_kernels()
     collector, network, generators = build_collector(settings)
     noted = {"config": config, "description": description, **origin}
     (folder / "run.yaml").write_text(yaml.safe_dump(noted, sort_keys=False))

@@ -1,16 +1,18 @@
 """Several collectors side by side on the threads of one process."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import torch
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
+from torchrl.collectors import BaseCollector
 
 from drone_rl.collectors.episodes import EpisodeCollector
 
 
-class ThreadedCollector:
+class ThreadedCollector(BaseCollector):
     """Joins the batches of collectors that run at the same time, each on a thread of its own.
 
     Drawing lets go of the interpreter's lock, so while one collector's worlds are being drawn
@@ -19,12 +21,20 @@ class ThreadedCollector:
     not depend on which thread is faster.
     """
 
-    def __init__(self, collectors: Sequence[EpisodeCollector]) -> None:
+    def __init__(
+        self,
+        collectors: Sequence[EpisodeCollector],
+        *,
+        postproc: Callable[[TensorDictBase], TensorDictBase] | None = None,
+    ) -> None:
         """Takes over the collectors.
 
         Args:
             collectors: Over disjoint worlds, each drawn by a single shard.
+            postproc: Applied to each joined batch, such as a return estimator.
         """
+        super().__init__()
+        self.postproc = postproc
         self.collectors = list(collectors)
         # one torch thread each: the collectors are what runs in parallel
         self._pool = ThreadPoolExecutor(
@@ -36,27 +46,49 @@ class ThreadedCollector:
         """The policy that learns."""
         return self.collectors[0].actor
 
-    def __iter__(self) -> Iterator[TensorDictBase]:
-        """Yields batches without end."""
+    def iterator(self) -> Iterator[TensorDictBase]:
+        """Yields batches without end; what a `for` over the collector goes through."""
         while True:
             yield self.collect()
 
     def collect(self) -> TensorDictBase:
         """Runs one episode in every world of every collector. Shape: (T_total,)."""
         parts = list(self._pool.map(EpisodeCollector.collect, self.collectors))
-        return parts[0] if len(parts) == 1 else torch.cat(parts)
+        batch = parts[0] if len(parts) == 1 else torch.cat(parts)
+        return batch if self.postproc is None else self.postproc(batch)
 
     def state_dict(self) -> dict:
         """The collectors' states, as they stand between two batches."""
         return {"collectors": [collector.state_dict() for collector in self.collectors]}
 
-    def load_state_dict(self, state: dict) -> None:
+    def load_state_dict(self, state_dict: dict) -> None:
         """Goes on from a `state_dict`."""
-        for collector, part in zip(self.collectors, state["collectors"], strict=True):
+        for collector, part in zip(self.collectors, state_dict["collectors"], strict=True):
             collector.load_state_dict(part)
 
-    def shutdown(self) -> None:
-        """Ends the threads and closes the environments."""
+    def set_seed(self, seed: int, static_seed: bool = False) -> int:
+        """Seeds all worlds, each of which has a stream of its own by its number.
+
+        Returns:
+            See `EpisodeCollector.set_seed`.
+        """
+        return [c.set_seed(seed, static_seed=static_seed) for c in self.collectors][-1]
+
+    def shutdown(
+        self, timeout: float | None = None, close_env: bool = True, raise_on_error: bool = True
+    ) -> None:
+        """Ends the threads and closes the environments, unless they shall stay open."""
         self._pool.shutdown()
         for collector in self.collectors:
-            collector.shutdown()
+            collector.shutdown(close_env=close_env)
+
+    def __len__(self) -> int:
+        """There is no end of batches."""
+        raise TypeError("a ThreadedCollector has batches without end")
+
+    def _maybe_fallback_update(
+        self, policy_or_weights: Any = None, *, model_id: str | None = None
+    ) -> None:
+        """What `update_policy_weights_` does, see `EpisodeCollector`."""
+        for collector in self.collectors:
+            collector.update_policy_weights_(policy_or_weights)

@@ -4,7 +4,6 @@ from drone_rl.objectives.estimators import (
     BatchNormalised,
     LeaveOneOut,
     LinearRamp,
-    ReturnEstimator,
     RewardToGo,
     Standardised,
     SuccessScaled,
@@ -12,6 +11,7 @@ from drone_rl.objectives.estimators import (
     TotalReward,
 )
 from drone_rl.objectives.reinforce import ReinforceLoss
+from drone_rl.objectives.return_estimator import ReturnEstimator
 
 __all__ = [
     "BatchNormalised",

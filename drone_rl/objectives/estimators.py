@@ -1,56 +1,11 @@
-"""Return estimators as modules: each writes "return_to_go" into a batch of complete episodes."""
-
-import abc
+"""Return estimators, one for each of `objectives.returns`; they write "return_to_go"."""
 
 import torch
-from tensordict import TensorDictBase
-from tensordict.nn import TensorDictModuleBase
-from tensordict.utils import NestedKey
 from torch import Tensor
 
 from drone_rl.objectives import returns
+from drone_rl.objectives.return_estimator import ReturnEstimator
 from drone_rl.utils.errors import InputError
-
-
-class ReturnEstimator(TensorDictModuleBase, abc.ABC):
-    """Reads rewards and end flags of shape (*batch, T, 1), writes returns of the same shape."""
-
-    def __init__(
-        self,
-        *,
-        scale: bool = False,
-        reward_key: NestedKey = ("next", "reward"),
-        done_key: NestedKey = ("next", "done"),
-        out_key: NestedKey = "return_to_go",
-    ) -> None:
-        """Names the entries.
-
-        Args:
-            scale: Whether to divide the batch's returns by their root mean square; biased, see
-                `returns.scale_to_unit`.
-            reward_key: Entry with the rewards.
-            done_key: Entry with the end flags.
-            out_key: Entry that is written.
-        """
-        super().__init__()
-        self.in_keys, self.out_keys = [reward_key, done_key], [out_key]
-        self.scale = scale
-
-    @torch.no_grad()
-    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
-        """Writes the returns.
-
-        Raises:
-            InputError: An episode is not complete.
-        """
-        values = self.estimate(*(tensordict.get(key) for key in self.in_keys))
-        return tensordict.set(
-            self.out_keys[0], returns.scale_to_unit(values) if self.scale else values
-        )
-
-    @abc.abstractmethod
-    def estimate(self, reward: Tensor, done: Tensor) -> Tensor:
-        """The returns. Shape: that of `reward`."""
 
 
 class _Discounted(ReturnEstimator):

@@ -18,6 +18,7 @@ from drone_rl.training.metrics import batch_metrics, episode_rewards, running_me
 from drone_rl.training.progress import Progress
 from drone_rl.training.restore import check_fits
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.memory import return_freed_memory
 
 
 class Collector(Protocol):
@@ -108,6 +109,7 @@ class Trainer:
                         reason = "frames"
                         break
                     self._notify("on_update", metrics)
+                    return_freed_memory()
             except NotANumberError:
                 self._notify("on_failure")
                 raise

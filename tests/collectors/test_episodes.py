@@ -1,19 +1,27 @@
+"""Whole episodes in order, and the contract of TorchRL's collectors."""
+
+import copy
 import itertools
 
 import pytest
 import torch
 from tensordict import TensorDict
 from tensordict.nn import TensorDictModule
+from torchrl.collectors import BaseCollector
 from torchrl.data import Binary, Categorical, Composite, Unbounded
 from torchrl.envs import EnvBase
 
-from drone_rl.collectors import EpisodeCollector, ThreadedCollector
+from drone_rl.collectors import EpisodeCollector
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation import Oracle
+from drone_rl.objectives import RewardToGo
 from drone_rl.sim.settings import TaskSettings
 from drone_rl.utils.errors import InputError
 
 SHORT = TaskSettings(num_cubes=2, first_distance=3.0, spacing=3.0, step_limit=12, front_margin=3.0)
+
+
+TRUTH = (("next", "info", "cubes"), ("next", "info", "end_reason"))
 
 
 class Scripted(EnvBase):
@@ -50,7 +58,7 @@ class Scripted(EnvBase):
 def scripted(**kwargs):
     """A collector whose actor answers each frame with its number."""
     actor = TensorDictModule(lambda f: f[:, 0].long(), in_keys=["frame"], out_keys=["action"])
-    return EpisodeCollector(Scripted(), actor, keep=(("next", "frame"),), **kwargs)
+    return EpisodeCollector(Scripted(), actor, **{"keep": (("next", "frame"),), **kwargs})
 
 
 def test_every_frame_of_every_episode_is_there_once_in_order_and_beside_its_action():
@@ -129,7 +137,7 @@ def test_shutdown_closes_once():
 
 @pytest.fixture
 def collector(make_pipeline):
-    return EpisodeCollector(*make_pipeline(5, task=SHORT))
+    return EpisodeCollector(*make_pipeline(5, task=SHORT), keep=TRUTH)
 
 
 def test_batch_is_complete_episodes_one_after_the_other(collector):
@@ -203,7 +211,7 @@ def test_stops_at_total_frames(make_pipeline):
 @pytest.fixture
 def seeing(make_pipeline):
     """A collector whose policy reads the nested truth; three worlds, nothing is drawn."""
-    return EpisodeCollector(DroneEnv(3, SHORT, pixels=False), Oracle(SHORT))
+    return EpisodeCollector(DroneEnv(3, SHORT, pixels=False), Oracle(SHORT), keep=TRUTH)
 
 
 def test_what_a_policy_reads_is_there_at_every_step_and_kept(seeing):
@@ -283,54 +291,60 @@ def test_unbatched_environment_is_refused(make_pipeline):
         EpisodeCollector(Unbatched(), actor)
 
 
-def threaded(make_pipeline):
-    shares = [make_pipeline(2, task=SHORT, first_world=i * 2, num_shards=1) for i in range(2)]
-    return ThreadedCollector([EpisodeCollector(*share) for share in shares])
+def test_what_the_environment_lacks_is_not_kept():
+    keep = (("next", "info", "end_reason"), ("next", "frame"))
+    batch = scripted(keep=keep).collect()
+    assert set(batch["next"].keys()) == {"reward", "done", "terminated", "frame"}
 
 
-def test_threads_give_the_same_batch_every_time(make_pipeline):
-    first, second = threaded(make_pipeline), threaded(make_pipeline)
-    for _ in range(3):
-        one, two = first.collect(), second.collect()
-        assert torch.equal(one["pixels"], two["pixels"])
-        assert torch.equal(one["action"], two["action"])
-    first.shutdown()
-    second.shutdown()
+def test_it_is_one_of_torchrls_collectors(seeing):
+    assert isinstance(seeing, BaseCollector)
+    alone = DroneEnv(3, SHORT, pixels=False)
+    other = EpisodeCollector(alone, Oracle(SHORT), keep=TRUTH)
+    assert torch.equal(seeing.next()["action"], other.collect()["action"])
+    with pytest.raises(TypeError, match="not known beforehand"):
+        len(seeing)
 
 
-def test_threads_join_in_order(make_pipeline):
-    joined = threaded(make_pipeline)
-    batch = joined.collect()
-    assert int(batch["next", "done"].sum()) == 4
-    alone = EpisodeCollector(*make_pipeline(2, task=SHORT, num_shards=1)).collect()
-    assert torch.equal(batch["pixels"][: len(alone)], alone["pixels"])
-    joined.shutdown()
+def test_a_list_of_batches():
+    assert [len(batch) for batch in list(scripted(total_frames=7))] == [6, 7]
 
 
-def test_threads_carry_every_episode_of_every_collector_on():
-    joined = ThreadedCollector([scripted(), scripted()])
-    assert joined.actor is joined.collectors[0].actor
-    for episode in range(3):
-        alone = [w * 100 + episode * 10 for w in range(3)]
-        batch = joined.collect()
-        firsts = batch["frame"][:, 0][batch["frame"][:, 0] % 10 == 0].tolist()
-        assert firsts == alone * 2
-        assert int(batch["next", "done"].sum()) == 6
-    assert [c.frames for c in joined.collectors] == [20, 20]
-    joined.shutdown()
-    assert all(c.env.is_closed for c in joined.collectors)
+def test_postproc_is_given_each_batch():
+    collector = scripted(postproc=RewardToGo(0.5), total_frames=7)
+    for batch in collector:
+        expected = RewardToGo(0.5)(batch.exclude("return_to_go"))["return_to_go"]
+        assert torch.equal(batch["return_to_go"], expected)
 
 
-def test_threaded_state_round_trip(make_pipeline):
-    first = threaded(make_pipeline)
-    first.collect()
-    state = first.state_dict()
-    second = threaded(make_pipeline)
-    second.load_state_dict(state)
-    assert second.state_dict() == state
-    for one, two in zip(first.collectors, second.collectors, strict=True):
-        cubes = [c.env.reset()["info", "cube_positions"] for c in (one, two)]
-        assert torch.equal(*cubes)
-    assert second.collectors[0].frames == first.collectors[0].frames
-    first.shutdown()
-    second.shutdown()
+def test_hooks_of_torchrls_collectors_are_there():
+    collector = scripted()
+    assert collector.pre_collect_hook is None and collector.post_collect_hook is None
+
+
+def test_seed_is_that_of_the_worlds(seeing):
+    first = seeing.collect()["next", "info", "cubes"]
+    assert seeing.set_seed(0, static_seed=True) == 0
+    assert torch.equal(seeing.collect()["next", "info", "cubes"], first)
+    assert seeing.set_seed(7) != 7  # a seed for the next collector
+
+
+def test_weights_of_another_actor_its_state_or_a_tensordict():
+    layer = torch.nn.Linear(1, 1)
+    actor = TensorDictModule(layer, in_keys=["frame"], out_keys=["action"])
+    collector = EpisodeCollector(Scripted(), actor, keep=())
+    before = layer.weight.detach().clone()
+    collector.update_policy_weights_()
+    assert torch.equal(layer.weight, before)
+    for value, kind in enumerate((lambda a: a, lambda a: a.state_dict(), TensorDict.from_module)):
+        other = copy.deepcopy(actor)
+        torch.nn.init.constant_(other.module.weight, value)
+        collector.update_policy_weights_(kind(other))
+        assert float(layer.weight.detach()) == value
+        assert layer.weight is collector.actor.module.weight  # in place, nothing is rebound
+
+
+def test_shutdown_may_leave_the_worlds_open(seeing):
+    seeing.collect()
+    seeing.shutdown(close_env=False)
+    assert not seeing.env.is_closed

@@ -9,6 +9,7 @@ TARGETS: dict[str, tuple[str, ...]] = {
         "verdicts/test_failures",
     ),
     "objectives/returns": ("objectives/test_returns",),
+    "objectives/return_estimator": ("objectives/test_return_estimator",),
     "objectives/estimators": ("objectives/test_estimators",),
     "objectives/reinforce": ("objectives/test_reinforce",),
     "collectors/episodes": ("collectors/test_episodes",),

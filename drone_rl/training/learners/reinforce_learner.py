@@ -56,18 +56,19 @@ class ReinforceLearner:
         """One step of the optimiser.
 
         Args:
-            batch: Complete episodes. Shape: (T_total,).
+            batch: Complete episodes one after the other, shape (T_total,), or pieces of episodes,
+                shape (num_envs, T), whose steps of unknown return are left out.
 
         Returns:
             The terms of the loss, the gradient's norm and the learning rate of the next step.
 
         Raises:
             NotANumberError: A loss or gradient is NaN or infinite.
-            InputError: An episode is not complete.
+            InputError: No episode ends in the batch.
         """
         self.optimiser.zero_grad()
         try:
-            terms = self._accumulate(self.estimator(batch))
+            terms = self._accumulate(_known_steps(self.estimator(batch)))
         except NotANumberError:
             self.optimiser.zero_grad()
             raise
@@ -125,3 +126,9 @@ class ReinforceLearner:
         self.optimiser.load_state_dict(state["optimiser"])
         if self.scheduler is not None:
             self.scheduler.load_state_dict(state["scheduler"])
+
+
+def _known_steps(batch: TensorDictBase) -> TensorDictBase:
+    """Those whose return is known. Shape: (num_steps,)."""
+    mask = batch.get(("collector", "mask"), None)
+    return batch.reshape(-1) if mask is None else batch[mask]

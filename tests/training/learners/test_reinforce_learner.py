@@ -4,6 +4,7 @@ import copy
 
 import pytest
 import torch
+from tensordict import TensorDict
 
 from drone_rl.training import NotANumberError
 from drone_rl.utils.errors import InputError
@@ -121,3 +122,24 @@ def test_state_of_another_learner_is_refused(make_trainer, part, value, message)
     with pytest.raises(InputError, match=message):
         learner.check_state({**learner.state_dict(), part: value})
     learner.check_state(learner.state_dict())
+
+
+def test_steps_of_unknown_return_change_nothing(make_trainer):
+    """Two rows of 3 steps, the second of which goes on: the update is that of the other 4."""
+    weights = []
+    for pieces in (True, False):
+        learner = make_trainer(minibatch_frames=2).learner
+        pixels = torch.arange(24.0).reshape(6, 4) / 24
+        done = torch.tensor([0, 0, 1, 1, 0, 0]).bool()[:, None]
+        reward = torch.tensor([0.0, 1.0, 1.0, 3.0, 5.0, 7.0])[:, None]
+        batch = TensorDict(
+            {
+                "pixels": pixels,
+                "action": torch.tensor([0, 1, 1, 0, 1, 0]),
+                "next": {"reward": reward, "done": done},
+            },
+            [6],
+        )
+        learner.update(batch.reshape(2, 3) if pieces else batch[:4])
+        weights.append(learner.network.weight.detach().clone())
+    assert torch.equal(*weights)

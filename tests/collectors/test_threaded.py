@@ -1,0 +1,91 @@
+"""Collectors side by side give the batch of one, whichever is faster."""
+
+import copy
+
+import pytest
+import torch
+from torchrl.collectors import BaseCollector
+
+from drone_rl.collectors import EpisodeCollector, ThreadedCollector
+from drone_rl.objectives import RewardToGo
+from tests.collectors.test_episodes import SHORT, scripted
+
+
+def threaded(make_pipeline):
+    shares = [make_pipeline(2, task=SHORT, first_world=i * 2, num_shards=1) for i in range(2)]
+    return ThreadedCollector([EpisodeCollector(*share) for share in shares])
+
+
+def test_threads_give_the_same_batch_every_time(make_pipeline):
+    first, second = threaded(make_pipeline), threaded(make_pipeline)
+    for _ in range(3):
+        one, two = first.collect(), second.collect()
+        assert torch.equal(one["pixels"], two["pixels"])
+        assert torch.equal(one["action"], two["action"])
+    first.shutdown()
+    second.shutdown()
+
+
+def test_threads_join_in_order(make_pipeline):
+    joined = threaded(make_pipeline)
+    batch = joined.collect()
+    assert int(batch["next", "done"].sum()) == 4
+    alone = EpisodeCollector(*make_pipeline(2, task=SHORT, num_shards=1)).collect()
+    assert torch.equal(batch["pixels"][: len(alone)], alone["pixels"])
+    joined.shutdown()
+
+
+def test_threads_carry_every_episode_of_every_collector_on():
+    joined = ThreadedCollector([scripted(), scripted()])
+    assert joined.actor is joined.collectors[0].actor
+    for episode in range(3):
+        alone = [w * 100 + episode * 10 for w in range(3)]
+        batch = joined.collect()
+        firsts = batch["frame"][:, 0][batch["frame"][:, 0] % 10 == 0].tolist()
+        assert firsts == alone * 2
+        assert int(batch["next", "done"].sum()) == 6
+    assert [c.frames for c in joined.collectors] == [20, 20]
+    joined.shutdown()
+    assert all(c.env.is_closed for c in joined.collectors)
+
+
+def test_threaded_state_round_trip(make_pipeline):
+    first = threaded(make_pipeline)
+    first.collect()
+    state = first.state_dict()
+    second = threaded(make_pipeline)
+    second.load_state_dict(state)
+    assert second.state_dict() == state
+    for one, two in zip(first.collectors, second.collectors, strict=True):
+        cubes = [c.env.reset()["info", "cube_positions"] for c in (one, two)]
+        assert torch.equal(*cubes)
+    assert second.collectors[0].frames == first.collectors[0].frames
+    first.shutdown()
+    second.shutdown()
+
+
+def test_it_is_one_of_torchrls_collectors():
+    joined = ThreadedCollector([scripted(), scripted()], postproc=RewardToGo(0.5))
+    assert isinstance(joined, BaseCollector)
+    assert len(joined.next()["return_to_go"]) == 12
+    with pytest.raises(TypeError, match="without end"):
+        len(joined)
+    for collector in joined.collectors:
+        collector.env.is_closed = False  # TorchRL takes every environment for closed until told
+    joined.shutdown(close_env=False)
+    assert not any(c.env.is_closed for c in joined.collectors)
+
+
+def test_seed_and_weights_reach_every_collector(make_pipeline):
+    joined = threaded(make_pipeline)
+    first = joined.collect()
+    assert joined.set_seed(0, static_seed=True) == 0
+    cubes = [c.env.reset()["info", "cube_positions"] for c in joined.collectors]
+    assert not torch.equal(*cubes)  # one seed, other worlds
+    other = copy.deepcopy(joined.actor)
+    for parameter in other.parameters():
+        torch.nn.init.zeros_(parameter)
+    joined.update_policy_weights_(other)
+    batch = joined.collect()
+    assert not batch["logits"].any() and first["logits"].any()
+    joined.shutdown()

@@ -1,0 +1,140 @@
+"""An estimator where TorchRL has transforms: after a collector, in a replay buffer, in no env."""
+
+import pytest
+import torch
+from tensordict import TensorDict
+from torchrl.collectors import Collector
+from torchrl.data import LazyTensorStorage, ReplayBuffer
+from torchrl.envs import Compose, Reward2GoTransform, TransformedEnv
+from torchrl.modules import RandomPolicy
+
+from drone_rl import objectives
+from drone_rl.envs.three_state import ThreeStateEnv
+from drone_rl.objectives import BatchNormalised, RewardToGo, TimeBaseline, TotalReward
+from drone_rl.utils.errors import InputError
+
+NAMES = [n for n in objectives.__all__ if n not in ("ReinforceLoss", "ReturnEstimator")]
+
+
+def rows(rewards, ends):
+    """A batch of shape (N, T)."""
+    reward = torch.tensor(rewards, dtype=torch.float32)[..., None]
+    done = torch.tensor(ends, dtype=torch.bool)[..., None]
+    return TensorDict({"next": {"reward": reward, "done": done}}, reward.shape[:-1])
+
+
+WHOLE = ([[1.0, 1.0, 2.0], [0.0, 4.0, 1.0]], [[0, 1, 1], [0, 0, 1]])
+CUT = ([[1.0, 1.0, 2.0], [0.0, 4.0, 1.0]], [[0, 1, 0], [0, 0, 1]])
+
+
+def collector(postproc):
+    env = ThreeStateEnv(4)
+    return Collector(
+        env,
+        RandomPolicy(env.action_spec),
+        frames_per_batch=20,
+        total_frames=40,
+        postproc=postproc,
+    )
+
+
+POSTPROC = {
+    "itself": lambda estimator: estimator,
+    "its inverse": lambda estimator: estimator.inv,
+    "a chain's inverse": lambda estimator: Compose(estimator).inv,
+}
+
+
+@pytest.mark.parametrize("how", POSTPROC)
+def test_postproc_of_a_collector_equals_torchrls_transform_where_it_is_known(how):
+    torch.manual_seed(1)
+    theirs, cut = Reward2GoTransform(0.5, out_keys=["theirs"]), 0
+    for batch in collector(POSTPROC[how](RewardToGo(0.5))):
+        known = batch.get(("collector", "mask"), torch.ones(4, 5, dtype=torch.bool))
+        expected = theirs.inv(batch)["theirs"]
+        torch.testing.assert_close(batch["return_to_go"][known], expected[known])
+        assert known[batch["next", "done"][..., 0]].all() and known.any()
+        cut += int((~known).sum())
+    assert cut > 0
+
+
+def test_a_chain_hands_on_what_it_is_given():
+    batch = rows(*WHOLE)
+    assert "return_to_go" not in Compose(RewardToGo())(batch)
+    assert "return_to_go" in Compose(RewardToGo()).inv(batch)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_estimator_after_a_collector(name):
+    for batch in collector(getattr(objectives, name)()):
+        assert batch["return_to_go"].shape == (4, 5, 1)
+        assert batch["return_to_go"].isfinite().all()
+
+
+def test_rows_of_whole_episodes_by_hand():
+    batch = RewardToGo(0.5)(rows(*WHOLE))
+    assert batch["return_to_go"][..., 0].tolist() == [[1.5, 1.0, 2.0], [2.25, 4.5, 1.0]]
+    assert ("collector", "mask") not in batch.keys(True)
+
+
+def test_an_unfinished_tail_is_masked_and_counts_for_nothing():
+    batch = RewardToGo(0.5)(rows(*CUT))
+    assert batch["return_to_go"][..., 0].tolist() == [[1.5, 1.0, 0.0], [2.25, 4.5, 1.0]]
+    assert batch["collector", "mask"].tolist() == [[True, True, False], [True, True, True]]
+    batch = TotalReward()(rows(*CUT))
+    assert batch["return_to_go"][..., 0].tolist() == [[2.0, 2.0, 0.0], [5.0, 5.0, 5.0]]
+    scaled = BatchNormalised(0.5)(rows(*CUT))["return_to_go"][..., 0]
+    assert float(scaled[0, 2]) == 0.0
+    assert float(scaled.sum()) == pytest.approx(0.0, abs=1e-6)
+    assert float(scaled.square().sum()) == pytest.approx(5.0)  # five steps are known
+
+
+def test_padding_is_masked_and_an_older_mask_is_not_believed():
+    """Padding never ends; TorchRL's collectors hand out their last batch's entries again."""
+    batch = rows(*CUT)
+    batch["collector", "mask"] = torch.tensor([[True, False, True], [True, True, True]])
+    mask = RewardToGo(0.5)(batch)["collector", "mask"]
+    assert mask.tolist() == [[True, True, False], [True, True, True]]
+    batch["next", "done"][0, 2] = True
+    assert RewardToGo(0.5)(batch)["collector", "mask"].all()
+
+
+def test_no_episode_ends():
+    with pytest.raises(InputError, match=r"no episode ends in a batch of shape \(1, 2\)"):
+        RewardToGo()(rows([[1.0, 1.0]], [[0, 0]]))
+
+
+def test_replay_buffer_estimates_what_comes_in_and_hands_out_samples_as_they_are():
+    buffer = ReplayBuffer(storage=LazyTensorStorage(20), transform=RewardToGo(0.5), batch_size=64)
+    for batch in (WHOLE, CUT):
+        buffer.extend(rows(*batch).flatten())
+    wanted = {(1.0, 1.5), (1.0, 1.0), (2.0, 2.0), (0.0, 2.25), (4.0, 4.5)}
+    stored = buffer[:6]
+    columns = (stored["next", "reward"][:, 0], stored["return_to_go"][:, 0])
+    assert set(zip(*(column.tolist() for column in columns), strict=True)) == wanted
+    sample = buffer.sample()
+    assert sample["return_to_go"].shape == (64, 1)
+    assert buffer[:]["collector", "mask"].tolist() == [True] * 12
+
+
+def test_replay_buffer_masks_tails():
+    buffer = ReplayBuffer(storage=LazyTensorStorage(20), transform=RewardToGo(0.5), batch_size=4)
+    buffer.extend(rows([[1.0, 1.0]], [[0, 1]])[0])
+    buffer.extend(rows([[1.0, 1.0]], [[1, 0]])[0])
+    assert buffer[:]["collector", "mask"].tolist() == [True, True, True, False]
+
+
+def test_a_memory_is_told_of_a_batch_once():
+    """A sample handed out again must not enter into the running mean."""
+    estimator = TimeBaseline(0.5, decay=0.5, max_steps=2)
+    buffer = ReplayBuffer(storage=LazyTensorStorage(8), transform=estimator, batch_size=8)
+    buffer.extend(rows([[1.0, 1.0]], [[0, 1]])[0])
+    before = estimator.baseline.tolist()
+    buffer.sample()
+    assert estimator.baseline.tolist() == before == [1.5, 1.0]
+
+
+@pytest.mark.parametrize("wrap", [lambda t: t, Compose, lambda t: Compose(Compose(t))])
+def test_no_transform_of_an_environment(wrap):
+    with pytest.raises(InputError, match=r"RewardToGo needs whole episodes.*postproc"):
+        TransformedEnv(ThreeStateEnv(2), wrap(RewardToGo()))
