@@ -6,6 +6,7 @@ one ends the episode. Nothing is collected and nothing vanishes.
 
 import dataclasses
 import enum
+import types
 
 import torch
 from torch import Tensor
@@ -15,7 +16,7 @@ from drone_rl.sim.batch import Batch
 from drone_rl.sim.dynamics import BodyState, ComputerVision
 from drone_rl.sim.entities.cube import Cube
 from drone_rl.sim.meaning import Meaning
-from drone_rl.sim.tasks import Goals, OracleRule
+from drone_rl.sim.tasks import Goals, Grid, OracleRule
 
 NUM_POSTS = 2
 REACH = 1.0
@@ -61,6 +62,9 @@ class Posts:
     strata = ("left", "right")
     luck = ("random", "forward")
     scored = ("passed", "sides")
+    remembered = types.MappingProxyType(
+        {"posts": "positions of the posts (T, 2, 3)", "next_cube": "number of the next post (T,)"}
+    )
     oracle = OracleRule(("end_reason",), lambda end: torch.zeros_like(end[..., 0]), MOVES)
     largest_reward = float(NUM_POSTS)
     drone_size = 0.5
@@ -73,6 +77,7 @@ class Posts:
             "passed": Entry((NUM_POSTS,), torch.bool),
             "sides": Entry((NUM_POSTS,), torch.int64, 0, 1),
             "end_reason": Entry((1,), torch.int64, 0, len(End) - 1),
+            "posts": Entry((NUM_POSTS, 3), torch.float32),
         }
 
     def make_dynamics(self):
@@ -121,6 +126,7 @@ class Posts:
             "passed": state.passed.clone(),
             "sides": (state.posts[..., 1] < 0).long(),
             "end_reason": state.end_reason[:, None].clone(),
+            "posts": state.posts.float(),
         }
 
     def score(self, info):
@@ -132,3 +138,92 @@ class Posts:
         """By the side on which a post stands."""
         for number, name in enumerate(self.strata):
             yield "side", name, goals.stratum == number
+
+    def remember(self, info):
+        """Where the posts are, and how many lie behind."""
+        return {"posts": info["posts"], "next_cube": info["passed"].sum(-1)}
+
+    def recall(self, kept, body):
+        """The posts as they stood."""
+        index = torch.arange(NUM_POSTS)
+        return PostsState(
+            body=body,
+            posts=kept["posts"].double(),
+            passed=index < kept["next_cube"][:, None],
+            steps=kept["step"].clone(),
+            end_reason=torch.zeros(len(kept["step"]), dtype=torch.int64),
+        )
+
+    def next_target(self, state):
+        """The nearest post ahead."""
+        return state.passed.sum(-1)
+
+    def next_offset(self, state):
+        """From the drone to it."""
+        following = self.next_target(state)
+        post = state.posts[torch.arange(len(state)), following.clamp(max=NUM_POSTS - 1)]
+        there = (following < NUM_POSTS)[:, None]
+        return torch.where(there, post - state.body.position, torch.nan)
+
+    def is_reached(self, state, target):
+        """Whether it was passed."""
+        return state.passed[torch.arange(len(state)), target]
+
+    def is_behind(self, state, target):
+        """Whether it lies behind."""
+        return state.body.position[:, 0] > state.posts[torch.arange(len(state)), target, 0]
+
+    def needed(self, offset):
+        """Away from a post in the way."""
+        lateral = offset[..., 1]
+        away = torch.where(lateral > 0, MOVES.right, MOVES.left)
+        return away.masked_fill(lateral.abs() > REACH, 0)
+
+    def stratum_at(self, offset):
+        """Left or right."""
+        return (offset[..., 1] < 0).long()
+
+    def grid(self, num_forward, num_lateral):
+        """Up to six metres ahead and three aside."""
+        return Grid(
+            torch.zeros(1).double(),
+            torch.linspace(2.0, 6.0, num_forward).double(),
+            torch.linspace(3.0, -3.0, num_lateral).double(),
+        )
+
+    def one_target(self, body, offset):
+        """The last post there, the others behind."""
+        state = self.start(torch.ones(len(offset), NUM_POSTS).double(), body)
+        state.posts[:, :-1] -= 100.0
+        state.posts[:, -1] = body.position + offset
+        state.passed[:, :-1] = True
+        return state
+
+    def without_targets(self, state):
+        """All posts far behind."""
+        gone = torch.ones_like(state.passed)
+        return dataclasses.replace(state, posts=state.posts - 100.0, passed=gone)
+
+    def without_next(self, state):
+        """The next one far behind."""
+        following = self._is_next(state)
+        posts = state.posts - 100.0 * following[..., None]
+        return dataclasses.replace(state, posts=posts, passed=state.passed | following)
+
+    def next_moved(self, state, metres):
+        """The next one to the left."""
+        posts = state.posts.clone()
+        move = torch.as_tensor(metres).expand(len(state))[:, None]
+        posts[..., 1] += move * self._is_next(state)
+        return dataclasses.replace(state, posts=posts)
+
+    def elsewhere(self, state, camera, generator):
+        """All posts ahead, somewhere to either side."""
+        draw = torch.rand(*state.posts.shape, generator=generator, dtype=torch.float64)
+        away = torch.stack([3.0 + 3.0 * draw[..., 0], 4.0 * draw[..., 1] - 2.0], -1)
+        posts = state.posts.clone()
+        posts[..., :2] = state.body.position[:, None, :2] + away
+        return dataclasses.replace(state, posts=posts, passed=torch.zeros_like(state.passed))
+
+    def _is_next(self, state):
+        return torch.arange(NUM_POSTS) == self.next_target(state)[:, None]

@@ -12,7 +12,7 @@ from drone_rl.bench.liars import liars
 from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, make_env
 from drone_rl.explain.hooks import probabilities
 from drone_rl.explain.planted import Planted, plant, reach
-from drone_rl.explain.scenes import Scenes, oracle_action
+from drone_rl.explain.scenes import Scenes
 from drone_rl.explain.trust import Pictures, Trial, check_maps, draw_pictures
 from drone_rl.policies import PolicyNetwork, SmallCNN
 from drone_rl.sim.tasks.collect_cubes import rules
@@ -89,10 +89,8 @@ def imagined(scenes: Scenes, episodes: int, frames: int) -> tuple[WorldState, np
 
 
 def expert(scenes: Scenes, state: WorldState) -> Tensor:
-    """What the oracle does in worlds with a next cube. Shape: (T,)."""
-    rows = torch.arange(len(state.drone), device=state.drone.device)
-    index = state.next_cube.clamp(max=state.cubes.shape[1] - 1)
-    return oracle_action(scenes, state.cubes[rows, index, 1] - state.drone[:, 1])
+    """What the next cube calls for, if there is one. Shape: (T,)."""
+    return scenes.task.needed(scenes.task.next_offset(state))
 
 
 def shipped(pictures: Pictures) -> dict[str, PolicyNetwork]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import imageio.v3 as iio
 import numpy as np
@@ -13,16 +14,14 @@ from torch import Tensor
 from torchrl.envs import TransformedEnv
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
-from drone_rl.sim.actions import Move
+from drone_rl.sim.actions import MOVES, Actions
 from drone_rl.sim.entities.cameras import CHASE
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.sim.tasks import Task
 from drone_rl.utils.errors import InputError
 
 PANEL_HEIGHT, PANEL_WIDTH = 360, 640
 FRAMES_PER_SECOND = 10
 _BACKGROUND, _TEXT, _CHOSEN, _BAR = (24, 26, 31), (235, 235, 240), (226, 74, 51), (120, 130, 150)
-_BARS = (Move.LEFT, Move.FORWARD, Move.RIGHT)
-"""The order in which the actions are drawn: as the drone would go."""
 
 
 @torch.no_grad()
@@ -40,19 +39,22 @@ def film_episode(
         RGB pictures, uint8. Shape: (360 + 40, 2 * 640, 3).
     """
     worlds = env.base_env.worlds
+    actions = worlds.dynamics.actions
     chase = worlds.view(CHASE.name, height=PANEL_HEIGHT, width=PANEL_WIDTH, show_drone=True)
     kind = ExplorationType.DETERMINISTIC if greedy else ExplorationType.RANDOM
-    state = env.reset()
+    state, earned = env.reset(), 0.0
     with set_exploration_type(kind):
         while True:
             outside = worlds.render(worlds.state, chase)[0]
             acted = actor(state.clone(False))
             inside = env.base_env.last_pixels[0]
-            yield _compose(inside, outside, acted, _caption(state))
+            yield _compose(inside, outside, _caption(worlds.task, state, earned), acted, actions)
             state = env.step(state.set("action", acted["action"]))["next"]
+            earned += float(state["reward"][0])
             if bool(state["done"].all()):
                 outside = worlds.render(worlds.state, chase)[0]
-                yield _compose(env.base_env.last_pixels[0], outside, None, _caption(state))
+                inside = env.base_env.last_pixels[0]
+                yield _compose(inside, outside, _caption(worlds.task, state, earned))
                 return
 
 
@@ -89,16 +91,18 @@ def write_video(frames: list[np.ndarray], path: Path) -> list[Path]:
     return files
 
 
-def _caption(state: TensorDictBase) -> str:
-    info = state["info"]
-    text = f"cubes {int(info['cubes'][0])}"
-    reason = EndReason(int(info["end_reason"][0]))
-    ended = "" if reason is EndReason.RUNNING else f"   ended: {reason.name.lower()}"
-    return text + ended.replace("_", " ")
+def _caption(task: Task[Any], state: TensorDictBase, earned: float) -> str:
+    end = task.ends(int(state["info", "end_reason"][0]))
+    ended = "" if end == 0 else f"   ended: {end.name.lower()}"
+    return f"{task.goal}s {earned:g}" + ended.replace("_", " ")
 
 
 def _compose(
-    inside: Tensor, outside: Tensor, acted: TensorDictBase | None, caption: str
+    inside: Tensor,
+    outside: Tensor,
+    caption: str,
+    acted: TensorDictBase | None = None,
+    actions: Actions = MOVES,
 ) -> np.ndarray:
     """The drone's view, enlarged, left; the chase view right; words and bars below."""
     canvas = Image.new("RGB", (2 * PANEL_WIDTH, PANEL_HEIGHT + 40), _BACKGROUND)
@@ -111,18 +115,22 @@ def _compose(
     draw.text((12, 10), "what the policy's camera sees", _TEXT, font)
     draw.text((12, PANEL_HEIGHT + 10), caption, _TEXT, font)
     if acted is not None:
-        _draw_bars(draw, font, acted)
+        _draw_bars(draw, font, acted, actions)
     return np.asarray(canvas)
 
 
-def _draw_bars(draw: ImageDraw.ImageDraw, font: ImageFont.ImageFont, acted: TensorDictBase) -> None:
-    """One bar an action, as long as it is probable; the chosen one in red (as in Fig. 13)."""
-    chosen = Move(int(acted["action"][0]))
+def _draw_bars(
+    draw: ImageDraw.ImageDraw, font: ImageFont.ImageFont, acted: TensorDictBase, actions: Actions
+) -> None:
+    """One bar an action, as long as it is wished for; the chosen one in red (as in Fig. 13)."""
+    chosen, names = int(acted["action"][0]), actions.names
     logits = acted.get("logits", None)
-    probability = torch.eye(len(Move))[chosen] if logits is None else logits[0].softmax(-1)
-    for i, action in enumerate(_BARS):
-        x, y = 300 + 320 * i, PANEL_HEIGHT + 10
-        share = float(probability[action])
-        draw.text((x, y), f"{action.name.lower()} {share:.2f}", _TEXT, font)
+    wish = torch.eye(len(names))[chosen] if logits is None else actions.wish(logits[0])
+    room = 960 // len(names)
+    for i, action in enumerate(actions.order):
+        x, y = 300 + room * i, PANEL_HEIGHT + 10
+        share = float(wish[action])
+        draw.text((x, y), f"{names[action]} {share:.2f}", _TEXT, font)
         color = _CHOSEN if action == chosen else _BAR
-        draw.rectangle((x + 120, y + 2, x + 120 + max(1, int(180 * share)), y + 18), color)
+        most = room - 140
+        draw.rectangle((x + 120, y + 2, x + 120 + max(1, int(most * share)), y + 18), color)

@@ -8,28 +8,31 @@ from torch import Tensor
 
 from drone_rl.explain.hooks import probabilities
 from drone_rl.explain.intervals import mean_interval
-from drone_rl.explain.response import MIRRORED, ResponseMap
+from drone_rl.explain.response import ResponseMap
 from drone_rl.policies import PolicyNetwork
-from drone_rl.sim.actions import Move
+from drone_rl.sim.actions import Actions
 
 
-def asymmetry(network: PolicyNetwork, observations: Tensor, episode: NDArray) -> dict[str, Any]:
+def asymmetry(
+    network: PolicyNetwork, observations: Tensor, episode: NDArray, actions: Actions
+) -> dict[str, Any]:
     """pi(left | x) against pi(right | mirrored x), over a data set.
 
     Args:
         network: The policy's.
         observations: Shape (T, C, H, W).
         episode: Shape (T,).
+        actions: What it can do.
 
     Returns:
         "signed": the mean of pi(left | x) - pi(right | mirrored x), below 0 if the policy prefers
-        right; "absolute": the mean distance (total variation) between the policy and its mirror
+        right; "absolute": the mean distance between the policy and its mirror
         image; "worst": frames in order of that distance, with it.
     """
     here = probabilities(network, observations)
-    there = probabilities(network, observations.flip(-1))[:, MIRRORED]
-    signed = (here - there)[:, Move.LEFT].double().cpu().numpy()
-    distance = 0.5 * (here - there).abs().sum(-1).double().cpu().numpy()
+    there = actions.mirror(probabilities(network, observations.flip(-1)))
+    signed = (actions.leaning(here) - actions.leaning(there)).double().cpu().numpy()
+    distance = actions.distance(here, there).double().cpu().numpy()
     worst = np.argsort(-distance, kind="stable")[:8]
     return {
         "signed": mean_interval(signed, episode, low=-1.0),
@@ -38,14 +41,13 @@ def asymmetry(network: PolicyNetwork, observations: Tensor, episode: NDArray) ->
     }
 
 
-def grid_asymmetry(response: ResponseMap) -> dict[str, Any]:
+def grid_asymmetry(response: ResponseMap, actions: Actions) -> dict[str, Any]:
     """The same over a response map, whose mirror image is itself read backwards."""
-    there = response.probabilities[:, :, ::-1][..., MIRRORED]
-    difference = response.probabilities - there
-    distance = 0.5 * np.abs(difference).sum(-1)
+    here, there = response.probabilities, actions.mirror(response.probabilities[:, :, ::-1])
+    signed, distance = actions.leaning(here) - actions.leaning(there), actions.distance(here, there)
     at = np.unravel_index(distance.argmax(), distance.shape)
     return {
-        "signed": float(difference[..., Move.LEFT].mean()),
+        "signed": float(signed.mean()),
         "absolute": float(distance.mean()),
         "worst": {
             "distance": float(distance.max()),

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.stats import rankdata
 from torch import Tensor
 
-from drone_rl.explain.hooks import probabilities
+from drone_rl.explain.hooks import actions_of, probabilities
 from drone_rl.explain.intervals import episode_means
 from drone_rl.explain.patches import Grid, replaced
 from drone_rl.policies import PolicyNetwork
@@ -39,15 +39,15 @@ def patch_effects(
         grid: The patches.
 
     Returns:
-        Total variation distance of the action probabilities before and after, its mean over the
-        alternatives. Shape: (T, count).
+        Distance of the wishes before and after, its mean over the alternatives. Shape: (T, count).
     """
     base = probabilities(network, observations)
     masks, effects = grid.masks(observations.shape[-2:]), []
+    distance = actions_of(network).distance
     for other in others:
         effect = base.new_zeros(len(base), grid.count)
         for frames, patches, after in replaced(network, observations, other, masks):
-            effect[frames, patches] = 0.5 * (after - base[frames]).abs().sum(-1)
+            effect[frames, patches] = distance(after, base[frames])
         effects.append(effect)
     return torch.stack(effects).mean(0).double().cpu().numpy()
 

@@ -8,6 +8,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
+from drone_rl.explain.hooks import actions_of
 from drone_rl.policies import PolicyNetwork
 from drone_rl.utils.errors import InputError
 
@@ -186,7 +187,7 @@ def visualise(
     ascend = _ascend_fourier if settings.parameterisation == "fourier" else _ascend_pixels
     reached = ascend(network, pictures, action, statistics, settings, generator)
     with torch.no_grad():
-        each = network(reached).softmax(-1).gather(1, action[:, None])[:, 0]
+        each = actions_of(network).wish(network(reached)).gather(1, action[:, None])[:, 0]
     by_action = (num_actions, settings.starts)
     return Attempts(
         pictures=reached.view(*by_action, *shape),
@@ -228,7 +229,7 @@ def _objective(
     """What each picture should have more of. Shape: (N,)."""
     logits = network(pictures)
     if settings.objective == "probability":
-        value = logits.softmax(-1).gather(1, action[:, None])[:, 0]
+        value = actions_of(network).wish(logits).gather(1, action[:, None])[:, 0]
     else:
         value = (logits - logits.mean(-1, keepdim=True)).gather(1, action[:, None])[:, 0]
     return value - settings.total_variation * _differences(pictures)

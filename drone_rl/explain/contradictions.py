@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
 from drone_rl.explain.dataset import RolloutDataset
-from drone_rl.sim.actions import Move
+from drone_rl.sim.actions import Actions
 
 ALIKE_METRES = 1.0
 """Next cubes stand alike if their places seen from the drone differ by at most this."""
@@ -45,23 +45,6 @@ class Pair:
     kind: Kind
 
 
-def opposition(probabilities: NDArray, others: NDArray) -> NDArray:
-    """How opposed two policies' wishes are: the lesser of the swings to the left and to the right.
-
-    Args:
-        probabilities: Shape (*, 3), by `Move`.
-        others: Shape (*, 3).
-
-    Returns:
-        0 (both want the same) to 1 (surely left, surely right). Positive where the first is the
-        one that wants left. Shape: (*).
-    """
-    swing = probabilities - others
-    to_left, to_right = swing[..., Move.LEFT], -swing[..., Move.RIGHT]
-    agreed = np.sign(to_left) == np.sign(to_right)
-    return np.where(agreed, np.sign(to_left) * np.minimum(np.abs(to_left), np.abs(to_right)), 0.0)
-
-
 def one_move(flights: RolloutDataset) -> float:
     """How much one move changes a picture: the median over successive frames.
 
@@ -75,20 +58,24 @@ def one_move(flights: RolloutDataset) -> float:
     return float(np.median(changes))
 
 
-def find_pairs(dataset: RolloutDataset, alike: float) -> list[Pair]:
+def find_pairs(
+    dataset: RolloutDataset, alike: float, actions: Actions, offset: NDArray
+) -> list[Pair]:
     """Alike frames with opposite actions, the most opposed first; each frame in at most one pair.
 
     Args:
         dataset: Rollouts.
         alike: Root mean square difference up to which two pictures are alike.
+        actions: What the policy can do.
+        offset: Metres ahead and to the left of the next cube, NaN where there is none. (T, 2)
     """
     flat = dataset.observations.reshape(len(dataset), -1).astype(np.float64)
-    probs, offset = dataset.probabilities, dataset.offset()
+    probs = dataset.probabilities
     found = []
     for start in range(0, len(flat), 500):
         rows = slice(start, start + 500)
         distance = cdist(flat[rows], flat) / np.sqrt(flat.shape[1])
-        swing = opposition(probs[rows, None], probs[None])
+        swing = actions.opposition(probs[rows, None], probs[None])
         for i, j in zip(*np.nonzero((distance <= alike) & (swing >= MIN_OPPOSITION)), strict=True):
             left, right = start + int(i), int(j)
             kind = _kind(offset[left], offset[right])

@@ -11,10 +11,9 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from drone_rl.explain.hooks import probabilities
+from drone_rl.explain.hooks import actions_of, probabilities
 from drone_rl.explain.intervals import episode_means
 from drone_rl.policies import PolicyNetwork
-from drone_rl.sim.actions import Move
 from drone_rl.utils.intervals import mean_bounds
 
 SHARES = (0.0, 0.01, 0.02, 0.03, 0.05, 0.075, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0)
@@ -52,9 +51,9 @@ def deletion_insertion(
             changed = torch.where(taken, absent, observations)
             curves[name].append(probabilities(network, changed).gather(1, actions[:, None])[:, 0])
     found = {}
-    for action in Move:
-        rows = (actions == action).numpy()
-        found[action.name.lower()] = {
+    for number, name in enumerate(actions_of(network).names):
+        rows = (actions == number).numpy()
+        found[name] = {
             "frames": int(rows.sum()),
             **{
                 name: _summary(torch.stack(points, 1).double().numpy()[rows], episode[rows])

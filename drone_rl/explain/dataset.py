@@ -1,8 +1,7 @@
 """Rollouts of a policy with all that the simulator knows about them, in one file of plain arrays.
 
-The file is an ordinary compressed `.npz`: `numpy.load(file)` gives the arrays that `FIELDS`
-describes, and the entry "meta", a JSON text, describes them once more, so that no program of ours
-is needed to read it.
+The file is an ordinary compressed `.npz`: `numpy.load(file)` gives the arrays, and the entry
+"meta", a JSON text, describes them under "fields", so that no program of ours is needed to read it.
 """
 
 import dataclasses
@@ -16,47 +15,51 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from drone_rl.explain.scenes import Region
-from drone_rl.sim.actions import Move
+from drone_rl.sim.actions import Actions
 from drone_rl.sim.dynamics import BodyState
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason, WorldState
+from drone_rl.sim.tasks import State, Task
 from drone_rl.utils.archives import read_arrays
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import parse_json
+from drone_rl.utils.schema import as_mapping
 
-FLOWN = {
-    "actions": "action taken: " + ", ".join(f"{a.value} {a.name.lower()}" for a in Move),
-    "rewards": "reward of the action, float32 (T,)",
-    "drone": "position before the action, metres, world frame: x forward, y left, z up (T, 3)",
-    "cubes": "positions of the cubes, metres, in order of x (T, C, 3)",
-    "present": "whether each cube still stands, bool (T, C)",
-    "collected": "whether each cube has been collected, bool (T, C)",
-    "next_cube": "index of the nearest standing cube, C if none (T,)",
-    "episode": "number of the episode (T,)",
-    "step": "step of the episode (T,)",
-    "end_reason": "after the action: "
-    + ", ".join(f"{r.value} {r.name.lower()}" for r in EndReason),
-}
-"""What is known of each frame; in the file also of every step flown, as "flights/..."."""
 SEEN = {
     "observations": "what the policy's network got, float32 (T, C, h, w)",
-    "probabilities": "the policy's probability of each action, float32 (T, 3)",
+    "probabilities": "the policy's probability of each action, float32 (T, number of actions)",
     "frames": "RGB pictures before the action, uint8 (T, H, W, 3)",
     "regions": "what each pixel shows: " + ", ".join(f"{r.value} {r.name.lower()}" for r in Region),
     "depth": "metres along the optical axis, 0 for the sky, float16 (T, H, W)",
 }
 """What is known besides of those frames that are analysed."""
-FIELDS = {**FLOWN, **SEEN}
+
+
+def flown_fields(task: Task[Any], actions: Actions) -> dict[str, str]:
+    """What is known of each frame; in the file also of every step flown, as "flights/..."."""
+    ends = ", ".join(f"{end.value} {end.name.lower()}" for end in task.ends)
+    return {
+        "actions": "action taken: " + ", ".join(f"{i} {n}" for i, n in enumerate(actions.names)),
+        "rewards": "reward of the action, float32 (T,)",
+        "drone": "position before the action, metres, world frame: x forward, y left, z up (T, 3)",
+        "attitude": "of the drone before the action, quaternion (w, x, y, z) (T, 4)",
+        **task.remembered,
+        "episode": "number of the episode (T,)",
+        "step": "step of the episode (T,)",
+        "end_reason": "after the action: " + ends,
+    }
 
 
 @dataclasses.dataclass
 class RolloutDataset:
-    """Frames of flights, in order of time; see `FIELDS`. Flights that are not drawn lack some."""
+    """Frames of flights, in order of time; see `flown_fields` and `SEEN`.
+
+    Flights that are not drawn lack most of what is seen.
+    """
 
     arrays: dict[str, NDArray]
     features: dict[str, NDArray]
     """What each recorded layer made of the frames, by layer name. Shape: (T, *)."""
     meta: dict[str, Any]
-    """Where it comes from."""
+    """Where it comes from; its "fields" describe the arrays."""
 
     def __len__(self) -> int:
         """Returns the number of frames."""
@@ -64,39 +67,31 @@ class RolloutDataset:
 
     def __getattr__(self, name: str) -> NDArray:
         """Returns an array by name."""
-        if name in FIELDS and name in self.arrays:
-            return self.arrays[name]
+        if name in (arrays := vars(self).get("arrays", {})):
+            return arrays[name]
         raise AttributeError(name)
 
     def tensor(self, name: str) -> Tensor:
         """An array as a tensor."""
         return torch.from_numpy(self.arrays[name])
 
-    def offset(self) -> NDArray:
-        """The next cube's place seen from the drone: metres ahead and to the left.
+    def offset(self, task: Task[Any]) -> NDArray:
+        """The next target's place seen from the drone: metres ahead and to the left.
 
         Returns:
-            Shape: (T, 2); NaN where no cube is left.
+            Shape: (T, 2); NaN where no target is left.
         """
-        index = np.minimum(self.next_cube, self.cubes.shape[1] - 1)
-        cube = self.cubes[np.arange(len(self)), index]
-        away = (cube - self.drone)[:, :2].astype(np.float64)
-        away[self.next_cube >= self.cubes.shape[1]] = np.nan
-        return away
+        return task.next_offset(self.state(task))[:, :2].numpy()
 
-    def state(self) -> WorldState:
-        """The worlds as they stood, ready to be changed and drawn again."""
-        present, collected = self.tensor("present"), self.tensor("collected")
-        return WorldState(
-            body=BodyState.at_rest(self.tensor("drone").double()),
-            cubes=self.tensor("cubes").double(),
-            collected=collected,
-            passed=~present & ~collected,
-            side=torch.full(present.shape, -1),
-            lateral=torch.full(present.shape, torch.nan, dtype=torch.float64),
-            steps=self.tensor("step").clone(),
-            end_reason=torch.zeros(len(self), dtype=torch.int64),
-        )
+    def state(self, task: Task[Any]) -> State:
+        """The worlds as they stood, the drones at rest, ready to be changed and drawn again.
+
+        Args:
+            task: What was flown.
+        """
+        kept = {name: self.tensor(name) for name in (*task.remembered, "step")}
+        attitude = self.tensor("attitude").double() if "attitude" in self.arrays else None
+        return task.recall(kept, BodyState.at_rest(self.tensor("drone").double(), attitude))
 
     def save(self, path: str | Path, flights: "RolloutDataset | None" = None) -> None:
         """Writes the file.
@@ -108,10 +103,11 @@ class RolloutDataset:
         Raises:
             InputError: It can't be written.
         """
-        described = {**self.meta, "fields": FIELDS, "features": list(self.features)}
+        described = {**self.meta, "features": list(self.features)}
         more = {f"features/{name}": value for name, value in self.features.items()}
         if flights is not None:
-            more |= {f"flights/{name}": flights.arrays[name] for name in FLOWN}
+            whole = flights.arrays.items()
+            more |= {f"flights/{name}": value for name, value in whole if name not in SEEN}
         try:
             arrays: dict[str, Any] = {**self.arrays, **more}  # or numpy's allow_pickle is in doubt
             np.savez_compressed(path, meta=json.dumps(described), **arrays)
@@ -130,7 +126,8 @@ class RolloutDataset:
         try:
             entries = read_arrays(Path(path))
             meta = parse_json(str(entries.pop("meta")), f"{path}: meta")
-            arrays = {name: entries.pop(name) for name in FIELDS}
+            names = as_mapping(as_mapping(meta, "meta").get("fields"), "meta.fields")
+            arrays = {name: entries.pop(name) for name in names}
             layers = {k: v for k, v in entries.items() if k.startswith("features/")}
             if len({value.shape[:1] for value in arrays.values()}) > 1:
                 raise InputError("its arrays are not of one length")

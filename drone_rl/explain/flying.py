@@ -1,21 +1,19 @@
 """What comes of a scene: the policy flies on from it, greedily, by the rules of the task."""
 
 import torch
-from torch import Tensor
 
 from drone_rl.explain.hooks import probabilities
 from drone_rl.explain.scenes import Scenes
 from drone_rl.policies import PolicyNetwork
-from drone_rl.sim.actions import Move
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason, WorldState
+from drone_rl.sim.tasks import State
 
 
 @torch.no_grad()
-def fly_on(scenes: Scenes, network: PolicyNetwork, state: WorldState) -> WorldState:
-    """Flies until it is settled which cubes are collected.
+def fly_on(scenes: Scenes, network: PolicyNetwork, state: State) -> State:
+    """Flies until it is settled which targets are reached.
 
-    That is when the flight ends, when no cube stands any more, or when a policy that remembers
-    nothing turns back to where it came from: it would go back and forth until the step limit.
+    That is when the flight ends, when no target is left, or when a policy that remembers nothing
+    turns back to where it came from: it would go back and forth until the step limit.
 
     Args:
         scenes: Where the flights are drawn.
@@ -23,26 +21,23 @@ def fly_on(scenes: Scenes, network: PolicyNetwork, state: WorldState) -> WorldSt
         state: Where they start; a policy that sees several frames has seen this one only.
 
     Returns:
-        How they ended; `end_reason` is RUNNING where no cube was left. Shape: that of `state`.
+        How they ended; `end_reason` is 0 where no target was left. Shape: that of `state`.
     """
-    done = state[torch.arange(len(state.drone), device=state.drone.device)]
-    flying = torch.arange(len(state.drone), device=state.drone.device)
-    now, last, earlier = state, torch.full_like(flying, Move.FORWARD), []
+    task, actions, device = scenes.task, scenes.actions, state.body.position.device
+    flying = torch.arange(len(state), device=device)
+    done, now, last, earlier = state[flying], state, None, []
+    is_new = torch.ones_like(flying, dtype=torch.bool)
     while len(flying):
         frames = scenes.frames(now)
-        action = probabilities(network, scenes.transform(frames, earlier)).argmax(-1)
-        now, reward = scenes.worlds.advance(now, action.to(now.drone.device))
-        if not scenes.memory:
-            now.end_reason[_turned_back(last, action)] = EndReason.STEP_LIMIT
+        wish = probabilities(network, scenes.transform(frames, earlier))
+        action = actions.chosen(wish).to(device)
+        now, reward = scenes.worlds.advance(now, action)
+        if last is not None and not scenes.memory:
+            now.end_reason[actions.undoes(action, last) & ~is_new] = task.truncation
         done[flying] = now
-        last = action.where(reward == 0, Move.FORWARD)  # a cube less is another scene
-        on = (now.end_reason == EndReason.RUNNING) & now.present.any(-1)
+        on = (now.end_reason == 0) & ~task.next_offset(now)[:, 0].isnan()
         earlier = [*earlier, frames][-scenes.memory :] if scenes.memory else []
-        now, flying, last = now[on], flying[on], last[on]
         earlier = [pictures[on] for pictures in earlier]
+        is_new = (reward != 0)[on]  # a target less is another scene
+        now, flying, last = now[on], flying[on], action[on]
     return done
-
-
-def _turned_back(last: Tensor, action: Tensor) -> Tensor:
-    """Whether an action undoes the one before. Shape: (T,), bool."""
-    return (last != Move.FORWARD) & (action != Move.FORWARD) & (last != action)

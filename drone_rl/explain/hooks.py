@@ -4,6 +4,7 @@ import torch
 from torch import Tensor, nn
 
 from drone_rl.policies import PolicyNetwork
+from drone_rl.sim.actions import MOVES, Actions
 from drone_rl.utils.errors import InputError
 
 BATCH = 512
@@ -67,5 +68,11 @@ def features(network: PolicyNetwork, observations: Tensor, layer: str) -> Tensor
 
 @torch.no_grad()
 def probabilities(network: PolicyNetwork, observations: Tensor) -> Tensor:
-    """The policy's action probabilities (Eq. 9). Shape: (T, C, H, W) to (T, num_actions)."""
-    return torch.cat([network(part).softmax(-1) for part in observations.split(BATCH)])
+    """What the policy wishes for (Eq. 9). Shape: (T, C, H, W) to (T, number of outputs)."""
+    actions = actions_of(network)
+    return torch.cat([actions.wish(network(part)) for part in observations.split(BATCH)])
+
+
+def actions_of(network: nn.Module) -> Actions:
+    """What a network's outputs ask for: the chapter's moves where it is none of ours."""
+    return network.actions if isinstance(network, PolicyNetwork) else MOVES

@@ -1,6 +1,5 @@
 """What only a simulator allows: change one thing, draw the scene again, and ask the policy."""
 
-import copy
 import dataclasses
 
 import numpy as np
@@ -14,7 +13,7 @@ from drone_rl.explain.scenes import Region, Scenes
 from drone_rl.policies import PolicyNetwork
 from drone_rl.sim.meaning import Meaning
 from drone_rl.sim.rendering import Appearance
-from drone_rl.sim.tasks.collect_cubes.rules import WorldState
+from drone_rl.sim.tasks import State
 
 OTHER_CUBES = Appearance(colors={Meaning.TARGET: (0.9, 0.85, 0.2)})
 MOVED_METRES = 2.0
@@ -28,14 +27,13 @@ class Intervention:
     area: Tensor  # (T, H, W) bool
     """Pixels that the change touched."""
     effect: NDArray  # (T,)
-    """Total variation distance of the action probabilities before and after; NaN where there
-    was nothing to change."""
+    """Distance of the wishes before and after; NaN where there was nothing to change."""
     frames: Tensor  # (T, H, W, 3) uint8
     """The pictures after the change."""
 
 
 def intervene(
-    scenes: Scenes, network: PolicyNetwork, state: WorldState, regions: Tensor, seed: int = 0
+    scenes: Scenes, network: PolicyNetwork, state: State, regions: Tensor, seed: int = 0
 ) -> list[Intervention]:
     """Takes the next cube away, moves it, recolours it; changes a patch of ground.
 
@@ -54,9 +52,9 @@ def intervene(
     ground = _patches(regions == Region.GROUND, visible.sum((1, 2)), seed)
     recoloured = scenes.frames(state, OTHER_CUBES)
     repainted = scenes.frames(state, DARK_GROUND)
-    moved = scenes.frames(to_the_middle(state))
+    moved = scenes.frames(to_the_middle(scenes, state))
     changes = {
-        "cube taken away": (scenes.frames(_without_next(state)), visible),
+        "cube taken away": (scenes.frames(scenes.task.without_next(state)), visible),
         "cube moved": (moved, (moved != before).any(-1)),
         "cube recoloured": (torch.where(visible[..., None], recoloured, before), visible),
         "ground patch changed": (torch.where(ground[..., None], repainted, before), ground),
@@ -71,28 +69,15 @@ def _effect(
     network: PolicyNetwork, scenes: Scenes, base: Tensor, frames: Tensor, area: Tensor
 ) -> NDArray:
     after = probabilities(network, scenes.transform(frames))
-    change = 0.5 * (after - base).abs().sum(-1)
+    change = scenes.actions.distance(after, base)
     touched = area.flatten(1).any(1)
     return torch.where(touched, change, torch.nan).double().cpu().numpy()
 
 
-def _without_next(state: WorldState) -> WorldState:
-    changed = copy.deepcopy(state)
-    changed.passed |= _is_next(state)
-    return changed
-
-
-def to_the_middle(state: WorldState) -> WorldState:
+def to_the_middle(scenes: Scenes, state: State) -> State:
     """The next cube moved sideways towards the middle of the picture, and no farther than there."""
-    changed = copy.deepcopy(state)
-    lateral = state.cubes[..., 1] - state.drone[:, None, 1]
-    changed.cubes[..., 1] -= lateral.clamp(-MOVED_METRES, MOVED_METRES) * _is_next(state)
-    return changed
-
-
-def _is_next(state: WorldState) -> Tensor:
-    index = torch.arange(state.cubes.shape[1], device=state.drone.device)
-    return index == state.next_cube[:, None]
+    lateral = scenes.task.next_offset(state)[:, 1].nan_to_num()
+    return scenes.task.next_moved(state, -lateral.clamp(-MOVED_METRES, MOVED_METRES))
 
 
 def _patches(ground: Tensor, size: Tensor, seed: int) -> Tensor:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from drone_rl.explain.dataset import RolloutDataset
-from drone_rl.sim.actions import Move
+from drone_rl.sim.actions import Actions
 from drone_rl.utils.intervals import proportion
 
 
@@ -19,27 +19,29 @@ class Loop:
     length: int
     """Frames."""
     reversals: int
-    """Changes between left and right."""
+    """Moves that undo the one before."""
 
 
-def find_loops(dataset: RolloutDataset, min_reversals: int = 2) -> list[Loop]:
-    """Runs of sideways moves, no forward one among them, that turn round at least so often.
+def find_loops(dataset: RolloutDataset, actions: Actions, min_reversals: int = 2) -> list[Loop]:
+    """Runs of moves that can be undone, no other among them, that turn round at least so often.
 
     Args:
         dataset: Whole flights.
+        actions: What can be done in them; forward is a move that nothing undoes.
         min_reversals: Two turns: back where it was, and away again.
     """
-    actions, episode = dataset.actions, dataset.episode
+    moves, episode = dataset.tensor("actions"), dataset.episode
+    sways = actions.can_be_undone(moves)
+    turns = actions.undoes(moves[1:], moves[:-1])
     loops, start = [], 0
-    for t in range(1, len(actions) + 1):
-        ends = t == len(actions) or episode[t] != episode[start]
-        if not ends and actions[t] != Move.FORWARD and actions[start] != Move.FORWARD:
+    for t in range(1, len(moves) + 1):
+        ends = t == len(moves) or episode[t] != episode[start]
+        if not ends and sways[t] and sways[start]:
             continue
-        moves = actions[start:t]
-        if actions[start] != Move.FORWARD:
-            reversals = int((moves[1:] != moves[:-1]).sum())
+        if sways[start]:
+            reversals = int(turns[start : t - 1].sum())
             if reversals >= min_reversals:
-                loops.append(Loop(start, len(moves), reversals))
+                loops.append(Loop(start, t - start, reversals))
         start = t
     return loops
 

@@ -4,7 +4,6 @@ That an action's probability changes at once does not show that the flight chang
 flights are compared with what they would have been, each with the others from the same frame.
 """
 
-import copy
 import dataclasses
 from typing import Any
 
@@ -20,7 +19,7 @@ from drone_rl.explain.intervals import episode_means
 from drone_rl.explain.scenes import Scenes
 from drone_rl.policies import PolicyNetwork
 from drone_rl.sim.rendering import Appearance
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason, WorldState
+from drone_rl.sim.tasks import State
 from drone_rl.utils.intervals import mean_bounds
 
 MOVED_METRES = 2.0
@@ -45,7 +44,7 @@ class Flights:
 
 
 def outcomes(
-    scenes: Scenes, network: PolicyNetwork, state: WorldState, episode: NDArray
+    scenes: Scenes, network: PolicyNetwork, state: State, episode: NDArray
 ) -> dict[str, Any]:
     """What becomes of flights when the next cube stands elsewhere, and of the ground repainted.
 
@@ -63,14 +62,15 @@ def outcomes(
         all when the cube is taken away; "ground_changed": share of flights whose outcome differs
         when the ground is repainted, at most its "upper95". "flights": how many each.
     """
-    rows = _starts(state, episode)
+    rows = _starts(scenes, state, episode)
     start, group = state[torch.from_numpy(rows)].to(scenes.worlds.device), episode[rows]
-    target = start.next_cube
+    task = scenes.task
+    target = task.next_target(start)
     variants = {
         "as it was": start,
-        "moved left": sideways(start, MOVED_METRES),
-        "moved right": sideways(start, -MOVED_METRES),
-        "taken away": taken_away(start),
+        "moved left": task.next_moved(start, MOVED_METRES),
+        "moved right": task.next_moved(start, -MOVED_METRES),
+        "taken away": task.without_next(start),
     }
     flown = {name: fly(scenes, network, s, target) for name, s in variants.items()}
     repainted = fly(scenes, network, start, target, DARK_GROUND)
@@ -94,7 +94,7 @@ def outcomes(
 def fly(
     scenes: Scenes,
     network: PolicyNetwork,
-    state: WorldState,
+    state: State,
     target: Tensor,
     appearance: Appearance | None = None,
 ) -> Flights:
@@ -107,9 +107,10 @@ def fly(
         target: The cube of each world. Shape: (N,).
         appearance: How the worlds look; as the task has it by default.
     """
+    task = scenes.task
     world = torch.arange(len(target), device=target.device)
     now, on = state[world], torch.ones_like(target, dtype=torch.bool)
-    decided, lateral, actions = torch.zeros_like(target), [now.drone[:, 1]], []
+    decided, lateral, actions = torch.zeros_like(target), [now.body.position[:, 1]], []
     earlier: list[Tensor] = []
     for _ in range(PATIENCE):
         if not on.any():
@@ -118,32 +119,20 @@ def fly(
         seen = scenes.frames(now[flying], appearance)
         past = [pictures[flying] for pictures in earlier]
         action = torch.full_like(target, -1)
-        action[flying] = probabilities(network, scenes.transform(seen, past)).argmax(-1)
+        wish = probabilities(network, scenes.transform(seen, past))
+        action[flying] = scenes.actions.chosen(wish)
         now[flying] = scenes.worlds.advance(now[flying], action[flying])[0]
         decided[flying] += 1
         actions.append(action)
-        lateral.append(now.drone[:, 1].clone())
-        passed = now.drone[:, 0] > now.cubes[world, target, 0]
-        on = ~passed & ~now.collected[world, target] & (now.end_reason == EndReason.RUNNING)
+        lateral.append(now.body.position[:, 1].clone())
+        on = ~task.is_behind(now, target) & ~task.is_reached(now, target) & (now.end_reason == 0)
         earlier = _remember(earlier, seen, flying, len(target), scenes.memory)
     return Flights(
-        now.collected[world, target].cpu().numpy(),
+        task.is_reached(now, target).cpu().numpy(),
         decided.cpu().numpy(),
         torch.stack(lateral, 1).cpu().numpy(),
         torch.stack(actions, 1).cpu().numpy() if actions else np.zeros((len(target), 0), int),
     )
-
-
-def sideways(state: WorldState, metres: float) -> WorldState:
-    """The next cube moved to the left by so much."""
-    changed = copy.deepcopy(state)
-    changed.cubes[..., 1] += metres * _is_next(state)
-    return changed
-
-
-def taken_away(state: WorldState) -> WorldState:
-    """The next cube left out."""
-    return dataclasses.replace(state, passed=state.passed | _is_next(state))
 
 
 def followed(left: Flights, right: Flights) -> NDArray:
@@ -168,15 +157,10 @@ def differ(first: Flights, second: Flights) -> NDArray:
     return ((one != two) & (one >= 0) & (two >= 0)).any(1)
 
 
-def _starts(state: WorldState, episode: NDArray) -> NDArray:
+def _starts(scenes: Scenes, state: State, episode: NDArray) -> NDArray:
     """Frames with a next cube ahead, a few an episode."""
-    there = (state.next_cube < state.cubes.shape[1]).nonzero()[:, 0].cpu().numpy()
+    there = (~scenes.task.next_offset(state)[:, 0].isnan()).nonzero()[:, 0].cpu().numpy()
     return there[spread(episode[there], FLIGHTS_AN_EPISODE)]
-
-
-def _is_next(state: WorldState) -> Tensor:
-    index = torch.arange(state.cubes.shape[1], device=state.drone.device)
-    return index == state.next_cube[:, None]
 
 
 def _remember(

@@ -8,7 +8,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from drone_rl.explain.hooks import BATCH
+from drone_rl.explain.hooks import BATCH, actions_of
 from drone_rl.policies import PolicyNetwork
 
 PATCHES = 40
@@ -98,4 +98,4 @@ def replaced(
     for batch in (pixels @ masks.flatten(1).float().T > 0).nonzero().split(BATCH):
         frames, parts = batch.unbind(1)
         changed = torch.where(masks[parts, None], other[frames], observations[frames])
-        yield frames, parts, network(changed).softmax(-1)
+        yield frames, parts, actions_of(network).wish(network(changed))

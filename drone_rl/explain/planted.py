@@ -14,7 +14,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from drone_rl.policies import MLP, PolicyNetwork, SmallCNN
-from drone_rl.sim.actions import Move
+from drone_rl.sim.actions import MOVES
 
 Window = tuple[float, float, float, float]
 """Top, bottom, left and right, as shares of the picture."""
@@ -100,7 +100,7 @@ def plant(absent: Tensor, observations: Tensor, wanted: Tensor) -> list[Planted]
 
 def linear(absent: Tensor, windows: Sequence[Window], scale: float) -> PolicyNetwork:
     """Goes left where windows are brighter than in the empty scene, right where darker."""
-    network = MLP(tuple(absent.shape), len(Move), hidden=())
+    network = MLP(tuple(absent.shape), len(MOVES), hidden=())
     look = _look(absent.shape, windows)
     _choose(network, scale * look.flatten(), -scale * float((look * absent).sum()))
     return network
@@ -108,7 +108,7 @@ def linear(absent: Tensor, windows: Sequence[Window], scale: float) -> PolicyNet
 
 def two_looks(absent: Tensor, windows: Sequence[Window], scale: float = 3.0) -> PolicyNetwork:
     """The same with a hidden layer, in which each window has two units: brighter, and darker."""
-    network = MLP(tuple(absent.shape), len(Move), hidden=(2 * len(windows),))
+    network = MLP(tuple(absent.shape), len(MOVES), hidden=(2 * len(windows),))
     with torch.no_grad():
         for i, window in enumerate(windows):
             look = _look(absent.shape, [window])
@@ -121,7 +121,7 @@ def two_looks(absent: Tensor, windows: Sequence[Window], scale: float = 3.0) -> 
 
 def convolution(absent: Tensor, windows: Sequence[Window], scale: float) -> PolicyNetwork:
     """The same by a convolution: means of patches, of which it minds those in the windows."""
-    network = SmallCNN(tuple(absent.shape), len(Move), channels=(2,), hidden=(), patch=PATCH)
+    network = SmallCNN(tuple(absent.shape), len(MOVES), channels=(2,), hidden=(), patch=PATCH)
     with torch.no_grad():
         mean = 1 / network.layers.conv1.weight[0].numel()
         network.layers.conv1.weight[0], network.layers.conv1.weight[1] = mean, -mean
@@ -135,7 +135,7 @@ def convolution(absent: Tensor, windows: Sequence[Window], scale: float) -> Poli
 
 def detector(absent: Tensor, window: Window, scale: float = 6.0) -> PolicyNetwork:
     """Goes left where a patch of a window is much darker than anything in the empty scene."""
-    network = SmallCNN(tuple(absent.shape), len(Move), channels=(1,), hidden=(), patch=PATCH)
+    network = SmallCNN(tuple(absent.shape), len(MOVES), channels=(1,), hidden=(), patch=PATCH)
     with torch.no_grad():
         network.layers.conv1.weight.fill_(-1 / network.layers.conv1.weight[0].numel())
         network.layers.conv1.bias.fill_(float(absent.min()) - 0.2)
@@ -154,7 +154,7 @@ def trained(window: Window, observations: Tensor, wanted: Tensor, seed: int = 0)
     """
     generator = torch.Generator().manual_seed(seed)
     shape = tuple(observations.shape[1:])
-    network = MLP(shape, len(Move), hidden=(16,), generator=generator)
+    network = MLP(shape, len(MOVES), hidden=(16,), generator=generator)
     seen = (_look(shape, [window]) > 0).flatten()
     weight = network.layers.fc1.weight
     optimiser = torch.optim.Adam(network.parameters(), lr=0.01)
@@ -188,8 +188,8 @@ def _choose(network: PolicyNetwork, weights: Tensor, bias: float) -> None:
         logits = network.layers.logits
         logits.weight.zero_()
         logits.bias.zero_()
-        logits.weight[Move.LEFT], logits.weight[Move.RIGHT] = weights, -weights
-        logits.bias[Move.LEFT], logits.bias[Move.RIGHT] = bias, -bias
+        logits.weight[MOVES.left], logits.weight[MOVES.right] = weights, -weights
+        logits.bias[MOVES.left], logits.bias[MOVES.right] = bias, -bias
 
 
 def _look(shape: Sequence[int], windows: Sequence[Window]) -> Tensor:

@@ -15,13 +15,14 @@ from torchrl.envs import TransformedEnv
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 from drone_rl.collectors import EpisodeCollector
-from drone_rl.explain.dataset import RolloutDataset
+from drone_rl.explain.dataset import SEEN, RolloutDataset, flown_fields
 from drone_rl.explain.hooks import features, probabilities
 from drone_rl.explain.scenes import Scenes
 from drone_rl.policies import PolicyNetwork
+from drone_rl.sim.tasks import Task
 from drone_rl.utils.errors import InputError
 
-_TRUTH = ("drone", "cube_positions", "collected", "next_cube")
+_POSE = ("drone", "attitude")
 
 
 def record(
@@ -66,22 +67,26 @@ def fly(
         meta: Where the policy comes from.
 
     Returns:
-        All frames, with `FLOWN` and "observations".
+        All frames, with `flown_fields` and "observations".
 
     Raises:
         InputError: No frames are asked for.
     """
     if num_frames < 1:
         raise InputError(f"frames={num_frames} records nothing; give 1 or more")
+    worlds = env.base_env.worlds
     keep = (("next", "info", "end_reason"),)
-    collector = EpisodeCollector(env, _WithTruth(actor), keep=keep)
+    collector = EpisodeCollector(env, _WithTruth(actor, (*worlds.task.entries, *_POSE)), keep=keep)
     kind = ExplorationType.DETERMINISTIC if greedy else ExplorationType.RANDOM
     batches = []
     with set_exploration_type(kind):
         while collector.episodes < num_episodes or collector.frames < num_frames:
             missing = num_episodes - collector.episodes
             batches.append(collector.collect(missing if missing > 0 else None))
-    return RolloutDataset(_arrays(torch.cat(batches)), {}, {"greedy": greedy, **(meta or {})})
+    fields = flown_fields(worlds.task, worlds.dynamics.actions)
+    described = {**fields, "observations": SEEN["observations"]}
+    about = {"greedy": greedy, **(meta or {}), "fields": described}
+    return RolloutDataset(_arrays(torch.cat(batches), worlds.task), {}, about)
 
 
 def spread(episode: NDArray, num_frames: int) -> NDArray:
@@ -129,8 +134,10 @@ def draw(
         InputError: A layer doesn't exist.
     """
     arrays = {name: value[rows] for name, value in flights.arrays.items()}
-    dataset = RolloutDataset(arrays, {}, flights.meta)
-    state, observations = dataset.state().to(scenes.worlds.device), dataset.tensor("observations")
+    fields = {**flights.meta["fields"], **SEEN}
+    dataset = RolloutDataset(arrays, {}, {**flights.meta, "fields": fields})
+    state = dataset.state(scenes.task).to(scenes.worlds.device)
+    observations = dataset.tensor("observations")
     arrays["frames"] = scenes.frames(state).cpu().numpy()
     arrays["regions"] = scenes.regions(state).cpu().numpy()
     arrays["depth"] = scenes.depth(state).cpu().numpy().astype(np.float16)
@@ -143,10 +150,10 @@ def draw(
 class _WithTruth(TensorDictModuleBase):
     """An actor that also lets the simulator's truth through, so that it is recorded."""
 
-    def __init__(self, actor: TensorDictModuleBase) -> None:
+    def __init__(self, actor: TensorDictModuleBase, names: tuple[str, ...]) -> None:
         super().__init__()
         self.actor = actor
-        self.in_keys = [*actor.in_keys, *(("info", name) for name in _TRUTH)]
+        self.in_keys = [*actor.in_keys, *(("info", name) for name in names)]
         self.out_keys = actor.out_keys
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
@@ -154,24 +161,17 @@ class _WithTruth(TensorDictModuleBase):
         return self.actor(tensordict)
 
 
-def _arrays(batch: TensorDictBase) -> dict[str, NDArray]:
+def _arrays(batch: TensorDictBase, task: Task[Any]) -> dict[str, NDArray]:
     info: TensorDict = batch["info"]
     episode = batch["collector", "traj_ids"]
     starts = torch.cat([episode.new_ones(1, dtype=torch.bool), episode[1:] != episode[:-1]])
     first = starts.nonzero()[:, 0][starts.cumsum(0) - 1]
-    next_cube = info["next_cube"][:, 0]
-    index = torch.arange(info["collected"].shape[-1], device=next_cube.device)
-    # cubes stand in order of x, so a standing cube is the next one or one behind it
-    present = ~info["collected"] & (index >= next_cube[:, None])
     arrays = {
         "observations": batch["pixels"],
         "actions": batch["action"],
         "rewards": batch["next", "reward"][:, 0],
-        "drone": info["drone"],
-        "cubes": info["cube_positions"],
-        "present": present,
-        "collected": info["collected"],
-        "next_cube": next_cube,
+        **{name: info[name] for name in _POSE},
+        **task.remember(info),
         "episode": starts.cumsum(0) - 1,
         "step": torch.arange(len(batch), device=episode.device) - first,
         "end_reason": batch["next", "info", "end_reason"][:, 0],

@@ -1,23 +1,21 @@
 """The response map: what a policy does about one cube wherever it stands, and what comes of it."""
 
 import dataclasses
+from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
 from drone_rl.explain.flying import fly_on
 from drone_rl.explain.hooks import probabilities
-from drone_rl.explain.scenes import Scenes, empty_scene, oracle_action, place_cube
+from drone_rl.explain.scenes import Scenes, empty_scene, place_cube
 from drone_rl.policies import PolicyNetwork
-from drone_rl.sim.actions import Move
+from drone_rl.sim.actions import Actions
 
 BLIND = 0.1
 """A policy is blind to a cube that changes its action probabilities by less than this."""
-MIRRORED = (Move.FORWARD, Move.RIGHT, Move.LEFT)
-"""What each action becomes in a mirror."""
 
 
 @dataclasses.dataclass
@@ -30,24 +28,16 @@ class ResponseMap:
     """Metres ahead of it."""
     lateral: NDArray  # (L,)
     """Metres to its left."""
-    probabilities: NDArray  # (Z, F, L, 3)
-    """By `Move`."""
-    without_cube: NDArray  # (3,)
+    probabilities: NDArray  # (Z, F, L, A)
+    """Of each action."""
+    without_cube: NDArray  # (A,)
     """The same for the scene without a cube."""
     oracle: NDArray  # (L,)
     """What must be done: a turn where flying straight on would miss."""
-
-    @property
-    def action(self) -> NDArray:
-        """The most probable action. Shape: (Z, F, L)."""
-        return self.probabilities.argmax(-1)
-
-    @property
-    def blind(self) -> NDArray:
-        """Where the cube calls for a turn and the policy doesn't notice it. Shape: (Z, F, L)."""
-        change = 0.5 * np.abs(self.probabilities - self.without_cube).sum(-1)
-        calls = self.oracle != Move.FORWARD
-        return (change < BLIND) & calls & (self.action != self.oracle)
+    stratum: NDArray  # (L,)
+    """The task's stratum of a cube there: its side."""
+    blind: NDArray  # (Z, F, L) bool
+    """Where the cube calls for a turn and the policy doesn't notice it."""
 
 
 @dataclasses.dataclass
@@ -60,6 +50,7 @@ class OutcomeMap:
     """As in `ResponseMap`."""
     collected: NDArray  # (Z, f, l) bool
     oracle: NDArray  # (l,)
+    stratum: NDArray  # (l,)
 
 
 def response_map(
@@ -70,24 +61,44 @@ def response_map(
     Args:
         scenes: Where they are drawn.
         network: The policy's.
-        num_lateral: Places sideways; see `_places`.
+        num_lateral: Places sideways; see `Explainable.grid`.
         num_forward: Places ahead.
     """
-    height, forward, lateral = _places(scenes, num_forward, num_lateral)
+    height, forward, lateral = scenes.task.grid(num_forward, num_lateral)
     ahead, aside = torch.meshgrid(forward, lateral, indexing="ij")
     layers = []
     for up in height.tolist():
         observed = scenes.observe(place_cube(scenes, ahead.flatten(), aside.flatten(), up))
         layers.append(probabilities(network, observed).view(num_forward, num_lateral, -1))
+    wishes = torch.stack(layers)
     alone = probabilities(network, scenes.observe(empty_scene(scenes)))[0]
+    needed = scenes.task.needed(_offsets(lateral)).to(wishes.device)
     return ResponseMap(
         height=height.numpy(),
         forward=forward.numpy(),
         lateral=lateral.numpy(),
-        probabilities=torch.stack(layers).cpu().numpy(),
+        probabilities=wishes.cpu().numpy(),
         without_cube=alone.cpu().numpy(),
-        oracle=oracle_action(scenes, lateral).numpy(),
+        oracle=needed.cpu().numpy(),
+        stratum=scenes.task.stratum_at(_offsets(lateral)).numpy(),
+        blind=find_blind(scenes.actions, wishes, alone, needed).cpu().numpy(),
     )
+
+
+def find_blind(actions: Actions, wishes: Tensor, alone: Tensor, needed: Tensor) -> Tensor:
+    """Where a cube calls for a turn and the policy doesn't notice it.
+
+    Args:
+        actions: What there is to do.
+        wishes: The policy's with a cube there. Shape: (Z, F, L, A).
+        alone: Without any cube. Shape: (A,).
+        needed: The action that is called for. Shape: (L,).
+
+    Returns:
+        Shape: (Z, F, L), bool.
+    """
+    unmoved = actions.distance(wishes, alone) < BLIND
+    return unmoved & actions.turns(needed) & (actions.chosen(wishes) != needed)
 
 
 def outcome_map(
@@ -98,27 +109,34 @@ def outcome_map(
     Args:
         scenes: Where the flights are drawn.
         network: The policy's.
-        num_lateral: Places sideways; see `_places`.
+        num_lateral: Places sideways; see `Explainable.grid`.
         num_forward: Places ahead.
     """
-    height, forward, lateral = _places(scenes, num_forward, num_lateral)
+    height, forward, lateral = scenes.task.grid(num_forward, num_lateral)
     ahead, aside = torch.meshgrid(forward, lateral, indexing="ij")
+    only = torch.zeros(num_forward * num_lateral, dtype=torch.int64, device=scenes.worlds.device)
     layers = []
     for up in height.tolist():
         starts = place_cube(scenes, ahead.flatten(), aside.flatten(), up)
         ends = fly_on(scenes, network, starts)
-        layers.append(ends.collected[:, 0].view(num_forward, num_lateral))
+        layers.append(scenes.task.is_reached(ends, only).view(num_forward, num_lateral))
     return OutcomeMap(
         height=height.numpy(),
         forward=forward.numpy(),
         lateral=lateral.numpy(),
         collected=torch.stack(layers).cpu().numpy(),
-        oracle=oracle_action(scenes, lateral).numpy(),
+        oracle=scenes.task.needed(_offsets(lateral)).numpy(),
+        stratum=scenes.task.stratum_at(_offsets(lateral)).numpy(),
     )
 
 
-def summarise(response: ResponseMap, outcome: OutcomeMap) -> dict[str, Any]:
+def summarise(response: ResponseMap, outcome: OutcomeMap, strata: Sequence[str]) -> dict[str, Any]:
     """Counts for people and programs.
+
+    Args:
+        response: What it wishes for.
+        outcome: What comes of it.
+        strata: Names of the task's, such as sides.
 
     Returns:
         "without_cube"; "rows": for each height and side ("left", "ahead" where flying straight on
@@ -128,11 +146,9 @@ def summarise(response: ResponseMap, outcome: OutcomeMap) -> dict[str, Any]:
     """
     rows = []
     for layer, height in enumerate(response.height.tolist()):
-        for side, action in (
-            ("left", Move.LEFT), ("ahead", Move.FORWARD), ("right", Move.RIGHT),
-        ):  # fmt: skip
-            blind = response.blind[layer][:, response.oracle == action]
-            collected = outcome.collected[layer][:, outcome.oracle == action]
+        for number, side in enumerate(strata):
+            blind = response.blind[layer][:, response.stratum == number]
+            collected = outcome.collected[layer][:, outcome.stratum == number]
             rows.append(
                 {
                     "height": height,
@@ -145,16 +161,7 @@ def summarise(response: ResponseMap, outcome: OutcomeMap) -> dict[str, Any]:
     return {"without_cube": response.without_cube.tolist(), "blind_below": BLIND, "rows": rows}
 
 
-def _places(scenes: Scenes, num_forward: int, num_lateral: int) -> tuple[Tensor, Tensor, Tensor]:
-    """Metres up, ahead and to the left at which cubes can stand, seen from the drone.
-
-    Ahead: from all but touching to where an episode's first cube stands. Sideways: symmetric, as
-    far as a next cube ever stands. Up: where the task places them; level, lowest and highest.
-    """
-    settings = scenes.worlds.task.settings
-    reach = 2.0 * settings.lateral_bound or settings.touch_distance * 2
-    nearest = settings.touch_distance + 0.5 * settings.step_length
-    bound = settings.vertical_bound
-    height = torch.tensor([-bound, 0.0, bound] if bound else [0.0], dtype=torch.float64)
-    forward = torch.linspace(nearest, settings.first_distance, num_forward).double()
-    return height, forward, torch.linspace(reach, -reach, num_lateral).double()
+def _offsets(lateral: Tensor) -> Tensor:
+    """Places level with the drone, so far to its left. (L,) to (L, 3)."""
+    nothing = torch.zeros_like(lateral)
+    return torch.stack([nothing, lateral, nothing], -1)

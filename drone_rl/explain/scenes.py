@@ -9,10 +9,8 @@ from torch.nn import functional
 from torchrl.envs import CatFrames, Transform, TransformedEnv
 
 from drone_rl.envs import CropRows
-from drone_rl.sim.actions import Move
 from drone_rl.sim.rendering import Appearance
-from drone_rl.sim.tasks.collect_cubes import rules
-from drone_rl.sim.tasks.collect_cubes.rules import WorldState
+from drone_rl.sim.tasks import State
 from drone_rl.sim.worlds import Worlds
 
 
@@ -27,7 +25,7 @@ class Region(enum.IntEnum):
 
 
 class Scenes:
-    """Draws any `WorldState` as the policy's camera sees it, or would.
+    """Draws any `State` as the policy's camera sees it, or would.
 
     A scene is a still: where the policy's pipeline stacks frames, it gets the same one N times, as
     it does at the start of an episode.
@@ -36,17 +34,19 @@ class Scenes:
     def __init__(self, env: TransformedEnv) -> None:
         """Borrows the worlds and the transforms of an environment."""
         self.worlds: Worlds = env.base_env.worlds
+        self.task = self.worlds.task
+        self.actions = self.worlds.dynamics.actions
         pipeline: Iterable[Transform] = env.transform  # type: ignore[assignment]
         self._transforms = [t for t in pipeline if "pixels" in (t.in_keys or [])]
         stacks = [t.N for t in self._transforms if isinstance(t, CatFrames)]
         self.memory: int = max(stacks, default=1) - 1
         """Pictures before the present one that the policy gets."""
 
-    def frames(self, state: WorldState, appearance: Appearance | None = None) -> Tensor:
+    def frames(self, state: State, appearance: Appearance | None = None) -> Tensor:
         """RGB pictures. Shape: (T, H, W, 3), uint8."""
         return self.worlds.render(state, appearance=appearance)
 
-    def depth(self, state: WorldState) -> Tensor:
+    def depth(self, state: State) -> Tensor:
         """Metres along the optical axis, 0 for the sky. Shape: (T, H, W)."""
         return self.worlds.render(state, self.worlds.view(modality="depth"))
 
@@ -95,11 +95,11 @@ class Scenes:
                 maps = functional.interpolate(maps[:, None], size, mode="bilinear")[:, 0]
         return maps
 
-    def observe(self, state: WorldState) -> Tensor:
+    def observe(self, state: State) -> Tensor:
         """Scenes as the policy gets them. Shape: (T, C, h, w)."""
         return self.transform(self.frames(state))
 
-    def regions(self, state: WorldState) -> Tensor:
+    def regions(self, state: State) -> Tensor:
         """What each pixel shows, a `Region`. Shape: (T, H, W), uint8.
 
         The horizon is the lowest row of sky and the highest of ground, where they meet.
@@ -107,7 +107,7 @@ class Scenes:
         geoms = self.worlds.render(state, self.worlds.view(modality="segmentation")).long()
         props = torch.tensor([*self.worlds.scene.props, -1], device=geoms.device)
         cube = props[geoms]  # geom -1 (the sky) reads the last entry
-        next_cube = state.next_cube[:, None, None]
+        next_cube = self.task.next_target(state)[:, None, None]
         regions = torch.full_like(cube, Region.GROUND)
         sky = geoms < 0
         regions[sky] = Region.SKY
@@ -123,8 +123,8 @@ def _border(sky: Tensor, ground: Tensor) -> Tensor:
     return functional.pad(meets, (0, 0, 0, 1)) | functional.pad(meets, (0, 0, 1, 0))
 
 
-def place_cube(scenes: Scenes, forward: Tensor, lateral: Tensor, height: float = 0.0) -> WorldState:
-    """Scenes with one cube at each place and the drone at its origin.
+def place_cube(scenes: Scenes, forward: Tensor, lateral: Tensor, height: float = 0.0) -> State:
+    """Scenes with one target at each place and the drone at its origin.
 
     Args:
         scenes: Where they will be drawn.
@@ -132,30 +132,12 @@ def place_cube(scenes: Scenes, forward: Tensor, lateral: Tensor, height: float =
         lateral: Metres to its left. Shape: (T,).
         height: Metres above it.
     """
-    settings = scenes.worlds.task.settings
-    count, cubes = len(forward), settings.num_cubes
-    places = torch.zeros(count, cubes, 3, dtype=torch.float64)
-    places[:, 0, 0], places[:, 0, 1] = forward.double(), lateral.double()
-    places[..., 2] = settings.altitude + height
-    state = rules.start(settings, places)
-    state.passed[:, 1:] = True  # the other cubes are not there
-    return state.to(scenes.worlds.device)
+    worlds = scenes.worlds
+    ahead, aside = forward.double(), lateral.double()
+    offset = torch.stack([ahead, aside, torch.full_like(ahead, height)], -1)
+    return worlds.task.one_target(worlds.bodies(len(offset)), offset).to(worlds.device)
 
 
-def empty_scene(scenes: Scenes) -> WorldState:
-    """One scene with no cube at all."""
-    state = place_cube(scenes, torch.ones(1), torch.zeros(1))
-    state.passed[:] = True
-    return state
-
-
-def oracle_action(scenes: Scenes, lateral: Tensor) -> Tensor:
-    """What must be done about a cube that stands `lateral` metres to the left. Shape kept.
-
-    Flying straight on touches a cube within the touch distance; any other calls for a turn.
-    """
-    tolerance = scenes.worlds.task.settings.touch_distance
-    action = torch.full_like(lateral, Move.FORWARD, dtype=torch.int64)
-    action[lateral > tolerance] = Move.LEFT
-    action[lateral < -tolerance] = Move.RIGHT
-    return action
+def empty_scene(scenes: Scenes) -> State:
+    """One scene with no target at all."""
+    return scenes.task.without_targets(place_cube(scenes, torch.ones(1), torch.zeros(1)))

@@ -4,13 +4,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drone_rl.explain.dataset import RolloutDataset
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.sim.tasks.judgeable import Judgeable
 
 COUNT = 6
 """Frames in a sequence, as in Figs. 13 to 15."""
 
 
-def key_frames(dataset: RolloutDataset, episode: int) -> list[tuple[int, str]]:
+def key_frames(dataset: RolloutDataset, episode: int, task: Judgeable) -> list[tuple[int, str]]:
     """Six frames of an episode in order of time, each with why it was chosen.
 
     The rule: the first frame; half way to the first collection (or to the end); the frame before
@@ -20,6 +20,7 @@ def key_frames(dataset: RolloutDataset, episode: int) -> list[tuple[int, str]]:
     Args:
         dataset: Whole flights.
         episode: One of them.
+        task: What was flown.
 
     Returns:
         Frame number and reason; fewer than six only where the episode is shorter.
@@ -28,10 +29,11 @@ def key_frames(dataset: RolloutDataset, episode: int) -> list[tuple[int, str]]:
     chosen: dict[int, str] = {int(frames[0]): "start"}
     collections = frames[dataset.rewards[frames] > 0]
     half = frames[len(frames) // 2] if not len(collections) else (frames[0] + collections[0]) // 2
-    events = [(int(t), "collects a cube") for t in collections]
-    events += [(int(t), "misses a cube") for t in _misses(dataset, frames)]
-    if dataset.end_reason[frames[-1]] not in (EndReason.RUNNING, EndReason.ALL_CUBES):
-        reason = EndReason(int(dataset.end_reason[frames[-1]])).name.lower().replace("_", " ")
+    events = [(int(t), f"collects a {task.goal}") for t in collections]
+    events += [(int(t), f"misses a {task.goal}") for t in _misses(dataset, frames)]
+    end = int(dataset.end_reason[frames[-1]])
+    if end not in (0, task.success_end):
+        reason = task.ends(end).name.lower().replace("_", " ")
         events.append((int(frames[-1]), f"fails: {reason}"))
     for frame, why in [*events, (int(half), "approach")]:
         if len(chosen) < COUNT:

@@ -37,7 +37,7 @@ from drone_rl.explain.placebos import placebo_maps
 from drone_rl.explain.randomised import likeness, shuffled_networks
 from drone_rl.explain.scenes import Scenes, empty_scene
 from drone_rl.policies import PolicyNetwork
-from drone_rl.sim.tasks.collect_cubes.rules import WorldState
+from drone_rl.sim.tasks import State
 from drone_rl.utils.intervals import median_bounds
 
 MapOf = Callable[[PolicyNetwork, Tensor, Tensor], Tensor]
@@ -126,7 +126,7 @@ class Pictures:
         return dataclasses.replace(trial[moved], still=int((~moved).sum()))
 
 
-def draw_pictures(scenes: Scenes, state: WorldState, episode: NDArray, seed: int = 0) -> Pictures:
+def draw_pictures(scenes: Scenes, state: State, episode: NDArray, seed: int = 0) -> Pictures:
     """Draws scenes and what they might have been.
 
     Args:
@@ -147,7 +147,7 @@ def draw_pictures(scenes: Scenes, state: WorldState, episode: NDArray, seed: int
 def make_trial(
     scenes: Scenes,
     network: PolicyNetwork,
-    state: WorldState,
+    state: State,
     actions: Tensor,
     episode: NDArray,
     seed: int = 0,

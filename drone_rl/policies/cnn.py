@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 import torch
 from torch import Tensor, nn
 
+from drone_rl.sim.actions import MOVES, Actions
 from drone_rl.utils.errors import InputError
 
 Weighted = nn.Conv2d | nn.Linear
@@ -17,6 +18,9 @@ class PolicyNetwork(nn.Module):
 
     The last layer is linear and called "logits".
     """
+
+    actions: Actions = MOVES
+    """What the outputs ask for."""
 
     def __init__(
         self,

@@ -38,6 +38,11 @@ class Actions(Protocol):
         ...
 
     @property
+    def order(self) -> tuple[int, ...]:
+        """The parts from left to right, as they are drawn."""
+        ...
+
+    @property
     def entry(self) -> Entry:
         """One world's action."""
         ...
@@ -72,6 +77,10 @@ class Actions(Protocol):
 
     def can_be_undone(self, action: Tensor) -> Tensor:
         """Whether any action undoes these; going back and forth is made of such. Shape: (*)."""
+        ...
+
+    def turns(self, action: Tensor) -> Tensor:
+        """Whether an action is another one in a mirror. Shape: (*), bool."""
         ...
 
     def as_dict(self) -> dict[str, Any]:
@@ -168,6 +177,10 @@ class DiscreteActions:
     def can_be_undone(self, action: Tensor) -> Tensor:
         """Whether an action has an opposite."""
         return self._opposite_of(action) != action
+
+    def turns(self, action: Tensor) -> Tensor:
+        """Whether an action's mirror image is another one."""
+        return torch.tensor(self.mirrored, device=action.device)[action] != action
 
     def _opposite_of(self, action: Tensor) -> Tensor:
         return torch.tensor(self.opposite, device=action.device)[action]

@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from drone_rl.sim.composer_task import ComposerTask
-from drone_rl.sim.dynamics import Dynamics
+from drone_rl.sim.dynamics import BodyState, Dynamics
 from drone_rl.sim.entities.cameras import FRONT_CENTER
 from drone_rl.sim.rendering import Appearance, Poses, View, WarpRenderer
 from drone_rl.sim.rendering.renderer import MakeRenderer
@@ -81,8 +81,12 @@ class Worlds:
         Args:
             drawn: What is random about each, as `Task.draw` returns it. First dimension: worlds.
         """
-        origin = torch.tensor(self.task.origin, dtype=torch.float64).repeat(len(drawn), 1)
-        return self.task.start(drawn, self.dynamics.start(origin)).to(self.device)
+        return self.task.start(drawn, self.bodies(len(drawn))).to(self.device)
+
+    def bodies(self, count: int) -> BodyState:
+        """Drones at the start of episodes, on the CPU."""
+        origin = torch.tensor(self.task.origin, dtype=torch.float64)
+        return self.dynamics.start(origin.repeat(count, 1))
 
     def reset(self, worlds: Tensor, random_states: Sequence[np.random.RandomState]) -> None:
         """Starts new episodes.

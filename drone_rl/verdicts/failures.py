@@ -27,7 +27,8 @@ def failure_table(episodes: Episodes, confidence: float = 0.95) -> dict[str, Any
         the row that holds many failures and little else, by the number of failures times the least
         share of them, None if nothing failed (the end that every missed goal leads to, as that of
         the field does who flies on behind a passed cube, is left out);
-        "bound": the share of episodes that failed, with its exact interval.
+        "expected_end": that end; "bound": the share of episodes that failed, with its exact
+        interval.
     """
     reached, task = episodes.goals.reached, episodes.task
     first = reached.long().cumprod(-1).sum(-1)  # number of goals where none failed
@@ -51,6 +52,7 @@ def failure_table(episodes: Episodes, confidence: float = 0.95) -> dict[str, Any
     return {
         "rows": rows,
         "largest": largest,
+        "expected_end": expected,
         "bound": proportion(int(failed.sum()), len(episodes), confidence),
     }
 

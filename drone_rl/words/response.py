@@ -14,7 +14,7 @@ def _level(evidence: Evidence, level: bool = True) -> list[Evidence]:
 def _collected(rows: Sequence[Evidence]) -> str:
     where = {"left": "on its left", "ahead": "ahead", "right": "on its right"}
     told = [
-        f"{row['collected']} of {row['places']} places {where[row['side']]}"
+        f"{row['collected']} of {row['places']} places {where.get(row['side'], row['side'])}"
         for row in rows
         if row["places"]
     ]
@@ -30,7 +30,7 @@ def _outcomes(evidence: Evidence) -> str:
 
 def _blind(evidence: Evidence) -> str:
     rows = {row["side"]: row["blind"] for row in _level(evidence)}
-    told = [f"{percent(rows[s])} of the places on the {s}" for s in ("left", "right")]
+    told = [f"{percent(rows[s])} of the places on the {s}" for s in rows if s != "ahead"]
     return (
         f"It is blind at {listed(told)}: a turn is called for and not made, and its probabilities "
         f"differ by less than {evidence['response']['blind_below']:g} from those without a cube. "

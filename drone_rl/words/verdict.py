@@ -25,7 +25,7 @@ _ENDS = {
     "step_limit": "at the step limit",
 }
 _EXPECTED_END = "front_boundary"
-"""Who has passed a cube flies on to there: no news."""
+"""Of older files. Who has passed a cube flies on to there: no news."""
 _KINDS = {
     "good": "good",
     "poor": "poor",
@@ -46,7 +46,21 @@ def _cubes(flights: Evidence) -> str:
 def best_luck(evidence: Evidence) -> str:
     """What sees nothing and collects most."""
     flown = evidence["baselines"]
-    return max(_LUCK, key=lambda name: flown[name]["shares"]["all"]["mean"])
+    return max(_luck(evidence), key=lambda name: flown[name]["shares"]["all"]["mean"])
+
+
+def _luck(evidence: Evidence) -> list[str]:
+    return [name for name in evidence["baselines"] if name != "oracle"]
+
+
+def _acting(luck: str) -> str:
+    return _LUCK.get(luck, f"always choosing {luck}")
+
+
+def _sides(evidence: Evidence) -> dict[str, str]:
+    """Strata by name, and where they are."""
+    names = [name for name in evidence["greedy"]["shares"] if name != "all"]
+    return {name: _SIDES.get(name, name) for name in names}
 
 
 def _list(parts: Sequence[str], last: str = "and") -> str:
@@ -82,9 +96,9 @@ def _open(evidence: Evidence) -> str:
 
 
 def _shares(evidence: Evidence) -> str:
-    shares = evidence["greedy"]["shares"]
-    met = [(percent(shares[k]["mean"]), v) for k, v in _SIDES.items() if shares[k]["count"]]
-    none = [v for k, v in _SIDES.items() if not shares[k]["count"]]
+    shares, sides = evidence["greedy"]["shares"], _sides(evidence)
+    met = [(percent(shares[k]["mean"]), v) for k, v in sides.items() if shares[k]["count"]]
+    none = [v for k, v in sides.items() if not shares[k]["count"]]
     parts = [f"{p} of {'those' if i else 'the cubes'} {v}" for i, (p, v) in enumerate(met)]
     text = f"It collects {_list(parts)}"
     return text + (f"; none were offered {_list(none, 'or')}." if none else ".")
@@ -94,21 +108,21 @@ def _baselines(evidence: Evidence) -> str:
     flown, luck = evidence["baselines"], best_luck(evidence)
     return (
         f"In the same worlds it collects {_cubes(evidence['greedy'])} of all cubes, "
-        f"{_LUCK[luck]} {_cubes(flown[luck])} and the oracle {_cubes(flown['oracle'])}."
+        f"{_acting(luck)} {_cubes(flown[luck])} and the oracle {_cubes(flown['oracle'])}."
     )
 
 
 def _luck_suffices(evidence: Evidence) -> bool:
     flown = evidence["baselines"]
-    luck = max(flown[name]["success"]["share"] for name in _LUCK)
+    luck = max(flown[name]["success"]["share"] for name in _luck(evidence))
     return luck > 0 and luck >= evidence["good_share"] * flown["oracle"]["success"]["share"]
 
 
 def _pointless(evidence: Evidence) -> str:
     flown = evidence["baselines"]
-    luck = max(_LUCK, key=lambda name: flown[name]["success"]["share"])
+    luck = max(_luck(evidence), key=lambda name: flown[name]["success"]["share"])
     return (
-        f"This task tells little, for luck is enough: {_LUCK[luck]} collects every cube in "
+        f"This task tells little, for luck is enough: {_acting(luck)} collects every cube in "
         f"{_success(flown[luck])} of episodes."
     )
 
@@ -126,8 +140,8 @@ def _largest(evidence: Evidence) -> str:
         "side": f"with cubes {_SIDES.get(value, value)}",
         "sideways": f"with cubes {value} to its side",
         "height": f"with cubes {_HEIGHTS.get(value, value)}",
-        "end": f"by ending {_ENDS.get(value, value)}",
-    }[by]
+        "end": f"by ending {_ending(value)}",
+    }.get(by, f"where {by} is {value}")
     whole = row["failed"] == row["episodes"]
     count = f"all {row['episodes']:,}" if whole else f"{row['failed']:,} of {row['episodes']:,}"
     offered = {"cube": " that got so far", "end": ""}.get(by, " that offered one")
@@ -137,16 +151,21 @@ def _largest(evidence: Evidence) -> str:
     return f"It fails most {where}: in {count} episodes{offered}{share}{_other_ends(evidence)}."
 
 
+def _ending(end: str) -> str:
+    return _ENDS.get(end, f"by {end.replace('_', ' ')}")
+
+
 def _other_ends(evidence: Evidence) -> str:
     """Ends by which many episodes fail, but for the usual one and what has just been said."""
     largest = evidence["failures"]["largest"]
-    said = (_EXPECTED_END, largest["value"] if largest["by"] == "end" else None)
+    expected = evidence["failures"].get("expected_end", _EXPECTED_END)
+    said = (expected, largest["value"] if largest["by"] == "end" else None)
     rows = [
         row
         for row in evidence["failures"]["rows"]
         if row["by"] == "end" and row["lower95"] > FREQUENT and row["value"] not in said
     ]
-    ends = [f"{percent(row['share'])} of all end {_ENDS[row['value']]}" for row in rows]
+    ends = [f"{percent(row['share'])} of all end {_ending(row['value'])}" for row in rows]
     return f"; {_list(ends)}" if ends else ""
 
 
@@ -170,7 +189,7 @@ def _drawing(evidence: Evidence) -> str:
 
 
 def _misses_or_lacks(evidence: Evidence) -> bool:
-    return any(evidence["greedy"]["shares"][side]["mean"] != 1.0 for side in _SIDES)
+    return any(evidence["greedy"]["shares"][side]["mean"] != 1.0 for side in _sides(evidence))
 
 
 SENTENCES = (

@@ -54,7 +54,7 @@ def _flights(verdict: Evidence) -> str:
     flown = {name: flights for name, flights in flown.items() if flights is not None}
     rows = [["", *flown], ["---"] * (1 + len(flown))]
     rows.append(["episodes with all cubes", *(_share(f["success"]) for f in flown.values())])
-    for side in ("all", "left", "ahead", "right"):
+    for side in verdict["greedy"]["shares"]:
         label = "cubes collected" if side == "all" else f"of those {side}"
         rows.append([label, *(_share(f["shares"][side]) for f in flown.values())])
     return _table(rows)

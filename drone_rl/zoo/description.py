@@ -14,8 +14,8 @@ from torchrl.envs import TransformedEnv
 
 from drone_rl.envs import DroneEnv, make_env
 from drone_rl.policies import PolicyNetwork
-from drone_rl.sim.actions import Move
 from drone_rl.sim.settings import CameraSettings, TaskSettings
+from drone_rl.sim.tasks import as_task
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Record, Several, as_mapping, shown
 from drone_rl.utils.settings import plain
@@ -125,8 +125,12 @@ class PolicyDescription:
         Args:
             generator: Source of the initial weights; torch's global one by default.
         """
-        part = NETWORKS[self.network.name]
-        return part.make(self.picture.shape, len(Move), generator=generator, **self.network.values)
+        actions = as_task(self.task).make_dynamics().actions
+        network: PolicyNetwork = NETWORKS[self.network.name].make(
+            self.picture.shape, len(actions.names), generator=generator, **self.network.values
+        )
+        network.actions = actions
+        return network
 
     def expected_weights(self) -> dict[str, torch.Tensor]:
         """Names, shapes and types of the network's weights, without the weights themselves."""

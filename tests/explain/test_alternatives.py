@@ -1,5 +1,3 @@
-import math
-
 import torch
 
 from drone_rl.explain.alternatives import (
@@ -7,14 +5,11 @@ from drone_rl.explain.alternatives import (
     DARK,
     DARK_GROUND,
     alternatives,
-    cubes_elsewhere,
-    without_cubes,
 )
-from drone_rl.explain.scenes import Region, Scenes, empty_scene, place_cube
+from drone_rl.explain.scenes import Region, empty_scene, place_cube
 from drone_rl.sim.entities.arena import FLOOR_COLOR, SKY_COLOR
 from drone_rl.sim.meaning import Meaning
 from drone_rl.sim.rendering import Appearance
-from drone_rl.sim.settings import TaskSettings
 
 
 def test_what_the_simulator_draws_otherwise(scenes, world):
@@ -46,27 +41,11 @@ def test_other_colours_are_darker_and_brighter_than_the_arenas():
             assert 0.2 < low < middle < high < 1.0  # still grounds and skies, no black or white
 
 
-def test_cubes_elsewhere_stand_where_cubes_can_stand(make_pipeline):
-    """In view, from where one just fits before the camera to where the first one stands."""
-    scenes = Scenes(make_pipeline(2, task=TaskSettings(vertical_bound=1.0, altitude=4.0))[0])
-    state = place_cube(scenes, torch.full((400,), 9.0), torch.zeros(400))
-    state.drone[:] = torch.tensor([5.0, -2.0, 4.0])
-    moved = cubes_elsewhere(scenes, state, torch.Generator().manual_seed(0))
-    ahead, aside, up = (moved.cubes - state.drone[:, None]).flatten(0, 1).unbind(-1)
-    nearest, edge = 1.65 + 2.5, math.tan(math.radians(scenes.worlds.camera.horizontal_fov / 2))
-    assert nearest <= ahead.min() < nearest + 0.5 and 14.5 < ahead.max() <= 15.0
-    slope = aside / ahead
-    assert -edge <= slope.min() < -0.95 * edge and 0.95 * edge < slope.max() <= edge
-    drawn = torch.stack([ahead, slope, up])[:, slope.abs() < 0.5 * edge]
-    assert (torch.corrcoef(drawn) - torch.eye(3)).abs().max() < 0.2  # independent of one another
-    assert abs(slope.mean()) < 0.2 * edge and 11.5 < aside.abs().max() <= 12.0 + 1e-9
-    assert -1.0 <= up.min() < -0.9 and 0.9 < up.max() <= 1.0 and abs(up.mean()) < 0.15
-
-
 def test_cubes_elsewhere_are_in_view(scenes):
-    state = without_cubes(place_cube(scenes, torch.full((80,), 9.0), torch.zeros(80)))
+    state = place_cube(scenes, torch.full((80,), 9.0), torch.zeros(80))
+    state = scenes.task.without_targets(state)
     state.drone[:, 1] = 11.0
-    moved = cubes_elsewhere(scenes, state, torch.Generator().manual_seed(0))
+    moved = scenes.task.elsewhere(state, scenes.worlds.camera, torch.Generator().manual_seed(0))
     regions = scenes.regions(moved)
     seen = (regions == Region.NEXT_CUBE) | (regions == Region.OTHER_CUBE)
     assert seen.flatten(1).any(1).all()

@@ -5,7 +5,7 @@ import torch
 from drone_rl.explain.asymmetry import asymmetry, grid_asymmetry
 from drone_rl.explain.response import ResponseMap
 from drone_rl.policies import MLP
-from drone_rl.sim.actions import Move
+from drone_rl.sim.actions import MOVES, Move
 
 
 def sides(bias):
@@ -21,7 +21,7 @@ def sides(bias):
 
 def test_a_fair_policy_equals_its_mirror_image_and_a_biased_one_does_not():
     x, episode = torch.randn(40, 1, 1, 4), np.arange(40)
-    fair, biased = asymmetry(sides(0.0), x, episode), asymmetry(sides(2.0), x, episode)
+    fair, biased = (asymmetry(sides(b), x, episode, MOVES) for b in (0.0, 2.0))
     assert fair["absolute"]["mean"] < 1e-6
     assert biased["absolute"]["mean"] > 0.1
     assert biased["signed"]["upper95"] < 0  # right is preferred
@@ -41,7 +41,7 @@ def test_asymmetry_of_frames_by_hand():
     distance = 0.5 * np.abs(here - there[:, [0, 2, 1]]).sum(1)
     episode = np.arange(10) // 2
     observed = torch.tensor(x, dtype=torch.float32)[:, None, None]
-    found = asymmetry(sides(bias), observed, episode)
+    found = asymmetry(sides(bias), observed, episode, MOVES)
     assert found["absolute"]["mean"] == pytest.approx(distance.mean(), abs=1e-5)
     assert found["signed"]["mean"] == pytest.approx((here[:, 1] - there[:, 2]).mean(), abs=1e-5)
     assert found["signed"]["lower95"] < -0.5  # few episodes tell little, down to -1
@@ -60,11 +60,13 @@ def test_a_policy_that_turns_to_either_side_is_its_mirror_image():
         probabilities=fair,
         without_cube=fair[0, 0, 1],
         oracle=np.array([1, 0, 2]),
+        stratum=np.array([0, 1, 2]),
+        blind=np.zeros((1, 1, 3), bool),
     )
-    result = grid_asymmetry(found)
+    result = grid_asymmetry(found, MOVES)
     assert (result["signed"], result["absolute"], result["worst"]["distance"]) == (0.0, 0.0, 0.0)
     found.probabilities[1, 0, 2] = [0.5, 0.0, 0.5]  # high up, near, to the right: less sure
-    result = grid_asymmetry(found)
+    result = grid_asymmetry(found, MOVES)
     assert result["signed"] == pytest.approx(0.3 / 12)
     assert result["absolute"] == pytest.approx(2 * 0.3 / 12)  # the place and its mirror image
     assert result["worst"] == {
@@ -81,8 +83,10 @@ def test_asymmetry_of_a_grid_by_hand():
         probabilities=probs,
         without_cube=probs[0, 0, 1],
         oracle=np.array([1, 0, 2]),
+        stratum=np.array([0, 1, 2]),
+        blind=np.zeros((1, 1, 3), bool),
     )
-    result = grid_asymmetry(found)
+    result = grid_asymmetry(found, MOVES)
     assert result["worst"] == {
         "distance": 0.8, "height": 0.0, "forward": 5.0, "lateral": 3.0,
     }  # fmt: skip

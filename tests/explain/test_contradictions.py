@@ -8,40 +8,27 @@ from drone_rl.explain.contradictions import (
     Pair,
     find_pairs,
     one_move,
-    opposition,
     summarise_pairs,
 )
 from drone_rl.explain.dataset import RolloutDataset
+from drone_rl.sim.actions import MOVES
 
 F, L, R = 0, 1, 2
 
 
 def fake(observations, probabilities, offsets, actions=None, episode=None):
     count = len(probabilities)
-    cubes = np.zeros((count, 1, 3))
-    cubes[:, 0, :2] = offsets
     arrays = {
         "observations": np.asarray(observations, np.float32).reshape(count, 1, 1, -1),
         "probabilities": np.asarray(probabilities, np.float32),
-        "drone": np.zeros((count, 3)),
-        "cubes": cubes,
-        "next_cube": np.zeros(count, int),
         "actions": np.asarray(actions if actions is not None else [F] * count),
         "episode": np.asarray(episode if episode is not None else [0] * count),
     }
-    return RolloutDataset(arrays, {}, {})
+    return RolloutDataset(arrays, {}, {"offsets": np.array(offsets, np.float64)})
 
 
-def test_opposition_by_hand():
-    sure_left, sure_right, forward = np.eye(3)[[L, R, F]]
-    assert opposition(sure_left, sure_right) == 1.0
-    assert opposition(sure_right, sure_left) == -1.0
-    assert opposition(sure_left, forward) == 0.0
-    assert opposition(np.array([0, 0.7, 0.3]), np.array([0, 0.4, 0.6])) == pytest.approx(0.3)
-    one, other = np.array([0.0, 0.9, 0.1]), np.array([0.2, 0.3, 0.5])  # 0.6 left, 0.4 right
-    assert opposition(one, other) == pytest.approx(0.4)
-    assert opposition(other, one) == pytest.approx(-0.4)
-    assert opposition(np.stack([one, other]), one).tolist() == [0.0, pytest.approx(-0.4)]
+def pairs_of(data, alike):
+    return find_pairs(data, alike, MOVES, data.meta["offsets"])
 
 
 LEFT, RIGHT = [0.0, 0.9, 0.1], [0.0, 0.1, 0.9]
@@ -55,8 +42,8 @@ def test_pairs_are_split_by_where_the_cube_is():
         probabilities=[LEFT, RIGHT, RIGHT, LEFT, LEFT, RIGHT],
         offsets=[[5, 1], [6, 2], [5, 3], [5, -3], [5, 1], [5, 1]],
     )
-    data.arrays["next_cube"][4] = 1
-    pairs = find_pairs(data, alike=0.1)
+    data.meta["offsets"][4] = np.nan
+    pairs = pairs_of(data, alike=0.1)
     assert {(p.left, p.right): p.kind for p in pairs} == {
         (0, 1): Kind.CONTRADICTION, (3, 2): Kind.JUSTIFIED, (4, 5): Kind.UNKNOWN,
     }  # fmt: skip
@@ -69,20 +56,20 @@ def test_pairs_are_split_by_where_the_cube_is():
 
 def test_pictures_farther_apart_are_not_alike():
     data = fake([[0, 0], [0, 0.1]], [LEFT, RIGHT], [[5, 1], [5, 1]])
-    assert len(find_pairs(data, alike=0.0708)) == 1  # 0.1 / sqrt(2) = 0.07071
-    assert find_pairs(data, alike=0.0707) == []
+    assert len(pairs_of(data, alike=0.0708)) == 1  # 0.1 / sqrt(2) = 0.07071
+    assert pairs_of(data, alike=0.0707) == []
 
 
 def test_wishes_less_opposed_are_no_pair():
     data = fake([[0, 0]] * 2, [[0.8, 0.2, 0.0], [0.8, 0.01, 0.19]], [[5, 1]] * 2)
-    assert find_pairs(data, alike=1.0) == []  # opposed by 0.19
+    assert pairs_of(data, alike=1.0) == []  # opposed by 0.19
     data = fake([[0, 0]] * 2, [[0.8, 0.2, 0.0], [0.8, 0.0, 0.2]], [[5, 1]] * 2)
-    assert len(find_pairs(data, alike=1.0)) == 1  # by just 0.2
+    assert len(pairs_of(data, alike=1.0)) == 1  # by just 0.2
 
 
 def test_of_equally_opposed_pairs_the_more_alike_comes_first():
     data = fake([[0], [3], [2]], [LEFT, RIGHT, RIGHT], [[5, 1]] * 3)
-    assert [(p.left, p.right) for p in find_pairs(data, alike=9.0)] == [(0, 2)]
+    assert [(p.left, p.right) for p in pairs_of(data, alike=9.0)] == [(0, 2)]
 
 
 def test_pairs_are_found_across_more_frames_than_are_compared_at_once():
@@ -91,26 +78,26 @@ def test_pairs_are_found_across_more_frames_than_are_compared_at_once():
     probs[[2, 700, 1202]] = [RIGHT, LEFT, RIGHT]
     data = fake(np.zeros((count, 1)), probs, [[5, 1]] * count)
     data.arrays["observations"][2] = 1.0  # a little less alike
-    pairs = find_pairs(data, alike=1.0)
+    pairs = pairs_of(data, alike=1.0)
     assert [(p.left, p.right, p.distance) for p in pairs] == [(700, 1202, 0.0)]
 
 
 def test_a_cube_stands_alike_up_to_one_metre():
     data = fake([[0]] * 2, [LEFT, RIGHT], [[5, 1], [5, 2]])
-    assert find_pairs(data, alike=1.0)[0].kind == Kind.CONTRADICTION
+    assert pairs_of(data, alike=1.0)[0].kind == Kind.CONTRADICTION
     data = fake([[0]] * 2, [LEFT, RIGHT], [[5, 1], [6.01, 1]])
-    assert find_pairs(data, alike=1.0)[0].kind == Kind.JUSTIFIED
+    assert pairs_of(data, alike=1.0)[0].kind == Kind.JUSTIFIED
 
 
 def test_each_frame_is_in_one_pair_and_the_most_opposed_comes_first():
     probs = [[0, 0.7, 0.3], [0, 0.9, 0.1], RIGHT]
-    pairs = find_pairs(fake(np.zeros((3, 2)), probs, [[5, 1]] * 3), alike=1.0)
+    pairs = pairs_of(fake(np.zeros((3, 2)), probs, [[5, 1]] * 3), alike=1.0)
     assert [(p.left, p.right) for p in pairs] == [(1, 2)]
 
 
 def test_all_pairs_are_counted_and_fifty_are_listed():
     data = fake(np.zeros((110, 2)), [LEFT, RIGHT] * 55, [[5, 1]] * 110)
-    summary = summarise_pairs(find_pairs(data, alike=1.0), data, 1.0)
+    summary = summarise_pairs(pairs_of(data, alike=1.0), data, 1.0)
     assert summary["pairs"] == summary["contradictions"] == 55
     assert len(summary["list"]) == 50
 
@@ -123,7 +110,7 @@ def test_a_pair_is_a_fact():
 
 def test_one_action_makes_no_pairs():
     data = fake(np.zeros((5, 2)), [[0, 1, 0]] * 5, [[5, 1]] * 5)
-    assert find_pairs(data, alike=1.0) == []
+    assert pairs_of(data, alike=1.0) == []
     assert summarise_pairs([], data, 1.0)["worst_opposition"] is None
 
 

@@ -58,7 +58,7 @@ def test_a_cube_is_moved_to_the_middle_and_never_away_from_it(scenes, lateral, m
     state = place_cube(scenes, torch.tensor([9.0]), torch.tensor([lateral]))
     state.drone[:, 1] += 7.0
     state.cubes[..., 1] += 7.0
-    after = to_the_middle(state)
+    after = to_the_middle(scenes, state)
     assert after.cubes[0, 0, 1].item() == pytest.approx(7.0 + moved)
     assert torch.equal(after.cubes[0, 1:], state.cubes[0, 1:])
     assert state.cubes[0, 0, 1] == 7.0 + lateral

@@ -13,8 +13,6 @@ from drone_rl.explain.outcomes import (
     fly,
     followed,
     outcomes,
-    sideways,
-    taken_away,
 )
 from drone_rl.explain.scenes import empty_scene, place_cube
 from drone_rl.sim.actions import Move
@@ -153,14 +151,6 @@ def test_flights_differ_where_both_still_fly():
     first, second = flights(2, [0], [[0, 1, -1]]), flights(3, [0], [[0, 1, 2]])
     assert not differ(first, second).any()
     assert differ(first, flights(2, [0], [[0, 2, -1]])).all()
-
-
-def test_what_is_changed_and_what_is_not(scenes):
-    state = place_cube(scenes, torch.tensor([9.0]), torch.tensor([1.0]))
-    assert sideways(state, 2.0).cubes[0, 0, 1] == 3.0
-    assert torch.equal(sideways(state, 2.0).cubes[0, 1:], state.cubes[0, 1:])
-    assert taken_away(state).passed.all() and not state.passed[0, 0]
-    assert state.cubes[0, 0, 1] == 1.0
 
 
 def test_without_a_cube_nothing_flies(scenes, follower):

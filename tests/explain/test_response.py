@@ -1,8 +1,6 @@
 import inspect
-from types import SimpleNamespace
 
 import numpy as np
-import pytest
 import torch
 from torch import nn
 
@@ -10,14 +8,14 @@ from drone_rl.explain.hooks import probabilities
 from drone_rl.explain.response import (
     OutcomeMap,
     ResponseMap,
-    _places,
+    find_blind,
     outcome_map,
     response_map,
     summarise,
 )
 from drone_rl.explain.scenes import Scenes, place_cube
+from drone_rl.sim.actions import MOVES
 from drone_rl.sim.settings import TaskSettings
-from drone_rl.sim.tasks import CollectCubes
 
 IDLE, LEFT = [1.0, 0.0, 0.0], [0.1, 0.9, 0.0]
 
@@ -36,20 +34,6 @@ def test_a_place_on_the_grid_is_that_place_in_the_world(scenes, world):
     at = place_cube(scenes, torch.tensor([found.forward[1]]), torch.tensor([found.lateral[3]]))
     expected = probabilities(world[2], scenes.observe(at))[0].numpy()
     np.testing.assert_allclose(found.probabilities[0, 1, 3], expected, atol=1e-6)
-
-
-def test_places_reach_as_far_as_cubes_stand():
-    def ends(**settings):
-        worlds = SimpleNamespace(task=CollectCubes(TaskSettings(**settings)))
-        height, *axes = _places(SimpleNamespace(worlds=worlds), 3, 5)
-        return [height.tolist(), *([axis[0].item(), axis[-1].item()] for axis in axes)]
-
-    near = pytest.approx([1.65 + 0.5, 15.0])  # half a step from touching
-    assert ends() == [[0.0], near, [12.0, -12.0]]
-    near = pytest.approx([1.65 + 0.2, 9.0])
-    task = {"step_length": 0.4, "first_distance": 9.0, "vertical_bound": 0.5}
-    assert ends(lateral_bound=4.0, **task) == [[-0.5, 0.0, 0.5], near, [8.0, -8.0]]
-    assert ends(lateral_bound=0.0)[2] == pytest.approx([3.3, -3.3])  # twice the reach of a touch
 
 
 def test_grids_are_odd_sideways_so_that_straight_ahead_is_on_them():
@@ -81,13 +65,18 @@ def test_an_outcome_is_flown_not_guessed(scenes):
 
 
 def test_blind_is_where_a_turn_is_called_for_and_nothing_changes():
+    wishes = np.array([[[IDLE, LEFT, IDLE, LEFT, [0.95, 0.0, 0.05]]]])
+    needed = torch.tensor([1, 1, 0, 2, 2])
+    blind = find_blind(MOVES, torch.tensor(wishes), torch.tensor(IDLE), needed)
     found = ResponseMap(
         height=np.array([0.0]),
         forward=np.array([5.0]),
         lateral=np.array([6.0, 3.0, 0.0, -3.0, -6.0]),
-        probabilities=np.array([[[IDLE, LEFT, IDLE, LEFT, [0.95, 0.0, 0.05]]]]),
+        probabilities=wishes,
         without_cube=np.array(IDLE),
-        oracle=np.array([1, 1, 0, 2, 2]),
+        oracle=needed.numpy(),
+        stratum=np.array([0, 0, 1, 2, 2]),
+        blind=blind.numpy(),
     )
     # unnoticed; noticed; rightly ignored; noticed, though answered wrongly; hardly noticed
     assert found.blind.tolist() == [[[True, False, False, False, True]]]
@@ -97,8 +86,9 @@ def test_blind_is_where_a_turn_is_called_for_and_nothing_changes():
         lateral=np.array([6.0, 0.0]),
         collected=np.array([[[False, True]]]),
         oracle=np.array([1, 0]),
+        stratum=np.array([0, 1]),
     )
-    rows = summarise(found, outcome)["rows"]
+    rows = summarise(found, outcome, ("left", "ahead", "right"))["rows"]
     assert rows == [
         {"height": 0.0, "side": "left", "blind": 0.5, "collected": 0, "places": 1},
         {"height": 0.0, "side": "ahead", "blind": 0.0, "collected": 1, "places": 1},

@@ -1,8 +1,7 @@
 import torch
 
 from drone_rl.envs import CropRows, DroneEnv, GrayPixels, Resize, make_env
-from drone_rl.explain.scenes import Region, Scenes, empty_scene, oracle_action, place_cube
-from drone_rl.sim.actions import Move
+from drone_rl.explain.scenes import Region, Scenes, empty_scene, place_cube
 from drone_rl.sim.settings import CameraSettings
 
 
@@ -36,12 +35,6 @@ def test_depth_is_the_cubes_distance(scenes):
     state = place_cube(scenes, torch.tensor([8.0]), torch.tensor([0.0]))
     # the camera sits 0.4 m ahead of the drone's middle, the cube's face 1.25 m before its own
     torch.testing.assert_close(scenes.depth(state)[0, 12, 32], torch.tensor(8 - 0.4 - 1.25))
-
-
-def test_the_oracle_turns_towards_the_cube(scenes):
-    lateral = torch.tensor([3.0, 0.5, -3.0])
-    expected = [Move.LEFT, Move.FORWARD, Move.RIGHT]
-    assert oracle_action(scenes, lateral).tolist() == expected
 
 
 def test_maps_go_back_to_where_the_pipeline_took_the_picture_from():

@@ -2,6 +2,7 @@ import numpy as np
 
 from drone_rl.explain.dataset import RolloutDataset
 from drone_rl.explain.sequence import key_frames
+from drone_rl.sim.tasks import CollectCubes
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
 
 
@@ -22,7 +23,7 @@ def fake(length, collects=(), misses=(), end=EndReason.ALL_CUBES):
 
 
 def test_a_good_episode():
-    frames = key_frames(fake(41, collects=(10, 20, 40)), 0)
+    frames = key_frames(fake(41, collects=(10, 20, 40)), 0, CollectCubes())
     assert [t for t, _ in frames] == [0, 5, 10, 20, 30, 40]
     assert [why for _, why in frames] == [
         "start", "approach", "collects a cube", "collects a cube", "in between", "collects a cube",
@@ -30,9 +31,13 @@ def test_a_good_episode():
 
 
 def test_a_failed_episode_shows_what_was_missed():
-    why = dict(key_frames(fake(30, collects=(9,), misses=(19,), end=EndReason.FRONT_BOUNDARY), 0))
+    why = dict(
+        key_frames(
+            fake(30, collects=(9,), misses=(19,), end=EndReason.FRONT_BOUNDARY), 0, CollectCubes()
+        )
+    )
     assert why[19] == "misses a cube" and why[29] == "fails: front boundary" and len(why) == 6
 
 
 def test_short_episodes_have_fewer_frames():
-    assert [t for t, _ in key_frames(fake(3), 0)] == [0, 1, 2]
+    assert [t for t, _ in key_frames(fake(3), 0, CollectCubes())] == [0, 1, 2]

@@ -219,7 +219,7 @@ def test_methods_follow_the_network_they_are_given(trial):
 def test_a_trial_of_a_policy_in_the_simulator(world, scenes, dataset):
     network = world[2]
     made = trust.make_trial(
-        scenes, network, dataset.state(), dataset.tensor("actions"), dataset.episode
+        scenes, network, dataset.state(scenes.task), dataset.tensor("actions"), dataset.episode
     )
     assert made.seed == 0
     assert made.effects.shape == (len(made.episode), 40) == (len(made.observations), 40)
@@ -232,7 +232,7 @@ def test_a_trial_of_a_policy_in_the_simulator(world, scenes, dataset):
     with torch.no_grad():
         network.layers.logits.weight.zero_()
     blind = trust.make_trial(
-        scenes, network, dataset.state(), dataset.tensor("actions"), dataset.episode
+        scenes, network, dataset.state(scenes.task), dataset.tensor("actions"), dataset.episode
     )
     assert len(blind.episode) == 0 and blind.still == len(rows)
     found = check_maps(blind, method_maps(Explainer(network, torch.zeros(1, 25, 64))))

@@ -6,8 +6,8 @@ from drone_rl.sim.actions import Move
 from drone_rl.sim.composer_task import ComposerTask, make_environment
 from drone_rl.sim.entities import cameras
 from drone_rl.sim.settings import TaskSettings
+from drone_rl.sim.tasks.collect_cubes.playing import VANISHED_DEPTH
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
-from drone_rl.sim.tasks.collect_cubes.task import VANISHED_DEPTH
 
 
 @pytest.fixture

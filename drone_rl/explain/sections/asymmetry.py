@@ -10,8 +10,9 @@ from drone_rl.explain.context import Context
 
 def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
     """Makes "asymmetry": on the "dataset" and on the "grid" of the response map."""
+    actions = context.scenes.actions
     numbers = {
-        "dataset": asymmetry(context.network, context.observations, context.episode),
-        "grid": grid_asymmetry(context.response),
+        "dataset": asymmetry(context.network, context.observations, context.episode, actions),
+        "grid": grid_asymmetry(context.response, actions),
     }
     return {"asymmetry": numbers}, {}

@@ -49,7 +49,7 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
             "heat_by": by,
             "key_steps": [
                 {"step": frame - int(rows[0]), "why": why}
-                for frame, why in key_frames(flights, FILMED)
+                for frame, why in key_frames(flights, FILMED, context.scenes.task)
             ],
         },
     }

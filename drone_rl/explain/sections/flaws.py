@@ -12,9 +12,10 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
     """Makes "contradictions", of the frames analysed, and "loops", of the whole flights."""
     data, flights = context.dataset, context.flights
     alike = contradictions.one_move(flights)
-    pairs = contradictions.find_pairs(data, alike)
+    scenes = context.scenes
+    pairs = contradictions.find_pairs(data, alike, scenes.actions, data.offset(scenes.task))
     numbers = {
         "contradictions": contradictions.summarise_pairs(pairs, data, alike),
-        "loops": loops.summarise_loops(flights, loops.find_loops(flights)),
+        "loops": loops.summarise_loops(flights, loops.find_loops(flights, scenes.actions)),
     }
     return numbers, {}

@@ -20,5 +20,4 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
         for name, one in (("response", response), ("outcome", outcome))
         for field in dataclasses.fields(one)
     }
-    arrays["response_blind"] = response.blind
-    return {"response": summarise(response, outcome)}, arrays
+    return {"response": summarise(response, outcome, context.scenes.task.strata)}, arrays

@@ -2,9 +2,10 @@
 
 from typing import Protocol
 
+from drone_rl.sim.tasks.explainable import Explainable
 from drone_rl.sim.tasks.judgeable import Judgeable
 from drone_rl.sim.tasks.playable import Playable, S
 
 
-class Task(Playable[S], Judgeable, Protocol[S]):
+class Task(Playable[S], Judgeable, Explainable[S], Protocol[S]):
     """Something to do. It holds no world: all its methods are functions of what they are given."""

@@ -9,7 +9,7 @@ def test_frames_and_grid_are_compared_with_their_mirror_images(context):
     numbers, arrays = section(context)
     found = numbers["asymmetry"]
     assert arrays == {}
-    assert found["grid"] == grid_asymmetry(context.response)
+    assert found["grid"] == grid_asymmetry(context.response, context.scenes.actions)
     worst = [entry["distance"] for entry in found["dataset"]["worst"]]
     assert worst == sorted(worst, reverse=True)
     assert worst[0] >= found["dataset"]["absolute"]["mean"] >= 0

@@ -60,7 +60,7 @@ def test_torchrl_sees_what_it_tells():
     env = DroneEnv(4, Posts(), pixels=False)
     check_env_specs(env)
     assert set(env.observation_spec["info"].keys()) == {
-        "passed", "sides", "end_reason", "drone", "attitude",
+        "passed", "sides", "end_reason", "posts", "drone", "attitude",
     }  # fmt: skip
     straight = env.rollout(12, policy=lambda td: td.set("action", torch.zeros(4).long()))
     assert straight["next", "reward"].sum(1).tolist() == [[2.0]] * 4

@@ -146,11 +146,16 @@ def judge(settings: TaskSettings, state: WorldState, body: BodyState) -> tuple[W
     return new, touched.sum(-1, dtype=torch.float64)
 
 
+def side_of(settings: TaskSettings, lateral: Tensor) -> Tensor:
+    """`Side` of a cube that stands so many metres to the left. Shape kept."""
+    right = torch.where(lateral < -settings.touch_distance, Side.RIGHT.value, Side.AHEAD.value)
+    return torch.where(lateral > settings.touch_distance, Side.LEFT.value, right)
+
+
 def _sightings(settings: TaskSettings, state: WorldState) -> tuple[Tensor, Tensor]:
     """Side and lateral offset, now recorded of every cube up to the next one. Shapes: (N, C)."""
     offset = state.cubes[..., 1] - state.drone[:, None, 1]
-    right = torch.where(offset < -settings.touch_distance, Side.RIGHT.value, Side.AHEAD.value)
-    side = torch.where(offset > settings.touch_distance, Side.LEFT.value, right)
+    side = side_of(settings, offset)
     index = torch.arange(state.side.shape[-1], device=side.device)
     is_new = (state.side < 0) & (index <= state.next_cube[:, None])
     return torch.where(is_new, side, state.side), torch.where(is_new, offset, state.lateral)

@@ -1,39 +1,15 @@
-"""The task as simulators know it: rules and entities together."""
+"""Collect the cubes (chapter, section 4)."""
 
-import functools
-from collections.abc import Iterator, Mapping
-
-import numpy as np
-import torch
-from torch import Tensor
-
-from drone_rl.sim.actions import MOVES, Entry
-from drone_rl.sim.dynamics import BodyState, ComputerVision
-from drone_rl.sim.entities.cube import Cube
 from drone_rl.sim.settings import TaskSettings
-from drone_rl.sim.tasks.collect_cubes import rules
-from drone_rl.sim.tasks.collect_cubes.goals import CubeGoals, classes
-from drone_rl.sim.tasks.collect_cubes.oracle import READS, line_up
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason, Side, WorldState
-from drone_rl.sim.tasks.judgeable import OracleRule
-
-VANISHED_DEPTH = 100.0
-"""Metres below its place at which a vanished cube is kept, out of sight under the floor."""
+from drone_rl.sim.tasks.collect_cubes.explaining import Explaining
+from drone_rl.sim.tasks.collect_cubes.judging import Judging
+from drone_rl.sim.tasks.collect_cubes.playing import Playing
 
 
-class CollectCubes:
+class CollectCubes(Playing, Judging, Explaining):
     """Move until every cube is touched. The reward is 1 a cube."""
 
     name = "collect_cubes"
-    ends = EndReason
-    truncation = EndReason.STEP_LIMIT
-    observed = ("cubes", "collected", "side", "end_reason")
-    goal = "cube"
-    success_end = EndReason.ALL_CUBES
-    expected_end = EndReason.FRONT_BOUNDARY
-    strata = tuple(side.name.lower() for side in Side)
-    luck = ("random", "forward", "left", "right")
-    scored = ("collected", "side", "lateral", "cube_positions", "drone")
 
     def __init__(self, settings: TaskSettings | None = None) -> None:
         """Takes the settings.
@@ -42,93 +18,3 @@ class CollectCubes:
             settings: Cubes, moves and boundaries; the original study's by default.
         """
         self.settings = settings or TaskSettings()
-
-    @property
-    def largest_reward(self) -> float:
-        """One a cube."""
-        return float(self.settings.num_cubes)
-
-    @property
-    def drone_size(self) -> float:
-        """Edge in metres of the box around the drone that touches cubes."""
-        return self.settings.drone_size
-
-    @property
-    def origin(self) -> tuple[float, float, float]:
-        """Where the drone starts, metres."""
-        return rules.origin(self.settings)
-
-    @property
-    def entries(self) -> Mapping[str, Entry]:
-        """Algorithm 3's info, and where the cubes are.
-
-        Cubes collected, which, on which side and how far aside each became the next one, which is
-        the next one, why the episode ended, and their positions (metres, world frame).
-        """
-        cubes = self.settings.num_cubes
-        return {
-            "cubes": Entry((1,), torch.int64, 0, cubes),
-            "collected": Entry((cubes,), torch.bool),
-            "side": Entry((cubes,), torch.int64, -1, len(Side) - 1),
-            "lateral": Entry((cubes,), torch.float64),
-            "next_cube": Entry((1,), torch.int64, 0, cubes),
-            "end_reason": Entry((1,), torch.int64, 0, len(EndReason) - 1),
-            "cube_positions": Entry((cubes, 3), torch.float32),
-        }
-
-    def make_dynamics(self) -> ComputerVision:
-        """The chapter's three moves (Table 1)."""
-        return ComputerVision(self.settings.step_length)
-
-    def make_props(self) -> list[Cube]:
-        """The cubes, nearest first."""
-        size, color = self.settings.cube_size, self.settings.cube_color
-        return [Cube(size, color, name=f"cube_{i}") for i in range(self.settings.num_cubes)]
-
-    def draw(self, random_state: np.random.RandomState) -> Tensor:
-        """Places of the cubes (Algorithm 2). Shape: (num_cubes, 3)."""
-        return rules.draw_cubes(self.settings, random_state)
-
-    def start(self, drawn: Tensor, body: BodyState) -> WorldState:
-        """The state at the start of episodes."""
-        return rules.start(self.settings, drawn, body)
-
-    def judge(self, state: WorldState, body: BodyState) -> tuple[WorldState, Tensor]:
-        """Algorithms 1 and 3."""
-        return rules.judge(self.settings, state, body)
-
-    def places(self, state: WorldState) -> Tensor:
-        """The cubes at their places, or under the floor once vanished."""
-        hidden = (~state.present).double() * VANISHED_DEPTH
-        return state.cubes - torch.nn.functional.pad(hidden[..., None], (2, 0))
-
-    def info(self, state: WorldState) -> dict[str, Tensor]:
-        """See `entries`."""
-        return {
-            "cubes": state.collected.sum(-1, keepdim=True),
-            "collected": state.collected.clone(),
-            "side": state.side.clone(),
-            "lateral": state.lateral.clone(),
-            "next_cube": state.next_cube[:, None],
-            "end_reason": state.end_reason[:, None].clone(),
-            "cube_positions": state.cubes.float(),
-        }
-
-    @property
-    def oracle(self) -> OracleRule:
-        """Lines up with the next cube, then flies at it."""
-        return OracleRule(READS, functools.partial(line_up, self.settings), MOVES)
-
-    def score(self, info: Mapping[str, Tensor]) -> CubeGoals:
-        """Each cube is a goal, which is reached by collecting it."""
-        return CubeGoals(
-            reached=info["collected"],
-            stratum=info["side"],
-            world=info["cube_positions"].flatten(1),
-            lateral=info["lateral"],
-            height=(info["cube_positions"][..., 2] - info["drone"][:, None, 2]).double(),
-        )
-
-    def classes(self, goals: CubeGoals) -> Iterator[tuple[str, str, Tensor]]:
-        """By number, side, sideways distance and height."""
-        return classes(self.settings, goals)
