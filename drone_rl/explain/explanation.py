@@ -70,6 +70,7 @@ def explain_policy(
         "name": name,
         "settings": dataclasses.asdict(settings),
         "seconds": seconds,
+        "actions": context.scenes.actions.as_dict(),
         **numbers,
         "provenance": provenance,
     }

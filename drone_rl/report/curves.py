@@ -4,8 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from drone_rl.report import pictures
-from drone_rl.report.explanation import ACTIONS, Explanation
+from drone_rl.report.explanation import Explanation
 from drone_rl.words.truth import NAMES
 
 _COLORS = ("#4269d0", "#efb118", "#ff725c", "#6cc5b0", "#9c6b4e")
@@ -17,10 +16,11 @@ def curves_chart(explanation: Explanation) -> Figure:
     """The mean effect of each patch; deletion and insertion by action, placebos dashed."""
     curves = explanation.numbers["truth"]["curves"]
     figure = Figure(figsize=(17, 7), layout="constrained")
-    axes = figure.subplots(2, 4)
+    axes = figure.subplots(2, 1 + len(explanation.actions.names))
     _effects(axes[0, 0], explanation)
     axes[1, 0].axis("off")
-    shown = [ACTIONS[action] for action in pictures.LEFT_TO_RIGHT]
+    actions = explanation.actions
+    shown = [actions.names[action] for action in actions.order]
     for column, action in zip(axes.T[1:], shown, strict=True):
         for axis, (kind, better) in zip(column, _KINDS.items(), strict=True):
             _curves(axis, curves, action, kind)

@@ -10,15 +10,16 @@ from drone_rl.utils.archives import read_arrays
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import parse_json, read_bytes, refuse_links
 from drone_rl.utils.schema import Text, as_mapping
+from drone_rl.words.actions import ShownActions, shown_actions
 
 FORMAT = "drone_rl explanation"
 FORMAT_VERSION = 2
-FRAME = frozenset({"format", "format_version", "name", "settings", "seconds", "provenance"})
+FRAME = frozenset(
+    {"format", "format_version", "name", "settings", "seconds", "actions", "provenance"}
+)
 """Entries of explanation.json that are no section's."""
 MOST_BYTES = 2**26
 """Of explanation.json."""
-ACTIONS = ("forward", "left", "right")
-"""By number, as in the files."""
 
 
 @dataclasses.dataclass
@@ -36,6 +37,11 @@ class Explanation:
     def name(self) -> str:
         """Of the policy."""
         return str(self.numbers["name"])
+
+    @property
+    def actions(self) -> ShownActions:
+        """What the policy could do."""
+        return shown_actions(self.numbers)
 
     @classmethod
     def load(cls, folder: Path) -> "Explanation":
@@ -55,6 +61,7 @@ class Explanation:
             arrays = read_arrays(folder / "arrays.npz")
             data = read_arrays(folder / "dataset.npz")
             data.pop("meta", None)
+            shown_actions(numbers)
             if "name" in numbers:
                 Text(1000).read(numbers["name"], "name")
         except (InputError, OSError) as error:

@@ -7,19 +7,18 @@ from matplotlib import colormaps
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-TINTS = {0: (214, 39, 40), 1: (44, 160, 44), 2: (31, 96, 200)}
-"""Red forward, green left, blue right, as in Figs. 7 and 8."""
-LEFT_TO_RIGHT = (1, 0, 2)
-"""The order in which actions are shown: left, forward, right."""
-BACKGROUND, INK, MUTED, CHOSEN = (255, 255, 255), (30, 32, 36), (150, 156, 166), (214, 39, 40)
+from drone_rl.report.indicator import indicator
+from drone_rl.report.palette import BACKGROUND, INK, Color
+from drone_rl.words.actions import MOVES, ShownActions
+
 SCALE = 5
 """Screen pixels to one of the policy's in a single picture."""
 
 
-def tint(frame: NDArray, action: int, strength: float = 0.4) -> NDArray:
+def tint(frame: NDArray, color: Color, strength: float = 0.4) -> NDArray:
     """A frame washed with its action's colour. Shape: (H, W, 3), uint8."""
-    color = np.array(TINTS[action], dtype=np.float64)
-    return (frame * (1 - strength) + color * strength).astype(np.uint8)
+    wash = np.array(color, dtype=np.float64)
+    return (frame * (1 - strength) + wash * strength).astype(np.uint8)
 
 
 def heated(frame: NDArray, heat: NDArray) -> NDArray:
@@ -32,48 +31,20 @@ def heated(frame: NDArray, heat: NDArray) -> NDArray:
     return (gray * (1 - weight) + color * weight).astype(np.uint8)
 
 
-def thumbnails(frames: NDArray, actions: NDArray, cells: NDArray) -> Image.Image:
+def thumbnails(frames: NDArray, colors: Sequence[Color], cells: NDArray) -> Image.Image:
     """Tinted frames on cells of a grid, none over another.
 
     Args:
         frames: Shape (N, H, W, 3).
-        actions: Shape (N,).
+        colors: Of each frame's action.
         cells: Column and row of each. Shape: (N, 2).
     """
     height, width = frames.shape[1:3]
     columns, rows = cells.max(0) + 1
     canvas = Image.new("RGB", (int(columns) * width, int(rows) * height), BACKGROUND)
-    for frame, action, (column, row) in zip(frames, actions, cells, strict=True):
-        picture = Image.fromarray(tint(frame, int(action)))
+    for frame, color, (column, row) in zip(frames, colors, cells, strict=True):
+        picture = Image.fromarray(tint(frame, color))
         canvas.paste(picture, (int(column) * width, int(row) * height))
-    return canvas
-
-
-def indicator(probabilities: Sequence[float], chosen: int, width: int) -> Image.Image:
-    """The chapter's three bars: left, forward (up) and right, as long as they are probable.
-
-    Args:
-        probabilities: By action number.
-        chosen: Its bar is red.
-        width: Pixels across.
-    """
-    height = 84
-    canvas = Image.new("RGB", (width, height), (236, 238, 242))
-    draw, font = ImageDraw.Draw(canvas), ImageFont.load_default(13)
-    middle, base, thick = width // 2, height - 16, 10
-    reach, up = width // 2 - 62, height - 24
-    forward, left, right = (float(p) for p in probabilities)
-    bars = {
-        1: (middle - 8 - reach * left, base - thick, middle - 8, base),
-        2: (middle + 8, base - thick, middle + 8 + reach * right, base),
-        0: (middle - thick // 2, base - up * forward, middle + thick // 2, base),
-    }
-    for action, box in bars.items():
-        color = CHOSEN if action == chosen else MUTED
-        draw.rectangle((box[0], min(box[1], box[3] - 1), max(box[2], box[0] + 1), box[3]), color)
-    draw.text((6, base - 14), f"left {left:.2f}", INK, font)
-    draw.text((width - 62, base - 14), f"right {right:.2f}", INK, font)
-    draw.text((middle + 12, 4), f"fwd {forward:.2f}", INK, font)
     return canvas
 
 
@@ -83,23 +54,28 @@ def explained_frame(
     probabilities: Sequence[float],
     chosen: int,
     captions: tuple[str, str],
+    actions: ShownActions = MOVES,
 ) -> Image.Image:
     """A frame, its heat map, each under a caption, and the indicator, from top to bottom."""
     plain, hot = enlarge(frame), enlarge(heated(frame, heat))
-    bars = indicator(probabilities, chosen, plain.width)
+    bars = indicator(probabilities, chosen, plain.width, actions)
     return stacked([titled(plain, captions[0]), titled(hot, captions[1]), bars])
 
 
-def probed_frame(data: Mapping[str, NDArray], frame: int, caption: str) -> Image.Image:
+def probed_frame(
+    data: Mapping[str, NDArray], frame: int, caption: str, actions: ShownActions = MOVES
+) -> Image.Image:
     """A frame of the data set under a caption, with what the policy made of it.
 
     Args:
         data: With "frames" (T, H, W, 3), "actions" (T,) and "probabilities" (T, num_actions).
         frame: Which of the T.
         caption: Over the picture.
+        actions: What they are.
     """
     plain = titled(enlarge(data["frames"][frame]), caption)
-    bars = indicator(data["probabilities"][frame], int(data["actions"][frame]), plain.width)
+    chosen = int(data["actions"][frame])
+    bars = indicator(data["probabilities"][frame], chosen, plain.width, actions)
     return stacked([plain, bars])
 
 

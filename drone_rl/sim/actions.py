@@ -189,10 +189,10 @@ class DiscreteActions:
         """As in `explanation.json`."""
         return {
             "names": list(self.names),
-            "order": list(self.order),
+            "order": [int(action) for action in self.order],
             "arrows": [list(arrow) for arrow in self.arrows],
-            "mirrored": list(self.mirrored),
-            "left": self.left,
+            "mirrored": [int(action) for action in self.mirrored],
+            "left": int(self.left),
             "colors": [list(color) for color in self.colors],
         }
 

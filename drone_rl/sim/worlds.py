@@ -1,5 +1,6 @@
 """Many worlds of a task at once: rules and motion in torch, pictures by a renderer."""
 
+import functools
 from collections.abc import Sequence
 from typing import Any
 
@@ -10,7 +11,7 @@ from torch import Tensor
 from drone_rl.sim.composer_task import ComposerTask
 from drone_rl.sim.dynamics import BodyState, Dynamics
 from drone_rl.sim.entities.cameras import FRONT_CENTER
-from drone_rl.sim.rendering import Appearance, Poses, View, WarpRenderer
+from drone_rl.sim.rendering import Appearance, Poses, Renderer, Scene, View, WarpRenderer
 from drone_rl.sim.rendering.renderer import MakeRenderer
 from drone_rl.sim.rendering.view import Modality
 from drone_rl.sim.settings import CameraSettings, TaskSettings
@@ -31,7 +32,7 @@ class Worlds:
         device: str = "cpu",
         num_shards: int | None = None,
     ) -> None:
-        """Compiles the model.
+        """Makes the worlds; the model is compiled when something is to be drawn.
 
         Args:
             num_worlds: How many.
@@ -48,15 +49,26 @@ class Worlds:
         self.dynamics = dynamics or self.task.make_dynamics()
         self.device = torch.device(device)
         self._every = torch.arange(num_worlds, device=self.device)
-        self.scene = ComposerTask(
-            self.task, self.camera, dynamics=self.dynamics, pixels=False
-        ).compile()
-        self._renderer = renderer(
-            self.scene, num_worlds=num_worlds, num_shards=num_shards, device=device
-        )
+        self._make_renderer, self._num_shards = renderer, num_shards
         self.policy_view = self.view()
         drawn = self.task.draw(np.random.RandomState(0))
         self.state = self.start(torch.zeros_like(drawn).expand(num_worlds, *drawn.shape).clone())
+
+    @functools.cached_property
+    def scene(self) -> Scene:
+        """What dm_control simulates, compiled."""
+        task = ComposerTask(self.task, self.camera, dynamics=self.dynamics, pixels=False)
+        return task.compile()
+
+    @functools.cached_property
+    def renderer(self) -> Renderer:
+        """What draws the worlds."""
+        return self._make_renderer(
+            self.scene,
+            num_worlds=self.num_worlds,
+            num_shards=self._num_shards,
+            device=str(self.device),
+        )
 
     def view(
         self,
@@ -133,7 +145,7 @@ class Worlds:
         Returns:
             See `Renderer.render`. First dimension: the state's worlds.
         """
-        return self._renderer.render(view or self.policy_view, self.poses(state), appearance)
+        return self.renderer.render(view or self.policy_view, self.poses(state), appearance)
 
     def poses(self, state: State) -> Poses:
         """Where a renderer must draw everything."""
@@ -141,8 +153,9 @@ class Worlds:
 
     def prepare(self, view: View | None = None) -> None:
         """Makes the renderer ready for a view, which its first picture would do otherwise."""
-        self._renderer.prepare(view or self.policy_view)
+        self.renderer.prepare(view or self.policy_view)
 
     def close(self) -> None:
-        """Ends the renderer."""
-        self._renderer.close()
+        """Ends the renderer, if there is one."""
+        if "renderer" in vars(self):
+            self.renderer.close()

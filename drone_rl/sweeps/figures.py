@@ -15,6 +15,7 @@ from drone_rl.sweeps.groups import FAILED, Group
 from drone_rl.sweeps.rows import Row
 from drone_rl.sweeps.statistics import median_band, on_grid
 from drone_rl.verdicts.kinds import KINDS
+from drone_rl.words.actions import MOVES
 
 FAVOURITE_AXIS = "optimiser.lr"
 COLORS = {
@@ -25,8 +26,8 @@ COLORS = {
     FAILED: "tab:purple",
 }
 MAX_PANELS = 6
-UNIFORM = float(np.log(3))
-"""Entropy of three actions of the same probability, nats."""
+UNIFORM = float(np.log(len(MOVES.names)))
+"""Entropy of the chapter's actions where all are as probable, nats."""
 
 
 @dataclasses.dataclass

@@ -2,12 +2,10 @@
 
 from collections.abc import Sequence
 
+from drone_rl.words.actions import shown_actions
 from drone_rl.words.licence import Evidence, Sentence, percent
 from drone_rl.words.numbers import among, bounds, listed, plural
 from drone_rl.words.response import ASYMMETRY, RESPONSE
-
-ACTIONS = ("forward", "left", "right")
-"""By number, as in the files."""
 
 
 def _size(evidence: Evidence) -> str:
@@ -19,14 +17,14 @@ def _size(evidence: Evidence) -> str:
 
 
 def _actions(evidence: Evidence) -> str:
-    shares = evidence["dataset"]["action_shares"]
-    told = listed([f"{percent(s)} {a}" for s, a in zip(shares, ACTIONS, strict=True)])
+    shares, names = evidence["dataset"]["action_shares"], shown_actions(evidence).names
+    told = listed([f"{percent(s)} {a}" for s, a in zip(shares, names, strict=True)])
     return f"Of these steps {told}."
 
 
 def _one_action(evidence: Evidence) -> str:
-    shares = evidence["dataset"]["action_shares"]
-    return f"In every one of these steps it went {ACTIONS[shares.index(max(shares))]}."
+    shares, names = evidence["dataset"]["action_shares"], shown_actions(evidence).names
+    return f"In every one of these steps it went {names[shares.index(max(shares))]}."
 
 
 def _entropy(evidence: Evidence) -> str:
@@ -167,15 +165,16 @@ LOOPS = (
 
 def _reached(evidence: Evidence) -> str:
     reached = evidence["class_model"]["logit"]["probabilities"]
-    told = listed([f"{a} {p:.3f}" for a, p in zip(ACTIONS, reached, strict=True)])
+    names = shown_actions(evidence).names
+    told = listed([f"{a} {p:.3f}" for a, p in zip(names, reached, strict=True)])
     return f"The pictures sought by logit reach a probability of {told}."
 
 
 def _unreached(evidence: Evidence) -> list[str]:
     """Actions that no attempt of either objective made more probable than not."""
-    found = evidence["class_model"]
+    found, names = evidence["class_model"], shown_actions(evidence).names
     highest = [max(p) for p in zip(*(found[o]["highest"] for o in _OBJECTIVES), strict=True)]
-    return [action for action, p in zip(ACTIONS, highest, strict=True) if p <= 0.5]
+    return [action for action, p in zip(names, highest, strict=True) if p <= 0.5]
 
 
 _OBJECTIVES = ("probability", "logit")

@@ -1,15 +1,12 @@
-import numpy as np
 import pytest
 import torch
 
 from drone_rl.collectors import EpisodeCollector
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation import ConstantPolicy, Oracle, RandomPolicy, run_episodes, summarise
-from drone_rl.evaluation.video import film_episode, write_video
 from drone_rl.sim.actions import Move
 from drone_rl.sim.settings import TaskSettings
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
-from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import Stream
 
 
@@ -122,21 +119,3 @@ def test_greedy_repeats_and_sampling_does_not(make_pipeline):
 
     assert torch.equal(*lengths(True))
     assert not torch.equal(*lengths(False))
-
-
-def test_film_and_files(make_pipeline, tmp_path):
-    settings = TaskSettings(num_cubes=1, first_distance=4.0, step_limit=4)
-    env, actor = make_pipeline(1, task=settings)
-    frames = list(film_episode(env, actor))
-    assert 2 <= len(frames) <= 5
-    assert frames[0].shape == (400, 1280, 3)
-    assert len({f.tobytes() for f in frames}) == len(frames)
-    files = write_video(frames, tmp_path / "sub" / "episode")
-    assert [f.suffix for f in files] == [".mp4", ".gif"]
-    assert all(f.stat().st_size > 1000 for f in files)
-
-
-def test_video_that_cannot_be_written(tmp_path):
-    (tmp_path / "file").write_text("")
-    with pytest.raises(InputError, match="another folder"):
-        write_video([np.zeros((16, 16, 3), np.uint8)], tmp_path / "file" / "episode")

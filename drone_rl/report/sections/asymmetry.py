@@ -13,7 +13,10 @@ def worst_frames(explanation: Explanation) -> Image.Image:
     worst = explanation.numbers["asymmetry"]["dataset"]["worst"][:3]
     tiles = [
         pictures.probed_frame(
-            explanation.data, entry["frame"], f"differs by {entry['distance']:.2f}"
+            explanation.data,
+            entry["frame"],
+            f"differs by {entry['distance']:.2f}",
+            explanation.actions,
         )
         for entry in worst
     ]

@@ -44,6 +44,7 @@ def explained_step(explanation: Explanation, step: int, caption: str) -> Image.I
         arrays["film_probabilities"][step],
         int(arrays["film_actions"][step]),
         (caption, "no heat" if by is None else f"heat: {NAMES[by]}"),
+        explanation.actions,
     )
 
 

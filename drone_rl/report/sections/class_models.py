@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from PIL import Image
 
 from drone_rl.report import pictures
-from drone_rl.report.explanation import ACTIONS, Explanation
+from drone_rl.report.explanation import Explanation
 from drone_rl.report.part import Part
 from drone_rl.words.report import CLASS_MODEL
 
@@ -19,11 +19,12 @@ def grid(explanations: Sequence[Explanation]) -> Image.Image:
         for objective in ("probability", "logit"):
             reached = explanation.numbers["class_model"][objective]["probabilities"]
             shown = explanation.arrays[f"class_model_{objective}"]
-            for action in pictures.LEFT_TO_RIGHT:
+            for action in explanation.actions.order:
                 gray = pictures.gray_picture(shown[action], statistics["low"], statistics["high"])
-                caption = f"{who}{ACTIONS[action]} {reached[action]:.3f} (by {objective})"
+                name = explanation.actions.names[action]
+                caption = f"{who}{name} {reached[action]:.3f} (by {objective})"
                 tiles.append(pictures.titled(pictures.enlarge(gray), caption))
-    return pictures.gridded(tiles, 3)
+    return pictures.gridded(tiles, len(explanations[0].actions.names))
 
 
 PART = Part(

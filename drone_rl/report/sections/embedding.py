@@ -8,7 +8,7 @@ from PIL import Image
 
 from drone_rl.explain.tsne import snap_to_grid
 from drone_rl.report import pictures
-from drone_rl.report.explanation import ACTIONS, Explanation
+from drone_rl.report.explanation import Explanation
 from drone_rl.report.part import Part, Rows
 from drone_rl.report.saving import to_png, to_uri
 from drone_rl.words.report import TSNE
@@ -34,7 +34,7 @@ def tsne_map(explanation: Explanation, which: str) -> Image.Image:
     chosen = shown_frames(explanation)
     return pictures.thumbnails(
         explanation.data["frames"][chosen],
-        explanation.data["actions"][chosen],
+        [explanation.actions.colors[a] for a in explanation.data["actions"][chosen]],
         cells(explanation, which),
     )
 
@@ -80,7 +80,15 @@ def points(explanation: Explanation) -> dict[str, Any]:
         "step": data["step"][chosen].tolist(),
         "reward": data["rewards"][chosen].tolist(),
         "last": last.tolist(),
+        "names": explanation.actions.names,
+        "order": explanation.actions.order,
+        "colors": explanation.actions.colors,
     }
+
+
+def _legend(explanation: Explanation) -> list[dict[str, str]]:
+    actions = explanation.actions
+    return [{"name": n, "color": actions.css(i)} for i, n in enumerate(actions.names)]
 
 
 def table(explanation: Explanation) -> Rows:
@@ -90,7 +98,7 @@ def table(explanation: Explanation) -> Rows:
     both = np.hstack([arrays[f"tsne_{which}"] for which in MAPS]).round(4).tolist()
     rows: list[list[Any]] = [["frame", "episode", "step", "action", *axes]]
     for t, row in enumerate(both):
-        action = ACTIONS[int(data["actions"][t])]
+        action = explanation.actions.names[int(data["actions"][t])]
         rows.append([t, int(data["episode"][t]), int(data["step"][t]), action, *row])
     return rows
 
@@ -104,7 +112,7 @@ PART = Part(
     draw=draw,
     tables=lambda explanation: {"tsne": table(explanation)},
     extras=lambda explanation: {
-        "actions": ACTIONS,
+        "actions": _legend(explanation),
         "points": points(explanation),
         "sprite": to_uri(to_png(sprite(explanation)), "image/png"),
     },

@@ -25,7 +25,9 @@ def pairs(explanation: Explanation, kind: str) -> Image.Image | None:
     if not shown:
         return None
     tiles = [
-        pictures.probed_frame(explanation.data, pair[side], f"frame {pair[side]}: more {side}")
+        pictures.probed_frame(
+            explanation.data, pair[side], f"frame {pair[side]}: more {side}", explanation.actions
+        )
         for pair in shown
         for side in ("left", "right")
     ]

@@ -10,12 +10,11 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from drone_rl.report import pictures
-from drone_rl.report.explanation import ACTIONS, Explanation
+from drone_rl.report.explanation import Explanation
 from drone_rl.report.part import Part, Rows
+from drone_rl.words.actions import ShownActions
 from drone_rl.words.response import RESPONSE
 
-_SHADES = ("#d62728", "#2ca02c", "#1f60c8")
 _OUTCOMES = (("#d9d9de", "#4269d0"), ("cube missed", "cube collected"))
 
 
@@ -26,16 +25,18 @@ def response_chart(explanation: Explanation) -> Figure:
     """
     arrays = explanation.arrays
     heights = arrays["response_height"]
-    figure = Figure(figsize=(16, 3.9 * len(heights)), layout="constrained")
-    axes = figure.subplots(len(heights), 5, squeeze=False, sharex=True, sharey=True)
+    actions, count = explanation.actions, len(explanation.actions.names)
+    figure = Figure(figsize=(3.2 * (count + 2), 3.9 * len(heights)), layout="constrained")
+    axes = figure.subplots(len(heights), count + 2, squeeze=False, sharex=True, sharey=True)
     for layer, row in zip(range(len(heights)), axes[::-1], strict=True):
-        _draw_row(row, arrays, layer)
+        _draw_row(row, arrays, layer, actions)
         level = f", cube {heights[layer]:+g} m" if len(heights) > 1 else ""
         row[0].set_ylabel(f"metres ahead{level}")
-    figure.colorbar(axes[0, 0].images[0], ax=axes[:, :3], shrink=0.8, label="probability")
+    figure.colorbar(axes[0, 0].images[0], ax=axes[:, :count], shrink=0.8, label="probability")
     for axis in axes[-1]:
         axis.set_xlabel("metres to the left (+) or right (-)", fontsize=9)
-    for axis, labels in ((axes[-1, 3], (_SHADES, ACTIONS)), (axes[-1, 4], _OUTCOMES)):
+    named = ([actions.css(action) for action in range(count)], actions.names)
+    for axis, labels in ((axes[-1, -2], named), (axes[-1, -1], _OUTCOMES)):
         handles = [Patch(color=c, label=n) for c, n in zip(*labels, strict=True)]
         axis.legend(
             handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3, fontsize=8,
@@ -44,37 +45,42 @@ def response_chart(explanation: Explanation) -> Figure:
     return figure
 
 
-def _draw_row(axes: Sequence[Axes], arrays: dict[str, NDArray], layer: int) -> None:
-    """The five maps of one height."""
+def _draw_row(
+    axes: Sequence[Axes], arrays: dict[str, NDArray], layer: int, actions: ShownActions
+) -> None:
+    """The maps of one height: one an action, the chosen action, what comes of it."""
     forward, lateral = arrays["response_forward"], arrays["response_lateral"]
     probabilities = arrays["response_probabilities"][layer]
     extent = (lateral[0], lateral[-1], forward[0], forward[-1])
     style: dict[str, Any] = {
         "extent": extent, "origin": "lower", "aspect": "auto", "interpolation": "nearest",
     }  # fmt: skip
-    for axis, action in zip(axes, pictures.LEFT_TO_RIGHT, strict=False):
+    *wishes, most, outcome = axes
+    for axis, action in zip(wishes, actions.order, strict=True):
         axis.imshow(probabilities[..., action], vmin=0, vmax=1, cmap="viridis", **style)
-        axis.set_title(f"P({ACTIONS[action]})")
-    axes[3].imshow(probabilities.argmax(-1), vmin=0, vmax=2, cmap=ListedColormap(_SHADES), **style)
-    axes[3].set_title("most probable action\n(in the white line: blind)", fontsize=10)
+        axis.set_title(f"P({actions.names[action]})")
+    shades = ListedColormap([actions.css(action) for action in range(len(wishes))])
+    most.imshow(probabilities.argmax(-1), vmin=0, vmax=len(wishes) - 1, cmap=shades, **style)
+    most.set_title("most probable action\n(in the white line: blind)", fontsize=10)
     blind = arrays["response_blind"][layer]
     if blind.any():
-        axes[3].contour(
+        most.contour(
             lateral, forward, blind.astype(float), levels=[0.5], colors="white", linewidths=2.5
         )
     ends = ListedColormap(_OUTCOMES[0])
-    axes[4].imshow(arrays["outcome_collected"][layer], vmin=0, vmax=1, cmap=ends, **style)
-    axes[4].set_title("what comes of it", fontsize=10)
+    outcome.imshow(arrays["outcome_collected"][layer], vmin=0, vmax=1, cmap=ends, **style)
+    outcome.set_title("what comes of it", fontsize=10)
 
 
 def tables(explanation: Explanation) -> dict[str, Rows]:
     """What it does, and what comes of it, at each place."""
     arrays = explanation.arrays
+    names = explanation.actions.names
     place = ["metres_up", "metres_ahead", "metres_left"]
-    does: list[list[Any]] = [[*place, *(f"p_{a}" for a in ACTIONS), "needed", "blind"]]
+    does: list[list[Any]] = [[*place, *(f"p_{a}" for a in names), "needed", "blind"]]
     for at, where in _grid(arrays, "response"):
         shares = arrays["response_probabilities"][at].round(5).tolist()
-        needed = ACTIONS[int(arrays["response_oracle"][at[-1]])]
+        needed = names[int(arrays["response_oracle"][at[-1]])]
         does.append([*where, *shares, needed, int(arrays["response_blind"][at])])
     comes: list[list[Any]] = [[*place, "collected"]]
     for at, where in _grid(arrays, "outcome"):

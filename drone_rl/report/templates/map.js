@@ -1,8 +1,7 @@
-const SHOWN = [1, 0, 2];
-const TINTS = ["214,39,40", "44,160,44", "31,96,200"];
 const tip = document.getElementById("tip");
-function bars(p, chosen) {
-  return SHOWN.map(a => `<div class="bar ${a === chosen ? "chosen" : ""}"><span>${ACTIONS[a]}</span>` +
+function bars(points, i) {
+  const p = points.probabilities[i], chosen = points.action[i];
+  return points.order.map(a => `<div class="bar ${a === chosen ? "chosen" : ""}"><span>${points.names[a]}</span>` +
     `<i style="width:${Math.max(1, 100 * p[a])}%"></i><span>${p[a].toFixed(2)}</span></div>`).join("");
 }
 function setUp(root, points, source) {
@@ -18,7 +17,7 @@ function setUp(root, points, source) {
     const ctx = canvas.getContext("2d");
     cells.forEach(([c, r], i) => {
       cut(ctx, i, c * w, r * h, w, h);
-      ctx.fillStyle = `rgba(${TINTS[points.action[i]]},.4)`;
+      ctx.fillStyle = `rgba(${points.colors[points.action[i]]},.4)`;
       ctx.fillRect(c * w, r * h, w, h);
       if (i === chosen) { ctx.lineWidth = 5; ctx.strokeStyle = "#000"; ctx.strokeRect(c * w, r * h, w, h); }
     });
@@ -43,7 +42,7 @@ function setUp(root, points, source) {
     tip.style.display = i < 0 ? "none" : "block";
     if (i < 0) return;
     picture(tip.querySelector("canvas"), i, true);
-    tip.querySelector("div").innerHTML = bars(points.probabilities[i], points.action[i]) +
+    tip.querySelector("div").innerHTML = bars(points, i) +
       `<small>${describe(i)}</small>`;
     const x = Math.min(event.clientX + 16, innerWidth - tip.offsetWidth - 8);
     const y = event.clientY + 16 + tip.offsetHeight > innerHeight ? event.clientY - tip.offsetHeight - 16 : event.clientY + 16;
@@ -58,7 +57,7 @@ function setUp(root, points, source) {
       const box = document.createElement("div"), small = document.createElement("canvas");
       box.className = k === i ? "here" : "";
       picture(small, k, true);
-      box.append(small, `step ${points.step[k]}: ${ACTIONS[points.action[k]]}`);
+      box.append(small, `step ${points.step[k]}: ${points.names[points.action[k]]}`);
       strip.append(box);
     }
     const note = document.createElement("div");

@@ -53,7 +53,7 @@ def test_a_view_that_it_cannot_draw_is_refused_in_one_line():
 def test_the_environment_flies_with_it_and_closes_it():
     env = DroneEnv(3, renderer=OneColour)
     check_env_specs(env)
-    renderer = env.worlds._renderer
+    renderer = env.worlds.renderer
     assert renderer.prepared[0] == env.worlds.policy_view
     env.close()
     assert renderer.is_closed

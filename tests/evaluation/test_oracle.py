@@ -1,0 +1,38 @@
+import pytest
+import torch
+from tensordict import TensorDict
+
+from drone_rl.evaluation import ConstantPolicy, Oracle, RandomPolicy
+from drone_rl.sim.actions import Move
+from drone_rl.sim.settings import TaskSettings
+from drone_rl.sim.tasks import CollectCubes
+from drone_rl.utils.errors import InputError
+from tests.second_task import Posts
+
+
+def test_the_oracle_does_what_the_tasks_rule_says():
+    info = {
+        "drone": torch.zeros(3, 3),
+        "cube_positions": torch.tensor([[[9.0, y, 0.0]] for y in (4.0, 0.1, -4.0)]),
+        "next_cube": torch.zeros(3, 1, dtype=torch.int64),
+    }
+    seen = TensorDict({"info": TensorDict(info, [3])}, [3])
+    for task in (TaskSettings(num_cubes=1), CollectCubes()):
+        assert Oracle(task)(seen)["action"].tolist() == [Move.LEFT, Move.FORWARD, Move.RIGHT]
+    assert Oracle(Posts()).in_keys == [("info", "end_reason")]
+
+
+def test_a_task_without_an_oracle_says_so_in_one_line():
+    class Blind(Posts):
+        name, oracle = "fog", None
+
+    with pytest.raises(InputError, match="task=fog has no oracle; choose a task that has one") as e:
+        Oracle(Blind())
+    assert "\n" not in str(e.value)
+
+
+def test_chance_draws_all_actions_alike_and_habit_takes_one():
+    done = TensorDict({"done": torch.zeros(3000, 1, dtype=torch.bool)}, [3000])
+    drawn = RandomPolicy(3, torch.Generator().manual_seed(0))(done)["action"]
+    assert all(900 < int((drawn == action).sum()) < 1100 for action in Move)
+    assert ConstantPolicy(Move.RIGHT)(done)["action"].unique().tolist() == [2]

@@ -1,0 +1,80 @@
+import numpy as np
+import pytest
+import torch
+from tensordict import TensorDict
+
+from drone_rl.evaluation.video import _draw_bars, film_episode, write_video
+from drone_rl.sim.actions import MOVES, DiscreteActions
+from drone_rl.sim.settings import TaskSettings
+from drone_rl.utils.errors import InputError
+from tests.second_task import Posts
+
+FIVE = DiscreteActions(
+    names=("up", "down", "left", "right", "stay"),
+    mirrored=(0, 1, 3, 2, 4),
+    opposite=(1, 0, 3, 2, 4),
+    left=2,
+    order=(2, 0, 4, 1, 3),
+    arrows=((0, 1), (0, -1), (-1, 0), (1, 0), (0, 0)),
+    colors=((0, 0, 0),) * 5,
+)
+
+
+class Canvas:
+    """Notes what is drawn."""
+
+    def __init__(self):
+        self.texts, self.bars = [], []
+
+    def text(self, place, text, *_):
+        self.texts.append((place[0], text))
+
+    def rectangle(self, box, color):
+        self.bars.append((box[0], box[2] - box[0], color))
+
+
+def test_film_and_files(make_pipeline, tmp_path):
+    settings = TaskSettings(num_cubes=1, first_distance=4.0, step_limit=4)
+    env, actor = make_pipeline(1, task=settings)
+    frames = list(film_episode(env, actor))
+    assert 2 <= len(frames) <= 5
+    assert frames[0].shape == (400, 1280, 3)
+    assert len({f.tobytes() for f in frames}) == len(frames)
+    files = write_video(frames, tmp_path / "sub" / "episode")
+    assert [f.suffix for f in files] == [".mp4", ".gif"]
+    assert all(f.stat().st_size > 1000 for f in files)
+
+
+def test_video_that_cannot_be_written(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="another folder"):
+        write_video([np.zeros((16, 16, 3), np.uint8)], tmp_path / "file" / "episode")
+
+
+def test_another_task_is_filmed_too(make_pipeline):
+    frames = list(film_episode(*make_pipeline(1, task=Posts())))
+    assert 2 <= len(frames) <= 13 and frames[0].shape == (400, 1280, 3)
+
+
+@pytest.mark.parametrize("actions", [MOVES, FIVE])
+def test_there_is_a_bar_for_each_action_from_left_to_right_as_long_as_it_is_probable(actions):
+    canvas, count = Canvas(), len(actions)
+    logits = torch.zeros(1, count)
+    logits[0, actions.left] = 50.0
+    acted = TensorDict({"action": torch.tensor([actions.left]), "logits": logits}, [1])
+    _draw_bars(canvas, None, acted, actions)
+    assert [text.split()[0] for _, text in canvas.texts] == [
+        actions.names[i] for i in actions.order
+    ]
+    places = [x for x, _ in canvas.texts]
+    assert places == sorted(places) and places[-1] + 960 // count <= 1280
+    (chosen,) = [b for b in canvas.bars if b[2] != canvas.bars[-1][2]]
+    assert chosen[1] == 960 // count - 140 and all(
+        b[1] == 1 for b in canvas.bars if b is not chosen
+    )
+
+
+def test_who_has_no_logits_is_sure():
+    canvas = Canvas()
+    _draw_bars(canvas, None, TensorDict({"action": torch.tensor([2])}, [1]), MOVES)
+    assert [text for _, text in canvas.texts] == ["left 0.00", "forward 0.00", "right 1.00"]

@@ -1,0 +1,28 @@
+import numpy as np
+import pytest
+from dm_control import mjcf
+
+from drone_rl.sim.entities import cameras
+
+LOOKS = {
+    "front_center": (1, 0, 0),
+    "front_right": (1, 0, 0),
+    "front_left": (1, 0, 0),
+    "bottom_center": (0, 0, -1),
+    "back_center": (-1, 0, 0),
+}
+
+
+@pytest.mark.parametrize("spec", cameras.DRONE_CAMERAS, ids=lambda spec: spec.name)
+def test_each_camera_looks_where_its_name_says_and_stands_upright(spec):
+    root = mjcf.RootElement()
+    camera = cameras.add_camera(root.worldbody.add("body", name="body"), spec, vertical_fov=40.0)
+    physics = mjcf.Physics.from_mjcf_model(root)
+    right, up, back = physics.bind(camera).xmat.reshape(3, 3).T
+    np.testing.assert_allclose(-back, LOOKS[spec.name], atol=1e-9)
+    np.testing.assert_allclose(physics.bind(camera).xpos, spec.pos)
+    assert physics.bind(camera).fovy == 40.0
+    side = {"front_left": 1, "front_right": -1}.get(spec.name, 0)
+    assert np.sign(spec.pos[1]) == side
+    assert up[2] == pytest.approx(1.0) or spec.name == "bottom_center"
+    assert right[1] == pytest.approx(1.0 if spec.name == "back_center" else -1.0)

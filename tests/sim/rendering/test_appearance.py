@@ -1,0 +1,25 @@
+import torch
+
+from drone_rl.sim.meaning import Meaning
+from drone_rl.sim.rendering import Appearance
+from drone_rl.sim.rendering.appearance import each
+
+RED = (1.0, 0.0, 0.0)
+SEVERAL = torch.tensor([[0.1, 0.2, 0.3], [0.4, 0.5, 0.6], [0.7, 0.8, 0.9]])
+
+
+def test_a_part_has_the_looks_of_its_worlds_and_what_all_share():
+    appearance = Appearance(
+        colors={Meaning.SKY: RED, Meaning.TARGET: SEVERAL}, sun=SEVERAL, ambient=RED
+    )
+    part = appearance[1:3]
+    assert part.colors[Meaning.SKY] == RED and part.ambient == RED
+    assert torch.equal(part.colors[Meaning.TARGET], SEVERAL[1:3])
+    assert torch.equal(part.sun, SEVERAL[1:3]) and part.sun_direction is None
+    assert torch.equal(Appearance(ambient=torch.tensor(RED))[0:1].ambient, torch.tensor(RED))
+
+
+def test_one_value_stands_for_every_world():
+    assert each(RED, 2).tolist() == [[1, 0, 0], [1, 0, 0]]
+    assert torch.equal(each(SEVERAL, 3).float(), SEVERAL)
+    assert each(RED, 2).dtype == torch.float64

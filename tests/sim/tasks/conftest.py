@@ -1,0 +1,34 @@
+"""What every task must keep is tested on each of them."""
+
+import pytest
+import torch
+
+from drone_rl.sim.settings import TaskSettings
+from drone_rl.sim.tasks import CollectCubes
+from drone_rl.sim.worlds import Worlds
+from drone_rl.utils.seeding import world_random_state
+from tests.second_task import Posts
+
+TASKS = (CollectCubes(), CollectCubes(TaskSettings(num_cubes=2, vertical_bound=0.5)), Posts())
+
+
+@pytest.fixture(params=TASKS, ids=("cubes", "two cubes", "posts"))
+def worlds(request):
+    """Five worlds of a task, each with an episode of its own."""
+    worlds = Worlds(5, request.param)
+    worlds.reset(torch.arange(5), [world_random_state(0, i) for i in range(5)])
+    yield worlds
+    worlds.close()
+
+
+@pytest.fixture
+def task(worlds):
+    return worlds.task
+
+
+@pytest.fixture
+def truth(worlds):
+    """What an environment tells of the worlds."""
+    body = worlds.state.body
+    pose = {"drone": body.position.float(), "attitude": body.attitude.float()}
+    return {**worlds.task.info(worlds.state), **pose}

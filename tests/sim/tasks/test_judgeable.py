@@ -1,0 +1,49 @@
+"""What verdicts count on, of every task."""
+
+import torch
+
+from drone_rl.sim.tasks import Goals
+
+
+def test_goals_are_made_of_what_the_task_says_it_reads(task, truth):
+    goals = task.score({name: truth[name] for name in task.scored})
+    assert isinstance(goals, Goals) and len(goals) == 5
+    assert goals.reached.dtype == torch.bool and goals.reached.shape == goals.stratum.shape
+    assert goals.stratum.min() >= -1 and goals.stratum.max() < len(task.strata)
+    assert goals[:2].world.shape[0] == 2
+
+
+def test_worlds_are_told_apart_by_what_was_drawn_and_not_by_what_was_done(worlds, task, truth):
+    before = task.score({name: truth[name] for name in task.scored}).world
+    state, _ = worlds.advance(worlds.state, torch.tensor([0, 1, 2, 0, 1]))
+    later = {**task.info(state), "drone": state.body.position.float()}
+    assert torch.equal(task.score({name: later[name] for name in task.scored}).world, before)
+    assert len(before.unique(dim=0)) > 1
+
+
+def test_classes_are_of_goals_and_have_names(task, truth):
+    goals = task.score({name: truth[name] for name in task.scored})
+    found = list(task.classes(goals))
+    assert found
+    assert len({(by, value) for by, value, _ in found}) == len(found)
+    for by, value, of in found:
+        assert by and value and of.dtype == torch.bool and of.shape == goals.reached.shape
+
+
+def test_the_oracle_reads_what_there_is_and_reaches_every_goal(worlds, task):
+    rule, state = task.oracle, worlds.state
+    done = torch.zeros(5, dtype=torch.bool)
+    for _ in range(100):
+        info = {**task.info(state), "drone": state.body.position.float()}
+        moved, _ = worlds.advance(state, rule.act(*(info[name] for name in rule.reads)))
+        going = (~done).nonzero()[:, 0]
+        state[going] = moved[going]
+        done |= state.end_reason != 0
+    info = {**task.info(state), "drone": state.body.position.float()}
+    assert task.score({name: info[name] for name in task.scored}).reached.all()
+    assert (state.end_reason == task.success_end).all()
+
+
+def test_luck_is_chance_and_actions_that_can_be_taken(worlds, task):
+    assert set(task.luck) - {"random"} <= set(worlds.dynamics.actions.names)
+    assert "oracle" not in task.luck and task.expected_end != task.success_end
