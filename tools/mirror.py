@@ -5,6 +5,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 PURE_DATA = {
     "bench/evidence": "evidence made by hand; bench/test_sentences reads every entry",
+    "report/palette": "colours; report/test_indicator and test_pictures find them in pictures",
+    "sim/meaning": "names; sim/test_worlds finds each on its things",
 }
 """Modules that need no test of their own, and why: what they hold is tried by others' tests."""
 

@@ -4,6 +4,11 @@ from pathlib import Path
 
 TARGETS: dict[str, tuple[str, ...]] = {
     "sim/tasks/collect_cubes/rules": ("sim/tasks/collect_cubes/test_rules", "sim/test_worlds"),
+    "sim/actions": ("sim/test_actions",),
+    "sim/tasks/collect_cubes/changes": (
+        "sim/tasks/collect_cubes/test_changes",
+        "explain/test_outcomes",
+    ),
     "sim/tasks/collect_cubes/goals": (
         "sim/tasks/collect_cubes/test_goals",
         "verdicts/test_failures",
