@@ -15,6 +15,7 @@ from drone_rl.explain.planted import Planted, plant, reach
 from drone_rl.explain.scenes import Scenes
 from drone_rl.explain.trust import Pictures, Trial, check_maps, draw_pictures
 from drone_rl.policies import PolicyNetwork, SmallCNN
+from drone_rl.sim.tasks import CollectCubes
 from drone_rl.sim.tasks.collect_cubes import rules
 from drone_rl.sim.tasks.collect_cubes.rules import WorldState
 from drone_rl.zoo import load_exported, policy_names, policy_path
@@ -77,7 +78,9 @@ def believed(pictures: Pictures, network: PolicyNetwork) -> tuple[list[str], int
 
 def imagined(scenes: Scenes, episodes: int, frames: int) -> tuple[WorldState, np.ndarray]:
     """Worlds with the drone at random places on its way, some in each of many episodes."""
-    settings = scenes.worlds.task.settings
+    task = scenes.worlds.task
+    assert isinstance(task, CollectCubes)  # whose cubes the planted policies look for
+    settings = task.settings
     random_state = np.random.RandomState(0)
     cubes = torch.stack([rules.draw_cubes(settings, random_state) for _ in range(episodes)])
     state = rules.start(settings, cubes.repeat_interleave(frames, 0))

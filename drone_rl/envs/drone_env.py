@@ -1,3 +1,7 @@
+# pyright: reportArgumentType=false
+# pyright: reportAttributeAccessIssue=false
+# pyright: reportIncompatibleMethodOverride=false
+# (TorchRL's specs take more than their annotations say: tuples as shapes, bounds.)
 """Many worlds of a task as one TorchRL environment."""
 
 from typing import Any

@@ -12,4 +12,5 @@ def make_env(env: EnvBase, transforms: Sequence[Transform] = ()) -> TransformedE
         env: The environment.
         transforms: In the order in which they are applied, cheapest data first.
     """
-    return TransformedEnv(env, Compose(*transforms))
+    # TorchRL annotates the star of its arguments as a list
+    return TransformedEnv(env, Compose(*transforms))  # pyright: ignore[reportArgumentType]

@@ -33,9 +33,9 @@ class _PixelTransform(ObservationTransform):
     def transform_observation_spec(self, observation_spec: TensorSpec) -> TensorSpec:
         """Declares the shape that the transform makes of each pixel entry."""
         for in_key, out_key in zip(self.in_keys, self.out_keys, strict=True):
-            before = observation_spec[in_key]
+            before = observation_spec[in_key]  # pyright: ignore[reportIndexIssue] (a composite)
             after = self._apply_transform(before.zero())
-            observation_spec[out_key] = Unbounded(
+            observation_spec[out_key] = Unbounded(  # pyright: ignore[reportIndexIssue]
                 shape=after.shape, dtype=after.dtype, device=before.device
             )
         return observation_spec
@@ -50,14 +50,14 @@ class GrayPixels(_PixelTransform):
         InputError: The frames are not RGB bytes with the colour last.
     """
 
-    def _apply_transform(self, pixels: Tensor) -> Tensor:
-        if pixels.dtype != torch.uint8 or pixels.shape[-1] != 3:
+    def _apply_transform(self, obs: Tensor) -> Tensor:
+        if obs.dtype != torch.uint8 or obs.shape[-1] != 3:
             raise InputError(
-                f"GrayPixels got {pixels.dtype} frames of shape {tuple(pixels.shape)}; "
+                f"GrayPixels got {obs.dtype} frames of shape {tuple(obs.shape)}; "
                 "give uint8 of shape (..., height, width, 3)"
             )
-        weights = torch.tensor(LUMA, device=pixels.device) / 255.0
-        return (pixels.float() @ weights).unsqueeze(-3)
+        weights = torch.tensor(LUMA, device=obs.device) / 255.0
+        return (obs.float() @ weights).unsqueeze(-3)
 
 
 class CropRows(_PixelTransform):
@@ -79,13 +79,13 @@ class CropRows(_PixelTransform):
             raise InputError(f"CropRows({top}, {bottom}) keeps no row; give 0 <= top < bottom")
         self.top, self.bottom = top, bottom
 
-    def _apply_transform(self, pixels: Tensor) -> Tensor:
-        if self.bottom > pixels.shape[-2]:
+    def _apply_transform(self, obs: Tensor) -> Tensor:
+        if self.bottom > obs.shape[-2]:
             raise InputError(
-                f"CropRows({self.top}, {self.bottom}) of a frame of {pixels.shape[-2]} rows; "
-                f"give a bottom of at most {pixels.shape[-2]}"
+                f"CropRows({self.top}, {self.bottom}) of a frame of {obs.shape[-2]} rows; "
+                f"give a bottom of at most {obs.shape[-2]}"
             )
-        return pixels[..., self.top : self.bottom, :]
+        return obs[..., self.top : self.bottom, :]
 
     def __repr__(self) -> str:
         return f"CropRows(top={self.top}, bottom={self.bottom})"
@@ -111,13 +111,13 @@ class Resize(_PixelTransform):
             raise InputError(f"Resize(height={height}, width={width}): give 1 pixel or more")
         self.height, self.width = height, width
 
-    def _apply_transform(self, pixels: Tensor) -> Tensor:
+    def _apply_transform(self, obs: Tensor) -> Tensor:
         size = (self.height, self.width)
-        if pixels.shape[-2:] == size:
-            return pixels
-        flat = pixels.reshape(-1, *pixels.shape[-3:])
+        if obs.shape[-2:] == size:
+            return obs
+        flat = obs.reshape(-1, *obs.shape[-3:])
         resized = functional.interpolate(flat, size, mode="area")
-        return resized.reshape(*pixels.shape[:-2], *size)
+        return resized.reshape(*obs.shape[:-2], *size)
 
     def __repr__(self) -> str:
         return f"Resize(height={self.height}, width={self.width})"
@@ -142,8 +142,8 @@ class StandardizePixels(_PixelTransform):
             raise InputError(f"StandardizePixels(std={std}): give a deviation above 0")
         self.mean, self.std = float(mean), float(std)
 
-    def _apply_transform(self, pixels: Tensor) -> Tensor:
-        return (pixels - self.mean).div_(self.std)
+    def _apply_transform(self, obs: Tensor) -> Tensor:
+        return (obs - self.mean).div_(self.std)
 
     def __repr__(self) -> str:
         return f"StandardizePixels(mean={self.mean:g}, std={self.std:g})"

@@ -1,5 +1,6 @@
 """From a network to an actor: logits to actions."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import torch
@@ -31,7 +32,7 @@ class SeededCategorical(Categorical):
         self._source = source
 
     @torch.no_grad()
-    def sample(self, sample_shape: torch.Size | tuple = ()) -> Tensor:
+    def sample(self, sample_shape: Sequence[int] = ()) -> Tensor:
         """Draws by inverting the cumulative distribution. Shape: (*sample_shape, *batch)."""
         generator = None if self._source is None else self._source.generator
         shape = (*sample_shape, *self.logits.shape[:-1], 1)
@@ -52,7 +53,7 @@ class CategoricalActor(ProbabilisticActor):
     """
 
     @dispatch(auto_batch_size=False)
-    def forward(
+    def forward(  # pyright: ignore[reportIncompatibleVariableOverride] (dispatch is untyped)
         self,
         tensordict: TensorDictBase,
         tensordict_out: TensorDictBase | None = None,

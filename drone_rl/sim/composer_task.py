@@ -1,3 +1,7 @@
+# pyright: reportAttributeAccessIssue=false
+# pyright: reportOptionalMemberAccess=false
+# pyright: reportIncompatibleMethodOverride=false
+# (dm_control's models of XML, its tasks' properties and its specs are untyped.)
 """Any task as dm_control knows it: one world, drawn by OpenGL, its rules a batch of one."""
 
 import dataclasses

@@ -4,7 +4,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from drone_rl.sweeps.search import import_optuna, open_study
-from drone_rl.training import Callback, Trainer
+from drone_rl.training import Callback
+from drone_rl.training.progress import Training
 
 
 class PruneCallback(Callback):
@@ -26,12 +27,12 @@ class PruneCallback(Callback):
         self._prunes = settings["prune"]
         self._reported = set(study.trials[number].intermediate_values)
 
-    def on_update(self, trainer: Trainer, metrics: Mapping[str, float]) -> None:
+    def on_update(self, training: Training, metrics: Mapping[str, float]) -> None:
         """Reports each time that so many frames have passed."""
-        step = trainer.progress.frames // self._frames
+        step = training.progress.frames // self._frames
         if step == 0 or step in self._reported:
             return
         self._reported.add(step)
-        self._trial.report(trainer.progress.running_reward, step)
+        self._trial.report(training.progress.running_reward, step)
         if self._prunes and self._trial.should_prune():
-            trainer.stop_request = "pruned"
+            training.stop_request = "pruned"

@@ -1,5 +1,7 @@
 """What a training says of itself: pure functions of batches."""
 
+from typing import cast
+
 import torch
 from tensordict import TensorDictBase
 from torch import Tensor
@@ -20,7 +22,7 @@ def episode_rewards(batch: TensorDictBase) -> Tensor:
     Raises:
         InputError: An episode is not complete and its reward so far not known.
     """
-    done = batch["next", "done"]
+    done, reward = (cast(Tensor, batch["next", name]) for name in ("done", "reward"))
     totals = batch.get(("next", "episode_reward"), None)
     if totals is not None:
         return totals[done].double()
@@ -30,7 +32,7 @@ def episode_rewards(batch: TensorDictBase) -> Tensor:
             "or put TorchRL's RewardSum behind the environment"
         )
     ends = done.flatten().nonzero()[:, 0]
-    cumulative = batch["next", "reward"].flatten().double().cumsum(0)[ends]
+    cumulative = reward.flatten().double().cumsum(0)[ends]
     return torch.diff(cumulative, prepend=cumulative.new_zeros(1))
 
 

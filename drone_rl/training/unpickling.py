@@ -1,3 +1,5 @@
+# pyright: reportAttributeAccessIssue=false
+# (Python's own unpickler in Python is not in its annotations.)
 """Tensors and plain values out of a file of `torch.save`, and nothing else, whatever is in it.
 
 `torch.load(weights_only=True)` runs no code, but it allocates what a file asks for, trusts the

@@ -1,3 +1,6 @@
+# pyright: reportAttributeAccessIssue=false
+# pyright: reportOptionalMemberAccess=false
+# (dm_control's models of XML are untyped.)
 """The empty world: floor, light and sky. Its boundaries are invisible: they are rules."""
 
 from dm_control import composer

@@ -1,3 +1,5 @@
+# pyright: reportReturnType=false
+# (dm_control's models of XML are untyped.)
 """The drone's five cameras, by AirSim's names, and the chase camera that films it."""
 
 from typing import NamedTuple

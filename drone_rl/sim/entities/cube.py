@@ -1,3 +1,6 @@
+# pyright: reportAttributeAccessIssue=false
+# pyright: reportOptionalMemberAccess=false
+# (dm_control's models of XML are untyped.)
 """The thing to collect."""
 
 from dm_control import composer, mjcf

@@ -1,3 +1,7 @@
+# pyright: reportAttributeAccessIssue=false
+# pyright: reportOptionalMemberAccess=false
+# pyright: reportReturnType=false
+# (dm_control's models of XML are untyped.)
 """The drone: a body with five cameras. How it moves is not its business."""
 
 from dm_control import composer, mjcf

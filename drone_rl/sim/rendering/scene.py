@@ -1,3 +1,5 @@
+# pyright: reportAttributeAccessIssue=false
+# (MuJoCo's compiled bindings are untyped.)
 """A compiled model of a task's world, in which everything that is drawn has a meaning."""
 
 import dataclasses

@@ -1,3 +1,5 @@
+# pyright: reportAttributeAccessIssue=false
+# (MuJoCo's compiled bindings are untyped.)
 """Pictures of many worlds at once by MuJoCo Warp's ray tracer: no OpenGL, CPU and GPU alike.
 
 A renderer holds no world. It is handed poses and returns pictures, so the cost is that of the

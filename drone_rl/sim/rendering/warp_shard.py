@@ -1,3 +1,6 @@
+# pyright: reportAttributeAccessIssue=false
+# pyright: reportArgumentType=false
+# (MuJoCo's compiled bindings and Warp's captures are untyped.)
 """Buffers and kernels of MuJoCo Warp that draw one share of a batch of worlds.
 
 A CPU's shard records the kernels of a frame once for each number of worlds and then replays them,
