@@ -93,7 +93,7 @@ def build_share(
     if network is None:
         network = description.build_network(torch_generator(seed, Stream.POLICY_INIT))
         network = network.to(env.device)
-    actions = torch_generator(seed, Stream.ACTIONS, number=number, device=env.device)
+    actions = torch_generator(seed, Stream.ACTIONS, number=number, device=str(env.device))
     return EpisodeCollector(env, make_actor(network, env.action_spec, actions)), network, actions
 
 

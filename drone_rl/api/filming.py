@@ -1,3 +1,7 @@
+# pyright: reportArgumentType=false
+# pyright: reportAttributeAccessIssue=false
+# pyright: reportCallIssue=false
+# (TorchRL annotates base_env to hold anything.)
 """Policies to look at: films of their flights, and dm_control's viewer."""
 
 import logging

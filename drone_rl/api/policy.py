@@ -87,7 +87,7 @@ class Policy:
             seed: Of the stream.
             stream: Which.
         """
-        device = env.device or torch.device("cpu")
+        device = str(env.device or "cpu")
         generator = torch_generator(seed, stream, device=device)
         return make_actor(self.make_network(device), env.action_spec, generator)
 

@@ -196,15 +196,15 @@ class _Tell(Callback):
         """Takes whom to tell."""
         self.progress = progress
 
-    def on_update(self, trainer: Running, metrics: Mapping[str, float]) -> None:
+    def on_update(self, training: Running, metrics: Mapping[str, float]) -> None:
         """Tells the running mean and the frames."""
-        done = trainer.progress
+        done = training.progress
         text = f"running reward {done.running_reward:.2f}, {done.episodes} episodes"
-        self.progress(text, done.frames, trainer.total_frames)
+        self.progress(text, done.frames, training.total_frames)
 
-    def on_end(self, trainer: Running, reason: str) -> None:
+    def on_end(self, training: Running, reason: str) -> None:
         """Tells that it is over, and why."""
-        frames = trainer.progress.frames
+        frames = training.progress.frames
         self.progress(f"stopped: {reason}", frames, frames)
 
 

@@ -1,3 +1,7 @@
+# pyright: reportArgumentType=false
+# pyright: reportCallIssue=false
+# pyright: reportFunctionMemberAccess=false
+# (Hydra's configuration is untyped; the job is a function with an attribute.)
 """Hydra's launchers for `drone-rl train -m`: each run of a sweep is a process of its own.
 
 Hydra's own launcher runs all jobs in one process, and its joblib launcher has not been kept up;

@@ -1,3 +1,7 @@
+# pyright: reportArgumentType=false
+# pyright: reportOptionalMemberAccess=false
+# pyright: reportIncompatibleVariableOverride=false
+# (Hydra's sweeper and Optuna's study are annotated to hold anything, or nothing.)
 """`hydra/sweeper=optuna`: a search for settings, in which hopeless runs are stopped early.
 
 Hydra's own Optuna plugin wants Optuna 2, and its runs can't be pruned.

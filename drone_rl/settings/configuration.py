@@ -88,9 +88,10 @@ def _named(variants: tuple[Variant, ...]) -> dict[str, Any]:
 
 def _several(hint: Any) -> type[Variant] | None:
     """The part of which a field holds several variants, as `tuple[Transform, ...]` does."""
-    inner = typing.get_args(hint)[:1] if typing.get_origin(hint) is tuple else ()
-    is_part = inner and isinstance(inner[0], type) and issubclass(inner[0], Variant)
-    return inner[0] if is_part else None
+    if typing.get_origin(hint) is not tuple:
+        return None
+    part = typing.get_args(hint)[0]
+    return part if isinstance(part, type) and issubclass(part, Variant) else None
 
 
 def _read(hint: Any, value: Any, where: str) -> Any:

@@ -153,7 +153,7 @@ class DiscreteActions:
 
     def distance(self, wish: Wish, other: Wish) -> Wish:
         """Total variation: half the sum of the absolute differences."""
-        return 0.5 * abs(wish - other).sum(-1)
+        return 0.5 * abs(wish - other).sum(-1)  # pyright: ignore[reportReturnType] (of arrays and tensors)
 
     def leaning(self, wish: Wish) -> Wish:
         """The probability of the action that goes left."""
