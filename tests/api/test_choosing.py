@@ -1,32 +1,22 @@
-"""Trainings and sweeps judge last policies in worlds to choose by, and keep the whole verdict."""
+"""Last policies are judged in worlds to choose by, and keep the whole verdict."""
 
 import json
-import shutil
 
 import pytest
 
+import drone_rl
 from drone_rl.api.choosing import judge_run, judge_to_choose
 from drone_rl.api.policy import Policy
-from drone_rl.sweeps import Run, Sweep
+from drone_rl.api.progress import silent
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import Stream
-from tests.cli.test_commands import error_line, in_process, run  # noqa: F401
+from tests.api.test_training import TINY
 
 
 @pytest.fixture
-def trained(run, tmp_path):  # noqa: F811
-    """A copy of a finished training that was not judged."""
-    return shutil.copytree(run, tmp_path / "sweep" / "0")
-
-
-@pytest.fixture
-def sweep(trained):
-    """A sweep of the training and of one that never began."""
-    folder = trained.parent
-    runs = [Run(i, (f"seed={i}",), folder / str(i)) for i in range(2)]
-    made = Sweep(folder, "drone-rl train -m", {}, runs)
-    made.save()
-    return made
+def trained(tmp_path):
+    """The folder of a training that was not judged."""
+    return drone_rl.train(TINY, folder=tmp_path / "run", progress=silent).folder
 
 
 def test_the_worlds_are_those_to_choose_by(trained, monkeypatch):
@@ -60,30 +50,3 @@ def test_a_checkpoint_that_is_not_that_of_the_result_is_refused(trained):
     (trained / "result.json").unlink()
     with pytest.raises(InputError, match=r"no result\.json"):
         judge_run(trained, 4, "cpu")
-
-
-def test_a_sweep_that_was_not_judged_can_be(sweep, in_process):  # noqa: F811
-    done = in_process("sweep-report", sweep.folder, "judge=true", "episodes=8")
-    assert done.returncode == 0, done.stderr
-    assert "Verdicts are on the last policies of 1 run, by 8 greedy episodes" in done.stdout
-    assert "1 run not ended yet" in done.stdout
-    summary = json.loads((sweep.folder / "summary.json").read_text())
-    assert (summary["judged"], summary["best"]["run"]) == (1, 0)
-
-
-def test_a_run_that_can_not_be_judged_leaves_the_others_alone(sweep, in_process):  # noqa: F811
-    (sweep.folder / "0" / "checkpoints" / "last.pt").write_bytes(b"rubbish")
-    done = in_process("sweep-report", sweep.folder, "judge=true", "episodes=8")
-    assert done.returncode == 0, done.stderr
-    assert "1 run finished and not judged" in done.stdout
-
-
-def test_no_episodes_are_a_mistake(sweep, in_process):  # noqa: F811
-    line = error_line(in_process("sweep-report", sweep.folder, "judge=true", "episodes=0"))
-    assert "episodes=0" in line
-
-
-def test_a_report_alone_judges_nothing(sweep, in_process):  # noqa: F811
-    done = in_process("sweep-report", sweep.folder)
-    assert done.returncode == 0, done.stderr
-    assert "verdict" not in json.loads((sweep.folder / "0" / "result.json").read_text())

@@ -1,0 +1,50 @@
+"""Usage, help, and one line for each of the mistakes that any command can be given."""
+
+import pytest
+
+from drone_rl.cli.main import USAGE
+from tests.cli.running import drone_rl, error_line
+
+
+def test_usage_and_help(tmp_path):
+    assert drone_rl("--help", cwd=tmp_path).stdout.strip() == USAGE.strip()
+    help_text = drone_rl("train", "--help", cwd=tmp_path).stdout
+    assert "optimiser: adam, sgd" in help_text
+    assert "# Cubes placed in every episode." in help_text
+    assert "num_cubes: 3" in help_text
+
+
+@pytest.mark.parametrize(
+    ("args", "words"),
+    [
+        (["trian"], ["trian", "train"]),
+        (["train", "sed=1"], ["sed", "--help"]),
+        (["train", "task.num_cubs=1"], ["num_cubs"]),
+        (["train", "task.num_cubes=three"], ["three"]),
+        (["train", "task.spacing=-9"], ["spacing=-9", "from 0.001"]),
+        (["train", "policy=resnet"], ["network/resnet", "small_cnn"]),
+        (["train", "returns.gamma=high"], ["gamma=high", "Float"]),
+        (["evaluate", "episodes=many"], ["episodes=many", "Integer"]),
+        (["explain", "frames=x"], ["frames=x", "Integer"]),
+        (["train", "camera.height=2", "camera.width=2"], ["2x2", "too small"]),
+        (["train", "seed=-1"], ["seed=-1", "0 or more"]),
+        (["train", "optimiser.lr=0"], ["optimiser.lr=0.0", "above 0"]),
+        (["train", "returns.gamma=2"], ["gamma=2", "0 to 1"]),
+        (["train", "trainer.target_share=2.97"], ["target_share=2.97", "up to 1"]),
+        (["train", "collector.num_envs=0"], ["num_envs=0", "1 or more"]),
+        (["train", "resume=nowhere"], ["nowhere", "folder of a run"]),
+        (["train", "hydra.run.dir=/dev/null/x"], ["/dev/null"]),
+        (["evaluate"], ["policy=latest", "drone-rl train"]),
+        (["evaluate", "checkpoint=no.pt"], ["no.pt", "does not exist"]),
+        (["train", "-m", "no_such=1,2"], ["no_such", "--help"]),
+        (["train", "-m", "seed=0,1", "hydra.launcher.num_jobs=0"], ["num_jobs=0", "1 or more"]),
+        (["train", "-m", "seed=0,1", "hydra/launcher=pbs"], ["pbs", "slurm"]),
+        (["train", "-m", "seed=interval(0,1)"], ["INTERVAL", "hydra/sweeper=optuna"]),
+        (["sweep-report"], ["folder=latest", "drone-rl train -m"]),
+        (["sweep-report", "no/such"], ["no/such", "sweep.json"]),
+        (["bench", "speed"], ["speed", "render"]),
+    ],
+)
+def test_mistakes_get_one_line_with_the_value_and_the_remedy(in_process, args, words):
+    line = error_line(in_process(*args))
+    assert all(word in line for word in words), line

@@ -1,0 +1,52 @@
+"""Reports on sweeps, whose runs can be judged again."""
+
+import json
+import shutil
+
+import pytest
+
+from drone_rl.sweeps import Run, Sweep
+from tests.cli.running import error_line
+
+
+@pytest.fixture
+def trained(run, tmp_path):
+    """A copy of a finished training that was not judged."""
+    return shutil.copytree(run, tmp_path / "sweep" / "0")
+
+
+@pytest.fixture
+def sweep(trained):
+    """A sweep of the training and of one that never began."""
+    folder = trained.parent
+    runs = [Run(i, (f"seed={i}",), folder / str(i)) for i in range(2)]
+    made = Sweep(folder, "drone-rl train -m", {}, runs)
+    made.save()
+    return made
+
+
+def test_a_sweep_that_was_not_judged_can_be(sweep, in_process):
+    done = in_process("sweep-report", sweep.folder, "judge=true", "episodes=8")
+    assert done.returncode == 0, done.stderr
+    assert "Verdicts are on the last policies of 1 run, by 8 greedy episodes" in done.stdout
+    assert "1 run not ended yet" in done.stdout
+    summary = json.loads((sweep.folder / "summary.json").read_text())
+    assert (summary["judged"], summary["best"]["run"]) == (1, 0)
+
+
+def test_a_run_that_can_not_be_judged_leaves_the_others_alone(sweep, in_process):
+    (sweep.folder / "0" / "checkpoints" / "last.pt").write_bytes(b"rubbish")
+    done = in_process("sweep-report", sweep.folder, "judge=true", "episodes=8")
+    assert done.returncode == 0, done.stderr
+    assert "1 run finished and not judged" in done.stdout
+
+
+def test_no_episodes_are_a_mistake(sweep, in_process):
+    line = error_line(in_process("sweep-report", sweep.folder, "judge=true", "episodes=0"))
+    assert "episodes=0" in line
+
+
+def test_a_report_alone_judges_nothing(sweep, in_process):
+    done = in_process("sweep-report", sweep.folder)
+    assert done.returncode == 0, done.stderr
+    assert "verdict" not in json.loads((sweep.folder / "0" / "result.json").read_text())

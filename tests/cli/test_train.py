@@ -1,0 +1,118 @@
+"""Trainings as a user runs them: repeated, killed, gone on with, told impossible things."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+import torch
+
+from drone_rl.training import load_checkpoint
+from tests.cli.running import TINY, drone_rl, error_line
+
+
+def test_training_leaves_everything_behind(run):
+    result = json.loads((run / "result.json").read_text())
+    assert result["reason"] == "frames"
+    assert result["frames"] >= 400
+    for name in ("checkpoints/last.pt", "checkpoints/best.pt", "metrics.csv", "run.yaml"):
+        assert (run / name).stat().st_size > 0
+    state = load_checkpoint(run / "checkpoints" / "last.pt")
+    assert state["config"]["collector"]["num_envs"] == 4
+    assert state["provenance"]["versions"]["torch"] == torch.__version__
+
+
+def test_same_seed_gives_the_same_parameters_byte_for_byte(run, tmp_path):
+    done = drone_rl("train", *TINY, "hydra.run.dir=again", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    first, again = (
+        load_checkpoint(folder / "checkpoints" / "last.pt")["policy"]
+        for folder in (run, tmp_path / "again")
+    )
+    assert all(first[k].numpy().tobytes() == again[k].numpy().tobytes() for k in first)
+
+
+def test_killed_and_resumed_is_bit_for_bit_the_uninterrupted(tmp_path):
+    settings = [*TINY, "trainer.total_frames=1500"]
+    whole = drone_rl("train", *settings, "hydra.run.dir=whole", cwd=tmp_path)
+    assert whole.returncode == 0, whole.stderr
+    command = [sys.executable, "-m", "drone_rl.cli.main", "train", *settings, "hydra.run.dir=half"]
+    process = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.DEVNULL)
+    metrics = tmp_path / "half" / "metrics.csv"
+    while not metrics.exists() or len(metrics.read_text().splitlines()) < 4:
+        assert process.poll() is None
+        time.sleep(0.02)
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(60) == 128 + signal.SIGTERM
+    done = drone_rl("train", "resume=half", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    one, two = (
+        load_checkpoint(tmp_path / name / "checkpoints" / "last.pt") for name in ("whole", "half")
+    )
+    assert all(torch.equal(one["policy"][k], two["policy"][k]) for k in one["policy"])
+    assert one["progress"]["running_reward"] == two["progress"]["running_reward"]
+    rows = [metrics.read_text().splitlines() for metrics in tmp_path.glob("*/metrics.csv")]
+    assert len(rows[0]) == len(rows[1])
+
+
+@pytest.mark.parametrize(
+    ("module", "extra", "args"),
+    [
+        ("submitit", "slurm", ["-m", "seed=0,1", "hydra/launcher=slurm"]),
+        ("ray", "ray", ["-m", "seed=0,1", "hydra/launcher=ray"]),
+        ("ray", "ray", ["collector=ray", *TINY]),
+        ("optuna", "optuna", ["-m", "seed=0,1", "hydra/sweeper=optuna"]),
+    ],
+)
+def test_an_extra_that_is_not_installed(in_process, monkeypatch, module, extra, args):
+    monkeypatch.setitem(sys.modules, module, None)
+    assert f"pip install 'drone-rl[{extra}]'" in error_line(in_process("train", *args))
+
+
+@pytest.mark.skipif(torch.cuda.is_available(), reason="there is a GPU")
+def test_cuda_without_a_gpu(in_process):
+    assert "give device=cpu" in error_line(in_process("train", "device=cuda"))
+
+
+def test_resume_with_a_changed_setting(run, in_process):
+    before = (run / "checkpoints" / "last.pt").read_bytes()
+    line = error_line(in_process("train", f"resume={run}", "optimiser.lr=0.5", cwd=run))
+    assert "optimiser.lr=0.5" in line
+    assert "optimiser.lr=0.002" in line
+    assert (run / "checkpoints" / "last.pt").read_bytes() == before
+
+
+def test_nan_names_itself_and_the_last_good_checkpoint(in_process, tmp_path):
+    sgd = ["optimiser=sgd", "optimiser.lr=1e38", "trainer.total_frames=4000"]
+    line = error_line(in_process("train", *TINY, *sgd, "hydra.run.dir=nan"))
+    assert "NaN or infinite" in line
+    assert "nan/checkpoints/last.pt" in line
+    state = load_checkpoint(tmp_path / "nan" / "checkpoints" / "last.pt")
+    assert all(v.isfinite().all() for v in state["policy"].values())
+
+
+def test_full_disk_while_saving_keeps_the_previous_checkpoint(run, tmp_path):
+    """A file-size limit stands in for a full disk: writing a checkpoint fails half-way."""
+    code = (
+        "import resource, sys, signal; signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
+        "from drone_rl.training import checkpoint as c\n"
+        "save = c.save_checkpoint; n = [0]\n"
+        "from drone_rl.training import callbacks\n"
+        "def limited(path, state):\n"
+        "    n[0] += 1\n"
+        "    if n[0] > 2: resource.setrlimit(resource.RLIMIT_FSIZE, (4096, -1))\n"
+        "    save(path, state)\n"
+        "callbacks.save_checkpoint = limited\n"
+        "from drone_rl.cli.main import main; main()\n"
+    )
+    settings = ["train", *TINY, "hydra.run.dir=full", "trainer.checkpoint_interval_s=0"]
+    command = [sys.executable, "-c", code, *settings]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert "previous checkpoint is intact" in error_line(done)
+    folder = tmp_path / "full" / "checkpoints"
+    assert sorted(p.name for p in folder.iterdir()) == ["best.pt", "last.pt"]
+    assert load_checkpoint(folder / "last.pt")["progress"]["updates"] == 0
+    assert os.path.getsize(folder / "last.pt") > 4096
