@@ -7,6 +7,13 @@ PURE_DATA = {
     "bench/evidence": "evidence made by hand; bench/test_sentences reads every entry",
     "report/palette": "colours; report/test_indicator and test_pictures find them in pictures",
     "sim/meaning": "names; sim/test_worlds finds each on its things",
+    **{
+        f"settings/{name}": "values with bounds; hydra_app/test_schemas reads and builds each"
+        for name in (
+            *("benchmarks", "collecting", "judging", "learning", "loggers"),
+            *("networks", "paths", "returns", "training", "transforms"),
+        )
+    },
 }
 """Modules that need no test of their own, and why: what they hold is tried by others' tests."""
 

@@ -92,8 +92,8 @@ def build_share(
     )
     if network is None:
         network = description.build_network(torch_generator(seed, Stream.POLICY_INIT))
-        network = network.to(env.device)
-    actions = torch_generator(seed, Stream.ACTIONS, number=number, device=str(env.device))
+        network = network.to(settings.device)
+    actions = torch_generator(seed, Stream.ACTIONS, number=number, device=settings.device)
     return EpisodeCollector(env, make_actor(network, env.action_spec, actions)), network, actions
 
 

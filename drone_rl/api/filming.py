@@ -7,12 +7,14 @@
 import logging
 import os
 from pathlib import Path
+from typing import cast
 
 import torch
 from tensordict import TensorDict
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 from drone_rl.api.policy import Policy
+from drone_rl.envs import DroneEnv
 from drone_rl.evaluation.video import film_episode, write_video
 from drone_rl.sim.composer_task import make_environment
 from drone_rl.utils.errors import InputError
@@ -68,7 +70,7 @@ def view(policy: Policy, *, greedy: bool = True, seed: int = 0, device: str = "c
     from dm_control import viewer
 
     env = policy.make_env(1, seed=seed, device=device)
-    actor, worlds = policy.make_actor(env, seed=seed), env.base_env.worlds
+    actor, worlds = policy.make_actor(env, seed=seed), cast(DroneEnv, env.base_env).worlds
     shown = make_environment(worlds.task, worlds.camera, pixels=False, random_state=seed)
     kind = ExplorationType.DETERMINISTIC if greedy else ExplorationType.RANDOM
 

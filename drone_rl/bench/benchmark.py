@@ -3,9 +3,11 @@
 import dataclasses
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import torch
+
+from drone_rl.settings.benchmarks import BenchSettings
 
 Figures = Mapping[str, Any]
 """Plain values by key. No two benchmarks make the same key."""
@@ -29,6 +31,24 @@ class Setup:
     """Held-out ones of each trained policy."""
     memory_frames: int
     """Over which memory must stay flat."""
+
+    @classmethod
+    def of(cls, settings: BenchSettings, folder: Path) -> Self:
+        """What the settings ask for.
+
+        Args:
+            settings: The command's.
+            folder: Of the results.
+        """
+        return cls(
+            folder=folder,
+            quick=settings.quick,
+            device=settings.device,
+            num_envs=settings.num_envs,
+            seeds=settings.seeds,
+            episodes=settings.episodes,
+            memory_frames=settings.memory_frames,
+        )
 
     @property
     def worlds(self) -> int:

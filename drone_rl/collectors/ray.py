@@ -148,9 +148,9 @@ class RayEpisodeCollector:
         """The workers' states, as they stand between two batches."""
         return {"workers": self._states}
 
-    def load_state_dict(self, state: dict) -> None:
+    def load_state_dict(self, state_dict: dict) -> None:
         """Goes on from a `state_dict`."""
-        self._states = list(state["workers"])
+        self._states = list(state_dict["workers"])
 
     def shutdown(self) -> None:
         """Ends the workers; a cluster that was started here ends with this process."""

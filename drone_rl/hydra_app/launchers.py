@@ -18,7 +18,7 @@ import types
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from hydra.core.hydra_config import HydraConfig
 from hydra.core.plugins import Plugins
@@ -105,7 +105,8 @@ class SweepLauncher(Launcher):
 
     def _settings(self) -> dict[str, Any]:
         everything = OmegaConf.to_container(self.config, resolve=False)
-        return {str(k): v for k, v in dict(everything).items() if k != "hydra"}
+        named = cast(dict[str, Any], everything)  # a configuration has names at its root
+        return {name: value for name, value in named.items() if name != "hydra"}
 
 
 class LocalLauncher(SweepLauncher):

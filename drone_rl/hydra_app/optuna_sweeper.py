@@ -10,7 +10,7 @@ Hydra's own Optuna plugin wants Optuna 2, and its runs can't be pruned.
 import logging
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.core.override_parser.types import ChoiceSweep, IntervalSweep, Override, RangeSweep
@@ -30,7 +30,11 @@ _log = logging.getLogger(__name__)
 
 
 class OptunaSweeper(Sweeper):
-    """Maximises the running mean of cubes at the end of a run."""
+    """Maximises the running mean of rewards at the end of a run."""
+
+    config: DictConfig
+    hydra_context: HydraContext
+    launcher: Launcher
 
     def __init__(
         self,
@@ -67,7 +71,7 @@ class OptunaSweeper(Sweeper):
     ) -> None:
         """Takes what Hydra hands over."""
         self.hydra_context, self.config = hydra_context, config
-        self.launcher: Launcher = Plugins.instance().instantiate_launcher(
+        self.launcher = Plugins.instance().instantiate_launcher(
             hydra_context=hydra_context, task_function=task_function, config=config
         )
 
@@ -143,4 +147,5 @@ def distribution(override: Override) -> Any:
         return d.IntDistribution(start, last, step=step)
     if not isinstance(value, IntervalSweep):
         raise InputError(f"{override.input_line} can't be searched; give a choice or an interval")
-    return d.FloatDistribution(float(value.start), float(value.end), log="log" in value.tags)
+    low, high = cast(float, value.start), cast(float, value.end)  # Hydra's parser wants both
+    return d.FloatDistribution(float(low), float(high), log="log" in value.tags)

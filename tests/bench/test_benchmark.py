@@ -1,6 +1,7 @@
 import torch
 
 from drone_rl.bench.benchmark import Setup
+from drone_rl.settings.benchmarks import BenchSettings
 
 
 def setup(tmp_path, **changes):
@@ -20,3 +21,11 @@ def test_a_gpu_draws_with_one_thread(tmp_path):
 
 def test_runs_are_kept_beside_the_results(tmp_path):
     assert setup(tmp_path).runs == tmp_path / "runs"
+
+
+def test_a_setup_is_what_the_settings_ask_for(tmp_path):
+    told = BenchSettings(seeds=(4, 5), quick=True, num_envs=7, episodes=8, memory_frames=9)
+    setup = Setup.of(told, tmp_path)
+    assert (setup.folder, setup.quick, setup.device) == (tmp_path, True, "cpu")
+    assert (setup.seeds, setup.num_envs) == ((4, 5), 7)
+    assert (setup.episodes, setup.memory_frames) == (8, 9)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from drone_rl.cli.main import USAGE
+from drone_rl.cli.usage import USAGE
 from tests.cli.running import drone_rl, error_line
 
 

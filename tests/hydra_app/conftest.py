@@ -5,7 +5,7 @@ import importlib
 import pytest
 from hydra import compose, initialize_config_dir
 
-from drone_rl.cli.main import COMMANDS
+from drone_rl.cli.usage import COMMANDS
 from drone_rl.hydra_app.composition import conf_dir, read_settings
 from drone_rl.hydra_app.schemas import register_schemas
 

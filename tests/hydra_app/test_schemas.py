@@ -9,7 +9,7 @@ import torch
 import yaml
 from hydra.errors import HydraException
 
-from drone_rl.cli.main import COMMANDS
+from drone_rl.cli.usage import COMMANDS
 from drone_rl.hydra_app import schemas
 from drone_rl.hydra_app.composition import conf_dir
 from drone_rl.settings.configuration import as_config

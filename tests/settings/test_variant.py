@@ -6,11 +6,9 @@ from typing import Annotated, ClassVar
 
 import pytest
 
-from drone_rl.settings.changes import Changes
 from drone_rl.settings.networks import Mlp, Network, OriginalCnn, SmallCnn
 from drone_rl.settings.returns import Returns
 from drone_rl.settings.variant import Variant, locate
-from drone_rl.sim.settings import TaskSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Whole
 
@@ -41,12 +39,3 @@ def test_what_is_made_is_imported_only_then():
     with pytest.raises(InputError, match="can't be imported"):
         locate("")
     assert locate("os.path").__name__ == "posixpath"
-
-
-def test_some_settings_of_a_task():
-    kind = Changes(TaskSettings)
-    assert kind.read({"num_cubes": 5, "spacing": None}, "task") == {"num_cubes": 5}
-    with pytest.raises(InputError, match=r"^task\.num_cubes=0"):
-        kind.read({"num_cubes": 0}, "task")
-    with pytest.raises(InputError, match=r"^task\.num_cubs is unknown"):
-        kind.read({"num_cubs": 1}, "task")

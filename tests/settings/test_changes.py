@@ -1,0 +1,14 @@
+import pytest
+
+from drone_rl.settings.changes import Changes
+from drone_rl.sim.settings import TaskSettings
+from drone_rl.utils.errors import InputError
+
+
+def test_some_settings_of_a_task():
+    kind = Changes(TaskSettings)
+    assert kind.read({"num_cubes": 5, "spacing": None}, "task") == {"num_cubes": 5}
+    with pytest.raises(InputError, match=r"^task\.num_cubes=0"):
+        kind.read({"num_cubes": 0}, "task")
+    with pytest.raises(InputError, match=r"^task\.num_cubs is unknown"):
+        kind.read({"num_cubs": 1}, "task")
