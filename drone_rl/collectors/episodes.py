@@ -1,3 +1,7 @@
+# pyright: reportAttributeAccessIssue=false
+# pyright: reportIncompatibleMethodOverride=false
+# pyright: reportReturnType=false
+# (TorchRL's collectors annotate states and seeds otherwise than they use them.)
 """Complete episodes, each frame once: what REINFORCE learns from."""
 
 from collections.abc import Callable, Iterator

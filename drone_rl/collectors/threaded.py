@@ -1,3 +1,6 @@
+# pyright: reportArgumentType=false
+# pyright: reportIncompatibleMethodOverride=false
+# (torch.cat takes TensorDicts, which its annotation lacks.)
 """Several collectors side by side on the threads of one process."""
 
 from collections.abc import Callable, Iterator, Sequence

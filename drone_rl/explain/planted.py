@@ -1,3 +1,9 @@
+# pyright: reportArgumentType=false
+# pyright: reportAttributeAccessIssue=false
+# pyright: reportCallIssue=false
+# pyright: reportIndexIssue=false
+# pyright: reportOptionalMemberAccess=false
+# (Layers of a network by name: torch annotates them to be anything.)
 """Policies whose true map is known, for their weights were made so: does the procedure find it?
 
 Each looks at some windows of the picture alone and is set by hand, or trained with all the rest

@@ -1,5 +1,7 @@
 """Return estimators, one for each of `objectives.returns`; they write "return_to_go"."""
 
+from typing import Any
+
 import torch
 from torch import Tensor
 
@@ -9,7 +11,7 @@ from drone_rl.utils.errors import InputError
 
 
 class _Discounted(ReturnEstimator):
-    def __init__(self, gamma: float = 0.99, **kwargs: object) -> None:
+    def __init__(self, gamma: float = 0.99, **kwargs: Any) -> None:
         """Sets the discount rate.
 
         Args:
@@ -60,7 +62,7 @@ class LinearRamp(ReturnEstimator):
 class SuccessScaled(_Discounted):
     """Discounted return scaled by exp(reward - max_reward)."""
 
-    def __init__(self, gamma: float = 0.99, max_reward: float = 3.0, **kwargs: object) -> None:
+    def __init__(self, gamma: float = 0.99, max_reward: float = 3.0, **kwargs: Any) -> None:
         """Sets the scale.
 
         Args:
@@ -79,8 +81,13 @@ class SuccessScaled(_Discounted):
 class TimeBaseline(_Discounted):
     """Discounted return minus a running mean, over earlier episodes, for each time step."""
 
+    baseline: Tensor
+    """Means by time step. Shape: (max_steps,)."""
+    seen: Tensor
+    """Which steps have one. Shape: (max_steps,)."""
+
     def __init__(
-        self, gamma: float = 0.99, decay: float = 0.9, max_steps: int = 300, **kwargs: object
+        self, gamma: float = 0.99, decay: float = 0.9, max_steps: int = 300, **kwargs: Any
     ) -> None:
         """Sets the memory.
 

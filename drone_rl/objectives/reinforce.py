@@ -1,3 +1,7 @@
+# pyright: reportArgumentType=false
+# pyright: reportIncompatibleMethodOverride=false
+# pyright: reportIncompatibleVariableOverride=false
+# (TorchRL's loss modules are annotated otherwise than they are documented.)
 """REINFORCE as a TorchRL loss module, without a critic."""
 
 import dataclasses

@@ -90,7 +90,8 @@ class ReinforceLearner:
             terms = {k: v for k, v in losses.items() if k.startswith("loss_")}
             for name, value in terms.items():
                 check_finite(value, name)
-            (sum(terms.values()) * weight).backward()
+            total: Any = sum(terms.values())  # not the 0 that it begins with
+            (total * weight).backward()
             for name, value in losses.items():
                 part = float(value.detach()) * (weight if name in terms else share)
                 totals[f"loss/{name}"] = totals.get(f"loss/{name}", 0.0) + part

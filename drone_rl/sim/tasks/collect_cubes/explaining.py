@@ -18,7 +18,7 @@ class Explaining:
     """See `Explainable`."""
 
     settings: TaskSettings
-    remembered = types.MappingProxyType(
+    remembered: Mapping[str, str] = types.MappingProxyType(
         {
             "cubes": "positions of the cubes, metres, in order of x (T, C, 3)",
             "present": "whether each cube still stands, bool (T, C)",

@@ -18,11 +18,11 @@ class Judging:
 
     settings: TaskSettings
     goal = "cube"
-    success_end = EndReason.ALL_CUBES
-    expected_end = EndReason.FRONT_BOUNDARY
-    strata = tuple(side.name.lower() for side in Side)
-    luck = ("random", "forward", "left", "right")
-    scored = ("collected", "side", "lateral", "cube_positions", "drone")
+    success_end: int = EndReason.ALL_CUBES
+    expected_end: int = EndReason.FRONT_BOUNDARY
+    strata: tuple[str, ...] = tuple(side.name.lower() for side in Side)
+    luck: tuple[str, ...] = ("random", "forward", "left", "right")
+    scored: tuple[str, ...] = ("collected", "side", "lateral", "cube_positions", "drone")
 
     @property
     def oracle(self) -> OracleRule:

@@ -1,5 +1,6 @@
 """Cube collection as simulators know it: rules and entities together."""
 
+import enum
 from collections.abc import Mapping
 
 import numpy as np
@@ -21,9 +22,9 @@ class Playing:
     """See `Playable`."""
 
     settings: TaskSettings
-    ends = EndReason
-    truncation = EndReason.STEP_LIMIT
-    observed = ("cubes", "collected", "side", "end_reason")
+    ends: type[enum.IntEnum] = EndReason
+    truncation: int = EndReason.STEP_LIMIT
+    observed: tuple[str, ...] = ("cubes", "collected", "side", "end_reason")
 
     @property
     def largest_reward(self) -> float:
