@@ -172,6 +172,7 @@ def _build(
         total_frames=limits.total_frames,
         total_episodes=limits.total_episodes,
         running_decay=limits.running_decay,
+        ends=as_task(settings.task).ends,
     )
     return trainer, checkpoints
 

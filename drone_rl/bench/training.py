@@ -12,6 +12,9 @@ import numpy as np
 
 from drone_rl.bench.commands import PROGRAM, call, memory_status
 
+SETTLING_FRAMES = 100_000
+"""After which a training has seen what it will see: numbers of worlds, lengths of batches."""
+
 
 def bench_solve(
     folder: Path, seeds: Sequence[int], episodes: int, device: str, quick: bool
@@ -55,12 +58,18 @@ def bench_solve(
 def bench_memory(folder: Path, frames: int, device: str, quick: bool) -> dict[str, Any]:
     """Trains on past the target and watches the resident memory.
 
+    Args:
+        folder: For the run.
+        frames: Over which memory must stay flat, after the first `SETTLING_FRAMES`.
+        device: Where to train.
+        quick: Whether a few thousand will do.
+
     Returns:
-        The peak, and the slope over the last four fifths of the frames.
+        The peak, and the growth.
     """
-    frames = 6_000 if quick else frames
+    settling, frames = (1_000, 5_000) if quick else (SETTLING_FRAMES, frames)
     run = folder / "memory"
-    command = ["train", "trainer.target_share=null", f"trainer.total_frames={frames}"]
+    command = ["train", "trainer.target_share=null", f"trainer.total_frames={settling + frames}"]
     process = subprocess.Popen(
         [*PROGRAM, *command, f"device={device}", f"hydra.run.dir={run}", "logger=csv"],
         stdout=subprocess.DEVNULL,
@@ -74,16 +83,31 @@ def bench_memory(folder: Path, frames: int, device: str, quick: bool) -> dict[st
         time.sleep(0.5)
     if process.returncode != 0:
         raise RuntimeError(f"the training for the memory benchmark failed: {process.returncode}")
-    settled = np.array([s for s in samples if s[0] >= frames / 5 and s[1] > 0])
-    slope = float(np.polyfit(settled[:, 0], settled[:, 1], 1)[0]) if len(settled) > 2 else None
     return {
         "peak_memory_mib": peak,
-        "memory_growth_mib_per_million_frames": None if slope is None else slope * 1e6,
+        "memory_growth_mib_per_million_frames": growth(samples, settling),
         "memory_frames": frames,
     }
 
 
+def growth(samples: Sequence[tuple[int, float]], settling: int) -> float | None:
+    """Slope of the line through samples, once memory has settled.
+
+    Args:
+        samples: Frames and resident memory, MiB; 0 where that could not be read.
+        settling: Frames before which a sample does not count.
+
+    Returns:
+        MiB for a million frames; None where there are too few samples.
+    """
+    settled = np.array([s for s in samples if s[0] >= settling and s[1] > 0])
+    if len(settled) < 3 or settled[0, 0] == settled[-1, 0]:
+        return None
+    return float(np.polyfit(settled[:, 0], settled[:, 1], 1)[0]) * 1e6
+
+
 def _frames(path: Path) -> int:
+    """Frames of the last whole row of a training's metrics."""
     if not path.exists():
         return 0
     with path.open(newline="") as file:

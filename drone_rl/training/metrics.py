@@ -1,5 +1,7 @@
 """What a training says of itself: pure functions of batches."""
 
+import enum
+from collections.abc import Iterable
 from typing import cast
 
 import torch
@@ -7,8 +9,6 @@ from tensordict import TensorDictBase
 from torch import Tensor
 
 from drone_rl.utils.errors import InputError
-
-END_REASONS = ("all_cubes", "front_boundary", "side_boundary", "step_limit")
 
 
 def episode_rewards(batch: TensorDictBase) -> Tensor:
@@ -43,19 +43,25 @@ def running_mean(old: float, values: Tensor, decay: float) -> float:
     return old
 
 
-def batch_metrics(batch: TensorDictBase) -> dict[str, float]:
+def batch_metrics(batch: TensorDictBase, ends: Iterable[enum.IntEnum] = ()) -> dict[str, float]:
     """Means over the episodes that end in a batch, and the shares of the reasons why.
 
-    NaN where none ends.
+    Args:
+        batch: See `episode_rewards`.
+        ends: What ("next", "info", "end_reason") may be (`Task.ends`); 0 is none.
+
+    Returns:
+        By name; NaN where no episode ends.
     """
     rewards = episode_rewards(batch)
     metrics = {
         "train/reward": float(rewards.mean()),
         "train/length": batch.numel() / len(rewards) if len(rewards) else float("nan"),
     }
-    reasons = batch.get(("next", "info", "end_reason"), None)
-    if reasons is not None:
-        final = reasons[batch["next", "done"]]
-        for i, name in enumerate(END_REASONS, start=1):
-            metrics[f"end/{name}"] = float((final == i).float().mean())
+    named = [end for end in ends if end]
+    if named:
+        reasons = cast(Tensor, batch["next", "info", "end_reason"])
+        final = reasons[cast(Tensor, batch["next", "done"])]
+        for end in named:
+            metrics[f"end/{end.name.lower()}"] = float((final == end).float().mean())
     return metrics

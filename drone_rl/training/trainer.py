@@ -2,10 +2,11 @@
 
 import contextlib
 import dataclasses
+import enum
 import signal
 import threading
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from types import FrameType
 from typing import Any, Protocol
 
@@ -59,6 +60,7 @@ class Trainer:
         total_episodes: int | None = None,
         target: float | None = 2.97,
         running_decay: float = 0.99,
+        ends: Iterable[enum.IntEnum] = (),
     ) -> None:
         """Connects the parts.
 
@@ -71,6 +73,8 @@ class Trainer:
             total_episodes: Stop once this many were collected; None for no limit.
             target: Stop once the running mean of the episodes' rewards reaches it; None for never.
             running_decay: Weight of the old value in the running mean, per episode.
+            ends: Why an episode may end (`Task.ends`), to be told of; the batches have them as
+                ("next", "info", "end_reason").
         """
         self.collector = collector
         self.learner = learner
@@ -80,6 +84,7 @@ class Trainer:
         self.total_episodes = total_episodes
         self.target = target
         self.running_decay = running_decay
+        self.ends = tuple(ends)
         self.progress = Progress()
         self.stop_signal: signal.Signals | None = None
         self.stop_request = ""
@@ -133,7 +138,7 @@ class Trainer:
         progress.running_reward = running_mean(progress.running_reward, rewards, self.running_decay)
         return {
             "train/running_reward": progress.running_reward,
-            **batch_metrics(batch),
+            **batch_metrics(batch, self.ends),
             **terms,
             "time/frames_per_second": batch.numel() / (end - begin),
             "time/collect_s": collected - begin,

@@ -1,3 +1,5 @@
+import enum
+
 import pytest
 import torch
 from hypothesis import given, settings
@@ -5,7 +7,7 @@ from hypothesis import strategies as st
 from tensordict import TensorDict
 
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
-from drone_rl.training.metrics import END_REASONS, batch_metrics, episode_rewards, running_mean
+from drone_rl.training.metrics import batch_metrics, episode_rewards, running_mean
 from drone_rl.utils.errors import InputError
 
 
@@ -25,7 +27,7 @@ def test_episode_rewards_and_batch_metrics_by_hand():
         [3],
     )
     assert episode_rewards(batch).tolist() == [1.0, 1.0]
-    assert batch_metrics(batch) == {
+    assert batch_metrics(batch, EndReason) == {
         "train/reward": 1.0,
         "train/length": 1.5,
         "end/all_cubes": 0.5,
@@ -35,8 +37,20 @@ def test_episode_rewards_and_batch_metrics_by_hand():
     }
 
 
-def test_names_of_the_ends_are_those_of_the_rules():
-    assert [EndReason[name.upper()].value for name in END_REASONS] == [1, 2, 3, 4]
+class End(enum.IntEnum):
+    FLYING = 0
+    THROUGH = 2
+    LOST = 3
+
+
+def test_ends_are_those_of_the_task():
+    """Three episodes: two by one of its reasons, one by the other."""
+    batch = make_batch([[0, 1], [1], [0]])
+    batch["next", "info"] = TensorDict({"end_reason": torch.tensor([0, 2, 3, 2])[:, None]}, [4])
+    metrics = batch_metrics(batch, End)
+    shares = {k: v for k, v in metrics.items() if k.startswith("end/")}
+    assert shares == {"end/through": pytest.approx(2 / 3), "end/lost": pytest.approx(1 / 3)}
+    assert not any(name.startswith("end/") for name in batch_metrics(batch))
 
 
 def test_pieces_of_episodes_by_their_sums_so_far():
@@ -53,7 +67,7 @@ def test_pieces_of_episodes_by_their_sums_so_far():
         [2, 3],
     )
     assert episode_rewards(batch).tolist() == [3.0, 1.0]
-    metrics = batch_metrics(batch)
+    metrics = batch_metrics(batch, EndReason)
     assert (metrics["train/reward"], metrics["train/length"]) == (2.0, 3.0)
     assert (metrics["end/side_boundary"], metrics["end/all_cubes"]) == (0.5, 0.0)
     del batch["next", "episode_reward"]
@@ -107,5 +121,7 @@ def test_end_of_an_episode_is_read_at_its_last_frame():
     batch = make_batch([[0, 1], [1, 1, 0], [0]])
     reasons = torch.tensor([4, 1, 4, 4, 2, 3])[:, None]
     batch["next", "info"] = TensorDict({"end_reason": reasons}, [6])
-    metrics = batch_metrics(batch)
-    assert [metrics[f"end/{name}"] for name in END_REASONS] == pytest.approx([1 / 3] * 3 + [0])
+    metrics = batch_metrics(batch, EndReason)
+    assert [metrics[f"end/{end.name.lower()}"] for end in EndReason if end] == pytest.approx(
+        [1 / 3] * 3 + [0]
+    )

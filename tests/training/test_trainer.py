@@ -1,3 +1,4 @@
+import enum
 import signal
 
 import pytest
@@ -129,6 +130,25 @@ def test_progress_counts_what_was_collected(make_trainer):
         mean = running_mean(mean, episode_rewards(batch), 0.99)
     assert progress.running_reward == mean
     assert progress.seconds > 0
+
+
+class Parity(enum.IntEnum):
+    NONE = 0
+    ODD = 1
+
+
+def test_ends_are_told_by_the_names_that_the_trainer_is_given(make_trainer):
+    at, trainer = At(-1, None), make_trainer(ends=Parity)
+    collect, trainer.callbacks = trainer.collector.collect, [at]
+
+    def with_ends():
+        batch = collect()
+        batch["next", "info"] = {"end_reason": batch["next", "done"].long()}
+        return batch
+
+    trainer.collector.collect = with_ends
+    trainer.run()
+    assert {metrics["end/odd"] for metrics in at.metrics} == {1.0}
 
 
 def test_metrics_of_an_update(make_trainer):
