@@ -5,7 +5,7 @@
 """Complete episodes, each frame once: what REINFORCE learns from."""
 
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import Any, cast
 
 import torch
 from tensordict import TensorDict, TensorDictBase
@@ -166,7 +166,8 @@ def copy_weights(source: Any, actor: TensorDictModuleBase) -> None:
         actor: Gets them.
     """
     if isinstance(source, TensorDictBase):
-        TensorDict.from_module(actor).data.update_(source.data)
+        weights = cast(TensorDictBase, TensorDict.from_module(actor))
+        weights.data.update_(source.data)
     else:
         actor.load_state_dict(source.state_dict() if isinstance(source, nn.Module) else source)
 
