@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from drone_rl.sweeps import Sweep, read_result, read_sweep
-from drone_rl.sweeps.page import write_report
+from drone_rl.sweeps.page import write_sweep_report
 from drone_rl.utils.errors import InputError
 
 _log = logging.getLogger(__name__)
@@ -55,7 +55,7 @@ def judge_sweep(sweep: Sweep, episodes: int, device: str) -> None:
 
 def report_sweep(sweep: Sweep) -> tuple[Path, str]:
     """Writes a sweep's report. Returns its path and its sentences, for a terminal."""
-    page = write_report(sweep)
+    page = write_sweep_report(sweep)
     return page, _lines(json.loads((sweep.folder / "summary.json").read_text()))
 
 

@@ -8,8 +8,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from drone_rl.api.environment import make_env
 from drone_rl.bench.liars import liars
-from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, make_env
 from drone_rl.explain.hooks import probabilities
 from drone_rl.explain.planted import Planted, plant, reach
 from drone_rl.explain.scenes import Scenes
@@ -33,7 +33,7 @@ def bench_maps(folder: Path, quick: bool) -> dict[str, Any]:
     """
     del folder
     begin = time.perf_counter()
-    env = make_env(DroneEnv(64), [GrayPixels(), StandardizePixels()])
+    env = make_env(64)
     scenes = Scenes(env)
     state, episode = imagined(scenes, 14 if quick else 40, 4 if quick else 6)
     pictures = draw_pictures(scenes, state, episode)

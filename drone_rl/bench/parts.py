@@ -8,33 +8,30 @@ import torch
 from torchrl.envs import TransformedEnv
 from torchrl.modules import ProbabilisticActor
 
-from drone_rl.collectors import EpisodeCollector, ThreadedCollector
-from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, make_env
-from drone_rl.policies import SmallCNN, make_actor
+from drone_rl.api.collecting import build_collector
+from drone_rl.api.environment import make_env
+from drone_rl.collectors import ThreadedCollector
+from drone_rl.envs import DroneEnv
+from drone_rl.policies import PolicyNetwork, SmallCNN, make_actor
+from drone_rl.settings.collecting import Threads
+from drone_rl.settings.training import TrainSettings
 from drone_rl.sim.settings import TaskSettings
 
 
 def default_collector(num_envs: int, num_threads: int, device: str) -> ThreadedCollector:
     """The collector of `drone-rl train`, with a policy that has learned nothing yet."""
-    network, collectors = None, []
-    for i in range(num_threads):
-        share = num_envs // num_threads
-        base = DroneEnv(share, first_world=i * share, num_shards=1, device=device)
-        env = make_env(base, [GrayPixels(), StandardizePixels()])
-        shape = tuple(env.observation_spec["pixels"].shape[1:])
-        network = network or SmallCNN(shape, 3, hidden=(128,)).to(device)
-        generator = torch.Generator(device).manual_seed(i)
-        collectors.append(EpisodeCollector(env, make_actor(network, env.action_spec, generator)))
-    return ThreadedCollector(collectors)
+    threads = Threads(num_envs=num_envs, num_threads=num_threads)
+    collector = build_collector(TrainSettings(collector=threads, device=device)).collector
+    assert isinstance(collector, ThreadedCollector)
+    return collector
 
 
-def default_pipeline(num_envs: int) -> tuple[TransformedEnv, ProbabilisticActor, SmallCNN]:
+def default_pipeline(num_envs: int) -> tuple[TransformedEnv, ProbabilisticActor, PolicyNetwork]:
     """Worlds on all cores, a policy that has learned nothing yet, and its network."""
-    env = make_env(DroneEnv(num_envs), [GrayPixels(), StandardizePixels()])
+    env = make_env(num_envs)
     shape = tuple(env.observation_spec["pixels"].shape[1:])
     network = SmallCNN(shape, 3, hidden=(128,), generator=torch.Generator().manual_seed(0))
-    generator = torch.Generator().manual_seed(0)
-    return env, make_actor(network, env.action_spec, generator), network
+    return env, make_actor(network, env.action_spec, torch.Generator().manual_seed(0)), network
 
 
 def random_walk(env: DroneEnv, steps: int, seed: int = 0) -> int:

@@ -77,7 +77,9 @@ class SweepLauncher(Launcher):
 
     def _finish(self, sweep: Sweep, runs: Sequence[Run]) -> int:
         """Returns how many runs failed."""
-        from drone_rl.sweeps.page import write_report  # slow to import; no single run needs it
+        from drone_rl.sweeps.page import (
+            write_sweep_report,  # slow to import; no single run needs it
+        )
 
         failed = 0
         try:
@@ -87,7 +89,7 @@ class SweepLauncher(Launcher):
                 failed += status != 0
                 _log.info("[%d/%d] %s: %s", done, len(unfinished), run.folder.name, _outcome(run))
         finally:
-            _log.info("report: %s", write_report(sweep))
+            _log.info("report: %s", write_sweep_report(sweep))
         return failed
 
     def _run(self, folder: Path, number: int, overrides: Sequence[str]) -> Run:

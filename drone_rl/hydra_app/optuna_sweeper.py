@@ -21,7 +21,7 @@ from hydra.types import HydraContext, TaskFunction
 from omegaconf import DictConfig
 
 from drone_rl.sweeps import read_result
-from drone_rl.sweeps.search import import_optuna, next_trials, open_study, tell
+from drone_rl.sweeps.search import import_optuna, next_trials, note_outcome, open_study
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import refuse_links
 from drone_rl.utils.schema import shown
@@ -114,7 +114,7 @@ class OptunaSweeper(Sweeper):
             for trial, job in zip(
                 trials, self.launcher.launch(batch, trials[0].number), strict=True
             ):
-                tell(study, trial.number, read_result(Path(str(job.working_dir))))
+                note_outcome(study, trial.number, read_result(Path(str(job.working_dir))))
         complete = [t for t in study.trials if t.state == optuna.trial.TrialState.COMPLETE]
         if complete:
             best = study.best_trial

@@ -20,7 +20,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import write_atomically
 
 
-def write_report(sweep: Sweep) -> Path:
+def write_sweep_report(sweep: Sweep) -> Path:
     """Writes `summary.csv`, `summary.json` and `report.html` into the sweep's folder.
 
     Returns:

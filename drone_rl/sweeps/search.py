@@ -69,7 +69,7 @@ def next_trials(study: Any, space: Mapping[str, Any], count: int, seed: int) -> 
     return study.trials[begin:]
 
 
-def tell(study: Any, number: int, result: Mapping[str, Any] | None) -> None:
+def note_outcome(study: Any, number: int, result: Mapping[str, Any] | None) -> None:
     """Notes what became of a trial: its running mean of rewards, that it was pruned or failed."""
     optuna = import_optuna()
     if study.trials[number].state != optuna.trial.TrialState.RUNNING:

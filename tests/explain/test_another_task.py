@@ -6,8 +6,8 @@ import torch
 
 from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, make_env
 from drone_rl.explain.context import Context
-from drone_rl.explain.explanation import explain_policy
 from drone_rl.explain.settings import ExplainSettings
+from drone_rl.explain.study import explain_policy
 from drone_rl.policies import MLP
 from tests.second_task import NUM_POSTS, Posts
 

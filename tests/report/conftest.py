@@ -7,8 +7,8 @@ import pytest
 import torch
 
 from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, make_env
-from drone_rl.explain.explanation import explain_policy
 from drone_rl.explain.settings import ExplainSettings
+from drone_rl.explain.study import explain_policy
 from drone_rl.policies import SmallCNN
 
 NASTY = '</script><b>"a" & b'

@@ -6,9 +6,9 @@ import pytest
 import torch
 
 from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, make_env
-from drone_rl.explain.explanation import explain_policy
 from drone_rl.explain.sections import find_sections
 from drone_rl.explain.settings import ExplainSettings
+from drone_rl.explain.study import explain_policy
 from drone_rl.policies import MLP
 from drone_rl.report import write_report
 from tests.second_dynamics import Turning

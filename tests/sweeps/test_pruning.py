@@ -7,7 +7,7 @@ import pytest
 optuna = pytest.importorskip("optuna", reason="pip install 'drone-rl[optuna]'")
 
 from drone_rl.sweeps.pruning import PruneCallback  # noqa: E402
-from drone_rl.sweeps.search import next_trials, tell  # noqa: E402
+from drone_rl.sweeps.search import next_trials, note_outcome  # noqa: E402
 from tests.sweeps.test_search import SPACE, begin  # noqa: E402
 
 
@@ -25,6 +25,8 @@ def test_a_run_below_the_median_is_stopped(tmp_path, prune, reason):
             trainer.progress.frames = frames
             callback.on_update(trainer, {})
         reasons.append(trainer.stop_request)
-        tell(study, number, {"reason": trainer.stop_request or "frames", "running_reward": cubes})
+        note_outcome(
+            study, number, {"reason": trainer.stop_request or "frames", "running_reward": cubes}
+        )
     assert reasons == ["", reason]
     assert list(study.trials[0].intermediate_values) == [1, 2]

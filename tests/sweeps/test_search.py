@@ -4,7 +4,7 @@ import pytest
 
 optuna = pytest.importorskip("optuna", reason="pip install 'drone-rl[optuna]'")
 
-from drone_rl.sweeps.search import next_trials, open_study, tell  # noqa: E402
+from drone_rl.sweeps.search import next_trials, note_outcome, open_study  # noqa: E402
 
 SPACE = {"optimiser.lr": optuna.distributions.FloatDistribution(1e-4, 1e-1, log=True)}
 
@@ -30,7 +30,7 @@ def test_a_killed_search_goes_on_with_the_trials_it_had_begun(tmp_path):
     first = next_trials(begin(tmp_path), SPACE, 3, seed=0)
     study = begin(tmp_path)  # a new process
     assert params(next_trials(study, SPACE, 3, seed=0)) == params(first)
-    tell(study, 1, {"reason": "frames", "running_reward": 2.0})
+    note_outcome(study, 1, {"reason": "frames", "running_reward": 2.0})
     assert [t.number for t in next_trials(study, SPACE, 3, seed=0)] == [0, 1, 2]
 
 
@@ -40,7 +40,7 @@ def test_the_same_results_lead_to_the_same_questions(tmp_path):
         study = begin(tmp_path / name)
         for number in (0, 1):
             next_trials(study, SPACE, 1, seed=0)
-            tell(study, number, {"reason": "frames", "running_reward": float(number)})
+            note_outcome(study, number, {"reason": "frames", "running_reward": float(number)})
         asked.append(params(next_trials(study, SPACE, 2, seed=0)))
     assert asked[0] == asked[1]
 
@@ -48,9 +48,9 @@ def test_the_same_results_lead_to_the_same_questions(tmp_path):
 def test_what_became_of_a_run_is_told(tmp_path):
     study = begin(tmp_path)
     next_trials(study, SPACE, 3, seed=0)
-    tell(study, 0, {"reason": "solved", "running_reward": 2.97})
-    tell(study, 1, {"reason": "pruned", "running_reward": 0.1})
-    tell(study, 2, None)
-    tell(study, 2, None)
+    note_outcome(study, 0, {"reason": "solved", "running_reward": 2.97})
+    note_outcome(study, 1, {"reason": "pruned", "running_reward": 0.1})
+    note_outcome(study, 2, None)
+    note_outcome(study, 2, None)
     assert [t.state.name for t in study.trials] == ["COMPLETE", "PRUNED", "FAIL"]
     assert study.best_value == 2.97

@@ -31,7 +31,7 @@ def explain_policy(
     *,
     name: str,
     provenance: dict[str, Any],
-    tell: Callable[[str], None] = lambda _: None,
+    progress: Callable[[str], None] = lambda _: None,
     sections: Mapping[str, Section] | None = None,
 ) -> dict[str, Any]:
     """Computes everything about one policy and writes it to a folder.
@@ -43,7 +43,7 @@ def explain_policy(
         settings: What to compute.
         name: Of the policy, for people.
         provenance: Where it comes from, as plain values.
-        tell: Called with what is being done.
+        progress: Called with what is being done.
         sections: What to compute, in this order, which changes nothing but the time of each; all
             of `explain/sections` by default.
 
@@ -58,7 +58,7 @@ def explain_policy(
     arrays: dict[str, NDArray] = {}
     seconds: dict[str, float] = {}
     for title, section in (find_sections() if sections is None else sections).items():
-        tell(title.replace("_", " "))
+        progress(title.replace("_", " "))
         began = time.perf_counter()
         its_numbers, its_arrays = section(context)
         numbers |= its_numbers

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import torch
 
-from drone_rl.explain.explanation import explain_policy
 from drone_rl.explain.sections import find_sections
 from drone_rl.explain.settings import ExplainSettings
+from drone_rl.explain.study import explain_policy
 from drone_rl.policies import MLP
 from drone_rl.utils.errors import InputError
 
