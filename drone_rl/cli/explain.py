@@ -34,11 +34,10 @@ class Command(ExplainSettings):
 
 def run(settings: Command, folder: Path) -> tuple[int, str]:
     """Explains policies and reports on them. Returns the exit status and the report's path."""
-    from drone_rl.api.explaining import explain
     from drone_rl.api.progress import log
 
     loaded = [drone_rl.load_policy(p, outputs=settings.paths.outputs) for p in settings.policy]
-    done = explain(
+    done = drone_rl.explain(
         [policy.in_task(**settings.task) for policy in loaded],
         settings.narrowed(ExplainSettings),
         folder=folder,

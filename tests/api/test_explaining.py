@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 import drone_rl
-from drone_rl.api.explaining import Explanations, _named, explain
+from drone_rl.api.explaining import Explanations, _named
 from drone_rl.utils.errors import InputError
 
 
@@ -36,7 +36,7 @@ def test_each_policy_is_explained_once(policies):
 )
 def test_mistakes_name_the_argument(change, message, tmp_path):
     with pytest.raises(InputError, match=f"^{message}"):
-        explain("good", folder=tmp_path, **change)
+        drone_rl.explain("good", folder=tmp_path, **change)
 
 
 def test_they_show_their_report(tmp_path):
