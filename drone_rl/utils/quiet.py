@@ -5,17 +5,26 @@ import os
 import sys
 import warnings
 from collections.abc import Iterator
+from typing import Any
 
 from absl import logging
 
-NOISE = (".*DISPLAY.*", ".*GLFW.*", ".*WeightUpdaterBase.*")
-"""Warnings of dm_control, which looks for a screen, and of TorchRL, of its own classes."""
+NOISE = ("DISPLAY", "GLFW", "WeightUpdaterBase")
+"""Words in warnings of dm_control, which looks for a screen, and of TorchRL, of its own classes."""
 
 
 def ignore_noise() -> None:
-    """Keeps warnings and log lines back that no user can do anything about."""
-    for message in NOISE:
-        warnings.filterwarnings("ignore", message=message)
+    """Keeps warnings and log lines back that no user can do anything about.
+
+    Filters would not do: dm_control puts one of its own, that lets all through, before them.
+    """
+    show = warnings.showwarning
+
+    def show_the_rest(message: Warning | str, *args: Any, **kwargs: Any) -> None:
+        if not any(word in str(message) for word in NOISE):
+            show(message, *args, **kwargs)
+
+    warnings.showwarning = show_the_rest
     logging.set_verbosity(logging.WARNING)  # dm_control tells which OpenGL it found
 
 

@@ -1,6 +1,8 @@
 """A training in Python is that of the command line, and goes on bit for bit."""
 
 import json
+import shutil
+from pathlib import Path
 
 import pytest
 import torch
@@ -13,6 +15,7 @@ from drone_rl.settings.training import TrainerSettings, TrainSettings
 from drone_rl.sim.settings import TaskSettings
 from drone_rl.utils.errors import InputError
 
+OLD = Path(__file__).parents[1] / "data" / "old_checkpoint.pt"
 TINY = TrainSettings(
     task=TaskSettings(num_cubes=1, first_distance=8.0, step_limit=60),
     collector=Threads(num_envs=4),
@@ -67,6 +70,16 @@ def test_stopped_and_resumed_is_the_uninterrupted(trained, tmp_path):
     assert again.result["frames"] == whole.result["frames"]
     one, two = weights(whole.folder), weights(again.folder)
     assert all(torch.equal(one[name], two[name]) for name in one)
+
+
+def test_a_run_of_version_0_1_goes_on(tmp_path):
+    (tmp_path / "checkpoints").mkdir()
+    shutil.copy(OLD, tmp_path / "checkpoints" / "last.pt")
+    before = drone_rl.load_policy(tmp_path).state["progress"]
+    more = TrainerSettings(total_frames=before["frames"] + 50)
+    done = drone_rl.train(folder=tmp_path, resume=True, trainer=more, progress=silent)
+    assert done.result["updates"] > before["updates"]
+    assert done.result["frames"] >= before["frames"] + 50
 
 
 def test_a_resumed_run_learns_as_it_did(trained):
