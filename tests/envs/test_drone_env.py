@@ -1,8 +1,11 @@
+import functools
+
 import pytest
 import torch
+from torchrl.envs import Compose, ParallelEnv, RewardSum, SerialEnv, TransformedEnv
 from torchrl.envs.utils import check_env_specs
 
-from drone_rl.envs import DroneEnv
+from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels
 from drone_rl.sim.settings import TaskSettings
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
 from drone_rl.utils.errors import InputError
@@ -19,6 +22,56 @@ def actions(env, value):
 def test_specs(num_envs, pixels):
     env = DroneEnv(num_envs, SHORT, pixels=pixels)
     check_env_specs(env, break_when_any_done="both")
+    env.close()
+
+
+def piped(**settings):
+    """As a policy sees it, with the rewards' sums as TorchRL's collectors want them."""
+    env = DroneEnv(2, SHORT, **settings)
+    return TransformedEnv(env, Compose(GrayPixels(), StandardizePixels(), RewardSum()))
+
+
+def test_specs_behind_the_pixel_pipeline():
+    env = piped()
+    check_env_specs(env, break_when_any_done="both")
+    env.close()
+
+
+@pytest.mark.parametrize("kind", [SerialEnv, pytest.param(ParallelEnv, marks=pytest.mark.slow)])
+def test_batches_of_batches(kind):
+    """Two workers of two worlds each are TorchRL's; their worlds are those of one batch of four."""
+    make = [functools.partial(piped, seed=4, first_world=first) for first in (0, 2)]
+    env = kind(2, make)
+    try:
+        check_env_specs(env, break_when_any_done="both")
+        env.set_seed(4, static_seed=True)
+        cubes = env.reset()["info", "cube_positions"].flatten(0, 1)
+        assert torch.equal(cubes, DroneEnv(4, SHORT, seed=4).reset()["info", "cube_positions"])
+        states = env.rollout(12, lambda td: td.set("action", torch.zeros(2, 2).long()))
+        assert states["next", "done"][:, :, -1].any()
+    finally:
+        env.close()
+
+
+def test_worlds_begin_anew_each_on_its_own():
+    """Ten steps in worlds of which one flies ahead and one sways until its limit."""
+    env = piped(pixels=True)
+    moves = torch.tensor([[0], [1]])
+    policy = iter([moves, moves * 2] * 5)  # ahead all the time; left and right by turns
+    rollout = env.rollout(
+        10, lambda td: td.set("action", next(policy)[:, 0]), break_when_any_done=False
+    )
+    done, drone = rollout["next", "done"][..., 0], rollout["info", "drone"]
+    after = rollout["next", "info", "drone"]
+    start = torch.tensor([0.0, 0.0, SHORT.altitude])
+    assert done[1].nonzero()[:, 0].tolist() == [4, 9]  # the limit is 5 steps
+    assert done[0].any() and not torch.equal(*done)
+    for world in range(2):
+        for t in range(9):
+            wanted = start if done[world, t] else after[world, t]
+            assert torch.equal(drone[world, t + 1], wanted)
+    sums = rollout["next", "episode_reward"][0, :, 0]
+    assert sums[done[0]].max() <= 1.0  # never more than its one cube
     env.close()
 
 
