@@ -102,20 +102,20 @@ class EpisodeCollector(BaseCollector):
         self, state: TensorDictBase, active: Tensor, worlds: Tensor
     ) -> tuple[dict[NestedKey, Tensor], TensorDictBase]:
         """Acts in the active worlds. Returns what is kept of them and the state after them."""
-        everyone = len(worlds) == len(active)
+        is_whole = len(worlds) == len(active)
         seen = state.select(*self._observed)
-        acted = self.actor(seen if everyone else seen[worlds])
+        acted = self.actor(seen if is_whole else seen[worlds])
         action = acted.get(self.env.action_key)
         keys = acted.keys(True, True) if self._keep_observations else (self.env.action_key,)
         step = {key: acted.get(key) for key in keys}
-        if not everyone:
+        if not is_whole:
             action = self.env.action_spec.zero().index_copy(0, worlds, action)
             state.set("_step", active)
         state.set(self.env.action_key, action)
         after = self.env.step(state)
         for key in self._kept:
             value = after.get(key)
-            step[key] = value if everyone else value[worlds]
+            step[key] = value if is_whole else value[worlds]
         state = after.get("next")
         for key in self._dropped:  # entries that no step reads make each step dearer
             state.pop(key, None)
@@ -180,8 +180,8 @@ def _join(
     steps: list[dict[NestedKey, Tensor]], worlds: list[Tensor], num_worlds: int
 ) -> TensorDictBase:
     """Time-major steps to episode after episode, copying each frame once. Shape: (T_total,)."""
-    everyone = torch.cat(worlds)
-    lengths = everyone.bincount(minlength=num_worlds)
+    worlds_of_steps = torch.cat(worlds)
+    lengths = worlds_of_steps.bincount(minlength=num_worlds)
     first = lengths.cumsum(0) - lengths
     rows = torch.cat([first[indices] + t for t, indices in enumerate(worlds)])
     batch = TensorDict({}, [len(rows)], device=rows.device)
@@ -191,5 +191,5 @@ def _join(
         for indices, step in zip(spans, steps, strict=True):
             joined.index_copy_(0, indices, step[key])
         batch.set(key, joined)
-    traj_ids = torch.empty_like(everyone).index_copy_(0, rows, everyone)
+    traj_ids = torch.empty_like(worlds_of_steps).index_copy_(0, rows, worlds_of_steps)
     return batch.set(("collector", "traj_ids"), traj_ids)
