@@ -4,7 +4,6 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 PURE_DATA = {
-    "training/progress": "counters and a protocol; training/test_trainer counts with every one",
     "bench/evidence": "evidence made by hand; bench/test_sentences reads every entry",
     "report/palette": "colours; report/test_indicator and test_pictures find them in pictures",
     "sim/meaning": "names; sim/test_worlds finds each on its things",

@@ -1,3 +1,6 @@
+import re
+from pathlib import Path
+
 import pytest
 
 from drone_rl.bench.ledger import digest_code
@@ -22,3 +25,8 @@ def test_an_unknown_word_is_answered_by_the_known_ones():
 @pytest.mark.parametrize("name", BENCHMARKS)
 def test_what_is_measured_is_there(name):
     assert digest_code(BENCHMARKS[name].measures)
+
+
+def test_the_settings_name_every_benchmark_and_group():
+    text = (Path(__file__).parents[2] / "conf" / "bench.yaml").read_text()
+    assert {name for name in (*GROUPS, *BENCHMARKS) if not re.search(rf"\b{name}\b", text)} == set()
