@@ -93,7 +93,7 @@ def imagined(scenes: Scenes, episodes: int, frames: int) -> tuple[WorldState, np
 
 def expert(scenes: Scenes, state: WorldState) -> Tensor:
     """What the next cube calls for, if there is one. Shape: (T,)."""
-    return scenes.task.needed(scenes.task.next_offset(state))
+    return scenes.needed(scenes.task.next_offset(state))
 
 
 def shipped(pictures: Pictures) -> dict[str, PolicyNetwork]:

@@ -1,7 +1,15 @@
 """The worlds as TorchRL environments, and the pixel pipeline behind them."""
 
-from drone_rl.envs.drone_env import DroneEnv
+from drone_rl.envs.drone_env import DroneEnv, worlds_of
 from drone_rl.envs.factory import make_env
 from drone_rl.envs.transforms import CropRows, GrayPixels, Resize, StandardizePixels
 
-__all__ = ["CropRows", "DroneEnv", "GrayPixels", "Resize", "StandardizePixels", "make_env"]
+__all__ = [
+    "CropRows",
+    "DroneEnv",
+    "GrayPixels",
+    "Resize",
+    "StandardizePixels",
+    "make_env",
+    "worlds_of",
+]

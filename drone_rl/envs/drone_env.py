@@ -132,10 +132,7 @@ class DroneEnv(EnvBase):
         info = Composite({**entries, **pose}, shape=(n,))
         observed = {"pixels": self._pixel_spec(), "info": info} if self.pixels else {"info": info}
         self.observation_spec = Composite(observed, shape=(n,)).to(self.device)
-        action = _spec(self.worlds.dynamics.actions.entry, n)
-        if action.dtype == torch.int64:
-            action = Categorical(int(action.high.max()) + 1, shape=action.shape, dtype=torch.int64)
-        self.action_spec = action.to(self.device)
+        self.action_spec = _action_spec(self.worlds.dynamics.actions.entry, n).to(self.device)
         self.reward_spec = Unbounded((n, 1)).to(self.device)
         done = {name: Binary(1, (n, 1), dtype=torch.bool) for name in _DONE_KEYS}
         self.full_done_spec = Composite(**done, shape=(n,)).to(self.device)
@@ -201,6 +198,19 @@ class DroneEnv(EnvBase):
 
 
 _DONE_KEYS = ("done", "terminated", "truncated")
+
+
+def worlds_of(env: EnvBase) -> Worlds:
+    """The worlds behind an environment, whatever transforms stand before them."""
+    base: Any = getattr(env, "base_env", env)
+    return base.worlds
+
+
+def _action_spec(entry: Entry, num_envs: int) -> TensorSpec:
+    """The same of an action: whole numbers are indices of discrete ones."""
+    if entry.dtype == torch.int64 and entry.high is not None:
+        return Categorical(int(entry.high) + 1, shape=(num_envs, *entry.shape), dtype=torch.int64)
+    return _spec(entry, num_envs)
 
 
 def _spec(entry: Entry, num_envs: int) -> TensorSpec:

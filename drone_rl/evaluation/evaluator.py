@@ -6,6 +6,7 @@ from torchrl.envs import EnvBase
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 from drone_rl.collectors import EpisodeCollector
+from drone_rl.envs import worlds_of
 from drone_rl.evaluation.metrics import Episodes
 
 
@@ -26,7 +27,7 @@ def run_episodes(
     Returns:
         The episodes, on the CPU.
     """
-    task = getattr(env, "base_env", env).worlds.task
+    task = worlds_of(env).task
     keep = tuple(("next", "info", name) for name in (*task.scored, "end_reason"))
     collector = EpisodeCollector(env, actor, keep=keep, keep_observations=False)
     kind = ExplorationType.DETERMINISTIC if greedy else ExplorationType.RANDOM

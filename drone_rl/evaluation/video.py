@@ -14,6 +14,7 @@ from torch import Tensor
 from torchrl.envs import TransformedEnv
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
+from drone_rl.envs import worlds_of
 from drone_rl.sim.actions import MOVES, Actions
 from drone_rl.sim.entities.cameras import CHASE
 from drone_rl.sim.tasks import Task
@@ -38,7 +39,7 @@ def film_episode(
     Yields:
         RGB pictures, uint8. Shape: (360 + 40, 2 * 640, 3).
     """
-    worlds = env.base_env.worlds
+    worlds = worlds_of(env)
     actions = worlds.dynamics.actions
     chase = worlds.view(CHASE.name, height=PANEL_HEIGHT, width=PANEL_WIDTH, show_drone=True)
     kind = ExplorationType.DETERMINISTIC if greedy else ExplorationType.RANDOM

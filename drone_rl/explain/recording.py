@@ -15,6 +15,7 @@ from torchrl.envs import TransformedEnv
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 from drone_rl.collectors import EpisodeCollector
+from drone_rl.envs import worlds_of
 from drone_rl.explain.dataset import SEEN, RolloutDataset, flown_fields
 from drone_rl.explain.hooks import features, probabilities
 from drone_rl.explain.scenes import Scenes
@@ -74,7 +75,7 @@ def fly(
     """
     if num_frames < 1:
         raise InputError(f"frames={num_frames} records nothing; give 1 or more")
-    worlds = env.base_env.worlds
+    worlds = worlds_of(env)
     keep = (("next", "info", "end_reason"),)
     collector = EpisodeCollector(env, _WithTruth(actor, (*worlds.task.entries, *_POSE)), keep=keep)
     kind = ExplorationType.DETERMINISTIC if greedy else ExplorationType.RANDOM

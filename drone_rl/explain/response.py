@@ -72,7 +72,7 @@ def response_map(
         layers.append(probabilities(network, observed).view(num_forward, num_lateral, -1))
     wishes = torch.stack(layers)
     alone = probabilities(network, scenes.observe(empty_scene(scenes)))[0]
-    needed = scenes.task.needed(_offsets(lateral)).to(wishes.device)
+    needed = scenes.needed(_offsets(lateral)).to(wishes.device)
     return ResponseMap(
         height=height.numpy(),
         forward=forward.numpy(),
@@ -92,13 +92,14 @@ def find_blind(actions: Actions, wishes: Tensor, alone: Tensor, needed: Tensor) 
         actions: What there is to do.
         wishes: The policy's with a cube there. Shape: (Z, F, L, A).
         alone: Without any cube. Shape: (A,).
-        needed: The action that is called for. Shape: (L,).
+        needed: The action that is called for, -1 where nobody knows. Shape: (L,).
 
     Returns:
         Shape: (Z, F, L), bool.
     """
     unmoved = actions.distance(wishes, alone) < BLIND
-    return unmoved & actions.turns(needed) & (actions.chosen(wishes) != needed)
+    calls = (needed >= 0) & actions.turns(needed)
+    return unmoved & calls & (actions.chosen(wishes) != needed)
 
 
 def outcome_map(
@@ -125,7 +126,7 @@ def outcome_map(
         forward=forward.numpy(),
         lateral=lateral.numpy(),
         collected=torch.stack(layers).cpu().numpy(),
-        oracle=scenes.task.needed(_offsets(lateral)).numpy(),
+        oracle=scenes.needed(_offsets(lateral)).numpy(),
         stratum=scenes.task.stratum_at(_offsets(lateral)).numpy(),
     )
 

@@ -8,10 +8,9 @@ from torch import Tensor
 from torch.nn import functional
 from torchrl.envs import CatFrames, Transform, TransformedEnv
 
-from drone_rl.envs import CropRows
+from drone_rl.envs import CropRows, worlds_of
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.tasks import State
-from drone_rl.sim.worlds import Worlds
 
 
 class Region(enum.IntEnum):
@@ -33,7 +32,7 @@ class Scenes:
 
     def __init__(self, env: TransformedEnv) -> None:
         """Borrows the worlds and the transforms of an environment."""
-        self.worlds: Worlds = env.base_env.worlds
+        self.worlds = worlds_of(env)
         self.task = self.worlds.task
         self.actions = self.worlds.dynamics.actions
         pipeline: Iterable[Transform] = env.transform  # type: ignore[assignment]
@@ -94,6 +93,18 @@ class Scenes:
             elif maps.shape[-2:] != size:
                 maps = functional.interpolate(maps[:, None], size, mode="bilinear")[:, 0]
         return maps
+
+    def needed(self, offset: Tensor) -> Tensor:
+        """The action that a target calls for which stands there; -1 where nobody knows.
+
+        A task tells what to do with the actions of its own choice of dynamics, and no others.
+
+        Args:
+            offset: Metres from the drone, world frame. Shape: (N, 3).
+        """
+        if self.actions.names != self.task.make_dynamics().actions.names:
+            return torch.full(offset.shape[:1], -1)
+        return self.task.needed(offset)
 
     def observe(self, state: State) -> Tensor:
         """Scenes as the policy gets them. Shape: (T, C, h, w)."""

@@ -59,7 +59,7 @@ def _acting(luck: str) -> str:
 
 def _sides(evidence: Evidence) -> dict[str, str]:
     """Strata by name, and where they are."""
-    names = [name for name in evidence["greedy"]["shares"] if name != "all"]
+    names = [str(name) for name in evidence["greedy"]["shares"] if name != "all"]
     return {name: _SIDES.get(name, name) for name in names}
 
 

@@ -3,6 +3,7 @@ import torch
 from drone_rl.envs import CropRows, DroneEnv, GrayPixels, Resize, make_env
 from drone_rl.explain.scenes import Region, Scenes, empty_scene, place_cube
 from drone_rl.sim.settings import CameraSettings
+from tests.second_dynamics import Turning
 
 
 def test_a_still_is_what_the_policy_saw(world, scenes):
@@ -46,4 +47,12 @@ def test_maps_go_back_to_where_the_pipeline_took_the_picture_from():
     assert maps.shape == (2, 36, 64)
     assert maps[:, :6].sum() == 0 and maps[:, 30:].sum() == 0
     assert (maps[:, 6:30] == 1).all()
+    env.close()
+
+
+def test_what_is_needed_is_known_of_the_tasks_own_actions_alone(scenes):
+    left = torch.tensor([[9.0, 4.0, 0.0]])
+    assert scenes.needed(left).tolist() == [1]
+    env = make_env(DroneEnv(1, dynamics=Turning()), [GrayPixels()])
+    assert Scenes(env).needed(left).tolist() == [-1]
     env.close()

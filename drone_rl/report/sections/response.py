@@ -80,7 +80,8 @@ def tables(explanation: Explanation) -> dict[str, Rows]:
     does: list[list[Any]] = [[*place, *(f"p_{a}" for a in names), "needed", "blind"]]
     for at, where in _grid(arrays, "response"):
         shares = arrays["response_probabilities"][at].round(5).tolist()
-        needed = names[int(arrays["response_oracle"][at[-1]])]
+        action = int(arrays["response_oracle"][at[-1]])
+        needed = names[action] if action >= 0 else ""
         does.append([*where, *shares, needed, int(arrays["response_blind"][at])])
     comes: list[list[Any]] = [[*place, "collected"]]
     for at, where in _grid(arrays, "outcome"):
