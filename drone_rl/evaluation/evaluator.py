@@ -1,6 +1,9 @@
 """Runs a policy on many worlds at once and gathers how the episodes ended."""
 
+from typing import cast
+
 import torch
+from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torchrl.envs import EnvBase
 from torchrl.envs.utils import ExplorationType, set_exploration_type
@@ -39,10 +42,10 @@ def run_episodes(
             finals.append(batch["next", "info"][done])
             lengths.append(batch["collector", "traj_ids"].unique(return_counts=True)[1])
             count += len(lengths[-1])
-    info = torch.cat(finals)[:num_episodes].cpu()
+    info = cast(TensorDictBase, torch.cat(finals)[:num_episodes].cpu())
     return Episodes(
         task=task,
-        goals=task.score(info),
+        goals=task.score({name: info[name] for name in task.scored}),
         end_reason=info["end_reason"][:, 0],
         length=torch.cat(lengths)[:num_episodes].cpu(),
     )

@@ -39,7 +39,8 @@ class Oracle(TensorDictModuleBase):
                 f"drones by {', '.join(actions.names)}; choose dynamics that it can fly"
             )
         self.rule = rule
-        self.in_keys = [("info", name) for name in rule.reads]
+        keys = [("info", name) for name in rule.reads]
+        self.in_keys = keys  # pyright: ignore[reportAttributeAccessIssue] (untyped in tensordict)
         self.out_keys = ["action"]
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:

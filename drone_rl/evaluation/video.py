@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import imageio.v3 as iio
 import numpy as np
@@ -14,7 +14,7 @@ from torch import Tensor
 from torchrl.envs import TransformedEnv
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
-from drone_rl.envs import worlds_of
+from drone_rl.envs import DroneEnv, worlds_of
 from drone_rl.sim.actions import MOVES, Actions
 from drone_rl.sim.entities.cameras import CHASE
 from drone_rl.sim.tasks import Task
@@ -39,7 +39,7 @@ def film_episode(
     Yields:
         RGB pictures, uint8. Shape: (360 + 40, 2 * 640, 3).
     """
-    worlds = worlds_of(env)
+    worlds, base = worlds_of(env), cast(DroneEnv, env.base_env)
     actions = worlds.dynamics.actions
     chase = worlds.view(CHASE.name, height=PANEL_HEIGHT, width=PANEL_WIDTH, show_drone=True)
     kind = ExplorationType.DETERMINISTIC if greedy else ExplorationType.RANDOM
@@ -48,13 +48,13 @@ def film_episode(
         while True:
             outside = worlds.render(worlds.state, chase)[0]
             acted = actor(state.clone(False))
-            inside = env.base_env.last_pixels[0]
+            inside = base.last_pixels[0]
             yield _compose(inside, outside, _caption(worlds.task, state, earned), acted, actions)
             state = env.step(state.set("action", acted["action"]))["next"]
             earned += float(state["reward"][0])
             if bool(state["done"].all()):
                 outside = worlds.render(worlds.state, chase)[0]
-                inside = env.base_env.last_pixels[0]
+                inside = base.last_pixels[0]
                 yield _compose(inside, outside, _caption(worlds.task, state, earned))
                 return
 
@@ -120,8 +120,11 @@ def _compose(
     return np.asarray(canvas)
 
 
+Font = ImageFont.FreeTypeFont | ImageFont.ImageFont
+
+
 def _draw_bars(
-    draw: ImageDraw.ImageDraw, font: ImageFont.ImageFont, acted: TensorDictBase, actions: Actions
+    draw: ImageDraw.ImageDraw, font: Font, acted: TensorDictBase, actions: Actions
 ) -> None:
     """One bar an action, as long as it is wished for; the chosen one in red (as in Fig. 13)."""
     chosen, names = int(acted["action"][0]), actions.names

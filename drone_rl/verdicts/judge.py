@@ -11,6 +11,7 @@ from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 from torchrl.envs import EnvBase
 
+from drone_rl.envs import worlds_of
 from drone_rl.evaluation import Episodes, run_episodes, summarise
 from drone_rl.utils.intervals import mean_bounds, proportion
 from drone_rl.verdicts.failures import failure_table
@@ -66,8 +67,8 @@ def judge_policy(
         sampled: Whether to fly the policy with drawn actions, too; one that has no probabilities
             to draw from need not.
     """
-    base = getattr(env, "base_env", env)
-    state, worlds = base.state_dict(), base.worlds
+    base: Any = getattr(env, "base_env", env)
+    state, worlds = base.state_dict(), worlds_of(env)
     greedy = run_episodes(env, actor, episodes)
     drawn = None
     if sampled:

@@ -26,9 +26,13 @@ class Explainable(Protocol[S]):
     are given stay as they are.
     """
 
-    remembered: Mapping[str, str]
-    """What data sets keep of each frame: entry and description. "next_cube" is always the number
-    of the next target, as many as there are if none is left."""
+    @property
+    def remembered(self) -> Mapping[str, str]:
+        """What data sets keep of each frame: entry and description.
+
+        "next_cube" is always the number of the next target, as many as there are if none is left.
+        """
+        ...
 
     def remember(self, info: Mapping[str, Tensor]) -> dict[str, Tensor]:
         """The entries `remembered`, made of the information before an action. Shapes: (T, *)."""

@@ -38,22 +38,45 @@ class OracleRule(NamedTuple):
 class Judgeable(Protocol):
     """How good an episode was. An episode is a success if all its goals are reached."""
 
-    name: str
-    """What people call the task."""
-    goal: str
-    """What people call one of its goals."""
-    ends: type[enum.IntEnum]
-    """Why an episode ends; 0 says that it goes on."""
-    success_end: int
-    """The one of `ends` that says that all goals are reached."""
-    expected_end: int
-    """How an episode ends in which a goal was missed and nothing else went wrong."""
-    strata: tuple[str, ...]
-    """Where a goal can stand, from left to right: verdicts count each apart."""
-    luck: tuple[str, ...]
-    """What needs no eyes: "random", and names of actions that are taken always."""
-    scored: tuple[str, ...]
-    """Entries of an episode's last information from which `score` makes its goals."""
+    @property
+    def name(self) -> str:
+        """What people call the task."""
+        ...
+
+    @property
+    def goal(self) -> str:
+        """What people call one of its goals."""
+        ...
+
+    @property
+    def ends(self) -> type[enum.IntEnum]:
+        """Why an episode ends; 0 says that it goes on."""
+        ...
+
+    @property
+    def success_end(self) -> int:
+        """The one of `ends` that says that all goals are reached."""
+        ...
+
+    @property
+    def expected_end(self) -> int:
+        """How an episode ends in which a goal was missed and nothing else went wrong."""
+        ...
+
+    @property
+    def strata(self) -> tuple[str, ...]:
+        """Where a goal can stand, from left to right: verdicts count each apart."""
+        ...
+
+    @property
+    def luck(self) -> tuple[str, ...]:
+        """What needs no eyes: "random", and names of actions that are taken always."""
+        ...
+
+    @property
+    def scored(self) -> tuple[str, ...]:
+        """Entries of an episode's last information from which `score` makes its goals."""
+        ...
 
     @property
     def oracle(self) -> OracleRule | None:

@@ -58,14 +58,25 @@ class Prop(Protocol):
 class Playable(Protocol[S]):
     """Rules of a world. It holds no world: states come in, states go out, many at once."""
 
-    name: str
-    """What people call it."""
-    ends: type[enum.IntEnum]
-    """Why an episode ends; 0 says that it goes on."""
-    truncation: int
-    """The one of `ends` that says nothing of what would have come: the episode is cut off."""
-    observed: tuple[str, ...]
-    """Entries of the information that dm_control's observations hold."""
+    @property
+    def name(self) -> str:
+        """What people call it."""
+        ...
+
+    @property
+    def ends(self) -> type[enum.IntEnum]:
+        """Why an episode ends; 0 says that it goes on."""
+        ...
+
+    @property
+    def truncation(self) -> int:
+        """The one of `ends` that says nothing of what would have come: the episode is cut off."""
+        ...
+
+    @property
+    def observed(self) -> tuple[str, ...]:
+        """Entries of the information that dm_control's observations hold."""
+        ...
 
     @property
     def largest_reward(self) -> float:
