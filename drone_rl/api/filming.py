@@ -71,7 +71,9 @@ def view(policy: Policy, *, greedy: bool = True, seed: int = 0, device: str = "c
 
     env = policy.make_env(1, seed=seed, device=device)
     actor, worlds = policy.make_actor(env, seed=seed), cast(DroneEnv, env.base_env).worlds
-    shown = make_environment(worlds.task, worlds.camera, pixels=False, random_state=seed)
+    shown = make_environment(
+        worlds.task, worlds.camera, dynamics=worlds.dynamics, pixels=False, random_state=seed
+    )
     kind = ExplorationType.DETERMINISTIC if greedy else ExplorationType.RANDOM
 
     @torch.no_grad()
