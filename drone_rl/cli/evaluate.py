@@ -34,7 +34,6 @@ class Command(EvaluateSettings):
 
 def run(settings: Command, folder: Path) -> tuple[int, float]:
     """Evaluates one policy. Returns the exit status and the share of complete episodes."""
-    from drone_rl.api.filming import film
     from drone_rl.api.progress import log
 
     policy = drone_rl.load_policy(settings.policy, outputs=settings.paths.outputs)
@@ -45,6 +44,8 @@ def run(settings: Command, folder: Path) -> tuple[int, float]:
     _log.info("policy: %s", policy.path)
     _log.info("written: %s", folder / "evaluation.json")
     if settings.videos:
+        from drone_rl.api.filming import film
+
         film(
             policy,
             folder / "videos",

@@ -36,9 +36,9 @@ class Command(Settings):
 
 def run(settings: Command, folder: Path) -> tuple[int, None]:
     """Films a policy. Returns the exit status."""
-    from drone_rl.api.filming import film, view
-
     policy = drone_rl.load_policy(settings.policy, outputs=settings.paths.outputs)
+    from drone_rl.api.filming import film, view  # after what is slow to import
+
     policy = policy.in_task(**settings.task)
     chosen = {name: getattr(settings, name) for name in ("greedy", "seed", "device")}
     if settings.viewer:

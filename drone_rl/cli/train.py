@@ -39,13 +39,14 @@ def register() -> None:
 
 def run(settings: Command, folder: Path) -> tuple[int, float]:
     """Trains one policy. Returns the exit status and the running mean of rewards."""
-    from drone_rl.api.progress import silent  # slow to import; a sweep leaves it to its runs
+    train = drone_rl.train  # slow to import; a sweep leaves it to its runs
+    from drone_rl.api.progress import silent
     from drone_rl.sweeps.pruning import PruneCallback
     from drone_rl.training import LoggerCallback, ProgressCallback
 
     loggers = LoggerCallback([logger.make() for logger in settings.logger])
     searching = [] if settings.trial is None else [PruneCallback(folder.parent, settings.trial)]
-    done = drone_rl.train(
+    done = train(
         settings.narrowed(TrainSettings),
         folder=folder,
         resume=settings.resume is not None,

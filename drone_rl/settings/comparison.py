@@ -21,23 +21,16 @@ def modern(config: Mapping[str, Any]) -> dict[str, Any]:
     Args:
         config: Of any version, as it stands in a checkpoint or a sweep's folder.
     """
-    groups = {k: _without(v, "_partial_") for k, v in config.items()}
+    groups = {name: _without(group, "_partial_") for name, group in config.items()}
     if "policy" in groups:
         groups["network"] = groups.pop("policy")
-    for name in ("task", "camera"):
-        if name in groups:
-            groups[name] = _without(groups[name], "_target_")
-    collector = groups.get("collector")
-    if isinstance(collector, Mapping) and "make" in collector:
-        maker = collector["make"]
-        moved = _MOVED.get(maker, maker) if isinstance(maker, str) else maker
-        groups["collector"] = {"_target_": moved, **_without(collector, "make")}
-    for steps in [s for s in (groups.get("transforms"),) if isinstance(s, Mapping)]:
-        fixed = {"CatFrames": ("dim", "in_keys")}
-        groups["transforms"] = {
-            name: _without(step, *fixed.get(_last(step), ())) for name, step in steps.items()
-        }
-    return groups
+    changes = {
+        "task": lambda task: _without(task, "_target_"),
+        "camera": lambda camera: _without(camera, "_target_"),
+        "collector": _collector,
+        "transforms": _transforms,
+    }
+    return {name: changes.get(name, lambda group: group)(group) for name, group in groups.items()}
 
 
 def check_same_config(
@@ -72,10 +65,25 @@ def _without(group: Any, *names: str) -> Any:
     return {name: value for name, value in group.items() if name not in names}
 
 
-def _last(step: Any) -> str:
-    """The last word of what makes a part."""
+def _collector(group: Any) -> Any:
+    if not isinstance(group, Mapping) or "make" not in group:
+        return group
+    maker = group["make"]
+    target = _MOVED.get(maker, maker) if isinstance(maker, str) else maker
+    return {"_target_": target, **_without(group, "make")}
+
+
+def _transforms(group: Any) -> Any:
+    """Stacked frames had arguments that are always the same."""
+    if not isinstance(group, Mapping):
+        return group
+    stacks = {name for name, step in group.items() if _makes(step, "CatFrames")}
+    return {n: _without(s, "dim", "in_keys") if n in stacks else s for n, s in group.items()}
+
+
+def _makes(step: Any, name: str) -> bool:
     target = step.get("_target_") if isinstance(step, Mapping) else None
-    return target.rpartition(".")[2] if isinstance(target, str) else ""
+    return isinstance(target, str) and target.endswith(f".{name}")
 
 
 def _flatten(config: Any, prefix: str = "") -> dict[str, Any]:
