@@ -1,3 +1,7 @@
+# pyright: reportArgumentType=false
+# pyright: reportIncompatibleMethodOverride=false
+# pyright: reportReturnType=false
+# (Ray is untyped; torch.cat takes TensorDicts, which its annotation lacks.)
 """Collectors on a Ray cluster, whose workers may die.
 
 TorchRL's `RayCollector` makes the workers, places them on the cluster and ends them. Two of its

@@ -1,3 +1,6 @@
+# pyright: reportArgumentType=false
+# pyright: reportAttributeAccessIssue=false
+# (TensorDict's entries are annotated as tensors or TensorDicts, its keys as single names.)
 """Flies a policy and records what it saw, did, and what was there in truth.
 
 Whole episodes are flown, and of each about as many frames are drawn and analysed: evenly spread

@@ -84,7 +84,8 @@ def _write(
     try:
         folder.mkdir(parents=True, exist_ok=True)
         context.dataset.save(folder / "dataset.npz", context.flights)
-        np.savez_compressed(folder / "arrays.npz", **arrays)
+        # numpy's annotation takes any name for allow_pickle
+        np.savez_compressed(folder / "arrays.npz", **arrays)  # pyright: ignore[reportArgumentType]
         (folder / "explanation.json").write_text(json.dumps(numbers, indent=1))
     except OSError as error:
         raise InputError(

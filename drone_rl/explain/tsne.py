@@ -87,7 +87,7 @@ def embed(originals: NDArray, *, perplexity: float = 30.0, seed: int = 0) -> Emb
     reduced = np.ascontiguousarray(centred @ components.T)
     few = len(flat) <= FEW
     model = openTSNE.TSNE(
-        perplexity=perplexity,
+        perplexity=perplexity,  # pyright: ignore[reportArgumentType] (takes fractions, too)
         initialization="pca",
         random_state=seed,
         n_jobs=1 if few else num_cores(),
