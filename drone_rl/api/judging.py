@@ -68,8 +68,10 @@ class Evaluation:
 
     def __str__(self) -> str:
         """The table for a terminal."""
-        lines = ((name, "".join(f"{v:>18}" for v in values)) for name, *values in self.rows())
-        return "\n".join(f"{name:21}{values}" for name, values in lines)
+        rows = self.rows()
+        widths = [2 + max(map(len, column)) for column in zip(*rows, strict=True)]
+        aligned = [[f"{row[0]:{widths[0]}}", *map(str.rjust, row[1:], widths[1:])] for row in rows]
+        return "\n".join("".join(cells) for cells in aligned)
 
     def _repr_html_(self) -> str:
         head, *rows = self.rows()

@@ -25,9 +25,9 @@ class Policy:
     """For people: a name in the zoo, or that of the run's folder."""
     path: Path
     """Its file."""
-    description: PolicyDescription
+    description: PolicyDescription = dataclasses.field(repr=False)
     """Task, camera, transforms and network."""
-    state: dict[str, Any]
+    state: dict[str, Any] = dataclasses.field(repr=False)
     """All that its file says, see `drone_rl.zoo.read_policy`."""
 
     @property

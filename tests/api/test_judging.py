@@ -1,5 +1,7 @@
 """Evaluations and verdicts in Python, and how they show themselves."""
 
+import re
+
 import pytest
 
 import drone_rl
@@ -85,3 +87,4 @@ def test_the_table_of_an_evaluation(good):
     assert "share left" in rows[4] and rows[4].endswith("not offered")
     assert rows[8].split() == ["ended:", "step", "limit", "1", "1"]
     assert len({len(row) for row in rows}) == 1
+    assert all(len(re.split(" {2,}", row)) == 3 for row in rows)  # no two columns touch

@@ -19,6 +19,7 @@ def test_a_policy_that_travels_with_the_package():
     shown = policy._repr_html_()
     assert "<td>network</td>" in shown
     assert "small_cnn" in shown
+    assert repr(policy) == f"Policy(name='good', path={policy.path!r})"  # not all its weights
 
 
 def test_a_changed_task_changes_the_worlds_alone():
