@@ -63,7 +63,9 @@ def __getattr__(name: str) -> Any:
     """Imports a public name when it is first asked for."""
     if name not in _HOMES:
         raise AttributeError(f"module 'drone_rl' has no attribute {name!r}")
-    with collecting_no_garbage():
+    from drone_rl.utils.quiet import noise_held_back
+
+    with collecting_no_garbage(), noise_held_back():
         value = getattr(importlib.import_module(_HOMES[name]), name)
     globals()[name] = value
     return value

@@ -33,3 +33,9 @@ def test_what_is_not_there():
 def test_nothing_heavy_is_imported():
     code = "import sys, drone_rl; assert not {'torch', 'numpy', 'hydra'} & set(sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_importing_the_api_says_nothing():
+    code = "import warnings; warnings.simplefilter('default'); import drone_rl; drone_rl.judge"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert (done.stdout, done.stderr) == ("", "")

@@ -11,6 +11,8 @@ from hydra.core.global_hydra import GlobalHydra
 from omegaconf import OmegaConf
 
 _KNOB = re.compile(r"(?P<indent> *)(?P<name>[A-Za-z_]\w*):(?= |$)")
+_NOT_SHOWN = ("hydra", "paths")
+"""Groups that nobody chooses from."""
 _EXAMPLES = """\
 examples
   drone-rl train seed=1 optimiser.lr=2e-3        change settings
@@ -36,12 +38,11 @@ def show_help(command: str, conf: Path, overrides: Sequence[str]) -> None:
     values = OmegaConf.to_container(config, resolve=False)
     print(f"drone-rl {command.replace('_', '-')} [setting=value ...]\n")
     print((conf / f"{command}.yaml").read_text().split("\ndefaults:")[0], end="\n\n")
-    print("Groups, each chosen by the name of a file:")
-    for group in chosen:
-        files = sorted(path.stem for path in (conf / group).glob("*.yaml"))
-        if files and group not in ("hydra", "paths"):
-            print(f"  {group}: {', '.join(files)}")
-    print("\nSettings, as they would be used now:")
+    groups = {g: sorted(p.stem for p in (conf / g).glob("*.yaml")) for g in chosen}
+    lines = [f"  {g}: {', '.join(f)}" for g, f in groups.items() if f and g not in _NOT_SHOWN]
+    if lines:
+        print("Groups, each chosen by the name of a file:", *lines, "", sep="\n")
+    print("Settings, as they would be used now:")
     for line in explained(values, comments(command, conf, chosen)):
         print(f"  {line}")
     print(f"\n{_EXAMPLES}")

@@ -29,6 +29,14 @@ def ignore_noise() -> None:
 
 
 @contextlib.contextmanager
+def noise_held_back() -> Iterator[None]:
+    """The same for a while, such as an import: warnings are shown as before afterwards."""
+    with warnings.catch_warnings():
+        ignore_noise()
+        yield
+
+
+@contextlib.contextmanager
 def standard_error_closed() -> Iterator[None]:
     """Lets nothing through to standard error, not even from below Python."""
     sys.stderr.flush()

@@ -3,7 +3,7 @@ import subprocess
 import sys
 import warnings
 
-from drone_rl.utils.quiet import ignore_noise, standard_error_closed
+from drone_rl.utils.quiet import ignore_noise, noise_held_back, standard_error_closed
 
 
 def test_nothing_gets_through_to_standard_error_until_it_is_open_again(capfd):
@@ -33,3 +33,12 @@ def test_other_warnings_are_left(monkeypatch):
     warnings.showwarning("about a tensor", UserWarning, "x", 1)
     warnings.showwarning("about GLFW", UserWarning, "x", 1)
     assert seen == ["about a tensor"]
+
+
+def test_noise_is_held_back_for_a_while_alone(monkeypatch):
+    seen = []
+    monkeypatch.setattr(warnings, "showwarning", lambda message, *_: seen.append(message))
+    with noise_held_back():
+        warnings.showwarning("about GLFW", UserWarning, "x", 1)
+    warnings.showwarning("about GLFW, later", UserWarning, "x", 1)
+    assert seen == ["about GLFW, later"]
