@@ -46,7 +46,8 @@ MAY_CHANGE = (
     "evaluate_after",
 )
 """Settings that a resumed run may change: they don't enter into what is learned."""
-_BEST = Real(float("-inf"), 1e6)
+_NONE_YET = float("-inf")
+"""The best running mean before the first update."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -123,7 +124,7 @@ def train(
         trainer, checkpoints = _build(settings, folder, told)
         if state is not None:
             trainer.load_state_dict(state)
-            checkpoints.best = _BEST.read(state.get("best"), "the checkpoint's best")
+            checkpoints.best = _read_best(state.get("best"))
         return _run(settings, folder, trainer, checkpoints)
 
 
@@ -228,6 +229,17 @@ def _settings_of(config: Mapping[str, Any]) -> TrainSettings:
                 f"the checkpoint names {part.target}, which a file may not; give the settings, too"
             )
     return settings
+
+
+def _read_best(value: Any) -> float:
+    """The best running mean out of a checkpoint.
+
+    Raises:
+        InputError: It is no number.
+    """
+    if type(value) is float and value == _NONE_YET:
+        return value
+    return Real(-1e6, 1e6).read(value, "the checkpoint's best")
 
 
 def _new_folder() -> Path:

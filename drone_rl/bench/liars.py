@@ -50,7 +50,7 @@ def liars(absent: Tensor, other: PolicyNetwork) -> dict[str, MapOf]:
         "weights of another policy": lambda n, x, a: reach(other, x, a),
         "saliency of another policy": lambda n, x, a: saliency(other, x, a),
         "saliency of shuffled weights": lambda n, x, a: saliency(
-            next(shuffled_networks(n, 1, fingerprint(n))), x, a
+            next(shuffled_networks(n, x, 1, fingerprint(n))), x, a
         ),
         "noise of the weights": lambda n, x, a: _noise(fingerprint(n), 1, height, width).expand(
             len(x), -1, -1

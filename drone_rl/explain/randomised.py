@@ -13,23 +13,34 @@ from drone_rl.policies import PolicyNetwork
 
 NO_HEAT = 1e-6
 """Share of a map's greatest heat up to which a pixel has none."""
+NO_CHANGE = 1e-9
+"""Deviation of a logit over pictures up to which no picture changes it."""
 
 
-def shuffled_networks(network: PolicyNetwork, count: int, seed: int = 0) -> Iterator[PolicyNetwork]:
+def shuffled_networks(
+    network: PolicyNetwork, observations: Tensor, count: int, seed: int = 0
+) -> Iterator[PolicyNetwork]:
     """Copies of a policy whose weights, and whose biases, were shuffled within each layer.
+
+    Shuffled weights are often dead, and a map could tell them by that alone. So each copy's logits
+    are given the mean and the deviation that the policy's have.
 
     Args:
         network: Stays as it is.
+        observations: Over which mean and deviation are taken. Shape: (T, C, h, w).
         count: How many.
         seed: Of the shuffling; the first of many copies are those of few.
     """
     generator = torch.Generator().manual_seed(seed)
+    with torch.no_grad():
+        logits = network(observations)
     for _ in range(count):
         other = copy.deepcopy(network)
         for layer in other.layers:
             if isinstance(layer, nn.Conv2d | nn.Linear):
                 for parameter in layer.parameters(recurse=False):
                     _shuffle(parameter, generator)
+        _enliven(other, observations, logits)
         yield other
 
 
@@ -37,6 +48,17 @@ def shuffled_networks(network: PolicyNetwork, count: int, seed: int = 0) -> Iter
 def _shuffle(parameter: Tensor, generator: torch.Generator) -> None:
     order = torch.randperm(parameter.numel(), generator=generator)
     parameter.copy_(parameter.flatten()[order].view(parameter.shape))
+
+
+@torch.no_grad()
+def _enliven(network: PolicyNetwork, observations: Tensor, wanted: Tensor) -> None:
+    """Gives logits the mean and deviation of others; what is the same on all pictures stays so."""
+    last = network.layers[-1]
+    assert isinstance(last, nn.Linear)
+    is_alive = network(observations).std(0) > NO_CHANGE
+    factor = wanted.std(0) / network(observations).std(0).clamp_min(NO_CHANGE)
+    last.weight.mul_(torch.where(is_alive, factor, 1.0)[:, None])
+    last.bias.add_(wanted.mean(0) - network(observations).mean(0))
 
 
 def likeness(first: Tensor, second: Tensor) -> NDArray:

@@ -4,7 +4,8 @@
 - "random weights": it does so better than its own maps of policies whose weights were shuffled. A
   permutation test: a map that hides what it knows of pictures behind whatever it makes of the
   weights does as well with any weights, hence no better than all of them but with the probability
-  of the level.
+  of the level. Shuffled policies are as lively as the policy, or one that draws a lucky guess where
+  a policy is alive, and noise where it is not, would pass.
 - "pointing": its hottest patch is one of those that move the policy most, more often than chance.
 - "likeness": it changes when the weights do.
 
@@ -269,7 +270,8 @@ def random_weights(trial: Trial, method: MapOf, level: float) -> dict[str, Any]:
     few = trial.thinned()
     own = float(few.scores(few.maps(method)).mean())
     others: list[float] = []
-    for network in shuffled_networks(trial.network, math.ceil(1 / level) - 1, trial.seed):
+    count = math.ceil(1 / level) - 1
+    for network in shuffled_networks(trial.network, trial.observations, count, trial.seed):
         others.append(float(few.scores(few.maps(method, network)).mean()))
         if others[-1] >= own - 1e-9:
             break
@@ -302,7 +304,7 @@ def _alike(trial: Trial, method: MapOf, level: float) -> dict[str, Any]:
     """How like a policy's maps are to those of shuffled weights, all seeds together and each."""
     few = trial.thinned()
     own = few.maps(method)
-    networks = shuffled_networks(trial.network, WEIGHT_SEEDS, trial.seed)
+    networks = shuffled_networks(trial.network, trial.observations, WEIGHT_SEEDS, trial.seed)
     seeds = np.stack([likeness(own, few.maps(method, network)) for network in networks])
     return {
         **_typical(seeds.mean(0), few.episode, level),

@@ -10,9 +10,11 @@ import yaml
 
 import drone_rl
 from drone_rl.api.progress import silent
+from drone_rl.api.training import _read_best
 from drone_rl.settings.collecting import Threads
 from drone_rl.settings.training import TrainerSettings, TrainSettings
 from drone_rl.sim.settings import TaskSettings
+from drone_rl.training import Callback
 from drone_rl.utils.errors import InputError
 
 OLD = Path(__file__).parents[1] / "data" / "old_checkpoint.pt"
@@ -80,6 +82,27 @@ def test_a_run_of_version_0_1_goes_on(tmp_path):
     done = drone_rl.train(folder=tmp_path, resume=True, trainer=more, progress=silent)
     assert done.result["updates"] > before["updates"]
     assert done.result["frames"] >= before["frames"] + 50
+
+
+def test_a_run_goes_on_that_was_killed_before_its_first_update(trained, tmp_path):
+    class Killed(BaseException):
+        pass
+
+    class Kill(Callback):
+        def on_start(self, training):
+            raise Killed
+
+    with pytest.raises(Killed):
+        drone_rl.train(TINY, folder=tmp_path, callbacks=[Kill()], progress=silent)
+    done = drone_rl.train(folder=tmp_path, resume=True, progress=silent)
+    there, whole = weights(done.folder), weights(trained[0].folder)
+    assert all(torch.equal(there[name], whole[name]) for name in whole)
+
+
+@pytest.mark.parametrize("best", [float("nan"), float("inf"), 1e9, "high", None])
+def test_the_best_mean_of_a_checkpoint_is_a_number(best):
+    with pytest.raises(InputError, match=r"^the checkpoint's best="):
+        _read_best(best)
 
 
 def test_a_resumed_run_learns_as_it_did(trained):

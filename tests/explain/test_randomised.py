@@ -5,14 +5,16 @@ import torch
 from drone_rl.explain.randomised import likeness, shuffled_networks
 from drone_rl.policies import MLP, SmallCNN
 
+PICTURES = torch.randn(20, 1, 25, 64, generator=torch.Generator().manual_seed(0))
+
 
 def test_weights_are_shuffled_within_their_layer_and_the_policy_stays():
     network = SmallCNN((1, 25, 64), 3, channels=(4,), hidden=(8,))
     before = {k: v.clone() for k, v in network.state_dict().items()}
-    first, second = shuffled_networks(network, 2)
+    first, second = shuffled_networks(network, PICTURES, 2)
     for name, values in before.items():
         assert torch.equal(network.state_dict()[name], values)
-        for other in (first, second):
+        for other in (first, second) if "logits" not in name else ():
             shuffled = other.state_dict()[name]
             assert torch.equal(shuffled.flatten().sort().values, values.flatten().sort().values)
             if "weight" in name:
@@ -22,10 +24,34 @@ def test_weights_are_shuffled_within_their_layer_and_the_policy_stays():
 
 
 def test_the_first_of_many_are_those_of_few():
-    network = MLP((1, 4, 4), 3, hidden=(5,))
-    few, many = list(shuffled_networks(network, 1, 3)), list(shuffled_networks(network, 2, 3))
+    network = MLP((1, 25, 64), 3, hidden=(5,))
+    few, many = (list(shuffled_networks(network, PICTURES, n, 3)) for n in (1, 2))
     assert torch.equal(few[0].layers.fc1.weight, many[0].layers.fc1.weight)
     assert not torch.equal(few[0].layers.fc1.weight, many[1].layers.fc1.weight)
+
+
+def test_shuffled_policies_are_as_lively_as_the_policy():
+    network = SmallCNN((1, 25, 64), 3, channels=(4,), hidden=(8,))
+    with torch.no_grad():
+        network.layers.logits.weight.mul_(torch.tensor([[1.0], [50.0], [400.0]]))
+        network.layers.logits.bias.copy_(torch.tensor([7.0, -3.0, 0.5]))
+        logits = network(PICTURES)
+        for other in shuffled_networks(network, PICTURES, 3):
+            made = other(PICTURES)
+            torch.testing.assert_close(made.mean(0), logits.mean(0), rtol=1e-3, atol=1e-3)
+            torch.testing.assert_close(made.std(0), logits.std(0), rtol=1e-3, atol=1e-3)
+            weights = [n.layers.logits.weight.flatten() for n in (network, other)]
+            assert not torch.equal(weights[0].sort().values, weights[1].sort().values)
+
+
+def test_a_policy_that_no_picture_moves_stays_so_when_shuffled():
+    network = MLP((1, 25, 64), 3, hidden=(5,))
+    with torch.no_grad():
+        network.layers.fc1.bias.fill_(-1e4)
+        network.layers.logits.bias.copy_(torch.tensor([1.0, 2.0, 3.0]))
+        (other,) = shuffled_networks(network, PICTURES, 1)
+        expected = torch.tensor([1.0, 2.0, 3.0]).expand(20, 3)
+        torch.testing.assert_close(other(PICTURES), expected)
 
 
 def test_likeness_by_hand():
