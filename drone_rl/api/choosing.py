@@ -27,12 +27,9 @@ def judge_to_choose(path: Path, episodes: int, device: str) -> tuple[dict[str, A
         InputError: The checkpoint is unusable.
     """
     policy = load_policy(path)
-    env = policy.make_env(min(episodes, 250), stream=Stream.CHOICE, device=device)
-    try:
-        actor = policy.make_actor(env, stream=Stream.CHOICE)
+    worlds = policy.flying(min(episodes, 250), stream=Stream.CHOICE, device=device)
+    with worlds as (env, actor):
         return judge_policy(env, actor, episodes).as_dict(), policy.state["progress"]
-    finally:
-        env.close()
 
 
 def judge_run(folder: Path, episodes: int, device: str) -> dict[str, Any]:

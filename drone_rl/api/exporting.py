@@ -27,19 +27,16 @@ def export(
     Raises:
         InputError: It can't be written.
     """
-    env = policy.make_env(settings.num_worlds, seed=settings.seed, device=settings.device)
-    try:
-        actor = policy.make_actor(env, seed=settings.seed)
+    seed, device = settings.seed, settings.device
+    with policy.flying(settings.num_worlds, seed=seed, device=device) as (env, actor):
         verdict = judge_policy(env, actor, settings.episodes).as_dict()
-    finally:
-        env.close()
     noted, chosen = origin_of(policy.path, policy.state)
     export_policy(
         target,
         policy.state,
         command=command or noted,
         verdict=verdict,
-        seed=settings.seed,
+        seed=seed,
         chosen=chosen,
     )
 

@@ -44,12 +44,11 @@ def film(
     Returns:
         The files.
     """
-    env = policy.make_env(1, seed=seed, device=device)
-    actor, files = policy.make_actor(env, seed=seed), []
-    for episode in range(episodes):
-        frames = list(film_episode(env, actor, greedy=greedy))
-        files += write_video(frames, folder / f"episode_{episode}")
-    env.close()
+    files: list[Path] = []
+    with policy.flying(1, seed=seed, device=device) as (env, actor):
+        for episode in range(episodes):
+            frames = list(film_episode(env, actor, greedy=greedy))
+            files += write_video(frames, folder / f"episode_{episode}")
     for file in files:
         _log.info("written: %s", file)
     return files

@@ -2,7 +2,8 @@
 
 import dataclasses
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -129,18 +130,18 @@ def evaluate(
     settings = (settings or EvaluateSettings()).replace(**changes)
     progress = progress or Bar()
     policy = policy if isinstance(policy, Policy) else load_policy(policy)
-    env, actor = _pilot(policy, settings)
-    worlds, task, episodes = env.base_env.state_dict(), policy.task, settings.episodes
-    steps = 3 if settings.baselines else 2
-    progress("most probable actions", 0, steps)
-    flown = {"greedy": run_episodes(env, actor, episodes)}
-    env.base_env.load_state_dict(worlds)
-    progress("drawn actions", 1, steps)
-    flown["sampled"] = run_episodes(env, actor, episodes, greedy=False)
+    episodes, steps = settings.episodes, 3 if settings.baselines else 2
+    with _flying(policy, settings) as (env, actor):
+        worlds = env.base_env.state_dict()
+        progress("most probable actions", 0, steps)
+        flown = {"greedy": run_episodes(env, actor, episodes)}
+        env.base_env.load_state_dict(worlds)
+        progress("drawn actions", 1, steps)
+        flown["sampled"] = run_episodes(env, actor, episodes, greedy=False)
     if settings.baselines:
         progress("luck and the oracle", 2, steps)
-        flown |= fly_baselines(env.batch_size[0], task, worlds, episodes, settings.device)
-    env.close()
+        num_worlds, device = settings.num_worlds, settings.device
+        flown |= fly_baselines(num_worlds, policy.task, worlds, episodes, device)
     progress("evaluated", steps, steps)
     return Evaluation(policy, settings, {name: summarise(e) for name, e in flown.items()})
 
@@ -173,28 +174,30 @@ def judge(
     progress("policy, luck and oracle", 0, 1)
     name = policy.name if isinstance(policy, Policy) else str(policy)
     changed = Changes(TaskSettings).read(task or {}, "task")
-    if policy in BASELINES:
-        env, actor = _baseline(name, TaskSettings(**changed), settings)
+    is_baseline = policy in BASELINES
+    if is_baseline:
+        worlds = _baseline(name, TaskSettings(**changed), settings)
     else:
         loaded = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
-        env, actor = _pilot(loaded.in_task(**changed), settings)
-    draws = settings.sampled and policy not in BASELINES
-    rule = Rule(good_share=settings.good_share)
-    verdict = judge_policy(env, actor, settings.episodes, rule=rule, sampled=draws)
-    env.close()
+        worlds = _flying(loaded.in_task(**changed), settings)
+    draws, rule = settings.sampled and not is_baseline, Rule(good_share=settings.good_share)
+    with worlds as (env, actor):
+        verdict = judge_policy(env, actor, settings.episodes, rule=rule, sampled=draws)
     progress("judged", 1, 1)
     return Judgement(name, settings, verdict)
 
 
-def _pilot(policy: Policy, settings: FlightSettings) -> tuple[Any, TensorDictModuleBase]:
+def _flying(
+    policy: Policy, settings: FlightSettings
+) -> AbstractContextManager[tuple[Any, TensorDictModuleBase]]:
     """Unseen worlds and the policy in them."""
-    env = policy.make_env(settings.num_worlds, seed=settings.seed, device=settings.device)
-    return env, policy.make_actor(env, seed=settings.seed)
+    return policy.flying(settings.num_worlds, seed=settings.seed, device=settings.device)
 
 
+@contextmanager
 def _baseline(
     name: str, task: TaskSettings, settings: FlightSettings
-) -> tuple[EnvBase, TensorDictModuleBase]:
+) -> Iterator[tuple[EnvBase, TensorDictModuleBase]]:
     """The same worlds and one that sees no picture."""
     env = DroneEnv(
         settings.num_worlds,
@@ -205,7 +208,10 @@ def _baseline(
         device=settings.device,
     )
     generator = torch_generator(settings.seed, Stream.ACTIONS, device=env.device)
-    return env, make_baseline(name, task, generator)
+    try:
+        yield env, make_baseline(name, task, generator)
+    finally:
+        env.close()
 
 
 def _interval(figure: dict[str, Any], key: str) -> str:

@@ -1,6 +1,8 @@
 """A trained policy, wherever it comes from, and the worlds to fly it in."""
 
+import contextlib
 import dataclasses
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +15,7 @@ from drone_rl.policies import PolicyNetwork, make_actor
 from drone_rl.settings.changes import Changes
 from drone_rl.sim.settings import TaskSettings
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.files import newest
 from drone_rl.utils.seeding import Stream, torch_generator
 from drone_rl.zoo import PolicyDescription, parse, policy_names, policy_path, read_policy
 
@@ -91,6 +94,29 @@ class Policy:
         generator = torch_generator(seed, stream, device=device)
         return make_actor(self.make_network(device), env.action_spec, generator)
 
+    @contextlib.contextmanager
+    def flying(
+        self,
+        num_envs: int,
+        *,
+        seed: int = 0,
+        stream: Stream = Stream.REPORT,
+        device: str = "cpu",
+    ) -> Iterator[tuple[TransformedEnv, TensorDictModuleBase]]:
+        """Worlds and it as their actor, for a while; then the worlds are closed.
+
+        Args:
+            num_envs: How many.
+            seed: Root of their random streams and of its own.
+            stream: Which worlds.
+            device: Where they are drawn.
+        """
+        env = self.make_env(num_envs, seed=seed, stream=stream, device=device)
+        try:
+            yield env, self.make_actor(env, seed=seed, stream=stream)
+        finally:
+            env.close()
+
     def _repr_html_(self) -> str:
         """Shows itself in a notebook."""
         progress, described = self.state["progress"], self.description.as_dict()
@@ -129,14 +155,13 @@ def find_policy(which: str | Path, outputs: str | Path = "outputs") -> Path:
         InputError: There is none.
     """
     if which == "latest":
-        runs = Path(outputs).glob("train/**/checkpoints/last.pt")
-        newest = max(runs, key=lambda path: path.stat().st_mtime, default=None)
-        if newest is None:
+        last = newest(Path(outputs).glob("train/**/checkpoints/last.pt"))
+        if last is None:
             raise InputError(
                 f"policy=latest, but there is no run under {outputs}/train; "
                 "run drone-rl train first or give the path of a checkpoint"
             )
-        return newest
+        return last
     if which in policy_names():
         return policy_path(str(which))
     path = Path(which)

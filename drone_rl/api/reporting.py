@@ -7,6 +7,7 @@ from jinja2 import TemplateError
 
 from drone_rl.report import write_report
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.files import newest
 
 _INCOMPLETE = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, TemplateError)
 """What becomes of a number that is missing or of another type, deep in the making of a report."""
@@ -42,13 +43,14 @@ def find_explanations(which: Sequence[str], outputs: str | Path = "outputs") -> 
     """
     if tuple(which) != ("latest",):
         return [folder for path in which for folder in _explanations(Path(path))]
-    runs = {path.parents[1] for path in Path(outputs).glob("explain/runs/*/*/explanation.json")}
-    if not runs:
+    made = Path(outputs).glob("explain/runs/*/*/explanation.json")
+    run = newest({path.parents[1] for path in made})
+    if run is None:
         raise InputError(
             f"explanations=latest, but there is none under {outputs}/explain; "
             "run drone-rl explain first or give folders"
         )
-    return _explanations(max(runs, key=lambda run: run.stat().st_mtime))
+    return _explanations(run)
 
 
 def _explanations(folder: Path) -> list[Path]:

@@ -8,6 +8,7 @@ from typing import Any
 from drone_rl.sweeps import Sweep, read_result, read_sweep
 from drone_rl.sweeps.page import write_sweep_report
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.files import newest
 
 _log = logging.getLogger(__name__)
 
@@ -24,14 +25,13 @@ def find_sweep(which: str | Path, outputs: str | Path = "outputs") -> Sweep:
     """
     if which != "latest":
         return read_sweep(Path(which).absolute())
-    sweeps = Path(outputs).glob("train/multiruns/*/sweep.json")
-    newest = max(sweeps, key=lambda path: path.stat().st_mtime, default=None)
-    if newest is None:
+    last = newest(Path(outputs).glob("train/multiruns/*/sweep.json"))
+    if last is None:
         raise InputError(
             f"folder=latest, but there is no sweep under {outputs}/train/multiruns; "
             "run drone-rl train -m first or give the folder of a sweep"
         )
-    return read_sweep(newest.parent.absolute())
+    return read_sweep(last.parent.absolute())
 
 
 def judge_sweep(sweep: Sweep, episodes: int, device: str) -> None:

@@ -53,12 +53,13 @@ def _shuffle(parameter: Tensor, generator: torch.Generator) -> None:
 @torch.no_grad()
 def _enliven(network: PolicyNetwork, observations: Tensor, wanted: Tensor) -> None:
     """Gives logits the mean and deviation of others; what is the same on all pictures stays so."""
-    last = network.layers[-1]
+    last, logits = network.layers[-1], network(observations)
     assert isinstance(last, nn.Linear)
-    is_alive = network(observations).std(0) > NO_CHANGE
-    factor = wanted.std(0) / network(observations).std(0).clamp_min(NO_CHANGE)
-    last.weight.mul_(torch.where(is_alive, factor, 1.0)[:, None])
-    last.bias.add_(wanted.mean(0) - network(observations).mean(0))
+    deviation, mean = torch.std_mean(logits, 0, correction=0)
+    wanted_deviation, wanted_mean = torch.std_mean(wanted, 0, correction=0)
+    factor = torch.where(deviation > NO_CHANGE, wanted_deviation / deviation, 1.0)
+    last.weight.mul_(factor[:, None])
+    last.bias.copy_(wanted_mean - factor * (mean - last.bias))
 
 
 def likeness(first: Tensor, second: Tensor) -> NDArray:

@@ -8,7 +8,7 @@ import os
 import re
 import stat
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -46,6 +46,11 @@ def read_bytes(path: Path, most: int) -> bytes:
     if not content:
         raise InputError(f"{path} is empty; the file was damaged or cut short")
     return content
+
+
+def newest(paths: Iterable[Path]) -> Path | None:
+    """The file or folder that was changed last; None if there is none."""
+    return max(paths, key=lambda path: path.stat().st_mtime, default=None)
 
 
 def read_json(path: Path, most: int = 1_000_000) -> Any:

@@ -29,7 +29,7 @@ def test_the_worlds_are_those_to_choose_by(trained, monkeypatch):
     monkeypatch.setattr(Policy, "make_env", note)
     with pytest.raises(InputError, match="enough"):
         judge_to_choose(trained / "checkpoints" / "last.pt", 5, "cpu")
-    assert asked == {"stream": Stream.CHOICE, "device": "cpu", "num_envs": 5}
+    assert asked == {"stream": Stream.CHOICE, "seed": 0, "device": "cpu", "num_envs": 5}
 
 
 def test_a_run_keeps_its_verdict_beside_its_result(trained):

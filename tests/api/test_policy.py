@@ -22,6 +22,15 @@ def test_a_policy_that_travels_with_the_package():
     assert repr(policy) == f"Policy(name='good', path={policy.path!r})"  # not all its weights
 
 
+def test_worlds_are_closed_when_the_flights_end_or_fail():
+    policy = drone_rl.load_policy("good")
+    with pytest.raises(KeyError), policy.flying(2) as (env, actor):
+        assert actor(env.reset())["action"].shape == (2,)
+        assert not env.is_closed
+        raise KeyError
+    assert env.is_closed
+
+
 def test_a_changed_task_changes_the_worlds_alone():
     policy = drone_rl.load_policy("good")
     other = policy.in_task(num_cubes=5, spacing=None)

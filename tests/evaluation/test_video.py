@@ -4,20 +4,11 @@ import torch
 from tensordict import TensorDict
 
 from drone_rl.evaluation.video import _draw_bars, film_episode, write_video
-from drone_rl.sim.actions import MOVES, DiscreteActions
+from drone_rl.sim.actions import MOVES
 from drone_rl.sim.settings import TaskSettings
 from drone_rl.utils.errors import InputError
+from tests.five_actions import FIVE
 from tests.second_task import Posts
-
-FIVE = DiscreteActions(
-    names=("up", "down", "left", "right", "stay"),
-    mirrored=(0, 1, 3, 2, 4),
-    opposite=(1, 0, 3, 2, 4),
-    left=2,
-    order=(2, 0, 4, 1, 3),
-    arrows=((0, 1), (0, -1), (-1, 0), (1, 0), (0, 0)),
-    colors=((0, 0, 0),) * 5,
-)
 
 
 class Canvas:

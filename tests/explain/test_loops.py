@@ -3,19 +3,11 @@ import pytest
 
 from drone_rl.explain.dataset import RolloutDataset
 from drone_rl.explain.loops import find_loops, summarise_loops
-from drone_rl.sim.actions import MOVES, DiscreteActions
+from drone_rl.sim.actions import MOVES
+from tests.five_actions import FIVE
 
 F, L, R = 0, 1, 2
 UP, DOWN, LEFT, RIGHT, STAY = range(5)
-FIVE = DiscreteActions(
-    names=("up", "down", "left", "right", "stay"),
-    mirrored=(0, 1, 3, 2, 4),
-    opposite=(1, 0, 3, 2, 4),
-    left=2,
-    order=(2, 0, 4, 1, 3),
-    arrows=((0, 1), (0, -1), (-1, 0), (1, 0), (0, 0)),
-    colors=((0, 0, 0),) * 5,
-)
 
 
 def flights(actions, episode):

@@ -3,17 +3,7 @@ import pytest
 import torch
 
 from drone_rl.sim.actions import MOVES, DiscreteActions, Move
-
-FIVE = DiscreteActions(
-    names=("up", "down", "left", "right", "stay"),
-    mirrored=(0, 1, 3, 2, 4),
-    opposite=(1, 0, 3, 2, 4),
-    left=2,
-    order=(2, 0, 4, 1, 3),
-    arrows=((0, 1), (0, -1), (-1, 0), (1, 0), (0, 0)),
-    colors=((1, 0, 0),) * 5,
-)
-"""A set of another size, with two pairs that undo each other and one pair of mirror images."""
+from tests.five_actions import FIVE
 
 
 def test_numbers_of_the_moves_are_those_of_files_and_policies():

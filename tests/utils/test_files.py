@@ -10,6 +10,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import (
     folder_lock,
     is_locked,
+    newest,
     parse_json,
     read_bytes,
     read_json,
@@ -25,6 +26,15 @@ def test_a_file_is_replaced_whole_and_nothing_is_left_beside_it(tmp_path):
     write_atomically(path, "new")
     assert path.read_text() == "new"
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_the_newest_is_the_one_that_was_changed_last(tmp_path):
+    paths = [tmp_path / name for name in ("a", "b", "c")]
+    for path, changed in zip(paths, (20, 30, 10), strict=True):
+        path.touch()
+        os.utime(path, (99, changed))
+    assert newest(paths) == tmp_path / "b"
+    assert newest([]) is None
 
 
 def test_a_folder_has_one_holder_at_a_time(tmp_path):
