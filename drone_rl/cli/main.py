@@ -5,6 +5,7 @@ import sys
 from typing import cast
 
 from drone_rl.cli.usage import COMMANDS, USAGE
+from drone_rl.utils.garbage import leave_garbage_to_the_system
 
 
 def main() -> None:
@@ -19,7 +20,9 @@ def main() -> None:
     from drone_rl.hydra_app.messages import guarded  # usage and typing errors don't wait for Hydra
 
     steps = [("train", overrides), ("evaluate", []), ("explain", [])]
-    sys.exit(guarded(lambda: _run_all(steps if name == "demo" else [(name, overrides)])))
+    status = guarded(lambda: _run_all(steps if name == "demo" else [(name, overrides)]))
+    leave_garbage_to_the_system()
+    sys.exit(status)
 
 
 def _run_all(steps: list[tuple[str, list[str]]]) -> int:

@@ -11,8 +11,15 @@ from torch import Tensor
 from drone_rl.sim.composer_task import ComposerTask
 from drone_rl.sim.dynamics import BodyState, Dynamics
 from drone_rl.sim.entities.cameras import FRONT_CENTER
-from drone_rl.sim.rendering import Appearance, Poses, Renderer, Scene, View, WarpRenderer
-from drone_rl.sim.rendering.renderer import MakeRenderer
+from drone_rl.sim.rendering import (
+    Appearance,
+    MakeRenderer,
+    Poses,
+    Renderer,
+    Scene,
+    View,
+    make_renderer,
+)
 from drone_rl.sim.rendering.view import Modality
 from drone_rl.sim.settings import CameraSettings, TaskSettings
 from drone_rl.sim.tasks import State, Task, as_task
@@ -28,7 +35,7 @@ class Worlds:
         camera: CameraSettings | None = None,
         *,
         dynamics: Dynamics | None = None,
-        renderer: MakeRenderer = WarpRenderer,
+        renderer: MakeRenderer = make_renderer,
         device: str = "cpu",
         num_shards: int | None = None,
     ) -> None:
@@ -39,7 +46,7 @@ class Worlds:
             task: What there is to do; cube collection as in the original study by default.
             camera: The policy's.
             dynamics: How the drones move; the task's own choice by default.
-            renderer: What makes the one that draws.
+            renderer: What makes the one that draws; the fastest for the device by default.
             device: "cpu", "cuda" or "cuda:N".
             num_shards: See `MakeRenderer`.
         """

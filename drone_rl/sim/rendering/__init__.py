@@ -1,17 +1,21 @@
 """Pictures of worlds: what is asked for, how things look, and who draws them."""
 
 from drone_rl.sim.rendering.appearance import Appearance
-from drone_rl.sim.rendering.renderer import Poses, Renderer
+from drone_rl.sim.rendering.default import make_renderer
+from drone_rl.sim.rendering.devices import check_device
+from drone_rl.sim.rendering.raytrace import Raytracer
+from drone_rl.sim.rendering.renderer import MakeRenderer, Poses, Renderer
 from drone_rl.sim.rendering.scene import Scene
 from drone_rl.sim.rendering.view import View
-from drone_rl.sim.rendering.warp import WarpRenderer, check_device
 
 __all__ = [
     "Appearance",
+    "MakeRenderer",
     "Poses",
+    "Raytracer",
     "Renderer",
     "Scene",
     "View",
-    "WarpRenderer",
     "check_device",
+    "make_renderer",
 ]

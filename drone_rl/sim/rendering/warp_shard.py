@@ -1,14 +1,7 @@
 # pyright: reportAttributeAccessIssue=false
-# pyright: reportArgumentType=false
-# (MuJoCo's compiled bindings and Warp's captures are untyped.)
-"""Buffers and kernels of MuJoCo Warp that draw one share of a batch of worlds.
+# (MuJoCo's compiled bindings are untyped.)
+"""Buffers and kernels of MuJoCo Warp that draw one share of a batch of worlds."""
 
-A CPU's shard records the kernels of a frame once for each number of worlds and then replays them,
-which spares Python the packing of some hundred arguments: a single world is drawn several times as
-fast.
-"""
-
-import threading
 from contextlib import AbstractContextManager, nullcontext
 
 import mujoco
@@ -24,8 +17,6 @@ from drone_rl.sim.rendering.scene import Scene
 from drone_rl.sim.rendering.view import View
 from drone_rl.sim.rendering.warp_looks import Looks
 
-RECORDING = threading.Lock()
-"""Held while kernels are recorded or built: Warp records whatever any thread launches."""
 _NOTHING_HIT = 0.0
 """Opacity of the sky's pixels, by which they are known; those of geoms are opaque."""
 
@@ -68,7 +59,6 @@ class Shard:
         self._mocap_pos = wp.to_torch(self._data.mocap_pos)
         self._pixels = self._buffer()
         self._looks = Looks(scene, self._model, capacity)
-        self._graphs: dict[int, wp.Graph] = {}
 
     def warm_up(self) -> None:
         """Compiles or loads the kernels now, on this thread: later calls may come from any."""
@@ -84,21 +74,10 @@ class Shard:
         self._qpos[:num_worlds] = torch.cat([poses.position, poses.attitude], dim=-1)
         self._mocap_pos[:num_worlds] = poses.props
         self._looks.wear(appearance, num_worlds)
-        if self._qpos.is_cpu:
-            wp.capture_launch(self._graph(num_worlds))
-        else:
-            self._launch(num_worlds)
+        self._launch(num_worlds)
         out.copy_(self._unpack(self._pixels[:num_worlds]))
         if appearance is not None and self._view.modality == "rgb":
             self._fill_sky(appearance, out)
-
-    def _graph(self, num_worlds: int) -> wp.Graph:
-        """The recorded launches of the first rows."""
-        if num_worlds not in self._graphs:
-            with RECORDING, wp.ScopedCapture("cpu") as capture:
-                self._launch(num_worlds)
-            self._graphs[num_worlds] = capture.graph
-        return self._graphs[num_worlds]
 
     def _launch(self, num_worlds: int) -> None:
         self._data.nworld = num_worlds

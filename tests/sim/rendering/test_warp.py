@@ -1,225 +1,34 @@
-import threading
+"""What sets it apart: many threads that build it, and GPUs. All else is in test_renderers."""
+
 from concurrent.futures import ThreadPoolExecutor
 
-import numpy as np
 import pytest
 import torch
 
-from drone_rl.sim.composer_task import make_environment
-from drone_rl.sim.entities.arena import FLOOR_COLOR
-from drone_rl.sim.entities.cameras import CHASE, DRONE_CAMERAS
-from drone_rl.sim.meaning import Meaning
-from drone_rl.sim.rendering import Appearance, View, check_device
-from drone_rl.sim.settings import CameraSettings, TaskSettings
+from drone_rl.sim.rendering.warp import WarpRenderer
 from drone_rl.sim.worlds import Worlds
-from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import world_random_state
 
 
-@pytest.fixture(scope="module")
-def worlds():
-    worlds = Worlds(3)
+def started(**options):
+    worlds = Worlds(3, **options)
     worlds.reset(torch.arange(3), [world_random_state(0, i) for i in range(3)])
-    yield worlds
-    worlds.close()
+    return worlds
 
 
-def names_seen(worlds, segmentation):
-    model = worlds.scene.model
-    return {model.geom(int(i)).name for i in segmentation.unique() if i >= 0}
-
-
-def test_any_part_of_a_batch_is_the_same_picture(worlds):
-    together = worlds.render(worlds.state)
-    assert together.shape == (3, 25, 64, 3)
-    assert together.dtype == torch.uint8
-    for i in range(3):
-        alone = worlds.render(worlds.state[torch.tensor([i])])
-        assert torch.equal(alone[0], together[i])
-
-
-def test_shards_draw_what_one_draws(worlds):
-    single = Worlds(3, num_shards=1)
-    double = Worlds(3, num_shards=2)
-    assert torch.equal(single.render(worlds.state), double.render(worlds.state))
-    single.close()
-    double.close()
-
-
-def test_recording_a_frame_takes_in_nothing_that_other_threads_draw(worlds):
-    expected = worlds.render(worlds.state)
-    stop = threading.Event()
-
-    def draw_on() -> list[bool]:
-        same = []
-        while not stop.is_set():
-            same.append(torch.equal(worlds.render(worlds.state), expected))
-        return same
-
-    with ThreadPoolExecutor(1) as pool:
-        others = pool.submit(draw_on)
-        fresh = Worlds(3, num_shards=1)  # builds, and records one, two and three worlds
-        pictures = [fresh.render(worlds.state[torch.arange(n)]) for n in (1, 2, 3)]
-        stop.set()
-    assert all(torch.equal(picture, expected[: len(picture)]) for picture in pictures)
-    assert others.result()
-    assert all(others.result())
-    fresh.close()
-
-
-def test_more_imagined_worlds_than_there_are(worlds):
-    index = torch.tensor([0, 1, 2, 0, 1])
-    assert torch.equal(
-        worlds.render(worlds.state[index]), worlds.render(worlds.state)[[0, 1, 2, 0, 1]]
-    )
-
-
-def test_depth_of_the_cube_ahead(worlds):
-    state = worlds.state[torch.tensor([0])]
-    state.cubes[0, :, 1] = 0.0
-    depth = worlds.render(state, worlds.view(modality="depth"))
-    # camera 0.4 m ahead of the drone's centre, front face 1.25 m before the cube's centre
-    assert depth[0, 12, 32].item() == pytest.approx(15.0 - 1.25 - 0.4, abs=1e-3)
-    assert depth[0, 0, 0].item() == 0.0  # sky
-
-
-def test_segmentation_names_what_is_seen(worlds):
-    state = worlds.state[torch.tensor([0])]
-    state.cubes[0, :, 1] = 0.0
-    seen = worlds.render(state, worlds.view(modality="segmentation"))[0]
-    name = worlds.scene.model.geom
-    assert name(int(seen[12, 32])).name == "cube_0/geom"
-    assert name(int(seen[24, 32])).name == "floor"
-    assert seen[0, 0].item() == -1
-
-
-@pytest.mark.parametrize("camera", [c.name for c in (*DRONE_CAMERAS, CHASE)])
-def test_every_camera_can_be_asked_for(worlds, camera):
-    picture = worlds.render(worlds.state, worlds.view(camera, height=20, width=30))
-    assert picture.shape == (3, 20, 30, 3)
-
-
-def test_drone_is_unseen_by_itself_and_seen_by_the_chase_camera(worlds):
-    view = worlds.view(CHASE.name, "segmentation", 40, 60, show_drone=True)
-    assert "drone/hull" in names_seen(worlds, worlds.render(worlds.state, view))
-    own = worlds.render(worlds.state, worlds.view("bottom_center", "segmentation"))
-    assert names_seen(worlds, own) == {"floor"}
-
-
-def test_vanished_cube_is_not_drawn(worlds):
-    state = worlds.state[torch.tensor([0])]
-    state.collected[:] = True
-    seen = worlds.render(state, worlds.view(modality="segmentation"))
-    assert names_seen(worlds, seen) == {"floor"}
-
-
-def test_bad_requests_are_refused(worlds):
-    with pytest.raises(InputError, match="choose from"):
-        worlds.render(worlds.state, worlds.view("no_such_camera"))
-    with pytest.raises(InputError, match="rgb, depth or segmentation"):
-        View(camera="x", height=1, width=1, modality="normals")
-    with pytest.raises(InputError, match="cpu, cuda"):
-        check_device("tpu")
-
-
-def test_a_view_that_it_does_not_know_is_refused_in_one_line(worlds):
-    view = worlds.view()
-    object.__setattr__(view, "modality", "normals")  # as another renderer's view may have it
-    with pytest.raises(InputError, match="'normals' can't be drawn by WarpRenderer; ask for one"):
-        worlds.prepare(view)
-
-
-@pytest.fixture
-def ahead(worlds):
-    """Two worlds, each with a cube before the camera."""
-    state = worlds.state[torch.tensor([0, 0])]
-    state.cubes[:, 0, 1] = 0.0
-    return state
-
-
-def regions(worlds, state):
-    """Whether each pixel shows the sky, the ground, a cube."""
-    seen = worlds.render(state, worlds.view(modality="segmentation"))
-    meaning = torch.tensor([*worlds.scene.meanings, Meaning.SKY])[seen]
-    return [meaning == m for m in (Meaning.SKY, Meaning.GROUND, Meaning.TARGET)]
-
-
-def test_an_appearance_colours_what_it_names_and_nothing_else(worlds, ahead):
-    plain, areas = worlds.render(ahead), regions(worlds, ahead)
-    assert all(area.any() for area in areas)
-    for meaning, area in zip((Meaning.SKY, Meaning.GROUND, Meaning.TARGET), areas, strict=True):
-        other = worlds.render(ahead, appearance=Appearance(colors={meaning: (0.1, 0.3, 0.05)}))
-        assert torch.equal((other != plain).any(-1), area), meaning
-    assert torch.equal(worlds.render(ahead), plain)  # and the next picture is as ever
-
-
-def test_the_sky_has_just_the_colour_that_is_asked_for(worlds, ahead):
-    picture = worlds.render(ahead, appearance=Appearance(colors={Meaning.SKY: (0.2, 0.5, 1.0)}))
-    assert picture[:, 0].unique(dim=1).tolist() == [[[51, 127, 255]]] * 2
-
-
-def test_each_world_of_a_call_may_look_its_own_way(worlds, ahead):
-    """Also in more worlds than are drawn together, and whatever part draws them."""
-    grounds = torch.tensor([[0.2, 0.2, 0.2], [0.8, 0.1, 0.1]])
-    skies = torch.tensor([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
-    rows, first = torch.tensor([0, 1, 1, 0, 1]), ahead[torch.tensor([0])]
-    alone = []
-    for ground, sky in zip(grounds.tolist(), skies.tolist(), strict=True):
-        appearance = Appearance(colors={Meaning.GROUND: tuple(ground), Meaning.SKY: tuple(sky)})
-        alone.append(worlds.render(first, appearance=appearance)[0])
-    assert not torch.equal(*alone)
-    appearance = Appearance(colors={Meaning.GROUND: grounds[rows], Meaning.SKY: skies[rows]})
-    together = worlds.render(ahead[torch.zeros(5, dtype=torch.int64)], appearance=appearance)
-    assert torch.equal(together, torch.stack(alone)[rows])
-
-
-def test_the_light_may_differ_from_world_to_world(worlds, ahead):
-    """Ambient light alone shows every colour just so, times its strength."""
-    dark = torch.tensor([[0.0, 0.0, 0.0]] * 2)
-    shine = torch.tensor([[1.0, 1.0, 1.0], [0.5, 0.5, 0.5]])
-    picture = worlds.render(ahead, appearance=Appearance(ambient=shine, sun=dark))
-    _, ground, cube = (area[0] for area in regions(worlds, ahead))
-    for world, strength in enumerate((1.0, 0.5)):
-        for area, color in ((ground, FLOOR_COLOR), (cube, TaskSettings().cube_color)):
-            shown = picture[world][area].unique(dim=0)
-            assert len(shown) == 1
-            expected = strength * 255 * torch.tensor(color)
-            torch.testing.assert_close(shown[0].float(), expected, atol=1.0, rtol=0)
-    low = worlds.render(ahead, appearance=Appearance(sun_direction=(1.0, 0.0, -0.1)))
-    high = worlds.render(ahead, appearance=Appearance(sun_direction=(0.0, 0.0, -9.0)))
-    assert (low[0][ground] < high[0][ground]).all()  # the ground is lit from above
-    assert low[0][cube].float().mean() > high[0][cube].float().mean()  # its front is not
-
-
-@pytest.mark.skipif(torch.cuda.is_available(), reason="there is a GPU")
-def test_cuda_without_gpu_is_refused():
-    with pytest.raises(InputError, match="give device=cpu"):
-        check_device("cuda")
+def test_several_threads_may_build_and_draw_at_a_time():
+    several = [started(renderer=WarpRenderer, num_shards=1) for _ in range(3)]
+    with ThreadPoolExecutor(3) as pool:
+        pictures = list(pool.map(lambda worlds: worlds.render(worlds.state), several))
+    assert torch.equal(pictures[0], pictures[1]) and torch.equal(pictures[0], pictures[2])
+    for worlds in several:
+        worlds.close()
 
 
 @pytest.mark.gpu
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a CUDA GPU")
-def test_gpu_draws_what_the_cpu_draws(worlds):
-    on_gpu = Worlds(3, device="cuda")
-    picture = on_gpu.render(worlds.state.to("cuda")).cpu()
-    difference = (picture.int() - worlds.render(worlds.state).int()).abs()
+def test_gpu_draws_what_the_cpu_draws():
+    on_cpu, on_gpu = started(), started(device="cuda")
+    picture = on_gpu.render(on_gpu.state).cpu()
+    difference = (picture.int() - on_cpu.render(on_cpu.state).int()).abs()
     assert float(difference.float().mean()) < 0.5
-
-
-@pytest.mark.render
-def test_pictures_agree_with_opengl(egl):
-    """Both renderers on the same poses: equal but for edges, where OpenGL blends samples."""
-    camera = CameraSettings(width=256, height=100)
-    env = make_environment(camera=camera, random_state=world_random_state(0, 0))
-    worlds = Worlds(1, camera=camera)
-    worlds.reset(torch.arange(1), [world_random_state(0, 0)])
-    timestep = env.reset()
-    for action in (0, 0, 1, 0, 2, 2, 0, 0, 0, 0, 0, 0):
-        traced = worlds.render(worlds.state)[0].numpy().astype(int)
-        drawn = timestep.observation["drone/front_center"].astype(int)
-        difference = np.abs(traced - drawn).max(-1)
-        assert np.median(difference) <= 2
-        assert (difference > 8).mean() < 0.04  # edges and the horizon's haze
-        timestep = env.step(action)
-        worlds.step(torch.arange(1), torch.tensor([action]))
-    worlds.close()

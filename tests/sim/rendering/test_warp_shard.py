@@ -7,7 +7,7 @@ import warp as wp
 
 from drone_rl.sim.meaning import Meaning
 from drone_rl.sim.rendering import Appearance, Poses, View
-from drone_rl.sim.rendering.warp_shard import RECORDING, Shard
+from drone_rl.sim.rendering.warp_shard import Shard
 from drone_rl.sim.worlds import Worlds
 
 VIEW = View(camera="drone/front_center", height=9, width=12)
@@ -23,7 +23,7 @@ def scene():
 @pytest.fixture
 def shard(scene):
     camera = mujoco.mj_name2id(scene.model, mujoco.mjtObj.mjOBJ_CAMERA, VIEW.camera)
-    with RECORDING, wp.ScopedDevice("cpu"):
+    with wp.ScopedDevice("cpu"):
         shard = Shard(scene, VIEW, camera, 3)
         shard.warm_up()
     return shard

@@ -1,0 +1,35 @@
+"""Where pictures are drawn, and Warp, which does it, started without a word."""
+
+from contextlib import nullcontext
+
+import torch
+import warp as wp
+
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.quiet import standard_error_closed
+
+
+def check_device(device: str) -> None:
+    """Refuses a device that this machine lacks.
+
+    Raises:
+        InputError: It is neither "cpu" nor a CUDA device that is there.
+    """
+    kind = device.split(":")[0]
+    if kind not in ("cpu", "cuda"):
+        raise InputError(f"device={device} is unknown; give cpu, cuda or cuda:N")
+    if kind == "cuda" and not (torch.cuda.is_available() and wp.get_cuda_device_count()):
+        raise InputError(f"device={device}, but no CUDA GPU is usable here; give device=cpu")
+
+
+def start_warp(device: str) -> None:
+    """Starts Warp; on a CPU it says nothing of the CUDA that is missing.
+
+    Raises:
+        InputError: There is no such device.
+    """
+    check_device(device)
+    quiet = wp.LOG_ERROR if device == "cpu" else wp.LOG_WARNING
+    wp.config.log_level = max(wp.config.log_level, quiet)
+    with standard_error_closed() if device == "cpu" else nullcontext():
+        wp.init()  # its native part tells, whatever the level

@@ -1,0 +1,454 @@
+# pyright: reportIndexIssue=false
+# pyright: reportArgumentType=false
+# pyright: reportCallIssue=false
+# pyright: reportOperatorIssue=false
+# pyright: reportGeneralTypeIssues=false
+# pyright: reportAttributeAccessIssue=false
+# (Warp compiles this file; Python's types say nothing about it.)
+"""The ray tracer itself: one geom after the other, each only where it can be seen.
+
+A worker draws whole worlds, one at a time, into pictures of sky alone. It takes the geoms in order
+and casts rays at each in the rectangle of pixels around its projection alone, in the geom's
+own frame; what is nearer than all before is painted over it. All geoms are convex and closed, or
+planes seen from above, so a ray enters each at most once, and there is no other hit to look for.
+"""
+
+import mujoco
+import warp as wp
+
+PLANE = wp.constant(int(mujoco.mjtGeom.mjGEOM_PLANE))
+SPHERE = wp.constant(int(mujoco.mjtGeom.mjGEOM_SPHERE))
+CAPSULE = wp.constant(int(mujoco.mjtGeom.mjGEOM_CAPSULE))
+ELLIPSOID = wp.constant(int(mujoco.mjtGeom.mjGEOM_ELLIPSOID))
+CYLINDER = wp.constant(int(mujoco.mjtGeom.mjGEOM_CYLINDER))
+BOX = wp.constant(int(mujoco.mjtGeom.mjGEOM_BOX))
+RGB, DEPTH, SEGMENTATION = wp.constant(0), wp.constant(1), wp.constant(2)
+DRONE_FRAME = wp.constant(1)
+"""The only frame that turns; 0 is the world's and the props' follow."""
+
+_PARALLEL = wp.constant(1e-15)
+"""Component of a ray's direction below which it never meets a plane across it."""
+_SAME = wp.constant(1e-6)
+"""Relative distance within which the later of two geoms is in front, as in OpenGL."""
+_FAR_AWAY = wp.constant(1e10)
+_IN_FRONT = wp.constant(1e-3)
+"""Metres before the camera from which corners are projected."""
+
+
+@wp.struct
+class Camera:
+    """One camera and its picture."""
+
+    frame: int
+    position: wp.vec3
+    """In its frame, metres."""
+    attitude: wp.vec4
+    """In its frame, (w, x, y, z); it looks along its own -z, with y up."""
+    half_width: float
+    """Of the picture at a distance of 1."""
+    half_height: float
+    width: int
+    height: int
+    far: float
+    """Metres along the axis beyond which nothing is drawn."""
+
+
+@wp.struct
+class Geoms:
+    """What is drawn, in the model's order."""
+
+    kind: wp.array[int]
+    number: wp.array[int]
+    """In the model."""
+    frame: wp.array[int]
+    position: wp.array[wp.vec3]
+    attitude: wp.array[wp.vec4]
+    size: wp.array[wp.vec3]
+    reach: wp.array[wp.vec3]
+    """Half extents of the box around each, in its own frame."""
+
+
+@wp.struct
+class Sight:
+    """One geom as one world's camera sees it."""
+
+    kind: int
+    number: int
+    size: wp.vec3
+    reach: wp.vec3
+    eye: wp.vec3
+    """The camera's place in the geom's frame."""
+    into: wp.mat33
+    """Turns directions from the camera's frame to the geom's."""
+    axes: wp.mat33
+    """The same from the geom's to the world's."""
+
+
+@wp.struct
+class Looks:
+    """Colours and light; first dimension: one for all worlds or one for each."""
+
+    colors: wp.array2d[wp.vec3]
+    ambient: wp.array2d[wp.vec3]
+    diffuse: wp.array2d[wp.vec3]
+    direction: wp.array2d[wp.vec3]
+
+
+@wp.func
+def _product(a: wp.vec4, b: wp.vec4) -> wp.vec4:
+    return wp.vec4(
+        a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
+        a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
+        a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
+        a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
+    )
+
+
+@wp.func
+def _rotation(q: wp.vec4) -> wp.mat33:
+    ww, xx, yy, zz = q[0] * q[0], q[1] * q[1], q[2] * q[2], q[3] * q[3]
+    wx, wy, wz = q[0] * q[1], q[0] * q[2], q[0] * q[3]
+    xy, xz, yz = q[1] * q[2], q[1] * q[3], q[2] * q[3]
+    return wp.mat33(
+        ww + xx - yy - zz,
+        2.0 * (xy - wz),
+        2.0 * (xz + wy),
+        2.0 * (xy + wz),
+        ww - xx + yy - zz,
+        2.0 * (yz - wx),
+        2.0 * (xz - wy),
+        2.0 * (yz + wx),
+        ww - xx - yy + zz,
+    )
+
+
+@wp.func
+def _frame_attitude(frame: int, drone: wp.vec4) -> wp.vec4:
+    if frame == DRONE_FRAME:
+        return drone
+    return wp.vec4(1.0, 0.0, 0.0, 0.0)
+
+
+@wp.func
+def _enter_box(size: wp.vec3, point: wp.vec3, ray: wp.vec3) -> tuple[float, wp.vec3]:
+    nearest = -1.0
+    normal = wp.vec3()
+    for i in range(3):
+        if wp.abs(ray[i]) > _PARALLEL:
+            side = -wp.sign(ray[i])
+            along = (side * size[i] - point[i]) / ray[i]
+            j = (i + 1) % 3
+            k = (i + 2) % 3
+            inside = (
+                wp.abs(point[j] + along * ray[j]) <= size[j]
+                and wp.abs(point[k] + along * ray[k]) <= size[k]
+            )
+            if inside and along >= 0.0 and (nearest < 0.0 or along < nearest):
+                nearest = along
+                normal = wp.vec3()
+                normal[i] = side
+    return nearest, normal
+
+
+@wp.func
+def _enter_ball(radius: float, point: wp.vec3, ray: wp.vec3) -> float:
+    """Distance to a ball around the origin; negative where the ray misses it or starts inside."""
+    a = wp.dot(ray, ray)
+    b = wp.dot(ray, point)
+    inside = b * b - a * (wp.dot(point, point) - radius * radius)
+    if inside <= 0.0:
+        return -1.0
+    return (-b - wp.sqrt(inside)) / a
+
+
+@wp.func
+def _enter_tube(radius: float, half: float, point: wp.vec3, ray: wp.vec3) -> tuple[float, wp.vec3]:
+    """A cylinder with flat ends: what lies in an endless tube and between two planes."""
+    a = ray[0] * ray[0] + ray[1] * ray[1]
+    b = ray[0] * point[0] + ray[1] * point[1]
+    c = point[0] * point[0] + point[1] * point[1] - radius * radius
+    tube_in = -_FAR_AWAY
+    tube_out = _FAR_AWAY
+    if a > _PARALLEL:
+        inside = b * b - a * c
+        if inside <= 0.0:
+            return -1.0, wp.vec3()
+        tube_in = (-b - wp.sqrt(inside)) / a
+        tube_out = (-b + wp.sqrt(inside)) / a
+    elif c > 0.0:
+        return -1.0, wp.vec3()
+    ends_in = -_FAR_AWAY
+    ends_out = _FAR_AWAY
+    side = -wp.sign(ray[2])
+    if wp.abs(ray[2]) > _PARALLEL:
+        ends_in = (side * half - point[2]) / ray[2]
+        ends_out = (-side * half - point[2]) / ray[2]
+    elif wp.abs(point[2]) > half:
+        return -1.0, wp.vec3()
+    along = wp.max(tube_in, ends_in)
+    if along > wp.min(tube_out, ends_out):
+        return -1.0, wp.vec3()
+    normal = wp.vec3(0.0, 0.0, side)
+    if tube_in > ends_in:
+        normal = wp.normalize(wp.vec3(point[0] + along * ray[0], point[1] + along * ray[1], 0.0))
+    return along, normal
+
+
+@wp.func
+def _enter_capsule(
+    radius: float, half: float, point: wp.vec3, ray: wp.vec3
+) -> tuple[float, wp.vec3]:
+    """The nearest of its round side and its two balls; inside it, no ray enters."""
+    inside = point - wp.vec3(0.0, 0.0, wp.clamp(point[2], -half, half))
+    if wp.length_sq(inside) < radius * radius:
+        return -1.0, wp.vec3()
+    nearest = float(_FAR_AWAY)
+    a = ray[0] * ray[0] + ray[1] * ray[1]
+    b = ray[0] * point[0] + ray[1] * point[1]
+    c = point[0] * point[0] + point[1] * point[1] - radius * radius
+    if a > _PARALLEL and b * b - a * c > 0.0:
+        along = (-b - wp.sqrt(b * b - a * c)) / a
+        if along >= 0.0 and wp.abs(point[2] + along * ray[2]) <= half:
+            nearest = along
+    for i in range(2):
+        end = wp.vec3(0.0, 0.0, (2.0 * float(i) - 1.0) * half)
+        along = _enter_ball(radius, point - end, ray)
+        if along >= 0.0 and along < nearest:
+            nearest = along
+    if nearest == _FAR_AWAY:
+        return -1.0, wp.vec3()
+    hit = point + nearest * ray
+    return nearest, wp.normalize(hit - wp.vec3(0.0, 0.0, wp.clamp(hit[2], -half, half)))
+
+
+@wp.func
+def _enter(kind: int, size: wp.vec3, point: wp.vec3, ray: wp.vec3) -> tuple[float, wp.vec3]:
+    """Where a ray enters a geom: how far along it, negative for nowhere, and the normal there."""
+    if kind == BOX:
+        along, normal = _enter_box(size, point, ray)
+        return along, normal
+    if kind == CYLINDER:
+        along, normal = _enter_tube(size[0], size[1], point, ray)
+        return along, normal
+    if kind == CAPSULE:
+        along, normal = _enter_capsule(size[0], size[1], point, ray)
+        return along, normal
+    radii = size
+    if kind == SPHERE:
+        radii = wp.vec3(size[0], size[0], size[0])
+    round_point = wp.cw_div(point, radii)
+    round_ray = wp.cw_div(ray, radii)
+    along = _enter_ball(1.0, round_point, round_ray)
+    hit = round_point + along * round_ray
+    return along, wp.normalize(wp.cw_div(hit, radii))
+
+
+@wp.func
+def _shade(looks: Looks, world: int, geom: int, normal: wp.vec3) -> wp.vec3:
+    """Lambert's law under distant lights, from 0 to 255. Normal: world frame."""
+    own = looks.colors[world % looks.colors.shape[0], geom]
+    row = world % looks.ambient.shape[0]
+    color = wp.vec3()
+    for light in range(looks.ambient.shape[1]):
+        color += wp.cw_mul(own, looks.ambient[row, light])
+    for light in range(looks.ambient.shape[1]):
+        facing = wp.max(0.0, wp.dot(normal, -looks.direction[row, light]))
+        color += wp.cw_mul(own, looks.diffuse[row, light] * facing)
+    return 255.0 * wp.vec3(
+        wp.clamp(color[0], 0.0, 1.0), wp.clamp(color[1], 0.0, 1.0), wp.clamp(color[2], 0.0, 1.0)
+    )
+
+
+@wp.func
+def _first(place: float, half: float, count: int) -> int:
+    """The first pixel that can show a place, given along an axis at a distance of 1."""
+    pixel = (place / half + 1.0) * 0.5 * float(count) - 1.5
+    return int(wp.clamp(wp.floor(pixel), 0.0, float(count)))
+
+
+@wp.func
+def _around(camera: Camera, sight: Sight) -> wp.vec4i:
+    """Columns and rows, from and to, outside which no ray meets a geom."""
+    lowest = wp.vec2(_FAR_AWAY, _FAR_AWAY)
+    highest = wp.vec2(-_FAR_AWAY, -_FAR_AWAY)
+    behind = 0
+    for corner in range(8):
+        sides = wp.vec3(
+            float(corner & 1) * 2.0 - 1.0,
+            float((corner >> 1) & 1) * 2.0 - 1.0,
+            float((corner >> 2) & 1) * 2.0 - 1.0,
+        )
+        at = wp.transpose(sight.into) @ (wp.cw_mul(sides, sight.reach) - sight.eye)
+        if -at[2] < _IN_FRONT:
+            behind += 1
+        else:
+            seen = wp.vec2(at[0] / -at[2], -at[1] / -at[2])
+            lowest = wp.min(lowest, seen)
+            highest = wp.max(highest, seen)
+    if behind == 8:
+        return wp.vec4i(0, 0, 0, 0)
+    if behind > 0:
+        return wp.vec4i(0, camera.width, 0, camera.height)
+    return wp.vec4i(
+        _first(lowest[0], camera.half_width, camera.width),
+        wp.min(_first(highest[0], camera.half_width, camera.width) + 3, camera.width),
+        _first(lowest[1], camera.half_height, camera.height),
+        wp.min(_first(highest[1], camera.half_height, camera.height) + 3, camera.height),
+    )
+
+
+@wp.func
+def _meet_plane(size: wp.vec3, point: wp.vec3, ray: wp.vec3) -> float:
+    """Distance to a rectangle of the plane z = 0, seen from above; endless where its size is 0."""
+    if ray[2] >= -_PARALLEL:
+        return -1.0
+    along = -point[2] / ray[2]
+    if size[0] > 0.0 and wp.abs(point[0] + along * ray[0]) > size[0]:
+        return -1.0
+    if size[1] > 0.0 and wp.abs(point[1] + along * ray[1]) > size[1]:
+        return -1.0
+    return along
+
+
+@wp.func
+def _is_nearest(along: float, so_far: float, ray: wp.vec3, far: float) -> bool:
+    return along >= 0.0 and along - so_far <= _SAME * wp.max(so_far, 1.0) and along * -ray[2] <= far
+
+
+@wp.func
+def _paint(rgb: wp.array2d[wp.uint8], world: int, pixel: int, color: wp.vec3) -> None:
+    rgb[world, 3 * pixel] = wp.uint8(color[0])
+    rgb[world, 3 * pixel + 1] = wp.uint8(color[1])
+    rgb[world, 3 * pixel + 2] = wp.uint8(color[2])
+
+
+@wp.func
+def _draw_plane(
+    what: int,
+    worker: int,
+    world: int,
+    camera: Camera,
+    rays: wp.array[wp.vec3],
+    sight: Sight,
+    looks: Looks,
+    nearest: wp.array2d[float],
+    rgb: wp.array2d[wp.uint8],
+    depths: wp.array2d[float],
+    numbers: wp.array2d[int],
+) -> None:
+    """Of one colour, in the rows that end below its horizon."""
+    color = _shade(looks, world, sight.number, sight.axes @ wp.vec3(0.0, 0.0, 1.0))
+    width = camera.width
+    for start in range(0, camera.height * width, width):
+        left = wp.dot(sight.into[2], rays[start])
+        right = wp.dot(sight.into[2], rays[start + width - 1])
+        if left < 0.0 or right < 0.0:
+            for pixel in range(start, start + width):
+                ray = rays[pixel]
+                along = _meet_plane(sight.size, sight.eye, sight.into @ ray)
+                if _is_nearest(along, nearest[worker, pixel], ray, camera.far):
+                    nearest[worker, pixel] = along
+                    if what == RGB:
+                        _paint(rgb, world, pixel, color)
+                    elif what == DEPTH:
+                        depths[world, pixel] = along * -ray[2]
+                    else:
+                        numbers[world, pixel] = sight.number
+
+
+@wp.func
+def _draw_solid(
+    what: int,
+    worker: int,
+    world: int,
+    camera: Camera,
+    rays: wp.array[wp.vec3],
+    sight: Sight,
+    looks: Looks,
+    nearest: wp.array2d[float],
+    rgb: wp.array2d[wp.uint8],
+    depths: wp.array2d[float],
+    numbers: wp.array2d[int],
+) -> None:
+    """In the rectangle of pixels around it."""
+    part = _around(camera, sight)
+    for row in range(part[2], part[3]):
+        for pixel in range(row * camera.width + part[0], row * camera.width + part[1]):
+            ray = rays[pixel]
+            along, normal = _enter(sight.kind, sight.size, sight.eye, sight.into @ ray)
+            if _is_nearest(along, nearest[worker, pixel], ray, camera.far):
+                nearest[worker, pixel] = along
+                if what == RGB:
+                    color = _shade(looks, world, sight.number, sight.axes @ normal)
+                    _paint(rgb, world, pixel, color)
+                elif what == DEPTH:
+                    depths[world, pixel] = along * -ray[2]
+                else:
+                    numbers[world, pixel] = sight.number
+
+
+@wp.kernel(enable_backward=False)
+def draw(
+    first: int,
+    last: int,
+    step: int,
+    what: int,
+    camera: Camera,
+    rays: wp.array[wp.vec3],
+    limits: wp.array[float],
+    geoms: Geoms,
+    places: wp.array2d[wp.vec3],
+    attitudes: wp.array[wp.vec4],
+    looks: Looks,
+    nearest: wp.array2d[float],
+    rgb: wp.array2d[wp.uint8],
+    depths: wp.array2d[float],
+    numbers: wp.array2d[int],
+) -> None:
+    """Draws worlds `first + worker`, and every `step` after, before `last`.
+
+    Args:
+        first: The first world.
+        last: The one after the last.
+        step: How many workers there are.
+        what: `RGB`, `DEPTH` or `SEGMENTATION`.
+        camera: Whose picture.
+        rays: Directions of length 1 in the camera's frame, of all pixels, row by row.
+        limits: How far along each of them nothing is drawn any more.
+        geoms: What is drawn.
+        places: Of the frames. Shape: (num_worlds, num_frames).
+        attitudes: Of the drones, quaternions (w, x, y, z) of length 1. Shape: (num_worlds,).
+        looks: Colours and light.
+        nearest: A row a worker, to work with: how far along each ray the nearest surface is.
+        rgb: Pictures of the sky, three bytes a pixel, to draw into. First dimension: worlds.
+        depths: The same for depths.
+        numbers: The same for numbers of geoms.
+    """
+    worker = wp.tid()
+    for world in range(first + worker, last, step):
+        drone = attitudes[world]
+        turned = _frame_attitude(camera.frame, drone)
+        eye = places[world, camera.frame] + _rotation(turned) @ camera.position
+        looking = _rotation(_product(turned, camera.attitude))
+        for pixel in range(camera.height * camera.width):
+            nearest[worker, pixel] = limits[pixel]
+        for geom in range(geoms.kind.shape[0]):
+            frame = geoms.frame[geom]
+            turned = _frame_attitude(frame, drone)
+            centre = places[world, frame] + _rotation(turned) @ geoms.position[geom]
+            sight = Sight()
+            sight.kind = geoms.kind[geom]
+            sight.number = geoms.number[geom]
+            sight.size = geoms.size[geom]
+            sight.reach = geoms.reach[geom]
+            sight.axes = _rotation(_product(turned, geoms.attitude[geom]))
+            sight.eye = wp.transpose(sight.axes) @ (eye - centre)
+            sight.into = wp.transpose(sight.axes) @ looking
+            if sight.kind == PLANE:
+                _draw_plane(
+                    what, worker, world, camera, rays, sight, looks, nearest, rgb, depths, numbers
+                )
+            else:
+                _draw_solid(
+                    what, worker, world, camera, rays, sight, looks, nearest, rgb, depths, numbers
+                )

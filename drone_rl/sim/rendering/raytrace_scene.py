@@ -1,0 +1,166 @@
+# pyright: reportAttributeAccessIssue=false
+# (MuJoCo's compiled bindings and Warp's structures are untyped.)
+"""A scene as the ray tracer's kernel knows it: cameras, rays and geoms, each in its frame.
+
+Frame 0 is the world's, frame 1 the drone's, and one follows for each of the task's props.
+"""
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+import mujoco
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from drone_rl.sim.meaning import Meaning
+from drone_rl.sim.rendering import raytrace_kernel as kernel
+from drone_rl.sim.rendering.scene import Scene
+from drone_rl.sim.rendering.view import View
+from drone_rl.utils.errors import InputError
+
+REACH: Mapping[int, Callable[[NDArray], NDArray]] = MappingProxyType(
+    {
+        kernel.PLANE: lambda size: size,
+        kernel.SPHERE: lambda size: size[[0, 0, 0]],
+        kernel.CAPSULE: lambda size: size[[0, 0, 1]] + [0.0, 0.0, size[0]],
+        kernel.ELLIPSOID: lambda size: size,
+        kernel.CYLINDER: lambda size: size[[0, 0, 1]],
+        kernel.BOX: lambda size: size,
+    }
+)
+"""Half extents of the box around each kind of geom, from its size as MuJoCo keeps it."""
+
+
+def check_scene(scene: Scene) -> None:
+    """Refuses what the kernel can't draw.
+
+    Raises:
+        InputError: There is a geom or a light of another kind.
+    """
+    model = scene.model
+    for geom in range(model.ngeom):
+        if model.geom_type[geom] not in REACH:
+            kind = mujoco.mjtGeom(model.geom_type[geom]).name.removeprefix("mjGEOM_").lower()
+            raise InputError(
+                f"geom {model.geom(geom).name!r} is a {kind}, which Raytracer can't draw; give "
+                "renderer=WarpRenderer"
+            )
+    if not model.nlight:
+        raise InputError("the scene has no light, so nothing could be seen; add one")
+    is_distant = model.light_type == mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
+    is_fixed = model.light_bodyid == 0
+    if not (is_distant & is_fixed & (model.light_castshadow == 0)).all():
+        raise InputError(
+            "a light of the scene is near, moves or casts shadows, which Raytracer can't draw; "
+            "give renderer=WarpRenderer"
+        )
+    if model.vis.headlight.active:
+        raise InputError("the scene's headlight is on; switch it off or take WarpRenderer")
+
+
+class Frames:
+    """Which frame everything is fixed to, and its place and attitude there."""
+
+    def __init__(self, scene: Scene) -> None:
+        """Looks at the model's first pose, in which nothing that a frame carries has moved."""
+        self._model = model = scene.model
+        self._data = mujoco.MjData(model)
+        mujoco.mj_forward(model, self._data)
+        self._of_body = np.zeros(model.nbody, int)
+        for geom, (meaning, prop) in enumerate(zip(scene.meanings, scene.props, strict=True)):
+            root = model.body_rootid[model.geom_bodyid[geom]]
+            if meaning is Meaning.DRONE:
+                self._of_body[model.body_rootid == root] = kernel.DRONE_FRAME
+            elif prop >= 0:
+                self._of_body[model.body_rootid == root] = kernel.DRONE_FRAME + 1 + prop
+
+    def place(
+        self, body: int, position: NDArray, attitude: NDArray
+    ) -> tuple[int, NDArray, NDArray]:
+        """Where something that is fixed to a body is.
+
+        Args:
+            body: Its number.
+            position: In the body's frame.
+            attitude: The same, (w, x, y, z).
+
+        Returns:
+            The frame's number, and position and attitude there.
+        """
+        data, frame = self._data, int(self._of_body[body])
+        root = self._model.body_rootid[body] if frame else 0
+        back, turned, whole = np.empty(4), np.empty(3), np.empty(4)
+        mujoco.mju_negQuat(back, data.xquat[root])
+        mujoco.mju_mulQuat(whole, data.xquat[body], attitude)
+        mujoco.mju_rotVecQuat(turned, position, data.xquat[body])
+        there, relative = np.empty(3), np.empty(4)
+        mujoco.mju_rotVecQuat(there, turned + data.xpos[body] - data.xpos[root], back)
+        mujoco.mju_mulQuat(relative, back, whole)
+        return frame, there, relative
+
+
+def make_camera(scene: Scene, frames: Frames, view: View) -> kernel.Camera:
+    """The camera of a view.
+
+    Raises:
+        InputError: There is none of that name, or it is of another kind.
+    """
+    model = scene.model
+    number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_CAMERA, view.camera)
+    if number < 0:
+        names = ", ".join(model.camera(i).name for i in range(model.ncam))
+        raise InputError(f"camera {view.camera!r} is not in the model; choose from: {names}")
+    camera = model.camera(number)
+    is_plain = model.cam_projection[number] == mujoco.mjtProjection.mjPROJ_PERSPECTIVE
+    if not (is_plain and camera.mode[0] == 0 and model.cam_sensorsize[number, 1] == 0):
+        raise InputError(
+            f"camera {view.camera!r} is not a fixed one with an angle of view, which is all that "
+            "Raytracer knows; give renderer=WarpRenderer"
+        )
+    made, extent = kernel.Camera(), model.stat.extent
+    made.frame, position, attitude = frames.place(camera.bodyid[0], camera.pos, camera.quat)
+    made.position, made.attitude = wp.vec3(position), wp.vec4(attitude)
+    half_angle = np.float32(0.5) * np.float32(camera.fovy[0]) * np.float32(np.pi / 180.0)
+    made.half_height = float(np.tan(half_angle))
+    made.half_width = made.half_height * view.width / view.height
+    made.width, made.height = view.width, view.height
+    made.far = float(model.vis.map.zfar * extent)
+    return made
+
+
+def make_rays(camera: kernel.Camera) -> NDArray:
+    """Directions through the middles of all pixels in the camera's frame.
+
+    Returns:
+        Of length 1. Shape: (height, width, 3), float32.
+    """
+    across = ((np.arange(camera.width) + 0.5) / camera.width * 2 - 1) * camera.half_width
+    down = ((np.arange(camera.height) + 0.5) / camera.height * 2 - 1) * camera.half_height
+    rays = np.stack(np.broadcast_arrays(across[None, :], -down[:, None], -1.0), -1)
+    return (rays / np.linalg.norm(rays, axis=-1, keepdims=True)).astype(np.float32)
+
+
+def make_geoms(scene: Scene, frames: Frames, show_drone: bool) -> kernel.Geoms:
+    """What is drawn.
+
+    Args:
+        scene: Where it is.
+        frames: Of the scene.
+        show_drone: Whether the drone is, too.
+    """
+    model = scene.model
+    seen = [i for i, m in enumerate(scene.meanings) if show_drone or m != Meaning.DRONE]
+    places = [
+        frames.place(model.geom_bodyid[i], model.geom_pos[i], model.geom_quat[i]) for i in seen
+    ]
+    reach = [REACH[model.geom_type[i]](model.geom_size[i]) for i in seen]
+    geoms, on_cpu = kernel.Geoms(), {"device": "cpu"}
+    geoms.kind = wp.array(model.geom_type[seen], dtype=int, **on_cpu)
+    geoms.number = wp.array(seen, dtype=int, **on_cpu)
+    geoms.frame = wp.array([frame for frame, _, _ in places], dtype=int, **on_cpu)
+    geoms.position = wp.array([position for _, position, _ in places], dtype=wp.vec3, **on_cpu)
+    geoms.attitude = wp.array([attitude for _, _, attitude in places], dtype=wp.vec4, **on_cpu)
+    geoms.size = wp.array(model.geom_size[seen], dtype=wp.vec3, **on_cpu)
+    geoms.reach = wp.array(reach, dtype=wp.vec3, **on_cpu)
+    return geoms
