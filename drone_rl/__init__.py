@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from drone_rl.api.judging import Evaluation, Judgement, evaluate, judge
     from drone_rl.api.policy import Policy, load_policy
     from drone_rl.api.training import Training, train
-    from drone_rl.explain.settings import ExplainSettings
+    from drone_rl.explanations.settings import ExplainSettings
     from drone_rl.settings.judging import EvaluateSettings, JudgeSettings
     from drone_rl.settings.training import TrainerSettings, TrainSettings
     from drone_rl.sim.settings import CameraSettings, TaskSettings

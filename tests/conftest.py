@@ -7,7 +7,7 @@ import sys
 import pytest
 import torch
 
-from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, make_env
+from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, with_transforms
 from drone_rl.policies import SmallCNN, make_actor
 
 torch.set_num_threads(1)
@@ -31,7 +31,9 @@ def make_pipeline():
     envs = []
 
     def build(num_envs=4, seed=0, **kwargs):
-        env = make_env(DroneEnv(num_envs, seed=seed, **kwargs), [GrayPixels(), StandardizePixels()])
+        env = with_transforms(
+            DroneEnv(num_envs, seed=seed, **kwargs), [GrayPixels(), StandardizePixels()]
+        )
         envs.append(env)
         generator = torch.Generator().manual_seed(seed)
         shape = tuple(env.observation_spec["pixels"].shape[1:])

@@ -1,28 +1,18 @@
 """`import drone_rl` is quick and offers all that it lists."""
 
-import importlib
 import subprocess
 import sys
 
 import pytest
 
 import drone_rl
-from drone_rl.utils.errors import InputError
 
 
 def test_everything_that_is_listed_is_there():
-    for name in set(drone_rl.__all__) - {"explain"}:  # which is a package, too
+    for name in drone_rl.__all__:
         assert getattr(drone_rl, name).__name__ == name
         assert name in dir(drone_rl)
     assert set(drone_rl._HOMES) == set(drone_rl.__all__)
-
-
-def test_the_package_explain_is_the_function_too():
-    module = importlib.import_module("drone_rl.explain")
-    for explain in (drone_rl.explain, module):
-        with pytest.raises(InputError, match=r"^frames=3 is less than one of each flight"):
-            explain("good", frames=3)
-    assert importlib.import_module("drone_rl.explain.settings").ExplainSettings
 
 
 def test_what_is_not_there():

@@ -35,4 +35,4 @@ def make_env(
         InputError: A setting is out of range; the message begins with its name.
     """
     base = envs.DroneEnv(num_envs, task, camera, seed=seed, device=device, **kwargs)
-    return envs.make_env(base, [transform.make() for transform in transforms])
+    return envs.with_transforms(base, [transform.make() for transform in transforms])

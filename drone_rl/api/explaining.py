@@ -10,8 +10,8 @@ import torch
 from drone_rl.api.policy import Policy, load_policy
 from drone_rl.api.progress import Bar, Progress
 from drone_rl.api.showing import page
-from drone_rl.explain.settings import ExplainSettings
-from drone_rl.explain.study import explain_policy
+from drone_rl.explanations.settings import ExplainSettings
+from drone_rl.explanations.study import explain_policy
 from drone_rl.report import write_report
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import to_file_name

@@ -29,7 +29,7 @@ from drone_rl.training import (
     ReinforceLearner,
     Trainer,
 )
-from drone_rl.training.progress import Training as Running
+from drone_rl.training.progress import OngoingTraining
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock, write_atomically
 from drone_rl.utils.memory import bound_kernels
@@ -62,7 +62,7 @@ class Training:
 
     @property
     def running_reward(self) -> float:
-        """Running mean of the episodes' rewards at the end."""
+        """OngoingTraining mean of the episodes' rewards at the end."""
         return self.result["running_reward"]
 
     @property
@@ -198,13 +198,13 @@ class _Tell(Callback):
         """Takes whom to tell."""
         self.progress = progress
 
-    def on_update(self, training: Running, metrics: Mapping[str, float]) -> None:
+    def on_update(self, training: OngoingTraining, metrics: Mapping[str, float]) -> None:
         """Tells the running mean and the frames."""
         done = training.progress
         text = f"running reward {done.running_reward:.2f}, {done.episodes} episodes"
         self.progress(text, done.frames, training.total_frames)
 
-    def on_end(self, training: Running, reason: str) -> None:
+    def on_end(self, training: OngoingTraining, reason: str) -> None:
         """Tells that it is over, and why."""
         frames = training.progress.frames
         self.progress(f"stopped: {reason}", frames, frames)

@@ -7,11 +7,11 @@ from typing import Any
 
 from drone_rl.bench.commands import watch
 from drone_rl.bench.parts import default_pipeline
-from drone_rl.explain import tsne
-from drone_rl.explain.hooks import feature_layer
-from drone_rl.explain.recording import record
-from drone_rl.explain.response import response_map
-from drone_rl.explain.scenes import Scenes
+from drone_rl.explanations import tsne
+from drone_rl.explanations.hooks import feature_layer
+from drone_rl.explanations.recording import record
+from drone_rl.explanations.response import response_map
+from drone_rl.explanations.scenes import Scenes
 
 
 def bench_explain(folder: Path, quick: bool) -> dict[str, Any]:

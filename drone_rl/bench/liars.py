@@ -9,10 +9,10 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from drone_rl.explain import placebos
-from drone_rl.explain.planted import reach
-from drone_rl.explain.randomised import shuffled_networks
-from drone_rl.explain.trust import MapOf
+from drone_rl.explanations import placebos
+from drone_rl.explanations.planted import reach
+from drone_rl.explanations.randomised import shuffled_networks
+from drone_rl.explanations.trust import MapOf
 from drone_rl.policies import PolicyNetwork
 
 

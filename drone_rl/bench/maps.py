@@ -10,10 +10,10 @@ from torch import Tensor
 
 from drone_rl.api.environment import make_env
 from drone_rl.bench.liars import liars
-from drone_rl.explain.hooks import probabilities
-from drone_rl.explain.planted import Planted, plant, reach
-from drone_rl.explain.scenes import Scenes
-from drone_rl.explain.trust import Pictures, Trial, check_maps, draw_pictures
+from drone_rl.explanations.hooks import probabilities
+from drone_rl.explanations.planted import Planted, plant, reach
+from drone_rl.explanations.scenes import Scenes
+from drone_rl.explanations.trust import Pictures, Trial, check_maps, draw_pictures
 from drone_rl.policies import PolicyNetwork, SmallCNN
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.sim.tasks.collect_cubes import rules

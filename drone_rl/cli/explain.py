@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import drone_rl
-from drone_rl.explain.settings import ExplainSettings
+from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.hydra_app.names import policies as prepare  # noqa: F401 -- of what was typed
 from drone_rl.settings.changes import TaskChanges, no_changes
 from drone_rl.settings.paths import PathsSettings

@@ -1,6 +1,6 @@
 """A part of the page: what one section of an explanation looks like to people.
 
-Each part is a module of `report/sections`, called like the section of `explain/sections` whose
+Each part is a module of `report/sections`, called like the section of `explanations/sections` whose
 numbers and arrays it shows, with a template of the same name. A new part is those two files; the
 page finds it. What no part shows is laid out plainly all the same.
 """

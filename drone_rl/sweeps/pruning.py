@@ -5,7 +5,7 @@ from pathlib import Path
 
 from drone_rl.sweeps.search import import_optuna, open_study
 from drone_rl.training import Callback
-from drone_rl.training.progress import Training
+from drone_rl.training.progress import OngoingTraining
 
 
 class PruneCallback(Callback):
@@ -27,7 +27,7 @@ class PruneCallback(Callback):
         self._prunes = settings["prune"]
         self._reported = set(study.trials[number].intermediate_values)
 
-    def on_update(self, training: Training, metrics: Mapping[str, float]) -> None:
+    def on_update(self, training: OngoingTraining, metrics: Mapping[str, float]) -> None:
         """Reports each time that so many frames have passed."""
         step = training.progress.frames // self._frames
         if step == 0 or step in self._reported:

@@ -14,7 +14,7 @@ from torchrl.record.loggers import Logger
 from tqdm import tqdm
 
 from drone_rl.training.checkpoint import save_checkpoint
-from drone_rl.training.progress import Training
+from drone_rl.training.progress import OngoingTraining
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.former_names import FORMER_NAMES
 
@@ -24,16 +24,16 @@ _log = logging.getLogger(__name__)
 class Callback:
     """Hooks of the training loop; override those of interest."""
 
-    def on_start(self, training: Training) -> None:
+    def on_start(self, training: OngoingTraining) -> None:
         """Before the first update of this process."""
 
-    def on_update(self, training: Training, metrics: Mapping[str, float]) -> None:
+    def on_update(self, training: OngoingTraining, metrics: Mapping[str, float]) -> None:
         """After each update."""
 
-    def on_end(self, training: Training, reason: str) -> None:
+    def on_end(self, training: OngoingTraining, reason: str) -> None:
         """After the last update, whyever it was the last."""
 
-    def on_failure(self, training: Training) -> None:
+    def on_failure(self, training: OngoingTraining) -> None:
         """When an update failed; the parameters are those before it."""
 
 
@@ -71,7 +71,7 @@ class CheckpointCallback(Callback):
         """The best checkpoint."""
         return self.folder / "best.pt"
 
-    def on_start(self, training: Training) -> None:
+    def on_start(self, training: OngoingTraining) -> None:
         """Makes sure, before any work is done, that there is a place to save to."""
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
@@ -83,7 +83,7 @@ class CheckpointCallback(Callback):
         if not self.last_path.exists():
             self._save(training)
 
-    def on_update(self, training: Training, metrics: Mapping[str, float]) -> None:
+    def on_update(self, training: OngoingTraining, metrics: Mapping[str, float]) -> None:
         """Notes the best state of all updates; saves when the interval has passed."""
         if training.progress.running_reward > self.best:
             self.best = training.progress.running_reward
@@ -91,11 +91,11 @@ class CheckpointCallback(Callback):
         if time.monotonic() - self._saved_at >= self.interval_s:
             self._save(training)
 
-    def on_end(self, training: Training, reason: str) -> None:
+    def on_end(self, training: OngoingTraining, reason: str) -> None:
         """Saves the final state."""
         self._save(training)
 
-    def _save(self, training: Training) -> None:
+    def _save(self, training: OngoingTraining) -> None:
         shared = {"best": self.best, **self.extra}
         state = training.state_dict()
         save_checkpoint(self.last_path, {**state, **shared})
@@ -112,7 +112,7 @@ class CsvCallback(Callback):
         """Sets the file."""
         self.path = Path(path)
 
-    def on_start(self, training: Training) -> None:
+    def on_start(self, training: OngoingTraining) -> None:
         """Keeps the rows up to the state that training goes on from."""
         if not self.path.exists():
             return
@@ -126,7 +126,7 @@ class CsvCallback(Callback):
             csv.writer(file).writerows(kept)
         os.replace(temporary, self.path)
 
-    def on_update(self, training: Training, metrics: Mapping[str, float]) -> None:
+    def on_update(self, training: OngoingTraining, metrics: Mapping[str, float]) -> None:
         """Appends a row."""
         progress = training.progress
         counters = {
@@ -150,7 +150,7 @@ class LoggerCallback(Callback):
         """Sets the loggers."""
         self.loggers = list(loggers)
 
-    def on_update(self, training: Training, metrics: Mapping[str, float]) -> None:
+    def on_update(self, training: OngoingTraining, metrics: Mapping[str, float]) -> None:
         """Logs each metric."""
         for logger in self.loggers:
             for name, value in metrics.items():
@@ -166,14 +166,14 @@ class ProgressCallback(Callback):
         self._bar: tqdm | None = None
         self._said_at = 0.0
 
-    def on_start(self, training: Training) -> None:
+    def on_start(self, training: OngoingTraining) -> None:
         """Opens the bar at the frames already done."""
         self._said_at = time.monotonic()
         if sys.stderr.isatty():
             total, done = training.total_frames, training.progress.frames
             self._bar = tqdm(total=total, initial=done, unit="frame", unit_scale=True)
 
-    def on_update(self, training: Training, metrics: Mapping[str, float]) -> None:
+    def on_update(self, training: OngoingTraining, metrics: Mapping[str, float]) -> None:
         """Moves the bar."""
         progress = training.progress
         text = f"episodes {progress.episodes}, running reward {progress.running_reward:.2f}"
@@ -192,7 +192,7 @@ class ProgressCallback(Callback):
                 left,
             )
 
-    def on_end(self, training: Training, reason: str) -> None:
+    def on_end(self, training: OngoingTraining, reason: str) -> None:
         """Closes the bar and says how it ended."""
         self._close()
         progress = training.progress
@@ -205,7 +205,7 @@ class ProgressCallback(Callback):
             progress.running_reward,
         )
 
-    def on_failure(self, training: Training) -> None:
+    def on_failure(self, training: OngoingTraining) -> None:
         """Closes the bar."""
         self._close()
 

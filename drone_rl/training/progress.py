@@ -17,7 +17,7 @@ class Progress:
     """Running mean of the episodes' rewards, from 0, as in the original study."""
 
 
-class Training(Protocol):
+class OngoingTraining(Protocol):
     """What a callback sees of a training, and may ask of it."""
 
     progress: Progress

@@ -12,7 +12,7 @@ from typing import Any
 import torch
 from torchrl.envs import TransformedEnv
 
-from drone_rl.envs import DroneEnv, make_env
+from drone_rl.envs import DroneEnv, with_transforms
 from drone_rl.policies import PolicyNetwork
 from drone_rl.sim.settings import CameraSettings, TaskSettings
 from drone_rl.sim.tasks import as_task
@@ -117,7 +117,7 @@ class PolicyDescription:
         env = DroneEnv(
             num_envs, self.task, self.camera, seed=seed, device=device, pixels=pixels, **kwargs
         )
-        return make_env(env, made)
+        return with_transforms(env, made)
 
     def build_network(self, generator: torch.Generator | None = None) -> PolicyNetwork:
         """The described network with fresh weights.

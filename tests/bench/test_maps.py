@@ -3,7 +3,7 @@ import pytest
 import torch
 
 from drone_rl.bench.maps import bench_maps, expert, imagined
-from drone_rl.explain.scenes import Scenes
+from drone_rl.explanations.scenes import Scenes
 from drone_rl.sim.actions import Move
 
 

@@ -6,9 +6,9 @@ import shutil
 import pytest
 import torch
 
-from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, make_env
-from drone_rl.explain.settings import ExplainSettings
-from drone_rl.explain.study import explain_policy
+from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, with_transforms
+from drone_rl.explanations.settings import ExplainSettings
+from drone_rl.explanations.study import explain_policy
 from drone_rl.policies import SmallCNN
 
 NASTY = '</script><b>"a" & b'
@@ -19,7 +19,7 @@ NASTY = '</script><b>"a" & b'
 def explanations(tmp_path_factory):
     """Two folders; the second is the first under another name."""
     root = tmp_path_factory.mktemp("explanations")
-    env = make_env(DroneEnv(4), [GrayPixels(), StandardizePixels()])
+    env = with_transforms(DroneEnv(4), [GrayPixels(), StandardizePixels()])
     generator = torch.Generator().manual_seed(0)
     network = SmallCNN((1, 25, 64), 3, channels=(4,), hidden=(8,), generator=generator)
     settings = ExplainSettings(frames=180, episodes=6, perplexity=5)

@@ -5,10 +5,10 @@ import json
 import pytest
 import torch
 
-from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, make_env
-from drone_rl.explain.sections import find_sections
-from drone_rl.explain.settings import ExplainSettings
-from drone_rl.explain.study import explain_policy
+from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, with_transforms
+from drone_rl.explanations.sections import find_sections
+from drone_rl.explanations.settings import ExplainSettings
+from drone_rl.explanations.study import explain_policy
 from drone_rl.policies import MLP
 from drone_rl.report import write_report
 from tests.second_dynamics import Turning
@@ -18,7 +18,7 @@ from tests.second_dynamics import Turning
 def folder(tmp_path_factory):
     """All sections but the verdict: the task's oracle does not know how to fly these drones."""
     folder = tmp_path_factory.mktemp("turning")
-    env = make_env(DroneEnv(6, dynamics=Turning()), [GrayPixels(), StandardizePixels()])
+    env = with_transforms(DroneEnv(6, dynamics=Turning()), [GrayPixels(), StandardizePixels()])
     network = MLP((1, 25, 64), 5, hidden=(8,), generator=torch.Generator().manual_seed(0))
     network.actions = Turning.actions
     with torch.no_grad():  # mostly onwards, or flights last for ever

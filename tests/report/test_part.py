@@ -4,7 +4,7 @@ from importlib import resources
 
 import pytest
 
-from drone_rl.explain.sections import find_sections
+from drone_rl.explanations.sections import find_sections
 from drone_rl.report import sections
 from drone_rl.report.explanation import Explanation
 from drone_rl.report.part import Part

@@ -3,7 +3,7 @@
 import dataclasses
 
 from drone_rl.training import Callback
-from drone_rl.training.progress import Progress, Training
+from drone_rl.training.progress import OngoingTraining, Progress
 from drone_rl.zoo.files import export_policy, load_exported
 from tests.words.test_card import VERDICT
 from tests.zoo.test_files import CHECKPOINT
@@ -23,8 +23,8 @@ def test_files_keep_all_of_it(tmp_path):
 
 def test_a_trainer_is_what_a_callback_sees(make_trainer):
     class Look(Callback):
-        def on_update(self, training: Training, metrics):
-            names = [*Training.__annotations__, "state_dict"]
+        def on_update(self, training: OngoingTraining, metrics):
+            names = [*OngoingTraining.__annotations__, "state_dict"]
             assert all(hasattr(training, name) for name in names)
             assert isinstance(training.progress, Progress)
             training.stop_request = "seen"

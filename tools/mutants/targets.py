@@ -7,7 +7,7 @@ TARGETS: dict[str, tuple[str, ...]] = {
     "sim/actions": ("sim/test_actions",),
     "sim/tasks/collect_cubes/changes": (
         "sim/tasks/collect_cubes/test_changes",
-        "explain/test_outcomes",
+        "explanations/test_outcomes",
     ),
     "sim/tasks/collect_cubes/goals": (
         "sim/tasks/collect_cubes/test_goals",
@@ -24,7 +24,7 @@ TARGETS: dict[str, tuple[str, ...]] = {
     "verdicts/*": ("verdicts/test_{name}", "verdicts"),
     "sweeps/statistics": ("sweeps/test_statistics",),
     **{
-        f"explain/{name}": (f"explain/test_{name}",)
+        f"explanations/{name}": (f"explanations/test_{name}",)
         for name in (
             "truth",
             "causal",

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from drone_rl.explain.tsne import snap_to_grid
+from drone_rl.explanations.tsne import snap_to_grid
 from drone_rl.report import pictures
 from drone_rl.report.explanation import Explanation
 from drone_rl.report.part import Part, Rows

@@ -1,4 +1,5 @@
 # pyright: reportIndexIssue=false
+# pyright: reportReturnType=false
 # pyright: reportArgumentType=false
 # pyright: reportCallIssue=false
 # pyright: reportOperatorIssue=false

@@ -1,4 +1,5 @@
 # pyright: reportAttributeAccessIssue=false
+# pyright: reportGeneralTypeIssues=false
 # (MuJoCo's compiled bindings and Warp's structures are untyped.)
 """Colours and lights for the ray tracer's kernel: the scene's, or each world's own."""
 

@@ -1,4 +1,5 @@
 # pyright: reportAttributeAccessIssue=false
+# pyright: reportGeneralTypeIssues=false
 # (MuJoCo's compiled bindings and Warp's structures are untyped.)
 """A scene as the ray tracer's kernel knows it: cameras, rays and geoms, each in its frame.
 
@@ -155,12 +156,12 @@ def make_geoms(scene: Scene, frames: Frames, show_drone: bool) -> kernel.Geoms:
         frames.place(model.geom_bodyid[i], model.geom_pos[i], model.geom_quat[i]) for i in seen
     ]
     reach = [REACH[model.geom_type[i]](model.geom_size[i]) for i in seen]
-    geoms, on_cpu = kernel.Geoms(), {"device": "cpu"}
-    geoms.kind = wp.array(model.geom_type[seen], dtype=int, **on_cpu)
-    geoms.number = wp.array(seen, dtype=int, **on_cpu)
-    geoms.frame = wp.array([frame for frame, _, _ in places], dtype=int, **on_cpu)
-    geoms.position = wp.array([position for _, position, _ in places], dtype=wp.vec3, **on_cpu)
-    geoms.attitude = wp.array([attitude for _, _, attitude in places], dtype=wp.vec4, **on_cpu)
-    geoms.size = wp.array(model.geom_size[seen], dtype=wp.vec3, **on_cpu)
-    geoms.reach = wp.array(reach, dtype=wp.vec3, **on_cpu)
+    geoms = kernel.Geoms()
+    geoms.kind = wp.array(model.geom_type[seen], dtype=int, device="cpu")
+    geoms.number = wp.array(seen, dtype=int, device="cpu")
+    geoms.frame = wp.array([frame for frame, _, _ in places], dtype=int, device="cpu")
+    geoms.position = wp.array([position for _, position, _ in places], dtype=wp.vec3, device="cpu")
+    geoms.attitude = wp.array([attitude for _, _, attitude in places], dtype=wp.vec4, device="cpu")
+    geoms.size = wp.array(model.geom_size[seen], dtype=wp.vec3, device="cpu")
+    geoms.reach = wp.array(reach, dtype=wp.vec3, device="cpu")
     return geoms

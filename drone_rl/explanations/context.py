@@ -1,0 +1,107 @@
+"""What the sections of an explanation share: one policy, its worlds, and what is made of them.
+
+Each shared thing is made when it is first asked for, and is the same whoever asks first, so that
+sections can run in any order.
+"""
+
+import functools
+
+from numpy.typing import NDArray
+from tensordict.nn import TensorDictModuleBase
+from torch import Tensor
+from torchrl.envs import TransformedEnv
+
+from drone_rl.explanations.attribution import Explainer
+from drone_rl.explanations.dataset import RolloutDataset
+from drone_rl.explanations.hooks import feature_layer, features
+from drone_rl.explanations.recording import draw, fly, spread
+from drone_rl.explanations.response import ResponseMap, response_map
+from drone_rl.explanations.scenes import Scenes, empty_scene
+from drone_rl.explanations.settings import ExplainSettings
+from drone_rl.policies import PolicyNetwork, make_actor
+from drone_rl.utils.seeding import Stream, torch_generator
+
+
+class Context:
+    """One policy that is being explained."""
+
+    def __init__(
+        self, env: TransformedEnv, network: PolicyNetwork, settings: ExplainSettings
+    ) -> None:
+        """Takes the policy and its worlds.
+
+        Args:
+            env: A batch of worlds that have not flown yet, with the policy's pipeline.
+            network: The policy's, on the CPU.
+            settings: What to compute.
+
+        Raises:
+            InputError: A setting doesn't fit the policy.
+        """
+        self.env, self.network, self.settings = env, network, settings
+        self.scenes = Scenes(env)
+        self.layer = settings.layer or feature_layer(network)
+        self.absent = self.scenes.observe(empty_scene(self.scenes))[0]
+        """The scene without a cube, as the policy gets it. Shape: (C, h, w)."""
+        self.explainer = Explainer(network, self.absent, settings.grad_cam_layer)
+        features(network, self.absent[None], self.layer)  # refuses an unknown layer now
+        self._start = env.base_env.state_dict()
+
+    def restart(self) -> TensorDictModuleBase:
+        """Puts the worlds back to their first episodes; returns an actor with a fresh stream."""
+        self.env.base_env.load_state_dict(self._start)
+        generator = torch_generator(self.settings.seed, Stream.REPORT, device=self.device)
+        return make_actor(self.network, self.env.action_spec, generator)
+
+    @functools.cached_property
+    def flights(self) -> RolloutDataset:
+        """Sampled flights, every step of them, without pictures but for what the policy got."""
+        return fly(
+            self.env,
+            self.restart(),
+            num_episodes=self.settings.data_episodes,
+            num_frames=self.settings.frames,
+            meta={"layer": self.layer, "seed": self.settings.seed},
+        )
+
+    @functools.cached_property
+    def dataset(self) -> RolloutDataset:
+        """The frames that are analysed, spread over all flights."""
+        rows = spread(self.flights.episode, self.settings.frames)
+        return draw(self.flights, rows, self.scenes, self.network, (self.layer,))
+
+    @property
+    def device(self) -> str:
+        """Where the worlds are."""
+        return str(self.env.device)
+
+    @property
+    def episode(self) -> NDArray:
+        """The episode of each frame of the data set. Shape: (T,)."""
+        return self.dataset.episode
+
+    @property
+    def observations(self) -> Tensor:
+        """What the policy got. Shape: (T, C, h, w)."""
+        return self.dataset.tensor("observations")
+
+    @property
+    def actions(self) -> Tensor:
+        """What it did. Shape: (T,)."""
+        return self.dataset.tensor("actions")
+
+    @functools.cached_property
+    def maps(self) -> dict[str, Tensor]:
+        """Heat maps of the actions taken by each method, as the policy's pictures: (T, h, w)."""
+        methods = self.explainer.methods()
+        return {name: of(self.observations, self.actions) for name, of in methods.items()}
+
+    @functools.cached_property
+    def frame_maps(self) -> dict[str, Tensor]:
+        """The same, put back to where they are in the camera's frame: (T, H, W)."""
+        return {name: self.scenes.to_frame(maps) for name, maps in self.maps.items()}
+
+    @functools.cached_property
+    def response(self) -> ResponseMap:
+        """What it does about one cube at each place of a grid."""
+        return response_map(self.scenes, self.network)

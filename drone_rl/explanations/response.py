@@ -1,0 +1,168 @@
+"""The response map: what a policy does about one cube wherever it stands, and what comes of it."""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any
+
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from drone_rl.explanations.flying import fly_on
+from drone_rl.explanations.hooks import probabilities
+from drone_rl.explanations.scenes import Scenes, empty_scene, place_cube
+from drone_rl.policies import PolicyNetwork
+from drone_rl.sim.actions import Actions
+
+BLIND = 0.1
+"""A policy is blind to a cube that changes its action probabilities by less than this."""
+
+
+@dataclasses.dataclass
+class ResponseMap:
+    """Move probabilities for one cube at every place of a grid: Z up, F ahead, L sideways."""
+
+    height: NDArray  # (Z,)
+    """Metres above the drone."""
+    forward: NDArray  # (F,)
+    """Metres ahead of it."""
+    lateral: NDArray  # (L,)
+    """Metres to its left."""
+    probabilities: NDArray  # (Z, F, L, A)
+    """Of each action."""
+    without_cube: NDArray  # (A,)
+    """The same for the scene without a cube."""
+    oracle: NDArray  # (L,)
+    """What must be done: a turn where flying straight on would miss."""
+    stratum: NDArray  # (L,)
+    """The task's stratum of a cube there: its side."""
+    blind: NDArray  # (Z, F, L) bool
+    """Where the cube calls for a turn and the policy doesn't notice it."""
+
+
+@dataclasses.dataclass
+class OutcomeMap:
+    """Whether the policy, flying on greedily, collects a cube that stands there."""
+
+    height: NDArray  # (Z,)
+    forward: NDArray  # (f,)
+    lateral: NDArray  # (l,)
+    """As in `ResponseMap`."""
+    collected: NDArray  # (Z, f, l) bool
+    oracle: NDArray  # (l,)
+    stratum: NDArray  # (l,)
+
+
+def response_map(
+    scenes: Scenes, network: PolicyNetwork, *, num_lateral: int = 41, num_forward: int = 31
+) -> ResponseMap:
+    """Draws one cube at every place of a grid and asks the policy about each.
+
+    Args:
+        scenes: Where they are drawn.
+        network: The policy's.
+        num_lateral: Places sideways; see `Explainable.grid`.
+        num_forward: Places ahead.
+    """
+    height, forward, lateral = scenes.task.grid(num_forward, num_lateral)
+    ahead, aside = torch.meshgrid(forward, lateral, indexing="ij")
+    layers = []
+    for up in height.tolist():
+        observed = scenes.observe(place_cube(scenes, ahead.flatten(), aside.flatten(), up))
+        layers.append(probabilities(network, observed).view(num_forward, num_lateral, -1))
+    wishes = torch.stack(layers)
+    alone = probabilities(network, scenes.observe(empty_scene(scenes)))[0]
+    needed = scenes.needed(_offsets(lateral)).to(wishes.device)
+    return ResponseMap(
+        height=height.numpy(),
+        forward=forward.numpy(),
+        lateral=lateral.numpy(),
+        probabilities=wishes.cpu().numpy(),
+        without_cube=alone.cpu().numpy(),
+        oracle=needed.cpu().numpy(),
+        stratum=scenes.task.stratum_at(_offsets(lateral)).numpy(),
+        blind=find_blind(scenes.actions, wishes, alone, needed).cpu().numpy(),
+    )
+
+
+def find_blind(actions: Actions, wishes: Tensor, alone: Tensor, needed: Tensor) -> Tensor:
+    """Where a cube calls for a turn and the policy doesn't notice it.
+
+    Args:
+        actions: What there is to do.
+        wishes: The policy's with a cube there. Shape: (Z, F, L, A).
+        alone: Without any cube. Shape: (A,).
+        needed: The action that is called for, -1 where nobody knows. Shape: (L,).
+
+    Returns:
+        Shape: (Z, F, L), bool.
+    """
+    unmoved = actions.distance(wishes, alone) < BLIND
+    calls = (needed >= 0) & actions.turns(needed)
+    return unmoved & calls & (actions.chosen(wishes) != needed)
+
+
+def outcome_map(
+    scenes: Scenes, network: PolicyNetwork, *, num_lateral: int = 21, num_forward: int = 8
+) -> OutcomeMap:
+    """Flies on from every place of a coarser grid, and sees whether the cube is collected.
+
+    Args:
+        scenes: Where the flights are drawn.
+        network: The policy's.
+        num_lateral: Places sideways; see `Explainable.grid`.
+        num_forward: Places ahead.
+    """
+    height, forward, lateral = scenes.task.grid(num_forward, num_lateral)
+    ahead, aside = torch.meshgrid(forward, lateral, indexing="ij")
+    only = torch.zeros(num_forward * num_lateral, dtype=torch.int64, device=scenes.worlds.device)
+    layers = []
+    for up in height.tolist():
+        starts = place_cube(scenes, ahead.flatten(), aside.flatten(), up)
+        ends = fly_on(scenes, network, starts)
+        layers.append(scenes.task.is_reached(ends, only).view(num_forward, num_lateral))
+    return OutcomeMap(
+        height=height.numpy(),
+        forward=forward.numpy(),
+        lateral=lateral.numpy(),
+        collected=torch.stack(layers).cpu().numpy(),
+        oracle=scenes.needed(_offsets(lateral)).numpy(),
+        stratum=scenes.task.stratum_at(_offsets(lateral)).numpy(),
+    )
+
+
+def summarise(response: ResponseMap, outcome: OutcomeMap, strata: Sequence[str]) -> dict[str, Any]:
+    """Counts for people and programs.
+
+    Args:
+        response: What it wishes for.
+        outcome: What comes of it.
+        strata: Names of the task's, such as sides.
+
+    Returns:
+        "without_cube"; "rows": for each height and side ("left", "ahead" where flying straight on
+        is enough, "right") the share of "places" at which the policy is "blind" (of the response
+        map) and from which the cube is "collected" (of the outcome map); None where no place of
+        the grid lies on that side.
+    """
+    rows = []
+    for layer, height in enumerate(response.height.tolist()):
+        for number, side in enumerate(strata):
+            blind = response.blind[layer][:, response.stratum == number]
+            collected = outcome.collected[layer][:, outcome.stratum == number]
+            rows.append(
+                {
+                    "height": height,
+                    "side": side,
+                    "blind": float(blind.mean()) if blind.size else None,
+                    "collected": int(collected.sum()),
+                    "places": int(collected.size),
+                }
+            )
+    return {"without_cube": response.without_cube.tolist(), "blind_below": BLIND, "rows": rows}
+
+
+def _offsets(lateral: Tensor) -> Tensor:
+    """Places level with the drone, so far to its left. (L,) to (L, 3)."""
+    nothing = torch.zeros_like(lateral)
+    return torch.stack([nothing, lateral, nothing], -1)

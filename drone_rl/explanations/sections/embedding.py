@@ -1,0 +1,27 @@
+"""t-SNE of what the policy makes of its pictures, and of the raw pictures."""
+
+import dataclasses
+from typing import Any
+
+from numpy.typing import NDArray
+
+from drone_rl.explanations import tsne
+from drone_rl.explanations.context import Context
+
+
+def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
+    """Makes "tsne"; arrays "tsne_features" and "tsne_pixels" (T, 2)."""
+    data, settings = context.dataset, context.settings
+    numbers, arrays = {}, {}
+    for name, originals in (
+        ("features", data.features[context.layer]),
+        ("pixels", data.observations),
+    ):
+        embedding = tsne.embed(originals, perplexity=settings.perplexity, seed=settings.seed)
+        arrays[f"tsne_{name}"] = embedding.points
+        numbers[name] = {
+            "layer": context.layer if name == "features" else None,
+            "perplexity": settings.perplexity,
+            **dataclasses.asdict(embedding.faithfulness),
+        }
+    return {"tsne": numbers}, arrays

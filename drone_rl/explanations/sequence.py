@@ -1,0 +1,50 @@
+"""Which frames tell an episode's story: the first, the approach, each collection, the failure."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drone_rl.explanations.dataset import RolloutDataset
+from drone_rl.sim.tasks.judgeable import Judgeable
+
+COUNT = 6
+"""Frames in a sequence, as in Figs. 13 to 15."""
+
+
+def key_frames(dataset: RolloutDataset, episode: int, task: Judgeable) -> list[tuple[int, str]]:
+    """Six frames of an episode in order of time, each with why it was chosen.
+
+    The rule: the first frame; half way to the first collection (or to the end); the frame before
+    each collection; the frame before each cube is missed, and the last one of an episode that
+    failed. What is still free goes to the frames furthest from those chosen.
+
+    Args:
+        dataset: Whole flights.
+        episode: One of them.
+        task: What was flown.
+
+    Returns:
+        Frame number and reason; fewer than six only where the episode is shorter.
+    """
+    frames = np.flatnonzero(dataset.episode == episode)
+    chosen: dict[int, str] = {int(frames[0]): "start"}
+    collections = frames[dataset.rewards[frames] > 0]
+    half = frames[len(frames) // 2] if not len(collections) else (frames[0] + collections[0]) // 2
+    events = [(int(t), f"collects a {task.goal}") for t in collections]
+    events += [(int(t), f"misses a {task.goal}") for t in _misses(dataset, frames)]
+    end = int(dataset.end_reason[frames[-1]])
+    if end not in (0, task.success_end):
+        reason = task.ends(end).name.lower().replace("_", " ")
+        events.append((int(frames[-1]), f"fails: {reason}"))
+    for frame, why in [*events, (int(half), "approach")]:
+        if len(chosen) < COUNT:
+            chosen.setdefault(frame, why)
+    while len(chosen) < min(COUNT, len(frames)):
+        away = np.abs(frames[:, None] - np.array(list(chosen))[None]).min(1)
+        chosen[int(frames[away.argmax()])] = "in between"
+    return sorted(chosen.items())
+
+
+def _misses(dataset: RolloutDataset, frames: NDArray) -> NDArray:
+    """Frames after which the next cube is another one though nothing was collected."""
+    moved_on = dataset.next_cube[frames[1:]] > dataset.next_cube[frames[:-1]]
+    return frames[:-1][moved_on & (dataset.rewards[frames[:-1]] == 0)]

@@ -1,0 +1,93 @@
+"""Everything about one policy, as files: `explanation.json`, `arrays.npz` and `dataset.npz`.
+
+These files are all that a report is made of, so that it can be made again without the policy.
+"""
+
+import dataclasses
+import json
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from torchrl.envs import TransformedEnv
+
+from drone_rl.explanations.context import Context
+from drone_rl.explanations.sections import Section, find_sections
+from drone_rl.explanations.settings import ExplainSettings
+from drone_rl.policies import PolicyNetwork
+from drone_rl.utils.errors import InputError
+
+FORMAT_VERSION = 2
+
+
+def explain_policy(
+    env: TransformedEnv,
+    network: PolicyNetwork,
+    folder: Path,
+    settings: ExplainSettings,
+    *,
+    name: str,
+    provenance: dict[str, Any],
+    progress: Callable[[str], None] = lambda _: None,
+    sections: Mapping[str, Section] | None = None,
+) -> dict[str, Any]:
+    """Computes everything about one policy and writes it to a folder.
+
+    Args:
+        env: A batch of held-out worlds that have not flown yet, with the policy's pipeline.
+        network: The policy's, on the CPU.
+        folder: Where to; made if need be.
+        settings: What to compute.
+        name: Of the policy, for people.
+        provenance: Where it comes from, as plain values.
+        progress: Called with what is being done.
+        sections: What to compute, in this order, which changes nothing but the time of each; all
+            of `explanations/sections` by default.
+
+    Returns:
+        The numbers, as in `explanation.json`.
+
+    Raises:
+        InputError: The folder can't be written or a setting doesn't fit the policy.
+    """
+    context = Context(env, network, settings)
+    numbers: dict[str, Any] = {}
+    arrays: dict[str, NDArray] = {}
+    seconds: dict[str, float] = {}
+    for title, section in (find_sections() if sections is None else sections).items():
+        progress(title.replace("_", " "))
+        began = time.perf_counter()
+        its_numbers, its_arrays = section(context)
+        numbers |= its_numbers
+        arrays |= its_arrays
+        seconds[title] = round(time.perf_counter() - began, 2)
+    written = {
+        "format": "drone_rl explanation",
+        "format_version": FORMAT_VERSION,
+        "name": name,
+        "settings": dataclasses.asdict(settings),
+        "seconds": seconds,
+        "actions": context.scenes.actions.as_dict(),
+        **numbers,
+        "provenance": provenance,
+    }
+    _write(folder, written, arrays, context)
+    return written
+
+
+def _write(
+    folder: Path, numbers: dict[str, Any], arrays: dict[str, NDArray], context: Context
+) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        context.dataset.save(folder / "dataset.npz", context.flights)
+        # numpy's annotation takes any name for allow_pickle
+        np.savez_compressed(folder / "arrays.npz", **arrays)  # pyright: ignore[reportArgumentType]
+        (folder / "explanation.json").write_text(json.dumps(numbers, indent=1))
+    except OSError as error:
+        raise InputError(
+            f"explanation {folder} can't be written ({error.strerror}); choose another folder"
+        ) from error

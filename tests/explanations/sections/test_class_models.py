@@ -1,0 +1,28 @@
+from types import SimpleNamespace
+
+import torch
+
+from drone_rl.explanations import class_model
+from drone_rl.explanations.sections.class_models import section
+
+
+def test_both_objectives_are_sought_in_the_range_of_the_pictures(monkeypatch):
+    calls = []
+
+    def search(network, statistics, objective, *, seed):
+        calls.append((network, statistics.low, statistics.high, objective, seed))
+        pictures = torch.full((3, 1, 2, 2), float(len(calls)))
+        return SimpleNamespace(pictures=pictures, summary=lambda: {"sought": objective})
+
+    monkeypatch.setattr(class_model, "search", search)
+    observations = torch.linspace(-2, 2, 40).reshape(10, 1, 2, 2)
+    context = SimpleNamespace(
+        observations=observations, network="net", settings=SimpleNamespace(seed=7)
+    )
+    numbers, arrays = section(context)
+    assert [call[0] for call in calls] == ["net", "net"]
+    assert [call[3:] for call in calls] == [("probability", 7), ("logit", 7)]
+    assert numbers["class_model"]["logit"] == {"sought": "logit"}
+    assert numbers["class_model"]["statistics"]["low"] == calls[0][1] < calls[0][2]
+    assert (arrays["class_model_probability"] == 1).all()
+    assert (arrays["class_model_logit"] == 2).all()

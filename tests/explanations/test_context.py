@@ -1,0 +1,37 @@
+import numpy as np
+import torch
+
+from drone_rl.explanations.context import Context
+from drone_rl.explanations.settings import ExplainSettings
+
+SMALL = ExplainSettings(frames=60, perplexity=5, seed=3)
+
+
+def test_worlds_and_actions_start_afresh_whoever_asked_first(make_pipeline):
+    flown = []
+    for first in ("flights", "restart"):
+        env, actor = make_pipeline(num_envs=4)
+        context = Context(env, actor.module[0].module, SMALL)
+        if first == "restart":
+            policy = context.restart()
+            for _ in range(2):  # somebody flies
+                env.rollout(50, policy)
+        flown.append(context.flights)
+    np.testing.assert_array_equal(flown[0].cubes, flown[1].cubes)
+    np.testing.assert_array_equal(flown[0].actions, flown[1].actions)
+
+
+def test_frames_are_of_the_flights_and_maps_of_the_frames(make_pipeline):
+    env, actor = make_pipeline(num_envs=4)
+    context = Context(env, actor.module[0].module, SMALL)
+    data, flights = context.dataset, context.flights
+    assert len(np.unique(flights.episode)) == len(np.unique(context.episode)) == 30
+    assert len(data) == len(context.actions) == 60
+    every = zip(flights.episode, flights.step, strict=True)
+    step = {(int(e), int(s)): t for t, (e, s) in enumerate(every)}
+    rows = [step[int(e), int(s)] for e, s in zip(data.episode, data.step, strict=True)]
+    np.testing.assert_array_equal(data.actions, flights.actions[rows])
+    assert context.dataset is data and context.maps is context.maps  # made once
+    first = context.explainer.saliency(context.observations[:2], context.actions[:2])
+    torch.testing.assert_close(context.maps["saliency"][:2], first)
+    assert set(context.maps) == set(context.frame_maps)

@@ -1,0 +1,101 @@
+import inspect
+
+import numpy as np
+import torch
+from torch import nn
+
+from drone_rl.explanations.hooks import probabilities
+from drone_rl.explanations.response import (
+    OutcomeMap,
+    ResponseMap,
+    find_blind,
+    outcome_map,
+    response_map,
+    summarise,
+)
+from drone_rl.explanations.scenes import Scenes, place_cube
+from drone_rl.sim.actions import MOVES
+from drone_rl.sim.settings import TaskSettings
+
+IDLE, LEFT = [1.0, 0.0, 0.0], [0.1, 0.9, 0.0]
+
+
+class Forward(nn.Module):
+    def forward(self, pictures):
+        return torch.tensor([9.0, 0.0, 0.0]).expand(len(pictures), 3)
+
+
+def test_a_place_on_the_grid_is_that_place_in_the_world(scenes, world):
+    found = response_map(scenes, world[2], num_lateral=5, num_forward=4)
+    assert found.probabilities.shape == (1, 4, 5, 3)
+    assert found.lateral.tolist() == [12, 6, 0, -6, -12] and found.forward[-1] == 15
+    assert found.height.tolist() == [0]
+    assert found.oracle.tolist() == [1, 1, 0, 2, 2]
+    at = place_cube(scenes, torch.tensor([found.forward[1]]), torch.tensor([found.lateral[3]]))
+    expected = probabilities(world[2], scenes.observe(at))[0].numpy()
+    np.testing.assert_allclose(found.probabilities[0, 1, 3], expected, atol=1e-6)
+
+
+def test_grids_are_odd_sideways_so_that_straight_ahead_is_on_them():
+    defaults = [
+        {k: v.default for k, v in inspect.signature(f).parameters.items() if k.startswith("num")}
+        for f in (response_map, outcome_map)
+    ]
+    fine, coarse = {"num_lateral": 41, "num_forward": 31}, {"num_lateral": 21, "num_forward": 8}
+    assert defaults == [fine, coarse]
+
+
+def test_heights_are_those_at_which_the_task_puts_cubes(make_pipeline):
+    env, actor = make_pipeline(num_envs=4, task=TaskSettings(vertical_bound=1.2))
+    scenes, network = Scenes(env), actor.module[0].module
+    found = response_map(scenes, network, num_lateral=3, num_forward=2)
+    assert found.height.tolist() == [-1.2, 0.0, 1.2]
+    at = place_cube(scenes, torch.tensor([15.0]), torch.tensor([12.0]), 1.2)
+    assert at.cubes[0, 0].tolist() == [15.0, 12.0, 2.5 + 1.2]
+    expected = probabilities(network, scenes.observe(at))[0].numpy()
+    np.testing.assert_allclose(found.probabilities[2, 1, 0], expected, atol=1e-6)
+    assert not np.allclose(found.probabilities[0], found.probabilities[2], atol=1e-6)
+
+
+def test_an_outcome_is_flown_not_guessed(scenes):
+    found = outcome_map(scenes, Forward(), num_lateral=17, num_forward=2)  # 1.5 m apart
+    straight = [False] * 7 + [True] * 3 + [False] * 7
+    assert found.collected.tolist() == [[straight, straight]]
+    assert (found.oracle == 0).tolist() == straight
+
+
+def test_blind_is_where_a_turn_is_called_for_and_nothing_changes():
+    wishes = np.array([[[IDLE, LEFT, IDLE, LEFT, [0.95, 0.0, 0.05]]]])
+    needed = torch.tensor([1, 1, 0, 2, 2])
+    blind = find_blind(MOVES, torch.tensor(wishes), torch.tensor(IDLE), needed)
+    found = ResponseMap(
+        height=np.array([0.0]),
+        forward=np.array([5.0]),
+        lateral=np.array([6.0, 3.0, 0.0, -3.0, -6.0]),
+        probabilities=wishes,
+        without_cube=np.array(IDLE),
+        oracle=needed.numpy(),
+        stratum=np.array([0, 0, 1, 2, 2]),
+        blind=blind.numpy(),
+    )
+    # unnoticed; noticed; rightly ignored; noticed, though answered wrongly; hardly noticed
+    assert found.blind.tolist() == [[[True, False, False, False, True]]]
+    outcome = OutcomeMap(
+        height=found.height,
+        forward=found.forward,
+        lateral=np.array([6.0, 0.0]),
+        collected=np.array([[[False, True]]]),
+        oracle=np.array([1, 0]),
+        stratum=np.array([0, 1]),
+    )
+    rows = summarise(found, outcome, ("left", "ahead", "right"))["rows"]
+    assert rows == [
+        {"height": 0.0, "side": "left", "blind": 0.5, "collected": 0, "places": 1},
+        {"height": 0.0, "side": "ahead", "blind": 0.0, "collected": 1, "places": 1},
+        {"height": 0.0, "side": "right", "blind": 0.5, "collected": 0, "places": 0},
+    ]
+
+
+def test_who_flies_straight_on_by_nature_is_blind_only_beyond_its_reach(scenes):
+    found = response_map(scenes, Forward(), num_lateral=17, num_forward=2)
+    assert found.blind[0, 0].tolist() == [True] * 7 + [False] * 3 + [True] * 7

@@ -1,0 +1,239 @@
+"""The procedure on a policy that looks at one window, without a simulator."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import torch
+
+from drone_rl.explanations import causal, trust
+from drone_rl.explanations.attribution import Explainer
+from drone_rl.explanations.patches import Grid
+from drone_rl.explanations.placebos import placebo_maps
+from drone_rl.explanations.trust import (
+    Pictures,
+    Trial,
+    check_maps,
+    check_method,
+    method_maps,
+    random_weights,
+)
+from drone_rl.policies import MLP
+
+LEVEL = 0.01
+SIZE = (8, 16)
+
+
+def looker(window):
+    """A linear policy that looks at a window alone."""
+    network = MLP((1, *SIZE), 3, hidden=())
+    weight = torch.zeros(3, *SIZE)
+    weight[1][window], weight[2][window] = 0.5, -0.5
+    with torch.no_grad():
+        network.layers.logits.weight.copy_(weight.flatten(1))
+    return network
+
+
+def weights(network, x, a):
+    """The true map of a linear policy."""
+    found = network.layers.logits.weight.detach().abs().sum(0)
+    return found.view(1, *SIZE).expand(len(x), -1, -1)
+
+
+def make_trial(network, episodes=40, frames=3, seed=0):
+    generator = torch.Generator().manual_seed(seed)
+    x = torch.randn(episodes * frames, 1, *SIZE, generator=generator)
+    others = [torch.randn(x.shape, generator=generator) for _ in range(2)]
+    grid = Grid(2, 4, 4, 4)
+    return Trial(
+        network=network,
+        observations=x,
+        actions=torch.arange(len(x)) % 3,
+        effects=causal.patch_effects(network, x, others, grid),
+        placebos=placebo_maps(x, torch.zeros(1, *SIZE), others),
+        episode=np.arange(len(x)) // frames,
+        grid=grid,
+    )
+
+
+@pytest.fixture(scope="module")
+def trial():
+    return make_trial(looker((slice(2, 6), slice(8, 16))))
+
+
+def test_the_true_map_is_trusted(trial):
+    found = check_maps(trial, {"true": weights}, num_methods=5)
+    method = found["methods"]["true"]
+    assert found["trusted"] == "true" and method["failed"] == []
+    assert method["score"]["mean"] > 0.7
+    assert method["random_weights"]["tried"] == 99 and method["random_weights"]["as_good"] == 0
+    # of the window's four patches, which are equally hot, two are the tenth that moves it most
+    assert (method["pointing"]["hit"], method["pointing"]["chance"]) == (0.5, 2 / 16)
+    assert found["level"] == LEVEL and found["confidence"] == 0.98
+    assert (found["frames"], found["episodes"]) == (120, 40)
+    assert found["placebos"]["ones"]["mean"] == 0.0
+
+
+def test_the_best_of_those_that_pass_is_trusted(trial):
+    def blurred(network, x, a):
+        return weights(network, x, a) + 0.02 * torch.rand(SIZE)
+
+    assert check_maps(trial, {"blurred": blurred, "true": weights})["trusted"] == "true"
+    assert check_maps(trial, {"true": weights, "blurred": blurred})["trusted"] == "true"
+
+
+def test_the_best_is_the_one_that_is_surely_good(trial, monkeypatch):
+    scores = {"sure": (0.5, 0.6), "perhaps": (0.1, 0.9), "no": (0.8, 0.9)}
+
+    def checked(trial, method, level, maps):
+        low, high = scores[method]
+        return {"trusted": method != "no", "score": {"lower95": low, "upper95": high}}
+
+    monkeypatch.setattr(trust, "check_method", checked)
+    methods = {name: name for name in scores}
+    assert check_maps(trial, methods, maps=methods)["trusted"] == "sure"
+
+
+@pytest.mark.parametrize(
+    ("likeness", "passed"),
+    [
+        ({"upper": 0.49, "seeds": [-0.9, 0.49]}, True),
+        ({"upper": 0.49, "seeds": [-0.9, 0.5]}, False),  # with some weights it is alike
+        ({"upper": 0.5, "seeds": [0.1, 0.2]}, False),
+        ({"upper": None, "seeds": [0.1, 0.2]}, False),  # too few episodes
+    ],
+)
+def test_likeness_is_of_all_seeds_together_and_of_each(likeness, passed):
+    bound = {"lower": 0.1}
+    found = trust._tests({"placebos": {"a": bound}, "pointing": bound, "likeness": likeness})
+    assert found == {"placebos": True, "pointing": True, "likeness": passed}
+
+
+def test_a_bound_of_nothing_is_no_gain():
+    likeness = {"upper": 0.0, "seeds": [0.0]}
+    for lower in (0.0, -0.1, None):
+        bounds = {"a": {"lower": 0.1}, "b": {"lower": lower}}
+        found = trust._tests(
+            {"placebos": bounds, "pointing": {"lower": lower}, "likeness": likeness}
+        )
+        assert found == {"placebos": False, "pointing": False, "likeness": True}
+
+
+def test_placebos_are_not_trusted(trial):
+    liars = {name: lambda n, x, a, m=maps: m for name, maps in trial.placebos.items()}
+    found = check_maps(
+        trial, {k: (lambda n, x, a, m=m: m(n, x, a)[: len(x)]) for k, m in liars.items()}
+    )
+    assert found["trusted"] is None
+    for name, method in found["methods"].items():
+        assert {"placebos", "likeness"} <= set(method["failed"]), name
+
+
+def test_the_true_map_turned_round_is_not_trusted(trial):
+    found = check_method(trial, lambda n, x, a: 2 - weights(n, x, a), LEVEL)
+    assert {"placebos", "pointing"} <= set(found["failed"])
+    assert found["score"]["upper95"] < 0
+
+
+def test_a_map_that_ignores_the_policy_is_not_trusted_even_if_it_is_right(trial):
+    true = weights(trial.network, trial.observations, None)
+    found = check_method(trial, lambda n, x, a: true[: len(x)], LEVEL)
+    assert found["failed"] == ["likeness"]
+    assert found["likeness"]["median"] == 1.0
+
+
+def test_a_map_that_hides_behind_noise_of_the_weights_is_not_trusted(trial):
+    true = weights(trial.network, trial.observations, None)
+
+    def liar(network, x, a):
+        seed = int(network.layers.logits.weight.double().cumsum(1).sum() * 1e6) % 2**31
+        noise = torch.rand(SIZE, generator=torch.Generator().manual_seed(seed))
+        return true[: len(x)] * (0.5 + noise)
+
+    found = check_method(trial, liar, LEVEL)
+    assert found["failed"] == ["random weights"]
+    assert found["random_weights"]["as_good"] == 1  # it stops there
+    assert found["random_weights"]["tried"] < 99
+
+
+def test_random_weights_are_as_good_when_they_score_as_much(trial):
+    found = random_weights(trial, lambda n, x, a: trial.placebos["ones"][: len(x)], LEVEL)
+    assert found == {"score": 0.0, "best": 0.0, "mean": 0.0, "tried": 1, "as_good": 1}
+
+
+def test_a_map_without_heat_is_not_trusted(trial):
+    found = check_method(trial, lambda n, x, a: torch.zeros(len(x), *SIZE), LEVEL)
+    assert {"placebos", "pointing", "likeness"} == set(found["failed"])
+    assert found["maps_without_heat"] == 120
+
+
+def test_few_episodes_show_nothing():
+    found = check_method(make_trial(looker((slice(2, 4), slice(4, 8))), 5), weights, LEVEL)
+    assert not found["trusted"] and found["pointing"]["lower"] is None
+
+
+def test_nothing_is_trusted_about_a_policy_that_nothing_moves(trial):
+    blind = trial[np.zeros(0, np.int64)]
+    found = check_maps(dataclasses.replace(blind, still=120), {"true": weights})
+    assert found["trusted"] is None and found["frames_unmoved"] == 120
+    assert found["methods"]["true"]["failed"] == ["nothing moves the policy"]
+    saliency = method_maps(Explainer(trial.network, torch.zeros(1, *SIZE)))["saliency"]
+    assert blind.maps(saliency).shape == (0, *SIZE)
+
+
+def test_a_trial_is_a_fact(trial):
+    assert (trial.seed, trial.still) == (0, 0)
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        trial.still = 1
+    with pytest.raises(TypeError):  # nine fields, told apart by name alone
+        Trial(*vars(trial).values())
+    pictures = Pictures(
+        observations=trial.observations, others=[], absent=trial.observations[0], episode=[]
+    )
+    assert pictures.seed == 0
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        pictures.seed = 1
+    with pytest.raises(TypeError):
+        Pictures(*vars(pictures).values())
+
+
+def test_a_trial_on_some_of_its_pictures(trial):
+    few = trial.thinned()
+    assert few.episode.tolist() == list(range(40))
+    assert torch.equal(few.observations, trial.observations[1::3])  # the middle of each episode
+    assert np.array_equal(few.effects, trial.effects[1::3])
+    assert torch.equal(few.placebos["noise"], trial.placebos["noise"][1::3])
+
+
+def test_methods_follow_the_network_they_are_given(trial):
+    methods = method_maps(Explainer(trial.network, torch.zeros(1, *SIZE)))
+    assert set(methods) == {"saliency", "integrated_gradients", "occlusion"}
+    other = looker((slice(0, 2), slice(0, 4)))
+    x, a = trial.observations[:4], trial.actions[:4]
+    for name in ("saliency", "occlusion"):
+        there = methods[name](other, x, a).mean(0)
+        assert there[0, 0] > 0 and there[3, 10] < 1e-6, name
+        assert methods[name](trial.network, x, a).mean(0)[3, 10] > 0, name
+
+
+def test_a_trial_of_a_policy_in_the_simulator(world, scenes, dataset):
+    network = world[2]
+    made = trust.make_trial(
+        scenes, network, dataset.state(scenes.task), dataset.tensor("actions"), dataset.episode
+    )
+    assert made.seed == 0
+    assert made.effects.shape == (len(made.episode), 40) == (len(made.observations), 40)
+    rows = causal.spread(dataset.episode, trust.FRAMES_AN_EPISODE)
+    assert len(made.episode) + made.still == len(rows)
+    torch.testing.assert_close(
+        made.observations, dataset.tensor("observations")[rows][: len(made.episode)]
+    )
+    assert "size of the change" in made.placebos
+    with torch.no_grad():
+        network.layers.logits.weight.zero_()
+    blind = trust.make_trial(
+        scenes, network, dataset.state(scenes.task), dataset.tensor("actions"), dataset.episode
+    )
+    assert len(blind.episode) == 0 and blind.still == len(rows)
+    found = check_maps(blind, method_maps(Explainer(network, torch.zeros(1, 25, 64))))
+    assert found["trusted"] is None
