@@ -28,7 +28,7 @@ _PLACES = {
     "api.judging": ("Evaluation", "Judgement", "evaluate", "judge"),
     "api.policy": ("Policy", "load_policy"),
     "api.training": ("Training", "train"),
-    "explain.settings": ("ExplainSettings",),
+    "explanations.settings": ("ExplainSettings",),
     "settings.judging": ("EvaluateSettings", "JudgeSettings"),
     "settings.training": ("TrainSettings", "TrainerSettings"),
     "sim.settings": ("CameraSettings", "TaskSettings"),

@@ -21,7 +21,7 @@ _DRAWING = ("sim", "envs")
 _COLLECTING = (*_DRAWING, "policies", "collectors")
 _TRAINING = (*_COLLECTING, "objectives", "training")
 _JUDGING = (*_DRAWING, "policies", "evaluation", "verdicts")
-_EXPLAINING = (*_JUDGING, "explain")
+_EXPLAINING = (*_JUDGING, "explanations")
 
 BENCHMARKS: dict[str, Benchmark] = {
     "render": Benchmark(

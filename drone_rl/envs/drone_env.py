@@ -170,10 +170,10 @@ class DroneEnv(EnvBase):
     def _draw(self, worlds: Tensor) -> None:
         if not self.pixels:
             return
-        everyone = len(worlds) == len(self._pixels)
-        state = self.worlds.state if everyone else self.worlds.state[worlds]
+        is_whole = len(worlds) == len(self._pixels)
+        state = self.worlds.state if is_whole else self.worlds.state[worlds]
         pixels = self.worlds.render(state)
-        if everyone:
+        if is_whole:
             self._pixels = pixels
         else:
             self._pixels = self._pixels.clone()

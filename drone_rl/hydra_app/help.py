@@ -29,11 +29,11 @@ def show_help(command: str, conf: Path, overrides: Sequence[str]) -> None:
         conf: That folder.
         overrides: As on the command line; those that are flags say nothing.
     """
-    told = [o for o in overrides if not o.startswith("-")]
+    typed = [o for o in overrides if not o.startswith("-")]
     GlobalHydra.instance().clear()
     with initialize_config_dir(str(conf), version_base="1.3"):
-        full = compose(command, told, return_hydra_config=True)
-        config = compose(command, told)
+        full = compose(command, typed, return_hydra_config=True)
+        config = compose(command, typed)
     chosen = {k: v for k, v in full.hydra.runtime.choices.items() if "/" not in k and "@" not in k}
     values = OmegaConf.to_container(config, resolve=False)
     print(f"drone-rl {command.replace('_', '-')} [setting=value ...]\n")

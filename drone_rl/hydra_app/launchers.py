@@ -97,11 +97,11 @@ class SweepLauncher(Launcher):
         config = copy.deepcopy(self.config)
         names = config.hydra.job.config.override_dirname
         left_out = tuple(f"{key}=" for key in names.exclude_keys)
-        told = sorted(o for o in overrides if not o.startswith(left_out))
-        told = [re.sub(r"[^\w.-]+", names.kv_sep, o) for o in told]  # no need of quotes in a shell
+        typed = sorted(o for o in overrides if not o.startswith(left_out))
+        typed = [re.sub(r"[^\w.-]+", names.kv_sep, o) for o in typed]  # needs no quotes in a shell
         with open_dict(config):
             config.hydra.job.id = config.hydra.job.num = number
-            config.hydra.job.override_dirname = names.item_sep.join(told)
+            config.hydra.job.override_dirname = names.item_sep.join(typed)
         HydraConfig.instance().set_config(config)
         return Run(number, tuple(overrides), folder / str(config.hydra.sweep.subdir)[:200])
 
@@ -171,8 +171,8 @@ def register_plugins(*plugins: type[Plugin]) -> None:
 
 def _command() -> list[str]:
     """What the user typed, without the folder that follows from it."""
-    told = [word for word in sys.argv[1:] if not word.startswith("hydra.sweep.dir=${")]
-    return [*sys.argv[0].split(), *told]
+    typed = [word for word in sys.argv[1:] if not word.startswith("hydra.sweep.dir=${")]
+    return [*sys.argv[0].split(), *typed]
 
 
 def _job_return(run: Run) -> JobReturn:

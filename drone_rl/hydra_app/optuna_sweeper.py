@@ -78,8 +78,8 @@ class OptunaSweeper(Sweeper):
     def sweep(self, arguments: list[str]) -> None:
         """Asks for settings, runs them, tells the results, until all trials are done."""
         parser = OverridesParser.create(config_loader=self.hydra_context.config_loader)
-        told = parser.parse_overrides([f"{k}={v}" for k, v in self.params.items()] + arguments)
-        last = {override.get_key_element(): override for override in told}
+        typed = parser.parse_overrides([f"{k}={v}" for k, v in self.params.items()] + arguments)
+        last = {override.get_key_element(): override for override in typed}
         space = {k: distribution(o) for k, o in last.items() if o.is_sweep_override()}
         fixed = [
             f"{k}={o.get_value_element_as_str()}"

@@ -19,18 +19,18 @@ def complete(overrides: Sequence[str]) -> list[str]:
     Raises:
         InputError: There is no such run, or it is not plain what its settings were.
     """
-    told = networks(overrides)
-    if is_sweep(told):
-        is_named = any(o.startswith("hydra.sweep.dir=") for o in told)
-        return told if is_named else [*told, _FOLDER + sweep_name(told)]
-    folders = [o.split("=", 1)[1] for o in told if o.startswith("resume=")]
+    typed = networks(overrides)
+    if is_sweep(typed):
+        is_named = any(o.startswith("hydra.sweep.dir=") for o in typed)
+        return typed if is_named else [*typed, _FOLDER + sweep_name(typed)]
+    folders = [o.split("=", 1)[1] for o in typed if o.startswith("resume=")]
     if not folders or folders[-1] in ("", "null"):
-        return told
-    if any(o.startswith("hydra.run.dir=") for o in told):
-        return told  # a sweep gives all settings itself
+        return typed
+    if any(o.startswith("hydra.run.dir=") for o in typed):
+        return typed  # a sweep gives all settings itself
     folder = Path(folders[-1])
     if not (folder / "checkpoints" / "last.pt").is_file():
         raise InputError(f"resume={folder} has no checkpoints/last.pt; give the folder of a run")
     refuse_links(folder)
-    kept = networks(taken_over(folder, [*told, *former(told)]))
-    return [*kept, *told, "hydra.mode=RUN", f"hydra.run.dir={quoted(str(folder))}"]
+    kept = networks(taken_over(folder, [*typed, *former(typed)]))
+    return [*kept, *typed, "hydra.mode=RUN", f"hydra.run.dir={quoted(str(folder))}"]

@@ -23,7 +23,7 @@ class _Discounted(ReturnEstimator):
         """
         super().__init__(**kwargs)
         if not 0.0 <= gamma <= 1.0:
-            raise InputError(f"returns.gamma={gamma} is out of range; give a rate from 0 to 1")
+            raise InputError(f"gamma={gamma} is out of range; give a rate from 0 to 1")
         self.gamma = gamma
 
 
@@ -102,7 +102,7 @@ class TimeBaseline(_Discounted):
         """
         super().__init__(gamma, **kwargs)
         if not 0.0 <= decay < 1.0:
-            raise InputError(f"returns.decay={decay} is out of range; give 0 or more, below 1")
+            raise InputError(f"decay={decay} is out of range; give 0 or more, below 1")
         self.decay = decay
         self.register_buffer("baseline", torch.zeros(max_steps))
         self.register_buffer("seen", torch.zeros(max_steps, dtype=torch.bool))

@@ -70,9 +70,9 @@ class ReinforceLoss(LossModule):
         """
         super().__init__()
         if reduction not in ("mean", "sum", "none"):
-            raise InputError(f"objective.reduction={reduction} is unknown; give mean, sum or none")
+            raise InputError(f"reduction={reduction} is unknown; give mean, sum or none")
         if entropy_coeff < 0:
-            raise InputError(f"objective.entropy_coeff={entropy_coeff} is negative; give 0 or more")
+            raise InputError(f"entropy_coeff={entropy_coeff} is negative; give 0 or more")
         self.reduction = reduction
         self.convert_to_functional(actor_network, "actor_network", create_target_params=False)
         self.register_buffer("entropy_coeff", torch.tensor(float(entropy_coeff)))

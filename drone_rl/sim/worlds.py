@@ -127,9 +127,9 @@ class Worlds:
         Returns:
             Reward. Shape: (k,), float64.
         """
-        everyone = torch.equal(worlds, self._every)
-        state, reward = self.advance(self.state if everyone else self.state[worlds], action)
-        if everyone:
+        is_whole = torch.equal(worlds, self._every)
+        state, reward = self.advance(self.state if is_whole else self.state[worlds], action)
+        if is_whole:
             self.state = state
         else:
             self.state[worlds] = state

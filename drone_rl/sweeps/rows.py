@@ -48,11 +48,6 @@ class Row:
     """Mean entropy of the policy over the last updates, nats."""
 
     @property
-    def has_ended(self) -> bool:
-        """Whether it belongs into a share."""
-        return self.state != "unfinished"
-
-    @property
     def is_solved(self) -> bool:
         """Whether it reached the target."""
         return self.result.get("reason") == "solved"

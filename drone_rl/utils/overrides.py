@@ -94,17 +94,17 @@ def read_overrides(folder: Path) -> list[str]:
     return [check_harmless(text, str(path)) for text in texts]
 
 
-def taken_over(folder: Path, told: Collection[str]) -> list[str]:
-    """The settings of a run that goes on, except those that are told anew.
+def taken_over(folder: Path, typed: Collection[str]) -> list[str]:
+    """The settings of a run that goes on, except those that are typed anew.
 
     Args:
         folder: Of the run.
-        told: Settings on the command line, which say more than any file may.
+        typed: Settings on the command line, which say more than any file may.
 
     Raises:
         InputError: A setting may not be taken over from a file.
     """
-    keys = {_key(override) for override in told}
+    keys = {_key(override) for override in typed}
     found = [o for o in read_overrides(folder) if _key(o) not in keys and _key(o) != "resume"]
     for override in found:
         if not any(re.fullmatch(pattern, override) for pattern in _TAKEN_OVER):

@@ -136,8 +136,8 @@ def measure(
         rule: Thresholds.
         times: Counts every episode so often, to see what more of the same would tell.
     """
-    told = observe(greedy, baselines, rule)
-    return tuple(estimate(i, np.tile(values, times), rule) for i, values in enumerate(told))
+    observed = observe(greedy, baselines, rule)
+    return tuple(estimate(i, np.tile(values, times), rule) for i, values in enumerate(observed))
 
 
 def observe(greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule) -> list[NDArray]:
@@ -148,14 +148,14 @@ def observe(greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule) -> 
         cube, the others one for each episode. Shape: (at most n,), float64.
     """
     oracle = baselines["oracle"]
-    told = [greedy.success - rule.good_share * oracle.success]
+    observed = [greedy.success - rule.good_share * oracle.success]
     strata = range(len(rule.strata))
-    told += [greedy.offered(stratum).double() for stratum in strata]
-    told += [greedy.stratum_share(stratum) for stratum in strata]
+    observed += [greedy.offered(stratum).double() for stratum in strata]
+    observed += [greedy.stratum_share(stratum) for stratum in strata]
     for name in rule.luck:
         luck = (1 - rule.luck_margin) * baselines[name].share
-        told.append(greedy.share - luck - rule.luck_margin * oracle.share)
-    return [values.numpy() for values in told]
+        observed.append(greedy.share - luck - rule.luck_margin * oracle.share)
+    return [values.numpy() for values in observed]
 
 
 def estimate(quantity: int, values: NDArray, rule: Rule) -> Quantity:

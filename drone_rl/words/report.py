@@ -18,8 +18,8 @@ def _size(evidence: Evidence) -> str:
 
 def _actions(evidence: Evidence) -> str:
     shares, names = evidence["dataset"]["action_shares"], shown_actions(evidence).names
-    told = listed([f"{percent(s)} {a}" for s, a in zip(shares, names, strict=True)])
-    return f"Of these steps {told}."
+    parts = listed([f"{percent(s)} {a}" for s, a in zip(shares, names, strict=True)])
+    return f"Of these steps {parts}."
 
 
 def _one_action(evidence: Evidence) -> str:
@@ -166,8 +166,8 @@ LOOPS = (
 def _reached(evidence: Evidence) -> str:
     reached = evidence["class_model"]["logit"]["probabilities"]
     names = shown_actions(evidence).names
-    told = listed([f"{a} {p:.3f}" for a, p in zip(names, reached, strict=True)])
-    return f"The pictures sought by logit reach a probability of {told}."
+    parts = listed([f"{a} {p:.3f}" for a, p in zip(names, reached, strict=True)])
+    return f"The pictures sought by logit reach a probability of {parts}."
 
 
 def _unreached(evidence: Evidence) -> list[str]:

@@ -13,12 +13,12 @@ def _level(evidence: Evidence, level: bool = True) -> list[Evidence]:
 
 def _collected(rows: Sequence[Evidence]) -> str:
     where = {"left": "on its left", "ahead": "ahead", "right": "on its right"}
-    told = [
+    parts = [
         f"{row['collected']} of {row['places']} places {where.get(row['side'], row['side'])}"
         for row in rows
         if row["places"]
     ]
-    return listed(told)
+    return listed(parts)
 
 
 def _outcomes(evidence: Evidence) -> str:
@@ -30,9 +30,9 @@ def _outcomes(evidence: Evidence) -> str:
 
 def _blind(evidence: Evidence) -> str:
     rows = {row["side"]: row["blind"] for row in _level(evidence)}
-    told = [f"{percent(rows[s])} of the places on the {s}" for s in rows if s != "ahead"]
+    parts = [f"{percent(rows[s])} of the places on the {s}" for s in rows if s != "ahead"]
     return (
-        f"It is blind at {listed(told)}: a turn is called for and not made, and its probabilities "
+        f"It is blind at {listed(parts)}: a turn is called for and not made, and its probabilities "
         f"differ by less than {evidence['response']['blind_below']:g} from those without a cube. "
         "Farther on it may see the cube yet."
     )

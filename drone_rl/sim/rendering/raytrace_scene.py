@@ -16,18 +16,19 @@ from numpy.typing import NDArray
 
 from drone_rl.sim.meaning import Meaning
 from drone_rl.sim.rendering import raytrace_kernel as kernel
+from drone_rl.sim.rendering import raytrace_solids as solids
 from drone_rl.sim.rendering.scene import Scene
 from drone_rl.sim.rendering.view import View
 from drone_rl.utils.errors import InputError
 
 REACH: Mapping[int, Callable[[NDArray], NDArray]] = MappingProxyType(
     {
-        kernel.PLANE: lambda size: size,
-        kernel.SPHERE: lambda size: size[[0, 0, 0]],
-        kernel.CAPSULE: lambda size: size[[0, 0, 1]] + [0.0, 0.0, size[0]],
-        kernel.ELLIPSOID: lambda size: size,
-        kernel.CYLINDER: lambda size: size[[0, 0, 1]],
-        kernel.BOX: lambda size: size,
+        solids.PLANE: lambda size: size,
+        solids.SPHERE: lambda size: size[[0, 0, 0]],
+        solids.CAPSULE: lambda size: size[[0, 0, 1]] + [0.0, 0.0, size[0]],
+        solids.ELLIPSOID: lambda size: size,
+        solids.CYLINDER: lambda size: size[[0, 0, 1]],
+        solids.BOX: lambda size: size,
     }
 )
 """Half extents of the box around each kind of geom, from its size as MuJoCo keeps it."""

@@ -1,0 +1,155 @@
+# pyright: reportIndexIssue=false
+# pyright: reportReturnType=false
+# pyright: reportArgumentType=false
+# pyright: reportCallIssue=false
+# pyright: reportOperatorIssue=false
+# pyright: reportGeneralTypeIssues=false
+# pyright: reportAttributeAccessIssue=false
+# (Warp compiles this file; Python's types say nothing about it.)
+"""Where rays meet the solids and planes that a world is made of, each in its own frame.
+
+All solids are convex and closed, so a ray from outside enters each at most once; of a ray from
+inside nothing is told, for only outsides are drawn. MuJoCo's sizes: a box, an ellipsoid has half
+extents; a ball a radius; a capsule, a cylinder a radius and half a length, without the caps.
+"""
+
+import mujoco
+import warp as wp
+
+PLANE = wp.constant(int(mujoco.mjtGeom.mjGEOM_PLANE))
+SPHERE = wp.constant(int(mujoco.mjtGeom.mjGEOM_SPHERE))
+CAPSULE = wp.constant(int(mujoco.mjtGeom.mjGEOM_CAPSULE))
+ELLIPSOID = wp.constant(int(mujoco.mjtGeom.mjGEOM_ELLIPSOID))
+CYLINDER = wp.constant(int(mujoco.mjtGeom.mjGEOM_CYLINDER))
+BOX = wp.constant(int(mujoco.mjtGeom.mjGEOM_BOX))
+
+_PARALLEL = wp.constant(1e-15)
+"""Component of a ray's direction below which it never meets a plane across it."""
+_FAR_AWAY = wp.constant(1e10)
+
+
+@wp.func
+def _enter_box(size: wp.vec3, point: wp.vec3, ray: wp.vec3) -> tuple[float, wp.vec3]:
+    nearest = -1.0
+    normal = wp.vec3()
+    for i in range(3):
+        if wp.abs(ray[i]) > _PARALLEL:
+            side = -wp.sign(ray[i])
+            along = (side * size[i] - point[i]) / ray[i]
+            j = (i + 1) % 3
+            k = (i + 2) % 3
+            inside = (
+                wp.abs(point[j] + along * ray[j]) <= size[j]
+                and wp.abs(point[k] + along * ray[k]) <= size[k]
+            )
+            if inside and along >= 0.0 and (nearest < 0.0 or along < nearest):
+                nearest = along
+                normal = wp.vec3()
+                normal[i] = side
+    return nearest, normal
+
+
+@wp.func
+def _enter_ball(radius: float, point: wp.vec3, ray: wp.vec3) -> float:
+    """Distance to a ball around the origin; negative where the ray misses it or starts inside."""
+    a = wp.dot(ray, ray)
+    b = wp.dot(ray, point)
+    inside = b * b - a * (wp.dot(point, point) - radius * radius)
+    if inside <= 0.0:
+        return -1.0
+    return (-b - wp.sqrt(inside)) / a
+
+
+@wp.func
+def _enter_tube(radius: float, half: float, point: wp.vec3, ray: wp.vec3) -> tuple[float, wp.vec3]:
+    """A cylinder with flat ends: what lies in an endless tube and between two planes."""
+    a = ray[0] * ray[0] + ray[1] * ray[1]
+    b = ray[0] * point[0] + ray[1] * point[1]
+    c = point[0] * point[0] + point[1] * point[1] - radius * radius
+    tube_in = -_FAR_AWAY
+    tube_out = _FAR_AWAY
+    if a > _PARALLEL:
+        inside = b * b - a * c
+        if inside <= 0.0:
+            return -1.0, wp.vec3()
+        tube_in = (-b - wp.sqrt(inside)) / a
+        tube_out = (-b + wp.sqrt(inside)) / a
+    elif c > 0.0:
+        return -1.0, wp.vec3()
+    ends_in = -_FAR_AWAY
+    ends_out = _FAR_AWAY
+    side = -wp.sign(ray[2])
+    if wp.abs(ray[2]) > _PARALLEL:
+        ends_in = (side * half - point[2]) / ray[2]
+        ends_out = (-side * half - point[2]) / ray[2]
+    elif wp.abs(point[2]) > half:
+        return -1.0, wp.vec3()
+    along = wp.max(tube_in, ends_in)
+    if along > wp.min(tube_out, ends_out):
+        return -1.0, wp.vec3()
+    normal = wp.vec3(0.0, 0.0, side)
+    if tube_in > ends_in:
+        normal = wp.normalize(wp.vec3(point[0] + along * ray[0], point[1] + along * ray[1], 0.0))
+    return along, normal
+
+
+@wp.func
+def _enter_capsule(
+    radius: float, half: float, point: wp.vec3, ray: wp.vec3
+) -> tuple[float, wp.vec3]:
+    """The nearest of its round side and its two balls; inside it, no ray enters."""
+    inside = point - wp.vec3(0.0, 0.0, wp.clamp(point[2], -half, half))
+    if wp.length_sq(inside) < radius * radius:
+        return -1.0, wp.vec3()
+    nearest = float(_FAR_AWAY)
+    a = ray[0] * ray[0] + ray[1] * ray[1]
+    b = ray[0] * point[0] + ray[1] * point[1]
+    c = point[0] * point[0] + point[1] * point[1] - radius * radius
+    if a > _PARALLEL and b * b - a * c > 0.0:
+        along = (-b - wp.sqrt(b * b - a * c)) / a
+        if along >= 0.0 and wp.abs(point[2] + along * ray[2]) <= half:
+            nearest = along
+    for i in range(2):
+        end = wp.vec3(0.0, 0.0, (2.0 * float(i) - 1.0) * half)
+        along = _enter_ball(radius, point - end, ray)
+        if along >= 0.0 and along < nearest:
+            nearest = along
+    if nearest == _FAR_AWAY:
+        return -1.0, wp.vec3()
+    hit = point + nearest * ray
+    return nearest, wp.normalize(hit - wp.vec3(0.0, 0.0, wp.clamp(hit[2], -half, half)))
+
+
+@wp.func
+def enter(kind: int, size: wp.vec3, point: wp.vec3, ray: wp.vec3) -> tuple[float, wp.vec3]:
+    """Where a ray enters a geom: how far along it, negative for nowhere, and the normal there."""
+    if kind == BOX:
+        along, normal = _enter_box(size, point, ray)
+        return along, normal
+    if kind == CYLINDER:
+        along, normal = _enter_tube(size[0], size[1], point, ray)
+        return along, normal
+    if kind == CAPSULE:
+        along, normal = _enter_capsule(size[0], size[1], point, ray)
+        return along, normal
+    radii = size
+    if kind == SPHERE:
+        radii = wp.vec3(size[0], size[0], size[0])
+    round_point = wp.cw_div(point, radii)
+    round_ray = wp.cw_div(ray, radii)
+    along = _enter_ball(1.0, round_point, round_ray)
+    hit = round_point + along * round_ray
+    return along, wp.normalize(wp.cw_div(hit, radii))
+
+
+@wp.func
+def meet_plane(size: wp.vec3, point: wp.vec3, ray: wp.vec3) -> float:
+    """Distance to a rectangle of the plane z = 0, seen from above; endless where its size is 0."""
+    if ray[2] >= -_PARALLEL:
+        return -1.0
+    along = -point[2] / ray[2]
+    if size[0] > 0.0 and wp.abs(point[0] + along * ray[0]) > size[0]:
+        return -1.0
+    if size[1] > 0.0 and wp.abs(point[1] + along * ray[1]) > size[1]:
+        return -1.0
+    return along
