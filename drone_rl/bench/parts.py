@@ -15,6 +15,7 @@ from drone_rl.envs import DroneEnv
 from drone_rl.policies import PolicyNetwork, SmallCNN, make_actor
 from drone_rl.settings.collecting import Threads
 from drone_rl.settings.training import TrainSettings
+from drone_rl.sim.rendering import MakeRenderer, make_renderer
 from drone_rl.sim.settings import TaskSettings
 
 
@@ -44,10 +45,12 @@ def random_walk(env: DroneEnv, steps: int, seed: int = 0) -> int:
     return steps * env.batch_size[0]
 
 
-def make_worlds(num_envs: int, device: str, num_cubes: int = 3) -> DroneEnv:
+def make_worlds(
+    num_envs: int, device: str, num_cubes: int = 3, renderer: MakeRenderer = make_renderer
+) -> DroneEnv:
     """A batch of worlds on all cores."""
     task = TaskSettings(num_cubes=num_cubes)
-    return DroneEnv(num_envs, task, device=device)
+    return DroneEnv(num_envs, task, device=device, renderer=renderer)
 
 
 def rate(work: Callable[[], int], seconds: float) -> float:

@@ -4,30 +4,65 @@ import json
 import os
 import subprocess
 import sys
+from functools import partial
 from typing import Any
 
 from drone_rl.bench.parts import default_collector, make_worlds, paired, random_walk, rate
+from drone_rl.sim.rendering import View, make_renderer
+from drone_rl.sim.rendering.warp import WarpRenderer
+from drone_rl.sim.worlds import Worlds
+
+SIZES = ((25, 64), (64, 64), (100, 256))
+"""Heights and widths at which renderers are compared."""
+_COMPARED_WORLDS = 128
 
 
 def bench_render(num_envs: int, device: str, quick: bool) -> dict[str, Any]:
-    """Raw drawing of a batch of worlds on all cores, at 25x64 pixels."""
+    """Raw drawing of a batch of worlds on all cores, at 25x64 pixels, and over MuJoCo Warp's."""
+    seconds = 0.5 if quick else 10.0
     env = make_worlds(num_envs, device)
     env.reset()
     worlds = env.worlds
-    frames = rate(lambda: len(worlds.render(worlds.state)), 2.0 if quick else 10.0)
+    frames = rate(lambda: len(worlds.render(worlds.state)), seconds)
     env.close()
-    return {"raw_render_fps": frames}
+    over = {f"{h}x{w}": _over_warp(h, w, device, seconds / 10) for h, w in SIZES}
+    return {"raw_render_fps": frames, "render_over_warp": over}
+
+
+def _over_warp(height: int, width: int, device: str, seconds: float) -> float:
+    """Frames a second of the default renderer over those of MuJoCo Warp's, in turn."""
+    ours, theirs = (
+        make_worlds(_COMPARED_WORLDS, device, renderer=renderer)
+        for renderer in (make_renderer, WarpRenderer)
+    )
+    view = ours.worlds.view(height=height, width=width)
+    work = [partial(_draw, env.worlds, view) for env in (ours, theirs)]
+    for env in (ours, theirs):
+        env.reset()
+    for draw in work:
+        draw()
+    _, _, ratio = paired(*work, seconds=seconds, rounds=3)
+    for env in (ours, theirs):
+        env.close()
+    return ratio
+
+
+def _draw(worlds: Worlds, view: View | None = None) -> int:
+    return len(worlds.render(worlds.state, view))
 
 
 def bench_collector(num_envs: int, num_threads: int, device: str, quick: bool) -> dict[str, Any]:
-    """The collector, policy and pipeline included, over raw drawing of the same batch."""
-    env = make_worlds(num_envs, device)
+    """The collector, policy and pipeline included, over MuJoCo Warp's drawing of such a batch.
+
+    That drawing alone was the limit until our own ray tracer took its place.
+    """
+    env = make_worlds(num_envs, device, renderer=WarpRenderer)
     env.reset()
-    worlds, collector = env.worlds, default_collector(num_envs, num_threads, device)
+    collector = default_collector(num_envs, num_threads, device)
     collector.collect()
     collected, drawn, ratio = paired(
         lambda: len(collector.collect()),
-        lambda: len(worlds.render(worlds.state)),
+        lambda: _draw(env.worlds),
         seconds=1.0 if quick else 4.0,
         rounds=1 if quick else 9,
     )

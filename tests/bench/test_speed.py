@@ -5,25 +5,46 @@ from types import SimpleNamespace
 import pytest
 
 from drone_rl.bench import speed
+from drone_rl.sim.rendering import make_renderer
+from drone_rl.sim.rendering.warp import WarpRenderer
 
 
 @pytest.fixture
 def worlds(monkeypatch):
-    """Worlds of which nothing is drawn; tells whether they were closed."""
-    env = SimpleNamespace(
-        closed=False, worlds=SimpleNamespace(state=None, render=lambda s: "frames")
-    )
-    env.reset = lambda: None
-    env.close = lambda: setattr(env, "closed", True)
-    monkeypatch.setattr(speed, "make_worlds", lambda num_envs, device: env)
+    """Worlds of which nothing is drawn; tells who drew and whether they were closed."""
+    made = []
+
+    def make_worlds(num_envs, device, renderer=make_renderer):
+        env = SimpleNamespace(closed=False, renderer=renderer)
+        env.worlds = SimpleNamespace(state=None, render=lambda state, view=None: "frames")
+        env.worlds.view = lambda **size: size
+        env.reset = lambda: None
+        env.close = lambda: setattr(env, "closed", True)
+        made.append(env)
+        return env
+
+    monkeypatch.setattr(speed, "make_worlds", make_worlds)
     monkeypatch.setattr(speed, "random_walk", lambda env, steps: 2 * steps)
-    return env
+    return made
 
 
 def test_raw_drawing(worlds, monkeypatch):
     monkeypatch.setattr(speed, "rate", lambda work, seconds: work() * seconds)
-    assert speed.bench_render(2, "cpu", quick=True) == {"raw_render_fps": 12.0}
-    assert worlds.closed
+    asked = []
+
+    def paired(first, second, seconds, rounds):
+        asked.append((first.args[1], second.args[1]))
+        return first(), second(), 11.0
+
+    monkeypatch.setattr(speed, "paired", paired)
+    assert speed.bench_render(2, "cpu", quick=True) == {
+        "raw_render_fps": 3.0,
+        "render_over_warp": {"25x64": 11.0, "64x64": 11.0, "100x256": 11.0},
+    }
+    assert asked[2] == ({"height": 100, "width": 256},) * 2
+    ours, theirs = [make_renderer] * 3, [WarpRenderer] * 3
+    assert [env.renderer for env in worlds[1:]] == [*sum(zip(ours, theirs, strict=True), ())]
+    assert all(env.closed for env in worlds)
 
 
 def test_collecting_over_drawing(worlds, monkeypatch):
@@ -42,7 +63,7 @@ def test_collecting_over_drawing(worlds, monkeypatch):
         "collector_over_raw": 0.7,
     }
     assert calls == [(5, 6, 4.0, 9)]  # letters of "batch" and "frames"
-    assert worlds.closed
+    assert worlds[0].closed and worlds[0].renderer is WarpRenderer
 
 
 @pytest.mark.parametrize(("single", "ratio"), [(4.0, 5.0), (None, None)])

@@ -40,6 +40,11 @@ def _rates(f: Figures) -> str:
     return f"{f['collector_over_raw']:.2f} ({collected:,.0f} over {drawn:,.0f})"
 
 
+def _drawing(f: Figures) -> str:
+    ratios = "; ".join(f"{ratio:.1f}" for ratio in f["render_over_warp"].values())
+    return f"{f['raw_render_fps']:,.0f}; {ratios} times"
+
+
 def _class_models(f: Figures) -> str:
     return ", ".join(f"{p:.3f}" for p in f["class_model_probability"])
 
@@ -123,7 +128,18 @@ MAIN = (
         lambda f: f"{min(f['success_lower95']):.3f}",
         "0.95",
     ),
-    Row("collector over raw drawing at 25x64, frames/s (`bench collector`)", _rates, "0.7"),
+    Row(
+        "drawing at 25x64, frames/s, and over MuJoCo Warp's renderer at 25x64; 64x64; 100x256 "
+        "(`bench render`)",
+        _drawing,
+        "-",
+    ),
+    Row(
+        "collector, policy in the loop, over what MuJoCo Warp draws alone, 25x64, frames/s "
+        "(`bench collector`)",
+        _rates,
+        "0.7",
+    ),
     Row(
         "batched environment over dm_control's pixel path, EGL, default quality "
         "(`bench dm_control`)",
