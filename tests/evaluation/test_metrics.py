@@ -37,6 +37,12 @@ def test_summary_by_hand(episodes):
     assert (summary["mean_length"], summary["max_length"]) == (30.0, 60)
 
 
+def test_a_stratum_is_not_those_after_it(episodes):
+    episodes.goals.stratum[1, 1] = 2  # which was not reached, while its first one was
+    assert episodes.stratum_share(0).tolist() == [1.0, 1.0]
+    assert episodes.stratum_share(2).tolist() == [0.0, 0.0]
+
+
 def test_what_was_not_offered_has_no_share(episodes):
     ahead = summarise(episodes)["shares"]["ahead"]
     assert ahead["mean"] is None

@@ -104,7 +104,8 @@ def test_pointing_where_patches_tie():
 
 
 def test_pictures_on_which_nothing_moves_the_policy():
-    assert moving(np.array([[0.0, 0.99e-4], [0.0, 1e-4]])).tolist() == [False, True]
+    effects = np.array([[0.0, 0.99e-4], [0.0, 1e-4], [0.2, 0.5]])
+    assert moving(effects).tolist() == [False, True, True]
 
 
 def test_rank_correlation_by_hand():

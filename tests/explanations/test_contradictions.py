@@ -54,6 +54,17 @@ def test_pairs_are_split_by_where_the_cube_is():
     assert summary["pairs"] == 3 and summary["worst_opposition"] == pytest.approx(0.8)
 
 
+def test_the_worst_is_the_most_opposed():
+    data = fake(
+        observations=[[0, 0], [0, 0.1], [5, 5], [5, 5.1]],
+        probabilities=[LEFT, RIGHT, [0.0, 0.7, 0.3], [0.0, 0.3, 0.7]],
+        offsets=[[5, 1]] * 4,
+    )
+    summary = summarise_pairs(pairs_of(data, alike=0.1), data, 0.1)
+    assert summary["contradictions"] == 2
+    assert summary["worst_opposition"] == pytest.approx(0.8)
+
+
 def test_pictures_farther_apart_are_not_alike():
     data = fake([[0, 0], [0, 0.1]], [LEFT, RIGHT], [[5, 1], [5, 1]])
     assert len(pairs_of(data, alike=0.0708)) == 1  # 0.1 / sqrt(2) = 0.07071

@@ -79,12 +79,13 @@ def test_a_policy_that_does_not_look_follows_nothing(scenes, starts, action):
         assert found["collected"]["as it was"]["mean"] < 0.5
 
 
-def test_a_policy_that_minds_the_ground_gets_another_outcome(scenes, starts):
+@pytest.mark.parametrize("fears_dark", [True, False])
+def test_a_policy_that_minds_the_ground_gets_another_outcome(scenes, starts, fears_dark):
     class Afraid(Always):
         def forward(self, x):
             dark = x[:, 0, -1, 0] < self.level  # the corner
             logits = super().forward(x)
-            logits[dark] = torch.tensor([0.0, 1.0, 0.0])
+            logits[dark == fears_dark] = torch.tensor([0.0, 1.0, 0.0])
             return logits
 
     network = Afraid(Move.FORWARD)
@@ -92,7 +93,8 @@ def test_a_policy_that_minds_the_ground_gets_another_outcome(scenes, starts):
     ahead = place_cube(scenes, torch.full((6,), 9.0), torch.zeros(6))
     found = outcomes(scenes, network, ahead, np.arange(6))
     assert found["ground_changed"]["mean"] == 1.0
-    assert found["collected"]["as it was"]["mean"] == 1.0
+    assert found["collected"]["as it was"]["mean"] == float(fears_dark)
+    assert set(found["collected"]) == {"as it was", "moved left", "moved right"}
 
 
 def test_flights_end_when_the_cube_is_decided(scenes):
@@ -151,6 +153,9 @@ def test_flights_differ_where_both_still_fly():
     first, second = flights(2, [0], [[0, 1, -1]]), flights(3, [0], [[0, 1, 2]])
     assert not differ(first, second).any()
     assert differ(first, flights(2, [0], [[0, 2, -1]])).all()
+    assert differ(
+        first, flights(2, [0], [[1, 1, -1]])
+    ).all()  # also where one took the first action
 
 
 def test_without_a_cube_nothing_flies(scenes, follower):

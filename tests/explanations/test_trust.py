@@ -100,6 +100,8 @@ def test_the_best_is_the_one_that_is_surely_good(trial, monkeypatch):
         ({"upper": 0.49, "seeds": [-0.9, 0.49]}, True),
         ({"upper": 0.49, "seeds": [-0.9, 0.5]}, False),  # with some weights it is alike
         ({"upper": 0.5, "seeds": [0.1, 0.2]}, False),
+        ({"upper": 0.9, "seeds": [0.1, 0.2]}, False),
+        ({"upper": 0.49, "seeds": [-0.9, 0.9]}, False),
         ({"upper": None, "seeds": [0.1, 0.2]}, False),  # too few episodes
     ],
 )
@@ -159,6 +161,20 @@ def test_a_map_that_hides_behind_noise_of_the_weights_is_not_trusted(trial):
 def test_random_weights_are_as_good_when_they_score_as_much(trial):
     found = random_weights(trial, lambda n, x, a: trial.placebos["ones"][: len(x)], LEVEL)
     assert found == {"score": 0.0, "best": 0.0, "mean": 0.0, "tried": 1, "as_good": 1}
+
+
+def test_the_others_are_told_by_the_best_and_the_mean(trial, monkeypatch):
+    scores = iter([0.6, 0.1, 0.3, 0.2])  # the policy's own, then those of shuffled weights
+    monkeypatch.setattr(trust.Trial, "scores", lambda self, maps: np.full(4, next(scores)))
+    monkeypatch.setattr(trust, "shuffled_networks", lambda *_: [None] * 3)
+    found = random_weights(trial, lambda n, x, a: x, 0.25)
+    assert found == {
+        "score": pytest.approx(0.6),
+        "best": pytest.approx(0.3),
+        "mean": pytest.approx(0.2),
+        "tried": 3,
+        "as_good": 0,
+    }
 
 
 def test_a_map_without_heat_is_not_trusted(trial):

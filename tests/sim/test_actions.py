@@ -77,6 +77,7 @@ def test_a_report_gets_plain_values():
     [
         ({"mirrored": (1, 2, 0)}, "mirrored"),
         ({"mirrored": (0, 0, 0)}, "mirrored"),
+        ({"mirrored": (0, 1, 3)}, "mirrored"),
         ({"opposite": (1, 2, 0)}, "opposite"),
         ({"order": (0, 1, 1)}, "order"),
         ({"colors": ((0, 0, 0),)}, "colour"),
