@@ -5,6 +5,7 @@ import sys
 from typing import cast
 
 from drone_rl.cli.usage import COMMANDS, USAGE
+from drone_rl.utils.compiler import leave_compiler_unloaded
 from drone_rl.utils.garbage import leave_garbage_to_the_system
 
 
@@ -19,6 +20,7 @@ def main() -> None:
         sys.exit(f"error: command {name!r} is unknown; use one of: demo, {', '.join(COMMANDS)}")
     from drone_rl.hydra_app.messages import guarded  # usage and typing errors don't wait for Hydra
 
+    leave_compiler_unloaded()
     steps = [("train", overrides), ("evaluate", []), ("explain", [])]
     status = guarded(lambda: _run_all(steps if name == "demo" else [(name, overrides)]))
     leave_garbage_to_the_system()
