@@ -1,4 +1,6 @@
 import gc
+import subprocess
+import sys
 
 import pytest
 
@@ -19,3 +21,20 @@ def test_it_goes_on_after_an_error():
     with pytest.raises(KeyError), collecting_no_garbage():
         raise KeyError
     assert gc.isenabled()
+
+
+def test_it_keeps_nothing_from_being_collected_later():
+    before = gc.get_freeze_count()
+    with collecting_no_garbage():
+        pass
+    assert gc.get_freeze_count() == before
+
+
+def test_at_the_end_nothing_is_looked_through():
+    code = """import gc
+from drone_rl.utils.garbage import leave_garbage_to_the_system
+kept = [[] for _ in range(1000)]
+leave_garbage_to_the_system()
+print(gc.get_freeze_count() >= 1000, len(gc.get_objects()) < 1000)"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "True True\n"
