@@ -3,6 +3,7 @@
 import csv
 import json
 
+import numpy as np
 import pytest
 
 from drone_rl.bench import training
@@ -13,6 +14,17 @@ def test_growth_by_hand():
     """2 MiB in 20,000 frames, once it has settled."""
     samples = [(0, 300.0), (50, 500.0), (100, 600.0), (10_100, 601.0), (20_100, 602.0)]
     assert growth(samples, 100) == pytest.approx(100.0)
+
+
+@pytest.mark.parametrize("leak", [0.0, 20.0])
+def test_swings_are_no_growth_and_hide_none(leak):
+    """Up to 100 MiB come and go with each batch, ever more often; the leak stays."""
+    random = np.random.default_rng(0)
+    frames = np.linspace(0, 1_000_000, 400)
+    swing = np.where(random.random(400) < 0.3 + 0.6 * frames / 1e6, random.random(400) * 100, 0.0)
+    samples = list(zip(frames, 600 + leak * frames / 1e6 + swing, strict=True))
+    assert growth(samples, 0) == pytest.approx(leak, abs=3.0)
+    assert abs(np.polyfit(*zip(*samples, strict=True), 1)[0] * 1e6 - leak) > 20  # a line alone
 
 
 def test_samples_that_do_not_count():
