@@ -22,8 +22,7 @@ def bench_render(num_envs: int, device: str, quick: bool) -> dict[str, Any]:
     seconds = 0.5 if quick else 10.0
     env = make_worlds(num_envs, device)
     env.reset()
-    worlds = env.worlds
-    frames = rate(lambda: len(worlds.render(worlds.state)), seconds)
+    frames = rate(partial(_draw, env.worlds), seconds)
     env.close()
     over = {f"{h}x{w}": _over_warp(h, w, device, seconds / 10) for h, w in SIZES}
     return {"raw_render_fps": frames, "render_over_warp": over}

@@ -47,16 +47,14 @@ class _Unloaded(types.ModuleType):
         if not isinstance(function, types.FunctionType | types.MethodType):
             return self._load().disable(function, recursive, **options)
 
-        @functools.wraps(function)
-        def call(*args: Any, **kwargs: Any) -> Any:
-            return disabled()(*args, **kwargs)
-
         @functools.cache
-        def loaded() -> Callable[..., Any]:
+        def disabled() -> Callable[..., Any]:
             return sys.modules[NAME].disable(function, recursive, **options)
 
-        def disabled() -> Callable[..., Any]:
-            return function if sys.modules.get(NAME) is self else loaded()
+        @functools.wraps(function)
+        def call(*args: Any, **kwargs: Any) -> Any:
+            is_unloaded = sys.modules.get(NAME) is self
+            return (function if is_unloaded else disabled())(*args, **kwargs)
 
         return call
 

@@ -87,3 +87,10 @@ assert not ({LOADED})
 import torch._dynamo.config
 print({LOADED}, torch._dynamo.config.verbose)"""
     assert run(code).strip() == "True False"
+
+
+def test_what_is_marked_constant_is_so_marked():
+    code = f"""{START}
+import torch
+print(torch.compiler.assume_constant_result(lambda: 1)._dynamo_marked_constant, {LOADED})"""
+    assert run(code).strip() == "True False"

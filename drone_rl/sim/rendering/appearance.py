@@ -28,6 +28,23 @@ class Appearance:
     sun_direction: Several | None = None
     """Where its light goes, world frame; need not be of length 1."""
 
+    def lights(self, num_worlds: int) -> dict[str, Tensor]:
+        """Those that are given, of each world, by name; directions have length 1.
+
+        Args:
+            num_worlds: As many as it has.
+
+        Returns:
+            Shapes: (num_worlds, 3), float64.
+        """
+        names = ("ambient", "sun", "sun_direction")
+        given = {name: getattr(self, name) for name in names}
+        lights = {name: each(v, num_worlds) for name, v in given.items() if v is not None}
+        if "sun_direction" in lights:
+            direction = lights["sun_direction"]
+            lights["sun_direction"] = direction / direction.norm(dim=-1, keepdim=True)
+        return lights
+
     def __getitem__(self, worlds: slice) -> "Appearance":
         """Returns that of some worlds."""
         cut = {f.name: _cut(getattr(self, f.name), worlds) for f in dataclasses.fields(self)}

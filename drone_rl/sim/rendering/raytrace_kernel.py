@@ -8,8 +8,8 @@
 # (Warp compiles this file; Python's types say nothing about it.)
 """The ray tracer itself: one geom after the other, each only where it can be seen.
 
-A worker draws whole worlds, one at a time, into pictures of sky alone. It takes the geoms in order
-and casts rays at each in the rectangle of pixels around its projection alone, in the geom's
+It draws whole worlds, one at a time, into pictures of sky alone. It takes the geoms in order and
+casts rays at each in the rectangle of pixels around its projection alone, in the geom's
 own frame; what is nearer than all before is painted over it. All geoms are convex and closed, or
 planes seen from above, so a ray enters each at most once, and there is no other hit to look for.
 """
@@ -190,15 +190,37 @@ def _paint(rgb: wp.array2d[wp.uint8], world: int, pixel: int, color: wp.vec3) ->
 
 
 @wp.func
+def _put(
+    what: int,
+    world: int,
+    pixel: int,
+    along: float,
+    ray: wp.vec3,
+    sight: Sight,
+    color: wp.vec3,
+    nearest: wp.array[float],
+    rgb: wp.array2d[wp.uint8],
+    depths: wp.array2d[float],
+    numbers: wp.array2d[int],
+) -> None:
+    nearest[pixel] = along
+    if what == RGB:
+        _paint(rgb, world, pixel, color)
+    elif what == DEPTH:
+        depths[world, pixel] = along * -ray[2]
+    else:
+        numbers[world, pixel] = sight.number
+
+
+@wp.func
 def _draw_plane(
     what: int,
-    worker: int,
     world: int,
     camera: Camera,
     rays: wp.array[wp.vec3],
     sight: Sight,
     looks: Looks,
-    nearest: wp.array2d[float],
+    nearest: wp.array[float],
     rgb: wp.array2d[wp.uint8],
     depths: wp.array2d[float],
     numbers: wp.array2d[int],
@@ -213,26 +235,21 @@ def _draw_plane(
             for pixel in range(start, start + width):
                 ray = rays[pixel]
                 along = meet_plane(sight.size, sight.eye, sight.into @ ray)
-                if _is_nearest(along, nearest[worker, pixel], ray, camera.far):
-                    nearest[worker, pixel] = along
-                    if what == RGB:
-                        _paint(rgb, world, pixel, color)
-                    elif what == DEPTH:
-                        depths[world, pixel] = along * -ray[2]
-                    else:
-                        numbers[world, pixel] = sight.number
+                if _is_nearest(along, nearest[pixel], ray, camera.far):
+                    _put(
+                        what, world, pixel, along, ray, sight, color, nearest, rgb, depths, numbers
+                    )
 
 
 @wp.func
 def _draw_solid(
     what: int,
-    worker: int,
     world: int,
     camera: Camera,
     rays: wp.array[wp.vec3],
     sight: Sight,
     looks: Looks,
-    nearest: wp.array2d[float],
+    nearest: wp.array[float],
     rgb: wp.array2d[wp.uint8],
     depths: wp.array2d[float],
     numbers: wp.array2d[int],
@@ -243,79 +260,75 @@ def _draw_solid(
         for pixel in range(row * camera.width + part[0], row * camera.width + part[1]):
             ray = rays[pixel]
             along, normal = enter(sight.kind, sight.size, sight.eye, sight.into @ ray)
-            if _is_nearest(along, nearest[worker, pixel], ray, camera.far):
-                nearest[worker, pixel] = along
+            if _is_nearest(along, nearest[pixel], ray, camera.far):
+                color = wp.vec3()
                 if what == RGB:
                     color = _shade(looks, world, sight.number, sight.axes @ normal)
-                    _paint(rgb, world, pixel, color)
-                elif what == DEPTH:
-                    depths[world, pixel] = along * -ray[2]
-                else:
-                    numbers[world, pixel] = sight.number
+                _put(what, world, pixel, along, ray, sight, color, nearest, rgb, depths, numbers)
+
+
+@wp.func
+def _look_at(
+    geoms: Geoms, geom: int, frame: wp.vec3, turned: wp.vec4, eye: wp.vec3, looking: wp.mat33
+) -> Sight:
+    """A geom whose frame is there and turned so, seen by a camera."""
+    centre = frame + _rotation(turned) @ geoms.position[geom]
+    sight = Sight()
+    sight.kind = geoms.kind[geom]
+    sight.number = geoms.number[geom]
+    sight.size = geoms.size[geom]
+    sight.reach = geoms.reach[geom]
+    sight.axes = _rotation(_product(turned, geoms.attitude[geom]))
+    sight.eye = wp.transpose(sight.axes) @ (eye - centre)
+    sight.into = wp.transpose(sight.axes) @ looking
+    return sight
 
 
 @wp.kernel(enable_backward=False)
 def draw(
     first: int,
     last: int,
-    step: int,
     what: int,
     camera: Camera,
     rays: wp.array[wp.vec3],
-    limits: wp.array[float],
     geoms: Geoms,
     places: wp.array2d[wp.vec3],
     attitudes: wp.array[wp.vec4],
     looks: Looks,
-    nearest: wp.array2d[float],
+    nearest: wp.array[float],
     rgb: wp.array2d[wp.uint8],
     depths: wp.array2d[float],
     numbers: wp.array2d[int],
 ) -> None:
-    """Draws worlds `first + worker`, and every `step` after, before `last`.
+    """Draws worlds one after the other, by a single worker: launch it with a dimension of 1.
 
     Args:
         first: The first world.
         last: The one after the last.
-        step: How many workers there are.
         what: `RGB`, `DEPTH` or `SEGMENTATION`.
         camera: Whose picture.
         rays: Directions of length 1 in the camera's frame, of all pixels, row by row.
-        limits: How far along each of them nothing is drawn any more.
         geoms: What is drawn.
         places: Of the frames. Shape: (num_worlds, num_frames).
         attitudes: Of the drones, quaternions (w, x, y, z) of length 1. Shape: (num_worlds,).
         looks: Colours and light.
-        nearest: A row a worker, to work with: how far along each ray the nearest surface is.
+        nearest: To work with, one a pixel: how far along its ray the nearest surface is.
         rgb: Pictures of the sky, three bytes a pixel, to draw into. First dimension: worlds.
         depths: The same for depths.
         numbers: The same for numbers of geoms.
     """
-    worker = wp.tid()
-    for world in range(first + worker, last, step):
+    for world in range(first, last):
         drone = attitudes[world]
         turned = _frame_attitude(camera.frame, drone)
         eye = places[world, camera.frame] + _rotation(turned) @ camera.position
         looking = _rotation(_product(turned, camera.attitude))
         for pixel in range(camera.height * camera.width):
-            nearest[worker, pixel] = limits[pixel]
+            nearest[pixel] = _FAR_AWAY
         for geom in range(geoms.kind.shape[0]):
             frame = geoms.frame[geom]
             turned = _frame_attitude(frame, drone)
-            centre = places[world, frame] + _rotation(turned) @ geoms.position[geom]
-            sight = Sight()
-            sight.kind = geoms.kind[geom]
-            sight.number = geoms.number[geom]
-            sight.size = geoms.size[geom]
-            sight.reach = geoms.reach[geom]
-            sight.axes = _rotation(_product(turned, geoms.attitude[geom]))
-            sight.eye = wp.transpose(sight.axes) @ (eye - centre)
-            sight.into = wp.transpose(sight.axes) @ looking
+            sight = _look_at(geoms, geom, places[world, frame], turned, eye, looking)
             if sight.kind == PLANE:
-                _draw_plane(
-                    what, worker, world, camera, rays, sight, looks, nearest, rgb, depths, numbers
-                )
+                _draw_plane(what, world, camera, rays, sight, looks, nearest, rgb, depths, numbers)
             else:
-                _draw_solid(
-                    what, worker, world, camera, rays, sight, looks, nearest, rgb, depths, numbers
-                )
+                _draw_solid(what, world, camera, rays, sight, looks, nearest, rgb, depths, numbers)

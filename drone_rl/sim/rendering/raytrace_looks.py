@@ -12,8 +12,8 @@ from drone_rl.sim.rendering import raytrace_kernel as kernel
 from drone_rl.sim.rendering.appearance import Appearance, each
 from drone_rl.sim.rendering.scene import Scene
 
-_LIGHTS = {"ambient": "ambient", "diffuse": "sun", "direction": "sun_direction"}
-"""What the kernel's lights are called in an appearance."""
+_LIGHTS = {"ambient": "ambient", "sun": "diffuse", "sun_direction": "direction"}
+"""What an appearance's lights are called in the kernel."""
 
 
 class Looks:
@@ -31,6 +31,7 @@ class Looks:
         }
         self._plain = {name: torch.tensor(v[None]).double() for name, v in stored.items()}
         self._made = self._structure(self._plain)
+        self._sky = _as_bytes(torch.tensor([scene.sky]))
 
     def of(self, appearance: Appearance | None, num_worlds: int) -> kernel.Looks:
         """What worlds look like.
@@ -45,18 +46,14 @@ class Looks:
         for meaning, color in appearance.colors.items():
             if meaning is not Meaning.SKY:
                 values["colors"][:, self._scene.geoms(meaning)] = each(color, num_worlds)[:, None]
-        for name, called in _LIGHTS.items():
-            if (value := getattr(appearance, called)) is not None:
-                value = each(value, num_worlds)
-                length = value.norm(dim=-1, keepdim=True) if name == "direction" else 1.0
-                values[name][:] = (value / length)[:, None]
+        for name, value in appearance.lights(num_worlds).items():
+            values[_LIGHTS[name]][:] = value[:, None]
         return self._structure(values)
 
     def sky(self, appearance: Appearance | None, num_worlds: int) -> Tensor:
         """Its colour in the pictures of worlds. Shape: (num_worlds or 1, 3), uint8."""
-        plain = torch.tensor([self._scene.sky])
         color = None if appearance is None else appearance.colors.get(Meaning.SKY)
-        return ((plain if color is None else each(color, num_worlds)) * 255).to(torch.uint8)
+        return self._sky if color is None else _as_bytes(each(color, num_worlds))
 
     @staticmethod
     def _structure(values: dict[str, Tensor]) -> kernel.Looks:
@@ -64,3 +61,7 @@ class Looks:
         for name, value in values.items():
             setattr(made, name, wp.from_torch(value.float().contiguous(), dtype=wp.vec3))
         return made
+
+
+def _as_bytes(color: Tensor) -> Tensor:
+    return (color * 255).to(torch.uint8)

@@ -109,10 +109,7 @@ def make_camera(scene: Scene, frames: Frames, view: View) -> kernel.Camera:
         InputError: There is none of that name, or it is of another kind.
     """
     model = scene.model
-    number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_CAMERA, view.camera)
-    if number < 0:
-        names = ", ".join(model.camera(i).name for i in range(model.ncam))
-        raise InputError(f"camera {view.camera!r} is not in the model; choose from: {names}")
+    number = scene.camera(view.camera)
     camera = model.camera(number)
     is_plain = model.cam_projection[number] == mujoco.mjtProjection.mjPROJ_PERSPECTIVE
     if not (is_plain and camera.mode[0] == 0 and model.cam_sensorsize[number, 1] == 0):
@@ -152,7 +149,7 @@ def make_geoms(scene: Scene, frames: Frames, show_drone: bool) -> kernel.Geoms:
         show_drone: Whether the drone is, too.
     """
     model = scene.model
-    seen = [i for i, m in enumerate(scene.meanings) if show_drone or m != Meaning.DRONE]
+    seen = scene.seen(show_drone)
     places = [
         frames.place(model.geom_bodyid[i], model.geom_pos[i], model.geom_quat[i]) for i in seen
     ]

@@ -42,7 +42,7 @@ def _enter_box(size: wp.vec3, point: wp.vec3, ray: wp.vec3) -> tuple[float, wp.v
                 wp.abs(point[j] + along * ray[j]) <= size[j]
                 and wp.abs(point[k] + along * ray[k]) <= size[k]
             )
-            if inside and along >= 0.0 and (nearest < 0.0 or along < nearest):
+            if inside and (nearest < 0.0 or along < nearest):
                 nearest = along
                 normal = wp.vec3()
                 normal[i] = side

@@ -7,6 +7,7 @@ import dataclasses
 import mujoco
 
 from drone_rl.sim.meaning import Meaning
+from drone_rl.utils.errors import InputError
 
 
 @dataclasses.dataclass(frozen=True)
@@ -24,3 +25,19 @@ class Scene:
     def geoms(self, meaning: Meaning) -> list[int]:
         """Numbers of the geoms with a meaning."""
         return [i for i, found in enumerate(self.meanings) if found is meaning]
+
+    def seen(self, show_drone: bool) -> list[int]:
+        """Numbers of the geoms that a view shows."""
+        return [i for i, m in enumerate(self.meanings) if show_drone or m is not Meaning.DRONE]
+
+    def camera(self, name: str) -> int:
+        """Number of a camera.
+
+        Raises:
+            InputError: There is none of that name.
+        """
+        number = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_CAMERA, name)
+        if number < 0:
+            names = ", ".join(self.model.camera(i).name for i in range(self.model.ncam))
+            raise InputError(f"camera {name!r} is not in the model; choose from: {names}")
+        return number

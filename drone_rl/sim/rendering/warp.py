@@ -1,5 +1,3 @@
-# pyright: reportAttributeAccessIssue=false
-# (MuJoCo's compiled bindings are untyped.)
 """Pictures of many worlds at once by MuJoCo Warp's ray tracer: no OpenGL, CPU and GPU alike.
 
 It draws any model, and is what `Raytracer` is held against.
@@ -7,7 +5,6 @@ It draws any model, and is what `Raytracer` is held against.
 
 import threading
 
-import mujoco
 import torch
 import warp as wp
 from torch import Tensor
@@ -19,7 +16,6 @@ from drone_rl.sim.rendering.renderer import Poses
 from drone_rl.sim.rendering.scene import Scene
 from drone_rl.sim.rendering.view import View
 from drone_rl.sim.rendering.warp_shard import Shard
-from drone_rl.utils.errors import InputError
 
 _BUILDING = threading.Lock()
 """Held while kernels are built, which Warp can't do twice at a time."""
@@ -69,7 +65,7 @@ class WarpRenderer:
     def render(self, view: View, poses: Poses, appearance: Appearance | None = None) -> Tensor:
         """Draws worlds; see `Renderer.render`."""
         self.prepare(view)
-        out = self._new_output(view, len(poses))
+        out = view.new_pictures(len(poses), self.device)
         shards = self._shards[view]
 
         def work(member: int, first: int, last: int) -> None:
@@ -86,16 +82,8 @@ class WarpRenderer:
         self._crew.close()
 
     def _make_shards(self, view: View) -> list[Shard]:
-        if view.modality not in DRAWN:
-            raise InputError(
-                f"view {view.modality!r} can't be drawn by WarpRenderer; "
-                f"ask for one of: {', '.join(DRAWN)}"
-            )
-        model = self.scene.model
-        camera = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_CAMERA, view.camera)
-        if camera < 0:
-            names = ", ".join(model.camera(i).name for i in range(model.ncam))
-            raise InputError(f"camera {view.camera!r} is not in the model; choose from: {names}")
+        view.check_modality(self, DRAWN)
+        camera = self.scene.camera(view.camera)
         count = self._crew.size
         share = -(-self._together // count)
         with _BUILDING, wp.ScopedDevice(str(self.device)):
@@ -104,10 +92,3 @@ class WarpRenderer:
         for shard in shards[1:]:
             shard.share_kernel_of(shards[0])
         return shards
-
-    def _new_output(self, view: View, num_worlds: int) -> Tensor:
-        shape, device = (num_worlds, view.height, view.width), self.device
-        if view.modality == "rgb":
-            return torch.empty(*shape, 3, dtype=torch.uint8, device=device)
-        dtype = torch.float32 if view.modality == "depth" else torch.int32
-        return torch.empty(shape, dtype=dtype, device=device)

@@ -20,7 +20,7 @@ class Looks:
 
         Args:
             scene: Whose things are coloured.
-            model: Changed in place; its kernels must not have been recorded yet.
+            model: Changed in place.
             capacity: Number of worlds.
         """
         self._scene = scene
@@ -50,12 +50,8 @@ class Looks:
             if meaning is not Meaning.SKY:
                 geoms = self._scene.geoms(meaning)
                 self._write("geom_rgba", geoms, each(color, num_worlds))
-        for name, stored in _LIGHTS.items():
-            value = getattr(appearance, name)
-            if value is not None:
-                value = each(value, num_worlds)
-                length = value.norm(dim=-1, keepdim=True) if name == "sun_direction" else 1.0
-                self._write(stored, slice(None), value / length)
+        for name, value in appearance.lights(num_worlds).items():
+            self._write(_LIGHTS[name], slice(None), value)
 
     def _write(self, name: str, where: list[int] | slice, value: Tensor) -> None:
         values = self._values[name]

@@ -38,7 +38,6 @@ class Shard:
         mujoco.mj_forward(model, data)
         self._model = mjw.put_model(model)
         self._data = mjw.put_data(model, data, nworld=capacity)
-        seen = [i for i, m in enumerate(scene.meanings) if view.show_drone or m != Meaning.DRONE]
         self._context = mjw.create_render_context(
             model,
             nworld=capacity,
@@ -47,7 +46,9 @@ class Shard:
             render_rgb=view.modality == "rgb",
             render_depth=view.modality == "depth",
             render_seg=view.modality == "segmentation",
-            enabled_geom_groups=sorted({int(model.geom_group[i]) for i in seen}),
+            enabled_geom_groups=sorted(
+                {int(model.geom_group[i]) for i in scene.seen(view.show_drone)}
+            ),
             background_color=(*scene.sky, _NOTHING_HIT),
             use_textures=False,
             enable_specular=False,

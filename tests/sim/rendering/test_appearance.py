@@ -23,3 +23,11 @@ def test_one_value_stands_for_every_world():
     assert each(RED, 2).tolist() == [[1, 0, 0], [1, 0, 0]]
     assert torch.equal(each(SEVERAL, 3).float(), SEVERAL)
     assert each(RED, 2).dtype == torch.float64
+
+
+def test_lights_that_are_given_are_those_of_each_world():
+    assert Appearance(colors={Meaning.SKY: RED}).lights(2) == {}
+    lights = Appearance(sun=SEVERAL, sun_direction=(0.0, 3.0, -4.0)).lights(3)
+    assert set(lights) == {"sun", "sun_direction"}
+    assert torch.equal(lights["sun"].float(), SEVERAL)
+    torch.testing.assert_close(lights["sun_direction"].float(), torch.tensor([[0, 0.6, -0.8]] * 3))

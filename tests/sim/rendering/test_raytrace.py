@@ -8,7 +8,9 @@ import torch
 from drone_rl.sim.meaning import Meaning
 from drone_rl.sim.rendering import Appearance, Poses, Raytracer, Scene, View
 from drone_rl.sim.rendering.warp import WarpRenderer
+from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.seeding import world_random_state
 
 XML = """<mujoco>
 <statistic extent="1"/>
@@ -76,6 +78,22 @@ def test_pictures_are_those_of_mujoco_warp(both, modality, tilt):
     tolerance = {"rgb": 1, "depth": 1e-3, "segmentation": 0}[modality]
     scale = theirs.double().clamp(min=1) if modality == "depth" else 1.0
     assert (difference > tolerance * scale).double().mean() < 1e-4
+
+
+@pytest.mark.parametrize("camera", ["front_center", "chase"])
+@pytest.mark.parametrize("modality", ["rgb", "segmentation"])
+def test_in_our_own_worlds_not_a_byte_differs(camera, modality):
+    """So that every policy trained with one sees the same with the other."""
+    several = [Worlds(200, renderer=kind) for kind in (Raytracer, WarpRenderer)]
+    states = [world_random_state(3, i) for i in range(200)]
+    several[0].reset(torch.arange(200), states)
+    state = several[0].state
+    state.body.position[:, 0] = torch.linspace(0.0, 60.0, 200)
+    view = several[0].view(camera, modality, height=25, width=64, show_drone=camera == "chase")
+    ours, theirs = (worlds.render(state, view) for worlds in several)
+    assert torch.equal(ours, theirs)
+    for worlds in several:
+        worlds.close()
 
 
 def test_every_kind_of_geom_is_seen(both):

@@ -25,12 +25,13 @@ def array(values, dtype):
     return wp.array(values, dtype=dtype, device="cpu")
 
 
-def geoms(depth=-6.0):
-    made = kernel.Geoms()
-    made.kind, made.number, made.frame = (array([int(v)], int) for v in (BOX, 3, 0))
-    made.position = array([[0.0, 0.0, depth]], wp.vec3)
-    made.attitude = array([[1.0, 0.0, 0.0, 0.0]], wp.vec4)
-    made.size = made.reach = array([[1.0, 1.0, 1.0]], wp.vec3)
+def geoms(*depths, numbers=(3,)):
+    count, made = len(numbers), kernel.Geoms()
+    made.kind, made.frame = array([int(BOX)] * count, int), array([0] * count, int)
+    made.number = array(numbers, int)
+    made.position = array([[0.0, 0.0, z] for z in depths or (-6.0,)], wp.vec3)
+    made.attitude = array([[1.0, 0.0, 0.0, 0.0]] * count, wp.vec4)
+    made.size = made.reach = array([[1.0, 1.0, 1.0]] * count, wp.vec3)
     return made
 
 
@@ -49,13 +50,12 @@ def drawn(what, shape, dtype, scene=None):
     out = wp.zeros((1, shape), dtype=dtype, device="cpu")
     outs = [out if what == i else None for i in range(3)]
     given = [
-        *(0, 1, 1, what, seen, array(directions, wp.vec3)),
-        array(seen.far / -directions[:, 2], float),
+        *(0, 1, what, seen, array(directions, wp.vec3)),
         scene or geoms(),
         array([[[0.0, 0.0, 0.0]]], wp.vec3),
         array([[1.0, 0.0, 0.0, 0.0]], wp.vec4),
         looks(),
-        wp.zeros((1, SIZE * SIZE), dtype=float, device="cpu"),
+        wp.zeros(SIZE * SIZE, dtype=float, device="cpu"),
         *outs,
     ]
     wp.launch(kernel.draw, 1, inputs=given, device="cpu")
@@ -87,3 +87,9 @@ def test_what_lies_behind_the_camera_or_too_far_is_not_there():
     for depth in (6.0, -60.0):
         numbers = drawn(kernel.SEGMENTATION, SIZE * SIZE, int, geoms(depth))
         assert not (numbers == 3).any()
+
+
+def test_the_nearer_is_in_front_and_of_the_same_the_later():
+    for depths, shown in (((-6.0, -9.0), 1), ((-9.0, -6.0), 2), ((-6.0, -6.0), 2)):
+        scene = geoms(*depths, numbers=(1, 2))
+        assert drawn(kernel.SEGMENTATION, SIZE * SIZE, int, scene)[20, 20, 0] == shown

@@ -1,6 +1,7 @@
 import dataclasses
 
 import pytest
+import torch
 
 from drone_rl.sim.rendering import View
 from drone_rl.utils.errors import InputError
@@ -26,3 +27,23 @@ def test_a_view_is_a_fact_by_which_things_can_be_kept():
 def test_what_no_camera_shows_is_refused(change, message):
     with pytest.raises(InputError, match=message):
         dataclasses.replace(VIEW, **change)
+
+
+@pytest.mark.parametrize(
+    ("modality", "shape", "dtype"),
+    [
+        ("rgb", (5, 25, 64, 3), torch.uint8),
+        ("depth", (5, 25, 64), torch.float32),
+        ("segmentation", (5, 25, 64), torch.int32),
+    ],
+)
+def test_pictures_have_the_shape_and_type_of_what_they_show(modality, shape, dtype):
+    pictures = dataclasses.replace(VIEW, modality=modality).new_pictures(5)
+    assert (tuple(pictures.shape), pictures.dtype) == (shape, dtype)
+
+
+def test_what_a_renderer_does_not_know_is_refused():
+    VIEW.check_modality(object(), {"rgb"})
+    depth = dataclasses.replace(VIEW, modality="depth")
+    with pytest.raises(InputError, match=r"'depth' can't be drawn by object; ask for one of: rgb$"):
+        depth.check_modality(object(), {"rgb"})
