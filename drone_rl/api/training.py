@@ -12,7 +12,6 @@ import torch
 import yaml
 from torch import nn
 
-from drone_rl.api.choosing import judge_to_choose
 from drone_rl.api.collecting import build_collector
 from drone_rl.api.policy import Policy, load_policy
 from drone_rl.api.progress import Bar, Progress
@@ -140,6 +139,8 @@ def _run(
     result = {"reason": reason, **dataclasses.asdict(trainer.progress)}
     result["num_cubes"] = settings.task.num_cubes
     if settings.evaluate_after and not reason.startswith("SIG"):
+        from drone_rl.api.choosing import judge_to_choose  # slow to import, and few need it
+
         last, episodes = checkpoints.last_path, settings.evaluate_after
         result["verdict"], _ = judge_to_choose(last, episodes, settings.device)
     write_atomically(folder / "result.json", json.dumps(result, indent=2))

@@ -7,13 +7,14 @@ from drone_rl.bench.coverage import bench_coverage
 from drone_rl.bench.explain import bench_explain
 from drone_rl.bench.hostile import bench_hostile
 from drone_rl.bench.maps import bench_maps
+from drone_rl.bench.memory import bench_memory
 from drone_rl.bench.mutants import bench_mutants
 from drone_rl.bench.scaling import bench_scaling
 from drone_rl.bench.sentences import bench_sentences
 from drone_rl.bench.speed import bench_collector, bench_dm_control, bench_render
 from drone_rl.bench.startup import bench_startup
 from drone_rl.bench.sweeps import bench_kills, bench_ray, bench_sweeps
-from drone_rl.bench.training import bench_memory, bench_solve
+from drone_rl.bench.training import bench_solve
 from drone_rl.bench.verdicts import bench_verdicts
 from drone_rl.utils.errors import InputError
 
@@ -43,7 +44,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "memory": Benchmark(
         lambda s: bench_memory(s.runs, s.memory_frames, s.device, s.quick),
         "main",
-        (*_TRAINING, "conf", "bench/training"),
+        (*_TRAINING, "bench/memory"),
     ),
     "solve": Benchmark(
         lambda s: bench_solve(s.runs, s.seeds, s.episodes, s.device, s.quick),

@@ -6,7 +6,7 @@ from typing import cast
 
 from drone_rl.cli.usage import COMMANDS, USAGE
 from drone_rl.utils.compiler import leave_compiler_unloaded
-from drone_rl.utils.garbage import leave_garbage_to_the_system
+from drone_rl.utils.garbage import leave_garbage_to_the_system, look_for_garbage_rarely
 
 
 def main() -> None:
@@ -18,6 +18,7 @@ def main() -> None:
     name, overrides = args[0], args[1:]
     if name not in ("demo", *COMMANDS):
         sys.exit(f"error: command {name!r} is unknown; use one of: demo, {', '.join(COMMANDS)}")
+    look_for_garbage_rarely()
     from drone_rl.hydra_app.messages import guarded  # usage and typing errors don't wait for Hydra
 
     leave_compiler_unloaded()

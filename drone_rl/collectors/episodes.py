@@ -104,7 +104,7 @@ class EpisodeCollector(BaseCollector):
         """Acts in the active worlds. Returns what is kept of them and the state after them."""
         is_whole = len(worlds) == len(active)
         seen = state.select(*self._observed)
-        acted = self.actor(seen if is_whole else seen[worlds])
+        acted = self.actor(seen if is_whole else _rows(seen, worlds))
         action = acted.get(self.env.action_key)
         keys = acted.keys(True, True) if self._keep_observations else (self.env.action_key,)
         step = {key: acted.get(key) for key in keys}
@@ -170,6 +170,12 @@ def copy_weights(source: Any, actor: TensorDictModuleBase) -> None:
         weights.data.update_(source.data)
     else:
         actor.load_state_dict(source.state_dict() if isinstance(source, nn.Module) else source)
+
+
+def _rows(tensordict: TensorDictBase, rows: Tensor) -> TensorDictBase:
+    """What indexing gives, without tensordict's search for the shape of it, which takes longer."""
+    taken = {key: tensordict.get(key).index_select(0, rows) for key in tensordict.keys(True, True)}
+    return TensorDict(taken, [len(rows)], device=tensordict.device)
 
 
 def _as_tuple(key: NestedKey) -> tuple[str, ...]:

@@ -176,21 +176,26 @@ def _with_head(
 
 
 def _flat_size(convolutions: "OrderedDict[str, nn.Module]", in_shape: Sequence[int]) -> int:
-    stack = nn.Sequential(convolutions)
-    try:
-        return stack(torch.zeros(1, *in_shape)).numel()
-    except RuntimeError as error:
-        channels, height, width = in_shape
-        smallest = next(s for s in range(1, 10_000) if _fits(stack, channels, s))
+    channels, height, width = in_shape
+    stack = [m for m in convolutions.values() if isinstance(m, nn.Conv2d | nn.MaxPool2d)]
+    high, wide = _left(stack, height), _left(stack, width)
+    if high < 1 or wide < 1:
+        smallest = next(s for s in range(1, 10_000) if _left(stack, s) >= 1)
         raise InputError(
             f"a picture of {height}x{width} pixels is too small for the network; give at least "
             f"{smallest}x{smallest} (camera.height, camera.width)"
-        ) from error
+        )
+    filters = [m.out_channels for m in stack if isinstance(m, nn.Conv2d)]
+    return (filters[-1] if filters else channels) * high * wide
 
 
-def _fits(stack: nn.Sequential, channels: int, size: int) -> bool:
-    try:
-        stack(torch.zeros(1, channels, size, size))
-    except RuntimeError:
-        return False
-    return True
+def _left(stack: Sequence[nn.Conv2d | nn.MaxPool2d], size: int) -> int:
+    """What square layers without padding leave of so many pixels; 0 or less where too few."""
+    for layer in stack:
+        kernel, stride = _side(layer.kernel_size), _side(layer.stride)
+        size = (size - kernel) // stride + 1 if size >= kernel else 0
+    return size
+
+
+def _side(size: int | tuple[int, ...]) -> int:
+    return size if isinstance(size, int) else size[0]

@@ -10,8 +10,8 @@ import functools
 import os
 from collections.abc import Callable
 
-KEPT_KERNELS = 256
-"""Enough for every number of up to 64 worlds under way at a time, about 50 KiB each."""
+KEPT_KERNELS = 128
+"""Enough for two layers and every number of up to 32 worlds under way at a time, and a batch."""
 
 
 def bound_kernels() -> None:

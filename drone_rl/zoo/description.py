@@ -14,6 +14,7 @@ from torchrl.envs import TransformedEnv
 
 from drone_rl.envs import DroneEnv, with_transforms
 from drone_rl.policies import PolicyNetwork
+from drone_rl.sim.actions import Actions
 from drone_rl.sim.settings import CameraSettings, TaskSettings
 from drone_rl.sim.tasks import as_task
 from drone_rl.utils.errors import InputError
@@ -125,17 +126,20 @@ class PolicyDescription:
         Args:
             generator: Source of the initial weights; torch's global one by default.
         """
+        return self._network(as_task(self.task).make_dynamics().actions, generator)
+
+    def expected_weights(self) -> dict[str, torch.Tensor]:
+        """Names, shapes and types of the network's weights, without the weights themselves."""
         actions = as_task(self.task).make_dynamics().actions
+        with torch.device("meta"):  # nothing is computed here: that would load a compiler's algebra
+            return dict(self._network(actions).state_dict())
+
+    def _network(self, actions: Actions, generator: torch.Generator | None = None) -> PolicyNetwork:
         network: PolicyNetwork = NETWORKS[self.network.name].make(
             self.picture.shape, len(actions.names), generator=generator, **self.network.values
         )
         network.actions = actions
         return network
-
-    def expected_weights(self) -> dict[str, torch.Tensor]:
-        """Names, shapes and types of the network's weights, without the weights themselves."""
-        with torch.device("meta"):
-            return dict(self.build_network().state_dict())
 
 
 def parse(data: Any) -> PolicyDescription:

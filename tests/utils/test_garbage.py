@@ -38,3 +38,19 @@ leave_garbage_to_the_system()
 print(gc.get_freeze_count() >= 1000, len(gc.get_objects()) < 1000)"""
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "True True\n"
+
+
+def test_a_program_looks_rarely_and_finds_what_there_is():
+    code = """import gc, weakref
+from drone_rl.utils.garbage import look_for_garbage_rarely
+class Loop: pass
+looks = []
+gc.callbacks.append(lambda phase, info: looks.append(phase))
+look_for_garbage_rarely()
+loop = Loop(); loop.itself = loop; gone = weakref.ref(loop); del loop
+kept = [[] for _ in range(40_000)]
+print(len(looks), gone() is None)
+more = [[] for _ in range(20_000)]
+print(len(looks) > 0, gone() is None)"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "0 False\nTrue True\n"

@@ -43,7 +43,7 @@ def test_kernels_are_bounded_unless_the_user_says_otherwise(monkeypatch):
     assert os.environ[name] == "7"
     monkeypatch.delenv(name)
     bound_kernels()
-    assert os.environ[name] == "256"
+    assert os.environ[name] == "128"
     monkeypatch.delenv(name)
 
 

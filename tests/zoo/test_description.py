@@ -1,6 +1,8 @@
 """A description is strict, says everything, and builds what it says."""
 
 import copy
+import subprocess
+import sys
 
 import pytest
 import torch
@@ -153,3 +155,17 @@ def test_frames_are_bounded_as_a_whole():
 def test_what_is_no_description(data):
     with pytest.raises(InputError):
         parse(data)
+
+
+def test_reading_a_description_computes_nothing():
+    """What is computed on no device loads torch's symbolic algebra: half a second a start."""
+    code = """import sys
+from drone_rl.utils.compiler import leave_compiler_unloaded
+leave_compiler_unloaded()
+from drone_rl.settings.configuration import as_config
+from drone_rl.settings.training import TrainSettings
+from drone_rl.zoo import describe
+describe(as_config(TrainSettings())).expected_weights()
+print("sympy" in sys.modules)"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "False\n"
