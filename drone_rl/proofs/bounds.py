@@ -1,0 +1,136 @@
+# pyright: reportCallIssue=false
+# (torch's functional convolution is overloaded on the kind of its padding.)
+"""What a network may do with pictures that are known pixel by pixel between bounds.
+
+Interval bound propagation (Gowal et al., 2018): the middle of an interval goes through a linear
+layer as it is, its radius through the absolute values of the weights. Between two actions the last
+layer's weights are subtracted first, so that what they have in common cancels.
+"""
+
+from collections.abc import Callable
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from drone_rl.policies import PolicyNetwork
+from drone_rl.utils.errors import InputError
+
+Step = Callable[[Tensor, Tensor], tuple[Tensor, Tensor]]
+"""From lower and upper bounds to lower and upper bounds."""
+
+
+class Bounds:
+    """A network's most probable actions, as far as bounds on its pictures tell."""
+
+    def __init__(self, network: PolicyNetwork, gap: float) -> None:
+        """Prepares the layers.
+
+        Args:
+            network: Ends in a linear layer; before it may stand convolutions, linear layers, ReLU,
+                pooling by maxima and flattening.
+            gap: An action is the most probable one for certain only if its logit is higher by more
+                than this: sums depend on how many pictures and threads there are.
+
+        Raises:
+            InputError: A layer is of another kind.
+        """
+        *inner, last = network.layers
+        if not isinstance(last, nn.Linear):
+            raise InputError("the network's last layer is not linear; prove a policy whose is")
+        self.gap = gap
+        self._network = network
+        self._steps = [_step(layer) for layer in inner]
+        weight, bias = last.weight.detach(), last.bias.detach()
+        actions = range(len(weight))
+        self._pairs = [(a, b) for a in actions for b in actions if a != b]
+        first, second = torch.tensor(self._pairs).T
+        self._weight = weight[first] - weight[second]
+        self._bias = bias[first] - bias[second]
+        self.num_actions = len(weight)
+
+    @torch.no_grad()
+    def possible(self, lower: Tensor, upper: Tensor) -> Tensor:
+        """Which actions may be the most probable ones.
+
+        Args:
+            lower: Pictures as the network sees them, none brighter than what there may be.
+            upper: None darker. Shape: (N, C, H, W).
+
+        Returns:
+            Bit a is set unless another action is certainly more probable than action a. Shape:
+            (N,), uint8.
+        """
+        for step in self._steps:
+            lower, upper = step(lower, upper)
+        middle, radius = (lower + upper) / 2, (upper - lower) / 2
+        least = functional.linear(middle, self._weight, self._bias)
+        least = least - functional.linear(radius, self._weight.abs())
+        return self._bits(least > self.gap)
+
+    @torch.no_grad()
+    def decide(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
+        """The same of pictures that are known.
+
+        Args:
+            pictures: Shape (N, C, H, W).
+
+        Returns:
+            The bits, and the gap between the two highest logits. Shapes: (N,).
+        """
+        logits = self._network(pictures)
+        first, second = torch.tensor(self._pairs).T
+        highest = logits.topk(2).values
+        bits = self._bits(logits[:, first] - logits[:, second] > self.gap)
+        return bits, highest[:, 0] - highest[:, 1]
+
+    def _bits(self, is_certain: Tensor) -> Tensor:
+        """From which action certainly beats which other one to what is left."""
+        bits = torch.full((len(is_certain),), (1 << self.num_actions) - 1, dtype=torch.uint8)
+        for (_, loser), beats in zip(self._pairs, is_certain.T, strict=True):
+            bits &= torch.where(beats, 255 - (1 << loser), 255).to(torch.uint8)
+        return bits
+
+
+def _step(layer: nn.Module) -> Step:
+    """How bounds go through a layer."""
+    if isinstance(layer, nn.Conv2d):
+        return _convolution(layer)
+    if isinstance(layer, nn.Linear):
+        return _linear(layer)
+    if isinstance(layer, nn.ReLU | nn.MaxPool2d | nn.Flatten):  # larger inputs, larger outputs
+        return lambda lower, upper: (layer(lower), layer(upper))
+    raise InputError(
+        f"the network has a layer {type(layer).__name__}, for which no bounds are known; prove a "
+        "policy of convolutions, linear layers, ReLU, MaxPool2d and Flatten"
+    )
+
+
+def _convolution(layer: nn.Conv2d) -> Step:
+    weight = layer.weight.detach().abs()
+
+    def step(lower: Tensor, upper: Tensor) -> tuple[Tensor, Tensor]:
+        middle = layer((lower + upper) / 2)
+        radius = functional.conv2d(
+            (upper - lower) / 2,
+            weight,
+            None,
+            layer.stride,
+            layer.padding,
+            layer.dilation,
+            layer.groups,
+        )
+        return middle - radius, middle + radius
+
+    return step
+
+
+def _linear(layer: nn.Linear) -> Step:
+    weight = layer.weight.detach().abs()
+
+    def step(lower: Tensor, upper: Tensor) -> tuple[Tensor, Tensor]:
+        middle = layer((lower + upper) / 2)
+        radius = functional.linear((upper - lower) / 2, weight)
+        return middle - radius, middle + radius
+
+    return step

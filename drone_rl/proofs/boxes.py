@@ -1,0 +1,86 @@
+"""Sets of placements as disjoint boxes: products of intervals, one for each cube.
+
+Boxes are arrays of shape (N, n, 2): N boxes, the lower and upper end for each of n cubes, metres.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Boxes = NDArray[np.float64]
+
+
+def whole(bound: float, num_cubes: int) -> Boxes:
+    """All placements: every cube anywhere from -bound to bound."""
+    return np.broadcast_to([-bound, bound], (1, num_cubes, 2)).astype(np.float64)
+
+
+def volumes(boxes: Boxes) -> NDArray[np.float64]:
+    """Of each box. Shape: (N,)."""
+    return np.prod(boxes[..., 1] - boxes[..., 0], axis=-1)
+
+
+def cut(boxes: Boxes, cube: int, place: float) -> tuple[Boxes, Boxes]:
+    """Boxes in two: where a cube stands to the right of a place, and where to the left."""
+    below = boxes[boxes[:, cube, 0] < place].copy()
+    below[:, cube, 1] = np.minimum(below[:, cube, 1], place)
+    above = boxes[boxes[:, cube, 1] > place].copy()
+    above[:, cube, 0] = np.maximum(above[:, cube, 0], place)
+    return below, above
+
+
+def merge(boxes: Boxes) -> Boxes:
+    """The same set in fewer boxes: neighbours with a whole side in common become one."""
+    before = -1
+    while len(boxes) not in (before, 0, 1):
+        before = len(boxes)
+        for cube in range(boxes.shape[1]):
+            boxes = _join(boxes, cube)
+    return boxes
+
+
+def intersect(boxes: Boxes, others: Boxes) -> Boxes:
+    """What any of some boxes have in common with any of some others; empty pieces left out."""
+    lower = np.maximum(boxes[:, None, :, 0], others[None, :, :, 0])
+    upper = np.minimum(boxes[:, None, :, 1], others[None, :, :, 1])
+    is_some = (lower < upper).all(-1)
+    return np.stack([lower[is_some], upper[is_some]], -1)
+
+
+def ragged(counts: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Numbers rows of different lengths: which row each entry belongs to, and its place there."""
+    row = np.repeat(np.arange(len(counts)), counts)
+    return row, np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)
+
+
+def _join(boxes: Boxes, cube: int) -> Boxes:
+    """Joins boxes that differ in one cube's interval alone and meet there."""
+    if len(boxes) < 2:
+        return boxes
+    key = np.zeros(len(boxes), np.int64)
+    for other in range(boxes.shape[1]):
+        for end in (0, 1) if other != cube else ():
+            values, number = np.unique(boxes[:, other, end], return_inverse=True)
+            _, key = np.unique(key * len(values) + number, return_inverse=True)
+    order = np.lexsort((boxes[:, cube, 0], key))
+    boxes, key = boxes[order], key[order]
+    meets = (key[1:] == key[:-1]) & (boxes[1:, cube, 0] == boxes[:-1, cube, 1])
+    first = np.flatnonzero(np.concatenate([[True], ~meets]))
+    last = np.concatenate([first[1:], [len(boxes)]]) - 1
+    joined = boxes[first]
+    joined[:, cube, 1] = boxes[last, cube, 1]
+    return joined
+
+
+def carve(boxes: Boxes, hole: Boxes) -> tuple[Boxes, Boxes]:
+    """Boxes in two: what lies in another box, and what does not.
+
+    Args:
+        boxes: Any.
+        hole: The other one. Shape: (n, 2).
+    """
+    outside = []
+    for cube, (lower, upper) in enumerate(hole):
+        below, boxes = cut(boxes, cube, lower)
+        boxes, above = cut(boxes, cube, upper)
+        outside += [below, above]
+    return boxes, np.concatenate(outside)

@@ -1,0 +1,132 @@
+"""All places of one cube, as a row of cells in each of which its picture stays the same.
+
+Between two cells lies a band, no wider than rounding errors, in which pixels that change do so one
+after the other, each once: every operation by which the renderer places them rounds without turning
+an order round. So the pictures of a band are found by halving it until neighbours are equal. Cells
+and bands alternate: index 0 is a cell, 1 a band, and so on; the last is a cell.
+"""
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drone_rl.proofs.silhouettes import Eye
+from drone_rl.utils.errors import InputError
+
+
+class Renderer(Protocol):
+    """Shows one cube at one distance."""
+
+    def look(self, left: NDArray[np.float32]) -> NDArray[np.uint8]:
+        """Its pictures, so many metres to the left. Shape: (N,) to (N, height, width, 3)."""
+        ...
+
+    def read(self, pictures: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """What each pixel shows of it, see `Eye.faces`. Shape: (N, height, width)."""
+        ...
+
+
+class Cells:
+    """The cells of one cube at one distance ahead, from the right to the left."""
+
+    def __init__(
+        self, eye: Eye, ahead: float, lowest: float, highest: float, renderer: Renderer | None = None
+    ) -> None:
+        """Finds them.
+
+        Args:
+            eye: The camera.
+            ahead: Metres from it to the cube's centre.
+            lowest: The same to the left, where the first cell begins.
+            highest: Where the last one ends.
+            renderer: Shows what there is within bands; without it they get their neighbours' pictures.
+
+        Raises:
+            InputError: The renderer shows something else than the closed form.
+        """
+        if eye.grazed(ahead).any():
+            raise InputError(
+                f"{ahead} m ahead a row of pixels just grazes the edge of a cube, so that it is "
+                "left to rounding what it shows; change task.first_distance a little"
+            )
+        places, errors = eye.borders(ahead)
+        is_inside = (places + errors > lowest) & (places - errors < highest)
+        starts, stops = _unite((places - errors)[is_inside], (places + errors)[is_inside])
+        bands = np.stack([starts, stops], -1)
+        self.limits = np.concatenate([[lowest], bands.reshape(-1), [highest]]).clip(lowest, highest)
+        """Where each begins, and where the last one ends, metres to the left of the camera."""
+        middles = (self.limits[0::2] + self.limits[1::2]) / 2
+        pure = eye.faces(ahead, middles)
+        between = [pure[:0]] * len(bands) if renderer is None else _within(bands, pure, renderer)
+        parts, begins = [pure[:1]], [0]
+        for inner, after in zip(between, pure[1:], strict=True):
+            begins += [begins[-1], begins[-1] + 1 + len(inner)]
+            parts += [inner, after[None]]
+        self.pictures = np.concatenate(parts)
+        """What each pixel shows in the different pictures. Shape: (pictures, height, width)."""
+        self.first = np.array(begins)
+        """Of the pictures that each cell or band may show."""
+        self.last = np.array([begins[min(i + i % 2, len(begins) - 1)] for i in range(len(begins))])
+        """The last of them."""
+
+    def __len__(self) -> int:
+        """How many cells and bands there are."""
+        return len(self.limits) - 1
+
+    def span(self, lower: NDArray, upper: NDArray) -> tuple[NDArray, NDArray]:
+        """Cells and bands that intervals reach into.
+
+        Args:
+            lower: Where they begin, metres to the left of the camera.
+            upper: Where they end.
+
+        Returns:
+            Index of the first, and of the last.
+        """
+        first = np.searchsorted(self.limits, lower, side="right") - 1
+        last = np.searchsorted(self.limits, upper, side="left") - 1
+        return first.clip(0, len(self) - 1), last.clip(0, len(self) - 1)
+
+
+def _within(bands: NDArray, pure: NDArray, renderer: Renderer) -> list[NDArray[np.uint8]]:
+    """The pictures inside each band but its neighbours', in order."""
+    slack = 4 * np.spacing(np.abs(bands).max(-1, initial=1.0).astype(np.float32))
+    low = (bands[:, 0] - slack).astype(np.float32)
+    high = (bands[:, 1] + slack).astype(np.float32)
+    ends = renderer.look(low), renderer.look(high)
+    if (renderer.read(ends[0]) != pure[:-1]).any() or (renderer.read(ends[1]) != pure[1:]).any():
+        raise InputError(
+            "the renderer draws another picture than the closed form beside a border, so nothing "
+            "can be proved of it; prove the policy in the default world"
+        )
+    seen = [{float(a): p, float(b): q} for a, b, p, q in zip(low, high, *ends, strict=True)]
+    open_ = [(i, a, b) for i, (a, b) in enumerate(zip(low, high, strict=True))]
+    while open_:
+        middles = np.array([(a + b) / np.float32(2) for _, a, b in open_], np.float32)
+        drawn, next_ = renderer.look(middles), []
+        for (i, a, b), middle, picture in zip(open_, middles, drawn, strict=True):
+            seen[i][float(middle)] = picture
+            for c, d in ((a, middle), (middle, b)):
+                is_wide = np.nextafter(c, d) < d
+                if is_wide and (seen[i][float(c)] != seen[i][float(d)]).any():
+                    next_.append((i, c, d))
+        open_ = next_
+    inner = [_different([found[y] for y in sorted(found)]) for found in seen]
+    counts = np.cumsum([len(pictures) for pictures in inner])
+    return np.split(renderer.read(np.concatenate(inner)), counts[:-1]) if inner else []
+
+
+def _different(pictures: list[NDArray[np.uint8]]) -> NDArray[np.uint8]:
+    """Those that are not like the one before them, without the first and the last kind."""
+    kept = [p for q, p in zip(pictures, pictures[1:]) if (p != q).any()]
+    return np.array(kept[:-1], np.uint8).reshape(-1, *pictures[0].shape)
+
+
+def _unite(starts: NDArray, stops: NDArray) -> tuple[NDArray, NDArray]:
+    """Intervals, sorted by their middles, with those that overlap made one."""
+    if not len(starts):
+        return starts, stops
+    is_new = starts[1:] > np.maximum.accumulate(stops)[:-1]
+    first = np.flatnonzero(np.concatenate([[True], is_new]))
+    return np.minimum.reduceat(starts, first), np.maximum.reduceat(stops, first)

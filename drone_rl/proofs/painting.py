@@ -1,0 +1,63 @@
+"""From what pixels may show of each cube to bounds on what the network sees."""
+
+from collections.abc import Callable, Sequence
+
+import torch
+from torch import Tensor
+
+from drone_rl.proofs.silhouettes import NOTHING
+
+Transform = Callable[[Tensor], Tensor]
+
+_FACES = 4
+
+
+class Painter:
+    """Paints cubes over each other, the nearer one in front, before an even background."""
+
+    def __init__(self, background: Tensor, faces: Tensor, rest: Transform | None = None) -> None:
+        """Notes the brightness of everything.
+
+        Args:
+            background: Of what is seen where no cube is. Shape: (height, width), float32.
+            faces: Of a cube's front, left and right side. Shape: (3,), float32.
+            rest: What becomes of a picture (N, 1, height, width) before the network sees it;
+                brighter pixels must not make anything darker. Nothing by default.
+        """
+        self._shape = background.shape
+        self._background = background.flatten()
+        self._rest = rest
+        inf = torch.inf
+        bits = torch.arange(2**_FACES)[:, None] >> torch.arange(1, _FACES) & 1 == 1
+        self._lowest = torch.where(bits, faces, inf).min(-1).values
+        self._highest = torch.where(bits, faces, -inf).max(-1).values
+        is_open = torch.arange(2**_FACES) >> NOTHING & 1 == 1
+        self._shut = torch.where(is_open, 0.0, inf)
+        """Added to what stands behind: it counts where the cube may leave it open."""
+
+    def paint(self, cubes: Sequence[tuple[Tensor, Tensor]]) -> tuple[Tensor, Tensor]:
+        """Bounds on pictures.
+
+        Args:
+            cubes: Of each, the nearest first: masks of what pixels may show of it, in different
+                cases (bit f for face f), shape (cases, height, width), uint8; and which case each
+                picture is, shape (N,).
+
+        Returns:
+            Lower and upper bounds. Shape: (N, height, width).
+        """
+        num_pictures = len(cubes[0][1]) if cubes else 1
+        lower = self._background.repeat(num_pictures, 1)
+        upper = lower.clone()
+        for masks, case in reversed(cubes):
+            index = masks.flatten(1).int()
+            shut = self._shut[index].index_select(0, case)
+            lower.add_(shut)
+            upper.sub_(shut)
+            torch.minimum(lower, self._lowest[index].index_select(0, case), out=lower)
+            torch.maximum(upper, self._highest[index].index_select(0, case), out=upper)
+        return lower.unflatten(1, self._shape), upper.unflatten(1, self._shape)
+
+    def see(self, pictures: Tensor) -> Tensor:
+        """What the network sees. Shape: (N, height, width) to (N, C, H, W)."""
+        return pictures[:, None] if self._rest is None else self._rest(pictures[:, None])

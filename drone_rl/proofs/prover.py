@@ -1,0 +1,204 @@
+"""Follows all placements of the cubes at once through a policy's whole flight.
+
+Places of the lattice are visited in an order in which none comes before one that leads to it. All
+placements with which a drone comes to a place are there as boxes; the outlook cuts them by what the
+policy does, and each part moves on. Where more than one action is possible, as far as is known, all
+are followed, and what becomes of it counts as decided only if all end alike.
+"""
+
+import dataclasses
+from collections import defaultdict
+from collections.abc import Iterator
+
+import numpy as np
+
+from drone_rl.proofs.boxes import Boxes, carve, intersect, merge, volumes, whole
+from drone_rl.proofs.cells import Cells
+from drone_rl.proofs.lattice import AHEAD, LEFT, RIGHT, Ending, Lattice, Place
+from drone_rl.proofs.outlook import Outlook, runs
+from drone_rl.proofs.silhouettes import camera_ahead
+from drone_rl.proofs.subject import Subject
+from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+
+MOST_ROWS = 20_000
+"""Of the outlook's table that are cut in one go."""
+MARGIN = 2.0
+"""Metres by which an outlook reaches farther than what it is made for: drones move sideways."""
+
+
+@dataclasses.dataclass
+class Findings:
+    """What is known of all placements, so far or in the end."""
+
+    endings: dict[Ending, Boxes]
+    """Placements that end so, disjoint."""
+    steps: dict[Ending, dict[int, float]]
+    """Volume of them by number of steps, as far as that is certain."""
+    undecided: Boxes
+    """The rest."""
+
+
+class Prover:
+    """A proof on its way: advance it place by place, and ask for its findings at any time."""
+
+    def __init__(self, subject: Subject) -> None:
+        """Begins with every placement at the start.
+
+        Args:
+            subject: Policy and task.
+        """
+        self.lattice = subject.lattice
+        task = self.lattice.task
+        self.waiting: dict[Place, list[Boxes]] = defaultdict(list)
+        self.waiting[Place(0, 0)].append(whole(task.lateral_bound, task.num_cubes))
+        self.ended: dict[tuple[Ending, int], list[Boxes]] = defaultdict(list)
+        """By number of steps."""
+        self.forked: list[Boxes] = []
+        """Where more than one action was possible for the first time, disjoint."""
+        self.fork_ends: dict[Ending | None, list[Boxes]] = defaultdict(list)
+        """What became of that; None for what is not followed to its end."""
+        self.num_places = self.pictures = self.most_boxes = 0
+        self.least_gap, self.largest_band = np.inf, 0.0
+        self._subject = subject
+        self._outlooks: dict[tuple[int, tuple[int, ...]], Outlook] = {}
+
+    @property
+    def is_finished(self) -> bool:
+        """Whether every placement has been followed to its end."""
+        return not self.waiting
+
+    def advance(self) -> Place:
+        """Visits the next place; returns it."""
+        place = min(self.waiting, key=lambda p: p.turn)
+        boxes = merge(np.concatenate(self.waiting.pop(place)))
+        if place.is_fork:
+            boxes = np.unique(boxes, axis=0)
+        self.num_places += 1
+        self.most_boxes = max(self.most_boxes, len(boxes))
+        for bits, part in self._cut(place, boxes):
+            actions = [action for action in (AHEAD, LEFT, RIGHT) if bits >> action & 1]
+            is_first_fork = len(actions) > 1 and not place.is_fork
+            if is_first_fork:
+                self.forked.append(part)
+            origin = dataclasses.replace(place, is_fork=place.is_fork or is_first_fork)
+            for action in actions:
+                self._follow(origin, action, part)
+        return place
+
+    def _follow(self, place: Place, action: int, boxes: Boxes) -> None:
+        """Moves on, unless that would be back to where the drone has just come from."""
+        if {place.came, action} == {LEFT, RIGHT}:
+            self._end(place, Ending(EndReason.STEP_LIMIT, place.collected, loops=True), boxes)
+            return
+        for moved, part in self.lattice.move(place, action, boxes):
+            if ending := self.lattice.ending(moved):
+                self._end(moved, ending, part)
+            else:
+                self.waiting[moved].append(part)
+
+    def _end(self, place: Place, ending: Ending, boxes: Boxes) -> None:
+        if place.is_fork:
+            # who may go to and fro may also leave off at any time
+            self.fork_ends[None if ending.loops else ending].append(boxes)
+        else:
+            steps = self.lattice.task.step_limit if ending.loops else place.steps
+            self.ended[ending, steps].append(boxes)
+
+    def _cut(self, place: Place, boxes: Boxes) -> Iterator[tuple[int, Boxes]]:
+        """Boxes by the bits of the actions that are possible."""
+        cubes, y = self.lattice.standing(place), self.lattice.y(place)
+        outlook = self._outlook(place, cubes, boxes)
+        spans = outlook.spans(boxes[:, cubes] - y)
+        pictures = outlook.pictures
+        outlook.fill(spans)
+        self.pictures += outlook.pictures - pictures
+        self.least_gap = min(self.least_gap, outlook.least_gap)
+        if not cubes:
+            yield int(outlook.table), boxes
+            return
+        found: dict[int, list[Boxes]] = defaultdict(list)
+        for owner, ranges, bits in runs(outlook, spans, MOST_ROWS):
+            pieces = boxes[owner]
+            for k, cube in enumerate(cubes):
+                limits = outlook.cells[k].limits + y
+                first, last = ranges[:, k].T
+                pieces[:, cube, 0] = np.maximum(pieces[:, cube, 0], limits[first])
+                pieces[:, cube, 1] = np.minimum(pieces[:, cube, 1], limits[last + 1])
+            is_some = (pieces[..., 0] < pieces[..., 1]).all(-1)
+            pieces, bits = pieces[is_some], bits[is_some]
+            for kind in np.unique(bits):
+                found[int(kind)].append(merge(pieces[bits == kind]))
+        for kind, parts in found.items():
+            yield kind, merge(np.concatenate(parts))
+
+    def _outlook(self, place: Place, cubes: list[int], boxes: Boxes) -> Outlook:
+        """What is seen from the place's x, as far to the sides as is needed."""
+        key = (place.ahead, tuple(cubes))
+        if any(ahead != place.ahead for ahead, _ in self._outlooks):
+            self._outlooks.clear()
+        left = boxes[:, cubes] - self.lattice.y(place)
+        lowest, highest = left[..., 0].min(0), left[..., 1].max(0)
+        known = self._outlooks.get(key)
+        if known is None or not all(
+            c.limits[0] <= low and high <= c.limits[-1]
+            for c, low, high in zip(known.cells, lowest, highest, strict=True)
+        ):
+            known = self._outlooks[key] = Outlook(
+                self._subject.bounds,
+                self._subject.painter,
+                [
+                    self._cells(place, cube, low - MARGIN, high + MARGIN)
+                    for cube, low, high in zip(cubes, lowest, highest, strict=True)
+                ],
+            )
+            widths = [np.diff(c.limits)[1::2] for c in known.cells if len(c) > 1]
+            self.largest_band = max(self.largest_band, *(float(w.max()) for w in widths), 0.0)
+        return known
+
+    def _cells(self, place: Place, cube: int, lowest: float, highest: float) -> Cells:
+        ahead = self.lattice.cubes[cube] - self.lattice.x(place) - camera_ahead()
+        shown = self._subject.seeing.of(cube, place.ahead)
+        return Cells(self._subject.eye, ahead, lowest, highest, shown)
+
+    def findings(self) -> Findings:
+        """What is known by now."""
+        endings: dict[Ending, list[Boxes]] = defaultdict(list)
+        steps: dict[Ending, dict[int, float]] = defaultdict(dict)
+        for (ending, count), boxes in self.ended.items():
+            endings[ending] += boxes
+            steps[ending][count] = float(sum(volumes(b).sum() for b in boxes))
+        undecided = [b for p, boxes in self.waiting.items() if not p.is_fork for b in boxes]
+        left = self._settle(endings)
+        n = self.lattice.task.num_cubes
+        undecided = [np.empty((0, n, 2)), *undecided, left]
+        return Findings(
+            {ending: merge(np.concatenate(boxes)) for ending, boxes in endings.items()},
+            steps,
+            merge(np.concatenate(undecided)),
+        )
+
+    def _settle(self, endings: dict[Ending, list[Boxes]]) -> Boxes:
+        """Adds the forks of which all ways end alike; returns the others."""
+        left = _joined(self.forked, self.lattice.task.num_cubes)
+        ways = {e: _joined(boxes, left.shape[1]) for e, boxes in self.fork_ends.items()}
+        open_ = [ways.pop(None)] if None in ways else []
+        open_ += [merge(np.concatenate(b)) for p, b in self.waiting.items() if p.is_fork]
+        different = list(ways.values())
+        for i, boxes in enumerate(different):
+            open_ += [intersect(boxes, others) for others in different[i + 1 :]]
+        undecided = []
+        for hole in merge(np.concatenate([left[:0], *open_])):
+            inside, left = carve(left, hole)
+            undecided.append(inside)
+        for ending, boxes in ways.items():
+            if len(ways) == 1 and not open_:
+                endings[ending].append(left)
+                return left[:0]
+            for hole in boxes:
+                inside, left = carve(left, hole)
+                endings[ending].append(inside)
+        return np.concatenate([left, *undecided])
+
+
+def _joined(boxes: list[Boxes], num_cubes: int) -> Boxes:
+    return merge(np.unique(np.concatenate([np.empty((0, num_cubes, 2)), *boxes]), axis=0))

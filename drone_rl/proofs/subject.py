@@ -1,0 +1,133 @@
+"""What can be proved, and of which policy: everything that is refused is refused here."""
+
+import dataclasses
+
+import numpy as np
+import torch
+from torch import Tensor
+from torchrl.envs import Compose
+
+from drone_rl.policies import PolicyNetwork
+from drone_rl.proofs.bounds import Bounds
+from drone_rl.proofs.lattice import Lattice
+from drone_rl.proofs.painting import Painter, Transform
+from drone_rl.proofs.seeing import Seeing
+from drone_rl.proofs.silhouettes import FRONT, Eye
+from drone_rl.sim.actions import MOVES
+from drone_rl.sim.settings import TaskSettings
+from drone_rl.sim.worlds import Worlds
+from drone_rl.utils.errors import InputError
+from drone_rl.zoo import PolicyDescription
+from drone_rl.zoo.registry import TRANSFORMS
+
+_SHADES = ("gray", "standardize")
+"""Transforms of each pixel alone, by which a brighter pixel stays brighter."""
+_MONOTONE = (*_SHADES, "crop", "resize")
+"""Transforms by which brighter pixels make nothing darker."""
+_BLIND = ("step_count", "episode_reward")
+"""Transforms that leave pictures alone."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Subject:
+    """A policy in a task, in the parts that proofs are made of."""
+
+    lattice: Lattice
+    eye: Eye
+    bounds: Bounds
+    painter: Painter
+    seeing: Seeing
+    worlds: Worlds
+
+    def close(self) -> None:
+        """Ends the worlds that draw."""
+        self.worlds.close()
+
+
+def make_subject(description: PolicyDescription, network: PolicyNetwork, gap: float) -> Subject:
+    """Takes a policy apart.
+
+    Args:
+        description: Of the policy, with the task that is to be proved.
+        network: Its own, on the CPU.
+        gap: See `Bounds`.
+
+    Raises:
+        InputError: Nothing can be proved of it; the message says why.
+    """
+    task = description.task
+    check_task(task)
+    if network.actions is not MOVES:
+        raise InputError(f"the policy does not choose among {', '.join(MOVES.names)}; prove one")
+    lattice, eye = Lattice(task), Eye.of(task, description.camera)
+    bounds = Bounds(network.eval(), gap)
+    worlds = Worlds(64, task, description.camera)
+    seeing = Seeing(worlds, lattice, eye)
+    return Subject(lattice, eye, bounds, make_painter(description, seeing), seeing, worlds)
+
+
+def check_task(task: TaskSettings) -> None:
+    """Refuses worlds whose pictures have no closed form.
+
+    Raises:
+        InputError: The first reason.
+    """
+    if task.vertical_bound:
+        raise InputError(
+            f"task.vertical_bound={task.vertical_bound} spreads cubes in height, for which no "
+            "proof is known; give 0"
+        )
+    if task.spacing <= task.cube_size:
+        raise InputError(
+            f"task.spacing={task.spacing} puts cubes beside each other, so that neither always "
+            f"covers the other; give more than {task.cube_size} (cube_size)"
+        )
+    if task.lateral_bound <= 0:
+        raise InputError("task.lateral_bound=0 leaves a single placement; simply fly it")
+
+
+def make_painter(description: PolicyDescription, seeing: Seeing) -> Painter:
+    """What the policy's transforms make of what its camera shows.
+
+    Raises:
+        InputError: A transform remembers, or makes something darker of brighter pixels.
+    """
+    chosen = [choice for choice in description.transforms if choice.name not in _BLIND]
+    names = [choice.name for choice in chosen]
+    if "stack" in names:
+        raise InputError(
+            "the policy sees a stack of frames, so what it does depends on the past; prove one "
+            "without memory"
+        )
+    if strange := [name for name in names if name not in _MONOTONE]:
+        raise InputError(
+            f"the transform {strange[0]} may make pixels darker that were brighter; prove a policy "
+            f"with no transforms but {', '.join(_MONOTONE)}"
+        )
+    if names[:1] != ["gray"]:
+        raise InputError("the policy does not see in gray; prove one whose first transform is gray")
+    count = next((i for i, n in enumerate(names) if n not in _SHADES), len(names))
+    made = [TRANSFORMS[c.name].make(**c.values, **TRANSFORMS[c.name].fixed) for c in chosen]
+    shade, rest = _apply(made[:count]), _apply(made[count:])
+    background = shade(seeing.background[None])[0, 0]
+    faces = shade(seeing.colors[None, None, FRONT:])[0, 0, 0]
+    return Painter(background, faces, rest if made[count:] else None)
+
+
+def _apply(transforms: list) -> Transform:
+    pipeline = Compose(*transforms)
+
+    def apply(pictures: Tensor) -> Tensor:
+        for transform in pipeline.transforms:
+            pictures = transform._apply_transform(pictures)
+        return pictures
+
+    return apply
+
+
+def draw_places(subject: Subject, count: int, seed: int) -> tuple[np.ndarray, torch.Tensor]:
+    """Random placements and what the renderer shows at the start of each."""
+    random_state = np.random.RandomState(seed)
+    bound = subject.lattice.task.lateral_bound
+    cubes = random_state.uniform(-bound, bound, (count, subject.lattice.task.num_cubes))
+    return cubes, subject.seeing.draw(cubes, np.zeros((count, 2), int))
