@@ -13,9 +13,11 @@ if TYPE_CHECKING:
     from drone_rl.api.explaining import Explanations, explain
     from drone_rl.api.judging import Evaluation, Judgement, evaluate, judge
     from drone_rl.api.policy import Policy, load_policy
+    from drone_rl.api.proving import Proof, load_proof, prove
     from drone_rl.api.training import Training, train
     from drone_rl.explanations.settings import ExplainSettings
     from drone_rl.settings.judging import EvaluateSettings, JudgeSettings
+    from drone_rl.settings.proving import ProveSettings
     from drone_rl.settings.training import TrainerSettings, TrainSettings
     from drone_rl.sim.settings import CameraSettings, TaskSettings
     from drone_rl.utils.errors import InputError
@@ -27,9 +29,11 @@ _PLACES = {
     "api.explaining": ("Explanations", "explain"),
     "api.judging": ("Evaluation", "Judgement", "evaluate", "judge"),
     "api.policy": ("Policy", "load_policy"),
+    "api.proving": ("Proof", "load_proof", "prove"),
     "api.training": ("Training", "train"),
     "explanations.settings": ("ExplainSettings",),
     "settings.judging": ("EvaluateSettings", "JudgeSettings"),
+    "settings.proving": ("ProveSettings",),
     "settings.training": ("TrainSettings", "TrainerSettings"),
     "sim.settings": ("CameraSettings", "TaskSettings"),
     "utils.errors": ("InputError",),
@@ -46,6 +50,8 @@ __all__ = [
     "JudgeSettings",
     "Judgement",
     "Policy",
+    "Proof",
+    "ProveSettings",
     "TaskSettings",
     "TrainSettings",
     "TrainerSettings",
@@ -54,7 +60,9 @@ __all__ = [
     "explain",
     "judge",
     "load_policy",
+    "load_proof",
     "make_env",
+    "prove",
     "train",
 ]
 

@@ -1,10 +1,9 @@
-# pyright: reportCallIssue=false
-# (torch's functional convolution is overloaded on the kind of its padding.)
 """What a network may do with pictures that are known pixel by pixel between bounds.
 
-Interval bound propagation (Gowal et al., 2018): the middle of an interval goes through a linear
-layer as it is, its radius through the absolute values of the weights. Between two actions the last
-layer's weights are subtracted first, so that what they have in common cancels.
+Interval bound propagation (Gowal et al., 2018): the sum of an interval's ends goes through a linear
+layer as it is, their difference through the absolute values of the weights. Between two actions the
+last layer's weights are subtracted first, so that what they have in common cancels. ReLU, pooling
+and flattening commute with multiplication, so nothing is halved on the way: biases grow instead.
 """
 
 from collections.abc import Callable
@@ -15,9 +14,6 @@ from torch.nn import functional
 
 from drone_rl.policies import PolicyNetwork
 from drone_rl.utils.errors import InputError
-
-Step = Callable[[Tensor, Tensor], tuple[Tensor, Tensor]]
-"""From lower and upper bounds to lower and upper bounds."""
 
 
 class Bounds:
@@ -40,7 +36,11 @@ class Bounds:
             raise InputError("the network's last layer is not linear; prove a policy whose is")
         self.gap = gap
         self._network = network
-        self._steps = [_step(layer) for layer in inner]
+        scale, self._steps = 2, []
+        for layer in inner:
+            self._steps.append(_step(layer, scale))
+            scale *= 1 if isinstance(layer, _AFFINE) else 2
+        self._scale = scale
         weight, bias = last.weight.detach(), last.bias.detach()
         actions = range(len(weight))
         self._pairs = [(a, b) for a in actions for b in actions if a != b]
@@ -61,12 +61,12 @@ class Bounds:
             Bit a is set unless another action is certainly more probable than action a. Shape:
             (N,), uint8.
         """
+        total, width = lower + upper, upper - lower
         for step in self._steps:
-            lower, upper = step(lower, upper)
-        middle, radius = (lower + upper) / 2, (upper - lower) / 2
-        least = functional.linear(middle, self._weight, self._bias)
-        least = least - functional.linear(radius, self._weight.abs())
-        return self._bits(least > self.gap)
+            total, width = step(total, width)
+        least = functional.linear(total, self._weight, self._scale * self._bias)
+        least -= functional.linear(width, self._weight.abs())
+        return self._bits(least > self._scale * self.gap)
 
     @torch.no_grad()
     def decide(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
@@ -92,45 +92,49 @@ class Bounds:
         return bits
 
 
-def _step(layer: nn.Module) -> Step:
-    """How bounds go through a layer."""
+_AFFINE = (nn.Conv2d, nn.Linear)
+Step = Callable[[Tensor, Tensor], tuple[Tensor, Tensor]]
+"""From sums and differences of the ends of intervals to those a layer farther on."""
+
+
+def _step(layer: nn.Module, scale: int) -> Step:
+    """How intervals go through a layer; their sums are so many times their middles before it."""
     if isinstance(layer, nn.Conv2d):
-        return _convolution(layer)
+        return _convolution(layer, scale)
     if isinstance(layer, nn.Linear):
-        return _linear(layer)
+        return _linear(layer, scale)
     if isinstance(layer, nn.ReLU | nn.MaxPool2d | nn.Flatten):  # larger inputs, larger outputs
-        return lambda lower, upper: (layer(lower), layer(upper))
+        return lambda total, width: _monotone(layer, total, width)
     raise InputError(
         f"the network has a layer {type(layer).__name__}, for which no bounds are known; prove a "
         "policy of convolutions, linear layers, ReLU, MaxPool2d and Flatten"
     )
 
 
-def _convolution(layer: nn.Conv2d) -> Step:
-    weight = layer.weight.detach().abs()
+def _monotone(layer: nn.Module, total: Tensor, width: Tensor) -> tuple[Tensor, Tensor]:
+    upper = layer(total + width)
+    lower = layer(total.sub_(width))
+    return lower + upper, upper.sub_(lower)
 
-    def step(lower: Tensor, upper: Tensor) -> tuple[Tensor, Tensor]:
-        middle = layer((lower + upper) / 2)
-        radius = functional.conv2d(
-            (upper - lower) / 2,
-            weight,
-            None,
-            layer.stride,
-            layer.padding,
-            layer.dilation,
-            layer.groups,
+
+def _convolution(layer: nn.Conv2d, scale: int) -> Step:
+    weight, bias = layer.weight.detach(), layer.bias
+    bias = None if bias is None else scale * bias.detach()
+
+    def step(total: Tensor, width: Tensor) -> tuple[Tensor, Tensor]:
+        # the layer's own way to convolve, with other weights
+        return (
+            layer._conv_forward(total, weight, bias),
+            layer._conv_forward(width, weight.abs(), None),
         )
-        return middle - radius, middle + radius
 
     return step
 
 
-def _linear(layer: nn.Linear) -> Step:
-    weight = layer.weight.detach().abs()
+def _linear(layer: nn.Linear, scale: int) -> Step:
+    weight, bias = layer.weight.detach(), scale * layer.bias.detach()
 
-    def step(lower: Tensor, upper: Tensor) -> tuple[Tensor, Tensor]:
-        middle = layer((lower + upper) / 2)
-        radius = functional.linear((upper - lower) / 2, weight)
-        return middle - radius, middle + radius
+    def step(total: Tensor, width: Tensor) -> tuple[Tensor, Tensor]:
+        return functional.linear(total, weight, bias), functional.linear(width, weight.abs())
 
     return step

@@ -6,6 +6,7 @@ an order round. So the pictures of a band are found by halving it until neighbou
 and bands alternate: index 0 is a cell, 1 a band, and so on; the last is a cell.
 """
 
+import itertools
 from typing import Protocol
 
 import numpy as np
@@ -13,6 +14,9 @@ from numpy.typing import NDArray
 
 from drone_rl.proofs.silhouettes import Eye
 from drone_rl.utils.errors import InputError
+
+SLIVER = 1e-9
+"""Metres of a cell beside a band that are enough to look at; bands stand farther apart."""
 
 
 class Renderer(Protocol):
@@ -31,7 +35,12 @@ class Cells:
     """The cells of one cube at one distance ahead, from the right to the left."""
 
     def __init__(
-        self, eye: Eye, ahead: float, lowest: float, highest: float, renderer: Renderer | None = None
+        self,
+        eye: Eye,
+        ahead: float,
+        lowest: float,
+        highest: float,
+        renderer: Renderer | None = None,
     ) -> None:
         """Finds them.
 
@@ -40,7 +49,7 @@ class Cells:
             ahead: Metres from it to the cube's centre.
             lowest: The same to the left, where the first cell begins.
             highest: Where the last one ends.
-            renderer: Shows what there is within bands; without it they get their neighbours' pictures.
+            renderer: Shows what there is within bands; without it, what is on either side.
 
         Raises:
             InputError: The renderer shows something else than the closed form.
@@ -51,10 +60,12 @@ class Cells:
                 "left to rounding what it shows; change task.first_distance a little"
             )
         places, errors = eye.borders(ahead)
-        is_inside = (places + errors > lowest) & (places - errors < highest)
-        starts, stops = _unite((places - errors)[is_inside], (places + errors)[is_inside])
-        bands = np.stack([starts, stops], -1)
-        self.limits = np.concatenate([[lowest], bands.reshape(-1), [highest]]).clip(lowest, highest)
+        starts, stops = _unite(places - errors, places + errors)
+        is_inside = (stops > lowest) & (starts < highest)
+        bands = np.stack([starts, stops], -1)[is_inside]
+        if len(bands):  # whole ones
+            lowest, highest = min(lowest, bands[0, 0] - SLIVER), max(highest, bands[-1, 1] + SLIVER)
+        self.limits = np.concatenate([[lowest], bands.reshape(-1), [highest]])
         """Where each begins, and where the last one ends, metres to the left of the camera."""
         middles = (self.limits[0::2] + self.limits[1::2]) / 2
         pure = eye.faces(ahead, middles)
@@ -119,7 +130,7 @@ def _within(bands: NDArray, pure: NDArray, renderer: Renderer) -> list[NDArray[n
 
 def _different(pictures: list[NDArray[np.uint8]]) -> NDArray[np.uint8]:
     """Those that are not like the one before them, without the first and the last kind."""
-    kept = [p for q, p in zip(pictures, pictures[1:]) if (p != q).any()]
+    kept = [p for q, p in itertools.pairwise(pictures) if (p != q).any()]
     return np.array(kept[:-1], np.uint8).reshape(-1, *pictures[0].shape)
 
 
@@ -127,6 +138,6 @@ def _unite(starts: NDArray, stops: NDArray) -> tuple[NDArray, NDArray]:
     """Intervals, sorted by their middles, with those that overlap made one."""
     if not len(starts):
         return starts, stops
-    is_new = starts[1:] > np.maximum.accumulate(stops)[:-1]
+    is_new = starts[1:] > np.maximum.accumulate(stops)[:-1] + 4 * SLIVER
     first = np.flatnonzero(np.concatenate([[True], is_new]))
     return np.minimum.reduceat(starts, first), np.maximum.reduceat(stops, first)

@@ -75,6 +75,11 @@ class Lattice:
         """x of each cube, metres."""
         self.everything = (1 << task.num_cubes) - 1
 
+    @property
+    def last(self) -> int:
+        """Steps ahead after which every episode has ended."""
+        return int(self.task.front_bound / self.task.step_length) + 1
+
     def x(self, place: Place) -> float:
         """Metres from the start."""
         return place.ahead * self.task.step_length

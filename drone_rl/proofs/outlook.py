@@ -6,7 +6,10 @@ decided at once if bounds on all of them allow a single action, else cut in two.
 are never looked at alone.
 """
 
-from collections.abc import Iterator, Sequence
+import functools
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import torch
@@ -18,10 +21,10 @@ from drone_rl.proofs.boxes import Boxes, ragged
 from drone_rl.proofs.cells import Cells
 from drone_rl.proofs.painting import Painter
 
-BATCH = 2048
-"""Pictures in one pass."""
-SINGLE = (1, 2, 4, 8, 16, 32, 64, 128)
-"""Bits of one action."""
+BATCH, CHUNK = 4096, 256
+"""Blocks that are tried in one go, and by one thread at a time."""
+MANY = 50
+"""Tries after which it is known whether more would be worth while."""
 
 
 class Outlook:
@@ -40,12 +43,18 @@ class Outlook:
         """Bits of the possible actions, 0 where not yet known. The nearest cube is last."""
         self.pictures = 0
         """How many passes through the network there were."""
-        self.least_gap = np.inf
-        """Between the two highest logits of the pictures that were looked at alone."""
+        self._gaps = [np.inf]
         self._bounds, self._painter = bounds, painter
         self._ranges = [Ranges(torch.from_numpy(c.pictures)) for c in self.cells]
         self._known = np.zeros([len(c.pictures) for c in reversed(self.cells)], np.uint8)
         """The same of each combination of pictures."""
+        self._record = np.zeros((self.cells[0].pictures[0].size if self.cells else 1, 2), int)
+        """By how many pixels are in doubt: blocks that were tried, and that were decided."""
+
+    @property
+    def least_gap(self) -> float:
+        """Between the two highest logits of the pictures that were looked at alone."""
+        return min(self._gaps)
 
     def spans(self, boxes: Boxes) -> NDArray[np.int64]:
         """First and last cell of each cube that boxes reach into.
@@ -74,9 +83,17 @@ class Outlook:
             if len(blocks) > BATCH:
                 stack.append(blocks[:-BATCH])
                 blocks = blocks[-BATCH:]
-            rest = self._try(blocks)
-            if len(rest):
-                stack.append(rest)
+            doubts = self._doubts(blocks)
+            pixels = doubts.sum(-1)
+            bits = np.zeros(len(blocks), np.uint8)
+            single, tried = np.flatnonzero(pixels == 0), np.flatnonzero(self._is_worth(pixels))
+            bits[single] = self._share_out(self._look, blocks[single])
+            bits[tried] = self._share_out(self._bound, blocks[tried])
+            self._note(pixels[tried], bits[tried] != 0)
+            done = bits != 0
+            self._write(blocks[done], bits[done])
+            if not done.all():
+                stack.append(_halve(blocks[~done], doubts[~done]))
         for block in unknown:
             self._gather(block)
 
@@ -109,21 +126,44 @@ class Outlook:
             found = np.take(reduced, np.arange(0, 2 * len(cell), 2), axis)
         self.table[_slices(block)] = found
 
-    def _try(self, blocks: NDArray) -> NDArray:
-        """Decides what can be decided; returns the rest, cut in two."""
-        cases = [r.of(blocks[:, k]) for k, r in enumerate(self._ranges)]
-        lower, upper = (self._painter.see(p) for p in self._painter.paint(cases))
-        in_doubt = (lower != upper).flatten(1).any(-1)
-        bits = torch.zeros(len(blocks), dtype=torch.uint8)
-        if not in_doubt.all():
-            bits[~in_doubt], gaps = self._bounds.decide(lower[~in_doubt])
-            self.least_gap = min(self.least_gap, float(gaps.min()))
-        if in_doubt.any():
-            bits[in_doubt] = self._bounds.possible(lower[in_doubt], upper[in_doubt])
+    def _share_out(
+        self, work: Callable[[NDArray], NDArray[np.uint8]], blocks: NDArray
+    ) -> NDArray[np.uint8]:
+        """Has several threads work on a part of the blocks each."""
         self.pictures += len(blocks)
-        done = ~in_doubt.numpy() | np.isin(bits.numpy(), SINGLE)
-        self._write(blocks[done], bits.numpy()[done])
-        return self._halve(blocks[~done])
+        parts = np.split(blocks, range(CHUNK, len(blocks), CHUNK)) if len(blocks) else []
+        return np.concatenate([np.zeros(0, np.uint8), *_workers().map(work, parts)])
+
+    def _look(self, blocks: NDArray) -> NDArray[np.uint8]:
+        """Bits of the possible actions in blocks of one picture each."""
+        bits, gaps = self._bounds.decide(self._paint(blocks)[0])
+        self._gaps.append(float(gaps.min()))
+        return bits.numpy()
+
+    def _bound(self, blocks: NDArray) -> NDArray[np.uint8]:
+        """The only possible action in whole blocks; 0 where bounds leave several."""
+        bits = self._bounds.possible(*self._paint(blocks))
+        return (bits * (bits & (bits - 1) == 0)).numpy()
+
+    def _paint(self, blocks: NDArray) -> tuple[Tensor, Tensor]:
+        cases = [(r.part, *r.of(blocks[:, k])) for k, r in enumerate(self._ranges)]
+        lower, upper = self._painter.paint(cases)
+        return self._painter.see(lower), self._painter.see(upper)
+
+    def _doubts(self, blocks: NDArray) -> NDArray[np.int64]:
+        """How many pixels each cube puts in doubt. Shape: (N, cubes)."""
+        if not self._ranges:
+            return np.zeros((len(blocks), 0), int)
+        return np.stack([r.doubts(blocks[:, k]) for k, r in enumerate(self._ranges)], -1)
+
+    def _is_worth(self, pixels: NDArray) -> NDArray[np.bool_]:
+        """Blocks with so many pixels in doubt that they may still be decided at once."""
+        tries, hits = self._record[np.minimum(pixels, len(self._record) - 1)].T
+        return (pixels > 0) & ((tries < MANY) | (hits > tries / 10))
+
+    def _note(self, doubts: NDArray, done: NDArray[np.bool_]) -> None:
+        kind = np.minimum(doubts, len(self._record) - 1)
+        np.add.at(self._record, kind, np.stack([np.ones(len(done), int), done.astype(int)], -1))
 
     def _write(self, blocks: NDArray, bits: NDArray[np.uint8]) -> None:
         sizes = blocks[..., 1] - blocks[..., 0] + 1
@@ -134,19 +174,25 @@ class Outlook:
             index.append(blocks[block, k, 0] + step)
         self._known[tuple(index[::-1])] = bits[block] if self.cells else bits[0]
 
-    def _halve(self, blocks: NDArray) -> NDArray:
-        """Cuts each block across the cube that puts the most pixels in doubt."""
-        if not len(blocks):
-            return blocks
-        doubts = np.stack([r.doubts(blocks[:, k]) for k, r in enumerate(self._ranges)], -1)
-        longer = blocks[..., 1] - blocks[..., 0]
-        cube = np.where(longer > 0, doubts + 1, 0).argmax(-1)
-        row = np.arange(len(blocks))
-        middle = blocks[row, cube].sum(-1) // 2
-        first, second = blocks.copy(), blocks.copy()
-        first[row, cube, 1] = middle
-        second[row, cube, 0] = middle + 1
-        return np.concatenate([first, second])
+
+def _halve(blocks: NDArray, doubts: NDArray) -> NDArray:
+    """Cuts each block across the cube that puts the most pixels in doubt."""
+    longer = blocks[..., 1] > blocks[..., 0]
+    cube = np.where(longer, doubts + 1, 0).argmax(-1)
+    row = np.arange(len(blocks))
+    middle = blocks[row, cube].sum(-1) // 2
+    first, second = blocks.copy(), blocks.copy()
+    first[row, cube, 1] = middle
+    second[row, cube, 0] = middle + 1
+    return np.concatenate([first, second])
+
+
+@functools.cache
+def _workers() -> ThreadPoolExecutor:
+    """One thread a core; torch computes within each by itself."""
+    return ThreadPoolExecutor(
+        os.cpu_count(), "prove", initializer=torch.set_num_threads, initargs=(1,)
+    )
 
 
 class Ranges:
@@ -158,6 +204,14 @@ class Ranges:
         Args:
             pictures: What each pixel shows. Shape: (pictures, height, width).
         """
+        shown = pictures.any(0)
+        rows, columns = shown.any(1).nonzero(), shown.any(0).nonzero()
+        self.part = (
+            slice(int(rows.min()), int(rows.max()) + 1) if len(rows) else slice(0, 0),
+            slice(int(columns.min()), int(columns.max()) + 1) if len(rows) else slice(0, 0),
+        )
+        """Rows and columns outside which nothing is ever seen of the cube."""
+        pictures = pictures[:, *self.part]
         masks = torch.bitwise_left_shift(torch.ones_like(pictures), pictures)
         self._levels = [masks]
         while len(masks) > (reach := 1 << (len(self._levels) - 1)):
@@ -166,9 +220,15 @@ class Ranges:
         self._doubts: dict[tuple[int, int], int] = {}
 
     def of(self, ranges: NDArray) -> tuple[Tensor, Tensor]:
-        """Masks of the different ranges, and which of them each one is; see `Painter.paint`."""
+        """Masks of the different ranges, within the part, and which of them each one is."""
         different, case = np.unique(ranges, axis=0, return_inverse=True)
-        masks = torch.stack([self._mask(a, b) for a, b in different.tolist()])
+        first, last = torch.from_numpy(different).T
+        levels = np.frexp(different[:, 1] - different[:, 0] + 1)[1] - 1
+        masks = self._levels[0].new_empty(len(different), *self._levels[0].shape[1:])
+        for level in np.unique(levels):
+            those = torch.from_numpy(np.flatnonzero(levels == level))
+            found, reach = self._levels[level], 1 << int(level)
+            masks[those] = found[first[those]] | found[last[those] + 1 - reach]
         return masks, torch.from_numpy(case.reshape(-1))
 
     def doubts(self, ranges: NDArray) -> NDArray[np.int64]:
@@ -220,7 +280,9 @@ def _runs(table: NDArray, spans: NDArray, part: NDArray) -> tuple[NDArray, ...]:
         cells.append(spans[part, 1 + k, 0][block] + step)
     low, high = spans[part, 0, 0], spans[part, 0, 1]
     least, most = low.min(), high.max()
-    rows = table[tuple(cells[::-1])][:, least : most + 1] if cells else table[None, least : most + 1]
+    rows = (
+        table[tuple(cells[::-1])][:, least : most + 1] if cells else table[None, least : most + 1]
+    )
     if not cells:
         rows = rows.repeat(len(part), 0)
     places = np.arange(least, most + 1)

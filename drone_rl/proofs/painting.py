@@ -9,6 +9,8 @@ from drone_rl.proofs.silhouettes import NOTHING
 
 Transform = Callable[[Tensor], Tensor]
 
+Part = tuple[slice, slice]
+"""Rows and columns of a picture."""
 _FACES = 4
 
 
@@ -24,8 +26,7 @@ class Painter:
             rest: What becomes of a picture (N, 1, height, width) before the network sees it;
                 brighter pixels must not make anything darker. Nothing by default.
         """
-        self._shape = background.shape
-        self._background = background.flatten()
+        self._background = background
         self._rest = rest
         inf = torch.inf
         bits = torch.arange(2**_FACES)[:, None] >> torch.arange(1, _FACES) & 1 == 1
@@ -35,28 +36,27 @@ class Painter:
         self._shut = torch.where(is_open, 0.0, inf)
         """Added to what stands behind: it counts where the cube may leave it open."""
 
-    def paint(self, cubes: Sequence[tuple[Tensor, Tensor]]) -> tuple[Tensor, Tensor]:
+    def paint(self, cubes: Sequence[tuple[Part, Tensor, Tensor]]) -> tuple[Tensor, Tensor]:
         """Bounds on pictures.
 
         Args:
-            cubes: Of each, the nearest first: masks of what pixels may show of it, in different
-                cases (bit f for face f), shape (cases, height, width), uint8; and which case each
-                picture is, shape (N,).
+            cubes: Of each, the nearest first: rows and columns outside which nothing is seen of
+                it; masks of what pixels may show there in different cases (bit f for face f),
+                shape (cases, rows, columns), uint8; which case each picture is, shape (N,).
 
         Returns:
             Lower and upper bounds. Shape: (N, height, width).
         """
-        num_pictures = len(cubes[0][1]) if cubes else 1
-        lower = self._background.repeat(num_pictures, 1)
+        num_pictures = len(cubes[0][2]) if cubes else 1
+        lower = self._background.repeat(num_pictures, 1, 1)
         upper = lower.clone()
-        for masks, case in reversed(cubes):
-            index = masks.flatten(1).int()
+        for part, masks, case in reversed(cubes):
+            index = masks.int()
             shut = self._shut[index].index_select(0, case)
-            lower.add_(shut)
-            upper.sub_(shut)
-            torch.minimum(lower, self._lowest[index].index_select(0, case), out=lower)
-            torch.maximum(upper, self._highest[index].index_select(0, case), out=upper)
-        return lower.unflatten(1, self._shape), upper.unflatten(1, self._shape)
+            low, high = lower[:, *part], upper[:, *part]
+            low.add_(shut).clamp_max_(self._lowest[index].index_select(0, case))
+            high.sub_(shut).clamp_min_(self._highest[index].index_select(0, case))
+        return lower, upper
 
     def see(self, pictures: Tensor) -> Tensor:
         """What the network sees. Shape: (N, height, width) to (N, C, H, W)."""

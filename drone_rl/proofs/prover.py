@@ -14,7 +14,7 @@ import numpy as np
 
 from drone_rl.proofs.boxes import Boxes, carve, intersect, merge, volumes, whole
 from drone_rl.proofs.cells import Cells
-from drone_rl.proofs.lattice import AHEAD, LEFT, RIGHT, Ending, Lattice, Place
+from drone_rl.proofs.lattice import AHEAD, LEFT, RIGHT, Ending, Place
 from drone_rl.proofs.outlook import Outlook, runs
 from drone_rl.proofs.silhouettes import camera_ahead
 from drone_rl.proofs.subject import Subject
@@ -61,6 +61,26 @@ class Prover:
         self.least_gap, self.largest_band = np.inf, 0.0
         self._subject = subject
         self._outlooks: dict[tuple[int, tuple[int, ...]], Outlook] = {}
+
+    @property
+    def gap(self) -> float:
+        """See `Bounds`."""
+        return self._subject.bounds.gap
+
+    @property
+    def renderer(self) -> str:
+        """Whose pictures the proof is about."""
+        return type(self._subject.worlds.renderer).__name__
+
+    @property
+    def boxes_under_way(self) -> int:
+        """Of all placements that are not yet followed to their end."""
+        return sum(len(b) for boxes in self.waiting.values() for b in boxes)
+
+    @property
+    def decided(self) -> float:
+        """Volume of what has been followed to its end, without forks."""
+        return float(sum(volumes(b).sum() for boxes in self.ended.values() for b in boxes))
 
     @property
     def is_finished(self) -> bool:
@@ -180,8 +200,8 @@ class Prover:
     def _settle(self, endings: dict[Ending, list[Boxes]]) -> Boxes:
         """Adds the forks of which all ways end alike; returns the others."""
         left = _joined(self.forked, self.lattice.task.num_cubes)
-        ways = {e: _joined(boxes, left.shape[1]) for e, boxes in self.fork_ends.items()}
-        open_ = [ways.pop(None)] if None in ways else []
+        ways = {e: _joined(boxes, left.shape[1]) for e, boxes in self.fork_ends.items() if e}
+        open_ = [merge(boxes) for boxes in self.fork_ends[None]]
         open_ += [merge(np.concatenate(b)) for p, b in self.waiting.items() if p.is_fork]
         different = list(ways.values())
         for i, boxes in enumerate(different):

@@ -5,6 +5,7 @@ checked on pictures of its own, byte for byte.
 """
 
 import dataclasses
+from typing import cast
 
 import numpy as np
 import torch
@@ -13,7 +14,7 @@ from torch import Tensor
 
 from drone_rl.proofs.lattice import Lattice
 from drone_rl.proofs.silhouettes import FRONT, LEFT_SIDE, NOTHING, RIGHT_SIDE, Eye, camera_ahead
-from drone_rl.sim.tasks import State
+from drone_rl.sim.tasks.collect_cubes.rules import WorldState
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 
@@ -186,7 +187,7 @@ class Seeing:
         task = self._lattice.task
         x = np.broadcast_to(self._lattice.cubes, cubes.shape)
         where = np.stack([x, cubes, np.full(cubes.shape, task.altitude)], -1)
-        state: State = self._worlds.start(torch.from_numpy(where))
+        state = cast(WorldState, self._worlds.start(torch.from_numpy(where)))
         steps = torch.from_numpy(places[:, :2] * task.step_length)
         state.body.position[:, :2] = steps
         state.passed[:] = torch.from_numpy(hidden)

@@ -1,11 +1,10 @@
 """What can be proved, and of which policy: everything that is refused is refused here."""
 
 import dataclasses
+from collections.abc import Sequence
+from typing import Any
 
-import numpy as np
-import torch
 from torch import Tensor
-from torchrl.envs import Compose
 
 from drone_rl.policies import PolicyNetwork
 from drone_rl.proofs.bounds import Bounds
@@ -114,20 +113,10 @@ def make_painter(description: PolicyDescription, seeing: Seeing) -> Painter:
     return Painter(background, faces, rest if made[count:] else None)
 
 
-def _apply(transforms: list) -> Transform:
-    pipeline = Compose(*transforms)
-
+def _apply(transforms: Sequence[Any]) -> Transform:
     def apply(pictures: Tensor) -> Tensor:
-        for transform in pipeline.transforms:
+        for transform in transforms:
             pictures = transform._apply_transform(pictures)
         return pictures
 
     return apply
-
-
-def draw_places(subject: Subject, count: int, seed: int) -> tuple[np.ndarray, torch.Tensor]:
-    """Random placements and what the renderer shows at the start of each."""
-    random_state = np.random.RandomState(seed)
-    bound = subject.lattice.task.lateral_bound
-    cubes = random_state.uniform(-bound, bound, (count, subject.lattice.task.num_cubes))
-    return cubes, subject.seeing.draw(cubes, np.zeros((count, 2), int))

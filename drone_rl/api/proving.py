@@ -1,0 +1,185 @@
+"""A proof of what a policy does, from its settings to its certificate."""
+
+import dataclasses
+import json
+import math
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+
+from drone_rl.api.policy import Policy, load_policy
+from drone_rl.api.progress import Bar, Progress
+from drone_rl.api.showing import paragraph, table
+from drone_rl.proofs.certificate import certify, weights_hash
+from drone_rl.proofs.prover import Prover
+from drone_rl.proofs.saving import load, save
+from drone_rl.proofs.subject import Subject, make_subject
+from drone_rl.settings.proving import ProveSettings
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.files import folder_lock, write_atomically
+from drone_rl.utils.provenance import provenance
+from drone_rl.words.proof import sentence
+
+
+@dataclasses.dataclass(frozen=True)
+class Proof:
+    """How all placements of the cubes end, exactly, as far as it is decided."""
+
+    certificate: dict[str, Any]
+    """Plain data, see `drone_rl.proofs.certificate`."""
+    folder: Path | None = None
+    """Where it lies, as `certificate.json`."""
+
+    @property
+    def success(self) -> float:
+        """Share of all placements from which everything is collected, for certain."""
+        done = (o["share"] for o in self.certificate["outcomes"] if o["end"] == "all_cubes")
+        return sum(done)
+
+    @property
+    def undecided(self) -> float:
+        """Share of the placements of which nothing is claimed."""
+        return self.certificate["undecided"]["share"]
+
+    @property
+    def is_proved(self) -> bool:
+        """Whether it succeeds from every placement."""
+        ends = {o["end"] for o in self.certificate["outcomes"]}
+        return ends == {"all_cubes"} and not self.certificate["undecided"]["boxes"]
+
+    def losing(self) -> np.ndarray:
+        """The boxes from which it does not succeed. Shape: (N, num_cubes, 2), metres."""
+        lost = [o["boxes"] for o in self.certificate["outcomes"] if o["end"] != "all_cubes"]
+        n = self.certificate["policy"]["description"]["task"]["num_cubes"]
+        return np.concatenate([np.empty((0, n, 2)), *map(np.array, lost)])
+
+    def rows(self) -> list[list[str]]:
+        """The outcomes as texts: names, then a row for each."""
+        rows = [["ends", "collects", "share of placements", "boxes"]]
+        for outcome in self.certificate["outcomes"]:
+            end = "to and fro" if outcome["loops"] else outcome["end"].replace("_", " ")
+            cubes = "".join(str(k + 1) if c else "-" for k, c in enumerate(outcome["collected"]))
+            rows.append([end, cubes, f"{outcome['share']:.9g}", str(len(outcome["boxes"]))])
+        left = self.certificate["undecided"]
+        return [*rows, ["undecided", "", f"{left['share']:.9g}", str(len(left["boxes"]))]]
+
+    def __str__(self) -> str:
+        """The table and what it comes to."""
+        rows = self.rows()
+        widths = [2 + max(map(len, column)) for column in zip(*rows, strict=True)]
+        lines = ["".join(map(str.ljust, row, widths)).rstrip() for row in rows]
+        return "\n".join([*lines, sentence(self.certificate)])
+
+    def _repr_html_(self) -> str:
+        head, *rows = self.rows()
+        return table(head, rows) + paragraph(sentence(self.certificate))
+
+
+def prove(
+    policy: str | Path | Policy,
+    settings: ProveSettings | None = None,
+    *,
+    folder: str | Path | None = None,
+    task: Mapping[str, Any] | None = None,
+    outputs: str | Path = "outputs",
+    progress: Progress | None = None,
+    **changes: Any,
+) -> Proof:
+    """Follows all placements of the cubes at once through a policy's whole greedy flight.
+
+    Args:
+        policy: The policy, or what `load_policy` takes.
+        settings: How.
+        folder: Where the certificate is left, and the state to go on from if it is stopped: a
+            proof that is found half done there is gone on with. Nowhere by default.
+        task: What to change of the policy's task.
+        outputs: See `load_policy`.
+        progress: Told how far it is; a bar by default.
+        changes: Settings to change, as in `prove("good", limit_s=60)`.
+
+    Raises:
+        InputError: The policy, its task or a setting is not for a proof; the message says why.
+    """
+    settings = (settings or ProveSettings()).replace(**changes)
+    policy = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
+    policy = policy.in_task(**(task or {}))
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)  # the proof's own threads share the cores out
+    subject = make_subject(policy.description, policy.make_network(), settings.logit_gap)
+    try:
+        subject.seeing.check(settings.compared, np.random.RandomState(0))
+        if folder is None:
+            return _prove(policy, subject, settings, None, progress or Bar())
+        folder = Path(folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        with folder_lock(folder):
+            return _prove(policy, subject, settings, folder, progress or Bar())
+    finally:
+        subject.close()
+        torch.set_num_threads(threads)
+
+
+def _prove(
+    policy: Policy,
+    subject: Subject,
+    settings: ProveSettings,
+    folder: Path | None,
+    progress: Progress,
+) -> Proof:
+    prover, weights = Prover(subject), weights_hash(policy.state["policy"])
+    known = json.dumps([weights, policy.description.as_dict(), settings.logit_gap])
+    state = None if folder is None else folder / "state.npz"
+    if state is not None and state.exists():
+        load(prover, state, known)
+    begin = time.monotonic()
+    _go_on(prover, settings, progress, state, known)
+    seconds = time.monotonic() - begin
+    found = certify(policy.name, policy.description, weights, prover, seconds) | provenance()
+    if folder is not None:
+        write_atomically(folder / "certificate.json", json.dumps(found))
+    if state is not None and prover.is_finished:
+        state.unlink(missing_ok=True)
+    return Proof(found, folder)
+
+
+def _go_on(
+    prover: Prover, settings: ProveSettings, progress: Progress, state: Path | None, known: str
+) -> None:
+    """Advances a proof until it is finished or must stop, and saves it now and then."""
+    task, last = prover.lattice.task, prover.lattice.last
+    total = (2 * task.lateral_bound) ** task.num_cubes
+    begin = saved = time.monotonic()
+    limit = math.inf if settings.limit_s is None else settings.limit_s
+    while not prover.is_finished and time.monotonic() - begin <= limit:
+        if prover.boxes_under_way > settings.most_boxes:
+            break
+        place = prover.advance()
+        done = prover.decided / total
+        text = f"step {place.ahead} of {last}, {done:.1%} decided, {prover.pictures:,} pictures"
+        progress(text, min(place.ahead, last - 1), last)
+        if state is not None and time.monotonic() - saved > settings.save_interval_s:
+            save(prover, state, known)
+            saved = time.monotonic()
+    if state is not None and not prover.is_finished:
+        save(prover, state, known)
+    progress("proved" if prover.is_finished else "stopped", last, last)
+
+
+def load_proof(path: str | Path) -> Proof:
+    """A proof out of its certificate.
+
+    Raises:
+        InputError: There is none.
+    """
+    path = Path(path)
+    path = path / "certificate.json" if path.is_dir() else path
+    try:
+        return Proof(json.loads(path.read_text()), path.parent)
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"certificate={path} can't be read ({error}); give a certificate"
+        ) from None

@@ -1,0 +1,91 @@
+"""A proof as plain data: how every placement of the cubes ends, box by box.
+
+Whoever gets one can check it without this program: the boxes of all outcomes and of what is
+undecided are a partition of the placements, so that they are disjoint and their volumes add up, and
+in each box every flight must end as it says.
+"""
+
+import hashlib
+from collections.abc import Mapping
+from typing import Any
+
+from torch import Tensor
+
+from drone_rl.proofs.boxes import Boxes, volumes
+from drone_rl.proofs.lattice import Ending
+from drone_rl.proofs.prover import Findings, Prover
+from drone_rl.zoo import PolicyDescription
+
+FORMAT = "drone_rl certificate"
+FORMAT_VERSION = 1
+
+
+def weights_hash(weights: Mapping[str, Tensor]) -> str:
+    """SHA-256 of a network's weights, whatever file they come from.
+
+    Args:
+        weights: Its state, by name.
+    """
+    digest = hashlib.sha256()
+    for name in sorted(weights):
+        value = weights[name].detach().cpu().float().contiguous()
+        digest.update(f"{name} {list(value.shape)}\n".encode())
+        digest.update(value.numpy().astype("<f4").tobytes())
+    return digest.hexdigest()
+
+
+def certify(
+    name: str, description: PolicyDescription, weights: str, prover: Prover, seconds: float
+) -> dict[str, Any]:
+    """What is known by now, as plain data.
+
+    Args:
+        name: Of the policy, for people.
+        description: Of the policy, in the task of the proof.
+        weights: See `weights_hash`.
+        prover: The proof.
+        seconds: That it took.
+    """
+    findings = prover.findings()
+    task = description.task
+    total = (2 * task.lateral_bound) ** task.num_cubes
+    return {
+        "format": FORMAT,
+        "format_version": FORMAT_VERSION,
+        "policy": {"name": name, "weights": weights, "description": description.as_dict()},
+        "outcomes": [
+            _outcome(ending, boxes, findings, task.num_cubes, total)
+            for ending, boxes in sorted(findings.endings.items())
+            if len(boxes)
+        ],
+        "undecided": {
+            "share": float(volumes(findings.undecided).sum()) / total,
+            "boxes": findings.undecided.tolist(),
+        },
+        "finished": prover.is_finished,
+        "stated": {
+            "logit_gap": prover.gap,
+            "largest_band": prover.largest_band,
+            "renderer": prover.renderer,
+        },
+        "found": {
+            "least_gap": prover.least_gap if prover.least_gap < float("inf") else None,
+            "pictures": prover.pictures,
+            "states": prover.num_places,
+            "most_boxes": prover.most_boxes,
+            "seconds": seconds,
+        },
+    }
+
+
+def _outcome(
+    ending: Ending, boxes: Boxes, findings: Findings, num_cubes: int, total: float
+) -> dict[str, Any]:
+    return {
+        "end": ending.reason.name.lower(),
+        "collected": [bool(ending.collected >> k & 1) for k in range(num_cubes)],
+        "loops": ending.loops,
+        "share": float(volumes(boxes).sum()) / total,
+        "steps": {str(k): v / total for k, v in sorted(findings.steps[ending].items())},
+        "boxes": boxes.tolist(),
+    }

@@ -1,0 +1,115 @@
+"""A proof on its way as one file of arrays, so that it goes on after whatever ended it."""
+
+import dataclasses
+import io
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drone_rl.proofs.boxes import Boxes
+from drone_rl.proofs.lattice import Ending, Place
+from drone_rl.proofs.prover import Prover
+from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.files import read_bytes, write_atomically
+
+MOST_BYTES = 2**31
+_COUNTS = ("num_places", "pictures", "most_boxes", "least_gap", "largest_band")
+_NOWHERE = (-1, 0, 0)
+"""Stands for what is not followed to its end."""
+
+
+def save(prover: Prover, path: Path, subject: str) -> None:
+    """Writes a proof's state.
+
+    Args:
+        prover: The proof, between two places.
+        path: The file; the old one stays until the new one is whole.
+        subject: Of what it is a proof, in one line.
+    """
+    waiting = [(dataclasses.astuple(p), b) for p, boxes in prover.waiting.items() for b in boxes]
+    ended = [((*_row(e), s), b) for (e, s), boxes in prover.ended.items() for b in boxes]
+    ways = [(_row(e), b) for e, boxes in prover.fork_ends.items() for b in boxes]
+    arrays = {
+        "subject": np.frombuffer(subject.encode(), np.uint8),
+        "counts": np.array([getattr(prover, name) for name in _COUNTS], np.float64),
+        **_packed("waiting", waiting),
+        **_packed("ended", ended),
+        **_packed("ways", ways),
+        **_packed("forked", [((), b) for b in prover.forked]),
+    }
+    buffer = io.BytesIO()
+    np.savez(buffer, **arrays)
+    write_atomically(path, buffer.getvalue())
+
+
+def load(prover: Prover, path: Path, subject: str) -> None:
+    """Lets a fresh proof go on from a state.
+
+    Args:
+        prover: The proof.
+        path: The file.
+        subject: As it was saved.
+
+    Raises:
+        InputError: The file is no such state, or one of another proof.
+    """
+    content = read_bytes(path, MOST_BYTES)
+    try:
+        with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
+            state = dict(arrays)
+        saved = bytes(state["subject"]).decode()
+        counts = dict(zip(_COUNTS, state["counts"].tolist(), strict=True))
+        parts = {name: _unpacked(name, state) for name in ("waiting", "ended", "ways", "forked")}
+        waiting = [(_place(row), b) for row, b in parts["waiting"]]
+        ended = [((_ending(row), row[3]), b) for row, b in parts["ended"]]
+        ways = [(_ending(row), b) for row, b in parts["ways"]]
+    except (ValueError, KeyError, TypeError, OSError, EOFError, UnicodeDecodeError) as error:
+        raise InputError(f"{path} is no state of a proof ({error}); delete it to begin") from None
+    if saved != subject:
+        raise InputError(f"{path} is of another proof; delete it, or give another folder")
+    prover.waiting.clear()
+    for place, boxes in waiting:
+        prover.waiting[place].append(boxes)
+    for key, boxes in ended:
+        prover.ended[key].append(boxes)
+    for way, boxes in ways:
+        prover.fork_ends[way].append(boxes)
+    prover.forked = [boxes for _, boxes in parts["forked"]]
+    for name, count in counts.items():
+        setattr(prover, name, type(getattr(prover, name))(count))
+
+
+def _place(row: tuple[int, ...]) -> Place:
+    ahead, left, collected, steps, came, is_fork = row
+    return Place(ahead, left, collected, steps, came, bool(is_fork))
+
+
+def _row(ending: Ending | None) -> tuple[int, int, int]:
+    if ending is None:
+        return _NOWHERE
+    return int(ending.reason), ending.collected, int(ending.loops)
+
+
+def _ending(row: tuple[int, ...]) -> Any:
+    if row[:3] == _NOWHERE:
+        return None
+    return Ending(EndReason(row[0]), row[1], bool(row[2]))
+
+
+def _packed(name: str, parts: Iterable[tuple[tuple, Boxes]]) -> dict[str, NDArray]:
+    rows, boxes = [row for row, _ in parts], [b for _, b in parts]
+    return {
+        f"{name}_rows": np.array(rows, np.int64).reshape(len(rows), -1),
+        f"{name}_counts": np.array([len(b) for b in boxes], np.int64),
+        f"{name}_boxes": np.concatenate(boxes) if boxes else np.empty((0, 0, 2)),
+    }
+
+
+def _unpacked(name: str, state: dict[str, NDArray]) -> list[tuple[tuple[int, ...], Boxes]]:
+    rows, counts = state[f"{name}_rows"].tolist(), state[f"{name}_counts"]
+    boxes = np.split(state[f"{name}_boxes"], np.cumsum(counts)[:-1]) if len(counts) else []
+    return [(tuple(row), b) for row, b in zip(rows, boxes, strict=True)]

@@ -1,0 +1,23 @@
+"""What a proof can be told."""
+
+import dataclasses
+from typing import Annotated
+
+from drone_rl.utils.schema import Real, Whole
+from drone_rl.utils.settings import Settings
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class ProveSettings(Settings):
+    """How a proof is made."""
+
+    logit_gap: Annotated[float, Real(0.0, 1.0)] = 1e-4
+    """Where the two highest logits are closer, either action may be taken: sums are not exact."""
+    compared: Annotated[int, Whole(1, 10_000_000)] = 4_000
+    """Random pictures of the renderer that must be the closed form's before the proof begins."""
+    limit_s: Annotated[float, Real(0.0)] | None = None
+    """Seconds after which the proof stops, to be gone on with; none for never."""
+    save_interval_s: Annotated[float, Real(0.0)] = 30.0
+    """Seconds between two states on disk, from which a proof that was killed goes on."""
+    most_boxes: Annotated[int, Whole(1)] = 2_000_000
+    """Boxes under way after which the proof stops: they bound its memory."""
