@@ -102,30 +102,46 @@ class Cells:
 
 def _within(bands: NDArray, pure: NDArray, renderer: Renderer) -> list[NDArray[np.uint8]]:
     """The pictures inside each band but its neighbours', in order."""
+    if not len(bands):
+        return []
     slack = 4 * np.spacing(np.abs(bands).max(-1, initial=1.0).astype(np.float32))
-    low = (bands[:, 0] - slack).astype(np.float32)
-    high = (bands[:, 1] + slack).astype(np.float32)
-    ends = renderer.look(low), renderer.look(high)
-    if (renderer.read(ends[0]) != pure[:-1]).any() or (renderer.read(ends[1]) != pure[1:]).any():
+    middle = bands.mean(-1)
+    # it mostly changes close to where it would without rounding: look there first
+    ends = np.stack([bands[:, 0] - slack, middle - slack, middle + slack, bands[:, 1] + slack])
+    points = ends.astype(np.float32)
+    drawn = np.stack([renderer.look(row) for row in points])
+    if (drawn[-1, :-1] != drawn[0, 1:]).any() or _differs(renderer, drawn, pure):
         raise InputError(
             "the renderer draws another picture than the closed form beside a border, so nothing "
             "can be proved of it; prove the policy in the default world"
         )
-    seen = [{float(a): p, float(b): q} for a, b, p, q in zip(low, high, *ends, strict=True)]
-    open_ = [(i, a, b) for i, (a, b) in enumerate(zip(low, high, strict=True))]
-    while open_:
+    seen: list[dict[np.float32, NDArray[np.uint8]]] = [
+        dict(zip(points[:, i], drawn[:, i], strict=True)) for i in range(len(bands))
+    ]
+    open_ = [(i, a, b) for i in range(len(bands)) for a, b in itertools.pairwise(points[:, i])]
+    while open_ := [o for o in open_ if _is_open(*o, seen)]:
         middles = np.array([(a + b) / np.float32(2) for _, a, b in open_], np.float32)
-        drawn, next_ = renderer.look(middles), []
-        for (i, a, b), middle, picture in zip(open_, middles, drawn, strict=True):
-            seen[i][float(middle)] = picture
-            for c, d in ((a, middle), (middle, b)):
-                is_wide = np.nextafter(c, d) < d
-                if is_wide and (seen[i][float(c)] != seen[i][float(d)]).any():
-                    next_.append((i, c, d))
-        open_ = next_
+        for (i, _, _), middle, picture in zip(open_, middles, renderer.look(middles), strict=True):
+            seen[i][middle] = picture
+        open_ = [
+            (i, *half)
+            for (i, a, b), middle in zip(open_, middles, strict=True)
+            for half in ((a, middle), (middle, b))
+        ]
     inner = [_different([found[y] for y in sorted(found)]) for found in seen]
     counts = np.cumsum([len(pictures) for pictures in inner])
     return np.split(renderer.read(np.concatenate(inner)), counts[:-1]) if inner else []
+
+
+def _is_open(i: int, first: np.float32, last: np.float32, seen: list[dict]) -> bool:
+    """Whether there are numbers between two at which different pictures were seen."""
+    return np.nextafter(first, last) < last and (seen[i][first] != seen[i][last]).any()
+
+
+def _differs(renderer: Renderer, drawn: NDArray[np.uint8], pure: NDArray[np.uint8]) -> bool:
+    """Whether anything but the closed form is drawn beside bands."""
+    beside = np.concatenate([drawn[0], drawn[-1, -1:]])
+    return bool(len(beside)) and (renderer.read(beside) != pure).any()
 
 
 def _different(pictures: list[NDArray[np.uint8]]) -> NDArray[np.uint8]:

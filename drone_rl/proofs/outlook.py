@@ -23,8 +23,10 @@ from drone_rl.proofs.painting import Painter
 
 BATCH, CHUNK = 4096, 256
 """Blocks that are tried in one go, and by one thread at a time."""
-MANY = 50
-"""Tries after which it is known whether more would be worth while."""
+SMALL = 1000
+"""Combinations of a span that are simply gone through."""
+FEW, PRICE = 8, 3.0
+"""Pictures of a block that are simply looked at; and what bounds on a block cost, in pictures."""
 
 
 class Outlook:
@@ -74,6 +76,7 @@ class Outlook:
         Args:
             spans: First and last cell of each cube. Shape: (N, cubes, 2).
         """
+        spans = spans[self._is_unknown(spans)]
         unknown = [block for span in spans if (block := self._unknown(span)) is not None]
         if not unknown:
             return
@@ -83,19 +86,32 @@ class Outlook:
             if len(blocks) > BATCH:
                 stack.append(blocks[:-BATCH])
                 blocks = blocks[-BATCH:]
-            doubts = self._doubts(blocks)
+            doubts, counts = self._doubts(blocks), _counts(blocks)
             pixels = doubts.sum(-1)
+            tried = np.flatnonzero(self._is_worth(pixels, counts))
             bits = np.zeros(len(blocks), np.uint8)
-            single, tried = np.flatnonzero(pixels == 0), np.flatnonzero(self._is_worth(pixels))
-            bits[single] = self._share_out(self._look, blocks[single])
             bits[tried] = self._share_out(self._bound, blocks[tried])
             self._note(pixels[tried], bits[tried] != 0)
-            done = bits != 0
-            self._write(blocks[done], bits[done])
-            if not done.all():
-                stack.append(_halve(blocks[~done], doubts[~done]))
+            self._write(blocks[bits != 0], bits[bits != 0])
+            is_open = bits == 0
+            few = _combinations(blocks[is_open & (counts <= FEW)])
+            self._known[tuple(few.T[::-1])] = self._share_out(self._look, few)
+            is_open &= counts > FEW
+            if is_open.any():
+                stack.append(_halve(blocks[is_open], doubts[is_open]))
         for block in unknown:
             self._gather(block)
+
+    def _is_unknown(self, spans: NDArray) -> NDArray[np.bool_]:
+        """Spans that may have something unknown; of small ones it is known whether they do."""
+        counts = _counts(spans)
+        small = np.flatnonzero(counts <= SMALL)
+        is_unknown = np.ones(len(spans), bool)
+        if len(small):
+            known = self.table[tuple(_combinations(spans[small]).T[::-1])]
+            begins = np.cumsum(counts[small]) - counts[small]
+            is_unknown[small] = np.minimum.reduceat(known, begins) == 0
+        return is_unknown
 
     def _unknown(self, span: NDArray) -> NDArray | None:
         """The smallest block around what is not known of one."""
@@ -134,9 +150,12 @@ class Outlook:
         parts = np.split(blocks, range(CHUNK, len(blocks), CHUNK)) if len(blocks) else []
         return np.concatenate([np.zeros(0, np.uint8), *_workers().map(work, parts)])
 
-    def _look(self, blocks: NDArray) -> NDArray[np.uint8]:
-        """Bits of the possible actions in blocks of one picture each."""
-        bits, gaps = self._bounds.decide(self._paint(blocks)[0])
+    def _look(self, combinations: NDArray) -> NDArray[np.uint8]:
+        """Bits of the possible actions with single pictures, given by their numbers."""
+        index = torch.from_numpy(combinations)
+        shown = [(r.part, r.pictures[index[:, k]]) for k, r in enumerate(self._ranges)]
+        pictures = self._painter.see(self._painter.paint_one(shown, len(index)))
+        bits, gaps = self._bounds.decide(pictures)
         self._gaps.append(float(gaps.min()))
         return bits.numpy()
 
@@ -156,23 +175,33 @@ class Outlook:
             return np.zeros((len(blocks), 0), int)
         return np.stack([r.doubts(blocks[:, k]) for k, r in enumerate(self._ranges)], -1)
 
-    def _is_worth(self, pixels: NDArray) -> NDArray[np.bool_]:
-        """Blocks with so many pixels in doubt that they may still be decided at once."""
+    def _is_worth(self, pixels: NDArray, counts: NDArray) -> NDArray[np.bool_]:
+        """Blocks of which bounds probably save more pictures than they take the time of."""
         tries, hits = self._record[np.minimum(pixels, len(self._record) - 1)].T
-        return (pixels > 0) & ((tries < MANY) | (hits > tries / 10))
+        return (hits + 1) * counts > PRICE * (tries + 1)
 
     def _note(self, doubts: NDArray, done: NDArray[np.bool_]) -> None:
         kind = np.minimum(doubts, len(self._record) - 1)
         np.add.at(self._record, kind, np.stack([np.ones(len(done), int), done.astype(int)], -1))
 
     def _write(self, blocks: NDArray, bits: NDArray[np.uint8]) -> None:
-        sizes = blocks[..., 1] - blocks[..., 0] + 1
-        block, place = ragged(sizes.prod(-1))
-        index = []
-        for k in range(len(self.cells)):
-            place, step = np.divmod(place, sizes[block, k])
-            index.append(blocks[block, k, 0] + step)
-        self._known[tuple(index[::-1])] = bits[block] if self.cells else bits[0]
+        self._known[tuple(_combinations(blocks).T[::-1])] = np.repeat(bits, _counts(blocks))
+
+
+def _counts(blocks: NDArray) -> NDArray[np.int64]:
+    """How many combinations each block has."""
+    return (blocks[..., 1] - blocks[..., 0] + 1).prod(-1)
+
+
+def _combinations(blocks: NDArray) -> NDArray[np.int64]:
+    """The combinations of all blocks, one after the other. Shape: (total, cubes)."""
+    block, place = ragged(_counts(blocks))
+    sizes = blocks[..., 1] - blocks[..., 0] + 1
+    found = np.empty((len(block), blocks.shape[1]), np.int64)
+    for k in range(blocks.shape[1]):
+        place, step = np.divmod(place, sizes[block, k])
+        found[:, k] = blocks[block, k, 0] + step
+    return found
 
 
 def _halve(blocks: NDArray, doubts: NDArray) -> NDArray:
@@ -211,7 +240,7 @@ class Ranges:
             slice(int(columns.min()), int(columns.max()) + 1) if len(rows) else slice(0, 0),
         )
         """Rows and columns outside which nothing is ever seen of the cube."""
-        pictures = pictures[:, *self.part]
+        self.pictures = pictures = pictures[:, *self.part].contiguous()
         masks = torch.bitwise_left_shift(torch.ones_like(pictures), pictures)
         self._levels = [masks]
         while len(masks) > (reach := 1 << (len(self._levels) - 1)):

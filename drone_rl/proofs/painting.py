@@ -30,6 +30,7 @@ class Painter:
         self._rest = rest
         inf = torch.inf
         bits = torch.arange(2**_FACES)[:, None] >> torch.arange(1, _FACES) & 1 == 1
+        self._shades = torch.cat([faces.new_zeros(1), faces])
         self._lowest = torch.where(bits, faces, inf).min(-1).values
         self._highest = torch.where(bits, faces, -inf).max(-1).values
         is_open = torch.arange(2**_FACES) >> NOTHING & 1 == 1
@@ -57,6 +58,24 @@ class Painter:
             low.add_(shut).clamp_max_(self._lowest[index].index_select(0, case))
             high.sub_(shut).clamp_min_(self._highest[index].index_select(0, case))
         return lower, upper
+
+    def paint_one(self, cubes: Sequence[tuple[Part, Tensor]], num_pictures: int) -> Tensor:
+        """Pictures of which everything is known.
+
+        Args:
+            cubes: Of each, the nearest first: rows and columns outside which nothing is seen of
+                it, and what pixels show there, shape (N, rows, columns), uint8.
+            num_pictures: N.
+
+        Returns:
+            Shape: (N, height, width).
+        """
+        pictures = self._background.repeat(num_pictures, 1, 1)
+        for part, faces in reversed(cubes):
+            shade = self._shades[faces.int()]
+            behind = pictures[:, *part]
+            behind.copy_(torch.where(faces == NOTHING, behind, shade))
+        return pictures
 
     def see(self, pictures: Tensor) -> Tensor:
         """What the network sees. Shape: (N, height, width) to (N, C, H, W)."""

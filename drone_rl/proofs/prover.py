@@ -55,12 +55,16 @@ class Prover:
         """By number of steps."""
         self.forked: list[Boxes] = []
         """Where more than one action was possible for the first time, disjoint."""
+        self.longest: dict[Place, int] = {}
+        """The most steps that forks took to where they are; their places count none."""
         self.fork_ends: dict[Ending | None, list[Boxes]] = defaultdict(list)
         """What became of that; None for what is not followed to its end."""
         self.num_places = self.pictures = self.most_boxes = 0
         self.least_gap, self.largest_band = np.inf, 0.0
         self._subject = subject
-        self._outlooks: dict[tuple[int, tuple[int, ...]], Outlook] = {}
+        self._seen_from = -1
+        self._cells: dict[int, Cells] = {}
+        self._outlooks: dict[tuple[int, ...], Outlook] = {}
 
     @property
     def gap(self) -> float:
@@ -93,6 +97,7 @@ class Prover:
         boxes = merge(np.concatenate(self.waiting.pop(place)))
         if place.is_fork:
             boxes = np.unique(boxes, axis=0)
+            place = dataclasses.replace(place, steps=self.longest.pop(place))
         self.num_places += 1
         self.most_boxes = max(self.most_boxes, len(boxes))
         for bits, part in self._cut(place, boxes):
@@ -113,13 +118,23 @@ class Prover:
         for moved, part in self.lattice.move(place, action, boxes):
             if ending := self.lattice.ending(moved):
                 self._end(moved, ending, part)
-            else:
+            elif not moved.is_fork:
                 self.waiting[moved].append(part)
+            else:
+                self._gather(moved, part)
+
+    def _gather(self, place: Place, boxes: Boxes) -> None:
+        """Puts forks together however many steps they took: the most that any did is noted."""
+        there = dataclasses.replace(place, steps=0)
+        steps = max(place.steps, self.longest.get(there, 0))
+        self.longest[there] = steps
+        self.waiting[there].append(boxes)
 
     def _end(self, place: Place, ending: Ending, boxes: Boxes) -> None:
         if place.is_fork:
             # who may go to and fro may also leave off at any time
-            self.fork_ends[None if ending.loops else ending].append(boxes)
+            is_known = not ending.loops and ending.reason is not EndReason.STEP_LIMIT
+            self.fork_ends[ending if is_known else None].append(boxes)
         else:
             steps = self.lattice.task.step_limit if ending.loops else place.steps
             self.ended[ending, steps].append(boxes)
@@ -153,32 +168,33 @@ class Prover:
 
     def _outlook(self, place: Place, cubes: list[int], boxes: Boxes) -> Outlook:
         """What is seen from the place's x, as far to the sides as is needed."""
-        key = (place.ahead, tuple(cubes))
-        if any(ahead != place.ahead for ahead, _ in self._outlooks):
+        if self._seen_from != place.ahead:
+            self._seen_from = place.ahead
             self._outlooks.clear()
+            self._cells.clear()
         left = boxes[:, cubes] - self.lattice.y(place)
-        lowest, highest = left[..., 0].min(0), left[..., 1].max(0)
-        known = self._outlooks.get(key)
-        if known is None or not all(
-            c.limits[0] <= low and high <= c.limits[-1]
-            for c, low, high in zip(known.cells, lowest, highest, strict=True)
-        ):
-            known = self._outlooks[key] = Outlook(
-                self._subject.bounds,
-                self._subject.painter,
-                [
-                    self._cells(place, cube, low - MARGIN, high + MARGIN)
-                    for cube, low, high in zip(cubes, lowest, highest, strict=True)
-                ],
-            )
-            widths = [np.diff(c.limits)[1::2] for c in known.cells if len(c) > 1]
-            self.largest_band = max(self.largest_band, *(float(w.max()) for w in widths), 0.0)
+        ends = zip(left[..., 0].min(0), left[..., 1].max(0), strict=True)
+        cells = [self._look(place, k, *end) for k, end in zip(cubes, ends, strict=True)]
+        known = self._outlooks.get(tuple(cubes))
+        if known is None or known.cells != cells:
+            known = Outlook(self._subject.bounds, self._subject.painter, cells)
+            self._outlooks[tuple(cubes)] = known
         return known
 
-    def _cells(self, place: Place, cube: int, lowest: float, highest: float) -> Cells:
+    def _look(self, place: Place, cube: int, lowest: float, highest: float) -> Cells:
+        """The cells of one cube, at least from the lowest to the highest place."""
+        known = self._cells.get(cube)
+        if known is not None and known.limits[0] <= lowest and highest <= known.limits[-1]:
+            return known
+        if known is not None:
+            lowest, highest = min(lowest, known.limits[0]), max(highest, known.limits[-1])
         ahead = self.lattice.cubes[cube] - self.lattice.x(place) - camera_ahead()
         shown = self._subject.seeing.of(cube, place.ahead)
-        return Cells(self._subject.eye, ahead, lowest, highest, shown)
+        found = Cells(self._subject.eye, ahead, lowest - MARGIN, highest + MARGIN, shown)
+        bands = np.diff(found.limits)[1::2]
+        self.largest_band = max(self.largest_band, float(bands.max(initial=0.0)))
+        self._cells[cube] = found
+        return found
 
     def findings(self) -> Findings:
         """What is known by now."""

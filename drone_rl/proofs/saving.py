@@ -30,7 +30,11 @@ def save(prover: Prover, path: Path, subject: str) -> None:
         path: The file; the old one stays until the new one is whole.
         subject: Of what it is a proof, in one line.
     """
-    waiting = [(dataclasses.astuple(p), b) for p, boxes in prover.waiting.items() for b in boxes]
+    waiting = [
+        ((*dataclasses.astuple(p), prover.longest.get(p, 0)), b)
+        for p, boxes in prover.waiting.items()
+        for b in boxes
+    ]
     ended = [((*_row(e), s), b) for (e, s), boxes in prover.ended.items() for b in boxes]
     ways = [(_row(e), b) for e, boxes in prover.fork_ends.items() for b in boxes]
     arrays = {
@@ -64,7 +68,7 @@ def load(prover: Prover, path: Path, subject: str) -> None:
         saved = bytes(state["subject"]).decode()
         counts = dict(zip(_COUNTS, state["counts"].tolist(), strict=True))
         parts = {name: _unpacked(name, state) for name in ("waiting", "ended", "ways", "forked")}
-        waiting = [(_place(row), b) for row, b in parts["waiting"]]
+        waiting = [(_place(row[:-1]), row[-1], b) for row, b in parts["waiting"]]
         ended = [((_ending(row), row[3]), b) for row, b in parts["ended"]]
         ways = [(_ending(row), b) for row, b in parts["ways"]]
     except (ValueError, KeyError, TypeError, OSError, EOFError, UnicodeDecodeError) as error:
@@ -72,8 +76,10 @@ def load(prover: Prover, path: Path, subject: str) -> None:
     if saved != subject:
         raise InputError(f"{path} is of another proof; delete it, or give another folder")
     prover.waiting.clear()
-    for place, boxes in waiting:
+    for place, longest, boxes in waiting:
         prover.waiting[place].append(boxes)
+        if place.is_fork:
+            prover.longest[place] = longest
     for key, boxes in ended:
         prover.ended[key].append(boxes)
     for way, boxes in ways:
