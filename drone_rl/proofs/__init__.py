@@ -1,0 +1,1 @@
+"""What a policy does, said exactly and not estimated from flights."""
