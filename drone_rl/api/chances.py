@@ -13,7 +13,7 @@ from drone_rl.api.policy import Policy, load_policy
 from drone_rl.api.progress import Bar, Progress
 from drone_rl.api.showing import paragraph, table
 from drone_rl.proofs.chain import Outcomes, follow_chances
-from drone_rl.proofs.lattice import explore, shape_of
+from drone_rl.proofs.graph import explore, shape_of
 from drone_rl.proofs.sight import Sight
 from drone_rl.settings.chances import ChanceSettings
 from drone_rl.sim.settings import TaskSettings
@@ -87,7 +87,7 @@ class Chances:
         rows = self.rows()
         widths = [2 + max(map(len, column)) for column in zip(*rows, strict=True)]
         aligned = [[f"{row[0]:{widths[0]}}", *map(str.rjust, row[1:], widths[1:])] for row in rows]
-        return "\n".join([*("".join(cells) for cells in aligned), self._about()])
+        return "\n".join([*("".join(nodes) for nodes in aligned), self._about()])
 
     def _repr_html_(self) -> str:
         head, *rows = self.rows()
@@ -149,22 +149,22 @@ def chances(
 
     Raises:
         InputError: The policy, a setting or a place is unusable, the policy has a memory, or the
-            task has too many cells.
+            task has too many nodes.
     """
     settings = (settings or ChanceSettings()).replace(**changes)
     progress = progress or Bar()
     policy = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
     policy = policy.in_task(**(task or {}))
     placed = _drawn(policy.task, settings) if cubes is None else _given(policy.task, cubes)
-    at_a_time = max(1, CELLS_AT_A_TIME // shape_of(policy.task).cells)
+    at_a_time = max(1, CELLS_AT_A_TIME // shape_of(policy.task).nodes)
     parts = placed.split(min(at_a_time, PLACEMENTS_AT_A_TIME))
     env = policy.make_env(1, device=settings.device)
     try:
         sight, told = Sight(env, policy.make_network(settings.device)), []
         for part in parts:
             progress("placements", sum(map(len, told)), len(placed))
-            lattice = explore(policy.task, part)
-            told.append(follow_chances(lattice, sight.on(lattice)))
+            graph = explore(policy.task, part)
+            told.append(follow_chances(graph, sight.on(graph)))
     finally:
         env.close()
     progress("placements", len(placed), len(placed))

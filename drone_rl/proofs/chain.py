@@ -1,6 +1,6 @@
 """How episodes end when moves are drawn: exactly, by the Markov chain on the lattice.
 
-The probability of being in each cell is carried from step to step, to the step limit, in float64.
+The probability of being in each node is carried from step to step, to the step limit, in float64.
 Nothing is drawn at random, and what is left out is reported as undecided.
 """
 
@@ -13,18 +13,18 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from drone_rl.proofs.lattice import Lattice
+from drone_rl.proofs.graph import Graph
 from drone_rl.sim.batch import Batch
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
 
 FAINT = 1e-18
-"""Probability of being in a cell at a step up to which the policy isn't asked what it does there;
-most cells are all but out of reach. Once it has been asked, all that comes there is followed."""
+"""Probability of being in a node at a step up to which the policy isn't asked what it does there;
+most nodes are all but out of reach. Once it has been asked, all that comes there is followed."""
 NEGLIGIBLE = 1e-15
 """Probability that any episode still goes on, of all placements together, below which none is
 followed farther."""
 Ask = Callable[[Tensor], Tensor]
-"""Cells by number (N,) to the probabilities of the moves there (N, A), float64."""
+"""Nodes by number (N,) to the probabilities of the moves there (N, A), float64."""
 
 
 @dataclasses.dataclass
@@ -75,44 +75,44 @@ class Outcomes(Batch):
         return self.collected.sum(-1)
 
 
-def follow_chances(lattice: Lattice, ask: Ask) -> Outcomes:
-    """Carries the probability of every cell on, step by step, until all episodes have ended.
+def follow_chances(graph: Graph, ask: Ask) -> Outcomes:
+    """Carries the probability of every node on, step by step, until all episodes have ended.
 
     Args:
-        lattice: From `drone_rl.proofs.lattice.explore`.
-        ask: What the policy wishes for, asked once of each cell that matters.
+        graph: From `drone_rl.proofs.graph.explore`.
+        ask: What the policy wishes for, asked once of each node that matters.
     """
-    count, sets = len(lattice.cubes), 2 ** lattice.cubes.shape[1]
-    placement = lattice.cells.placement.numpy()
-    wish, visits, last, dropped = _carry(lattice, ask)
-    reason, collected = lattice.reason.numpy(), lattice.collected.numpy()
+    count, sets = len(graph.cubes), 2 ** graph.cubes.shape[1]
+    placement = graph.nodes.placement.numpy()
+    wish, visits, last, dropped = _carry(graph, ask)
+    reason, collected = graph.reason.numpy(), graph.collected.numpy()
     flow = visits[:, None] * wish  # of the moves that go on, too: those "end" as RUNNING
     end = (placement[:, None] * len(EndReason) + reason) * sets + collected
     ends = np.bincount(end.ravel(), flow.ravel(), count * len(EndReason) * sets)
     ends = ends.reshape(count, len(EndReason), sets)
     ends[:, EndReason.RUNNING] = 0.0
-    by_set = placement * sets + lattice.cells.collected.numpy()
+    by_set = placement * sets + graph.nodes.collected.numpy()
     ends[:, EndReason.STEP_LIMIT] += np.bincount(by_set, last, count * sets).reshape(count, sets)
     steps = np.bincount(placement, visits, count)
     undecided = np.bincount(placement, dropped, count)
     return Outcomes(*map(torch.from_numpy, (ends.clip(max=1.0), steps, undecided)))
 
 
-def _carry(lattice: Lattice, ask: Ask) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+def _carry(graph: Graph, ask: Ask) -> tuple[NDArray, NDArray, NDArray, NDArray]:
     """Steps as long as anything goes on.
 
     Returns:
-        Of each cell the wish, which is 0 where none was asked for (K, A); how often it is expected
+        Of each node the wish, which is 0 where none was asked for (K, A); how often it is expected
         to be left; the probability of being there at the step limit; and that which was not
         followed from there. Shapes: (K,).
     """
-    target = lattice.target.numpy()
+    target = graph.target.numpy()
     goes_on = target >= 0
-    cells = len(target)
-    wish, visits, dropped = np.zeros(target.shape), np.zeros(cells), np.zeros(cells)
-    is_known = np.zeros(cells, dtype=bool)
-    now = (np.arange(cells) < len(lattice.cubes)).astype(float)
-    for _ in range(lattice.settings.step_limit):
+    nodes = len(target)
+    wish, visits, dropped = np.zeros(target.shape), np.zeros(nodes), np.zeros(nodes)
+    is_known = np.zeros(nodes, dtype=bool)
+    now = (np.arange(nodes) < len(graph.cubes)).astype(float)
+    for _ in range(graph.settings.step_limit):
         new = (now > FAINT) & ~is_known
         if new.any():
             wish[new] = ask(torch.from_numpy(new.nonzero()[0])).numpy()
@@ -122,7 +122,7 @@ def _carry(lattice: Lattice, ask: Ask) -> tuple[NDArray, NDArray, NDArray, NDArr
         visits += now
         here = now.nonzero()[0]
         flow, inner = now[here, None] * wish[here], goes_on[here]
-        now = np.bincount(target[here][inner], flow[inner], cells)
+        now = np.bincount(target[here][inner], flow[inner], nodes)
         if now.sum() < NEGLIGIBLE:
-            return wish, visits, np.zeros(cells), dropped + now
+            return wish, visits, np.zeros(nodes), dropped + now
     return wish, visits, now, dropped

@@ -8,7 +8,7 @@ from torchrl.envs import CatFrames, Transform, TransformedEnv
 
 from drone_rl.envs import worlds_of
 from drone_rl.proofs.chain import Ask
-from drone_rl.proofs.lattice import Lattice
+from drone_rl.proofs.graph import Graph
 from drone_rl.sim.tasks.collect_cubes.rules import WorldState
 from drone_rl.utils.errors import InputError
 
@@ -17,7 +17,7 @@ BATCH = 1000
 
 
 class Sight:
-    """Draws cells of lattices as the policy's camera does, and asks its network."""
+    """Draws nodes of lattices as the policy's camera does, and asks its network."""
 
     def __init__(self, env: TransformedEnv, network: Callable[[Tensor], Tensor]) -> None:
         """Borrows worlds, transforms and a network.
@@ -27,7 +27,7 @@ class Sight:
             network: Pictures (N, C, H, W) to logits (N, A).
 
         Raises:
-            InputError: The policy remembers pictures, so that a cell doesn't decide what it does.
+            InputError: The policy remembers pictures, so that a node doesn't decide what it does.
         """
         self.pictures = 0
         """Drawn so far."""
@@ -41,20 +41,20 @@ class Sight:
                 "give a policy that sees one picture"
             )
 
-    def on(self, lattice: Lattice) -> Ask:
-        """How to ask what the policy does in cells of a lattice; no picture is drawn twice."""
-        cell, picture = lattice.pictures()
-        every = lattice.states()
+    def on(self, graph: Graph) -> Ask:
+        """How to ask what the policy does in nodes of a graph; no picture is drawn twice."""
+        node, picture = graph.pictures()
+        every = graph.states()
         known = torch.full(
-            (len(cell), len(self._worlds.dynamics.actions.names)), torch.nan
+            (len(node), len(self._worlds.dynamics.actions.names)), torch.nan
         ).double()
 
-        def ask(cells: Tensor) -> Tensor:
-            wanted = picture[cells].unique()
+        def ask(nodes: Tensor) -> Tensor:
+            wanted = picture[nodes].unique()
             new = wanted[known[wanted, 0].isnan()]
             if len(new):
-                known[new] = self._wishes(every[cell[new]])
-            return known[picture[cells]]
+                known[new] = self._wishes(every[node[new]])
+            return known[picture[nodes]]
 
         return ask
 

@@ -1,4 +1,4 @@
-"""A lattice that a person can count, and placements by their metres to the left."""
+"""A graph that a person can count, and placements by their metres to the left."""
 
 import pytest
 import torch

@@ -12,7 +12,7 @@ from torch import nn
 from drone_rl.evaluation import run_episodes, summarise
 from drone_rl.policies import make_actor
 from drone_rl.proofs.chain import NEGLIGIBLE, Outcomes, follow_chances
-from drone_rl.proofs.lattice import explore
+from drone_rl.proofs.graph import explore
 from drone_rl.proofs.sight import Sight
 from drone_rl.sim.settings import TaskSettings
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
@@ -21,9 +21,9 @@ from drone_rl.zoo import parse, policy_path, read_policy
 
 def constant(settings, cubes, *wish):
     """The outcomes of a policy that sees nothing."""
-    lattice = explore(settings, cubes)
+    graph = explore(settings, cubes)
     wishes = torch.tensor(wish, dtype=torch.float64)
-    return follow_chances(lattice, lambda cells: wishes.expand(len(cells), 3))
+    return follow_chances(graph, lambda nodes: wishes.expand(len(nodes), 3))
 
 
 def test_forward_alone_collects_what_stands_ahead(place):
@@ -64,9 +64,9 @@ def test_the_step_limit_by_hand(small, place):
 
 
 def test_back_and_forth_for_ever_is_the_step_limit(small, place):
-    lattice = explore(small, place(small, [0.0]))
+    graph = explore(small, place(small, [0.0]))
     wishes = torch.tensor([[0.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]).double()
-    done = follow_chances(lattice, lambda cells: wishes[cells])
+    done = follow_chances(graph, lambda nodes: wishes[nodes])
     assert done.ends[0, EndReason.STEP_LIMIT, 0] == 1.0
     assert done.steps.tolist() == [300.0]
 
@@ -144,8 +144,8 @@ def test_flights_of_the_simulator_with_drawn_actions_agree(place, monkeypatch):
     env, network = flying("good", 500, factor=0.1, num_cubes=2)
     task, flights = env.base_env.worlds.task, 2000
     cubes = place(task.settings, [4.0, -3.0])
-    lattice = explore(task.settings, cubes)
-    done = follow_chances(lattice, Sight(env, network).on(lattice))
+    graph = explore(task.settings, cubes)
+    done = follow_chances(graph, Sight(env, network).on(graph))
     monkeypatch.setattr(task, "draw", lambda random_state: cubes[0])
     actor = make_actor(network, env.action_spec, torch.Generator().manual_seed(0))
     flown = run_episodes(env, actor, flights, greedy=False)
@@ -168,8 +168,8 @@ def test_greedy_flights_end_as_a_policy_does_that_is_sure_of_itself():
     flown = run_episodes(env, actor, 20)
     settings = env.base_env.worlds.task.settings
     cubes = flown.goals.world.view(20, settings.num_cubes, 3).double()
-    lattice = explore(settings, cubes)
-    done = follow_chances(lattice, Sight(env, network).on(lattice))
+    graph = explore(settings, cubes)
+    done = follow_chances(graph, Sight(env, network).on(graph))
     env.close()
     assert torch.equal(done.reasons.argmax(-1), flown.end_reason)
     assert torch.equal(done.collected, flown.goals.reached.double())
@@ -178,19 +178,19 @@ def test_greedy_flights_end_as_a_policy_does_that_is_sure_of_itself():
 
 def test_what_is_all_but_impossible_is_not_asked_for_and_told_as_undecided(place):
     settings = TaskSettings(num_cubes=1)
-    lattice = explore(settings, place(settings, [0.0]))
+    graph = explore(settings, place(settings, [0.0]))
     asked = []
 
-    def ask(cells):
-        asked.append(cells)
-        return torch.tensor([1.0 - 1e-10, 1e-10, 0.0], dtype=torch.float64).expand(len(cells), 3)
+    def ask(nodes):
+        asked.append(nodes)
+        return torch.tensor([1.0 - 1e-10, 1e-10, 0.0], dtype=torch.float64).expand(len(nodes), 3)
 
-    done = follow_chances(lattice, ask)
-    cells = torch.cat(asked)
+    done = follow_chances(graph, ask)
+    nodes = torch.cat(asked)
     assert (
-        len(cells) == len(cells.unique()) == 2 * 14
+        len(nodes) == len(nodes.unique()) == 2 * 14
     )  # 14 steps to the cube: straight, or one left
-    assert lattice.cells.aside[cells].unique().tolist() == [0, 1]
+    assert graph.nodes.aside[nodes].unique().tolist() == [0, 1]
     twice_left = 1e-20 * sum(range(1, 15))  # the first left any time before the second one
     assert float(done.undecided[0]) == pytest.approx(twice_left, rel=1e-6)
     assert float(done.success[0]) == pytest.approx(1.0, abs=1e-15)

@@ -1,11 +1,11 @@
-"""What a policy is shown of a cell is what its camera shows it there."""
+"""What a policy is shown of a node is what its camera shows it there."""
 
 import pytest
 import torch
 from torchrl.envs import CatFrames
 
 from drone_rl.envs import DroneEnv, GrayPixels, with_transforms
-from drone_rl.proofs.lattice import explore
+from drone_rl.proofs.graph import explore
 from drone_rl.proofs.sight import Sight
 from drone_rl.sim.settings import TaskSettings
 from drone_rl.utils.errors import InputError
@@ -17,21 +17,21 @@ def test_wishes_are_those_of_the_same_pictures_in_flight(make_pipeline):
     now = env.reset()
     task = env.base_env.worlds.task.settings
     cubes = env.base_env.worlds.state.cubes.clone()
-    lattice, sight = explore(task, cubes), Sight(env, network)
-    ask, cell = sight.on(lattice), torch.arange(3)
-    wishes = ask(torch.arange(len(lattice.cells)))
-    assert sight.pictures == len(lattice.pictures()[0])
+    graph, sight = explore(task, cubes), Sight(env, network)
+    ask, node = sight.on(graph), torch.arange(3)
+    wishes = ask(torch.arange(len(graph.nodes)))
+    assert sight.pictures == len(graph.pictures()[0])
     assert torch.equal(ask(torch.tensor([7, 3, 7])), wishes[[7, 3, 7]])
-    assert sight.pictures == len(lattice.pictures()[0])  # no more than before
+    assert sight.pictures == len(graph.pictures()[0])  # no more than before
     random = torch.Generator().manual_seed(0)
     for _ in range(20):
         with torch.no_grad():
             expected = network(now["pixels"]).double().softmax(-1)
-        assert torch.allclose(wishes[cell], expected, atol=1e-6, rtol=0)
+        assert torch.allclose(wishes[node], expected, atol=1e-6, rtol=0)
         action = torch.randint(0, 3, (3,), generator=random) * (torch.arange(3) % 2)  # one wanders
-        cell = lattice.target[cell, action]
+        node = graph.target[node, action]
         now = env.step(now.set("action", action))["next"]
-    assert len(wishes) == len(lattice.cells)
+    assert len(wishes) == len(graph.nodes)
     assert torch.allclose(wishes.sum(-1), torch.ones(len(wishes)).double())
 
 
