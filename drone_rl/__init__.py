@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from drone_rl.utils.garbage import collecting_no_garbage
 
 if TYPE_CHECKING:
+    from drone_rl.api.chances import Chances, chances
     from drone_rl.api.environment import make_env
     from drone_rl.api.explaining import Explanations, explain
     from drone_rl.api.judging import Evaluation, Judgement, evaluate, judge
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from drone_rl.api.proving import Proof, load_proof, prove
     from drone_rl.api.training import Training, train
     from drone_rl.explanations.settings import ExplainSettings
+    from drone_rl.settings.chances import ChanceSettings
     from drone_rl.settings.judging import EvaluateSettings, JudgeSettings
     from drone_rl.settings.proving import ProveSettings
     from drone_rl.settings.training import TrainerSettings, TrainSettings
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _PLACES = {
+    "api.chances": ("Chances", "chances"),
     "api.environment": ("make_env",),
     "api.explaining": ("Explanations", "explain"),
     "api.judging": ("Evaluation", "Judgement", "evaluate", "judge"),
@@ -32,6 +35,7 @@ _PLACES = {
     "api.proving": ("Proof", "load_proof", "prove"),
     "api.training": ("Training", "train"),
     "explanations.settings": ("ExplainSettings",),
+    "settings.chances": ("ChanceSettings",),
     "settings.judging": ("EvaluateSettings", "JudgeSettings"),
     "settings.proving": ("ProveSettings",),
     "settings.training": ("TrainSettings", "TrainerSettings"),
@@ -42,6 +46,8 @@ _HOMES = {name: f"drone_rl.{module}" for module, names in _PLACES.items() for na
 
 __all__ = [
     "CameraSettings",
+    "ChanceSettings",
+    "Chances",
     "EvaluateSettings",
     "Evaluation",
     "ExplainSettings",
@@ -56,6 +62,7 @@ __all__ = [
     "TrainSettings",
     "TrainerSettings",
     "Training",
+    "chances",
     "evaluate",
     "explain",
     "judge",

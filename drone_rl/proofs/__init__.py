@@ -1,1 +1,1 @@
-"""What a policy does from every placement of the cubes, proved rather than estimated."""
+"""What a policy does, said exactly and not estimated from flights."""

@@ -1,0 +1,72 @@
+"""What a policy wishes for in worlds that were only imagined, through its camera and transforms."""
+
+from collections.abc import Callable, Iterable
+
+import torch
+from torch import Tensor
+from torchrl.envs import CatFrames, Transform, TransformedEnv
+
+from drone_rl.envs import worlds_of
+from drone_rl.proofs.chain import Ask
+from drone_rl.proofs.graph import Graph
+from drone_rl.sim.tasks.collect_cubes.rules import WorldState
+from drone_rl.utils.errors import InputError
+
+BATCH = 1000
+"""Pictures drawn at a time; bounds memory."""
+
+
+class Sight:
+    """Draws nodes of lattices as the policy's camera does, and asks its network."""
+
+    def __init__(self, env: TransformedEnv, network: Callable[[Tensor], Tensor]) -> None:
+        """Borrows worlds, transforms and a network.
+
+        Args:
+            env: Worlds of cube collection and the policy's transforms.
+            network: Pictures (N, C, H, W) to logits (N, A).
+
+        Raises:
+            InputError: The policy remembers pictures, so that a node doesn't decide what it does.
+        """
+        self.pictures = 0
+        """Drawn so far."""
+        self._worlds, self._network = worlds_of(env), network
+        pipeline: Iterable[Transform] = env.transform  # type: ignore[assignment]
+        self._transforms = [t for t in pipeline if "pixels" in (t.in_keys or [])]
+        stacks = [t.N for t in self._transforms if isinstance(t, CatFrames)]
+        if max(stacks, default=1) > 1:
+            raise InputError(
+                f"the policy stacks {max(stacks)} frames, so that its moves depend on the past; "
+                "give a policy that sees one picture"
+            )
+
+    def on(self, graph: Graph) -> Ask:
+        """How to ask what the policy does in nodes of a graph; no picture is drawn twice."""
+        node, picture = graph.pictures()
+        every = graph.states()
+        known = torch.full(
+            (len(node), len(self._worlds.dynamics.actions.names)), torch.nan
+        ).double()
+
+        def ask(nodes: Tensor) -> Tensor:
+            wanted = picture[nodes].unique()
+            new = wanted[known[wanted, 0].isnan()]
+            if len(new):
+                known[new] = self._wishes(every[node[new]])
+            return known[picture[nodes]]
+
+        return ask
+
+    @torch.no_grad()
+    def _wishes(self, states: WorldState) -> Tensor:
+        """Probabilities of the moves in worlds. Shape: (N, A), float64, on the CPU."""
+        self.pictures += len(states)
+        parts = states.to(self._worlds.device).split(BATCH)
+        return torch.cat([self._logits(part) for part in parts]).double().softmax(-1).cpu()
+
+    def _logits(self, state: WorldState) -> Tensor:
+        pixels = self._worlds.render(state)
+        for transform in self._transforms:
+            pixels = transform._apply_transform(pixels)
+        return self._network(pixels)
