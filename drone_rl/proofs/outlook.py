@@ -102,6 +102,10 @@ class Outlook:
         for block in unknown:
             self._gather(block)
 
+    def nothing_in_sight(self) -> int:
+        """Bits of the possible actions where there is no cube."""
+        return int(self._look(np.empty((1, 0), int))[0])
+
     def _is_unknown(self, spans: NDArray) -> NDArray[np.bool_]:
         """Spans that may have something unknown; of small ones it is known whether they do."""
         counts = _counts(spans)

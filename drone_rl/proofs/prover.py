@@ -143,14 +143,14 @@ class Prover:
         """Boxes by the bits of the actions that are possible."""
         cubes, y = self.lattice.standing(place), self.lattice.y(place)
         outlook = self._outlook(place, cubes, boxes)
+        if not cubes:
+            yield outlook.nothing_in_sight(), boxes
+            return
         spans = outlook.spans(boxes[:, cubes] - y)
         pictures = outlook.pictures
         outlook.fill(spans)
         self.pictures += outlook.pictures - pictures
         self.least_gap = min(self.least_gap, outlook.least_gap)
-        if not cubes:
-            yield int(outlook.table), boxes
-            return
         found: dict[int, list[Boxes]] = defaultdict(list)
         for owner, ranges, bits in runs(outlook, spans, MOST_ROWS):
             pieces = boxes[owner]

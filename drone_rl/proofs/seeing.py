@@ -191,7 +191,7 @@ class Seeing:
         state = cast(WorldState, self._worlds.start(torch.from_numpy(where)))
         steps = torch.from_numpy(places[:, :2] * task.step_length)
         state.body.position[:, :2] = steps
-        state.passed[:] = torch.from_numpy(hidden)
+        state.passed[:] = torch.from_numpy(hidden.copy())
         return self._worlds.render(state)
 
 
