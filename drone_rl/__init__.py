@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING, Any
 from drone_rl.utils.garbage import collecting_no_garbage
 
 if TYPE_CHECKING:
+    from drone_rl.api.checking import Check, check
     from drone_rl.api.environment import make_env
     from drone_rl.api.explaining import Explanations, explain
     from drone_rl.api.judging import Evaluation, Judgement, evaluate, judge
     from drone_rl.api.policy import Policy, load_policy
     from drone_rl.api.training import Training, train
     from drone_rl.explanations.settings import ExplainSettings
+    from drone_rl.settings.checking import CheckSettings
     from drone_rl.settings.judging import EvaluateSettings, JudgeSettings
     from drone_rl.settings.training import TrainerSettings, TrainSettings
     from drone_rl.sim.settings import CameraSettings, TaskSettings
@@ -23,12 +25,14 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _PLACES = {
+    "api.checking": ("Check", "check"),
     "api.environment": ("make_env",),
     "api.explaining": ("Explanations", "explain"),
     "api.judging": ("Evaluation", "Judgement", "evaluate", "judge"),
     "api.policy": ("Policy", "load_policy"),
     "api.training": ("Training", "train"),
     "explanations.settings": ("ExplainSettings",),
+    "settings.checking": ("CheckSettings",),
     "settings.judging": ("EvaluateSettings", "JudgeSettings"),
     "settings.training": ("TrainSettings", "TrainerSettings"),
     "sim.settings": ("CameraSettings", "TaskSettings"),
@@ -38,6 +42,8 @@ _HOMES = {name: f"drone_rl.{module}" for module, names in _PLACES.items() for na
 
 __all__ = [
     "CameraSettings",
+    "Check",
+    "CheckSettings",
     "EvaluateSettings",
     "Evaluation",
     "ExplainSettings",
@@ -50,6 +56,7 @@ __all__ = [
     "TrainSettings",
     "TrainerSettings",
     "Training",
+    "check",
     "evaluate",
     "explain",
     "judge",

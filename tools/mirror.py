@@ -10,7 +10,7 @@ PURE_DATA = {
     **{
         f"settings/{name}": "values with bounds; hydra_app/test_schemas reads and builds each"
         for name in (
-            *("benchmarks", "collecting", "judging", "learning", "loggers"),
+            *("benchmarks", "checking", "collecting", "judging", "learning", "loggers"),
             *("networks", "paths", "returns", "training", "transforms"),
         )
     },

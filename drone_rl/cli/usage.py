@@ -13,6 +13,7 @@ commands
   explain    see what a policy sees, and whether to trust it: one HTML report
   report     make the report of explanations again, or of several side by side
   verdict    good, poor or one-sided? as JSON and as an exit status
+  check      does a certificate hold? flown anew; as JSON and as an exit status
   export     write a policy as safetensors with a model card
   sweep-report  compare the runs of a sweep: CSV, JSON, one HTML page
   bench      measure every figure that the README quotes
@@ -27,7 +28,7 @@ examples
   drone-rl COMMAND --help              every setting of a command
 """
 COMMANDS = (
-    *("train", "evaluate", "play", "explain", "report", "verdict", "export"),
+    *("train", "evaluate", "play", "explain", "report", "verdict", "check", "export"),
     *("sweep-report", "bench"),
 )
 """Each a module of `drone_rl.cli` and a file in conf/; `demo` runs three of them."""

@@ -126,7 +126,7 @@ def test_every_value_of_every_sweep_is_understood(name, settings):
                 settings("train", f"sweep={name}", f"{setting}={value}")
 
 
-@pytest.mark.parametrize("command", ["evaluate", "play", "verdict", "explain"])
+@pytest.mark.parametrize("command", ["evaluate", "play", "verdict", "check", "explain"])
 def test_any_setting_of_the_task_can_be_changed_for_a_trained_policy(command, config, settings):
     assert set(config(command).task) == set(kinds_of(TaskSettings))
     assert settings(command).task == {}
