@@ -10,6 +10,7 @@ from drone_rl.utils.garbage import collecting_no_garbage
 
 if TYPE_CHECKING:
     from drone_rl.api.chances import Chances, chances
+    from drone_rl.api.checking import Check, check
     from drone_rl.api.environment import make_env
     from drone_rl.api.explaining import Explanations, explain
     from drone_rl.api.judging import Evaluation, Judgement, evaluate, judge
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from drone_rl.api.training import Training, train
     from drone_rl.explanations.settings import ExplainSettings
     from drone_rl.settings.chances import ChanceSettings
+    from drone_rl.settings.checking import CheckSettings
     from drone_rl.settings.judging import EvaluateSettings, JudgeSettings
     from drone_rl.settings.proving import ProveSettings
     from drone_rl.settings.training import TrainerSettings, TrainSettings
@@ -28,6 +30,7 @@ __version__ = "0.1.0"
 
 _PLACES = {
     "api.chances": ("Chances", "chances"),
+    "api.checking": ("Check", "check"),
     "api.environment": ("make_env",),
     "api.explaining": ("Explanations", "explain"),
     "api.judging": ("Evaluation", "Judgement", "evaluate", "judge"),
@@ -36,6 +39,7 @@ _PLACES = {
     "api.training": ("Training", "train"),
     "explanations.settings": ("ExplainSettings",),
     "settings.chances": ("ChanceSettings",),
+    "settings.checking": ("CheckSettings",),
     "settings.judging": ("EvaluateSettings", "JudgeSettings"),
     "settings.proving": ("ProveSettings",),
     "settings.training": ("TrainSettings", "TrainerSettings"),
@@ -48,6 +52,8 @@ __all__ = [
     "CameraSettings",
     "ChanceSettings",
     "Chances",
+    "Check",
+    "CheckSettings",
     "EvaluateSettings",
     "Evaluation",
     "ExplainSettings",
@@ -63,6 +69,7 @@ __all__ = [
     "TrainerSettings",
     "Training",
     "chances",
+    "check",
     "evaluate",
     "explain",
     "judge",

@@ -10,8 +10,8 @@ PURE_DATA = {
     **{
         f"settings/{name}": "values with bounds; hydra_app/test_schemas reads and builds each"
         for name in (
-            *("benchmarks", "chances", "collecting", "judging", "learning", "loggers"),
-            *("networks", "paths", "returns", "training", "transforms"),
+            *("benchmarks", "chances", "checking", "collecting", "judging", "learning", "loggers"),
+            *("networks", "paths", "proving", "returns", "training", "transforms"),
         )
     },
 }

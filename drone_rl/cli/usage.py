@@ -14,6 +14,7 @@ commands
   report     make the report of explanations again, or of several side by side
   verdict    good, poor or one-sided? as JSON and as an exit status
   prove      how does it end from every placement of the cubes? exactly, as a certificate
+  check      does a certificate hold? flown anew; as JSON and as an exit status
   chain      how probable each end of an episode is, exactly, if moves are drawn
   export     write a policy as safetensors with a model card
   sweep-report  compare the runs of a sweep: CSV, JSON, one HTML page
@@ -30,6 +31,6 @@ examples
 """
 COMMANDS = (
     *("train", "evaluate", "play", "explain", "report", "verdict"),
-    *("prove", "chain", "export", "sweep-report", "bench"),
+    *("prove", "check", "chain", "export", "sweep-report", "bench"),
 )
 """Each a module of `drone_rl.cli` and a file in conf/; `demo` runs three of them."""

@@ -126,7 +126,9 @@ def test_every_value_of_every_sweep_is_understood(name, settings):
                 settings("train", f"sweep={name}", f"{setting}={value}")
 
 
-@pytest.mark.parametrize("command", ["evaluate", "play", "verdict", "chain", "explain"])
+@pytest.mark.parametrize(
+    "command", ["evaluate", "play", "verdict", "prove", "check", "chain", "explain"]
+)
 def test_any_setting_of_the_task_can_be_changed_for_a_trained_policy(command, config, settings):
     assert set(config(command).task) == set(kinds_of(TaskSettings))
     assert settings(command).task == {}

@@ -1,0 +1,19 @@
+"""What the check of a certificate can be told."""
+
+import dataclasses
+from typing import Annotated
+
+from drone_rl.utils.schema import Whole
+from drone_rl.utils.settings import Settings
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class CheckSettings(Settings):
+    """How a certificate is checked."""
+
+    flights: Annotated[int, Whole(1, 10_000_000)] = 2000
+    """Flights from corners, centres and random points of the boxes, and beside their borders."""
+    seed: Annotated[int, Whole(0)] = 0
+    """Root of the random stream that draws where they start."""
+    device: str = "cpu"
+    """Where worlds are drawn and the policy runs: cpu, cuda or cuda:N."""

@@ -1,0 +1,31 @@
+import numpy as np
+import pytest
+
+from drone_rl.checks.certificate import Outcome
+from drone_rl.checks.tallies import find_wrong_tallies
+from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+
+OWNER = np.repeat([0, 1], [800, 200])
+STEPS = np.repeat([10, 11, 0], [600, 200, 200])
+"""Of 1000 flights 600 took 10 steps, 200 took 11; of 200 nothing is stated."""
+
+
+def wrong(steps, share=0.8):
+    nowhere = np.zeros((0, 1, 2))
+    outcome = Outcome(EndReason.ALL_CUBES, (True,), False, share, steps, nowhere)
+    return list(find_wrong_tallies([outcome], OWNER, STEPS))
+
+
+@pytest.mark.parametrize("steps", [{10: 0.6, 11: 0.2}, {10: 0.62, 11: 0.18}, {10: 0.5}, {}])
+def test_what_luck_can_explain_or_is_not_stated_is_accepted(steps):
+    assert wrong(steps) == []
+
+
+@pytest.mark.parametrize(
+    ("steps", "number"),
+    [({10: 0.2, 11: 0.6}, 10), ({10: 0.8}, 10), ({12: 0.3}, 12), ({10: 0.6, 12: 0.2}, 11)],
+)
+def test_what_luck_can_not_explain_is_told(steps, number):
+    lines = wrong(steps)
+    assert any(f"to take {number} steps" in line for line in lines), lines
+    assert all("of 1000 random flights refute" in line for line in lines)
