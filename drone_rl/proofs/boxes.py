@@ -3,6 +3,8 @@
 Boxes are arrays of shape (N, n, 2): N boxes, the lower and upper end for each of n cubes, metres.
 """
 
+import itertools
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -36,6 +38,34 @@ def merge(boxes: Boxes) -> Boxes:
         for cube in range(boxes.shape[1]):
             boxes = _join(boxes, cube)
     return boxes
+
+
+def unite(boxes: Boxes, most: int = 10_000_000) -> Boxes:
+    """The same set in disjoint boxes, where they overlap.
+
+    Args:
+        boxes: Any.
+        most: Cells of the grid that all their sides make, above which they are left as they are.
+    """
+    boxes = np.unique(boxes, axis=0)
+    n = boxes.shape[1]
+    sides = [np.unique(boxes[:, k]) for k in range(n)]
+    shape = [len(side) for side in sides]
+    if len(boxes) < 2 or np.prod(shape, dtype=float) > most:
+        return merge(boxes)
+    ends = np.stack([np.searchsorted(side, boxes[:, k]) for k, side in enumerate(sides)], 1)
+    count = np.zeros(shape, np.int32)
+    for corner in itertools.product((0, 1), repeat=n):
+        at = tuple(ends[:, k, end] for k, end in enumerate(corner))
+        np.add.at(count, at, (-1) ** sum(corner))
+    for axis in range(n):
+        count = count.cumsum(axis)
+    edges = np.diff((count > 0).astype(np.int8), prepend=0, axis=n - 1)
+    first, last = np.argwhere(edges > 0), np.argwhere(edges < 0)
+    lower = np.stack([sides[k][first[:, k]] for k in range(n)], -1)
+    upper = np.stack([sides[k][(first[:, k] + 1)] for k in range(n)], -1)
+    upper[:, -1] = sides[-1][last[:, -1]]
+    return merge(np.stack([lower, upper], -1))
 
 
 def intersect(boxes: Boxes, others: Boxes) -> Boxes:

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from drone_rl.proofs.boxes import Boxes, carve, intersect, merge, volumes, whole
+from drone_rl.proofs.boxes import Boxes, carve, intersect, merge, unite, volumes, whole
 from drone_rl.proofs.cells import Cells
 from drone_rl.proofs.lattice import AHEAD, LEFT, RIGHT, Ending, Place
 from drone_rl.proofs.outlook import Outlook, runs
@@ -94,9 +94,9 @@ class Prover:
     def advance(self) -> Place:
         """Visits the next place; returns it."""
         place = min(self.waiting, key=lambda p: p.turn)
-        boxes = merge(np.concatenate(self.waiting.pop(place)))
+        boxes = np.concatenate(self.waiting.pop(place))
+        boxes = unite(boxes) if place.is_fork else merge(boxes)
         if place.is_fork:
-            boxes = np.unique(boxes, axis=0)
             place = dataclasses.replace(place, steps=self.longest.pop(place))
         self.num_places += 1
         self.most_boxes = max(self.most_boxes, len(boxes))
@@ -124,7 +124,15 @@ class Prover:
                 self._gather(moved, part)
 
     def _gather(self, place: Place, boxes: Boxes) -> None:
-        """Puts forks together however many steps they took: the most that any did is noted."""
+        """Puts forks together however they came: what follows does not depend on it.
+
+        Of steps, the most that any took are noted. Of cubes that are no longer there, every place
+        is taken for possible: that can only leave more undecided, and only within forks.
+        """
+        gone = [k for k in range(boxes.shape[1]) if k not in self.lattice.standing(place)]
+        bound = self.lattice.task.lateral_bound
+        boxes = boxes.copy()
+        boxes[:, gone] = (-bound, bound)
         there = dataclasses.replace(place, steps=0)
         steps = max(place.steps, self.longest.get(there, 0))
         self.longest[there] = steps
@@ -208,22 +216,22 @@ class Prover:
         n = self.lattice.task.num_cubes
         undecided = [np.empty((0, n, 2)), *undecided, left]
         return Findings(
-            {ending: merge(np.concatenate(boxes)) for ending, boxes in endings.items()},
+            {ending: unite(np.concatenate(boxes)) for ending, boxes in endings.items()},
             steps,
-            merge(np.concatenate(undecided)),
+            unite(np.concatenate(undecided)),
         )
 
     def _settle(self, endings: dict[Ending, list[Boxes]]) -> Boxes:
         """Adds the forks of which all ways end alike; returns the others."""
         left = _joined(self.forked, self.lattice.task.num_cubes)
         ways = {e: _joined(boxes, left.shape[1]) for e, boxes in self.fork_ends.items() if e}
-        open_ = [merge(boxes) for boxes in self.fork_ends[None]]
-        open_ += [merge(np.concatenate(b)) for p, b in self.waiting.items() if p.is_fork]
+        open_ = list(self.fork_ends[None])
+        open_ += [b for p, boxes in self.waiting.items() if p.is_fork for b in boxes]
         different = list(ways.values())
         for i, boxes in enumerate(different):
             open_ += [intersect(boxes, others) for others in different[i + 1 :]]
         undecided = []
-        for hole in merge(np.concatenate([left[:0], *open_])):
+        for hole in unite(np.concatenate([left[:0], *open_])):
             inside, left = carve(left, hole)
             undecided.append(inside)
         for ending, boxes in ways.items():
@@ -237,4 +245,4 @@ class Prover:
 
 
 def _joined(boxes: list[Boxes], num_cubes: int) -> Boxes:
-    return merge(np.unique(np.concatenate([np.empty((0, num_cubes, 2)), *boxes]), axis=0))
+    return unite(np.concatenate([np.empty((0, num_cubes, 2)), *boxes]))
