@@ -132,7 +132,7 @@ class Lattice:
         return None if reason is None else Ending(reason, place.collected)
 
     def _touched(self, place: Place, stood: list[int], boxes: Boxes) -> Iterator[tuple[int, Boxes]]:
-        """Boxes by the cubes that the drone has when it has come to a place, of those that stood."""
+        """Boxes by the cubes that the drone has at a place, of those that stood before."""
         parts = [(place.collected, boxes)]
         reach, y = self.task.touch_distance, self.y(place)
         first, beyond = _least(y, reach), math.nextafter(-_least(-y, reach), math.inf)
