@@ -219,7 +219,8 @@ class Prover:
         undecided = [b for p, boxes in self.waiting.items() if not p.is_fork for b in boxes]
         settled, left = settle(self.forked, self._ways(), self._open())
         for ending, boxes in settled.items():
-            endings[ending].append(boxes)
+            if len(boxes):
+                endings[ending].append(boxes)
         task = self.lattice.task
         space = whole(task.lateral_bound, task.num_cubes)
         parts = {ending: merge(np.concatenate(boxes)) for ending, boxes in endings.items()}

@@ -69,15 +69,16 @@ def test_half_way_the_rest_is_undecided():
         prover.advance()
     parts, undecided = shares(prover.findings())
     subject.close()
-    assert not prover.is_finished and prover.boxes_under_way == 1
+    assert not prover.is_finished and prover.boxes_under_way > 0
     assert parts == {} and undecided == 1.0
 
 
 def test_where_logits_are_close_nothing_is_claimed():
-    """With a gap that hardly any picture has, most placements are undecided, none wrongly."""
-    bold, careful = prove("right_and_forward"), prove("right_and_forward", gap=1.0)
-    (_, few), (parts, many) = shares(bold.findings()), shares(careful.findings())
-    assert many > few
+    """The larger the gap that is asked for, the more ways are followed, and nothing is wrong."""
+    bold, careful = prove("right_and_forward"), prove("right_and_forward", gap=3.0)
+    forked = [sum(volumes(b).sum() for b in prover.forked) for prover in (bold, careful)]
+    assert forked[0] < 1e-3 < forked[1]
+    parts, _ = shares(careful.findings())
     assert parts.get(("ALL_CUBES", 1), 0) <= (6 + 1.65) / 12 + 1e-9
     assert parts.get(("FRONT_BOUNDARY", 0), 0) <= (6 - 1.65) / 12 + 1e-9
 
