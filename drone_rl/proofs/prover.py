@@ -217,11 +217,11 @@ class Prover:
             endings[ending] += boxes
             steps[ending][count] = float(sum(volumes(b).sum() for b in boxes))
         undecided = [b for p, boxes in self.waiting.items() if not p.is_fork for b in boxes]
-        settled, left = settle(self.forked, self._ways(), self._open())
+        task = self.lattice.task
+        settled, left = settle(self.forked, self._ways(), self._open(), task.num_cubes)
         for ending, boxes in settled.items():
             if len(boxes):
                 endings[ending].append(boxes)
-        task = self.lattice.task
         space = whole(task.lateral_bound, task.num_cubes)
         parts = {ending: merge(np.concatenate(boxes)) for ending, boxes in endings.items()}
         return Findings(*simplify(parts, merge(np.concatenate([left, *undecided])), space), steps)

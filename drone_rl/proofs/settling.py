@@ -18,7 +18,7 @@ _AT_ONCE = 10_000_000
 
 
 def settle(
-    forks: Sequence[Boxes], ways: Mapping[E, Boxes], unknown: Sequence[Boxes]
+    forks: Sequence[Boxes], ways: Mapping[E, Boxes], unknown: Sequence[Boxes], num_cubes: int
 ) -> tuple[dict[E, Boxes], Boxes]:
     """Parts forks by how they end.
 
@@ -26,14 +26,12 @@ def settle(
         forks: Where there is more than one way, disjoint.
         ways: Where a way may end so; together they cover the forks.
         unknown: Where a way may end in another manner.
+        num_cubes: How many intervals a box has.
 
     Returns:
         The forks that can only end so, disjoint; and the rest.
     """
-    if not forks:
-        none = np.empty((0, *next(iter(unknown), np.empty((0, 0, 2))).shape[1:]))
-        return {}, none
-    left = merge(np.concatenate(forks))
+    left = merge(np.concatenate([np.empty((0, num_cubes, 2)), *forks]))
     if not ways:
         return {}, left
     usual = max(ways, key=lambda e: volumes(ways[e]).sum())
