@@ -11,6 +11,7 @@ from drone_rl.api.progress import silent
 from drone_rl.api.proving import Proof, prove
 from drone_rl.api.training import train
 from drone_rl.bench.tampering import count_refused
+from drone_rl.settings.training import TrainerSettings
 
 FLIGHTS = 100_000
 """Of all certificates together."""
@@ -34,7 +35,8 @@ def bench_prove(folder: Path, seeds: Sequence[int], quick: bool) -> dict[str, An
     proofs, seconds = {"good": good}, []
     for seed in seeds[:1] if quick else seeds:
         run = folder / f"seed_{seed}"
-        train(folder=run, seed=seed, progress=silent)
+        limits = TrainerSettings(total_frames=10_000) if quick else TrainerSettings()
+        train(folder=run, seed=seed, trainer=limits, progress=silent)
         proofs[str(run)], taken = _timed(run, three, run)
         seconds.append(taken)
     trained = list(proofs.values())[1:]

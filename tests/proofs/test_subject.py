@@ -1,0 +1,92 @@
+"""What can be proved is taken apart; what can't is refused in one line."""
+
+import dataclasses
+
+import pytest
+import torch
+
+import drone_rl
+from drone_rl.proofs.subject import check_task, make_painter, make_subject
+from drone_rl.sim.settings import TaskSettings
+from drone_rl.utils.errors import InputError
+from drone_rl.zoo import parse
+
+
+@pytest.fixture(scope="module")
+def subject():
+    policy = drone_rl.load_policy("good")
+    subject = make_subject(policy.description, policy.make_network(), 1e-4)
+    yield subject
+    subject.close()
+
+
+def with_transforms(*names):
+    """Policy good's description with other transforms; they decide only what is seen."""
+    described = drone_rl.load_policy("good").description.as_dict()
+    described["transforms"] = [n if isinstance(n, dict) else {"name": n} for n in names]
+    return parse(described)
+
+
+def test_pictures_are_what_the_network_sees(subject):
+    """Painted by hand and by the renderer and the real transforms."""
+    policy = drone_rl.load_policy("good")
+    env = policy.make_env(3)
+    try:
+        state = env.reset()
+        seen = state["pixels"]
+        nothing = subject.painter.see(subject.painter.paint([])[0])
+        assert seen.shape[1:] == nothing.shape[1:]
+        assert torch.allclose(seen[:, :, 0], nothing[:, :, 0].expand_as(seen[:, :, 0]))
+    finally:
+        env.close()
+
+
+def test_transforms_after_the_shades_are_applied(subject):
+    crop = {"name": "crop", "top": 2, "bottom": 22}
+    description = with_transforms("gray", crop, {"name": "standardize", "mean": 0.5, "std": 0.25})
+    painter = make_painter(description, subject.seeing)
+    picture = painter.see(painter.paint([])[0])
+    assert picture.shape == (1, 1, 20, 64)
+    sky = (0.299 * 158 + 0.587 * 188 + 0.114 * 234) / 255
+    assert float(picture[0, 0, 0, 0]) == pytest.approx((sky - 0.5) / 0.25, abs=1e-5)
+
+
+def test_memory_is_refused(subject):
+    stack = {"name": "stack", "N": 2}
+    with pytest.raises(InputError, match="sees a stack of frames"):
+        make_painter(with_transforms("gray", stack), subject.seeing)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"vertical_bound": 0.5}, "vertical_bound=0.5 spreads cubes in height"),
+        ({"spacing": 2.0}, "spacing=2.0 puts cubes beside each other"),
+        ({"lateral_bound": 0.0}, "leaves a single placement"),
+    ],
+)
+def test_worlds_without_a_closed_form_are_refused(change, message):
+    check_task(TaskSettings())
+    with pytest.raises(InputError, match=message):
+        check_task(TaskSettings(**change))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"step_length": 0.3}, "can't be added up without rounding"),
+        ({"cube_color": (0.0, 0.0, 0.0)}, "makes a face look like another"),
+    ],
+)
+def test_what_the_parts_refuse_is_refused(change, message):
+    policy = drone_rl.load_policy("good").in_task(**change)
+    with pytest.raises(InputError, match=message):
+        make_subject(policy.description, policy.make_network(), 1e-4)
+
+
+def test_the_networks_actions_must_be_moves():
+    policy = drone_rl.load_policy("good")
+    network = policy.make_network()
+    network.actions = dataclasses.replace(network.actions)
+    with pytest.raises(InputError, match="does not choose among"):
+        make_subject(policy.description, network, 1e-4)
