@@ -1,5 +1,6 @@
 """Certificates that go together and are of this network and task, but false: only flights tell."""
 
+import copy
 import operator
 from collections.abc import Callable
 from fractions import Fraction
@@ -19,7 +20,10 @@ def _reshared(way: Callable[[Data], None]) -> Way:
     """Makes shares those of the boxes afterwards; leaves no steps too many, no outcome empty."""
 
     def whole(data: Data) -> Data:
+        before = copy.deepcopy(data)
         way(data)
+        if data == before:  # nothing there to lie about
+            return data
         task = data["policy"]["description"]["task"]
         placements = Fraction(2 * task["lateral_bound"]) ** task["num_cubes"]
         for part in (*data["outcomes"], data["undecided"]):
