@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from drone_rl.api.environment import make_env
     from drone_rl.api.explaining import Explanations, explain
     from drone_rl.api.judging import Evaluation, Judgement, evaluate, judge
+    from drone_rl.api.mapping import Places, places
     from drone_rl.api.policy import Policy, load_policy
     from drone_rl.api.proving import Proof, load_proof, prove
     from drone_rl.api.training import Training, train
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from drone_rl.settings.chances import ChanceSettings
     from drone_rl.settings.checking import CheckSettings
     from drone_rl.settings.judging import EvaluateSettings, JudgeSettings
+    from drone_rl.settings.mapping import PlacesSettings
     from drone_rl.settings.proving import ProveSettings
     from drone_rl.settings.training import TrainerSettings, TrainSettings
     from drone_rl.sim.settings import CameraSettings, TaskSettings
@@ -34,6 +36,7 @@ _PLACES = {
     "api.environment": ("make_env",),
     "api.explaining": ("Explanations", "explain"),
     "api.judging": ("Evaluation", "Judgement", "evaluate", "judge"),
+    "api.mapping": ("Places", "places"),
     "api.policy": ("Policy", "load_policy"),
     "api.proving": ("Proof", "load_proof", "prove"),
     "api.training": ("Training", "train"),
@@ -41,6 +44,7 @@ _PLACES = {
     "settings.chances": ("ChanceSettings",),
     "settings.checking": ("CheckSettings",),
     "settings.judging": ("EvaluateSettings", "JudgeSettings"),
+    "settings.mapping": ("PlacesSettings",),
     "settings.proving": ("ProveSettings",),
     "settings.training": ("TrainSettings", "TrainerSettings"),
     "sim.settings": ("CameraSettings", "TaskSettings"),
@@ -61,6 +65,8 @@ __all__ = [
     "InputError",
     "JudgeSettings",
     "Judgement",
+    "Places",
+    "PlacesSettings",
     "Policy",
     "Proof",
     "ProveSettings",
@@ -76,6 +82,7 @@ __all__ = [
     "load_policy",
     "load_proof",
     "make_env",
+    "places",
     "prove",
     "train",
 ]

@@ -11,7 +11,7 @@ PURE_DATA = {
         f"settings/{name}": "values with bounds; hydra_app/test_schemas reads and builds each"
         for name in (
             *("benchmarks", "chances", "checking", "collecting", "judging", "learning", "loggers"),
-            *("networks", "paths", "proving", "returns", "training", "transforms"),
+            *("mapping", "networks", "paths", "proving", "returns", "training", "transforms"),
         )
     },
 }

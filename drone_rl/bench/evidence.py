@@ -108,6 +108,12 @@ HIGHER = [
     _places("left", 1.2, 0.6, 50), _places("ahead", 1.2, 0.0, 72), _places("right", 1.2, 0.5, 40),
 ]  # fmt: skip
 """Rows of a response map for cubes above the drone."""
+
+
+def _side(share: float, actions: list[float], unseen: float, blind: float) -> Plain:
+    return {"share": share, "actions": actions, "unseen": unseen, "blind": blind}
+
+
 EXPLANATION: Plain = {
     "verdict": VERDICT,
     "dataset": {
@@ -171,6 +177,24 @@ EXPLANATION: Plain = {
         "integration_error": {"mean": 0.001, "max": 0.007, "pictures": 30},
     },
     "response": {"rows": _LEVEL, "blind_below": 0.1},
+    "places": {
+        "window": {"nearest": 2.5, "farthest": 20.0, "sideways": 8.0},
+        "sides": {
+            "left": _side(0.4, [0.75, 0.25, 0.0], 0.2, 0.75),
+            "ahead": _side(0.2, [1.0, 0.0, 0.0], 0.0, 0.0),
+            "right": _side(0.4, [0.5, 0.0, 0.5], 0.0, 0.5),
+        },
+        "actions": [0.7, 0.1, 0.2],
+        "alone": 0,
+        "unseen": 0.08,
+        "blind": 0.5,
+        "least_gap": 0.000012,
+        "least_gap_ahead": 7.25,
+        "least_gap_left": -1.5,
+        "logit_gap": 0.0001,
+        "close": 0.0003,
+        "in_doubt": 0.0002,
+    },
     "asymmetry": {
         "dataset": {"signed": _mean(-0.2, -0.3, -0.1), "absolute": _mean(0.3, 0.2, 0.4)},
         "grid": {"absolute": 0.25},

@@ -85,6 +85,7 @@ _NO_LOOP = {"loops.loops": 0, "loops.episodes.successes": 0}
 _ONE_ACTION = {"dataset.action_shares": [0.0, 1.0, 0.0]}
 _NO_LAYER = {"attribution.layer": None}
 _NO_SIDE = {"asymmetry.dataset.signed.upper95": 0.1}
+_NO_MAP = {"places": {"refused": "it has a memory"}}
 _ALL_HEIGHTS = {"response.rows": [*EXPLANATION["response"]["rows"], *HIGHER]}
 _LEFT_BLIND = "response.rows.0.blind"
 _OF_REPORTS = (
@@ -124,6 +125,17 @@ _OF_REPORTS = (
     ("response.heights", {"response.rows": EXPLANATION["response"]["rows"]}, _ALL_HEIGHTS),
     ("response.blind", {_LEFT_BLIND: 0.0}),
     ("response.blind", {_LEFT_BLIND: None}),
+    ("places.does", _NO_MAP),
+    ("places.does", {"places.sides.left.actions": [0.5, 0.5, 0.0]}),
+    ("places.unseen", {"places.unseen": 0.0}),
+    ("places.blind", {"places.blind": 0.0}),
+    ("places.blind", {"places.alone": 1}),
+    ("places.sees", {"places.blind": 0.1}, {"places.blind": 0.0}),
+    ("places.gap", {"places.least_gap": 0.5}),
+    ("places.gap", {"places.least_gap_left": 1.5}),
+    ("places.close", {"places.close": 0.0}),
+    ("places.doubt", {"places.in_doubt": 0.0}),
+    ("places.refused", {"places": EXPLANATION["places"]}, _NO_MAP),
     ("asymmetry.differs", {"asymmetry.dataset.absolute.mean": 0.01}),
     ("asymmetry.prefers", _NO_SIDE),
     ("asymmetry.prefers", {"asymmetry.dataset.signed": {"mean": 0.2, "lower95": 0.1,

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from drone_rl.words.actions import shown_actions
 from drone_rl.words.licence import Evidence, Sentence, percent
 from drone_rl.words.numbers import among, bounds, listed, plural
+from drone_rl.words.places import PLACES
 from drone_rl.words.response import ASYMMETRY, RESPONSE
 
 
@@ -250,6 +251,7 @@ SECTIONS = {
     "class_model": CLASS_MODEL,
     "attribution": ATTRIBUTION,
     "response": RESPONSE,
+    "places": PLACES,
     "asymmetry": ASYMMETRY,
 }
 """Sentences by the section of the page in which they stand."""

@@ -127,7 +127,8 @@ def test_every_value_of_every_sweep_is_understood(name, settings):
 
 
 @pytest.mark.parametrize(
-    "command", ["evaluate", "play", "verdict", "prove", "check", "chain", "explain"]
+    "command",
+    ["evaluate", "play", "verdict", "prove", "check", "places", "chain", "explain"],
 )
 def test_any_setting_of_the_task_can_be_changed_for_a_trained_policy(command, config, settings):
     assert set(config(command).task) == set(kinds_of(TaskSettings))

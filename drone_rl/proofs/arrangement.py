@@ -1,0 +1,311 @@
+"""Straight pieces in a rectangle, and all the cells into which they cut it.
+
+The pieces, cut where they meet, are the edges of a plane graph; each edge is two half-edges, one
+for the cell on either side. Around a cell each half-edge is followed by the one that turns most to
+the left, so a cell is a cycle of half-edges, and none can be missed.
+"""
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from drone_rl.utils.errors import InputError
+
+SAME = 1e-11
+"""Metres: what is no farther apart in x and in y is one point, for these are rounded."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Window:
+    """A rectangle of places."""
+
+    nearest: float
+    """Least x, metres."""
+    farthest: float
+    """Largest x."""
+    sideways: float
+    """Largest |y|."""
+
+    @property
+    def area(self) -> float:
+        """Square metres."""
+        return 2 * self.sideways * (self.farthest - self.nearest)
+
+
+@dataclasses.dataclass(frozen=True)
+class Pieces:
+    """Pieces of straight lines: y = slope x + offset from x = begin to end; and upright ones."""
+
+    slope: NDArray[np.float64]
+    offset: NDArray[np.float64]
+    begin: NDArray[np.float64]
+    end: NDArray[np.float64]
+    """Shapes: (N,)."""
+    upright: NDArray[np.float64]
+    """x, lowest and highest y of each. Shape: (M, 3)."""
+
+    def clipped(self, window: Window) -> "Pieces":
+        """What of them is inside."""
+        side, slope, offset = window.sideways, self.slope, self.offset
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ends = np.stack([(-side - offset) / slope, (side - offset) / slope])
+        level = slope == 0
+        inside = np.where(np.abs(offset) < side - SAME, np.inf, -np.inf)
+        first = np.where(level, -inside, ends.min(0))
+        last = np.where(level, inside, ends.max(0))
+        begin = np.maximum(np.maximum(self.begin, first), window.nearest)
+        end = np.minimum(np.minimum(self.end, last), window.farthest)
+        kept = end - begin > SAME
+        x, low, high = self.upright.T
+        low, high = np.maximum(low, -side), np.minimum(high, side)
+        stands = (np.minimum(x - window.nearest, window.farthest - x) > SAME) & (high - low > SAME)
+        return Pieces(
+            slope[kept],
+            offset[kept],
+            begin[kept],
+            end[kept],
+            np.stack([x, low, high], -1)[stands],
+        )
+
+    def framed(self, window: Window) -> "Pieces":
+        """They and the rectangle's four sides."""
+        side, ends = window.sideways, (window.nearest, window.farthest)
+        return Pieces(
+            np.append(self.slope, [0.0, 0.0]),
+            np.append(self.offset, [-side, side]),
+            np.append(self.begin, [ends[0]] * 2),
+            np.append(self.end, [ends[1]] * 2),
+            np.concatenate([self.upright, [[x, -side, side] for x in ends]]),
+        )
+
+
+@dataclasses.dataclass(frozen=True)
+class Arrangement:
+    """Cells and what is around them. The second half of the half-edges are the first's twins."""
+
+    points: NDArray[np.float64]
+    """Where pieces meet or end. Shape: (P, 2)."""
+    origin: NDArray[np.int64]
+    """The point that each half-edge starts from. Shape: (E,)."""
+    angle: NDArray[np.float64]
+    """Where it goes to, radians. Shape: (E,)."""
+    following: NDArray[np.int64]
+    """The half-edge after it around its cell, which lies to its left. Shape: (E,)."""
+    cell: NDArray[np.int64]
+    """The cell; -1 outside of the rectangle. Shape: (E,)."""
+    num_cells: int
+
+    @property
+    def twin(self) -> NDArray[np.int64]:
+        """The same edge seen from its other side. Shape: (E,)."""
+        return np.roll(np.arange(len(self.origin)), len(self.origin) // 2)
+
+    def areas(self, above: float | None = None) -> NDArray[np.float64]:
+        """Square metres of each cell, or of what of it has a y above that. Shape: (num_cells,)."""
+        of = self.cell >= 0
+        cell, after = self.cell[of], self.following[of]
+        corner = np.empty(self.num_cells, np.int64)
+        corner[cell] = self.origin[of]
+        base = self.points[corner[cell]]  # from here a small cell is reckoned without loss
+        x, y = (self.points[self.origin[of]] - base).T
+        next_x, next_y = (self.points[self.origin[after]] - base).T
+        mean = (y + next_y) / 2
+        if above is not None:
+            y, next_y = y - (above - base[:, 1]), next_y - (above - base[:, 1])
+            higher, lower = np.maximum(y, next_y), np.minimum(y, next_y)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                part = np.maximum(higher, 0.0) ** 2 / (2 * (higher - lower))
+            mean = np.where(lower >= 0, (y + next_y) / 2, np.where(higher > 0, part, 0.0))
+        return np.bincount(cell, (x - next_x) * mean, self.num_cells).astype(np.float64)
+
+    def locate(self, places: NDArray[np.float64]) -> NDArray[np.int64]:
+        """The cell of each place inside of the rectangle, on no border: above the next one below.
+
+        Args:
+            places: x and y. Shape: (N, 2).
+        """
+        origin, end = self.points[self.origin], self.points[self.origin[self.twin]]
+        goes_right = np.flatnonzero((end[:, 0] - origin[:, 0] > 0) & (self.cell >= 0))
+        (x, y), (far_x, far_y) = origin[goes_right].T, end[goes_right].T
+        slope = (far_y - y) / (far_x - x)
+        found = np.empty(len(places), np.int64)
+        for number, (here, up) in enumerate(places):
+            height = y + slope * (here - x)
+            below = np.flatnonzero((x <= here) & (here < far_x) & (height <= up))
+            found[number] = self.cell[goes_right[below[height[below].argmax()]]]
+        return found
+
+    def inner_points(self) -> NDArray[np.float64]:
+        """A place well inside of each cell. Shape: (num_cells, 2)."""
+        of = self.cell >= 0
+        cell = self.cell[of]
+        corners = self.points[self.origin[of]]
+        count = np.bincount(cell, minlength=self.num_cells)
+        sums = [np.bincount(cell, c, self.num_cells) for c in corners.T]
+        found = np.stack(sums, -1) / count[:, None]
+        turn = (self.angle[self.following] - self.angle + np.pi) % (2 * np.pi) - np.pi
+        for dented in np.unique(self.cell[(turn < -SAME) & of]):
+            found[dented] = _inside(self.points[self.origin[self._around(dented)]])
+        return found
+
+    def outlines(self, labels: NDArray[np.int64]) -> list[tuple[int, NDArray[np.float64]]]:
+        """Borders between cells of different labels.
+
+        Args:
+            labels: Of each cell, from 0. Shape: (num_cells,).
+
+        Returns:
+            A label and a closed way along its border, it to the left; several of each label. Shape
+            of a way: (corners, 2).
+        """
+        label = np.append(labels, -1)[self.cell]
+        twin = self.twin
+        is_border = (label != label[twin]) & (label >= 0)
+        edges = np.flatnonzero(is_border)
+        following = self.following[edges]
+        while (inner := ~is_border[following]).any():
+            following[inner] = self.following[twin[following[inner]]]
+        after = dict(zip(edges.tolist(), following.tolist(), strict=True))
+        ways = []
+        while after:
+            edge, way = next(iter(after)), []
+            while edge in after:
+                way.append(edge)
+                edge = after.pop(edge)
+            angles = self.angle[way]
+            corner = angles != np.roll(angles, 1)
+            ways.append((int(label[way[0]]), self.points[self.origin[way]][corner]))
+        return ways
+
+    def _around(self, cell: int) -> list[int]:
+        """A cell's half-edges in their order."""
+        edge = first = int(np.flatnonzero(self.cell == cell)[0])
+        around = [first]
+        while (edge := int(self.following[edge])) != first:
+            around.append(edge)
+        return around
+
+
+def arrange(pieces: Pieces, window: Window, most_cells: int) -> Arrangement:
+    """All cells into which pieces cut a rectangle.
+
+    Args:
+        pieces: Inside, see `Pieces.clipped`. Two that lie on one line don't overlap, and each hangs
+            together with the rectangle's sides by way of others.
+        window: The rectangle.
+        most_cells: Bounds memory.
+
+    Raises:
+        InputError: There are more cells than that.
+    """
+    pieces = pieces.framed(window)
+    points, piece = _meetings(pieces, most_cells)
+    points, vertex = _merged(points)
+    order = np.lexsort((points[vertex, 1], points[vertex, 0], piece))
+    piece, vertex = piece[order], vertex[order]
+    edge = np.flatnonzero((piece[1:] == piece[:-1]) & (vertex[1:] != vertex[:-1]))
+    first, last, piece = vertex[edge], vertex[edge + 1], piece[edge]
+    angle = np.append(np.arctan(pieces.slope), np.full(len(pieces.upright), np.pi / 2))[piece]
+    origin = np.concatenate([first, last])
+    angle = np.concatenate([angle, angle + np.pi])
+    following = _following(origin, angle)
+    graph = coo_array((np.ones(len(origin), bool), (np.arange(len(origin)), following)))
+    num_cells, cell = connected_components(graph, directed=False)
+    found = Arrangement(points, origin, angle, following, cell.astype(np.int64), num_cells)
+    areas = found.areas()
+    is_outside = areas <= 0
+    number = np.where(is_outside, -1, np.cumsum(~is_outside) - 1)
+    inside = areas[~is_outside]
+    if abs(inside.sum() - window.area) > 1e-9 * window.area:
+        raise ArithmeticError(f"cells of {inside.sum()} m2 don't fill {window.area} m2")
+    return dataclasses.replace(found, cell=number[found.cell], num_cells=len(inside))
+
+
+def _meetings(pieces: Pieces, most: int) -> tuple[NDArray, NDArray]:
+    """Where pieces meet and end: points, and the piece on which each lies, upright ones last."""
+    slope, offset, begin, end = pieces.slope, pieces.offset, pieces.begin, pieces.end
+    count = len(slope)
+    index = np.arange(count)
+    xs, ys, ons = [begin, end], [slope * begin + offset, slope * end + offset], [index, index]
+    total = 0
+    for i in range(count - 1):
+        with np.errstate(divide="ignore", invalid="ignore"):
+            x = (offset[i + 1 :] - offset[i]) / (slope[i] - slope[i + 1 :])
+        first, last = np.maximum(begin[i + 1 :], begin[i]), np.minimum(end[i + 1 :], end[i])
+        meets = np.flatnonzero((x >= first - SAME) & (x <= last + SAME))
+        x = x[meets]
+        y = slope[i] * x + offset[i]
+        xs += [x, x]
+        ys += [y, y]
+        ons += [np.full(len(x), i), meets + i + 1]
+        total += len(x)
+        if total > 2 * most:
+            break
+    for number, (x, low, high) in enumerate(pieces.upright):
+        y = slope * x + offset
+        reaches = (begin - SAME <= x) & (x <= end + SAME)
+        meets = np.flatnonzero(reaches & (low - SAME <= y) & (y <= high + SAME))
+        y = np.concatenate([y[meets], y[meets], [low, high]])
+        xs.append(np.full(len(y), x))
+        ys.append(y)
+        ons.append(np.append(meets, np.full(len(meets) + 2, count + number)))
+        total += len(meets)
+    if total > 2 * most:
+        raise InputError(
+            f"the pictures of one cube change at more than {most} cells of places (most_cells); "
+            "give a smaller window (farthest, sideways) or raise it"
+        )
+    return np.stack([np.concatenate(xs), np.concatenate(ys)], -1), np.concatenate(ons)
+
+
+def _merged(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """The different ones of points, and which of them each one is."""
+    column = _groups(points[:, 0], np.zeros(len(points), np.int64))
+    _, first = np.unique(column, return_index=True)
+    x = points[first[column], 0]  # the very same along an upright piece, whose points are sorted
+    group = _groups(points[:, 1], column)
+    _, first = np.unique(group, return_index=True)
+    return np.stack([x, points[:, 1]], -1)[first], group
+
+
+def _groups(values: NDArray[np.float64], within: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Numbers the groups of values that are the same, apart for each group that they are within."""
+    order = np.lexsort((values, within))
+    value, outer = values[order], within[order]
+    is_new = np.append(False, (np.diff(value) > SAME) | (np.diff(outer) != 0))
+    group = np.empty(len(values), np.int64)
+    group[order] = np.cumsum(is_new)
+    return group
+
+
+def _following(origin: NDArray[np.int64], angle: NDArray[np.float64]) -> NDArray[np.int64]:
+    """The half-edge after each: at its end, the next one clockwise from its twin."""
+    count = len(origin)
+    order = np.lexsort((angle, origin))
+    start = np.append(True, np.diff(origin[order]) != 0)
+    first = np.flatnonzero(start)
+    last = np.append(first[1:], count) - 1
+    before = np.arange(count) - 1
+    before[first] = last
+    clockwise = np.empty(count, np.int64)
+    clockwise[order] = order[before]
+    return clockwise[np.roll(np.arange(count), count // 2)]
+
+
+def _inside(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A place inside of any polygon without holes, whose corners turn to the left in all."""
+    at = int(np.lexsort(corners.T[::-1])[0])
+    first, tip, last = corners[at - 1], corners[at], corners[(at + 1) % len(corners)]
+    triangle = np.array([first, tip, last])
+    weights = np.linalg.solve(
+        np.vstack([triangle.T, np.ones(3)]), np.vstack([corners.T, np.ones(len(corners))])
+    )
+    away = weights[[0, 2]].sum(0)  # 0 at the tip, 1 on the side across from it
+    within = (weights > SAME).all(0)
+    if not within.any():
+        return triangle.mean(0)
+    nearest = np.flatnonzero(within)[away[within].argmin()]
+    return (tip + corners[nearest]) / 2
