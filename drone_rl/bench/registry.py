@@ -9,6 +9,7 @@ from drone_rl.bench.hostile import bench_hostile
 from drone_rl.bench.maps import bench_maps
 from drone_rl.bench.memory import bench_memory
 from drone_rl.bench.mutants import bench_mutants
+from drone_rl.bench.places import bench_places
 from drone_rl.bench.proving import bench_many_cubes, bench_prove, bench_tampering
 from drone_rl.bench.scaling import bench_scaling
 from drone_rl.bench.sentences import bench_sentences
@@ -107,6 +108,9 @@ BENCHMARKS: dict[str, Benchmark] = {
         lambda s: bench_tampering(s.runs / "tampering", s.quick),
         "proof",
         (*_PROVING, "bench/tampering", "bench/tampered_parts", "bench/tampered_wholes"),
+    ),
+    "places": Benchmark(
+        lambda s: bench_places(s.quick), "proof", (*_PROVING, "bench/places")
     ),
     "many_cubes": Benchmark(
         lambda s: bench_many_cubes(s.runs / "many_cubes", 1.0, s.quick),
