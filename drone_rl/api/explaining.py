@@ -9,6 +9,7 @@ import torch
 
 from drone_rl.api.policy import Policy, load_policy
 from drone_rl.api.progress import Bar, Progress
+from drone_rl.api.quoting import find_claim
 from drone_rl.api.showing import page
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.explanations.study import explain_policy
@@ -120,6 +121,7 @@ def _explain(
             name=policy.name,
             provenance=origin,
             progress=lambda title: progress(f"{policy.name}: {title}"),
+            claim=find_claim(policy),
         )
     finally:
         env.close()

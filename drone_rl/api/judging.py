@@ -12,12 +12,14 @@ from torchrl.envs import EnvBase
 
 from drone_rl.api.policy import Policy, load_policy
 from drone_rl.api.progress import Bar, Progress
+from drone_rl.api.quoting import find_claim
 from drone_rl.api.showing import paragraph, table
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation import run_episodes, summarise
 from drone_rl.settings.changes import Changes
 from drone_rl.settings.judging import EvaluateSettings, FlightSettings, JudgeSettings
 from drone_rl.sim.settings import TaskSettings
+from drone_rl.utils.errors import InputError
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import Stream, torch_generator
 from drone_rl.verdicts.judge import Verdict, judge_policy
@@ -86,10 +88,18 @@ class Judgement:
     name: str
     settings: JudgeSettings
     verdict: Verdict
+    certificate: Path | None = None
+    """That lies with the policy or was given, whether it is quoted or not."""
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values, as in `verdict.json`."""
-        return {"policy": self.name, **self.verdict.as_dict(), **provenance()}
+        path = None if self.certificate is None else str(self.certificate)
+        return {
+            "policy": self.name,
+            "certificate": path,
+            **self.verdict.as_dict(),
+            **provenance(),
+        }
 
     def save(self, path: Path) -> None:
         """Writes `verdict.json`."""
@@ -151,6 +161,7 @@ def judge(
     settings: JudgeSettings | None = None,
     *,
     task: Mapping[str, Any] | None = None,
+    certificate: str | Path | None = None,
     outputs: str | Path = "outputs",
     progress: Progress | None = None,
     **changes: Any,
@@ -162,29 +173,44 @@ def judge(
             "right" or "oracle".
         settings: How it is judged.
         task: What to change of the policy's task or, for a baseline, of the default one.
+        certificate: A proof's file to quote; by default the one that lies with the policy, see
+            `drone_rl.zoo.certificate_path`, if it is of this task.
         outputs: Folder under which runs are kept.
         progress: Told of what is being done; a bar by default.
         changes: Settings to change, as in `judge("good", episodes=1000)`.
 
     Raises:
-        InputError: The policy or a setting is unusable.
+        InputError: The policy, a setting or the certificate that is given is unusable.
     """
     settings = (settings or JudgeSettings()).replace(**changes)
     progress = progress or Bar()
     progress("policy, luck and oracle", 0, 1)
     name = policy.name if isinstance(policy, Policy) else str(policy)
     changed = Changes(TaskSettings).read(task or {}, "task")
-    is_baseline = policy in BASELINES
+    is_baseline, claim = policy in BASELINES, None
+    if is_baseline and certificate is not None:
+        raise InputError(
+            f"certificate={certificate}, but policy={name} has no network; give certificate= with "
+            "the policy that was proved"
+        )
     if is_baseline:
         worlds = _baseline(name, TaskSettings(**changed), settings)
     else:
         loaded = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
-        worlds = _flying(loaded.in_task(**changed), settings)
+        loaded = loaded.in_task(**changed)
+        claim = find_claim(
+            loaded,
+            certificate,
+            flights=settings.certificate_flights,
+            seed=settings.seed,
+            device=settings.device,
+        )
+        worlds = _flying(loaded, settings)
     draws, rule = settings.sampled and not is_baseline, Rule(good_share=settings.good_share)
     with worlds as (env, actor):
-        verdict = judge_policy(env, actor, settings.episodes, rule=rule, sampled=draws)
+        verdict = judge_policy(env, actor, settings.episodes, rule=rule, sampled=draws, claim=claim)
     progress("judged", 1, 1)
-    return Judgement(name, settings, verdict)
+    return Judgement(name, settings, verdict, None if claim is None else claim.path)
 
 
 def _flying(

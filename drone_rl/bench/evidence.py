@@ -59,6 +59,8 @@ VERDICT: Plain = {
     "error_rate": 0.05,
     "good_share": 0.9,
     "enough": 400,
+    "num_cubes": 3,
+    "proof": None,
     "greedy": _flights(0.6, 0.5, 1.0, 0.9),
     "sampled": _flights(0.4, 0.4, 0.9, 0.8),
     "drawing": _mean(-0.2, -0.3, -0.1),
@@ -76,6 +78,19 @@ VERDICT: Plain = {
     },
 }
 """`verdict.json` of a policy that collects half of the cubes on its left."""
+
+
+PROOF: Plain = {
+    "refused": None,
+    "every": True,
+    "share": 1.0,
+    "lost": 0.0,
+    "undecided": 0.0,
+    "finished": True,
+    "checked": 0,
+    "agreeing": 400,
+}
+"""What a verdict quotes of a certificate that says: from every placement."""
 
 
 def _method(trusted: bool, failed: list[str], score: float) -> Plain:

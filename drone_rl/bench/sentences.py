@@ -4,7 +4,7 @@ import dataclasses
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from drone_rl.bench.evidence import CARD, EXPLANATION, GROUP, HIGHER, SWEEP, VERDICT, changed
+from drone_rl.bench.evidence import CARD, EXPLANATION, GROUP, HIGHER, PROOF, SWEEP, VERDICT, changed
 from drone_rl.words import advice, card, report, sweep, truth, verdict
 from drone_rl.words.licence import Sentence, said
 
@@ -56,6 +56,9 @@ def _plants(of: str, plants: Iterable[tuple[Any, ...]]) -> list[Plant]:
 _ALL_LUCK = {"baselines.forward.success.share": 0.95}
 _SURE = {"failures.largest": None, "failures.bound.successes": 0}
 _OPEN = {"certain": False, "enough": 1600}
+_PROVED = {"proof": PROOF}
+_IN_PART = {"proof": {**PROOF, "every": False, "share": 0.6, "lost": 0.3, "undecided": 0.1}}
+_REFUSED = {"proof": {"refused": "it is of another network"}}
 _OF_VERDICTS = (
     ("kind", {"certain": False}),
     ("kind", {"kind": "good"}),
@@ -63,6 +66,20 @@ _OF_VERDICTS = (
     ("kind", {"greedy.shares.all.mean": 0.3}, {"kind": "poor", "greedy.shares.all.mean": 0.35}),
     ("open", {"certain": True}, _OPEN),
     ("open", {"enough": None}, _OPEN),
+    ("proof.every", {"proof": None}, _PROVED),
+    ("proof.every", {"proof.every": False}, _PROVED),
+    ("proof.every", _REFUSED, _PROVED),
+    ("proof.every", {"num_cubes": 2}, _PROVED),
+    ("proof.share", _PROVED, _IN_PART),
+    ("proof.share", _REFUSED, _IN_PART),
+    ("proof.share", {"proof.share": 0.5}, _IN_PART),
+    ("proof.share", {"proof.lost": 0.4, "proof.undecided": 0.0}, _IN_PART),
+    ("proof.share", {"proof.finished": False}, _IN_PART),
+    ("proof.basis", {"proof": None}, _PROVED),
+    ("proof.basis", {"proof.checked": 2000}, _PROVED),
+    ("proof.basis", {"proof.agreeing": 0}, _PROVED),
+    ("proof.refused", _PROVED, _REFUSED),
+    ("proof.refused", {"proof.refused": "it contradicts itself"}, _REFUSED),
     ("shares", {f"greedy.shares.{side}.mean": 1.0 for side in ("left", "ahead", "right")}),
     ("shares", {"greedy.shares.left": {"mean": None, "count": 0}}),
     ("baselines", _ALL_LUCK),
@@ -175,6 +192,7 @@ _OF_CARDS = (
     ("card.verdict", _OTHER_RULE),
     ("card.verdict", {"verdict.kind": "good"}),
     ("card.reported", {"worlds": "choice"}),
+    ("card.reported", {"verdict.proof": PROOF}),
     ("card.chosen", {"chosen": None}),
     ("card.chosen", {"chosen.episodes": None}),
     ("card.not_chosen", {"chosen": {"runs": 3, "episodes": 200}}, {"chosen": None}),

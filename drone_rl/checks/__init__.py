@@ -3,6 +3,8 @@
 from drone_rl.checks.certificate import Certificate, Outcome, read_certificate
 from drone_rl.checks.checker import Contradiction, Findings, check_certificate
 from drone_rl.checks.identity import fingerprint, refuse_another
+from drone_rl.checks.places import find
+from drone_rl.checks.trying import read_tried
 
 __all__ = [
     "Certificate",
@@ -10,7 +12,9 @@ __all__ = [
     "Findings",
     "Outcome",
     "check_certificate",
+    "find",
     "fingerprint",
     "read_certificate",
+    "read_tried",
     "refuse_another",
 ]

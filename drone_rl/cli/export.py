@@ -24,6 +24,8 @@ class Command(FlightSettings):
     """Name of the files."""
     command: Annotated[str, COMMAND] | None = None
     """The command that trained it, for the card; none names the run's own settings."""
+    certificate: str | None = None
+    """A proof's file for the card to quote; none takes the one that lies with the policy."""
     paths: PathsSettings = PathsSettings()
     """Folders."""
 
@@ -34,6 +36,7 @@ def run(settings: Command, folder: Path) -> tuple[int, str]:
 
     policy = drone_rl.load_policy(settings.policy, outputs=settings.paths.outputs)
     target = folder / f"{settings.name}.safetensors"
-    export(policy, target, settings, command=settings.command)
+    given = settings.certificate
+    export(policy, target, settings, command=settings.command, certificate=given)
     _log.info("written: %s and %s", target, target.with_suffix(".md").name)
     return 0, str(target)

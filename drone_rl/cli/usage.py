@@ -12,7 +12,7 @@ commands
   play       film a policy, or watch it in dm_control's viewer
   explain    see what a policy sees, and whether to trust it: one HTML report
   report     make the report of explanations again, or of several side by side
-  verdict    good, poor or one-sided? as JSON and as an exit status
+  verdict    good, poor or one-sided? proved? as JSON and as an exit status
   prove      how does it end from every placement of the cubes? exactly, as a certificate
   check      does a certificate hold? flown anew; as JSON and as an exit status
   places     what does it do about one cube, wherever that stands? exactly, as a map

@@ -3,12 +3,15 @@
 import dataclasses
 import logging
 from pathlib import Path
+from typing import Annotated
 
 import drone_rl
 from drone_rl.hydra_app.names import policies as prepare  # noqa: F401 -- of what was typed
 from drone_rl.settings.changes import TaskChanges, no_changes
 from drone_rl.settings.judging import JudgeSettings
 from drone_rl.settings.paths import PathsSettings
+from drone_rl.utils.schema import OneOf
+from drone_rl.verdicts.kinds import NOT_PROVED
 
 _log = logging.getLogger(__name__)
 
@@ -19,6 +22,10 @@ class Command(JudgeSettings):
 
     policy: str = "latest"
     """Whom to judge, see `drone_rl.judge`."""
+    certificate: str | None = None
+    """A proof's file to quote; none takes the one that lies with the policy, if there is one."""
+    require: Annotated[str, OneOf(("proved",))] | None = None
+    """Refuse (exit status 16) what is not proved for every placement; none judges by flights."""
     task: TaskChanges = no_changes()
     """What to change of the policy's task."""
     paths: PathsSettings = PathsSettings()
@@ -26,14 +33,24 @@ class Command(JudgeSettings):
 
 
 def run(settings: Command, folder: Path) -> tuple[int, str]:
-    """Judges one policy. Returns the verdict's exit status and the kind's name."""
+    """Judges one policy. Returns the exit status and the kind's name."""
     from drone_rl.api.progress import silent
 
     outputs = settings.paths.outputs
     done = drone_rl.judge(
-        settings.policy, settings, task=settings.task, outputs=outputs, progress=silent
+        settings.policy,
+        settings,
+        task=settings.task,
+        certificate=settings.certificate,
+        outputs=outputs,
+        progress=silent,
     )
     done.save(folder / "verdict.json")
     print(done)
     _log.info("written: %s", folder / "verdict.json")
-    return done.verdict.exit_code, done.verdict.kind.value
+    status = done.verdict.exit_code
+    if settings.require is not None:
+        status = 0 if done.verdict.is_proved else NOT_PROVED
+        if done.verdict.evidence["proof"] is None:
+            _log.info("no certificate lies with it; make one by drone-rl prove, give certificate=")
+    return status, done.verdict.kind.value

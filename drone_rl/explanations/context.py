@@ -20,13 +20,18 @@ from drone_rl.explanations.scenes import Scenes, empty_scene
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.policies import PolicyNetwork, make_actor
 from drone_rl.utils.seeding import Stream, torch_generator
+from drone_rl.verdicts.proof import Claim
 
 
 class Context:
     """One policy that is being explained."""
 
     def __init__(
-        self, env: TransformedEnv, network: PolicyNetwork, settings: ExplainSettings
+        self,
+        env: TransformedEnv,
+        network: PolicyNetwork,
+        settings: ExplainSettings,
+        claim: Claim | None = None,
     ) -> None:
         """Takes the policy and its worlds.
 
@@ -34,11 +39,12 @@ class Context:
             env: A batch of worlds that have not flown yet, with the policy's pipeline.
             network: The policy's, on the CPU.
             settings: What to compute.
+            claim: A certificate of it in the task of these worlds, if there is one.
 
         Raises:
             InputError: A setting doesn't fit the policy.
         """
-        self.env, self.network, self.settings = env, network, settings
+        self.env, self.network, self.settings, self.claim = env, network, settings, claim
         self.scenes = Scenes(env)
         self.layer = settings.layer or feature_layer(network)
         self.absent = self.scenes.observe(empty_scene(self.scenes))[0]

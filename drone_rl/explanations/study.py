@@ -19,6 +19,7 @@ from drone_rl.explanations.sections import Section, find_sections
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.policies import PolicyNetwork
 from drone_rl.utils.errors import InputError
+from drone_rl.verdicts.proof import Claim
 
 FORMAT_VERSION = 2
 
@@ -33,6 +34,7 @@ def explain_policy(
     provenance: dict[str, Any],
     progress: Callable[[str], None] = lambda _: None,
     sections: Mapping[str, Section] | None = None,
+    claim: Claim | None = None,
 ) -> dict[str, Any]:
     """Computes everything about one policy and writes it to a folder.
 
@@ -46,6 +48,7 @@ def explain_policy(
         progress: Called with what is being done.
         sections: What to compute, in this order, which changes nothing but the time of each; all
             of `explanations/sections` by default.
+        claim: A certificate of the policy in the task of these worlds, if there is one.
 
     Returns:
         The numbers, as in `explanation.json`.
@@ -53,7 +56,7 @@ def explain_policy(
     Raises:
         InputError: The folder can't be written or a setting doesn't fit the policy.
     """
-    context = Context(env, network, settings)
+    context = Context(env, network, settings, claim)
     numbers: dict[str, Any] = {}
     arrays: dict[str, NDArray] = {}
     seconds: dict[str, float] = {}

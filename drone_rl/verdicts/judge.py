@@ -17,6 +17,7 @@ from drone_rl.utils.intervals import mean_bounds, proportion
 from drone_rl.verdicts.failures import failure_table
 from drone_rl.verdicts.kinds import NOT_CERTAIN, Kind
 from drone_rl.verdicts.luck import fly_baselines
+from drone_rl.verdicts.proof import Claim
 from drone_rl.verdicts.rule import Quantity, Rule, decide, kinds_within
 from drone_rl.words.licence import say
 from drone_rl.words.verdict import SENTENCES
@@ -40,6 +41,12 @@ class Verdict:
         return self.evidence["exit_code"]
 
     @property
+    def is_proved(self) -> bool:
+        """Whether a certificate says that it succeeds from every placement, and is quoted."""
+        proof = self.evidence["proof"]
+        return proof is not None and proof["refused"] is None and proof["every"]
+
+    @property
     def sentence(self) -> str:
         """For a person."""
         return say(SENTENCES, self.evidence)
@@ -56,6 +63,7 @@ def judge_policy(
     *,
     rule: Rule | None = None,
     sampled: bool = True,
+    claim: Claim | None = None,
 ) -> Verdict:
     """Flies a policy, greedily and sampled, and the baselines, all in the same worlds, and judges.
 
@@ -66,6 +74,7 @@ def judge_policy(
         rule: Thresholds.
         sampled: Whether to fly the policy with drawn actions, too; one that has no probabilities
             to draw from need not.
+        claim: A certificate of the policy in the task of the worlds, if there is one.
     """
     base: Any = getattr(env, "base_env", env)
     state, worlds = base.state_dict(), worlds_of(env)
@@ -77,7 +86,7 @@ def judge_policy(
     baselines = fly_baselines(
         env.batch_size[0], worlds.task, state, episodes, str(worlds.device), worlds.dynamics
     )
-    return judge(greedy, baselines, rule=rule, sampled=drawn)
+    return judge(greedy, baselines, rule=rule, sampled=drawn, claim=claim)
 
 
 def judge(
@@ -86,6 +95,7 @@ def judge(
     *,
     rule: Rule | None = None,
     sampled: Episodes | None = None,
+    claim: Claim | None = None,
 ) -> Verdict:
     """Applies the rule.
 
@@ -95,6 +105,7 @@ def judge(
             policy's.
         rule: Thresholds.
         sampled: The policy's episodes with drawn actions, in the same worlds.
+        claim: A certificate of the policy in the same task, if there is one.
 
     Raises:
         ValueError: They were flown in different worlds.
@@ -113,6 +124,7 @@ def judge(
         "error_rate": rule.error_rate,
         "good_share": rule.good_share,
         "num_cubes": greedy.goals.reached.shape[-1],
+        "proof": None if claim is None else claim.beside(greedy),
         "greedy": summarise(greedy),
         "sampled": None if sampled is None else summarise(sampled),
         "baselines": {name: summarise(flown) for name, flown in baselines.items()},

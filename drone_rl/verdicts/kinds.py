@@ -7,6 +7,8 @@ import enum
 
 NOT_CERTAIN = 13
 """Exit status where the episodes are too few to be certain of the kind."""
+NOT_PROVED = 16
+"""Exit status where a proof for every placement is required, and no certificate gives it."""
 
 
 class Kind(enum.StrEnum):

@@ -1,5 +1,6 @@
 """What a policy's card may say. Evidence: the verdict and where it comes from, see `zoo.card`."""
 
+from drone_rl.words.certificate import is_quoted
 from drone_rl.words.licence import Evidence, Sentence
 
 _NUMBERS = {1: "one cube", 2: "two cubes", 3: "three cubes", 4: "four cubes", 5: "five cubes"}
@@ -15,8 +16,9 @@ def _verdict(card: Evidence) -> str:
 
 
 def _reported(card: Evidence) -> str:
+    but = " but those that are proved" if is_quoted(card["verdict"]) else ""
     return (
-        f"All figures are of {card['verdict']['greedy']['episodes']:,} episodes in worlds to "
+        f"All figures{but} are of {card['verdict']['greedy']['episodes']:,} episodes in worlds to "
         f"report on (seed {card['seed']}), which neither a training nor the choice in a sweep uses."
     )
 

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
+from drone_rl.words.certificate import PROOF
 from drone_rl.words.licence import Evidence, Sentence, percent
 
 FREQUENT = 0.02
@@ -195,6 +196,7 @@ def _misses_or_lacks(evidence: Evidence) -> bool:
 SENTENCES = (
     Sentence("kind", "the kind is certain", lambda e: e["certain"], _kind),
     Sentence("open", "the kind is not certain", lambda e: not e["certain"], _open),
+    *PROOF,
     Sentence("shares", "a cube was missed, or a side not offered", _misses_or_lacks, _shares),
     Sentence("baselines", "luck is not enough", lambda e: not _luck_suffices(e), _baselines),
     Sentence("pointless", "luck succeeds as a good policy does", _luck_suffices, _pointless),

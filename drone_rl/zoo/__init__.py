@@ -3,6 +3,7 @@
 from drone_rl.zoo.description import PolicyDescription, parse
 from drone_rl.zoo.files import (
     card_path,
+    certificate_path,
     export_policy,
     load_exported,
     policy_names,
@@ -16,6 +17,7 @@ from drone_rl.zoo.registry import register_network, register_transform
 __all__ = [
     "PolicyDescription",
     "card_path",
+    "certificate_path",
     "describe",
     "export_policy",
     "load_exported",

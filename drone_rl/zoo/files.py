@@ -81,6 +81,18 @@ def card_path(name: str) -> Path:
     return _FOLDER / f"{name}.md"
 
 
+def certificate_path(policy: Path) -> Path:
+    """Where the certificate of a policy lies, if it has one.
+
+    Args:
+        policy: Its file: an exported one has it beside itself, as those that travel with the
+            package do, the checkpoint of a run in the run's folder.
+    """
+    if policy.suffix == ".safetensors":
+        return policy.with_suffix(".certificate.json")
+    return policy.absolute().parent.parent / "certificate.json"
+
+
 def read_policy(path: Path) -> dict[str, Any]:
     """A policy out of a file: its description, weights that fit it, and where it comes from.
 

@@ -4,9 +4,13 @@ import json
 
 import pytest
 
-from drone_rl.api.exporting import origin_of
+import drone_rl
+from drone_rl.api.exporting import export, origin_of
+from drone_rl.settings.judging import FlightSettings
 from drone_rl.sweeps import Run, Sweep
+from drone_rl.utils.errors import InputError
 from drone_rl.verdicts.rule import Rule
+from tests.checks.making import of_every_place
 
 METRICS = "frames,train/running_reward\n100,1.5\n"
 FIGURES = {"frames": 100, "episodes": 9, "seconds": 1.0, "running_reward": 1.5, "num_cubes": 3}
@@ -65,3 +69,37 @@ def test_what_an_exported_file_says_of_its_origin_goes_on(checkpoint):
     said = {"command": "drone-rl train seed=9", "chosen": {"runs": 7, "episodes": 20}}
     found = origin_of(checkpoint.with_suffix(".safetensors"), said)
     assert found == (said["command"], said["chosen"])
+
+
+FEW = FlightSettings(episodes=4)
+
+
+@pytest.mark.parametrize(("name", "is_true"), [("good", True), ("poor", False)])
+def test_a_card_quotes_a_certificate_that_then_travels_with_the_policy(tmp_path, name, is_true):
+    policy = drone_rl.load_policy(name)
+    made = tmp_path / "made.json"
+    made.write_text(json.dumps(of_every_place(policy)))
+    target = tmp_path / "mine.safetensors"
+    export(policy, target, FEW, certificate=made)
+    card = (tmp_path / "mine.md").read_text()
+    assert ("Proved for every placement" in card) == is_true
+    assert ("All figures but those that are proved are of 4 episodes" in card) == is_true
+    assert ("A certificate is not quoted: 4 of 4 greedy flights" in card) == (not is_true)
+    beside = tmp_path / "mine.certificate.json"
+    assert beside.exists() == is_true
+    if is_true:
+        assert beside.read_bytes() == made.read_bytes()
+        again = drone_rl.load_policy(target)
+        assert drone_rl.judge(again, episodes=2, progress=lambda *_: None).verdict.is_proved
+
+
+def test_a_certificate_of_another_is_no_word_of_a_card(tmp_path):
+    policy, target = drone_rl.load_policy("poor"), tmp_path / "mine.safetensors"
+    beside = tmp_path / "mine.certificate.json"
+    beside.write_text(json.dumps(of_every_place(drone_rl.load_policy("good"))))
+    with pytest.raises(InputError, match="network with the hash"):
+        export(policy, target, FEW, certificate=beside)
+    export(policy, target, FEW)
+    export(drone_rl.load_policy(target), tmp_path / "again.safetensors", FEW)
+    assert "ertificate" not in (tmp_path / "again.md").read_text()
+    assert not (tmp_path / "again.certificate.json").exists()

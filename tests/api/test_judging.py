@@ -1,5 +1,6 @@
 """Evaluations and verdicts in Python, and how they show themselves."""
 
+import json
 import re
 
 import pytest
@@ -9,6 +10,7 @@ from drone_rl.api.judging import Evaluation
 from drone_rl.api.progress import silent
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import mean_bounds, proportion
+from tests.checks.making import of_every_place
 
 
 @pytest.fixture(scope="module")
@@ -43,6 +45,36 @@ def test_a_verdict_in_python(good):
     assert str(few).startswith("good (not certain): ")
     assert few.as_dict()["policy"] == "good"
     assert "<td>success</td>" in few._repr_html_()
+
+
+def test_a_verdict_with_proof(good, tmp_path):
+    path = tmp_path / "certificate.json"
+    path.write_text(json.dumps(of_every_place(good.in_task(num_cubes=1))))
+    how = {"certificate": path, "episodes": 8, "sampled": False, "progress": silent}
+    done = drone_rl.judge(good, task={"num_cubes": 1}, **how)
+    assert done.verdict.is_proved
+    assert "Proved for every placement" in str(done)
+    assert (done.as_dict()["certificate"], done.as_dict()["proof"]["agreeing"]) == (str(path), 8)
+    with pytest.raises(InputError, match="another task: num_cubes=1, not 3"):
+        drone_rl.judge(good, **how)
+    with pytest.raises(InputError, match="policy=oracle has no network; give certificate= with"):
+        drone_rl.judge("oracle", **how)
+
+
+def test_a_certificate_that_flights_refute_proves_nothing(tmp_path):
+    poor = drone_rl.load_policy("poor").in_task(num_cubes=1)
+    path = tmp_path / "certificate.json"
+    path.write_text(json.dumps(of_every_place(poor)))
+    done = drone_rl.judge(poor, certificate=path, episodes=8, sampled=False, progress=silent)
+    assert not done.verdict.is_proved
+    assert "8 of 8 greedy flights of this verdict ended otherwise than it states." in str(done)
+    assert "Proved" not in str(done)
+
+
+def test_without_a_certificate_nothing_is_proved(good):
+    done = drone_rl.judge(good, episodes=2, sampled=False, progress=silent)
+    assert not done.verdict.is_proved
+    assert (done.as_dict()["certificate"], done.as_dict()["proof"]) == (None, None)
 
 
 def test_a_verdict_on_luck_in_another_task():

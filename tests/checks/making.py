@@ -88,3 +88,23 @@ def _as_outcomes(pieces, cuts):
 
 def _length(boxes):
     return sum(high - low for ((low, high),) in boxes)
+
+
+def of_every_place(policy, end="all_cubes", undecided=False):
+    """By hand and not by any proof: every flight ends so, but perhaps where y of a cube is > 3."""
+    task = policy.description.task
+    bound, cubes = task.lateral_bound, task.num_cubes
+    stated, left = [[[-bound, bound]] * cubes], []
+    if undecided:
+        stated = [[[-bound, 3.0], *[[-bound, bound]] * (cubes - 1)]]
+        left = [[[3.0, bound], *[[-bound, bound]] * (cubes - 1)]]
+    share = (bound + 3.0) / (2 * bound) if undecided else 1.0
+    outcome = {
+        "end": end,
+        "collected": [end == "all_cubes"] * cubes,
+        "loops": False,
+        "share": share,
+        "steps": {},
+        "boxes": stated,
+    }
+    return certificate_of(policy, [outcome], left, 1.0 - share)

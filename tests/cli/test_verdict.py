@@ -4,6 +4,8 @@ import json
 
 import pytest
 
+import drone_rl
+from tests.checks.making import of_every_place
 from tests.cli.running import error_line
 
 
@@ -25,9 +27,41 @@ def test_verdicts_are_exit_statuses(in_process, tmp_path, policy, status, verdic
     assert done.stdout.startswith(verdict)
 
 
+ONE = ["verdict", "policy=good", "task.num_cubes=1", "episodes=10", "sampled=false"]
+
+
+@pytest.fixture
+def good():
+    return drone_rl.load_policy("good").in_task(num_cubes=1)
+
+
+@pytest.mark.parametrize(
+    ("undecided", "status", "words"),
+    [(False, 0, "Proved for every placement"), (True, 16, "from a share of 0.75 of all placem")],
+)
+def test_a_proof_can_be_required(in_process, tmp_path, good, undecided, status, words):
+    made = of_every_place(good, undecided=undecided)
+    (tmp_path / "c.json").write_text(json.dumps(made))
+    done = in_process(*ONE, "certificate=c.json", "require=proved", "hydra.run.dir=v")
+    assert done.returncode == status, done.stderr
+    assert words in done.stdout
+    kept = json.loads((tmp_path / "v" / "verdict.json").read_text())
+    assert kept["proof"]["every"] == (status == 0)
+    assert kept["certificate"] == "c.json"
+    by_kind = in_process(*ONE, "certificate=c.json")
+    assert by_kind.returncode == 13  # ten flights are too few to be certain of a kind
+
+
+def test_without_a_certificate_nothing_is_proved(in_process):
+    assert in_process(*ONE, "require=proved").returncode == 16
+
+
 @pytest.mark.parametrize(
     ("command", "words"),
     [
+        (["verdict", "policy=good", "require=good"], ["require='good'", "proved"]),
+        (["verdict", "policy=good", "certificate=none.json"], ["none.json can't be read"]),
+        (["verdict", "policy=left", "certificate=c.json"], ["policy=left has no network"]),
         (["verdict", "policy=good", "episodes=0"], ["episodes=0", "1 or more"]),
         (["verdict", "policy=good", "good_share=1"], ["good_share=1", "below 1"]),
     ],

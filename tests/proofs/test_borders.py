@@ -16,7 +16,9 @@ from drone_rl.sim.settings import CameraSettings, TaskSettings
 
 def eye(left, up):
     """Cubes with an edge of 2 m."""
-    return Eye(np.array(left, float), np.array(up, float), half=1.0, farthest=10.0, widest=10.0)
+    return Eye(
+        np.array(left, float), np.array(up, float), half=1.0, farthest=10.0, widest=10.0, bound=6.0
+    )
 
 
 def cells(eye, window):

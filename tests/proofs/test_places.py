@@ -10,7 +10,7 @@ from drone_rl.proofs.silhouettes import FRONT, LEFT_SIDE, NOTHING, RIGHT_SIDE, E
 from drone_rl.sim.actions import Move
 from drone_rl.utils.errors import InputError
 
-EYE = Eye(np.array([1.0, -1.0]), np.array([0.0]), half=1.0, farthest=10.0, widest=10.0)
+EYE = Eye(np.array([1.0, -1.0]), np.array([0.0]), half=1.0, farthest=10.0, widest=10.0, bound=6.0)
 """A pixel sees half left, one half right: fronts at Y = +-(D - 2 to D), sides to +-(D + 2)."""
 WINDOW = Window(4.0, 5.0, 10.0)
 

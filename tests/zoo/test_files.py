@@ -12,6 +12,7 @@ from drone_rl.training import save_checkpoint
 from drone_rl.utils.errors import InputError
 from drone_rl.zoo import (
     card_path,
+    certificate_path,
     export_policy,
     load_exported,
     parse,
@@ -187,3 +188,13 @@ def test_each_is_what_its_name_says(name, kind):
     found = load_exported(policy_path(name))
     assert (found["verdict"]["kind"], found["verdict"]["certain"]) == (kind, True)
     assert (found["worlds"], found["verdict"]["greedy"]["episodes"]) == ("report", 1000)
+
+
+def test_where_certificates_lie(tmp_path, monkeypatch):
+    assert certificate_path(policy_path("good")).name == "good.certificate.json"
+    assert certificate_path(policy_path("good")).parent == policy_path("good").parent
+    run = tmp_path / "run"
+    assert certificate_path(run / "checkpoints" / "best.pt") == run / "certificate.json"
+    monkeypatch.chdir(tmp_path)
+    assert certificate_path(Path("last.pt")) == tmp_path.parent / "certificate.json"
+    assert certificate_path(Path("/last.pt")) == Path("/certificate.json")

@@ -11,7 +11,7 @@ from drone_rl.verdicts.rule import Rule
 
 def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
     """Makes "verdict"."""
-    settings = context.settings
-    rule = Rule(good_share=settings.good_share)
-    verdict = judge_policy(context.env, context.restart(), settings.episodes, rule=rule)
+    episodes, rule = context.settings.episodes, Rule(good_share=context.settings.good_share)
+    actor, claim = context.restart(), context.claim
+    verdict = judge_policy(context.env, actor, episodes, rule=rule, claim=claim)
     return {"verdict": verdict.as_dict()}, {}

@@ -1,0 +1,61 @@
+"""Which certificate a verdict, a card or a report may quote of a policy."""
+
+from pathlib import Path
+
+from drone_rl.api.policy import Policy
+from drone_rl.checks import check_certificate, read_tried
+from drone_rl.utils.errors import InputError
+from drone_rl.verdicts.proof import Claim
+from drone_rl.zoo import certificate_path
+
+
+def find_claim(
+    policy: Policy,
+    given: str | Path | None = None,
+    *,
+    flights: int = 0,
+    seed: int = 0,
+    device: str = "cpu",
+) -> Claim | None:
+    """The certificate of a policy in its task, tried, see `drone_rl.checks.read_tried`.
+
+    Args:
+        policy: Which, in the task that counts.
+        given: The certificate's file, or a folder that holds a certificate.json; by default the one
+            that lies with the policy, see `drone_rl.zoo.certificate_path`.
+        flights: How many to fly anew; 0 for none.
+        seed: Of where these start.
+        device: Where they are flown.
+
+    Returns:
+        None if none is given and none lies there. One that lies there and can't be believed is
+        returned as refused.
+
+    Raises:
+        InputError: The one that is given can't be read, is of another network or task, contradicts
+            itself, or is refuted by a flight.
+    """
+    path = certificate_path(policy.path) if given is None else _file(Path(given))
+    if given is None and not path.is_file():
+        return None
+    try:
+        return _try(policy, path, flights, seed, device)
+    except InputError as error:
+        if given is not None:
+            raise
+        return Claim(path, None, refused=str(error))
+
+
+def _file(path: Path) -> Path:
+    return path / "certificate.json" if path.is_dir() else path
+
+
+def _try(policy: Policy, path: Path, flights: int, seed: int, device: str) -> Claim:
+    weights = policy.state["policy"]
+    certificate = read_tried(path, policy.description, weights)
+    if flights:
+        found = check_certificate(certificate, weights, flights=flights, seed=seed, device=device)
+        if not found.accepted:
+            raise InputError(f"certificate {path} does not hold: {found.lines()[0]}; prove again")
+        flights = sum(found.flights.values())
+    return Claim(path, certificate, flights=flights)

@@ -1,0 +1,80 @@
+"""A certificate beside a verdict: what it states of all placements, or why it is not quoted."""
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drone_rl.checks import Certificate, find
+from drone_rl.evaluation import Episodes
+from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+
+
+@dataclasses.dataclass(frozen=True)
+class Claim:
+    """A certificate that was found, tried as far as that goes without this verdict's flights."""
+
+    path: Path
+    """Its file."""
+    certificate: Certificate | None
+    """Of the policy in its task, see `drone_rl.checks.read_tried`; None if it was refused."""
+    refused: str | None = None
+    """Why, in one line."""
+    flights: int = 0
+    """Flown anew to check it, all of which ended as it states; 0 if none were."""
+
+    def beside(self, greedy: Episodes) -> dict[str, Any]:
+        """What a verdict may quote of it, which is nothing if a flight ended otherwise.
+
+        Args:
+            greedy: The verdict's episodes with the most probable actions, in the same task.
+
+        Returns:
+            Plain values: "refused" (why, or None) and, unless it is, "every" (whether all is
+            collected from every placement), the shares of placements from which all is collected
+            ("share"), is not ("lost"), and of which nothing is stated ("undecided"), "finished",
+            "checked" (flights flown anew) and "agreeing" (the verdict's own flights that started
+            where an end is stated, and ended so).
+        """
+        stated = self.certificate
+        if stated is None:
+            return {"refused": self.refused}
+        held = _ends_as_stated(stated, greedy)
+        if not all(held):
+            count = f"{len(held) - sum(held)} of {len(held)} greedy flights of this verdict"
+            return {"refused": f"{count} ended otherwise than it states"}
+        won, lost = (
+            [o for o in stated.outcomes if len(o.boxes) and (o.end == EndReason.ALL_CUBES) == wins]
+            for wins in (True, False)
+        )
+        return {
+            "refused": None,
+            "every": not lost and not len(stated.undecided),
+            "share": sum(outcome.share for outcome in won),
+            "lost": sum(outcome.share for outcome in lost),
+            "undecided": stated.undecided_share,
+            "finished": stated.finished,
+            "checked": self.flights,
+            "agreeing": len(held),
+        }
+
+
+def _ends_as_stated(stated: Certificate, greedy: Episodes) -> list[bool]:
+    """Of each episode from a place of which an end is stated: whether it was that end."""
+    groups = stated.groups
+    owner = np.repeat(np.arange(len(groups)), [len(boxes) for boxes in groups])
+    outcome = owner[find(np.concatenate(groups), _placements(greedy))]
+    flown = zip(outcome, greedy.end_reason.tolist(), greedy.goals.reached.tolist(), strict=True)
+    return [
+        (end, tuple(reached)) == (stated.outcomes[i].end, stated.outcomes[i].collected)
+        for i, end, reached in flown
+        if i < len(stated.outcomes)
+    ]
+
+
+def _placements(episodes: Episodes) -> NDArray[np.float64]:
+    """Metres to the left of each cube. Shape: (n, cubes)."""
+    places = episodes.goals.world.reshape(len(episodes), -1, 3)  # x, y, z of each cube
+    return places[..., 1].double().numpy()

@@ -1,0 +1,70 @@
+"""What is said of a certificate, word by word."""
+
+import pytest
+
+from drone_rl.words.certificate import PROOF, is_quoted
+from drone_rl.words.licence import said
+
+QUOTED = {
+    "refused": None,
+    "every": True,
+    "share": 1.0,
+    "lost": 0.0,
+    "undecided": 0.0,
+    "finished": True,
+    "checked": 0,
+    "agreeing": 1000,
+}
+
+
+def speak(num_cubes=3, **changed):
+    return said(PROOF, {"num_cubes": num_cubes, "proof": {**QUOTED, **changed}})
+
+
+def test_every_placement():
+    assert speak() == {
+        "proof.every": "Proved for every placement: with its most probable actions it collects "
+        "all 3 cubes from all places where they may stand.",
+        "proof.basis": "The certificate is of this network and task, and its boxes are a partition "
+        "of the placements; its flights were not flown anew (drone-rl check does that). The 1,000 "
+        "greedy flights of this verdict that it tells of ended so.",
+    }
+    assert "collects the cube from" in speak(1)["proof.every"]
+
+
+def test_the_exact_share():
+    lost = speak(1, every=False, share=0.6375, lost=0.3625)
+    assert lost["proof.share"] == (
+        "Proved: with its most probable actions it collects the cube from a share of 0.6375 of all "
+        "placements; from 0.3625 it does not."
+    )
+    assert "proof.every" not in lost
+    some = speak(every=False, share=0.5, lost=0.25, undecided=0.25, finished=False)
+    assert some["proof.share"] == (
+        "Proved so far, for the proof was stopped: with its most probable actions it collects all "
+        "3 cubes from a share of 0.5 of all placements; from 0.25 it does not, and 0.25 is "
+        "undecided."
+    )
+
+
+@pytest.mark.parametrize("share", [1 - 1e-12, 1.0])
+def test_nearly_all_is_never_all(share):
+    text = speak(every=False, share=share, undecided=1e-12)["proof.share"]
+    assert "a share of more than 0.999999999 of all" in text
+    assert "from 0 it does not, and 1e-12 is undecided" in text
+
+
+def test_flights_anew_and_none_of_its_own():
+    basis = speak(checked=2000, agreeing=0)["proof.basis"]
+    assert basis.endswith("; 2,000 flights were made anew to try it and ended as it states.")
+
+
+def test_what_is_refused_is_not_quoted():
+    found = said(PROOF, {"num_cubes": 3, "proof": {"refused": "it is of another network"}})
+    assert found == {"proof.refused": "A certificate is not quoted: it is of another network."}
+
+
+@pytest.mark.parametrize("evidence", [{}, {"proof": None}])
+def test_without_a_certificate_nothing_is_said(evidence):
+    assert not is_quoted(evidence)
+    assert said(PROOF, evidence) == {}
