@@ -57,7 +57,15 @@ def test_every_part_is_there_in_order_with_a_link_to_it(report):
 
 def test_figures_are_saved_with_their_numbers(report):
     figures = report.parent / "figures"
-    for name in ("tsne_features", "class_model", "sequence", "truth", "response", "asymmetry"):
+    for name in (
+        "tsne_features",
+        "class_model",
+        "sequence",
+        "truth",
+        "response",
+        "places",
+        "asymmetry",
+    ):
         assert (figures / f"1_second_{name}.png").read_bytes().startswith(b"\x89PNG")
     with open(figures / "1_second_response.csv", newline="") as file:
         rows = list(csv.DictReader(file))
@@ -69,7 +77,8 @@ def test_figures_are_saved_with_their_numbers(report):
 
 
 def test_what_is_missing_is_left_out(changed, tmp_path):
-    gone = ("tsne", "truth", "attribution", "response", "class_model", "contradictions")
+    maps = ("response", "places")
+    gone = ("tsne", "truth", "attribution", *maps, "class_model", "contradictions")
     page = write_report([changed(**dict.fromkeys(gone))], tmp_path).read_text()
     shown = ["evaluation", "dataset", "asymmetry", "provenance"]
     assert re.findall(r'<section id="([^"]+)">', page) == [*shown[:3], "others", shown[3]]
@@ -77,7 +86,8 @@ def test_what_is_missing_is_left_out(changed, tmp_path):
 
 
 def test_what_no_part_shows_is_laid_out_plainly_and_names_no_file(changed, tmp_path):
-    parts = ("verdict", "tsne", "truth", "attribution", "response", "class_model", "loops")
+    maps = ("response", "places")
+    parts = ("verdict", "tsne", "truth", "attribution", *maps, "class_model", "loops")
     key = "../../<b>tides"
     folder = changed(**dict.fromkeys(parts), contradictions=None, **{key: {"height": 3.25}})
     page = write_report([folder], tmp_path / "x" / "y").read_text()
