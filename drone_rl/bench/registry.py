@@ -4,6 +4,7 @@ from collections.abc import Iterable
 
 from drone_rl.bench.benchmark import Benchmark
 from drone_rl.bench.coverage import bench_coverage
+from drone_rl.bench.exact_coverage import bench_exact_coverage
 from drone_rl.bench.explain import bench_explain
 from drone_rl.bench.hostile import bench_hostile
 from drone_rl.bench.maps import bench_maps
@@ -111,6 +112,11 @@ BENCHMARKS: dict[str, Benchmark] = {
     ),
     "places": Benchmark(
         lambda s: bench_places(s.quick), "proof", (*_PROVING, "bench/places")
+    ),
+    "exact_coverage": Benchmark(
+        lambda s: bench_exact_coverage(s.runs / "exact_coverage", s.quick),
+        "proof",
+        (*_TRAINING, *_PROVING, "verdicts", "bench/exact_coverage"),
     ),
     "many_cubes": Benchmark(
         lambda s: bench_many_cubes(s.runs / "many_cubes", 1.0, s.quick),
