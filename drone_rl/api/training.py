@@ -19,7 +19,7 @@ from drone_rl.api.showing import picture, table
 from drone_rl.settings.comparison import check_same_config, modern
 from drone_rl.settings.configuration import as_config, from_config
 from drone_rl.settings.training import TrainSettings
-from drone_rl.sim.tasks import as_task
+from drone_rl.sim.tasks import Practice, as_task
 from drone_rl.training import (
     Callback,
     CheckpointCallback,
@@ -93,6 +93,7 @@ def train(
     *,
     folder: str | Path | None = None,
     resume: bool = False,
+    practice: Practice | None = None,
     callbacks: Sequence[Callback] = (),
     progress: Progress | None = None,
     **changes: Any,
@@ -103,6 +104,7 @@ def train(
         settings: What is learned, how, and for how long; those of the run if it is resumed.
         folder: Where everything is left; by default a new one under outputs/train/runs.
         resume: Whether to go on with the run that is in the folder, bit for bit.
+        practice: Where episodes begin, if not anywhere; not a part of what is saved.
         callbacks: Told of every update, besides those that write checkpoints and metrics.
         progress: Told of how far it is; a bar by default.
         changes: Settings to change, as in `train(seed=1, task=TaskSettings(num_cubes=5))`.
@@ -120,7 +122,7 @@ def train(
     folder.mkdir(parents=True, exist_ok=True)
     with folder_lock(folder):
         told = [*callbacks, _Tell(progress or Bar())]
-        trainer, checkpoints = _build(settings, folder, told)
+        trainer, checkpoints = _build(settings, folder, told, practice)
         if state is not None:
             trainer.load_state_dict(state)
             checkpoints.best = _read_best(state.get("best"))
@@ -148,14 +150,14 @@ def _run(
 
 
 def _build(
-    settings: TrainSettings, folder: Path, callbacks: Sequence[Callback]
+    settings: TrainSettings, folder: Path, callbacks: Sequence[Callback], practice: Practice | None
 ) -> tuple[Trainer, CheckpointCallback]:
     config, origin = as_config(settings), provenance()
     description = describe(config).as_dict()
     # sums depend on how many threads make them: on as many everywhere, whatever the machine has
     torch.set_num_threads(settings.collector.num_threads)
     bound_kernels()
-    collector, network, generators = build_collector(settings)
+    collector, network, generators = build_collector(settings, practice)
     noted = {"config": config, "description": description, **origin}
     (folder / "run.yaml").write_text(yaml.safe_dump(noted, sort_keys=False))
     limits = settings.trainer
