@@ -9,6 +9,7 @@ from drone_rl.bench.hostile import bench_hostile
 from drone_rl.bench.maps import bench_maps
 from drone_rl.bench.memory import bench_memory
 from drone_rl.bench.mutants import bench_mutants
+from drone_rl.bench.proving import bench_many_cubes, bench_prove, bench_tampering
 from drone_rl.bench.scaling import bench_scaling
 from drone_rl.bench.sentences import bench_sentences
 from drone_rl.bench.speed import bench_collector, bench_dm_control, bench_render
@@ -22,6 +23,7 @@ _DRAWING = ("sim", "envs")
 _COLLECTING = (*_DRAWING, "policies", "collectors")
 _TRAINING = (*_COLLECTING, "objectives", "training")
 _JUDGING = (*_DRAWING, "policies", "evaluation", "verdicts")
+_PROVING = (*_DRAWING, "policies", "proofs", "checks")
 _EXPLAINING = (*_JUDGING, "explanations")
 
 BENCHMARKS: dict[str, Benchmark] = {
@@ -96,6 +98,21 @@ BENCHMARKS: dict[str, Benchmark] = {
         "many",
         (*_COLLECTING, "conf", "bench/sweeps"),
     ),
+    "prove": Benchmark(
+        lambda s: bench_prove(s.runs / "prove", s.seeds, s.quick),
+        "proof",
+        (*_PROVING, "bench/proving"),
+    ),
+    "tampering": Benchmark(
+        lambda s: bench_tampering(s.runs / "tampering", s.quick),
+        "proof",
+        (*_PROVING, "bench/tampering", "bench/tampered_parts", "bench/tampered_wholes"),
+    ),
+    "many_cubes": Benchmark(
+        lambda s: bench_many_cubes(s.runs / "many_cubes", 1.0, s.quick),
+        "hours",
+        (*_PROVING, "bench/proving"),
+    ),
     "startup": Benchmark(
         lambda s: bench_startup(s.runs / "startup", s.device, s.quick),
         "room",
@@ -103,7 +120,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     ),
 }  # fmt: skip
 GROUPS = tuple(dict.fromkeys(benchmark.group for benchmark in BENCHMARKS.values()))
-"""Names of several at once: the main job, whether what is said is true, many trainings."""
+"""Names of several at once: the main job, whether what is said is true, proofs, many trainings."""
 
 
 def find_benchmarks(words: Iterable[str]) -> list[str]:

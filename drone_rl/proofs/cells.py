@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from drone_rl.proofs.silhouettes import Eye
 from drone_rl.utils.errors import InputError
 
+NARROWER = 8
+"""A renderer that is asked shows its bands: by so much they are narrower than rounding allows."""
 SLIVER = 1e-9
 """Metres of a cell beside a band that are enough to look at; bands stand farther apart."""
 
@@ -59,17 +61,21 @@ class Cells:
                 f"{ahead} m ahead a row of pixels just grazes the edge of a cube, so that it is "
                 "left to rounding what it shows; change task.first_distance a little"
             )
-        places, errors = eye.borders(ahead)
-        starts, stops = _unite(places - errors, places + errors)
-        is_inside = (stops > lowest) & (starts < highest)
-        bands = np.stack([starts, stops], -1)[is_inside]
-        if len(bands):  # whole ones
-            lowest, highest = min(lowest, bands[0, 0] - SLIVER), max(highest, bands[-1, 1] + SLIVER)
-        self.limits = np.concatenate([[lowest], bands.reshape(-1), [highest]])
+        bands, between = _bands(eye, ahead, lowest, highest, NARROWER), None
+        if renderer is not None:
+            between = _within(bands, eye, ahead, renderer)
+            if between is None:
+                bands = _bands(eye, ahead, lowest, highest, 1)
+                between = _within(bands, eye, ahead, renderer)
+            if between is None:
+                raise InputError(
+                    "the renderer draws another picture than the closed form beside a border, so "
+                    "nothing can be proved of it; prove the policy in the default world"
+                )
+        self.limits = _limits(bands, lowest, highest)
         """Where each begins, and where the last one ends, metres to the left of the camera."""
-        middles = (self.limits[0::2] + self.limits[1::2]) / 2
-        pure = eye.faces(ahead, middles)
-        between = [pure[:0]] * len(bands) if renderer is None else _within(bands, pure, renderer)
+        pure = eye.faces(ahead, _middles(self.limits))
+        between = [pure[:0]] * len(bands) if between is None else between
         parts, begins = [pure[:1]], [0]
         for inner, after in zip(between, pure[1:], strict=True):
             begins += [begins[-1], begins[-1] + 1 + len(inner)]
@@ -100,21 +106,44 @@ class Cells:
         return first.clip(0, len(self) - 1), last.clip(0, len(self) - 1)
 
 
-def _within(bands: NDArray, pure: NDArray, renderer: Renderer) -> list[NDArray[np.uint8]]:
-    """The pictures inside each band but its neighbours', in order."""
+def _bands(eye: Eye, ahead: float, lowest: float, highest: float, narrower: float) -> NDArray:
+    """Where pictures change, from the first band that reaches into a range to the last."""
+    places, errors = eye.borders(ahead)
+    errors = errors / narrower + eye.rounding(places)
+    starts, stops = _unite(places - errors, places + errors)
+    return np.stack([starts, stops], -1)[(stops > lowest) & (starts < highest)]
+
+
+def _limits(bands: NDArray, lowest: float, highest: float) -> NDArray[np.float64]:
+    """Where cells and bands begin and end; the outermost cells are beside whole bands."""
+    if len(bands):
+        lowest, highest = min(lowest, bands[0, 0] - SLIVER), max(highest, bands[-1, 1] + SLIVER)
+    return np.concatenate([[lowest], bands.reshape(-1), [highest]])
+
+
+def _middles(limits: NDArray) -> NDArray[np.float64]:
+    return (limits[0::2] + limits[1::2]) / 2
+
+
+def _within(
+    bands: NDArray, eye: Eye, ahead: float, renderer: Renderer
+) -> list[NDArray[np.uint8]] | None:
+    """The pictures inside each band but its neighbours', in order.
+
+    None if a neighbour's picture is not yet seen as far inside of a band's ends as rounding may
+    move a cube: then the bands are too narrow.
+    """
     if not len(bands):
         return []
-    slack = 4 * np.spacing(np.abs(bands).max(-1, initial=1.0).astype(np.float32))
-    middle = bands.mean(-1)
-    # it mostly changes close to where it would without rounding: look there first
-    ends = np.stack([bands[:, 0] - slack, middle - slack, middle + slack, bands[:, 1] + slack])
-    points = ends.astype(np.float32)
+    low = bands[:, 0] + eye.rounding(bands[:, 0])
+    high = bands[:, 1] - eye.rounding(bands[:, 1])
+    middle, close = (low + high) / 2, (high - low) / 8
+    # mostly it changes close to where it would without rounding: look there first
+    points = np.stack([low, middle - close, middle + close, high]).astype(np.float32)
     drawn = np.stack([renderer.look(row) for row in points])
+    pure = eye.faces(ahead, _middles(_limits(bands, np.inf, -np.inf)))
     if (drawn[-1, :-1] != drawn[0, 1:]).any() or _differs(renderer, drawn, pure):
-        raise InputError(
-            "the renderer draws another picture than the closed form beside a border, so nothing "
-            "can be proved of it; prove the policy in the default world"
-        )
+        return None
     seen: list[dict[np.float32, NDArray[np.uint8]]] = [
         dict(zip(points[:, i], drawn[:, i], strict=True)) for i in range(len(bands))
     ]

@@ -113,7 +113,7 @@ class Lattice:
             steps=place.steps + 1,
             came=action,
         )
-        for collected, part in self._touched(moved, boxes):
+        for collected, part in self._touched(moved, self.standing(place), boxes):
             is_new = collected != place.collected
             came = AHEAD if is_new else action
             yield dataclasses.replace(moved, collected=collected, came=came), part
@@ -131,20 +131,19 @@ class Lattice:
             reason = EndReason.ALL_CUBES
         return None if reason is None else Ending(reason, place.collected)
 
-    def _touched(self, place: Place, boxes: Boxes) -> Iterator[tuple[int, Boxes]]:
-        """Boxes by the cubes that the drone has when it has come to a place."""
+    def _touched(self, place: Place, stood: list[int], boxes: Boxes) -> Iterator[tuple[int, Boxes]]:
+        """Boxes by the cubes that the drone has at a place, of those that stood before."""
         parts = [(place.collected, boxes)]
         reach, y = self.task.touch_distance, self.y(place)
         first, beyond = _least(y, reach), math.nextafter(-_least(-y, reach), math.inf)
-        for cube in np.flatnonzero(np.abs(self.x(place) - self.cubes) <= reach):
+        for cube in stood:
+            if abs(self.x(place) - self.cubes[cube]) > reach:
+                continue
             for _ in range(len(parts)):
                 collected, part = parts.pop(0)
-                if collected >> int(cube) & 1:
-                    parts.append((collected, part))
-                    continue
-                right, rest = cut(part, int(cube), first)
-                touched, left = cut(rest, int(cube), beyond)
-                with_it = collected | 1 << int(cube)
+                right, rest = cut(part, cube, first)
+                touched, left = cut(rest, cube, beyond)
+                with_it = collected | 1 << cube
                 parts += [(collected, right), (with_it, touched), (collected, left)]
         yield from ((collected, part) for collected, part in parts if len(part))
 

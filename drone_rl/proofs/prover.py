@@ -7,15 +7,17 @@ are followed, and what becomes of it counts as decided only if all end alike.
 """
 
 import dataclasses
+import itertools
 from collections import defaultdict
 from collections.abc import Iterator
 
 import numpy as np
 
-from drone_rl.proofs.boxes import Boxes, carve, intersect, merge, unite, volumes, whole
+from drone_rl.proofs.boxes import Boxes, merge, unite, volumes, whole
 from drone_rl.proofs.cells import Cells
 from drone_rl.proofs.lattice import AHEAD, LEFT, RIGHT, Ending, Place
 from drone_rl.proofs.outlook import Outlook, runs
+from drone_rl.proofs.settling import settle, simplify
 from drone_rl.proofs.silhouettes import camera_ahead
 from drone_rl.proofs.subject import Subject
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
@@ -25,6 +27,9 @@ MOST_ROWS = 20_000
 MARGIN = 2.0
 """Metres by which an outlook reaches farther than what it is made for: drones move sideways."""
 
+COARSE = 0.5
+"""Metres to which it is known, of forks, where cubes stood that are gone."""
+
 
 @dataclasses.dataclass
 class Findings:
@@ -32,10 +37,10 @@ class Findings:
 
     endings: dict[Ending, Boxes]
     """Placements that end so, disjoint."""
-    steps: dict[Ending, dict[int, float]]
-    """Volume of them by number of steps, as far as that is certain."""
     undecided: Boxes
     """The rest."""
+    steps: dict[Ending, dict[int, float]]
+    """Volume of each ending by number of steps, as far as that is certain."""
 
 
 class Prover:
@@ -126,13 +131,13 @@ class Prover:
     def _gather(self, place: Place, boxes: Boxes) -> None:
         """Puts forks together however they came: what follows does not depend on it.
 
-        Of steps, the most that any took are noted. Of cubes that are no longer there, every place
-        is taken for possible: that can only leave more undecided, and only within forks.
+        Of steps, the most that any took are noted. Where cubes stood that are gone is rounded, so
+        that it includes where they stood: that can only leave more undecided, within forks.
         """
         gone = [k for k in range(boxes.shape[1]) if k not in self.lattice.standing(place)]
-        bound = self.lattice.task.lateral_bound
         boxes = boxes.copy()
-        boxes[:, gone] = (-bound, bound)
+        boxes[:, gone, 0] = np.floor(boxes[:, gone, 0] / COARSE) * COARSE
+        boxes[:, gone, 1] = np.ceil(boxes[:, gone, 1] / COARSE) * COARSE
         there = dataclasses.replace(place, steps=0)
         steps = max(place.steps, self.longest.get(there, 0))
         self.longest[there] = steps
@@ -206,43 +211,26 @@ class Prover:
 
     def findings(self) -> Findings:
         """What is known by now."""
-        endings: dict[Ending, list[Boxes]] = defaultdict(list)
         steps: dict[Ending, dict[int, float]] = defaultdict(dict)
+        endings: dict[Ending, list[Boxes]] = defaultdict(list)
         for (ending, count), boxes in self.ended.items():
             endings[ending] += boxes
             steps[ending][count] = float(sum(volumes(b).sum() for b in boxes))
         undecided = [b for p, boxes in self.waiting.items() if not p.is_fork for b in boxes]
-        left = self._settle(endings)
-        n = self.lattice.task.num_cubes
-        undecided = [np.empty((0, n, 2)), *undecided, left]
-        return Findings(
-            {ending: unite(np.concatenate(boxes)) for ending, boxes in endings.items()},
-            steps,
-            unite(np.concatenate(undecided)),
-        )
+        task = self.lattice.task
+        settled, left = settle(self.forked, self._ways(), self._open(), task.num_cubes)
+        for ending, boxes in settled.items():
+            if len(boxes):
+                endings[ending].append(boxes)
+        space = whole(task.lateral_bound, task.num_cubes)
+        parts = {ending: merge(np.concatenate(boxes)) for ending, boxes in endings.items()}
+        return Findings(*simplify(parts, merge(np.concatenate([left, *undecided])), space), steps)
 
-    def _settle(self, endings: dict[Ending, list[Boxes]]) -> Boxes:
-        """Adds the forks of which all ways end alike; returns the others."""
-        left = _joined(self.forked, self.lattice.task.num_cubes)
-        ways = {e: _joined(boxes, left.shape[1]) for e, boxes in self.fork_ends.items() if e}
-        open_ = list(self.fork_ends[None])
-        open_ += [b for p, boxes in self.waiting.items() if p.is_fork for b in boxes]
-        different = list(ways.values())
-        for i, boxes in enumerate(different):
-            open_ += [intersect(boxes, others) for others in different[i + 1 :]]
-        undecided = []
-        for hole in unite(np.concatenate([left[:0], *open_])):
-            inside, left = carve(left, hole)
-            undecided.append(inside)
-        for ending, boxes in ways.items():
-            if len(ways) == 1 and not open_:
-                endings[ending].append(left)
-                return left[:0]
-            for hole in boxes:
-                inside, left = carve(left, hole)
-                endings[ending].append(inside)
-        return np.concatenate([left, *undecided])
+    def _ways(self) -> dict[Ending, Boxes]:
+        """Where forks may end so."""
+        return {e: unite(np.concatenate(b)) for e, b in self.fork_ends.items() if e and b}
 
-
-def _joined(boxes: list[Boxes], num_cubes: int) -> Boxes:
-    return unite(np.concatenate([np.empty((0, num_cubes, 2)), *boxes]))
+    def _open(self) -> list[Boxes]:
+        """Where it is not known how forks may end."""
+        waiting = (boxes for place, boxes in self.waiting.items() if place.is_fork)
+        return [*self.fork_ends.get(None, []), *itertools.chain.from_iterable(waiting)]

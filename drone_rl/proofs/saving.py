@@ -2,6 +2,7 @@
 
 import dataclasses
 import io
+import zipfile
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -71,7 +72,7 @@ def load(prover: Prover, path: Path, subject: str) -> None:
         waiting = [(_place(row[:-1]), row[-1], b) for row, b in parts["waiting"]]
         ended = [((_ending(row), row[3]), b) for row, b in parts["ended"]]
         ways = [(_ending(row), b) for row, b in parts["ways"]]
-    except (ValueError, KeyError, TypeError, OSError, EOFError, UnicodeDecodeError) as error:
+    except (ValueError, KeyError, TypeError, OSError, EOFError, zipfile.BadZipFile) as error:
         raise InputError(f"{path} is no state of a proof ({error}); delete it to begin") from None
     if saved != subject:
         raise InputError(f"{path} is of another proof; delete it, or give another folder")
@@ -109,7 +110,7 @@ def _ending(row: tuple[int, ...]) -> Any:
 def _packed(name: str, parts: Iterable[tuple[tuple, Boxes]]) -> dict[str, NDArray]:
     rows, boxes = [row for row, _ in parts], [b for _, b in parts]
     return {
-        f"{name}_rows": np.array(rows, np.int64).reshape(len(rows), -1),
+        f"{name}_rows": np.array(rows, np.int64).reshape(len(rows), -1 if rows and rows[0] else 0),
         f"{name}_counts": np.array([len(b) for b in boxes], np.int64),
         f"{name}_boxes": np.concatenate(boxes) if boxes else np.empty((0, 0, 2)),
     }

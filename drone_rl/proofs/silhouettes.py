@@ -40,6 +40,8 @@ class Eye:
     """No x is larger, metres."""
     widest: float
     """No |y| is larger, metres."""
+    bound: float
+    """No cube's |y| is larger, metres."""
 
     @classmethod
     def of(cls, task: TaskSettings, camera: CameraSettings) -> "Eye":
@@ -52,6 +54,7 @@ class Eye:
             half=task.cube_size / 2,
             farthest=task.front_bound + task.step_length,
             widest=task.side_bound + task.step_length,
+            bound=task.lateral_bound,
         )
 
     def borders(self, ahead: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -105,6 +108,14 @@ class Eye:
             faces[np.broadcast_to(is_front[:, None], faces.shape)] = FRONT
         faces[:, back < front] = NOTHING
         return faces
+
+    def rounding(self, left: NDArray[np.float64]) -> NDArray[np.float64]:
+        """By how much float32 may move a cube that stands so far to the left of the camera.
+
+        Its y is rounded, and so is the difference from the camera's, which are twice what they may
+        be; where a drone is, is no matter of rounding.
+        """
+        return 2 * UNIT * (self.bound + np.abs(left) + 1)
 
     def grazed(self, ahead: float) -> NDArray[np.bool_]:
         """Rows that end within rounding errors of a cube's upper or lower front edge.

@@ -1,0 +1,112 @@
+"""Proofs of shipped and of freshly trained policies: how long, how much, and do they hold?"""
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from drone_rl.api.checking import Check, check
+from drone_rl.api.policy import load_policy
+from drone_rl.api.progress import silent
+from drone_rl.api.proving import Proof, prove
+from drone_rl.api.training import train
+from drone_rl.bench.tampering import count_refused
+
+FLIGHTS = 100_000
+"""Of all certificates together."""
+
+
+def bench_prove(folder: Path, seeds: Sequence[int], quick: bool) -> dict[str, Any]:
+    """Trains the default from each seed, proves what came of it, and checks every certificate.
+
+    Args:
+        folder: For runs and certificates.
+        seeds: Of the trainings.
+        quick: Whether one cube and one seed will do.
+
+    Returns:
+        "proof_two_s" of policy good with two cubes; "proof_three_s", "proof_success",
+        "proof_undecided" of each seed's policy with the default's three; how many certificates the
+        second checker accepts, and how many of its flights end otherwise than proved.
+    """
+    two, three = (1, 1) if quick else (2, 3)
+    good, good_s = _timed("good", two, folder / "good")
+    proofs, seconds = {"good": good}, []
+    for seed in seeds[:1] if quick else seeds:
+        run = folder / f"seed_{seed}"
+        train(folder=run, seed=seed, progress=silent)
+        proofs[str(run)], taken = _timed(run, three, run)
+        seconds.append(taken)
+    trained = list(proofs.values())[1:]
+    for name in ("poor", "right_and_forward"):
+        proofs[name], _ = _timed(name, two, folder / name)
+    flights = 200 if quick else -(-FLIGHTS // len(proofs))
+    checks = [_check(proof, policy, flights) for policy, proof in proofs.items()]
+    return {
+        "proof_two_s": good_s,
+        "proof_three_s": seconds,
+        "proof_success": [proof.success for proof in trained],
+        "proof_undecided": max(proof.undecided for proof in trained),
+        "proof_undecided_each": [proof.undecided for proof in trained],
+        "proof_contradicted": sum(done.findings.contradicted for done in checks),
+        "proof_flights": sum(sum(done.findings.flights.values()) for done in checks),
+        "proof_checked": sum(done.accepted for done in checks),
+        "proof_checked_total": len(checks),
+    }
+
+
+def bench_many_cubes(folder: Path, hours: float, quick: bool) -> dict[str, Any]:
+    """How much is decided of policy good with four and with five cubes in a given time.
+
+    Args:
+        folder: For certificates.
+        hours: For each.
+        quick: Whether a few seconds will do.
+
+    Returns:
+        "proof_four", "proof_five": the shares decided, and the seconds that it took.
+    """
+    found: dict[str, Any] = {}
+    for cubes, name in ((4, "proof_four"), (5, "proof_five")):
+        limit = 2.0 if quick else 3600 * hours
+        begin = time.perf_counter()
+        proof = prove(
+            "good",
+            folder=folder / name,
+            task={"num_cubes": cubes},
+            limit_s=limit,
+            progress=silent,
+        )
+        found |= {name: 1.0 - proof.undecided, f"{name}_s": time.perf_counter() - begin}
+    return found
+
+
+def bench_tampering(folder: Path, quick: bool) -> dict[str, Any]:
+    """Proves two small tasks, and tampers with their certificates in every way there is.
+
+    Args:
+        folder: For certificates.
+        quick: Whether one of them will do.
+
+    Returns:
+        How many of the tampered certificates are refused, and how many there are.
+    """
+    paths = {}
+    for cubes in (1,) if quick else (1, 2):
+        name = "right_and_forward"
+        _timed(name, cubes, folder / f"{name}_{cubes}")
+        paths[folder / f"{name}_{cubes}" / "certificate.json"] = None
+    return count_refused(paths, 400)
+
+
+def _timed(policy: str | Path, num_cubes: int, folder: Path) -> tuple[Proof, float]:
+    begin = time.perf_counter()
+    task = {"num_cubes": num_cubes}
+    proof = prove(load_policy(policy), folder=folder, task=task, progress=silent)
+    return proof, time.perf_counter() - begin
+
+
+def _check(proof: Proof, policy: str, flights: int) -> Check:
+    assert proof.folder is not None
+    path = proof.folder / "certificate.json"
+    return check(path, policy, flights=flights, progress=silent)

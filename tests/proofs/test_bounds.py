@@ -1,0 +1,93 @@
+"""Interval bounds by hand, and against every picture that they are about."""
+
+import itertools
+
+import pytest
+import torch
+from torch import nn
+
+from drone_rl.policies import OriginalCNN, SmallCNN
+from drone_rl.proofs.bounds import Bounds
+from drone_rl.utils.errors import InputError
+
+
+class Linear(nn.Module):
+    """Logits of a picture of two pixels."""
+
+    def __init__(self, weight, bias, *before):
+        super().__init__()
+        last = nn.Linear(2, len(weight))
+        with torch.no_grad():
+            last.weight.copy_(torch.tensor(weight))
+            last.bias.copy_(torch.tensor(bias))
+        self.layers = nn.Sequential(*before, nn.Flatten(), last)
+
+    def forward(self, pictures):
+        return self.layers(pictures)
+
+
+def pictures(*pixels):
+    return torch.tensor(pixels)[:, None, None].float()
+
+
+def test_what_actions_have_in_common_cancels():
+    """Both logits rise alike with the first pixel, so that it decides nothing."""
+    bounds = Bounds(Linear([[5.0, 1.0], [5.0, 0.0]], [0.0, 0.0]), gap=0.1)
+    assert bounds.possible(pictures([-9, 0.2]), pictures([9, 1])).tolist() == [0b01]
+    assert bounds.possible(pictures([-9, -1]), pictures([9, -0.2])).tolist() == [0b10]
+    assert bounds.possible(pictures([-9, 0.05]), pictures([9, 1])).tolist() == [0b11]
+
+
+def test_known_pictures_and_their_gap():
+    bounds = Bounds(Linear([[1.0, 0.0], [0.0, 1.0]], [0.0, 0.0]), gap=0.5)
+    bits, gaps = bounds.decide(pictures([3, 1], [1, 1.2], [0, 2]))
+    assert bits.tolist() == [0b01, 0b11, 0b10]
+    assert gaps.tolist() == pytest.approx([2.0, 0.2, 2.0])
+
+
+def test_a_third_action_is_left_out_where_another_beats_it():
+    bounds = Bounds(Linear([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]], [0.0, 0.0, -5.0]), gap=0.0)
+    assert bounds.possible(pictures([0.0, 0.0]), pictures([1.0, 1.0])).tolist() == [0b011]
+
+
+@pytest.mark.parametrize(("make", "doubt"), [(SmallCNN, 0.05), (OriginalCNN, 1e-3)])
+def test_bounds_hold_for_all_that_they_are_about(make, doubt):
+    """Two pixels in doubt and all mixtures of them: no action is taken that bounds excluded."""
+    generator = torch.Generator().manual_seed(0)
+    network = make((1, 25, 64), 3, generator=generator).eval()
+    with torch.no_grad():
+        network.layers[-1].weight.mul_(100)
+    bounds = Bounds(network, gap=1e-4)
+    lower = torch.rand(40, 1, 25, 64, generator=generator)
+    upper = lower.clone()
+    upper[:, 0, 10, 30] += doubt
+    upper[:, 0, 12, 31] += doubt
+    possible = bounds.possible(lower.clone(), upper.clone())
+    single = possible & (possible - 1) == 0
+    assert single.any()  # else it says nothing
+    for rows in itertools.product((False, True), repeat=2):
+        mixed = lower.clone()
+        mixed[:, 0, 10, 30] += doubt * rows[0]
+        mixed[:, 0, 12, 31] += doubt * rows[1]
+        bits, _ = bounds.decide(mixed)
+        assert ((bits & ~possible) == 0).all()
+
+
+def test_without_doubt_bounds_decide_like_the_network():
+    generator = torch.Generator().manual_seed(1)
+    network = SmallCNN((1, 25, 64), 3, generator=generator).eval()
+    with torch.no_grad():
+        network.layers[-1].weight.mul_(100)
+    seen = torch.rand(50, 1, 25, 64, generator=generator)
+    bounds = Bounds(network, gap=1e-4)
+    assert bounds.possible(seen.clone(), seen.clone()).tolist() == bounds.decide(seen)[0].tolist()
+    assert bounds.decide(seen)[0].tolist() == (1 << network(seen).argmax(-1)).tolist()
+
+
+def test_other_layers_are_refused():
+    with pytest.raises(InputError, match="a layer Tanh, for which no bounds"):
+        Bounds(Linear([[1.0, 0.0]], [0.0], nn.Tanh()), gap=0.0)
+    network = Linear([[1.0, 0.0]], [0.0])
+    network.layers.append(nn.ReLU())
+    with pytest.raises(InputError, match="last layer is not linear"):
+        Bounds(network, gap=0.0)

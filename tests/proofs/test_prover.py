@@ -1,0 +1,145 @@
+"""Whole proofs of one cube: what is known of it by hand, and against flights."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import drone_rl
+from drone_rl.proofs.boxes import volumes
+from drone_rl.proofs.prover import Prover
+from drone_rl.proofs.subject import make_subject
+from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.utils.errors import InputError
+
+
+def prove(name, gap=1e-4, **task):
+    policy = drone_rl.load_policy(name).in_task(num_cubes=1, **task)
+    subject = make_subject(policy.description, policy.make_network(), gap)
+    prover = Prover(subject)
+    while not prover.is_finished:
+        prover.advance()
+    subject.close()
+    return prover
+
+
+@pytest.fixture(scope="module")
+def one_sided():
+    return prove("right_and_forward")
+
+
+def shares(findings, bound=6.0):
+    parts = {
+        (ending.reason.name, ending.collected): float(volumes(boxes).sum()) / (2 * bound)
+        for ending, boxes in findings.endings.items()
+    }
+    return parts, float(volumes(findings.undecided).sum()) / (2 * bound)
+
+
+def test_the_share_that_a_policy_collects(one_sided):
+    """It never goes to the left: it collects what stands up to 1.65 m to its left."""
+    parts, undecided = shares(one_sided.findings())
+    assert parts[("ALL_CUBES", 1)] == pytest.approx((6 + 1.65) / 12, abs=1e-9)
+    assert parts[("FRONT_BOUNDARY", 0)] == pytest.approx((6 - 1.65) / 12, abs=1e-9)
+    assert undecided < 1e-6
+
+
+def test_steps_are_counted(one_sided):
+    """At y=0 it takes 14 steps ahead and none to the side."""
+    steps = one_sided.findings().steps
+    (won,) = [e for e in steps if e.reason is EndReason.ALL_CUBES]
+    assert min(steps[won]) == 14
+    assert sum(steps[won].values()) <= (6 + 1.65) + 1e-9
+
+
+def test_it_says_what_flights_show(one_sided):
+    findings = one_sided.findings()
+    won = np.concatenate([b for e, b in findings.endings.items() if e.collected])
+    share = float(volumes(won).sum()) / 12
+    policy = drone_rl.load_policy("right_and_forward").in_task(num_cubes=1)
+    flown = drone_rl.evaluate(policy, episodes=200, baselines=False).success
+    assert abs(flown - share) < 5 * (share * (1 - share) / 200) ** 0.5
+
+
+def test_half_way_the_rest_is_undecided():
+    policy = drone_rl.load_policy("right_and_forward").in_task(num_cubes=1)
+    subject = make_subject(policy.description, policy.make_network(), 1e-4)
+    prover = Prover(subject)
+    for _ in range(5):
+        prover.advance()
+    parts, undecided = shares(prover.findings())
+    subject.close()
+    assert not prover.is_finished and prover.boxes_under_way > 0
+    assert parts == {} and undecided == 1.0
+
+
+def test_where_logits_are_close_nothing_is_claimed():
+    """The larger the gap that is asked for, the more ways are followed, and nothing is wrong."""
+    bold, careful = prove("right_and_forward"), prove("right_and_forward", gap=3.0)
+    forked = [sum(volumes(b).sum() for b in prover.forked) for prover in (bold, careful)]
+    assert forked[0] < 1e-3 < forked[1]
+    parts, _ = shares(careful.findings())
+    assert parts.get(("ALL_CUBES", 1), 0) <= (6 + 1.65) / 12 + 1e-9
+    assert parts.get(("FRONT_BOUNDARY", 0), 0) <= (6 - 1.65) / 12 + 1e-9
+
+
+def test_to_and_fro_ends_at_the_step_limit(monkeypatch):
+    """Whoever turns left where it came from the right, and back, goes on until the step limit."""
+    policy = drone_rl.load_policy("good").in_task(num_cubes=1)
+    subject = make_subject(policy.description, policy.make_network(), 1e-4)
+    prover = Prover(subject)
+    monkeypatch.setattr(
+        prover, "_cut", lambda place, boxes: [(2 if place.left % 2 == 0 else 4, boxes)]
+    )
+    while not prover.is_finished:
+        prover.advance()
+    subject.close()
+    (ending,) = prover.findings().endings
+    assert ending.loops and ending.reason is EndReason.STEP_LIMIT and ending.collected == 0
+
+
+def test_a_fork_is_decided_only_if_all_its_ways_end_alike(monkeypatch):
+    """Straight on is won near the middle; to the left for ever is lost everywhere."""
+    policy = drone_rl.load_policy("good").in_task(num_cubes=1)
+    subject = make_subject(policy.description, policy.make_network(), 1e-4)
+    prover = Prover(subject)
+
+    def both_at_first(place, boxes):
+        is_start = place.ahead == place.left == 0
+        return [(3 if is_start else 2 if place.left else 1, boxes)]
+
+    monkeypatch.setattr(prover, "_cut", both_at_first)
+    while not prover.is_finished:
+        prover.advance()
+    subject.close()
+    parts, undecided = shares(prover.findings())
+    assert parts == {} and undecided == 1.0
+
+
+def test_bigger_steps_and_other_cubes_can_be_proved():
+    prover = prove("good", step_length=1.25, cube_size=2.0, lateral_bound=2.0)
+    parts, undecided = shares(prover.findings(), bound=2.0)
+    assert sum(parts.values()) + undecided == pytest.approx(1.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"vertical_bound": 0.5}, "vertical_bound=0.5 spreads cubes in height"),
+        ({"spacing": 2.0}, "spacing=2.0 puts cubes beside each other"),
+        ({"lateral_bound": 0.0}, "leaves a single placement"),
+        ({"step_length": 0.3}, "can't be added up without rounding"),
+        ({"cube_color": (0.0, 0.0, 0.0)}, "makes a face look like another"),
+    ],
+)
+def test_what_cannot_be_proved_is_refused(change, message):
+    with pytest.raises(InputError, match=message):
+        prove("good", **change)
+
+
+def test_the_networks_actions_must_be_moves():
+    policy = drone_rl.load_policy("good").in_task(num_cubes=1)
+    network = policy.make_network()
+    network.actions = dataclasses.replace(network.actions)
+    with pytest.raises(InputError, match="does not choose among"):
+        make_subject(policy.description, network, 1e-4)

@@ -1,0 +1,61 @@
+"""A proof that is stopped and gone on with ends as one that never was."""
+
+import numpy as np
+import pytest
+
+import drone_rl
+from drone_rl.proofs.prover import Prover
+from drone_rl.proofs.saving import load, save
+from drone_rl.proofs.subject import make_subject
+from drone_rl.utils.errors import InputError
+
+
+@pytest.fixture(scope="module")
+def subject():
+    policy = drone_rl.load_policy("right_and_forward").in_task(num_cubes=1)
+    subject = make_subject(policy.description, policy.make_network(), 1e-4)
+    yield subject
+    subject.close()
+
+
+def finish(prover):
+    while not prover.is_finished:
+        prover.advance()
+    found = prover.findings()
+    endings = {e: sorted(b.tolist()) for e, b in found.endings.items()}
+    return endings, found.steps, sorted(found.undecided.tolist()), prover.num_places
+
+
+@pytest.mark.parametrize("places", [3, 40])
+def test_stopped_and_gone_on_with(subject, tmp_path, places):
+    path = tmp_path / "state.npz"
+    stopped = Prover(subject)
+    for _ in range(places):
+        stopped.advance()
+    save(stopped, path, "this")
+    later = Prover(subject)
+    load(later, path, "this")
+    assert later.decided == stopped.decided
+    assert finish(later) == finish(Prover(subject))
+
+
+def test_another_proofs_state_is_refused(subject, tmp_path):
+    path = tmp_path / "state.npz"
+    save(Prover(subject), path, "this")
+    with pytest.raises(InputError, match="is of another proof; delete it"):
+        load(Prover(subject), path, "that")
+
+
+@pytest.mark.parametrize("content", [b"no archive", b"PK\x03\x04 cut short"])
+def test_a_broken_state_is_refused(subject, tmp_path, content):
+    path = tmp_path / "state.npz"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match="is no state of a proof"):
+        load(Prover(subject), path, "this")
+
+
+def test_a_state_with_code_in_it_is_refused(subject, tmp_path):
+    path = tmp_path / "state.npz"
+    np.savez(path, subject=np.array([print], dtype=object))
+    with pytest.raises(InputError, match="is no state of a proof"):
+        load(Prover(subject), path, "this")
