@@ -15,12 +15,14 @@ if TYPE_CHECKING:
     from drone_rl.api.explaining import Explanations, explain
     from drone_rl.api.judging import Evaluation, Judgement, evaluate, judge
     from drone_rl.api.policy import Policy, load_policy
+    from drone_rl.api.provable import train_until_proved
     from drone_rl.api.proving import Proof, load_proof, prove
     from drone_rl.api.training import Training, train
     from drone_rl.explanations.settings import ExplainSettings
     from drone_rl.settings.chances import ChanceSettings
     from drone_rl.settings.checking import CheckSettings
     from drone_rl.settings.judging import EvaluateSettings, JudgeSettings
+    from drone_rl.settings.provable import ProvableSettings
     from drone_rl.settings.proving import ProveSettings
     from drone_rl.settings.training import TrainerSettings, TrainSettings
     from drone_rl.sim.settings import CameraSettings, TaskSettings
@@ -35,12 +37,14 @@ _PLACES = {
     "api.explaining": ("Explanations", "explain"),
     "api.judging": ("Evaluation", "Judgement", "evaluate", "judge"),
     "api.policy": ("Policy", "load_policy"),
+    "api.provable": ("train_until_proved",),
     "api.proving": ("Proof", "load_proof", "prove"),
     "api.training": ("Training", "train"),
     "explanations.settings": ("ExplainSettings",),
     "settings.chances": ("ChanceSettings",),
     "settings.checking": ("CheckSettings",),
     "settings.judging": ("EvaluateSettings", "JudgeSettings"),
+    "settings.provable": ("ProvableSettings",),
     "settings.proving": ("ProveSettings",),
     "settings.training": ("TrainSettings", "TrainerSettings"),
     "sim.settings": ("CameraSettings", "TaskSettings"),
@@ -63,6 +67,7 @@ __all__ = [
     "Judgement",
     "Policy",
     "Proof",
+    "ProvableSettings",
     "ProveSettings",
     "TaskSettings",
     "TrainSettings",
@@ -78,6 +83,7 @@ __all__ = [
     "make_env",
     "prove",
     "train",
+    "train_until_proved",
 ]
 
 

@@ -93,7 +93,6 @@ def train(
     *,
     folder: str | Path | None = None,
     resume: bool = False,
-    practice: Practice | None = None,
     callbacks: Sequence[Callback] = (),
     progress: Progress | None = None,
     **changes: Any,
@@ -104,7 +103,6 @@ def train(
         settings: What is learned, how, and for how long; those of the run if it is resumed.
         folder: Where everything is left; by default a new one under outputs/train/runs.
         resume: Whether to go on with the run that is in the folder, bit for bit.
-        practice: Where episodes begin, if not anywhere; not a part of what is saved.
         callbacks: Told of every update, besides those that write checkpoints and metrics.
         progress: Told of how far it is; a bar by default.
         changes: Settings to change, as in `train(seed=1, task=TaskSettings(num_cubes=5))`.
@@ -112,41 +110,70 @@ def train(
     Raises:
         InputError: A setting is unusable, or learning broke down.
     """
-    folder = _new_folder() if folder is None else Path(folder)
-    state = read_checkpoint(folder / "checkpoints" / "last.pt") if resume else None
+    folder = new_folder() if folder is None else Path(folder)
+    state = read_checkpoint(last_of(folder)) if resume else None
     if settings is None:
-        settings = TrainSettings() if state is None else _settings_of(state["config"])
+        settings = TrainSettings() if state is None else settings_of(state["config"])
     settings = settings.replace(**changes)
-    if state is not None:
-        check_same_config(_own(state["config"]), as_config(settings), MAY_CHANGE)
     folder.mkdir(parents=True, exist_ok=True)
     with folder_lock(folder):
-        told = [*callbacks, _Tell(progress or Bar())]
-        trainer, checkpoints = _build(settings, folder, told, practice)
-        if state is not None:
-            trainer.load_state_dict(state)
-            checkpoints.best = _read_best(state.get("best"))
-        return _run(settings, folder, trainer, checkpoints)
+        told = [*callbacks, Tell(progress or Bar())]
+        return finish(settings, folder, learn(settings, folder, state, told))
 
 
-def _run(
-    settings: TrainSettings, folder: Path, trainer: Trainer, checkpoints: CheckpointCallback
-) -> Training:
+def learn(
+    settings: TrainSettings,
+    folder: Path,
+    state: Mapping[str, Any] | None,
+    callbacks: Sequence[Callback],
+    practice: Practice | None = None,
+) -> dict[str, Any]:
+    """Trains until solved, out of budget or told to stop, and leaves checkpoints and metrics.
+
+    Args:
+        settings: What is learned, how, and for how long.
+        folder: Where everything is left; this process holds it.
+        state: Of the checkpoint to go on from, if any.
+        callbacks: Told of every update, besides those that write checkpoints and metrics.
+        practice: Where episodes begin, if not anywhere; not a part of what is saved.
+
+    Returns:
+        Why it stopped and how far it came, as in `result.json`.
+
+    Raises:
+        InputError: The checkpoint is of another training, or learning broke down.
+    """
+    if state is not None:
+        check_same_config(_own(state["config"]), as_config(settings), MAY_CHANGE)
+    trainer, checkpoints = _build(settings, folder, callbacks, practice)
+    if state is not None:
+        trainer.load_state_dict(state)
+        checkpoints.best = _read_best(state.get("best"))
     try:
         reason = trainer.run()
     except NotANumberError as error:
         raise InputError(f"{error}; the last good checkpoint is {checkpoints.last_path}") from error
     finally:
         trainer.collector.shutdown()
-    result = {"reason": reason, **dataclasses.asdict(trainer.progress)}
-    result["num_cubes"] = settings.task.num_cubes
-    if settings.evaluate_after and not reason.startswith("SIG"):
+    progress = dataclasses.asdict(trainer.progress)
+    return {"reason": reason, **progress, "num_cubes": settings.task.num_cubes}
+
+
+def finish(settings: TrainSettings, folder: Path, result: dict[str, Any]) -> Training:
+    """Judges the last policy, if that is asked for and no signal ended it, and notes the result.
+
+    Args:
+        settings: Of the training.
+        folder: Its own.
+        result: Goes into `result.json`.
+    """
+    if settings.evaluate_after and not result["reason"].startswith("SIG"):
         from drone_rl.api.choosing import judge_to_choose  # slow to import, and few need it
 
-        last, episodes = checkpoints.last_path, settings.evaluate_after
+        last, episodes = last_of(folder), settings.evaluate_after
         result["verdict"], _ = judge_to_choose(last, episodes, settings.device)
     write_atomically(folder / "result.json", json.dumps(result, indent=2))
-    return Training(folder, reason, result)
+    return Training(folder, result["reason"], result)
 
 
 def _build(
@@ -194,7 +221,7 @@ def _learner(settings: TrainSettings, network: nn.Module, actor: nn.Module) -> R
     )
 
 
-class _Tell(Callback):
+class Tell(Callback):
     """Passes on how far a training is."""
 
     def __init__(self, progress: Progress) -> None:
@@ -218,7 +245,7 @@ def _own(config: Mapping[str, Any]) -> dict[str, Any]:
     return {k: v for k, v in modern(config).items() if k in kinds_of(TrainSettings)}
 
 
-def _settings_of(config: Mapping[str, Any]) -> TrainSettings:
+def settings_of(config: Mapping[str, Any]) -> TrainSettings:
     """The settings that a checkpoint was made with; only such as name parts of our own.
 
     Raises:
@@ -245,7 +272,12 @@ def _read_best(value: Any) -> float:
     return Real(-1e6, 1e6).read(value, "the checkpoint's best")
 
 
-def _new_folder() -> Path:
+def last_of(folder: Path) -> Path:
+    """The newest checkpoint of a run."""
+    return folder / "checkpoints" / "last.pt"
+
+
+def new_folder() -> Path:
     """Named by when it begins, like those of `drone-rl train`."""
     now = time.time()
     stamp = time.strftime("%Y-%m-%d_%H-%M-%S", time.localtime(now))

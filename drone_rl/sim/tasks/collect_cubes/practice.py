@@ -63,4 +63,4 @@ def inflated(boxes: NDArray[np.float64], metres: float, bound: float) -> NDArray
         metres: How much farther.
         bound: Cubes are placed up to so many metres to either side.
     """
-    return np.clip(boxes + (-metres, metres), -bound, bound)
+    return np.clip(boxes + np.array([-metres, metres]), -bound, bound)
