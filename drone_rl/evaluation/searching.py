@@ -8,7 +8,7 @@ from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 from drone_rl.collectors import EpisodeCollector
 
-_TOLD = ("cube_positions", "collected")
+_TOLD = ("collected", "cube_positions")
 
 
 def find_failures(
@@ -32,7 +32,8 @@ def find_failures(
     with set_exploration_type(ExplorationType.DETERMINISTIC):
         while collector.episodes < num_episodes and sum(map(len, found)) < enough:
             batch = collector.collect()
-            last = batch["next", "info"][batch["next", "done"][:, 0]]
-            failed = last[~last["collected"].all(-1)]
-            found.append(failed["cube_positions"][..., 1].double().cpu().numpy())
+            is_last = batch["next", "done"][:, 0]
+            collected, cubes = (batch["next", "info", name][is_last] for name in _TOLD)
+            failed = cubes[~collected.all(-1)]
+            found.append(np.asarray(failed[..., 1].double().cpu()))
     return np.concatenate(found), collector.episodes
