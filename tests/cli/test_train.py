@@ -125,7 +125,7 @@ def test_rounds_of_practice_by_the_command_line(tmp_path):
     assert "8 of 8 flights failed" in done.stdout
     noted = json.loads((tmp_path / "run" / "provable.json").read_text())
     assert noted["how"]["frames"] == 100 and len(noted["rounds"]) == 1  # the frames are spent
-    longer = ["trainer.total_frames=600", "provable.rounds=2"]
+    longer = ["trainer.total_frames=2000", "provable.rounds=2"]
     done = drone_rl("train", "resume=run", *longer, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     result = json.loads((tmp_path / "run" / "result.json").read_text())
