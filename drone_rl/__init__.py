@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from drone_rl.api.judging import Evaluation, Judgement, evaluate, judge
     from drone_rl.api.mapping import Places, places
     from drone_rl.api.policy import Policy, load_policy
+    from drone_rl.api.provable import train_until_proved
     from drone_rl.api.proving import Proof, load_proof, prove
     from drone_rl.api.training import Training, train
     from drone_rl.explanations.settings import ExplainSettings
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from drone_rl.settings.checking import CheckSettings
     from drone_rl.settings.judging import EvaluateSettings, JudgeSettings
     from drone_rl.settings.mapping import PlacesSettings
+    from drone_rl.settings.provable import ProvableSettings
     from drone_rl.settings.proving import ProveSettings
     from drone_rl.settings.training import TrainerSettings, TrainSettings
     from drone_rl.sim.settings import CameraSettings, TaskSettings
@@ -38,6 +40,7 @@ _PLACES = {
     "api.judging": ("Evaluation", "Judgement", "evaluate", "judge"),
     "api.mapping": ("Places", "places"),
     "api.policy": ("Policy", "load_policy"),
+    "api.provable": ("train_until_proved",),
     "api.proving": ("Proof", "load_proof", "prove"),
     "api.training": ("Training", "train"),
     "explanations.settings": ("ExplainSettings",),
@@ -45,6 +48,7 @@ _PLACES = {
     "settings.checking": ("CheckSettings",),
     "settings.judging": ("EvaluateSettings", "JudgeSettings"),
     "settings.mapping": ("PlacesSettings",),
+    "settings.provable": ("ProvableSettings",),
     "settings.proving": ("ProveSettings",),
     "settings.training": ("TrainSettings", "TrainerSettings"),
     "sim.settings": ("CameraSettings", "TaskSettings"),
@@ -69,6 +73,7 @@ __all__ = [
     "PlacesSettings",
     "Policy",
     "Proof",
+    "ProvableSettings",
     "ProveSettings",
     "TaskSettings",
     "TrainSettings",
@@ -85,6 +90,7 @@ __all__ = [
     "places",
     "prove",
     "train",
+    "train_until_proved",
 ]
 
 

@@ -11,6 +11,7 @@ from drone_rl.settings.collecting import Ray
 from drone_rl.settings.configuration import as_config, from_config
 from drone_rl.settings.training import TrainSettings
 from drone_rl.settings.variant import locate
+from drone_rl.sim.tasks import Practice
 from drone_rl.utils.seeding import Stream, torch_generator
 from drone_rl.zoo import describe
 
@@ -27,28 +28,33 @@ class Collecting(NamedTuple):
     """Random streams of this process, by name."""
 
 
-def build_collector(settings: TrainSettings) -> Collecting:
+def build_collector(settings: TrainSettings, practice: Practice | None = None) -> Collecting:
     """The collector that the settings ask for, over worlds that fly by an untrained network.
+
+    Args:
+        settings: The training's.
+        practice: Where episodes begin, if not anywhere.
 
     Raises:
         InputError: There is no such device, or an extra isn't installed.
     """
-    return locate(settings.collector.target)(settings)
+    make = locate(settings.collector.target)
+    return make(settings) if practice is None else make(settings, practice)
 
 
-def threaded_collector(settings: TrainSettings) -> Collecting:
+def threaded_collector(settings: TrainSettings, practice: Practice | None = None) -> Collecting:
     """`Threads`: the workers are threads of this process."""
     shares = _shares(settings, is_one=settings.device.startswith("cuda"))
     network, collectors, generators = None, [], {}
     for i in range(len(shares)):
-        collector, network, actions = build_share(settings, shares, i, network)
+        collector, network, actions = build_share(settings, shares, i, network, practice)
         collectors.append(collector)
         generators[f"actions_{i}"] = actions
     assert network is not None  # there is at least one share
     return Collecting(ThreadedCollector(collectors), network, generators)
 
 
-def ray_collector(settings: TrainSettings) -> Collecting:
+def ray_collector(settings: TrainSettings, practice: Practice | None = None) -> Collecting:
     """`Ray`: the workers are processes of a Ray cluster."""
     from drone_rl.collectors.ray import RayEpisodeCollector  # slow to import, seldom needed
 
@@ -58,7 +64,8 @@ def ray_collector(settings: TrainSettings) -> Collecting:
     local, network, _ = build_share(settings, [1], 0)
     local.shutdown()
     config = as_config(settings)
-    makers = [functools.partial(_remote_share, config, shares, i) for i in range(len(shares))]
+    workers = range(len(shares))
+    makers = [functools.partial(_remote_share, config, shares, i, practice) for i in workers]
     collector = RayEpisodeCollector(
         makers,
         local.actor,
@@ -72,7 +79,11 @@ def ray_collector(settings: TrainSettings) -> Collecting:
 
 
 def build_share(
-    settings: TrainSettings, shares: list[int], number: int, network: PolicyNetwork | None = None
+    settings: TrainSettings,
+    shares: list[int],
+    number: int,
+    network: PolicyNetwork | None = None,
+    practice: Practice | None = None,
 ) -> tuple[EpisodeCollector, PolicyNetwork, torch.Generator]:
     """One worker's worlds, with the network that all share, and the stream of its actions.
 
@@ -81,12 +92,14 @@ def build_share(
         shares: Worlds of each worker.
         number: Of this worker.
         network: That of the other workers; None makes it.
+        practice: Where episodes begin, if not anywhere.
     """
     description, seed = describe(as_config(settings)), settings.seed
     env = description.build_env(
         shares[number],
         seed=seed,
         device=settings.device,
+        task=practice,
         first_world=sum(shares[:number]),
         num_shards=1,
     )
@@ -98,10 +111,11 @@ def build_share(
 
 
 def _remote_share(
-    config: dict[str, Any], shares: list[int], number: int
+    config: dict[str, Any], shares: list[int], number: int, practice: Practice | None
 ) -> tuple[EpisodeCollector, PolicyNetwork, torch.Generator]:
     """`build_share` from what can be sent."""
-    return build_share(from_config(TrainSettings, config), shares, number)
+    settings = from_config(TrainSettings, config)
+    return build_share(settings, shares, number, practice=practice)
 
 
 def _shares(settings: TrainSettings, is_one: bool = False) -> list[int]:

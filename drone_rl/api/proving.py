@@ -41,6 +41,11 @@ class Proof:
         return sum(done)
 
     @property
+    def lost(self) -> float:
+        """Share of all placements from which it is not, for certain."""
+        return sum(o["share"] for o in self.certificate["outcomes"] if o["end"] != "all_cubes")
+
+    @property
     def undecided(self) -> float:
         """Share of the placements of which nothing is claimed."""
         return self.certificate["undecided"]["share"]
@@ -56,6 +61,11 @@ class Proof:
         lost = [o["boxes"] for o in self.certificate["outcomes"] if o["end"] != "all_cubes"]
         n = self.certificate["policy"]["description"]["task"]["num_cubes"]
         return np.concatenate([np.empty((0, n, 2)), *map(np.array, lost)])
+
+    def open(self) -> np.ndarray:
+        """The boxes of which nothing is claimed. Shape: (N, num_cubes, 2), metres."""
+        n = self.certificate["policy"]["description"]["task"]["num_cubes"]
+        return np.array(self.certificate["undecided"]["boxes"], float).reshape(-1, n, 2)
 
     def rows(self) -> list[list[str]]:
         """The outcomes as texts: names, then a row for each."""

@@ -19,7 +19,7 @@ from drone_rl.api.showing import picture, table
 from drone_rl.settings.comparison import check_same_config, modern
 from drone_rl.settings.configuration import as_config, from_config
 from drone_rl.settings.training import TrainSettings
-from drone_rl.sim.tasks import as_task
+from drone_rl.sim.tasks import Practice, as_task
 from drone_rl.training import (
     Callback,
     CheckpointCallback,
@@ -110,52 +110,81 @@ def train(
     Raises:
         InputError: A setting is unusable, or learning broke down.
     """
-    folder = _new_folder() if folder is None else Path(folder)
-    state = read_checkpoint(folder / "checkpoints" / "last.pt") if resume else None
+    folder = new_folder() if folder is None else Path(folder)
+    state = read_checkpoint(last_of(folder)) if resume else None
     if settings is None:
-        settings = TrainSettings() if state is None else _settings_of(state["config"])
+        settings = TrainSettings() if state is None else settings_of(state["config"])
     settings = settings.replace(**changes)
-    if state is not None:
-        check_same_config(_own(state["config"]), as_config(settings), MAY_CHANGE)
     folder.mkdir(parents=True, exist_ok=True)
     with folder_lock(folder):
-        told = [*callbacks, _Tell(progress or Bar())]
-        trainer, checkpoints = _build(settings, folder, told)
-        if state is not None:
-            trainer.load_state_dict(state)
-            checkpoints.best = _read_best(state.get("best"))
-        return _run(settings, folder, trainer, checkpoints)
+        told = [*callbacks, Tell(progress or Bar())]
+        return finish(settings, folder, learn(settings, folder, state, told))
 
 
-def _run(
-    settings: TrainSettings, folder: Path, trainer: Trainer, checkpoints: CheckpointCallback
-) -> Training:
+def learn(
+    settings: TrainSettings,
+    folder: Path,
+    state: Mapping[str, Any] | None,
+    callbacks: Sequence[Callback],
+    practice: Practice | None = None,
+) -> dict[str, Any]:
+    """Trains until solved, out of budget or told to stop, and leaves checkpoints and metrics.
+
+    Args:
+        settings: What is learned, how, and for how long.
+        folder: Where everything is left; this process holds it.
+        state: Of the checkpoint to go on from, if any.
+        callbacks: Told of every update, besides those that write checkpoints and metrics.
+        practice: Where episodes begin, if not anywhere; not a part of what is saved.
+
+    Returns:
+        Why it stopped and how far it came, as in `result.json`.
+
+    Raises:
+        InputError: The checkpoint is of another training, or learning broke down.
+    """
+    if state is not None:
+        check_same_config(_own(state["config"]), as_config(settings), MAY_CHANGE)
+    trainer, checkpoints = _build(settings, folder, callbacks, practice)
+    if state is not None:
+        trainer.load_state_dict(state)
+        checkpoints.best = _read_best(state.get("best"))
     try:
         reason = trainer.run()
     except NotANumberError as error:
         raise InputError(f"{error}; the last good checkpoint is {checkpoints.last_path}") from error
     finally:
         trainer.collector.shutdown()
-    result = {"reason": reason, **dataclasses.asdict(trainer.progress)}
-    result["num_cubes"] = settings.task.num_cubes
-    if settings.evaluate_after and not reason.startswith("SIG"):
+    progress = dataclasses.asdict(trainer.progress)
+    return {"reason": reason, **progress, "num_cubes": settings.task.num_cubes}
+
+
+def finish(settings: TrainSettings, folder: Path, result: dict[str, Any]) -> Training:
+    """Judges the last policy, if that is asked for and no signal ended it, and notes the result.
+
+    Args:
+        settings: Of the training.
+        folder: Its own.
+        result: Goes into `result.json`.
+    """
+    if settings.evaluate_after and not result["reason"].startswith("SIG"):
         from drone_rl.api.choosing import judge_to_choose  # slow to import, and few need it
 
-        last, episodes = checkpoints.last_path, settings.evaluate_after
+        last, episodes = last_of(folder), settings.evaluate_after
         result["verdict"], _ = judge_to_choose(last, episodes, settings.device)
     write_atomically(folder / "result.json", json.dumps(result, indent=2))
-    return Training(folder, reason, result)
+    return Training(folder, result["reason"], result)
 
 
 def _build(
-    settings: TrainSettings, folder: Path, callbacks: Sequence[Callback]
+    settings: TrainSettings, folder: Path, callbacks: Sequence[Callback], practice: Practice | None
 ) -> tuple[Trainer, CheckpointCallback]:
     config, origin = as_config(settings), provenance()
     description = describe(config).as_dict()
     # sums depend on how many threads make them: on as many everywhere, whatever the machine has
     torch.set_num_threads(settings.collector.num_threads)
     bound_kernels()
-    collector, network, generators = build_collector(settings)
+    collector, network, generators = build_collector(settings, practice)
     noted = {"config": config, "description": description, **origin}
     (folder / "run.yaml").write_text(yaml.safe_dump(noted, sort_keys=False))
     limits = settings.trainer
@@ -192,7 +221,7 @@ def _learner(settings: TrainSettings, network: nn.Module, actor: nn.Module) -> R
     )
 
 
-class _Tell(Callback):
+class Tell(Callback):
     """Passes on how far a training is."""
 
     def __init__(self, progress: Progress) -> None:
@@ -216,7 +245,7 @@ def _own(config: Mapping[str, Any]) -> dict[str, Any]:
     return {k: v for k, v in modern(config).items() if k in kinds_of(TrainSettings)}
 
 
-def _settings_of(config: Mapping[str, Any]) -> TrainSettings:
+def settings_of(config: Mapping[str, Any]) -> TrainSettings:
     """The settings that a checkpoint was made with; only such as name parts of our own.
 
     Raises:
@@ -243,7 +272,12 @@ def _read_best(value: Any) -> float:
     return Real(-1e6, 1e6).read(value, "the checkpoint's best")
 
 
-def _new_folder() -> Path:
+def last_of(folder: Path) -> Path:
+    """The newest checkpoint of a run."""
+    return folder / "checkpoints" / "last.pt"
+
+
+def new_folder() -> Path:
     """Named by when it begins, like those of `drone-rl train`."""
     now = time.time()
     stamp = time.strftime("%Y-%m-%d_%H-%M-%S", time.localtime(now))

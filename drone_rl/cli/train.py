@@ -1,10 +1,12 @@
 """`drone-rl train`: one run, or the sweep of many, which needs none of the heavy libraries."""
 
 import dataclasses
+import functools
 import logging
 import signal
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import drone_rl
 from drone_rl.hydra_app.launchers import LocalLauncher, RayLauncher, SlurmLauncher, register_plugins
@@ -12,8 +14,10 @@ from drone_rl.hydra_app.optuna_sweeper import OptunaSweeper
 from drone_rl.hydra_app.resuming import complete as prepare  # noqa: F401 -- of what was typed
 from drone_rl.settings.loggers import Logger, Tensorboard
 from drone_rl.settings.paths import PathsSettings
+from drone_rl.settings.provable import ProvableSettings
 from drone_rl.settings.training import TrainSettings
 from drone_rl.utils.schema import Instance, Several, Whole
+from drone_rl.words.proof import found
 
 _log = logging.getLogger(__name__)
 
@@ -28,8 +32,17 @@ class Command(TrainSettings):
     """Folders."""
     resume: str | None = None
     """Folder of a run to go on with (its own settings are taken over); none starts a new one."""
+    provable: ProvableSettings = ProvableSettings()
+    """How training goes on until nothing is left that the policy fails at."""
     trial: Annotated[int, Whole(0)] | None = None
     """Number of this run in the search of hydra/sweeper=optuna, which sets it; none for none."""
+
+
+def _training(provable: ProvableSettings) -> Callable[..., Any]:
+    """What trains: as usual, or until it is proved."""
+    if not provable.rounds:
+        return drone_rl.train
+    return functools.partial(drone_rl.train_until_proved, how=provable)
 
 
 def register() -> None:
@@ -39,7 +52,7 @@ def register() -> None:
 
 def run(settings: Command, folder: Path) -> tuple[int, float]:
     """Trains one policy. Returns the exit status and the running mean of rewards."""
-    train = drone_rl.train  # slow to import; a sweep leaves it to its runs
+    train = _training(settings.provable)  # slow to import; a sweep leaves it to its runs
     from drone_rl.api.progress import silent
     from drone_rl.sweeps.pruning import PruneCallback
     from drone_rl.training import LoggerCallback, ProgressCallback
@@ -54,6 +67,8 @@ def run(settings: Command, folder: Path) -> tuple[int, float]:
         progress=silent,
     )
     _log.info("run folder: %s", folder)
+    for row in done.result.get("rounds", ()):
+        _log.info(found(row))
     if not done.reason.startswith("SIG"):
         return 0, done.running_reward
     _log.info("go on with: drone-rl train resume=%s", folder)

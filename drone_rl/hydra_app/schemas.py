@@ -14,6 +14,7 @@ from drone_rl.settings.learning import Objective, Optimiser, Scheduler
 from drone_rl.settings.loggers import Logger
 from drone_rl.settings.networks import Network
 from drone_rl.settings.paths import PathsSettings
+from drone_rl.settings.provable import ProvableSettings
 from drone_rl.settings.returns import Returns
 from drone_rl.settings.training import TrainerSettings
 from drone_rl.settings.transforms import Transform
@@ -25,6 +26,7 @@ GROUPS: dict[str, type[Settings]] = {
     "task": TaskSettings,
     "camera": CameraSettings,
     "trainer": TrainerSettings,
+    "provable": ProvableSettings,
     "paths": PathsSettings,
 }
 """Groups whose files start from the schema `base_<group>`."""

@@ -49,8 +49,8 @@ class Row:
 
     @property
     def is_solved(self) -> bool:
-        """Whether it reached the target."""
-        return self.result.get("reason") == "solved"
+        """Whether it reached the target, or was proved to do all that there is to do."""
+        return self.result.get("reason") in ("solved", "proved")
 
     @property
     def verdict(self) -> dict[str, Any] | None:

@@ -23,7 +23,9 @@ _NAME = r"[A-Za-z]\w*"
 _HARMLESS = re.compile(rf"(\+{{0,2}}{_NAME}([./@]{_NAME})*=.*|~{_NAME}([./@]{_NAME})*)")
 _SCALAR = r"[\w.+-]*"
 _VALUE = rf"({_SCALAR}|\[({_SCALAR}(, ?{_SCALAR})*)?\])"
-_SECTIONS = "task|camera|trainer|network|policy|returns|objective|optimiser|scheduler|transforms"
+_SECTIONS = (
+    "task|camera|trainer|network|policy|returns|objective|optimiser|scheduler|transforms|provable"
+)
 _TAKEN_OVER = (
     r"(seed|evaluate_after|trial|resume)=\w*",
     r"device=(cpu|cuda)(:\d+)?",

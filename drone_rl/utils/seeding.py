@@ -22,6 +22,8 @@ class Stream(enum.IntEnum):
     """Worlds by which one policy of several is chosen; never those of a report."""
     REPORT = 4
     """Worlds of which figures are reported; nothing is ever chosen by them."""
+    SEARCH = 5
+    """Worlds in which a training looks for what its policy can't do yet."""
 
 
 def seed_sequence(seed: int, *key: int) -> np.random.SeedSequence:

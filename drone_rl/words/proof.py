@@ -26,5 +26,18 @@ def sentence(certificate: Mapping[str, Any]) -> str:
     return text + "."
 
 
+def found(search: Mapping[str, Any]) -> str:
+    """What a training found in one of its searches for failures.
+
+    Args:
+        search: A row of "rounds" in `result.json`, see `drone_rl.api.journal.Round`.
+    """
+    text = f"at frame {search['frames']:,}: {search['failures']} of {search['flights']:,} flights"
+    if search["losing"] is None:
+        return f"{text} failed"
+    text += f" failed; proof in {search['proof_s']:.0f} s: fails from {_share(search['losing'])}"
+    return f"{text}, undecided {_share(search['undecided'])}"
+
+
 def _share(value: float) -> str:
     return f"a share of {value:.9g}"

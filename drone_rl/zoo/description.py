@@ -16,7 +16,7 @@ from drone_rl.envs import DroneEnv, with_transforms
 from drone_rl.policies import PolicyNetwork
 from drone_rl.sim.actions import Actions
 from drone_rl.sim.settings import CameraSettings, TaskSettings
-from drone_rl.sim.tasks import as_task
+from drone_rl.sim.tasks import Task, as_task
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Record, Several, as_mapping, shown
 from drone_rl.utils.settings import plain
@@ -100,7 +100,14 @@ class PolicyDescription:
         }
 
     def build_env(
-        self, num_envs: int, *, seed: int, device: str, pixels: bool = True, **kwargs: Any
+        self,
+        num_envs: int,
+        *,
+        seed: int,
+        device: str,
+        pixels: bool = True,
+        task: Task[Any] | None = None,
+        **kwargs: Any,
     ) -> TransformedEnv:
         """The described worlds, seen through the described camera and transforms.
 
@@ -109,6 +116,7 @@ class PolicyDescription:
             seed: Root of their random streams.
             device: Where they are drawn.
             pixels: Whether they are drawn at all.
+            task: One that looks like the described one, but begins its episodes otherwise.
             kwargs: See `DroneEnv`.
         """
         made = []
@@ -116,7 +124,13 @@ class PolicyDescription:
             part = TRANSFORMS[choice.name]
             made.append(part.make(**choice.values, **part.fixed))
         env = DroneEnv(
-            num_envs, self.task, self.camera, seed=seed, device=device, pixels=pixels, **kwargs
+            num_envs,
+            task or self.task,
+            self.camera,
+            seed=seed,
+            device=device,
+            pixels=pixels,
+            **kwargs,
         )
         return with_transforms(env, made)
 

@@ -116,3 +116,18 @@ def test_full_disk_while_saving_keeps_the_previous_checkpoint(run, tmp_path):
     assert sorted(p.name for p in folder.iterdir()) == ["best.pt", "last.pt"]
     assert load_checkpoint(folder / "last.pt")["progress"]["updates"] == 0
     assert os.path.getsize(folder / "last.pt") > 4096
+
+
+def test_rounds_of_practice_by_the_command_line(tmp_path):
+    rounds = ["provable.rounds=1", "provable.frames=100", "provable.flights=8"]
+    done = drone_rl("train", *TINY, *rounds, "hydra.run.dir=run", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "8 of 8 flights failed" in done.stdout
+    noted = json.loads((tmp_path / "run" / "provable.json").read_text())
+    assert noted["how"]["frames"] == 100 and len(noted["rounds"]) == 1  # the frames are spent
+    longer = ["trainer.total_frames=2000", "provable.rounds=2"]
+    done = drone_rl("train", "resume=run", *longer, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    result = json.loads((tmp_path / "run" / "result.json").read_text())
+    frames = [row["frames"] for row in result["rounds"]]
+    assert len(frames) == 3 and frames == sorted(set(frames))

@@ -42,6 +42,7 @@ def test_streams_have_the_numbers_on_which_all_figures_rest():
         "ACTIONS": 2,
         "CHOICE": 3,
         "REPORT": 4,
+        "SEARCH": 5,
     }
     drawn = world_random_state(7, 2).uniform()
     child = np.random.SeedSequence(7, spawn_key=(Stream.WORLDS, 2))

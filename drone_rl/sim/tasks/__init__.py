@@ -3,13 +3,23 @@
 from typing import Any
 
 from drone_rl.sim.settings import TaskSettings
-from drone_rl.sim.tasks.collect_cubes import CollectCubes
+from drone_rl.sim.tasks.collect_cubes import CollectCubes, Practice
 from drone_rl.sim.tasks.explainable import Grid
 from drone_rl.sim.tasks.judgeable import Goals, OracleRule
 from drone_rl.sim.tasks.playable import Prop, State
 from drone_rl.sim.tasks.task import Task
 
-__all__ = ["CollectCubes", "Goals", "Grid", "OracleRule", "Prop", "State", "Task", "as_task"]
+__all__ = [
+    "CollectCubes",
+    "Goals",
+    "Grid",
+    "OracleRule",
+    "Practice",
+    "Prop",
+    "State",
+    "Task",
+    "as_task",
+]
 
 
 def as_task(task: TaskSettings | Task[Any] | None) -> Task[Any]:

@@ -1,0 +1,59 @@
+"""Policies that are trained until they are proved, and what usual training leaves behind."""
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from drone_rl.api.progress import silent
+from drone_rl.api.proving import prove
+from drone_rl.api.training import train
+from drone_rl.bench.commands import call
+from drone_rl.utils.files import read_json
+
+
+def bench_provable(folder: Path, seeds: Sequence[int], quick: bool) -> dict[str, Any]:
+    """Trains from each seed until the policy is proved, as a user starts it.
+
+    Args:
+        folder: For the runs.
+        seeds: Of the trainings.
+        quick: Whether one cube and one seed will do.
+
+    Returns:
+        Per seed: seconds from the start of the command to its end, searches for failures, and
+        whether it is proved.
+    """
+    results: dict[str, list] = {"provable_s": [], "provable_rounds": [], "provable_proved": []}
+    easier = ["task=collect_one", "provable.flights=500"] if quick else []
+    for seed in seeds[:1] if quick else seeds:
+        run = folder / f"provable_{seed}"
+        begin = time.perf_counter()
+        call("train", "experiment=provable", f"seed={seed}", f"hydra.run.dir={run}", *easier)
+        results["provable_s"].append(time.perf_counter() - begin)
+        result = read_json(run / "result.json")
+        results["provable_rounds"].append(len(result["rounds"]))
+        results["provable_proved"].append(result["reason"] == "proved")
+    return results
+
+
+def bench_losing(folder: Path, seeds: Sequence[int], quick: bool) -> dict[str, Any]:
+    """Trains with the defaults from each seed, and proves how much of its task each policy fails.
+
+    Args:
+        folder: For runs and certificates.
+        seeds: Of the trainings.
+        quick: Whether one cube and one seed will do.
+
+    Returns:
+        Per seed: the exact share of placements that fail, and that which is undecided.
+    """
+    losing, undecided = [], []
+    for seed in seeds[:1] if quick else seeds:
+        run = folder / f"default_{seed}"
+        done = train(folder=run, seed=seed, progress=silent)
+        task = {"num_cubes": 1} if quick else {}
+        proof = prove(done.policy, folder=run, task=task, progress=silent)
+        losing.append(proof.lost)
+        undecided.append(proof.undecided)
+    return {"losing_default": losing, "losing_default_undecided": undecided}
