@@ -8,7 +8,9 @@ from pathlib import Path
 
 from drone_rl.bench.commands import PROGRAM, call
 
-_IMPORT = "import time; t = time.perf_counter(); import drone_rl; print(time.perf_counter() - t)"
+_IMPORT = "import time; t = time.perf_counter(); import {}; print(time.perf_counter() - t)"
+TORCH_S = 1.0
+"""Of `import torch` on the machine for which the figures were asked."""
 _LOOK_S = 0.005
 """Time between two looks for the first update."""
 
@@ -23,24 +25,30 @@ def bench_startup(folder: Path, device: str, quick: bool) -> dict[str, float]:
 
     Returns:
         "import_s" of the package alone, "start_to_first_update_s" of `drone-rl train`, "verdict_s"
-        of `drone-rl verdict policy=good`, with its 400 episodes.
+        of `drone-rl verdict policy=good`, with its 400 episodes; "import_torch_s", which tells how
+        fast the machine is, and the two times as they would be where that takes 1 s.
     """
     times = range(1 if quick else 3)
     import_seconds()  # the first one compiles Python's files
     first_update_seconds(folder / "warm", device)  # and this one the kernels
     updates = [first_update_seconds(folder / f"update_{i}", device) for i in times]
     verdicts = [verdict_seconds(folder / f"verdict_{i}", device) for i in times]
+    torch_s = statistics.median(import_seconds("torch") for _ in times)
+    update_s, verdict_s = statistics.median(updates), statistics.median(verdicts)
     return {
         "import_s": statistics.median(import_seconds() for _ in times),
-        "start_to_first_update_s": statistics.median(updates),
-        "verdict_s": statistics.median(verdicts),
+        "start_to_first_update_s": update_s,
+        "verdict_s": verdict_s,
+        "import_torch_s": torch_s,
+        "start_to_first_update_scaled_s": update_s * TORCH_S / torch_s,
+        "verdict_scaled_s": verdict_s * TORCH_S / torch_s,
     }
 
 
-def import_seconds() -> float:
-    """Of `import drone_rl` in a fresh interpreter."""
-    done = subprocess.run([sys.executable, "-c", _IMPORT], capture_output=True, check=True)
-    return float(done.stdout)
+def import_seconds(name: str = "drone_rl") -> float:
+    """Of an import in a fresh interpreter."""
+    command = [sys.executable, "-c", _IMPORT.format(name)]
+    return float(subprocess.run(command, capture_output=True, check=True).stdout)
 
 
 def first_update_seconds(folder: Path, device: str) -> float:

@@ -86,14 +86,14 @@ def _join(boxes: Boxes, cube: int) -> Boxes:
     """Joins boxes that differ in one cube's interval alone and meet there."""
     if len(boxes) < 2:
         return boxes
-    key = np.zeros(len(boxes), np.int64)
-    for other in range(boxes.shape[1]):
-        for end in (0, 1) if other != cube else ():
-            values, number = np.unique(boxes[:, other, end], return_inverse=True)
-            _, key = np.unique(key * len(values) + number, return_inverse=True)
-    order = np.lexsort((boxes[:, cube, 0], key))
-    boxes, key = boxes[order], key[order]
-    meets = (key[1:] == key[:-1]) & (boxes[1:, cube, 0] == boxes[:-1, cube, 1])
+    others = [k for k in range(boxes.shape[1]) if k != cube]
+    rest = boxes[:, others].reshape(len(boxes), -1)
+    order = np.lexsort((boxes[:, cube, 0], *rest.T))
+    boxes, rest = boxes[order], rest[order]
+    meets = boxes[1:, cube, 0] == boxes[:-1, cube, 1]
+    meets &= (rest[1:] == rest[:-1]).all(-1)
+    if not meets.any():
+        return boxes
     first = np.flatnonzero(np.concatenate([[True], ~meets]))
     last = np.concatenate([first[1:], [len(boxes)]]) - 1
     joined = boxes[first]

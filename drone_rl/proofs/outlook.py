@@ -151,6 +151,8 @@ class Outlook:
     ) -> NDArray[np.uint8]:
         """Has several threads work on a part of the blocks each."""
         self.pictures += len(blocks)
+        if len(blocks) <= CHUNK:
+            return work(blocks) if len(blocks) else np.zeros(0, np.uint8)
         parts = np.split(blocks, range(CHUNK, len(blocks), CHUNK)) if len(blocks) else []
         return np.concatenate([np.zeros(0, np.uint8), *_workers().map(work, parts)])
 
@@ -250,36 +252,37 @@ class Ranges:
         while len(masks) > (reach := 1 << (len(self._levels) - 1)):
             masks = masks[:-reach] | masks[reach:]
             self._levels.append(masks)
-        self._doubts: dict[tuple[int, int], int] = {}
+        self._doubts = np.full((len(pictures), len(pictures)), -1, np.int32)
+        """Of each range, by its first and last picture; -1 where not yet counted."""
 
     def of(self, ranges: NDArray) -> tuple[Tensor, Tensor]:
         """Masks of the different ranges, within the part, and which of them each one is."""
-        different, case = np.unique(ranges, axis=0, return_inverse=True)
-        first, last = torch.from_numpy(different).T
-        levels = np.frexp(different[:, 1] - different[:, 0] + 1)[1] - 1
-        masks = self._levels[0].new_empty(len(different), *self._levels[0].shape[1:])
-        for level in np.unique(levels):
-            those = torch.from_numpy(np.flatnonzero(levels == level))
-            found, reach = self._levels[level], 1 << int(level)
-            masks[those] = found[first[those]] | found[last[those] + 1 - reach]
-        return masks, torch.from_numpy(case.reshape(-1))
+        code, case = np.unique(self._code(ranges), return_inverse=True)
+        return self._masks(code), torch.from_numpy(case)
 
     def doubts(self, ranges: NDArray) -> NDArray[np.int64]:
         """How many pixels may show several things in each range."""
-        different, case = np.unique(ranges, axis=0, return_inverse=True)
-        counts = [self._count(a, b) for a, b in different.tolist()]
-        return np.array(counts)[case.reshape(-1)]
+        code, counts = self._code(ranges), self._doubts.reshape(-1)
+        unknown = np.unique(code[counts[code] < 0])
+        if len(unknown):
+            masks = self._masks(unknown)
+            counts[unknown] = (masks & (masks - 1) != 0).flatten(1).sum(-1).numpy()
+        return counts[code].astype(np.int64)
 
-    def _mask(self, first: int, last: int) -> Tensor:
-        level = (last - first + 1).bit_length() - 1
-        masks = self._levels[level]
-        return masks[first] | masks[last + 1 - (1 << level)]
+    def _code(self, ranges: NDArray) -> NDArray[np.int64]:
+        """One number for each range."""
+        return ranges[:, 0] * len(self.pictures) + ranges[:, 1]
 
-    def _count(self, first: int, last: int) -> int:
-        if (first, last) not in self._doubts:
-            mask = self._mask(first, last)
-            self._doubts[first, last] = int((mask & (mask - 1) != 0).sum())
-        return self._doubts[first, last]
+    def _masks(self, code: NDArray[np.int64]) -> Tensor:
+        """What pixels may show anywhere in ranges. Shape: (N, rows, columns)."""
+        first, last = np.divmod(code, len(self.pictures))
+        levels = np.frexp(last - first + 1)[1] - 1
+        masks = self._levels[0].new_empty(len(code), *self._levels[0].shape[1:])
+        for level in np.unique(levels):
+            those = np.flatnonzero(levels == level)
+            found, reach = self._levels[level], 1 << int(level)
+            masks[those] = found[first[those]] | found[last[those] + 1 - reach]
+        return masks
 
 
 def _slices(span: NDArray) -> tuple[slice, ...]:

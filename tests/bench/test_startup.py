@@ -26,7 +26,8 @@ def test_medians_of_three_after_a_first_run(tmp_path, monkeypatch):
     seconds = iter([9.0, 4.0, 5.0, 3.0])
     monkeypatch.setattr(startup, "first_update_seconds", lambda *_: next(seconds))
     monkeypatch.setattr(startup, "verdict_seconds", lambda *_: 6.0)
-    monkeypatch.setattr(startup, "import_seconds", lambda: 0.1)
+    monkeypatch.setattr(startup, "import_seconds", lambda name="": 2.0 if name == "torch" else 0.1)
     assert startup.bench_startup(tmp_path, "cpu", quick=False) == {
         **{"import_s": 0.1, "start_to_first_update_s": 4.0, "verdict_s": 6.0},
+        **{"import_torch_s": 2.0, "start_to_first_update_scaled_s": 2.0, "verdict_scaled_s": 3.0},
     }

@@ -103,7 +103,9 @@ def test_the_exact_map_is_zoomed_and_shown_whole_again(browser):
     where = browser.find_element(By.CSS_SELECTOR, "#places .where").text
     assert "m ahead" in where and "goes " in where
     ActionChains(browser).double_click(element).perform()
-    assert [float(v) for v in element.get_dom_attribute("viewBox").split()] == [float(v) for v in whole]
+    assert [float(v) for v in element.get_dom_attribute("viewBox").split()] == [
+        float(v) for v in whole
+    ]
 
 
 def test_it_fits_a_phone(browser):
