@@ -165,7 +165,7 @@ def _within(
 
 
 def _between(first: np.float32, last: np.float32) -> list[np.float32]:
-    """The middle and the quarters: to look at several places at once is hardly slower than at one."""
+    """The middle and the quarters: several places are looked at as fast as one."""
     middle = (first + last) / np.float32(2)
     return [(first + middle) / np.float32(2), middle, (middle + last) / np.float32(2)]
 
