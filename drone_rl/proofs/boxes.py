@@ -60,12 +60,22 @@ def unite(boxes: Boxes, most: int = 10_000_000) -> Boxes:
         np.add.at(count, at, (-1) ** sum(corner))
     for axis in range(n):
         count = count.cumsum(axis)
-    edges = np.diff((count > 0).astype(np.int8), prepend=0, axis=n - 1)
+    lower, upper = np.moveaxis(blocks(count > 0), -1, 0)
+    ends = [np.stack([side[lower[:, k]], side[upper[:, k]]], -1) for k, side in enumerate(sides)]
+    return merge(np.stack(ends, 1))
+
+
+def blocks(mask: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Where a grid's cells are set, as disjoint boxes of whole cells; not the fewest.
+
+    Returns:
+        First cell along each axis, and the one after the last. Shape: (N, axes, 2).
+    """
+    edges = np.diff(mask.view(np.int8), prepend=0, append=0, axis=-1)
     first, last = np.argwhere(edges > 0), np.argwhere(edges < 0)
-    lower = np.stack([sides[k][first[:, k]] for k in range(n)], -1)
-    upper = np.stack([sides[k][(first[:, k] + 1)] for k in range(n)], -1)
-    upper[:, -1] = sides[-1][last[:, -1]]
-    return merge(np.stack([lower, upper], -1))
+    beyond = first + 1
+    beyond[:, -1] = last[:, -1]
+    return np.stack([first, beyond], -1)
 
 
 def intersect(boxes: Boxes, others: Boxes) -> Boxes:

@@ -6,7 +6,6 @@ an order round. So the pictures of a band are found by halving it until neighbou
 and bands alternate: index 0 is a cell, 1 a band, and so on; the last is a cell.
 """
 
-import itertools
 from typing import Protocol
 
 import numpy as np
@@ -139,52 +138,44 @@ def _within(
     high = bands[:, 1] - eye.rounding(bands[:, 1])
     middle, close = (low + high) / 2, (high - low) / 8
     # mostly it changes close to where it would without rounding: look there first
-    points = np.stack([low, middle - close, middle + close, high]).astype(np.float32)
-    drawn = renderer.look(points.reshape(-1)).reshape(*points.shape, *eye.shape, 3)
+    left = np.stack([low, middle - close, middle + close, high], -1).astype(np.float32)
+    drawn = _look(renderer, left)
     pure = eye.faces(ahead, _middles(_limits(bands, np.inf, -np.inf)))
-    if (drawn[-1, :-1] != drawn[0, 1:]).any() or _differs(renderer, drawn, pure):
+    if (drawn[:-1, -1] != drawn[1:, 0]).any() or _differs(renderer, drawn, pure):
         return None
-    seen: list[dict[np.float32, NDArray[np.uint8]]] = [
-        dict(zip(points[:, i], drawn[:, i], strict=True)) for i in range(len(bands))
-    ]
-    open_ = [(i, a, b) for i in range(len(bands)) for a, b in itertools.pairwise(points[:, i])]
-    while open_ := [o for o in open_ if _is_open(*o, seen)]:
-        between = [_between(a, b) for _, a, b in open_]
-        pictures = renderer.look(np.array(between).reshape(-1))
-        pictures = pictures.reshape(len(open_), -1, *pictures.shape[1:])
-        for (i, _, _), places, found in zip(open_, between, pictures, strict=True):
-            seen[i].update(zip(places, found, strict=True))
-        open_ = [
-            (i, *part)
-            for (i, a, b), places in zip(open_, between, strict=True)
-            for part in itertools.pairwise((a, *places, b))
-        ]
-    inner = [_different([found[y] for y in sorted(found)]) for found in seen]
-    counts = np.cumsum([len(pictures) for pictures in inner])
-    return np.split(renderer.read(np.concatenate(inner)), counts[:-1]) if inner else []
+    band, found = np.arange(len(bands)), []
+    while True:
+        row, k = np.nonzero((drawn[:, 1:] != drawn[:, :-1]).any((2, 3, 4)))
+        band, a, b = band[row], left[row, k], left[row, k + 1]
+        first, last = drawn[row, k], drawn[row, k + 1]
+        is_done = np.nextafter(a, b) >= b
+        found.append((band[is_done], b[is_done], last[is_done]))
+        band, a, b, first, last = (v[~is_done] for v in (band, a, b, first, last))
+        if not len(band):
+            break
+        middle = (a + b) / np.float32(2)
+        # several places are looked at as fast as one
+        between = np.stack([(a + middle) / 2, middle, (middle + b) / 2], -1)
+        left = np.concatenate([a[:, None], between, b[:, None]], -1)
+        drawn = np.concatenate([first[:, None], _look(renderer, between), last[:, None]], 1)
+    band, where, pictures = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    order = np.lexsort((where, band))
+    is_inner = band[order][1:] == band[order][:-1]  # the last of a band is that of its end
+    inner = order[:-1][is_inner]
+    counts = np.bincount(band[inner], minlength=len(bands))
+    return np.split(renderer.read(pictures[inner]), np.cumsum(counts)[:-1])
 
 
-def _between(first: np.float32, last: np.float32) -> list[np.float32]:
-    """The middle and the quarters: several places are looked at as fast as one."""
-    middle = (first + last) / np.float32(2)
-    return [(first + middle) / np.float32(2), middle, (middle + last) / np.float32(2)]
-
-
-def _is_open(i: int, first: np.float32, last: np.float32, seen: list[dict]) -> bool:
-    """Whether there are numbers between two at which different pictures were seen."""
-    return np.nextafter(first, last) < last and (seen[i][first] != seen[i][last]).any()
+def _look(renderer: Renderer, left: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """Pictures at several places of each band. Shape: (bands, places) to (bands, places, ...)."""
+    pictures = renderer.look(left.reshape(-1))
+    return pictures.reshape(*left.shape, *pictures.shape[1:])
 
 
 def _differs(renderer: Renderer, drawn: NDArray[np.uint8], pure: NDArray[np.uint8]) -> bool:
     """Whether anything but the closed form is drawn beside bands."""
-    beside = np.concatenate([drawn[0], drawn[-1, -1:]])
+    beside = np.concatenate([drawn[:, 0], drawn[-1:, -1]])
     return bool(len(beside)) and (renderer.read(beside) != pure).any()
-
-
-def _different(pictures: list[NDArray[np.uint8]]) -> NDArray[np.uint8]:
-    """Those that are not like the one before them, without the first and the last kind."""
-    kept = [p for q, p in itertools.pairwise(pictures) if (p != q).any()]
-    return np.array(kept[:-1], np.uint8).reshape(-1, *pictures[0].shape)
 
 
 def _unite(starts: NDArray, stops: NDArray) -> tuple[NDArray, NDArray]:

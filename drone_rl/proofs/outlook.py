@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from drone_rl.proofs.bounds import Bounds
-from drone_rl.proofs.boxes import Boxes, ragged
+from drone_rl.proofs.boxes import Boxes, blocks, merge, ragged
 from drone_rl.proofs.cells import Cells
 from drone_rl.proofs.painting import Painter
 
@@ -25,20 +25,24 @@ BATCH, CHUNK = 4096, 256
 """Blocks that are tried in one go, and by one thread at a time."""
 SMALL = 1000
 """Combinations of a span that are simply gone through."""
-FEW, PRICE = 8, 3.0
+FEW, PRICE = 8, 6.0
 """Pictures of a block that are simply looked at; and what bounds on a block cost, in pictures."""
 
 
 class Outlook:
     """The possible actions over all combinations of the places of the cubes in sight."""
 
-    def __init__(self, bounds: Bounds, painter: Painter, cells: Sequence[Cells]) -> None:
+    def __init__(
+        self, bounds: Bounds, painter: Painter, cells: Sequence[Cells], record: NDArray[np.int64]
+    ) -> None:
         """Starts with nothing known.
 
         Args:
             bounds: Of the network.
             painter: Of its pictures.
             cells: Of each cube in sight, the nearest first.
+            record: By how many pixels are in doubt: blocks on which bounds were tried, and those
+                that they decided; all outlooks of a proof learn from it. Shape: (pixels, 2).
         """
         self.cells = list(cells)
         self.table = np.zeros([len(c) for c in reversed(self.cells)], np.uint8)
@@ -50,8 +54,7 @@ class Outlook:
         self._ranges = [Ranges(torch.from_numpy(c.pictures)) for c in self.cells]
         self._known = np.zeros([len(c.pictures) for c in reversed(self.cells)], np.uint8)
         """The same of each combination of pictures."""
-        self._record = np.zeros((self.cells[0].pictures[0].size if self.cells else 1, 2), int)
-        """By how many pixels are in doubt: blocks that were tried, and that were decided."""
+        self._record = record
 
     @property
     def least_gap(self) -> float:
@@ -76,29 +79,27 @@ class Outlook:
         Args:
             spans: First and last cell of each cube. Shape: (N, cubes, 2).
         """
-        spans = spans[self._is_unknown(spans)]
-        unknown = [block for span in spans if (block := self._unknown(span)) is not None]
-        if not unknown:
-            return
-        stack = [self._pictures_of(np.array(unknown))]
+        unknown = _open(self.table, spans[self._is_unknown(spans)])
+        tasks = _open(self._known, self._pictures_of(unknown))
+        stack = [tasks] if len(tasks) else []
         while stack:
-            blocks = stack.pop()
-            if len(blocks) > BATCH:
-                stack.append(blocks[:-BATCH])
-                blocks = blocks[-BATCH:]
-            doubts, counts = self._doubts(blocks), _counts(blocks)
+            tasks = stack.pop()
+            if len(tasks) > BATCH:
+                stack.append(tasks[:-BATCH])
+                tasks = tasks[-BATCH:]
+            doubts, counts = self._doubts(tasks), _counts(tasks)
             pixels = doubts.sum(-1)
             tried = np.flatnonzero(self._is_worth(pixels, counts))
-            bits = np.zeros(len(blocks), np.uint8)
-            bits[tried] = self._share_out(self._bound, blocks[tried])
+            bits = np.zeros(len(tasks), np.uint8)
+            bits[tried] = self._share_out(self._bound, tasks[tried])
             self._note(pixels[tried], bits[tried] != 0)
-            self._write(blocks[bits != 0], bits[bits != 0])
+            self._write(tasks[bits != 0], bits[bits != 0])
             is_open = bits == 0
-            few = _combinations(blocks[is_open & (counts <= FEW)])
+            few = _combinations(tasks[is_open & (counts <= FEW)])
             self._known[tuple(few.T[::-1])] = self._share_out(self._look, few)
             is_open &= counts > FEW
             if is_open.any():
-                stack.append(_halve(blocks[is_open], doubts[is_open]))
+                stack.append(_halve(tasks[is_open], doubts[is_open]))
         for block in unknown:
             self._gather(block)
 
@@ -107,22 +108,16 @@ class Outlook:
         return int(self._look(np.empty((1, 0), int))[0])
 
     def _is_unknown(self, spans: NDArray) -> NDArray[np.bool_]:
-        """Spans that may have something unknown; of small ones it is known whether they do."""
+        """Spans that have something unknown."""
         counts = _counts(spans)
-        small = np.flatnonzero(counts <= SMALL)
-        is_unknown = np.ones(len(spans), bool)
-        if len(small):
+        small, is_unknown = counts <= SMALL, np.zeros(len(spans), bool)
+        if small.any():
             known = self.table[tuple(_combinations(spans[small]).T[::-1])]
             begins = np.cumsum(counts[small]) - counts[small]
             is_unknown[small] = np.minimum.reduceat(known, begins) == 0
+        for i in np.flatnonzero(~small):
+            is_unknown[i] = (self.table[_slices(spans[i])] == 0).any()
         return is_unknown
-
-    def _unknown(self, span: NDArray) -> NDArray | None:
-        """The smallest block around what is not known of one."""
-        left = np.argwhere(self.table[_slices(span)] == 0)
-        if not len(left):
-            return None
-        return span[:, :1] + np.stack([left.min(0)[::-1], left.max(0)[::-1]], -1)
 
     def _pictures_of(self, blocks: NDArray) -> NDArray:
         """From cells and bands to the pictures that they may show."""
@@ -192,6 +187,19 @@ class Outlook:
 
     def _write(self, blocks: NDArray, bits: NDArray[np.uint8]) -> None:
         self._known[tuple(_combinations(blocks).T[::-1])] = np.repeat(bits, _counts(blocks))
+
+
+def _open(table: NDArray[np.uint8], spans: NDArray) -> NDArray[np.int64]:
+    """Disjoint blocks of all that is unknown in any of some spans; shapes as of spans."""
+    if not len(spans):
+        return spans
+    lowest, highest = spans[..., 0].min(0), spans[..., 1].max(0)
+    is_asked = np.zeros([*(highest - lowest + 1)[::-1]], bool)
+    for span in spans:
+        is_asked[_slices(span - lowest[:, None])] = True
+    is_asked &= table[_slices(np.stack([lowest, highest], -1))] == 0
+    found = merge(blocks(is_asked)[:, ::-1])
+    return found + lowest[:, None] - [0, 1]
 
 
 def _counts(blocks: NDArray) -> NDArray[np.int64]:

@@ -12,6 +12,7 @@ from collections import defaultdict
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
 from drone_rl.proofs.boxes import Boxes, merge, unite, volumes, whole
 from drone_rl.proofs.cells import Cells
@@ -68,8 +69,11 @@ class Prover:
         self.least_gap, self.largest_band = np.inf, 0.0
         self._subject = subject
         self._seen_from = -1
+        self._foreseen: tuple[int, set[int]] = (-1, set())
         self._cells: dict[int, Cells] = {}
         self._outlooks: dict[tuple[int, ...], Outlook] = {}
+        eye = subject.eye
+        self._record = np.zeros((len(eye.left) * len(eye.up), 2), np.int64)
 
     @property
     def gap(self) -> float:
@@ -99,6 +103,7 @@ class Prover:
     def advance(self) -> Place:
         """Visits the next place; returns it."""
         place = min(self.waiting, key=lambda p: p.turn)
+        self._foresee(place)
         boxes = np.concatenate(self.waiting.pop(place))
         boxes = unite(boxes) if place.is_fork else merge(boxes)
         if place.is_fork:
@@ -155,15 +160,12 @@ class Prover:
     def _cut(self, place: Place, boxes: Boxes) -> Iterator[tuple[int, Boxes]]:
         """Boxes by the bits of the actions that are possible."""
         cubes, y = self.lattice.standing(place), self.lattice.y(place)
-        outlook = self._outlook(place, cubes, boxes)
+        seen = boxes[:, cubes] - y
+        outlook = self._outlook(place, cubes, seen)
         if not cubes:
             yield outlook.nothing_in_sight(), boxes
             return
-        spans = outlook.spans(boxes[:, cubes] - y)
-        pictures = outlook.pictures
-        outlook.fill(spans)
-        self.pictures += outlook.pictures - pictures
-        self.least_gap = min(self.least_gap, outlook.least_gap)
+        spans = self._fill(outlook, seen)
         found: dict[int, list[Boxes]] = defaultdict(list)
         for owner, ranges, bits in runs(outlook, spans, MOST_ROWS):
             pieces = boxes[owner]
@@ -179,18 +181,44 @@ class Prover:
         for kind, parts in found.items():
             yield kind, merge(np.concatenate(parts))
 
+    def _fill(self, outlook: Outlook, boxes: Boxes) -> NDArray[np.int64]:
+        """Makes an outlook known there; returns the spans."""
+        spans, pictures = outlook.spans(boxes), outlook.pictures
+        outlook.fill(spans)
+        self.pictures += outlook.pictures - pictures
+        self.least_gap = min(self.least_gap, outlook.least_gap)
+        return spans
+
+    def _foresee(self, place: Place) -> None:
+        """Fills the outlook of all places beside one that were come to from behind.
+
+        None of them leads to another one; many small batches would cost more than a large one.
+        """
+        if self._foreseen[0] != place.ahead:
+            self._foreseen = (place.ahead, set())
+        if place.collected in self._foreseen[1] or not (cubes := self.lattice.standing(place)):
+            return
+        self._foreseen[1].add(place.collected)
+        beside = [
+            np.concatenate(boxes)[:, cubes] - self.lattice.y(p)
+            for p, boxes in self.waiting.items()
+            if (p.ahead, p.collected, p.came) == (place.ahead, place.collected, AHEAD)
+        ]
+        if len(beside) > 1:
+            boxes = merge(np.unique(np.concatenate(beside), axis=0))
+            self._fill(self._outlook(place, cubes, boxes), boxes)
+
     def _outlook(self, place: Place, cubes: list[int], boxes: Boxes) -> Outlook:
-        """What is seen from the place's x, as far to the sides as is needed."""
+        """What is seen from the place's x, as far to the sides as boxes of cubes in sight reach."""
         if self._seen_from != place.ahead:
             self._seen_from = place.ahead
             self._outlooks.clear()
             self._cells.clear()
-        left = boxes[:, cubes] - self.lattice.y(place)
-        ends = zip(left[..., 0].min(0), left[..., 1].max(0), strict=True)
+        ends = zip(boxes[..., 0].min(0), boxes[..., 1].max(0), strict=True)
         cells = [self._look(place, k, *end) for k, end in zip(cubes, ends, strict=True)]
         known = self._outlooks.get(tuple(cubes))
         if known is None or known.cells != cells:
-            known = Outlook(self._subject.bounds, self._subject.painter, cells)
+            known = Outlook(self._subject.bounds, self._subject.painter, cells, self._record)
             self._outlooks[tuple(cubes)] = known
         return known
 

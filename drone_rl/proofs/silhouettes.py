@@ -57,11 +57,6 @@ class Eye:
             bound=task.lateral_bound,
         )
 
-    @property
-    def shape(self) -> tuple[int, int]:
-        """Height and width of its pictures."""
-        return len(self.up), len(self.left)
-
     def borders(self, ahead: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Where the picture of a cube changes as it stands farther to the left.
 
