@@ -7,7 +7,6 @@ are never looked at alone.
 """
 
 import functools
-import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
@@ -20,9 +19,10 @@ from drone_rl.proofs.bounds import Bounds
 from drone_rl.proofs.boxes import Boxes, blocks, merge, ragged
 from drone_rl.proofs.cells import Cells
 from drone_rl.proofs.painting import Painter
+from drone_rl.utils.provenance import num_cores
 
-BATCH, CHUNK = 4096, 256
-"""Blocks that are tried in one go, and by one thread at a time."""
+BATCH, CHUNK, ALONE = 4096, 256, 64
+"""Blocks that are tried in one go, by one thread at a time, and with no other thread."""
 SMALL = 1000
 """Combinations of a span that are simply gone through."""
 FEW, PRICE = 8, 6.0
@@ -146,10 +146,10 @@ class Outlook:
     ) -> NDArray[np.uint8]:
         """Has several threads work on a part of the blocks each."""
         self.pictures += len(blocks)
-        if len(blocks) <= CHUNK:
+        if len(blocks) <= ALONE:
             return work(blocks) if len(blocks) else np.zeros(0, np.uint8)
-        parts = np.split(blocks, range(CHUNK, len(blocks), CHUNK)) if len(blocks) else []
-        return np.concatenate([np.zeros(0, np.uint8), *_workers().map(work, parts)])
+        parts = np.array_split(blocks, max(-(-len(blocks) // CHUNK), num_cores()))
+        return np.concatenate(list(_workers().map(work, parts)))
 
     def _look(self, combinations: NDArray) -> NDArray[np.uint8]:
         """Bits of the possible actions with single pictures, given by their numbers."""
@@ -234,7 +234,7 @@ def _halve(blocks: NDArray, doubts: NDArray) -> NDArray:
 def _workers() -> ThreadPoolExecutor:
     """One thread a core; torch computes within each by itself."""
     return ThreadPoolExecutor(
-        os.cpu_count(), "prove", initializer=torch.set_num_threads, initargs=(1,)
+        num_cores(), "prove", initializer=torch.set_num_threads, initargs=(1,)
     )
 
 
