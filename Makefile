@@ -20,7 +20,7 @@ demo: $(STAMP)
 	@$(BIN)/drone-rl demo
 
 test: check
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile
 
 check: $(STAMP)
 	$(BIN)/ruff check .

@@ -4,11 +4,13 @@ Boxes are arrays of shape (N, n, 2): N boxes, the lower and upper end for each o
 """
 
 import itertools
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 Boxes = NDArray[np.float64]
+_Number = TypeVar("_Number", np.float64, np.int64)
 
 
 def whole(bound: float, num_cubes: int) -> Boxes:
@@ -30,7 +32,7 @@ def cut(boxes: Boxes, cube: int, place: float) -> tuple[Boxes, Boxes]:
     return below, above
 
 
-def merge(boxes: Boxes) -> Boxes:
+def merge(boxes: NDArray[_Number]) -> NDArray[_Number]:
     """The same set in fewer boxes: neighbours with a whole side in common become one."""
     before = -1
     while len(boxes) not in (before, 0, 1):
@@ -92,7 +94,7 @@ def ragged(counts: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int
     return row, np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)
 
 
-def _join(boxes: Boxes, cube: int) -> Boxes:
+def _join(boxes: NDArray[_Number], cube: int) -> NDArray[_Number]:
     """Joins boxes that differ in one cube's interval alone and meet there."""
     if len(boxes) < 2:
         return boxes

@@ -3,7 +3,17 @@
 import numpy as np
 import pytest
 
-from drone_rl.proofs.boxes import carve, cut, intersect, merge, ragged, unite, volumes, whole
+from drone_rl.proofs.boxes import (
+    blocks,
+    carve,
+    cut,
+    intersect,
+    merge,
+    ragged,
+    unite,
+    volumes,
+    whole,
+)
 
 
 def boxes(*given):
@@ -95,3 +105,12 @@ def test_rows_of_different_lengths():
     row, place = ragged(np.array([2, 0, 3]))
     assert row.tolist() == [0, 0, 2, 2, 2]
     assert place.tolist() == [0, 1, 0, 1, 2]
+
+
+def test_blocks_of_a_grid_are_its_cells_once_each():
+    mask = np.random.RandomState(0).rand(5, 4, 6) < 0.6
+    seen = np.zeros(mask.shape, int)
+    for (a, b), (c, d), (e, f) in blocks(mask):
+        seen[a:b, c:d, e:f] += 1
+    assert np.array_equal(seen, mask)
+    assert blocks(np.zeros((2, 3), bool)).shape == (0, 2, 2)

@@ -33,11 +33,14 @@ class Network(nn.Module):
         return self.layers(pictures)
 
 
+def make(cells):
+    painter = Painter(torch.full((5, 8), 0.2), torch.tensor([1.0, -1.0, 0.6]))
+    return Outlook(Bounds(Network().eval(), 1e-4), painter, cells, np.zeros((41, 2), int))
+
+
 @pytest.fixture
 def outlook():
-    cells = [Cells(EYE, 4.0, -5.0, 5.0), Cells(EYE, 9.0, -5.0, 5.0)]
-    painter = Painter(torch.full((5, 8), 0.2), torch.tensor([1.0, -1.0, 0.6]))
-    return Outlook(Bounds(Network().eval(), 1e-4), painter, cells)
+    return make([Cells(EYE, 4.0, -5.0, 5.0), Cells(EYE, 9.0, -5.0, 5.0)])
 
 
 def all_of(outlook):
@@ -88,9 +91,17 @@ def test_only_what_is_asked_for_is_filled_and_only_once(outlook):
     assert (outlook.table[0::2, 0::2] == 1 << looked_at(outlook)).all()
 
 
+def test_what_several_ask_for_is_looked_at_once(outlook):
+    outlook._record[:, 0] = 10**9  # bounds seem to be of no use
+    near, far = ((len(c) - 1) // 2 * 2 for c in outlook.cells)
+    outlook.fill(np.array([[[0, near], [0, 0]], [[0, 0], [0, far]], [[0, near], [0, 2]]]))
+    a, b = outlook.cells[0].last[near] + 1, outlook.cells[1].last[far] + 1
+    c = outlook.cells[1].last[2] + 1
+    assert outlook.pictures == a * c + b - c
+
+
 def test_nothing_in_sight():
-    painter = Painter(torch.full((5, 8), 0.2), torch.tensor([1.0, -1.0, 0.6]))
-    outlook = Outlook(Bounds(Network().eval(), 1e-4), painter, [])
+    outlook = make([])
     with torch.no_grad():
         action = int(Network()(torch.full((1, 5, 8), 0.2)).argmax())
     assert outlook.nothing_in_sight() == 1 << action
@@ -111,8 +122,7 @@ def test_runs_are_a_partition_into_one_kind_each(outlook, most):
 
 
 def test_runs_of_one_cube():
-    painter = Painter(torch.full((5, 8), 0.2), torch.tensor([1.0, -1.0, 0.6]))
-    outlook = Outlook(Bounds(Network().eval(), 1e-4), painter, [Cells(EYE, 4.0, -5.0, 5.0)])
+    outlook = make([Cells(EYE, 4.0, -5.0, 5.0)])
     spans = all_of(outlook)
     outlook.fill(spans)
     ((_, ranges, bits),) = runs(outlook, spans, 100)
