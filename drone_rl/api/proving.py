@@ -140,7 +140,10 @@ def _prove(
     folder: Path | None,
     progress: Progress,
 ) -> Proof:
-    prover, weights = Prover(subject), weights_hash(policy.state["policy"])
+    prover, weights = (
+        Prover(subject, settings.most_combinations),
+        weights_hash(policy.state["policy"]),
+    )
     known = json.dumps([weights, policy.description.as_dict(), settings.logit_gap])
     state = None if folder is None else folder / "state.npz"
     if state is not None and state.exists():
@@ -170,7 +173,10 @@ def _go_on(
         place = prover.advance()
         done = prover.decided / total
         text = f"step {place.ahead} of {last}, {done:.1%} decided, {prover.pictures:,} pictures"
-        progress(text, min(place.ahead, last - 1), last)
+        at = min(place.ahead, last - 1)
+        if len(prover.parts):
+            text, at = f"{text}, {len(prover.parts):,} parts to come", int(done * last)
+        progress(text, at, last)
         if state is not None and time.monotonic() - saved > settings.save_interval_s:
             save(prover, state, known)
             saved = time.monotonic()

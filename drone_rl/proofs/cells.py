@@ -6,6 +6,7 @@ an order round. So the pictures of a band are found by halving it until neighbou
 and bands alternate: index 0 is a cell, 1 a band, and so on; the last is a cell.
 """
 
+import copy
 from typing import Protocol
 
 import numpy as np
@@ -89,6 +90,18 @@ class Cells:
     def __len__(self) -> int:
         """How many cells and bands there are."""
         return len(self.limits) - 1
+
+    def between(self, lowest: float, highest: float) -> "Cells":
+        """Those alone that an interval reaches into, metres to the left of the camera."""
+        (first,), (last,) = self.span(np.array([lowest]), np.array([highest]))
+        first, last = first - first % 2, last + last % 2  # from a cell to a cell
+        some = copy.copy(self)
+        some.limits = self.limits[first : last + 2]
+        begin, end = self.first[first], self.last[last]
+        some.pictures = self.pictures[begin : end + 1]
+        some.first = self.first[first : last + 1] - begin
+        some.last = self.last[first : last + 1] - begin
+        return some
 
     def span(self, lower: NDArray, upper: NDArray) -> tuple[NDArray, NDArray]:
         """Cells and bands that intervals reach into.

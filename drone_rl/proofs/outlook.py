@@ -191,7 +191,7 @@ class Outlook:
 
 def _open(table: NDArray[np.uint8], spans: NDArray) -> NDArray[np.int64]:
     """Disjoint blocks of all that is unknown in any of some spans; shapes as of spans."""
-    if not len(spans):
+    if not len(spans) or (len(spans) == 1 and not table[_slices(spans[0])].any()):
         return spans
     lowest, highest = spans[..., 0].min(0), spans[..., 1].max(0)
     is_asked = np.zeros([*(highest - lowest + 1)[::-1]], bool)

@@ -8,6 +8,7 @@ are followed, and what becomes of it counts as decided only if all end alike.
 
 import dataclasses
 import itertools
+import math
 from collections import defaultdict
 from collections.abc import Iterator
 
@@ -18,6 +19,7 @@ from drone_rl.proofs.boxes import Boxes, merge, unite, volumes, whole
 from drone_rl.proofs.cells import Cells
 from drone_rl.proofs.lattice import AHEAD, LEFT, RIGHT, Ending, Place
 from drone_rl.proofs.outlook import Outlook, runs
+from drone_rl.proofs.parts import in_parts
 from drone_rl.proofs.settling import settle, simplify
 from drone_rl.proofs.silhouettes import camera_ahead
 from drone_rl.proofs.subject import Subject
@@ -47,16 +49,21 @@ class Findings:
 class Prover:
     """A proof on its way: advance it place by place, and ask for its findings at any time."""
 
-    def __init__(self, subject: Subject) -> None:
+    def __init__(self, subject: Subject, most_combinations: int = 500_000_000) -> None:
         """Begins with every placement at the start.
 
         Args:
             subject: Policy and task.
+            most_combinations: Of pictures that are remembered at a time, about; where cubes have
+                more, the placements are gone through in parts, one after the other.
+
+        Raises:
+            InputError: There would be too many parts.
         """
         self.lattice = subject.lattice
-        task = self.lattice.task
+        self.parts = in_parts(subject, most_combinations)
+        """Placements that are not yet begun with."""
         self.waiting: dict[Place, list[Boxes]] = defaultdict(list)
-        self.waiting[Place(0, 0)].append(whole(task.lateral_bound, task.num_cubes))
         self.ended: dict[tuple[Ending, int], list[Boxes]] = defaultdict(list)
         """By number of steps."""
         self.forked: list[Boxes] = []
@@ -67,7 +74,7 @@ class Prover:
         """What became of that; None for what is not followed to its end."""
         self.num_places = self.pictures = self.most_boxes = 0
         self.least_gap, self.largest_band = np.inf, 0.0
-        self._subject = subject
+        self._subject, self._most = subject, most_combinations
         self._seen_from = -1
         self._foreseen: tuple[int, set[int]] = (-1, set())
         self._cells: dict[int, Cells] = {}
@@ -98,10 +105,13 @@ class Prover:
     @property
     def is_finished(self) -> bool:
         """Whether every placement has been followed to its end."""
-        return not self.waiting
+        return not self.waiting and not len(self.parts)
 
     def advance(self) -> Place:
         """Visits the next place; returns it."""
+        if not self.waiting:
+            self.waiting[Place(0, 0)].append(self.parts[:1])
+            self.parts = self.parts[1:]
         place = min(self.waiting, key=lambda p: p.turn)
         self._foresee(place)
         boxes = np.concatenate(self.waiting.pop(place))
@@ -206,21 +216,33 @@ class Prover:
         ]
         if len(beside) > 1:
             boxes = merge(np.unique(np.concatenate(beside), axis=0))
-            self._fill(self._outlook(place, cubes, boxes), boxes)
+            if self._is_within(self._looks(place, cubes, boxes)):
+                self._fill(self._outlook(place, cubes, boxes), boxes)
 
     def _outlook(self, place: Place, cubes: list[int], boxes: Boxes) -> Outlook:
         """What is seen from the place's x, as far to the sides as boxes of cubes in sight reach."""
-        if self._seen_from != place.ahead:
-            self._seen_from = place.ahead
-            self._outlooks.clear()
-            self._cells.clear()
-        ends = zip(boxes[..., 0].min(0), boxes[..., 1].max(0), strict=True)
-        cells = [self._look(place, k, *end) for k, end in zip(cubes, ends, strict=True)]
+        cells = self._looks(place, cubes, boxes)
+        if not self._is_within(cells):  # what is seen from elsewhere is of little use here
+            ends = zip(boxes[..., 0].min(0), boxes[..., 1].max(0), strict=True)
+            cells = [c.between(*end) for c, end in zip(cells, ends, strict=True)]
         known = self._outlooks.get(tuple(cubes))
         if known is None or known.cells != cells:
             known = Outlook(self._subject.bounds, self._subject.painter, cells, self._record)
             self._outlooks[tuple(cubes)] = known
         return known
+
+    def _is_within(self, cells: list[Cells]) -> bool:
+        """Whether the combinations of pictures are few enough to be remembered."""
+        return math.prod(len(c.pictures) for c in cells) <= self._most
+
+    def _looks(self, place: Place, cubes: list[int], boxes: Boxes) -> list[Cells]:
+        """The cells of each cube in sight."""
+        if self._seen_from != place.ahead:
+            self._seen_from = place.ahead
+            self._outlooks.clear()
+            self._cells.clear()
+        ends = zip(boxes[..., 0].min(0), boxes[..., 1].max(0), strict=True)
+        return [self._look(place, k, *end) for k, end in zip(cubes, ends, strict=True)]
 
     def _look(self, place: Place, cube: int, lowest: float, highest: float) -> Cells:
         """The cells of one cube, at least from the lowest to the highest place."""
@@ -244,7 +266,7 @@ class Prover:
         for (ending, count), boxes in self.ended.items():
             endings[ending] += boxes
             steps[ending][count] = float(sum(volumes(b).sum() for b in boxes))
-        undecided = [b for p, boxes in self.waiting.items() if not p.is_fork for b in boxes]
+        waiting = [b for p, boxes in self.waiting.items() if not p.is_fork for b in boxes]
         task = self.lattice.task
         settled, left = settle(self.forked, self._ways(), self._open(), task.num_cubes)
         for ending, boxes in settled.items():
@@ -252,7 +274,9 @@ class Prover:
                 endings[ending].append(boxes)
         space = whole(task.lateral_bound, task.num_cubes)
         parts = {ending: merge(np.concatenate(boxes)) for ending, boxes in endings.items()}
-        return Findings(*simplify(parts, merge(np.concatenate([left, *undecided])), space), steps)
+        return Findings(
+            *simplify(parts, merge(np.concatenate([left, *waiting, self.parts])), space), steps
+        )
 
     def _ways(self) -> dict[Ending, Boxes]:
         """Where forks may end so."""

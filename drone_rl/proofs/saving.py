@@ -19,6 +19,7 @@ from drone_rl.utils.files import read_bytes, write_atomically
 
 MOST_BYTES = 2**31
 _COUNTS = ("num_places", "pictures", "most_boxes", "least_gap", "largest_band")
+_SETS = ("waiting", "ended", "ways", "forked", "parts")
 _NOWHERE = (-1, 0, 0)
 """Stands for what is not followed to its end."""
 
@@ -45,6 +46,7 @@ def save(prover: Prover, path: Path, subject: str) -> None:
         **_packed("ended", ended),
         **_packed("ways", ways),
         **_packed("forked", [((), b) for b in prover.forked]),
+        **_packed("parts", [((), prover.parts)]),
     }
     buffer = io.BytesIO()
     np.savez(buffer, **arrays)
@@ -68,10 +70,10 @@ def load(prover: Prover, path: Path, subject: str) -> None:
             state = dict(arrays)
         saved = bytes(state["subject"]).decode()
         counts = dict(zip(_COUNTS, state["counts"].tolist(), strict=True))
-        parts = {name: _unpacked(name, state) for name in ("waiting", "ended", "ways", "forked")}
-        waiting = [(_place(row[:-1]), row[-1], b) for row, b in parts["waiting"]]
-        ended = [((_ending(row), row[3]), b) for row, b in parts["ended"]]
-        ways = [(_ending(row), b) for row, b in parts["ways"]]
+        sets = {name: _unpacked(name, state) for name in _SETS}
+        waiting = [(_place(row[:-1]), row[-1], b) for row, b in sets["waiting"]]
+        ended = [((_ending(row), row[3]), b) for row, b in sets["ended"]]
+        ways = [(_ending(row), b) for row, b in sets["ways"]]
     except (ValueError, KeyError, TypeError, OSError, EOFError, zipfile.BadZipFile) as error:
         raise InputError(f"{path} is no state of a proof ({error}); delete it to begin") from None
     if saved != subject:
@@ -85,7 +87,8 @@ def load(prover: Prover, path: Path, subject: str) -> None:
         prover.ended[key].append(boxes)
     for way, boxes in ways:
         prover.fork_ends[way].append(boxes)
-    prover.forked = [boxes for _, boxes in parts["forked"]]
+    prover.forked = [boxes for _, boxes in sets["forked"]]
+    ((_, prover.parts),) = sets["parts"]
     for name, count in counts.items():
         setattr(prover, name, type(getattr(prover, name))(count))
 

@@ -21,3 +21,5 @@ class ProveSettings(Settings):
     """Seconds between two states on disk, from which a proof that was killed goes on."""
     most_boxes: Annotated[int, Whole(1)] = 2_000_000
     """Boxes under way after which the proof stops: they bound its memory."""
+    most_combinations: Annotated[int, Whole(1)] = 500_000_000
+    """Of pictures that are remembered at a time; where cubes have more, proofs go part by part."""

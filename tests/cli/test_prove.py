@@ -4,6 +4,10 @@ import json
 import subprocess
 import sys
 
+import pytest
+
+from tests.cli.running import error_line
+
 PROGRAM = [sys.executable, "-m", "drone_rl.cli.main"]
 
 
@@ -20,14 +24,15 @@ def test_one_cube(tmp_path):
     assert json.loads((tmp_path / "certificate.json").read_text())["finished"]
 
 
-def test_bad_input_is_one_line(tmp_path):
-    run = f"hydra.run.dir={tmp_path}"
-    for setting, message in (
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
         ("task.vertical_bound=0.5", "spreads cubes in height"),
         ("logit_gap=-1", "logit_gap"),
         ("policy=nobody", "policy=nobody does not exist"),
-    ):
-        done = call("prove", "policy=good", setting, run)
-        assert done.returncode == 2
-        (line,) = done.stderr.strip().splitlines()
-        assert message in line
+        ("task.num_cubes=6", "fewer cubes"),
+    ],
+)
+def test_bad_input_is_one_line(in_process, tmp_path, setting, message):
+    done = in_process("prove", "policy=good", setting, f"hydra.run.dir={tmp_path}")
+    assert message in error_line(done)

@@ -86,3 +86,16 @@ def test_grazing_rows_are_refused():
     eye = Eye(**{**vars(TINY), "up": np.array([0.5])})
     with pytest.raises(InputError, match=r"3.0 m ahead a row of pixels just grazes"):
         Cells(eye, 3.0, -5.0, 5.0)
+
+
+def test_a_part_of_a_row_shows_what_the_row_does_there():
+    whole = Cells(TINY, 4.0, -5.0, 5.0)
+    some = whole.between(-0.7, 2.5)
+    assert some.limits[0] <= -0.7 and some.limits[-1] >= 1.3
+    assert 1 < len(some) < len(whole) and len(some) % 2 == 1
+    (at,) = np.flatnonzero(whole.limits == some.limits[0])
+    for k in range(len(some)):
+        mine = some.pictures[some.first[k] : some.last[k] + 1]
+        theirs = whole.pictures[whole.first[at + k] : whole.last[at + k] + 1]
+        assert np.array_equal(mine, theirs)
+    assert len(some.pictures) == some.last[-1] + 1

@@ -10,10 +10,10 @@ from drone_rl.proofs.subject import make_subject
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
 
 
-def prove(name, gap=1e-4, **task):
+def prove(name, gap=1e-4, most=500_000_000, **task):
     policy = drone_rl.load_policy(name).in_task(num_cubes=1, **task)
     subject = make_subject(policy.description, policy.make_network(), gap)
-    prover = Prover(subject)
+    prover = Prover(subject, most)
     while not prover.is_finished:
         prover.advance()
     subject.close()
@@ -39,6 +39,14 @@ def test_the_share_that_a_policy_collects(one_sided):
     assert parts[("ALL_CUBES", 1)] == pytest.approx((6 + 1.65) / 12, abs=1e-9)
     assert parts[("FRONT_BOUNDARY", 0)] == pytest.approx((6 - 1.65) / 12, abs=1e-9)
     assert undecided < 1e-6
+
+
+def test_part_by_part_it_comes_to_the_same(one_sided):
+    in_parts = prove("right_and_forward", most=20)
+    assert in_parts.num_places > one_sided.num_places
+    (parts, undecided), (whole, left) = shares(in_parts.findings()), shares(one_sided.findings())
+    assert parts == pytest.approx(whole, abs=1e-12) and undecided == pytest.approx(left, abs=1e-12)
+    assert in_parts.findings().steps.keys() == one_sided.findings().steps.keys()
 
 
 def test_steps_are_counted(one_sided):
