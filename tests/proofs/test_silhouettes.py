@@ -75,3 +75,12 @@ def test_between_borders_nothing_changes(ahead):
 def test_grazing_rows_are_told(tiny):
     assert tiny.grazed(3.0).tolist() == [True, False, True]  # 2 m away, where they are 1 m up
     assert not tiny.grazed(3.1).any()
+
+
+def test_float32_moves_a_cube_by_no_more_than_is_allowed_for():
+    eye, random = Eye.of(TaskSettings(), CameraSettings()), np.random.RandomState(0)
+    cubes = random.uniform(-eye.bound, eye.bound, 200_000)
+    drone = random.randint(-int(eye.widest), int(eye.widest) + 1, len(cubes)).astype(float)
+    seen = (cubes.astype(np.float32) - drone.astype(np.float32)).astype(float)
+    errors = np.abs(seen - (cubes - drone)) / eye.rounding(cubes - drone)
+    assert 0.5 < errors.max() < 1  # and not for much more
