@@ -1,13 +1,10 @@
-"""Policies that are trained until they are proved, and what usual training leaves behind."""
+"""Policies that are trained until they are proved."""
 
 import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from drone_rl.api.progress import silent
-from drone_rl.api.proving import prove
-from drone_rl.api.training import train
 from drone_rl.bench.commands import call
 from drone_rl.utils.files import read_json
 
@@ -35,25 +32,3 @@ def bench_provable(folder: Path, seeds: Sequence[int], quick: bool) -> dict[str,
         results["provable_rounds"].append(len(result["rounds"]))
         results["provable_proved"].append(result["reason"] == "proved")
     return results
-
-
-def bench_losing(folder: Path, seeds: Sequence[int], quick: bool) -> dict[str, Any]:
-    """Trains with the defaults from each seed, and proves how much of its task each policy fails.
-
-    Args:
-        folder: For runs and certificates.
-        seeds: Of the trainings.
-        quick: Whether one cube and one seed will do.
-
-    Returns:
-        Per seed: the exact share of placements that fail, and that which is undecided.
-    """
-    losing, undecided = [], []
-    for seed in seeds[:1] if quick else seeds:
-        run = folder / f"default_{seed}"
-        done = train(folder=run, seed=seed, progress=silent)
-        task = {"num_cubes": 1} if quick else {}
-        proof = prove(done.policy, folder=run, task=task, progress=silent)
-        losing.append(proof.lost)
-        undecided.append(proof.undecided)
-    return {"losing_default": losing, "losing_default_undecided": undecided}

@@ -11,7 +11,7 @@ from drone_rl.bench.maps import bench_maps
 from drone_rl.bench.memory import bench_memory
 from drone_rl.bench.mutants import bench_mutants
 from drone_rl.bench.places import bench_places
-from drone_rl.bench.provable import bench_losing, bench_provable
+from drone_rl.bench.provable import bench_provable
 from drone_rl.bench.proving import bench_many_cubes, bench_prove, bench_tampering
 from drone_rl.bench.scaling import bench_scaling
 from drone_rl.bench.sentences import bench_sentences
@@ -121,13 +121,8 @@ BENCHMARKS: dict[str, Benchmark] = {
     ),
     "provable": Benchmark(
         lambda s: bench_provable(s.runs / "provable", s.seeds[:3], s.quick),
-        "hours",
+        "proof",
         (*_TRAINING, *_PROVING, "conf", "bench/provable"),
-    ),
-    "losing": Benchmark(
-        lambda s: bench_losing(s.runs / "losing", s.seeds, s.quick),
-        "hours",
-        (*_TRAINING, *_PROVING, "bench/provable"),
     ),
     "many_cubes": Benchmark(
         lambda s: bench_many_cubes(s.runs / "many_cubes", 1.0, s.quick),

@@ -10,7 +10,7 @@ from drone_rl.checks.claims import missing_steps
 from drone_rl.utils.intervals import proportion
 
 DOUBT = 1e-9
-"""Probability at which luck may refuse a true statement, for each number of steps."""
+"""Probability at which luck may refuse what is true, for each number of steps, and all others."""
 
 
 def find_wrong_tallies(
@@ -26,13 +26,19 @@ def find_wrong_tallies(
     """
     for i, outcome in enumerate(outcomes):
         here, missing = steps[owner == i], missing_steps(outcome)
-        for number in sorted({*outcome.steps, *here.tolist()}):
-            stated = outcome.steps.get(number, 0.0)
+        for number, stated in sorted(outcome.steps.items()):
             found = proportion(int((here == number).sum()), len(steps), 1 - DOUBT)
-            low, high = found["lower95"], found["upper95"]
-            if high < stated or low > stated + missing:
+            if found["upper95"] < stated or found["lower95"] > stated + missing:
                 yield (
                     f"outcome {i} ({outcome}) is said to take {number} steps from a share of "
                     f"{stated:.6g}, which {found['successes']} of {found['trials']} random flights "
                     "refute"
                 )
+        is_other = ~np.isin(here, list(outcome.steps))
+        found = proportion(int(is_other.sum()), len(steps), 1 - DOUBT)
+        if found["lower95"] > missing:
+            yield (
+                f"outcome {i} ({outcome}) is said to take other numbers of steps than those stated "
+                f"from a share of {missing:.6g}, which {found['successes']} of {found['trials']} "
+                "random flights refute"
+            )

@@ -112,8 +112,8 @@ class Eye:
     def rounding(self, left: NDArray[np.float64]) -> NDArray[np.float64]:
         """By how much float32 may move a cube that stands so far to the left of the camera.
 
-        Its y is rounded, which is at most `bound`, and so is the difference from the camera's; a metre
-        more covers errors of this sum itself. Where a drone is, is no matter of rounding.
+        Its y is rounded, which is at most `bound`, and so is the difference from the camera's; a
+        metre more covers errors of this sum itself. Where a drone is, is no matter of rounding.
         """
         return UNIT * (self.bound + np.abs(left) + 1)
 

@@ -11,7 +11,7 @@ from tools.readme.__main__ import ROOT, keep, main, make_readme
 from tools.readme.blocks import replace_blocks
 from tools.readme.layers import draw_layers, list_packages
 from tools.readme.stale import tell_ages
-from tools.readme.tables import MAIN, TRUTH, UNKNOWN, Row, make_table
+from tools.readme.tables import MAIN, PROOF, TRUTH, UNKNOWN, Row, make_table
 
 
 def test_it_is_made_of_todays_figures_and_contracts():
@@ -66,7 +66,7 @@ def test_rows_say_what_the_figures_are():
         "planted_maps_total": 27,
         "launcher_overhead": 0.0794,
     }
-    text = make_table(MAIN, figures) + make_table(TRUTH, figures)
+    text = "".join(make_table(rows, figures) for rows in (MAIN, TRUTH, PROOF))
     for cell in ("20 to 41, median 25", "0.991", "1024 MiB", "44 of 45 certain, of 55", "7.9%"):
         assert f"| {cell} |" in text
     assert "| 26 of 27 |" in text

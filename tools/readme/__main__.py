@@ -7,7 +7,7 @@ from drone_rl.bench.ledger import Ledger
 from tools.readme.blocks import replace_blocks
 from tools.readme.layers import draw_layers, list_packages, read_contracts
 from tools.readme.stale import tell_ages
-from tools.readme.tables import MAIN, TRUTH, make_table
+from tools.readme.tables import MAIN, PROOF, TRUTH, make_table
 
 ROOT = Path(__file__).resolve().parents[2]
 MEASURED = ROOT / "outputs" / "bench" / "results.json"
@@ -19,6 +19,7 @@ def make_readme(root: Path) -> str:
     contracts = read_contracts(root)
     blocks = {
         "truth": make_table(TRUTH, figures),
+        "proof": make_table(PROOF, figures),
         "main": make_table(MAIN, figures),
         "packages": list_packages(contracts, root / "drone_rl"),
         "layers": draw_layers(contracts),
