@@ -19,7 +19,9 @@ def test_wheel_carries_the_configuration_and_runs_without_the_checkout(tmp_path)
     assert {f"drone_rl/conf/{path.as_posix()}" for path in carried} <= names
     assert "drone_rl/py.typed" in names
     assert "drone_rl/report/templates/report.html" in names
-    assert {f"drone_rl/zoo/{n}.safetensors" for n in ("good", "poor", "right_and_forward")} <= names
+    policies = ("good", "poor", "right_and_forward", "proved")
+    assert {f"drone_rl/zoo/{n}.safetensors" for n in policies} <= names
+    assert "drone_rl/zoo/proved.certificate.json" in names
     code = "import sys; sys.path.insert(0, 'site'); from drone_rl.cli.main import main; "
     code += "from drone_rl.hydra_app.composition import conf_dir; "
     code += "assert str(conf_dir()).endswith('site/drone_rl/conf'), conf_dir(); main()"

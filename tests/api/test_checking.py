@@ -8,6 +8,7 @@ import pytest
 import drone_rl
 from drone_rl.api.progress import silent
 from drone_rl.utils.errors import InputError
+from drone_rl.zoo import certificate_path
 from tests.checks.making import of_one_cube
 
 
@@ -38,6 +39,14 @@ def test_a_check_in_python(path, tmp_path):
     done.save(tmp_path / "check.json")
     kept = json.loads((tmp_path / "check.json").read_text())
     assert kept["accepted"] and kept["task"]["num_cubes"] == 1 and kept["versions"]
+
+
+def test_the_certificate_that_travels_with_the_package():
+    proved = drone_rl.load_policy("proved")
+    done = drone_rl.check(certificate_path(proved.path), flights=200, progress=silent)
+    assert done.accepted and done.findings.contradicted == 0
+    assert drone_rl.load_proof(certificate_path(proved.path)).is_proved
+    assert proved.task.num_cubes == 3
 
 
 def test_the_newest_certificate_and_a_policy_in_a_file(path, tmp_path):

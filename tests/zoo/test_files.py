@@ -170,8 +170,8 @@ def test_a_checkpoint_that_lies(tmp_path, change, message):
         read_policy(tmp_path / "a.pt")
 
 
-def test_the_three_policies_travel_with_their_cards():
-    assert {"good", "poor", "right_and_forward"} <= set(policy_names())
+def test_the_policies_travel_with_their_cards():
+    assert {"good", "poor", "right_and_forward", "proved"} <= set(policy_names())
     for name in policy_names():
         path, card = policy_path(name), card_path(name).read_text()
         assert path.stat().st_size < 1_000_000
@@ -182,7 +182,12 @@ def test_the_three_policies_travel_with_their_cards():
 
 @pytest.mark.parametrize(
     ("name", "kind"),
-    [("good", "good"), ("poor", "poor"), ("right_and_forward", "one-sided (right)")],
+    [
+        ("good", "good"),
+        ("poor", "poor"),
+        ("right_and_forward", "one-sided (right)"),
+        ("proved", "good"),
+    ],
 )
 def test_each_is_what_its_name_says(name, kind):
     found = load_exported(policy_path(name))
