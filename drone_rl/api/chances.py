@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -13,9 +14,12 @@ from drone_rl.api.policy import Policy, load_policy
 from drone_rl.api.progress import Bar, Progress
 from drone_rl.api.showing import paragraph, table
 from drone_rl.proofs.chain import Outcomes, follow_chances
+from drone_rl.proofs.chance_bounds import Bounded, bound_success
 from drone_rl.proofs.graph import explore, shape_of
 from drone_rl.proofs.sight import Sight
+from drone_rl.proofs.subject import make_subject
 from drone_rl.settings.chances import ChanceSettings
+from drone_rl.settings.proving import ProveSettings
 from drone_rl.sim.settings import TaskSettings
 from drone_rl.sim.tasks.collect_cubes import rules
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
@@ -23,6 +27,12 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import Stream, world_random_state
 
+_BOUNDS = {
+    "least": "everywhere at least",
+    "most": "everywhere at most",
+    "mean_least": "on average at least",
+    "mean_most": "on average at most",
+}
 CELLS_AT_A_TIME = 2**22
 """Bounds memory."""
 PLACEMENTS_AT_A_TIME = 20
@@ -40,6 +50,10 @@ class Chances:
     """Of each placement."""
     pictures: int
     """How many were drawn."""
+    within: float = 0.0
+    """Metres to either side of each cube for which the bounds are."""
+    bounded: tuple[Bounded, ...] = ()
+    """Bounds on the success of each placement, wherever within these metres the cubes stand."""
 
     @property
     def success(self) -> float:
@@ -64,6 +78,9 @@ class Chances:
             rows.append(_row(text, told.reasons[:, reason], _percent))
         rows.append(_row("mean length", told.steps, "{:.2f}".format))
         rows.append(_row("undecided", told.undecided, _percent))
+        for name, words in _BOUNDS.items() if self.bounded else ():
+            bounds = torch.tensor([getattr(b, name) for b in self.bounded], dtype=torch.float64)
+            rows.append(_row(f"within {self.within:g} m, {words}", bounds, _percent))
         return rows if len(self.cubes) > 1 else [["", "chance"], *(row[:2] for row in rows[1:])]
 
     def as_dict(self) -> dict[str, Any]:
@@ -93,6 +110,9 @@ class Chances:
         head, *rows = self.rows()
         return table(head, rows) + paragraph(self._about())
 
+    def _bounds(self, i: int) -> Bounded | None:
+        return self.bounded[i] if self.bounded else None
+
     def _about(self) -> str:
         """Of what these are the figures."""
         if len(self.cubes) == 1:
@@ -103,7 +123,11 @@ class Chances:
     def _placement(self, i: int) -> dict[str, Any]:
         told, ends = self.outcomes, self.outcomes.ends[i]
         count = self.cubes.shape[1]
+        bounds = (
+            {"metres": self.within, **dataclasses.asdict(b)} if (b := self._bounds(i)) else None
+        )
         return {
+            "within": bounds,
             "cubes": self.cubes[i].tolist(),
             "success": float(told.success[i]),
             "failure": float(told.failure[i]),
@@ -168,7 +192,26 @@ def chances(
     finally:
         env.close()
     progress("placements", len(placed), len(placed))
-    return Chances(policy, placed, Outcomes.joined(told), sight.pictures)
+    bounded = _bounded(policy, placed, settings, progress) if settings.within else ()
+    outcomes = Outcomes.joined(told)
+    return Chances(policy, placed, outcomes, sight.pictures, settings.within, bounded)
+
+
+def _bounded(
+    policy: Policy, placed: Tensor, settings: ChanceSettings, progress: Progress
+) -> tuple[Bounded, ...]:
+    """Bounds around each placement, as far as cubes are placed at all."""
+    subject = make_subject(policy.description, policy.make_network(), ProveSettings().logit_gap)
+    bound, found = policy.task.lateral_bound, []
+    try:
+        for i, aside in enumerate(placed[..., 1].numpy()):
+            progress("bounds", i, len(placed))
+            box = np.stack([aside - settings.within, aside + settings.within], -1)
+            found.append(bound_success(subject, box.clip(-bound, bound), settings.parts))
+    finally:
+        subject.close()
+    progress("bounds", len(placed), len(placed))
+    return tuple(found)
 
 
 def _drawn(task: TaskSettings, settings: ChanceSettings) -> Tensor:

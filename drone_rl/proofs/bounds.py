@@ -61,12 +61,32 @@ class Bounds:
             Bit a is set unless another action is certainly more probable than action a. Shape:
             (N,), uint8.
         """
+        return self._bits(self._least(lower, upper) > self._scale * self.gap)
+
+    @torch.no_grad()
+    def probabilities(self, lower: Tensor, upper: Tensor) -> tuple[Tensor, Tensor]:
+        """How probable each action may be if it is drawn.
+
+        Args:
+            lower: See `possible`.
+            upper: The same.
+
+        Returns:
+            At least, and at most. Shapes: (N, actions), float64.
+        """
+        least = self._least(lower, upper).double() / self._scale - self.gap
+        lead = torch.zeros(len(least), self.num_actions, self.num_actions, dtype=torch.float64)
+        first, second = torch.tensor(self._pairs).T
+        lead[:, first, second] = least  # of an action over another one, at least
+        return 1 / (-lead).exp().sum(-1), 1 / lead.transpose(1, 2).exp().sum(-1)
+
+    def _least(self, lower: Tensor, upper: Tensor) -> Tensor:
+        """By how much logits are higher than others, at least, times the scale. Shape: (N, pairs)."""
         total, width = lower + upper, upper - lower
         for step in self._steps:
             total, width = step(total, width)
         least = functional.linear(total, self._weight, self._scale * self._bias)
-        least -= functional.linear(width, self._weight.abs())
-        return self._bits(least > self._scale * self.gap)
+        return least - functional.linear(width, self._weight.abs())
 
     @torch.no_grad()
     def decide(self, pictures: Tensor) -> tuple[Tensor, Tensor]:

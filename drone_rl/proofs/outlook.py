@@ -167,7 +167,7 @@ class Outlook:
 
     def _paint(self, blocks: NDArray) -> tuple[Tensor, Tensor]:
         cases = [(r.part, *r.of(blocks[:, k])) for k, r in enumerate(self._ranges)]
-        lower, upper = self._painter.paint(cases)
+        lower, upper = self._painter.paint(cases, len(blocks))
         return self._painter.see(lower), self._painter.see(upper)
 
     def _doubts(self, blocks: NDArray) -> NDArray[np.int64]:

@@ -37,18 +37,20 @@ class Painter:
         self._shut = torch.where(is_open, 0.0, inf)
         """Added to what stands behind: it counts where the cube may leave it open."""
 
-    def paint(self, cubes: Sequence[tuple[Part, Tensor, Tensor]]) -> tuple[Tensor, Tensor]:
+    def paint(
+        self, cubes: Sequence[tuple[Part, Tensor, Tensor]], num_pictures: int
+    ) -> tuple[Tensor, Tensor]:
         """Bounds on pictures.
 
         Args:
             cubes: Of each, the nearest first: rows and columns outside which nothing is seen of
                 it; masks of what pixels may show there in different cases (bit f for face f),
                 shape (cases, rows, columns), uint8; which case each picture is, shape (N,).
+            num_pictures: N.
 
         Returns:
             Lower and upper bounds. Shape: (N, height, width).
         """
-        num_pictures = len(cubes[0][2]) if cubes else 1
         lower = self._background.repeat(num_pictures, 1, 1)
         upper = lower.clone()
         for part, masks, case in reversed(cubes):

@@ -3,7 +3,7 @@
 import dataclasses
 from typing import Annotated
 
-from drone_rl.utils.schema import Whole
+from drone_rl.utils.schema import Real, Whole
 from drone_rl.utils.settings import Settings
 
 
@@ -15,5 +15,9 @@ class ChanceSettings(Settings):
     """Held-out placements: those of the first episodes of as many worlds of a verdict."""
     seed: Annotated[int, Whole(0)] = 0
     """Root of the held-out worlds' random streams; training never draws from these."""
+    within: Annotated[float, Real(0.0, 10_000.0)] = 0.0
+    """Metres to either side of each cube; if given, success is bounded wherever they stand."""
+    parts: Annotated[int, Whole(1, 1_000_000)] = 20
+    """Into which such a box is cut: the more, the closer the bounds, and the longer it takes."""
     device: str = "cpu"
     """Where cells are drawn and the policy runs: cpu, cuda or cuda:N."""

@@ -33,6 +33,22 @@ def test_of_placements_that_are_given(good, tmp_path):
     assert kept["pictures"] == done.pictures > 100
 
 
+def test_bounds_wherever_the_cubes_stand_beside_a_placement(good, tmp_path):
+    told = []
+    done = drone_rl.chances(
+        good, [5.98], task=ONE, within=0.05, parts=2, progress=lambda *how: told.append(how[0])
+    )
+    (bounds,) = done.bounded
+    assert bounds.least <= done.success <= bounds.most <= 1.0
+    assert "bounds" in told
+    names = [row[0] for row in done.rows()]
+    assert "within 0.05 m, everywhere at least" in names and len(names) == len({*names})
+    done.save(tmp_path / "chances.json")
+    (placement,) = json.loads((tmp_path / "chances.json").read_text())["placements"]
+    assert placement["within"]["metres"] == 0.05
+    assert placement["within"]["least"] == bounds.least
+
+
 def test_held_out_placements_are_those_of_a_verdict(good):
     done = drone_rl.chances(good, placements=3, task=ONE, progress=silent)
     with good.in_task(**ONE).flying(3) as (env, _):

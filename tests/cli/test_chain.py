@@ -28,6 +28,8 @@ def test_held_out_placements(in_process):
     [
         (["cubes=[1.0,2.0]"], ["cubes=(1.0, 2.0)", "must place 3", "task.num_cubes"]),
         (["cubes=[1.0,2.0,9.0]"], ["from -6 to 6"]),
+        (["within=-0.1"], ["within=-0.1", "0"]),
+        (["within=0.1", "parts=0"], ["parts=0", "1"]),
         (["placements=0"], ["placements=0", "1 or more"]),
         (["task.num_cubes=20"], ["num_cubes=20", "fewer cubes"]),
     ],

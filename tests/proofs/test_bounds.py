@@ -91,3 +91,16 @@ def test_other_layers_are_refused():
     network.layers.append(nn.ReLU())
     with pytest.raises(InputError, match="last layer is not linear"):
         Bounds(network, gap=0.0)
+
+
+def test_probabilities_of_drawn_actions_by_hand():
+    """Logits 0 and x with x from 1 to 2: the second is drawn with 1 / (1 + exp(-x))."""
+    bounds = Bounds(Linear([[0.0, 0.0], [1.0, 0.0]], [0.0, 0.0]), gap=0.0)
+    least, most = bounds.probabilities(pictures([1.0, 0.0]), pictures([2.0, 0.0]))
+    one, two = (1 / (1 + torch.tensor([-1.0, -2.0]).double().exp())).tolist()
+    assert least[0].tolist() == pytest.approx([1 - two, one])
+    assert most[0].tolist() == pytest.approx([1 - one, two])
+    wider, _ = Bounds(Linear([[0.0, 0.0], [1.0, 0.0]], [0.0, 0.0]), gap=0.5).probabilities(
+        pictures([1.0, 0.0]), pictures([2.0, 0.0])
+    )
+    assert float(wider[0, 1]) == pytest.approx(1 / (1 + float(torch.tensor(-0.5).exp())))

@@ -19,7 +19,7 @@ def mask(*pixels):
 
 def paint(*cubes):
     case = torch.tensor([0])
-    lower, upper = PAINTER.paint([(ALL, cube, case) for cube in cubes])
+    lower, upper = PAINTER.paint([(ALL, cube, case) for cube in cubes], len(case))
     return lower[0, 0].tolist(), upper[0, 0].tolist()
 
 
@@ -30,7 +30,7 @@ def close(found, lower, upper):
 
 def test_nothing_shows_the_background():
     close(paint(mask([NOTHING], [NOTHING])), [0.5, 0.9], [0.5, 0.9])
-    lower, upper = PAINTER.paint([])
+    lower, upper = PAINTER.paint([], 1)
     close((lower[0, 0].tolist(), upper[0, 0].tolist()), [0.5, 0.9], [0.5, 0.9])
 
 

@@ -34,7 +34,7 @@ def test_pictures_are_what_the_network_sees(subject):
     try:
         state = env.reset()
         seen = state["pixels"]
-        nothing = subject.painter.see(subject.painter.paint([])[0])
+        nothing = subject.painter.see(subject.painter.paint([], 1)[0])
         assert seen.shape[1:] == nothing.shape[1:]
         assert torch.allclose(seen[:, :, 0], nothing[:, :, 0].expand_as(seen[:, :, 0]))
     finally:
@@ -45,7 +45,7 @@ def test_transforms_after_the_shades_are_applied(subject):
     crop = {"name": "crop", "top": 2, "bottom": 22}
     description = with_transforms("gray", crop, {"name": "standardize", "mean": 0.5, "std": 0.25})
     painter = make_painter(description, subject.seeing)
-    picture = painter.see(painter.paint([])[0])
+    picture = painter.see(painter.paint([], 1)[0])
     assert picture.shape == (1, 1, 20, 64)
     sky = (0.299 * 158 + 0.587 * 188 + 0.114 * 234) / 255
     assert float(picture[0, 0, 0, 0]) == pytest.approx((sky - 0.5) / 0.25, abs=1e-5)
