@@ -81,7 +81,7 @@ class Bounds:
         return 1 / (-lead).exp().sum(-1), 1 / lead.transpose(1, 2).exp().sum(-1)
 
     def _least(self, lower: Tensor, upper: Tensor) -> Tensor:
-        """By how much logits are higher than others, at least, times the scale. Shape: (N, pairs)."""
+        """By how much logits are higher than others, at least, times the scale. (N, pairs)."""
         total, width = lower + upper, upper - lower
         for step in self._steps:
             total, width = step(total, width)
