@@ -18,7 +18,8 @@ from torch import Tensor
 from drone_rl.proofs.bounds import Bounds
 from drone_rl.proofs.boxes import Boxes, blocks, merge, ragged
 from drone_rl.proofs.cells import Cells
-from drone_rl.proofs.painting import Painter
+from drone_rl.proofs.painting import Painter, Part
+from drone_rl.proofs.silhouettes import NOTHING
 from drone_rl.utils.provenance import num_cores
 
 BATCH, CHUNK, ALONE = 4096, 256, 64
@@ -41,8 +42,9 @@ class Outlook:
             bounds: Of the network.
             painter: Of its pictures.
             cells: Of each cube in sight, the nearest first.
-            record: By how many pixels are in doubt: blocks on which bounds were tried, and those
-                that they decided; all outlooks of a proof learn from it. Shape: (pixels, 2).
+            record: By how many pixels are in doubt, in powers of two: blocks on which bounds were
+                tried, and those that they decided; all outlooks of a proof learn from it. Shape:
+                (32, 2).
         """
         self.cells = list(cells)
         self.table = np.zeros([len(c) for c in reversed(self.cells)], np.uint8)
@@ -55,6 +57,11 @@ class Outlook:
         self._known = np.zeros([len(c.pictures) for c in reversed(self.cells)], np.uint8)
         """The same of each combination of pictures."""
         self._record = record
+        self._hidden = [
+            [_alike(near, far, r.part) for near in self.cells[:k]]
+            for k, (far, r) in enumerate(zip(self.cells, self._ranges, strict=True))
+        ]
+        """Of each cube, by each nearer one: see `_alike`."""
 
     @property
     def least_gap(self) -> float:
@@ -95,8 +102,7 @@ class Outlook:
             self._note(pixels[tried], bits[tried] != 0)
             self._write(tasks[bits != 0], bits[bits != 0])
             is_open = bits == 0
-            few = _combinations(tasks[is_open & (counts <= FEW)])
-            self._known[tuple(few.T[::-1])] = self._share_out(self._look, few)
+            self._look_at(_combinations(tasks[is_open & (counts <= FEW)]))
             is_open &= counts > FEW
             if is_open.any():
                 stack.append(_halve(tasks[is_open], doubts[is_open]))
@@ -151,6 +157,19 @@ class Outlook:
         parts = np.array_split(blocks, max(-(-len(blocks) // CHUNK), num_cores()))
         return np.concatenate(list(_workers().map(work, parts)))
 
+    def _look_at(self, combinations: NDArray) -> None:
+        """Looks at the different pictures among some, if they were not looked at before."""
+        shown = combinations.copy()
+        for k, nearer in enumerate(self._hidden):
+            for i, alike in enumerate(nearer):
+                shown[:, k] = alike[shown[:, i], shown[:, k]]
+        code = np.ravel_multi_index(tuple(shown.T[::-1]), self._known.shape)
+        known = self._known.reshape(-1)
+        new = np.unique(code[known[code] == 0])
+        index = np.stack(np.unravel_index(new, self._known.shape)[::-1], -1)
+        known[new] = self._share_out(self._look, index)
+        self._known[tuple(combinations.T[::-1])] = known[code]
+
     def _look(self, combinations: NDArray) -> NDArray[np.uint8]:
         """Bits of the possible actions with single pictures, given by their numbers."""
         index = torch.from_numpy(combinations)
@@ -178,12 +197,15 @@ class Outlook:
 
     def _is_worth(self, pixels: NDArray, counts: NDArray) -> NDArray[np.bool_]:
         """Blocks of which bounds probably save more pictures than they take the time of."""
-        tries, hits = self._record[np.minimum(pixels, len(self._record) - 1)].T
+        tries, hits = self._record[np.frexp(pixels)[1]].T
         return (hits + 1) * counts > PRICE * (tries + 1)
 
     def _note(self, doubts: NDArray, done: NDArray[np.bool_]) -> None:
-        kind = np.minimum(doubts, len(self._record) - 1)
-        np.add.at(self._record, kind, np.stack([np.ones(len(done), int), done.astype(int)], -1))
+        np.add.at(
+            self._record,
+            np.frexp(doubts)[1],
+            np.stack([np.ones(len(done), int), done.astype(int)], -1),
+        )
 
     def _write(self, blocks: NDArray, bits: NDArray[np.uint8]) -> None:
         self._known[tuple(_combinations(blocks).T[::-1])] = np.repeat(bits, _counts(blocks))
@@ -291,6 +313,27 @@ class Ranges:
             found, reach = self._levels[level], 1 << int(level)
             masks[those] = found[first[those]] | found[last[those] + 1 - reach]
         return masks
+
+
+def _alike(near: Cells, far: Cells, part: Part) -> NDArray[np.int64]:
+    """Which picture of a cube looks the same behind each picture of a nearer one.
+
+    Args:
+        near: The nearer cube's.
+        far: The other one's.
+        part: Rows and columns outside which nothing is ever seen of that.
+
+    Returns:
+        The first of the neighbours that differ only where the nearer cube stands. Shape: (pictures
+        of the nearer one, pictures of the other one).
+    """
+    behind = far.pictures[:, *part].reshape(len(far.pictures), -1)
+    changes = (behind[1:] != behind[:-1]).astype(np.float32)
+    is_open = near.pictures[:, *part].reshape(len(near.pictures), -1) == NOTHING
+    is_new = is_open.astype(np.float32) @ changes.T > 0
+    first = np.zeros((len(is_new), len(behind)), np.int64)
+    first[:, 1:] = np.where(is_new, np.arange(1, len(behind)), 0)
+    return np.maximum.accumulate(first, axis=1)
 
 
 def _slices(span: NDArray) -> tuple[slice, ...]:

@@ -79,8 +79,7 @@ class Prover:
         self._foreseen: tuple[int, set[int]] = (-1, set())
         self._cells: dict[int, Cells] = {}
         self._outlooks: dict[tuple[int, ...], Outlook] = {}
-        eye = subject.eye
-        self._record = np.zeros((len(eye.left) * len(eye.up), 2), np.int64)
+        self._record = np.zeros((32, 2), np.int64)
 
     @property
     def gap(self) -> float:
