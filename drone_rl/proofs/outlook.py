@@ -166,7 +166,7 @@ class Outlook:
         code = np.ravel_multi_index(tuple(shown.T[::-1]), self._known.shape)
         known = self._known.reshape(-1)
         new = np.unique(code[known[code] == 0])
-        index = np.stack(np.unravel_index(new, self._known.shape)[::-1], -1)
+        index = np.array(np.unravel_index(new, self._known.shape))[::-1].T
         known[new] = self._share_out(self._look, index)
         self._known[tuple(combinations.T[::-1])] = known[code]
 
