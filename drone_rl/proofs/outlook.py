@@ -163,10 +163,10 @@ class Outlook:
         for k, nearer in enumerate(self._hidden):
             for i, alike in enumerate(nearer):
                 shown[:, k] = alike[shown[:, i], shown[:, k]]
-        code = np.ravel_multi_index(tuple(shown.T[::-1]), self._known.shape)
+        code = np.asarray(np.ravel_multi_index(tuple(shown.T[::-1]), self._known.shape))
         known = self._known.reshape(-1)
         new = np.unique(code[known[code] == 0])
-        index = np.array(np.unravel_index(new, self._known.shape))[::-1].T
+        index = np.stack(np.unravel_index(new, self._known.shape)[::-1], -1)
         known[new] = self._share_out(self._look, index)
         self._known[tuple(combinations.T[::-1])] = known[code]
 
