@@ -73,6 +73,8 @@ class Prover:
         self.fork_ends: dict[Ending | None, list[Boxes]] = defaultdict(list)
         """What became of that; None for what is not followed to its end."""
         self.num_places = self.pictures = self.most_boxes = 0
+        self.decided = 0.0
+        """Volume of what has been followed to its end, without forks."""
         self.least_gap, self.largest_band = np.inf, 0.0
         self._subject, self._most = subject, most_combinations
         self._seen_from = -1
@@ -95,11 +97,6 @@ class Prover:
     def boxes_under_way(self) -> int:
         """Of all placements that are not yet followed to their end."""
         return sum(len(b) for boxes in self.waiting.values() for b in boxes)
-
-    @property
-    def decided(self) -> float:
-        """Volume of what has been followed to its end, without forks."""
-        return float(sum(volumes(b).sum() for boxes in self.ended.values() for b in boxes))
 
     @property
     def is_finished(self) -> bool:
@@ -165,6 +162,7 @@ class Prover:
         else:
             steps = self.lattice.task.step_limit if ending.loops else place.steps
             self.ended[ending, steps].append(boxes)
+            self.decided += float(volumes(boxes).sum())
 
     def _cut(self, place: Place, boxes: Boxes) -> Iterator[tuple[int, Boxes]]:
         """Boxes by the bits of the actions that are possible."""

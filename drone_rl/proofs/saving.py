@@ -18,7 +18,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import read_bytes, write_atomically
 
 MOST_BYTES = 2**31
-_COUNTS = ("num_places", "pictures", "most_boxes", "least_gap", "largest_band")
+_COUNTS = ("num_places", "pictures", "most_boxes", "least_gap", "largest_band", "decided")
 _SETS = ("waiting", "ended", "ways", "forked", "parts")
 _NOWHERE = (-1, 0, 0)
 """Stands for what is not followed to its end."""
