@@ -12,7 +12,7 @@ from torch import Tensor, nn
 
 from drone_rl.proofs.arrangement import SAME, Arrangement, Window, arrange
 from drone_rl.proofs.borders import doubtful_area, find_borders
-from drone_rl.proofs.silhouettes import FRONT, LEFT_SIDE, NOTHING, RIGHT_SIDE, Eye
+from drone_rl.proofs.silhouettes import NOTHING, Eye
 from drone_rl.sim.actions import MOVES, Move
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.provenance import num_cores
@@ -174,7 +174,7 @@ def map_places(
     with ThreadPoolExecutor(
         num_cores(), "places", initializer=torch.set_num_threads, initargs=(1,)
     ) as pool:
-        found = pool.map(lambda part: decide(see(eye, part)), parts)
+        found = pool.map(lambda part: decide(eye.faces(*part.T)), parts)
         action, gap, is_unseen = map(np.concatenate, zip(*found, strict=True))
     return PlaceMap(
         window=window,
@@ -193,28 +193,3 @@ def map_places(
 def _share(area: float, total: float) -> float:
     """To as many digits as sums of areas are good to."""
     return round(float(area / total), 12)
-
-
-def see(eye: Eye, places: NDArray[np.float64]) -> NDArray[np.uint8]:
-    """`Eye.faces` of a cube at places that are each at a distance of its own.
-
-    Args:
-        eye: The camera.
-        places: Metres ahead of it, more than half a cube's edge, and to its left. Shape: (N, 2).
-
-    Returns:
-        Shape: (N, height, width).
-    """
-    with np.errstate(divide="ignore"):
-        above = eye.half / np.abs(eye.up)
-    ahead, left = places[:, :1], places[:, 1:]
-    front, back = ahead - eye.half, np.minimum(ahead + eye.half, above)
-    slope, out = np.abs(eye.left), np.where(eye.left < 0, -1.0, 1.0) * left
-    is_front = np.abs(out - slope * front) <= eye.half
-    is_beyond = out > slope * front + eye.half
-    ends = slope * back[..., None] + eye.half
-    side = np.where(eye.left < 0, RIGHT_SIDE, LEFT_SIDE).astype(np.uint8)
-    faces = np.where(is_beyond[:, None] & (out[:, None] <= ends), side, np.uint8(NOTHING))
-    faces[np.broadcast_to(is_front[:, None], faces.shape)] = FRONT
-    faces[back < front] = NOTHING
-    return faces

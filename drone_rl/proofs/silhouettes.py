@@ -86,27 +86,29 @@ class Eye:
         order = np.argsort(both)
         return both[order], errors[order]
 
-    def faces(self, ahead: float, left: NDArray[np.float64]) -> NDArray[np.uint8]:
+    def faces(
+        self, ahead: float | NDArray[np.float64], left: NDArray[np.float64]
+    ) -> NDArray[np.uint8]:
         """What each pixel shows of a cube.
 
         Args:
-            ahead: Metres from the camera to the cube's centre.
+            ahead: Metres from the camera to the cube's centre; one for all, or of shape (N,).
             left: The same to the left. Shape: (N,).
 
         Returns:
             NOTHING, FRONT, LEFT_SIDE or RIGHT_SIDE. Shape: (N, height, width).
         """
+        ahead = np.reshape(ahead, (-1, 1))
         front, back = self._depths(ahead)
         slope = np.abs(self.left)
         out = np.where(self.left < 0, -1.0, 1.0) * left[:, None]
-        is_front = np.abs(out - slope * front) <= self.half
+        is_front = (np.abs(out - slope * front) <= self.half) & (ahead > self.half)
         is_beyond = out > slope * front + self.half
-        ends = slope * back[:, None] + self.half
+        ends = slope * back[..., None] + self.half
         side = np.where(self.left < 0, RIGHT_SIDE, LEFT_SIDE).astype(np.uint8)
         faces = np.where(is_beyond[:, None] & (out[:, None] <= ends), side, np.uint8(NOTHING))
-        if ahead > self.half:
-            faces[np.broadcast_to(is_front[:, None], faces.shape)] = FRONT
-        faces[:, back < front] = NOTHING
+        faces[np.broadcast_to(is_front[:, None], faces.shape)] = FRONT
+        faces[np.broadcast_to(back < front, faces.shape[:2])] = NOTHING
         return faces
 
     def rounding(self, left: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -125,11 +127,16 @@ class Eye:
         front, back = self._depths(ahead)
         return np.abs(back - front) <= 32 * UNIT * self.farthest
 
-    def _depths(self, ahead: float) -> tuple[float, NDArray[np.float64]]:
-        """Metres ahead of the camera where rays reach a cube's front, and leave it, by row."""
+    def _depths(
+        self, ahead: float | NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Metres ahead of the camera where rays reach a cube's front, and leave it, by row.
+
+        Shapes: that of `ahead`, which is one number or (N, 1); and (height,) or (N, height).
+        """
         with np.errstate(divide="ignore"):
             above = self.half / np.abs(self.up)
-        return max(ahead - self.half, 0.0), np.minimum(ahead + self.half, above)
+        return np.maximum(ahead - self.half, 0.0), np.minimum(ahead + self.half, above)
 
 
 def camera_ahead() -> float:

@@ -9,7 +9,6 @@ import pytest
 from drone_rl.proofs import borders
 from drone_rl.proofs.arrangement import Pieces, Window, arrange
 from drone_rl.proofs.borders import doubtful_area, find_borders, joined
-from drone_rl.proofs.places import see
 from drone_rl.proofs.silhouettes import FRONT, LEFT_SIDE, NOTHING, UNIT, Eye
 from drone_rl.sim.settings import CameraSettings, TaskSettings
 
@@ -24,7 +23,7 @@ def eye(left, up):
 def cells(eye, window):
     """Area of what the only pixel shows, and how many cells there are."""
     found = arrange(find_borders(eye, window), window, 10_000)
-    faces = see(eye, found.inner_points())[:, 0, 0]
+    faces = eye.faces(*found.inner_points().T)[:, 0, 0]
     areas = np.bincount(faces, found.areas(), 4)
     return {int(face): round(areas[face], 9) for face in np.unique(faces)}, found.num_cells
 
@@ -76,7 +75,7 @@ def test_twelve_pixels():
     np.testing.assert_allclose(uprights, [(2.5, -wide, wide), (5, -3.75, 3.75)])
     cells = arrange(found, window, 100)
     assert cells.num_cells == 16
-    faces = see(seen, cells.inner_points())[:, 0]  # the outer row
+    faces = seen.faces(*cells.inner_points().T)[:, 0]  # the outer row
     fronts = (faces == FRONT) * cells.areas()[:, None]
     np.testing.assert_allclose(fronts.sum(0), [1.25] * 3)  # 2.5 m wide, from 2 to 2.5 m
 
@@ -91,8 +90,8 @@ def missed(eye, found, count=2000):
     random_state = np.random.RandomState(0)
     low, high = (WINDOW.nearest, -WINDOW.sideways), (WINDOW.farthest, WINDOW.sideways)
     places = random_state.uniform(low, high, (count, 2))
-    pictures = see(eye, cells.inner_points())[cells.locate(places)]
-    return int((pictures != see(eye, places)).any((1, 2)).sum())
+    pictures = eye.faces(*cells.inner_points().T)[cells.locate(places)]
+    return int((pictures != eye.faces(*places.T)).any((1, 2)).sum())
 
 
 @pytest.mark.parametrize("camera", CAMERAS)
@@ -106,7 +105,7 @@ def test_every_place_has_the_picture_of_its_cell(camera):
     assert cells.areas().sum() == pytest.approx(WINDOW.area, rel=1e-12)
     label, twin = cells.cell, cells.cell[cells.twin]
     inner = (label >= 0) & (twin >= 0)
-    pictures = see(seen, cells.inner_points())
+    pictures = seen.faces(*cells.inner_points().T)
     differ = (pictures[label[inner]] != pictures[twin[inner]]).any((1, 2))
     assert differ.all()  # no border parts what is alike
 
@@ -131,14 +130,6 @@ def test_no_family_of_borders_can_be_left_out(family, monkeypatch):
         found = dataclasses.replace(found, upright=np.empty((0, 3)))
     with contextlib.suppress(ArithmeticError):  # where what is left hangs in the air
         assert missed(seen, found) > 0
-
-
-def test_a_picture_of_each_place_is_the_closed_form_of_its_distance():
-    seen = Eye.of(TaskSettings(), CameraSettings(width=9, height=6))
-    left = np.linspace(-7, 7, 40)
-    for ahead in (1.3, 4.0, 17.0):
-        places = np.stack([np.full(40, ahead), left], -1)
-        np.testing.assert_array_equal(see(seen, places), seen.faces(ahead, left))
 
 
 def test_the_doubtful_area_is_a_band_along_each_border():

@@ -5,8 +5,8 @@ import pytest
 import torch
 
 from drone_rl.proofs.arrangement import Window
-from drone_rl.proofs.places import BLIND, UNSEEN, map_places, see
-from drone_rl.proofs.silhouettes import FRONT, LEFT_SIDE, NOTHING, RIGHT_SIDE, Eye
+from drone_rl.proofs.places import BLIND, UNSEEN, map_places
+from drone_rl.proofs.silhouettes import NOTHING, Eye
 from drone_rl.sim.actions import Move
 from drone_rl.utils.errors import InputError
 
@@ -82,9 +82,3 @@ def test_a_place_in_the_cube_is_refused():
 def test_too_many_cells_are_refused():
     with pytest.raises(InputError, match="most_cells"):
         map_places(EYE, WINDOW, look, Turns(), touch_distance=3.0, most_cells=2)
-
-
-def test_what_is_seen_from_several_distances():
-    places = np.array([[4.0, 3.0], [4.0, 5.0], [5.0, -5.5], [5.0, 0.0]])
-    shown = see(EYE, places)[:, 0].tolist()
-    assert shown == [[FRONT, 0], [LEFT_SIDE, 0], [0, RIGHT_SIDE], [0, 0]]

@@ -51,6 +51,15 @@ def test_beside_the_camera_only_sides_are_seen(tiny):
     assert tiny.faces(0.5, np.array([1.1]))[0, 1].tolist() == [LEFT_SIDE, NOTHING]
 
 
+def test_cubes_at_distances_of_their_own(tiny):
+    """Fronts are 3, 3, 1.5 and no metres away: as by hand above, all at once."""
+    ahead, left = np.array([4.0, 4.0, 2.5, 0.5]), np.array([2.1, 4.1, -2.6, 1.1])
+    shown = tiny.faces(ahead, left)
+    assert shown[:, 1].tolist() == [[FRONT, 0], [LEFT_SIDE, 0], [0, RIGHT_SIDE], [LEFT_SIDE, 0]]
+    alone = [tiny.faces(float(a), y[None])[0] for a, y in zip(ahead, left, strict=True)]
+    np.testing.assert_array_equal(shown, alone)
+
+
 def test_borders_are_where_faces_change(tiny):
     """Of 4 m: 2, 4 and 6 to either side, for only the middle row shows anything."""
     places, errors = tiny.borders(4.0)
