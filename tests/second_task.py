@@ -17,6 +17,7 @@ from drone_rl.sim.dynamics import BodyState, ComputerVision
 from drone_rl.sim.entities.cube import Cube
 from drone_rl.sim.meaning import Meaning
 from drone_rl.sim.tasks import Goals, Grid, OracleRule
+from drone_rl.words.terms import Terms
 
 NUM_POSTS = 2
 REACH = 1.0
@@ -56,14 +57,24 @@ class Posts:
     ends = End
     truncation = End.TIME
     observed = ("passed", "end_reason")
-    goal = "post"
+    terms = Terms(
+        goal="post",
+        reach="pass",
+        reached="passed",
+        target="post",
+        handle="get past the post",
+        handled="untouched",
+        unhandled="touched",
+        follows=False,
+        tested="two posts",
+    )
     success_end = End.THROUGH
     expected_end = End.TIME
     strata = ("left", "right")
     luck = ("random", "forward")
     scored = ("passed", "sides")
     remembered = types.MappingProxyType(
-        {"posts": "positions of the posts (T, 2, 3)", "next_cube": "number of the next post (T,)"}
+        {"posts": "positions of the posts (T, 2, 3)", "next_target": "number of the next post (T,)"}
     )
     oracle = OracleRule(("end_reason",), lambda end: torch.zeros_like(end[..., 0]), MOVES)
     largest_reward = float(NUM_POSTS)
@@ -141,7 +152,11 @@ class Posts:
 
     def remember(self, info):
         """Where the posts are, and how many lie behind."""
-        return {"posts": info["posts"], "next_cube": info["passed"].sum(-1)}
+        return {"posts": info["posts"], "next_target": info["passed"].sum(-1)}
+
+    def tally(self, info):
+        passed = info["passed"].sum(-1)
+        return passed, torch.zeros_like(passed)
 
     def recall(self, kept, body):
         """The posts as they stood."""
@@ -149,7 +164,7 @@ class Posts:
         return PostsState(
             body=body,
             posts=kept["posts"].double(),
-            passed=index < kept["next_cube"][:, None],
+            passed=index < kept["next_target"][:, None],
             steps=kept["step"].clone(),
             end_reason=torch.zeros(len(kept["step"]), dtype=torch.int64),
         )

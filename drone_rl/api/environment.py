@@ -7,13 +7,13 @@ from torchrl.envs import TransformedEnv
 
 from drone_rl import envs
 from drone_rl.settings.transforms import Gray, Standardize, Transform
-from drone_rl.sim.settings import CameraSettings, TaskSettings
+from drone_rl.sim.settings import BaseTaskSettings, CameraSettings
 
 
 def make_env(
     num_envs: int = 1,
     *,
-    task: TaskSettings | None = None,
+    task: BaseTaskSettings | None = None,
     camera: CameraSettings | None = None,
     transforms: Sequence[Transform] = (Gray(), Standardize()),
     seed: int = 0,

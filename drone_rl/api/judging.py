@@ -19,6 +19,7 @@ from drone_rl.evaluation import run_episodes, summarise
 from drone_rl.settings.changes import Changes
 from drone_rl.settings.judging import EvaluateSettings, FlightSettings, JudgeSettings
 from drone_rl.sim.settings import TaskSettings
+from drone_rl.sim.tasks import as_task
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import Stream, torch_generator
@@ -46,8 +47,9 @@ class Evaluation:
         """The figures side by side, as texts: names, then a row for each figure."""
         flown = self.flown.values()
         rows = [["", *self.flown]]
-        rows.append(["all cubes", *(_interval(f["success"], "share") for f in flown)])
-        rows.append(["mean cubes", *(f"{f['mean_cubes']:.3f}" for f in flown)])
+        terms = as_task(self.policy.task).terms
+        rows.append([f"all {terms.goals}", *(_interval(f["success"], "share") for f in flown)])
+        rows.append([f"mean {terms.goals}", *(f"{f['mean_goals']:.3f}" for f in flown)])
         for name in self.flown["greedy"]["shares"]:
             cells = (_interval(f["shares"][name], "mean") for f in flown)
             rows.append([f"share {name}", *cells])
@@ -186,7 +188,6 @@ def judge(
     progress = progress or Bar()
     progress("policy, luck and oracle", 0, 1)
     name = policy.name if isinstance(policy, Policy) else str(policy)
-    changed = Changes(TaskSettings).read(task or {}, "task")
     is_baseline, claim = policy in BASELINES, None
     if is_baseline and certificate is not None:
         raise InputError(
@@ -194,10 +195,11 @@ def judge(
             "the policy that was proved"
         )
     if is_baseline:
+        changed = Changes(TaskSettings).read(task or {}, "task")
         worlds = _baseline(name, TaskSettings(**changed), settings)
     else:
         loaded = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
-        loaded = loaded.in_task(**changed)
+        loaded = loaded.in_task(**(task or {}))
         claim = find_claim(
             loaded,
             certificate,

@@ -13,7 +13,7 @@ from torchrl.envs import TransformedEnv
 from drone_rl.api.showing import table
 from drone_rl.policies import PolicyNetwork, make_actor
 from drone_rl.settings.changes import Changes
-from drone_rl.sim.settings import TaskSettings
+from drone_rl.sim.settings import BaseTaskSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import newest
 from drone_rl.utils.seeding import Stream, torch_generator
@@ -34,7 +34,7 @@ class Policy:
     """All that its file says, see `drone_rl.zoo.read_policy`."""
 
     @property
-    def task(self) -> TaskSettings:
+    def task(self) -> BaseTaskSettings:
         """What it flies in."""
         return self.description.task
 

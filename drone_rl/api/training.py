@@ -156,7 +156,8 @@ def learn(
     finally:
         trainer.collector.shutdown()
     progress = dataclasses.asdict(trainer.progress)
-    return {"reason": reason, **progress, "num_cubes": settings.task.num_cubes}
+    largest = as_task(settings.task).largest_reward
+    return {"reason": reason, **progress, "largest_reward": largest}
 
 
 def finish(settings: TrainSettings, folder: Path, result: dict[str, Any]) -> Training:

@@ -137,7 +137,7 @@ EXPLANATION: Plain = {
         "steps": 1300,
         "action_shares": [0.8, 0.1, 0.1],
         "entropy": _mean(0.1, 0.06, 0.2),
-        "cubes_collected": 60,
+        "goals_reached": 60,
     },
     "tsne": {
         name: {
@@ -186,7 +186,7 @@ EXPLANATION: Plain = {
             "ground_changed": _mean(0.02, 0.0, 0.1),
         },
         "interventions": {
-            "cube taken away": _mean(0.4, 0.3, 0.5),
+            "target taken away": _mean(0.4, 0.3, 0.5),
             "ground patch changed": _mean(0.05, 0.02, 0.2),
         },
         "integration_error": {"mean": 0.001, "max": 0.007, "pictures": 30},

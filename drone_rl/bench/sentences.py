@@ -118,7 +118,7 @@ _OF_REPORTS = (
     ("dataset.one_action", {"dataset.action_shares": [0.001, 0.999, 0.0]}, _ONE_ACTION),
     ("dataset.entropy", {"dataset.entropy.mean": None}),
     ("dataset.entropy", {"dataset.entropy.upper95": 0.5}),
-    ("dataset.no_cube", {"dataset.cubes_collected": 1}, {"dataset.cubes_collected": 0}),
+    ("dataset.none_reached", {"dataset.goals_reached": 1}, {"dataset.goals_reached": 0}),
     ("tsne.faithful", {"tsne.pixels.neighbours_kept": 0.3}),
     ("tsne.unfaithful", {"tsne.pixels.neighbours_kept": 0.6}, {"tsne.pixels.neighbours_kept": 0.4}),
     ("contradictions.none", {"contradictions.pairs": 1}, _NO_PAIR),
@@ -183,8 +183,8 @@ _OF_MAPS = (
     ("truth.follows_not", {"truth.outcomes.follows.lower95": 0.1}, _NOT_ALONG),
     ("truth.ground", {"truth.outcomes.ground_changed.upper95": 0.4}),
     ("truth.patch", {"truth.interventions.ground patch changed.upper95": 0.5}),
-    ("truth.cube", {"truth.interventions.ground patch changed.upper95": 0.31}),
-    ("truth.cube", {"truth.interventions.cube taken away.lower95": 0.19}),
+    ("truth.target", {"truth.interventions.ground patch changed.upper95": 0.31}),
+    ("truth.target", {"truth.interventions.target taken away.lower95": 0.19}),
     ("truth.integral", {"truth.integration_error": None}),
 )
 _OTHER_RULE = {"verdict.certain": False}

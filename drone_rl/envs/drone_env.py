@@ -16,7 +16,7 @@ from torchrl.envs import EnvBase
 from drone_rl.sim.actions import Entry
 from drone_rl.sim.dynamics import Dynamics
 from drone_rl.sim.rendering import MakeRenderer, check_device, make_renderer
-from drone_rl.sim.settings import CameraSettings, TaskSettings
+from drone_rl.sim.settings import BaseTaskSettings, CameraSettings
 from drone_rl.sim.tasks import Task
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
@@ -41,7 +41,7 @@ class DroneEnv(EnvBase):
     def __init__(
         self,
         num_envs: int,
-        task: TaskSettings | Task[Any] | None = None,
+        task: BaseTaskSettings | Task[Any] | None = None,
         camera: CameraSettings | None = None,
         *,
         seed: int = 0,

@@ -82,11 +82,11 @@ def summarise(episodes: Episodes) -> dict[str, Any]:
         "shares": shares,
         "never_reached": mean_bounds((goals.stratum < 0).double().mean(-1)),
         "ends": ends,
-        "mean_cubes": float(goals.reached.sum(-1).double().mean()),
+        "mean_goals": float(goals.reached.sum(-1).double().mean()),
         "mean_length": float(episodes.length.double().mean()),
         "max_length": int(episodes.length.max()),
     }
 
 
 def _share(values: Tensor, count: int) -> dict[str, Any]:
-    return {**mean_bounds(values), "cubes": count}
+    return {**mean_bounds(values), "goals": count}

@@ -7,7 +7,7 @@ from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 
 from drone_rl.sim.actions import Actions
-from drone_rl.sim.settings import TaskSettings
+from drone_rl.sim.settings import BaseTaskSettings
 from drone_rl.sim.tasks import Task, as_task
 from drone_rl.utils.errors import InputError
 
@@ -15,7 +15,7 @@ from drone_rl.utils.errors import InputError
 class Oracle(TensorDictModuleBase):
     """Acts by the true positions: the best that can be hoped for."""
 
-    def __init__(self, task: TaskSettings | Task[Any], actions: Actions | None = None) -> None:
+    def __init__(self, task: BaseTaskSettings | Task[Any], actions: Actions | None = None) -> None:
         """Learns the task's rule.
 
         Args:

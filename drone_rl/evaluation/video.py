@@ -95,7 +95,7 @@ def write_video(frames: list[np.ndarray], path: Path) -> list[Path]:
 def _caption(task: Task[Any], state: TensorDictBase, earned: float) -> str:
     end = task.ends(int(state["info", "end_reason"][0]))
     ended = "" if end == 0 else f"   ended: {end.name.lower()}"
-    return f"{task.goal}s {earned:g}" + ended.replace("_", " ")
+    return f"{task.terms.goals} {earned:g}" + ended.replace("_", " ")
 
 
 def _compose(

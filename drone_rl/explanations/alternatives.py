@@ -28,14 +28,14 @@ def alternatives(scenes: Scenes, state: State, seed: int = 0) -> dict[str, Tenso
         seed: Of the cubes' random places.
 
     Returns:
-        By name, pictures as the policy gets them, shape (T, C, h, w): no cubes; cubes elsewhere,
+        By name, pictures as the policy gets them, shape (T, C, h, w): no cubes; targets elsewhere,
         `PLACEMENTS` times; ground and sky darker, and brighter.
     """
     generator = torch.Generator().manual_seed(seed)
-    found = {"no cubes": scenes.observe(scenes.task.without_targets(state))}
+    found = {"no targets": scenes.observe(scenes.task.without_targets(state))}
     for i in range(PLACEMENTS):
         other = scenes.task.elsewhere(state, scenes.worlds.camera, generator)
-        found[f"cubes elsewhere {i}"] = scenes.observe(other)
+        found[f"targets elsewhere {i}"] = scenes.observe(other)
     for name, appearance in (("darker", DARK), ("brighter", BRIGHT)):
         found[name] = scenes.transform(scenes.frames(state, appearance))
     return found

@@ -39,6 +39,7 @@ def flown_fields(task: Task[Any], actions: Actions) -> dict[str, str]:
     return {
         "actions": "action taken: " + ", ".join(f"{i} {n}" for i, n in enumerate(actions.names)),
         "rewards": "reward of the action, float32 (T,)",
+        "event": "1 where the action reaches a goal, -1 where it misses one, else 0, int8 (T,)",
         "drone": "position before the action, metres, world frame: x forward, y left, z up (T, 3)",
         "attitude": "of the drone before the action, quaternion (w, x, y, z) (T, 4)",
         **task.remembered,

@@ -15,7 +15,9 @@ from drone_rl.sim.meaning import Meaning
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.tasks import State
 
-OTHER_CUBES = Appearance(colors={Meaning.TARGET: (0.9, 0.85, 0.2)})
+OTHER_TARGETS = Appearance(
+    colors={Meaning.TARGET: (0.9, 0.85, 0.2), Meaning.OBSTACLE: (0.9, 0.85, 0.2)}
+)
 MOVED_METRES = 2.0
 
 
@@ -48,15 +50,15 @@ def intervene(
     """
     before = scenes.frames(state)
     base = probabilities(network, scenes.transform(before))
-    visible = regions == Region.NEXT_CUBE
+    visible = regions == Region.NEXT_TARGET
     ground = _patches(regions == Region.GROUND, visible.sum((1, 2)), seed)
-    recoloured = scenes.frames(state, OTHER_CUBES)
+    recoloured = scenes.frames(state, OTHER_TARGETS)
     repainted = scenes.frames(state, DARK_GROUND)
     moved = scenes.frames(to_the_middle(scenes, state))
     changes = {
-        "cube taken away": (scenes.frames(scenes.task.without_next(state)), visible),
-        "cube moved": (moved, (moved != before).any(-1)),
-        "cube recoloured": (torch.where(visible[..., None], recoloured, before), visible),
+        "target taken away": (scenes.frames(scenes.task.without_next(state)), visible),
+        "target moved": (moved, (moved != before).any(-1)),
+        "target recoloured": (torch.where(visible[..., None], recoloured, before), visible),
         "ground patch changed": (torch.where(ground[..., None], repainted, before), ground),
     }
     return [

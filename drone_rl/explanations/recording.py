@@ -7,6 +7,7 @@ Whole episodes are flown, and of each about as many frames are drawn and analyse
 over the episode, so that one that circles for hundreds of steps counts no more than another.
 """
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ import torch
 from numpy.typing import NDArray
 from tensordict import TensorDict, TensorDictBase
 from tensordict.nn import TensorDictModuleBase
+from torch import Tensor
 from torchrl.envs import TransformedEnv
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
@@ -174,6 +176,7 @@ def _arrays(batch: TensorDictBase, task: Task[Any]) -> dict[str, NDArray]:
         "observations": batch["pixels"],
         "actions": batch["action"],
         "rewards": batch["next", "reward"][:, 0],
+        "event": _events(task, info, starts, batch["next", "info", "end_reason"][:, 0]),
         **{name: info[name] for name in _POSE},
         **task.remember(info),
         "episode": starts.cumsum(0) - 1,
@@ -181,3 +184,15 @@ def _arrays(batch: TensorDictBase, task: Task[Any]) -> dict[str, NDArray]:
         "end_reason": batch["next", "info", "end_reason"][:, 0],
     }
     return {name: value.cpu().numpy() for name, value in arrays.items()}
+
+
+def _events(
+    task: Task[Any], info: Mapping[str, Tensor], starts: Tensor, end_reason: Tensor
+) -> Tensor:
+    """What comes of the actions: 1 where a goal is reached, -1 where one is missed, else 0. (T,)."""
+    is_last = torch.cat([starts[1:], starts.new_ones(1)])
+    reached, missed = (
+        torch.where(is_last, 0, torch.diff(count, append=count[-1:])) for count in task.tally(info)
+    )
+    is_reached = (reached > 0) | (is_last & (end_reason == task.success_end))
+    return torch.where(is_reached, 1, -(missed > 0).long()).to(torch.int8)

@@ -10,7 +10,7 @@ from torch import Tensor
 
 from drone_rl.explanations.flying import fly_on
 from drone_rl.explanations.hooks import probabilities
-from drone_rl.explanations.scenes import Scenes, empty_scene, place_cube
+from drone_rl.explanations.scenes import Scenes, empty_scene, place_target
 from drone_rl.policies import PolicyNetwork
 from drone_rl.sim.actions import Actions
 
@@ -30,7 +30,7 @@ class ResponseMap:
     """Metres to its left."""
     probabilities: NDArray  # (Z, F, L, A)
     """Of each action."""
-    without_cube: NDArray  # (A,)
+    without_target: NDArray  # (A,)
     """The same for the scene without a cube."""
     oracle: NDArray  # (L,)
     """What must be done: a turn where flying straight on would miss."""
@@ -68,7 +68,7 @@ def response_map(
     ahead, aside = torch.meshgrid(forward, lateral, indexing="ij")
     layers = []
     for up in height.tolist():
-        observed = scenes.observe(place_cube(scenes, ahead.flatten(), aside.flatten(), up))
+        observed = scenes.observe(place_target(scenes, ahead.flatten(), aside.flatten(), up))
         layers.append(probabilities(network, observed).view(num_forward, num_lateral, -1))
     wishes = torch.stack(layers)
     alone = probabilities(network, scenes.observe(empty_scene(scenes)))[0]
@@ -78,7 +78,7 @@ def response_map(
         forward=forward.numpy(),
         lateral=lateral.numpy(),
         probabilities=wishes.cpu().numpy(),
-        without_cube=alone.cpu().numpy(),
+        without_target=alone.cpu().numpy(),
         oracle=needed.cpu().numpy(),
         stratum=scenes.task.stratum_at(_offsets(lateral)).numpy(),
         blind=find_blind(scenes.actions, wishes, alone, needed).cpu().numpy(),
@@ -118,7 +118,7 @@ def outcome_map(
     only = torch.zeros(num_forward * num_lateral, dtype=torch.int64, device=scenes.worlds.device)
     layers = []
     for up in height.tolist():
-        starts = place_cube(scenes, ahead.flatten(), aside.flatten(), up)
+        starts = place_target(scenes, ahead.flatten(), aside.flatten(), up)
         ends = fly_on(scenes, network, starts)
         layers.append(scenes.task.is_reached(ends, only).view(num_forward, num_lateral))
     return OutcomeMap(
@@ -140,7 +140,7 @@ def summarise(response: ResponseMap, outcome: OutcomeMap, strata: Sequence[str])
         strata: Names of the task's, such as sides.
 
     Returns:
-        "without_cube"; "rows": for each height and side ("left", "ahead" where flying straight on
+        "without_target"; "rows": for each height and side ("left", "ahead" where flying straight on
         is enough, "right") the share of "places" at which the policy is "blind" (of the response
         map) and from which the cube is "collected" (of the outcome map); None where no place of
         the grid lies on that side.
@@ -159,7 +159,7 @@ def summarise(response: ResponseMap, outcome: OutcomeMap, strata: Sequence[str])
                     "places": int(collected.size),
                 }
             )
-    return {"without_cube": response.without_cube.tolist(), "blind_below": BLIND, "rows": rows}
+    return {"without_target": response.without_target.tolist(), "blind_below": BLIND, "rows": rows}
 
 
 def _offsets(lateral: Tensor) -> Tensor:

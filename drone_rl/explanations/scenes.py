@@ -16,8 +16,8 @@ from drone_rl.sim.tasks import State
 class Region(enum.IntEnum):
     """What a pixel shows."""
 
-    NEXT_CUBE = 0
-    OTHER_CUBE = 1
+    NEXT_TARGET = 0
+    OTHER_TARGET = 1
     HORIZON = 2
     GROUND = 3
     SKY = 4
@@ -123,8 +123,8 @@ class Scenes:
         sky = geoms < 0
         regions[sky] = Region.SKY
         regions[_border(sky, ~sky & (cube < 0))] = Region.HORIZON
-        regions[cube >= 0] = Region.OTHER_CUBE
-        regions[(cube >= 0) & (cube == next_cube)] = Region.NEXT_CUBE
+        regions[cube >= 0] = Region.OTHER_TARGET
+        regions[(cube >= 0) & (cube == next_cube)] = Region.NEXT_TARGET
         return regions.to(torch.uint8)
 
 
@@ -134,7 +134,7 @@ def _border(sky: Tensor, ground: Tensor) -> Tensor:
     return functional.pad(meets, (0, 0, 0, 1)) | functional.pad(meets, (0, 0, 1, 0))
 
 
-def place_cube(scenes: Scenes, forward: Tensor, lateral: Tensor, height: float = 0.0) -> State:
+def place_target(scenes: Scenes, forward: Tensor, lateral: Tensor, height: float = 0.0) -> State:
     """Scenes with one target at each place and the drone at its origin.
 
     Args:
@@ -151,4 +151,4 @@ def place_cube(scenes: Scenes, forward: Tensor, lateral: Tensor, height: float =
 
 def empty_scene(scenes: Scenes) -> State:
     """One scene with no target at all."""
-    return scenes.task.without_targets(place_cube(scenes, torch.ones(1), torch.zeros(1)))
+    return scenes.task.without_targets(place_target(scenes, torch.ones(1), torch.zeros(1)))

@@ -1,7 +1,6 @@
-"""Which frames tell an episode's story: the first, the approach, each collection, the failure."""
+"""Which frames tell an episode's story: the first, the approach, each goal, the failure."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from drone_rl.explanations.dataset import RolloutDataset
 from drone_rl.sim.tasks.judgeable import Judgeable
@@ -13,8 +12,8 @@ COUNT = 6
 def key_frames(dataset: RolloutDataset, episode: int, task: Judgeable) -> list[tuple[int, str]]:
     """Six frames of an episode in order of time, each with why it was chosen.
 
-    The rule: the first frame; half way to the first collection (or to the end); the frame before
-    each collection; the frame before each cube is missed, and the last one of an episode that
+    The rule: the first frame; half way to the first goal (or to the end); the frame before
+    each goal is reached; the frame before one is missed, and the last one of an episode that
     failed. What is still free goes to the frames furthest from those chosen.
 
     Args:
@@ -27,10 +26,11 @@ def key_frames(dataset: RolloutDataset, episode: int, task: Judgeable) -> list[t
     """
     frames = np.flatnonzero(dataset.episode == episode)
     chosen: dict[int, str] = {int(frames[0]): "start"}
-    collections = frames[dataset.rewards[frames] > 0]
-    half = frames[len(frames) // 2] if not len(collections) else (frames[0] + collections[0]) // 2
-    events = [(int(t), f"collects a {task.goal}") for t in collections]
-    events += [(int(t), f"misses a {task.goal}") for t in _misses(dataset, frames)]
+    reached, missed = (frames[dataset.event[frames] == event] for event in (1, -1))
+    half = frames[len(frames) // 2] if not len(reached) else (frames[0] + reached[0]) // 2
+    terms = task.terms
+    events = [(int(t), f"{terms.reaches} a {terms.goal}") for t in reached]
+    events += [(int(t), f"misses a {terms.goal}") for t in missed]
     end = int(dataset.end_reason[frames[-1]])
     if end not in (0, task.success_end):
         reason = task.ends(end).name.lower().replace("_", " ")
@@ -42,9 +42,3 @@ def key_frames(dataset: RolloutDataset, episode: int, task: Judgeable) -> list[t
         away = np.abs(frames[:, None] - np.array(list(chosen))[None]).min(1)
         chosen[int(frames[away.argmax()])] = "in between"
     return sorted(chosen.items())
-
-
-def _misses(dataset: RolloutDataset, frames: NDArray) -> NDArray:
-    """Frames after which the next cube is another one though nothing was collected."""
-    moved_on = dataset.next_cube[frames[1:]] > dataset.next_cube[frames[:-1]]
-    return frames[:-1][moved_on & (dataset.rewards[frames[:-1]] == 0)]

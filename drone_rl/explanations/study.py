@@ -21,7 +21,7 @@ from drone_rl.policies import PolicyNetwork
 from drone_rl.utils.errors import InputError
 from drone_rl.verdicts.proof import Claim
 
-FORMAT_VERSION = 2
+FORMAT_VERSION = 3
 
 
 def explain_policy(
@@ -74,6 +74,7 @@ def explain_policy(
         "settings": dataclasses.asdict(settings),
         "seconds": seconds,
         "actions": context.scenes.actions.as_dict(),
+        "terms": context.scenes.task.terms.as_dict(),
         **numbers,
         "provenance": provenance,
     }

@@ -22,7 +22,7 @@ def pointing_game(maps: NDArray, regions: NDArray, episode: NDArray) -> dict[str
     Returns:
         "hit", and beside it "chance": the share of the picture that the cube fills.
     """
-    flat, target = _flat(maps), _flat(regions) == Region.NEXT_CUBE
+    flat, target = _flat(maps), _flat(regions) == Region.NEXT_TARGET
     seen = target.any(1)
     brightest = flat.argmax(1)
     hit = target[np.arange(len(flat)), brightest] & (flat.max(1) > 0)

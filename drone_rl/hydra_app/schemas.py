@@ -8,7 +8,7 @@ from typing import Any
 from hydra.core.config_store import ConfigStore
 from omegaconf import MISSING
 
-from drone_rl.settings.changes import Changes
+from drone_rl.settings.changes import ChangesOfTask
 from drone_rl.settings.collecting import Collector
 from drone_rl.settings.learning import Objective, Optimiser, Scheduler
 from drone_rl.settings.loggers import Logger
@@ -19,11 +19,11 @@ from drone_rl.settings.returns import Returns
 from drone_rl.settings.training import TrainerSettings
 from drone_rl.settings.transforms import Transform
 from drone_rl.settings.variant import Variant
-from drone_rl.sim.settings import CameraSettings, TaskSettings
+from drone_rl.sim.settings import BaseTaskSettings, CameraSettings, TaskSettings
+from drone_rl.sim.tasks.registry import TASKS
 from drone_rl.utils.settings import Settings, kinds_of, snake_case, types_of
 
 GROUPS: dict[str, type[Settings]] = {
-    "task": TaskSettings,
     "camera": CameraSettings,
     "trainer": TrainerSettings,
     "provable": ProvableSettings,
@@ -50,6 +50,9 @@ def register_schemas(**commands: type[Settings]) -> None:
         commands: The settings of each command, by the name of its file.
     """
     store = ConfigStore.instance()
+    for task in TASKS:
+        name = "base_task" if task is TaskSettings else f"base_{task.name}"
+        store.store(group="task", name=name, node=schema_of(task))
     for group, settings in GROUPS.items():
         store.store(group=group, name=f"base_{group}", node=schema_of(settings))
     for group, part in PARTS.items():
@@ -65,17 +68,25 @@ def register_schemas(**commands: type[Settings]) -> None:
 
 def schema_of(cls: type[Settings]) -> type:
     """A dataclass of the same fields with no defaults, for those are in conf/."""
-    target = [("_target_", str, cls.target)] if issubclass(cls, Variant) else []
     fields = [(name, *_field(cls, name)) for name in types_of(cls)]
-    return dataclasses.make_dataclass(f"{cls.__name__}Schema", [*target, *fields])
+    return dataclasses.make_dataclass(f"{cls.__name__}Schema", [*_named(cls), *fields])
+
+
+def _named(cls: type[Settings]) -> list[tuple[str, Any, Any]]:
+    """What says which variant or task it is."""
+    if issubclass(cls, Variant):
+        return [("_target_", str, cls.target)]
+    if issubclass(cls, BaseTaskSettings) and cls is not TaskSettings:
+        return [("name", str, cls.name)]
+    return []
 
 
 def _field(cls: type[Settings], name: str) -> tuple[Any, Any]:
     """A type that Hydra knows, and the value before any file gives one."""
     kind, hint = kinds_of(cls)[name], types_of(cls)[name]
-    if isinstance(kind, Changes):
-        changes = [(n, _simple(h) | None, None) for n, h in types_of(kind.of).items()]
-        schema = dataclasses.make_dataclass(f"{kind.of.__name__}Changes", changes)
+    if isinstance(kind, ChangesOfTask):
+        changes = [(n, _simple(h) | None, None) for n, h in kind.types.items()]
+        schema = dataclasses.make_dataclass("TaskChanges", changes)
         return schema, dataclasses.field(default_factory=schema)
     return _simple(hint), MISSING
 

@@ -11,11 +11,12 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import parse_json, read_bytes, refuse_links
 from drone_rl.utils.schema import Text, as_mapping
 from drone_rl.words.actions import ShownActions, shown_actions
+from drone_rl.words.terms import Terms, terms_of
 
 FORMAT = "drone_rl explanation"
-FORMAT_VERSION = 2
+FORMAT_VERSION = 3
 FRAME = frozenset(
-    {"format", "format_version", "name", "settings", "seconds", "actions", "provenance"}
+    {"format", "format_version", "name", "settings", "seconds", "actions", "terms", "provenance"}
 )
 """Entries of explanation.json that are no section's."""
 MOST_BYTES = 2**26
@@ -43,6 +44,11 @@ class Explanation:
         """What the policy could do."""
         return shown_actions(self.numbers)
 
+    @property
+    def terms(self) -> Terms:
+        """What its task calls things."""
+        return terms_of(self.numbers)
+
     @classmethod
     def load(cls, folder: Path) -> "Explanation":
         """Reads a folder.
@@ -62,6 +68,7 @@ class Explanation:
             data = read_arrays(folder / "dataset.npz")
             data.pop("meta", None)
             shown_actions(numbers)
+            terms_of(numbers)
             if "name" in numbers:
                 Text(1000).read(numbers["name"], "name")
         except (InputError, OSError) as error:

@@ -67,6 +67,7 @@ class Policy:
             "numbers": self.explanation.numbers,
             "pictures": _save(part.draw(self.explanation), self.folder, f"{self.prefix}_"),
             "words": {n: say(may, self.explanation.numbers) for n, may in part.words.items()},
+            "terms": self.explanation.terms,
             "extras": part.extras(self.explanation),
         }
 

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from typing import Any, ClassVar, TypeVar
 
 from drone_rl.settings.variant import Variant
+from drone_rl.sim.settings import BaseTaskSettings, TaskSettings
+from drone_rl.sim.tasks.registry import named_settings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import as_mapping, shown
 from drone_rl.utils.settings import Settings, below, check_names, kinds_of, plain, types_of
@@ -14,7 +16,12 @@ S = TypeVar("S", bound=Settings)
 
 
 def as_config(settings: Settings) -> dict[str, Any]:
-    """Settings as plain data; a variant says by "_target_" what makes it, several are named."""
+    """Settings as plain data; a variant says by "_target_" what makes it, several are named.
+
+    A task says by "name" which it is, see `BaseTaskSettings.values`.
+    """
+    if isinstance(settings, BaseTaskSettings):
+        return settings.values()
     target = {"_target_": settings.target} if isinstance(settings, Variant) else {}
     if isinstance(settings, Variant) and not settings.is_known:
         return {**target, **settings.values()}
@@ -104,6 +111,8 @@ def _read(hint: Any, value: Any, where: str) -> Any:
         return value
     if issubclass(hint, Variant):
         return variant_of(hint, value, where)
+    if issubclass(hint, BaseTaskSettings) and hint is not TaskSettings:
+        hint, value = named_settings(value, where)
     return from_config(hint, value, where)
 
 

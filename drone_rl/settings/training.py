@@ -8,7 +8,7 @@ from drone_rl.settings.learning import Adam, Constant, Objective, Optimiser, Rei
 from drone_rl.settings.networks import Network, SmallCnn
 from drone_rl.settings.returns import LeaveOneOut, Returns
 from drone_rl.settings.transforms import Gray, Standardize, Transform
-from drone_rl.sim.settings import CameraSettings, TaskSettings
+from drone_rl.sim.settings import BaseTaskSettings, CameraSettings, TaskSettings
 from drone_rl.utils.schema import Instance, Real, Several, Whole
 from drone_rl.utils.settings import Settings
 
@@ -39,7 +39,7 @@ class TrainerSettings(Settings):
 class TrainSettings(Settings):
     """One training: what is learned, how, and for how long."""
 
-    task: TaskSettings = TaskSettings()
+    task: BaseTaskSettings = TaskSettings()
     """What the drone has to do."""
     camera: CameraSettings = CameraSettings()
     """The picture that the drone takes."""

@@ -18,7 +18,7 @@ from drone_rl.sim.entities.arena import SKY_COLOR, Field
 from drone_rl.sim.entities.drone import Drone
 from drone_rl.sim.meaning import Meaning
 from drone_rl.sim.rendering.scene import Scene
-from drone_rl.sim.settings import CameraSettings, TaskSettings
+from drone_rl.sim.settings import BaseTaskSettings, CameraSettings
 from drone_rl.sim.tasks import State, Task, as_task
 
 CONTROL_TIMESTEP_S = 0.1
@@ -34,7 +34,7 @@ class ComposerTask(composer.Task):
 
     def __init__(
         self,
-        task: TaskSettings | Task[Any] | None = None,
+        task: BaseTaskSettings | Task[Any] | None = None,
         camera: CameraSettings | None = None,
         *,
         dynamics: Dynamics | None = None,
@@ -174,7 +174,7 @@ class ComposerTask(composer.Task):
 
 
 def make_environment(
-    task: TaskSettings | Task[Any] | None = None,
+    task: BaseTaskSettings | Task[Any] | None = None,
     camera: CameraSettings | None = None,
     *,
     dynamics: Dynamics | None = None,

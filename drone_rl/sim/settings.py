@@ -1,12 +1,13 @@
-"""What can be chosen about the cube collection task, checked before anything is built.
+"""What can be chosen about tasks and the camera, checked before anything is built.
 
-The defaults are the original study's; the sizes of the cube and the drone, which it leaves out, are
-chosen so that a uniformly random policy collects about as much as it did there (0.84 cubes).
+Of cube collection the defaults are the original study's; the sizes of the cube and the drone, which
+it leaves out, are chosen so that a uniformly random policy collects about as much as it did there
+(0.84 cubes).
 """
 
 import dataclasses
 import math
-from typing import Annotated
+from typing import Annotated, Any, ClassVar
 
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Real, Several, Whole
@@ -18,7 +19,20 @@ Color = Annotated[tuple[float, float, float], Several(Real(0.0, 1.0), 3, 3)]
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class TaskSettings(Settings):
+class BaseTaskSettings(Settings):
+    """What the settings of a task are; each task has a class of its own."""
+
+    name: ClassVar[str]
+    """What files call the task."""
+
+    def values(self) -> dict[str, Any]:
+        """See `Settings.values`; the task is named, but for cube collection, which was the first."""
+        named = {} if self.name == TaskSettings.name else {"name": self.name}
+        return {**named, **super().values()}
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class TaskSettings(BaseTaskSettings):
     """The cubes, the drone's moves and the boundaries. Lengths in metres, world frame.
 
     The world frame has x forward, y left and z up; the drone starts at x = y = 0.
@@ -27,6 +41,7 @@ class TaskSettings(Settings):
         InputError: A value is out of range, or the settings together can't be met.
     """
 
+    name: ClassVar[str] = "collect_cubes"
     num_cubes: Annotated[int, Whole(1, 100)] = 3
     """Cubes placed in every episode."""
     first_distance: Length = 15.0

@@ -21,7 +21,7 @@ from drone_rl.sim.rendering import (
     make_renderer,
 )
 from drone_rl.sim.rendering.view import Modality
-from drone_rl.sim.settings import CameraSettings, TaskSettings
+from drone_rl.sim.settings import BaseTaskSettings, CameraSettings
 from drone_rl.sim.tasks import State, Task, as_task
 
 
@@ -31,7 +31,7 @@ class Worlds:
     def __init__(
         self,
         num_worlds: int,
-        task: TaskSettings | Task[Any] | None = None,
+        task: BaseTaskSettings | Task[Any] | None = None,
         camera: CameraSettings | None = None,
         *,
         dynamics: Dynamics | None = None,

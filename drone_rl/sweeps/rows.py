@@ -82,8 +82,8 @@ class Row:
 
     @property
     def final_share(self) -> float:
-        """The running mean at the end, as a share of the task's cubes; nothing if it failed."""
-        return self.result["running_reward"] / self.result["num_cubes"] if self.result else 0.0
+        """The running mean at the end, as a share of the greatest reward; nothing if it failed."""
+        return self.result["running_reward"] / self.result["largest_reward"] if self.result else 0.0
 
     def share(self, of: str) -> float | None:
         """Of the cubes "all", "left", "ahead" or "right", what its greedy policy collects.
@@ -146,7 +146,7 @@ def _read_row(run: Run, choice: dict[str, str]) -> Row:
         return row
     try:
         _check_result(result)
-        curve, _, entropy = _read_metrics(run.folder, result["num_cubes"])
+        curve, _, entropy = _read_metrics(run.folder, result["largest_reward"])
         had = float(result["frames"]), float(result["seconds"])
         row = Row(run, choice, "finished", None, result, curve, *had, entropy)
         _check_verdict(row)
@@ -157,10 +157,10 @@ def _read_row(run: Run, choice: dict[str, str]) -> Row:
 
 
 def _check_result(result: dict[str, Any]) -> None:
-    for key in ("frames", "episodes", "seconds", "running_reward", "num_cubes"):
+    for key in ("frames", "episodes", "seconds", "running_reward", "largest_reward"):
         _check_number(key, result[key])
-    if result["num_cubes"] < 1:
-        raise ValueError(f"num_cubes is {result['num_cubes']}")
+    if result["largest_reward"] <= 0:
+        raise ValueError(f"largest_reward is {result['largest_reward']}")
 
 
 def _check_verdict(row: Row) -> None:
@@ -183,7 +183,7 @@ def _check_number(name: str, value: object) -> None:
 
 
 def _read_metrics(
-    folder: Path, num_cubes: int
+    folder: Path, largest_reward: float
 ) -> tuple[tuple[Array, Array], tuple[float, float], float | None]:
     """The learning curve, frames and seconds until its end, and the entropy there."""
     text = read_bytes(folder / "metrics.csv", 2**26).decode()
@@ -192,4 +192,4 @@ def _read_metrics(
     rewards = np.array([float(row["train/running_reward"]) for row in rows])
     had = (float(rows[-1]["frames"]), float(rows[-1].get("seconds") or 0)) if rows else (0.0, 0.0)
     last = [float(row["loss/entropy"]) for row in rows[-LAST_UPDATES:] if row.get("loss/entropy")]
-    return (frames, rewards / num_cubes), had, float(np.mean(last)) if last else None
+    return (frames, rewards / largest_reward), had, float(np.mean(last)) if last else None

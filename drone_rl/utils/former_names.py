@@ -7,6 +7,7 @@ FORMER_NAMES = {
     "running_cubes": "running_reward",
     "train/running_cubes": "train/running_reward",
     "train/cubes": "train/reward",
+    "num_cubes": "largest_reward",
 }
 """The name in an older file, and the present one."""
 

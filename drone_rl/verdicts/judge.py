@@ -123,6 +123,7 @@ def judge(
         "rule": rule.text,
         "error_rate": rule.error_rate,
         "good_share": rule.good_share,
+        "terms": task.terms.as_dict(),
         "num_cubes": greedy.goals.reached.shape[-1],
         "proof": None if claim is None else claim.beside(greedy),
         "greedy": summarise(greedy),

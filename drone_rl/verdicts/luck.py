@@ -9,7 +9,7 @@ from drone_rl.envs import DroneEnv
 from drone_rl.evaluation import ConstantPolicy, Episodes, Oracle, RandomPolicy, run_episodes
 from drone_rl.sim.actions import Actions
 from drone_rl.sim.dynamics import Dynamics
-from drone_rl.sim.settings import TaskSettings
+from drone_rl.sim.settings import BaseTaskSettings
 from drone_rl.sim.tasks import Task, as_task
 from drone_rl.utils.seeding import Stream, torch_generator
 from drone_rl.verdicts.rule import LUCK
@@ -21,7 +21,7 @@ _LUCK_SEED = 0
 
 def make_baseline(
     name: str,
-    task: TaskSettings | Task[Any],
+    task: BaseTaskSettings | Task[Any],
     generator: torch.Generator,
     actions: Actions | None = None,
 ) -> TensorDictModuleBase:
@@ -47,7 +47,7 @@ def make_baseline(
 
 def fly_baselines(
     num_worlds: int,
-    task: TaskSettings | Task[Any],
+    task: BaseTaskSettings | Task[Any],
     worlds: dict[str, Any],
     episodes: int,
     device: str = "cpu",

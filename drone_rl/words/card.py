@@ -2,8 +2,22 @@
 
 from drone_rl.words.certificate import is_quoted
 from drone_rl.words.licence import Evidence, Sentence
+from drone_rl.words.terms import terms_of
 
 _NUMBERS = {1: "one cube", 2: "two cubes", 3: "three cubes", 4: "four cubes", 5: "five cubes"}
+
+
+def some_cubes(task: Evidence) -> str:
+    """The cubes of a task.
+
+    Args:
+        task: Its settings, or a file's, which may be of before there were other tasks.
+    """
+    cubes = _NUMBERS.get(task["num_cubes"], f"{task['num_cubes']} cubes")
+    return (
+        f"{cubes} of {task['cube_size']:g} m, up to {task['lateral_bound']:g} m to either side "
+        f"and {task['vertical_bound']:g} m up or down"
+    )
 
 
 def _verdict(card: Evidence) -> str:
@@ -32,12 +46,10 @@ def _chosen(card: Evidence) -> str:
 
 
 def _tested(card: Evidence) -> str:
-    task = card["task"]
-    cubes = _NUMBERS.get(task["num_cubes"], f"{task['num_cubes']} cubes")
+    tested = terms_of(card["verdict"]).tested or some_cubes(card["task"])
     return (
-        f"Tested with {cubes} of {task['cube_size']:g} m, up to {task['lateral_bound']:g} m to "
-        f"either side and {task['vertical_bound']:g} m up or down, in this task's look and light "
-        "only: nothing is known of other colours, light or sizes."
+        f"Tested with {tested}, in this task's look and light only: nothing is known of other "
+        "colours, light or sizes."
     )
 
 

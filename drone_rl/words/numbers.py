@@ -3,6 +3,8 @@
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth")
+
 
 def bounds(interval: Mapping[str, Any], show: Callable[[float], str] = "{:.2f}".format) -> str:
     """The 95% interval of a number."""
@@ -24,3 +26,8 @@ def listed(parts: Sequence[str], last: str = "and") -> str:
 def plural(count: int, noun: str) -> str:
     """A count with its noun, whose plural is regular."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def ordinal(number: int) -> str:
+    """What people call the thing with this index."""
+    return ORDINALS[number] if number < len(ORDINALS) else f"{number + 1}th"

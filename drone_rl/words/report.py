@@ -7,6 +7,7 @@ from drone_rl.words.licence import Evidence, Sentence, percent
 from drone_rl.words.numbers import among, bounds, listed, plural
 from drone_rl.words.places import PLACES
 from drone_rl.words.response import ASYMMETRY, RESPONSE
+from drone_rl.words.terms import terms_of
 
 
 def _size(evidence: Evidence) -> str:
@@ -57,10 +58,10 @@ DATASET = (
         _entropy,
     ),
     Sentence(
-        "dataset.no_cube",
-        "no cube was collected in any step flown",
-        lambda e: e["dataset"]["cubes_collected"] == 0,
-        lambda e: "No cube was collected in these flights.",
+        "dataset.none_reached",
+        "no goal was reached in any step flown",
+        lambda e: e["dataset"]["goals_reached"] == 0,
+        lambda e: f"No {terms_of(e).goal} was {terms_of(e).reached} in these flights.",
     ),
 )
 
@@ -102,15 +103,15 @@ def _no_pair(evidence: Evidence) -> str:
 
 
 def _pairs(evidence: Evidence) -> str:
-    found = evidence["contradictions"]
+    found, target = evidence["contradictions"], terms_of(evidence).target
     text = (
         f"Among these {found['frames']} frames {plural(found['pairs'], 'pair')} of alike ones, "
         f"each frame in one pair at most, {'is' if found['pairs'] == 1 else 'are'} answered in "
-        f"opposite ways: {plural(found['contradictions'], 'contradiction')} (the next cube stands "
+        f"opposite ways: {plural(found['contradictions'], 'contradiction')} (the next {target} stands "
         f"alike in both), {found['justified']} justified (it stands elsewhere)"
     )
     unknown = found["unknown"]
-    return text + (f", {unknown} unknown (a frame has no next cube)." if unknown else ".")
+    return text + (f", {unknown} unknown (a frame has no next {target})." if unknown else ".")
 
 
 def _worst(evidence: Evidence) -> str:

@@ -4,17 +4,18 @@ from collections.abc import Sequence
 
 from drone_rl.words.licence import Evidence, Sentence, percent
 from drone_rl.words.numbers import bounds, listed
+from drone_rl.words.terms import terms_of
 
 
 def _level(evidence: Evidence, level: bool = True) -> list[Evidence]:
-    """Rows of cubes at the drone's height, or of all others."""
+    """Rows of targets at the drone's height, or of all others."""
     return [row for row in evidence["response"]["rows"] if (row["height"] == 0) == level]
 
 
-def _collected(rows: Sequence[Evidence]) -> str:
-    where = {"left": "on its left", "ahead": "ahead", "right": "on its right"}
+def _collected(evidence: Evidence, rows: Sequence[Evidence]) -> str:
+    terms = terms_of(evidence)
     parts = [
-        f"{row['collected']} of {row['places']} places {where.get(row['side'], row['side'])}"
+        f"{row['collected']} of {row['places']} places {terms.place(row['side'])}"
         for row in rows
         if row["places"]
     ]
@@ -22,19 +23,21 @@ def _collected(rows: Sequence[Evidence]) -> str:
 
 
 def _outcomes(evidence: Evidence) -> str:
+    terms = terms_of(evidence)
     return (
-        "Put before one cube alone, and flying on with its most probable actions, it collects the "
-        f"cube from {_collected(_level(evidence))}."
+        f"Put before one {terms.target} alone, and flying on with its most probable actions, it "
+        f"{terms.handles} from {_collected(evidence, _level(evidence))}."
     )
 
 
 def _blind(evidence: Evidence) -> str:
     rows = {row["side"]: row["blind"] for row in _level(evidence)}
-    parts = [f"{percent(rows[s])} of the places on the {s}" for s in rows if s != "ahead"]
+    terms = terms_of(evidence)
+    parts = [f"{percent(rows[s])} of the places {terms.place(s)}" for s in rows if s != "ahead"]
     return (
         f"It is blind at {listed(parts)}: a turn is called for and not made, and its probabilities "
-        f"differ by less than {evidence['response']['blind_below']:g} from those without a cube. "
-        "Farther on it may see the cube yet."
+        f"differ by less than {evidence['response']['blind_below']:g} from those without a "
+        f"{terms.target}. Farther on it may see the {terms.target} yet."
     )
 
 
@@ -44,8 +47,8 @@ def _heights(evidence: Evidence) -> str:
     for height in sorted({row["height"] for row in other}):
         word = "higher" if height > 0 else "lower"
         rows = [row for row in other if row["height"] == height]
-        parts.append(f"{abs(height):g} m {word}: from {_collected(rows)}")
-    return f"Where the cube stands {'; '.join(parts)}."
+        parts.append(f"{abs(height):g} m {word}: from {_collected(evidence, rows)}")
+    return f"Where the {terms_of(evidence).target} stands {'; '.join(parts)}."
 
 
 RESPONSE = (
@@ -57,7 +60,7 @@ RESPONSE = (
     ),
     Sentence(
         "response.heights",
-        "cubes of the task stand at other heights, too",
+        "targets of the task stand at other heights, too",
         lambda e: bool(_level(e, level=False)),
         _heights,
     ),

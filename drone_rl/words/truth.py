@@ -5,6 +5,7 @@ from typing import Any
 
 from drone_rl.words.licence import Evidence, Sentence, percent
 from drone_rl.words.numbers import bounds, listed, plural
+from drone_rl.words.terms import terms_of
 
 NAMES = {
     "grad_cam": "Grad-CAM",
@@ -75,18 +76,23 @@ def _was_flown(evidence: Evidence) -> bool:
     return _truth(evidence).get("outcomes") is not None
 
 
+def _is_followed(evidence: Evidence) -> bool:
+    """Whether there is something to fly to, and to follow where it moves."""
+    return _was_flown(evidence) and terms_of(evidence).follows
+
+
 def _outcome(evidence: Evidence, name: str) -> Mapping[str, Any]:
     return _truth(evidence)["outcomes"][name]
 
 
 def _follows(evidence: Evidence) -> bool:
-    return _was_flown(evidence) and _is_above(_outcome(evidence, "follows")["lower95"], 0)
+    return _is_followed(evidence) and _is_above(_outcome(evidence, "follows")["lower95"], 0)
 
 
 def _moved_along(evidence: Evidence) -> str:
     follows, flights = _outcome(evidence, "follows"), _truth(evidence)["outcomes"]["flights"]
     return (
-        f"When the next cube is moved sideways, {plural(flights, 'flight')} gone on from these "
+        f"When the next {terms_of(evidence).target} is moved sideways, {plural(flights, 'flight')} gone on from these "
         f"pictures move with it by {follows['mean']:.2f} m a metre ({bounds(follows)})."
     )
 
@@ -94,7 +100,7 @@ def _moved_along(evidence: Evidence) -> str:
 def _not_along(evidence: Evidence) -> str:
     follows = _outcome(evidence, "follows")
     return (
-        "When the next cube is moved sideways, flights gone on do not surely move with it "
+        f"When the next {terms_of(evidence).target} is moved sideways, flights gone on do not surely move with it "
         f"({follows['mean']:.2f} m a metre, {bounds(follows)})."
     )
 
@@ -113,18 +119,18 @@ def _patch(evidence: Evidence) -> Mapping[str, Any]:
 
 
 def _taken(evidence: Evidence) -> Mapping[str, Any]:
-    return _truth(evidence)["interventions"]["cube taken away"]
+    return _truth(evidence)["interventions"]["target taken away"]
 
 
-def _cube_counts(evidence: Evidence) -> bool:
-    cube, patch = _taken(evidence)["lower95"], _patch(evidence)["upper95"]
-    return cube is not None and patch is not None and cube > patch
+def _target_counts(evidence: Evidence) -> bool:
+    taken, patch = _taken(evidence)["lower95"], _patch(evidence)["upper95"]
+    return taken is not None and patch is not None and taken > patch
 
 
-def _cube(evidence: Evidence) -> str:
+def _target(evidence: Evidence) -> str:
     change = _taken(evidence)
     return (
-        f"Taking the next cube away changes the probabilities by {change['mean']:.2f} of 1 "
+        f"Taking the next {terms_of(evidence).target} away changes the probabilities by {change['mean']:.2f} of 1 "
         f"({bounds(change)}), surely more than a patch of ground does."
     )
 
@@ -187,14 +193,14 @@ SENTENCES = (
     ),
     Sentence(
         "truth.follows",
-        "flights with the next cube moved surely end up sideways with it",
+        "flights with the next target, to which one flies, moved surely end up sideways with it",
         _follows,
         _moved_along,
     ),
     Sentence(
         "truth.follows_not",
         "they do not surely",
-        lambda e: _was_flown(e) and not _follows(e),
+        lambda e: _is_followed(e) and not _follows(e),
         _not_along,
     ),
     Sentence("truth.ground", "the ground was repainted in flights", _was_flown, _ground),
@@ -208,10 +214,10 @@ SENTENCES = (
         ),
     ),
     Sentence(
-        "truth.cube",
-        "the cube taken away changes at least more than the patch of ground does at most",
-        _cube_counts,
-        _cube,
+        "truth.target",
+        "the target taken away changes at least more than the patch of ground does at most",
+        _target_counts,
+        _target,
     ),
     Sentence(
         "truth.integral",

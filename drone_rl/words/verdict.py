@@ -5,6 +5,7 @@ from typing import Any
 
 from drone_rl.words.certificate import PROOF
 from drone_rl.words.licence import Evidence, Sentence, percent
+from drone_rl.words.terms import terms_of
 
 FREQUENT = 0.02
 """How an episode ends is worth a word if surely more than this share of episodes end so."""
@@ -14,34 +15,21 @@ _LUCK = {
     "left": "flying left",
     "right": "flying right",
 }
-_SIDES = {"left": "on its left", "ahead": "ahead", "right": "on its right"}
-_HEIGHTS = {
-    "lower": "lower than itself",
-    "level": "at its own height",
-    "higher": "higher than itself",
-}
-_ENDS = {
-    "front_boundary": "behind the last cube",
-    "side_boundary": "outside the field, left or right",
-    "step_limit": "at the step limit",
-}
 _EXPECTED_END = "front_boundary"
 """Of older files. Who has passed a cube flies on to there: no news."""
-_KINDS = {
-    "good": "good",
-    "poor": "poor",
-    "one-sided (left)": "blind to cubes on its right",
-    "one-sided (right)": "blind to cubes on its left",
-    "none of these": "neither good nor poor nor one-sided",
-}
 
 
 def _success(flights: Evidence) -> str:
     return percent(flights["success"]["share"])
 
 
-def _cubes(flights: Evidence) -> str:
+def _all(flights: Evidence) -> str:
     return percent(flights["shares"]["all"]["mean"])
+
+
+def _every(evidence: Evidence) -> str:
+    terms = terms_of(evidence)
+    return f"{terms.reaches} every {terms.goal}"
 
 
 def best_luck(evidence: Evidence) -> str:
@@ -61,7 +49,21 @@ def _acting(luck: str) -> str:
 def _sides(evidence: Evidence) -> dict[str, str]:
     """Strata by name, and where they are."""
     names = [str(name) for name in evidence["greedy"]["shares"] if name != "all"]
-    return {name: _SIDES.get(name, name) for name in names}
+    return {name: terms_of(evidence).side(name) for name in names}
+
+
+def _lost_side(evidence: Evidence) -> str:
+    """Goals on the side that a one-sided policy has lost; nothing of another one."""
+    lost = {"one-sided (left)": "right", "one-sided (right)": "left"}.get(evidence["kind"])
+    terms = terms_of(evidence)
+    return f"{terms.goals} {terms.side(lost)}" if lost else ""
+
+
+def _looks(evidence: Evidence) -> str:
+    if lost := _lost_side(evidence):
+        return f"blind to {lost}"
+    neither = "neither good nor poor nor one-sided"
+    return neither if evidence["kind"] == "none of these" else evidence["kind"]
 
 
 def _list(parts: Sequence[str], last: str = "and") -> str:
@@ -69,16 +71,14 @@ def _list(parts: Sequence[str], last: str = "and") -> str:
 
 
 def _kind(evidence: Evidence) -> str:
-    kind = evidence["kind"]
-    every = f"it collects every cube in {_success(evidence['greedy'])} of episodes"
-    blind = {"one-sided (left)": "right", "one-sided (right)": "left"}.get(kind)
-    if blind:
-        return f"This policy can't be trusted with cubes on its {blind}: {every}."
+    every = f"it {_every(evidence)} in {_success(evidence['greedy'])} of episodes"
+    if lost := _lost_side(evidence):
+        return f"This policy can't be trusted with {lost}: {every}."
     return {
         "good": f"This policy does its task: {every}.",
         "poor": f"This policy does not do its task: it is {_beside_luck(evidence)} luck.",
-        "none of these": f"This policy is {_KINDS['none of these']}: {every}.",
-    }[kind]
+        "none of these": f"This policy is {_looks(evidence)}: {every}.",
+    }[evidence["kind"]]
 
 
 def _beside_luck(evidence: Evidence) -> str:
@@ -88,11 +88,11 @@ def _beside_luck(evidence: Evidence) -> str:
 
 
 def _open(evidence: Evidence) -> str:
-    flown, enough = evidence["greedy"], evidence["enough"]
+    flown, enough, terms = evidence["greedy"], evidence["enough"], terms_of(evidence)
     more = f"about {enough:,} would do" if enough else "many times as many might not do"
     return (
-        f"This policy looks {_KINDS[evidence['kind']]}, but {flown['episodes']:,} episodes are too "
-        f"few to be certain ({more}): it collected every cube in {_success(flown)} of them."
+        f"This policy looks {_looks(evidence)}, but {flown['episodes']:,} episodes are too few to "
+        f"be certain ({more}): it {terms.reached} every {terms.goal} in {_success(flown)} of them."
     )
 
 
@@ -100,16 +100,18 @@ def _shares(evidence: Evidence) -> str:
     shares, sides = evidence["greedy"]["shares"], _sides(evidence)
     met = [(percent(shares[k]["mean"]), v) for k, v in sides.items() if shares[k]["count"]]
     none = [v for k, v in sides.items() if not shares[k]["count"]]
-    parts = [f"{p} of {'those' if i else 'the cubes'} {v}" for i, (p, v) in enumerate(met)]
-    text = f"It collects {_list(parts)}"
+    terms = terms_of(evidence)
+    goals = f"the {terms.goals}"
+    parts = [f"{p} of {'those' if i else goals} {v}" for i, (p, v) in enumerate(met)]
+    text = f"It {terms.reaches} {_list(parts)}"
     return text + (f"; none were offered {_list(none, 'or')}." if none else ".")
 
 
 def _baselines(evidence: Evidence) -> str:
-    flown, luck = evidence["baselines"], best_luck(evidence)
+    flown, luck, terms = evidence["baselines"], best_luck(evidence), terms_of(evidence)
     return (
-        f"In the same worlds it collects {_cubes(evidence['greedy'])} of all cubes, "
-        f"{_acting(luck)} {_cubes(flown[luck])} and the oracle {_cubes(flown['oracle'])}."
+        f"In the same worlds it {terms.reaches} {_all(evidence['greedy'])} of all {terms.goals}, "
+        f"{_acting(luck)} {_all(flown[luck])} and the oracle {_all(flown['oracle'])}."
     )
 
 
@@ -123,37 +125,27 @@ def _pointless(evidence: Evidence) -> str:
     flown = evidence["baselines"]
     luck = max(_luck(evidence), key=lambda name: flown[name]["success"]["share"])
     return (
-        f"This task tells little, for luck is enough: {_acting(luck)} collects every cube in "
+        f"This task tells little, for luck is enough: {_acting(luck)} {_every(evidence)} in "
         f"{_success(flown[luck])} of episodes."
     )
 
 
 def _hopeless(evidence: Evidence) -> str:
     oracle = evidence["baselines"]["oracle"]
-    return f"Even the oracle collects every cube in only {_success(oracle)} of episodes."
+    return f"Even the oracle {_every(evidence)} in only {_success(oracle)} of episodes."
 
 
 def _largest(evidence: Evidence) -> str:
     row: dict[str, Any] = evidence["failures"]["largest"]
-    by, value = row["by"], row["value"]
-    where = {
-        "cube": f"at the {value} cube",
-        "side": f"with cubes {_SIDES.get(value, value)}",
-        "sideways": f"with cubes {value} to its side",
-        "height": f"with cubes {_HEIGHTS.get(value, value)}",
-        "end": f"by ending {_ending(value)}",
-    }.get(by, f"where {by} is {value}")
+    by, terms = row["by"], terms_of(evidence)
+    where = terms.failing(by, row["value"])
     whole = row["failed"] == row["episodes"]
     count = f"all {row['episodes']:,}" if whole else f"{row['failed']:,} of {row['episodes']:,}"
-    offered = {"cube": " that got so far", "end": ""}.get(by, " that offered one")
+    offered = {terms.goal: " that got so far", "end": ""}.get(by, " that offered one")
     if row["episodes"] == evidence["greedy"]["episodes"]:
         offered = ""
     share = "" if whole else f" ({percent(row['share'])})"
     return f"It fails most {where}: in {count} episodes{offered}{share}{_other_ends(evidence)}."
-
-
-def _ending(end: str) -> str:
-    return _ENDS.get(end, f"by {end.replace('_', ' ')}")
 
 
 def _other_ends(evidence: Evidence) -> str:
@@ -166,7 +158,10 @@ def _other_ends(evidence: Evidence) -> str:
         for row in evidence["failures"]["rows"]
         if row["by"] == "end" and row["lower95"] > FREQUENT and row["value"] not in said
     ]
-    ends = [f"{percent(row['share'])} of all end {_ending(row['value'])}" for row in rows]
+    ends = [
+        f"{percent(row['share'])} of all end {terms_of(evidence).ending(row['value'])}"
+        for row in rows
+    ]
     return f"; {_list(ends)}" if ends else ""
 
 
@@ -185,7 +180,7 @@ def _drawing(evidence: Evidence) -> str:
     sampled, greedy = _success(evidence["sampled"]), _success(evidence["greedy"])
     return (
         "That holds for its most probable actions: with actions drawn by their probabilities it "
-        f"collects every cube in {sampled} of episodes, not in {greedy}."
+        f"{_every(evidence)} in {sampled} of episodes, not in {greedy}."
     )
 
 
@@ -197,7 +192,7 @@ SENTENCES = (
     Sentence("kind", "the kind is certain", lambda e: e["certain"], _kind),
     Sentence("open", "the kind is not certain", lambda e: not e["certain"], _open),
     *PROOF,
-    Sentence("shares", "a cube was missed, or a side not offered", _misses_or_lacks, _shares),
+    Sentence("shares", "a goal was missed, or a side not offered", _misses_or_lacks, _shares),
     Sentence("baselines", "luck is not enough", lambda e: not _luck_suffices(e), _baselines),
     Sentence("pointless", "luck succeeds as a good policy does", _luck_suffices, _pointless),
     Sentence(

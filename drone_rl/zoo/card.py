@@ -5,6 +5,7 @@ from typing import Any
 
 from drone_rl.words.card import SENTENCES
 from drone_rl.words.licence import said
+from drone_rl.words.terms import terms_of
 from drone_rl.words.verdict import best_luck
 
 Evidence = Mapping[str, Any]
@@ -53,9 +54,12 @@ def _flights(verdict: Evidence) -> str:
     }
     flown = {name: flights for name, flights in flown.items() if flights is not None}
     rows = [["", *flown], ["---"] * (1 + len(flown))]
-    rows.append(["episodes with all cubes", *(_share(f["success"]) for f in flown.values())])
+    terms = terms_of(verdict)
+    rows.append(
+        [f"episodes with all {terms.goals}", *(_share(f["success"]) for f in flown.values())]
+    )
     for side in verdict["greedy"]["shares"]:
-        label = "cubes collected" if side == "all" else f"of those {side}"
+        label = f"{terms.goals} {terms.reached}" if side == "all" else f"of those {side}"
         rows.append([label, *(_share(f["shares"][side]) for f in flown.values())])
     return _table(rows)
 

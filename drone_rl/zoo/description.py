@@ -15,8 +15,8 @@ from torchrl.envs import TransformedEnv
 from drone_rl.envs import DroneEnv, with_transforms
 from drone_rl.policies import PolicyNetwork
 from drone_rl.sim.actions import Actions
-from drone_rl.sim.settings import CameraSettings, TaskSettings
-from drone_rl.sim.tasks import Task, as_task
+from drone_rl.sim.settings import BaseTaskSettings, CameraSettings
+from drone_rl.sim.tasks import Task, as_task, read_task
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Record, Several, as_mapping, shown
 from drone_rl.utils.settings import plain
@@ -54,7 +54,7 @@ class PolicyDescription:
         InputError: They don't fit, or together exceed a bound.
     """
 
-    task: TaskSettings
+    task: BaseTaskSettings
     camera: CameraSettings
     transforms: tuple[Choice, ...]
     """In the order in which they are applied."""
@@ -182,7 +182,7 @@ def parse(data: Any) -> PolicyDescription:
         data["transforms"], "transforms"
     )
     return PolicyDescription(
-        TaskSettings.read(data["task"], "task"),
+        read_task(data["task"], "task"),
         CameraSettings.read(data["camera"], "camera"),
         chosen,
         _ChoiceOf(NETWORKS).read(data["network"], "network"),

@@ -26,7 +26,7 @@ def test_an_evaluation_in_python(good):
 
     done = drone_rl.evaluate(good.in_task(num_cubes=2), episodes=6, num_envs=4, progress=note)
     assert set(done.flown) == {"greedy", "sampled", "random", "forward", "left", "right", "oracle"}
-    assert done.flown["oracle"]["mean_cubes"] == 2.0
+    assert done.flown["oracle"]["mean_goals"] == 2.0
     assert done.success == done.flown["greedy"]["success"]["share"]
     assert done.as_dict()["trained"]["frames"] > 0
     assert said[0] == ("most probable actions", 0, 3)
@@ -105,7 +105,7 @@ def test_the_table_of_an_evaluation(good):
             "shares": {s: mean_bounds(left) for s in ("all", "left", "ahead", "right")},
             "ends": {"step_limit": proportion(1, 4)},
             "never_reached": mean_bounds([0.25]),
-            "mean_cubes": 1.5,
+            "mean_goals": 1.5,
             "mean_length": 40.0,
             "episodes": 4,
         }

@@ -10,7 +10,7 @@ import torch
 import drone_rl
 from drone_rl.api.policy import Policy
 from drone_rl.api.progress import silent
-from drone_rl.explanations.scenes import Scenes, place_cube
+from drone_rl.explanations.scenes import Scenes, place_target
 from drone_rl.proofs.silhouettes import camera_ahead
 from drone_rl.utils.errors import InputError
 from drone_rl.zoo import parse
@@ -40,7 +40,7 @@ def test_everywhere_it_does_what_it_does_about_the_simulators_picture(small, don
     env = small.make_env(8)
     scenes = Scenes(env)
     ahead, left = torch.from_numpy(places).T
-    pictures = scenes.observe(place_cube(scenes, ahead + camera_ahead(), left))
+    pictures = scenes.observe(place_target(scenes, ahead + camera_ahead(), left))
     with torch.no_grad():
         taken = small.make_network()(pictures).argmax(-1).numpy()
     env.close()

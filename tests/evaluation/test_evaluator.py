@@ -24,7 +24,7 @@ def test_random_policy_collects_what_the_original_studys_did():
     env = DroneEnv(500, pixels=False)
     policy = RandomPolicy(3, torch.Generator().manual_seed(0))
     summary = summarise(run_episodes(env, policy, 500))
-    assert 0.7 < summary["mean_cubes"] < 1.0  # 0.84 there
+    assert 0.7 < summary["mean_goals"] < 1.0  # 0.84 there
     assert 125 < summary["mean_length"] < 142  # 133 there
 
 

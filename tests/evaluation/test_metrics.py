@@ -26,11 +26,11 @@ def episodes():
 def test_summary_by_hand(episodes):
     summary = summarise(episodes)
     assert summary["success"] == proportion(1, 3)
-    assert summary["mean_cubes"] == 1.0
+    assert summary["mean_goals"] == 1.0
     shares = summary["shares"]
-    assert shares["all"] == {**mean_bounds([1.0, 0.5, 0.0]), "cubes": 6}
-    assert shares["left"] == {**mean_bounds([1.0, 0.5]), "cubes": 4}  # an episode counts once
-    assert shares["right"] == {**mean_bounds([0.0]), "cubes": 1}
+    assert shares["all"] == {**mean_bounds([1.0, 0.5, 0.0]), "goals": 6}
+    assert shares["left"] == {**mean_bounds([1.0, 0.5]), "goals": 4}  # an episode counts once
+    assert shares["right"] == {**mean_bounds([0.0]), "goals": 1}
     assert summary["never_reached"] == mean_bounds([0.0, 0.0, 0.5])
     ends = {name: end["successes"] for name, end in summary["ends"].items()}
     assert ends == {"all_cubes": 1, "front_boundary": 1, "side_boundary": 0, "step_limit": 1}
@@ -46,7 +46,7 @@ def test_a_stratum_is_not_those_after_it(episodes):
 def test_what_was_not_offered_has_no_share(episodes):
     ahead = summarise(episodes)["shares"]["ahead"]
     assert ahead["mean"] is None
-    assert (ahead["lower95"], ahead["upper95"], ahead["count"], ahead["cubes"]) == (0, 1, 0, 0)
+    assert (ahead["lower95"], ahead["upper95"], ahead["count"], ahead["goals"]) == (0, 1, 0, 0)
 
 
 def test_dependent_cubes_don_t_make_an_interval_narrower():

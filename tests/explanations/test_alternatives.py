@@ -6,7 +6,7 @@ from drone_rl.explanations.alternatives import (
     DARK_GROUND,
     alternatives,
 )
-from drone_rl.explanations.scenes import Region, empty_scene, place_cube
+from drone_rl.explanations.scenes import Region, empty_scene, place_target
 from drone_rl.sim.entities.arena import FLOOR_COLOR, SKY_COLOR
 from drone_rl.sim.meaning import Meaning
 from drone_rl.sim.rendering import Appearance
@@ -19,15 +19,15 @@ def test_what_the_simulator_draws_otherwise(scenes, world):
     before = state.passed.clone()
     found = alternatives(scenes, state)
     assert list(found) == [
-        "no cubes", "cubes elsewhere 0", "cubes elsewhere 1", "cubes elsewhere 2",
+        "no targets", "targets elsewhere 0", "targets elsewhere 1", "targets elsewhere 2",
         "darker", "brighter",
     ]  # fmt: skip
     x, empty = scenes.observe(state), scenes.observe(empty_scene(scenes))
-    torch.testing.assert_close(found["no cubes"], empty.expand_as(x))
+    torch.testing.assert_close(found["no targets"], empty.expand_as(x))
     assert (found["darker"][:, 0, -1] < x[:, 0, -1]).all()  # the ground
     assert (found["darker"][:, 0, 0] < x[:, 0, 0]).all()  # the sky
     assert (found["brighter"][:, 0, -1] > x[:, 0, -1]).all()
-    assert not torch.equal(found["cubes elsewhere 0"], found["cubes elsewhere 1"])
+    assert not torch.equal(found["targets elsewhere 0"], found["targets elsewhere 1"])
     assert torch.equal(state.passed, before)
     torch.testing.assert_close(scenes.observe(state), x)  # the worlds are as they were
     again = alternatives(scenes, state)
@@ -42,12 +42,12 @@ def test_other_colours_are_darker_and_brighter_than_the_arenas():
 
 
 def test_cubes_elsewhere_are_in_view(scenes):
-    state = place_cube(scenes, torch.full((80,), 9.0), torch.zeros(80))
+    state = place_target(scenes, torch.full((80,), 9.0), torch.zeros(80))
     state = scenes.task.without_targets(state)
     state.drone[:, 1] = 11.0
     moved = scenes.task.elsewhere(state, scenes.worlds.camera, torch.Generator().manual_seed(0))
     regions = scenes.regions(moved)
-    seen = (regions == Region.NEXT_CUBE) | (regions == Region.OTHER_CUBE)
+    seen = (regions == Region.NEXT_TARGET) | (regions == Region.OTHER_TARGET)
     assert seen.flatten(1).any(1).all()
     columns = seen.any(1).float().mean(0)
     assert (columns > 0.1).all()  # everywhere in the picture
@@ -55,7 +55,7 @@ def test_cubes_elsewhere_are_in_view(scenes):
 
 
 def test_only_the_named_colours_change(scenes):
-    state = place_cube(scenes, torch.tensor([6.0]), torch.tensor([2.0]))
+    state = place_target(scenes, torch.tensor([6.0]), torch.tensor([2.0]))
     regions, before = scenes.regions(state), scenes.frames(state)
     after = scenes.frames(state, Appearance(colors={Meaning.GROUND: (0.1, 0.1, 0.1)}))
     changed = (before != after).any(-1)

@@ -25,7 +25,7 @@ def context():
 
 def test_flights_are_recorded_as_the_task_remembers_them(context):
     data = context.dataset
-    assert {"posts", "next_cube"} < set(data.arrays) and "cubes" not in data.arrays
+    assert {"posts", "next_target"} < set(data.arrays) and "cubes" not in data.arrays
     state = data.state(context.scenes.task)
     again = context.scenes.frames(state).numpy()
     np.testing.assert_array_equal(again, data.frames)  # the recalled worlds look as they did

@@ -56,7 +56,7 @@ def test_offset_is_seen_from_the_drone(dataset):
     expected = dataset.cubes[t, 0, :2] - dataset.drone[t, :2]
     np.testing.assert_allclose(dataset.offset(CollectCubes())[t], expected)
     near = np.flatnonzero((dataset.next_cube == 0) & (dataset.step < 5))
-    assert (dataset.regions == Region.NEXT_CUBE).any((1, 2))[near].all()
+    assert (dataset.regions == Region.NEXT_TARGET).any((1, 2))[near].all()
 
 
 def test_without_a_next_cube_there_is_no_offset(dataset):

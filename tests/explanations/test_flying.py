@@ -5,7 +5,7 @@ from torchrl.envs import CatFrames
 
 from drone_rl.envs import DroneEnv, GrayPixels, with_transforms
 from drone_rl.explanations.flying import fly_on
-from drone_rl.explanations.scenes import Scenes, place_cube
+from drone_rl.explanations.scenes import Scenes, place_target
 from drone_rl.sim.actions import Move
 from drone_rl.sim.settings import TaskSettings
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
@@ -33,7 +33,7 @@ def scenes(make_pipeline):
 
 def test_straight_on_collects_what_it_touches(scenes):
     reach = scenes.worlds.task.settings.touch_distance  # 1.65 m
-    starts = place_cube(
+    starts = place_target(
         scenes, torch.tensor([5.0, 5.0, 5.0]), torch.tensor([0, reach, reach + 0.1])
     )
     network = Always(F)
@@ -46,20 +46,20 @@ def test_straight_on_collects_what_it_touches(scenes):
 
 def test_one_that_turns_back_is_in_a_loop_for_ever(scenes):
     network = Always(F, L, R, F)
-    ends = fly_on(scenes, network, place_cube(scenes, torch.tensor([9.0]), torch.tensor([0.0])))
+    ends = fly_on(scenes, network, place_target(scenes, torch.tensor([9.0]), torch.tensor([0.0])))
     assert ends.end_reason.tolist() == [EndReason.STEP_LIMIT] and not ends.collected.any()
     assert len(network.seen) == 3
 
 
 def test_turning_the_same_way_is_no_loop(scenes):
     ends = fly_on(
-        scenes, Always(L, L, L, F), place_cube(scenes, torch.tensor([4.0]), torch.tensor([4.0]))
+        scenes, Always(L, L, L, F), place_target(scenes, torch.tensor([4.0]), torch.tensor([4.0]))
     )
     assert ends.collected[0, 0]
 
 
 def test_turning_back_after_a_cube_is_no_loop(scenes):
-    starts = place_cube(scenes, torch.tensor([1.0]), torch.tensor([2.0]))
+    starts = place_target(scenes, torch.tensor([1.0]), torch.tensor([2.0]))
     starts.passed[:, 1] = False  # a second cube, 9 m on
     starts.cubes[:, 1, :2] = torch.tensor([10.0, 0.0])
     ends = fly_on(scenes, Always(L, R, F), starts)  # the first step left touches the first cube
@@ -67,7 +67,9 @@ def test_turning_back_after_a_cube_is_no_loop(scenes):
 
 
 def test_leaving_the_field_ends_a_flight(scenes):
-    ends = fly_on(scenes, Always(L), place_cube(scenes, torch.tensor([9.0]), torch.tensor([-3.0])))
+    ends = fly_on(
+        scenes, Always(L), place_target(scenes, torch.tensor([9.0]), torch.tensor([-3.0]))
+    )
     assert ends.end_reason.tolist() == [EndReason.SIDE_BOUNDARY]
     assert ends.steps.tolist() == [27]  # 26 m is the bound
 
@@ -77,7 +79,7 @@ def test_a_policy_that_remembers_sees_the_frames_before_and_may_turn_back():
     task = TaskSettings(num_cubes=1, step_limit=20)
     env = with_transforms(DroneEnv(1, task), [GrayPixels(), stack])
     scenes, network = Scenes(env), Always(F, L, R, F)
-    starts = place_cube(scenes, torch.tensor([9.0]), torch.tensor([0.0]))
+    starts = place_target(scenes, torch.tensor([9.0]), torch.tensor([0.0]))
     ends = fly_on(scenes, network, starts)
     env.close()
     assert scenes.memory == 1 and ends.collected[0, 0]

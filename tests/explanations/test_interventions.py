@@ -5,37 +5,37 @@ import torch
 from drone_rl.explanations.alternatives import DARK_GROUND
 from drone_rl.explanations.hooks import probabilities
 from drone_rl.explanations.interventions import (
-    OTHER_CUBES,
+    OTHER_TARGETS,
     _patches,
     intervene,
     to_the_middle,
 )
-from drone_rl.explanations.scenes import Region, empty_scene, place_cube
+from drone_rl.explanations.scenes import Region, empty_scene, place_target
 from drone_rl.sim.entities.arena import FLOOR_COLOR
 from drone_rl.sim.meaning import Meaning
 from drone_rl.sim.settings import TaskSettings
 
 
 def test_only_what_was_changed_changes(scenes, world):
-    state = place_cube(scenes, torch.tensor([5.0, 8.0]), torch.tensor([2.0, -1.0]))
+    state = place_target(scenes, torch.tensor([5.0, 8.0]), torch.tensor([2.0, -1.0]))
     regions, before = scenes.regions(state), scenes.frames(state)
     changes = {c.name: c for c in intervene(scenes, world[2], state, regions)}
-    cube = regions == Region.NEXT_CUBE
-    away = changes["cube taken away"]
+    cube = regions == Region.NEXT_TARGET
+    away = changes["target taken away"]
     torch.testing.assert_close(away.frames, scenes.frames(empty_scene(scenes)).expand_as(before))
-    for name in ("cube recoloured", "ground patch changed"):
+    for name in ("target recoloured", "ground patch changed"):
         changed = (changes[name].frames != before).any(-1)
         assert torch.equal(changed, changes[name].area), name
-    assert torch.equal(changes["cube recoloured"].area, cube)
+    assert torch.equal(changes["target recoloured"].area, cube)
     patch = changes["ground patch changed"].area
     assert patch.any() and (regions[patch] == Region.GROUND).all()
-    moved = changes["cube moved"]
+    moved = changes["target moved"]
     assert torch.equal((moved.frames != before).any(-1), moved.area)
 
 
 def test_the_effect_is_the_distance_of_the_probabilities(scenes, world):
     network = world[2]
-    state = place_cube(scenes, torch.tensor([5.0, 8.0]), torch.tensor([2.0, -1.0]))
+    state = place_target(scenes, torch.tensor([5.0, 8.0]), torch.tensor([2.0, -1.0]))
     changes = intervene(scenes, network, state, scenes.regions(state))
     before = probabilities(network, scenes.observe(state))
     for change in changes:
@@ -55,7 +55,7 @@ def test_without_a_cube_there_is_nothing_to_change(scenes, world):
     ("lateral", "moved"), [(5.0, 3.0), (-5.0, -3.0), (0.5, 0.0), (-0.5, 0.0), (2.0, 0.0)]
 )
 def test_a_cube_is_moved_to_the_middle_and_never_away_from_it(scenes, lateral, moved):
-    state = place_cube(scenes, torch.tensor([9.0]), torch.tensor([lateral]))
+    state = place_target(scenes, torch.tensor([9.0]), torch.tensor([lateral]))
     state.drone[:, 1] += 7.0
     state.cubes[..., 1] += 7.0
     after = to_the_middle(scenes, state)
@@ -82,7 +82,7 @@ def test_a_patch_of_ground_is_a_square_of_about_as_many_pixels():
 
 
 def test_other_colours_are_colours_unlike_the_cubes_and_the_grounds():
-    yellow, dark = OTHER_CUBES.colors[Meaning.TARGET], DARK_GROUND.colors[Meaning.GROUND]
+    yellow, dark = OTHER_TARGETS.colors[Meaning.TARGET], DARK_GROUND.colors[Meaning.GROUND]
     for other, usual in ((yellow, TaskSettings().cube_color), (dark, FLOOR_COLOR)):
         assert all(0.0 <= part <= 1.0 for part in other)
         assert max(abs(a - b) for a, b in zip(other, usual, strict=True)) > 0.2

@@ -14,7 +14,7 @@ from drone_rl.explanations.outcomes import (
     followed,
     outcomes,
 )
-from drone_rl.explanations.scenes import empty_scene, place_cube
+from drone_rl.explanations.scenes import empty_scene, place_target
 from drone_rl.sim.actions import Move
 
 
@@ -47,7 +47,7 @@ class Always(nn.Module):
 
 @pytest.fixture
 def starts(scenes):
-    return place_cube(scenes, torch.full((12,), 9.0), torch.linspace(-3, 3, 12))
+    return place_target(scenes, torch.full((12,), 9.0), torch.linspace(-3, 3, 12))
 
 
 @pytest.fixture
@@ -90,7 +90,7 @@ def test_a_policy_that_minds_the_ground_gets_another_outcome(scenes, starts, fea
 
     network = Afraid(Move.FORWARD)
     network.level = float(scenes.observe(starts)[0, 0, -1, 0]) - 0.3
-    ahead = place_cube(scenes, torch.full((6,), 9.0), torch.zeros(6))
+    ahead = place_target(scenes, torch.full((6,), 9.0), torch.zeros(6))
     found = outcomes(scenes, network, ahead, np.arange(6))
     assert found["ground_changed"]["mean"] == 1.0
     assert found["collected"]["as it was"]["mean"] == float(fears_dark)
@@ -98,7 +98,7 @@ def test_a_policy_that_minds_the_ground_gets_another_outcome(scenes, starts, fea
 
 
 def test_flights_end_when_the_cube_is_decided(scenes):
-    state = place_cube(scenes, torch.tensor([5.0, 5.0]), torch.tensor([0.0, 4.0]))
+    state = place_target(scenes, torch.tensor([5.0, 5.0]), torch.tensor([0.0, 4.0]))
     flown = fly(scenes, Always(Move.FORWARD), state, state.next_cube)
     # touched at 5 - 1.65, that is after four steps; passed after six
     assert (flown.collected.tolist(), flown.decided.tolist()) == ([True, False], [4, 6])
@@ -110,7 +110,7 @@ def test_flights_end_when_the_cube_is_decided(scenes):
 
 def test_patience_ends(scenes, monkeypatch):
     monkeypatch.setattr("drone_rl.explanations.outcomes.PATIENCE", 3)
-    state = place_cube(scenes, torch.tensor([9.0]), torch.tensor([0.0]))
+    state = place_target(scenes, torch.tensor([9.0]), torch.tensor([0.0]))
     flown = fly(scenes, Always(Move.FORWARD), state, state.next_cube)
     assert (flown.collected.tolist(), flown.decided.tolist()) == ([False], [3])
 

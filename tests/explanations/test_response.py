@@ -13,7 +13,7 @@ from drone_rl.explanations.response import (
     response_map,
     summarise,
 )
-from drone_rl.explanations.scenes import Scenes, place_cube
+from drone_rl.explanations.scenes import Scenes, place_target
 from drone_rl.sim.actions import MOVES
 from drone_rl.sim.settings import TaskSettings
 
@@ -31,7 +31,7 @@ def test_a_place_on_the_grid_is_that_place_in_the_world(scenes, world):
     assert found.lateral.tolist() == [12, 6, 0, -6, -12] and found.forward[-1] == 15
     assert found.height.tolist() == [0]
     assert found.oracle.tolist() == [1, 1, 0, 2, 2]
-    at = place_cube(scenes, torch.tensor([found.forward[1]]), torch.tensor([found.lateral[3]]))
+    at = place_target(scenes, torch.tensor([found.forward[1]]), torch.tensor([found.lateral[3]]))
     expected = probabilities(world[2], scenes.observe(at))[0].numpy()
     np.testing.assert_allclose(found.probabilities[0, 1, 3], expected, atol=1e-6)
 
@@ -50,7 +50,7 @@ def test_heights_are_those_at_which_the_task_puts_cubes(make_pipeline):
     scenes, network = Scenes(env), actor.module[0].module
     found = response_map(scenes, network, num_lateral=3, num_forward=2)
     assert found.height.tolist() == [-1.2, 0.0, 1.2]
-    at = place_cube(scenes, torch.tensor([15.0]), torch.tensor([12.0]), 1.2)
+    at = place_target(scenes, torch.tensor([15.0]), torch.tensor([12.0]), 1.2)
     assert at.cubes[0, 0].tolist() == [15.0, 12.0, 2.5 + 1.2]
     expected = probabilities(network, scenes.observe(at))[0].numpy()
     np.testing.assert_allclose(found.probabilities[2, 1, 0], expected, atol=1e-6)
@@ -73,7 +73,7 @@ def test_blind_is_where_a_turn_is_called_for_and_nothing_changes():
         forward=np.array([5.0]),
         lateral=np.array([6.0, 3.0, 0.0, -3.0, -6.0]),
         probabilities=wishes,
-        without_cube=np.array(IDLE),
+        without_target=np.array(IDLE),
         oracle=needed.numpy(),
         stratum=np.array([0, 0, 1, 2, 2]),
         blind=blind.numpy(),

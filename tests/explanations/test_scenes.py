@@ -1,7 +1,7 @@
 import torch
 
 from drone_rl.envs import CropRows, DroneEnv, GrayPixels, Resize, with_transforms
-from drone_rl.explanations.scenes import Region, Scenes, empty_scene, place_cube
+from drone_rl.explanations.scenes import Region, Scenes, empty_scene, place_target
 from drone_rl.sim.settings import CameraSettings
 from tests.second_dynamics import Turning
 
@@ -12,15 +12,15 @@ def test_a_still_is_what_the_policy_saw(world, scenes):
 
 
 def test_a_cube_on_the_left_is_on_the_left_of_the_picture(scenes):
-    regions = scenes.regions(place_cube(scenes, torch.tensor([6.0]), torch.tensor([4.0])))[0]
-    columns = (regions == Region.NEXT_CUBE).nonzero()[:, 1]
+    regions = scenes.regions(place_target(scenes, torch.tensor([6.0]), torch.tensor([4.0])))[0]
+    columns = (regions == Region.NEXT_TARGET).nonzero()[:, 1]
     assert len(columns) and columns.max() < 32
 
 
 def test_the_nearest_cube_is_next_and_the_horizon_lies_between(scenes, world):
     world[0].reset()
     regions = scenes.regions(scenes.worlds.state)
-    assert {Region.NEXT_CUBE, Region.HORIZON, Region.GROUND, Region.SKY} <= set(
+    assert {Region.NEXT_TARGET, Region.HORIZON, Region.GROUND, Region.SKY} <= set(
         regions.unique().tolist()
     )
     rows = (regions[0] == Region.HORIZON).nonzero()[:, 0]
@@ -29,11 +29,11 @@ def test_the_nearest_cube_is_next_and_the_horizon_lies_between(scenes, world):
 
 def test_an_empty_scene_has_no_cube(scenes):
     regions = scenes.regions(empty_scene(scenes))
-    assert not ((regions == Region.NEXT_CUBE) | (regions == Region.OTHER_CUBE)).any()
+    assert not ((regions == Region.NEXT_TARGET) | (regions == Region.OTHER_TARGET)).any()
 
 
 def test_depth_is_the_cubes_distance(scenes):
-    state = place_cube(scenes, torch.tensor([8.0]), torch.tensor([0.0]))
+    state = place_target(scenes, torch.tensor([8.0]), torch.tensor([0.0]))
     # the camera sits 0.4 m ahead of the drone's middle, the cube's face 1.25 m before its own
     torch.testing.assert_close(scenes.depth(state)[0, 12, 32], torch.tensor(8 - 0.4 - 1.25))
 

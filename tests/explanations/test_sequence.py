@@ -7,15 +7,12 @@ from drone_rl.sim.tasks.collect_cubes.rules import EndReason
 
 
 def fake(length, collects=(), misses=(), end=EndReason.ALL_CUBES):
-    rewards, next_cube = np.zeros(length), np.zeros(length, int)
-    rewards[list(collects)] = 1
-    for t in (*collects, *misses):
-        next_cube[t + 1 :] += 1
+    event = np.zeros(length, np.int8)
+    event[list(collects)], event[list(misses)] = 1, -1
     reason = np.zeros(length, int)
     reason[-1] = end
     arrays = {
-        "rewards": rewards,
-        "next_cube": next_cube,
+        "event": event,
         "end_reason": reason,
         "episode": np.zeros(length, int),
     }

@@ -4,7 +4,7 @@ import pytest
 from drone_rl.explanations.scenes import Region
 from drone_rl.explanations.truth import heat_shares, pointing_game
 
-REGIONS = np.array([[[Region.NEXT_CUBE, Region.GROUND], [Region.SKY, Region.SKY]]] * 3)
+REGIONS = np.array([[[Region.NEXT_TARGET, Region.GROUND], [Region.SKY, Region.SKY]]] * 3)
 
 
 def test_pointing_game_by_hand():

@@ -168,10 +168,10 @@ def test_a_policy_is_flown_beside_its_baselines_and_repeats():
     assert first == again
     assert first["greedy"] == first["sampled"] == first["baselines"]["oracle"]
     assert first["skill"]["oracle"]["mean"] == 0.0
-    assert first["baselines"]["left"]["mean_cubes"] == 0.0
-    assert 0 < first["baselines"]["forward"]["mean_cubes"] < 1
+    assert first["baselines"]["left"]["mean_goals"] == 0.0
+    assert 0 < first["baselines"]["forward"]["mean_goals"] < 1
     assert math.isclose(
-        first["skill"]["forward"]["mean"], 1 - first["baselines"]["forward"]["mean_cubes"]
+        first["skill"]["forward"]["mean"], 1 - first["baselines"]["forward"]["mean_goals"]
     )
 
 

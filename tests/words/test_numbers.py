@@ -1,5 +1,5 @@
 from drone_rl.words.licence import percent
-from drone_rl.words.numbers import among, bounds, listed, plural
+from drone_rl.words.numbers import among, bounds, listed, ordinal, plural
 
 
 def test_numbers_as_people_write_them():
@@ -20,3 +20,7 @@ def test_counts():
     assert (plural(0, "pair"), plural(1, "pair"), plural(2, "pair")) == (
         "0 pairs", "1 pair", "2 pairs",
     )  # fmt: skip
+
+
+def test_ordinals_go_on_beyond_their_names():
+    assert [ordinal(i) for i in (0, 8, 9, 10)] == ["first", "ninth", "10th", "11th"]

@@ -50,10 +50,10 @@ def test_of_a_policy_that_nothing_moves_only_that_is_said():
 def test_what_changes_do_is_said_with_its_bounds():
     found = speak()
     assert "no more than 0.20 of 1" in found["truth.patch"]
-    assert "by 0.40 of 1 (95%: 0.30 to 0.50)" in found["truth.cube"]
+    assert "by 0.40 of 1 (95%: 0.30 to 0.50)" in found["truth.target"]
     assert "0.0010 on average and 0.0070 at most, on 30 pictures" in found["truth.integral"]
     weak = {"truth.interventions.ground patch changed.upper95": 0.3}  # as much as the cube's least
-    assert "truth.cube" not in speak(weak)
+    assert "truth.target" not in speak(weak)
     none = {"truth.interventions.ground patch changed.upper95": None}
-    assert not {"truth.cube", "truth.patch"} & set(speak(none))
+    assert not {"truth.target", "truth.patch"} & set(speak(none))
     assert "truth.ground" not in speak({"truth.outcomes": None})

@@ -21,6 +21,6 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
         "steps": len(flights),
         "action_shares": (counts / counts.sum()).tolist(),
         "entropy": mean_interval(entropy.clip(0.0, 1.0), data.episode),
-        "cubes_collected": int(flights.rewards.sum()),
+        "goals_reached": int((flights.event > 0).sum()),
     }
     return {"dataset": numbers}, {}

@@ -78,12 +78,17 @@ def points(explanation: Explanation) -> dict[str, Any]:
         "probabilities": np.round(data["probabilities"][chosen].astype(float), 3).tolist(),
         "episode": data["episode"][chosen].tolist(),
         "step": data["step"][chosen].tolist(),
-        "reward": data["rewards"][chosen].tolist(),
+        "event": [_event(explanation, int(event)) for event in data["event"][chosen]],
         "last": last.tolist(),
         "names": explanation.actions.names,
         "order": explanation.actions.order,
         "colors": explanation.actions.colors,
     }
+
+
+def _event(explanation: Explanation, event: int) -> str:
+    terms = explanation.terms
+    return {1: f"{terms.reaches} a {terms.goal}", -1: f"misses a {terms.goal}"}.get(event, "")
 
 
 def _legend(explanation: Explanation) -> list[dict[str, str]]:

@@ -1,4 +1,4 @@
-"""What it does about one cube, wherever that stands."""
+"""What it does about one target, wherever that stands."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -15,28 +15,31 @@ from drone_rl.report.part import Part, Rows
 from drone_rl.words.actions import ShownActions
 from drone_rl.words.response import RESPONSE
 
-_OUTCOMES = (("#d9d9de", "#4269d0"), ("cube missed", "cube collected"))
+_OUTCOMES = ("#d9d9de", "#4269d0")
+"""Colours of what is not handled, and of what is."""
 
 
 def response_chart(explanation: Explanation) -> Figure:
-    """Probability of each action by where the cube stands, the chosen action, what comes of it.
+    """Probability of each action by where the target stands, the chosen action, what comes of it.
 
-    A row for each height at which cubes stand, the highest on top.
+    A row for each height at which targets stand, the highest on top.
     """
     arrays = explanation.arrays
     heights = arrays["response_height"]
     actions, count = explanation.actions, len(explanation.actions.names)
+    terms = explanation.terms
     figure = Figure(figsize=(3.2 * (count + 2), 3.9 * len(heights)), layout="constrained")
     axes = figure.subplots(len(heights), count + 2, squeeze=False, sharex=True, sharey=True)
     for layer, row in zip(range(len(heights)), axes[::-1], strict=True):
         _draw_row(row, arrays, layer, actions)
-        level = f", cube {heights[layer]:+g} m" if len(heights) > 1 else ""
+        level = f", {terms.target} {heights[layer]:+g} m" if len(heights) > 1 else ""
         row[0].set_ylabel(f"metres ahead{level}")
     figure.colorbar(axes[0, 0].images[0], ax=axes[:, :count], shrink=0.8, label="probability")
     for axis in axes[-1]:
         axis.set_xlabel("metres to the left (+) or right (-)", fontsize=9)
     named = ([actions.css(action) for action in range(count)], actions.names)
-    for axis, labels in ((axes[-1, -2], named), (axes[-1, -1], _OUTCOMES)):
+    ends = (_OUTCOMES, [f"{terms.target} {what}" for what in (terms.unhandled, terms.handled)])
+    for axis, labels in ((axes[-1, -2], named), (axes[-1, -1], ends)):
         handles = [Patch(color=c, label=n) for c, n in zip(*labels, strict=True)]
         axis.legend(
             handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3, fontsize=8,
@@ -67,7 +70,7 @@ def _draw_row(
         most.contour(
             lateral, forward, blind.astype(float), levels=[0.5], colors="white", linewidths=2.5
         )
-    ends = ListedColormap(_OUTCOMES[0])
+    ends = ListedColormap(_OUTCOMES)
     outcome.imshow(arrays["outcome_collected"][layer], vmin=0, vmax=1, cmap=ends, **style)
     outcome.set_title("what comes of it", fontsize=10)
 
@@ -99,7 +102,7 @@ def _grid(
 
 
 PART = Part(
-    title="What it does about a cube, wherever that stands",
+    title="What it does about one thing alone, wherever that stands",
     label="Response map",
     place=80,
     needs=("response",),

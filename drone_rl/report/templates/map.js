@@ -35,7 +35,7 @@ function setUp(root, points, source) {
   }
   function describe(i) {
     return `episode ${points.episode[i]}, step ${points.step[i]} of ${points.last[points.episode[i]]}` +
-      (points.reward[i] > 0 ? ", collects a cube" : "");
+      (points.event[i] ? ", " + points.event[i] : "");
   }
   function hover(event) {
     const i = at(event);

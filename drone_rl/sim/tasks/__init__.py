@@ -1,29 +1,27 @@
 """What there is to do in a world, and what can be asked about it."""
 
-from typing import Any
-
-from drone_rl.sim.settings import TaskSettings
 from drone_rl.sim.tasks.collect_cubes import CollectCubes, Practice
 from drone_rl.sim.tasks.explainable import Grid
 from drone_rl.sim.tasks.judgeable import Goals, OracleRule
+from drone_rl.sim.tasks.pillars import Pillars, PillarsSettings
 from drone_rl.sim.tasks.playable import Prop, State
+from drone_rl.sim.tasks.registry import TASKS, as_task, read_task, register_task, settings_of
 from drone_rl.sim.tasks.task import Task
 
 __all__ = [
+    "TASKS",
     "CollectCubes",
     "Goals",
     "Grid",
     "OracleRule",
+    "Pillars",
+    "PillarsSettings",
     "Practice",
     "Prop",
     "State",
     "Task",
     "as_task",
+    "read_task",
+    "register_task",
+    "settings_of",
 ]
-
-
-def as_task(task: TaskSettings | Task[Any] | None) -> Task[Any]:
-    """The task of some settings; the original study's by default."""
-    if task is None or isinstance(task, TaskSettings):
-        return CollectCubes(task)
-    return task

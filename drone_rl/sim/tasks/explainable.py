@@ -30,12 +30,16 @@ class Explainable(Protocol[S]):
     def remembered(self) -> Mapping[str, str]:
         """What data sets keep of each frame: entry and description.
 
-        "next_cube" is always the number of the next target, as many as there are if none is left.
+        "next_target" is always the number of the next target, as many as there are if none is left.
         """
         ...
 
     def remember(self, info: Mapping[str, Tensor]) -> dict[str, Tensor]:
         """The entries `remembered`, made of the information before an action. Shapes: (T, *)."""
+        ...
+
+    def tally(self, info: Mapping[str, Tensor]) -> tuple[Tensor, Tensor]:
+        """How many goals are reached, and how many missed for good. Shapes: (T,), int64."""
         ...
 
     def recall(self, kept: Mapping[str, Tensor], body: BodyState) -> S:

@@ -9,6 +9,7 @@ from torch import Tensor
 
 from drone_rl.sim.actions import Actions
 from drone_rl.sim.batch import Batch
+from drone_rl.words.terms import Terms
 
 
 @dataclasses.dataclass
@@ -44,8 +45,8 @@ class Judgeable(Protocol):
         ...
 
     @property
-    def goal(self) -> str:
-        """What people call one of its goals."""
+    def terms(self) -> Terms:
+        """What people call its goals and targets, and what becomes of them."""
         ...
 
     @property

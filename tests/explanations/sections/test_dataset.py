@@ -25,6 +25,6 @@ def test_counts_by_hand():
     assert arrays == {}
     assert (found["frames"], found["episodes"], found["steps"]) == (3, 3, 5)
     assert found["action_shares"] == [0.8, 0.0, 0.2]
-    assert found["cubes_collected"] == 2
+    assert found["goals_reached"] == 2
     # an episode counts once: 0, and the mean of log 2 / log 3 and 1
     assert found["entropy"]["mean"] == pytest.approx((0 + (np.log(2) / np.log(3) + 1) / 2) / 2)

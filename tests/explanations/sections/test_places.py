@@ -4,7 +4,7 @@ from types import SimpleNamespace
 import numpy as np
 import torch
 
-from drone_rl.explanations.scenes import place_cube
+from drone_rl.explanations.scenes import place_target
 from drone_rl.explanations.sections import places
 from drone_rl.proofs.silhouettes import camera_ahead
 from tests.five_actions import FIVE
@@ -20,7 +20,7 @@ def test_a_map_of_near_places_is_that_of_the_policys_own_pictures(context, monke
     found = places._map(context, small)
     where = np.random.RandomState(0).uniform((2.5, -3.0), (3.5, 3.0), (100, 2))
     ahead, left = torch.from_numpy(where).T
-    pictures = context.scenes.observe(place_cube(context.scenes, ahead + camera_ahead(), left))
+    pictures = context.scenes.observe(place_target(context.scenes, ahead + camera_ahead(), left))
     with torch.no_grad():
         taken = context.network(pictures).argmax(-1)
     assert found.at(where).tolist() == taken.tolist()

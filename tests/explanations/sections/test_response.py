@@ -14,7 +14,7 @@ def test_every_field_of_both_maps_is_kept(monkeypatch):
     needs = {"oracle": oracle, "stratum": np.array([2, 1, 0])}
     blind = np.array([[[True, False, True]] * 2])
     does = ResponseMap(
-        **axes, **needs, probabilities=ahead, without_cube=np.array([1.0, 0, 0]), blind=blind
+        **axes, **needs, probabilities=ahead, without_target=np.array([1.0, 0, 0]), blind=blind
     )
     comes = OutcomeMap(**axes, **needs, collected=np.array([[[False, True, False]] * 2]))
     monkeypatch.setattr(response, "outcome_map", lambda scenes, network: comes)

@@ -22,6 +22,7 @@ def make_explanation():
             "episode": episode,
             "step": step,
             "rewards": (np.arange(frames) == 2).astype(float),
+            "event": (np.arange(frames) == 2).astype(np.int8),
             "flights/episode": episode,
         }
         return Explanation({"name": name, **(numbers or {})}, arrays or {}, data)

@@ -8,8 +8,8 @@ from drone_rl.report.sections.truth import changes
 @pytest.fixture
 def explanation(make_explanation):
     effects = {
-        "cube taken away": {"mean": 0.5, "lower95": 0.4, "upper95": 0.6},
-        "cube moved": {"mean": None, "lower95": None, "upper95": None},
+        "target taken away": {"mean": 0.5, "lower95": 0.4, "upper95": 0.6},
+        "target moved": {"mean": None, "lower95": None, "upper95": None},
     }
     truth = {"shown_frame": 3, "interventions": effects}
     after = np.zeros((2, 4, 60, 3), np.uint8)
@@ -22,8 +22,8 @@ def explanation(make_explanation):
     ("place", "gray", "caption"),
     [
         (0, 200, "as it was"),
-        (1, 0, "cube taken away: 0.50 [0.40, 0.60]"),
-        (2, 0, "cube moved: not tried"),
+        (1, 0, "target taken away: 0.50 [0.40, 0.60]"),
+        (2, 0, "target moved: not tried"),
     ],
 )
 def test_each_change_stands_under_what_it_does(explanation, place, gray, caption):

@@ -5,7 +5,7 @@ import torch
 from torchrl.envs.utils import check_env_specs
 
 from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, with_transforms
-from drone_rl.explanations.scenes import Scenes, place_cube
+from drone_rl.explanations.scenes import Scenes, place_target
 from drone_rl.sim.meaning import Meaning
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.worlds import Worlds
@@ -62,6 +62,6 @@ def test_the_environment_flies_with_it_and_closes_it():
 def test_explanations_show_the_policy_what_it_paints():
     env = with_transforms(DroneEnv(2, renderer=OneColour), [GrayPixels(), StandardizePixels()])
     scenes = Scenes(env)
-    seen = scenes.observe(place_cube(scenes, torch.tensor([5.0, 9.0]), torch.zeros(2)))
+    seen = scenes.observe(place_target(scenes, torch.tensor([5.0, 9.0]), torch.zeros(2)))
     assert seen.shape == (2, 1, 25, 64) and len(seen.unique()) == 1
     env.close()

@@ -4,15 +4,21 @@ import pytest
 import torch
 
 from drone_rl.sim.settings import TaskSettings
-from drone_rl.sim.tasks import CollectCubes
+from drone_rl.sim.tasks import CollectCubes, Pillars, PillarsSettings
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.seeding import world_random_state
 from tests.second_task import Posts
 
-TASKS = (CollectCubes(), CollectCubes(TaskSettings(num_cubes=2, vertical_bound=0.5)), Posts())
+TASKS = (
+    CollectCubes(),
+    CollectCubes(TaskSettings(num_cubes=2, vertical_bound=0.5)),
+    Pillars(),
+    Pillars(PillarsSettings(num_rows=2, density=0.4, width=0.6)),
+    Posts(),
+)
 
 
-@pytest.fixture(params=TASKS, ids=("cubes", "two cubes", "posts"))
+@pytest.fixture(params=TASKS, ids=("cubes", "two cubes", "pillars", "thin pillars", "posts"))
 def worlds(request):
     """Five worlds of a task, each with an episode of its own."""
     worlds = Worlds(5, request.param)

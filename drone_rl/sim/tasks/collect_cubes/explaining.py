@@ -23,7 +23,7 @@ class Explaining:
             "cubes": "positions of the cubes, metres, in order of x (T, C, 3)",
             "present": "whether each cube still stands, bool (T, C)",
             "collected": "whether each cube has been collected, bool (T, C)",
-            "next_cube": "index of the nearest standing cube, C if none (T,)",
+            "next_target": "index of the nearest standing cube, C if none (T,)",
         }
     )
 
@@ -36,8 +36,13 @@ class Explaining:
             "cubes": info["cube_positions"],
             "present": ~collected & (index >= next_cube[:, None]),
             "collected": collected,
-            "next_cube": next_cube,
+            "next_target": next_cube,
         }
+
+    def tally(self, info: Mapping[str, Tensor]) -> tuple[Tensor, Tensor]:
+        """Cubes collected, and cubes left behind."""
+        collected = info["collected"].sum(-1)
+        return collected, info["next_cube"][:, 0] - collected
 
     def recall(self, kept: Mapping[str, Tensor], body: BodyState) -> WorldState:
         """The worlds as they stood, but for where cubes were seen first."""

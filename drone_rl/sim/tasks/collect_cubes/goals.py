@@ -9,8 +9,7 @@ from torch import Tensor
 from drone_rl.sim.settings import TaskSettings
 from drone_rl.sim.tasks.collect_cubes.rules import Side
 from drone_rl.sim.tasks.judgeable import Goals
-
-ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth")
+from drone_rl.words.numbers import ordinal
 
 
 @dataclasses.dataclass
@@ -48,8 +47,3 @@ def sideways_edges(settings: TaskSettings) -> list[float]:
     touch, bound = settings.touch_distance, settings.lateral_bound
     edges = [round(2 * edge) / 2 for edge in ((touch + bound) / 2, bound, 1.5 * bound)]
     return [touch, *sorted({edge for edge in edges if edge > touch})]
-
-
-def ordinal(number: int) -> str:
-    """What people call the cube with this index."""
-    return ORDINALS[number] if number < len(ORDINALS) else f"{number + 1}th"

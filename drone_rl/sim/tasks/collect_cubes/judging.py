@@ -1,5 +1,6 @@
 """Cube collection as verdicts know it: each cube is a goal, and its side a stratum."""
 
+import dataclasses
 import functools
 from collections.abc import Iterator, Mapping
 
@@ -11,18 +12,24 @@ from drone_rl.sim.tasks.collect_cubes.goals import CubeGoals, classes
 from drone_rl.sim.tasks.collect_cubes.oracle import READS, line_up
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason, Side
 from drone_rl.sim.tasks.judgeable import OracleRule
+from drone_rl.words.card import some_cubes
+from drone_rl.words.terms import CUBES, Terms
 
 
 class Judging:
     """See `Judgeable`."""
 
     settings: TaskSettings
-    goal = "cube"
     success_end: int = EndReason.ALL_CUBES
     expected_end: int = EndReason.FRONT_BOUNDARY
     strata: tuple[str, ...] = tuple(side.name.lower() for side in Side)
     luck: tuple[str, ...] = ("random", "forward", "left", "right")
     scored: tuple[str, ...] = ("collected", "side", "lateral", "cube_positions", "drone")
+
+    @property
+    def terms(self) -> Terms:
+        """Cubes are flown to and collected."""
+        return dataclasses.replace(CUBES, tested=some_cubes(self.settings.values()))
 
     @property
     def oracle(self) -> OracleRule:

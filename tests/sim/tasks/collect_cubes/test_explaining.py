@@ -19,7 +19,7 @@ def test_of_passed_and_collected_cubes_none_is_present():
     }
     kept = TASK.remember(info)
     assert kept["present"].tolist() == [[False, False, True], [True] * 3]
-    assert kept["next_cube"].tolist() == [2, 0]
+    assert kept["next_target"].tolist() == [2, 0]
     body = BodyState.at_rest(torch.zeros(2, 3, dtype=torch.float64))
     state = TASK.recall({**kept, "step": torch.tensor([7, 0])}, body)
     assert state.passed.tolist() == [[False, True, False], [False] * 3]

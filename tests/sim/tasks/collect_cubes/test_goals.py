@@ -4,21 +4,13 @@ import torch
 
 from drone_rl.sim.settings import TaskSettings
 from drone_rl.sim.tasks import CollectCubes
-from drone_rl.sim.tasks.collect_cubes.goals import ordinal, sideways_edges
+from drone_rl.sim.tasks.collect_cubes.goals import sideways_edges
 
 
 def test_classes_of_distance_fit_the_task():
     assert sideways_edges(TaskSettings()) == [1.65, 4.0, 6.0, 9.0]
     assert sideways_edges(TaskSettings(lateral_bound=3.0)) == [1.65, 2.5, 3.0, 4.5]
     assert sideways_edges(TaskSettings(lateral_bound=0.5)) == [1.65]
-
-
-def test_ordinals():
-    assert [ordinal(i) for i in (0, 8, 9)] == ["first", "ninth", "10th"]
-
-
-def test_ordinals_go_on_beyond_their_names():
-    assert [ordinal(i) for i in (0, 8, 9, 10)] == ["first", "ninth", "10th", "11th"]
 
 
 def test_goals_are_made_of_the_last_information():

@@ -9,7 +9,7 @@ from drone_rl.sim.tasks.collect_cubes.rules import EndReason
 
 def test_names_are_those_of_verdicts():
     task = CollectCubes()
-    assert (task.name, task.goal) == ("collect_cubes", "cube")
+    assert (task.name, task.terms.goal) == ("collect_cubes", "cube")
     assert task.strata == ("left", "ahead", "right")
     assert task.luck == ("random", *MOVES.names)
     assert task.ends(task.success_end) is EndReason.ALL_CUBES
