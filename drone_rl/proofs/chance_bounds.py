@@ -16,8 +16,8 @@ from torch import Tensor
 from drone_rl.proofs.boxes import Boxes
 from drone_rl.proofs.cells import Cells
 from drone_rl.proofs.lattice import AHEAD, LEFT, RIGHT, Place
-from drone_rl.proofs.outlook import Ranges
 from drone_rl.proofs.painting import Part
+from drone_rl.proofs.ranges import Ranges
 from drone_rl.proofs.silhouettes import camera_ahead
 from drone_rl.proofs.subject import Subject
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
