@@ -21,7 +21,6 @@ from drone_rl.proofs.lattice import AHEAD, LEFT, RIGHT, Ending, Place
 from drone_rl.proofs.outlook import Outlook, runs
 from drone_rl.proofs.parts import in_parts
 from drone_rl.proofs.settling import settle, simplify
-from drone_rl.proofs.silhouettes import camera_ahead
 from drone_rl.proofs.subject import Subject
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
 
@@ -248,9 +247,7 @@ class Prover:
             return known
         if known is not None:
             lowest, highest = min(lowest, known.limits[0]), max(highest, known.limits[-1])
-        ahead = self.lattice.cubes[cube] - self.lattice.x(place) - camera_ahead()
-        shown = self._subject.seeing.of(cube, place.ahead)
-        found = Cells(self._subject.eye, ahead, lowest - MARGIN, highest + MARGIN, shown)
+        found = self._subject.cells(cube, place.ahead, lowest - MARGIN, highest + MARGIN)
         bands = np.diff(found.limits)[1::2]
         self.largest_band = max(self.largest_band, float(bands.max(initial=0.0)))
         self._cells[cube] = found

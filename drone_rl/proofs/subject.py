@@ -8,10 +8,11 @@ from torch import Tensor
 
 from drone_rl.policies import PolicyNetwork
 from drone_rl.proofs.bounds import Bounds
+from drone_rl.proofs.cells import Cells
 from drone_rl.proofs.lattice import Lattice
 from drone_rl.proofs.painting import Painter, Transform
 from drone_rl.proofs.seeing import Seeing
-from drone_rl.proofs.silhouettes import FRONT, Eye
+from drone_rl.proofs.silhouettes import FRONT, Eye, camera_ahead
 from drone_rl.sim.actions import MOVES
 from drone_rl.sim.settings import TaskSettings
 from drone_rl.sim.worlds import Worlds
@@ -37,6 +38,21 @@ class Subject:
     painter: Painter
     seeing: Seeing
     worlds: Worlds
+
+    def cells(self, cube: int, steps: int, lowest: float, highest: float) -> Cells:
+        """The cells of one cube, for a drone that has gone so many steps ahead.
+
+        Args:
+            cube: Its number.
+            steps: Of the drone.
+            lowest: Where the first cell begins, metres to the left of the drone.
+            highest: Where the last one ends.
+
+        Raises:
+            InputError: See `Cells`.
+        """
+        ahead = self.lattice.cubes[cube] - steps * self.lattice.task.step_length - camera_ahead()
+        return Cells(self.eye, ahead, lowest, highest, self.seeing.of(cube, steps))
 
     def close(self) -> None:
         """Ends the worlds that draw."""
