@@ -9,12 +9,13 @@ def is_quoted(evidence: Evidence) -> bool:
     return proof is not None and proof["refused"] is None
 
 
+def is_proved(evidence: Evidence) -> bool:
+    """Whether that certificate says that it succeeds from every placement."""
+    return is_quoted(evidence) and evidence["proof"]["every"]
+
+
 def _is_refused(evidence: Evidence) -> bool:
     return evidence.get("proof") is not None and not is_quoted(evidence)
-
-
-def _is_every(evidence: Evidence) -> bool:
-    return is_quoted(evidence) and evidence["proof"]["every"]
 
 
 def _is_share(evidence: Evidence) -> bool:
@@ -68,7 +69,7 @@ PROOF = (
     Sentence(
         "proof.every",
         "a certificate that holds together says so, and no flight speaks against it",
-        _is_every,
+        is_proved,
         _every,
     ),
     Sentence(

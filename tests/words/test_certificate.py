@@ -2,7 +2,7 @@
 
 import pytest
 
-from drone_rl.words.certificate import PROOF, is_quoted
+from drone_rl.words.certificate import PROOF, is_proved, is_quoted
 from drone_rl.words.licence import said
 
 QUOTED = {
@@ -66,5 +66,11 @@ def test_what_is_refused_is_not_quoted():
 
 @pytest.mark.parametrize("evidence", [{}, {"proof": None}])
 def test_without_a_certificate_nothing_is_said(evidence):
-    assert not is_quoted(evidence)
+    assert not is_quoted(evidence) and not is_proved(evidence)
     assert said(PROOF, evidence) == {}
+
+
+def test_a_policy_is_proved_if_what_is_quoted_says_so_of_every_placement():
+    assert is_proved({"proof": QUOTED})
+    assert not is_proved({"proof": {**QUOTED, "every": False}})
+    assert not is_proved({"proof": {"refused": "it is of another network"}})
