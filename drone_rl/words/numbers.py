@@ -24,3 +24,14 @@ def listed(parts: Sequence[str], last: str = "and") -> str:
 def plural(count: int, noun: str) -> str:
     """A count with its noun, whose plural is regular."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def all_cubes(count: int) -> str:
+    """All cubes of a task that has so many."""
+    return "the cube" if count == 1 else f"all {count} cubes"
+
+
+def exact(share: float, is_all: bool = False) -> str:
+    """A share in nine digits; 1 only of what is all, not of what is only nearly all."""
+    text = f"{share:.9g}"
+    return text if is_all or text != "1" else "more than 0.999999999"

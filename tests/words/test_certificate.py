@@ -54,6 +54,17 @@ def test_nearly_all_is_never_all(share):
     assert "from 0 it does not, and 1e-12 is undecided" in text
 
 
+def test_all_is_said_to_be_all():
+    text = speak(every=False, share=0.0, lost=1.0)["proof.share"]
+    assert "a share of 0 of all placements; from 1 it does not." in text
+    text = speak(every=False, share=0.0, undecided=1.0, finished=False)["proof.share"]
+    assert "from 0 it does not, and 1 is undecided." in text
+    text = speak(every=False, share=1e-12, lost=1.0)["proof.share"]
+    assert "from more than 0.999999999 it does not" in text
+    text = speak(every=False, lost=1e-12, share=0.0, undecided=1.0)["proof.share"]
+    assert "and more than 0.999999999 is undecided" in text
+
+
 def test_flights_anew_and_none_of_its_own():
     basis = speak(checked=2000, agreeing=0)["proof.basis"]
     assert basis.endswith("; 2,000 flights were made anew to try it and ended as it states.")
