@@ -110,9 +110,6 @@ class Chances:
         head, *rows = self.rows()
         return table(head, rows) + paragraph(self._about())
 
-    def _bounds(self, i: int) -> Bounded | None:
-        return self.bounded[i] if self.bounded else None
-
     def _about(self) -> str:
         """Of what these are the figures."""
         if len(self.cubes) == 1:
@@ -123,9 +120,9 @@ class Chances:
     def _placement(self, i: int) -> dict[str, Any]:
         told, ends = self.outcomes, self.outcomes.ends[i]
         count = self.cubes.shape[1]
-        bounds = (
-            {"metres": self.within, **dataclasses.asdict(b)} if (b := self._bounds(i)) else None
-        )
+        bounds = None
+        if self.bounded:
+            bounds = {"metres": self.within, **dataclasses.asdict(self.bounded[i])}
         return {
             "within": bounds,
             "cubes": self.cubes[i].tolist(),

@@ -26,6 +26,7 @@ def test_of_placements_that_are_given(good, tmp_path):
     kept = json.loads((tmp_path / "chances.json").read_text())
     assert [p["cubes"][0][1] for p in kept["placements"]] == [6.0, 0.0]
     for placement in kept["placements"]:
+        assert placement["within"] is None
         ends = placement["ends"]
         assert sum(e["probability"] for e in ends) == pytest.approx(1.0, abs=1e-12)
         collected = sum(e["probability"] for e in ends if e["collected"] == [True])
