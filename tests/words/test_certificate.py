@@ -2,19 +2,9 @@
 
 import pytest
 
+from drone_rl.bench.evidence import PROOF as QUOTED
 from drone_rl.words.certificate import PROOF, is_proved, is_quoted
 from drone_rl.words.licence import said
-
-QUOTED = {
-    "refused": None,
-    "every": True,
-    "share": 1.0,
-    "lost": 0.0,
-    "undecided": 0.0,
-    "finished": True,
-    "checked": 0,
-    "agreeing": 1000,
-}
 
 
 def speak(num_cubes=3, **changed):
@@ -22,7 +12,7 @@ def speak(num_cubes=3, **changed):
 
 
 def test_every_placement():
-    assert speak() == {
+    assert speak(agreeing=1000) == {
         "proof.every": "Proved for every placement: with its most probable actions it collects "
         "all 3 cubes from all places where they may stand.",
         "proof.basis": "The certificate is of this network and task, and its boxes are a partition "
