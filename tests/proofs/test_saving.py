@@ -59,3 +59,36 @@ def test_a_state_with_code_in_it_is_refused(subject, tmp_path):
     np.savez(path, subject=np.array([print], dtype=object))
     with pytest.raises(InputError, match="is no state of a proof"):
         load(Prover(subject), path, "this")
+
+
+NOTHING = np.zeros(0, np.int64)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"parts_rows": np.zeros((2, 0)), "parts_counts": np.array([0, 0])},  # parts twice
+        {"parts_rows": np.zeros((0, 0)), "parts_counts": NOTHING},  # not at all
+        {"parts_boxes": np.zeros((3, 2, 2)), "parts_counts": np.array([3])},  # of two cubes
+        {"waiting_boxes": np.zeros((0, 1, 2))},
+        {"waiting_boxes": np.array([[["a", "b"]]])},
+        {"waiting_rows": np.zeros((1, 0), np.int64)},
+        {"ended_rows": np.zeros((1, 1), np.int64), "ended_counts": np.array([1])},
+        {"ways_rows": np.array([[99, 0, 0]]), "ways_counts": np.array([0])},
+        {"counts": np.full(6, np.nan)},
+        {"counts": np.full(6, np.inf)},
+        {"counts": np.zeros(5)},
+    ],
+)
+def test_a_state_that_makes_no_sense_is_refused_and_nothing_taken_over(subject, tmp_path, change):
+    path, fresh = tmp_path / "state.npz", Prover(subject)
+    begun = Prover(subject)
+    begun.advance()
+    save(begun, path, "this")
+    with np.load(path) as arrays:
+        state = {**arrays, "ended_boxes": np.zeros((1, 1, 2)), "ways_boxes": np.zeros((0, 1, 2))}
+    np.savez(path, **(state | change))
+    with pytest.raises(InputError, match="is no state of a proof"):
+        load(fresh, path, "this")
+    assert not fresh.waiting and not fresh.ended and not fresh.fork_ends and not fresh.forked
+    assert fresh.num_places == 0 and fresh.parts.tolist() == [[[-6.0, 6.0]]]
