@@ -3,6 +3,7 @@
 import dataclasses
 import json
 from collections.abc import Mapping, Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -198,15 +199,13 @@ def _bounded(
     policy: Policy, placed: Tensor, settings: ChanceSettings, progress: Progress
 ) -> tuple[Bounded, ...]:
     """Bounds around each placement, as far as cubes are placed at all."""
-    subject = make_subject(policy.description, policy.make_network(), ProveSettings().logit_gap)
+    made = make_subject(policy.description, policy.make_network(), ProveSettings().logit_gap)
     bound, found = policy.task.lateral_bound, []
-    try:
+    with closing(made) as subject:
         for i, aside in enumerate(placed[..., 1].numpy()):
             progress("bounds", i, len(placed))
             box = np.stack([aside - settings.within, aside + settings.within], -1)
             found.append(bound_success(subject, box.clip(-bound, bound), settings.parts))
-    finally:
-        subject.close()
     progress("bounds", len(placed), len(placed))
     return tuple(found)
 
