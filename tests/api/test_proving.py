@@ -81,6 +81,16 @@ def test_progress_is_told():
     assert np.diff([done for _, done, _ in told]).min() >= 0
 
 
+def test_parts_to_come_are_told():
+    told, narrow = [], {**ONE, "lateral_bound": 2.0}
+    stopped = drone_rl.prove(
+        "good", task=narrow, compared=1, most_combinations=400, most_boxes=1,
+        progress=lambda text, *_: told.append(text),
+    )  # fmt: skip
+    assert told[0].endswith(" pictures, 1 parts to come") and told[-1] == "stopped"
+    assert stopped.undecided == pytest.approx(1.0)
+
+
 def test_the_certificate_is_of_the_task_that_was_asked_for(proof):
     written = json.loads((proof.folder / "certificate.json").read_text())
     assert written["policy"]["description"]["task"]["num_cubes"] == 1

@@ -39,6 +39,23 @@ def test_stopped_and_gone_on_with(subject, tmp_path, places):
     assert finish(later) == finish(Prover(subject))
 
 
+@pytest.mark.parametrize("places", [5, None])
+def test_stopped_within_a_part_or_between_two(tmp_path, places):
+    policy = drone_rl.load_policy("right_and_forward").in_task(num_cubes=1, lateral_bound=1.0)
+    subject = make_subject(policy.description, policy.make_network(), 1e-4)
+    path, stopped, later = tmp_path / "state.npz", *(Prover(subject, 100) for _ in range(2))
+    assert len(stopped.parts) == 2
+    stopped.advance()
+    while stopped.waiting and stopped.num_places != places:
+        stopped.advance()
+    assert len(stopped.parts) == 1 and bool(stopped.waiting) == bool(places)
+    save(stopped, path, "this")
+    load(later, path, "this")
+    assert len(later.parts) == 1
+    assert finish(later) == finish(Prover(subject, 100))
+    subject.close()
+
+
 def test_another_proofs_state_is_refused(subject, tmp_path):
     path = tmp_path / "state.npz"
     save(Prover(subject), path, "this")
