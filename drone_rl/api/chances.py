@@ -3,6 +3,7 @@
 import dataclasses
 import json
 from collections.abc import Mapping, Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ from drone_rl.proofs.subject import make_subject
 from drone_rl.settings.chances import ChanceSettings
 from drone_rl.settings.proving import ProveSettings
 from drone_rl.sim.settings import TaskSettings
-from drone_rl.sim.tasks.collect_cubes import rules
+from drone_rl.sim.tasks.collect_cubes import require_cubes, rules
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.provenance import provenance
@@ -110,9 +111,6 @@ class Chances:
         head, *rows = self.rows()
         return table(head, rows) + paragraph(self._about())
 
-    def _bounds(self, i: int) -> Bounded | None:
-        return self.bounded[i] if self.bounded else None
-
     def _about(self) -> str:
         """Of what these are the figures."""
         if len(self.cubes) == 1:
@@ -123,9 +121,9 @@ class Chances:
     def _placement(self, i: int) -> dict[str, Any]:
         told, ends = self.outcomes, self.outcomes.ends[i]
         count = self.cubes.shape[1]
-        bounds = (
-            {"metres": self.within, **dataclasses.asdict(b)} if (b := self._bounds(i)) else None
-        )
+        bounds = None
+        if self.bounded:
+            bounds = {"metres": self.within, **dataclasses.asdict(self.bounded[i])}
         return {
             "within": bounds,
             "cubes": self.cubes[i].tolist(),
@@ -179,15 +177,16 @@ def chances(
     progress = progress or Bar()
     policy = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
     policy = policy.in_task(**(task or {}))
-    placed = _drawn(policy.task, settings) if cubes is None else _given(policy.task, cubes)
-    at_a_time = max(1, CELLS_AT_A_TIME // shape_of(policy.task).nodes)
+    flown = require_cubes(policy.task, "the chance of each placement")
+    placed = _drawn(flown, settings) if cubes is None else _given(flown, cubes)
+    at_a_time = max(1, CELLS_AT_A_TIME // shape_of(flown).nodes)
     parts = placed.split(min(at_a_time, PLACEMENTS_AT_A_TIME))
     env = policy.make_env(1, device=settings.device)
     try:
         sight, told = Sight(env, policy.make_network(settings.device)), []
         for part in parts:
             progress("placements", sum(map(len, told)), len(placed))
-            graph = explore(policy.task, part)
+            graph = explore(flown, part)
             told.append(follow_chances(graph, sight.on(graph)))
     finally:
         env.close()
@@ -201,15 +200,14 @@ def _bounded(
     policy: Policy, placed: Tensor, settings: ChanceSettings, progress: Progress
 ) -> tuple[Bounded, ...]:
     """Bounds around each placement, as far as cubes are placed at all."""
-    subject = make_subject(policy.description, policy.make_network(), ProveSettings().logit_gap)
-    bound, found = policy.task.lateral_bound, []
-    try:
+    made = make_subject(policy.description, policy.make_network(), ProveSettings().logit_gap)
+    found: list[Bounded] = []
+    with closing(made) as subject:
+        bound = subject.lattice.task.lateral_bound
         for i, aside in enumerate(placed[..., 1].numpy()):
             progress("bounds", i, len(placed))
             box = np.stack([aside - settings.within, aside + settings.within], -1)
             found.append(bound_success(subject, box.clip(-bound, bound), settings.parts))
-    finally:
-        subject.close()
     progress("bounds", len(placed), len(placed))
     return tuple(found)
 

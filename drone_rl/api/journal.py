@@ -16,6 +16,8 @@ from drone_rl.settings.comparison import check_same_config
 from drone_rl.settings.configuration import as_config
 from drone_rl.settings.provable import ProvableSettings
 from drone_rl.settings.training import TrainSettings
+from drone_rl.sim.settings import TaskSettings
+from drone_rl.sim.tasks.collect_cubes import require_cubes
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import read_bytes, read_json, write_atomically
 from drone_rl.utils.schema import Plain, Real, Record, Several, Whole
@@ -95,8 +97,14 @@ class Journal:
             check_same_config(saved["how"], how.values(), HOW_MAY_CHANGE)
             rounds = [Round.read(row, "rounds") for row in saved["rounds"]]
         journal = cls(folder, settings, how or ProvableSettings(rounds=10), rounds)
+        _ = journal.task  # refused before anything is written
         journal._write()
         return journal
+
+    @property
+    def task(self) -> TaskSettings:
+        """The task, of which something can be proved."""
+        return require_cubes(self.settings.task, "training until it is proved")
 
     @property
     def is_proved(self) -> bool:

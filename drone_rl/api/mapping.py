@@ -4,6 +4,7 @@ import dataclasses
 import json
 import time
 from collections.abc import Mapping
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from drone_rl.proofs.arrangement import Window
 from drone_rl.proofs.painting import Painter
 from drone_rl.proofs.places import Look, PlaceMap, map_places
 from drone_rl.proofs.subject import make_subject
+from drone_rl.proofs.threads import one_thread
 from drone_rl.report import regions
 from drone_rl.settings.mapping import PlacesSettings
 from drone_rl.utils.errors import InputError
@@ -112,11 +114,9 @@ def places(
     settings, progress = (settings or PlacesSettings()).replace(**changes), progress or Bar()
     policy = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
     policy = policy.in_task(**(task or {}))
-    begin, threads = time.perf_counter(), torch.get_num_threads()
-    torch.set_num_threads(1)  # the map's own threads share the cores out
-    network = policy.make_network()
-    subject = make_subject(policy.description, network, settings.logit_gap)
-    try:
+    begin = time.perf_counter()
+    network, gap = policy.make_network(), settings.logit_gap
+    with one_thread(), closing(make_subject(policy.description, network, gap)) as subject:
         progress("comparing the renderer's pictures")
         compared = subject.seeing.check(settings.compared, np.random.RandomState(0))
         progress("deciding the cells")
@@ -125,12 +125,9 @@ def places(
             Window(settings.nearest, settings.farthest, settings.sideways),
             _look(subject.painter),
             network.eval(),
-            touch_distance=policy.task.touch_distance,
+            touch_distance=subject.lattice.task.touch_distance,
             most_cells=settings.most_cells,
         )
-    finally:
-        subject.close()
-        torch.set_num_threads(threads)
     progress("mapped", 1, 1)
     numbers = {
         "policy": policy.name,

@@ -91,13 +91,13 @@ def _learn(
         until = min(journal.rounds[-1].frames + more, settings.trainer.total_frames)
         trainer = settings.trainer.replace(total_frames=until, target_share=None)
         settings, failures = settings.replace(trainer=trainer), journal.failures()
-        practice = Practice(settings.task, failures, how.share) if len(failures) else None
+        practice = Practice(journal.task, failures, how.share) if len(failures) else None
     return learn(settings, journal.folder, state, callbacks, practice)
 
 
 def _search(journal: Journal, progress: Progress) -> None:
     """Looks for failures by flights, then by a proof, and notes them."""
-    settings, how = journal.settings, journal.how
+    how = journal.how
     policy = load_policy(last_of(journal.folder))
     progress(f"{how.flights} flights in search of failures", 0, how.flights)
     places, flights = _fly(policy, journal)
@@ -116,14 +116,14 @@ def _search(journal: Journal, progress: Progress) -> None:
         proof_s=None if proof is None else proof.certificate["found"]["seconds"],
         boxes=len(boxes),
     )
-    journal.add(done, inflated(boxes, how.margin, settings.task.lateral_bound))
+    journal.add(done, inflated(boxes, how.margin, journal.task.lateral_bound))
 
 
 def _fly(policy: Policy, journal: Journal) -> tuple[NDArray[np.float64], int]:
     """See `find_failures`; in worlds of this search alone."""
     settings, how = journal.settings, journal.how
     if not how.flights:
-        return np.empty((0, settings.task.num_cubes)), 0
+        return np.empty((0, journal.task.num_cubes)), 0
     env = policy.make_env(
         min(WORLDS, how.flights),
         seed=settings.seed,

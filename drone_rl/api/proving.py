@@ -5,11 +5,11 @@ import json
 import math
 import time
 from collections.abc import Mapping
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 
 from drone_rl.api.policy import Policy, load_policy
 from drone_rl.api.progress import Bar, Progress
@@ -18,6 +18,7 @@ from drone_rl.proofs.certificate import certify, weights_hash
 from drone_rl.proofs.prover import Prover
 from drone_rl.proofs.saving import load, save
 from drone_rl.proofs.subject import Subject, make_subject
+from drone_rl.proofs.threads import one_thread
 from drone_rl.settings.proving import ProveSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock, write_atomically
@@ -117,10 +118,8 @@ def prove(
     settings = (settings or ProveSettings()).replace(**changes)
     policy = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
     policy = policy.in_task(**(task or {}))
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)  # the proof's own threads share the cores out
-    subject = make_subject(policy.description, policy.make_network(), settings.logit_gap)
-    try:
+    network, gap = policy.make_network(), settings.logit_gap
+    with one_thread(), closing(make_subject(policy.description, network, gap)) as subject:
         subject.seeing.check(settings.compared, np.random.RandomState(0))
         if folder is None:
             return _prove(policy, subject, settings, None, progress or Bar())
@@ -128,9 +127,6 @@ def prove(
         folder.mkdir(parents=True, exist_ok=True)
         with folder_lock(folder):
             return _prove(policy, subject, settings, folder, progress or Bar())
-    finally:
-        subject.close()
-        torch.set_num_threads(threads)
 
 
 def _prove(

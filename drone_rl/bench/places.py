@@ -1,6 +1,7 @@
 """How long the exact map takes, and whether the closed form that it rests on is the renderer's."""
 
 import statistics
+from contextlib import closing
 from typing import Any
 
 import numpy as np
@@ -32,14 +33,14 @@ def bench_places(quick: bool) -> dict[str, Any]:
     wrong = compared = 0
     for cubes in (2, 3):
         policy = load_policy("good").in_task(num_cubes=cubes)
-        subject = make_subject(policy.description, policy.make_network(), 0.0)
-        try:
+        made = make_subject(policy.description, policy.make_network(), 0.0)
+        with closing(made) as subject:
             for begin in range(0, count // 2, _BATCH):
                 size = min(_BATCH, count // 2 - begin)
-                found = compare(subject.seeing, policy.task.front_bound, cubes, size, random_state)
+                found = compare(
+                    subject.seeing, subject.lattice.task.front_bound, cubes, size, random_state
+                )
                 wrong, compared = wrong + found[0], compared + found[1]
-        finally:
-            subject.close()
     return {
         "places_s": statistics.median(one["seconds"] for one in maps),
         "places_cells": maps[0]["cells"],

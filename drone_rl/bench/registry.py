@@ -18,7 +18,7 @@ from drone_rl.bench.sentences import bench_sentences
 from drone_rl.bench.speed import bench_collector, bench_dm_control, bench_render
 from drone_rl.bench.startup import bench_startup
 from drone_rl.bench.sweeps import bench_kills, bench_ray, bench_sweeps
-from drone_rl.bench.training import bench_solve
+from drone_rl.bench.training import bench_pillars, bench_solve
 from drone_rl.bench.verdicts import bench_verdicts
 from drone_rl.utils.errors import InputError
 
@@ -128,6 +128,11 @@ BENCHMARKS: dict[str, Benchmark] = {
         lambda s: bench_many_cubes(s.runs / "many_cubes", 1.0, s.quick),
         "hours",
         (*_PROVING, "bench/proving"),
+    ),
+    "pillars": Benchmark(
+        lambda s: bench_pillars(s.runs / "pillars", s.seeds[:3], s.episodes, s.device, s.quick),
+        "guests",
+        (*_TRAINING, "evaluation", "conf", "bench/training"),
     ),
     "startup": Benchmark(
         lambda s: bench_startup(s.runs / "startup", s.device, s.quick),

@@ -2,7 +2,7 @@
 
 import json
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,31 +20,62 @@ def bench_solve(
         Per seed: seconds from the start of the command to its end, whether it reached the target
         and the lower end of the exact 95% interval of the share of complete episodes.
     """
-    results: dict[str, list] = {"time_to_solve_s": [], "frames_to_solve": [], "success_lower95": []}
-    reasons = []
+    tried = seeds[:1] if quick else seeds
     settings = ["experiment=smoke"] if quick else []
-    for seed in seeds[:1] if quick else seeds:
+    done = _train(folder, tried, settings, 50 if quick else episodes, device)
+    return {
+        "time_to_solve_s": done["seconds"],
+        "frames_to_solve": done["frames"],
+        "success_lower95": done["lower95"],
+        "median_time_to_solve_s": float(np.median(done["seconds"])),
+        "seeds_solved": done["reason"].count("solved"),
+        "seeds_tried": len(tried),
+    }
+
+
+def bench_pillars(
+    folder: Path, seeds: Sequence[int], episodes: int, device: str, quick: bool
+) -> dict[str, Any]:
+    """Trains `experiment=pillars` from each seed and evaluates each policy, greedy.
+
+    Returns:
+        Per seed: "pillars_train_s", seconds from the start of the command to its end;
+        "pillars_lower95" of the share of held-out episodes that cross the line and touch no
+        pillar; "pillars_frames".
+    """
+    tried = seeds[:1] if quick else seeds
+    settings = ["experiment=pillars", *(["trainer.total_frames=4000"] if quick else [])]
+    done = _train(folder, tried, settings, 50 if quick else episodes, device)
+    return {
+        "pillars_train_s": done["seconds"],
+        "pillars_frames": done["frames"],
+        "pillars_lower95": done["lower95"],
+        "pillars_solved": done["reason"].count("solved"),
+    }
+
+
+def _train(
+    folder: Path, seeds: Sequence[int], settings: Iterable[str], episodes: int, device: str
+) -> dict[str, list]:
+    """Trains from each seed and evaluates, by the commands that a user gives."""
+    results: dict[str, list] = {"seconds": [], "frames": [], "reason": [], "lower95": []}
+    for seed in seeds:
         run = folder / f"train_{seed}"
         begin = time.perf_counter()
         call("train", f"seed={seed}", f"device={device}", f"hydra.run.dir={run}", *settings)
-        results["time_to_solve_s"].append(time.perf_counter() - begin)
+        results["seconds"].append(time.perf_counter() - begin)
         result = json.loads((run / "result.json").read_text())
-        results["frames_to_solve"].append(result["frames"])
-        reasons.append(result["reason"])
+        results["frames"].append(result["frames"])
+        results["reason"].append(result["reason"])
         call(
             "evaluate",
             f"checkpoint={run}",
-            f"episodes={50 if quick else episodes}",
+            f"episodes={episodes}",
             "baselines=false",
             "videos=0",
             f"device={device}",
             f"hydra.run.dir={run}/evaluation",
         )
         evaluation = json.loads((run / "evaluation" / "evaluation.json").read_text())
-        results["success_lower95"].append(evaluation["greedy"]["success"]["lower95"])
-    return {
-        **results,
-        "median_time_to_solve_s": float(np.median(results["time_to_solve_s"])),
-        "seeds_solved": reasons.count("solved"),
-        "seeds_tried": len(reasons),
-    }
+        results["lower95"].append(evaluation["greedy"]["success"]["lower95"])
+    return results

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drone_rl.sim.settings import TaskSettings
+from drone_rl.sim.tasks.collect_cubes import require_cubes
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import parse_json, read_bytes
@@ -85,7 +86,7 @@ class Certificate:
     @property
     def task(self) -> TaskSettings:
         """The task that it is stated of."""
-        return self.description.task
+        return require_cubes(self.description.task, "what a certificate states")
 
     @property
     def bound(self) -> float:

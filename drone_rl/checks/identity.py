@@ -6,7 +6,7 @@ from collections.abc import Mapping
 import torch
 
 from drone_rl.checks.certificate import Certificate
-from drone_rl.sim.settings import TaskSettings
+from drone_rl.sim.settings import BaseTaskSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.zoo import PolicyDescription
 
@@ -29,7 +29,7 @@ def refuse_another(
     certificate: Certificate,
     described: PolicyDescription,
     weights: Mapping[str, torch.Tensor],
-    task: TaskSettings | None = None,
+    task: BaseTaskSettings | None = None,
 ) -> None:
     """Makes sure that a certificate is of this policy, and that it can be.
 

@@ -189,7 +189,7 @@ def _arrays(batch: TensorDictBase, task: Task[Any]) -> dict[str, NDArray]:
 def _events(
     task: Task[Any], info: Mapping[str, Tensor], starts: Tensor, end_reason: Tensor
 ) -> Tensor:
-    """What comes of the actions: 1 where a goal is reached, -1 where one is missed, else 0. (T,)."""
+    """What actions do: 1 where a goal is reached, -1 where one is missed, else 0. Shape: (T,)."""
     is_last = torch.cat([starts[1:], starts.new_ones(1)])
     reached, missed = (
         torch.where(is_last, 0, torch.diff(count, append=count[-1:])) for count in task.tally(info)

@@ -19,8 +19,7 @@ from drone_rl.settings.returns import Returns
 from drone_rl.settings.training import TrainerSettings
 from drone_rl.settings.transforms import Transform
 from drone_rl.settings.variant import Variant
-from drone_rl.sim.settings import BaseTaskSettings, CameraSettings, TaskSettings
-from drone_rl.sim.tasks.registry import TASKS
+from drone_rl.sim.settings import TASKS, BaseTaskSettings, CameraSettings, TaskSettings
 from drone_rl.utils.settings import Settings, kinds_of, snake_case, types_of
 
 GROUPS: dict[str, type[Settings]] = {
@@ -50,7 +49,7 @@ def register_schemas(**commands: type[Settings]) -> None:
         commands: The settings of each command, by the name of its file.
     """
     store = ConfigStore.instance()
-    for task in TASKS:
+    for task in TASKS.values():
         name = "base_task" if task is TaskSettings else f"base_{task.name}"
         store.store(group="task", name=name, node=schema_of(task))
     for group, settings in GROUPS.items():

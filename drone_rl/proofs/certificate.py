@@ -47,7 +47,7 @@ def certify(
         seconds: That it took.
     """
     findings = prover.findings()
-    task = description.task
+    task = prover.lattice.task
     total = (2 * task.lateral_bound) ** task.num_cubes
     return {
         "format": FORMAT,

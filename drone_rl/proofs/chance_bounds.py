@@ -16,9 +16,8 @@ from torch import Tensor
 from drone_rl.proofs.boxes import Boxes
 from drone_rl.proofs.cells import Cells
 from drone_rl.proofs.lattice import AHEAD, LEFT, RIGHT, Place
-from drone_rl.proofs.outlook import Ranges
 from drone_rl.proofs.painting import Part
-from drone_rl.proofs.silhouettes import camera_ahead
+from drone_rl.proofs.ranges import Ranges
 from drone_rl.proofs.subject import Subject
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
 
@@ -158,11 +157,9 @@ class _Looks:
 
     def _look(self, cube: int, ahead: int) -> tuple[Cells, Ranges]:
         if (cube, ahead) not in self._known:
-            lattice = self.subject.lattice
-            step, side = lattice.task.step_length, lattice.task.side_bound
-            away = lattice.cubes[cube] - ahead * step - camera_ahead()
-            ends = self._box[cube, 0] - side - step, self._box[cube, 1] + side + step
-            cells = Cells(self.subject.eye, away, *ends, self.subject.seeing.of(cube, ahead))
+            task, (low, high) = self.subject.lattice.task, self._box[cube]
+            aside = task.side_bound + task.step_length
+            cells = self.subject.cells(cube, ahead, low - aside, high + aside)
             self._known[cube, ahead] = cells, Ranges(torch.from_numpy(cells.pictures))
         return self._known[cube, ahead]
 

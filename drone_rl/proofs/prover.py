@@ -21,7 +21,6 @@ from drone_rl.proofs.lattice import AHEAD, LEFT, RIGHT, Ending, Place
 from drone_rl.proofs.outlook import Outlook, runs
 from drone_rl.proofs.parts import in_parts
 from drone_rl.proofs.settling import settle, simplify
-from drone_rl.proofs.silhouettes import camera_ahead
 from drone_rl.proofs.subject import Subject
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
 
@@ -78,7 +77,7 @@ class Prover:
         self.least_gap, self.largest_band = np.inf, 0.0
         self._subject, self._most = subject, most_combinations
         self._seen_from = -1
-        self._foreseen: tuple[int, set[int]] = (-1, set())
+        self._foreseen: set[int] = set()
         self._cells: dict[int, Cells] = {}
         self._outlooks: dict[tuple[int, ...], Outlook] = {}
         self._record = np.zeros((32, 2), np.int64)
@@ -109,6 +108,7 @@ class Prover:
             self.waiting[Place(0, 0)].append(self.parts[:1])
             self.parts = self.parts[1:]
         place = min(self.waiting, key=lambda p: p.turn)
+        self._arrive(place.ahead)
         self._foresee(place)
         boxes = np.concatenate(self.waiting.pop(place))
         boxes = unite(boxes) if place.is_fork else merge(boxes)
@@ -196,16 +196,22 @@ class Prover:
         self.least_gap = min(self.least_gap, outlook.least_gap)
         return spans
 
+    def _arrive(self, ahead: int) -> None:
+        """Forgets what was seen from elsewhere than so many steps ahead."""
+        if ahead != self._seen_from:
+            self._seen_from = ahead
+            self._foreseen.clear()
+            self._outlooks.clear()
+            self._cells.clear()
+
     def _foresee(self, place: Place) -> None:
         """Fills the outlook of all places beside one that were come to from behind.
 
         None of them leads to another one; many small batches would cost more than a large one.
         """
-        if self._foreseen[0] != place.ahead:
-            self._foreseen = (place.ahead, set())
-        if place.collected in self._foreseen[1] or not (cubes := self.lattice.standing(place)):
+        if place.collected in self._foreseen or not (cubes := self.lattice.standing(place)):
             return
-        self._foreseen[1].add(place.collected)
+        self._foreseen.add(place.collected)
         beside = [
             np.concatenate(boxes)[:, cubes] - self.lattice.y(p)
             for p, boxes in self.waiting.items()
@@ -234,10 +240,6 @@ class Prover:
 
     def _looks(self, place: Place, cubes: list[int], boxes: Boxes) -> list[Cells]:
         """The cells of each cube in sight."""
-        if self._seen_from != place.ahead:
-            self._seen_from = place.ahead
-            self._outlooks.clear()
-            self._cells.clear()
         ends = zip(boxes[..., 0].min(0), boxes[..., 1].max(0), strict=True)
         return [self._look(place, k, *end) for k, end in zip(cubes, ends, strict=True)]
 
@@ -248,9 +250,7 @@ class Prover:
             return known
         if known is not None:
             lowest, highest = min(lowest, known.limits[0]), max(highest, known.limits[-1])
-        ahead = self.lattice.cubes[cube] - self.lattice.x(place) - camera_ahead()
-        shown = self._subject.seeing.of(cube, place.ahead)
-        found = Cells(self._subject.eye, ahead, lowest - MARGIN, highest + MARGIN, shown)
+        found = self._subject.cells(cube, place.ahead, lowest - MARGIN, highest + MARGIN)
         bands = np.diff(found.limits)[1::2]
         self.largest_band = max(self.largest_band, float(bands.max(initial=0.0)))
         self._cells[cube] = found

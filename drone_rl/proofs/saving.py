@@ -3,6 +3,7 @@
 import dataclasses
 import io
 import zipfile
+import zlib
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,11 @@ from drone_rl.utils.files import read_bytes, write_atomically
 MOST_BYTES = 2**31
 _COUNTS = ("num_places", "pictures", "most_boxes", "least_gap", "largest_band", "decided")
 _SETS = ("waiting", "ended", "ways", "forked", "parts")
+_DAMAGE = (
+    *(zipfile.BadZipFile, zlib.error, RuntimeError, EOFError, OSError),
+    *(ValueError, TypeError, LookupError, ArithmeticError),
+)
+"""What the reading of something else raises."""
 _NOWHERE = (-1, 0, 0)
 """Stands for what is not followed to its end."""
 
@@ -57,7 +63,7 @@ def load(prover: Prover, path: Path, subject: str) -> None:
     """Lets a fresh proof go on from a state.
 
     Args:
-        prover: The proof.
+        prover: The proof; left as it is if the state is refused.
         path: The file.
         subject: As it was saved.
 
@@ -69,12 +75,17 @@ def load(prover: Prover, path: Path, subject: str) -> None:
         with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
             state = dict(arrays)
         saved = bytes(state["subject"]).decode()
-        counts = dict(zip(_COUNTS, state["counts"].tolist(), strict=True))
-        sets = {name: _unpacked(name, state) for name in _SETS}
+        counts = {
+            name: type(getattr(prover, name))(count)
+            for name, count in zip(_COUNTS, state["counts"].tolist(), strict=True)
+        }
+        shape = prover.parts.shape[1:]
+        sets = {name: _unpacked(name, state, shape) for name in _SETS}
         waiting = [(_place(row[:-1]), row[-1], b) for row, b in sets["waiting"]]
         ended = [((_ending(row), row[3]), b) for row, b in sets["ended"]]
         ways = [(_ending(row), b) for row, b in sets["ways"]]
-    except (ValueError, KeyError, TypeError, OSError, EOFError, zipfile.BadZipFile) as error:
+        ((_, parts),) = sets["parts"]
+    except _DAMAGE as error:
         raise InputError(f"{path} is no state of a proof ({error}); delete it to begin") from None
     if saved != subject:
         raise InputError(f"{path} is of another proof; delete it, or give another folder")
@@ -88,9 +99,9 @@ def load(prover: Prover, path: Path, subject: str) -> None:
     for way, boxes in ways:
         prover.fork_ends[way].append(boxes)
     prover.forked = [boxes for _, boxes in sets["forked"]]
-    ((_, prover.parts),) = sets["parts"]
+    prover.parts = parts
     for name, count in counts.items():
-        setattr(prover, name, type(getattr(prover, name))(count))
+        setattr(prover, name, count)
 
 
 def _place(row: tuple[int, ...]) -> Place:
@@ -119,7 +130,13 @@ def _packed(name: str, parts: Iterable[tuple[tuple, Boxes]]) -> dict[str, NDArra
     }
 
 
-def _unpacked(name: str, state: dict[str, NDArray]) -> list[tuple[tuple[int, ...], Boxes]]:
-    rows, counts = state[f"{name}_rows"].tolist(), state[f"{name}_counts"]
-    boxes = np.split(state[f"{name}_boxes"], np.cumsum(counts)[:-1]) if len(counts) else []
-    return [(tuple(row), b) for row, b in zip(rows, boxes, strict=True)]
+def _unpacked(
+    name: str, state: dict[str, NDArray], shape: tuple[int, ...]
+) -> list[tuple[tuple[int, ...], Boxes]]:
+    rows, counts, boxes = (state[f"{name}_{part}"] for part in ("rows", "counts", "boxes"))
+    if not len(counts):
+        return []
+    if boxes.shape != (counts.sum(), *shape) or boxes.dtype != np.float64:
+        raise ValueError(f"{name} are {boxes.dtype} of shape {boxes.shape}")
+    parts = np.split(boxes, np.cumsum(counts)[:-1])
+    return [(tuple(row), b) for row, b in zip(rows.tolist(), parts, strict=True)]

@@ -8,12 +8,14 @@ from torch import Tensor
 
 from drone_rl.policies import PolicyNetwork
 from drone_rl.proofs.bounds import Bounds
+from drone_rl.proofs.cells import Cells
 from drone_rl.proofs.lattice import Lattice
 from drone_rl.proofs.painting import Painter, Transform
 from drone_rl.proofs.seeing import Seeing
-from drone_rl.proofs.silhouettes import FRONT, Eye
+from drone_rl.proofs.silhouettes import FRONT, Eye, camera_ahead
 from drone_rl.sim.actions import MOVES
 from drone_rl.sim.settings import TaskSettings
+from drone_rl.sim.tasks.collect_cubes import require_cubes
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 from drone_rl.zoo import PolicyDescription
@@ -38,6 +40,21 @@ class Subject:
     seeing: Seeing
     worlds: Worlds
 
+    def cells(self, cube: int, steps: int, lowest: float, highest: float) -> Cells:
+        """The cells of one cube, for a drone that has gone so many steps ahead.
+
+        Args:
+            cube: Its number.
+            steps: Of the drone.
+            lowest: Where the first cell begins, metres to the left of the drone.
+            highest: Where the last one ends.
+
+        Raises:
+            InputError: See `Cells`.
+        """
+        ahead = self.lattice.cubes[cube] - steps * self.lattice.task.step_length - camera_ahead()
+        return Cells(self.eye, ahead, lowest, highest, self.seeing.of(cube, steps))
+
     def close(self) -> None:
         """Ends the worlds that draw."""
         self.worlds.close()
@@ -54,7 +71,7 @@ def make_subject(description: PolicyDescription, network: PolicyNetwork, gap: fl
     Raises:
         InputError: Nothing can be proved of it; the message says why.
     """
-    task = description.task
+    task = require_cubes(description.task, "what is proved")
     check_task(task)
     if network.actions is not MOVES:
         raise InputError(f"the policy does not choose among {', '.join(MOVES.names)}; prove one")

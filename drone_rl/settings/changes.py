@@ -4,7 +4,7 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-from drone_rl.sim.tasks.registry import TASKS
+from drone_rl.sim.settings import TASKS
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import as_mapping
 from drone_rl.utils.settings import Settings, below, check_names, kinds_of, types_of
@@ -35,7 +35,9 @@ class ChangesOfTask:
     @property
     def types(self) -> dict[str, Any]:
         """The plain type of every setting that some task has."""
-        return {name: hint for settings in TASKS for name, hint in types_of(settings).items()}
+        return {
+            name: hint for settings in TASKS.values() for name, hint in types_of(settings).items()
+        }
 
     def read(self, value: Any, where: str) -> dict[str, Any]:
         """See `drone_rl.utils.schema.Kind`."""

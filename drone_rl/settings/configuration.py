@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from typing import Any, ClassVar, TypeVar
 
 from drone_rl.settings.variant import Variant
-from drone_rl.sim.settings import BaseTaskSettings, TaskSettings
-from drone_rl.sim.tasks.registry import named_settings
+from drone_rl.sim.settings import BaseTaskSettings, TaskSettings, named_settings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import as_mapping, shown
 from drone_rl.utils.settings import Settings, below, check_names, kinds_of, plain, types_of

@@ -19,6 +19,7 @@ from drone_rl.verdicts.kinds import NOT_CERTAIN, Kind
 from drone_rl.verdicts.luck import fly_baselines
 from drone_rl.verdicts.proof import Claim
 from drone_rl.verdicts.rule import Quantity, Rule, decide, kinds_within
+from drone_rl.words.certificate import is_proved
 from drone_rl.words.licence import say
 from drone_rl.words.verdict import SENTENCES
 
@@ -43,8 +44,7 @@ class Verdict:
     @property
     def is_proved(self) -> bool:
         """Whether a certificate says that it succeeds from every placement, and is quoted."""
-        proof = self.evidence["proof"]
-        return proof is not None and proof["refused"] is None and proof["every"]
+        return is_proved(self.evidence)
 
     @property
     def sentence(self) -> str:

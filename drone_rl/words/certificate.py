@@ -1,6 +1,7 @@
 """What a verdict quotes of a certificate. Evidence: `verdict.json`; old ones have no "proof"."""
 
 from drone_rl.words.licence import Evidence, Sentence
+from drone_rl.words.numbers import all_cubes, exact
 
 
 def is_quoted(evidence: Evidence) -> bool:
@@ -9,45 +10,38 @@ def is_quoted(evidence: Evidence) -> bool:
     return proof is not None and proof["refused"] is None
 
 
+def is_proved(evidence: Evidence) -> bool:
+    """Whether that certificate says that it succeeds from every placement."""
+    return is_quoted(evidence) and evidence["proof"]["every"]
+
+
 def _is_refused(evidence: Evidence) -> bool:
     return evidence.get("proof") is not None and not is_quoted(evidence)
-
-
-def _is_every(evidence: Evidence) -> bool:
-    return is_quoted(evidence) and evidence["proof"]["every"]
 
 
 def _is_share(evidence: Evidence) -> bool:
     return is_quoted(evidence) and not evidence["proof"]["every"]
 
 
-def _cubes(evidence: Evidence) -> str:
-    count = evidence["num_cubes"]
-    return "the cube" if count == 1 else f"all {count} cubes"
-
-
 def _every(evidence: Evidence) -> str:
     return (
         "Proved for every placement: with its most probable actions it collects "
-        f"{_cubes(evidence)} from all places where they may stand."
+        f"{all_cubes(evidence['num_cubes'])} from all places where they may stand."
     )
 
 
 def _share(evidence: Evidence) -> str:
-    proof = evidence["proof"]
+    proof, cubes = evidence["proof"], all_cubes(evidence["num_cubes"])
+    share, lost, undecided = (proof[name] for name in ("share", "lost", "undecided"))
     so_far = "" if proof["finished"] else " so far, for the proof was stopped"
-    open_part = f", and {_exact(proof['undecided'])} is undecided" if proof["undecided"] else ""
-    return (
-        f"Proved{so_far}: with its most probable actions it collects {_cubes(evidence)} from a "
-        f"share of {_exact(proof['share'])} of all placements; from {_exact(proof['lost'])} it "
-        f"does not{open_part}."
+    text = (
+        f"Proved{so_far}: with its most probable actions it collects {cubes} from a share of "
+        f"{exact(share)} of all placements; from {exact(lost, is_all=share == undecided == 0)} it "
+        "does not"
     )
-
-
-def _exact(share: float) -> str:
-    """A share in nine digits; never 1 of what is only nearly all."""
-    text = f"{share:.9g}"
-    return "more than 0.999999999" if text == "1" else text
+    if undecided:
+        text += f", and {exact(undecided, is_all=share == lost == 0)} is undecided"
+    return f"{text}."
 
 
 def _basis(evidence: Evidence) -> str:
@@ -68,7 +62,7 @@ PROOF = (
     Sentence(
         "proof.every",
         "a certificate that holds together says so, and no flight speaks against it",
-        _is_every,
+        is_proved,
         _every,
     ),
     Sentence(

@@ -31,3 +31,14 @@ def plural(count: int, noun: str) -> str:
 def ordinal(number: int) -> str:
     """What people call the thing with this index."""
     return ORDINALS[number] if number < len(ORDINALS) else f"{number + 1}th"
+
+
+def all_cubes(count: int) -> str:
+    """All cubes of a task that has so many."""
+    return "the cube" if count == 1 else f"all {count} cubes"
+
+
+def exact(share: float, is_all: bool = False) -> str:
+    """A share in nine digits; 1 only of what is all, not of what is only nearly all."""
+    text = f"{share:.9g}"
+    return text if is_all or text != "1" else "more than 0.999999999"

@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
+from drone_rl.words.numbers import all_cubes, exact
+
 
 def sentence(certificate: Mapping[str, Any]) -> str:
     """Says no more than the certificate does.
@@ -11,16 +13,17 @@ def sentence(certificate: Mapping[str, Any]) -> str:
         certificate: See `drone_rl.proofs.certificate`.
     """
     task = certificate["policy"]["description"]["task"]
-    cubes = "the cube" if task["num_cubes"] == 1 else f"all {task['num_cubes']} cubes"
+    cubes = all_cubes(task["num_cubes"])
     outcomes, undecided = certificate["outcomes"], certificate["undecided"]
     success = sum(o["share"] for o in outcomes if o["end"] == "all_cubes")
     if not undecided["boxes"] and all(o["end"] == "all_cubes" for o in outcomes):
         return f"Proved: greedy, it collects {cubes} from every placement."
     lost = sum(o["share"] for o in outcomes if o["end"] != "all_cubes")
-    text = f"Proved: greedy, it collects {cubes} from {_share(success)} of all placements"
-    text += f" and does not from {_share(lost)}"
+    lost = exact(lost, is_all=not success and not undecided["boxes"])
+    text = f"Proved: greedy, it collects {cubes} from a share of {exact(success)} of all placements"
+    text += f" and does not from a share of {lost}"
     if undecided["boxes"]:
-        text += f"; {_share(undecided['share'])} are undecided"
+        text += f"; a share of {exact(undecided['share'], is_all=not outcomes)} are undecided"
     if not certificate["finished"]:
         text += " so far (the proof was stopped)"
     return text + "."
@@ -35,9 +38,6 @@ def found(search: Mapping[str, Any]) -> str:
     text = f"at frame {search['frames']:,}: {search['failures']} of {search['flights']:,} flights"
     if search["losing"] is None:
         return f"{text} failed"
-    text += f" failed; proof in {search['proof_s']:.0f} s: fails from {_share(search['losing'])}"
-    return f"{text}, undecided {_share(search['undecided'])}"
-
-
-def _share(value: float) -> str:
-    return f"a share of {value:.9g}"
+    losing, undecided = exact(search["losing"]), exact(search["undecided"])
+    text += f" failed; proof in {search['proof_s']:.0f} s: fails from a share of {losing}"
+    return f"{text}, undecided a share of {undecided}"

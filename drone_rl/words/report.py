@@ -107,8 +107,8 @@ def _pairs(evidence: Evidence) -> str:
     text = (
         f"Among these {found['frames']} frames {plural(found['pairs'], 'pair')} of alike ones, "
         f"each frame in one pair at most, {'is' if found['pairs'] == 1 else 'are'} answered in "
-        f"opposite ways: {plural(found['contradictions'], 'contradiction')} (the next {target} stands "
-        f"alike in both), {found['justified']} justified (it stands elsewhere)"
+        f"opposite ways: {plural(found['contradictions'], 'contradiction')} (the next {target} "
+        f"stands alike in both), {found['justified']} justified (it stands elsewhere)"
     )
     unknown = found["unknown"]
     return text + (f", {unknown} unknown (a frame has no next {target})." if unknown else ".")

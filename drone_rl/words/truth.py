@@ -89,10 +89,14 @@ def _follows(evidence: Evidence) -> bool:
     return _is_followed(evidence) and _is_above(_outcome(evidence, "follows")["lower95"], 0)
 
 
+def _next(evidence: Evidence) -> str:
+    return f"the next {terms_of(evidence).target}"
+
+
 def _moved_along(evidence: Evidence) -> str:
     follows, flights = _outcome(evidence, "follows"), _truth(evidence)["outcomes"]["flights"]
     return (
-        f"When the next {terms_of(evidence).target} is moved sideways, {plural(flights, 'flight')} gone on from these "
+        f"When {_next(evidence)} is moved sideways, {plural(flights, 'flight')} gone on from these "
         f"pictures move with it by {follows['mean']:.2f} m a metre ({bounds(follows)})."
     )
 
@@ -100,7 +104,7 @@ def _moved_along(evidence: Evidence) -> str:
 def _not_along(evidence: Evidence) -> str:
     follows = _outcome(evidence, "follows")
     return (
-        f"When the next {terms_of(evidence).target} is moved sideways, flights gone on do not surely move with it "
+        f"When {_next(evidence)} is moved sideways, flights gone on do not surely move with it "
         f"({follows['mean']:.2f} m a metre, {bounds(follows)})."
     )
 
@@ -130,7 +134,7 @@ def _target_counts(evidence: Evidence) -> bool:
 def _target(evidence: Evidence) -> str:
     change = _taken(evidence)
     return (
-        f"Taking the next {terms_of(evidence).target} away changes the probabilities by {change['mean']:.2f} of 1 "
+        f"Taking {_next(evidence)} away changes the probabilities by {change['mean']:.2f} of 1 "
         f"({bounds(change)}), surely more than a patch of ground does."
     )
 

@@ -15,8 +15,8 @@ from torchrl.envs import TransformedEnv
 from drone_rl.envs import DroneEnv, with_transforms
 from drone_rl.policies import PolicyNetwork
 from drone_rl.sim.actions import Actions
-from drone_rl.sim.settings import BaseTaskSettings, CameraSettings
-from drone_rl.sim.tasks import Task, as_task, read_task
+from drone_rl.sim.settings import BaseTaskSettings, CameraSettings, read_task
+from drone_rl.sim.tasks import Task, as_task
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Record, Several, as_mapping, shown
 from drone_rl.utils.settings import plain

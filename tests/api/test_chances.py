@@ -7,6 +7,7 @@ import torch
 
 import drone_rl
 from drone_rl.api.progress import silent
+from drone_rl.proofs.chance_bounds import Bounded
 from drone_rl.utils.errors import InputError
 
 ONE = {"num_cubes": 1, "side_margin": 2.0}
@@ -26,6 +27,7 @@ def test_of_placements_that_are_given(good, tmp_path):
     kept = json.loads((tmp_path / "chances.json").read_text())
     assert [p["cubes"][0][1] for p in kept["placements"]] == [6.0, 0.0]
     for placement in kept["placements"]:
+        assert placement["within"] is None
         ends = placement["ends"]
         assert sum(e["probability"] for e in ends) == pytest.approx(1.0, abs=1e-12)
         collected = sum(e["probability"] for e in ends if e["collected"] == [True])
@@ -47,6 +49,18 @@ def test_bounds_wherever_the_cubes_stand_beside_a_placement(good, tmp_path):
     (placement,) = json.loads((tmp_path / "chances.json").read_text())["placements"]
     assert placement["within"]["metres"] == 0.05
     assert placement["within"]["least"] == bounds.least
+
+
+def test_bounds_are_of_places_where_cubes_may_stand(good, monkeypatch):
+    boxes = []
+
+    def bound(_, box, parts):
+        boxes.append(box.tolist())
+        return Bounded(0.0, 1.0, 0.0, 1.0)
+
+    monkeypatch.setattr("drone_rl.api.chances.bound_success", bound)
+    drone_rl.chances(good, [[5.75], [-6.0], [1.0]], task=ONE, within=0.5, progress=silent)
+    assert boxes == [[[5.25, 6.0]], [[-6.0, -5.5]], [[0.5, 1.5]]]
 
 
 def test_held_out_placements_are_those_of_a_verdict(good):

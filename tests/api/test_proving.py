@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+import torch
 
 import drone_rl
 from drone_rl.api.progress import silent
@@ -80,9 +81,36 @@ def test_progress_is_told():
     assert np.diff([done for _, done, _ in told]).min() >= 0
 
 
+def test_parts_to_come_are_told():
+    told, narrow = [], {**ONE, "lateral_bound": 2.0}
+    stopped = drone_rl.prove(
+        "good", task=narrow, compared=1, most_combinations=400, most_boxes=1,
+        progress=lambda text, *_: told.append(text),
+    )  # fmt: skip
+    assert told[0].endswith(" pictures, 1 parts to come") and told[-1] == "stopped"
+    assert stopped.undecided == pytest.approx(1.0)
+
+
 def test_the_certificate_is_of_the_task_that_was_asked_for(proof):
     written = json.loads((proof.folder / "certificate.json").read_text())
     assert written["policy"]["description"]["task"]["num_cubes"] == 1
+
+
+def test_torch_has_its_threads_again():
+    before = torch.get_num_threads()
+    torch.set_num_threads(2)
+    try:
+        told = []
+        drone_rl.prove(
+            "good", task=ONE, compared=1, limit_s=0.0,
+            progress=lambda *_: told.append(torch.get_num_threads()),
+        )  # fmt: skip
+        assert {*told} == {1} and torch.get_num_threads() == 2
+        with pytest.raises(InputError, match=r"vertical_bound=1\.0"):
+            drone_rl.prove("good", task={"vertical_bound": 1.0}, progress=silent)
+        assert torch.get_num_threads() == 2
+    finally:
+        torch.set_num_threads(before)
 
 
 def test_a_policy_with_memory_is_refused(tmp_path):

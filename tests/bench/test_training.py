@@ -3,23 +3,29 @@
 import json
 
 from drone_rl.bench import training
-from drone_rl.bench.training import bench_solve
+from drone_rl.bench.training import bench_pillars, bench_solve
 
 
-def test_solving_gathers_what_each_seed_left(monkeypatch, tmp_path):
+def record_calls(monkeypatch, folder):
+    """The commands, each of which leaves what it would."""
     commands = []
 
     def call(*command):
         commands.append(command)
         name = "result.json" if command[0] == "train" else "evaluation.json"
-        folder = tmp_path / next(c for c in command if "run.dir" in c).split("=")[1]
-        folder.mkdir(parents=True, exist_ok=True)
+        run = folder / next(c for c in command if "run.dir" in c).split("=")[1]
+        run.mkdir(parents=True, exist_ok=True)
         lower = {"greedy": {"success": {"lower95": 0.9}}}
-        (folder / name).write_text(
+        (run / name).write_text(
             json.dumps({"frames": 10 * len(commands), "reason": "solved", **lower})
         )
 
     monkeypatch.setattr(training, "call", call)
+    return commands
+
+
+def test_solving_gathers_what_each_seed_left(monkeypatch, tmp_path):
+    commands = record_calls(monkeypatch, tmp_path)
     result = bench_solve(tmp_path, [3, 4], 100, "cpu", False)
     assert [c[0] for c in commands] == ["train", "evaluate"] * 2
     assert "seed=3" in commands[0] and "seed=4" in commands[2]
@@ -28,3 +34,12 @@ def test_solving_gathers_what_each_seed_left(monkeypatch, tmp_path):
     assert result["success_lower95"] == [0.9, 0.9]
     assert len(result["time_to_solve_s"]) == 2
     assert len(bench_solve(tmp_path, [3, 4], 100, "cpu", True)["frames_to_solve"]) == 1
+
+
+def test_pillars_are_trained_by_their_experiment(monkeypatch, tmp_path):
+    commands = record_calls(monkeypatch, tmp_path)
+    result = bench_pillars(tmp_path, [3, 4], 100, "cpu", False)
+    assert [c[0] for c in commands] == ["train", "evaluate"] * 2
+    assert all("experiment=pillars" in c for c in commands[::2])
+    assert result["pillars_lower95"] == [0.9, 0.9] and result["pillars_solved"] == 2
+    assert result["pillars_frames"] == [10, 30] and len(result["pillars_train_s"]) == 2

@@ -7,7 +7,7 @@ from torch import nn
 
 from drone_rl.proofs.bounds import Bounds
 from drone_rl.proofs.cells import Cells
-from drone_rl.proofs.outlook import Outlook, Ranges, runs
+from drone_rl.proofs.outlook import Outlook, runs
 from drone_rl.proofs.painting import Painter
 from drone_rl.proofs.silhouettes import Eye
 
@@ -137,12 +137,3 @@ def test_runs_of_one_cube():
     ((_, ranges, bits),) = runs(outlook, spans, 100)
     assert (bits[1:] != bits[:-1]).all()
     assert ranges[:, 0].tolist()[0][0] == 0 and ranges[-1, 0, 1] == len(outlook.cells[0]) - 1
-
-
-def test_ranges_look_up_what_may_be_seen():
-    pictures = torch.tensor([[[0, 1]], [[2, 1]], [[0, 0]]], dtype=torch.uint8)
-    ranges = Ranges(pictures)
-    masks, case = ranges.of(np.array([[0, 0], [0, 2], [1, 2], [0, 2]]))
-    found = masks[case][:, 0].tolist()
-    assert found == [[1, 2], [5, 3], [5, 3], [5, 3]]
-    assert ranges.doubts(np.array([[0, 0], [0, 1], [0, 2]])).tolist() == [0, 1, 2]

@@ -78,6 +78,22 @@ def test_half_way_the_rest_is_undecided():
     assert parts == {} and undecided == 1.0
 
 
+def test_parts_that_are_not_begun_with_are_undecided():
+    policy = drone_rl.load_policy("right_and_forward").in_task(num_cubes=1, lateral_bound=2.0)
+    subject = make_subject(policy.description, policy.make_network(), 1e-4)
+    prover = Prover(subject, 200)
+    count = len(prover.parts)
+    assert count > 2 and shares(prover.findings(), bound=2.0) == ({}, pytest.approx(1.0))
+    prover.advance()
+    while prover.waiting:
+        prover.advance()
+    subject.close()
+    parts, undecided = shares(prover.findings(), bound=2.0)
+    assert len(prover.parts) == count - 1 and not prover.is_finished
+    assert parts == {("ALL_CUBES", 1): pytest.approx(1 / count, abs=1e-6)}
+    assert undecided == pytest.approx(1 - 1 / count, abs=1e-6)
+
+
 def test_where_logits_are_close_nothing_is_claimed():
     """The larger the gap that is asked for, the more ways are followed, and nothing is wrong."""
     bold, careful = prove("right_and_forward"), prove("right_and_forward", gap=3.0)

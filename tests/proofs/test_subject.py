@@ -2,10 +2,12 @@
 
 import dataclasses
 
+import numpy as np
 import pytest
 import torch
 
 import drone_rl
+from drone_rl.proofs.cells import Cells
 from drone_rl.proofs.subject import check_task, make_painter, make_subject
 from drone_rl.sim.settings import TaskSettings
 from drone_rl.utils.errors import InputError
@@ -49,6 +51,15 @@ def test_transforms_after_the_shades_are_applied(subject):
     assert picture.shape == (1, 1, 20, 64)
     sky = (0.299 * 158 + 0.587 * 188 + 0.114 * 234) / 255
     assert float(picture[0, 0, 0, 0]) == pytest.approx((sky - 0.5) / 0.25, abs=1e-5)
+
+
+def test_cells_are_those_of_a_cubes_distance(subject):
+    """The second cube is 24 m ahead of the start, so 19.6 m of the camera after 4 steps."""
+    cells = subject.cells(1, 4, -3.0, 3.0)
+    expected = Cells(subject.eye, 24.0 - 4.0 - 0.4, -3.0, 3.0, subject.seeing.of(1, 4))
+    assert np.array_equal(cells.limits, expected.limits)
+    assert np.array_equal(cells.pictures, expected.pictures)
+    assert len(cells) > 10 and cells.pictures.any()
 
 
 def test_memory_is_refused(subject):

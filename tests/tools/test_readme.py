@@ -65,10 +65,13 @@ def test_rows_say_what_the_figures_are():
         "planted_maps_found": 26 / 27,
         "planted_maps_total": 27,
         "launcher_overhead": 0.0794,
+        "proof_two_s": 4.2,
+        "proof_two_scaled_s": 3.0,
     }
     text = "".join(make_table(rows, figures) for rows in (MAIN, TRUTH, PROOF))
     for cell in ("20 to 41, median 25", "0.991", "1024 MiB", "44 of 45 certain, of 55", "7.9%"):
         assert f"| {cell} |" in text
+    assert "| 4.2, on a machine 1.4 times slower |" in text
     assert "| 26 of 27 |" in text
 
 

@@ -2,19 +2,9 @@
 
 import pytest
 
-from drone_rl.words.certificate import PROOF, is_quoted
+from drone_rl.bench.evidence import PROOF as QUOTED
+from drone_rl.words.certificate import PROOF, is_proved, is_quoted
 from drone_rl.words.licence import said
-
-QUOTED = {
-    "refused": None,
-    "every": True,
-    "share": 1.0,
-    "lost": 0.0,
-    "undecided": 0.0,
-    "finished": True,
-    "checked": 0,
-    "agreeing": 1000,
-}
 
 
 def speak(num_cubes=3, **changed):
@@ -22,7 +12,7 @@ def speak(num_cubes=3, **changed):
 
 
 def test_every_placement():
-    assert speak() == {
+    assert speak(agreeing=1000) == {
         "proof.every": "Proved for every placement: with its most probable actions it collects "
         "all 3 cubes from all places where they may stand.",
         "proof.basis": "The certificate is of this network and task, and its boxes are a partition "
@@ -54,6 +44,17 @@ def test_nearly_all_is_never_all(share):
     assert "from 0 it does not, and 1e-12 is undecided" in text
 
 
+def test_all_is_said_to_be_all():
+    text = speak(every=False, share=0.0, lost=1.0)["proof.share"]
+    assert "a share of 0 of all placements; from 1 it does not." in text
+    text = speak(every=False, share=0.0, undecided=1.0, finished=False)["proof.share"]
+    assert "from 0 it does not, and 1 is undecided." in text
+    text = speak(every=False, share=1e-12, lost=1.0)["proof.share"]
+    assert "from more than 0.999999999 it does not" in text
+    text = speak(every=False, lost=1e-12, share=0.0, undecided=1.0)["proof.share"]
+    assert "and more than 0.999999999 is undecided" in text
+
+
 def test_flights_anew_and_none_of_its_own():
     basis = speak(checked=2000, agreeing=0)["proof.basis"]
     assert basis.endswith("; 2,000 flights were made anew to try it and ended as it states.")
@@ -66,5 +67,11 @@ def test_what_is_refused_is_not_quoted():
 
 @pytest.mark.parametrize("evidence", [{}, {"proof": None}])
 def test_without_a_certificate_nothing_is_said(evidence):
-    assert not is_quoted(evidence)
+    assert not is_quoted(evidence) and not is_proved(evidence)
     assert said(PROOF, evidence) == {}
+
+
+def test_a_policy_is_proved_if_what_is_quoted_says_so_of_every_placement():
+    assert is_proved({"proof": QUOTED})
+    assert not is_proved({"proof": {**QUOTED, "every": False}})
+    assert not is_proved({"proof": {"refused": "it is of another network"}})

@@ -1,5 +1,5 @@
 from drone_rl.words.licence import percent
-from drone_rl.words.numbers import among, bounds, listed, ordinal, plural
+from drone_rl.words.numbers import all_cubes, among, bounds, exact, listed, ordinal, plural
 
 
 def test_numbers_as_people_write_them():
@@ -24,3 +24,18 @@ def test_counts():
 
 def test_ordinals_go_on_beyond_their_names():
     assert [ordinal(i) for i in (0, 8, 9, 10)] == ["first", "ninth", "10th", "11th"]
+
+
+def test_cubes():
+    assert (all_cubes(1), all_cubes(3)) == ("the cube", "all 3 cubes")
+
+
+def test_nearly_all_is_never_all():
+    assert [exact(share) for share in (0.0, 1e-12, 0.25, 1 / 3)] == [
+        "0", "1e-12", "0.25", "0.333333333",
+    ]  # fmt: skip
+    assert exact(1 - 1e-9) == "0.999999999"
+    for share in (1 - 1e-10, 1 - 1e-16, 1.0, 1 + 1e-12):  # whose digits, or the sum's, are too few
+        assert exact(share) == "more than 0.999999999"
+    assert exact(1 - 1e-16, is_all=True) == "1"
+    assert exact(0.5, is_all=True) == "0.5"

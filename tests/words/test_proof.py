@@ -2,7 +2,7 @@
 
 import pytest
 
-from drone_rl.words.proof import sentence
+from drone_rl.words.proof import found, sentence
 
 
 def certificate(won=1.0, undecided=0.0, finished=True, cubes=3):
@@ -39,3 +39,26 @@ def test_shares():
 def test_a_proof_that_was_stopped():
     text = sentence(certificate(won=0.25, undecided=0.75, finished=False))
     assert text.endswith("so far (the proof was stopped).")
+
+
+def test_nearly_all_is_never_all_and_all_is():
+    nearly = sentence(certificate(won=1 - 1e-12, undecided=1e-12))
+    assert "from a share of more than 0.999999999 of all placements" in nearly
+    assert "does not from a share of 1." in sentence(certificate(won=0.0))
+    lost = sentence(certificate(won=1e-12))
+    assert "from a share of 1e-12 of all placements" in lost
+    assert "does not from a share of more than 0.999999999." in lost
+    stopped = sentence(certificate(won=0.0, undecided=1.0, finished=False))
+    assert "from a share of 0; a share of 1 are undecided so far" in stopped
+    begun = sentence(certificate(won=1e-12, undecided=1 - 1e-12, finished=False))
+    assert "a share of more than 0.999999999 are undecided so far" in begun
+
+
+def test_what_a_training_found():
+    search = {"frames": 20_000, "failures": 3, "flights": 4000, "losing": None}
+    assert found(search) == "at frame 20,000: 3 of 4,000 flights failed"
+    proof = {"losing": 0.25, "undecided": 1e-7, "proof_s": 61.6}
+    assert found(search | proof) == (
+        "at frame 20,000: 3 of 4,000 flights failed; proof in 62 s: fails from a share of 0.25, "
+        "undecided a share of 1e-07"
+    )

@@ -3,25 +3,21 @@
 from drone_rl.sim.tasks.collect_cubes import CollectCubes, Practice
 from drone_rl.sim.tasks.explainable import Grid
 from drone_rl.sim.tasks.judgeable import Goals, OracleRule
-from drone_rl.sim.tasks.pillars import Pillars, PillarsSettings
+from drone_rl.sim.tasks.pillars import Pillars
 from drone_rl.sim.tasks.playable import Prop, State
-from drone_rl.sim.tasks.registry import TASKS, as_task, read_task, register_task, settings_of
+from drone_rl.sim.tasks.registry import as_task, register_task
 from drone_rl.sim.tasks.task import Task
 
 __all__ = [
-    "TASKS",
     "CollectCubes",
     "Goals",
     "Grid",
     "OracleRule",
     "Pillars",
-    "PillarsSettings",
     "Practice",
     "Prop",
     "State",
     "Task",
     "as_task",
-    "read_task",
     "register_task",
-    "settings_of",
 ]

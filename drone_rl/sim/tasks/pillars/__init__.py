@@ -1,6 +1,5 @@
 """Fly through a field of pillars, and touch none."""
 
-from drone_rl.sim.tasks.pillars.settings import PillarsSettings
 from drone_rl.sim.tasks.pillars.task import Pillars
 
-__all__ = ["Pillars", "PillarsSettings"]
+__all__ = ["Pillars"]

@@ -7,11 +7,10 @@ import torch
 from torch import Tensor
 
 from drone_rl.sim.dynamics import BodyState
-from drone_rl.sim.settings import CameraSettings
+from drone_rl.sim.settings import CameraSettings, PillarsSettings
 from drone_rl.sim.tasks.explainable import Grid
 from drone_rl.sim.tasks.pillars import rules
 from drone_rl.sim.tasks.pillars.rules import FieldState
-from drone_rl.sim.tasks.pillars.settings import PillarsSettings
 
 
 def next_pillar(state: FieldState) -> Tensor:

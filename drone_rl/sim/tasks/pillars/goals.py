@@ -6,9 +6,9 @@ from collections.abc import Iterator
 import torch
 from torch import Tensor
 
+from drone_rl.sim.settings import PillarsSettings
 from drone_rl.sim.tasks.judgeable import Goals
 from drone_rl.sim.tasks.pillars.rules import Side
-from drone_rl.sim.tasks.pillars.settings import PillarsSettings
 from drone_rl.words.numbers import ordinal
 
 

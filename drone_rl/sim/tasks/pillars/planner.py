@@ -4,8 +4,8 @@ import torch
 from torch import Tensor
 
 from drone_rl.sim.actions import Move
+from drone_rl.sim.settings import PillarsSettings
 from drone_rl.sim.tasks.pillars import rules
-from drone_rl.sim.tasks.pillars.settings import PillarsSettings
 
 READS = ("drone", "rows", "next_row")
 """Entries of the information that `fly_through` looks at."""

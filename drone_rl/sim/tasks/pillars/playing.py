@@ -10,9 +10,9 @@ from torch import Tensor
 from drone_rl.sim.actions import Entry
 from drone_rl.sim.dynamics import BodyState, ComputerVision
 from drone_rl.sim.entities.pillar import Pillar
-from drone_rl.sim.tasks.pillars import field, rules
+from drone_rl.sim.settings import PillarsSettings, field
+from drone_rl.sim.tasks.pillars import rules
 from drone_rl.sim.tasks.pillars.rules import EndReason, FieldState, Side
-from drone_rl.sim.tasks.pillars.settings import PillarsSettings
 
 VANISHED_DEPTH = 100.0
 """Metres below its place at which a pillar is kept that does not stand, out of sight."""

@@ -14,7 +14,7 @@ from torch import Tensor
 
 from drone_rl.sim.batch import Batch
 from drone_rl.sim.dynamics.body import BodyState
-from drone_rl.sim.tasks.pillars.settings import PillarsSettings
+from drone_rl.sim.settings import PillarsSettings
 
 
 class Side(enum.IntEnum):

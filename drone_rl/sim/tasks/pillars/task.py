@@ -1,9 +1,9 @@
 """Fly through a field of pillars to the line beyond it."""
 
+from drone_rl.sim.settings import PillarsSettings
 from drone_rl.sim.tasks.pillars.explaining import Explaining
 from drone_rl.sim.tasks.pillars.judging import Judging
 from drone_rl.sim.tasks.pillars.playing import Playing
-from drone_rl.sim.tasks.pillars.settings import PillarsSettings
 
 
 class Pillars(Playing, Judging, Explaining):

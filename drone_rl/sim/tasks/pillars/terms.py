@@ -2,7 +2,7 @@
 
 import dataclasses
 
-from drone_rl.sim.tasks.pillars.settings import PillarsSettings
+from drone_rl.sim.settings import PillarsSettings
 from drone_rl.words.numbers import plural
 from drone_rl.words.terms import Terms
 

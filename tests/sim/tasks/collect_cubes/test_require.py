@@ -1,7 +1,6 @@
 import pytest
 
-from drone_rl.sim.settings import TaskSettings
-from drone_rl.sim.tasks import PillarsSettings
+from drone_rl.sim.settings import PillarsSettings, TaskSettings
 from drone_rl.sim.tasks.collect_cubes import require_cubes
 from drone_rl.utils.errors import InputError
 
@@ -9,5 +8,5 @@ from drone_rl.utils.errors import InputError
 def test_only_cube_collection_passes():
     task = TaskSettings(num_cubes=2)
     assert require_cubes(task, "a proof") is task
-    with pytest.raises(InputError, match="^task.name=pillars: a proof is known of collect_cubes al"):
+    with pytest.raises(InputError, match="a proof is known of collect_cubes alone"):
         require_cubes(PillarsSettings(), "a proof")

@@ -1,7 +1,7 @@
 import torch
 
+from drone_rl.sim.settings import PillarsSettings
 from drone_rl.sim.tasks import Pillars
-from drone_rl.sim.tasks.pillars import PillarsSettings
 from drone_rl.sim.tasks.pillars.goals import RowGoals, classes, gap_edges
 
 

@@ -5,7 +5,8 @@ import torch
 
 from drone_rl.sim.actions import Move
 from drone_rl.sim.dynamics import ComputerVision
-from drone_rl.sim.tasks.pillars import PillarsSettings, field, rules
+from drone_rl.sim.settings import PillarsSettings, field
+from drone_rl.sim.tasks.pillars import rules
 from drone_rl.sim.tasks.pillars.planner import first_turn, fly_through
 from drone_rl.sim.tasks.pillars.rules import EndReason
 

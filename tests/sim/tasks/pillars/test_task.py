@@ -1,4 +1,5 @@
-from drone_rl.sim.tasks import Pillars, PillarsSettings, as_task
+from drone_rl.sim.settings import PillarsSettings
+from drone_rl.sim.tasks import Pillars, as_task
 
 
 def test_settings_make_the_task():

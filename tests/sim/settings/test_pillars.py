@@ -1,6 +1,6 @@
 import pytest
 
-from drone_rl.sim.tasks.pillars import PillarsSettings
+from drone_rl.sim.settings import PillarsSettings
 from drone_rl.utils.errors import InputError
 
 
@@ -22,8 +22,8 @@ def test_what_follows_from_the_settings():
         ({"height": 2.0}, "height=2.0 puts pillars below the drone; give at least 2.5"),
         ({"step_limit": 33}, "step_limit=33 ends every episode .* at least 34"),
         ({"density": 6.0}, "density=6.0 makes fields too dense to cross: .* lower density"),
-        ({"width": 16.0, "density": 0.5, "spacing": 20.0, "first_distance": 20.0, "finish_margin": 9.0},
-         "too dense to cross"),
+        ({"width": 16.0, "density": 0.5, "spacing": 20.0, "first_distance": 20.0,
+          "finish_margin": 9.0}, "too dense to cross"),
         ({"density": 0.0}, "density=0.0"),
         ({"collision_penalty": -1.0}, "collision_penalty=-1.0"),
     ],

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from drone_rl.sim.tasks.pillars import PillarsSettings, field
+from drone_rl.sim.settings import PillarsSettings, field
 
 SETTINGS = PillarsSettings(spread=3.0, density=0.34)  # two pillars a row, seven lanes
 
@@ -15,7 +15,9 @@ def test_lanes_are_a_step_apart_and_within_the_field():
 
 def test_a_lane_is_open_where_no_pillar_of_the_row_is_touched():
     rows = np.array([[0.5, 0.5], [-1.0, 2.0], [-3.0, 3.0]])
-    opened = [field.lanes(SETTINGS.layout)[row].tolist() for row in field.is_open(SETTINGS.layout, rows)]
+    opened = [
+        field.lanes(SETTINGS.layout)[row].tolist() for row in field.is_open(SETTINGS.layout, rows)
+    ]
     # a pillar at -1 touches who is at -2, -1 or 0: 1 m is still a touch
     assert opened == [[-3, -2, -1, 2, 3], [-3], [-1, 0, 1]]
 

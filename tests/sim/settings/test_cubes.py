@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from drone_rl.sim.settings import CameraSettings, TaskSettings
+from drone_rl.sim.settings import TaskSettings
 from drone_rl.utils.errors import InputError
 
 
@@ -48,18 +48,3 @@ def test_step_limit_that_just_suffices():
     TaskSettings(step_limit=needed)
     with pytest.raises(InputError, match=f"at least {needed}"):
         TaskSettings(step_limit=needed - 1)
-
-
-def test_vertical_fov_of_square_pixels():
-    assert CameraSettings(width=64, height=64, horizontal_fov=90.0).vertical_fov == pytest.approx(
-        90
-    )
-    half = math.degrees(math.atan(math.tan(math.radians(67.5)) * 144 / 256))
-    original = CameraSettings(width=256, height=144, horizontal_fov=135.0)
-    assert original.vertical_fov == pytest.approx(2 * half)
-
-
-@pytest.mark.parametrize("change", [{"width": 0}, {"height": 1025}, {"horizontal_fov": 180.0}])
-def test_bad_camera_is_refused(change):
-    with pytest.raises(InputError, match="out of range"):
-        CameraSettings(**change)

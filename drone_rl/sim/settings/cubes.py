@@ -1,34 +1,16 @@
-"""What can be chosen about tasks and the camera, checked before anything is built.
+"""What can be chosen about cube collection, checked before anything is built.
 
-Of cube collection the defaults are the original study's; the sizes of the cube and the drone, which
-it leaves out, are chosen so that a uniformly random policy collects about as much as it did there
-(0.84 cubes).
+The defaults are the original study's; the sizes of the cube and the drone, which it leaves out, are
+chosen so that a uniformly random policy collects about as much as it did there (0.84 cubes).
 """
 
 import dataclasses
 import math
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, ClassVar
 
+from drone_rl.sim.settings.task import FIRST, BaseTaskSettings, Bound, Color, Length
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import Real, Several, Whole
-from drone_rl.utils.settings import Settings
-
-Length = Annotated[float, Real(0.001, 10_000.0)]
-Bound = Annotated[float, Real(0.0, 10_000.0)]
-Color = Annotated[tuple[float, float, float], Several(Real(0.0, 1.0), 3, 3)]
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class BaseTaskSettings(Settings):
-    """What the settings of a task are; each task has a class of its own."""
-
-    name: ClassVar[str]
-    """What files call the task."""
-
-    def values(self) -> dict[str, Any]:
-        """See `Settings.values`; the task is named, but for cube collection, which was the first."""
-        named = {} if self.name == TaskSettings.name else {"name": self.name}
-        return {**named, **super().values()}
+from drone_rl.utils.schema import Whole
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -41,7 +23,7 @@ class TaskSettings(BaseTaskSettings):
         InputError: A value is out of range, or the settings together can't be met.
     """
 
-    name: ClassVar[str] = "collect_cubes"
+    name: ClassVar[str] = FIRST
     num_cubes: Annotated[int, Whole(1, 100)] = 3
     """Cubes placed in every episode."""
     first_distance: Length = 15.0
@@ -118,25 +100,3 @@ class TaskSettings(BaseTaskSettings):
                 f"step_limit={self.step_limit} ends every episode before the last cube can be "
                 f"reached; give at least {needed}"
             )
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class CameraSettings(Settings):
-    """The picture that the policy's camera takes.
-
-    Raises:
-        InputError: A value is out of range.
-    """
-
-    width: Annotated[int, Whole(1, 1024)] = 64
-    """Pixels across."""
-    height: Annotated[int, Whole(1, 1024)] = 25
-    """Pixels down."""
-    horizontal_fov: Annotated[float, Real(1.0, 170.0)] = 135.0
-    """Horizontal field of view in degrees."""
-
-    @property
-    def vertical_fov(self) -> float:
-        """Vertical field of view in degrees, for square pixels."""
-        half = math.tan(math.radians(self.horizontal_fov) / 2) * self.height / self.width
-        return math.degrees(2 * math.atan(half))

@@ -6,8 +6,8 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
-from drone_rl.sim.settings import BaseTaskSettings, Color, Length
-from drone_rl.sim.tasks.pillars.field import Layout, draw_rows, is_open
+from drone_rl.sim.settings.field import Layout, draw_rows, is_open
+from drone_rl.sim.settings.task import BaseTaskSettings, Color, Length
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Real, Whole
 

@@ -1,0 +1,18 @@
+"""What can be chosen about tasks and the camera; known without what they are made of."""
+
+from drone_rl.sim.settings.camera import CameraSettings
+from drone_rl.sim.settings.cubes import TaskSettings
+from drone_rl.sim.settings.pillars import PillarsSettings
+from drone_rl.sim.settings.registry import TASKS, named_settings, read_task, settings_of
+from drone_rl.sim.settings.task import BaseTaskSettings
+
+__all__ = [
+    "TASKS",
+    "BaseTaskSettings",
+    "CameraSettings",
+    "PillarsSettings",
+    "TaskSettings",
+    "named_settings",
+    "read_task",
+    "settings_of",
+]

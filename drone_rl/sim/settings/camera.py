@@ -1,0 +1,30 @@
+"""What can be chosen about the policy's camera."""
+
+import dataclasses
+import math
+from typing import Annotated
+
+from drone_rl.utils.schema import Real, Whole
+from drone_rl.utils.settings import Settings
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class CameraSettings(Settings):
+    """The picture that the policy's camera takes.
+
+    Raises:
+        InputError: A value is out of range.
+    """
+
+    width: Annotated[int, Whole(1, 1024)] = 64
+    """Pixels across."""
+    height: Annotated[int, Whole(1, 1024)] = 25
+    """Pixels down."""
+    horizontal_fov: Annotated[float, Real(1.0, 170.0)] = 135.0
+    """Horizontal field of view in degrees."""
+
+    @property
+    def vertical_fov(self) -> float:
+        """Vertical field of view in degrees, for square pixels."""
+        half = math.tan(math.radians(self.horizontal_fov) / 2) * self.height / self.width
+        return math.degrees(2 * math.atan(half))

@@ -1,0 +1,26 @@
+"""What the settings of every task have in common."""
+
+import dataclasses
+from typing import Annotated, Any, ClassVar
+
+from drone_rl.utils.schema import Real, Several
+from drone_rl.utils.settings import Settings
+
+Length = Annotated[float, Real(0.001, 10_000.0)]
+Bound = Annotated[float, Real(0.0, 10_000.0)]
+Color = Annotated[tuple[float, float, float], Several(Real(0.0, 1.0), 3, 3)]
+FIRST = "collect_cubes"
+"""The task of files that name none."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class BaseTaskSettings(Settings):
+    """What the settings of a task are; each task has a class of its own."""
+
+    name: ClassVar[str]
+    """What files call the task."""
+
+    def values(self) -> dict[str, Any]:
+        """See `Settings.values`; the task is named, but for the first that there was."""
+        named = {} if self.name == FIRST else {"name": self.name}
+        return {**named, **super().values()}
