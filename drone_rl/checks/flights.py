@@ -13,6 +13,7 @@ from torchrl.envs import Transform
 
 from drone_rl.envs import worlds_of
 from drone_rl.sim.tasks import State
+from drone_rl.sim.tasks.collect_cubes import require_cubes
 from drone_rl.sim.tasks.collect_cubes.rules import WorldState
 from drone_rl.zoo import PolicyDescription
 
@@ -64,7 +65,8 @@ class Simulator:
         pixels = described.camera.width * described.camera.height
         self.at_once = max(1, min(MOST_AT_ONCE, MOST_PIXELS // pixels))
         self._env = described.build_env(min(self.at_once, 64), seed=0, device=device)
-        self._worlds, self._task = worlds_of(self._env), described.task
+        self._worlds = worlds_of(self._env)
+        self._task = require_cubes(described.task, "what a certificate states")
         every: Iterable[Transform] = self._env.transform  # type: ignore[assignment]
         self._transforms = [t for t in every if "pixels" in (t.in_keys or [])]
         self._network = described.build_network(torch.Generator().manual_seed(0))

@@ -73,7 +73,10 @@ def comments(command: str, conf: Path, chosen: dict[str, str | None]) -> dict[st
         conf: That folder.
         chosen: The file of each group.
     """
-    found = {f"task.{k}": v for k, v in read_comments(conf / "task" / "collect_cubes.yaml").items()}
+    found: dict[str, str] = {}
+    tasks = conf / "task"
+    for path in [*sorted(tasks.glob("*.yaml")), tasks / "collect_cubes.yaml"]:  # its words count
+        found |= {f"task.{key}": text for key, text in read_comments(path).items()}
     for group, name in chosen.items():
         for path in _with_parents(conf / group / f"{name}.yaml"):
             found |= {f"{group}.{key}": text for key, text in read_comments(path).items()}

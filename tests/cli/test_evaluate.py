@@ -15,7 +15,7 @@ def test_evaluate_writes_table_json_and_videos(run):
     assert "all cubes" in done.stdout
     assert "oracle" in done.stdout
     report = json.loads((run / "evaluation" / "evaluation.json").read_text())
-    assert report["oracle"]["mean_cubes"] == 1.0
+    assert report["oracle"]["mean_goals"] == 1.0
     assert report["greedy"]["episodes"] == report["sampled"]["episodes"] == 5
     assert {p.suffix for p in (run / "evaluation" / "videos").iterdir()} == {".mp4", ".gif"}
 

@@ -30,7 +30,7 @@ def test_flights_are_recorded_as_the_task_remembers_them(context):
     again = context.scenes.frames(state).numpy()
     np.testing.assert_array_equal(again, data.frames)  # the recalled worlds look as they did
     assert data.offset(context.scenes.task).shape == (40, 2)
-    assert data.next_cube.max() <= NUM_POSTS
+    assert data.next_target.max() <= NUM_POSTS
 
 
 def test_all_sections_are_made(context, tmp_path):

@@ -52,10 +52,10 @@ def test_the_file_holds_every_step_of_the_flights(dataset, world, tmp_path):
 
 
 def test_offset_is_seen_from_the_drone(dataset):
-    t = int(np.flatnonzero(dataset.next_cube == 0)[0])
+    t = int(np.flatnonzero(dataset.next_target == 0)[0])
     expected = dataset.cubes[t, 0, :2] - dataset.drone[t, :2]
     np.testing.assert_allclose(dataset.offset(CollectCubes())[t], expected)
-    near = np.flatnonzero((dataset.next_cube == 0) & (dataset.step < 5))
+    near = np.flatnonzero((dataset.next_target == 0) & (dataset.step < 5))
     assert (dataset.regions == Region.NEXT_TARGET).any((1, 2))[near].all()
 
 

@@ -14,7 +14,7 @@ from drone_rl.hydra_app import schemas
 from drone_rl.hydra_app.composition import conf_dir
 from drone_rl.settings.configuration import as_config
 from drone_rl.settings.training import TrainSettings
-from drone_rl.sim.settings import CameraSettings, TaskSettings
+from drone_rl.sim.settings import CameraSettings, PillarsSettings, TaskSettings
 from drone_rl.utils.settings import kinds_of, snake_case, types_of
 from drone_rl.zoo import describe
 from tests.hydra_app.conftest import commands
@@ -131,7 +131,7 @@ def test_every_value_of_every_sweep_is_understood(name, settings):
     ["evaluate", "play", "verdict", "prove", "check", "places", "chain", "explain"],
 )
 def test_any_setting_of_the_task_can_be_changed_for_a_trained_policy(command, config, settings):
-    assert set(config(command).task) == set(kinds_of(TaskSettings))
+    assert set(config(command).task) == set(kinds_of(TaskSettings)) | set(kinds_of(PillarsSettings))
     assert settings(command).task == {}
     assert settings(command, "task.num_cubes=5").task == {"num_cubes": 5}
 

@@ -2,11 +2,10 @@
 
 import dataclasses
 import math
+import random
+from collections.abc import Iterator
 from typing import Annotated, ClassVar
 
-import numpy as np
-
-from drone_rl.sim.settings.field import Layout, draw_rows, is_open
 from drone_rl.sim.settings.task import BaseTaskSettings, Color, Length
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Real, Whole
@@ -76,12 +75,6 @@ class PillarsSettings(BaseTaskSettings):
         return self.first_distance + (self.num_rows - 1) * self.spacing
 
     @property
-    def layout(self) -> Layout:
-        """What its fields have in common."""
-        sizes = self.spread, self.touch_distance, self.step_length
-        return Layout(self.num_rows, self.row_size, *sizes)
-
-    @property
     def finish(self) -> float:
         """X of the line, in metres."""
         return self.last_distance + self.finish_margin
@@ -110,10 +103,21 @@ class PillarsSettings(BaseTaskSettings):
                 f"step_limit={self.step_limit} ends every episode before the line can be reached; "
                 f"give at least {steps}"
             )
-        rows = draw_rows(self.layout, np.random.RandomState(0), _TRIED)
-        if is_open(self.layout, rows).any(-1).sum() < _LEAST_OPEN:
+        if sum(self._is_open(row) for row in self._rows()) < _LEAST_OPEN:
             raise InputError(
                 f"density={self.density} makes fields too dense to cross: of {_TRIED} rows, next "
                 "to none leave a way through; give a lower density, a smaller width or a larger "
                 "spread"
             )
+
+    def _rows(self) -> Iterator[list[float]]:
+        """Rows as they may come: the y of their pillars."""
+        source = random.Random(0)
+        for _ in range(_TRIED):
+            yield [source.uniform(-self.spread, self.spread) for _ in range(self.row_size)]
+
+    def _is_open(self, row: list[float]) -> bool:
+        """Whether a row leaves a lane, see `drone_rl.sim.tasks.pillars.field`."""
+        most = int(self.spread / self.step_length + 1e-9)
+        lanes = (number * self.step_length for number in range(-most, most + 1))
+        return any(all(abs(y - lane) > self.touch_distance for y in row) for lane in lanes)

@@ -10,8 +10,8 @@ from torch import Tensor
 from drone_rl.sim.actions import Entry
 from drone_rl.sim.dynamics import BodyState, ComputerVision
 from drone_rl.sim.entities.pillar import Pillar
-from drone_rl.sim.settings import PillarsSettings, field
-from drone_rl.sim.tasks.pillars import rules
+from drone_rl.sim.settings import PillarsSettings
+from drone_rl.sim.tasks.pillars import field, rules
 from drone_rl.sim.tasks.pillars.rules import EndReason, FieldState, Side
 
 VANISHED_DEPTH = 100.0
@@ -70,7 +70,7 @@ class Playing:
 
     def draw(self, random_state: np.random.RandomState) -> Tensor:
         """The y of the pillars of a field that some path crosses. Shape: (R, K), metres."""
-        return torch.from_numpy(field.draw_field(self.settings.layout, random_state))
+        return torch.from_numpy(field.draw_field(self.settings, random_state))
 
     def start(self, drawn: Tensor, body: BodyState) -> FieldState:
         """The state at the start of episodes."""

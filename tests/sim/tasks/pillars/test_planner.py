@@ -5,8 +5,8 @@ import torch
 
 from drone_rl.sim.actions import Move
 from drone_rl.sim.dynamics import ComputerVision
-from drone_rl.sim.settings import PillarsSettings, field
-from drone_rl.sim.tasks.pillars import rules
+from drone_rl.sim.settings import PillarsSettings
+from drone_rl.sim.tasks.pillars import field, rules
 from drone_rl.sim.tasks.pillars.planner import first_turn, fly_through
 from drone_rl.sim.tasks.pillars.rules import EndReason
 
@@ -15,8 +15,8 @@ SETTINGS = PillarsSettings(num_rows=3, spread=4.0, density=0.4)  # three pillars
 
 def fewest_turns(rows, y, next_row):
     """By trying every choice of lanes: metres of turns in all, and to the first row's lane."""
-    lanes = field.lanes(SETTINGS.layout)
-    opened = [lanes[o] for o in field.is_open(SETTINGS.layout, rows[next_row:])]
+    lanes = field.lanes(SETTINGS)
+    opened = [lanes[o] for o in field.is_open(SETTINGS, rows[next_row:])]
     ways = [np.diff([y, *way]) for way in itertools.product(*opened)]
     total = [np.abs(way).sum() for way in ways]
     return min(total), {way[0] for way, t in zip(ways, total, strict=True) if t == min(total)}
@@ -25,7 +25,7 @@ def fewest_turns(rows, y, next_row):
 def test_the_plan_has_the_fewest_turns_there_are():
     random_state = np.random.RandomState(0)
     for _ in range(60):
-        rows = field.draw_field(SETTINGS.layout, random_state)
+        rows = field.draw_field(SETTINGS, random_state)
         y, row = float(random_state.randint(-4, 5)), random_state.randint(3)
         turn = first_turn(
             SETTINGS, torch.from_numpy(rows)[None], torch.tensor([y]).double(), torch.tensor([row])
@@ -59,7 +59,7 @@ def test_beside_a_row_one_flies_on():
 
 def test_every_field_is_crossed():
     random_state = np.random.RandomState(7)
-    drawn = np.stack([field.draw_field(SETTINGS.layout, random_state) for _ in range(300)])
+    drawn = np.stack([field.draw_field(SETTINGS, random_state) for _ in range(300)])
     dynamics = ComputerVision(SETTINGS.step_length)
     body = dynamics.start(torch.tensor([[0.0, 0.0, 2.5]]).double().repeat(300, 1))
     state = rules.start(SETTINGS, torch.from_numpy(drawn), body)
