@@ -12,8 +12,8 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Real, Several, Whole
 from drone_rl.utils.settings import Settings
 
-Length = Annotated[float, Real(0.001, 10_000.0)]
-Bound = Annotated[float, Real(0.0, 10_000.0)]
+Length = Annotated[float, Real(0.001, 10_000.0, unit="m")]
+Bound = Annotated[float, Real(0.0, 10_000.0, unit="m")]
 Color = Annotated[tuple[float, float, float], Several(Real(0.0, 1.0), 3, 3)]
 
 
@@ -27,7 +27,7 @@ class TaskSettings(Settings):
         InputError: A value is out of range, or the settings together can't be met.
     """
 
-    num_cubes: Annotated[int, Whole(1, 100)] = 3
+    num_cubes: Annotated[int, Whole(1, 100, "cubes")] = 3
     """Cubes placed in every episode."""
     first_distance: Length = 15.0
     """x of the first cube."""
@@ -47,7 +47,7 @@ class TaskSettings(Settings):
     """z at which the drone starts and, in computer-vision mode, stays."""
     step_length: Length = 1.0
     """Length of one move."""
-    step_limit: Annotated[int, Whole(1, 100_000)] = 300
+    step_limit: Annotated[int, Whole(1, 100_000, "steps")] = 300
     """Steps after which an episode is truncated."""
     front_margin: Length = 11.0
     """How far behind the last cube the front boundary stands."""
@@ -113,11 +113,11 @@ class CameraSettings(Settings):
         InputError: A value is out of range.
     """
 
-    width: Annotated[int, Whole(1, 1024)] = 64
+    width: Annotated[int, Whole(1, 1024, "pixels")] = 64
     """Pixels across."""
-    height: Annotated[int, Whole(1, 1024)] = 25
+    height: Annotated[int, Whole(1, 1024, "pixels")] = 25
     """Pixels down."""
-    horizontal_fov: Annotated[float, Real(1.0, 170.0)] = 135.0
+    horizontal_fov: Annotated[float, Real(1.0, 170.0, unit="degrees")] = 135.0
     """Horizontal field of view in degrees."""
 
     @property
