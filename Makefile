@@ -6,7 +6,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: demo test check format bench readme keep stale count mutants clean
+.PHONY: demo test check format bench readme keep stale docs count mutants clean
 
 $(STAMP): pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
@@ -36,13 +36,18 @@ format: $(STAMP)
 bench: $(STAMP)
 	$(BIN)/drone-rl bench
 
-# The tables and the diagram of README.md; with the newest figures; which figures are old.
+# What README.md and docs/ have that is made; with the newest figures; which figures are old.
 readme: $(STAMP)
 	@$(BIN)/python -m tools.readme
 keep: $(STAMP)
 	@$(BIN)/python -m tools.readme keep
 stale: $(STAMP)
 	@$(BIN)/python -m tools.readme stale
+
+# The site, in site/: open site/index.html. No network is needed, to make it or to read it.
+docs: $(STAMP)
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	@echo "site/index.html"
 
 # Lines of test for a line of code; modules without a test of their own name.
 count: $(STAMP)
@@ -54,4 +59,4 @@ mutants: $(STAMP)
 	@$(BIN)/python -m tools.mutants $(MUTANTS)
 
 clean:
-	rm -rf $(VENV) outputs/* .pytest_cache .ruff_cache
+	rm -rf $(VENV) outputs/* site .pytest_cache .ruff_cache

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from drone_rl.api.checking import Check, check
     from drone_rl.api.environment import make_env
     from drone_rl.api.explaining import Explanations, explain
+    from drone_rl.api.exporting import export_onnx
     from drone_rl.api.judging import Evaluation, Judgement, evaluate, judge
     from drone_rl.api.mapping import Places, places
     from drone_rl.api.policy import Policy, load_policy
@@ -37,6 +38,7 @@ _PLACES = {
     "api.checking": ("Check", "check"),
     "api.environment": ("make_env",),
     "api.explaining": ("Explanations", "explain"),
+    "api.exporting": ("export_onnx",),
     "api.judging": ("Evaluation", "Judgement", "evaluate", "judge"),
     "api.mapping": ("Places", "places"),
     "api.policy": ("Policy", "load_policy"),
@@ -83,6 +85,7 @@ __all__ = [
     "check",
     "evaluate",
     "explain",
+    "export_onnx",
     "judge",
     "load_policy",
     "load_proof",

@@ -1,4 +1,4 @@
-"""Policies as files for others, each with a card that says what it is and where it comes from."""
+"""Policies as files for others: with a card that tells all about them, or as ONNX models."""
 
 import shlex
 from pathlib import Path
@@ -6,6 +6,7 @@ from typing import Any
 
 from drone_rl.api.policy import Policy
 from drone_rl.api.quoting import find_claim
+from drone_rl.evaluation import Agreement, agreement
 from drone_rl.settings.judging import FlightSettings
 from drone_rl.sweeps import read_sweep
 from drone_rl.sweeps.rows import read_rows
@@ -14,7 +15,12 @@ from drone_rl.utils.files import write_atomically
 from drone_rl.utils.overrides import read_overrides
 from drone_rl.verdicts.judge import judge_policy
 from drone_rl.words.certificate import is_quoted
-from drone_rl.zoo import certificate_path, export_policy
+from drone_rl.zoo import certificate_path, export_policy, make_onnx, open_onnx
+
+MOST_DIFFERENCE = 1e-5
+"""Of a probability that an ONNX model gives, from PyTorch's."""
+_WORLDS, _STEPS = 100, 100
+"""Of the flights on which it is compared: 10,000 pictures."""
 
 
 def export(
@@ -54,6 +60,42 @@ def export(
     )
     if claim is not None and is_quoted(verdict):
         _carry(claim.path, certificate_path(target))
+
+
+def export_onnx(
+    policy: Policy, target: str | Path, *, command: str | None = None, seed: int = 0
+) -> Agreement:
+    """Writes a policy as an ONNX model, if that does what the policy does: all of it on the CPU.
+
+    Args:
+        policy: Which.
+        target: Of the file, ending in .onnx; what is in it, see `drone_rl.zoo.make_onnx`.
+        command: That trained it, for the model's metadata; None names what its file or folder says.
+        seed: Root of the random streams of the worlds in which the two are compared.
+
+    Returns:
+        How far the model and PyTorch agree, on 10,000 pictures that the policy met.
+
+    Raises:
+        InputError: It can't be an ONNX model, or not be written, or the model is another function
+            than the policy; then nothing is written.
+    """
+    told = {"command": command or origin_of(policy.path, policy.state)[0]}
+    content = make_onnx(policy.description, policy.make_network(), told)
+    model = open_onnx(content)
+    with policy.flying(_WORLDS, seed=seed) as (env, actor):
+        found = agreement(env, actor, model, _STEPS)
+    if not found.difference <= MOST_DIFFERENCE:
+        raise InputError(
+            f"policy {policy.name} as an ONNX model gives probabilities that differ by up to "
+            f"{found.difference:.2g} from its own, and {MOST_DIFFERENCE:g} is allowed; export it "
+            "with format=safetensors"
+        )
+    try:
+        write_atomically(Path(target), content)
+    except OSError as error:
+        raise InputError(f"policy {target} can't be written ({error})") from error
+    return found
 
 
 def _carry(certificate: Path, target: Path) -> None:

@@ -61,7 +61,7 @@ class Training:
 
     @property
     def running_reward(self) -> float:
-        """OngoingTraining mean of the episodes' rewards at the end."""
+        """Running mean of the episodes' rewards at the end."""
         return self.result["running_reward"]
 
     @property

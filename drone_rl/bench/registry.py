@@ -10,6 +10,7 @@ from drone_rl.bench.hostile import bench_hostile
 from drone_rl.bench.maps import bench_maps
 from drone_rl.bench.memory import bench_memory
 from drone_rl.bench.mutants import bench_mutants
+from drone_rl.bench.onnx_export import bench_onnx
 from drone_rl.bench.places import bench_places
 from drone_rl.bench.provable import bench_provable
 from drone_rl.bench.proving import bench_many_cubes, bench_prove, bench_tampering
@@ -139,9 +140,15 @@ BENCHMARKS: dict[str, Benchmark] = {
         "room",
         (*_TRAINING, "verdicts", "api", "settings", "hydra_app", "cli", "conf", "bench/startup"),
     ),
+    "onnx": Benchmark(
+        lambda s: bench_onnx(s.runs / "onnx", s.quick),
+        "guests",
+        (*_DRAWING, "policies", "zoo", "evaluation", "api/exporting", "bench/onnx_export"),
+    ),
 }  # fmt: skip
 GROUPS = tuple(dict.fromkeys(benchmark.group for benchmark in BENCHMARKS.values()))
-"""Names of several at once: the main job, whether what is said is true, proofs, many trainings."""
+"""Names of several at once: the main job, whether what is said is true, proofs, many trainings,
+what works with programs of others."""
 
 
 def find_benchmarks(words: Iterable[str]) -> list[str]:

@@ -21,7 +21,7 @@ class Command(ChanceSettings):
 
     policy: str = "latest"
     """Whose chances, see `drone_rl.load_policy`."""
-    cubes: Annotated[tuple[float, ...], Several(Real(-10_000.0, 10_000.0), 0, 100)] = ()
+    cubes: Annotated[tuple[float, ...], Several(Real(-10_000.0, 10_000.0, unit="m"), 0, 100)] = ()
     """Where the cubes of one placement stand, metres to the left, nearest first; none: held-out
     placements."""
     task: TaskChanges = no_changes()

@@ -22,7 +22,7 @@ class Command(EvaluateSettings):
 
     policy: str = "latest"
     """What to evaluate, see `drone_rl.load_policy`."""
-    videos: Annotated[int, Whole(0)] = 2
+    videos: Annotated[int, Whole(0, unit="episodes")] = 2
     """Episodes filmed as MP4 and GIF; 0 for none."""
     greedy: bool = True
     """Whether the films show the most probable actions instead of drawn ones."""

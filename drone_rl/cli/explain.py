@@ -22,7 +22,7 @@ class Command(ExplainSettings):
 
     policy: Annotated[Any, Listed("policy")] = ("latest",)
     """Whom to explain, one or several, see `drone_rl.load_policy`."""
-    num_envs: Annotated[int, Whole(1)] = 128
+    num_envs: Annotated[int, Whole(1, unit="worlds")] = 128
     """Worlds in one batch; bounds memory."""
     require: Annotated[str, OneOf(tuple(Kind))] | None = None
     """Refuse (exit status 10 to 13) a policy whose verdict is not this; none accepts all."""

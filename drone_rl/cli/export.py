@@ -9,7 +9,9 @@ import drone_rl
 from drone_rl.hydra_app.names import policies as prepare  # noqa: F401 -- of what was typed
 from drone_rl.settings.judging import FlightSettings
 from drone_rl.settings.paths import PathsSettings
+from drone_rl.utils.errors import InputError
 from drone_rl.utils.overrides import COMMAND
+from drone_rl.utils.schema import OneOf
 
 _log = logging.getLogger(__name__)
 
@@ -22,6 +24,8 @@ class Command(FlightSettings):
     """Which policy, see `drone_rl.load_policy`."""
     name: str = "policy"
     """Name of the files."""
+    format: Annotated[str, OneOf(("safetensors", "onnx"))] = "safetensors"
+    """What is written: safetensors with a model card for this program, an ONNX model for any."""
     command: Annotated[str, COMMAND] | None = None
     """The command that trained it, for the card; none names the run's own settings."""
     certificate: str | None = None
@@ -29,13 +33,26 @@ class Command(FlightSettings):
     paths: PathsSettings = PathsSettings()
     """Folders."""
 
+    def check(self) -> None:
+        """A certificate is quoted on a card, and beside an ONNX model lies none."""
+        if self.format == "onnx" and self.certificate is not None:
+            raise InputError(
+                "certificate is for the card, which format=onnx has not; leave it out or use "
+                "format=safetensors"
+            )
+
 
 def run(settings: Command, folder: Path) -> tuple[int, str]:
     """Exports one policy. Returns the exit status and the file's path."""
-    from drone_rl.api.exporting import export
+    from drone_rl.api.exporting import export, export_onnx
 
     policy = drone_rl.load_policy(settings.policy, outputs=settings.paths.outputs)
-    target = folder / f"{settings.name}.safetensors"
+    target = folder / f"{settings.name}.{settings.format}"
+    if settings.format == "onnx":
+        found = export_onnx(policy, target, command=settings.command, seed=settings.seed)
+        difference = f"{found.difference:.1e} in {found.frames:,} pictures"
+        _log.info("written: %s, which differs from PyTorch by at most %s", target, difference)
+        return 0, str(target)
     given = settings.certificate
     export(policy, target, settings, command=settings.command, certificate=given)
     _log.info("written: %s and %s", target, target.with_suffix(".md").name)

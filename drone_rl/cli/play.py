@@ -18,7 +18,7 @@ class Command(Settings):
 
     policy: str = "latest"
     """Who flies, see `drone_rl.load_policy`."""
-    episodes: Annotated[int, Whole(1)] = 3
+    episodes: Annotated[int, Whole(1, unit="episodes")] = 3
     """Episodes to film, one file each."""
     greedy: bool = True
     """Whether to take the most probable action instead of drawing one."""

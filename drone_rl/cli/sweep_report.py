@@ -23,7 +23,7 @@ class Command(Settings):
     """PNG to write, too, of what policies came out, lost sides and entropies; none for none."""
     judge: bool = False
     """Whether to judge the last.pt of every finished run again, by the present rule."""
-    episodes: Annotated[int, Whole(1)] = 200
+    episodes: Annotated[int, Whole(1, unit="episodes")] = 200
     """Episodes of such a verdict, in worlds to choose by."""
     device: str = "cpu"
     """Where these are flown: cpu, cuda or cuda:N."""

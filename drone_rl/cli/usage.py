@@ -17,7 +17,7 @@ commands
   check      does a certificate hold? flown anew; as JSON and as an exit status
   places     what does it do about one cube, wherever that stands? exactly, as a map
   chain      how probable each end of an episode is, exactly, if moves are drawn
-  export     write a policy as safetensors with a model card
+  export     write a policy as safetensors with a model card, or as an ONNX model
   sweep-report  compare the runs of a sweep: CSV, JSON, one HTML page
   bench      measure every figure that the README quotes
 

@@ -1,7 +1,7 @@
 """The worlds as TorchRL environments, and the pixel pipeline behind them."""
 
 from drone_rl.envs.drone_env import DroneEnv, worlds_of
-from drone_rl.envs.pipeline import with_transforms
+from drone_rl.envs.pipeline import on_pixels, with_transforms
 from drone_rl.envs.transforms import CropRows, GrayPixels, Resize, StandardizePixels
 
 __all__ = [
@@ -10,6 +10,7 @@ __all__ = [
     "GrayPixels",
     "Resize",
     "StandardizePixels",
+    "on_pixels",
     "with_transforms",
     "worlds_of",
 ]

@@ -19,11 +19,11 @@ class ExplainSettings(Settings):
         InputError: A value is out of range.
     """
 
-    frames: Annotated[int, Whole(1)] = 600
+    frames: Annotated[int, Whole(1, unit="frames")] = 600
     """Frames that are analysed, spread evenly over the flights of the data set."""
-    data_episodes: Annotated[int, Whole(MIN_EPISODES)] = MIN_EPISODES
+    data_episodes: Annotated[int, Whole(MIN_EPISODES, unit="episodes")] = MIN_EPISODES
     """Whole flights in the data set, at least."""
-    episodes: Annotated[int, Whole(1)] = 400
+    episodes: Annotated[int, Whole(1, unit="episodes")] = 400
     """Episodes on which the verdict rests."""
     good_share: Annotated[float, Real(0.0, 1.0, is_above=True, is_below=True)] = 0.9
     """A good policy succeeds in more than this share of the oracle's episodes."""
@@ -31,7 +31,7 @@ class ExplainSettings(Settings):
     """Layer whose features are embedded; the last one before the logits by default."""
     grad_cam_layer: str | None = None
     """Layer that Grad-CAM looks at; the last convolution's nonlinearity by default."""
-    perplexity: Annotated[float, Real(1.0)] = 30.0
+    perplexity: Annotated[float, Real(1.0, unit="neighbours")] = 30.0
     """Of t-SNE."""
     seed: Annotated[int, Whole(0)] = 0
     """Of everything that is drawn."""

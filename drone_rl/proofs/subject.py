@@ -1,16 +1,13 @@
 """What can be proved, and of which policy: everything that is refused is refused here."""
 
 import dataclasses
-from collections.abc import Sequence
-from typing import Any
 
-from torch import Tensor
-
+from drone_rl.envs import on_pixels
 from drone_rl.policies import PolicyNetwork
 from drone_rl.proofs.bounds import Bounds
 from drone_rl.proofs.cells import Cells
 from drone_rl.proofs.lattice import Lattice
-from drone_rl.proofs.painting import Painter, Transform
+from drone_rl.proofs.painting import Painter
 from drone_rl.proofs.seeing import Seeing
 from drone_rl.proofs.silhouettes import FRONT, Eye, camera_ahead
 from drone_rl.sim.actions import MOVES
@@ -19,7 +16,6 @@ from drone_rl.sim.tasks.collect_cubes import require_cubes
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 from drone_rl.zoo import PolicyDescription
-from drone_rl.zoo.registry import TRANSFORMS
 
 _SHADES = ("gray", "standardize")
 """Transforms of each pixel alone, by which a brighter pixel stays brighter."""
@@ -123,17 +119,8 @@ def make_painter(description: PolicyDescription, seeing: Seeing) -> Painter:
     if names[:1] != ["gray"]:
         raise InputError("the policy does not see in gray; prove one whose first transform is gray")
     count = next((i for i, n in enumerate(names) if n not in _SHADES), len(names))
-    made = [TRANSFORMS[c.name].make(**c.values, **TRANSFORMS[c.name].fixed) for c in chosen]
-    shade, rest = _apply(made[:count]), _apply(made[count:])
+    made = [choice.make_transform() for choice in chosen]
+    shade, rest = on_pixels(made[:count]), on_pixels(made[count:])
     background = shade(seeing.background[None])[0, 0]
     faces = shade(seeing.colors[None, None, FRONT:])[0, 0, 0]
     return Painter(background, faces, rest if made[count:] else None)
-
-
-def _apply(transforms: Sequence[Any]) -> Transform:
-    def apply(pictures: Tensor) -> Tensor:
-        for transform in transforms:
-            pictures = transform._apply_transform(pictures)
-        return pictures
-
-    return apply

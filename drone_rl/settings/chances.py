@@ -11,13 +11,13 @@ from drone_rl.utils.settings import Settings
 class ChanceSettings(Settings):
     """Which placements of the cubes are looked at, and where."""
 
-    placements: Annotated[int, Whole(1)] = 100
+    placements: Annotated[int, Whole(1, unit="placements")] = 100
     """Held-out placements: those of the first episodes of as many worlds of a verdict."""
     seed: Annotated[int, Whole(0)] = 0
     """Root of the held-out worlds' random streams; training never draws from these."""
-    within: Annotated[float, Real(0.0, 10_000.0)] = 0.0
+    within: Annotated[float, Real(0.0, 10_000.0, unit="m")] = 0.0
     """Metres to either side of each cube; if given, success is bounded wherever they stand."""
-    parts: Annotated[int, Whole(1, 1_000_000)] = 20
+    parts: Annotated[int, Whole(1, 1_000_000, "parts")] = 20
     """Into which such a box is cut: the more, the closer the bounds, and the longer it takes."""
     device: str = "cpu"
     """Where cells are drawn and the policy runs: cpu, cuda or cuda:N."""

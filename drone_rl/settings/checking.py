@@ -11,7 +11,7 @@ from drone_rl.utils.settings import Settings
 class CheckSettings(Settings):
     """How a certificate is checked."""
 
-    flights: Annotated[int, Whole(1, 10_000_000)] = 2000
+    flights: Annotated[int, Whole(1, 10_000_000, "flights")] = 2000
     """Flights from corners, centres and random points of the boxes, and beside their borders."""
     seed: Annotated[int, Whole(0)] = 0
     """Root of the random stream that draws where they start."""

@@ -11,9 +11,9 @@ from drone_rl.utils.schema import Real, Whole
 class Collector(Variant):
     """Which workers, and how many."""
 
-    num_envs: Annotated[int, Whole(1)] = 64
+    num_envs: Annotated[int, Whole(1, unit="worlds")] = 64
     """Worlds, each with one episode in a batch."""
-    num_threads: Annotated[int, Whole(1)] = 2
+    num_threads: Annotated[int, Whole(1, unit="threads")] = 2
     """Groups of worlds collected at the same time, each on a thread or worker of its own: the cores
     to use. Each draws its actions from its own stream: this is part of what a seed means."""
 
@@ -32,7 +32,7 @@ class Ray(Collector):
     target: ClassVar[str] = "drone_rl.api.collecting.ray_collector"
     address: str | None = None
     """Of the cluster, such as auto or ray://host:10001; none starts one on this machine."""
-    num_cpus: Annotated[float, Real(0.0, is_above=True)] = 1.0
+    num_cpus: Annotated[float, Real(0.0, is_above=True, unit="cores")] = 1.0
     """Cores that a worker takes of the cluster."""
-    max_lost_workers: Annotated[int, Whole(0)] = 10
+    max_lost_workers: Annotated[int, Whole(0, unit="workers")] = 10
     """Workers that may be lost, and replaced, before training stops."""

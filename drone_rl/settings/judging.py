@@ -11,11 +11,11 @@ from drone_rl.utils.settings import Settings
 class FlightSettings(Settings):
     """How many episodes are flown, in which worlds, and where."""
 
-    episodes: Annotated[int, Whole(1)] = 1000
+    episodes: Annotated[int, Whole(1, unit="episodes")] = 1000
     """Held-out episodes, each in a world of its own; the same worlds for all that is flown."""
     seed: Annotated[int, Whole(0)] = 0
     """Root of the held-out worlds' random streams; training never draws from these."""
-    num_envs: Annotated[int, Whole(1)] = 250
+    num_envs: Annotated[int, Whole(1, unit="worlds")] = 250
     """Worlds in one batch; bounds memory."""
     device: str = "cpu"
     """Where worlds are drawn and the policy runs: cpu, cuda or cuda:N."""
@@ -38,13 +38,13 @@ class EvaluateSettings(FlightSettings):
 class JudgeSettings(FlightSettings):
     """How a policy is judged."""
 
-    episodes: Annotated[int, Whole(1)] = 400
+    episodes: Annotated[int, Whole(1, unit="episodes")] = 400
     """Held-out episodes, flown greedily, with drawn actions and by luck and the oracle alike."""
-    num_envs: Annotated[int, Whole(1)] = 400
+    num_envs: Annotated[int, Whole(1, unit="worlds")] = 400
     """Worlds in one batch; bounds memory."""
     sampled: bool = True
     """Whether to fly the policy with drawn actions, too; told beside the verdict."""
     good_share: Annotated[float, Real(0.0, 1.0, is_above=True, is_below=True)] = 0.9
     """A good policy succeeds in more than this share of the oracle's episodes."""
-    certificate_flights: Annotated[int, Whole(0, 10_000_000)] = 0
+    certificate_flights: Annotated[int, Whole(0, 10_000_000, "flights")] = 0
     """Flights that try a certificate anew before it is quoted, as `drone-rl check` does."""

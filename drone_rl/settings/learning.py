@@ -60,7 +60,7 @@ class Constant(Scheduler):
     target: ClassVar[str] = "torch.optim.lr_scheduler.ConstantLR"
     factor: Annotated[float, Real(0.0, 1.0)] = 1.0
     """Factor on the learning rate."""
-    total_iters: Annotated[int, Whole(0)] = 0
+    total_iters: Annotated[int, Whole(0, unit="updates")] = 0
     """Updates for which the factor holds."""
 
 
@@ -69,7 +69,7 @@ class StepDecay(Scheduler):
     """The original study's schedule: 0.99 times the rate every 5 updates."""
 
     target: ClassVar[str] = "torch.optim.lr_scheduler.StepLR"
-    step_size: Annotated[int, Whole(1)] = 5
+    step_size: Annotated[int, Whole(1, unit="updates")] = 5
     """Updates from one decay to the next."""
     gamma: Annotated[float, Real(0.0, 1.0)] = 0.99
     """Factor of a decay."""

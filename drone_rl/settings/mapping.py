@@ -16,17 +16,17 @@ class PlacesSettings(Settings):
         InputError: A value is out of range, or the least distance is not the lesser one.
     """
 
-    nearest: Annotated[float, Real(0.0, 1000.0)] = 2.5
+    nearest: Annotated[float, Real(0.0, 1000.0, unit="m")] = 2.5
     """Metres from the camera to the centre of a cube, straight ahead, at least."""
-    farthest: Annotated[float, Real(0.0, 1000.0)] = 20.0
+    farthest: Annotated[float, Real(0.0, 1000.0, unit="m")] = 20.0
     """The same at most."""
-    sideways: Annotated[float, Real(0.001, 1000.0)] = 8.0
+    sideways: Annotated[float, Real(0.001, 1000.0, unit="m")] = 8.0
     """Metres to the left or right, at most."""
     logit_gap: Annotated[float, Real(0.0, 1.0)] = 1e-4
     """Where the two highest logits are closer, either action may be taken: sums are not exact."""
-    compared: Annotated[int, Whole(1, 10_000_000)] = 4_000
+    compared: Annotated[int, Whole(1, 10_000_000, "pictures")] = 4_000
     """Random pictures of the renderer that must be the closed form's before anything is claimed."""
-    most_cells: Annotated[int, Whole(1)] = 1_000_000
+    most_cells: Annotated[int, Whole(1, unit="pictures")] = 1_000_000
     """Different pictures of one cube after which a camera or a window is too large; bounds
     memory."""
 

@@ -6,8 +6,8 @@ from typing import Annotated, ClassVar
 from drone_rl.settings.variant import Variant
 from drone_rl.utils.schema import Several, Whole
 
-Channels = Annotated[tuple[int, ...], Several(Whole(1, 512), 1, 8)]
-Widths = Annotated[tuple[int, ...], Several(Whole(1, 4096), 0, 8)]
+Channels = Annotated[tuple[int, ...], Several(Whole(1, 512, "channels"), 1, 8)]
+Widths = Annotated[tuple[int, ...], Several(Whole(1, 4096, "neurons"), 0, 8)]
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -20,7 +20,7 @@ class SmallCnn(Network):
     """For small pictures: learns as well as the original's at a tenth of the cost."""
 
     target: ClassVar[str] = "drone_rl.policies.SmallCNN"
-    patch: Annotated[int, Whole(1, 64)] = 4
+    patch: Annotated[int, Whole(1, 64, "pixels")] = 4
     """Size and stride of the first convolution, pixels."""
     channels: Channels = (16, 32)
     """Output channels of the convolutions."""

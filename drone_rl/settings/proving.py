@@ -13,13 +13,13 @@ class ProveSettings(Settings):
 
     logit_gap: Annotated[float, Real(0.0, 1.0)] = 1e-4
     """Where the two highest logits are closer, either action may be taken: sums are not exact."""
-    compared: Annotated[int, Whole(1, 10_000_000)] = 4_000
+    compared: Annotated[int, Whole(1, 10_000_000, "pictures")] = 4_000
     """Random pictures of the renderer that must be the closed form's before the proof begins."""
-    limit_s: Annotated[float, Real(0.0)] | None = None
+    limit_s: Annotated[float, Real(0.0, unit="s")] | None = None
     """Seconds after which the proof stops, to be gone on with; none for never."""
-    save_interval_s: Annotated[float, Real(0.0)] = 30.0
+    save_interval_s: Annotated[float, Real(0.0, unit="s")] = 30.0
     """Seconds between two states on disk, from which a proof that was killed goes on."""
-    most_boxes: Annotated[int, Whole(1)] = 2_000_000
+    most_boxes: Annotated[int, Whole(1, unit="boxes")] = 2_000_000
     """Boxes under way after which the proof stops: they bound its memory."""
     most_combinations: Annotated[int, Whole(1)] = 500_000_000
     """Of pictures that are remembered at a time; where cubes have more, proofs go part by part."""

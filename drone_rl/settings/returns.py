@@ -69,7 +69,7 @@ class TimeBaseline(_Discounted):
     """Whether to divide a batch's returns by their root mean square."""
     decay: Annotated[float, Real(0.0, 1.0, is_below=True)] = 0.9
     """Share of the old mean that is kept at each batch, 0 to below 1."""
-    max_steps: Annotated[int, Whole(1, 100_000)] = 300
+    max_steps: Annotated[int, Whole(1, 100_000, "steps")] = 300
     """Time steps that have a mean of their own: the task's limit."""
 
 

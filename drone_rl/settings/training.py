@@ -19,9 +19,9 @@ MOST_TRANSFORMS = 16
 class TrainerSettings(Settings):
     """How long to train and when to stop."""
 
-    total_frames: Annotated[int, Whole(1)] = 2_000_000
+    total_frames: Annotated[int, Whole(1, unit="frames")] = 2_000_000
     """Stop once this many frames were collected."""
-    total_episodes: Annotated[int, Whole(1)] | None = None
+    total_episodes: Annotated[int, Whole(1, unit="episodes")] | None = None
     """Stop once this many episodes were collected; none for no limit."""
     target_share: Annotated[float, Real(0.0, 1.0, is_above=True)] | None = 0.99
     """Stop once the running mean reaches this share of the greatest reward; none for never."""
@@ -29,9 +29,9 @@ class TrainerSettings(Settings):
     """Weight of the old value in the running mean, per episode: 0.99 looks back about 100."""
     max_grad_norm: Annotated[float, Real(0.0, is_above=True)] | None = None
     """Clip the gradient to this norm; none for no clipping."""
-    minibatch_frames: Annotated[int, Whole(1)] = 512
+    minibatch_frames: Annotated[int, Whole(1, unit="frames")] = 512
     """Frames in one forward and backward pass; bounds memory, changes nothing else."""
-    checkpoint_interval_s: Annotated[float, Real(0.0)] = 15.0
+    checkpoint_interval_s: Annotated[float, Real(0.0, unit="s")] = 15.0
     """Seconds between two checkpoints."""
 
 
@@ -65,5 +65,5 @@ class TrainSettings(Settings):
     """Root of every random stream: worlds, actions, initial weights."""
     device: str = "cpu"
     """Where worlds are drawn and policies run: cpu, cuda or cuda:N."""
-    evaluate_after: Annotated[int, Whole(0)] = 0
+    evaluate_after: Annotated[int, Whole(0, unit="episodes")] = 0
     """Episodes, in worlds to choose by, of the verdict at the end; 0 for none."""

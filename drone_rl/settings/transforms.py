@@ -35,9 +35,9 @@ class Crop(Transform):
     """The rows that are kept, from top (included) to bottom (excluded)."""
 
     target: ClassVar[str] = "drone_rl.envs.transforms.CropRows"
-    top: Annotated[int, Whole(0, 1023)] = 5
+    top: Annotated[int, Whole(0, 1023, "pixels")] = 5
     """First row."""
-    bottom: Annotated[int, Whole(1, 1024)] = 30
+    bottom: Annotated[int, Whole(1, 1024, "pixels")] = 30
     """First row that is not kept."""
 
 
@@ -46,9 +46,9 @@ class Resize(Transform):
     """Averaging over areas."""
 
     target: ClassVar[str] = "drone_rl.envs.transforms.Resize"
-    height: Annotated[int, Whole(1, 1024)] = 25
+    height: Annotated[int, Whole(1, 1024, "pixels")] = 25
     """Pixels down."""
-    width: Annotated[int, Whole(1, 1024)] = 64
+    width: Annotated[int, Whole(1, 1024, "pixels")] = 64
     """Pixels across."""
 
 
@@ -57,7 +57,7 @@ class Stack(Transform):
     """The newest frames as channels, oldest first."""
 
     target: ClassVar[str] = "torchrl.envs.CatFrames"
-    N: Annotated[int, Whole(1, 16)] = 2
+    N: Annotated[int, Whole(1, 16, "frames")] = 2
     """Frames."""
 
     def make(self, *args: Any, **kwargs: Any) -> Any:

@@ -41,13 +41,21 @@ class Whole:
 
     low: int
     high: float = math.inf
+    unit: str = ""
+    """What it counts or measures in, for people."""
 
     def read(self, value: Any, where: str) -> int:
         """See `Kind`."""
         if type(value) is not int or not self.low <= value <= self.high:
-            span = f"of {self.low} or more" if self.high == math.inf else _span(self.low, self.high)
-            raise InputError(f"{where}={shown(value)} is out of range; give a whole number {span}")
+            raise InputError(f"{where}={shown(value)} is out of range; give {self.words}")
         return value
+
+    @property
+    def words(self) -> str:
+        """What it may be, for people."""
+        if self.high == math.inf:
+            return f"a whole number of {self.low} or more"
+        return f"a whole number from {self.low} to {self.high}"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -60,13 +68,13 @@ class Real:
     """Whether it must be greater than `low`, not only as great."""
     is_below: bool = False
     """Whether it must be less than `high`."""
+    unit: str = ""
+    """What it measures in, for people; empty for rates, shares and other bare numbers."""
 
     def read(self, value: Any, where: str) -> float:
         """See `Kind`."""
         if type(value) not in (int, float) or not self._holds(value):
-            raise InputError(
-                f"{where}={shown(value)} is out of range; give a number {self._range()}"
-            )
+            raise InputError(f"{where}={shown(value)} is out of range; give {self.words}")
         return float(value)
 
     def _holds(self, value: float) -> bool:
@@ -75,13 +83,16 @@ class Real:
         above = value > self.low if self.is_above else value >= self.low
         return above and (value < self.high if self.is_below else value <= self.high)
 
-    def _range(self) -> str:
+    @property
+    def words(self) -> str:
+        """What it may be, for people."""
         low, high = f"{self.low:g}", f"{self.high:g}"
         if self.high == math.inf:
-            return f"above {low}" if self.is_above else f"of {low} or more"
+            return f"a number above {low}" if self.is_above else f"a number of {low} or more"
         if self.is_above:
-            return f"above {low} and below {high}" if self.is_below else f"above {low} up to {high}"
-        return f"from {low} to below {high}" if self.is_below else _span(low, high)
+            until = f"and below {high}" if self.is_below else f"up to {high}"
+            return f"a number above {low} {until}"
+        return f"a number from {low} to {'below ' if self.is_below else ''}{high}"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -251,10 +262,6 @@ def shown(value: Any) -> str:
         return f"({type(value).__name__})"
     text = repr(value[:80] if isinstance(value, str) else value)
     return text if len(text) <= 80 else f"{text[:77]}..."
-
-
-def _span(low: object, high: object) -> str:
-    return f"from {low} to {high}"
 
 
 def _inside(item: Any, where: str) -> Sequence[Any]:

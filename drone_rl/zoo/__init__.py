@@ -12,6 +12,7 @@ from drone_rl.zoo.files import (
     read_policy,
 )
 from drone_rl.zoo.migration import describe
+from drone_rl.zoo.onnx_model import make_onnx, open_onnx
 from drone_rl.zoo.registry import register_network, register_transform
 
 __all__ = [
@@ -21,6 +22,8 @@ __all__ = [
     "describe",
     "export_policy",
     "load_exported",
+    "make_onnx",
+    "open_onnx",
     "parse",
     "policy_names",
     "policy_path",

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import torch
-from torchrl.envs import TransformedEnv
+from torchrl.envs import Transform, TransformedEnv
 
 from drone_rl.envs import DroneEnv, with_transforms
 from drone_rl.policies import PolicyNetwork
@@ -44,6 +44,11 @@ class Choice:
     def as_dict(self) -> dict[str, Any]:
         """As in files."""
         return {"name": self.name, **{k: plain(v) for k, v in self.values.items()}}
+
+    def make_transform(self) -> Transform:
+        """The transform that it stands for."""
+        part = TRANSFORMS[self.name]
+        return part.make(**self.values, **part.fixed)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -119,10 +124,6 @@ class PolicyDescription:
             task: One that looks like the described one, but begins its episodes otherwise.
             kwargs: See `DroneEnv`.
         """
-        made = []
-        for choice in self.transforms if pixels else ():
-            part = TRANSFORMS[choice.name]
-            made.append(part.make(**choice.values, **part.fixed))
         env = DroneEnv(
             num_envs,
             task or self.task,
@@ -132,7 +133,11 @@ class PolicyDescription:
             pixels=pixels,
             **kwargs,
         )
-        return with_transforms(env, made)
+        return with_transforms(env, self.make_transforms() if pixels else ())
+
+    def make_transforms(self) -> list[Transform]:
+        """The described transforms, in their order."""
+        return [choice.make_transform() for choice in self.transforms]
 
     def build_network(self, generator: torch.Generator | None = None) -> PolicyNetwork:
         """The described network with fresh weights.

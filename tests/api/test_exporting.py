@@ -3,8 +3,10 @@
 import json
 
 import pytest
+import torch
 
 import drone_rl
+from drone_rl.api import exporting
 from drone_rl.api.exporting import export, origin_of
 from drone_rl.settings.judging import FlightSettings
 from drone_rl.sweeps import Run, Sweep
@@ -103,3 +105,47 @@ def test_a_certificate_of_another_is_no_word_of_a_card(tmp_path):
     export(drone_rl.load_policy(target), tmp_path / "again.safetensors", FEW)
     assert "ertificate" not in (tmp_path / "again.md").read_text()
     assert not (tmp_path / "again.certificate.json").exists()
+
+
+def test_an_onnx_model_that_agrees_is_left_with_its_command(tmp_path):
+    target = tmp_path / "mine.onnx"
+    found = drone_rl.export_onnx(drone_rl.load_policy("good"), target)
+    assert found.frames == 10_000 and found.actions_differ == 0
+    assert 0 < found.difference <= 1e-5
+    assert b'"drone-rl train"' in target.read_bytes()
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.onnx"]
+
+
+@pytest.mark.parametrize("wrong", [1 / 3 + 1.1e-5, float("nan")])
+def test_an_onnx_model_that_does_otherwise_is_not_left(tmp_path, monkeypatch, wrong):
+    """A policy that always goes left is said to have one chance in three."""
+    monkeypatch.setattr(exporting, "make_onnx", lambda *_: b"a model")
+    monkeypatch.setattr(exporting, "open_onnx", lambda _: lambda f: torch.full((len(f), 3), wrong))
+    (tmp_path / "mine.onnx").write_text("an older one")
+    with pytest.raises(InputError, match=r"differ by up to (0.67|nan).*format=safetensors"):
+        drone_rl.export_onnx(drone_rl.load_policy("poor"), tmp_path / "mine.onnx")
+    assert (tmp_path / "mine.onnx").read_text() == "an older one"
+
+
+@pytest.mark.parametrize(("added", "is_left"), [(0.9e-5, True), (1.1e-5, False)])
+def test_the_limit_is_one_in_a_hundred_thousand(tmp_path, monkeypatch, added, is_left):
+    """A policy that surely goes left, whatever it sees."""
+    always = torch.tensor([0.0, 1.0, 0.0], dtype=torch.float64)
+    other = (always - added * always).expand(100, 3)
+    monkeypatch.setattr(exporting, "make_onnx", lambda *_: b"a model")
+    monkeypatch.setattr(exporting, "open_onnx", lambda _: lambda f: other)
+    policy = drone_rl.load_policy("poor")
+    if is_left:
+        assert drone_rl.export_onnx(policy, tmp_path / "m.onnx").difference < 1e-5
+    else:
+        with pytest.raises(InputError, match="1e-05 is allowed"):
+            drone_rl.export_onnx(policy, tmp_path / "m.onnx")
+    assert (tmp_path / "m.onnx").exists() == is_left
+
+
+def test_a_place_for_an_onnx_model_that_is_none(tmp_path, monkeypatch):
+    monkeypatch.setattr(exporting, "MOST_DIFFERENCE", 2.0)
+    monkeypatch.setattr(exporting, "make_onnx", lambda *_: b"a model")
+    monkeypatch.setattr(exporting, "open_onnx", lambda _: lambda f: torch.zeros(len(f), 3))
+    with pytest.raises(InputError, match=r"nowhere/m\.onnx can't be written"):
+        drone_rl.export_onnx(drone_rl.load_policy("poor"), tmp_path / "nowhere" / "m.onnx")

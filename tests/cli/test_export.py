@@ -14,9 +14,20 @@ def test_an_export_can_be_judged(in_process, tmp_path):
     assert done.stdout.startswith("good (not certain): ")
 
 
+def test_an_export_for_other_programs(in_process, tmp_path):
+    done = in_process("export", "policy=poor", "name=mine", "format=onnx", "hydra.run.dir=e")
+    assert done.returncode == 0, done.stderr
+    assert {path.name for path in (tmp_path / "e").iterdir()} == {".hydra", "mine.onnx"}
+
+
 @pytest.mark.parametrize(
     ("command", "words"),
     [
+        (["export", "policy=good", "format=pickle"], ["format='pickle'", "safetensors, onnx"]),
+        (
+            ["export", "policy=proved", "format=onnx", "certificate=c.json"],
+            ["certificate", "format=safetensors"],
+        ),
         (["export", "policy=good", "episodes=0"], ["episodes=0", "1 or more"]),
     ],
 )

@@ -1,4 +1,4 @@
-"""README's tables and diagram are those of the files that they are made from."""
+"""What is made from files in README.md and docs/ is that of today's files."""
 
 import json
 import re
@@ -7,32 +7,52 @@ import pytest
 
 from drone_rl.bench.benchmark import Benchmark
 from drone_rl.bench.ledger import Ledger, Origin, digest_code, make_origin
-from tools.readme.__main__ import ROOT, keep, main, make_readme
-from tools.readme.blocks import replace_blocks
+from drone_rl.bench.registry import BENCHMARKS
+from tools.readme.__main__ import PAGES, ROOT, keep, main, make_blocks, make_files
+from tools.readme.blocks import marked_blocks, replace_blocks
 from tools.readme.layers import draw_layers, list_packages
+from tools.readme.rows import CLAIMS, GUESTS, MAIN, PROOF, TRUTH
 from tools.readme.stale import tell_ages
-from tools.readme.tables import MAIN, PROOF, TRUTH, UNKNOWN, Row, make_table
+from tools.readme.tables import UNKNOWN, Row, list_figures, list_origins, make_table
 
 
-def test_it_is_made_of_todays_figures_and_contracts():
-    assert make_readme(ROOT) == (ROOT / "README.md").read_text(), "run make readme"
+@pytest.fixture(scope="module")
+def made():
+    return make_files(ROOT)
 
 
-def test_files_and_folders_that_it_names_are_there():
-    text = (ROOT / "README.md").read_text()
+def test_it_is_made_of_todays_files(made):
+    for path, content in made.items():
+        assert content == (ROOT / path).read_text(), f"{path}: run make readme"
+
+
+def test_every_block_that_is_made_stands_somewhere():
+    marked = set().union(*(marked_blocks((ROOT / path).read_text()) for path in PAGES))
+    assert marked == set(make_blocks(ROOT))
+
+
+@pytest.mark.parametrize("path", PAGES)
+def test_files_and_folders_that_it_names_are_there(path):
+    text = (ROOT / path).read_text()
     named = set(re.findall(r"`((?:[a-z_]+/)+(?:[a-z_]+\.py)?)`", text))
     missing = {n for n in named if not any((ROOT / top / n).exists() for top in ("drone_rl", ""))}
     assert {n for n in missing if not n.startswith("outputs/")} == set()
 
 
 def test_a_changed_figure_changes_it(tmp_path):
-    for name in ("README.md", "pyproject.toml", "docs/results.json"):
-        (tmp_path / name).parent.mkdir(exist_ok=True)
+    for name in (*PAGES, "pyproject.toml", "docs/results.json", "docs/tutorials/notebook.md"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text((ROOT / name).read_text())
-    (tmp_path / "drone_rl").symlink_to(ROOT / "drone_rl")
+    for name in ("drone_rl", "conf", "examples"):
+        (tmp_path / name).symlink_to(ROOT / name)
     path = tmp_path / "docs" / "results.json"
-    path.write_text(json.dumps(json.loads(path.read_text()) | {"sweep_speedup": 1.234}))
-    assert "| 1.23 times | 1.6 times |" in make_readme(tmp_path)
+    changed = {"sweep_speedup": 1.234, "seeds_solved": 4, "success_lower95": [0.999, 0.876]}
+    path.write_text(json.dumps(json.loads(path.read_text()) | changed))
+    made = make_files(tmp_path)
+    assert "| 1.23 times | 1.6 times | `sweeps` |" in made["docs/results.md"]
+    assert "| `sweep_speedup` | 1.234 | `sweeps` |" in made["docs/results.md"]
+    assert "| 0.876 | 0.95 | `solve` |" in made["README.md"]  # a claim stands in both
+    assert "| 0.876 | 0.95 | `solve` |" in made["docs/results.md"]
 
 
 def test_blocks_are_replaced_and_nothing_else():
@@ -42,16 +62,26 @@ def test_blocks_are_replaced_and_nothing_else():
     assert replace_blocks(made, {"x": "1\n2", "y": "3"}) == made
 
 
-@pytest.mark.parametrize("blocks", [{}, {"x": "", "z": ""}])
-def test_a_block_that_nobody_makes_or_marks_is_an_error(blocks):
-    with pytest.raises(ValueError, match="marks blocks"):
+@pytest.mark.parametrize("blocks", [{}, {"z": ""}])
+def test_a_block_that_nobody_makes_is_an_error(blocks):
+    with pytest.raises(ValueError, match=r"nobody makes the blocks \['x'\]"):
         replace_blocks("<!-- made: x -->\n<!-- /made -->", blocks)
 
 
 def test_a_figure_that_is_missing_leaves_its_cell_unmeasured():
-    rows = (Row("tide", lambda f: f"{f['tide_m']:.1f} m", "3 m"),)
-    assert make_table(rows, {"tide_m": 2.96}).splitlines()[2:] == ["| tide | 3.0 m | 3 m |"]
-    assert f"| tide | {UNKNOWN} | 3 m |" in make_table(rows, {})
+    rows = (Row("moon", "tide", lambda f: f"{f['tide_m']:.1f} m", "3 m"),)
+    assert make_table(rows, {"tide_m": 2.96}).splitlines()[2:] == [
+        "| tide | 3.0 m | 3 m | `moon` |"
+    ]
+    assert f"| tide | {UNKNOWN} | 3 m | `moon` |" in make_table(rows, {})
+
+
+def test_every_row_names_a_benchmark_and_every_benchmark_with_figures_has_a_row():
+    rows = (*MAIN, *TRUTH, *PROOF, *GUESTS)
+    named = {row.bench for row in rows}
+    assert named <= set(BENCHMARKS)
+    assert set(BENCHMARKS) - named == {"scaling"}  # which is a picture
+    assert set(CLAIMS) < set(rows) and 8 <= len(CLAIMS) <= 20
 
 
 def test_rows_say_what_the_figures_are():
@@ -67,8 +97,12 @@ def test_rows_say_what_the_figures_are():
         "launcher_overhead": 0.0794,
         "proof_two_s": 4.2,
         "proof_two_scaled_s": 3.0,
+        "onnx_max_difference": 2.56e-6,
+        "onnx_frames": 40_000,
+        "onnx_actions_differ": 3,
     }
-    text = "".join(make_table(rows, figures) for rows in (MAIN, TRUTH, PROOF))
+    text = "".join(make_table(rows, figures) for rows in (MAIN, TRUTH, PROOF, GUESTS))
+    assert "| 2.6e-06 on 40,000 pictures |" in text and "| 3 of 40,000 |" in text
     for cell in ("20 to 41, median 25", "0.991", "1024 MiB", "44 of 45 certain, of 55", "7.9%"):
         assert f"| {cell} |" in text
     assert "| 4.2, on a machine 1.4 times slower |" in text
@@ -87,8 +121,8 @@ def test_layers_side_by_side_are_one_box_and_what_is_forbidden_is_told():
             },
         ]
     )
-    assert "  left[left, right]\n" in drawn
-    assert "  top --> left --> base\n" in drawn
+    boxes = ["top</code>", "left</code> <code>right</code>", "base</code>"]
+    assert drawn.splitlines()[1:4] == [f"<li><code>{box}</li>" for box in boxes]
     assert drawn.endswith("- No water inside: in top, left, no sea, rain.")
 
 
@@ -134,6 +168,24 @@ def test_figures_older_than_their_code_are_named(measured):
         f"unknown: {since}of code that was not noted",
         "never: never measured",
     ]
+
+
+def test_every_figure_is_listed_with_the_benchmark_and_where_it_was_run(tmp_path):
+    ledger = Ledger(tmp_path / "r.json")
+    figures = {
+        "tide_m": 2.0 / 3.0, "days": 3, "moons": [1.0, 0.5], "phases": {"new": 1, "full": 2},
+        "names": ["a"] * 9, "lost": [], "by_day": {},
+    }  # fmt: skip
+    origin = Origin(
+        revision=None, date="2026-11-22", machine="2 cores", code=None, settings={}, keys=()
+    )
+    ledger.add("sea", figures, origin)
+    assert [line.split(" | ")[:2] for line in list_figures(ledger).splitlines()[2:]] == [
+        ["| `tide_m`", "0.6667"], ["| `days`", "3"], ["| `moons`", "1, 0.5"],
+        ["| `phases`", "2 entries"], ["| `names`", "9 entries"], ["| `lost`", "none"],
+        ["| `by_day`", "none"],
+    ]  # fmt: skip
+    assert list_origins(ledger).splitlines()[2] == "| `sea` | 2026-11-22 | unknown | 2 cores |"
 
 
 def test_newer_figures_replace_those_of_their_benchmarks_alone(measured, tmp_path):

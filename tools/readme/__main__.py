@@ -6,25 +6,45 @@ from pathlib import Path
 from drone_rl.bench.ledger import Ledger
 from tools.readme.blocks import replace_blocks
 from tools.readme.layers import draw_layers, list_packages, read_contracts
+from tools.readme.notebook import make_notebook
+from tools.readme.rows import CLAIMS, GUESTS, MAIN, PROOF, TRUTH
+from tools.readme.settings import list_commands, list_groups, list_parts, list_presets
 from tools.readme.stale import tell_ages
-from tools.readme.tables import MAIN, PROOF, TRUTH, make_table
+from tools.readme.tables import list_figures, list_origins, make_table
 
 ROOT = Path(__file__).resolve().parents[2]
 MEASURED = ROOT / "outputs" / "bench" / "results.json"
+PAGES = ("README.md", "docs/design.md", "docs/results.md", "docs/settings.md", "docs/onnx.md")
+"""Which have blocks that are made."""
+NOTEBOOK = "docs/tutorials/notebook"
+"""The page that is a notebook, too."""
 
 
-def make_readme(root: Path) -> str:
-    """README.md as it should be."""
-    figures = Ledger(root / "docs" / "results.json").figures
+def make_blocks(root: Path) -> dict[str, str]:
+    """Every block as it should be, by name."""
+    ledger = Ledger(root / "docs" / "results.json")
     contracts = read_contracts(root)
-    blocks = {
-        "truth": make_table(TRUTH, figures),
-        "proof": make_table(PROOF, figures),
-        "main": make_table(MAIN, figures),
+    tables = {"claims": CLAIMS, "main": MAIN, "truth": TRUTH, "proof": PROOF, "guests": GUESTS}
+    return {
+        **{name: make_table(rows, ledger.figures) for name, rows in tables.items()},
+        "figures": list_figures(ledger),
+        "origins": list_origins(ledger),
         "packages": list_packages(contracts, root / "drone_rl"),
         "layers": draw_layers(contracts),
+        "groups": list_groups(),
+        "parts": list_parts(),
+        "commands": list_commands(),
+        "presets": list_presets(root / "conf"),
+        "run_onnx": f"```python\n{(root / 'examples' / 'run_onnx.py').read_text()}```",
     }
-    return replace_blocks((root / "README.md").read_text(), blocks)
+
+
+def make_files(root: Path) -> dict[str, str]:
+    """All that is made from files, as it should be, by path."""
+    blocks = make_blocks(root)
+    files = {path: replace_blocks((root / path).read_text(), blocks) for path in PAGES}
+    page = (root / f"{NOTEBOOK}.md").read_text()
+    return {**files, f"{NOTEBOOK}.ipynb": make_notebook(page)}
 
 
 def keep(source: Path, target: Path) -> list[str]:
@@ -48,7 +68,8 @@ def main(words: list[str]) -> int:
         return 2
     if words:
         print("kept:", ", ".join(keep(MEASURED, ROOT / "docs" / "results.json")))
-    (ROOT / "README.md").write_text(make_readme(ROOT))
+    for path, content in make_files(ROOT).items():
+        (ROOT / path).write_text(content)
     return 0
 
 

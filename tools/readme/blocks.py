@@ -14,9 +14,14 @@ def replace_blocks(text: str, blocks: Mapping[str, str]) -> str:
         blocks: What stands between, by name.
 
     Raises:
-        ValueError: The text has other blocks than these.
+        ValueError: The text marks a block that is none of these.
     """
-    marked = [match.group(2) for match in _BLOCK.finditer(text)]
-    if sorted(marked) != sorted(blocks):
-        raise ValueError(f"the text marks blocks {sorted(marked)}, not {sorted(blocks)}")
+    unknown = marked_blocks(text) - set(blocks)
+    if unknown:
+        raise ValueError(f"nobody makes the blocks {sorted(unknown)}; there are {sorted(blocks)}")
     return _BLOCK.sub(lambda match: f"{match[1]}{blocks[match[2]].strip()}\n{match[3]}", text)
+
+
+def marked_blocks(text: str) -> set[str]:
+    """Names of a text's blocks."""
+    return {match.group(2) for match in _BLOCK.finditer(text)}

@@ -29,11 +29,13 @@ def list_packages(contracts: Iterable[dict[str, Any]], package: Path) -> str:
 
 
 def draw_layers(contracts: Iterable[dict[str, Any]]) -> str:
-    """The contract of layers as a Mermaid diagram, and under it what the others forbid."""
-    rows = _layers(contracts)
-    boxes = [f"  {names[0]}[{', '.join(names)}]" for names in rows]
-    chain = " --> ".join(names[0] for names in rows)
-    lines = ["```mermaid", "flowchart TD", *boxes, f"  {chain}", "```", ""]
+    """The contract of layers as a list from the top, and under it what the others forbid.
+
+    A list needs no program that draws it, on the site or on any page that shows Markdown; the site
+    makes boxes of its items.
+    """
+    boxes = [" ".join(f"<code>{name}</code>" for name in names) for names in _layers(contracts)]
+    lines = ['<ol class="layers">', *(f"<li>{box}</li>" for box in boxes), "</ol>", ""]
     forbidden = [c for c in contracts if c["type"] == "forbidden"]
     return "\n".join([*lines, *(_sentence(c) for c in forbidden)])
 

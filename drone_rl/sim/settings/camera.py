@@ -16,11 +16,11 @@ class CameraSettings(Settings):
         InputError: A value is out of range.
     """
 
-    width: Annotated[int, Whole(1, 1024)] = 64
+    width: Annotated[int, Whole(1, 1024, "pixels")] = 64
     """Pixels across."""
-    height: Annotated[int, Whole(1, 1024)] = 25
+    height: Annotated[int, Whole(1, 1024, "pixels")] = 25
     """Pixels down."""
-    horizontal_fov: Annotated[float, Real(1.0, 170.0)] = 135.0
+    horizontal_fov: Annotated[float, Real(1.0, 170.0, unit="degrees")] = 135.0
     """Horizontal field of view in degrees."""
 
     @property

@@ -24,7 +24,7 @@ class TaskSettings(BaseTaskSettings):
     """
 
     name: ClassVar[str] = FIRST
-    num_cubes: Annotated[int, Whole(1, 100)] = 3
+    num_cubes: Annotated[int, Whole(1, 100, "cubes")] = 3
     """Cubes placed in every episode."""
     first_distance: Length = 15.0
     """x of the first cube."""
@@ -44,7 +44,7 @@ class TaskSettings(BaseTaskSettings):
     """z at which the drone starts and, in computer-vision mode, stays."""
     step_length: Length = 1.0
     """Length of one move."""
-    step_limit: Annotated[int, Whole(1, 100_000)] = 300
+    step_limit: Annotated[int, Whole(1, 100_000, "steps")] = 300
     """Steps after which an episode is truncated."""
     front_margin: Length = 11.0
     """How far behind the last cube the front boundary stands."""

@@ -25,13 +25,13 @@ class PillarsSettings(BaseTaskSettings):
     """
 
     name: ClassVar[str] = "pillars"
-    num_rows: Annotated[int, Whole(1, 100)] = 4
+    num_rows: Annotated[int, Whole(1, 100, "rows")] = 4
     """Rows of pillars, one behind the other."""
     first_distance: Length = 9.0
     """x of the first row."""
     spacing: Length = 7.0
     """Distance in x from one row to the next."""
-    density: Annotated[float, Real(0.001, 10.0)] = 0.25
+    density: Annotated[float, Real(0.001, 10.0, unit="per m")] = 0.25
     """Pillars for each metre across a row."""
     width: Length = 1.2
     """Edge of a pillar's square cross-section."""
@@ -51,7 +51,7 @@ class PillarsSettings(BaseTaskSettings):
     """z at which the drone starts and, in computer-vision mode, stays."""
     step_length: Length = 1.0
     """Length of one move."""
-    step_limit: Annotated[int, Whole(1, 100_000)] = 120
+    step_limit: Annotated[int, Whole(1, 100_000, "steps")] = 120
     """Steps after which an episode is truncated."""
 
     @property

@@ -6,8 +6,8 @@ from typing import Annotated, Any, ClassVar
 from drone_rl.utils.schema import Real, Several
 from drone_rl.utils.settings import Settings
 
-Length = Annotated[float, Real(0.001, 10_000.0)]
-Bound = Annotated[float, Real(0.0, 10_000.0)]
+Length = Annotated[float, Real(0.001, 10_000.0, unit="m")]
+Bound = Annotated[float, Real(0.0, 10_000.0, unit="m")]
 Color = Annotated[tuple[float, float, float], Several(Real(0.0, 1.0), 3, 3)]
 FIRST = "collect_cubes"
 """The task of files that name none."""

@@ -1,0 +1,44 @@
+"""Command lines of a page, composed as the program would, but not run."""
+
+import importlib
+import re
+import shlex
+
+from hydra import compose, initialize_config_dir
+from hydra.core.global_hydra import GlobalHydra
+
+from drone_rl.cli.usage import COMMANDS
+from drone_rl.hydra_app.composition import conf_dir, read_settings
+from drone_rl.hydra_app.schemas import register_schemas
+
+COMMAND = re.compile(r"^(?:[A-Z]+=\S+ )?drone-rl ([a-z-]+)(.*)$", re.MULTILINE)
+_SWEPT = re.compile(r"=(?:range\((\d+)\)|([^\[\]{},]+),.*)$")
+
+
+def check_commands(text):
+    """Composes every command line of a text. Returns how many there are."""
+    found = COMMAND.findall(text)
+    for name, words in found:
+        if name != "demo":
+            check_command(name, shlex.split(words, comments=True))
+    return len(found)
+
+
+def check_command(name, words):
+    """Makes sure that a command knows all it is told; of a sweep's values the first."""
+    assert name in COMMANDS, name
+    module = importlib.import_module(f"drone_rl.cli.{name.replace('-', '_')}")
+    told = [word for word in words if word not in ("-m", "--help") and "resume=" not in word]
+    told = [re.sub("[<>]", "", _SWEPT.sub(lambda m: f"={m[2] or 0}", word)) for word in told]
+    file = name.replace("-", "_")
+    no_logger = ["logger=csv"] if name == "train" else []  # whose folder only a run knows
+    told = [*no_logger, *getattr(module, "prepare", list)(told)]
+    register_schemas(**{file: module.Command})
+    getattr(module, "register", lambda: None)()
+    GlobalHydra.instance().clear()
+    with initialize_config_dir(str(conf_dir()), version_base="1.3"):
+        config = compose(file, told, return_hydra_config=True)
+    del config.hydra
+    if "sweep" in config:
+        del config.sweep
+    read_settings(module.Command, config)

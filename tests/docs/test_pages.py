@@ -1,0 +1,62 @@
+"""What pages say of the program: commands that it knows, names and files that are there."""
+
+import ast
+import re
+
+import pytest
+
+import drone_rl
+from tests.docs.commands import check_command, check_commands
+from tests.docs.conftest import ROOT
+
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+LANGUAGE = r"^```{}\n(.*?)^```$"
+
+
+def blocks(page, language):
+    """The blocks of a page in one language."""
+    return re.findall(LANGUAGE.format(language), page.read_text(), re.DOTALL | re.MULTILINE)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_commands_are_known(page):
+    counts = [check_commands(block) for block in blocks(page, "sh")]
+    assert all(counts) or page.stem == "index"  # whose one command is make's
+
+
+def test_a_command_that_is_unknown_is_found():
+    with pytest.raises(AssertionError):
+        check_commands("drone-rl fly")
+    with pytest.raises(Exception, match="num_cubs"):
+        check_commands("X=1 drone-rl train task.num_cubs=3  # more of them\n")
+    check_command("train", ["seed=1,2", "returns=reward_to_go,leave_one_out", "-m"])
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_names_are_public(page):
+    code = "\n".join(blocks(page, "python"))
+    used = {
+        node.attr
+        for node in ast.walk(ast.parse(code))
+        if isinstance(node, ast.Attribute)
+        and isinstance(node.value, ast.Name)
+        and node.value.id == "drone_rl"
+    }
+    assert used <= set(drone_rl.__all__)
+
+
+def test_every_public_name_is_in_the_reference():
+    entries = re.findall(r"^::: (\S+)$", (ROOT / "docs/reference/api.md").read_text(), re.MULTILINE)
+    homes = [f"{home}.{name}" for name, home in drone_rl._HOMES.items()]
+    assert sorted(entries) == sorted(homes)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_files_that_it_links_are_there(page):
+    for path, heading in re.findall(r"\]\(([^)#:]+)(?:#([^)]+))?\)", page.read_text()):
+        target = page.parent / path
+        assert target.exists(), path
+        if heading and "." not in heading:  # those with a dot are made of docstrings
+            titles = re.findall(r"^#+ (.+)$", target.read_text(), re.MULTILINE)
+            slugs = {re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-") for title in titles}
+            assert heading in slugs, f"{path}#{heading}"

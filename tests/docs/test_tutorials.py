@@ -1,0 +1,110 @@
+"""Every tutorial runs as it stands, block by block, but for sizes that would take minutes."""
+
+import ast
+import re
+import sys
+from pathlib import Path
+
+import jinja2
+import pytest
+import torch
+
+from drone_rl.explanations import sections, study
+from drone_rl.explanations.sections import find_sections
+from drone_rl.report import sections as parts
+from drone_rl.zoo.registry import NETWORKS
+from tests.docs.commands import check_commands
+
+DOCS = Path(__file__).parents[2] / "docs"
+PAGES = sorted((DOCS / "tutorials").glob("*.md"))
+BLOCK = re.compile(r'^```(\w+)(?: title="([^"]+)")?\n(.*?)^```$', re.DOTALL | re.MULTILINE)
+SHORT = (
+    "trainer=drone_rl.TrainerSettings(total_frames=1500, checkpoint_interval_s=0.0), "
+    "collector=drone_rl.settings.collecting.Threads(num_envs=8)"
+)
+SMALLER = {
+    "notebook": {
+        "train(seed=1)": f"train(seed=1, {SHORT})",
+        "judge(policy)": "judge(policy, episodes=8)",
+        "episodes=200": "episodes=8",
+        'explain([policy, "poor"], ': "explain([policy], frames=30, episodes=8, perplexity=5, ",
+    },
+    "returns": {"seed=1)": f"seed=1, {SHORT})"},
+    "network": {"seed=1)": f"seed=1, {SHORT})", "episodes=200": "episodes=8"},
+    "motion": {
+        "100": "10",
+        "make_env(64": "make_env(8",
+        "total_frames=400_000": "total_frames=2_000",
+    },
+    "task": {
+        "make_env(64": "make_env(8",
+        "total_frames=100_000": "total_frames=500",
+        "actor, 400": "actor, 20",
+    },
+    "learner": {
+        "make_env(64": "make_env(8",
+        "total_frames=200_000": "total_frames=1_500",
+        "total_frames=20_000": "total_frames=3_000",
+        "total_frames=10_000": "total_frames=1_500",
+    },
+    "section": {"frames=120": "frames=30, perplexity=5", "make_env(64)": "make_env(30)"},
+}
+"""What the tests change of a page, and into what."""
+
+
+@pytest.fixture
+def workplace(tmp_path, monkeypatch):
+    """A folder as a reader's: modules are found there, and so are files for the package."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    inside = tmp_path / "drone_rl"
+    for package in (sections, parts):
+        folder = inside.joinpath(*package.__name__.split(".")[1:])
+        monkeypatch.setattr(package, "__path__", [*package.__path__, str(folder)])
+    few = {name: find_sections()[name] for name in ("dataset", "evaluation")}
+    monkeypatch.setattr(study, "find_sections", lambda: few)  # all of them take a minute
+    known, networks, threads = set(sys.modules), dict(NETWORKS), torch.get_num_threads()
+    templates = jinja2.FileSystemLoader(inside / "report" / "templates")
+    theirs = jinja2.PackageLoader("drone_rl.report")
+    loader = jinja2.ChoiceLoader([theirs, templates])
+    monkeypatch.setattr(jinja2, "PackageLoader", lambda _: loader)
+    yield tmp_path
+    torch.set_num_threads(threads)
+    NETWORKS.clear()
+    NETWORKS.update(networks)
+    for name in set(sys.modules) - known:
+        if str(tmp_path) in str(getattr(sys.modules[name], "__file__", "")):
+            del sys.modules[name]
+
+
+def read_blocks(page):
+    """Language, file name and code of each, with the sizes of the tests."""
+    text = page.read_text()
+    for large, small in SMALLER[page.stem].items():
+        assert large in text, f"{page.stem} no longer has {large!r}"
+        text = text.replace(large, small)
+    return BLOCK.findall(text)
+
+
+def run(code, where, names):
+    """Runs a block as a notebook would: what its last line is worth is shown."""
+    tree = ast.parse(code)
+    last = tree.body.pop() if isinstance(tree.body[-1], ast.Expr) else None
+    exec(compile(tree, where, "exec"), names)
+    if last is not None:
+        value = eval(compile(ast.Expression(last.value), where, "eval"), names)
+        if hasattr(value, "_repr_html_"):
+            assert value._repr_html_().startswith("<")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_it_runs(page, workplace):
+    names = {"__name__": "__main__"}
+    for number, (language, title, code) in enumerate(read_blocks(page)):
+        if title:
+            (workplace / title).parent.mkdir(parents=True, exist_ok=True)
+            (workplace / title).write_text(code)
+        elif language == "python":
+            run(code, f"{page.stem}, block {number}", names)
+        elif language == "sh":
+            check_commands(code)

@@ -1,0 +1,321 @@
+"""What the tables of figures say, row by row, of which keys of docs/results.json."""
+
+import statistics
+from collections.abc import Sequence
+
+from tools.readme.tables import Figures, Row
+
+
+def _times(f: Figures) -> str:
+    times = f["time_to_solve_s"]
+    return f"{min(times):.0f} to {max(times):.0f}, median {statistics.median(times):.0f}"
+
+
+def _rates(f: Figures) -> str:
+    collected, drawn = f["collector_fps"], f["raw_render_beside_collector_fps"]
+    return f"{f['collector_over_raw']:.2f} ({collected:,.0f} over {drawn:,.0f})"
+
+
+def _drawing(f: Figures) -> str:
+    ratios = "; ".join(f"{ratio:.1f}" for ratio in f["render_over_warp"].values())
+    return f"{f['raw_render_fps']:,.0f}; {ratios} times"
+
+
+def _class_models(f: Figures) -> str:
+    return ", ".join(f"{p:.3f}" for p in f["class_model_probability"])
+
+
+def _verdicts(f: Figures) -> str:
+    right, certain, total = (f[f"verdicts_{name}"] for name in ("right", "certain", "total"))
+    return f"{right} of {certain} certain, of {total}"
+
+
+def _planted(f: Figures) -> str:
+    share, total = f["planted_maps_found"], f["planted_maps_total"]
+    return f"{share * total:.0f} of {total}"
+
+
+def _shares(values: Sequence[float]) -> str:
+    return ", ".join(f"{value:.2g}" if value else "0" for value in values)
+
+
+def _seconds(values: Sequence[float]) -> str:
+    return ", ".join(f"{value:.0f}" for value in values)
+
+
+def _slower(f: Figures) -> str:
+    """Than the one for which the figures were asked, by how the bench scaled its seconds."""
+    return f"on a machine {f['proof_two_s'] / f['proof_two_scaled_s']:.1f} times slower"
+
+
+TRUTH = (
+    Row(
+        "coverage",
+        "smallest coverage of a 95% interval that is shown, by enumeration and simulation",
+        lambda f: f"{f['interval_coverage_min']:.3f}",
+        "0.945",
+    ),
+    Row(
+        "coverage",
+        "certain and wrong, the worst of 36 simulated policies at and around the thresholds",
+        lambda f: f"{f['false_certain_rate']:.3f}",
+        "at most 0.05",
+        is_claim=True,
+    ),
+    Row(
+        "maps",
+        "maps that say nothing of the policy and are trusted",
+        lambda f: f"{f['placebo_maps_trusted']} of {f['placebo_maps_total']}",
+        "0",
+        is_claim=True,
+    ),
+    Row("maps", "planted networks whose true map is trusted", _planted, "0.9"),
+    Row(
+        "sentences",
+        "planted changes of evidence that change or take the sentence",
+        lambda f: f"{f['sentences_flipped']} of {f['sentences_total']}",
+        "all",
+        is_claim=True,
+    ),
+    Row(
+        "verdicts",
+        "verdicts called certain that agree with 5,000 other episodes",
+        _verdicts,
+        "all",
+        is_claim=True,
+    ),
+    Row(
+        "hostile",
+        "hostile files refused in one line, with nothing run, read or written",
+        lambda f: f"{f['hostile_refused']} of {f['hostile_total']}",
+        "all",
+        is_claim=True,
+    ),
+    Row(
+        "mutants",
+        "mutants killed, of those sampled that change anything (`make mutants` before it)",
+        lambda f: (
+            f"{f['mutation_score_at_first_sight']:.2f} at first sight of the sample of "
+            f"{f['mutants_sampled']}; {f['mutation_score']:.2f} once its survivors had tests"
+        ),
+        "0.9",
+    ),
+    Row(
+        "explain",
+        "`drone-rl explain policy=good`, 600 frames, report included",
+        lambda f: f"{f['explain_s']:.0f} s, {f['explain_peak_memory_mib'] / 1024:.1f} GiB",
+        "120 s, 2 GiB",
+    ),
+)
+"""Whether what the program says holds against an adversary."""
+PROOF = (
+    Row(
+        "prove",
+        "share of all placements that the default's 5 seeds fail at, exactly",
+        lambda f: _shares(f["proof_lost"]),
+        "",
+        is_claim=True,
+    ),
+    Row("prove", "the same, undecided at most", lambda f: f"{f['proof_undecided']:.1e}", "1e-6"),
+    Row(
+        "prove",
+        "seconds of these proofs",
+        lambda f: f"{_seconds(f['proof_three_s'])}, {_slower(f)}",
+        "240",
+    ),
+    Row(
+        "prove",
+        "seconds of a proof with two cubes, policy good",
+        lambda f: f"{f['proof_two_s']:.1f}, {_slower(f)}",
+        "4",
+    ),
+    Row(
+        "prove",
+        "flights of the simulator that end otherwise than proved",
+        lambda f: f"{f['proof_contradicted']} of {f['proof_flights']:,}",
+        "0",
+        is_claim=True,
+    ),
+    Row(
+        "prove",
+        "certificates that the second checker accepts",
+        lambda f: f"{f['proof_checked']} of {f['proof_checked_total']}",
+        "all",
+    ),
+    Row(
+        "tampering",
+        "tampered certificates that it refuses",
+        lambda f: f"{f['tampered_refused']} of {f['tampered_total']}",
+        "all",
+    ),
+    Row(
+        "places",
+        "random pictures that are not the closed form's",
+        lambda f: f"{f['places_wrong']} of {f['places_compared']:,}",
+        "0",
+    ),
+    Row(
+        "places",
+        "seconds of an exact map",
+        lambda f: f"{f['places_s']:.1f}, {f['places_cells']:,} cells",
+        "15",
+    ),
+    Row(
+        "provable",
+        "minutes until `experiment=provable` is proved, three seeds",
+        lambda f: ", ".join(f"{seconds / 60:.1f}" for seconds in f["provable_s"]),
+        "30",
+        is_claim=True,
+    ),
+    Row(
+        "exact_coverage",
+        "intervals of verdicts that hold the exact share",
+        lambda f: f"{f['verdict_coverage_exact']:.3f}",
+        "0.945",
+    ),
+    Row(
+        "many_cubes",
+        "four and five cubes, policy good: share decided within an hour",
+        lambda f: f"{f['proof_four']:.2g}; {f['proof_five']:.2g}",
+        "",
+    ),
+)
+"""What is proved."""
+MAIN = (
+    Row(
+        "solve",
+        "seconds from the start of `drone-rl train` to a running mean of 2.97 of 3 cubes, 5 seeds",
+        _times,
+        "60",
+        is_claim=True,
+    ),
+    Row("solve", "seeds of 5 that reach it", lambda f: str(f["seeds_solved"]), "5"),
+    Row(
+        "solve",
+        "share of 1,000 episodes in worlds to report on with all cubes, lower end of the exact 95% "
+        "interval, the least of 5 seeds",
+        lambda f: f"{min(f['success_lower95']):.3f}",
+        "0.95",
+        is_claim=True,
+    ),
+    Row(
+        "render",
+        "drawing at 25x64, frames/s, and over MuJoCo Warp's renderer at 25x64; 64x64; 100x256",
+        _drawing,
+        "-",
+        is_claim=True,
+    ),
+    Row(
+        "collector",
+        "collector, policy in the loop, over what MuJoCo Warp draws alone, 25x64, frames/s",
+        _rates,
+        "0.7",
+    ),
+    Row(
+        "dm_control",
+        "batched environment over dm_control's pixel path, EGL, default quality",
+        lambda f: f"{f['batched_over_dm_control']:.0f} times ({f['dm_control_fps']:.0f} frames/s)",
+        "100 times",
+        is_claim=True,
+    ),
+    Row(
+        "dm_control",
+        "the same, dm_control's quality tuned by hand",
+        lambda f: (
+            f"{f['batched_over_dm_control_tuned']:.1f} times "
+            f"({f['dm_control_tuned_fps']:.0f} frames/s)"
+        ),
+        "1.5 times",
+    ),
+    Row(
+        "memory",
+        "peak memory of the default training",
+        lambda f: f"{f['peak_memory_mib']:.0f} MiB",
+        "1,024 MiB",
+    ),
+    Row(
+        "memory",
+        "growth of memory over 1,000,000 frames after the first 100,000",
+        lambda f: f"{f['memory_growth_mib_per_million_frames']:.0f} MiB",
+        "5 MiB",
+    ),
+    Row(
+        "startup",
+        "start of `drone-rl train` to its first update, kernels cached",
+        lambda f: (
+            f"{f['start_to_first_update_s']:.1f} s where `import torch` takes "
+            f"{f['import_torch_s']:.1f} s: {f['start_to_first_update_scaled_s']:.1f} s where it "
+            "takes 1 s"
+        ),
+        "4 s",
+    ),
+    Row(
+        "startup",
+        "`drone-rl verdict policy=good`, 400 episodes",
+        lambda f: f"{f['verdict_s']:.1f} s; {f['verdict_scaled_s']:.1f} s",
+        "6 s",
+    ),
+    Row("startup", "`import drone_rl`", lambda f: f"{f['import_s']:.2f} s", "0.3 s"),
+    Row(
+        "explain",
+        "t-SNE of 600 frames; of 10,000",
+        lambda f: f"{f['tsne_600_s']:.1f} s; {f['tsne_10000_s']:.0f} s",
+        "5 s; 60 s",
+    ),
+    Row(
+        "explain",
+        "response map, 41 x 31 places",
+        lambda f: f"{f['response_map_s']:.1f} s",
+        "3 s",
+    ),
+    Row(
+        "explain",
+        "probability that the good policy's class models reach (forward, left, right)",
+        _class_models,
+        "0.99",
+    ),
+    Row("explain", "size of report.html", lambda f: f"{f['report_mib']:.1f} MiB", "10 MB"),
+    Row(
+        "sweeps",
+        "trainings an hour of a sweep, two at once over one at a time",
+        lambda f: f"{f['sweep_speedup']:.2f} times",
+        "1.6 times",
+    ),
+    Row(
+        "sweeps",
+        "what launcher and logging add to the time of bare trainings",
+        lambda f: f"{100 * f['launcher_overhead']:.1f}%",
+        "10%",
+    ),
+    Row(
+        "kills",
+        "runs that end the same, to the last bit, in a sweep killed three times",
+        lambda f: f"{f['sweep_runs_same_after_kills']} of {f['sweep_runs']}",
+        "all",
+        is_claim=True,
+    ),
+    Row(
+        "ray",
+        "frames/s of collecting with `collector=ray` over the plain collector",
+        lambda f: f"{f['ray_over_plain']:.2f}",
+        "0.8",
+    ),
+)
+"""The main job and sweeps."""
+GUESTS = (
+    Row(
+        "onnx",
+        "greatest difference of a probability between the shipped policies and their ONNX models",
+        lambda f: f"{f['onnx_max_difference']:.1e} on {f['onnx_frames']:,} pictures",
+        "1e-5",
+    ),
+    Row(
+        "onnx",
+        "pictures of which they call different actions the most probable",
+        lambda f: f"{f['onnx_actions_differ']} of {f['onnx_frames']:,}",
+        "0",
+    ),
+)
+"""What works with programs of others."""
+CLAIMS = tuple(row for row in (*MAIN, *TRUTH, *PROOF, *GUESTS) if row.is_claim)
+"""What a newcomer reads first."""

@@ -1,0 +1,159 @@
+"""Every setting as Markdown: what it may be, its unit, its default and what it means."""
+
+import ast
+import dataclasses
+import functools
+import importlib
+import inspect
+import textwrap
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from drone_rl.cli.usage import COMMANDS
+from drone_rl.hydra_app.schemas import GROUPS, PARTS, SEVERAL
+from drone_rl.settings.changes import Changes
+from drone_rl.settings.variant import Variant
+from drone_rl.utils.schema import Flag, Instance, Kind, Listed, Maybe, OneOf, Several
+from drone_rl.utils.settings import Settings, kinds_of, plain, snake_case
+
+BAR = "&#124;"
+"""A bar within a cell."""
+_HEAD = "| setting | may be | unit | default | meaning |\n| --- | --- | --- | --- | --- |"
+
+
+def list_groups() -> str:
+    """The groups that have settings of their own, such as task and camera, each with a table."""
+    return "\n\n".join(
+        f"### {group}\n\n{_about(cls)}\n\n{make_table(cls, f'{group}.')}"
+        for group, cls in GROUPS.items()
+    )
+
+
+def list_parts() -> str:
+    """The parts of a training that come in variants, and the settings of each variant."""
+    return "\n\n".join(_part(group, part) for group, part in {**PARTS, **SEVERAL}.items())
+
+
+def list_commands() -> str:
+    """What each command can be told besides."""
+    lines = []
+    for name in COMMANDS:
+        module = importlib.import_module(f"drone_rl.cli.{name.replace('-', '_')}")
+        lines += [f"### drone-rl {name}", make_table(module.Command)]
+    return "\n\n".join(lines)
+
+
+def list_presets(conf: Path) -> str:
+    """Ready-made sets of settings, by what their files say first."""
+    rows = ["| command | what it is |", "| --- | --- |"]
+    for group in ("experiment", "sweep"):
+        for path in sorted((conf / group).glob("*.yaml")):
+            _, _, words = first_comment(path).partition(": ")
+            rows.append(f"| `drone-rl train {group}={path.stem}` | {words} |")
+    return "\n".join(rows)
+
+
+def make_table(cls: type[Settings], prefix: str = "") -> str:
+    """A table of the settings of a class.
+
+    Args:
+        cls: Which.
+        prefix: Before the name of each, such as "task.".
+    """
+    defaults, words = cls(), meanings(cls)
+    rows = [
+        f"| `{prefix}{name}` | {_may_be(kind)} | {_unit(kind)} | "
+        f"{_shown(getattr(defaults, name))} | {words[name].replace('|', BAR)} |"
+        for name, kind in kinds_of(cls).items()
+    ]
+    return "\n".join([_HEAD, *rows])
+
+
+@functools.cache
+def meanings(cls: type) -> Mapping[str, str]:
+    """What a class says below each of its fields, and what those say that it is made of."""
+    found: dict[str, str] = {}
+    for part in reversed(cls.__mro__):
+        if dataclasses.is_dataclass(part):
+            (body,) = ast.parse(textwrap.dedent(inspect.getsource(part))).body
+            found |= dict(_documented(body))
+    return found
+
+
+def first_comment(path: Path) -> str:
+    """The first lines of a file of settings that are for people."""
+    lines = [line for line in path.read_text().splitlines() if not line.startswith("# @package")]
+    count = next((i for i, line in enumerate(lines) if not line.startswith("#")), len(lines))
+    return " ".join(line.removeprefix("#").strip() for line in lines[:count])
+
+
+def _part(group: str, part: type[Variant]) -> str:
+    lines = [f"### {group}", _about(part)]
+    for variant in part.variants():
+        name = snake_case(variant)
+        lines.append(f"**`{name}`** {_about(variant)}")
+        if kinds_of(variant):
+            inside = f"{name}." if group in SEVERAL else ""
+            lines.append(make_table(variant, f"{group}.{inside}"))
+    return "\n\n".join(lines)
+
+
+def _documented(body: Any) -> Iterator[tuple[str, str]]:
+    """The fields of a class's source, each with the text below it."""
+    for field, below in zip(body.body, body.body[1:], strict=False):
+        is_text = isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant)
+        if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name) and is_text:
+            yield field.target.id, " ".join(below.value.value.split())
+
+
+def _about(cls: type) -> str:
+    return (inspect.getdoc(cls) or "").partition("\n\n")[0].replace("\n", " ")
+
+
+def _may_be(kind: Kind) -> str:
+    """What a kind takes, in words."""
+    match kind:
+        case Maybe():
+            return f"{_may_be(kind.kind)}; or null"
+        case Several(kind=Instance(of=cls)) | Instance(of=cls):
+            return _link(cls)
+        case Several():
+            count = kind.most if kind.least == kind.most else f"{kind.least} to {kind.most}"
+            return f"{count} values, each {_may_be(kind.kind)}"
+        case Changes():
+            return f"changes to the policy's {_link(kind.of)}"
+        case OneOf():
+            return " or ".join(f"`{name}`" for name in kind.names)
+        case Listed():
+            return f"a {kind.what} or a list of them"
+        case Flag():
+            return "true or false"
+    return getattr(kind, "words", "a text")
+
+
+def _link(cls: type) -> str:
+    """A group by its name, as a link to its settings."""
+    groups = {
+        **{c: g for g, c in GROUPS.items()},
+        **{c: g for g, c in {**PARTS, **SEVERAL}.items()},
+    }
+    return f"[{groups[cls]}](#{groups[cls]})"
+
+
+def _unit(kind: Kind) -> str:
+    inner = getattr(kind, "kind", kind)
+    return getattr(getattr(inner, "kind", inner), "unit", "")
+
+
+def _shown(value: Any) -> str:
+    """A default as it would be typed; of parts their names."""
+    several = value if isinstance(value, tuple) else (value,)
+    if several and all(isinstance(one, Variant) for one in several):
+        return ", ".join(f"`{one.name}`" for one in several)
+    if isinstance(value, Settings):
+        return ""
+    text = yaml.safe_dump(plain(value), default_flow_style=True, width=1000).splitlines()[0]
+    return f"`{text}`"
