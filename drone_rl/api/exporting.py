@@ -4,7 +4,7 @@ import shlex
 from pathlib import Path
 from typing import Any
 
-from drone_rl.api.policy import Policy
+from drone_rl.api.policy import Policy, load_policy
 from drone_rl.api.quoting import find_claim
 from drone_rl.evaluation import Agreement, agreement
 from drone_rl.settings.judging import FlightSettings
@@ -63,12 +63,16 @@ def export(
 
 
 def export_onnx(
-    policy: Policy, target: str | Path, *, command: str | None = None, seed: int = 0
+    policy: str | Path | Policy,
+    target: str | Path,
+    *,
+    command: str | None = None,
+    seed: int = 0,
 ) -> Agreement:
     """Writes a policy as an ONNX model, if that does what the policy does: all of it on the CPU.
 
     Args:
-        policy: Which.
+        policy: The policy, or what `load_policy` takes.
         target: Of the file, ending in .onnx; what is in it, see `drone_rl.zoo.make_onnx`.
         command: That trained it, for the model's metadata; None names what its file or folder says.
         seed: Root of the random streams of the worlds in which the two are compared.
@@ -80,6 +84,7 @@ def export_onnx(
         InputError: It can't be an ONNX model, or not be written, or the model is another function
             than the policy; then nothing is written.
     """
+    policy = policy if isinstance(policy, Policy) else load_policy(policy)
     told = {"command": command or origin_of(policy.path, policy.state)[0]}
     content = make_onnx(policy.description, policy.make_network(), told)
     model = open_onnx(content)

@@ -3,7 +3,6 @@
 from pathlib import Path
 
 from drone_rl.api.exporting import export_onnx
-from drone_rl.api.policy import load_policy
 from drone_rl.zoo import policy_names
 
 
@@ -20,7 +19,7 @@ def bench_onnx(folder: Path, quick: bool) -> dict[str, float]:
     """
     folder.mkdir(parents=True, exist_ok=True)
     names = policy_names()[: 1 if quick else None]
-    found = [export_onnx(load_policy(name), folder / f"{name}.onnx") for name in names]
+    found = [export_onnx(name, folder / f"{name}.onnx") for name in names]
     return {
         "onnx_max_difference": max(f.difference for f in found),
         "onnx_actions_differ": sum(f.actions_differ for f in found),

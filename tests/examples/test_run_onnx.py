@@ -21,7 +21,7 @@ def example():
 @pytest.mark.parametrize(("name", "cubes"), [("good", 3.0), ("poor", 0.0)])
 def test_it_flies_as_the_policy_does(example, name, cubes, tmp_path):
     target = tmp_path / f"{name}.onnx"
-    drone_rl.export_onnx(drone_rl.load_policy(name), target)
+    drone_rl.export_onnx(name, target)
     assert example.fly(str(target), episodes=3) == [cubes] * 3
 
 
