@@ -14,21 +14,30 @@ import yaml
 
 from drone_rl.cli.usage import COMMANDS
 from drone_rl.hydra_app.schemas import GROUPS, PARTS, SEVERAL
-from drone_rl.settings.changes import Changes
+from drone_rl.settings.changes import ChangesOfTask
 from drone_rl.settings.variant import Variant
+from drone_rl.sim.settings import TASKS, BaseTaskSettings
 from drone_rl.utils.schema import Flag, Instance, Kind, Listed, Maybe, OneOf, Several
 from drone_rl.utils.settings import Settings, kinds_of, plain, snake_case
 
 BAR = "&#124;"
 """A bar within a cell."""
+_TASK = "task"
 _HEAD = "| setting | may be | unit | default | meaning |\n| --- | --- | --- | --- | --- |"
 
 
 def list_groups() -> str:
     """The groups that have settings of their own, such as task and camera, each with a table."""
     return "\n\n".join(
-        f"### {group}\n\n{_about(cls)}\n\n{make_table(cls, f'{group}.')}"
-        for group, cls in GROUPS.items()
+        [
+            f"### {_TASK}",
+            _about(BaseTaskSettings),
+            *(f"**`{n}`** {_about(cls)}\n\n{make_table(cls, 'task.')}" for n, cls in TASKS.items()),
+            *(
+                f"### {group}\n\n{_about(cls)}\n\n{make_table(cls, f'{group}.')}"
+                for group, cls in GROUPS.items()
+            ),
+        ]
     )
 
 
@@ -123,8 +132,8 @@ def _may_be(kind: Kind) -> str:
         case Several():
             count = kind.most if kind.least == kind.most else f"{kind.least} to {kind.most}"
             return f"{count} values, each {_may_be(kind.kind)}"
-        case Changes():
-            return f"changes to the policy's {_link(kind.of)}"
+        case ChangesOfTask():
+            return f"changes to the policy's {_link(BaseTaskSettings)}"
         case OneOf():
             return " or ".join(f"`{name}`" for name in kind.names)
         case Listed():
@@ -137,6 +146,7 @@ def _may_be(kind: Kind) -> str:
 def _link(cls: type) -> str:
     """A group by its name, as a link to its settings."""
     groups = {
+        BaseTaskSettings: _TASK,
         **{c: g for g, c in GROUPS.items()},
         **{c: g for g, c in {**PARTS, **SEVERAL}.items()},
     }
