@@ -1,14 +1,21 @@
 """A training's worlds shared out to workers, with the network that all of them fly by."""
 
 import functools
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import torch
 
-from drone_rl.collectors import EpisodeCollector, ThreadedCollector
+from drone_rl.collectors import (
+    EpisodeCollector,
+    RolloutCollector,
+    ThreadedCollector,
+    WorldsCollector,
+)
 from drone_rl.policies import PolicyNetwork, make_actor
 from drone_rl.settings.collecting import Ray
 from drone_rl.settings.configuration import as_config, from_config
+from drone_rl.settings.objectives import WithCritic
 from drone_rl.settings.training import TrainSettings
 from drone_rl.settings.variant import locate
 from drone_rl.sim.tasks import Practice
@@ -17,6 +24,8 @@ from drone_rl.zoo import describe
 
 if TYPE_CHECKING:
     from drone_rl.collectors.ray import RayEpisodeCollector
+
+C = TypeVar("C", bound=WorldsCollector)
 
 
 class Collecting(NamedTuple):
@@ -43,11 +52,26 @@ def build_collector(settings: TrainSettings, practice: Practice | None = None) -
 
 
 def threaded_collector(settings: TrainSettings, practice: Practice | None = None) -> Collecting:
-    """`Threads`: the workers are threads of this process."""
+    """`Threads`: complete episodes from threads of this process."""
+    return _threaded(settings, practice, EpisodeCollector)
+
+
+def rollout_collector(settings: TrainSettings, practice: Practice | None = None) -> Collecting:
+    """`Rollouts`: the next steps of each world, from threads of this process."""
+    objective = settings.objective
+    assert isinstance(objective, WithCritic)
+    collect = functools.partial(RolloutCollector, num_steps=objective.num_steps)
+    return _threaded(settings, practice, collect)
+
+
+def _threaded(
+    settings: TrainSettings, practice: Practice | None, collect: Callable[..., WorldsCollector]
+) -> Collecting:
+    """The worlds shared out to threads, each with a collector made of worlds and an actor."""
     shares = _shares(settings, is_one=settings.device.startswith("cuda"))
     network, collectors, generators = None, [], {}
     for i in range(len(shares)):
-        collector, network, actions = build_share(settings, shares, i, network, practice)
+        collector, network, actions = build_share(settings, shares, i, network, practice, collect)
         collectors.append(collector)
         generators[f"actions_{i}"] = actions
     assert network is not None  # there is at least one share
@@ -84,7 +108,8 @@ def build_share(
     number: int,
     network: PolicyNetwork | None = None,
     practice: Practice | None = None,
-) -> tuple[EpisodeCollector, PolicyNetwork, torch.Generator]:
+    collect: Callable[..., C] = EpisodeCollector,
+) -> tuple[C, PolicyNetwork, torch.Generator]:
     """One worker's worlds, with the network that all share, and the stream of its actions.
 
     Args:
@@ -93,6 +118,7 @@ def build_share(
         number: Of this worker.
         network: That of the other workers; None makes it.
         practice: Where episodes begin, if not anywhere.
+        collect: Makes a collector of worlds and an actor.
     """
     description, seed = describe(as_config(settings)), settings.seed
     env = description.build_env(
@@ -107,7 +133,7 @@ def build_share(
         network = description.build_network(torch_generator(seed, Stream.POLICY_INIT))
         network = network.to(settings.device)
     actions = torch_generator(seed, Stream.ACTIONS, number=number, device=settings.device)
-    return EpisodeCollector(env, make_actor(network, env.action_spec, actions)), network, actions
+    return collect(env, make_actor(network, env.action_spec, actions)), network, actions
 
 
 def _remote_share(

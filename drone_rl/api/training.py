@@ -10,9 +10,9 @@ from typing import Any
 
 import torch
 import yaml
-from torch import nn
 
 from drone_rl.api.collecting import build_collector
+from drone_rl.api.learning import build_learner
 from drone_rl.api.policy import Policy, load_policy
 from drone_rl.api.progress import Bar, Progress
 from drone_rl.api.showing import picture, table
@@ -25,7 +25,6 @@ from drone_rl.training import (
     CheckpointCallback,
     CsvCallback,
     NotANumberError,
-    ReinforceLearner,
     Trainer,
 )
 from drone_rl.training.progress import OngoingTraining
@@ -185,7 +184,7 @@ def _build(
     # sums depend on how many threads make them: on as many everywhere, whatever the machine has
     torch.set_num_threads(settings.collector.num_threads)
     bound_kernels()
-    collector, network, generators = build_collector(settings, practice)
+    made = build_collector(settings, practice)
     noted = {"config": config, "description": description, **origin}
     (folder / "run.yaml").write_text(yaml.safe_dump(noted, sort_keys=False))
     limits = settings.trainer
@@ -196,10 +195,10 @@ def _build(
     )
     share = limits.target_share
     trainer = Trainer(
-        collector=collector,
-        learner=_learner(settings, network, collector.actor),
+        collector=made.collector,
+        learner=build_learner(settings, made),
         callbacks=[CsvCallback(folder / "metrics.csv"), checkpoints, *callbacks],
-        generators=generators,
+        generators=made.generators,
         target=None if share is None else share * as_task(settings.task).largest_reward,
         total_frames=limits.total_frames,
         total_episodes=limits.total_episodes,
@@ -207,19 +206,6 @@ def _build(
         ends=as_task(settings.task).ends,
     )
     return trainer, checkpoints
-
-
-def _learner(settings: TrainSettings, network: nn.Module, actor: nn.Module) -> ReinforceLearner:
-    optimiser = settings.optimiser.make(network.parameters())
-    return ReinforceLearner(
-        network=network,
-        estimator=settings.returns.make().to(settings.device),
-        loss=settings.objective.make(actor).to(settings.device),
-        optimiser=optimiser,
-        scheduler=settings.scheduler.make(optimiser),
-        max_grad_norm=settings.trainer.max_grad_norm,
-        minibatch_frames=settings.trainer.minibatch_frames,
-    )
 
 
 class Tell(Callback):

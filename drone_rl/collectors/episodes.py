@@ -1,24 +1,20 @@
-# pyright: reportAttributeAccessIssue=false
 # pyright: reportIncompatibleMethodOverride=false
-# pyright: reportReturnType=false
-# (TorchRL's collectors annotate states and seeds otherwise than they use them.)
+# (TorchRL's collectors annotate states otherwise than they use them.)
 """Complete episodes, each frame once: what REINFORCE learns from."""
 
-from collections.abc import Callable, Iterator
-from typing import Any, cast
+from typing import Any
 
 import torch
 from tensordict import TensorDict, TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from tensordict.utils import NestedKey
-from torch import Tensor, nn
-from torchrl.collectors import BaseCollector
+from torch import Tensor
 from torchrl.envs import EnvBase
 
-from drone_rl.utils.errors import InputError
+from drone_rl.collectors.worlds_collector import WorldsCollector, take_rows
 
 
-class EpisodeCollector(BaseCollector):
+class EpisodeCollector(WorldsCollector):
     """Iterates over batches of `env.batch_size[0]` complete episodes, one a world.
 
     A batch is in the "cat" format of TorchRL's `Collector(trajs_per_batch=...)`: a flat TensorDict
@@ -37,46 +33,22 @@ class EpisodeCollector(BaseCollector):
         env: EnvBase,
         actor: TensorDictModuleBase,
         *,
-        total_frames: int = -1,
         keep_observations: bool = True,
-        keep: tuple = (("next", "info", "end_reason"),),
-        postproc: Callable[[TensorDictBase], TensorDictBase] | None = None,
+        **kwargs: Any,
     ) -> None:
         """Connects an environment and a policy.
 
         Args:
             env: A batched environment that honours TorchRL's "_step" masks.
             actor: Writes the action.
-            total_frames: Stop before a batch once this many frames were collected; -1 for never.
             keep_observations: Whether to keep what the actor saw and made of it.
-            keep: Entries kept besides that, the action, the reward and the end flags, as far as
-                the environment has them.
-            postproc: Applied to each batch, such as a return estimator.
+            kwargs: See `WorldsCollector`.
 
         Raises:
             InputError: The environment is not a batch of worlds.
         """
-        if len(env.batch_size) != 1:
-            raise InputError(f"env has batch size {list(env.batch_size)}; give a batch of worlds")
-        super().__init__()
-        self.env = env
-        self.actor = actor
-        self.postproc = postproc
-        self.total_frames = total_frames
-        self.frames = 0
-        self.episodes = 0
-        self._observed = tuple(actor.in_keys)
+        super().__init__(env, actor, **kwargs)
         self._keep_observations = keep_observations
-        flags = (env.reward_key, *env.done_keys)
-        observable = {("next", *_as_tuple(key)) for key in env.observation_spec.keys(True, True)}
-        self._kept = (*(("next", key) for key in flags), *(k for k in keep if k in observable))
-        observed = {key if isinstance(key, str) else key[0] for key in self._observed}
-        self._dropped = {env.reward_key, "info"} - observed
-
-    def iterator(self) -> Iterator[TensorDictBase]:
-        """Yields batches until `total_frames`; what a `for` over the collector goes through."""
-        while self.total_frames < 0 or self.frames < self.total_frames:
-            yield self.collect()
 
     @torch.no_grad()
     def collect(self, num_worlds: int | None = None) -> TensorDictBase:
@@ -94,9 +66,7 @@ class EpisodeCollector(BaseCollector):
             active = active & ~state.get("done").reshape(active.shape)
         batch = _join(steps, worlds, len(active))
         batch["collector", "traj_ids"] += self.episodes
-        self.frames += len(batch)
-        self.episodes += flying
-        return batch if self.postproc is None else self.postproc(batch)
+        return self._finish(batch, flying)
 
     def _step(
         self, state: TensorDictBase, active: Tensor, worlds: Tensor
@@ -104,7 +74,7 @@ class EpisodeCollector(BaseCollector):
         """Acts in the active worlds. Returns what is kept of them and the state after them."""
         is_whole = len(worlds) == len(active)
         seen = state.select(*self._observed)
-        acted = self.actor(seen if is_whole else _rows(seen, worlds))
+        acted = self.actor(seen if is_whole else take_rows(seen, worlds))
         action = acted.get(self.env.action_key)
         keys = acted.keys(True, True) if self._keep_observations else (self.env.action_key,)
         step = {key: acted.get(key) for key in keys}
@@ -123,63 +93,13 @@ class EpisodeCollector(BaseCollector):
 
     def state_dict(self) -> dict:
         """Counters and the environment's random streams, as they stand between two batches."""
-        worlds = getattr(self.env, "base_env", self.env).state_dict()
+        worlds = self.worlds.state_dict()
         return {"frames": self.frames, "episodes": self.episodes, "worlds": worlds}
 
     def load_state_dict(self, state_dict: dict) -> None:
         """Goes on from a `state_dict`."""
         self.frames, self.episodes = state_dict["frames"], state_dict["episodes"]
-        getattr(self.env, "base_env", self.env).load_state_dict(state_dict["worlds"])
-
-    def set_seed(self, seed: int, static_seed: bool = False) -> int:
-        """Seeds the worlds; the actor's draws are the business of whoever made its generator.
-
-        Returns:
-            A seed for the next collector, or the same if it is static.
-        """
-        return self.env.set_seed(seed, static_seed=static_seed)
-
-    def shutdown(
-        self, timeout: float | None = None, close_env: bool = True, raise_on_error: bool = True
-    ) -> None:
-        """Closes the environment, unless it shall stay open."""
-        if close_env and not self.env.is_closed:
-            self.env.close()
-
-    def __len__(self) -> int:
-        """How many batches there will be is not known: they differ in length."""
-        raise TypeError(f"the number of batches of {type(self).__name__} is not known beforehand")
-
-    def _maybe_fallback_update(
-        self, policy_or_weights: Any = None, *, model_id: str | None = None
-    ) -> None:
-        """What `update_policy_weights_` does: nothing without weights, if the actor is shared."""
-        if policy_or_weights is not None:
-            copy_weights(policy_or_weights, self.actor)
-
-
-def copy_weights(source: Any, actor: TensorDictModuleBase) -> None:
-    """Copies parameters into an actor.
-
-    Args:
-        source: Another such actor, its `state_dict`, or a TensorDict of its parameters.
-        actor: Gets them.
-    """
-    if isinstance(source, TensorDictBase):
-        weights = cast(TensorDictBase, TensorDict.from_module(actor))
-        weights.data.update_(source.data)
-    else:
-        actor.load_state_dict(source.state_dict() if isinstance(source, nn.Module) else source)
-
-
-def _rows(tensordict: TensorDictBase, rows: Tensor) -> TensorDictBase:
-    """What indexing gives, without tensordict's search for the shape of it, which takes longer."""
-    taken = {key: tensordict.get(key).index_select(0, rows) for key in tensordict.keys(True, True)}
-    return TensorDict(taken, [len(rows)], device=tensordict.device)
-
-
-def _as_tuple(key: NestedKey) -> tuple[str, ...]:
-    return (key,) if isinstance(key, str) else key
+        self.worlds.load_state_dict(state_dict["worlds"])
 
 
 def _join(

@@ -12,7 +12,7 @@ from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torchrl.collectors import BaseCollector
 
-from drone_rl.collectors.episodes import EpisodeCollector
+from drone_rl.collectors.worlds_collector import WorldsCollector
 
 
 class ThreadedCollector(BaseCollector):
@@ -26,7 +26,7 @@ class ThreadedCollector(BaseCollector):
 
     def __init__(
         self,
-        collectors: Sequence[EpisodeCollector],
+        collectors: Sequence[WorldsCollector],
         *,
         postproc: Callable[[TensorDictBase], TensorDictBase] | None = None,
     ) -> None:
@@ -55,8 +55,8 @@ class ThreadedCollector(BaseCollector):
             yield self.collect()
 
     def collect(self) -> TensorDictBase:
-        """Runs one episode in every world of every collector. Shape: (T_total,)."""
-        parts = list(self._pool.map(EpisodeCollector.collect, self.collectors))
+        """What the collectors give, one after the other along the first dimension."""
+        parts = list(self._pool.map(lambda collector: collector.collect(), self.collectors))
         batch = parts[0] if len(parts) == 1 else torch.cat(parts)
         return batch if self.postproc is None else self.postproc(batch)
 
@@ -73,7 +73,7 @@ class ThreadedCollector(BaseCollector):
         """Seeds all worlds, each of which has a stream of its own by its number.
 
         Returns:
-            See `EpisodeCollector.set_seed`.
+            See `WorldsCollector.set_seed`.
         """
         return [c.set_seed(seed, static_seed=static_seed) for c in self.collectors][-1]
 
@@ -92,6 +92,6 @@ class ThreadedCollector(BaseCollector):
     def _maybe_fallback_update(
         self, policy_or_weights: Any = None, *, model_id: str | None = None
     ) -> None:
-        """What `update_policy_weights_` does, see `EpisodeCollector`."""
+        """What `update_policy_weights_` does, see `WorldsCollector`."""
         for collector in self.collectors:
             collector.update_policy_weights_(policy_or_weights)

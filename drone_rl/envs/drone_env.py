@@ -4,6 +4,7 @@
 # (TorchRL's specs take more than their annotations say: tuples as shapes, bounds.)
 """Many worlds of a task as one TorchRL environment."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -112,6 +113,20 @@ class DroneEnv(EnvBase):
             )
         for random_state, state in zip(self._random_states, states, strict=True):
             set_state(random_state, state)
+
+    def running_state(self) -> dict[str, Any]:
+        """The worlds themselves and their streams: enough to go on within episodes."""
+        return {**self.state_dict(), "worlds": self.worlds.state.tensors()}
+
+    def load_running_state(self, state: Mapping[str, Any]) -> None:
+        """Goes on within the episodes of a `running_state`, whose pictures are drawn anew.
+
+        Raises:
+            InputError: See `load_state_dict`.
+        """
+        self.load_state_dict(dict(state))
+        self.worlds.state = self.worlds.state.with_tensors(state["worlds"])
+        self._draw(self._indices(None))
 
     @property
     def last_pixels(self) -> Tensor:

@@ -10,9 +10,10 @@ from omegaconf import MISSING
 
 from drone_rl.settings.changes import ChangesOfTask
 from drone_rl.settings.collecting import Collector
-from drone_rl.settings.learning import Objective, Optimiser, Scheduler
+from drone_rl.settings.learning import Optimiser, Scheduler
 from drone_rl.settings.loggers import Logger
 from drone_rl.settings.networks import Network
+from drone_rl.settings.objectives import Objective
 from drone_rl.settings.paths import PathsSettings
 from drone_rl.settings.provable import ProvableSettings
 from drone_rl.settings.returns import Returns

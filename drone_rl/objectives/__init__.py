@@ -1,5 +1,6 @@
 """Returns, their estimators, and the loss that learns from them."""
 
+from drone_rl.objectives.advantages import Advantages
 from drone_rl.objectives.estimators import (
     BatchNormalised,
     LeaveOneOut,
@@ -14,6 +15,7 @@ from drone_rl.objectives.reinforce import ReinforceLoss
 from drone_rl.objectives.return_estimator import ReturnEstimator
 
 __all__ = [
+    "Advantages",
     "BatchNormalised",
     "LeaveOneOut",
     "LinearRamp",

@@ -1,4 +1,4 @@
-"""How batches of episodes are collected, and on what."""
+"""How batches are collected, and on what."""
 
 import dataclasses
 from typing import Annotated, ClassVar
@@ -12,7 +12,7 @@ class Collector(Variant):
     """Which workers, and how many."""
 
     num_envs: Annotated[int, Whole(1, unit="worlds")] = 64
-    """Worlds, each with one episode in a batch."""
+    """Worlds, each with one episode in a batch, or with as many steps as the others."""
     num_threads: Annotated[int, Whole(1, unit="threads")] = 2
     """Groups of worlds collected at the same time, each on a thread or worker of its own: the cores
     to use. Each draws its actions from its own stream: this is part of what a seed means."""
@@ -36,3 +36,13 @@ class Ray(Collector):
     """Cores that a worker takes of the cluster."""
     max_lost_workers: Annotated[int, Whole(0, unit="workers")] = 10
     """Workers that may be lost, and replaced, before training stops."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Rollouts(Collector):
+    """Batches of the next steps of each world, with what was seen after them, from threads.
+
+    How many steps is the objective's business. Episodes go on from one batch to the next.
+    """
+
+    target: ClassVar[str] = "drone_rl.api.collecting.rollout_collector"

@@ -1,28 +1,12 @@
-"""How parameters are changed: objective, optimiser and the schedule of its rate."""
+"""How parameters are changed: the optimiser and the schedule of its rate."""
 
 import dataclasses
 from typing import Annotated, ClassVar
 
 from drone_rl.settings.variant import Variant
-from drone_rl.utils.schema import OneOf, Real, Whole
+from drone_rl.utils.schema import Real, Whole
 
 LearningRate = Annotated[float, Real(0.0, is_above=True)]
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class Objective(Variant):
-    """Which loss, and with which values."""
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class Reinforce(Objective):
-    """REINFORCE without a critic."""
-
-    target: ClassVar[str] = "drone_rl.objectives.ReinforceLoss"
-    entropy_coeff: Annotated[float, Real(0.0)] = 0.0
-    """Weight of the entropy bonus; 0 for none."""
-    reduction: Annotated[str, OneOf(("mean", "sum"))] = "mean"
-    """Over a batch's steps: mean, or sum as in Algorithm 4."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

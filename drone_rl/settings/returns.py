@@ -89,3 +89,16 @@ class BatchNormalised(_Discounted):
     """Discounted return, normalised over the batch."""
 
     target: ClassVar[str] = "drone_rl.objectives.BatchNormalised"
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Gae(_Discounted):
+    """Generalised advantage estimates, for objectives with a critic."""
+
+    target: ClassVar[str] = "drone_rl.objectives.Advantages"
+    scale: bool = True
+    """Whether to standardise a batch's advantages."""
+    gamma: Rate = 0.95
+    """Discount rate, 0 to 1."""
+    lmbda: Rate = 0.95
+    """Weight of estimates that look one step farther, 0 to 1; 0 looks one step."""

@@ -1,14 +1,16 @@
 """Everything that a training can be told."""
 
 import dataclasses
-from typing import Annotated
+from typing import Annotated, Any, Self
 
-from drone_rl.settings.collecting import Collector, Threads
-from drone_rl.settings.learning import Adam, Constant, Objective, Optimiser, Reinforce, Scheduler
+from drone_rl.settings.collecting import Collector, Rollouts, Threads
+from drone_rl.settings.learning import Adam, Constant, Optimiser, Scheduler
 from drone_rl.settings.networks import Network, SmallCnn
-from drone_rl.settings.returns import LeaveOneOut, Returns
+from drone_rl.settings.objectives import Objective, Reinforce
+from drone_rl.settings.returns import Gae, LeaveOneOut, Returns
 from drone_rl.settings.transforms import Gray, Standardize, Transform
 from drone_rl.sim.settings import BaseTaskSettings, CameraSettings, TaskSettings
+from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Instance, Real, Several, Whole
 from drone_rl.utils.settings import Settings
 
@@ -52,13 +54,13 @@ class TrainSettings(Settings):
     returns: Returns = LeaveOneOut()
     """What a step is worth."""
     objective: Objective = Reinforce()
-    """What is made smaller."""
+    """What is made smaller, and what learns."""
     optimiser: Optimiser = Adam()
     """How."""
     scheduler: Scheduler = Constant()
     """The course of the learning rate."""
     collector: Collector = Threads()
-    """Where episodes come from."""
+    """Where batches come from."""
     trainer: TrainerSettings = TrainerSettings()
     """How long, and when to stop."""
     seed: Annotated[int, Whole(0)] = 0
@@ -67,3 +69,30 @@ class TrainSettings(Settings):
     """Where worlds are drawn and policies run: cpu, cuda or cuda:N."""
     evaluate_after: Annotated[int, Whole(0, unit="episodes")] = 0
     """Episodes, in worlds to choose by, of the verdict at the end; 0 for none."""
+
+    def check(self) -> None:
+        """Refuses parts that can't work together."""
+        needs, objective = self.objective.needs, self.objective.name
+        for name, part in needs.items():
+            given = getattr(self, name)
+            if given.is_known and not isinstance(given, type(part)):
+                raise InputError(
+                    f"{name} {type(given).__name__} does not go with objective={objective}; give "
+                    f"{name}={part.name}"
+                )
+        for name, kind in {"returns": Gae, "collector": Rollouts}.items():
+            part = getattr(self, name)
+            if isinstance(part, kind) and name not in needs:
+                raise InputError(
+                    f"{name}={part.name} is for a critic, which objective={objective} lacks; give "
+                    f"objective=ppo or a2c, or another {name}"
+                )
+
+    def replace(self, **changes: Any) -> Self:
+        """See `Settings`; a new objective brings the parts that it needs, unless they are given."""
+        objective = changes.get("objective")
+        if isinstance(objective, Objective):
+            for name, part in objective.needs.items():
+                if not isinstance(getattr(self, name), type(part)):
+                    changes.setdefault(name, part)
+        return super().replace(**changes)

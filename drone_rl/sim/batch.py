@@ -1,6 +1,7 @@
 """Records of tensors whose first dimension counts worlds, cut and written all together."""
 
-from typing import Self
+from collections.abc import Mapping
+from typing import Any, Self
 
 import torch
 from torch import Tensor
@@ -31,3 +32,17 @@ class Batch:
         parts = {k: v.split(size) for k, v in vars(self).items()}
         count = len(next(iter(parts.values())))
         return [type(self)(**{k: v[i] for k, v in parts.items()}) for i in range(count)]
+
+    def tensors(self) -> dict[str, Any]:
+        """The fields by name, those of batches in it as mappings: what a file may hold."""
+        return {k: v.tensors() if isinstance(v, Batch) else v for k, v in vars(self).items()}
+
+    def with_tensors(self, tensors: Mapping[str, Any]) -> Self:
+        """One of the same kind made of what `tensors` gave, with tensors of its own."""
+        own = {k: (v, tensors[k]) for k, v in vars(self).items()}
+        return type(self)(
+            **{
+                k: v.with_tensors(new) if isinstance(v, Batch) else new.to(v, copy=True)
+                for k, (v, new) in own.items()
+            }
+        )

@@ -8,12 +8,18 @@ from drone_rl.training.callbacks import (
     ProgressCallback,
 )
 from drone_rl.training.checkpoint import load_checkpoint, save_checkpoint
-from drone_rl.training.learners import Learner, NotANumberError, ReinforceLearner
+from drone_rl.training.learners import (
+    ActorCriticLearner,
+    Learner,
+    NotANumberError,
+    ReinforceLearner,
+)
 from drone_rl.training.progress import Progress
 from drone_rl.training.trainer import Collector, Trainer
 from drone_rl.training.weights import check_weights
 
 __all__ = [
+    "ActorCriticLearner",
     "Callback",
     "CheckpointCallback",
     "Collector",

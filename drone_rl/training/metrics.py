@@ -16,8 +16,8 @@ def episode_rewards(batch: TensorDictBase) -> Tensor:
 
     Args:
         batch: Rows of complete episodes; or pieces of fixed length with ("next",
-            "episode_reward"), which TorchRL's transform `RewardSum` writes, since the first part
-            of an episode may lie in an earlier batch. Shape: (*batch, T).
+            "episode_reward"), which `RolloutCollector` and TorchRL's transform `RewardSum` write,
+            since the first part of an episode may lie in an earlier batch. Shape: (*batch, T).
 
     Raises:
         InputError: An episode is not complete and its reward so far not known.
@@ -28,8 +28,8 @@ def episode_rewards(batch: TensorDictBase) -> Tensor:
         return totals[done].double()
     if not bool(done[..., -1, :].all()):
         raise InputError(
-            "a batch ends within an episode, whose reward is not known; collect complete episodes "
-            "or put TorchRL's RewardSum behind the environment"
+            "a batch ends within an episode, whose reward is not known; collect complete episodes, "
+            "or by collector=rollouts, or put TorchRL's RewardSum behind the environment"
         )
     ends = done.flatten().nonzero()[:, 0]
     cumulative = reward.flatten().double().cumsum(0)[ends]
@@ -54,14 +54,16 @@ def batch_metrics(batch: TensorDictBase, ends: Iterable[enum.IntEnum] = ()) -> d
         By name; NaN where no episode ends.
     """
     rewards = episode_rewards(batch)
-    metrics = {
-        "train/reward": float(rewards.mean()),
-        "train/length": batch.numel() / len(rewards) if len(rewards) else float("nan"),
-    }
+    done, lengths = batch["next", "done"], batch.get(("next", "step_count"), None)
+    metrics = {"train/reward": float(rewards.mean())}
+    if lengths is not None:
+        metrics["train/length"] = float(lengths[done].double().mean())
+    else:
+        metrics["train/length"] = batch.numel() / len(rewards) if len(rewards) else float("nan")
     named = [end for end in ends if end]
     if named:
         reasons = cast(Tensor, batch["next", "info", "end_reason"])
-        final = reasons[cast(Tensor, batch["next", "done"])]
+        final = reasons[cast(Tensor, done)]
         for end in named:
             metrics[f"end/{end.name.lower()}"] = float((final == end).float().mean())
     return metrics

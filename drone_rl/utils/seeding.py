@@ -24,6 +24,9 @@ class Stream(enum.IntEnum):
     """Worlds of which figures are reported; nothing is ever chosen by them."""
     SEARCH = 5
     """Worlds in which a training looks for what its policy can't do yet."""
+    CRITIC_INIT = 6
+    MINIBATCHES = 7
+    """The order in which a learner goes through the steps of a batch."""
 
 
 def seed_sequence(seed: int, *key: int) -> np.random.SeedSequence:

@@ -147,6 +147,14 @@ class PolicyDescription:
         """
         return self._network(as_task(self.task).make_dynamics().actions, generator)
 
+    def build_critic(self, generator: torch.Generator | None = None) -> PolicyNetwork:
+        """A network like the described one, from a picture to one number.
+
+        Args:
+            generator: See `build_network`.
+        """
+        return self._layers(1, generator)
+
     def expected_weights(self) -> dict[str, torch.Tensor]:
         """Names, shapes and types of the network's weights, without the weights themselves."""
         actions = as_task(self.task).make_dynamics().actions
@@ -154,11 +162,13 @@ class PolicyDescription:
             return dict(self._network(actions).state_dict())
 
     def _network(self, actions: Actions, generator: torch.Generator | None = None) -> PolicyNetwork:
-        network: PolicyNetwork = NETWORKS[self.network.name].make(
-            self.picture.shape, len(actions.names), generator=generator, **self.network.values
-        )
+        network = self._layers(len(actions.names), generator)
         network.actions = actions
         return network
+
+    def _layers(self, outputs: int, generator: torch.Generator | None) -> PolicyNetwork:
+        make = NETWORKS[self.network.name].make
+        return make(self.picture.shape, outputs, generator=generator, **self.network.values)
 
 
 def parse(data: Any) -> PolicyDescription:

@@ -1,6 +1,5 @@
 """Whole episodes in order, and the contract of TorchRL's collectors."""
 
-import copy
 import itertools
 
 import pytest
@@ -315,36 +314,3 @@ def test_postproc_is_given_each_batch():
     for batch in collector:
         expected = RewardToGo(0.5)(batch.exclude("return_to_go"))["return_to_go"]
         assert torch.equal(batch["return_to_go"], expected)
-
-
-def test_hooks_of_torchrls_collectors_are_there():
-    collector = scripted()
-    assert collector.pre_collect_hook is None and collector.post_collect_hook is None
-
-
-def test_seed_is_that_of_the_worlds(seeing):
-    first = seeing.collect()["next", "info", "cubes"]
-    assert seeing.set_seed(0, static_seed=True) == 0
-    assert torch.equal(seeing.collect()["next", "info", "cubes"], first)
-    assert seeing.set_seed(7) != 7  # a seed for the next collector
-
-
-def test_weights_of_another_actor_its_state_or_a_tensordict():
-    layer = torch.nn.Linear(1, 1)
-    actor = TensorDictModule(layer, in_keys=["frame"], out_keys=["action"])
-    collector = EpisodeCollector(Scripted(), actor, keep=())
-    before = layer.weight.detach().clone()
-    collector.update_policy_weights_()
-    assert torch.equal(layer.weight, before)
-    for value, kind in enumerate((lambda a: a, lambda a: a.state_dict(), TensorDict.from_module)):
-        other = copy.deepcopy(actor)
-        torch.nn.init.constant_(other.module.weight, value)
-        collector.update_policy_weights_(kind(other))
-        assert float(layer.weight.detach()) == value
-        assert layer.weight is collector.actor.module.weight  # in place, nothing is rebound
-
-
-def test_shutdown_may_leave_the_worlds_open(seeing):
-    seeing.collect()
-    seeing.shutdown(close_env=False)
-    assert not seeing.env.is_closed

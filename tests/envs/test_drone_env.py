@@ -1,7 +1,9 @@
+import copy
 import functools
 
 import pytest
 import torch
+from tensordict import TensorDict
 from torchrl.envs import Compose, ParallelEnv, RewardSum, SerialEnv, TransformedEnv
 from torchrl.envs.utils import check_env_specs
 
@@ -147,6 +149,25 @@ def test_state_round_trip_repeats_the_next_episodes():
     assert torch.equal(other.reset()["info", "cube_positions"], expected)
     with pytest.raises(InputError, match="num_envs=2"):
         DroneEnv(3, pixels=False).load_state_dict(saved)
+
+
+def test_running_state_goes_on_within_episodes():
+    env = DroneEnv(2, SHORT, seed=0)
+    state = env.reset()
+    state["action"] = torch.tensor([1, 2])
+    env.step(state)
+    saved = copy.deepcopy(env.running_state())
+    other = DroneEnv(2, SHORT, seed=99)
+    other.reset()
+    other.load_running_state(saved)
+    assert torch.equal(other.last_pixels, env.last_pixels)
+    for action in ([0, 0], [1, 0]):
+        told = TensorDict({"action": torch.tensor(action)}, [2])
+        one, two = (e.step(told.clone())["next"] for e in (env, other))
+        assert all(torch.equal(one[k], two[k]) for k in ("pixels", "reward", "done"))
+    assert torch.equal(*(e.reset()["info", "cube_positions"] for e in (env, other)))
+    with pytest.raises(InputError, match="num_envs=2"):
+        DroneEnv(3, SHORT, pixels=False).load_running_state(saved)
 
 
 @pytest.mark.parametrize("num_envs", [0, -1, 2.0])

@@ -13,7 +13,8 @@ from drone_rl.envs.three_state import ThreeStateEnv
 from drone_rl.objectives import BatchNormalised, RewardToGo, TimeBaseline, TotalReward
 from drone_rl.utils.errors import InputError
 
-NAMES = [n for n in objectives.__all__ if n not in ("ReinforceLoss", "ReturnEstimator")]
+OTHERS = ("Advantages", "ReinforceLoss", "ReturnEstimator")
+NAMES = [n for n in objectives.__all__ if n not in OTHERS]
 
 
 def rows(rewards, ends):

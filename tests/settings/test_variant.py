@@ -27,7 +27,7 @@ def test_a_variant_makes_what_it_stands_for():
 def test_the_variants_of_a_part():
     assert set(Network.variants()) == {SmallCnn, OriginalCnn, Mlp}
     assert "_Discounted" not in {variant.__name__ for variant in Returns.variants()}
-    assert len(Returns.variants()) == 8
+    assert len(Returns.variants()) == 9
     assert SmallCnn().name == "small_cnn"
 
 

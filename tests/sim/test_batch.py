@@ -49,3 +49,12 @@ def test_parts_follow_one_another_and_the_last_may_be_smaller(batch):
 def test_everything_goes_to_the_device(batch):
     moved = batch.to("meta")
     assert moved.y.is_meta and moved.inner.x.is_meta and not batch.y.is_meta
+
+
+def test_as_plain_tensors_and_back(batch):
+    told = batch.tensors()
+    assert told["inner"]["x"] is batch.inner.x and set(told) == {"inner", "y"}
+    again = Outer(Inner(torch.zeros(4, 2)), torch.zeros(4).long()).with_tensors(told)
+    assert torch.equal(again.inner.x, batch.inner.x) and torch.equal(again.y, batch.y)
+    again.inner.x.zero_()
+    assert batch.inner.x.sum() == 28  # it has tensors of its own

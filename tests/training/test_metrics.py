@@ -75,6 +75,16 @@ def test_pieces_of_episodes_by_their_sums_so_far():
         episode_rewards(batch)
 
 
+def test_lengths_of_whole_episodes_where_they_are_counted():
+    """A batch of 4 frames, in which episodes of 7 and 2 steps end."""
+    batch = make_batch([[0.0, 1.0], [0.0, 1.0]])
+    batch["next", "episode_reward"] = torch.tensor([1.0, 2.0, 0.0, 1.0])[:, None]
+    batch["next", "step_count"] = torch.tensor([6, 7, 1, 2])[:, None]
+    assert batch_metrics(batch) == {"train/reward": 1.5, "train/length": 4.5}
+    batch["next", "done"][:] = False
+    assert all(value != value for value in batch_metrics(batch).values())  # NaN
+
+
 def test_no_episode_ends():
     batch = make_batch([[0.0, 1.0]])
     batch["next", "episode_reward"] = batch["next", "reward"]

@@ -1,5 +1,6 @@
 """A state that a training did not write is refused by name before anything of it is taken over."""
 
+import contextlib
 import copy
 
 import pytest
@@ -41,6 +42,21 @@ def test_what_fits(change):
 def test_what_does_not(change, message):
     with pytest.raises(InputError, match=message):
         check_fits({**OWN, **change}, OWN, "state")
+
+
+@pytest.mark.parametrize(
+    ("saved", "fits"),
+    [
+        ([1.0, float("nan")], True),
+        ([float("nan")] * 2, True),
+        ([1.0, 2.0], True),
+        ([1.0, float("inf")], False),
+    ],
+)
+def test_what_may_be_unknown_here_may_be_so_there(saved, fits):
+    own = {"lateral": torch.tensor([0.5, float("nan")])}
+    with contextlib.nullcontext() if fits else pytest.raises(InputError, match="infinity"):
+        check_fits({"lateral": torch.tensor(saved)}, own, "state")
 
 
 def stepped(kind=torch.optim.Adam, **settings):

@@ -43,6 +43,8 @@ def test_streams_have_the_numbers_on_which_all_figures_rest():
         "CHOICE": 3,
         "REPORT": 4,
         "SEARCH": 5,
+        "CRITIC_INIT": 6,
+        "MINIBATCHES": 7,
     }
     drawn = world_random_state(7, 2).uniform()
     child = np.random.SeedSequence(7, spawn_key=(Stream.WORLDS, 2))

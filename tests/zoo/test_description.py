@@ -48,6 +48,16 @@ def changed(where, value):
     return data
 
 
+def test_a_critic_is_the_described_network_with_one_output():
+    described = parse(DEFAULT)
+    critic = described.build_critic(torch.Generator().manual_seed(0))
+    wanted = dict(described.expected_weights())
+    shapes = {name: tuple(value.shape) for name, value in critic.state_dict().items()}
+    last = {"layers.logits.weight": (1, 128), "layers.logits.bias": (1,)}
+    assert shapes == {name: tuple(value.shape) for name, value in wanted.items()} | last
+    assert critic(torch.zeros(5, 1, 25, 64)).shape == (5, 1)
+
+
 def test_it_comes_back_as_it_was():
     assert parse(DEFAULT).as_dict() == DEFAULT
     assert parse(parse(DEFAULT).as_dict()) == parse(DEFAULT)

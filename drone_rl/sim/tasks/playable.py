@@ -2,7 +2,7 @@
 
 import enum
 from collections.abc import Mapping, Sequence
-from typing import Protocol, Self, TypeVar
+from typing import Any, Protocol, Self, TypeVar
 
 import numpy as np
 import torch
@@ -38,6 +38,14 @@ class State(Protocol):
 
     def to(self, device: torch.device | str) -> Self:
         """Returns the same on another device."""
+        ...
+
+    def tensors(self) -> dict[str, Any]:
+        """All that there is to know of them, by name, nested."""
+        ...
+
+    def with_tensors(self, tensors: Mapping[str, Any]) -> Self:
+        """Others that `tensors` told of."""
         ...
 
 

@@ -72,7 +72,7 @@ def check_batch(batch: TensorDictBase, learner: Learner) -> None:
         if key not in held:
             raise InputError(
                 f"a batch has no entry {key!r}, which {type(learner).__name__} learns from; use a "
-                "collector that keeps it"
+                "collector that keeps it, such as collector=rollouts"
             )
 
 

@@ -6,10 +6,10 @@ from typing import Any
 import torch
 from tensordict import TensorDictBase
 from torch import nn
-from torch.nn.utils import clip_grad_norm_
 
 from drone_rl.objectives import ReinforceLoss, ReturnEstimator
-from drone_rl.training.learners.learner import NotANumberError, check_finite
+from drone_rl.training.learners.gradient import accumulate, descend
+from drone_rl.training.learners.learner import NotANumberError
 from drone_rl.training.restore import check_fits, check_optimiser
 
 
@@ -68,37 +68,21 @@ class ReinforceLearner:
         """
         self.optimiser.zero_grad()
         try:
-            terms = self._accumulate(_known_steps(self.estimator(batch)))
+            terms = accumulate(
+                _known_steps(self.estimator(batch)),
+                self.loss,
+                self.minibatch_frames,
+                is_sum=self.loss.reduction == "sum",
+            )
+            norm = descend(self.optimiser, self.network.named_parameters(), self.max_grad_norm)
         except NotANumberError:
             self.optimiser.zero_grad()
             raise
-        bound = float("inf") if self.max_grad_norm is None else self.max_grad_norm
-        norm = clip_grad_norm_(self.network.parameters(), bound)
-        self.optimiser.step()
         if self.scheduler is not None:
             self.scheduler.step()
         rate = self.optimiser.param_groups[0]["lr"]
-        return {**terms, "loss/grad_norm": float(norm), "train/learning_rate": rate}
-
-    def _accumulate(self, batch: TensorDictBase) -> dict[str, float]:
-        """The gradient of a batch, chunk by chunk. Returns the terms of the loss."""
-        totals: dict[str, float] = {}
-        for chunk in batch.split(self.minibatch_frames):
-            share = len(chunk) / len(batch)
-            weight = 1.0 if self.loss.reduction == "sum" else share
-            losses = self.loss(chunk)
-            terms = {k: v for k, v in losses.items() if k.startswith("loss_")}
-            for name, value in terms.items():
-                check_finite(value, name)
-            total: Any = sum(terms.values())  # not the 0 that it begins with
-            (total * weight).backward()
-            for name, value in losses.items():
-                part = float(value.detach()) * (weight if name in terms else share)
-                totals[f"loss/{name}"] = totals.get(f"loss/{name}", 0.0) + part
-        for name, parameter in self.network.named_parameters():
-            if parameter.grad is not None:
-                check_finite(parameter.grad, f"the gradient of {name}")
-        return totals
+        told = {f"loss/{name}": value for name, value in {**terms, "grad_norm": norm}.items()}
+        return {**told, "train/learning_rate": rate}
 
     def state_dict(self) -> dict[str, Any]:
         """Weights, and what the estimator, optimiser and scheduler remember."""

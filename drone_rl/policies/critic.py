@@ -1,0 +1,79 @@
+# pyright: reportArgumentType=false
+# pyright: reportCallIssue=false
+# (TensorDict annotates the star of its sequences' arguments as a list.)
+"""A critic beside a policy network: what a state is worth, for whoever learns with one."""
+
+import torch
+from tensordict.nn import (
+    ProbabilisticTensorDictModule,
+    ProbabilisticTensorDictSequential,
+    TensorDictModule,
+)
+from torch import nn
+
+from drone_rl.policies.actor import SeededCategorical
+from drone_rl.policies.cnn import PolicyNetwork, orthogonal
+from drone_rl.utils.errors import InputError
+
+PIXELS, FEATURES = "pixels", "features"
+LOG_PROB = "action_log_prob"
+VALUE = "state_value"
+
+
+class ActorCritic(nn.Module):
+    """A policy network, taken apart at its last layer, and a critic.
+
+    The features are made once for all who read them. The policy's parameters are the network's own.
+    """
+
+    def __init__(
+        self,
+        network: PolicyNetwork,
+        own: PolicyNetwork | None = None,
+        generator: torch.Generator | None = None,
+    ) -> None:
+        """Puts a critic beside a policy.
+
+        Args:
+            network: The policy's.
+            own: The critic's, from pictures to one number; None makes one linear layer on the
+                features of the policy, whose trunk both then share.
+            generator: Source of that layer's initial weights.
+
+        Raises:
+            InputError: The policy's network is not made of layers.
+        """
+        super().__init__()
+        if not isinstance(network, PolicyNetwork):
+            raise InputError(
+                f"a critic needs a policy of layers, which {type(network).__name__} is not; derive "
+                "it from drone_rl.policies.PolicyNetwork"
+            )
+        *_, last = network.layers
+        self.trunk = TensorDictModule(network.layers[:-1], in_keys=[PIXELS], out_keys=[FEATURES])
+        """"pixels" to "features"."""
+        self.actor = ProbabilisticTensorDictSequential(
+            TensorDictModule(last, in_keys=[FEATURES], out_keys=["logits"]),
+            ProbabilisticTensorDictModule(
+                in_keys=["logits"],
+                out_keys=["action"],
+                distribution_class=SeededCategorical,
+                return_log_prob=True,
+                log_prob_key=LOG_PROB,
+            ),
+        )
+        """"features" to "logits" and the distribution of "action"."""
+        self.critic = TensorDictModule(
+            own or _one_number(last, generator),
+            in_keys=[FEATURES if own is None else PIXELS],
+            out_keys=[VALUE],
+        )
+        """"features" or "pixels" to "state_value"."""
+
+
+def _one_number(logits: nn.Module, generator: torch.Generator | None) -> nn.Linear:
+    """A layer that sees what the last one of a policy sees."""
+    weight = logits.get_parameter("weight")
+    layer = nn.Linear(weight.shape[1], 1)
+    orthogonal(generator)(layer, True)
+    return layer.to(weight.device)

@@ -1,0 +1,178 @@
+"""A policy and its critic: some passes over the steps of a rollout, by TorchRL's losses."""
+
+import copy
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import torch
+from tensordict import TensorDict, TensorDictBase
+from torch import Tensor, nn
+from torchrl.objectives import A2CLoss, ClipPPOLoss
+
+from drone_rl.collectors import take_rows
+from drone_rl.objectives import Advantages
+from drone_rl.policies import ActorCritic
+from drone_rl.policies.critic import LOG_PROB, PIXELS, VALUE
+from drone_rl.training.learners.gradient import accumulate, descend
+from drone_rl.training.learners.learner import NotANumberError
+from drone_rl.training.restore import check_fits, check_optimiser
+
+_TOLD = ("loss_objective", "loss_critic", "loss_entropy", "clip_fraction", "kl_approx")
+"""What is told of a loss, as far as it has it."""
+
+
+class ActorCriticLearner:
+    """Values, advantages, then passes over minibatches, each a step of the optimiser.
+
+    Values and log-probabilities are those of the policy and critic that an update begins with,
+    and are computed once. What follows a step is taken to be the next one of its row, unless the
+    row is cut there.
+    """
+
+    def __init__(
+        self,
+        *,
+        network: nn.Module,
+        model: ActorCritic,
+        estimator: Advantages,
+        loss: A2CLoss | ClipPPOLoss,
+        optimiser: torch.optim.Optimizer,
+        generator: torch.Generator,
+        scheduler: torch.optim.lr_scheduler.LRScheduler | None = None,
+        epochs: int = 1,
+        minibatch_frames: int | None = None,
+        max_grad_norm: float | None = None,
+        chunk_frames: int = 512,
+    ) -> None:
+        """Connects the parts.
+
+        Args:
+            network: The policy's.
+            model: The same, with its critic.
+            estimator: Makes advantages of values.
+            loss: Of the model's actor and critic; a mean over steps.
+            optimiser: Over the model's parameters.
+            generator: Shuffles the steps, on the CPU.
+            scheduler: Stepped after each update.
+            epochs: Passes over a batch.
+            minibatch_frames: About how many steps make one step of the optimiser; None for all.
+            max_grad_norm: Clip the gradient of each to this norm; None for no clipping.
+            chunk_frames: Steps in one forward and backward pass; changes nothing but memory.
+        """
+        self.network = network
+        self.model = model
+        self.estimator = estimator
+        self.loss = loss
+        self.optimiser = optimiser
+        self.generator = generator
+        self.scheduler = scheduler
+        self.epochs = epochs
+        self.minibatch_frames = minibatch_frames
+        self.max_grad_norm = max_grad_norm
+        self.chunk_frames = chunk_frames
+        following = (PIXELS, "reward", "done", "terminated")
+        self.in_keys = [PIXELS, "action", *(("next", key) for key in following)]
+
+    def update(self, batch: TensorDictBase) -> dict[str, float]:
+        """Learns from a rollout.
+
+        Args:
+            batch: Rows of steps, with what was seen after each. Shape: (num_envs, T).
+
+        Returns:
+            Means over the minibatches: the terms of the loss, how far the policy went from where it
+            began, the gradient's norm; and the entropy of the policy that collected, and the
+            learning rate of the next step.
+
+        Raises:
+            NotANumberError: A loss or gradient is NaN or infinite.
+        """
+        before = copy.deepcopy(self.state_dict())
+        try:
+            steps, entropy = self._estimated(batch)
+            told = list(self._descend(steps))
+        except NotANumberError:
+            self.load_state_dict(before)
+            self.optimiser.zero_grad()
+            raise
+        if self.scheduler is not None:
+            self.scheduler.step()
+        means = {f"loss/{name}": sum(t[name] for t in told) / len(told) for name in told[0]}
+        rate = self.optimiser.param_groups[0]["lr"]
+        return {**means, "loss/entropy": entropy, "train/learning_rate": rate}
+
+    @torch.no_grad()
+    def _estimated(self, batch: TensorDictBase) -> tuple[TensorDictBase, float]:
+        """The steps one after the other, with advantages, and the policy's mean entropy."""
+        steps = batch.select(PIXELS, "action").reshape(-1)
+        seen = self._look(steps.get(PIXELS))
+        chances = self.model.actor.get_dist(seen)
+        steps.set(LOG_PROB, chances.log_prob(steps.get("action")))
+        value = seen.get(VALUE).reshape(*batch.shape, 1)
+        after = batch.get("next").select("reward", "done", "terminated")
+        after.set(VALUE, self._after(batch, value))
+        estimated = self.estimator(TensorDict({VALUE: value, "next": after}, batch.shape))
+        for key in ("advantage", "value_target"):
+            steps.set(key, estimated.get(key).reshape(-1, 1))
+        return steps, float(chances.entropy().mean())
+
+    def _after(self, batch: TensorDictBase, value: Tensor) -> Tensor:
+        """What the state after each step is worth; anything after a terminal one. Shape: kept."""
+        after = torch.cat([value[..., 1:, :], value[..., -1:, :]], -2)
+        cut = batch.get(("next", "done")).clone()
+        cut[..., -1, :] = True
+        cut = (cut & ~batch.get(("next", "terminated")))[..., 0]
+        after[cut] = self._look(batch.get(("next", PIXELS))[cut]).get(VALUE)
+        return after
+
+    def _look(self, pixels: Tensor) -> TensorDictBase:
+        """Features and values of pictures, without these. Shape: (num_pictures,)."""
+        chunks = (TensorDict({PIXELS: c}, [len(c)]) for c in pixels.split(self.chunk_frames))
+        seen = [self.model.critic(self.model.trunk(chunk)).exclude(PIXELS) for chunk in chunks]
+        # it takes TensorDicts, too, which its annotation lacks
+        return torch.cat(seen)  # pyright: ignore[reportReturnType]
+
+    def _descend(self, steps: TensorDictBase) -> Iterator[dict[str, float]]:
+        """Takes the steps of the optimiser. Yields what is told of each."""
+        pieces = max(1, round(len(steps) / (self.minibatch_frames or len(steps))))
+        for _ in range(self.epochs):
+            order = torch.randperm(len(steps), generator=self.generator).to(steps.device)
+            for rows in order.chunk(pieces):
+                self.optimiser.zero_grad()
+                minibatch = take_rows(steps, rows)
+                terms = accumulate(minibatch, self._losses, self.chunk_frames)
+                norm = descend(self.optimiser, self.model.named_parameters(), self.max_grad_norm)
+                yield {**{k: terms[k] for k in _TOLD if k in terms}, "grad_norm": norm}
+
+    def _losses(self, chunk: TensorDictBase) -> TensorDictBase:
+        return self.loss(self.model.trunk(chunk))
+
+    def state_dict(self) -> dict[str, Any]:
+        """Weights of both, and what the optimiser, scheduler and shuffling remember."""
+        return {
+            "policy": self.network.state_dict(),
+            "critic": self.model.critic.state_dict(),
+            "optimiser": self.optimiser.state_dict(),
+            "scheduler": None if self.scheduler is None else self.scheduler.state_dict(),
+            "minibatches": self.generator.get_state(),
+        }
+
+    def check_state(self, state: Mapping[str, Any]) -> None:
+        """See `Learner.check_state`.
+
+        Raises:
+            InputError: It is not a state of such a learner.
+        """
+        own = self.state_dict()
+        for key in ("policy", "critic", "scheduler", "minibatches"):
+            check_fits(state[key], own[key], key)
+        check_optimiser(state["optimiser"], self.optimiser)
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Goes on from a state."""
+        self.network.load_state_dict(state["policy"])
+        self.model.critic.load_state_dict(state["critic"])
+        self.optimiser.load_state_dict(state["optimiser"])
+        if self.scheduler is not None:
+            self.scheduler.load_state_dict(state["scheduler"])
+        self.generator.set_state(state["minibatches"])

@@ -1,0 +1,72 @@
+"""From a batch to one step of an optimiser, in bounded memory."""
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import torch
+from tensordict import TensorDictBase
+from torch import nn
+from torch.nn.utils import clip_grad_norm_
+
+from drone_rl.training.learners.learner import check_finite
+
+
+def accumulate(
+    batch: TensorDictBase,
+    losses: Callable[[TensorDictBase], TensorDictBase],
+    chunk_frames: int,
+    *,
+    is_sum: bool = False,
+) -> dict[str, float]:
+    """Adds the gradient of a batch to the parameters, chunk by chunk.
+
+    Args:
+        batch: Steps. Shape: (num_steps,).
+        losses: Gives the terms of the loss, `loss_*`, and figures beside them.
+        chunk_frames: Steps in one forward and backward pass; changes nothing but memory.
+        is_sum: Whether the terms are sums over steps; means otherwise.
+
+    Returns:
+        The terms and figures of the whole batch, by name.
+
+    Raises:
+        NotANumberError: A term is NaN or infinite.
+    """
+    totals: dict[str, float] = {}
+    for chunk in batch.split(chunk_frames):
+        share = len(chunk) / len(batch)
+        weight = 1.0 if is_sum else share
+        told = losses(chunk)
+        terms = {k: v for k, v in told.items() if k.startswith("loss_")}
+        for name, value in terms.items():
+            check_finite(value, name)
+        total: Any = sum(terms.values())  # not the 0 that it begins with
+        (total * weight).backward()
+        for name, value in told.items():
+            part = float(value.detach()) * (weight if name in terms else share)
+            totals[name] = totals.get(name, 0.0) + part
+    return totals
+
+
+def descend(
+    optimiser: torch.optim.Optimizer,
+    parameters: Iterable[tuple[str, nn.Parameter]],
+    max_norm: float | None,
+) -> float:
+    """A step along the gradient, and its norm before it was clipped.
+
+    Args:
+        optimiser: Over the parameters.
+        parameters: By name.
+        max_norm: Clip to this norm; None for no clipping.
+
+    Raises:
+        NotANumberError: The gradient is NaN or infinite; no parameter was changed.
+    """
+    known = dict(parameters)
+    for name, parameter in known.items():
+        if parameter.grad is not None:
+            check_finite(parameter.grad, f"the gradient of {name}")
+    norm = clip_grad_norm_(known.values(), float("inf") if max_norm is None else max_norm)
+    optimiser.step()
+    return float(norm)

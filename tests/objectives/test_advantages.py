@@ -1,0 +1,56 @@
+"""Generalised advantages by hand: where an episode goes on, is cut, and ends."""
+
+import pytest
+import torch
+from tensordict import TensorDict
+
+from drone_rl.objectives import Advantages
+
+GAMMA, LMBDA = 0.5, 0.4
+
+
+def row(value, after, reward, done, terminated):
+    def column(values, dtype=torch.float32):
+        return torch.tensor(values, dtype=dtype)[None, :, None]
+
+    end = {"done": column(done, torch.bool), "terminated": column(terminated, torch.bool)}
+    following = {"state_value": column(after), "reward": column(reward), **end}
+    return TensorDict({"state_value": column(value), "next": following}, [1, len(value)])
+
+
+def test_where_a_row_goes_on_ends_and_is_cut():
+    """Steps 0 and 1 of an episode that ends, one of another that is cut, two of a third.
+
+    With d = r + 0.5 V(next) - V and weight 0.2 of the next advantage within an episode:
+    step 4, the end of the batch: 0 + 0.5 * 8 - 3 = 1
+    step 3: 1 + 0.5 * 3 - 2 = 0.5, and 0.2 * 1 = 0.7
+    step 2, cut by the time limit: 0 + 0.5 * 6 - 1 = 2; nothing of step 3
+    step 1, the end: 2 - 4 = -2; what follows is worth nothing, whatever the critic says
+    step 0: 0 + 0.5 * 4 - 1 = 1, and 0.2 * -2 = 0.6
+    """
+    batch = row(
+        value=[1.0, 4.0, 1.0, 2.0, 3.0],
+        after=[4.0, 100.0, 6.0, 3.0, 8.0],
+        reward=[0.0, 2.0, 0.0, 1.0, 0.0],
+        done=[0, 1, 1, 0, 0],
+        terminated=[0, 1, 0, 0, 0],
+    )
+    found = Advantages(GAMMA, LMBDA)(batch)
+    assert found["advantage"].flatten().tolist() == pytest.approx([0.6, -2.0, 2.0, 0.7, 1.0])
+    wanted = [1.6, 2.0, 3.0, 2.7, 4.0]  # advantage and value
+    assert found["value_target"].flatten().tolist() == pytest.approx(wanted)
+
+
+def test_rows_are_apart():
+    one = row([1.0, 2.0], [2.0, 3.0], [0.0, 1.0], [0, 0], [0, 0])
+    two = row([5.0, 4.0], [4.0, 0.0], [1.0, 0.0], [0, 1], [0, 1])
+    both = Advantages(GAMMA, LMBDA)(torch.cat([one, two]))["advantage"]
+    alone = [Advantages(GAMMA, LMBDA)(r)["advantage"] for r in (one, two)]
+    torch.testing.assert_close(both, torch.cat(alone))
+
+
+def test_scaled_advantages_are_standardised_over_the_batch():
+    batch = row([0.0, 0.0], [0.0, 0.0], [1.0, 3.0], [1, 1], [1, 1])
+    found = Advantages(GAMMA, LMBDA, scale=True)(batch)
+    assert found["advantage"].flatten().tolist() == pytest.approx([-(0.5**0.5), 0.5**0.5])
+    assert found["value_target"].flatten().tolist() == [1.0, 3.0]  # as they are
