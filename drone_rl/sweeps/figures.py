@@ -100,11 +100,11 @@ def _draw(layout: Layout, draw: Draw, height: float) -> tuple[bytes, bytes]:
 def _picture(
     layout: Layout, draws: Sequence[Draw], height: float, transparent: bool = False
 ) -> bytes:
-    """One block of panels below the other, two panels side by side."""
+    """One block of panels below the other, up to three panels side by side, else two."""
     panels = list(layout.panels.items())
-    columns = min(2, max(1, len(panels)))
+    columns = len(panels) if 0 < len(panels) <= 3 else min(2, len(panels) or 1)
     rows = max(1, -(-len(panels) // columns))
-    size = (5.2 * columns, height * rows * len(draws))
+    size = (min(5.2 * columns, 13.0), height * rows * len(draws))
     figure = Figure(figsize=size, layout="constrained")
     grid = figure.subplots(rows * len(draws), columns, squeeze=False, sharey="row")
     for draw, block in zip(draws, np.split(grid, len(draws)), strict=True):
@@ -112,6 +112,8 @@ def _picture(
             axes.spines[["top", "right"]].set_visible(False)
             axes.set_title(_literal(title), fontsize=10)
             draw(axes, layout, groups)
+        for axes in block[:, 1:].flat:
+            axes.set_ylabel("")  # that of the first column, which shares its axis
         for axes in block.flat[len(panels) :]:
             axes.set_visible(False)
     file = io.BytesIO()

@@ -1,5 +1,7 @@
 """What is drawn: lines, bands and dots, as matplotlib holds them."""
 
+import struct
+
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
@@ -68,3 +70,15 @@ def test_costs_are_seen_beside_a_panel_without_any(begin_sweep):
     figures._costs(first, layout, [none])
     figures._costs(second, layout, [solved])
     assert second.get_ylim() == (0, 1.2 * 2000)
+
+
+@pytest.mark.parametrize(
+    ("learners", "size"), [(2, (1144, 825)), (3, (1430, 825)), (4, (1144, 1650))]
+)
+def test_learners_are_shown_side_by_side(begin_sweep, make_verdict, learners, size):
+    """Up to three in a row, the three figures of each below one another, 110 pixels an inch."""
+    judged = {"verdict": make_verdict()}
+    runs = {f"objective={i} optimiser.lr={lr}": judged for i in range(learners) for lr in (1, 2)}
+    layout = figures.lay_out(make_groups(read_rows(begin_sweep(runs))))
+    assert list(layout.panels) == [f"objective={i}" for i in range(learners)]
+    assert struct.unpack(">II", figures.draw_outcome(layout)[16:24]) == size
