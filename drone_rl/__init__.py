@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from drone_rl.settings.provable import ProvableSettings
     from drone_rl.settings.proving import ProveSettings
     from drone_rl.settings.training import TrainerSettings, TrainSettings
-    from drone_rl.sim.settings import CameraSettings, TaskSettings
+    from drone_rl.sim.settings import CameraSettings, PillarsSettings, TaskSettings
     from drone_rl.utils.errors import InputError
 
 __version__ = "0.1.0"
@@ -53,7 +53,7 @@ _PLACES = {
     "settings.provable": ("ProvableSettings",),
     "settings.proving": ("ProveSettings",),
     "settings.training": ("TrainSettings", "TrainerSettings"),
-    "sim.settings": ("CameraSettings", "TaskSettings"),
+    "sim.settings": ("CameraSettings", "PillarsSettings", "TaskSettings"),
     "utils.errors": ("InputError",),
 }
 _HOMES = {name: f"drone_rl.{module}" for module, names in _PLACES.items() for name in names}
@@ -71,6 +71,7 @@ __all__ = [
     "InputError",
     "JudgeSettings",
     "Judgement",
+    "PillarsSettings",
     "Places",
     "PlacesSettings",
     "Policy",
