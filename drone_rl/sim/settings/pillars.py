@@ -33,7 +33,7 @@ class PillarsSettings(BaseTaskSettings):
     """Distance in x from one row to the next."""
     density: Annotated[float, Real(0.001, 10.0, unit="per m")] = 0.25
     """Pillars for each metre across a row."""
-    width: Length = 1.2
+    width: Length = 1.0
     """Edge of a pillar's square cross-section."""
     spread: Length = 8.0
     """Pillars stand uniformly with |y| at most this; who leaves that range is out of bounds."""

@@ -7,7 +7,7 @@ from drone_rl.utils.errors import InputError
 def test_what_follows_from_the_settings():
     settings = PillarsSettings()
     assert (settings.row_size, settings.num_pillars) == (4, 16)  # a quarter a metre, 16 m across
-    assert settings.touch_distance == 1.0
+    assert settings.touch_distance == 0.9
     assert (settings.last_distance, settings.finish) == (30.0, 34.0)
     assert settings.values()["name"] == "pillars"
     assert PillarsSettings(density=0.001).row_size == 1
@@ -30,10 +30,10 @@ def test_what_follows_from_the_settings():
 )  # fmt: skip
 def test_what_can_not_be_flown_is_refused(changes, said):
     with pytest.raises(InputError, match=said):
-        PillarsSettings(**changes)
+        PillarsSettings(**{"width": 1.2, **changes})
 
 
 def test_what_is_just_possible_is_not():
     PillarsSettings(step_limit=34)
-    PillarsSettings(spacing=4.01)
+    PillarsSettings(width=1.2, spacing=4.01)
     PillarsSettings(height=2.5)

@@ -11,7 +11,7 @@ from drone_rl.sim.tasks.pillars import rules
 @pytest.fixture
 def settings():
     """Two rows of two pillars, at x = 9 and 16; the line is at x = 20."""
-    return PillarsSettings(num_rows=2, density=0.125, collision_penalty=0.0)
+    return PillarsSettings(num_rows=2, density=0.125, width=1.2, collision_penalty=0.0)
 
 
 @pytest.fixture

@@ -4,7 +4,8 @@ import pytest
 from drone_rl.sim.settings import PillarsSettings
 from drone_rl.sim.tasks.pillars import field
 
-SETTINGS = PillarsSettings(spread=3.0, density=0.34)  # two pillars a row, seven lanes
+SETTINGS = PillarsSettings(spread=3.0, density=0.34, width=1.2)
+"""Two pillars a row, seven lanes; drone and pillars touch up to 1 m."""
 
 
 def test_lanes_are_a_step_apart_and_within_the_field():
@@ -22,7 +23,7 @@ def test_a_lane_is_open_where_no_pillar_of_the_row_is_touched():
 
 
 def test_fields_that_no_path_crosses_are_never_made():
-    dense = PillarsSettings(spread=3.0, density=1.2)  # seven pillars in six metres
+    dense = PillarsSettings(spread=3.0, density=1.2, width=1.2)  # seven pillars in six metres
     drawn = field.draw_rows(dense, np.random.RandomState(0), 500)
     closed = ~field.is_open(dense, drawn).any(-1)
     assert 50 < closed.sum() < 480  # many rows are closed as they come

@@ -10,7 +10,8 @@ from drone_rl.sim.tasks.pillars import field, rules
 from drone_rl.sim.tasks.pillars.planner import first_turn, fly_through
 from drone_rl.sim.tasks.pillars.rules import EndReason
 
-SETTINGS = PillarsSettings(num_rows=3, spread=4.0, density=0.4)  # three pillars a row, nine lanes
+SETTINGS = PillarsSettings(num_rows=3, spread=4.0, density=0.4, width=1.2)
+"""Three pillars a row, nine lanes; drone and pillars touch up to 1 m."""
 
 
 def fewest_turns(rows, y, next_row):

@@ -78,7 +78,7 @@ def test_what_is_flown_through_is_touched_however_long_the_move(settings):
 @given(st.tuples(*[st.floats(-4, 4)] * 4))
 @hypothesis_settings(max_examples=200, deadline=None)
 def test_a_way_meets_a_pillar_where_any_of_its_points_does(way):
-    settings = PillarsSettings()
+    settings = PillarsSettings(width=1.2)
     x, y, to_x, to_y = way
     pillar = torch.zeros(1, 1, 3).double()
     start, end = (torch.tensor([[*p, 2.5]]).double() for p in ((x, y), (to_x, to_y)))
