@@ -39,7 +39,7 @@ class WithCritic(Objective):
 
     learner: ClassVar[str] = "drone_rl.api.learning.actor_critic_learner"
     needs: ClassVar[Mapping[str, Variant]] = {"returns": Gae(), "collector": Rollouts()}
-    num_steps: Annotated[int, Whole(2)] = 32
+    num_steps: Annotated[int, Whole(2, 4096)] = 32
     """Steps of each world in a batch."""
     shares_trunk: bool = True
     """Whether the critic sees the features that the policy makes; else it has its own network."""
@@ -65,7 +65,7 @@ class A2c(WithCritic):
     """Advantage actor-critic: one step of the optimiser from each batch."""
 
     target: ClassVar[str] = "torchrl.objectives.A2CLoss"
-    num_steps: Annotated[int, Whole(2)] = 16
+    num_steps: Annotated[int, Whole(2, 4096)] = 16
     """Steps of each world in a batch."""
 
 

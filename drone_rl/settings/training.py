@@ -77,7 +77,7 @@ class TrainSettings(Settings):
             given = getattr(self, name)
             if given.is_known and not isinstance(given, type(part)):
                 raise InputError(
-                    f"{name} {type(given).__name__} does not go with objective={objective}; give "
+                    f"objective={objective} does not go with these settings of {name}; give "
                     f"{name}={part.name}"
                 )
         for name, kind in {"returns": Gae, "collector": Rollouts}.items():

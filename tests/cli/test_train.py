@@ -58,6 +58,39 @@ def test_killed_and_resumed_is_bit_for_bit_the_uninterrupted(tmp_path):
     assert len(rows[0]) == len(rows[1])
 
 
+@pytest.mark.parametrize("objective", ["a2c", "ppo"])
+def test_a_critic_is_chosen_stopped_and_gone_on_with(in_process, tmp_path, objective):
+    """What `resume` takes over, it takes over with all that the objective brought."""
+    told = ["train", *TINY, f"objective={objective}", "objective.num_steps=20", "returns.gamma=0.9"]
+    for name, frames in (("whole", 800), ("half", 400)):
+        run = [f"hydra.run.dir={name}", f"trainer.total_frames={frames}"]
+        assert in_process(*told, *run).returncode == 0
+    assert in_process("train", "resume=half", "trainer.total_frames=800").returncode == 0
+    one, two = (
+        load_checkpoint(tmp_path / name / "checkpoints" / "last.pt") for name in ("whole", "half")
+    )
+    assert one["config"]["collector"]["_target_"].endswith("rollout_collector")
+    assert one["progress"]["frames"] == two["progress"]["frames"] == 800
+    for key in ("policy", "critic"):
+        assert all(torch.equal(one[key][name], two[key][name]) for name in one[key])
+
+
+@pytest.mark.parametrize(
+    ("told", "remedy"),
+    [
+        (["objective=ppo", "collector=episodes"], "of collector; give collector=rollouts"),
+        (["objective=a2c", "collector=ray"], "of collector; give collector=rollouts"),
+        (["objective=ppo", "returns=leave_one_out"], "of returns; give returns=gae"),
+        (["returns=gae"], "lacks; give objective=ppo or a2c, or another returns"),
+        (["collector=rollouts"], "lacks; give objective=ppo or a2c, or another collector"),
+        (["objective=ppo", "objective.epochs=0"], "objective.epochs=0 is out of range"),
+        (["objective=a2c", "objective.epochs=2"], "epochs"),
+    ],
+)
+def test_parts_that_do_not_go_together(in_process, told, remedy):
+    assert remedy in error_line(in_process("train", *TINY, *told))
+
+
 @pytest.mark.parametrize(
     ("module", "extra", "args"),
     [

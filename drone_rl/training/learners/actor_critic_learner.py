@@ -112,7 +112,7 @@ class ActorCriticLearner:
         after = batch.get("next").select("reward", "done", "terminated")
         after.set(VALUE, self._after(batch, value))
         estimated = self.estimator(TensorDict({VALUE: value, "next": after}, batch.shape))
-        for key in ("advantage", "value_target"):
+        for key in (VALUE, "advantage", "value_target"):
             steps.set(key, estimated.get(key).reshape(-1, 1))
         return steps, float(chances.entropy().mean())
 

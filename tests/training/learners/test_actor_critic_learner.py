@@ -124,6 +124,15 @@ def test_a_ratio_beyond_the_bound_teaches_nothing_more(make_learner, batch, rati
     assert gradient(learner, steps).abs().max() > 1e-3
 
 
+def test_values_may_be_clipped_too(make_learner, batch):
+    """An option of TorchRL's loss, which compares with the values that an update begins with."""
+    terms = [
+        make_learner(loss={"clip_value": most}, epochs=4, lr=1.0).update(batch)["loss/loss_critic"]
+        for most in (None, 0.01)
+    ]
+    assert terms[0] != pytest.approx(terms[1])
+
+
 def passes(learner):
     """What the loss is given, in order."""
     seen, losses = [], learner._losses
