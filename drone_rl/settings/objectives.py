@@ -78,10 +78,10 @@ class Ppo(WithCritic):
     """How far the probability of an action may change, as a share, before it counts no more."""
     epochs: Annotated[int, Whole(1)] = 2
     """Passes over a batch."""
-    minibatch_frames: Annotated[int, Whole(1)] = 512
+    minibatch_size: Annotated[int, Whole(1)] = 512
     """About how many steps of a batch make one step of the optimiser."""
 
     @property
     def passes(self) -> dict[str, int]:
         """See `WithCritic`."""
-        return {"epochs": self.epochs, "minibatch_frames": self.minibatch_frames}
+        return {"epochs": self.epochs, "minibatch_size": self.minibatch_size}

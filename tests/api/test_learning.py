@@ -24,7 +24,7 @@ from drone_rl.utils.errors import InputError
 
 TASK = TaskSettings(num_cubes=2, first_distance=8.0, step_limit=40)
 TINY = TrainSettings(task=TASK, trainer=TrainerSettings(total_frames=300)).replace(
-    objective=Ppo(num_steps=12, minibatch_frames=30), collector=Rollouts(num_envs=5)
+    objective=Ppo(num_steps=12, minibatch_size=30), collector=Rollouts(num_envs=5)
 )
 STACKED = {"transforms": (Gray(), Stack(), EpisodeReward())}
 KINDS = {

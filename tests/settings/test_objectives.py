@@ -73,7 +73,7 @@ def test_a_setting_of_torchrls_loss_that_is_not_ours_is_passed_on(monkeypatch):
     told = from_config(TrainSettings, {**as_config(TrainSettings().replace(objective=Ppo()))})
     mine = from_config(TrainSettings, {**as_config(told), "objective": config}).objective
     assert mine.make() == {"functional": False, "clip_value": 0.3}
-    assert mine.passes == {"epochs": 5, "minibatch_frames": Ppo().minibatch_frames}
+    assert mine.passes == {"epochs": 5, "minibatch_size": Ppo().minibatch_size}
 
 
 @pytest.mark.parametrize(
@@ -81,7 +81,7 @@ def test_a_setting_of_torchrls_loss_that_is_not_ours_is_passed_on(monkeypatch):
     [
         ({"num_steps": 1}, "num_steps=1 is out of range; give a whole number from 2 to 4096"),
         ({"epochs": 0}, "epochs=0 is out of range; give a whole number of 1 or more"),
-        ({"minibatch_frames": 0}, "minibatch_frames=0 is out of range"),
+        ({"minibatch_size": 0}, "minibatch_size=0 is out of range"),
         ({"clip_epsilon": 0.0}, "clip_epsilon=0.0 is out of range; give a number above 0 up to 1"),
         ({"critic_coeff": 0.0}, "critic_coeff=0.0 is out of range; give a number above 0"),
         ({"entropy_coeff": -1.0}, "entropy_coeff=-1.0 is out of range"),

@@ -40,7 +40,7 @@ class ActorCriticLearner:
         generator: torch.Generator,
         scheduler: torch.optim.lr_scheduler.LRScheduler | None = None,
         epochs: int = 1,
-        minibatch_frames: int | None = None,
+        minibatch_size: int | None = None,
         max_grad_norm: float | None = None,
         chunk_frames: int = 512,
     ) -> None:
@@ -55,7 +55,7 @@ class ActorCriticLearner:
             generator: Shuffles the steps, on the CPU.
             scheduler: Stepped after each update.
             epochs: Passes over a batch.
-            minibatch_frames: About how many steps make one step of the optimiser; None for all.
+            minibatch_size: About how many steps make one step of the optimiser; None for all.
             max_grad_norm: Clip the gradient of each to this norm; None for no clipping.
             chunk_frames: Steps in one forward and backward pass; changes nothing but memory.
         """
@@ -67,7 +67,7 @@ class ActorCriticLearner:
         self.generator = generator
         self.scheduler = scheduler
         self.epochs = epochs
-        self.minibatch_frames = minibatch_frames
+        self.minibatch_size = minibatch_size
         self.max_grad_norm = max_grad_norm
         self.chunk_frames = chunk_frames
         following = (PIXELS, "reward", "done", "terminated")
@@ -134,7 +134,7 @@ class ActorCriticLearner:
 
     def _descend(self, steps: TensorDictBase) -> Iterator[dict[str, float]]:
         """Takes the steps of the optimiser. Yields what is told of each."""
-        pieces = max(1, round(len(steps) / (self.minibatch_frames or len(steps))))
+        pieces = max(1, round(len(steps) / (self.minibatch_size or len(steps))))
         for _ in range(self.epochs):
             order = torch.randperm(len(steps), generator=self.generator).to(steps.device)
             for rows in order.chunk(pieces):

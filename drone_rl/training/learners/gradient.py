@@ -6,7 +6,7 @@ from typing import Any
 import torch
 from tensordict import TensorDictBase
 from torch import nn
-from torch.nn.utils import clip_grad_norm_
+from torch.nn.utils import clip_grads_with_norm_, get_total_norm
 
 from drone_rl.training.learners.learner import check_finite
 
@@ -63,10 +63,13 @@ def descend(
     Raises:
         NotANumberError: The gradient is NaN or infinite; no parameter was changed.
     """
-    known = dict(parameters)
-    for name, parameter in known.items():
-        if parameter.grad is not None:
-            check_finite(parameter.grad, f"the gradient of {name}")
-    norm = clip_grad_norm_(known.values(), float("inf") if max_norm is None else max_norm)
+    known = {name: p for name, p in parameters if p.grad is not None}
+    gradients = {name: p.grad for name, p in known.items() if p.grad is not None}
+    norm = get_total_norm(gradients.values())
+    if not bool(torch.isfinite(norm)):  # or finite numbers whose squares are not
+        for name, gradient in gradients.items():
+            check_finite(gradient, f"the gradient of {name}")
+    if max_norm is not None:
+        clip_grads_with_norm_(known.values(), max_norm, norm)
     optimiser.step()
     return float(norm)

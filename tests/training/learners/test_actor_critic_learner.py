@@ -154,7 +154,7 @@ def test_one_step_of_all_for_a2c(make_learner, batch):
 
 
 def test_every_pass_goes_through_every_step_once_in_an_order_of_its_own(make_learner, batch):
-    learner = make_learner(epochs=3, minibatch_frames=2)
+    learner = make_learner(epochs=3, minibatch_size=2)
     seen = passes(learner)
     learner.update(batch)
     assert [len(minibatch) for minibatch in seen] == [2] * 9
@@ -166,7 +166,7 @@ def test_every_pass_goes_through_every_step_once_in_an_order_of_its_own(make_lea
 
 @pytest.mark.parametrize(("frames", "sizes"), [(4, [3, 3]), (5, [6]), (1, [1] * 6), (99, [6])])
 def test_minibatches_are_of_about_the_size_and_alike(make_learner, batch, frames, sizes):
-    learner = make_learner(minibatch_frames=frames)
+    learner = make_learner(minibatch_size=frames)
     seen = passes(learner)
     learner.update(batch)
     assert [len(minibatch) for minibatch in seen] == sizes
@@ -215,7 +215,7 @@ def test_it_learns_what_to_do_and_what_that_is_worth(make_learner, kind, own):
 
 def test_not_a_number_changes_nothing(make_learner, batch):
     """The third minibatch fails: the two steps before it are taken back."""
-    learner = make_learner(epochs=2, minibatch_frames=2)
+    learner = make_learner(epochs=2, minibatch_size=2)
     learner.update(batch)
     before = copy.deepcopy(learner.state_dict())
     losses, calls = learner._losses, []
@@ -248,7 +248,7 @@ def assert_same(one, two):
 
 
 def test_a_state_is_all_there_is(make_learner, batch):
-    first, second = (make_learner(epochs=2, minibatch_frames=2) for _ in range(2))
+    first, second = (make_learner(epochs=2, minibatch_size=2) for _ in range(2))
     first.update(batch)
     state = copy.deepcopy(first.state_dict())
     second.generator.manual_seed(99)
