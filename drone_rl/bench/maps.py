@@ -18,7 +18,7 @@ from drone_rl.policies import PolicyNetwork, SmallCNN
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.sim.tasks.collect_cubes import rules
 from drone_rl.sim.tasks.collect_cubes.rules import WorldState
-from drone_rl.zoo import load_exported, policy_names, policy_path
+from drone_rl.zoo import load_exported, parse, policy_names, policy_path
 
 NUM_METHODS = 5
 """Methods that an explanation tries; a candidate is judged as one of so many."""
@@ -97,10 +97,13 @@ def expert(scenes: Scenes, state: WorldState) -> Tensor:
 
 
 def shipped(pictures: Pictures) -> dict[str, PolicyNetwork]:
-    """The policies that travel with the package and fit the pictures."""
+    """The policies that travel with the package and were made for such pictures."""
     networks = {}
     for name in policy_names():
-        parameters = load_exported(policy_path(name))["policy"]
+        exported = load_exported(policy_path(name))
+        if parse(exported["description"]).picture.shape != tuple(pictures.absent.shape):
+            continue
+        parameters = exported["policy"]
         network = SmallCNN(pictures.absent.shape, 3, hidden=(128,))
         network.load_state_dict(parameters)
         networks[name] = network

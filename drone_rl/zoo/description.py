@@ -93,6 +93,11 @@ class PolicyDescription:
                 )
         return picture
 
+    @property
+    def frames(self) -> int:
+        """How many frames the network sees at once."""
+        return math.prod(c.values["N"] for c in self.transforms if c.name == "stack")
+
     def as_dict(self) -> dict[str, Any]:
         """As in files; `parse` undoes it."""
         return {

@@ -30,7 +30,7 @@ class SeeingPolicy(nn.Module):
 
     def __init__(self, description: PolicyDescription, network: PolicyNetwork) -> None:
         super().__init__()
-        if any(choice.name == "stack" for choice in description.transforms):
+        if description.frames > 1:
             raise InputError(
                 "the policy sees a stack of frames, but an ONNX model is given one at a time; "
                 "export it with format=safetensors"

@@ -179,3 +179,9 @@ describe(as_config(TrainSettings())).expected_weights()
 print("sympy" in sys.modules)"""
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "False\n"
+
+
+def test_frames_seen_at_once_are_those_of_all_stacks():
+    assert parse(DESCRIPTION).frames == 1
+    stacks = [{"name": "gray"}, {"name": "stack", "N": 2}, {"name": "stack", "N": 3}]
+    assert parse({**DESCRIPTION, "transforms": stacks}).frames == 6
