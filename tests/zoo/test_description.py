@@ -182,6 +182,6 @@ print("sympy" in sys.modules)"""
 
 
 def test_frames_seen_at_once_are_those_of_all_stacks():
-    assert parse(DESCRIPTION).frames == 1
+    assert parse(DEFAULT).frames == 1
     stacks = [{"name": "gray"}, {"name": "stack", "N": 2}, {"name": "stack", "N": 3}]
-    assert parse({**DESCRIPTION, "transforms": stacks}).frames == 6
+    assert parse({**DEFAULT, "transforms": stacks}).frames == 6
