@@ -115,7 +115,7 @@ def test_a_resumed_run_learns_as_it_did(trained):
     ("change", "message"),
     [
         ({"seed": -1}, "seed=-1 is out of range; give a whole number of 0 or more"),
-        ({"task": {"num_cubes": 1}}, r"task=\(dict\) is no TaskSettings"),
+        ({"task": {"num_cubes": 1}}, r"task=\(dict\) is no BaseTaskSettings"),
         ({"returns": 3}, "returns=3 is no Returns"),
         ({"transforms": (3,)}, r"transforms\[0\]=3 is no Transform"),
         ({"wind": 3}, "wind is unknown; there are: task, camera"),

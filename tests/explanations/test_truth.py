@@ -37,6 +37,6 @@ def test_heat_shares_by_hand():
     found = heat_shares(maps, REGIONS[:1], np.zeros(1))
     shares = {name: region["share"]["mean"] for name, region in found.items()}
     assert shares == pytest.approx(
-        {"next_cube": 0.6, "other_cube": 0, "horizon": 0, "ground": 0.1, "sky": 0.3}
+        {"next_target": 0.6, "other_target": 0, "horizon": 0, "ground": 0.1, "sky": 0.3}
     )
     assert found["sky"]["chance"]["mean"] == 0.5

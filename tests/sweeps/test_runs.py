@@ -26,7 +26,7 @@ def test_a_result_that_no_training_writes_is_none(tmp_path, content):
 
 def test_a_result_is_read_and_a_pipe_is_not_waited_for(tmp_path):
     (tmp_path / "result.json").write_text('{"reason": "solved", "num_cubes": 3}')
-    assert read_result(tmp_path) == {"reason": "solved", "num_cubes": 3}
+    assert read_result(tmp_path) == {"reason": "solved", "largest_reward": 3}  # its name of old
     (tmp_path / "result.json").unlink()
     os.mkfifo(tmp_path / "result.json")
     assert read_result(tmp_path) is None

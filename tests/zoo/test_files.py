@@ -187,6 +187,9 @@ def test_the_policies_travel_with_their_cards():
         ("poor", "poor"),
         ("right_and_forward", "one-sided (right)"),
         ("proved", "good"),
+        ("pillars_good", "good"),
+        ("pillars_reckless", "poor"),
+        ("pillars_timid", "poor"),
     ],
 )
 def test_each_is_what_its_name_says(name, kind):

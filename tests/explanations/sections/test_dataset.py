@@ -18,7 +18,7 @@ def test_counts_by_hand():
     flights = Frames(
         episode=np.array([0, 0, 0, 1, 2]),
         actions=np.array([0, 0, 0, 2, 0]),
-        rewards=np.array([0.0, 1.0, 1.0, 0.0, 0.0]),
+        event=np.array([0, 1, 1, 0, -1], np.int8),
     )
     numbers, arrays = section(SimpleNamespace(dataset=data, flights=flights))
     found = numbers["dataset"]
