@@ -6,7 +6,9 @@ What is listed here is imported when it is first used, so that `import drone_rl`
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from drone_rl.api.gymnasium import register
 from drone_rl.utils.garbage import collecting_no_garbage
+from drone_rl.utils.when_imported import when_imported
 
 if TYPE_CHECKING:
     from drone_rl.api.chances import Chances, chances
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
     from drone_rl.api.provable import train_until_proved
     from drone_rl.api.proving import Proof, load_proof, prove
     from drone_rl.api.training import Training, train
+    from drone_rl.envs.gymnasium.world import DroneWorld
+    from drone_rl.envs.gymnasium.worlds import DroneWorlds
     from drone_rl.explanations.settings import ExplainSettings
     from drone_rl.settings.chances import ChanceSettings
     from drone_rl.settings.checking import CheckSettings
@@ -43,6 +47,8 @@ _PLACES = {
     "api.provable": ("train_until_proved",),
     "api.proving": ("Proof", "load_proof", "prove"),
     "api.training": ("Training", "train"),
+    "envs.gymnasium.world": ("DroneWorld",),
+    "envs.gymnasium.worlds": ("DroneWorlds",),
     "explanations.settings": ("ExplainSettings",),
     "settings.chances": ("ChanceSettings",),
     "settings.checking": ("CheckSettings",),
@@ -62,6 +68,8 @@ __all__ = [
     "Chances",
     "Check",
     "CheckSettings",
+    "DroneWorld",
+    "DroneWorlds",
     "EvaluateSettings",
     "Evaluation",
     "ExplainSettings",
@@ -92,6 +100,8 @@ __all__ = [
     "train",
     "train_until_proved",
 ]
+
+when_imported("gymnasium", register)
 
 
 def __getattr__(name: str) -> Any:
