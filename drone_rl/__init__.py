@@ -23,7 +23,10 @@ if TYPE_CHECKING:
     from drone_rl.api.training import Training, train
     from drone_rl.envs.gymnasium.world import DroneWorld
     from drone_rl.envs.gymnasium.worlds import DroneWorlds
+    from drone_rl.envs.sb3.worlds import Sb3Worlds
     from drone_rl.explanations.settings import ExplainSettings
+    from drone_rl.policies.sb3.logits import Sb3Logits
+    from drone_rl.policies.sb3.trunk import Sb3Trunk
     from drone_rl.settings.chances import ChanceSettings
     from drone_rl.settings.checking import CheckSettings
     from drone_rl.settings.judging import EvaluateSettings, JudgeSettings
@@ -49,7 +52,10 @@ _PLACES = {
     "api.training": ("Training", "train"),
     "envs.gymnasium.world": ("DroneWorld",),
     "envs.gymnasium.worlds": ("DroneWorlds",),
+    "envs.sb3.worlds": ("Sb3Worlds",),
     "explanations.settings": ("ExplainSettings",),
+    "policies.sb3.logits": ("Sb3Logits",),
+    "policies.sb3.trunk": ("Sb3Trunk",),
     "settings.chances": ("ChanceSettings",),
     "settings.checking": ("CheckSettings",),
     "settings.judging": ("EvaluateSettings", "JudgeSettings"),
@@ -83,6 +89,9 @@ __all__ = [
     "Proof",
     "ProvableSettings",
     "ProveSettings",
+    "Sb3Logits",
+    "Sb3Trunk",
+    "Sb3Worlds",
     "TaskSettings",
     "TrainSettings",
     "TrainerSettings",

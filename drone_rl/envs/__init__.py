@@ -1,15 +1,17 @@
 """The worlds as TorchRL environments, and the pixel pipeline behind them."""
 
 from drone_rl.envs.drone_env import DroneEnv, worlds_of
-from drone_rl.envs.pipeline import with_transforms
-from drone_rl.envs.transforms import CropRows, GrayPixels, Resize, StandardizePixels
+from drone_rl.envs.pipeline import on_pixels, with_transforms
+from drone_rl.envs.transforms import CropRows, GrayPixels, Resize, RgbPixels, StandardizePixels
 
 __all__ = [
     "CropRows",
     "DroneEnv",
     "GrayPixels",
     "Resize",
+    "RgbPixels",
     "StandardizePixels",
+    "on_pixels",
     "with_transforms",
     "worlds_of",
 ]
