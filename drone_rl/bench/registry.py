@@ -6,6 +6,7 @@ from drone_rl.bench.benchmark import Benchmark
 from drone_rl.bench.coverage import bench_coverage
 from drone_rl.bench.exact_coverage import bench_exact_coverage
 from drone_rl.bench.explain import bench_explain
+from drone_rl.bench.gymnasium import bench_gymnasium
 from drone_rl.bench.hostile import bench_hostile
 from drone_rl.bench.maps import bench_maps
 from drone_rl.bench.memory import bench_memory
@@ -134,9 +135,15 @@ BENCHMARKS: dict[str, Benchmark] = {
         "room",
         (*_TRAINING, "verdicts", "api", "settings", "hydra_app", "cli", "conf", "bench/startup"),
     ),
+    "gymnasium": Benchmark(
+        lambda s: bench_gymnasium(s.worlds, s.device, s.quick),
+        "guests",
+        (*_DRAWING, "bench/gymnasium"),
+    ),
 }  # fmt: skip
 GROUPS = tuple(dict.fromkeys(benchmark.group for benchmark in BENCHMARKS.values()))
-"""Names of several at once: the main job, whether what is said is true, proofs, many trainings."""
+"""Names of several at once: the main job, whether what is said is true, proofs, many trainings,
+what works with programs of others."""
 
 
 def find_benchmarks(words: Iterable[str]) -> list[str]:
