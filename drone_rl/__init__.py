@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from drone_rl.api.checking import Check, check
     from drone_rl.api.environment import make_env
     from drone_rl.api.explaining import Explanations, explain
+    from drone_rl.api.foreign import ForeignPolicy, policy_from
     from drone_rl.api.judging import Evaluation, Judgement, evaluate, judge
     from drone_rl.api.mapping import Places, places
     from drone_rl.api.policy import Policy, load_policy
@@ -44,6 +45,7 @@ _PLACES = {
     "api.checking": ("Check", "check"),
     "api.environment": ("make_env",),
     "api.explaining": ("Explanations", "explain"),
+    "api.foreign": ("ForeignPolicy", "policy_from"),
     "api.judging": ("Evaluation", "Judgement", "evaluate", "judge"),
     "api.mapping": ("Places", "places"),
     "api.policy": ("Policy", "load_policy"),
@@ -80,6 +82,7 @@ __all__ = [
     "Evaluation",
     "ExplainSettings",
     "Explanations",
+    "ForeignPolicy",
     "InputError",
     "JudgeSettings",
     "Judgement",
@@ -105,6 +108,7 @@ __all__ = [
     "load_proof",
     "make_env",
     "places",
+    "policy_from",
     "prove",
     "train",
     "train_until_proved",
