@@ -6,7 +6,9 @@ What is listed here is imported when it is first used, so that `import drone_rl`
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from drone_rl.api.gymnasium import register
 from drone_rl.utils.garbage import collecting_no_garbage
+from drone_rl.utils.when_imported import when_imported
 
 if TYPE_CHECKING:
     from drone_rl.api.chances import Chances, chances
@@ -14,13 +16,19 @@ if TYPE_CHECKING:
     from drone_rl.api.environment import make_env
     from drone_rl.api.explaining import Explanations, explain
     from drone_rl.api.exporting import export_onnx
+    from drone_rl.api.foreign import ForeignPolicy, policy_from
     from drone_rl.api.judging import Evaluation, Judgement, evaluate, judge
     from drone_rl.api.mapping import Places, places
     from drone_rl.api.policy import Policy, load_policy
     from drone_rl.api.provable import train_until_proved
     from drone_rl.api.proving import Proof, load_proof, prove
     from drone_rl.api.training import Training, train
+    from drone_rl.envs.gymnasium.world import DroneWorld
+    from drone_rl.envs.gymnasium.worlds import DroneWorlds
+    from drone_rl.envs.sb3.worlds import Sb3Worlds
     from drone_rl.explanations.settings import ExplainSettings
+    from drone_rl.policies.sb3.logits import Sb3Logits
+    from drone_rl.policies.sb3.trunk import Sb3Trunk
     from drone_rl.settings.chances import ChanceSettings
     from drone_rl.settings.checking import CheckSettings
     from drone_rl.settings.judging import EvaluateSettings, JudgeSettings
@@ -39,13 +47,19 @@ _PLACES = {
     "api.environment": ("make_env",),
     "api.explaining": ("Explanations", "explain"),
     "api.exporting": ("export_onnx",),
+    "api.foreign": ("ForeignPolicy", "policy_from"),
     "api.judging": ("Evaluation", "Judgement", "evaluate", "judge"),
     "api.mapping": ("Places", "places"),
     "api.policy": ("Policy", "load_policy"),
     "api.provable": ("train_until_proved",),
     "api.proving": ("Proof", "load_proof", "prove"),
     "api.training": ("Training", "train"),
+    "envs.gymnasium.world": ("DroneWorld",),
+    "envs.gymnasium.worlds": ("DroneWorlds",),
+    "envs.sb3.worlds": ("Sb3Worlds",),
     "explanations.settings": ("ExplainSettings",),
+    "policies.sb3.logits": ("Sb3Logits",),
+    "policies.sb3.trunk": ("Sb3Trunk",),
     "settings.chances": ("ChanceSettings",),
     "settings.checking": ("CheckSettings",),
     "settings.judging": ("EvaluateSettings", "JudgeSettings"),
@@ -64,10 +78,13 @@ __all__ = [
     "Chances",
     "Check",
     "CheckSettings",
+    "DroneWorld",
+    "DroneWorlds",
     "EvaluateSettings",
     "Evaluation",
     "ExplainSettings",
     "Explanations",
+    "ForeignPolicy",
     "InputError",
     "JudgeSettings",
     "Judgement",
@@ -78,6 +95,9 @@ __all__ = [
     "Proof",
     "ProvableSettings",
     "ProveSettings",
+    "Sb3Logits",
+    "Sb3Trunk",
+    "Sb3Worlds",
     "TaskSettings",
     "TrainSettings",
     "TrainerSettings",
@@ -92,10 +112,13 @@ __all__ = [
     "load_proof",
     "make_env",
     "places",
+    "policy_from",
     "prove",
     "train",
     "train_until_proved",
 ]
+
+when_imported("gymnasium", register)
 
 
 def __getattr__(name: str) -> Any:

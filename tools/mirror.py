@@ -6,6 +6,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PURE_DATA = {
     "bench/evidence": "evidence made by hand; bench/test_sentences reads every entry",
     "report/palette": "colours; report/test_indicator and test_pictures find them in pictures",
+    "settings/gymnasium": "values with bounds; envs/gymnasium/test_stage gives each",
     "sim/meaning": "names; sim/test_worlds finds each on its things",
     **{
         f"settings/{name}": "values with bounds; hydra_app/test_schemas reads and builds each"

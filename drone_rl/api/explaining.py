@@ -7,7 +7,8 @@ from typing import Any
 
 import torch
 
-from drone_rl.api.policy import Policy, load_policy
+from drone_rl.api.foreign import Logits, as_pilot
+from drone_rl.api.pilot import Pilot
 from drone_rl.api.progress import Bar, Progress
 from drone_rl.api.quoting import find_claim
 from drone_rl.api.showing import page
@@ -43,8 +44,12 @@ class Explanations:
         return page(self.report.read_text(encoding="utf-8"))
 
 
+Given = str | Path | Pilot | Logits
+"""A policy, or what it is made of, see `as_pilot`."""
+
+
 def explain(
-    policies: str | Path | Policy | Sequence[str | Path | Policy],
+    policies: Given | Sequence[Given],
     settings: ExplainSettings | None = None,
     *,
     folder: str | Path = "outputs/explain/notebook",
@@ -55,7 +60,8 @@ def explain(
     """Shows what policies see, and whether to trust them.
 
     Args:
-        policies: One or several: policies, or what `load_policy` takes.
+        policies: One or several: policies, what `load_policy` takes, or callables, see
+            `policy_from`.
         settings: What to compute.
         folder: Where explanations and report go.
         num_envs: Worlds in one batch; bounds memory.
@@ -86,32 +92,24 @@ def explain(
     return Explanations(folder, report, numbers)
 
 
-def _named(policies: str | Path | Policy | Sequence[str | Path | Policy]) -> dict[str, Policy]:
+def _named(policies: Given | Sequence[Given]) -> dict[str, Pilot]:
     """The policies by their names or, where some share one, by their files."""
-    several = [policies] if isinstance(policies, str | Path | Policy) else list(policies)
-    loaded = [p if isinstance(p, Policy) else load_policy(p) for p in several]
+    if isinstance(policies, str) or not isinstance(policies, Sequence):
+        policies = [policies]
+    loaded = [as_pilot(policy) for policy in policies]
     names = [policy.name for policy in loaded]
     if len(set(names)) < len(names):
-        names = [str(policy.path) for policy in loaded]
+        names = [policy.origin["policy"] for policy in loaded]
     if not names or len(set(names)) < len(names):
         raise InputError(f"policy={names} must name one or more policies, each once")
     return dict(zip(names, loaded, strict=True))
 
 
 def _explain(
-    policy: Policy, settings: ExplainSettings, folder: Path, num_envs: int, progress: Progress
+    policy: Pilot, settings: ExplainSettings, folder: Path, num_envs: int, progress: Progress
 ) -> dict[str, Any]:
     env = policy.make_env(num_envs, seed=settings.seed)
-    origin = {
-        "policy": str(policy.path),
-        "trained": {
-            "description": policy.state["description"],
-            "progress": policy.state["progress"],
-            "provenance": policy.state["provenance"],
-            "command": policy.state.get("command"),
-        },
-        **provenance(),
-    }
+    origin = {**policy.origin, **provenance()}
     try:
         return explain_policy(
             env,

@@ -10,7 +10,8 @@ from typing import Any
 from tensordict.nn import TensorDictModuleBase
 from torchrl.envs import EnvBase
 
-from drone_rl.api.policy import Policy, load_policy
+from drone_rl.api.foreign import Logits, as_pilot
+from drone_rl.api.pilot import Pilot
 from drone_rl.api.progress import Bar, Progress
 from drone_rl.api.quoting import find_claim
 from drone_rl.api.showing import paragraph, table
@@ -32,7 +33,7 @@ from drone_rl.verdicts.rule import Rule
 class Evaluation:
     """How good a policy is, and luck and the oracle beside it, in the same worlds."""
 
-    policy: Policy
+    policy: Pilot
     settings: EvaluateSettings
     flown: dict[str, dict[str, Any]]
     """Figures of all that was flown, by name, see `drone_rl.evaluation.summarise`: "greedy",
@@ -63,12 +64,13 @@ class Evaluation:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values, as in `evaluation.json`."""
+        origin = self.policy.origin
         return {
-            "policy": str(self.policy.path),
+            "policy": origin["policy"],
             "seed": self.settings.seed,
             **self.flown,
             **provenance(),
-            "trained": self.policy.state["progress"],
+            "trained": origin["trained"] and origin["trained"]["progress"],
         }
 
     def __str__(self) -> str:
@@ -122,7 +124,7 @@ class Judgement:
 
 
 def evaluate(
-    policy: str | Path | Policy,
+    policy: str | Path | Pilot | Logits,
     settings: EvaluateSettings | None = None,
     *,
     progress: Progress | None = None,
@@ -131,7 +133,7 @@ def evaluate(
     """Flies a policy, greedily and with drawn actions, and the baselines, in unseen worlds.
 
     Args:
-        policy: The policy, or what `load_policy` takes.
+        policy: The policy, what `load_policy` takes, or a callable, see `policy_from`.
         settings: How.
         progress: Told of what is being flown; a bar by default.
         changes: Settings to change, as in `evaluate("good", episodes=200)`.
@@ -141,7 +143,7 @@ def evaluate(
     """
     settings = (settings or EvaluateSettings()).replace(**changes)
     progress = progress or Bar()
-    policy = policy if isinstance(policy, Policy) else load_policy(policy)
+    policy = as_pilot(policy)
     episodes, steps = settings.episodes, 3 if settings.baselines else 2
     with _flying(policy, settings) as (env, actor):
         worlds = env.base_env.state_dict()
@@ -159,7 +161,7 @@ def evaluate(
 
 
 def judge(
-    policy: str | Path | Policy,
+    policy: str | Path | Pilot | Logits,
     settings: JudgeSettings | None = None,
     *,
     task: Mapping[str, Any] | None = None,
@@ -171,8 +173,8 @@ def judge(
     """Good, poor, one-sided or none of these, and whether that is certain.
 
     Args:
-        policy: The policy, what `load_policy` takes, or a baseline: "random", "forward", "left",
-            "right" or "oracle".
+        policy: The policy, what `load_policy` takes, a callable, see `policy_from`, or a baseline:
+            "random", "forward", "left", "right" or "oracle".
         settings: How it is judged.
         task: What to change of the policy's task or, for a baseline, of the default one.
         certificate: A proof's file to quote; by default the one that lies with the policy, see
@@ -187,28 +189,28 @@ def judge(
     settings = (settings or JudgeSettings()).replace(**changes)
     progress = progress or Bar()
     progress("policy, luck and oracle", 0, 1)
-    name = policy.name if isinstance(policy, Policy) else str(policy)
-    is_baseline, claim = policy in BASELINES, None
-    if is_baseline and certificate is not None:
+    pilot = None if policy in BASELINES else as_pilot(policy, outputs)
+    name = str(policy) if pilot is None or isinstance(policy, str | Path) else pilot.name
+    claim = None
+    if pilot is None and certificate is not None:
         raise InputError(
             f"certificate={certificate}, but policy={name} has no network; give certificate= with "
             "the policy that was proved"
         )
-    if is_baseline:
+    if pilot is None:
         changed = Changes(TaskSettings).read(task or {}, "task")
         worlds = _baseline(name, TaskSettings(**changed), settings)
     else:
-        loaded = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
-        loaded = loaded.in_task(**(task or {}))
+        pilot = pilot.in_task(**(task or {}))
         claim = find_claim(
-            loaded,
+            pilot,
             certificate,
             flights=settings.certificate_flights,
             seed=settings.seed,
             device=settings.device,
         )
-        worlds = _flying(loaded, settings)
-    draws, rule = settings.sampled and not is_baseline, Rule(good_share=settings.good_share)
+        worlds = _flying(pilot, settings)
+    draws, rule = settings.sampled and pilot is not None, Rule(good_share=settings.good_share)
     with worlds as (env, actor):
         verdict = judge_policy(env, actor, settings.episodes, rule=rule, sampled=draws, claim=claim)
     progress("judged", 1, 1)
@@ -216,7 +218,7 @@ def judge(
 
 
 def _flying(
-    policy: Policy, settings: FlightSettings
+    policy: Pilot, settings: FlightSettings
 ) -> AbstractContextManager[tuple[Any, TensorDictModuleBase]]:
     """Unseen worlds and the policy in them."""
     return policy.flying(settings.num_worlds, seed=settings.seed, device=settings.device)

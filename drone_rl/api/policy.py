@@ -1,27 +1,25 @@
 """A trained policy, wherever it comes from, and the worlds to fly it in."""
 
-import contextlib
 import dataclasses
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import torch
-from tensordict.nn import TensorDictModuleBase
 from torchrl.envs import TransformedEnv
 
+from drone_rl.api.pilot import Pilot
 from drone_rl.api.showing import table
-from drone_rl.policies import PolicyNetwork, make_actor
+from drone_rl.policies import PolicyNetwork
 from drone_rl.settings.changes import Changes
 from drone_rl.sim.settings import BaseTaskSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import newest
-from drone_rl.utils.seeding import Stream, torch_generator
+from drone_rl.utils.seeding import Stream
 from drone_rl.zoo import PolicyDescription, parse, policy_names, policy_path, read_policy
 
 
 @dataclasses.dataclass(frozen=True)
-class Policy:
+class Policy(Pilot):
     """A trained policy: what it flies in, what it sees, its network, and where it comes from."""
 
     name: str
@@ -38,15 +36,15 @@ class Policy:
         """What it flies in."""
         return self.description.task
 
+    @property
+    def origin(self) -> dict[str, Any]:
+        """See `Pilot`; of the training "description", "progress", "provenance" and "command"."""
+        told = ("description", "progress", "provenance")
+        trained = {**{key: self.state[key] for key in told}, "command": self.state.get("command")}
+        return {"policy": str(self.path), "trained": trained}
+
     def in_task(self, **changes: Any) -> "Policy":
-        """The same policy in a changed task, such as `policy.in_task(num_cubes=5)`.
-
-        Args:
-            changes: Settings of the task; None keeps its own.
-
-        Raises:
-            InputError: A setting is unknown or out of range; the message begins with "task.".
-        """
+        """See `Pilot`."""
         changed = Changes(type(self.task)).read(changes, "task")
         described = self.description.as_dict()
         described["task"] |= changed
@@ -61,15 +59,7 @@ class Policy:
         device: str = "cpu",
         **kwargs: Any,
     ) -> TransformedEnv:
-        """Worlds like those that it was trained in, seen as it sees them.
-
-        Args:
-            num_envs: How many.
-            seed: Root of their random streams.
-            stream: Which worlds: by default those to report on, which training never sees.
-            device: Where they are drawn.
-            kwargs: See `drone_rl.envs.DroneEnv`.
-        """
+        """See `Pilot`."""
         return self.description.build_env(
             num_envs, seed=seed, stream=stream, device=device, **kwargs
         )
@@ -79,43 +69,6 @@ class Policy:
         network = self.description.build_network(torch.Generator().manual_seed(0))
         network.load_state_dict(self.state["policy"])
         return network.to(device)
-
-    def make_actor(
-        self, env: TransformedEnv, *, seed: int = 0, stream: Stream = Stream.REPORT
-    ) -> TensorDictModuleBase:
-        """It as a TorchRL actor, which draws its actions from a stream of its own.
-
-        Args:
-            env: From `make_env`.
-            seed: Of the stream.
-            stream: Which.
-        """
-        device = str(env.device or "cpu")
-        generator = torch_generator(seed, stream, device=device)
-        return make_actor(self.make_network(device), env.action_spec, generator)
-
-    @contextlib.contextmanager
-    def flying(
-        self,
-        num_envs: int,
-        *,
-        seed: int = 0,
-        stream: Stream = Stream.REPORT,
-        device: str = "cpu",
-    ) -> Iterator[tuple[TransformedEnv, TensorDictModuleBase]]:
-        """Worlds and it as their actor, for a while; then the worlds are closed.
-
-        Args:
-            num_envs: How many.
-            seed: Root of their random streams and of its own.
-            stream: Which worlds.
-            device: Where they are drawn.
-        """
-        env = self.make_env(num_envs, seed=seed, stream=stream, device=device)
-        try:
-            yield env, self.make_actor(env, seed=seed, stream=stream)
-        finally:
-            env.close()
 
     def _repr_html_(self) -> str:
         """Shows itself in a notebook."""
@@ -141,6 +94,12 @@ def load_policy(which: str | Path, *, outputs: str | Path = "outputs") -> Policy
     Raises:
         InputError: There is none, or it is unusable.
     """
+    if not isinstance(which, str | Path):
+        name = getattr(which, "name", type(which).__name__)
+        raise InputError(
+            f"policy={name} is in no file of drone-rl's, and a network from elsewhere can only be "
+            "judged, evaluated and explained; give a policy that drone-rl trained"
+        )
     path = find_policy(which, outputs)
     state = read_policy(path)
     is_run = path.suffix == ".pt" and len(path.parents) > 1

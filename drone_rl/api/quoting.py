@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from drone_rl.api.pilot import Pilot
 from drone_rl.api.policy import Policy
 from drone_rl.checks import check_certificate, read_tried
 from drone_rl.utils.errors import InputError
@@ -10,7 +11,7 @@ from drone_rl.zoo import certificate_path
 
 
 def find_claim(
-    policy: Policy,
+    policy: Pilot,
     given: str | Path | None = None,
     *,
     flights: int = 0,
@@ -28,13 +29,20 @@ def find_claim(
         device: Where they are flown.
 
     Returns:
-        None if none is given and none lies there. One that lies there and can't be believed is
-        returned as refused.
+        None if none is given and none lies there, as for a policy in no file. One that lies there
+        and can't be believed is returned as refused.
 
     Raises:
         InputError: The one that is given can't be read, is of another network or task, contradicts
             itself, or is refuted by a flight.
     """
+    if not isinstance(policy, Policy):
+        if given is not None:
+            raise InputError(
+                f"certificate={given}, but policy={policy.name} was made elsewhere, and nothing is "
+                "proved of it; leave the certificate out"
+            )
+        return None
     path = certificate_path(policy.path) if given is None else _file(Path(given))
     if given is None and not path.is_file():
         return None

@@ -169,6 +169,7 @@ EXPLANATION: Plain = {
     },
     "attribution": {
         "layer": "relu2",
+        "shown": "grad_cam",
         "film": {"heat_by": ["grad_cam", "grad_cam_logit", None, "grad_cam"]},
     },
     "truth": {
@@ -210,6 +211,7 @@ EXPLANATION: Plain = {
         "close": 0.0003,
         "in_doubt": 0.0002,
     },
+    "left_out": {"embedding": "It has no layers."},
     "asymmetry": {
         "dataset": {"signed": _mean(-0.2, -0.3, -0.1), "absolute": _mean(0.3, 0.2, 0.4)},
         "grid": {"absolute": 0.25},

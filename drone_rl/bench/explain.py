@@ -35,6 +35,7 @@ def bench_explain(folder: Path, quick: bool) -> dict[str, Any]:
 def _parts(many: int) -> dict[str, Any]:
     env, actor, network = default_pipeline(256)
     layer = feature_layer(network)
+    assert layer is not None  # the default's network has several
     features = record(env, actor, network, many, layers=(layer,)).features[layer]
     results = {}
     for count in (600, many):

@@ -13,10 +13,10 @@ from drone_rl.explanations import placebos
 from drone_rl.explanations.planted import reach
 from drone_rl.explanations.randomised import shuffled_networks
 from drone_rl.explanations.trust import MapOf
-from drone_rl.policies import PolicyNetwork
+from drone_rl.policies import PictureNetwork
 
 
-def liars(absent: Tensor, other: PolicyNetwork) -> dict[str, MapOf]:
+def liars(absent: Tensor, other: PictureNetwork) -> dict[str, MapOf]:
     """Liars by name.
 
     Args:
@@ -73,7 +73,7 @@ def liars(absent: Tensor, other: PolicyNetwork) -> dict[str, MapOf]:
     }  # fmt: skip
 
 
-def fingerprint(network: PolicyNetwork) -> int:
+def fingerprint(network: PictureNetwork) -> int:
     """A number that any change of a weight changes."""
     digest = hashlib.sha256()
     for value in network.state_dict().values():
@@ -81,7 +81,7 @@ def fingerprint(network: PolicyNetwork) -> int:
     return int.from_bytes(digest.digest()[:4], "little")
 
 
-def saliency(network: PolicyNetwork, observations: Tensor, actions: Tensor) -> Tensor:
+def saliency(network: PictureNetwork, observations: Tensor, actions: Tensor) -> Tensor:
     """Size of the derivative of the action's logit by each pixel. Shape: (T, h, w)."""
     x = observations.detach().clone().requires_grad_()
     chosen = network(x).gather(1, actions[:, None]).sum()
@@ -111,7 +111,7 @@ def _coarse(seed: int, height: int, width: int) -> Tensor:
     return functional.interpolate(_noise(seed, 1, 5, 8)[:, None], (height, width))[:, 0]
 
 
-def _if_strong(network: PolicyNetwork, x: Tensor, guess: Tensor, absent: Tensor) -> Tensor:
+def _if_strong(network: PictureNetwork, x: Tensor, guess: Tensor, absent: Tensor) -> Tensor:
     """A guess that drowns in noise where the policy hardly minds the pictures."""
     with torch.no_grad():
         spread = (network(x).softmax(-1) - network(absent[None]).softmax(-1)).abs().mean()

@@ -14,7 +14,7 @@ from drone_rl.explanations.hooks import probabilities
 from drone_rl.explanations.planted import Planted, plant, reach
 from drone_rl.explanations.scenes import Scenes
 from drone_rl.explanations.trust import Pictures, Trial, check_maps, draw_pictures
-from drone_rl.policies import PolicyNetwork, SmallCNN
+from drone_rl.policies import PictureNetwork, SmallCNN
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.sim.tasks.collect_cubes import rules
 from drone_rl.sim.tasks.collect_cubes.rules import WorldState
@@ -67,7 +67,7 @@ def trusts(pictures: Pictures, planted: Planted) -> list[str]:
     return checks["methods"]["true"]["failed"]
 
 
-def believed(pictures: Pictures, network: PolicyNetwork) -> tuple[list[str], int]:
+def believed(pictures: Pictures, network: PictureNetwork) -> tuple[list[str], int]:
     """Names of the liars that are trusted on a policy, and how many there were."""
     trial = _trial(pictures, network)
     other = SmallCNN(network.in_shape, 3, generator=torch.Generator().manual_seed(99))
@@ -96,7 +96,7 @@ def expert(scenes: Scenes, state: WorldState) -> Tensor:
     return scenes.needed(scenes.task.next_offset(state))
 
 
-def shipped(pictures: Pictures) -> dict[str, PolicyNetwork]:
+def shipped(pictures: Pictures) -> dict[str, PictureNetwork]:
     """The policies that travel with the package and were made for such pictures."""
     networks = {}
     for name in policy_names():
@@ -110,7 +110,7 @@ def shipped(pictures: Pictures) -> dict[str, PolicyNetwork]:
     return networks
 
 
-def untrained(pictures: Pictures, count: int = 4) -> dict[str, PolicyNetwork]:
+def untrained(pictures: Pictures, count: int = 4) -> dict[str, PictureNetwork]:
     """Policies of random weights, with opinions."""
     networks = {}
     for seed in range(count):
@@ -122,6 +122,6 @@ def untrained(pictures: Pictures, count: int = 4) -> dict[str, PolicyNetwork]:
     return networks
 
 
-def _trial(pictures: Pictures, network: PolicyNetwork) -> Trial:
+def _trial(pictures: Pictures, network: PictureNetwork) -> Trial:
     greedy = probabilities(network, pictures.observations).argmax(-1)
     return pictures.trial(network, greedy)

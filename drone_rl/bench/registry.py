@@ -6,6 +6,7 @@ from drone_rl.bench.benchmark import Benchmark
 from drone_rl.bench.coverage import bench_coverage
 from drone_rl.bench.exact_coverage import bench_exact_coverage
 from drone_rl.bench.explain import bench_explain
+from drone_rl.bench.gymnasium import bench_gymnasium
 from drone_rl.bench.hostile import bench_hostile
 from drone_rl.bench.maps import bench_maps
 from drone_rl.bench.memory import bench_memory
@@ -144,6 +145,11 @@ BENCHMARKS: dict[str, Benchmark] = {
         lambda s: bench_onnx(s.runs / "onnx", s.quick),
         "guests",
         (*_DRAWING, "policies", "zoo", "evaluation", "api/exporting", "bench/onnx_export"),
+    ),
+    "gymnasium": Benchmark(
+        lambda s: bench_gymnasium(s.worlds, s.device, s.quick),
+        "guests",
+        (*_DRAWING, "bench/gymnasium"),
     ),
 }  # fmt: skip
 GROUPS = tuple(dict.fromkeys(benchmark.group for benchmark in BENCHMARKS.values()))

@@ -2,13 +2,14 @@
 
 from drone_rl.envs.drone_env import DroneEnv, worlds_of
 from drone_rl.envs.pipeline import on_pixels, with_transforms
-from drone_rl.envs.transforms import CropRows, GrayPixels, Resize, StandardizePixels
+from drone_rl.envs.transforms import CropRows, GrayPixels, Resize, RgbPixels, StandardizePixels
 
 __all__ = [
     "CropRows",
     "DroneEnv",
     "GrayPixels",
     "Resize",
+    "RgbPixels",
     "StandardizePixels",
     "on_pixels",
     "with_transforms",

@@ -28,8 +28,7 @@ class DroneEnv(EnvBase):
     """`num_envs` drones, each in a world of its own, stepped and drawn as one batch.
 
     Observation "pixels": uint8, shape (num_envs, height, width, 3). Action: one of
-    the dynamics'. The nested "info" holds the truth, as the task tells it (`Task.entries`), and the
-    drone's pose: "drone" (metres) and "attitude" (quaternion w, x, y, z), world frame.
+    the dynamics'. The nested "info" holds the truth, see `Worlds.entries`.
 
     Only what is asked for is computed: a reset draws only the worlds that are reset, and worlds
     outside a step's "_step" mask (TorchRL's partial steps) are neither moved nor drawn; their rows
@@ -141,9 +140,8 @@ class DroneEnv(EnvBase):
 
     def _make_specs(self) -> None:
         n = self.batch_size[0]
-        entries = {name: _spec(entry, n) for name, entry in self.worlds.task.entries.items()}
-        pose = {"drone": Unbounded((n, 3)), "attitude": Unbounded((n, 4))}
-        info = Composite({**entries, **pose}, shape=(n,))
+        entries = {name: _spec(entry, n) for name, entry in self.worlds.entries.items()}
+        info = Composite(entries, shape=(n,))
         observed = {"pixels": self._pixel_spec(), "info": info} if self.pixels else {"info": info}
         self.observation_spec = Composite(observed, shape=(n,)).to(self.device)
         self.action_spec = _action_spec(self.worlds.dynamics.actions.entry, n).to(self.device)
@@ -196,10 +194,7 @@ class DroneEnv(EnvBase):
 
     def _observe(self, entries: dict[str, Tensor]) -> TensorDict:
         pixels = {"pixels": self._pixels} if self.pixels else {}
-        state = self.worlds.state
-        pose = {"drone": state.body.position.float(), "attitude": state.body.attitude.float()}
-        truth = {**self.worlds.task.info(state), **pose}
-        info = TensorDict(truth, self.batch_size, device=self.device)
+        info = TensorDict(self.worlds.info(), self.batch_size, device=self.device)
         return TensorDict({**pixels, "info": info, **entries}, self.batch_size, device=self.device)
 
     def _indices(self, mask: Tensor | None) -> Tensor:

@@ -51,13 +51,21 @@ class GrayPixels(_PixelTransform):
     """
 
     def _apply_transform(self, obs: Tensor) -> Tensor:
-        if obs.dtype != torch.uint8 or obs.shape[-1] != 3:
-            raise InputError(
-                f"GrayPixels got {obs.dtype} frames of shape {tuple(obs.shape)}; "
-                "give uint8 of shape (..., height, width, 3)"
-            )
+        _check_bytes(self, obs)
         weights = torch.tensor(LUMA, device=obs.device) / 255.0
         return (obs.float() @ weights).unsqueeze(-3)
+
+
+class RgbPixels(_PixelTransform):
+    """RGB bytes (*, H, W, 3) to floats (*, 3, H, W), float32 in [0, 1].
+
+    Raises:
+        InputError: The frames are not RGB bytes with the colour last.
+    """
+
+    def _apply_transform(self, obs: Tensor) -> Tensor:
+        _check_bytes(self, obs)
+        return obs.movedim(-1, -3).float() / 255.0
 
 
 class CropRows(_PixelTransform):
@@ -147,3 +155,11 @@ class StandardizePixels(_PixelTransform):
 
     def __repr__(self) -> str:
         return f"StandardizePixels(mean={self.mean:g}, std={self.std:g})"
+
+
+def _check_bytes(transform: _PixelTransform, obs: Tensor) -> None:
+    if obs.dtype != torch.uint8 or obs.shape[-1] != 3:
+        raise InputError(
+            f"{type(transform).__name__} got {obs.dtype} frames of shape {tuple(obs.shape)}; "
+            "give uint8 of shape (..., height, width, 3)"
+        )

@@ -9,12 +9,12 @@ from torch import Tensor
 from drone_rl.explanations.hooks import probabilities
 from drone_rl.explanations.intervals import mean_interval
 from drone_rl.explanations.response import ResponseMap
-from drone_rl.policies import PolicyNetwork
+from drone_rl.policies import PictureNetwork
 from drone_rl.sim.actions import Actions
 
 
 def asymmetry(
-    network: PolicyNetwork, observations: Tensor, episode: NDArray, actions: Actions
+    network: PictureNetwork, observations: Tensor, episode: NDArray, actions: Actions
 ) -> dict[str, Any]:
     """pi(left | x) against pi(right | mirrored x), over a data set.
 

@@ -11,7 +11,7 @@ from torch.nn import functional
 
 from drone_rl.explanations.hooks import find_layer, probabilities, spatial_layers
 from drone_rl.explanations.patches import replaced
-from drone_rl.policies import PolicyNetwork
+from drone_rl.policies import PictureNetwork
 from drone_rl.utils.errors import InputError
 
 Objective = Literal["probability", "logit"]
@@ -43,7 +43,7 @@ def grad_cam(activations: Tensor, gradients: Tensor) -> Tensor:
 class Explainer:
     """Heat maps of one policy by several methods, all of the size of its pictures."""
 
-    network: PolicyNetwork
+    network: PictureNetwork
     absent: Tensor
     """What stands for "nothing there": the scene without cubes. Shape: (C, H, W)."""
     layer: str | None = None
@@ -55,7 +55,7 @@ class Explainer:
         Raises:
             InputError: It isn't one with a feature map.
         """
-        spatial = spatial_layers(self.network)
+        spatial = spatial_layers(self.network) if self.network.is_differentiable else []
         if self.layer is None:
             self.layer = spatial[-1] if spatial else None
             return
@@ -70,8 +70,9 @@ class Explainer:
         if self.layer is not None:
             maps["grad_cam"] = lambda x, a: self.grad_cam(x, a, "probability")
             maps["grad_cam_logit"] = lambda x, a: self.grad_cam(x, a, "logit")
-        maps["saliency"] = self.saliency
-        maps["integrated_gradients"] = self.integrated_gradients
+        if self.network.is_differentiable:
+            maps["saliency"] = self.saliency
+            maps["integrated_gradients"] = self.integrated_gradients
         maps["occlusion"] = self.occlusion
         return maps
 

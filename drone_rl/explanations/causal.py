@@ -16,7 +16,7 @@ from torch import Tensor
 from drone_rl.explanations.hooks import actions_of, probabilities
 from drone_rl.explanations.intervals import episode_means
 from drone_rl.explanations.patches import Grid, replaced
-from drone_rl.policies import PolicyNetwork
+from drone_rl.policies import PictureNetwork
 from drone_rl.utils.intervals import mean_bounds
 
 UNMOVED = 1e-4
@@ -28,7 +28,7 @@ _EQUAL = 1e-6
 
 
 def patch_effects(
-    network: PolicyNetwork, observations: Tensor, others: Iterable[Tensor], grid: Grid
+    network: PictureNetwork, observations: Tensor, others: Iterable[Tensor], grid: Grid
 ) -> NDArray:
     """How far each patch moves the policy when it alone becomes what it might have been.
 

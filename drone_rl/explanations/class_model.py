@@ -9,7 +9,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from drone_rl.explanations.hooks import actions_of
-from drone_rl.policies import PolicyNetwork
+from drone_rl.policies import PictureNetwork
 from drone_rl.utils.errors import InputError
 
 AS_PROBABLE = 0.01
@@ -163,7 +163,7 @@ def best_start(probabilities: Tensor, roughness: Tensor) -> int:
 
 
 def visualise(
-    network: PolicyNetwork,
+    network: PictureNetwork,
     statistics: PictureStatistics,
     settings: ClassModelSettings,
     *,
@@ -198,7 +198,7 @@ def visualise(
 
 
 def search(
-    network: PolicyNetwork,
+    network: PictureNetwork,
     statistics: PictureStatistics,
     objective: Literal["probability", "logit"] = "logit",
     *,
@@ -224,7 +224,7 @@ def search(
 
 
 def _objective(
-    network: PolicyNetwork, pictures: Tensor, action: Tensor, settings: ClassModelSettings
+    network: PictureNetwork, pictures: Tensor, action: Tensor, settings: ClassModelSettings
 ) -> Tensor:
     """What each picture should have more of. Shape: (N,)."""
     logits = network(pictures)
@@ -236,7 +236,7 @@ def _objective(
 
 
 def _ascend_pixels(
-    network: PolicyNetwork,
+    network: PictureNetwork,
     pictures: Tensor,
     action: Tensor,
     statistics: PictureStatistics,
@@ -255,7 +255,7 @@ def _ascend_pixels(
 
 
 def _ascend_fourier(
-    network: PolicyNetwork,
+    network: PictureNetwork,
     pictures: Tensor,
     action: Tensor,
     statistics: PictureStatistics,

@@ -18,9 +18,13 @@ from drone_rl.explanations.recording import draw, fly, spread
 from drone_rl.explanations.response import ResponseMap, response_map
 from drone_rl.explanations.scenes import Scenes, empty_scene
 from drone_rl.explanations.settings import ExplainSettings
-from drone_rl.policies import PolicyNetwork, make_actor
+from drone_rl.policies import PictureNetwork, make_actor
 from drone_rl.utils.seeding import Stream, torch_generator
 from drone_rl.verdicts.proof import Claim
+
+
+class LeftOutError(Exception):
+    """A section can't be made of this policy; the message says in sentences why, and the remedy."""
 
 
 class Context:
@@ -29,7 +33,7 @@ class Context:
     def __init__(
         self,
         env: TransformedEnv,
-        network: PolicyNetwork,
+        network: PictureNetwork,
         settings: ExplainSettings,
         claim: Claim | None = None,
     ) -> None:
@@ -47,10 +51,12 @@ class Context:
         self.env, self.network, self.settings, self.claim = env, network, settings, claim
         self.scenes = Scenes(env)
         self.layer = settings.layer or feature_layer(network)
+        """Whose features are embedded; None of a policy of which no layers are known."""
         self.absent = self.scenes.observe(empty_scene(self.scenes))[0]
         """The scene without a cube, as the policy gets it. Shape: (C, h, w)."""
         self.explainer = Explainer(network, self.absent, settings.grad_cam_layer)
-        features(network, self.absent[None], self.layer)  # refuses an unknown layer now
+        if self.layer is not None:
+            features(network, self.absent[None], self.layer)  # refuses an unknown layer now
         self._start = env.base_env.state_dict()
 
     def restart(self) -> TensorDictModuleBase:
@@ -74,7 +80,8 @@ class Context:
     def dataset(self) -> RolloutDataset:
         """The frames that are analysed, spread over all flights."""
         rows = spread(self.flights.episode, self.settings.frames)
-        return draw(self.flights, rows, self.scenes, self.network, (self.layer,))
+        layers = () if self.layer is None else (self.layer,)
+        return draw(self.flights, rows, self.scenes, self.network, layers)
 
     @property
     def device(self) -> str:

@@ -13,7 +13,7 @@ from torch import Tensor
 
 from drone_rl.explanations.hooks import actions_of, probabilities
 from drone_rl.explanations.intervals import episode_means
-from drone_rl.policies import PolicyNetwork
+from drone_rl.policies import PictureNetwork
 from drone_rl.utils.intervals import mean_bounds
 
 SHARES = (0.0, 0.01, 0.02, 0.03, 0.05, 0.075, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0)
@@ -21,7 +21,7 @@ SHARES = (0.0, 0.01, 0.02, 0.03, 0.05, 0.075, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 0.8
 
 
 def deletion_insertion(
-    network: PolicyNetwork,
+    network: PictureNetwork,
     observations: Tensor,
     actions: Tensor,
     maps: Tensor,

@@ -4,12 +4,12 @@ import torch
 
 from drone_rl.explanations.hooks import probabilities
 from drone_rl.explanations.scenes import Scenes
-from drone_rl.policies import PolicyNetwork
+from drone_rl.policies import PictureNetwork
 from drone_rl.sim.tasks import State
 
 
 @torch.no_grad()
-def fly_on(scenes: Scenes, network: PolicyNetwork, state: State) -> State:
+def fly_on(scenes: Scenes, network: PictureNetwork, state: State) -> State:
     """Flies until it is settled which targets are reached.
 
     That is when the flight ends, when no target is left, or when a policy that remembers nothing

@@ -10,7 +10,7 @@ from torch import Tensor
 from drone_rl.explanations.alternatives import DARK_GROUND
 from drone_rl.explanations.hooks import probabilities
 from drone_rl.explanations.scenes import Region, Scenes
-from drone_rl.policies import PolicyNetwork
+from drone_rl.policies import PictureNetwork
 from drone_rl.sim.meaning import Meaning
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.tasks import State
@@ -35,7 +35,7 @@ class Intervention:
 
 
 def intervene(
-    scenes: Scenes, network: PolicyNetwork, state: State, regions: Tensor, seed: int = 0
+    scenes: Scenes, network: PictureNetwork, state: State, regions: Tensor, seed: int = 0
 ) -> list[Intervention]:
     """Takes the next cube away, moves it, recolours it; changes a patch of ground.
 
@@ -68,7 +68,7 @@ def intervene(
 
 
 def _effect(
-    network: PolicyNetwork, scenes: Scenes, base: Tensor, frames: Tensor, area: Tensor
+    network: PictureNetwork, scenes: Scenes, base: Tensor, frames: Tensor, area: Tensor
 ) -> NDArray:
     after = probabilities(network, scenes.transform(frames))
     change = scenes.actions.distance(after, base)

@@ -17,7 +17,7 @@ from drone_rl.explanations.causal import spread
 from drone_rl.explanations.hooks import probabilities
 from drone_rl.explanations.intervals import episode_means
 from drone_rl.explanations.scenes import Scenes
-from drone_rl.policies import PolicyNetwork
+from drone_rl.policies import PictureNetwork
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.tasks import State
 from drone_rl.utils.intervals import mean_bounds
@@ -44,7 +44,7 @@ class Flights:
 
 
 def outcomes(
-    scenes: Scenes, network: PolicyNetwork, state: State, episode: NDArray
+    scenes: Scenes, network: PictureNetwork, state: State, episode: NDArray
 ) -> dict[str, Any]:
     """What becomes of flights when the next cube stands elsewhere, and of the ground repainted.
 
@@ -93,7 +93,7 @@ def outcomes(
 @torch.no_grad()
 def fly(
     scenes: Scenes,
-    network: PolicyNetwork,
+    network: PictureNetwork,
     state: State,
     target: Tensor,
     appearance: Appearance | None = None,

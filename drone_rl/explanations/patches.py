@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from drone_rl.explanations.hooks import BATCH, actions_of
-from drone_rl.policies import PolicyNetwork
+from drone_rl.policies import PictureNetwork
 
 PATCHES = 40
 """About so many in a picture."""
@@ -79,7 +79,7 @@ def make_grid(height: int, width: int, patches: int = PATCHES) -> Grid:
 
 @torch.no_grad()
 def replaced(
-    network: PolicyNetwork, observations: Tensor, other: Tensor, masks: Tensor
+    network: PictureNetwork, observations: Tensor, other: Tensor, masks: Tensor
 ) -> Iterator[tuple[Tensor, Tensor, Tensor]]:
     """Asks the policy about pictures of which one part was replaced, for all parts that differ.
 

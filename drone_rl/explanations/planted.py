@@ -19,7 +19,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from drone_rl.policies import MLP, PolicyNetwork, SmallCNN
+from drone_rl.policies import MLP, PictureNetwork, PolicyNetwork, SmallCNN
 from drone_rl.sim.actions import MOVES
 
 Window = tuple[float, float, float, float]
@@ -50,7 +50,7 @@ class Planted:
     """Whether no picture moves it, so that no map of it is true."""
 
 
-def reach(network: PolicyNetwork, observations: Tensor, actions: Tensor) -> Tensor:
+def reach(network: PictureNetwork, observations: Tensor, actions: Tensor) -> Tensor:
     """How strongly each pixel can reach the choice of an action: a map made of weights alone.
 
     The sum over all paths from the pixel to the logits of the product of the weights' sizes; what
@@ -66,7 +66,7 @@ def reach(network: PolicyNetwork, observations: Tensor, actions: Tensor) -> Tens
     """
     del actions
     sized = copy.deepcopy(network)
-    layers = [layer for layer in sized.layers if isinstance(layer, nn.Conv2d | nn.Linear)]
+    layers = [layer for layer in sized.modules() if isinstance(layer, nn.Conv2d | nn.Linear)]
     with torch.no_grad():
         layers[-1].weight.sub_(layers[-1].weight.mean(0, keepdim=True))
         for layer in layers:

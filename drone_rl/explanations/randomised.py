@@ -6,10 +6,10 @@ from collections.abc import Iterator
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from torch import Tensor, nn
+from torch import Tensor
 
 from drone_rl.explanations.causal import rank_correlation
-from drone_rl.policies import PolicyNetwork
+from drone_rl.policies import PictureNetwork
 
 NO_HEAT = 1e-6
 """Share of a map's greatest heat up to which a pixel has none."""
@@ -18,8 +18,8 @@ NO_CHANGE = 1e-9
 
 
 def shuffled_networks(
-    network: PolicyNetwork, observations: Tensor, count: int, seed: int = 0
-) -> Iterator[PolicyNetwork]:
+    network: PictureNetwork, observations: Tensor, count: int, seed: int = 0
+) -> Iterator[PictureNetwork]:
     """Copies of a policy whose weights, and whose biases, were shuffled within each layer.
 
     Shuffled weights are often dead, and a map could tell them by that alone. So each copy's logits
@@ -36,10 +36,8 @@ def shuffled_networks(
         logits = network(observations)
     for _ in range(count):
         other = copy.deepcopy(network)
-        for layer in other.layers:
-            if isinstance(layer, nn.Conv2d | nn.Linear):
-                for parameter in layer.parameters(recurse=False):
-                    _shuffle(parameter, generator)
+        for parameter in other.parameters():
+            _shuffle(parameter, generator)
         _enliven(other, observations, logits)
         yield other
 
@@ -51,15 +49,12 @@ def _shuffle(parameter: Tensor, generator: torch.Generator) -> None:
 
 
 @torch.no_grad()
-def _enliven(network: PolicyNetwork, observations: Tensor, wanted: Tensor) -> None:
+def _enliven(network: PictureNetwork, observations: Tensor, wanted: Tensor) -> None:
     """Gives logits the mean and deviation of others; what is the same on all pictures stays so."""
-    last, logits = network.layers[-1], network(observations)
-    assert isinstance(last, nn.Linear)
-    deviation, mean = torch.std_mean(logits, 0, correction=0)
+    deviation, mean = torch.std_mean(network(observations), 0, correction=0)
     wanted_deviation, wanted_mean = torch.std_mean(wanted, 0, correction=0)
     factor = torch.where(deviation > NO_CHANGE, wanted_deviation / deviation, 1.0)
-    last.weight.mul_(factor[:, None])
-    last.bias.copy_(wanted_mean - factor * (mean - last.bias))
+    network.rescale(factor, wanted_mean - factor * mean)
 
 
 def likeness(first: Tensor, second: Tensor) -> NDArray:

@@ -24,7 +24,7 @@ from drone_rl.envs import worlds_of
 from drone_rl.explanations.dataset import SEEN, RolloutDataset, flown_fields
 from drone_rl.explanations.hooks import features, probabilities
 from drone_rl.explanations.scenes import Scenes
-from drone_rl.policies import PolicyNetwork
+from drone_rl.policies import PictureNetwork
 from drone_rl.sim.tasks import Task
 from drone_rl.utils.errors import InputError
 
@@ -34,7 +34,7 @@ _POSE = ("drone", "attitude")
 def record(
     env: TransformedEnv,
     actor: TensorDictModuleBase,
-    network: PolicyNetwork,
+    network: PictureNetwork,
     num_frames: int,
     *,
     num_episodes: int = 1,
@@ -124,7 +124,7 @@ def draw(
     flights: RolloutDataset,
     rows: NDArray,
     scenes: Scenes,
-    network: PolicyNetwork,
+    network: PictureNetwork,
     layers: tuple[str, ...] = (),
 ) -> RolloutDataset:
     """Some frames of flights, with all that can be known about them.

@@ -11,7 +11,7 @@ from torch import Tensor
 from drone_rl.explanations.flying import fly_on
 from drone_rl.explanations.hooks import probabilities
 from drone_rl.explanations.scenes import Scenes, empty_scene, place_target
-from drone_rl.policies import PolicyNetwork
+from drone_rl.policies import PictureNetwork
 from drone_rl.sim.actions import Actions
 
 BLIND = 0.1
@@ -54,7 +54,7 @@ class OutcomeMap:
 
 
 def response_map(
-    scenes: Scenes, network: PolicyNetwork, *, num_lateral: int = 41, num_forward: int = 31
+    scenes: Scenes, network: PictureNetwork, *, num_lateral: int = 41, num_forward: int = 31
 ) -> ResponseMap:
     """Draws one cube at every place of a grid and asks the policy about each.
 
@@ -103,7 +103,7 @@ def find_blind(actions: Actions, wishes: Tensor, alone: Tensor, needed: Tensor) 
 
 
 def outcome_map(
-    scenes: Scenes, network: PolicyNetwork, *, num_lateral: int = 21, num_forward: int = 8
+    scenes: Scenes, network: PictureNetwork, *, num_lateral: int = 21, num_forward: int = 8
 ) -> OutcomeMap:
     """Flies on from every place of a coarser grid, and sees whether the cube is collected.
 

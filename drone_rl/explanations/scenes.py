@@ -8,7 +8,7 @@ from torch import Tensor
 from torch.nn import functional
 from torchrl.envs import CatFrames, Transform, TransformedEnv
 
-from drone_rl.envs import CropRows, worlds_of
+from drone_rl.envs import CropRows, RgbPixels, worlds_of
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.tasks import State
 
@@ -37,6 +37,8 @@ class Scenes:
         self.actions = self.worlds.dynamics.actions
         pipeline: Iterable[Transform] = env.transform  # type: ignore[assignment]
         self._transforms = [t for t in pipeline if "pixels" in (t.in_keys or [])]
+        self.is_color: bool = any(isinstance(t, RgbPixels) for t in self._transforms)
+        """Whether the channels of what the policy gets are red, green and blue."""
         stacks = [t.N for t in self._transforms if isinstance(t, CatFrames)]
         self.memory: int = max(stacks, default=1) - 1
         """Pictures before the present one that the policy gets."""

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 from torchrl.envs import TransformedEnv
 
-from drone_rl.explanations.context import Context
+from drone_rl.explanations.context import Context, LeftOutError
 from drone_rl.explanations.sections import Section, find_sections
 from drone_rl.explanations.settings import ExplainSettings
-from drone_rl.policies import PolicyNetwork
+from drone_rl.policies import PictureNetwork
 from drone_rl.utils.errors import InputError
 from drone_rl.verdicts.proof import Claim
 
@@ -26,7 +26,7 @@ FORMAT_VERSION = 3
 
 def explain_policy(
     env: TransformedEnv,
-    network: PolicyNetwork,
+    network: PictureNetwork,
     folder: Path,
     settings: ExplainSettings,
     *,
@@ -51,7 +51,8 @@ def explain_policy(
         claim: A certificate of the policy in the task of these worlds, if there is one.
 
     Returns:
-        The numbers, as in `explanation.json`.
+        The numbers, as in `explanation.json`; "left_out" says of sections that can't be made of
+        this policy why.
 
     Raises:
         InputError: The folder can't be written or a setting doesn't fit the policy.
@@ -60,10 +61,15 @@ def explain_policy(
     numbers: dict[str, Any] = {}
     arrays: dict[str, NDArray] = {}
     seconds: dict[str, float] = {}
+    left_out: dict[str, str] = {}
     for title, section in (find_sections() if sections is None else sections).items():
         progress(title.replace("_", " "))
         began = time.perf_counter()
-        its_numbers, its_arrays = section(context)
+        try:
+            its_numbers, its_arrays = section(context)
+        except LeftOutError as error:
+            left_out[title] = str(error)
+            continue
         numbers |= its_numbers
         arrays |= its_arrays
         seconds[title] = round(time.perf_counter() - began, 2)
@@ -76,6 +82,7 @@ def explain_policy(
         "actions": context.scenes.actions.as_dict(),
         "terms": context.scenes.task.terms.as_dict(),
         **numbers,
+        **({"left_out": left_out} if left_out else {}),
         "provenance": provenance,
     }
     _write(folder, written, arrays, context)

@@ -37,11 +37,11 @@ from drone_rl.explanations.patches import Grid, make_grid
 from drone_rl.explanations.placebos import placebo_maps
 from drone_rl.explanations.randomised import likeness, shuffled_networks
 from drone_rl.explanations.scenes import Scenes, empty_scene
-from drone_rl.policies import PolicyNetwork
+from drone_rl.policies import PictureNetwork
 from drone_rl.sim.tasks import State
 from drone_rl.utils.intervals import median_bounds
 
-MapOf = Callable[[PolicyNetwork, Tensor, Tensor], Tensor]
+MapOf = Callable[[PictureNetwork, Tensor, Tensor], Tensor]
 """A method: network, pictures (T, C, h, w) and an action each (T,) to maps (T, h, w), 0 or more."""
 ERROR_RATE = 0.05
 """Probability that anything is trusted that knows nothing of the policy, all methods together."""
@@ -57,7 +57,7 @@ MOST_ALIKE = 0.5
 class Trial:
     """What maps of one policy are held against. All pictures are such that some patch moves it."""
 
-    network: PolicyNetwork
+    network: PictureNetwork
     observations: Tensor  # (T, C, h, w)
     actions: Tensor  # (T,)
     """The actions whose maps are asked for."""
@@ -82,7 +82,7 @@ class Trial:
             episode=self.episode[rows],
         )
 
-    def maps(self, method: MapOf, network: PolicyNetwork | None = None) -> Tensor:
+    def maps(self, method: MapOf, network: PictureNetwork | None = None) -> Tensor:
         """A method's maps of the trial's pictures. Shape: (T, h, w)."""
         if not len(self.observations):
             return self.observations.new_zeros(0, *self.observations.shape[-2:])
@@ -109,7 +109,7 @@ class Pictures:
     episode: NDArray  # (T,)
     seed: int = 0
 
-    def trial(self, network: PolicyNetwork, actions: Tensor) -> Trial:
+    def trial(self, network: PictureNetwork, actions: Tensor) -> Trial:
         """Finds out which patches move a policy; `actions` (T,) are those to be explained."""
         grid = make_grid(*self.observations.shape[-2:])
         effects = causal.patch_effects(network, self.observations, self.others, grid)
@@ -147,7 +147,7 @@ def draw_pictures(scenes: Scenes, state: State, episode: NDArray, seed: int = 0)
 
 def make_trial(
     scenes: Scenes,
-    network: PolicyNetwork,
+    network: PictureNetwork,
     state: State,
     actions: Tensor,
     episode: NDArray,

@@ -6,21 +6,15 @@ from collections.abc import Callable, Sequence
 import torch
 from torch import Tensor, nn
 
-from drone_rl.sim.actions import MOVES, Actions
+from drone_rl.policies.network import PictureNetwork
 from drone_rl.utils.errors import InputError
 
 Weighted = nn.Conv2d | nn.Linear
 """Layers that are initialised."""
 
 
-class PolicyNetwork(nn.Module):
-    """Layers from a picture to one logit an action; any number of leading batch dimensions.
-
-    The last layer is linear and called "logits".
-    """
-
-    actions: Actions = MOVES
-    """What the outputs ask for."""
+class PolicyNetwork(PictureNetwork):
+    """Layers from a picture to one logit an action, of which the last is linear: "logits"."""
 
     def __init__(
         self,
@@ -49,12 +43,20 @@ class PolicyNetwork(nn.Module):
         """Number of logits."""
         return len(self.layers.get_parameter("logits.weight"))
 
-    def forward(self, pixels: Tensor) -> Tensor:
-        """Pictures (*, C, H, W) to logits (*, num_actions).
+    @property
+    def parts(self) -> nn.Module:
+        """The layers."""
+        return self.layers
 
-        Raises:
-            InputError: The pictures are of another shape than the network was built for.
-        """
+    @torch.no_grad()
+    def rescale(self, factor: Tensor, shift: Tensor) -> None:
+        """See `PictureNetwork`; the last layer changes."""
+        weight, bias = (self.layers.get_parameter(f"logits.{n}") for n in ("weight", "bias"))
+        weight.mul_(factor[:, None])
+        bias.mul_(factor).add_(shift)
+
+    def forward(self, pixels: Tensor) -> Tensor:
+        """See `PictureNetwork`."""
         if tuple(pixels.shape[-3:]) != self.in_shape:
             raise InputError(
                 f"the policy was built for pictures of shape {self.in_shape}, not "

@@ -115,7 +115,18 @@ def gridded(pictures: Sequence[Image.Image], columns: int, gap: int = 12) -> Ima
     return canvas
 
 
-def gray_picture(observation: NDArray, low: float, high: float) -> NDArray:
-    """What a policy gets, its newest channel, as gray bytes. (C, H, W) to (H, W, 3)."""
-    share = (observation[-1].astype(np.float64) - low) / max(high - low, 1e-12)
-    return np.repeat((share.clip(0, 1) * 255).astype(np.uint8)[..., None], 3, -1)
+def shown_picture(observation: NDArray, low: float, high: float, *, color: bool) -> NDArray:
+    """What a policy gets, as bytes: its newest colours, or its newest channel in gray.
+
+    Args:
+        observation: Shape (C, H, W).
+        low: Becomes black.
+        high: Becomes white.
+        color: Whether the channels are red, green and blue, of one frame or several.
+
+    Returns:
+        Shape: (H, W, 3).
+    """
+    channels = observation[-3:] if color else observation[-1:].repeat(3, 0)
+    share = (np.moveaxis(channels, 0, -1).astype(np.float64) - low) / max(high - low, 1e-12)
+    return (share.clip(0, 1) * 255).astype(np.uint8)

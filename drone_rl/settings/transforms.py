@@ -20,6 +20,13 @@ class Gray(Transform):
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
+class Rgb(Transform):
+    """RGB bytes to colours from 0 to 1."""
+
+    target: ClassVar[str] = "drone_rl.envs.transforms.RgbPixels"
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class Standardize(Transform):
     """Shifted and scaled: (x - mean) / std."""
 

@@ -1,13 +1,14 @@
 """Many worlds of a task at once: rules and motion in torch, pictures by a renderer."""
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor
 
+from drone_rl.sim.actions import Entry
 from drone_rl.sim.composer_task import ComposerTask
 from drone_rl.sim.dynamics import BodyState, Dynamics
 from drone_rl.sim.entities.cameras import FRONT_CENTER
@@ -23,6 +24,8 @@ from drone_rl.sim.rendering import (
 from drone_rl.sim.rendering.view import Modality
 from drone_rl.sim.settings import BaseTaskSettings, CameraSettings
 from drone_rl.sim.tasks import State, Task, as_task
+
+_POSE = {"drone": Entry((3,), torch.float32), "attitude": Entry((4,), torch.float32)}
 
 
 class Worlds:
@@ -60,6 +63,25 @@ class Worlds:
         self.policy_view = self.view()
         drawn = self.task.draw(np.random.RandomState(0))
         self.state = self.start(torch.zeros_like(drawn).expand(num_worlds, *drawn.shape).clone())
+
+    @property
+    def entries(self) -> Mapping[str, Entry]:
+        """What `info` tells of each world.
+
+        `Task.entries`, and the drone's pose: "drone" (metres) and "attitude" (quaternion w, x, y,
+        z), world frame.
+        """
+        return {**self.task.entries, **_POSE}
+
+    def info(self, state: State | None = None) -> dict[str, Tensor]:
+        """The truth about worlds, as `entries` has it. Shapes: (number of worlds, *).
+
+        Args:
+            state: Of other worlds; of these by default.
+        """
+        state = self.state if state is None else state
+        pose = {"drone": state.body.position.float(), "attitude": state.body.attitude.float()}
+        return {**self.task.info(state), **pose}
 
     @functools.cached_property
     def scene(self) -> Scene:

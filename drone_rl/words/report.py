@@ -8,6 +8,7 @@ from drone_rl.words.numbers import among, bounds, listed, plural
 from drone_rl.words.places import PLACES
 from drone_rl.words.response import ASYMMETRY, RESPONSE
 from drone_rl.words.terms import terms_of
+from drone_rl.words.truth import NAMES
 
 
 def _size(evidence: Evidence) -> str:
@@ -228,9 +229,12 @@ ATTRIBUTION = (
     ),
     Sentence(
         "attribution.no_convolution",
-        "it has none",
+        "none is known",
         lambda e: e["attribution"]["layer"] is None,
-        lambda e: "This policy has no convolution and thus no Grad-CAM; saliency is shown.",
+        lambda e: (
+            "No convolution is known of this policy that gradients go through, and thus no "
+            f"Grad-CAM; {NAMES[e['attribution'].get('shown', 'saliency')]} is shown."
+        ),
     ),
     Sentence(
         "attribution.stand_in",
@@ -244,7 +248,17 @@ ATTRIBUTION = (
 )
 
 
+LEFT_OUT = (
+    Sentence(
+        "left_out.why",
+        "sections could not be made of this policy",
+        lambda e: bool(e.get("left_out")),
+        lambda e: " ".join(e["left_out"].values()),
+    ),
+)
+
 SECTIONS = {
+    "left_out": LEFT_OUT,
     "dataset": DATASET,
     "tsne": TSNE,
     "contradictions": CONTRADICTIONS,

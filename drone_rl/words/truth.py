@@ -172,6 +172,15 @@ SENTENCES = (
         lambda e: "No map is to be trusted on this policy.",
     ),
     Sentence(
+        "truth.untested",
+        "something moves the policy, and no method was tested",
+        lambda e: _has_any(e) and not _truth(e)["methods"],
+        lambda e: (
+            "None could be tested: whether a map depends on the weights is not to be found out "
+            "where these are not known. Give the policy as a torch module."
+        ),
+    ),
+    Sentence(
         "truth.refused",
         "something moves the policy, and a method failed a test",
         lambda e: _has_any(e) and bool(_refused(e)),

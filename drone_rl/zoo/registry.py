@@ -22,6 +22,7 @@ from drone_rl.settings.transforms import (
     EpisodeReward,
     Gray,
     Resize,
+    Rgb,
     Stack,
     Standardize,
     StepCount,
@@ -128,9 +129,17 @@ def _place(make: Any) -> str:
 
 
 def _gray(picture: Picture, _: Mapping[str, Any]) -> Picture:
+    return _of_bytes("gray", picture, 1)
+
+
+def _rgb(picture: Picture, _: Mapping[str, Any]) -> Picture:
+    return _of_bytes("rgb", picture, 3)
+
+
+def _of_bytes(name: str, picture: Picture, channels: int) -> Picture:
     if picture.is_float or picture.shape[-1] != 3:
-        raise InputError("the transform gray needs the camera's own RGB; let it come first")
-    return Picture((1, *picture.shape[:2]), True)
+        raise InputError(f"the transform {name} needs the camera's own RGB; let it come first")
+    return Picture((channels, *picture.shape[:2]), True)
 
 
 def _crop(picture: Picture, values: Mapping[str, Any]) -> Picture:
@@ -174,6 +183,7 @@ register_transform(
     *(Gray.target, "drone_rl.envs.GrayPixels"),
     change=_gray,
 )
+register_transform("rgb", envs.RgbPixels, kinds_of(Rgb), Rgb.target, change=_rgb)
 register_transform(
     "standardize",
     envs.StandardizePixels,

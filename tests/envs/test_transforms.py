@@ -4,7 +4,7 @@ from torchrl.envs import CatFrames, Compose, StepCounter, ToTensorImage, Transfo
 from torchrl.envs.transforms import GrayScale, RewardSum
 from torchrl.envs.utils import check_env_specs
 
-from drone_rl.envs import CropRows, DroneEnv, GrayPixels, Resize, StandardizePixels
+from drone_rl.envs import CropRows, DroneEnv, GrayPixels, Resize, RgbPixels, StandardizePixels
 from drone_rl.utils.errors import InputError
 
 
@@ -17,6 +17,7 @@ def base():
 
 PIPELINES = {
     "gray": lambda: [GrayPixels()],
+    "rgb": lambda: [RgbPixels()],
     "standardize": lambda: [GrayPixels(), StandardizePixels()],
     "crop": lambda: [GrayPixels(), CropRows(5, 20)],
     "resize": lambda: [GrayPixels(), Resize(height=10, width=32)],
@@ -66,6 +67,12 @@ def test_gray_by_hand():
     torch.testing.assert_close(gray, expected)
 
 
+def test_colours_by_hand():
+    pixels = torch.tensor([[[255, 0, 51], [0, 102, 0]]], dtype=torch.uint8)
+    colours = RgbPixels()._apply_transform(pixels)
+    torch.testing.assert_close(colours, torch.tensor([[[1.0, 0]], [[0, 0.4]], [[0.2, 0]]]))
+
+
 def test_gray_is_torchrls_to_tensor_image_and_gray_scale():
     pixels = torch.randint(0, 256, (4, 5, 7, 3), dtype=torch.uint8)
     theirs = GrayScale()._apply_transform(ToTensorImage()._apply_transform(pixels))
@@ -98,5 +105,6 @@ def test_bad_sizes_are_refused():
         Resize(height=0, width=4)
     with pytest.raises(InputError, match="above 0"):
         StandardizePixels(std=0.0)
-    with pytest.raises(InputError, match="uint8"):
-        GrayPixels()._apply_transform(torch.zeros(2, 2, 3))
+    for transform in (GrayPixels(), RgbPixels()):
+        with pytest.raises(InputError, match=r"Pixels got torch.float32 frames of .*; give uint8"):
+            transform._apply_transform(torch.zeros(2, 2, 3))

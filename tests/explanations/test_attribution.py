@@ -4,7 +4,8 @@ import pytest
 import torch
 
 from drone_rl.explanations.attribution import Explainer, grad_cam
-from drone_rl.policies import MLP, SmallCNN
+from drone_rl.policies import MLP, ForeignNetwork, SmallCNN
+from drone_rl.sim.actions import MOVES
 from drone_rl.utils.errors import InputError
 
 
@@ -46,6 +47,20 @@ def test_all_methods_give_maps_of_the_pictures_size_and_leave_no_hook(explainer,
         assert (maps >= 0).all() and torch.isfinite(maps).all()
     assert sum(len(m._forward_hooks) + len(m._backward_hooks) for m in network.modules()) == 0
     assert all(p.grad is None for p in network.parameters())
+
+
+def test_what_has_no_gradients_has_but_occlusion(explainer, frames):
+    network = ForeignNetwork(torch.no_grad()(explainer.network), (1, 25, 64), MOVES)
+    other = Explainer(network, explainer.absent)
+    assert list(other.methods()) == ["occlusion"]
+    torch.testing.assert_close(other.occlusion(*frames), explainer.occlusion(*frames))
+    with pytest.raises(InputError, match=r"^Grad-CAM needs a convolution"):
+        other.grad_cam(*frames)
+    whole = ForeignNetwork(explainer.network, (1, 25, 64), MOVES)
+    same = Explainer(whole, explainer.absent)
+    assert same.layer == "layers.relu1"
+    for name, method in same.methods().items():
+        torch.testing.assert_close(method(*frames), explainer.methods()[name](*frames))
 
 
 def test_integrated_gradients_add_up_to_the_change_of_a_linear_policy():

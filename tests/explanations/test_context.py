@@ -3,6 +3,8 @@ import torch
 
 from drone_rl.explanations.context import Context
 from drone_rl.explanations.settings import ExplainSettings
+from drone_rl.policies import ForeignNetwork
+from drone_rl.sim.actions import MOVES
 
 SMALL = ExplainSettings(frames=60, perplexity=5, seed=3)
 
@@ -19,6 +21,13 @@ def test_worlds_and_actions_start_afresh_whoever_asked_first(make_pipeline):
         flown.append(context.flights)
     np.testing.assert_array_equal(flown[0].cubes, flown[1].cubes)
     np.testing.assert_array_equal(flown[0].actions, flown[1].actions)
+
+
+def test_of_a_function_no_layers_are_recorded(make_pipeline):
+    env, _ = make_pipeline(num_envs=4)
+    network = ForeignNetwork(lambda x: x.flatten(1)[:, :3], (1, 25, 64), MOVES)
+    context = Context(env, network, SMALL)
+    assert context.layer is None and context.dataset.features == {}
 
 
 def test_frames_are_of_the_flights_and_maps_of_the_frames(make_pipeline):

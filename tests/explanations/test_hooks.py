@@ -1,5 +1,6 @@
 import pytest
 import torch
+from torch import nn
 
 from drone_rl.explanations.hooks import (
     feature_layer,
@@ -9,7 +10,8 @@ from drone_rl.explanations.hooks import (
     probabilities,
     spatial_layers,
 )
-from drone_rl.policies import MLP
+from drone_rl.policies import MLP, ForeignNetwork
+from drone_rl.sim.actions import MOVES
 from drone_rl.utils.errors import InputError
 
 
@@ -47,3 +49,48 @@ def test_probabilities_add_up_to_one(world):
     torch.testing.assert_close(
         probabilities(world[2], torch.randn(5, 1, 25, 64)).sum(-1), torch.ones(5)
     )
+
+
+class Elsewhere(nn.Module):
+    """Layers in modules of modules, one twice, one never, and one whose output is no tensor."""
+
+    def __init__(self):
+        super().__init__()
+        self.head = nn.ModuleDict({"last": nn.Linear(6, 3), "before": nn.Linear(40, 6)})
+        self.body = nn.Sequential(nn.Conv2d(1, 2, 3, padding=1), nn.ReLU(), nn.Conv2d(2, 2, 2, 2))
+        self.twice, self.never, self.memory = nn.Tanh(), nn.Linear(1, 1), nn.LSTM(1, 1)
+
+    def forward(self, x):
+        self.memory(x.new_zeros(1, 1))
+        x = self.twice(self.body(x)).flatten(1)
+        return self.twice(self.head["last"](self.head["before"](x)))
+
+
+@pytest.fixture
+def elsewhere():
+    return ForeignNetwork(Elsewhere(), (1, 8, 10), MOVES)
+
+
+def test_layers_from_elsewhere_stand_in_the_order_in_which_they_act(elsewhere):
+    assert layer_names(elsewhere) == ["body.0", "body.1", "body.2", "head.before", "head.last"]
+    assert spatial_layers(elsewhere) == ["body.1", "body.2"]  # what follows the second acts twice
+    assert feature_layer(elsewhere) == "head.before"
+    assert num_hooks(elsewhere) == 0
+    x = torch.randn(5, 1, 8, 10)
+    body = elsewhere.parts.body
+    torch.testing.assert_close(features(elsewhere, x, "body.1"), body[1](body[0](x)))
+
+
+@pytest.mark.parametrize("name", ["head", "", "body"])
+def test_what_is_no_layer(elsewhere, name):
+    with pytest.raises(InputError, match=r"choose from: body\.0, body\.1, .*, head\.last$"):
+        find_layer(elsewhere, name)
+
+
+def test_a_function_has_no_layers():
+    network = ForeignNetwork(lambda x: x.flatten(1)[:, :3], (1, 8, 10), MOVES)
+    assert (layer_names(network), spatial_layers(network), feature_layer(network)) == ([], [], None)
+    with pytest.raises(InputError, match="choose from: none, for it is no torch module"):
+        find_layer(network, "conv1")
+    one = ForeignNetwork(nn.Sequential(nn.Flatten(), nn.Linear(80, 3)), (1, 8, 10), MOVES)
+    assert feature_layer(one) == "0"

@@ -1,9 +1,11 @@
 import numpy as np
 import pytest
 import torch
+from torch import nn
 
 from drone_rl.explanations.randomised import likeness, shuffled_networks
-from drone_rl.policies import MLP, SmallCNN
+from drone_rl.policies import MLP, ForeignNetwork, SmallCNN
+from drone_rl.sim.actions import MOVES
 
 PICTURES = torch.randn(20, 1, 25, 64, generator=torch.Generator().manual_seed(0))
 
@@ -21,6 +23,20 @@ def test_weights_are_shuffled_within_their_layer_and_the_policy_stays():
                 assert not torch.equal(shuffled, values)
     assert not torch.equal(first.layers.fc1.weight, second.layers.fc1.weight)
     assert first.layers.conv1.weight.is_contiguous(memory_format=torch.channels_last)
+
+
+def test_networks_from_elsewhere_are_shuffled_as_ours():
+    layers = SmallCNN((1, 25, 64), 3, channels=(4,), hidden=(8,)).layers
+    network = ForeignNetwork(nn.Sequential(layers, nn.BatchNorm1d(3)), (1, 25, 64), MOVES)
+    (other,) = shuffled_networks(network, PICTURES, 1)
+    before, after = network.state_dict(), other.state_dict()
+    assert not torch.equal(*(state["_logits.0.conv1.weight"] for state in (before, after)))
+    assert all(torch.equal(before[k].flatten().sort().values, after[k].flatten().sort().values)
+               for k in before)  # fmt: skip
+    with torch.no_grad():
+        logits, made = network(PICTURES), other(PICTURES)
+    torch.testing.assert_close(made.mean(0), logits.mean(0), rtol=1e-3, atol=1e-3)
+    torch.testing.assert_close(made.std(0), logits.std(0), rtol=1e-3, atol=1e-3)
 
 
 def test_the_first_of_many_are_those_of_few():

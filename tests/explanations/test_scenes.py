@@ -1,6 +1,6 @@
 import torch
 
-from drone_rl.envs import CropRows, DroneEnv, GrayPixels, Resize, with_transforms
+from drone_rl.envs import CropRows, DroneEnv, GrayPixels, Resize, RgbPixels, with_transforms
 from drone_rl.explanations.scenes import Region, Scenes, empty_scene, place_target
 from drone_rl.sim.settings import CameraSettings
 from tests.second_dynamics import Turning
@@ -47,6 +47,12 @@ def test_maps_go_back_to_where_the_pipeline_took_the_picture_from():
     assert maps.shape == (2, 36, 64)
     assert maps[:, :6].sum() == 0 and maps[:, 30:].sum() == 0
     assert (maps[:, 6:30] == 1).all()
+    env.close()
+
+
+def test_whether_the_channels_are_colours(scenes):
+    env = with_transforms(DroneEnv(1), [RgbPixels()])
+    assert Scenes(env).is_color and not scenes.is_color
     env.close()
 
 

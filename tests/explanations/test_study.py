@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import torch
 
+from drone_rl.explanations.context import LeftOutError
 from drone_rl.explanations.sections import find_sections
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.explanations.study import explain_policy
@@ -52,6 +53,20 @@ def test_a_policy_without_convolutions_and_with_one_action_is_explained(make_pip
     assert numbers["contradictions"]["pairs"] == 0
     assert numbers["attribution"]["layer"] is None
     assert numbers["truth"]["trusted"] is None
+
+
+def test_a_section_that_can_not_be_made_is_told_of_and_the_others_are(make_pipeline, tmp_path):
+    env, actor = make_pipeline()
+
+    def fails(context):
+        raise LeftOutError("It has no eyes.")
+
+    sections = {"eyes": fails, "dataset": find_sections()["dataset"]}
+    numbers = explain(env, actor.module[0].module, tmp_path, sections=sections)
+    assert numbers["left_out"] == {"eyes": "It has no eyes."}
+    assert numbers["dataset"]["frames"] == 60 and "eyes" not in numbers["seconds"]
+    del sections["eyes"]
+    assert "left_out" not in explain(env, actor.module[0].module, tmp_path, sections=sections)
 
 
 def test_an_unknown_layer_is_refused_before_any_work(make_pipeline, tmp_path):

@@ -304,6 +304,12 @@ MAIN = (
 """The main job and sweeps."""
 GUESTS = (
     Row(
+        "gymnasium",
+        "Gymnasium's vector environment over the batched environment itself, frames/s",
+        lambda f: f"{f['gym_over_batched']:.2f} ({f['gym_fps']:,.0f} frames/s)",
+        "0.8",
+    ),
+    Row(
         "pillars",
         "flying through pillars, share of 1,000 held-out episodes that touch none, lower end of "
         "the exact 95% interval, three seeds",

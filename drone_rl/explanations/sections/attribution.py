@@ -15,6 +15,8 @@ FILMED = 0
 """The flight that is shown: the first, whatever it is like."""
 SHOWN = ("grad_cam", "grad_cam_logit")
 """Maps of the film: the second where the first has no heat at all."""
+INSTEAD = ("saliency", "occlusion")
+"""The first that there is, of a policy without Grad-CAM."""
 
 
 def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
@@ -27,7 +29,8 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
     flights, explainer = context.flights, context.explainer
     rows = np.flatnonzero(flights.episode == FILMED)
     film = draw(flights, rows, context.scenes, context.network)
-    methods = [name for name in SHOWN if name in context.maps] or ["saliency"]
+    methods = [name for name in SHOWN if name in context.maps]
+    methods = methods or [name for name in INSTEAD if name in context.maps][:1]
     heat = torch.zeros(film.frames.shape[:-1])
     by: list[str | None] = [None] * len(film)
     for name in methods:
@@ -44,6 +47,7 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
     numbers = {
         "layer": explainer.layer,
         "methods": list(context.maps),
+        "shown": methods[0],
         "film": {
             "episode": FILMED,
             "heat_by": by,

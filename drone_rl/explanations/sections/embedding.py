@@ -6,11 +6,16 @@ from typing import Any
 from numpy.typing import NDArray
 
 from drone_rl.explanations import tsne
-from drone_rl.explanations.context import Context
+from drone_rl.explanations.context import Context, LeftOutError
 
 
 def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
     """Makes "tsne"; arrays "tsne_features" and "tsne_pixels" (T, 2)."""
+    if context.layer is None:
+        raise LeftOutError(
+            "Frames are laid out by likeness of what a layer makes of them (t-SNE), and no layers "
+            "of this policy are known; give it as a torch module made of layers."
+        )
     data, settings = context.dataset, context.settings
     numbers, arrays = {}, {}
     for name, originals in (

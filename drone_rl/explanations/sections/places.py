@@ -48,6 +48,8 @@ def _map(context: Context, settings: PlacesSettings) -> PlaceMap:
         raise InputError("it sees a stack of frames, so what it does depends on the past")
     task: TaskSettings = scenes.task.settings
     check_task(task)
+    if not network.has_weights:
+        raise InputError("it is no torch module, so that nothing is known of its sums")
     eye, lattice = Eye.of(task, scenes.worlds.camera), Lattice(task)
     seeing = Seeing(scenes.worlds, lattice, eye)
     seeing.check(_COMPARED, np.random.RandomState(context.settings.seed))

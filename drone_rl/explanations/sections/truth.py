@@ -16,10 +16,11 @@ from drone_rl.explanations.trust import Trial
 def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
     """Makes "truth".
 
-    See `check_maps`; besides "heat" of each method by region; "cube": is its brightest pixel on
-    the next cube; "curves" of deletion and insertion, of placebos too; "interventions": what
-    changes to the scene do at once; "outcomes": what becomes of flights (None if no picture has a
-    next cube); "integration_error" of integrated gradients; "empty": why maps of Grad-CAM are.
+    See `check_maps`, of no method where weights aren't known; besides "heat" of each method by
+    region; "cube": is its brightest pixel on the next cube; "curves" of deletion and insertion, of
+    placebos too; "interventions": what changes to the scene do at once; "outcomes": what becomes of
+    flights (None if no picture has a next cube); "integration_error" of integrated gradients;
+    "empty": why maps of Grad-CAM are.
 
     Arrays: "interventions" (K, H, W, 3): one frame after each change; "patch_effects" (rows,
     columns): how far each patch moves the policy, on average.
@@ -51,7 +52,7 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
 
 def _maps(context: Context, trial: Trial) -> dict[str, Any]:
     """The tests of all methods, and curves of methods and placebos."""
-    methods = trust.method_maps(context.explainer)
+    methods = trust.method_maps(context.explainer) if context.network.has_weights else {}
     maps = {name: trial.maps(method) for name, method in methods.items()}
     curves = {
         name: deletion_insertion(
@@ -75,7 +76,7 @@ def _places(context: Context) -> dict[str, Any]:
 def _integration_error(context: Context, trial: Trial) -> dict[str, float] | None:
     """Mean and greatest error of the integral, on one picture an episode; None without any."""
     few = trial.thinned()
-    if not len(few.actions):
+    if not len(few.actions) or not context.network.is_differentiable:
         return None
     error = context.explainer.completeness_error(few.observations, few.actions)
     return {"mean": float(error.mean()), "max": float(error.max()), "pictures": len(error)}

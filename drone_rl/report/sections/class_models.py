@@ -16,14 +16,16 @@ def grid(explanations: Sequence[Explanation]) -> Image.Image:
     for explanation in explanations:
         who = f"{explanation.name[:18]}: " if len(explanations) > 1 else ""
         statistics = explanation.numbers["class_model"]["statistics"]
+        low, high = statistics["low"], statistics["high"]
+        color = explanation.numbers["class_model"].get("color", False)
         for objective in ("probability", "logit"):
             reached = explanation.numbers["class_model"][objective]["probabilities"]
             shown = explanation.arrays[f"class_model_{objective}"]
             for action in explanation.actions.order:
-                gray = pictures.gray_picture(shown[action], statistics["low"], statistics["high"])
+                picture = pictures.shown_picture(shown[action], low, high, color=color)
                 name = explanation.actions.names[action]
                 caption = f"{who}{name} {reached[action]:.3f} (by {objective})"
-                tiles.append(pictures.titled(pictures.enlarge(gray), caption))
+                tiles.append(pictures.titled(pictures.enlarge(picture), caption))
     return pictures.gridded(tiles, len(explanations[0].actions.names))
 
 

@@ -1,8 +1,10 @@
 from types import SimpleNamespace
 
+import pytest
 import torch
 
 from drone_rl.explanations import class_model
+from drone_rl.explanations.context import LeftOutError
 from drone_rl.explanations.sections.class_models import section
 
 
@@ -16,13 +18,24 @@ def test_both_objectives_are_sought_in_the_range_of_the_pictures(monkeypatch):
 
     monkeypatch.setattr(class_model, "search", search)
     observations = torch.linspace(-2, 2, 40).reshape(10, 1, 2, 2)
+    network = SimpleNamespace(is_differentiable=True)
     context = SimpleNamespace(
-        observations=observations, network="net", settings=SimpleNamespace(seed=7)
+        observations=observations,
+        network=network,
+        settings=SimpleNamespace(seed=7),
+        scenes=SimpleNamespace(is_color=True),
     )
     numbers, arrays = section(context)
-    assert [call[0] for call in calls] == ["net", "net"]
+    assert [call[0] for call in calls] == [network, network]
     assert [call[3:] for call in calls] == [("probability", 7), ("logit", 7)]
     assert numbers["class_model"]["logit"] == {"sought": "logit"}
     assert numbers["class_model"]["statistics"]["low"] == calls[0][1] < calls[0][2]
+    assert numbers["class_model"]["color"] is True
     assert (arrays["class_model_probability"] == 1).all()
     assert (arrays["class_model_logit"] == 2).all()
+
+
+def test_without_gradients_they_are_left_out():
+    network = SimpleNamespace(is_differentiable=False)
+    with pytest.raises(LeftOutError, match="have none by the pixels; give it as a torch function"):
+        section(SimpleNamespace(network=network))

@@ -1,7 +1,9 @@
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
+from drone_rl.explanations.context import LeftOutError
 from drone_rl.explanations.sections.embedding import section
 from drone_rl.explanations.settings import ExplainSettings
 
@@ -23,3 +25,10 @@ def test_features_and_pixels_are_embedded_each_by_itself():
     assert found["features"]["perplexity"] == 4
     assert 0 < found["pixels"]["trustworthiness"] <= 1
     assert found["features"]["neighbours_kept"] > found["features"]["neighbours_chance"]
+
+
+def test_without_layers_it_is_left_out():
+    with pytest.raises(
+        LeftOutError, match="no layers of this policy are known; give it as a torch"
+    ):
+        section(SimpleNamespace(layer=None))

@@ -6,7 +6,9 @@ import torch
 
 from drone_rl.explanations.scenes import place_target
 from drone_rl.explanations.sections import places
+from drone_rl.policies import ForeignNetwork
 from drone_rl.proofs.silhouettes import camera_ahead
+from drone_rl.sim.actions import MOVES
 from tests.five_actions import FIVE
 
 
@@ -31,8 +33,9 @@ def test_why_there_is_none(context):
 
     def refused(**changes):
         names = ("task", "actions", "memory", "worlds")
+        network = changes.pop("network", None)
         changed = {name: getattr(scenes, name) for name in names} | changes
-        given = SimpleNamespace(scenes=SimpleNamespace(**changed), network=None)
+        given = SimpleNamespace(scenes=SimpleNamespace(**changed), network=network)
         numbers, arrays = places.section(given)
         assert arrays == {}
         return numbers["places"]["refused"]
@@ -41,4 +44,6 @@ def test_why_there_is_none(context):
     assert "does not choose among forward, left, right" in refused(actions=FIVE)
     assert "not that of collecting cubes" in refused(task=None)
     tall = dataclasses.replace(scenes.task.settings, vertical_bound=1.0)
+    function = ForeignNetwork(lambda x: x.flatten(1)[:, :3], (1, 25, 64), MOVES)
+    assert "no torch module" in refused(network=function)
     assert "vertical_bound=1.0" in refused(task=type(scenes.task)(tall))

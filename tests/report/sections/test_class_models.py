@@ -28,6 +28,14 @@ def test_actions_stand_from_left_to_right_and_objectives_below_each_other(explan
     assert middles == [(255,) * 3, (0,) * 3, (0,) * 3]
 
 
+def test_colours_are_shown_as_such(explanation):
+    for name in ("class_model_probability", "class_model_logit"):
+        explanation.arrays[name] = np.zeros((3, 3, 4, 30))
+        explanation.arrays[name][1, 0] = 1.0  # the picture for left is red
+    explanation.numbers["class_model"]["color"] = True
+    assert grid([explanation]).getpixel((75, 30)) == (255, 0, 0)
+
+
 def test_policies_stand_below_each_other(explanation):
     one, two = grid([explanation]), PART.compare([explanation, explanation])["class_models"]
     assert two.size == (one.width, 2 * one.height + 12)

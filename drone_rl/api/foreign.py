@@ -1,0 +1,163 @@
+"""Policies that were made elsewhere: any callable from pictures to logits."""
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import torch
+from torchrl.envs import TransformedEnv
+
+from drone_rl.api.environment import make_env
+from drone_rl.api.pilot import Pilot
+from drone_rl.api.policy import load_policy
+from drone_rl.api.showing import table
+from drone_rl.policies import ForeignNetwork
+from drone_rl.settings.changes import Changes
+from drone_rl.settings.transforms import Gray, Rgb, Standardize, Transform
+from drone_rl.sim.settings import BaseTaskSettings, CameraSettings, TaskSettings
+from drone_rl.sim.tasks import Task, as_task
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.seeding import Stream
+from drone_rl.utils.settings import Settings, below
+from drone_rl.zoo.registry import TRANSFORMS, Picture, find_part
+
+Logits = Callable[[Any], Any]
+"""From a batch of pictures to logits, see `policy_from`."""
+
+
+@dataclasses.dataclass(frozen=True)
+class ForeignPolicy(Pilot):
+    """A network from elsewhere, and what it sees and flies in; see `policy_from`.
+
+    It is in no file, so that nothing can be proved of it for others to check.
+    """
+
+    name: str
+    logits: Logits = dataclasses.field(repr=False)
+    own_task: BaseTaskSettings | Task[Any]
+    camera: CameraSettings
+    transforms: tuple[Transform, ...]
+    """None: the camera's RGB bytes."""
+
+    @property
+    def task(self) -> BaseTaskSettings | Task[Any]:
+        """What it flies in."""
+        return self.own_task
+
+    @property
+    def origin(self) -> dict[str, Any]:
+        """Its name; nothing is known of its training."""
+        return {"policy": self.name, "trained": None}
+
+    def in_task(self, **changes: Any) -> "ForeignPolicy":
+        """See `Pilot`."""
+        if not isinstance(self.own_task, Settings):
+            if changes:
+                raise InputError(f"task.{min(changes)} is unknown; the task has no settings")
+            return self
+        changed = Changes(type(self.own_task)).read(changes, "task")
+        with below("task"):
+            return dataclasses.replace(self, own_task=self.own_task.replace(**changed))
+
+    def make_env(
+        self,
+        num_envs: int,
+        *,
+        seed: int = 0,
+        stream: Stream = Stream.REPORT,
+        device: str = "cpu",
+        **kwargs: Any,
+    ) -> TransformedEnv:
+        """See `Pilot`."""
+        task: Any = self.own_task
+        return make_env(
+            num_envs,
+            task=task,
+            camera=self.camera,
+            transforms=self.transforms or (Rgb(),),
+            seed=seed,
+            stream=stream,
+            device=device,
+            **kwargs,
+        )
+
+    def make_network(self, device: str | torch.device = "cpu") -> ForeignNetwork:
+        """See `Pilot`.
+
+        Raises:
+            InputError: It takes no such pictures, or its logits are not one an action.
+        """
+        picture = Picture((self.camera.height, self.camera.width, 3))
+        for transform in self.transforms or (Rgb(),):
+            part = find_part(TRANSFORMS, transform.name, "transforms")
+            picture = part.change(picture, transform.values())
+        return ForeignNetwork(
+            self.logits,
+            picture.shape,
+            as_task(self.own_task).make_dynamics().actions,
+            takes_bytes=not self.transforms,
+            device=device,
+        )
+
+    def _repr_html_(self) -> str:
+        """Shows itself in a notebook."""
+        sees = " > ".join(transform.name for transform in self.transforms) or "RGB bytes"
+        rows = [["network", type(self.logits).__name__], ["sees", sees], ["file", "none"]]
+        return table(["policy", self.name], rows)
+
+
+def policy_from(
+    logits: Logits,
+    *,
+    task: BaseTaskSettings | Task[Any] | None = None,
+    camera: CameraSettings | None = None,
+    transforms: Sequence[Transform] = (Gray(), Standardize()),
+    name: str | None = None,
+) -> ForeignPolicy:
+    """A policy that was made elsewhere, to be judged, evaluated and explained.
+
+    Of a torch module a copy is taken when it is asked, in evaluation mode, and all can be explained
+    of it. Of another torch function some explanations are left out, of any other callable more.
+
+    Args:
+        logits: From a batch of pictures, floats (N, C, H, W) after the transforms, to a logit for
+            each action (N, number of actions), as a tensor or an array.
+        task: What it flies in.
+        camera: The picture that the drone takes.
+        transforms: What becomes of the picture before it gets it; without any it gets the camera's
+            own, RGB bytes (N, H, W, 3).
+        name: For people; that of the callable by default.
+
+    Raises:
+        InputError: It takes no such pictures, or its logits are not one an action.
+    """
+    if not callable(logits):
+        raise InputError(
+            f"policy_from got a {type(logits).__name__}; give a callable from pictures to logits"
+        )
+    policy = ForeignPolicy(
+        name=name or getattr(logits, "__name__", type(logits).__name__),
+        logits=logits,
+        own_task=task or TaskSettings(),
+        camera=camera or CameraSettings(),
+        transforms=tuple(transforms),
+    )
+    policy.make_network()  # refuses now what could not be asked later
+    return policy
+
+
+def as_pilot(which: str | Path | Pilot | Logits, outputs: str | Path = "outputs") -> Pilot:
+    """A policy as it is, one made of a callable, or one out of a file.
+
+    Args:
+        which: The policy, a callable as `policy_from` takes it, or what `load_policy` takes.
+        outputs: Folder under which runs are kept.
+
+    Raises:
+        InputError: There is none, or it is unusable.
+    """
+    if isinstance(which, Pilot):
+        return which
+    is_file = isinstance(which, str | Path)
+    return load_policy(which, outputs=outputs) if is_file else policy_from(which)

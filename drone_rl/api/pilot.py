@@ -1,0 +1,104 @@
+"""Whoever can be flown, judged and explained: a policy out of a file, or one made elsewhere."""
+
+import abc
+import contextlib
+from collections.abc import Iterator
+from typing import Any, Self
+
+import torch
+from tensordict.nn import TensorDictModuleBase
+from torchrl.envs import TransformedEnv
+
+from drone_rl.policies import PictureNetwork, make_actor
+from drone_rl.sim.settings import BaseTaskSettings
+from drone_rl.sim.tasks import Task
+from drone_rl.utils.seeding import Stream, torch_generator
+
+
+class Pilot(abc.ABC):
+    """A policy, with what it sees and what it flies in."""
+
+    name: str
+    """For people."""
+
+    @property
+    @abc.abstractmethod
+    def task(self) -> BaseTaskSettings | Task[Any]:
+        """What it flies in."""
+
+    @property
+    @abc.abstractmethod
+    def origin(self) -> dict[str, Any]:
+        """Where it comes from, as plain values: "policy", and how it was "trained", if known."""
+
+    @abc.abstractmethod
+    def in_task(self, **changes: Any) -> Self:
+        """The same policy in a changed task, such as `policy.in_task(num_cubes=5)`.
+
+        Args:
+            changes: Settings of the task; None keeps its own.
+
+        Raises:
+            InputError: A setting is unknown or out of range; the message begins with "task.".
+        """
+
+    @abc.abstractmethod
+    def make_env(
+        self,
+        num_envs: int,
+        *,
+        seed: int = 0,
+        stream: Stream = Stream.REPORT,
+        device: str = "cpu",
+        **kwargs: Any,
+    ) -> TransformedEnv:
+        """Worlds like those that it was trained in, seen as it sees them.
+
+        Args:
+            num_envs: How many.
+            seed: Root of their random streams.
+            stream: Which worlds: by default those to report on, which training never sees.
+            device: Where they are drawn.
+            kwargs: See `drone_rl.envs.DroneEnv`.
+        """
+
+    @abc.abstractmethod
+    def make_network(self, device: str | torch.device = "cpu") -> PictureNetwork:
+        """Its network."""
+
+    def make_actor(
+        self, env: TransformedEnv, *, seed: int = 0, stream: Stream = Stream.REPORT
+    ) -> TensorDictModuleBase:
+        """It as a TorchRL actor, which draws its actions from a stream of its own.
+
+        Args:
+            env: From `make_env`.
+            seed: Of the stream.
+            stream: Which.
+        """
+        device = str(env.device or "cpu")
+        generator = torch_generator(seed, stream, device=device)
+        return make_actor(self.make_network(device), env.action_spec, generator)
+
+    @contextlib.contextmanager
+    def flying(
+        self,
+        num_envs: int,
+        *,
+        seed: int = 0,
+        stream: Stream = Stream.REPORT,
+        device: str = "cpu",
+    ) -> Iterator[tuple[TransformedEnv, TensorDictModuleBase]]:
+        """Worlds and it as their actor, for a while; then the worlds are closed.
+
+        Args:
+            num_envs: How many.
+            seed: Root of their random streams and of its own.
+            stream: Which worlds.
+            device: Where they are drawn.
+        """
+        env = self.make_env(num_envs, seed=seed, stream=stream, device=device)
+        try:
+            yield env, self.make_actor(env, seed=seed, stream=stream)
+        finally:
+            env.close()

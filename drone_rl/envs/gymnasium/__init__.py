@@ -1,0 +1,5 @@
+"""The worlds as Gymnasium knows environments: one, or many as a vector environment."""
+
+from drone_rl.utils.extras import extra
+
+extra("gymnasium", "gym", "drone_rl.envs.gymnasium")

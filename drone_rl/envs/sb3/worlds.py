@@ -1,0 +1,130 @@
+"""A Gymnasium vector environment as a vector environment of Stable-Baselines3's own kind.
+
+Stable-Baselines3 takes a single Gymnasium environment, and vectorises it by itself, one world after
+the other; it takes no vector environment of Gymnasium's.
+"""
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+import torch
+from gymnasium import Wrapper, spaces
+from gymnasium.vector import AutoresetMode, VectorEnv
+from numpy.typing import NDArray
+from stable_baselines3.common.vec_env import VecEnv
+from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvStepReturn
+
+from drone_rl.envs.pipeline import on_pixels
+from drone_rl.settings.transforms import Stack, Transform
+from drone_rl.utils.errors import InputError
+
+
+class Sb3Worlds(VecEnv):
+    """`Sb3Worlds(gymnasium.make_vec(name, num_envs=64, autoreset_mode="SameStep"))`.
+
+    The information that each step gives is of those worlds alone whose episode has just ended.
+    """
+
+    def __init__(self, env: VectorEnv, transforms: Sequence[Transform] = ()) -> None:
+        """Takes the worlds over.
+
+        Args:
+            env: Worlds that begin anew in the step in which they end.
+            transforms: What becomes of its pictures, RGB bytes (H, W, 3), in this order; without
+                any, Stable-Baselines3 puts the channels first, and networks get them from 0 to 1.
+
+        Raises:
+            InputError: It begins anew otherwise, or a transform doesn't fit.
+        """
+        mode = env.metadata.get("autoreset_mode")
+        if mode is not AutoresetMode.SAME_STEP:
+            name = getattr(mode, "value", mode)
+            raise InputError(
+                f"autoreset_mode={name}, but Stable-Baselines3 expects new episodes at once; give "
+                "gymnasium.make_vec(..., autoreset_mode='SameStep')"
+            )
+        if any(isinstance(transform, Stack) for transform in transforms):
+            raise InputError("transforms stack frames; use Stable-Baselines3's VecFrameStack")
+        self.env = env
+        self._look = on_pixels([transform.make() for transform in transforms])
+        self._actions: NDArray[Any] = np.zeros(env.num_envs, np.int64)
+        space = env.single_observation_space
+        if transforms:
+            seen = self._seen(np.zeros((1, *(space.shape or ())), space.dtype))[0]
+            space = spaces.Box(-np.inf, np.inf, seen.shape, np.float32)
+        super().__init__(env.num_envs, space, env.single_action_space)
+
+    def reset(self) -> NDArray[Any]:
+        """Starts episodes, with the seeds of `seed` where it was called; Shape: (num_envs, *)."""
+        if any(self._options):
+            raise InputError("options are unknown to reset; set none")
+        seen, info = self.env.reset(seed=self._seeds)  # pyright: ignore[reportArgumentType] (one a world, as SyncVectorEnv)
+        everywhere = range(self.num_envs)
+        self.reset_infos = [_of_world(info, i) for i in everywhere]
+        self._reset_seeds()
+        return self._seen(seen)
+
+    def step_async(self, actions: NDArray[Any]) -> None:
+        """Notes what the drones shall do."""
+        self._actions = actions
+
+    def step_wait(self) -> VecEnvStepReturn:
+        """Lets them do it.
+
+        Returns:
+            What is seen, rewards, which episodes ended, and of these the information, with
+            "terminal_observation" and "TimeLimit.truncated".
+        """
+        seen, rewards, terminated, truncated, info = self.env.step(self._actions)
+        done = terminated | truncated
+        infos: list[dict[str, Any]] = [{} for _ in done]
+        if done.any():
+            worlds = np.flatnonzero(done)
+            last = self._seen(np.stack([info["final_obs"][i] for i in worlds]))
+            for i, observation in zip(worlds.tolist(), last, strict=True):
+                infos[i] = {
+                    **_of_world(info["final_info"], i),
+                    "terminal_observation": observation,
+                    "TimeLimit.truncated": bool(truncated[i] and not terminated[i]),
+                }
+        return self._seen(seen), rewards.astype(np.float32), done, infos
+
+    def close(self) -> None:
+        """Ends the renderer."""
+        self.env.close()
+
+    def get_images(self) -> Sequence[Any]:
+        """What `render` draws of each world."""
+        return self.env.render() or [None] * self.num_envs
+
+    def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
+        """An attribute of the vector environment, once a world."""
+        return [getattr(self.env, attr_name) for _ in self._worlds(indices)]
+
+    def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
+        """Can't be: worlds have no attributes of their own."""
+        raise InputError(f"{attr_name} can't be set of worlds apart; set it of .env")
+
+    def env_method(
+        self, method_name: str, *args: Any, indices: VecEnvIndices = None, **kwargs: Any
+    ) -> list[Any]:
+        """Can't be: worlds have no methods of their own."""
+        raise InputError(f"{method_name} can't be called of worlds apart; call it of .env")
+
+    def env_is_wrapped(
+        self, wrapper_class: type[Wrapper], indices: VecEnvIndices = None
+    ) -> list[bool]:
+        """No world is."""
+        return [False for _ in self._worlds(indices)]
+
+    def _worlds(self, indices: VecEnvIndices) -> Iterable[int]:
+        return self._get_indices(indices)
+
+    def _seen(self, pictures: NDArray[Any]) -> NDArray[Any]:
+        return self._look(torch.from_numpy(pictures)).numpy()
+
+
+def _of_world(info: dict[str, Any], world: int) -> dict[str, Any]:
+    """What a vector environment's information says of one world."""
+    return {name: value[world] for name, value in info.items() if not name.startswith("_")}

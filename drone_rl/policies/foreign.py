@@ -1,0 +1,135 @@
+"""Any callable from pictures to logits, made elsewhere, as a network like ours."""
+
+import copy
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from drone_rl.policies.network import PictureNetwork
+from drone_rl.sim.actions import Actions
+from drone_rl.utils.errors import InputError
+
+Logits = Callable[[Tensor], Any]
+"""From a batch of pictures to logits (N, number of actions), a tensor or an array."""
+_REPEATS = 1e-5
+"""Logits of the same picture that differ by more are drawn, not computed."""
+
+
+class ForeignNetwork(PictureNetwork):
+    """A copy of a torch module that computes and does not learn, or a callable as it is.
+
+    Raises:
+        InputError: It takes no such pictures, its logits are not one an action, or it doesn't give
+            the same twice.
+    """
+
+    def __init__(
+        self,
+        logits: Logits,
+        in_shape: tuple[int, ...],
+        actions: Actions,
+        *,
+        takes_bytes: bool = False,
+        device: torch.device | str = "cpu",
+    ) -> None:
+        """Tries it on a picture.
+
+        Args:
+            logits: The callable.
+            in_shape: Shape (C, H, W) of one picture.
+            actions: One for each logit.
+            takes_bytes: Whether it wants RGB bytes (N, H, W, 3) in place of floats from 0 to 1.
+            device: Where a module is put.
+        """
+        super().__init__()
+        self.in_shape, self.actions = tuple(in_shape), actions
+        self._takes_bytes = takes_bytes
+        self._logits = _copied(logits).to(device) if isinstance(logits, nn.Module) else logits
+        self._factor = torch.ones(self.num_actions, device=device)
+        self._shift = torch.zeros(self.num_actions, device=device)
+        picture = torch.full((1, *self.in_shape), 0.5, device=device, requires_grad=True)
+        try:
+            found = self(picture)
+        except InputError:
+            raise
+        except Exception as error:
+            what = " ".join(f"{type(error).__name__}: {error}".split())[:200]
+            shown = tuple(self._given(picture.detach()).shape)
+            raise InputError(
+                f"the network can't take pictures of shape {shown} ({what}); give the camera and "
+                "transforms that it was trained with"
+            ) from error
+        if not torch.allclose(found, self(picture), atol=_REPEATS):
+            raise InputError(
+                "the network gives other logits for the same picture; give one that draws nothing"
+            )
+        self.is_differentiable = _depends(found, picture)
+
+    @property
+    def parts(self) -> nn.Module:
+        """The module; one without any parts of a callable that is none."""
+        return self._logits if isinstance(self._logits, nn.Module) else nn.Module()
+
+    def forward(self, pixels: Tensor) -> Tensor:
+        """See `PictureNetwork`.
+
+        Raises:
+            InputError: What is given back are no logits.
+        """
+        flat = pixels.reshape(-1, *self.in_shape)
+        made = self._logits(self._given(flat))
+        wanted, names = (len(flat), self.num_actions), ", ".join(self.actions.names)
+        if not isinstance(made, Tensor | np.ndarray):
+            raise InputError(
+                f"the network gives a {type(made).__name__}; give a callable that gives logits of "
+                f"shape {wanted}, one of each of {names}"
+            )
+        logits = torch.as_tensor(made).to(flat.device, flat.dtype)
+        if tuple(logits.shape) != wanted:
+            raise InputError(
+                f"the network gives logits of shape {tuple(logits.shape)}; give one that gives "
+                f"{wanted}, one of each of {names}"
+            )
+        if not torch.isfinite(logits).all():
+            raise InputError("the network gives logits that are not finite; give one that does not")
+        logits = logits * self._factor + self._shift
+        return logits.reshape(*pixels.shape[:-3], self.num_actions)
+
+    def rescale(self, factor: Tensor, shift: Tensor) -> None:
+        """See `PictureNetwork`; what is given back is computed with."""
+        self._factor, self._shift = self._factor * factor, self._shift * factor + shift
+
+    def _given(self, flat: Tensor) -> Tensor:
+        if not self._takes_bytes:
+            return flat
+        return (flat * 255).round().to(torch.uint8).movedim(-3, -1)
+
+
+def _copied(module: nn.Module) -> nn.Module:
+    """A copy of its own, which stays as it is when the module is trained on.
+
+    Raises:
+        InputError: It can't be copied.
+    """
+    try:
+        own = copy.deepcopy(module).eval()
+    except Exception as error:
+        raise InputError(
+            f"the network {type(module).__name__} can't be copied ({type(error).__name__}); give a "
+            "function that calls it"
+        ) from error
+    for part in own.modules():
+        if hasattr(part, "inplace"):  # else what a layer makes is gone when one looks at it
+            vars(part)["inplace"] = False
+    return own
+
+
+def _depends(logits: Tensor, picture: Tensor) -> bool:
+    """Whether there is a gradient."""
+    if not logits.requires_grad:
+        return False
+    (slope,) = torch.autograd.grad(logits.sum(), picture, allow_unused=True)
+    return slope is not None

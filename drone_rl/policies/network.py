@@ -1,0 +1,43 @@
+"""What judges and explanations ask of a network, whoever made it."""
+
+from torch import Tensor, nn
+
+from drone_rl.sim.actions import MOVES, Actions
+
+
+class PictureNetwork(nn.Module):
+    """From pictures to one logit an action; any number of leading batch dimensions."""
+
+    in_shape: tuple[int, ...]
+    """Shape (C, H, W) of one picture."""
+    actions: Actions = MOVES
+    """What the outputs ask for."""
+    is_differentiable: bool = True
+    """Whether the logits have gradients by the pixels."""
+
+    @property
+    def num_actions(self) -> int:
+        """Number of logits."""
+        return len(self.actions.names)
+
+    @property
+    def has_weights(self) -> bool:
+        """Whether any are known, so that they can be shuffled."""
+        return any(True for _ in self.parameters())
+
+    @property
+    def parts(self) -> nn.Module:
+        """That within which layers are addressed by name."""
+        return self
+
+    def rescale(self, factor: Tensor, shift: Tensor) -> None:
+        """Multiplies each logit and then adds to it, from now on. Shapes: (num_actions,)."""
+        raise NotImplementedError
+
+    def forward(self, pixels: Tensor) -> Tensor:
+        """Pictures (*, C, H, W) to logits (*, num_actions).
+
+        Raises:
+            InputError: The pictures are of another shape than the network was built for.
+        """
+        raise NotImplementedError

@@ -1,0 +1,158 @@
+"""Policies that were made elsewhere are flown, judged and explained as ours are."""
+
+import pytest
+import torch
+from torch import nn
+
+import drone_rl
+from drone_rl.api.foreign import as_pilot
+from drone_rl.api.progress import silent
+from drone_rl.settings.transforms import EpisodeReward, Gray, Resize, Rgb, Stack
+from drone_rl.utils.errors import InputError
+from tests.second_task import Posts
+
+FEW = {"episodes": 8, "sampled": False, "progress": silent}
+
+
+@pytest.fixture(scope="module")
+def network():
+    return drone_rl.load_policy("good").make_network()
+
+
+def on_bytes(network):
+    """The same network, behind what becomes of a frame before it, outside of torch's sight."""
+
+    def logits(frames):
+        assert frames.dtype == torch.uint8 and frames.shape[1:] == (25, 64, 3)
+        gray = frames.float() @ torch.tensor([0.299, 0.587, 0.114]) / 255
+        with torch.no_grad():
+            return network(((gray - 0.53) / 0.21)[:, None]).numpy()
+
+    return logits
+
+
+def left(pictures):
+    return torch.tensor([0.0, 99.0, 0.0]).expand(len(pictures), 3)
+
+
+def test_the_same_network_gets_the_same_verdict_wherever_it_comes_from(network):
+    own = drone_rl.judge("good", **FEW).as_dict()
+    ways = {
+        "module": network,
+        "function": lambda x: network(x),
+        "bytes": drone_rl.policy_from(on_bytes(network), transforms=()),
+    }
+    for name, way in ways.items():
+        found = drone_rl.judge(way, **FEW).as_dict()
+        for key in ("kind", "greedy", "skill", "quantities"):
+            assert found[key] == own[key], (name, key)
+
+
+def test_drawn_actions_are_those_of_the_same_network(network):
+    few = {"episodes": 6, "num_envs": 6, "progress": silent}
+    own, found = drone_rl.evaluate("good", **few), drone_rl.evaluate(network, **few)
+    assert found.flown == own.flown
+    told = found.as_dict()
+    assert (told["policy"], told["trained"]) == ("SmallCNN", None)
+
+
+def test_a_changed_task_and_a_task_of_another_kind():
+    done = drone_rl.judge(left, task={"num_cubes": 1}, **FEW)
+    assert (done.name, done.as_dict()["num_cubes"]) == ("left", 1)
+    assert done.verdict.kind == "poor"
+    posts = drone_rl.policy_from(left, task=Posts(), name="aside")
+    with posts.flying(2) as (env, actor):
+        assert actor(env.reset())["action"].tolist() == [1, 1]
+    assert posts.in_task() is posts
+    with pytest.raises(InputError, match=r"^task\.num_cubes is unknown; the task has no settings"):
+        posts.in_task(num_cubes=2)
+
+
+@pytest.mark.parametrize(
+    ("transforms", "shape"),
+    [
+        ([Gray()], (1, 25, 64)),
+        ([Rgb(), Resize(height=8, width=9)], (3, 8, 9)),
+        ([Gray(), Stack(N=3)], (3, 25, 64)),
+        ([Gray(), EpisodeReward()], (1, 25, 64)),
+    ],
+)
+def test_it_sees_what_the_transforms_make(transforms, shape):
+    seen = []
+
+    def note(pictures):
+        seen.append(tuple(pictures.shape[1:]))
+        return left(pictures)
+
+    policy = drone_rl.policy_from(note, transforms=transforms)
+    assert policy.make_network().in_shape == shape
+    with policy.flying(2) as (env, actor):
+        actor(env.reset())
+    assert set(seen) == {shape}
+
+
+def test_it_shows_itself():
+    policy = drone_rl.policy_from(left, camera=drone_rl.CameraSettings(width=32), transforms=())
+    assert repr(policy).startswith("ForeignPolicy(name='left', own_task=TaskSettings(")
+    assert "<td>RGB bytes</td>" in policy._repr_html_()
+    assert policy.make_network().in_shape == (3, 25, 32)
+
+
+def test_what_a_policy_can_be_given_as(network):
+    policy = drone_rl.policy_from(left)
+    assert as_pilot(policy) is policy
+    assert as_pilot("good").name == "good"
+    assert as_pilot(network).logits is network
+
+
+@pytest.mark.parametrize(
+    ("given", "options", "message"),
+    [
+        (3, {}, "policy_from got a int; give a callable from pictures to logits"),
+        (nn.Linear(9, 3), {}, r"the network can't take pictures of shape \(1, 1, 25, 64\)"),
+        (lambda x: left(x)[:, :2], {}, r"the network gives logits of shape \(1, 2\); give one"),
+        (left, {"transforms": [Resize()]}, "the transform resize needs floats; let gray come f"),
+        (left, {"transforms": [Gray(), Gray()]}, "the transform gray needs the camera's own RGB"),
+    ],
+)
+def test_what_does_not_fit_is_told_when_it_is_given(given, options, message):
+    with pytest.raises(InputError, match=f"^{message}"):
+        drone_rl.policy_from(given, **options)
+
+
+def test_a_camera_that_does_not_fit_a_network_of_ours(network):
+    with pytest.raises(InputError, match=r"built for pictures of shape \(1, 25, 64\), not \(1, 2"):
+        drone_rl.policy_from(network, camera=drone_rl.CameraSettings(width=32))
+
+
+def test_nothing_is_proved_of_it(tmp_path):
+    policy = drone_rl.policy_from(left)
+    for ask in (drone_rl.prove, drone_rl.chances, drone_rl.places, drone_rl.load_policy):
+        with pytest.raises(InputError, match=r"^policy=left is in no file of drone-rl's") as caught:
+            ask(policy)
+        assert "\n" not in str(caught.value)
+    with pytest.raises(InputError, match=r"policy=left was made elsewhere, and nothing is proved"):
+        drone_rl.judge(policy, certificate=tmp_path / "certificate.json", **FEW)
+
+
+@pytest.mark.slow
+def test_of_a_mere_callable_all_is_explained_that_can_be(network, tmp_path):
+    policy = drone_rl.policy_from(on_bytes(network), transforms=(), name="a function")
+    small = {"frames": 40, "episodes": 6, "perplexity": 5}
+    done = drone_rl.explain(policy, folder=tmp_path, progress=silent, **small)
+    numbers = done.numbers["a function"]
+    assert set(numbers["left_out"]) == {"class_models", "embedding"}
+    assert not {"class_model", "tsne"} & set(numbers)
+    assert (numbers["attribution"]["methods"], numbers["attribution"]["layer"]) == (
+        ["occlusion"],
+        None,
+    )
+    truth = numbers["truth"]
+    assert (truth["trusted"], truth["methods"], truth["integration_error"]) == (None, {}, None)
+    assert truth["outcomes"]["flights"] > 0
+    assert "it is no torch module" in numbers["places"]["refused"]
+    assert numbers["provenance"]["trained"] is None
+    page = done.report.read_text()
+    assert "What is left out, and why" in page
+    assert "None could be tested" in page
+    assert "Grad-CAM; occlusion is shown" in page
