@@ -9,7 +9,7 @@ from tensordict.nn import (
     ProbabilisticTensorDictSequential,
     TensorDictModule,
 )
-from torch import nn
+from torch import Tensor, nn
 
 from drone_rl.policies.actor import SeededCategorical
 from drone_rl.policies.cnn import PolicyNetwork, orthogonal
@@ -50,7 +50,7 @@ class ActorCritic(nn.Module):
                 "it from drone_rl.policies.PolicyNetwork"
             )
         *_, last = network.layers
-        self.trunk = TensorDictModule(network.layers[:-1], in_keys=[PIXELS], out_keys=[FEATURES])
+        self.trunk = TensorDictModule(_Trunk(network), in_keys=[PIXELS], out_keys=[FEATURES])
         """"pixels" to "features"."""
         self.actor = ProbabilisticTensorDictSequential(
             TensorDictModule(last, in_keys=[FEATURES], out_keys=["logits"]),
@@ -69,6 +69,20 @@ class ActorCritic(nn.Module):
             out_keys=[VALUE],
         )
         """"features" or "pixels" to "state_value"."""
+
+
+class _Trunk(nn.Module):
+    """The layers of a policy but the last, for any number of leading batch dimensions."""
+
+    def __init__(self, network: PolicyNetwork) -> None:
+        super().__init__()
+        self.in_shape = network.in_shape
+        self.layers = network.layers[:-1]
+
+    def forward(self, pixels: Tensor) -> Tensor:
+        """Pictures (*, C, H, W) to features (*, width)."""
+        features = self.layers(pixels.reshape(-1, *self.in_shape))
+        return features.reshape(*pixels.shape[:-3], features.shape[-1])
 
 
 def _one_number(logits: nn.Module, generator: torch.Generator | None) -> nn.Linear:

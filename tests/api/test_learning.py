@@ -5,6 +5,9 @@ import shutil
 
 import pytest
 import torch
+from tensordict.nn import TensorDictSequential
+from torchrl.collectors import Collector
+from torchrl.objectives.value import GAE
 
 import drone_rl
 from drone_rl.api.collecting import build_collector
@@ -22,7 +25,7 @@ from drone_rl.training import ActorCriticLearner, ReinforceLearner, load_checkpo
 from drone_rl.training.checkpoint import save_checkpoint
 from drone_rl.utils.errors import InputError
 
-TASK = TaskSettings(num_cubes=2, first_distance=8.0, step_limit=40)
+TASK = TaskSettings(num_cubes=2, first_distance=4.0, spacing=4.0, front_margin=2.0, step_limit=29)
 TINY = TrainSettings(task=TASK, trainer=TrainerSettings(total_frames=300)).replace(
     objective=Ppo(num_steps=12, minibatch_size=30), collector=Rollouts(num_envs=5)
 )
@@ -123,7 +126,7 @@ def test_its_policy_is_judged_and_exported_as_any_other(trained, tmp_path):
     state = checkpoint(trained)
     assert set(state["policy"]) == set(trained.policy.description.expected_weights())
     judged = drone_rl.judge(trained.policy, episodes=4, progress=silent)
-    assert judged.verdict.kind.value in ("poor", "none of these", "one-sided", "good")
+    assert judged.verdict.sentence
     export(trained.policy, tmp_path / "mine.safetensors", FlightSettings(episodes=4))
     there = drone_rl.load_policy(tmp_path / "mine.safetensors").state["policy"]
     assert_same(dict(there), dict(state["policy"]))
@@ -168,6 +171,28 @@ def refused(trained, folder, state, message):
     save_checkpoint(folder / "run" / "checkpoints" / "last.pt", state)
     with pytest.raises(InputError, match=message):
         drone_rl.train(folder=folder / "run", resume=True, progress=silent)
+
+
+@pytest.mark.parametrize("is_ours", [True, False])
+def test_advantages_are_torchrls_by_its_own_way_through_the_critic(is_ours):
+    """TorchRL looks at every next picture, too; its own collector's batches will do as well."""
+    made = build_collector(TINY.replace(collector=Rollouts(num_envs=5, num_threads=1)))
+    learner, (ours,) = build_learner(TINY, made), made.collector.collectors
+    torch.nn.init.normal_(learner.model.critic.module.weight)
+    collector = Collector(ours.env, ours.actor, frames_per_batch=400, total_frames=-1)
+    if is_ours:
+        ours.num_steps = 80
+    batch = next(iter(made.collector if is_ours else collector))
+    assert batch["next", "terminated"].any() and batch["next", "truncated"].any()
+    both = TensorDictSequential(learner.model.trunk, learner.model.critic)
+    rates = {"gamma": TINY.returns.gamma, "lmbda": TINY.returns.lmbda}
+    gae = GAE(**rates, value_network=both, average_gae=True, deactivate_vmap=True)
+    found, _ = learner._estimated(batch)
+    wanted = gae(batch.select(*learner.in_keys))
+    for key in ("advantage", "value_target"):
+        torch.testing.assert_close(found[key], wanted[key].reshape(-1, 1), rtol=1e-4, atol=1e-5)
+    assert learner.update(batch)["loss/grad_norm"] > 0
+    collector.shutdown()
 
 
 def test_a_collector_that_keeps_no_next_observations(monkeypatch, tmp_path):

@@ -41,6 +41,14 @@ def test_a_policy_taken_apart_is_the_same_policy(network):
     torch.testing.assert_close(acted[LOG_PROB], picked)
 
 
+def test_any_number_of_batch_dimensions(network):
+    model = ActorCritic(network)
+    pixels, steps = seen(model, 6)
+    rows = TensorDict({"pixels": pixels.reshape(2, 3, *SHAPE)}, [2, 3])
+    found = model.critic(model.trunk(rows))
+    torch.testing.assert_close(found["state_value"].reshape(6, 1), steps["state_value"])
+
+
 def test_a_shared_trunk_has_one_layer_for_the_critic_and_learns_from_both(network):
     model = ActorCritic(network, generator=generator())
     own = {name: p for name, p in model.critic.named_parameters()}
