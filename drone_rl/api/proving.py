@@ -2,7 +2,6 @@
 
 import dataclasses
 import json
-import math
 import time
 from collections.abc import Mapping
 from contextlib import closing
@@ -23,7 +22,8 @@ from drone_rl.settings.proving import ProveSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock, write_atomically
 from drone_rl.utils.provenance import provenance
-from drone_rl.words.proof import sentence
+from drone_rl.words.numbers import plural
+from drone_rl.words.proof import sentence, why_stopped
 
 
 @dataclasses.dataclass(frozen=True)
@@ -145,9 +145,10 @@ def _prove(
     if state is not None and state.exists():
         load(prover, state, known)
     begin = time.monotonic()
-    _go_on(prover, settings, progress, state, known)
+    stopped = _go_on(prover, settings, progress, state, known)
     seconds = time.monotonic() - begin
-    found = certify(policy.name, policy.description, weights, prover, seconds) | provenance()
+    found = certify(policy.name, policy.description, weights, prover, seconds, stopped)
+    found |= provenance()
     if folder is not None:
         write_atomically(folder / "certificate.json", json.dumps(found))
     if state is not None and prover.is_finished:
@@ -157,28 +158,38 @@ def _prove(
 
 def _go_on(
     prover: Prover, settings: ProveSettings, progress: Progress, state: Path | None, known: str
-) -> None:
-    """Advances a proof until it is finished or must stop, and saves it now and then."""
+) -> str | None:
+    """Advances a proof until it is finished or must stop, and saves it now and then.
+
+    Returns:
+        The setting that stopped it; None if it is finished.
+    """
     task, last = prover.lattice.task, prover.lattice.last
     total = (2 * task.lateral_bound) ** task.num_cubes
-    begin = saved = time.monotonic()
-    limit = math.inf if settings.limit_s is None else settings.limit_s
-    while not prover.is_finished and time.monotonic() - begin <= limit:
-        if prover.boxes_under_way > settings.most_boxes:
-            break
+    begin, stopped = time.monotonic(), None
+    saved = begin
+    while not prover.is_finished and not (stopped := _reached(prover, settings, begin)):
         place = prover.advance()
         done = prover.decided / total
         text = f"step {place.ahead} of {last}, {done:.1%} decided, {prover.pictures:,} pictures"
         at = min(place.ahead, last - 1)
-        if len(prover.parts):
-            text, at = f"{text}, {len(prover.parts):,} parts to come", int(done * last)
+        if count := len(prover.parts):
+            text, at = f"{text}, {plural(count, 'part')} to come", int(done * last)
         progress(text, at, last)
         if state is not None and time.monotonic() - saved > settings.save_interval_s:
             save(prover, state, known)
             saved = time.monotonic()
-    if state is not None and not prover.is_finished:
+    if state is not None and stopped:
         save(prover, state, known)
-    progress("proved" if prover.is_finished else "stopped", last, last)
+    progress(why_stopped(stopped) if stopped else "proved", last, last)
+    return stopped
+
+
+def _reached(prover: Prover, settings: ProveSettings, begin: float) -> str | None:
+    """The setting because of which a proof stops, if there is one."""
+    if settings.limit_s is not None and time.monotonic() - begin > settings.limit_s:
+        return "limit_s"
+    return "most_boxes" if prover.boxes_under_way > settings.most_boxes else None
 
 
 def load_proof(path: str | Path) -> Proof:

@@ -39,6 +39,6 @@ def run(settings: Command, folder: Path) -> tuple[int, float]:
     )
     print(proof)
     _log.info("written: %s", folder / "certificate.json")
-    if not proof.certificate["finished"]:
+    if proof.certificate["found"]["stopped_by"] == "limit_s":
         _log.info("go on with the same command and hydra.run.dir=%s", folder)
     return 0 if proof.is_proved else NOT_PROVED, proof.success

@@ -4,6 +4,8 @@ Boxes are arrays of shape (N, n, 2): N boxes, the lower and upper end for each o
 """
 
 import itertools
+import math
+from collections.abc import Sequence
 from typing import TypeVar
 
 import numpy as np
@@ -11,6 +13,13 @@ from numpy.typing import NDArray
 
 Boxes = NDArray[np.float64]
 _Number = TypeVar("_Number", np.float64, np.int64)
+Sides = Sequence[NDArray[np.float64]]
+"""Along each axis, where the cells of a grid begin and end."""
+
+AT_ONCE = 1_000_000
+"""Cells of a grid, so that it takes little memory."""
+MOST_GRIDS = 1_000
+"""That are gone through, so that it takes half a minute at most."""
 
 
 def whole(bound: float, num_cubes: int) -> Boxes:
@@ -42,29 +51,38 @@ def merge(boxes: NDArray[_Number]) -> NDArray[_Number]:
     return boxes
 
 
-def unite(boxes: Boxes, most: int = 10_000_000) -> Boxes:
+def unite(boxes: Boxes, most: int = MOST_GRIDS) -> Boxes:
     """The same set in disjoint boxes, where they overlap.
 
     Args:
         boxes: Any.
-        most: Cells of the grid that all their sides make, above which they are left as they are.
+        most: Grids, see `_grids`; where it takes more, boxes are left as they are.
     """
+    if len(boxes) < 2:
+        return boxes
     boxes = np.unique(boxes, axis=0)
-    n = boxes.shape[1]
-    sides = [np.unique(boxes[:, k]) for k in range(n)]
-    shape = [len(side) for side in sides]
-    if len(boxes) < 2 or np.prod(shape, dtype=float) > most:
+    hull = np.stack([boxes[..., 0].min(0), boxes[..., 1].max(0)], -1)[None]
+    grids = _grids(boxes, hull, most)
+    if grids is None:
         return merge(boxes)
-    ends = np.stack([np.searchsorted(side, boxes[:, k]) for k, side in enumerate(sides)], 1)
-    count = np.zeros(shape, np.int32)
-    for corner in itertools.product((0, 1), repeat=n):
-        at = tuple(ends[:, k, end] for k, end in enumerate(corner))
-        np.add.at(count, at, (-1) ** sum(corner))
-    for axis in range(n):
-        count = count.cumsum(axis)
-    lower, upper = np.moveaxis(blocks(count > 0), -1, 0)
-    ends = [np.stack([side[lower[:, k]], side[upper[:, k]]], -1) for k, side in enumerate(sides)]
-    return merge(np.stack(ends, 1))
+    return merge(np.concatenate([_of_grid(_covered(*grid), grid[1]) for grid in grids]))
+
+
+def beyond(boxes: Boxes, space: Boxes, most: int = MOST_GRIDS) -> Boxes | None:
+    """What some boxes leave of another one, in disjoint boxes.
+
+    Args:
+        boxes: Any within the other one.
+        space: That one. Shape: (1, n, 2).
+        most: See `unite`.
+
+    Returns:
+        None if it would take more.
+    """
+    grids = _grids(boxes, space, most)
+    if grids is None:
+        return None
+    return merge(np.concatenate([_of_grid(~_covered(*grid), grid[1]) for grid in grids]))
 
 
 def blocks(mask: NDArray[np.bool_]) -> NDArray[np.int64]:
@@ -92,6 +110,52 @@ def ragged(counts: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int
     """Numbers rows of different lengths: which row each entry belongs to, and its place there."""
     row = np.repeat(np.arange(len(counts)), counts)
     return row, np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)
+
+
+def _grids(boxes: Boxes, space: Boxes, most: int) -> list[tuple[Boxes, Sides]] | None:
+    """A space in parts that are small enough: the boxes in each, and its sides and theirs.
+
+    Args:
+        boxes: Any within the space.
+        space: One box.
+        most: Parts, so that time is bounded.
+
+    Returns:
+        None if there would be more.
+    """
+    found: list[tuple[Boxes, Sides]] = []
+    rest = [(boxes, space)]
+    while rest:
+        boxes, space = rest.pop()
+        every = np.concatenate([boxes, space])
+        sides = [np.unique(every[:, k]) for k in range(every.shape[1])]
+        if math.prod(map(len, sides)) <= AT_ONCE:
+            found.append((boxes, sides))
+        else:
+            longest = max(range(len(sides)), key=lambda k: len(sides[k]))
+            middle = longest, sides[longest][len(sides[longest]) // 2]
+            rest += zip(cut(boxes, *middle), cut(space, *middle), strict=True)
+        if len(found) + len(rest) > most:
+            return None
+    return found
+
+
+def _covered(boxes: Boxes, sides: Sides) -> NDArray[np.bool_]:
+    """Which cells between the sides any box has."""
+    ends = np.stack([np.searchsorted(side, boxes[:, k]) for k, side in enumerate(sides)], 1)
+    count = np.zeros([len(side) for side in sides], np.int32)
+    for corner in itertools.product((0, 1), repeat=len(sides)):
+        at = tuple(ends[:, k, end] for k, end in enumerate(corner))
+        np.add.at(count, at, (-1) ** sum(corner))
+    for axis in range(len(sides)):
+        count = count.cumsum(axis)
+    return count[(slice(-1),) * len(sides)] > 0
+
+
+def _of_grid(mask: NDArray[np.bool_], sides: Sides) -> Boxes:
+    """The cells between the sides that are set."""
+    ends = blocks(mask)
+    return merge(np.stack([side[ends[:, k]] for k, side in enumerate(sides)], 1))
 
 
 def _join(boxes: NDArray[_Number], cube: int) -> NDArray[_Number]:

@@ -12,8 +12,9 @@ from typing import Any
 from torch import Tensor
 
 from drone_rl.proofs.boxes import Boxes, volumes
+from drone_rl.proofs.findings import Findings
 from drone_rl.proofs.lattice import Ending
-from drone_rl.proofs.prover import Findings, Prover
+from drone_rl.proofs.prover import Prover
 from drone_rl.zoo import PolicyDescription
 
 FORMAT = "drone_rl certificate"
@@ -35,7 +36,12 @@ def weights_hash(weights: Mapping[str, Tensor]) -> str:
 
 
 def certify(
-    name: str, description: PolicyDescription, weights: str, prover: Prover, seconds: float
+    name: str,
+    description: PolicyDescription,
+    weights: str,
+    prover: Prover,
+    seconds: float,
+    stopped_by: str | None = None,
 ) -> dict[str, Any]:
     """What is known by now, as plain data.
 
@@ -45,6 +51,7 @@ def certify(
         weights: See `weights_hash`.
         prover: The proof.
         seconds: That it took.
+        stopped_by: The setting that stopped it before its end.
     """
     findings = prover.findings()
     task = prover.lattice.task
@@ -74,6 +81,7 @@ def certify(
             "states": prover.num_places,
             "most_boxes": prover.most_boxes,
             "seconds": seconds,
+            "stopped_by": stopped_by,
         },
     }
 
@@ -86,6 +94,6 @@ def _outcome(
         "collected": [bool(ending.collected >> k & 1) for k in range(num_cubes)],
         "loops": ending.loops,
         "share": float(volumes(boxes).sum()) / total,
-        "steps": {str(k): v / total for k, v in sorted(findings.steps[ending].items())},
+        "steps": {str(k): v / total for k, v in sorted(findings.steps.get(ending, {}).items())},
         "boxes": boxes.tolist(),
     }

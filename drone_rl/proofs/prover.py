@@ -7,7 +7,6 @@ are followed, and what becomes of it counts as decided only if all end alike.
 """
 
 import dataclasses
-import itertools
 import math
 from collections import defaultdict
 from collections.abc import Iterator
@@ -17,10 +16,11 @@ from numpy.typing import NDArray
 
 from drone_rl.proofs.boxes import Boxes, merge, unite, volumes, whole
 from drone_rl.proofs.cells import Cells
+from drone_rl.proofs.findings import Findings, ended, simplified, so_far, together, undecided
 from drone_rl.proofs.lattice import AHEAD, LEFT, RIGHT, Ending, Place
 from drone_rl.proofs.outlook import Outlook, runs
 from drone_rl.proofs.parts import in_parts
-from drone_rl.proofs.settling import settle, simplify
+from drone_rl.proofs.settling import settle
 from drone_rl.proofs.subject import Subject
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
 
@@ -31,18 +31,6 @@ MARGIN = 2.0
 
 COARSE = 0.5
 """Metres to which it is known, of forks, where cubes stood that are gone."""
-
-
-@dataclasses.dataclass
-class Findings:
-    """What is known of all placements, so far or in the end."""
-
-    endings: dict[Ending, Boxes]
-    """Placements that end so, disjoint."""
-    undecided: Boxes
-    """The rest."""
-    steps: dict[Ending, dict[int, float]]
-    """Volume of each ending by number of steps, as far as that is certain."""
 
 
 class Prover:
@@ -62,9 +50,13 @@ class Prover:
         self.lattice = subject.lattice
         self.parts = in_parts(subject, most_combinations)
         """Placements that are not yet begun with."""
+        self.part = self.parts[:0]
+        """Those under way; none between two parts."""
+        self.done = undecided(self.parts[:0])
+        """What is known of the parts before."""
         self.waiting: dict[Place, list[Boxes]] = defaultdict(list)
         self.ended: dict[tuple[Ending, int], list[Boxes]] = defaultdict(list)
-        """By number of steps."""
+        """Of the part under way, by number of steps."""
         self.forked: list[Boxes] = []
         """Where more than one action was possible for the first time, disjoint."""
         self.longest: dict[Place, int] = {}
@@ -73,7 +65,7 @@ class Prover:
         """What became of that; None for what is not followed to its end."""
         self.num_places = self.pictures = self.most_boxes = 0
         self.decided = 0.0
-        """Volume of what has been followed to its end, without forks."""
+        """Volume of what is known: of the part under way, what ended without forks."""
         self.least_gap, self.largest_band = np.inf, 0.0
         self._subject, self._most = subject, most_combinations
         self._seen_from = -1
@@ -105,8 +97,8 @@ class Prover:
     def advance(self) -> Place:
         """Visits the next place; returns it."""
         if not self.waiting:
-            self.waiting[Place(0, 0)].append(self.parts[:1])
-            self.parts = self.parts[1:]
+            self.part, self.parts = self.parts[:1], self.parts[1:]
+            self.waiting[Place(0, 0)].append(self.part)
         place = min(self.waiting, key=lambda p: p.turn)
         self._arrive(place.ahead)
         self._foresee(place)
@@ -124,7 +116,21 @@ class Prover:
             origin = dataclasses.replace(place, is_fork=place.is_fork or is_first_fork)
             for action in actions:
                 self._follow(origin, action, part)
+        if not self.waiting:
+            self._settle()
         return place
+
+    def _settle(self) -> None:
+        """Settles the forks of a part that is done, and forgets how it came to that."""
+        ways = {e: unite(np.concatenate(b)) for e, b in self.fork_ends.items() if e}
+        unknown, num_cubes = self.fork_ends.get(None, []), self.lattice.task.num_cubes
+        forks = Findings(*settle(self.forked, ways, unknown, num_cubes), {})
+        found = together([ended(self.ended, self.part[:0]), forks])
+        self.done = together([self.done, simplified(found, self.part)])
+        self.decided = self.done.decided
+        self.part = self.part[:0]
+        for forgotten in (self.ended, self.forked, self.fork_ends):
+            forgotten.clear()
 
     def _follow(self, place: Place, action: int, boxes: Boxes) -> None:
         """Moves on, unless that would be back to where the drone has just come from."""
@@ -257,29 +263,7 @@ class Prover:
         return found
 
     def findings(self) -> Findings:
-        """What is known by now."""
-        steps: dict[Ending, dict[int, float]] = defaultdict(dict)
-        endings: dict[Ending, list[Boxes]] = defaultdict(list)
-        for (ending, count), boxes in self.ended.items():
-            endings[ending] += boxes
-            steps[ending][count] = float(sum(volumes(b).sum() for b in boxes))
-        waiting = [b for p, boxes in self.waiting.items() if not p.is_fork for b in boxes]
+        """What is known by now of all placements; nothing yet of forks of the part under way."""
         task = self.lattice.task
-        settled, left = settle(self.forked, self._ways(), self._open(), task.num_cubes)
-        for ending, boxes in settled.items():
-            if len(boxes):
-                endings[ending].append(boxes)
-        space = whole(task.lateral_bound, task.num_cubes)
-        parts = {ending: merge(np.concatenate(boxes)) for ending, boxes in endings.items()}
-        return Findings(
-            *simplify(parts, merge(np.concatenate([left, *waiting, self.parts])), space), steps
-        )
-
-    def _ways(self) -> dict[Ending, Boxes]:
-        """Where forks may end so."""
-        return {e: unite(np.concatenate(b)) for e, b in self.fork_ends.items() if e and b}
-
-    def _open(self) -> list[Boxes]:
-        """Where it is not known how forks may end."""
-        waiting = (boxes for place, boxes in self.waiting.items() if place.is_fork)
-        return [*self.fork_ends.get(None, []), *itertools.chain.from_iterable(waiting)]
+        found = [self.done, so_far(self.ended, self.part), undecided(self.parts)]
+        return simplified(together(found), whole(task.lateral_bound, task.num_cubes))

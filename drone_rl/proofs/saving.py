@@ -4,14 +4,15 @@ import dataclasses
 import io
 import zipfile
 import zlib
-from collections.abc import Iterable
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drone_rl.proofs.boxes import Boxes
+from drone_rl.proofs.findings import Findings, together
 from drone_rl.proofs.lattice import Ending, Place
 from drone_rl.proofs.prover import Prover
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
@@ -20,7 +21,7 @@ from drone_rl.utils.files import read_bytes, write_atomically
 
 MOST_BYTES = 2**31
 _COUNTS = ("num_places", "pictures", "most_boxes", "least_gap", "largest_band", "decided")
-_SETS = ("waiting", "ended", "ways", "forked", "parts")
+_SETS = ("waiting", "ended", "ways", "forked", "parts", "part", "done", "undecided")
 _DAMAGE = (
     *(zipfile.BadZipFile, zlib.error, RuntimeError, EOFError, OSError),
     *(ValueError, TypeError, LookupError, ArithmeticError),
@@ -45,6 +46,7 @@ def save(prover: Prover, path: Path, subject: str) -> None:
     ]
     ended = [((*_row(e), s), b) for (e, s), boxes in prover.ended.items() for b in boxes]
     ways = [(_row(e), b) for e, boxes in prover.fork_ends.items() for b in boxes]
+    steps = [((*_row(e), s), v) for e, known in prover.done.steps.items() for s, v in known.items()]
     arrays = {
         "subject": np.frombuffer(subject.encode(), np.uint8),
         "counts": np.array([getattr(prover, name) for name in _COUNTS], np.float64),
@@ -53,6 +55,11 @@ def save(prover: Prover, path: Path, subject: str) -> None:
         **_packed("ways", ways),
         **_packed("forked", [((), b) for b in prover.forked]),
         **_packed("parts", [((), prover.parts)]),
+        **_packed("part", [((), prover.part)]),
+        **_packed("done", [(_row(e), b) for e, b in prover.done.endings.items()]),
+        **_packed("undecided", [((), prover.done.undecided)]),
+        "steps_rows": np.array([row for row, _ in steps], np.int64).reshape(len(steps), 4),
+        "steps_volumes": np.array([volume for _, volume in steps], np.float64),
     }
     buffer = io.BytesIO()
     np.savez(buffer, **arrays)
@@ -83,8 +90,12 @@ def load(prover: Prover, path: Path, subject: str) -> None:
         sets = {name: _unpacked(name, state, shape) for name in _SETS}
         waiting = [(_place(row[:-1]), row[-1], b) for row, b in sets["waiting"]]
         ended = [((_ending(row), row[3]), b) for row, b in sets["ended"]]
-        ways = [(_ending(row), b) for row, b in sets["ways"]]
-        ((_, parts),) = sets["parts"]
+        ways = [(None if row == _NOWHERE else _ending(row), b) for row, b in sets["ways"]]
+        forked = [boxes for _, boxes in sets["forked"]]
+        parts, part, left = (_only(sets[name]) for name in ("parts", "part", "undecided"))
+        _check(part, waiting, [*ended, *ways, *forked])
+        done = [Findings({_ending(row): b}, left[:0], {}) for row, b in sets["done"]]
+        done = together([Findings({}, left, _steps(state)), *done])
     except _DAMAGE as error:
         raise InputError(f"{path} is no state of a proof ({error}); delete it to begin") from None
     if saved != subject:
@@ -98,8 +109,7 @@ def load(prover: Prover, path: Path, subject: str) -> None:
         prover.ended[key].append(boxes)
     for way, boxes in ways:
         prover.fork_ends[way].append(boxes)
-    prover.forked = [boxes for _, boxes in sets["forked"]]
-    prover.parts = parts
+    prover.forked, prover.parts, prover.part, prover.done = forked, parts, part, done
     for name, count in counts.items():
         setattr(prover, name, count)
 
@@ -115,10 +125,30 @@ def _row(ending: Ending | None) -> tuple[int, int, int]:
     return int(ending.reason), ending.collected, int(ending.loops)
 
 
-def _ending(row: tuple[int, ...]) -> Any:
-    if row[:3] == _NOWHERE:
-        return None
+def _ending(row: tuple[int, ...]) -> Ending:
     return Ending(EndReason(row[0]), row[1], bool(row[2]))
+
+
+def _only(parts: Sequence[tuple[tuple[int, ...], Boxes]]) -> Boxes:
+    ((_, boxes),) = parts
+    return boxes
+
+
+def _check(part: Boxes, waiting: Sequence[tuple], known: Sequence) -> None:
+    """Something waits where a part is under way, and only there more can be known than is done."""
+    if len(part) != bool(waiting) or (known and not waiting):
+        raise ValueError(f"{len(part)} parts are under way at {len(waiting)} places")
+
+
+def _steps(state: dict[str, NDArray]) -> dict[Ending, dict[int, float]]:
+    """See `Findings`."""
+    rows, volumes = state["steps_rows"], state["steps_volumes"]
+    if rows.shape != (*volumes.shape, 4) or not np.isfinite(volumes).all():
+        raise ValueError(f"steps are {volumes.dtype} of shape {rows.shape}")
+    steps: dict[Ending, dict[int, float]] = defaultdict(dict)
+    for row, volume in zip(rows.tolist(), volumes.tolist(), strict=True):
+        steps[_ending(row)][row[3]] = volume
+    return dict(steps)
 
 
 def _packed(name: str, parts: Iterable[tuple[tuple, Boxes]]) -> dict[str, NDArray]:

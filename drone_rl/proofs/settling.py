@@ -55,28 +55,6 @@ def settle(
     )
 
 
-def simplify(
-    endings: Mapping[E, Boxes], undecided: Boxes, space: Boxes
-) -> tuple[dict[E, Boxes], Boxes]:
-    """The same partition of a space in fewer boxes: the largest part is what the others leave.
-
-    Args:
-        endings: Its parts, disjoint.
-        undecided: Another one.
-        space: What they are a partition of.
-    """
-    if not endings:
-        return {}, undecided
-    usual = max(endings, key=lambda e: volumes(endings[e]).sum())
-    others = [boxes for ending, boxes in endings.items() if ending != usual]
-    holes, rest = np.concatenate([undecided, *others]), space
-    if len(holes) > len(endings[usual]):
-        return dict(endings), undecided
-    for hole in holes:
-        rest = carve(rest, hole)[1]
-    return {**endings, usual: merge(rest)}, undecided
-
-
 def _meets(boxes: Boxes, others: Boxes) -> NDArray[np.bool_]:
     """Which boxes have something in common with any of some others."""
     found = np.zeros(len(boxes), bool)

@@ -25,8 +25,22 @@ def sentence(certificate: Mapping[str, Any]) -> str:
     if undecided["boxes"]:
         text += f"; a share of {exact(undecided['share'], is_all=not outcomes)} are undecided"
     if not certificate["finished"]:
-        text += " so far (the proof was stopped)"
+        text += f" so far ({why_stopped(certificate['found'].get('stopped_by'))})"
     return text + "."
+
+
+def why_stopped(setting: str | None) -> str:
+    """Why a proof has not come to its end, and what helps.
+
+    Args:
+        setting: The one that stopped it, if it is known.
+    """
+    if setting != "most_boxes":
+        return "the proof was stopped"
+    return (
+        "the proof was stopped, for more than most_boxes boxes were under way; begin anew with a "
+        "smaller most_combinations, which makes parts of fewer boxes"
+    )
 
 
 def found(search: Mapping[str, Any]) -> str:
