@@ -16,7 +16,7 @@ from drone_rl.settings.training import TrainerSettings
 
 FLIGHTS = 105_000
 """Of all certificates together, at most: somewhat more than the 100,000 that are asked for."""
-SMALL_PARTS = {4: 4e7, 5: 1e8}
+SMALL_PARTS = {4: 2e7, 5: 5e7}
 """By number of cubes, combinations of pictures of a part: so few that parts are done in time."""
 
 
@@ -91,6 +91,7 @@ def bench_many_cubes(folder: Path, hours: float, quick: bool) -> dict[str, Any]:
             task={"num_cubes": cubes},
             limit_s=limit,
             most_combinations=int(SMALL_PARTS[cubes]),
+            most_boxes=20_000_000,
             progress=silent,
         )
         found |= {name: 1.0 - proof.undecided, f"{name}_s": time.perf_counter() - begin}

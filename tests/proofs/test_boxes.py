@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
+from drone_rl.proofs import boxes as module
 from drone_rl.proofs.boxes import (
+    beyond,
     blocks,
     carve,
     cut,
@@ -68,15 +70,34 @@ def test_merging_changes_no_set():
     assert (holds(merged, points) == holds(some, points)).all()
 
 
-@pytest.mark.parametrize("most", [10_000_000, 1])
-def test_overlaps_are_united(most):
+@pytest.mark.parametrize(("cells", "most"), [(1_000_000, 1), (20, 1000), (20, 1)])
+def test_overlaps_are_united(cells, most, monkeypatch):
+    """In one grid, in many small ones, and not at all where there would be too many."""
+    monkeypatch.setattr(module, "AT_ONCE", cells)
     random = np.random.default_rng(1)
     some, points = random_boxes(random, 30), random.random((2000, 3)) * 7
     united = unite(some, most)
     counts = holds(united, points)
     assert ((counts > 0) == (holds(some, points) > 0)).all()
-    if most > 1:
-        assert counts.max() == 1
+    assert (counts.max() == 1) == (cells * most > 20)
+
+
+@pytest.mark.parametrize("cells", [1_000_000, 20])
+def test_what_boxes_leave_of_another(cells, monkeypatch):
+    monkeypatch.setattr(module, "AT_ONCE", cells)
+    random = np.random.default_rng(3)
+    some, space = random_boxes(random, 10), boxes([[0, 7], [0, 7], [0, 7]])
+    left, points = beyond(some, space), random.random((2000, 3)) * 7
+    assert left is not None
+    assert (holds(left, points) == (holds(some, points) == 0)).all()
+    assert volumes(left).sum() + volumes(unite(some)).sum() == pytest.approx(343.0)
+
+
+def test_what_would_take_too_long_is_left(monkeypatch):
+    monkeypatch.setattr(module, "AT_ONCE", 20)
+    some, space = random_boxes(np.random.default_rng(3), 10), boxes([[0, 7], [0, 7], [0, 7]])
+    assert beyond(some, space, most=2) is None
+    assert beyond(some[:0], space).tolist() == space.tolist()
 
 
 def test_united_volume_by_hand():

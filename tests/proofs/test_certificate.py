@@ -1,12 +1,16 @@
 """Certificates: what is in one, and that the second checker, which shares nothing, accepts it."""
 
 import json
+from contextlib import closing
 
 import pytest
 import torch
 
 import drone_rl
-from drone_rl.proofs.certificate import weights_hash
+from drone_rl.proofs.certificate import certify, weights_hash
+from drone_rl.proofs.prover import Prover
+from drone_rl.proofs.subject import make_subject
+from drone_rl.utils.provenance import provenance
 
 
 @pytest.fixture(scope="module")
@@ -40,6 +44,29 @@ def test_it_is_data(proof):
 
 def test_the_second_checker_accepts_it(proof):
     assert drone_rl.check(proof.folder / "certificate.json", flights=300).accepted
+
+
+def test_what_is_stated_when_it_is_stopped_within_a_part_is_accepted(tmp_path):
+    policy = drone_rl.load_policy("right_and_forward").in_task(num_cubes=1, lateral_bound=2.0)
+    network = policy.make_network()
+    path, found = tmp_path / "certificate.json", {}
+    with closing(make_subject(policy.description, network, 1e-4)) as subject:
+        prover = Prover(subject, 100)
+        while prover.parts.size:
+            prover.advance()
+        while not prover.ended:
+            prover.advance()
+        assert prover.part.size and prover.waiting and prover.done.endings
+        weights = weights_hash(policy.state["policy"])
+        found = certify(policy.name, policy.description, weights, prover, 1.0, "limit_s")
+    path.write_text(json.dumps(found | provenance()))
+    assert not found["finished"] and found["found"]["stopped_by"] == "limit_s"
+    shares = sum(o["share"] for o in found["outcomes"])
+    assert 0.0 < shares < 1.0 and shares + found["undecided"]["share"] == pytest.approx(1.0)
+    assert drone_rl.check(path, flights=300).accepted
+    found["outcomes"][0]["boxes"] += found["undecided"]["boxes"][:1]
+    path.write_text(json.dumps(found | provenance()))
+    assert not drone_rl.check(path, flights=300).accepted
 
 
 def test_the_second_checker_refuses_what_was_changed(proof, tmp_path):

@@ -42,7 +42,7 @@ def test_the_share_that_a_policy_collects(one_sided):
 
 
 def test_part_by_part_it_comes_to_the_same(one_sided):
-    in_parts = prove("right_and_forward", most=20)
+    in_parts = prove("right_and_forward", most=200)
     assert in_parts.num_places > one_sided.num_places
     (parts, undecided), (whole, left) = shares(in_parts.findings()), shares(one_sided.findings())
     assert parts == pytest.approx(whole, abs=1e-12) and undecided == pytest.approx(left, abs=1e-12)
@@ -78,6 +78,25 @@ def test_half_way_the_rest_is_undecided():
     assert parts == {} and undecided == 1.0
 
 
+def test_a_part_that_is_done_is_settled_and_how_it_came_is_forgotten():
+    policy = drone_rl.load_policy("right_and_forward").in_task(num_cubes=1, lateral_bound=2.0)
+    subject = make_subject(policy.description, policy.make_network(), 1e-4)
+    prover, most = Prover(subject, 200), 0
+    while not prover.is_finished:
+        prover.advance()
+        most = max(most, len(prover.forked), len(prover.ended))
+        findings = prover.findings()
+        parts, undecided = shares(findings, bound=2.0)
+        assert sum(parts.values()) + undecided == pytest.approx(1.0, abs=1e-12)
+        assert sum(parts.values()) * 4.0 == pytest.approx(findings.decided, abs=1e-12)
+        assert sum(parts.values()) * 4.0 <= prover.decided + 1e-9
+        counted = sum(sum(steps.values()) for steps in findings.steps.values())
+        assert counted <= findings.decided + 1e-12
+    subject.close()
+    assert most and not prover.ended and not prover.forked and not prover.fork_ends
+    assert not len(prover.part) and prover.decided == pytest.approx(findings.decided)
+
+
 def test_parts_that_are_not_begun_with_are_undecided():
     policy = drone_rl.load_policy("right_and_forward").in_task(num_cubes=1, lateral_bound=2.0)
     subject = make_subject(policy.description, policy.make_network(), 1e-4)
@@ -94,10 +113,18 @@ def test_parts_that_are_not_begun_with_are_undecided():
     assert undecided == pytest.approx(1 - 1 / count, abs=1e-6)
 
 
-def test_where_logits_are_close_nothing_is_claimed():
+def test_where_logits_are_close_nothing_is_claimed(one_sided, monkeypatch):
     """The larger the gap that is asked for, the more ways are followed, and nothing is wrong."""
-    bold, careful = prove("right_and_forward"), prove("right_and_forward", gap=3.0)
-    forked = [sum(volumes(b).sum() for b in prover.forked) for prover in (bold, careful)]
+    forked = []
+    settle = Prover._settle
+
+    def noted(prover):
+        forked.append(sum(volumes(b).sum() for b in prover.forked))
+        settle(prover)
+
+    monkeypatch.setattr(Prover, "_settle", noted)
+    prove("right_and_forward")
+    careful = prove("right_and_forward", gap=3.0)
     assert forked[0] < 1e-3 < forked[1]
     parts, _ = shares(careful.findings())
     assert parts.get(("ALL_CUBES", 1), 0) <= (6 + 1.65) / 12 + 1e-9

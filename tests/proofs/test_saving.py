@@ -92,6 +92,13 @@ NOTHING = np.zeros(0, np.int64)
         {"waiting_rows": np.zeros((1, 0), np.int64)},
         {"ended_rows": np.zeros((1, 1), np.int64), "ended_counts": np.array([1])},
         {"ways_rows": np.array([[99, 0, 0]]), "ways_counts": np.array([0])},
+        {"part_boxes": np.zeros((0, 1, 2)), "part_counts": np.array([0])},  # yet something waits
+        {"waiting_rows": np.zeros((0, 7), np.int64), "waiting_counts": NOTHING},
+        {"done_rows": np.zeros((1, 2), np.int64), "done_counts": np.array([0])},
+        {"undecided_rows": np.zeros((0, 0)), "undecided_counts": NOTHING},
+        {"steps_rows": np.zeros((1, 4), np.int64)},  # and no volume
+        {"steps_rows": np.full((1, 4), 99), "steps_volumes": np.array([1.0])},
+        {"steps_rows": np.array([[1, 1, 0, 9]]), "steps_volumes": np.array([np.nan])},
         {"counts": np.full(6, np.nan)},
         {"counts": np.full(6, np.inf)},
         {"counts": np.zeros(5)},
@@ -108,4 +115,5 @@ def test_a_state_that_makes_no_sense_is_refused_and_nothing_taken_over(subject, 
     with pytest.raises(InputError, match="is no state of a proof"):
         load(fresh, path, "this")
     assert not fresh.waiting and not fresh.ended and not fresh.fork_ends and not fresh.forked
+    assert not len(fresh.part) and not fresh.done.endings and not fresh.done.steps
     assert fresh.num_places == 0 and fresh.parts.tolist() == [[[-6.0, 6.0]]]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from drone_rl.proofs.boxes import volumes
-from drone_rl.proofs.settling import settle, simplify
+from drone_rl.proofs.settling import settle
 
 
 def line(*intervals):
@@ -71,13 +71,3 @@ def test_against_every_point(seed):
         said = {name: int(has(boxes, point)) for name, boxes in settled.items()}
         assert said == {name: int(is_sure and name in ends) for name in said}
         assert has(left, point) == (not is_sure)
-
-
-def test_the_largest_part_is_what_the_others_leave():
-    parts = {"won": line(*[[i, i + 1] for i in range(0, 9, 2)], [1, 2], [3, 4], [5, 6])}
-    parts["lost"] = line([7, 8])
-    simple, undecided = simplify(parts, line(), line([0, 9]))
-    assert sorted(simple["won"].tolist()) == [[[0, 7]], [[8, 9]]]
-    assert simple["lost"].tolist() == [[[7, 8]]]
-    assert len(undecided) == 0
-    assert simplify({}, line([0, 9]), line([0, 9]))[1].tolist() == [[[0, 9]]]

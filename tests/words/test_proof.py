@@ -14,6 +14,7 @@ def certificate(won=1.0, undecided=0.0, finished=True, cubes=3):
         "outcomes": outcomes,
         "undecided": {"share": undecided, "boxes": [[[0, 1]]] if undecided else []},
         "finished": finished,
+        "found": {},
     }
 
 
@@ -39,6 +40,15 @@ def test_shares():
 def test_a_proof_that_was_stopped():
     text = sentence(certificate(won=0.25, undecided=0.75, finished=False))
     assert text.endswith("so far (the proof was stopped).")
+
+
+def test_what_helps_a_proof_of_too_many_boxes():
+    stopped = certificate(won=0.25, undecided=0.75, finished=False)
+    stopped["found"]["stopped_by"] = "most_boxes"
+    assert "more than most_boxes boxes" in sentence(stopped)
+    assert "with a smaller most_combinations" in sentence(stopped)
+    stopped["found"]["stopped_by"] = "limit_s"
+    assert sentence(stopped).endswith("so far (the proof was stopped).")
 
 
 def test_nearly_all_is_never_all_and_all_is():
