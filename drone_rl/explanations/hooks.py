@@ -29,7 +29,7 @@ def _acting(network: PictureNetwork) -> dict[str, tuple[nn.Module, tuple[int, ..
         whole = isinstance(out, Tensor) and out.shape[:1] == (_TRIED,)
         acted.append((layer, tuple(out.shape[1:]) if whole else ()))
 
-    leaves = [part for part in names if not [*part.children()]]
+    leaves = [p for p in names if not [*p.children()] and not isinstance(p, nn.Sequential)]
     handles = [leaf.register_forward_hook(note) for leaf in leaves]
     try:
         device = next((p.device for p in network.parameters()), torch.device("cpu"))

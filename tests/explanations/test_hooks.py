@@ -58,11 +58,12 @@ class Elsewhere(nn.Module):
         super().__init__()
         self.head = nn.ModuleDict({"last": nn.Linear(6, 3), "before": nn.Linear(40, 6)})
         self.body = nn.Sequential(nn.Conv2d(1, 2, 3, padding=1), nn.ReLU(), nn.Conv2d(2, 2, 2, 2))
+        self.nothing = nn.Sequential()
         self.twice, self.never, self.memory = nn.Tanh(), nn.Linear(1, 1), nn.LSTM(1, 1)
 
     def forward(self, x):
         self.memory(x.new_zeros(1, 1))
-        x = self.twice(self.body(x)).flatten(1)
+        x = self.nothing(self.twice(self.body(x)).flatten(1))
         return self.twice(self.head["last"](self.head["before"](x)))
 
 

@@ -1,12 +1,17 @@
 """A policy that Stable-Baselines3 trained, as a network from pictures to logits."""
 
+from typing import Any
+
 import numpy as np
+import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.policies import ActorCriticPolicy
 from torch import Tensor, nn
-from torch.distributions import Categorical
 
 from drone_rl.utils.errors import InputError
+
+_SAME = 1e-4
+"""Log-probabilities that differ by less are the model's own."""
 
 
 class Sb3Logits(nn.Module):
@@ -16,11 +21,11 @@ class Sb3Logits(nn.Module):
     makes.
 
     Raises:
-        InputError: The model has no probabilities of a few actions.
+        InputError: The model has no probabilities of a few actions that depend on a picture alone.
     """
 
     def __init__(self, model: BaseAlgorithm) -> None:
-        """Takes the model's policy, which it shares.
+        """Takes the modules between picture and logits, which it shares with the model.
 
         Args:
             model: Of an actor-critic algorithm with discrete actions.
@@ -28,15 +33,33 @@ class Sb3Logits(nn.Module):
         super().__init__()
         policy = model.policy
         if not isinstance(policy, ActorCriticPolicy) or not hasattr(policy.action_space, "n"):
-            raise InputError(
-                f"the policy of {type(model).__name__} has no logits; give one of PPO or A2C with "
-                "discrete actions, or a callable from pictures to logits"
-            )
-        self.policy = policy
-        self.scale = 255.0 if policy.observation_space.dtype == np.uint8 else 1.0
+            raise _refusal(model)
+        takes_bytes = policy.observation_space.dtype == np.uint8
+        self.scale = 255.0 if takes_bytes and not policy.normalize_images else 1.0
+        self.trunk = policy.pi_features_extractor
+        self.hidden = policy.mlp_extractor.policy_net
+        self.logits = policy.action_net
+        if not self._agrees(policy):
+            raise _refusal(model)
 
     def forward(self, pixels: Tensor) -> Tensor:
         """Pictures (N, C, H, W) to logits (N, number of actions)."""
-        distribution = self.policy.get_distribution(pixels * self.scale).distribution
-        assert isinstance(distribution, Categorical)
-        return distribution.logits
+        return self.logits(self.hidden(self.trunk(pixels * self.scale)))
+
+    @torch.no_grad()
+    def _agrees(self, policy: ActorCriticPolicy) -> bool:
+        """Whether it does what the policy does; one with a memory, say, does not."""
+        picture = torch.zeros(1, *(policy.observation_space.shape or ()), device=policy.device)
+        try:
+            distribution: Any = policy.get_distribution(picture).distribution
+        except TypeError:
+            return False
+        own = self(picture).log_softmax(-1)
+        return bool(torch.allclose(own, distribution.logits, atol=_SAME))
+
+
+def _refusal(model: BaseAlgorithm) -> InputError:
+    return InputError(
+        f"the policy of {type(model).__name__} gives no logits of a picture alone; give one of PPO "
+        "or A2C with discrete actions, or a callable from pictures to logits"
+    )

@@ -33,7 +33,7 @@ class Sb3Trunk(BaseFeaturesExtractor):
         assert isinstance(made, PolicyNetwork)
         width = made.layers.get_parameter("logits.weight").shape[1]
         super().__init__(observation_space, features_dim=width)
-        # as it makes them orthogonal it can't do with the weights' order that is fast on a CPU
+        # with our order of the weights in memory its initialisation could not do
         self.layers = made.layers[:-1].to(memory_format=torch.contiguous_format)  # pyright: ignore[reportCallIssue] (torch's annotations lack it)
 
     def forward(self, observations: Tensor) -> Tensor:

@@ -3,7 +3,10 @@
 import numpy as np
 import pytest
 import torch
+from torch import nn
 
+from drone_rl.policies import ForeignNetwork
+from drone_rl.sim.actions import MOVES
 from drone_rl.utils.errors import InputError
 
 gymnasium = pytest.importorskip("gymnasium", reason="Gymnasium is not installed")
@@ -21,6 +24,9 @@ class Still(gymnasium.Env):
 
     def reset(self, *, seed=None, options=None):
         return self.observation_space.sample(), {}
+
+    def step(self, action):
+        return self.observation_space.sample(), float(action), False, False, {}
 
 
 BYTES = gymnasium.spaces.Box(0, 255, (40, 48, 3), np.uint8)
@@ -49,9 +55,33 @@ def test_floats_stay_as_they_are():
     torch.testing.assert_close(wish, torch.tensor([[0.0, 1.0, -1.0]]).softmax(-1))
 
 
+def test_bytes_that_are_not_normalised():
+    kwargs = {"normalize_images": False}
+    model = sb3.A2C("CnnPolicy", Still(BYTES), seed=0, policy_kwargs=kwargs)
+    frame = torch.from_numpy(BYTES.sample()).movedim(-1, 0)[None]
+    wanted = model.policy.get_distribution(frame.float()).distribution.probs
+    torch.testing.assert_close(Sb3Logits(model)(frame / 255).softmax(-1), wanted)
+
+
+def test_a_trained_model_can_be_judged_although_it_holds_what_torch_does_not_copy():
+    model = sb3.A2C("MlpPolicy", Still(FLOATS), n_steps=5, seed=0).learn(5)
+    network = ForeignNetwork(nn.Sequential(nn.Flatten(), Sb3Logits(model)), (1, 1, 3), MOVES)
+    before = network(torch.ones(1, 1, 1, 3))
+    model.learn(5)
+    assert torch.equal(network(torch.ones(1, 1, 1, 3)), before)
+
+
+def test_a_policy_that_does_more_than_its_modules():
+    model = sb3.PPO("MlpPolicy", Still(FLOATS), seed=0)
+    with torch.no_grad():  # so that there is something to differ by
+        model.policy.mlp_extractor.value_net[0].bias.fill_(1.0)
+        model.policy.action_net.weight.mul_(100)
+    model.policy.mlp_extractor.forward_actor = model.policy.mlp_extractor.forward_critic
+    with pytest.raises(InputError, match=r"^the policy of PPO gives no logits of a picture alone"):
+        Sb3Logits(model)
+
+
 def test_a_model_without_probabilities_of_actions():
     model = sb3.DQN("MlpPolicy", Still(FLOATS), buffer_size=10)
-    with pytest.raises(
-        InputError, match=r"^the policy of DQN has no logits; give one of PPO or A2C"
-    ):
+    with pytest.raises(InputError, match=r"^the policy of DQN gives no logits of a picture"):
         Sb3Logits(model)

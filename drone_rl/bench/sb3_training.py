@@ -1,0 +1,138 @@
+"""Stable-Baselines3's algorithms on our worlds, with the default's network, until it is solved."""
+
+import dataclasses
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any
+
+import gymnasium
+import numpy as np
+from stable_baselines3 import A2C, PPO
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
+
+from drone_rl.api.foreign import ForeignPolicy, policy_from
+from drone_rl.envs.gymnasium.worlds import DroneWorlds
+from drone_rl.envs.sb3.worlds import Sb3Worlds
+from drone_rl.policies.sb3.logits import Sb3Logits
+from drone_rl.policies.sb3.trunk import Sb3Trunk
+from drone_rl.settings.transforms import Gray, Standardize, Transform
+from drone_rl.utils.errors import InputError
+
+ALGORITHMS: Mapping[str, type[OnPolicyAlgorithm]] = MappingProxyType({"ppo": PPO, "a2c": A2C})
+"""By name."""
+SETTINGS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
+    {
+        "ppo": {
+            "n_steps": 64,
+            "n_epochs": 4,
+            "batch_size": 512,
+            "learning_rate": 1e-3,
+            "ent_coef": 0.01,
+        },
+        "a2c": {},
+    }
+)
+"""Of each algorithm, where they differ from its own defaults."""
+NUM_ENVS = 64
+TARGET, DECAY = 2.97, 0.99
+"""Of the running mean of the episodes' rewards, which begins at 0."""
+TRANSFORMS: tuple[Transform, ...] = (Gray(), Standardize())
+"""What the default's network sees."""
+
+
+class Solved(BaseCallback):
+    """Stops a training once the running mean of the episodes' rewards has reached a target."""
+
+    def __init__(self, target: float, decay: float = DECAY) -> None:
+        """Begins at 0.
+
+        Args:
+            target: Of the running mean.
+            decay: What an episode leaves of it.
+        """
+        super().__init__()
+        self.target, self.decay = target, decay
+        self.running_reward, self.episodes = 0.0, 0
+        self._earned = np.zeros(1)
+
+    @property
+    def is_reached(self) -> bool:
+        """Whether the target has been reached."""
+        return self.running_reward >= self.target
+
+    def count(self, rewards: np.ndarray, done: np.ndarray) -> None:
+        """Adds a step. Shapes: (num_envs,)."""
+        self._earned = self._earned + rewards
+        for earned in self._earned[done].tolist():
+            self.running_reward = self.decay * self.running_reward + (1 - self.decay) * earned
+            self.episodes += 1
+        self._earned = np.where(done, 0.0, self._earned)
+
+    def _on_step(self) -> bool:
+        self.count(self.locals["rewards"], self.locals["dones"])
+        return not self.is_reached
+
+
+@dataclasses.dataclass(frozen=True)
+class PeerTraining:
+    """What came of a training."""
+
+    is_solved: bool
+    """Whether the running mean has reached the target."""
+    frames: int
+    episodes: int
+    running_reward: float
+    policy: ForeignPolicy
+    """The policy, to be judged in worlds that it was not trained in."""
+
+
+def train_sb3(
+    algorithm: str,
+    seed: int,
+    *,
+    environment: str = "drone_rl/CollectCubes-v0",
+    num_envs: int = NUM_ENVS,
+    target: float = TARGET,
+    max_frames: int = 1_000_000,
+    **settings: Any,
+) -> PeerTraining:
+    """Trains until the running mean of the episodes' rewards has reached a target.
+
+    Args:
+        algorithm: "ppo" or "a2c".
+        seed: Of worlds, weights and actions.
+        environment: Gymnasium's name of the worlds.
+        num_envs: Worlds in a batch.
+        target: Of the running mean.
+        max_frames: It stops after so many in any case.
+        settings: Of the algorithm, in place of `SETTINGS`.
+
+    Raises:
+        InputError: There is no such algorithm.
+    """
+    if algorithm not in ALGORITHMS:
+        raise InputError(f"algorithm={algorithm!r} is unknown; give {', '.join(ALGORITHMS)}")
+    worlds = gymnasium.make_vec(environment, num_envs=num_envs, autoreset_mode="SameStep")
+    assert isinstance(worlds, DroneWorlds)
+    env, solved = Sb3Worlds(worlds, TRANSFORMS), Solved(target)
+    model = ALGORITHMS[algorithm](
+        "MlpPolicy",  # of which the trunk and the heads are all that is left
+        env,
+        seed=seed,
+        policy_kwargs={"features_extractor_class": Sb3Trunk, "net_arch": []},
+        device="cpu",
+        **{**SETTINGS[algorithm], **settings},
+    )
+    model.learn(max_frames, callback=solved)
+    stage = worlds.stage
+    env.close()
+    policy = policy_from(
+        Sb3Logits(model),
+        task=stage.worlds.task,
+        camera=stage.worlds.camera,
+        transforms=TRANSFORMS,
+        name=f"sb3 {algorithm}",
+    )
+    told = (model.num_timesteps, solved.episodes, solved.running_reward)
+    return PeerTraining(solved.is_reached, *told, policy)

@@ -1,0 +1,34 @@
+"""The example runs as it stands, in short form, and is short itself."""
+
+import importlib.util
+from pathlib import Path
+
+import pytest
+
+sb3 = pytest.importorskip("stable_baselines3", reason="Stable-Baselines3 is not installed")
+PATH = Path(__file__).parents[2] / "examples" / "judge_sb3.py"
+
+
+@pytest.fixture(scope="module")
+def example():
+    spec = importlib.util.spec_from_file_location("judge_sb3", PATH)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.slow
+def test_a_model_is_trained_saved_judged_and_explained(example, tmp_path, capsys):
+    example.train(64, num_envs=4, steps=16).save(tmp_path / "ppo.zip")
+    model = sb3.PPO.load(tmp_path / "ppo.zip")
+    example.trust(model, str(tmp_path), frames=40, episodes=6, perplexity=5)
+    verdict, report = capsys.readouterr().out.splitlines()
+    assert "episodes are too few to be certain" in verdict
+    page = Path(report).read_text()
+    assert "Grad-CAM of layer trunk.cnn.5" in page  # the nonlinearity after the last convolution
+    assert "features of layer trunk.linear.1" in page
+    assert "What is left out" not in page
+
+
+def test_it_is_short():
+    assert len(PATH.read_text().splitlines()) <= 50
