@@ -12,6 +12,7 @@ from drone_rl.bench.maps import bench_maps
 from drone_rl.bench.memory import bench_memory
 from drone_rl.bench.mutants import bench_mutants
 from drone_rl.bench.onnx_export import bench_onnx
+from drone_rl.bench.peers.side_by_side import bench_peers
 from drone_rl.bench.places import bench_places
 from drone_rl.bench.provable import bench_provable
 from drone_rl.bench.proving import bench_many_cubes, bench_prove, bench_tampering
@@ -145,6 +146,11 @@ BENCHMARKS: dict[str, Benchmark] = {
         lambda s: bench_onnx(s.runs / "onnx", s.quick),
         "guests",
         (*_DRAWING, "policies", "zoo", "evaluation", "api/exporting", "bench/onnx_export"),
+    ),
+    "peers": Benchmark(
+        lambda s: bench_peers(s.runs / "peers", s.seeds[:3], s.episodes, s.quick),
+        "guests",
+        (*_TRAINING, "api", "settings", "hydra_app", "cli", "conf", "bench/peers"),
     ),
     "gymnasium": Benchmark(
         lambda s: bench_gymnasium(s.worlds, s.device, s.quick),

@@ -1,6 +1,5 @@
 """Stable-Baselines3's algorithms on our worlds, with the default's network, until it is solved."""
 
-import dataclasses
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
@@ -11,7 +10,8 @@ from stable_baselines3 import A2C, PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 
-from drone_rl.api.foreign import ForeignPolicy, policy_from
+from drone_rl.api.foreign import policy_from
+from drone_rl.bench.peers.training import DECAY, TARGET, PeerTraining
 from drone_rl.envs.gymnasium.worlds import DroneWorlds
 from drone_rl.envs.sb3.worlds import Sb3Worlds
 from drone_rl.policies.sb3.logits import Sb3Logits
@@ -35,8 +35,6 @@ SETTINGS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
 )
 """Of each algorithm, where they differ from its own defaults."""
 NUM_ENVS = 64
-TARGET, DECAY = 2.97, 0.99
-"""Of the running mean of the episodes' rewards, which begins at 0."""
 TRANSFORMS: tuple[Transform, ...] = (Gray(), Standardize())
 """What the default's network sees."""
 
@@ -72,19 +70,6 @@ class Solved(BaseCallback):
     def _on_step(self) -> bool:
         self.count(self.locals["rewards"], self.locals["dones"])
         return not self.is_reached
-
-
-@dataclasses.dataclass(frozen=True)
-class PeerTraining:
-    """What came of a training."""
-
-    is_solved: bool
-    """Whether the running mean has reached the target."""
-    frames: int
-    episodes: int
-    running_reward: float
-    policy: ForeignPolicy
-    """The policy, to be judged in worlds that it was not trained in."""
 
 
 def train_sb3(
@@ -134,5 +119,4 @@ def train_sb3(
         transforms=TRANSFORMS,
         name=f"sb3 {algorithm}",
     )
-    told = (model.num_timesteps, solved.episodes, solved.running_reward)
-    return PeerTraining(solved.is_reached, *told, policy)
+    return PeerTraining(solved.is_reached, model.num_timesteps, solved.running_reward, policy)

@@ -7,7 +7,7 @@ from drone_rl.utils.errors import InputError
 
 pytest.importorskip("gymnasium", reason="Gymnasium is not installed")
 pytest.importorskip("stable_baselines3", reason="Stable-Baselines3 is not installed")
-from drone_rl.bench.sb3_training import SETTINGS, Solved, train_sb3
+from drone_rl.bench.peers.sb3 import SETTINGS, Solved, train_sb3
 
 
 def test_the_running_mean_counts_whole_episodes_in_the_order_of_their_ends():
