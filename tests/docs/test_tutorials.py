@@ -47,6 +47,13 @@ SMALLER = {
         "total_frames=20_000": "total_frames=3_000",
         "total_frames=10_000": "total_frames=1_500",
     },
+    "sb3": {
+        "num_envs=32": "num_envs=4",
+        "n_steps=128": "n_steps=16",
+        "40_000": "64",
+        "episodes=400": "episodes=8",
+        'folder="outputs/explain/sb3"': 'folder="sb3", frames=30, episodes=6, perplexity=5',
+    },
     "section": {"frames=120": "frames=30, perplexity=5", "make_env(64)": "make_env(30)"},
 }
 """What the tests change of a page, and into what."""
@@ -99,6 +106,8 @@ def run(code, where, names):
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_it_runs(page, workplace):
+    if page.stem == "sb3":
+        pytest.importorskip("stable_baselines3", reason="Stable-Baselines3 is not installed")
     names = {"__name__": "__main__"}
     for number, (language, title, code) in enumerate(read_blocks(page)):
         if title:

@@ -7,6 +7,7 @@ from drone_rl.bench.ledger import Ledger
 from tools.readme.blocks import replace_blocks
 from tools.readme.layers import draw_layers, list_packages, read_contracts
 from tools.readme.notebook import make_notebook
+from tools.readme.peers import make_peers
 from tools.readme.rows import CLAIMS, GUESTS, MAIN, PROOF, TRUTH
 from tools.readme.settings import list_commands, list_groups, list_parts, list_presets
 from tools.readme.stale import tell_ages
@@ -14,7 +15,10 @@ from tools.readme.tables import list_figures, list_origins, make_table
 
 ROOT = Path(__file__).resolve().parents[2]
 MEASURED = ROOT / "outputs" / "bench" / "results.json"
-PAGES = ("README.md", "docs/design.md", "docs/results.md", "docs/settings.md", "docs/onnx.md")
+PAGES = (
+    *("README.md", "docs/design.md", "docs/results.md", "docs/settings.md", "docs/onnx.md"),
+    "docs/learners.md",
+)
 """Which have blocks that are made."""
 NOTEBOOK = "docs/tutorials/notebook"
 """The page that is a notebook, too."""
@@ -27,6 +31,7 @@ def make_blocks(root: Path) -> dict[str, str]:
     tables = {"claims": CLAIMS, "main": MAIN, "truth": TRUTH, "proof": PROOF, "guests": GUESTS}
     return {
         **{name: make_table(rows, ledger.figures) for name, rows in tables.items()},
+        "peers": make_peers(ledger.figures),
         "figures": list_figures(ledger),
         "origins": list_origins(ledger),
         "packages": list_packages(contracts, root / "drone_rl"),

@@ -6,6 +6,12 @@ from collections.abc import Sequence
 from tools.readme.tables import Figures, Row
 
 
+def _beside(figures: Figures) -> str:
+    peers = figures["peers"]
+    names = ("reinforce", "ppo", "sb3_ppo", "sb3_a2c", "torchrl")
+    return "; ".join(f"{statistics.mean(peers[name]['seconds']):.1f}" for name in names)
+
+
 def _times(f: Figures) -> str:
     times = f["time_to_solve_s"]
     return f"{min(times):.0f} to {max(times):.0f}, median {statistics.median(times):.0f}"
@@ -303,6 +309,14 @@ MAIN = (
 )
 """The main job and sweeps."""
 GUESTS = (
+    Row(
+        "peers",
+        "seconds from the start of the process until solved, mean of three seeds: our default; our "
+        "PPO; Stable-Baselines3's PPO; its A2C; TorchRL's collector",
+        _beside,
+        "ours the least",
+        is_claim=True,
+    ),
     Row(
         "gymnasium",
         "Gymnasium's vector environment over the batched environment itself, frames/s",

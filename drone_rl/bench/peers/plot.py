@@ -4,16 +4,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-LABELS = {
-    "reinforce": "drone_rl, REINFORCE (default)",
-    "a2c": "drone_rl, A2C",
-    "ppo": "drone_rl, PPO",
-    "sb3_ppo": "Stable-Baselines3, PPO",
-    "sb3_a2c": "Stable-Baselines3, A2C",
-    "torchrl": "TorchRL's Collector, REINFORCE",
+from drone_rl.bench.peers.contenders import LABELS, THEIRS
+
+COLORS = {
+    "start and imports": "0.8",
+    "training, ours": "tab:blue",
+    "training, others": "tab:orange",
 }
-"""For people, by name."""
-OURS, THEIRS, START = "tab:blue", "tab:orange", "0.8"
 
 
 def plot(found: Mapping[str, Mapping[str, list[Any]]], path: Path) -> None:
@@ -31,17 +28,16 @@ def plot(found: Mapping[str, Mapping[str, list[Any]]], path: Path) -> None:
     for i, name in enumerate(names):
         seconds, trained = (found[name][k] for k in ("seconds", "seconds_without_imports"))
         whole, training = sum(seconds) / len(seconds), sum(trained) / len(trained)
-        color = THEIRS if name.startswith(("sb3", "torchrl")) else OURS
-        axes.barh(i, whole - training, color=START)
-        axes.barh(i, training, left=whole - training, color=color)
+        kind = "training, others" if name in THEIRS else "training, ours"
+        axes.barh(i, whole - training, color=COLORS["start and imports"])
+        axes.barh(i, training, left=whole - training, color=COLORS[kind])
         axes.plot(seconds, [i] * len(seconds), "o", color="black", markersize=4)
         if not all(found[name]["is_solved"]):
             axes.text(whole, i, "  not all solved", va="center")
     axes.set_yticks(range(len(names)), [LABELS[name] for name in names])
     axes.invert_yaxis()
     axes.set(xlabel="seconds from the start of the process until it is solved", xlim=(0, None))
-    kinds = {"start and imports": START, "training, ours": OURS, "training, others": THEIRS}
-    handles: list[Any] = [Patch(color=color, label=label) for label, color in kinds.items()]
+    handles: list[Any] = [Patch(color=color, label=label) for label, color in COLORS.items()]
     handles += axes.plot([], [], "o", color="black", markersize=4, label="each seed")
     figure.legend(handles=handles, loc="outside upper center", ncols=4, frameon=False)
     figure.savefig(path, dpi=120)

@@ -3,8 +3,8 @@
     python -m drone_rl.bench.peers.program sb3_ppo --seed 100 --started "$(date +%s.%N)"
 
 It prints a line of JSON: "seconds" from the start of the process until it is solved,
-"seconds_without_imports", "frames", "is_solved", "running_reward", and of as many held-out greedy
-episodes as were asked for "success_lower95".
+"seconds_without_imports", "frames", "is_solved", and of as many held-out greedy episodes as were
+asked for "success_lower95".
 """
 
 import argparse
@@ -61,7 +61,6 @@ def measure(arguments: Sequence[str]) -> dict[str, Any]:
         "seconds_without_imports": solved - imported,
         "frames": done.frames,
         "is_solved": done.is_solved,
-        "running_reward": done.running_reward,
     }
     if given.episodes:
         found["success_lower95"] = success_lower95(done.policy, given.episodes)

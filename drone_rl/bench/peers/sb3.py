@@ -21,19 +21,6 @@ from drone_rl.utils.errors import InputError
 
 ALGORITHMS: Mapping[str, type[OnPolicyAlgorithm]] = MappingProxyType({"ppo": PPO, "a2c": A2C})
 """By name."""
-SETTINGS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
-    {
-        "ppo": {
-            "n_steps": 64,
-            "n_epochs": 4,
-            "batch_size": 512,
-            "learning_rate": 1e-3,
-            "ent_coef": 0.01,
-        },
-        "a2c": {},
-    }
-)
-"""Of each algorithm, where they differ from its own defaults."""
 NUM_ENVS = 64
 TRANSFORMS: tuple[Transform, ...] = (Gray(), Standardize())
 """What the default's network sees."""
@@ -91,7 +78,7 @@ def train_sb3(
         num_envs: Worlds in a batch.
         target: Of the running mean.
         max_frames: It stops after so many in any case.
-        settings: Of the algorithm, in place of `SETTINGS`.
+        settings: Of the algorithm.
 
     Raises:
         InputError: There is no such algorithm.
@@ -107,7 +94,7 @@ def train_sb3(
         seed=seed,
         policy_kwargs={"features_extractor_class": Sb3Trunk, "net_arch": []},
         device="cpu",
-        **{**SETTINGS[algorithm], **settings},
+        **settings,
     )
     model.learn(max_frames, callback=solved)
     stage = worlds.stage

@@ -1,26 +1,19 @@
 """Our learners and what a user would pick instead, one after the other on the same machine."""
 
+import functools
 import json
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 from drone_rl.bench.commands import call
+from drone_rl.bench.peers.contenders import OURS, THEIRS
 from drone_rl.bench.peers.plot import plot
-from drone_rl.bench.peers.program import PEERS, success_lower95
+from drone_rl.bench.peers.program import success_lower95
 
-OURS: Mapping[str, tuple[str, ...]] = MappingProxyType(
-    {
-        "reinforce": (),
-        "a2c": ("objective=a2c",),
-        "ppo": ("objective=ppo",),
-    }
-)
-"""Arguments of `drone-rl train`."""
 Measured = dict[str, Any]
 
 
@@ -43,45 +36,67 @@ def bench_peers(folder: Path, seeds: Sequence[int], episodes: int, quick: bool) 
     """
     contenders: dict[str, Callable[..., Measured]] = {}
     for name, arguments in OURS.items():
-        contenders[name] = lambda seed, a=arguments, n=name: _ours(
-            a, seed, episodes, folder / f"{n}_{seed}", quick
+        short = ("trainer.total_frames=1",) if quick else ()
+        contenders[name] = functools.partial(
+            train_ours, (*arguments, *short), episodes=episodes, folder=folder / name
         )
-    for name in PEERS:
-        contenders[name] = lambda seed, n=name: _peer(n, seed, episodes, quick)
+    for name, settings in THEIRS.items():
+        most = 1 if quick else 1_000_000
+        contenders[name] = functools.partial(
+            train_theirs, name, settings, episodes=episodes, max_frames=most
+        )
     found: dict[str, dict[str, list]] = {name: {} for name in contenders}
     for seed in seeds[:1] if quick else seeds:
         for name, measure in contenders.items():
-            for key, value in measure(seed).items():
+            for key, value in measure(seed=seed).items():
                 found[name].setdefault(key, []).append(value)
     plot(found, folder.parent.parent / "peers.png")
     return {"peers": found}
 
 
-def _ours(
-    arguments: Sequence[str], seed: int, episodes: int, folder: Path, quick: bool
-) -> Measured:
-    short = ["trainer.total_frames=1"] if quick else []
+def train_ours(arguments: Sequence[str], *, seed: int, episodes: int, folder: Path) -> Measured:
+    """One training by `drone-rl train`.
+
+    Args:
+        arguments: Of the command.
+        seed: Of worlds, weights and actions.
+        episodes: Held-out ones to fly afterwards; 0 for none.
+        folder: For the runs.
+    """
+    run = folder / str(seed)
     begin = time.perf_counter()
-    call("train", *arguments, *short, f"seed={seed}", f"hydra.run.dir={folder}")
+    call("train", *arguments, f"seed={seed}", f"hydra.run.dir={run}")
     seconds = time.perf_counter() - begin
-    result = json.loads((folder / "result.json").read_text())
-    return {
+    result = json.loads((run / "result.json").read_text())
+    found = {
         "seconds": seconds,
         "seconds_without_imports": result["seconds"],
         "frames": result["frames"],
         "is_solved": result["reason"] == "solved",
-        "success_lower95": success_lower95(folder, episodes),
     }
+    return found | ({"success_lower95": success_lower95(run, episodes)} if episodes else {})
 
 
-def _peer(name: str, seed: int, episodes: int, quick: bool) -> Measured:
-    options = ["--seed", str(seed), "--episodes", str(episodes)]
-    options += ["--max-frames", "1"] if quick else []
+def train_theirs(
+    name: str, settings: Mapping[str, Any], *, seed: int, episodes: int, max_frames: int
+) -> Measured:
+    """One training by others.
+
+    Args:
+        name: Of the peer.
+        settings: Of it.
+        seed: Of worlds, weights and actions.
+        episodes: Held-out ones to fly afterwards; 0 for none.
+        max_frames: It stops after so many in any case.
+
+    Raises:
+        RuntimeError: It failed.
+    """
+    options = {"seed": seed, "episodes": episodes, "max-frames": max_frames}
+    options |= {"settings": json.dumps(dict(settings)), "started": time.time()}
+    words = [f"--{key}={value}" for key, value in options.items()]
     program = [sys.executable, "-m", "drone_rl.bench.peers.program", name]
-    command = [*program, *options, "--started", str(time.time())]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    done = subprocess.run([*program, *words], capture_output=True, text=True, check=False)
     if done.returncode:
         raise RuntimeError(f"{name} failed: {done.stderr.strip()[-500:]}")
-    measured = json.loads(done.stdout.splitlines()[-1])
-    del measured["running_reward"]
-    return measured
+    return json.loads(done.stdout.splitlines()[-1])

@@ -34,7 +34,7 @@ def test_of_torchrls_collector():
     settings = json.dumps({"num_envs": 4, "steps": 160})
     found = measure(["torchrl", "--max-frames", "640", "--settings", settings])
     assert found["frames"] == 640 and not found["is_solved"]
-    assert 0 < found["running_reward"] < 2 and "success_lower95" not in found
+    assert "success_lower95" not in found
     assert 0 < found["seconds_without_imports"] < found["seconds"]
 
 

@@ -7,7 +7,7 @@ from drone_rl.utils.errors import InputError
 
 pytest.importorskip("gymnasium", reason="Gymnasium is not installed")
 pytest.importorskip("stable_baselines3", reason="Stable-Baselines3 is not installed")
-from drone_rl.bench.peers.sb3 import SETTINGS, Solved, train_sb3
+from drone_rl.bench.peers.sb3 import Solved, train_sb3
 
 
 def test_the_running_mean_counts_whole_episodes_in_the_order_of_their_ends():
@@ -47,10 +47,6 @@ def test_it_stops_at_frames_or_target_and_leaves_a_policy_to_judge(algorithm, se
         assert actor(env.reset())["action"].shape == (2,)
     at_once = train_sb3(algorithm, 3, target=0.0, **how)
     assert (at_once.is_solved, at_once.frames) == (True, 4)
-
-
-def test_settings_are_told():
-    assert SETTINGS["ppo"]["learning_rate"] == 1e-3 and SETTINGS["a2c"] == {}
 
 
 def test_an_algorithm_that_is_none():

@@ -2,9 +2,8 @@
 
 import pytest
 
-from drone_rl.bench.peers import side_by_side
-from drone_rl.bench.peers.plot import LABELS
-from drone_rl.bench.peers.side_by_side import bench_peers
+from drone_rl.bench.peers.contenders import LABELS
+from drone_rl.bench.peers.side_by_side import bench_peers, train_theirs
 
 
 @pytest.mark.slow
@@ -22,4 +21,4 @@ def test_all_of_them(tmp_path):
 
 def test_a_peer_that_fails_says_why():
     with pytest.raises(RuntimeError, match="no_such failed"):
-        side_by_side._peer("no_such", 0, 1, quick=True)
+        train_theirs("no_such", {}, seed=0, episodes=1, max_frames=1)

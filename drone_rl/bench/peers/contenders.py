@@ -1,0 +1,40 @@
+"""Who is measured, and with which settings; `python -m tools.tuning` is how they were found."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any
+
+OURS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        "reinforce": (),
+        "a2c": ("objective=a2c",),
+        "ppo": ("objective=ppo",),
+    }
+)
+"""Arguments of `drone-rl train`."""
+THEIRS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
+    {
+        "sb3_ppo": {
+            "num_envs": 64,
+            "n_steps": 64,
+            "n_epochs": 4,
+            "batch_size": 512,
+            "learning_rate": 1e-3,
+            "ent_coef": 0.01,
+        },
+        "sb3_a2c": {"num_envs": 64},
+        "torchrl": {"num_envs": 16, "steps": 200, "lr": 2e-3},
+    }
+)
+"""Where they differ from their own defaults."""
+LABELS: Mapping[str, str] = MappingProxyType(
+    {
+        "reinforce": "drone_rl, REINFORCE (default)",
+        "a2c": "drone_rl, A2C",
+        "ppo": "drone_rl, PPO",
+        "sb3_ppo": "Stable-Baselines3, PPO",
+        "sb3_a2c": "Stable-Baselines3, A2C",
+        "torchrl": "TorchRL's Collector, REINFORCE",
+    }
+)
+"""For people."""

@@ -1,0 +1,32 @@
+"""Everybody is tuned with the same care, and what was found is what is used."""
+
+from drone_rl.bench.peers import contenders
+from tools import tuning
+
+
+def test_all_have_as_many_settings_and_none_twice():
+    tried = [*tuning.OURS.values(), *tuning.THEIRS.values()]
+    assert {len(settings) for settings in tried} == {6}
+    assert all(len({str(one) for one in settings}) == 6 for settings in tried)
+    assert [*tuning.OURS, *tuning.THEIRS] == [*contenders.LABELS]
+
+
+def test_the_settings_that_are_measured_are_of_those_that_were_tried():
+    for name, settings in contenders.THEIRS.items():
+        assert dict(settings) in tuning.THEIRS[name]
+
+
+def test_a_line_is_told_of_each(monkeypatch, capsys):
+    times = iter([10.0, 12.0, 20.0, 21.0])
+
+    def trained(name, settings, *, seed, episodes, max_frames):
+        assert (seed in tuning.SEEDS, episodes, name) == (True, 0, "torchrl")
+        return {"seconds": next(times), "frames": 2000, "is_solved": settings["lr"] < 3e-3}
+
+    monkeypatch.setattr(tuning, "train_theirs", trained)
+    monkeypatch.setattr(tuning, "THEIRS", {"torchrl": [{"lr": 2e-3}, {"lr": 3e-3}]})
+    tuning.main(["torchrl"])
+    assert capsys.readouterr().out.splitlines() == [
+        'torchrl {"lr": 0.002} 11.0 s: 10.0, 12.0 s; 2,000, 2,000 frames',
+        'torchrl {"lr": 0.003} 20.5 s (not all solved): 20.0, 21.0 s; 2,000, 2,000 frames',
+    ]

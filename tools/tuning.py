@@ -1,0 +1,106 @@
+"""Tunes our learners and their peers with the same care: as many settings, the same seeds.
+
+    python -m tools.tuning [NAME ...]
+
+Each setting is tried from seeds that `drone-rl bench peers` does not use; the one with the least
+mean time from the start of the process until it is solved is what `contenders.py` and `conf` have.
+It takes half an hour on two cores. One training that is not solved rules a setting out.
+"""
+
+import json
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from statistics import mean
+from typing import Any
+
+from drone_rl.bench.peers.side_by_side import train_ours, train_theirs
+
+SEEDS = (100, 101)
+MOST_FRAMES = 200_000
+_PPO = "objective=ppo"
+_SB3 = {"num_envs": 64, "n_steps": 64, "n_epochs": 4, "batch_size": 512, "ent_coef": 0.01}
+OURS: Mapping[str, Sequence[str]] = {
+    "reinforce": [
+        "optimiser.lr=2e-3",
+        "optimiser.lr=3e-3",
+        "optimiser.lr=2e-3 collector.num_envs=32",
+        "optimiser.lr=3e-3 collector.num_envs=32",
+        "optimiser.lr=2e-3 collector.num_envs=16",
+        "optimiser.lr=3e-3 collector.num_envs=16",
+    ],
+    "a2c": [
+        "objective=a2c",
+        "objective=a2c optimiser.lr=1e-3",
+        "objective=a2c optimiser.lr=3e-3",
+        "objective=a2c objective.num_steps=8",
+        "objective=a2c objective.num_steps=32 optimiser.lr=3e-3",
+        "objective=a2c objective.num_steps=8 optimiser.lr=1e-3",
+    ],
+    "ppo": [
+        _PPO,
+        f"{_PPO} optimiser.lr=1e-3",
+        f"{_PPO} optimiser.lr=3e-3",
+        f"{_PPO} objective.epochs=4 optimiser.lr=1e-3",
+        f"{_PPO} objective.epochs=1 optimiser.lr=3e-3",
+        f"{_PPO} objective.num_steps=16",
+    ],
+}
+"""Arguments of `drone-rl train`."""
+THEIRS: Mapping[str, Sequence[Mapping[str, Any]]] = {
+    "sb3_ppo": [
+        _SB3 | {"learning_rate": 1e-3},
+        _SB3 | {"learning_rate": 2e-3},
+        _SB3 | {"learning_rate": 2e-3, "n_epochs": 2},
+        _SB3 | {"learning_rate": 2e-3, "n_epochs": 2, "n_steps": 32},
+        _SB3 | {"learning_rate": 3e-3, "n_epochs": 2, "n_steps": 32},
+        _SB3 | {"learning_rate": 2e-3, "n_epochs": 2, "n_steps": 32, "ent_coef": 0.0},
+    ],
+    "sb3_a2c": [
+        {"num_envs": 64},
+        {"num_envs": 64, "learning_rate": 2e-3},
+        {"num_envs": 64, "n_steps": 16},
+        {"num_envs": 64, "n_steps": 16, "learning_rate": 2e-3},
+        {"num_envs": 64, "n_steps": 16, "learning_rate": 2e-3, "use_rms_prop": False},
+        {"num_envs": 16, "n_steps": 16},
+    ],
+    "torchrl": [
+        {"num_envs": 16, "steps": 200, "lr": 2e-3},
+        {"num_envs": 16, "steps": 200, "lr": 3e-3},
+        {"num_envs": 32, "steps": 200, "lr": 3e-3},
+        {"num_envs": 64, "steps": 200, "lr": 3e-3},
+        {"num_envs": 32, "steps": 100, "lr": 2e-3},
+        {"num_envs": 16, "steps": 100, "lr": 2e-3},
+    ],
+}
+"""Of the peers."""
+
+
+def main(names: Sequence[str]) -> None:
+    """Tries all settings of those who are named, or of everybody, and prints a line for each."""
+    with tempfile.TemporaryDirectory() as folder:
+        for name in names or [*OURS, *THEIRS]:
+            for settings in [*OURS.get(name, ()), *THEIRS.get(name, ())]:
+                done = [_try(name, settings, seed, Path(folder)) for seed in SEEDS]
+                print(name, json.dumps(settings), *_told(done), flush=True)
+
+
+def _try(name: str, settings: Any, seed: int, folder: Path) -> dict[str, Any]:
+    if name in THEIRS:
+        return train_theirs(name, settings, seed=seed, episodes=0, max_frames=MOST_FRAMES)
+    words = [*settings.split(), f"trainer.total_frames={MOST_FRAMES}"]
+    place = folder / str(len(list(folder.iterdir())))
+    return train_ours(words, seed=seed, episodes=0, folder=place)
+
+
+def _told(done: Sequence[Mapping[str, Any]]) -> list[str]:
+    mark = "" if all(one["is_solved"] for one in done) else " (not all solved)"
+    seconds = [f"{one['seconds']:.1f}" for one in done]
+    frames = [f"{one['frames']:,}" for one in done]
+    least = mean(one["seconds"] for one in done)
+    return [f"{least:.1f} s{mark}:", ", ".join(seconds), "s;", ", ".join(frames), "frames"]
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
