@@ -44,7 +44,7 @@ def test_a_touch_ends_it_by_the_rules_and_the_limit_cuts_it_off():
     ahead.reset(seed=0)
     ended = np.zeros(8, bool)
     for _ in range(100):
-        _, _, terminated, truncated, info = ahead.step(np.zeros(8, int))
+        _, _, terminated, truncated, _ = ahead.step(np.zeros(8, int))
         assert not truncated.any()
         ended = terminated
         if ended.any():
