@@ -13,8 +13,8 @@ from drone_rl.bench.hostile import SECRET
 
 @pytest.mark.slow
 def test_hostile_files_are_refused(tmp_path):
-    outcomes = hostile.run_all(tmp_path, every=2)
-    assert len(outcomes) >= 60
+    outcomes = hostile.run_all(tmp_path, every=4)
+    assert len(outcomes) >= 40
     assert len({outcome["name"] for outcome in outcomes}) == len(outcomes)
     assert {o["name"]: o["wrong"] for o in outcomes if o["wrong"]} == {}
 

@@ -26,8 +26,3 @@ def test_an_update_and_a_few_flights(example):
 
 def test_it_is_short():
     assert len(PATH.read_text().splitlines()) <= 50
-
-
-@pytest.mark.slow
-def test_it_learns(example):
-    assert example.success(example.train()) > 0.9

@@ -11,7 +11,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 
 from drone_rl.api.foreign import policy_from
-from drone_rl.bench.peers.training import DECAY, TARGET, PeerTraining
+from drone_rl.bench.peers.outcome import DECAY, TARGET, PeerTraining
 from drone_rl.envs.gymnasium.worlds import DroneWorlds
 from drone_rl.envs.sb3.worlds import Sb3Worlds
 from drone_rl.policies.sb3.logits import Sb3Logits

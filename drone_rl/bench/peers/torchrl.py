@@ -6,7 +6,7 @@ from types import ModuleType
 from typing import Any
 
 from drone_rl.api.foreign import policy_from
-from drone_rl.bench.peers.training import TARGET, PeerTraining
+from drone_rl.bench.peers.outcome import TARGET, PeerTraining
 from drone_rl.settings.transforms import Gray, Standardize
 from drone_rl.utils.errors import InputError
 
