@@ -15,7 +15,7 @@ _NOT_SHOWN = ("hydra", "paths")
 """Groups that nobody chooses from."""
 _EXAMPLES = """\
 examples
-  drone-rl train seed=1 optimiser.lr=1e-3        change settings
+  drone-rl train seed=1 optimiser.lr=2e-3        change settings
   drone-rl train experiment=smoke                a ready-made set of settings
   drone-rl train -m seed=0,1,2                   several runs, side by side
   drone-rl evaluate policy=latest                test the newest policy on unseen worlds"""
