@@ -13,7 +13,7 @@ def test_it_stops_at_frames_or_target_and_leaves_a_policy_to_judge():
     assert done.running_reward > 0
     network = done.policy.make_network()
     assert network.in_shape == (1, 25, 64) and done.policy.name == "torchrl's Collector"
-    assert train_torchrl(3, target=0.0, num_envs=2, steps=5).is_solved
+    assert train_torchrl(3, target=0.0, num_envs=2, steps=160).is_solved
 
 
 def test_without_the_repository(monkeypatch, tmp_path):
