@@ -1,6 +1,5 @@
 """The example runs as it stands, in short form, and is short itself."""
 
-import importlib.util
 from pathlib import Path
 
 import pytest
@@ -10,14 +9,6 @@ from drone_rl.explanations.sections import find_sections
 
 sb3 = pytest.importorskip("stable_baselines3", reason="Stable-Baselines3 is not installed")
 PATH = Path(__file__).parents[2] / "examples" / "judge_sb3.py"
-
-
-@pytest.fixture(scope="module")
-def example():
-    spec = importlib.util.spec_from_file_location("judge_sb3", PATH)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 @pytest.mark.slow
