@@ -11,7 +11,8 @@ from tensordict.utils import NestedKey
 from torch import Tensor
 from torchrl.envs import EnvBase
 
-from drone_rl.collectors.worlds_collector import WorldsCollector, take_rows
+from drone_rl.collectors.ways import find_way
+from drone_rl.collectors.worlds_collector import WorldsCollector
 
 
 class EpisodeCollector(WorldsCollector):
@@ -49,47 +50,27 @@ class EpisodeCollector(WorldsCollector):
         """
         super().__init__(env, actor, **kwargs)
         self._keep_observations = keep_observations
+        self._way = find_way(env, self._observed, self._kept)
 
     @torch.no_grad()
     def collect(self, num_worlds: int | None = None) -> TensorDictBase:
         """Runs one episode in every world, or in the first `num_worlds`. Shape: (T_total,)."""
-        state = self.env.reset()
-        active = torch.ones(self.env.batch_size, dtype=torch.bool, device=state.device)
-        active[len(active) if num_worlds is None else num_worlds :] = False
-        flying = int(active.sum())
+        flying = self.env.batch_size[0] if num_worlds is None else num_worlds
+        indices = torch.arange(flying, device=self.env.device)
         worlds: list[Tensor] = []
         steps: list[dict[NestedKey, Tensor]] = []
-        while len(indices := active.nonzero()[:, 0]):
-            step, state = self._step(state, active, indices)
+        seen = self._way.begin(indices)
+        while len(indices):
+            acted = self.actor(seen)
+            keys = acted.keys(True, True) if self._keep_observations else (self.env.action_key,)
+            step = {key: acted.get(key) for key in keys}
+            after, seen = self._way.step(indices, acted.get(self.env.action_key))
             worlds.append(indices)
-            steps.append(step)
-            active = active & ~state.get("done").reshape(active.shape)
-        batch = _join(steps, worlds, len(active))
+            steps.append(step | after)
+            indices = indices[~after["next", "done"].flatten()]
+        batch = _join(steps, worlds, self.env.batch_size[0])
         batch["collector", "traj_ids"] += self.episodes
         return self._finish(batch, flying)
-
-    def _step(
-        self, state: TensorDictBase, active: Tensor, worlds: Tensor
-    ) -> tuple[dict[NestedKey, Tensor], TensorDictBase]:
-        """Acts in the active worlds. Returns what is kept of them and the state after them."""
-        is_whole = len(worlds) == len(active)
-        seen = state.select(*self._observed)
-        acted = self.actor(seen if is_whole else take_rows(seen, worlds))
-        action = acted.get(self.env.action_key)
-        keys = acted.keys(True, True) if self._keep_observations else (self.env.action_key,)
-        step = {key: acted.get(key) for key in keys}
-        if not is_whole:
-            action = self.env.action_spec.zero().index_copy(0, worlds, action)
-            state.set("_step", active)
-        state.set(self.env.action_key, action)
-        after = self.env.step(state)
-        for key in self._kept:
-            value = after.get(key)
-            step[key] = value if is_whole else value[worlds]
-        state = after.get("next")
-        for key in self._dropped:  # entries that no step reads make each step dearer
-            state.pop(key, None)
-        return step, state
 
     def state_dict(self) -> dict:
         """Counters and the environment's random streams, as they stand between two batches."""

@@ -14,7 +14,7 @@ LUMA = (0.299, 0.587, 0.114)
 """Weights of red, green and blue in a gray pixel (ITU-R BT.601), as in the original study."""
 
 
-class _PixelTransform(ObservationTransform):
+class PixelTransform(ObservationTransform):
     """A map from pixels to pixels, applied alike at reset and at every step."""
 
     def __init__(
@@ -24,6 +24,11 @@ class _PixelTransform(ObservationTransform):
     ) -> None:
         in_keys = in_keys if in_keys is not None else ["pixels"]
         super().__init__(in_keys=in_keys, out_keys=out_keys or list(in_keys))
+
+    @property
+    def is_in_place(self) -> bool:
+        """Whether it takes "pixels" and puts what it makes of them in their place."""
+        return list(self.in_keys) == list(self.out_keys) == ["pixels"]
 
     def _reset(
         self, tensordict: TensorDictBase, tensordict_reset: TensorDictBase
@@ -41,7 +46,7 @@ class _PixelTransform(ObservationTransform):
         return observation_spec
 
 
-class GrayPixels(_PixelTransform):
+class GrayPixels(PixelTransform):
     """RGB bytes (*, H, W, 3) to gray (*, 1, H, W), float32 in [0, 1], in one pass.
 
     The same as TorchRL's `ToTensorImage` and `GrayScale`, several times faster on a CPU.
@@ -56,7 +61,7 @@ class GrayPixels(_PixelTransform):
         return (obs.float() @ weights).unsqueeze(-3)
 
 
-class RgbPixels(_PixelTransform):
+class RgbPixels(PixelTransform):
     """RGB bytes (*, H, W, 3) to floats (*, 3, H, W), float32 in [0, 1].
 
     Raises:
@@ -68,7 +73,7 @@ class RgbPixels(_PixelTransform):
         return obs.movedim(-1, -3).float() / 255.0
 
 
-class CropRows(_PixelTransform):
+class CropRows(PixelTransform):
     """Keeps the rows `top` to `bottom` (exclusive) of frames (*, C, H, W).
 
     Raises:
@@ -99,7 +104,7 @@ class CropRows(_PixelTransform):
         return f"CropRows(top={self.top}, bottom={self.bottom})"
 
 
-class Resize(_PixelTransform):
+class Resize(PixelTransform):
     """Resizes frames (*, C, H, W) by averaging over areas.
 
     Raises:
@@ -131,7 +136,7 @@ class Resize(_PixelTransform):
         return f"Resize(height={self.height}, width={self.width})"
 
 
-class StandardizePixels(_PixelTransform):
+class StandardizePixels(PixelTransform):
     """Shifts and scales pixels: (x - mean) / std. The defaults are the original study's.
 
     Raises:
@@ -157,7 +162,7 @@ class StandardizePixels(_PixelTransform):
         return f"StandardizePixels(mean={self.mean:g}, std={self.std:g})"
 
 
-def _check_bytes(transform: _PixelTransform, obs: Tensor) -> None:
+def _check_bytes(transform: PixelTransform, obs: Tensor) -> None:
     if obs.dtype != torch.uint8 or obs.shape[-1] != 3:
         raise InputError(
             f"{type(transform).__name__} got {obs.dtype} frames of shape {tuple(obs.shape)}; "

@@ -1,0 +1,80 @@
+"""The straight way gives what steps of TorchRL give; it is not taken where it cannot."""
+
+import pytest
+import torch
+from torchrl.envs import CatFrames, RewardSum
+
+from drone_rl.collectors import EpisodeCollector
+from drone_rl.collectors.ways import StraightWay, TorchrlWay, find_way
+from drone_rl.envs import CropRows, DroneEnv, GrayPixels, StandardizePixels, with_transforms
+from drone_rl.policies import SmallCNN, make_actor
+from drone_rl.sim.settings import PillarsSettings, TaskSettings
+
+SHORT = TaskSettings(num_cubes=2, first_distance=3.0, spacing=3.0, step_limit=12, front_margin=3.0)
+KEPT = [("next", name) for name in ("reward", "done", "terminated", "truncated")]
+REASON = ("next", "info", "end_reason")
+
+
+def make_env(*transforms, task=SHORT, **kwargs):
+    return with_transforms(DroneEnv(5, task, **kwargs), transforms)
+
+
+def collector(is_straight, task, keep=(REASON,), transforms=(GrayPixels, StandardizePixels)):
+    env = make_env(*(transform() for transform in transforms), task=task)
+    generator = torch.Generator().manual_seed(0)
+    shape = tuple(env.observation_spec["pixels"].shape[1:])
+    network = SmallCNN(shape, 3, channels=(4,), hidden=(8,), generator=generator)
+    made = EpisodeCollector(env, make_actor(network, env.action_spec, generator), keep=keep)
+    assert isinstance(made._way, StraightWay)
+    if not is_straight:
+        made._way = TorchrlWay(env, made._observed, made._kept)
+    return made
+
+
+@pytest.mark.parametrize("task", [SHORT, PillarsSettings(num_rows=1)])
+@pytest.mark.parametrize("worlds", [None, 3])
+def test_both_ways_give_the_same_bit_for_bit(task, worlds):
+    keep = (REASON, ("next", "info", "drone"))
+    ways = [collector(is_straight, task, keep) for is_straight in (True, False)]
+    lengths = set()
+    for _ in range(3):  # the streams of worlds and actions go on alike
+        one, other = (way.collect(worlds) for way in ways)
+        assert set(one.keys(True, True)) == set(other.keys(True, True))
+        for key in one.keys(True, True):
+            assert torch.equal(one[key], other[key]), key
+        first = one["collector", "traj_ids"].min()
+        lengths |= {*torch.bincount(one["collector", "traj_ids"] - first).tolist()}
+    assert len(lengths) > 1 or task is not SHORT  # some went on alone
+
+
+@pytest.mark.parametrize(
+    ("transforms", "options", "observed", "kept"),
+    [
+        ([GrayPixels(), CatFrames(2, dim=-3, in_keys=["pixels"])], {}, ["pixels"], []),
+        ([GrayPixels(), RewardSum()], {}, ["pixels"], []),
+        ([GrayPixels(out_keys=["gray"])], {}, ["gray"], []),
+        ([GrayPixels()], {}, ["pixels", ("info", "drone")], []),
+        ([GrayPixels()], {}, ["pixels"], [("next", "pixels")]),
+        ([], {"pixels": False}, [("info", "drone")], []),
+    ],
+)
+def test_where_something_is_in_the_way_steps_are_torchrls(transforms, options, observed, kept):
+    env = make_env(*transforms, **options)
+    assert isinstance(find_way(env, observed, [*KEPT, *kept]), TorchrlWay)
+    env.close()
+
+
+def test_maps_from_picture_to_picture_are_in_nobodys_way():
+    env = make_env(GrayPixels(), CropRows(5, 25), StandardizePixels())
+    assert isinstance(find_way(env, ["pixels"], [*KEPT, REASON]), StraightWay)
+    assert isinstance(find_way(env.base_env, ["pixels"], KEPT), TorchrlWay)
+    env.close()
+
+
+def test_an_environment_of_another_kind_may_have_steps_of_its_own():
+    class Windy(DroneEnv):
+        pass
+
+    env = with_transforms(Windy(2, SHORT), [GrayPixels()])
+    assert isinstance(find_way(env, ["pixels"], KEPT), TorchrlWay)
+    env.close()
