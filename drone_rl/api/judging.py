@@ -221,7 +221,12 @@ def _flying(
     policy: Pilot, settings: FlightSettings
 ) -> AbstractContextManager[tuple[Any, TensorDictModuleBase]]:
     """Unseen worlds and the policy in them."""
-    return policy.flying(settings.num_worlds, seed=settings.seed, device=settings.device)
+    return policy.flying(
+        settings.num_worlds,
+        seed=settings.seed,
+        device=settings.device,
+        renderer=settings.renderer,
+    )
 
 
 @contextmanager

@@ -129,6 +129,7 @@ def _fly(policy: Policy, journal: Journal) -> tuple[NDArray[np.float64], int]:
         seed=settings.seed,
         stream=Stream.SEARCH,
         device=settings.device,
+        renderer=settings.renderer,
         first_world=len(journal.rounds) * WORLDS,
     )
     try:

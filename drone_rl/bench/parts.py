@@ -15,7 +15,7 @@ from drone_rl.envs import DroneEnv
 from drone_rl.policies import PolicyNetwork, SmallCNN, make_actor
 from drone_rl.settings.collecting import Threads
 from drone_rl.settings.training import TrainSettings
-from drone_rl.sim.rendering import MakeRenderer, make_renderer
+from drone_rl.sim.rendering import MakeRenderer
 from drone_rl.sim.settings import TaskSettings
 
 
@@ -46,7 +46,7 @@ def random_walk(env: DroneEnv, steps: int, seed: int = 0) -> int:
 
 
 def make_worlds(
-    num_envs: int, device: str, num_cubes: int = 3, renderer: MakeRenderer = make_renderer
+    num_envs: int, device: str, num_cubes: int = 3, renderer: str | MakeRenderer = "raytrace"
 ) -> DroneEnv:
     """A batch of worlds on all cores."""
     task = TaskSettings(num_cubes=num_cubes)

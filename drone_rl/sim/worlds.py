@@ -19,7 +19,7 @@ from drone_rl.sim.rendering import (
     Renderer,
     Scene,
     View,
-    make_renderer,
+    find_renderer,
 )
 from drone_rl.sim.rendering.view import Modality
 from drone_rl.sim.settings import BaseTaskSettings, CameraSettings
@@ -39,7 +39,7 @@ class Worlds:
         camera: CameraSettings | None = None,
         *,
         dynamics: Dynamics | None = None,
-        renderer: MakeRenderer = make_renderer,
+        renderer: str | MakeRenderer = "raytrace",
         device: str = "cpu",
         num_shards: int | None = None,
     ) -> None:
@@ -50,9 +50,12 @@ class Worlds:
             task: What there is to do; cube collection as in the original study by default.
             camera: The policy's.
             dynamics: How the drones move; the task's own choice by default.
-            renderer: What makes the one that draws; the fastest for the device by default.
+            renderer: Who draws, see `find_renderer`.
             device: "cpu", "cuda" or "cuda:N".
             num_shards: See `MakeRenderer`.
+
+        Raises:
+            InputError: There is no such renderer.
         """
         self.num_worlds = num_worlds
         self.task = as_task(task)
@@ -60,7 +63,7 @@ class Worlds:
         self.dynamics = dynamics or self.task.make_dynamics()
         self.device = torch.device(device)
         self._every = torch.arange(num_worlds, device=self.device)
-        self._make_renderer, self._num_shards = renderer, num_shards
+        self._make_renderer, self._num_shards = find_renderer(renderer), num_shards
         self.policy_view = self.view()
         drawn = self.task.draw(np.random.RandomState(0))
         self.state = self.start(torch.zeros_like(drawn).expand(num_worlds, *drawn.shape).clone())
