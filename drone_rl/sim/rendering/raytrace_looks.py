@@ -29,7 +29,7 @@ class Looks:
         model = scene.model
         self._scene, self._device = scene, device
         stored = {
-            "colors": model.geom_rgba[:, :3],
+            "colors": scene.colors[:, :3],
             "ambient": model.light_ambient,
             "diffuse": model.light_diffuse,
             "direction": model.light_dir,

@@ -48,6 +48,10 @@ def check_scene(scene: Scene) -> None:
                 f"geom {model.geom(geom).name!r} is a {kind}, which Raytracer can't draw; give "
                 "renderer=mujoco_warp"
             )
+    if model.nflex:
+        raise InputError(
+            "the scene has soft bodies, which Raytracer can't draw; give renderer=mujoco_warp"
+        )
     if not model.nlight:
         raise InputError("the scene has no light, so nothing could be seen; add one")
     is_distant = model.light_type == mujoco.mjtLightType.mjLIGHT_DIRECTIONAL

@@ -260,6 +260,31 @@ def test_what_it_cannot_draw_is_refused_by_name(old, new, message):
         Raytracer(scene(xml), num_worlds=1).prepare(view())
 
 
+@pytest.mark.parametrize(
+    ("geom", "message"),
+    [
+        (
+            '<geom name="rock" type="mesh" mesh="m"/>',
+            "geom 'rock' is a mesh, which Raytracer can't",
+        ),
+        (
+            '<flexcomp name="f" type="grid" count="2 2 2" spacing="1 1 1" dim="3"/>',
+            "the scene has soft bodies, which Raytracer can't draw; give renderer=mujoco_warp",
+        ),
+    ],
+)
+def test_models_of_others_are_refused_in_one_line_that_names_who_draws_them(geom, message):
+    xml = f"""<mujoco><asset><mesh name="m" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/></asset><worldbody>
+    <light directional="true" castshadow="false"/>{geom}</worldbody></mujoco>"""
+    model = mujoco.MjModel.from_xml_string(xml)
+    count = model.ngeom
+    strange = Scene(model, (Meaning.OBSTACLE,) * count, (-1,) * count, (0.0, 0.0, 0.0))
+    with pytest.raises(InputError, match=message) as refused:
+        Raytracer(strange, num_worlds=1)
+    assert str(refused.value).endswith("give renderer=mujoco_warp")
+    assert "\n" not in str(refused.value)
+
+
 def test_a_scene_without_light_is_refused():
     xml = "<mujoco><worldbody><geom size='1'/></worldbody></mujoco>"
     with pytest.raises(InputError, match="no light"):
