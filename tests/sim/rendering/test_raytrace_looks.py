@@ -7,6 +7,7 @@ import torch
 
 from drone_rl.sim.meaning import Meaning
 from drone_rl.sim.rendering import Appearance, Scene
+from drone_rl.sim.rendering.devices import start_warp
 from drone_rl.sim.rendering.raytrace_looks import Looks
 
 XML = """<mujoco><worldbody><light directional="true" dir="0 0 -1" ambient=".1 .1 .1"
@@ -16,6 +17,7 @@ diffuse=".5 .5 .5"/><geom name="a" type="plane" size="1 1 1" rgba=".2 .4 .6 1"/>
 
 @pytest.fixture
 def looks():
+    start_warp("cpu")
     model = mujoco.MjModel.from_xml_string(XML)
     meanings = (Meaning.GROUND, Meaning.TARGET)
     return Looks(Scene(model, meanings, (-1, 0), (0.2, 0.5, 1.0)), "cpu")
