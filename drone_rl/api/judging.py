@@ -208,6 +208,7 @@ def judge(
             flights=settings.certificate_flights,
             seed=settings.seed,
             device=settings.device,
+            renderer=settings.renderer,
         )
         worlds = _flying(pilot, settings)
     draws, rule = settings.sampled and pilot is not None, Rule(good_share=settings.good_share)

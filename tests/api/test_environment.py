@@ -9,6 +9,7 @@ from drone_rl.settings.transforms import Gray, Resize
 from drone_rl.sim import worlds as worlds_module
 from drone_rl.sim.rendering import Raytracer
 from drone_rl.utils.errors import InputError
+from drone_rl.zoo import certificate_path, policy_path
 
 
 def test_worlds_as_policies_see_them():
@@ -65,6 +66,23 @@ def test_whoever_is_asked_for_draws(asked, tmp_path):
     asked.clear()
     drone_rl.judge("right_and_forward", episodes=1, **chosen)
     assert asked[0] == "mujoco_warp"  # luck and the oracle see nothing
+
+
+@pytest.mark.parametrize(
+    ("command", "given"),
+    [
+        *[(command, "good") for command in ("prove", "places", "chances", "explain", "judge")],
+        ("check", certificate_path(policy_path("proved"))),
+    ],
+)
+def test_every_command_that_draws_asks_for_it(command, given, monkeypatch, tmp_path):
+    def refuse(which):
+        raise InputError(f"asked for {which}")
+
+    monkeypatch.setattr(worlds_module, "find_renderer", refuse)
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match="asked for mujoco_warp"):
+        getattr(drone_rl, command)(given, renderer="mujoco_warp", progress=lambda *_: None)
 
 
 def test_a_renderer_that_there_is_not():
