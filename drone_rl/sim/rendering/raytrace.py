@@ -74,9 +74,10 @@ class Raytracer:
         if view not in self._views:
             view.check_modalities(self, _BITS)
             where = str(self.device)
-            made = make_view(self.scene, self._frames, view, where)
+            with on_torch_stream(self.device):
+                made = make_view(self.scene, self._frames, view, where)
+                geoms = make_geoms(self.scene, self._frames, view.show_drone, where)
             made.what = sum({_BITS[modality] for modality in view.modalities})
-            geoms = make_geoms(self.scene, self._frames, view.show_drone, where)
             self._painter.load()
             self._views[view] = (made, geoms)
 

@@ -15,6 +15,8 @@ rectangle of pixels around its projection alone, in the geom's own frame; what i
 before takes the pixel. All geoms are convex and closed, or planes seen from above, so a ray enters
 each at most once, and there is no other hit to look for. Then it writes what each pixel shows,
 which is worked out once for pixels in a row that show the same flat face.
+
+Pixels are counted by `while`: what Warp makes of `for` is several times as slow on a CPU.
 """
 
 import warp as wp
