@@ -10,6 +10,9 @@ from drone_rl.sim.meaning import Meaning
 from drone_rl.sim.rendering import Scene
 
 CAMERA = "camera"
+NUDGED = ("left", "right", "up", "down")
+"""Cameras in the same place, turned a little."""
+_TURNS = ((0.0, 1.0, 0.0), (0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (-1.0, 0.0, 0.0))
 NEAR, FAR = 0.02, 60.0
 """Metres along the axis within which OpenGL draws."""
 _SLICES = 400
@@ -29,7 +32,7 @@ _XML = f"""<mujoco>
   <geom type="plane" size="8 8 10" pos="1 2 3" euler="10 20 30"/>
   <geom type="plane" size="0.9 0.5 10" pos="1 2 3" euler="10 20 30"/>
   {'<geom type="sphere" size="1 1 1" pos="1 2 3" euler="10 20 30"/>' * 8}
-  <camera name="{CAMERA}" pos="1 2 3" euler="10 20 30"/>
+  {"".join(f'<camera name="{name}" pos="1 2 3"/>' for name in (CAMERA, *NUDGED))}
 </worldbody></mujoco>"""
 _PLANES = 3
 """The first geoms, of which OpenGL keeps the sizes that it was given first: the ground, a large
@@ -43,13 +46,15 @@ _SOLIDS = tuple(
 class RandomScenes:
     """One model that becomes one scene after the other."""
 
-    def __init__(self, seed: int) -> None:
+    def __init__(self, seed: int, nudge: float = 0.0) -> None:
         """Compiles it.
 
         Args:
             seed: Of the scenes.
+            nudge: By how much of a picture's height other cameras see its middle elsewhere.
         """
         self.model = mujoco.MjModel.from_xml_string(_XML)
+        self._nudge = nudge
         self._random = np.random.RandomState(seed)
 
     def draw(self) -> Scene:
@@ -71,9 +76,14 @@ class RandomScenes:
         model.geom_rgba[:, :3] = random.uniform(0.0, 1.0, (count, 3))
         model.geom_pos[1:] = random.uniform(-3.0, 3.0, (count - 1, 3))
         model.geom_quat[1:] = _attitudes(random, count - 1)
-        model.cam_pos[0] = random.uniform(-3.0, 3.0, 3)
+        model.cam_pos[:] = random.uniform(-3.0, 3.0, 3)
         model.cam_quat[0] = _looking(model.cam_pos[0] - random.uniform(-2.0, 2.0, 3), random)
-        model.cam_fovy[0] = random.uniform(30.0, 120.0)
+        model.cam_fovy[:] = random.uniform(30.0, 120.0)
+        angle = 2 * self._nudge * np.tan(np.radians(model.cam_fovy[0]) / 2)
+        for i, axis in enumerate(_TURNS, 1):
+            turn = np.zeros(4)
+            mujoco.mju_axisAngle2Quat(turn, np.array(axis), angle)
+            mujoco.mju_mulQuat(model.cam_quat[i], model.cam_quat[0], turn)
         toward = random.normal(size=3)
         model.light_dir[0] = toward / np.linalg.norm(toward)
         model.geom_pos[1] = model.cam_pos[0] - np.exp(random.uniform(-3.5, 1.0)) * _normal(model, 1)

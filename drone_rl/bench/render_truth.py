@@ -20,7 +20,7 @@ import torch
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from drone_rl.bench.random_scenes import CAMERA, NEAR, RandomScenes
+from drone_rl.bench.random_scenes import CAMERA, NEAR, NUDGED, RandomScenes
 from drone_rl.sim.rendering import Poses, Raytracer, Scene, View
 
 SIZE = 128
@@ -47,7 +47,8 @@ class Compared:
     inner_wrong: int
     """Pixels on no edge in which another geom is seen."""
     overlaps: tuple[float, ...]
-    """Of each geom that is large in one of them: pixels in both over pixels in any."""
+    """Of each geom that is large in one of them: pixels in both over pixels in any, but for those
+    in which OpenGL's own rounding decides what is seen."""
     depth_m: float
     """Greatest difference on no edge beyond what OpenGL's own rounding explains."""
     rgb: int
@@ -63,7 +64,8 @@ def compare(ours: Picture, theirs: Picture) -> Compared:
     surfaces by as much as their depth changes over that.
 
     Args:
-        ours: All of `_MODALITIES`.
+        ours: All of `_MODALITIES`, and as "nudged" segmentations by cameras that are turned by
+            `_SNAP`. Shape: (4, height, width).
         theirs: The same without normals.
     """
     seen, other = ours["segmentation"], theirs["segmentation"]
@@ -71,6 +73,7 @@ def compare(ours: Picture, theirs: Picture) -> Compared:
     inner = ~_edges(seen) & ~_edges(other) & drawn
     geoms = [g for g in np.unique(np.stack([seen, other])) if g >= 0]
     large = [g for g in geoms if max((seen == g).sum(), (other == g).sum()) > LARGE]
+    sure = drawn & (ours["nudged"] == seen).all(0)
     both = inner & (seen == other) & (seen >= 0)
     depth, smooth = ours["depth"].astype(float), both & ~_creases(ours["normals"])
     explained = 2 * 2.0**-24 * depth**2 / NEAR + _SNAP * _slope(depth)
@@ -78,7 +81,7 @@ def compare(ours: Picture, theirs: Picture) -> Compared:
     colors = np.abs(ours["rgb"].astype(int) - theirs["rgb"]).max(-1)
     return Compared(
         inner_wrong=int((inner & (seen != other)).sum()),
-        overlaps=tuple(_overlap(seen == g, other == g, drawn) for g in large),
+        overlaps=tuple(_overlap(seen == g, other == g, sure) for g in large),
         depth_m=float(beyond[both].max(initial=0.0)),
         rgb=int(colors[smooth].max(initial=0)),
     )
@@ -113,18 +116,20 @@ class OpenGL:
 
 
 def draw(scene: Scene) -> Picture:
-    """The same by our own renderer, and normals."""
+    """The same by our own renderer, and what `compare` needs besides."""
     renderer = Raytracer(scene, num_worlds=1, num_shards=1)
-    view = View(cameras=(CAMERA,), height=SIZE, width=SIZE, modalities=_MODALITIES)
+    cameras = (CAMERA, *NUDGED)
+    view = View(cameras=cameras, height=SIZE, width=SIZE, modalities=_MODALITIES)
     still = Poses(torch.zeros(1, 3), torch.tensor([[1.0, 0.0, 0.0, 0.0]]), torch.zeros(1, 0, 3))
     pictures = renderer.render(view, still)
     renderer.close()
-    return {modality: several[0, 0].numpy() for modality, several in pictures.items()}
+    drawn: Picture = {modality: several[0, 0].numpy() for modality, several in pictures.items()}
+    return {**drawn, "nudged": pictures["segmentation"][0, 1:].numpy()}
 
 
 def compare_scenes(count: int, seed: int = 0) -> list[Compared]:
     """Compares so many random scenes; needs MUJOCO_GL=egl."""
-    scenes = RandomScenes(seed)
+    scenes = RandomScenes(seed, nudge=_SNAP / SIZE)
     opengl = OpenGL(scenes.model)
     try:
         drawn = (scenes.draw() for _ in range(count))
@@ -180,9 +185,9 @@ def _slope(depth: NDArray[Any]) -> NDArray[Any]:
     return np.abs(_windows(depth) - depth[..., None, None]).max((-2, -1))
 
 
-def _overlap(ours: NDArray[Any], theirs: NDArray[Any], drawn: NDArray[Any]) -> float:
-    either = ((ours | theirs) & drawn).sum()
-    return float((ours & theirs & drawn).sum() / either) if either else 1.0
+def _overlap(ours: NDArray[Any], theirs: NDArray[Any], sure: NDArray[Any]) -> float:
+    either = ((ours | theirs) & sure).sum()
+    return float((ours & theirs & sure).sum() / either) if either else 1.0
 
 
 if __name__ == "__main__":

@@ -43,6 +43,19 @@ def test_planes_are_seen_from_above_and_one_at_arms_length():
         assert (heights > 0).all() and 0.03 < heights[1] < 2.72
 
 
+def test_nudged_cameras_see_the_middle_a_little_aside():
+    """From the same place; by so much of the picture's height, which is 2 tan(fovy / 2) high."""
+    model = RandomScenes(0, nudge=0.01).draw().model
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    axes = data.cam_xmat.reshape(-1, 3, 3)
+    assert (model.cam_pos == model.cam_pos[0]).all()
+    high = 2 * np.tan(np.radians(model.cam_fovy[0]) / 2)
+    seen = axes[0].T @ -axes[1:, :, 2].T  # where the others look, in the first one's frame
+    aside = 0.01 * high * np.array([[-1, 1, 0, 0], [0, 0, 1, -1]])
+    np.testing.assert_allclose(seen[:2] / -seen[2], aside, atol=1e-4)
+
+
 def test_light_and_attitudes_have_length_one():
     model = RandomScenes(0).draw().model
     assert np.linalg.norm(model.light_dir[0]) == pytest.approx(1.0)

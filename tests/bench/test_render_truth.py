@@ -22,6 +22,7 @@ def picture():
     inside = (slice(2, 10), slice(2, 10))
     made["rgb"][inside], made["depth"][inside] = 100, 4.0
     made["segmentation"][inside], made["normals"][inside] = 3, [-1.0, 0.0, 0.0]
+    made["nudged"] = np.stack([made["segmentation"]] * 4)
     return made
 
 
@@ -37,6 +38,13 @@ def test_another_geom_within_is_wrong_and_on_an_edge_is_not():
     theirs["segmentation"][4:9, 4:9] = 7  # another geom, of 3 x 3 pixels on no edge
     assert compare(picture(), theirs).inner_wrong == 9
     assert min(compare(picture(), theirs).overlaps) == (63 - 25) / 64  # 25 are too few to count
+
+
+def test_where_opengls_rounding_decides_a_geom_need_not_overlap():
+    ours, theirs = picture(), picture()
+    theirs["segmentation"][2, 5:7] = -1
+    ours["nudged"][3, 2, 5] = -1  # turned a little, ours has the same there
+    assert compare(ours, theirs).overlaps == (62 / 63,)
 
 
 def test_depth_differs_but_for_what_opengl_rounds():
