@@ -31,31 +31,31 @@ OURS: Mapping[str, Sequence[str]] = {
         "optimiser.lr=3e-3 collector.num_envs=16",
     ],
     "a2c": [
-        "objective=a2c",
+        "objective=a2c optimiser.lr=2e-3",
         "objective=a2c optimiser.lr=1e-3",
         "objective=a2c optimiser.lr=3e-3",
-        "objective=a2c objective.num_steps=8",
+        "objective=a2c objective.num_steps=8 optimiser.lr=2e-3",
         "objective=a2c objective.num_steps=32 optimiser.lr=3e-3",
         "objective=a2c objective.num_steps=8 optimiser.lr=1e-3",
     ],
     "ppo": [
-        _PPO,
+        f"{_PPO} optimiser.lr=2e-3",
         f"{_PPO} optimiser.lr=1e-3",
         f"{_PPO} optimiser.lr=3e-3",
         f"{_PPO} objective.epochs=4 optimiser.lr=1e-3",
         f"{_PPO} objective.epochs=1 optimiser.lr=3e-3",
-        f"{_PPO} objective.num_steps=16",
+        f"{_PPO} objective.num_steps=16 optimiser.lr=2e-3",
     ],
 }
 """Arguments of `drone-rl train`."""
 THEIRS: Mapping[str, Sequence[Mapping[str, Any]]] = {
     "sb3_ppo": [
         _SB3 | {"learning_rate": 1e-3},
-        _SB3 | {"learning_rate": 2e-3},
         _SB3 | {"learning_rate": 2e-3, "n_epochs": 2},
         _SB3 | {"learning_rate": 2e-3, "n_epochs": 2, "n_steps": 32},
         _SB3 | {"learning_rate": 3e-3, "n_epochs": 2, "n_steps": 32},
         _SB3 | {"learning_rate": 2e-3, "n_epochs": 2, "n_steps": 32, "ent_coef": 0.0},
+        _SB3 | {"learning_rate": 3e-3, "n_epochs": 1, "n_steps": 32},
     ],
     "sb3_a2c": [
         {"num_envs": 64},
@@ -70,8 +70,8 @@ THEIRS: Mapping[str, Sequence[Mapping[str, Any]]] = {
         {"num_envs": 16, "steps": 200, "lr": 3e-3},
         {"num_envs": 32, "steps": 200, "lr": 3e-3},
         {"num_envs": 64, "steps": 200, "lr": 3e-3},
-        {"num_envs": 32, "steps": 100, "lr": 2e-3},
-        {"num_envs": 16, "steps": 100, "lr": 2e-3},
+        {"num_envs": 32, "steps": 200, "lr": 2e-3},
+        {"num_envs": 32, "steps": 150, "lr": 3e-3},
     ],
 }
 """Of the peers."""

@@ -7,13 +7,14 @@ from typing import Any
 
 import torch
 
-from drone_rl.api.foreign import Logits, as_pilot
+from drone_rl.api.foreign import as_pilot
 from drone_rl.api.pilot import Pilot
 from drone_rl.api.progress import Bar, Progress
 from drone_rl.api.quoting import find_claim
 from drone_rl.api.showing import page
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.explanations.study import explain_policy
+from drone_rl.policies.foreign import Logits
 from drone_rl.report import write_report
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import to_file_name

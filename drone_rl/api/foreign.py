@@ -1,7 +1,7 @@
 """Policies that were made elsewhere: any callable from pictures to logits."""
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ from drone_rl.api.pilot import Pilot
 from drone_rl.api.policy import load_policy
 from drone_rl.api.showing import table
 from drone_rl.policies import ForeignNetwork
+from drone_rl.policies.foreign import Logits
 from drone_rl.settings.changes import Changes
 from drone_rl.settings.transforms import Gray, Rgb, Standardize, Transform
 from drone_rl.sim.settings import BaseTaskSettings, CameraSettings, TaskSettings
@@ -21,9 +22,6 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import Stream
 from drone_rl.utils.settings import Settings, below
 from drone_rl.zoo.registry import TRANSFORMS, Picture, find_part
-
-Logits = Callable[[Any], Any]
-"""From a batch of pictures to logits, see `policy_from`."""
 
 
 @dataclasses.dataclass(frozen=True)

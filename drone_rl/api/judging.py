@@ -10,13 +10,14 @@ from typing import Any
 from tensordict.nn import TensorDictModuleBase
 from torchrl.envs import EnvBase
 
-from drone_rl.api.foreign import Logits, as_pilot
+from drone_rl.api.foreign import as_pilot
 from drone_rl.api.pilot import Pilot
 from drone_rl.api.progress import Bar, Progress
 from drone_rl.api.quoting import find_claim
 from drone_rl.api.showing import paragraph, table
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation import run_episodes, summarise
+from drone_rl.policies.foreign import Logits
 from drone_rl.settings.changes import Changes
 from drone_rl.settings.judging import EvaluateSettings, FlightSettings, JudgeSettings
 from drone_rl.sim.settings import TaskSettings

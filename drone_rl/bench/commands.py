@@ -5,8 +5,10 @@ import subprocess
 import time
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from drone_rl.sweeps.process import PROGRAM
+from drone_rl.utils.files import read_json
 
 
 def call(
@@ -29,6 +31,24 @@ def call(
     )
     if done.returncode not in statuses:
         raise RuntimeError(f"drone-rl {' '.join(args)} failed: {done.stderr.strip()[-500:]}")
+
+
+def train(run: Path, *args: str) -> tuple[float, Any]:
+    """Runs `drone-rl train`.
+
+    Args:
+        run: Folder of the run.
+        args: Others.
+
+    Returns:
+        Seconds from the start of the command to its end, and what is in result.json.
+
+    Raises:
+        RuntimeError: It failed.
+    """
+    begin = time.perf_counter()
+    call("train", *args, f"hydra.run.dir={run}")
+    return time.perf_counter() - begin, read_json(run / "result.json")
 
 
 def watch(*args: str) -> tuple[float, float]:

@@ -1,12 +1,10 @@
 """Policies that are trained until they are proved."""
 
-import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from drone_rl.bench.commands import call
-from drone_rl.utils.files import read_json
+from drone_rl.bench.commands import train
 
 
 def bench_provable(folder: Path, seeds: Sequence[int], quick: bool) -> dict[str, Any]:
@@ -25,10 +23,8 @@ def bench_provable(folder: Path, seeds: Sequence[int], quick: bool) -> dict[str,
     easier = ["task=collect_one", "provable.flights=500"] if quick else []
     for seed in seeds[:1] if quick else seeds:
         run = folder / f"provable_{seed}"
-        begin = time.perf_counter()
-        call("train", "experiment=provable", f"seed={seed}", f"hydra.run.dir={run}", *easier)
-        results["provable_s"].append(time.perf_counter() - begin)
-        result = read_json(run / "result.json")
+        seconds, result = train(run, "experiment=provable", f"seed={seed}", *easier)
+        results["provable_s"].append(seconds)
         results["provable_rounds"].append(len(result["rounds"]))
         results["provable_proved"].append(result["reason"] == "proved")
     return results

@@ -1,14 +1,13 @@
 """Whole trainings, as a user starts them: time to solve and success."""
 
 import json
-import time
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from drone_rl.bench.commands import call
+from drone_rl.bench.commands import call, train
 
 
 def bench_solve(
@@ -61,10 +60,8 @@ def _train(
     results: dict[str, list] = {"seconds": [], "frames": [], "reason": [], "lower95": []}
     for seed in seeds:
         run = folder / f"train_{seed}"
-        begin = time.perf_counter()
-        call("train", f"seed={seed}", f"device={device}", f"hydra.run.dir={run}", *settings)
-        results["seconds"].append(time.perf_counter() - begin)
-        result = json.loads((run / "result.json").read_text())
+        seconds, result = train(run, f"seed={seed}", f"device={device}", *settings)
+        results["seconds"].append(seconds)
         results["frames"].append(result["frames"])
         results["reason"].append(result["reason"])
         call(

@@ -174,10 +174,9 @@ class DroneEnv(EnvBase):
         action = tensordict.get(self.action_key)
         reward[worlds, 0] = self.worlds.step(worlds, action[worlds]).float()
         self._draw(worlds)
-        reason = self.worlds.state.end_reason[:, None]
-        truncated = reason == self.worlds.task.truncation
-        done = reason != 0
-        flags = {"done": done, "terminated": done & ~truncated, "truncated": truncated}
+        terminated, truncated = (flag[:, None] for flag in self.worlds.ends())
+        done = terminated | truncated
+        flags = {"done": done, "terminated": terminated, "truncated": truncated}
         return self._observe({"reward": reward, **flags})
 
     def _draw(self, worlds: Tensor) -> None:

@@ -12,7 +12,7 @@ from drone_rl.policies.network import PictureNetwork
 from drone_rl.sim.actions import Actions
 from drone_rl.utils.errors import InputError
 
-Logits = Callable[[Tensor], Any]
+Logits = Callable[[Any], Any]
 """From a batch of pictures to logits (N, number of actions), a tensor or an array."""
 _REPEATS = 1e-5
 """Logits of the same picture that differ by more are drawn, not computed."""

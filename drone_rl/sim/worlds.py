@@ -87,6 +87,11 @@ class Worlds:
         pose = {"drone": state.body.position.float(), "attitude": state.body.attitude.float()}
         return {**self.task.info(state), **pose}
 
+    def ends(self) -> tuple[Tensor, Tensor]:
+        """Which worlds have terminated, and which were truncated. Shapes: (num_worlds,)."""
+        truncated = self.state.end_reason == self.task.truncation
+        return (self.state.end_reason != 0) & ~truncated, truncated
+
     @functools.cached_property
     def scene(self) -> Scene:
         """What dm_control simulates, compiled."""

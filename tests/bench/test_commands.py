@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from drone_rl.bench import commands
-from drone_rl.bench.commands import call, memory_status, watch
+from drone_rl.bench.commands import call, memory_status, train, watch
 
 
 def python(code):
@@ -36,6 +36,25 @@ def test_time_and_peak_of_memory_are_watched(monkeypatch):
     monkeypatch.setattr(commands, "PROGRAM", python("raise SystemExit(3)"))
     with pytest.raises(RuntimeError, match="drone-rl explain failed: status 3"):
         watch("explain")
+
+
+def test_a_training_is_timed_and_its_result_is_read(monkeypatch, tmp_path):
+    code = """
+import json, os, sys, time
+assert sys.argv[1:3] == ["train", "seed=3"], sys.argv
+run = sys.argv[3].removeprefix("hydra.run.dir=")
+os.mkdir(run)
+time.sleep(0.3)
+json.dump({"frames": 7}, open(run + "/result.json", "w"))
+"""
+
+    def run_it(*args):
+        call(*args, program=python(code))
+
+    monkeypatch.setattr(commands, "call", run_it)
+    seconds, result = train(tmp_path / "run", "seed=3")
+    assert result == {"frames": 7}
+    assert 0.3 < seconds < 20
 
 
 def test_memory_of_a_process():

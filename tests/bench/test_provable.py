@@ -2,7 +2,7 @@
 
 import json
 
-from drone_rl.bench import provable
+from drone_rl.bench import commands as running
 from drone_rl.bench.provable import bench_provable
 
 
@@ -17,7 +17,7 @@ def test_proved_runs_are_gathered(monkeypatch, tmp_path):
         rounds = [{"frames": 10}] * (1 + len(commands))
         (run / "result.json").write_text(json.dumps({"reason": reason, "rounds": rounds}))
 
-    monkeypatch.setattr(provable, "call", call)
+    monkeypatch.setattr(running, "call", call)
     result = bench_provable(tmp_path, [3, 4], False)
     assert [c[:3] for c in commands] == [
         ("train", "experiment=provable", "seed=3"),

@@ -2,6 +2,7 @@
 
 import json
 
+from drone_rl.bench import commands as running
 from drone_rl.bench import training
 from drone_rl.bench.training import bench_pillars, bench_solve
 
@@ -20,7 +21,8 @@ def record_calls(monkeypatch, folder):
             json.dumps({"frames": 10 * len(commands), "reason": "solved", **lower})
         )
 
-    monkeypatch.setattr(training, "call", call)
+    for module in (training, running):
+        monkeypatch.setattr(module, "call", call)
     return commands
 
 

@@ -7,7 +7,7 @@ from tests.cli.running import drone_rl, error_line
 
 @pytest.mark.slow
 def test_explain_then_report(tmp_path):
-    few = ["frames=60", "episodes=8", "perplexity=5", "num_envs=8"]
+    few = ["frames=60", "episodes=8", "perplexity=5", "num_envs=32"]
     done = drone_rl("explain", "policy=[good,poor]", *few, "hydra.run.dir=run", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "poor: poor" in done.stdout

@@ -1,24 +1,21 @@
 """The example runs as it stands, in short form, and is short itself."""
 
-import importlib.util
 from pathlib import Path
 
 import pytest
+
+from drone_rl.explanations import study
+from drone_rl.explanations.sections import find_sections
 
 sb3 = pytest.importorskip("stable_baselines3", reason="Stable-Baselines3 is not installed")
 PATH = Path(__file__).parents[2] / "examples" / "judge_sb3.py"
 
 
-@pytest.fixture(scope="module")
-def example():
-    spec = importlib.util.spec_from_file_location("judge_sb3", PATH)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
 @pytest.mark.slow
-def test_a_model_is_trained_saved_judged_and_explained(example, tmp_path, capsys):
+def test_a_model_is_trained_saved_judged_and_explained(example, tmp_path, capsys, monkeypatch):
+    kept = ("attribution", "dataset", "embedding", "evaluation")
+    few = {name: find_sections()[name] for name in kept}
+    monkeypatch.setattr(study, "find_sections", lambda: few)  # all of them take a minute
     example.train(64, num_envs=4, steps=16).save(tmp_path / "ppo.zip")
     model = sb3.PPO.load(tmp_path / "ppo.zip")
     example.trust(model, str(tmp_path), frames=40, episodes=6, perplexity=5)

@@ -1,6 +1,5 @@
 """The example flies what was exported, and is short."""
 
-import importlib.util
 from pathlib import Path
 
 import pytest
@@ -8,14 +7,6 @@ import pytest
 import drone_rl
 
 PATH = Path(__file__).parents[2] / "examples" / "run_onnx.py"
-
-
-@pytest.fixture(scope="module")
-def example():
-    spec = importlib.util.spec_from_file_location("run_onnx", PATH)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 @pytest.mark.parametrize(("name", "cubes"), [("good", 3.0), ("poor", 0.0)])

@@ -1,20 +1,11 @@
 """The example runs as it stands, in short form, and is short itself."""
 
-import importlib.util
 import math
 from pathlib import Path
 
 import pytest
 
 PATH = Path(__file__).parents[2] / "examples" / "train_with_torchrl.py"
-
-
-@pytest.fixture(scope="module")
-def example():
-    spec = importlib.util.spec_from_file_location("train_with_torchrl", PATH)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 def test_two_updates(example):

@@ -12,7 +12,7 @@ SMALL = ExplainSettings(frames=60, perplexity=5, seed=3)
 def test_worlds_and_actions_start_afresh_whoever_asked_first(make_pipeline):
     flown = []
     for first in ("flights", "restart"):
-        env, actor = make_pipeline(num_envs=4)
+        env, actor = make_pipeline(num_envs=30)
         context = Context(env, actor.module[0].module, SMALL)
         if first == "restart":
             policy = context.restart()
@@ -24,14 +24,14 @@ def test_worlds_and_actions_start_afresh_whoever_asked_first(make_pipeline):
 
 
 def test_of_a_function_no_layers_are_recorded(make_pipeline):
-    env, _ = make_pipeline(num_envs=4)
+    env, _ = make_pipeline(num_envs=30)
     network = ForeignNetwork(lambda x: x.flatten(1)[:, :3], (1, 25, 64), MOVES)
     context = Context(env, network, SMALL)
     assert context.layer is None and context.dataset.features == {}
 
 
 def test_frames_are_of_the_flights_and_maps_of_the_frames(make_pipeline):
-    env, actor = make_pipeline(num_envs=4)
+    env, actor = make_pipeline(num_envs=30)
     context = Context(env, actor.module[0].module, SMALL)
     data, flights = context.dataset, context.flights
     assert len(np.unique(flights.episode)) == len(np.unique(context.episode)) == 30

@@ -19,7 +19,7 @@ NASTY = '</script><b>"a" & b'
 def explanations(tmp_path_factory):
     """Two folders; the second is the first under another name."""
     root = tmp_path_factory.mktemp("explanations")
-    env = with_transforms(DroneEnv(4), [GrayPixels(), StandardizePixels()])
+    env = with_transforms(DroneEnv(30), [GrayPixels(), StandardizePixels()])
     generator = torch.Generator().manual_seed(0)
     network = SmallCNN((1, 25, 64), 3, channels=(4,), hidden=(8,), generator=generator)
     settings = ExplainSettings(frames=180, episodes=6, perplexity=5)

@@ -16,8 +16,8 @@ def test_a_line_for_each():
     lines = {line.split(" | ")[0]: line for line in table.splitlines()[2:]}
     assert len(lines) == 6
     assert lines["| drone_rl, PPO"].endswith(
-        "| `drone-rl train objective=ppo` | 9.0; 10.0 | 5.0; 6.0 | 12,000; 9,000 | 0.996; 0.980 |"
+        "| 9.0; 10.0 | 5.0; 6.0 | 12,000; 9,000 | 0.996; 0.980 |"
     )
     assert "12,000; 9,000 (1 not solved)" in lines["| TorchRL's Collector, REINFORCE"]
-    assert "num_envs 16, steps 200, lr 0.002" in lines["| TorchRL's Collector, REINFORCE"]
+    assert "num_envs 32, steps 150, lr 0.003" in lines["| TorchRL's Collector, REINFORCE"]
     assert lines["| Stable-Baselines3, A2C"].count(UNKNOWN) == 4

@@ -16,8 +16,12 @@ from tools.readme.tables import list_figures, list_origins, make_table
 ROOT = Path(__file__).resolve().parents[2]
 MEASURED = ROOT / "outputs" / "bench" / "results.json"
 PAGES = (
-    *("README.md", "docs/design.md", "docs/results.md", "docs/settings.md", "docs/onnx.md"),
+    "README.md",
+    "docs/design.md",
     "docs/learners.md",
+    "docs/onnx.md",
+    "docs/results.md",
+    "docs/settings.md",
 )
 """Which have blocks that are made."""
 NOTEBOOK = "docs/tutorials/notebook"

@@ -7,8 +7,8 @@ from typing import Any
 OURS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "reinforce": (),
-        "a2c": ("objective=a2c",),
-        "ppo": ("objective=ppo",),
+        "a2c": ("objective=a2c", "objective.num_steps=32", "optimiser.lr=3e-3"),
+        "ppo": ("objective=ppo", "objective.epochs=1", "optimiser.lr=3e-3"),
     }
 )
 """Arguments of `drone-rl train`."""
@@ -16,14 +16,14 @@ THEIRS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
     {
         "sb3_ppo": {
             "num_envs": 64,
-            "n_steps": 64,
-            "n_epochs": 4,
+            "n_steps": 32,
+            "n_epochs": 1,
             "batch_size": 512,
-            "learning_rate": 1e-3,
             "ent_coef": 0.01,
+            "learning_rate": 3e-3,
         },
-        "sb3_a2c": {"num_envs": 64},
-        "torchrl": {"num_envs": 16, "steps": 200, "lr": 2e-3},
+        "sb3_a2c": {"num_envs": 64, "n_steps": 16, "learning_rate": 2e-3},
+        "torchrl": {"num_envs": 32, "steps": 150, "lr": 3e-3},
     }
 )
 """Where they differ from their own defaults."""

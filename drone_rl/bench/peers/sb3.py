@@ -6,17 +6,19 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+import torch
 from stable_baselines3 import A2C, PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 
 from drone_rl.api.foreign import policy_from
-from drone_rl.bench.peers.training import DECAY, TARGET, PeerTraining
+from drone_rl.bench.peers.outcome import DECAY, TARGET, PeerTraining
 from drone_rl.envs.gymnasium.worlds import DroneWorlds
 from drone_rl.envs.sb3.worlds import Sb3Worlds
 from drone_rl.policies.sb3.logits import Sb3Logits
 from drone_rl.policies.sb3.trunk import Sb3Trunk
 from drone_rl.settings.transforms import Gray, Standardize, Transform
+from drone_rl.training.metrics import running_mean
 from drone_rl.utils.errors import InputError
 
 ALGORITHMS: Mapping[str, type[OnPolicyAlgorithm]] = MappingProxyType({"ppo": PPO, "a2c": A2C})
@@ -49,9 +51,9 @@ class Solved(BaseCallback):
     def count(self, rewards: np.ndarray, done: np.ndarray) -> None:
         """Adds a step. Shapes: (num_envs,)."""
         self._earned = self._earned + rewards
-        for earned in self._earned[done].tolist():
-            self.running_reward = self.decay * self.running_reward + (1 - self.decay) * earned
-            self.episodes += 1
+        ended = torch.from_numpy(self._earned[done])
+        self.running_reward = running_mean(self.running_reward, ended, self.decay)
+        self.episodes += len(ended)
         self._earned = np.where(done, 0.0, self._earned)
 
     def _on_step(self) -> bool:

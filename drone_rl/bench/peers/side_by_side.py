@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from drone_rl.bench.commands import call
+from drone_rl.bench.commands import train
 from drone_rl.bench.peers.contenders import OURS, THEIRS
 from drone_rl.bench.peers.plot import plot
 from drone_rl.bench.peers.program import success_lower95
@@ -64,10 +64,7 @@ def train_ours(arguments: Sequence[str], *, seed: int, episodes: int, folder: Pa
         folder: For the runs.
     """
     run = folder / str(seed)
-    begin = time.perf_counter()
-    call("train", *arguments, f"seed={seed}", f"hydra.run.dir={run}")
-    seconds = time.perf_counter() - begin
-    result = json.loads((run / "result.json").read_text())
+    seconds, result = train(run, *arguments, f"seed={seed}")
     found = {
         "seconds": seconds,
         "seconds_without_imports": result["seconds"],

@@ -6,8 +6,7 @@ from types import ModuleType
 from typing import Any
 
 from drone_rl.api.foreign import policy_from
-from drone_rl.bench.peers.training import TARGET, PeerTraining
-from drone_rl.settings.transforms import Gray, Standardize
+from drone_rl.bench.peers.outcome import TARGET, PeerTraining
 from drone_rl.utils.errors import InputError
 
 EXAMPLE = Path(__file__).parents[3] / "examples" / "train_with_torchrl.py"
@@ -30,8 +29,7 @@ def train_torchrl(
     """
     done = _example().train(seed=seed, target=target, max_frames=max_frames, **settings)
     reached = done.running_reward >= target
-    transforms = (Gray(), Standardize())
-    policy = policy_from(done.network, transforms=transforms, name="torchrl's Collector")
+    policy = policy_from(done.network, name="torchrl's Collector")
     return PeerTraining(reached, done.frames, done.running_reward, policy)
 
 

@@ -103,9 +103,8 @@ class Stage:
 
     def flags(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Which worlds have terminated, and which were truncated. Shapes: (num_worlds,)."""
-        reason = self.worlds.state.end_reason.cpu().numpy()
-        truncated = reason == self.worlds.task.truncation
-        return (reason != 0) & ~truncated, truncated
+        terminated, truncated = self.worlds.ends()
+        return terminated.cpu().numpy(), truncated.cpu().numpy()
 
     def info(self, state: State | None = None) -> dict[str, NDArray[Any]]:
         """The truth about all worlds, or about those of a state.

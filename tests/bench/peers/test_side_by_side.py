@@ -2,21 +2,51 @@
 
 import pytest
 
-from drone_rl.bench.peers.contenders import LABELS
-from drone_rl.bench.peers.side_by_side import bench_peers, train_theirs
+from drone_rl.bench.peers import side_by_side
+from drone_rl.bench.peers.contenders import LABELS, OURS, THEIRS
+from drone_rl.bench.peers.side_by_side import bench_peers, train_ours, train_theirs
+
+KEYS = {"seconds", "seconds_without_imports", "frames", "is_solved", "success_lower95"}
 
 
-@pytest.mark.slow
-def test_all_of_them(tmp_path):
-    pytest.importorskip("stable_baselines3", reason="Stable-Baselines3 is not installed")
-    found = bench_peers(tmp_path / "runs" / "peers", [5], 3, quick=True)["peers"]
-    assert [*found] == ["reinforce", "a2c", "ppo", "sb3_ppo", "sb3_a2c", "torchrl"] == [*LABELS]
-    for measured in found.values():
-        assert {len(values) for values in measured.values()} == {1}
-        assert 0 < measured["seconds_without_imports"][0] < measured["seconds"][0]
-        assert measured["is_solved"] == [False] and 0 <= measured["success_lower95"][0] < 1
-        assert measured["frames"][0] > 0
+def test_lists_by_seed_in_the_order_of_seeds_by_turns(tmp_path, monkeypatch):
+    told = []
+
+    def measured(name, seed, episodes):
+        told.append((name, seed))
+        assert episodes == 3
+        return {"seconds": 10.0 + seed, "seconds_without_imports": 5.0, "is_solved": True}
+
+    def ours(arguments, *, seed, episodes, folder):
+        assert tuple(arguments) == OURS[folder.name]
+        return measured(folder.name, seed, episodes)
+
+    def theirs(name, settings, *, seed, episodes, max_frames):
+        assert (settings, max_frames) == (THEIRS[name], 1_000_000)
+        return measured(name, seed, episodes)
+
+    monkeypatch.setattr(side_by_side, "train_ours", ours)
+    monkeypatch.setattr(side_by_side, "train_theirs", theirs)
+    found = bench_peers(tmp_path / "runs" / "peers", [5, 4], 3, quick=False)["peers"]
+    assert told == [(name, seed) for seed in (5, 4) for name in LABELS]
+    assert [*found] == [*LABELS]
+    assert all(measured["seconds"] == [15.0, 14.0] for measured in found.values())
     assert (tmp_path / "peers.png").stat().st_size > 10_000
+
+
+def test_the_command_that_a_user_gives(tmp_path):
+    short = ["trainer.total_frames=1", "collector.num_envs=2", "task.num_cubes=1"]
+    found = train_ours(short, seed=1, episodes=2, folder=tmp_path)
+    assert found.keys() == KEYS and not found["is_solved"]
+    assert 0 < found["seconds_without_imports"] < found["seconds"]
+    assert found["frames"] > 0 and 0 <= found["success_lower95"] < 1
+    assert (tmp_path / "1" / "result.json").is_file()
+
+
+def test_a_peer():
+    how = {"num_envs": 2, "steps": 160}
+    found = train_theirs("torchrl", how, seed=1, episodes=2, max_frames=1)
+    assert found.keys() == KEYS and found["frames"] == 320 and not found["is_solved"]
 
 
 def test_a_peer_that_fails_says_why():
