@@ -181,7 +181,7 @@ def chances(
     placed = _drawn(flown, settings) if cubes is None else _given(flown, cubes)
     at_a_time = max(1, CELLS_AT_A_TIME // shape_of(flown).nodes)
     parts = placed.split(min(at_a_time, PLACEMENTS_AT_A_TIME))
-    env = policy.make_env(1, device=settings.device)
+    env = policy.make_env(1, device=settings.device, renderer=settings.renderer)
     try:
         sight, told = Sight(env, policy.make_network(settings.device)), []
         for part in parts:
@@ -200,7 +200,8 @@ def _bounded(
     policy: Policy, placed: Tensor, settings: ChanceSettings, progress: Progress
 ) -> tuple[Bounded, ...]:
     """Bounds around each placement, as far as cubes are placed at all."""
-    made = make_subject(policy.description, policy.make_network(), ProveSettings().logit_gap)
+    network, gap = policy.make_network(), ProveSettings().logit_gap
+    made = make_subject(policy.description, network, gap, settings.renderer)
     found: list[Bounded] = []
     with closing(made) as subject:
         bound = subject.lattice.task.lateral_bound

@@ -134,6 +134,7 @@ def check(
         flights=settings.flights,
         seed=settings.seed,
         device=settings.device,
+        renderer=settings.renderer,
         tell=functools.partial(progress or Bar(), "flown"),
     )
     return Check(path, flown, settings, stated, findings)

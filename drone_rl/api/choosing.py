@@ -12,13 +12,16 @@ from drone_rl.utils.seeding import Stream
 from drone_rl.verdicts.judge import judge_policy
 
 
-def judge_to_choose(path: Path, episodes: int, device: str) -> tuple[dict[str, Any], dict]:
+def judge_to_choose(
+    path: Path, episodes: int, device: str, renderer: str = "raytrace"
+) -> tuple[dict[str, Any], dict]:
     """What a checkpoint's policy is, in worlds that are the same for all who are chosen among.
 
     Args:
         path: The checkpoint.
         episodes: To fly.
         device: Where to fly them.
+        renderer: Who draws them.
 
     Returns:
         The verdict, as in verdict.json, and the checkpoint's progress.
@@ -27,7 +30,8 @@ def judge_to_choose(path: Path, episodes: int, device: str) -> tuple[dict[str, A
         InputError: The checkpoint is unusable.
     """
     policy = load_policy(path)
-    worlds = policy.flying(min(episodes, 250), stream=Stream.CHOICE, device=device)
+    count = min(episodes, 250)
+    worlds = policy.flying(count, stream=Stream.CHOICE, device=device, renderer=renderer)
     with worlds as (env, actor):
         return judge_policy(env, actor, episodes).as_dict(), policy.state["progress"]
 

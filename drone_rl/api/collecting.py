@@ -125,6 +125,7 @@ def build_share(
         shares[number],
         seed=seed,
         device=settings.device,
+        renderer=settings.renderer,
         task=practice,
         first_world=sum(shares[:number]),
         num_shards=1,

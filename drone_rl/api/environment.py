@@ -29,7 +29,7 @@ def make_env(
         transforms: What becomes of the picture, in this order.
         seed: Root of the worlds' random streams.
         device: Where they are drawn: "cpu", "cuda" or "cuda:N".
-        kwargs: See `drone_rl.envs.DroneEnv`.
+        kwargs: See `drone_rl.envs.DroneEnv`; renderer="mujoco_warp" draws by MuJoCo Warp.
 
     Raises:
         InputError: A setting is out of range; the message begins with its name.

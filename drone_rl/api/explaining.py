@@ -109,7 +109,7 @@ def _named(policies: Given | Sequence[Given]) -> dict[str, Pilot]:
 def _explain(
     policy: Pilot, settings: ExplainSettings, folder: Path, num_envs: int, progress: Progress
 ) -> dict[str, Any]:
-    env = policy.make_env(num_envs, seed=settings.seed)
+    env = policy.make_env(num_envs, seed=settings.seed, renderer=settings.renderer)
     origin = {**policy.origin, **provenance()}
     try:
         return explain_policy(

@@ -47,7 +47,9 @@ def export(
     seed, device = settings.seed, settings.device
     claim = find_claim(policy, certificate)
     claim = None if claim is None or claim.refused else claim  # a card tells of what is
-    with policy.flying(settings.num_worlds, seed=seed, device=device) as (env, actor):
+    with policy.flying(
+        settings.num_worlds, seed=seed, device=device, renderer=settings.renderer
+    ) as (env, actor):
         verdict = judge_policy(env, actor, settings.episodes, claim=claim).as_dict()
     noted, chosen = origin_of(policy.path, policy.state)
     export_policy(

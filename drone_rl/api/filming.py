@@ -30,6 +30,7 @@ def film(
     greedy: bool = True,
     seed: int = 0,
     device: str = "cpu",
+    renderer: str = "raytrace",
 ) -> list[Path]:
     """Writes videos of a policy in unseen worlds.
 
@@ -40,12 +41,13 @@ def film(
         greedy: Whether to take the most probable action instead of drawing one.
         seed: Root of the worlds' random streams.
         device: Where to draw.
+        renderer: Who draws, see `drone_rl.sim.rendering.find_renderer`.
 
     Returns:
         The files.
     """
     files: list[Path] = []
-    with policy.flying(1, seed=seed, device=device) as (env, actor):
+    with policy.flying(1, seed=seed, device=device, renderer=renderer) as (env, actor):
         for episode in range(episodes):
             frames = list(film_episode(env, actor, greedy=greedy))
             files += write_video(frames, folder / f"episode_{episode}")
@@ -54,11 +56,18 @@ def film(
     return files
 
 
-def view(policy: Policy, *, greedy: bool = True, seed: int = 0, device: str = "cpu") -> None:
+def view(
+    policy: Policy,
+    *,
+    greedy: bool = True,
+    seed: int = 0,
+    device: str = "cpu",
+    renderer: str = "raytrace",
+) -> None:
     """Opens dm_control's viewer on the composer task, flown by a policy.
 
-    The viewer shows the dm_control simulation; the policy sees the same poses drawn by Warp, as
-    it did in training.
+    The viewer shows the dm_control simulation; the policy sees the same poses drawn as in
+    training.
 
     Raises:
         InputError: There is no display.
@@ -68,7 +77,7 @@ def view(policy: Policy, *, greedy: bool = True, seed: int = 0, device: str = "c
     import dm_env
     from dm_control import viewer
 
-    env = policy.make_env(1, seed=seed, device=device)
+    env = policy.make_env(1, seed=seed, device=device, renderer=renderer)
     actor, worlds = policy.make_actor(env, seed=seed), cast(DroneEnv, env.base_env).worlds
     shown = make_environment(
         worlds.task, worlds.camera, dynamics=worlds.dynamics, pixels=False, random_state=seed

@@ -209,6 +209,7 @@ def judge(
             flights=settings.certificate_flights,
             seed=settings.seed,
             device=settings.device,
+            renderer=settings.renderer,
         )
         worlds = _flying(pilot, settings)
     draws, rule = settings.sampled and pilot is not None, Rule(good_share=settings.good_share)
@@ -222,7 +223,12 @@ def _flying(
     policy: Pilot, settings: FlightSettings
 ) -> AbstractContextManager[tuple[Any, TensorDictModuleBase]]:
     """Unseen worlds and the policy in them."""
-    return policy.flying(settings.num_worlds, seed=settings.seed, device=settings.device)
+    return policy.flying(
+        settings.num_worlds,
+        seed=settings.seed,
+        device=settings.device,
+        renderer=settings.renderer,
+    )
 
 
 @contextmanager

@@ -116,7 +116,8 @@ def places(
     policy = policy.in_task(**(task or {}))
     begin = time.perf_counter()
     network, gap = policy.make_network(), settings.logit_gap
-    with one_thread(), closing(make_subject(policy.description, network, gap)) as subject:
+    made = make_subject(policy.description, network, gap, settings.renderer)
+    with one_thread(), closing(made) as subject:
         progress("comparing the renderer's pictures")
         compared = subject.seeing.check(settings.compared, np.random.RandomState(0))
         progress("deciding the cells")

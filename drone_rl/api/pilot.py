@@ -88,6 +88,7 @@ class Pilot(abc.ABC):
         seed: int = 0,
         stream: Stream = Stream.REPORT,
         device: str = "cpu",
+        **kwargs: Any,
     ) -> Iterator[tuple[TransformedEnv, TensorDictModuleBase]]:
         """Worlds and it as their actor, for a while; then the worlds are closed.
 
@@ -96,8 +97,9 @@ class Pilot(abc.ABC):
             seed: Root of their random streams and of its own.
             stream: Which worlds.
             device: Where they are drawn.
+            kwargs: See `drone_rl.envs.DroneEnv`.
         """
-        env = self.make_env(num_envs, seed=seed, stream=stream, device=device)
+        env = self.make_env(num_envs, seed=seed, stream=stream, device=device, **kwargs)
         try:
             yield env, self.make_actor(env, seed=seed, stream=stream)
         finally:

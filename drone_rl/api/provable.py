@@ -104,7 +104,13 @@ def _search(journal: Journal, progress: Progress) -> None:
     progress(f"{len(places)} of {flights} flights failed", how.flights, how.flights)
     proof, boxes = None, np.repeat(places[..., None], 2, -1)
     if not len(places):
-        proof = prove(policy, folder=journal.next_folder, limit_s=how.limit_s, progress=progress)
+        proof = prove(
+            policy,
+            folder=journal.next_folder,
+            limit_s=how.limit_s,
+            renderer=journal.settings.renderer,
+            progress=progress,
+        )
         boxes = _largest(_doubtful(proof), how.most_boxes)
     done = Round(
         frames=policy.state["progress"]["frames"],
@@ -129,6 +135,7 @@ def _fly(policy: Policy, journal: Journal) -> tuple[NDArray[np.float64], int]:
         seed=settings.seed,
         stream=Stream.SEARCH,
         device=settings.device,
+        renderer=settings.renderer,
         first_world=len(journal.rounds) * WORLDS,
     )
     try:

@@ -119,7 +119,8 @@ def prove(
     policy = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
     policy = policy.in_task(**(task or {}))
     network, gap = policy.make_network(), settings.logit_gap
-    with one_thread(), closing(make_subject(policy.description, network, gap)) as subject:
+    made = make_subject(policy.description, network, gap, settings.renderer)
+    with one_thread(), closing(made) as subject:
         subject.seeing.check(settings.compared, np.random.RandomState(0))
         if folder is None:
             return _prove(policy, subject, settings, None, progress or Bar())

@@ -1,6 +1,7 @@
 """Which certificate a verdict, a card or a report may quote of a policy."""
 
 from pathlib import Path
+from typing import Any
 
 from drone_rl.api.pilot import Pilot
 from drone_rl.api.policy import Policy
@@ -17,6 +18,7 @@ def find_claim(
     flights: int = 0,
     seed: int = 0,
     device: str = "cpu",
+    renderer: str = "raytrace",
 ) -> Claim | None:
     """The certificate of a policy in its task, tried, see `drone_rl.checks.read_tried`.
 
@@ -27,6 +29,7 @@ def find_claim(
         flights: How many to fly anew; 0 for none.
         seed: Of where these start.
         device: Where they are flown.
+        renderer: Who draws, see `drone_rl.sim.rendering.find_renderer`.
 
     Returns:
         None if none is given and none lies there, as for a policy in no file. One that lies there
@@ -47,7 +50,7 @@ def find_claim(
     if given is None and not path.is_file():
         return None
     try:
-        return _try(policy, path, flights, seed, device)
+        return _try(policy, path, flights, seed=seed, device=device, renderer=renderer)
     except InputError as error:
         if given is not None:
             raise
@@ -58,11 +61,11 @@ def _file(path: Path) -> Path:
     return path / "certificate.json" if path.is_dir() else path
 
 
-def _try(policy: Policy, path: Path, flights: int, seed: int, device: str) -> Claim:
+def _try(policy: Policy, path: Path, flights: int, **flying: Any) -> Claim:
     weights = policy.state["policy"]
     certificate = read_tried(path, policy.description, weights)
     if flights:
-        found = check_certificate(certificate, weights, flights=flights, seed=seed, device=device)
+        found = check_certificate(certificate, weights, flights=flights, **flying)
         if not found.accepted:
             raise InputError(f"certificate {path} does not hold: {found.lines()[0]}; prove again")
         flights = sum(found.flights.values())

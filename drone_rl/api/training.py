@@ -42,6 +42,7 @@ MAY_CHANGE = (
     "trainer.target_share",
     "trainer.checkpoint_interval_s",
     "evaluate_after",
+    "renderer",
 )
 """Settings that a resumed run may change: they don't enter into what is learned."""
 _NONE_YET = float("-inf")
@@ -171,7 +172,8 @@ def finish(settings: TrainSettings, folder: Path, result: dict[str, Any]) -> Tra
         from drone_rl.api.choosing import judge_to_choose  # slow to import, and few need it
 
         last, episodes = last_of(folder), settings.evaluate_after
-        result["verdict"], _ = judge_to_choose(last, episodes, settings.device)
+        given = (settings.device, settings.renderer)
+        result["verdict"], _ = judge_to_choose(last, episodes, *given)
     write_atomically(folder / "result.json", json.dumps(result, indent=2))
     return Training(folder, result["reason"], result)
 

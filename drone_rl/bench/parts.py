@@ -15,8 +15,8 @@ from drone_rl.envs import DroneEnv
 from drone_rl.policies import PolicyNetwork, SmallCNN, make_actor
 from drone_rl.settings.collecting import Threads
 from drone_rl.settings.training import TrainSettings
-from drone_rl.sim.rendering import MakeRenderer, make_renderer
-from drone_rl.sim.settings import TaskSettings
+from drone_rl.sim.rendering import MakeRenderer
+from drone_rl.sim.settings import CameraSettings, TaskSettings
 
 
 def default_collector(num_envs: int, num_threads: int, device: str) -> ThreadedCollector:
@@ -46,11 +46,15 @@ def random_walk(env: DroneEnv, steps: int, seed: int = 0) -> int:
 
 
 def make_worlds(
-    num_envs: int, device: str, num_cubes: int = 3, renderer: MakeRenderer = make_renderer
+    num_envs: int,
+    device: str,
+    num_cubes: int = 3,
+    renderer: str | MakeRenderer = "raytrace",
+    camera: CameraSettings | None = None,
 ) -> DroneEnv:
     """A batch of worlds on all cores."""
     task = TaskSettings(num_cubes=num_cubes)
-    return DroneEnv(num_envs, task, device=device, renderer=renderer)
+    return DroneEnv(num_envs, task, camera, device=device, renderer=renderer)
 
 
 def rate(work: Callable[[], int], seconds: float) -> float:

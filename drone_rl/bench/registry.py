@@ -16,6 +16,7 @@ from drone_rl.bench.peers.side_by_side import bench_peers
 from drone_rl.bench.places import bench_places
 from drone_rl.bench.provable import bench_provable
 from drone_rl.bench.proving import bench_many_cubes, bench_prove, bench_tampering
+from drone_rl.bench.render_truth import bench_render_truth
 from drone_rl.bench.scaling import bench_scaling
 from drone_rl.bench.sentences import bench_sentences
 from drone_rl.bench.speed import bench_collector, bench_dm_control, bench_render
@@ -87,6 +88,11 @@ BENCHMARKS: dict[str, Benchmark] = {
         lambda s: bench_verdicts(s.runs, s.device, s.quick),
         "truth",
         (*_JUDGING, "bench/verdicts", "bench/scripted"),
+    ),
+    "render_truth": Benchmark(
+        lambda s: bench_render_truth(s.quick),
+        "truth",
+        ("sim/rendering", "bench/render_truth", "bench/random_scenes"),
     ),
     "mutants": Benchmark(lambda s: bench_mutants(), "truth", ("bench/mutants",)),
     "sweeps": Benchmark(

@@ -1,4 +1,4 @@
-"""Cost must grow linearly with worlds, frames and cubes."""
+"""Cost must grow linearly with worlds, frames, cubes and pixels."""
 
 import statistics
 import time
@@ -8,16 +8,19 @@ from typing import Any
 import numpy as np
 
 from drone_rl.bench.parts import make_worlds, random_walk
+from drone_rl.sim.settings import CameraSettings
 
 
 def bench_scaling(folder: Path, device: str, quick: bool) -> dict[str, Any]:
-    """Times random flight against the number of worlds, frames and cubes, and draws it.
+    """Times random flight against the number of worlds, frames, cubes and pixels, and draws it.
 
     Returns:
         For each, the sizes, the seconds and the share of the variance that a line explains.
     """
     worlds = (32, 64, 128) if quick else (32, 64, 128, 256, 512)
     cubes = (1, 4, 8) if quick else (1, 2, 4, 8, 16)
+    larger = range(1, 4 if quick else 6)
+    cameras = [CameraSettings(width=64 * k, height=25 * k) for k in larger]
     steps = 5 if quick else 20
     series = {
         "worlds": {n: _seconds(make_worlds(n, device), steps, quick) for n in worlds},
@@ -26,6 +29,10 @@ def bench_scaling(folder: Path, device: str, quick: bool) -> dict[str, Any]:
             for k in ((1, 2, 3) if quick else (1, 2, 4, 8))
         },
         "cubes": {n: _seconds(make_worlds(128, device, n), steps, quick) for n in cubes},
+        "pixels": {
+            c.width * c.height: _seconds(make_worlds(128, device, camera=c), steps, quick)
+            for c in cameras
+        },
     }
     _plot(series, folder / "scaling.png")
     results = {}
@@ -56,7 +63,7 @@ def _r_squared(points: dict[int, float]) -> float:
 def _plot(series: dict[str, dict[int, float]], path: Path) -> None:
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(11, 3.4), layout="constrained")
+    figure = Figure(figsize=(14, 3.4), layout="constrained")
     for axes, (name, points) in zip(figure.subplots(1, len(series)), series.items(), strict=True):
         x, y = np.array(list(points)), np.array(list(points.values()))
         line = np.polyfit(x, y, 1)

@@ -1,5 +1,6 @@
 """Frames a second: drawing alone, the collector, and dm_control's own pixel path."""
 
+import dataclasses
 import json
 import os
 import subprocess
@@ -8,8 +9,8 @@ from functools import partial
 from typing import Any
 
 from drone_rl.bench.parts import default_collector, make_worlds, paired, random_walk, rate
-from drone_rl.sim.rendering import View, make_renderer
-from drone_rl.sim.rendering.warp import WarpRenderer
+from drone_rl.sim.rendering import View
+from drone_rl.sim.rendering.view import MODALITIES
 from drone_rl.sim.worlds import Worlds
 
 SIZES = ((25, 64), (64, 64), (100, 256))
@@ -18,21 +19,46 @@ _COMPARED_WORLDS = 128
 
 
 def bench_render(num_envs: int, device: str, quick: bool) -> dict[str, Any]:
-    """Raw drawing of a batch of worlds on all cores, at 25x64 pixels, and over MuJoCo Warp's."""
+    """Raw drawing of a batch of worlds on all cores.
+
+    Returns:
+        Frames a second at 25x64 and 64x64 pixels, how many times as many as by MuJoCo Warp's
+        renderer, and the time of all modalities in one pass over that of RGB.
+    """
     seconds = 0.5 if quick else 10.0
     env = make_worlds(num_envs, device)
     env.reset()
     frames = rate(partial(_draw, env.worlds), seconds)
+    larger = partial(_draw, env.worlds, env.worlds.view(height=64, width=64))
+    frames_64 = rate(larger, seconds)
     env.close()
-    over = {f"{h}x{w}": _over_warp(h, w, device, seconds / 10) for h, w in SIZES}
-    return {"raw_render_fps": frames, "render_over_warp": over}
+    return {
+        "raw_render_fps": frames,
+        "raw_render_fps_64": frames_64,
+        "render_over_warp": {f"{h}x{w}": _over_warp(h, w, device, seconds / 10) for h, w in SIZES},
+        "render_all_over_rgb": _all_over_rgb(device, seconds / 20),
+    }
+
+
+def _all_over_rgb(device: str, seconds: float) -> float:
+    """Time of a picture of all modalities over that of one in colours, in turn."""
+    env = make_worlds(_COMPARED_WORLDS, device)
+    env.reset()
+    view = env.worlds.view(modality=MODALITIES, height=64, width=64)
+    work = [partial(_draw, env.worlds, dataclasses.replace(view, modalities=("rgb",)))]
+    work.append(partial(_draw, env.worlds, view))
+    for draw in work:
+        draw()
+    _, _, ratio = paired(*work, seconds=seconds, rounds=9)
+    env.close()
+    return ratio
 
 
 def _over_warp(height: int, width: int, device: str, seconds: float) -> float:
     """Frames a second of the default renderer over those of MuJoCo Warp's, in turn."""
     ours, theirs = (
         make_worlds(_COMPARED_WORLDS, device, renderer=renderer)
-        for renderer in (make_renderer, WarpRenderer)
+        for renderer in ("raytrace", "mujoco_warp")
     )
     view = ours.worlds.view(height=height, width=width)
     work = [partial(_draw, env.worlds, view) for env in (ours, theirs)]
@@ -47,7 +73,8 @@ def _over_warp(height: int, width: int, device: str, seconds: float) -> float:
 
 
 def _draw(worlds: Worlds, view: View | None = None) -> int:
-    return len(worlds.render(worlds.state, view))
+    pictures = worlds.render_all(worlds.state, view or worlds.policy_view)
+    return len(next(iter(pictures.values())))
 
 
 def bench_collector(num_envs: int, num_threads: int, device: str, quick: bool) -> dict[str, Any]:
@@ -55,7 +82,7 @@ def bench_collector(num_envs: int, num_threads: int, device: str, quick: bool) -
 
     That drawing alone was the limit until our own ray tracer took its place.
     """
-    env = make_worlds(num_envs, device, renderer=WarpRenderer)
+    env = make_worlds(num_envs, device, renderer="mujoco_warp")
     env.reset()
     collector = default_collector(num_envs, num_threads, device)
     collector.collect()

@@ -84,6 +84,7 @@ def check_certificate(
     flights: int = 2000,
     seed: int = 0,
     device: str = "cpu",
+    renderer: str = "raytrace",
     tell: Tell = lambda done, total: None,
 ) -> Findings:
     """Checks a certificate that is of a policy with these weights, see `refuse_another`.
@@ -97,6 +98,7 @@ def check_certificate(
         flights: How many, at most.
         seed: Of where they start.
         device: Where they are flown.
+        renderer: Who draws, see `drone_rl.sim.rendering.find_renderer`.
         tell: Told now and then how many were flown, and of how many.
 
     Raises:
@@ -107,7 +109,8 @@ def check_certificate(
         return Findings(lies, (), 0, {})
     drawn = draw_places(certificate, flights, np.random.default_rng(seed))
     stated = drawn.outcome < len(certificate.outcomes)
-    with closing(Simulator(certificate.description, weights, device)) as simulator:
+    simulator = Simulator(certificate.description, weights, device, renderer)
+    with closing(simulator):
         flown = simulator.fly(drawn.points[stated], tell)
     outcomes = [certificate.outcomes[i] for i in drawn.outcome[stated]]
     points, why = drawn.points[stated], drawn.why[stated]

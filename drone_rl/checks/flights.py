@@ -50,7 +50,11 @@ class Simulator:
     """Flies a policy that acts by the present picture alone."""
 
     def __init__(
-        self, described: PolicyDescription, weights: Mapping[str, Tensor], device: str = "cpu"
+        self,
+        described: PolicyDescription,
+        weights: Mapping[str, Tensor],
+        device: str = "cpu",
+        renderer: str = "raytrace",
     ) -> None:
         """Builds worlds and network.
 
@@ -58,13 +62,15 @@ class Simulator:
             described: The policy, in the task to fly.
             weights: Of its network.
             device: Where worlds are drawn and the network runs.
+            renderer: Who draws, see `drone_rl.sim.rendering.find_renderer`.
 
         Raises:
             InputError: There is no such device.
         """
         pixels = described.camera.width * described.camera.height
         self.at_once = max(1, min(MOST_AT_ONCE, MOST_PIXELS // pixels))
-        self._env = described.build_env(min(self.at_once, 64), seed=0, device=device)
+        count = min(self.at_once, 64)
+        self._env = described.build_env(count, seed=0, device=device, renderer=renderer)
         self._worlds = worlds_of(self._env)
         self._task = require_cubes(described.task, "what a certificate states")
         every: Iterable[Transform] = self._env.transform  # type: ignore[assignment]

@@ -53,5 +53,6 @@ def run(settings: Command, folder: Path) -> tuple[int, float]:
             greedy=settings.greedy,
             seed=settings.seed,
             device=settings.device,
+            renderer=settings.renderer,
         )
     return 0, done.success

@@ -8,6 +8,7 @@ import drone_rl
 from drone_rl.hydra_app.names import policies as prepare  # noqa: F401 -- of what was typed
 from drone_rl.settings.changes import TaskChanges, no_changes
 from drone_rl.settings.paths import PathsSettings
+from drone_rl.sim.settings import RendererName
 from drone_rl.utils.schema import Whole
 from drone_rl.utils.settings import Settings
 
@@ -28,6 +29,8 @@ class Command(Settings):
     """Whether to open dm_control's viewer, which needs a display, instead of filming."""
     device: str = "cpu"
     """Where worlds are drawn and the policy runs: cpu, cuda or cuda:N."""
+    renderer: RendererName = "raytrace"
+    """Who draws: raytrace, our own, or mujoco_warp, MuJoCo Warp's."""
     task: TaskChanges = no_changes()
     """What to change of the policy's task."""
     paths: PathsSettings = PathsSettings()
@@ -40,7 +43,7 @@ def run(settings: Command, folder: Path) -> tuple[int, None]:
     from drone_rl.api.filming import film, view  # after what is slow to import
 
     policy = policy.in_task(**settings.task)
-    chosen = {name: getattr(settings, name) for name in ("greedy", "seed", "device")}
+    chosen = {name: getattr(settings, name) for name in ("greedy", "seed", "device", "renderer")}
     if settings.viewer:
         view(policy, **chosen)
     else:

@@ -16,7 +16,7 @@ from torchrl.envs import EnvBase
 
 from drone_rl.sim.actions import Entry
 from drone_rl.sim.dynamics import Dynamics
-from drone_rl.sim.rendering import MakeRenderer, check_device, make_renderer
+from drone_rl.sim.rendering import MakeRenderer, check_device
 from drone_rl.sim.settings import BaseTaskSettings, CameraSettings
 from drone_rl.sim.tasks import Task
 from drone_rl.sim.worlds import Worlds
@@ -51,7 +51,7 @@ class DroneEnv(EnvBase):
         pixels: bool = True,
         device: str = "cpu",
         dynamics: Dynamics | None = None,
-        renderer: MakeRenderer = make_renderer,
+        renderer: str | MakeRenderer = "raytrace",
     ) -> None:
         """Builds the worlds.
 
@@ -66,7 +66,7 @@ class DroneEnv(EnvBase):
             pixels: Whether to draw and observe; policies that read the truth don't need it.
             device: "cpu", "cuda" or "cuda:N".
             dynamics: How the drones move; the task's own choice by default.
-            renderer: What makes the one that draws; the fastest for the device by default.
+            renderer: Who draws, see `drone_rl.sim.rendering.find_renderer`.
 
         Raises:
             InputError: A setting is out of range.

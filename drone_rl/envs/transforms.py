@@ -8,10 +8,8 @@ from torch.nn import functional
 from torchrl.data import TensorSpec, Unbounded
 from torchrl.envs.transforms import ObservationTransform
 
+from drone_rl.sim.rendering.gray import to_gray
 from drone_rl.utils.errors import InputError
-
-LUMA = (0.299, 0.587, 0.114)
-"""Weights of red, green and blue in a gray pixel (ITU-R BT.601), as in the original study."""
 
 
 class PixelTransform(ObservationTransform):
@@ -57,8 +55,7 @@ class GrayPixels(PixelTransform):
 
     def _apply_transform(self, obs: Tensor) -> Tensor:
         _check_bytes(self, obs)
-        weights = torch.tensor(LUMA, device=obs.device) / 255.0
-        return (obs.float() @ weights).unsqueeze(-3)
+        return to_gray(obs).unsqueeze(-3)
 
 
 class RgbPixels(PixelTransform):

@@ -3,6 +3,7 @@
 import dataclasses
 from typing import Annotated
 
+from drone_rl.sim.settings import RendererName
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Real, Whole
 from drone_rl.utils.settings import Settings
@@ -35,6 +36,8 @@ class ExplainSettings(Settings):
     """Of t-SNE."""
     seed: Annotated[int, Whole(0)] = 0
     """Of everything that is drawn."""
+    renderer: RendererName = "raytrace"
+    """Who draws: raytrace, our own, or mujoco_warp, MuJoCo Warp's."""
 
     def check(self) -> None:
         """Refuses what shows nothing."""

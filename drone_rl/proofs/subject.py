@@ -56,13 +56,19 @@ class Subject:
         self.worlds.close()
 
 
-def make_subject(description: PolicyDescription, network: PolicyNetwork, gap: float) -> Subject:
+def make_subject(
+    description: PolicyDescription,
+    network: PolicyNetwork,
+    gap: float,
+    renderer: str = "raytrace",
+) -> Subject:
     """Takes a policy apart.
 
     Args:
         description: Of the policy, with the task that is to be proved.
         network: Its own, on the CPU.
         gap: See `Bounds`.
+        renderer: Who draws, see `drone_rl.sim.rendering.find_renderer`.
 
     Raises:
         InputError: Nothing can be proved of it; the message says why.
@@ -73,7 +79,7 @@ def make_subject(description: PolicyDescription, network: PolicyNetwork, gap: fl
         raise InputError(f"the policy does not choose among {', '.join(MOVES.names)}; prove one")
     lattice, eye = Lattice(task), Eye.of(task, description.camera)
     bounds = Bounds(network.eval(), gap)
-    worlds = Worlds(64, task, description.camera)
+    worlds = Worlds(64, task, description.camera, renderer=renderer)
     seeing = Seeing(worlds, lattice, eye)
     return Subject(lattice, eye, bounds, make_painter(description, seeing), seeing, worlds)
 

@@ -3,6 +3,7 @@
 import dataclasses
 from typing import Annotated
 
+from drone_rl.sim.settings import RendererName
 from drone_rl.utils.schema import Real, Whole
 from drone_rl.utils.settings import Settings
 
@@ -21,3 +22,5 @@ class ChanceSettings(Settings):
     """Into which such a box is cut: the more, the closer the bounds, and the longer it takes."""
     device: str = "cpu"
     """Where cells are drawn and the policy runs: cpu, cuda or cuda:N."""
+    renderer: RendererName = "raytrace"
+    """Who draws: raytrace, our own, or mujoco_warp, MuJoCo Warp's."""

@@ -3,6 +3,7 @@
 import dataclasses
 from typing import Annotated
 
+from drone_rl.sim.settings import RendererName
 from drone_rl.utils.schema import Whole
 from drone_rl.utils.settings import Settings
 
@@ -17,3 +18,5 @@ class CheckSettings(Settings):
     """Root of the random stream that draws where they start."""
     device: str = "cpu"
     """Where worlds are drawn and the policy runs: cpu, cuda or cuda:N."""
+    renderer: RendererName = "raytrace"
+    """Who draws: raytrace, our own, or mujoco_warp, MuJoCo Warp's."""

@@ -3,7 +3,7 @@
 import dataclasses
 from typing import Annotated
 
-from drone_rl.sim.settings import CameraSettings
+from drone_rl.sim.settings import CameraSettings, RendererName
 from drone_rl.utils.schema import OneOf
 from drone_rl.utils.settings import Settings
 
@@ -20,3 +20,5 @@ class GymnasiumSettings(Settings):
     """What `render` returns: none for nothing, rgb_array for the drone from behind."""
     device: str = "cpu"
     """Where worlds are drawn: cpu, cuda or cuda:N."""
+    renderer: RendererName = "raytrace"
+    """Who draws: raytrace, our own, or mujoco_warp, MuJoCo Warp's."""

@@ -3,6 +3,7 @@
 import dataclasses
 from typing import Annotated
 
+from drone_rl.sim.settings import RendererName
 from drone_rl.utils.schema import Real, Whole
 from drone_rl.utils.settings import Settings
 
@@ -19,6 +20,8 @@ class FlightSettings(Settings):
     """Worlds in one batch; bounds memory."""
     device: str = "cpu"
     """Where worlds are drawn and the policy runs: cpu, cuda or cuda:N."""
+    renderer: RendererName = "raytrace"
+    """Who draws: raytrace, our own, or mujoco_warp, MuJoCo Warp's."""
 
     @property
     def num_worlds(self) -> int:

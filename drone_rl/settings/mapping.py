@@ -3,6 +3,7 @@
 import dataclasses
 from typing import Annotated
 
+from drone_rl.sim.settings import RendererName
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Real, Whole
 from drone_rl.utils.settings import Settings
@@ -26,6 +27,8 @@ class PlacesSettings(Settings):
     """Where the two highest logits are closer, either action may be taken: sums are not exact."""
     compared: Annotated[int, Whole(1, 10_000_000, "pictures")] = 4_000
     """Random pictures of the renderer that must be the closed form's before anything is claimed."""
+    renderer: RendererName = "raytrace"
+    """Who draws: raytrace, our own, or mujoco_warp, MuJoCo Warp's."""
     most_cells: Annotated[int, Whole(1, unit="pictures")] = 1_000_000
     """Different pictures of one cube after which a camera or a window is too large; bounds
     memory."""

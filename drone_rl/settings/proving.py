@@ -3,6 +3,7 @@
 import dataclasses
 from typing import Annotated
 
+from drone_rl.sim.settings import RendererName
 from drone_rl.utils.schema import Real, Whole
 from drone_rl.utils.settings import Settings
 
@@ -15,6 +16,8 @@ class ProveSettings(Settings):
     """Where the two highest logits are closer, either action may be taken: sums are not exact."""
     compared: Annotated[int, Whole(1, 10_000_000, "pictures")] = 4_000
     """Random pictures of the renderer that must be the closed form's before the proof begins."""
+    renderer: RendererName = "raytrace"
+    """Who draws: raytrace, our own, or mujoco_warp, MuJoCo Warp's."""
     limit_s: Annotated[float, Real(0.0, unit="s")] | None = None
     """Seconds after which the proof stops, to be gone on with; none for never."""
     save_interval_s: Annotated[float, Real(0.0, unit="s")] = 30.0

@@ -9,7 +9,7 @@ from drone_rl.settings.networks import Network, SmallCnn
 from drone_rl.settings.objectives import Objective, Reinforce
 from drone_rl.settings.returns import Gae, LeaveOneOut, Returns
 from drone_rl.settings.transforms import Gray, Standardize, Transform
-from drone_rl.sim.settings import BaseTaskSettings, CameraSettings, TaskSettings
+from drone_rl.sim.settings import BaseTaskSettings, CameraSettings, RendererName, TaskSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Instance, Real, Several, Whole
 from drone_rl.utils.settings import Settings
@@ -67,6 +67,8 @@ class TrainSettings(Settings):
     """Root of every random stream: worlds, actions, initial weights."""
     device: str = "cpu"
     """Where worlds are drawn and policies run: cpu, cuda or cuda:N."""
+    renderer: RendererName = "raytrace"
+    """Who draws: raytrace, our own, or mujoco_warp, MuJoCo Warp's."""
     evaluate_after: Annotated[int, Whole(0, unit="episodes")] = 0
     """Episodes, in worlds to choose by, of the verdict at the end; 0 for none."""
 

@@ -19,11 +19,12 @@ from drone_rl.sim.rendering import (
     Renderer,
     Scene,
     View,
-    make_renderer,
+    find_renderer,
 )
 from drone_rl.sim.rendering.view import Modality
 from drone_rl.sim.settings import BaseTaskSettings, CameraSettings
 from drone_rl.sim.tasks import State, Task, as_task
+from drone_rl.utils.errors import InputError
 
 _POSE = {"drone": Entry((3,), torch.float32), "attitude": Entry((4,), torch.float32)}
 
@@ -38,7 +39,7 @@ class Worlds:
         camera: CameraSettings | None = None,
         *,
         dynamics: Dynamics | None = None,
-        renderer: MakeRenderer = make_renderer,
+        renderer: str | MakeRenderer = "raytrace",
         device: str = "cpu",
         num_shards: int | None = None,
     ) -> None:
@@ -49,9 +50,12 @@ class Worlds:
             task: What there is to do; cube collection as in the original study by default.
             camera: The policy's.
             dynamics: How the drones move; the task's own choice by default.
-            renderer: What makes the one that draws; the fastest for the device by default.
+            renderer: Who draws, see `find_renderer`.
             device: "cpu", "cuda" or "cuda:N".
             num_shards: See `MakeRenderer`.
+
+        Raises:
+            InputError: There is no such renderer.
         """
         self.num_worlds = num_worlds
         self.task = as_task(task)
@@ -59,7 +63,7 @@ class Worlds:
         self.dynamics = dynamics or self.task.make_dynamics()
         self.device = torch.device(device)
         self._every = torch.arange(num_worlds, device=self.device)
-        self._make_renderer, self._num_shards = renderer, num_shards
+        self._make_renderer, self._num_shards = find_renderer(renderer), num_shards
         self.policy_view = self.view()
         drawn = self.task.draw(np.random.RandomState(0))
         self.state = self.start(torch.zeros_like(drawn).expand(num_worlds, *drawn.shape).clone())
@@ -106,18 +110,19 @@ class Worlds:
 
     def view(
         self,
-        camera: str = FRONT_CENTER.name,
-        modality: Modality = "rgb",
+        camera: str | Sequence[str] = FRONT_CENTER.name,
+        modality: Modality | Sequence[Modality] = "rgb",
         height: int | None = None,
         width: int | None = None,
         show_drone: bool = False,
     ) -> View:
-        """A view of any of the drone's cameras, of the policy's picture size by default."""
+        """A view of some of the drone's cameras, of the policy's picture size by default."""
+        cameras = (camera,) if isinstance(camera, str) else camera
         return View(
-            camera=f"drone/{camera}",
+            cameras=tuple(f"drone/{name}" for name in cameras),
             height=height or self.camera.height,
             width=width or self.camera.width,
-            modality=modality,
+            modalities=(modality,) if isinstance(modality, str) else tuple(modality),
             show_drone=show_drone,
         )
 
@@ -169,17 +174,33 @@ class Worlds:
     def render(
         self, state: State, view: View | None = None, appearance: Appearance | None = None
     ) -> Tensor:
-        """Draws worlds, be they these or imagined ones.
+        """Draws worlds, be they these or imagined ones, as one camera sees them.
 
         Args:
             state: What to draw; any number of worlds.
-            view: The policy's camera by default.
+            view: Of one camera and one modality; the policy's by default.
             appearance: How they look; as the task has it by default.
 
         Returns:
-            See `Renderer.render`. First dimension: the state's worlds.
+            See `Renderer.render`, without the dimension of cameras. First dimension: the state's
+            worlds.
+
+        Raises:
+            InputError: The view is of several cameras or modalities.
         """
-        return self.renderer.render(view or self.policy_view, self.poses(state), appearance)
+        view = view or self.policy_view
+        if len(view.cameras) * len(view.modalities) > 1:
+            raise InputError(
+                f"a view of cameras {', '.join(view.cameras)}, each as "
+                f"{', '.join(view.modalities)}, is more than one picture; take render_all"
+            )
+        return self.render_all(state, view, appearance)[view.modalities[0]][:, 0]
+
+    def render_all(
+        self, state: State, view: View, appearance: Appearance | None = None
+    ) -> dict[Modality, Tensor]:
+        """The same of any number of cameras and modalities, in one pass; see `Renderer.render`."""
+        return self.renderer.render(view, self.poses(state), appearance)
 
     def poses(self, state: State) -> Poses:
         """Where a renderer must draw everything."""

@@ -16,7 +16,7 @@ from drone_rl.utils.provenance import provenance
 from drone_rl.utils.schema import Maybe, Plain, Record, Several, Text, Whole, as_mapping, shown
 
 FORMAT = "drone_rl sweep"
-MAY_CHANGE = ("resume", "logger", "paths", "trainer.checkpoint_interval_s")
+MAY_CHANGE = ("resume", "logger", "paths", "trainer.checkpoint_interval_s", "renderer")
 """Settings that may differ when a sweep is gone on with."""
 
 _RUN = Record(

@@ -28,8 +28,9 @@ def test_the_worlds_are_those_to_choose_by(trained, monkeypatch):
 
     monkeypatch.setattr(Policy, "make_env", note)
     with pytest.raises(InputError, match="enough"):
-        judge_to_choose(trained / "checkpoints" / "last.pt", 5, "cpu")
-    assert asked == {"stream": Stream.CHOICE, "seed": 0, "device": "cpu", "num_envs": 5}
+        judge_to_choose(trained / "checkpoints" / "last.pt", 5, "cpu", "mujoco_warp")
+    where = {"device": "cpu", "renderer": "mujoco_warp"}
+    assert asked == {"stream": Stream.CHOICE, "seed": 0, "num_envs": 5, **where}
 
 
 def test_a_run_keeps_its_verdict_beside_its_result(trained):

@@ -1,8 +1,15 @@
+import pytest
 import torch
 from torchrl.envs.utils import check_env_specs
 
 import drone_rl
+from drone_rl.api.collecting import build_collector
+from drone_rl.api.filming import film
 from drone_rl.settings.transforms import Gray, Resize
+from drone_rl.sim import worlds as worlds_module
+from drone_rl.sim.rendering import Raytracer
+from drone_rl.utils.errors import InputError
+from drone_rl.zoo import certificate_path, policy_path
 
 
 def test_worlds_as_policies_see_them():
@@ -27,3 +34,59 @@ def test_a_seed_means_the_same_worlds():
         found.append(env.reset()["info", "cube_positions"])
         env.close()
     assert torch.equal(*found)
+
+
+@pytest.fixture
+def asked(monkeypatch):
+    """Names of the renderers that worlds were asked to be drawn by; our own draws them all."""
+    names = []
+
+    def find(which):
+        names.append(which)
+        return Raytracer
+
+    monkeypatch.setattr(worlds_module, "find_renderer", find)
+    return names
+
+
+def test_whoever_is_asked_for_draws(asked, tmp_path):
+    """In worlds to train in, to be judged in, to be looked at, and of others."""
+    chosen = {"renderer": "mujoco_warp"}
+    drone_rl.make_env(1, **chosen).close()
+    assert asked == ["mujoco_warp"]
+    build_collector(drone_rl.TrainSettings(**chosen)).collector.shutdown()
+    assert set(asked) == {"mujoco_warp"}
+    asked.clear()
+    drone_rl.evaluate("good", episodes=1, baselines=False, **chosen)
+    assert asked == ["mujoco_warp"]
+    asked.clear()
+    film(drone_rl.load_policy("right_and_forward"), tmp_path, 1, **chosen)
+    drone_rl.DroneWorld(**chosen).close()
+    assert asked == ["mujoco_warp"] * 2
+    asked.clear()
+    drone_rl.judge("right_and_forward", episodes=1, **chosen)
+    assert asked[0] == "mujoco_warp"  # luck and the oracle see nothing
+
+
+@pytest.mark.parametrize(
+    ("command", "given"),
+    [
+        *[(command, "good") for command in ("prove", "places", "chances", "explain", "judge")],
+        ("check", certificate_path(policy_path("proved"))),
+    ],
+)
+def test_every_command_that_draws_asks_for_it(command, given, monkeypatch, tmp_path):
+    def refuse(which):
+        raise InputError(f"asked for {which}")
+
+    monkeypatch.setattr(worlds_module, "find_renderer", refuse)
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match="asked for mujoco_warp"):
+        getattr(drone_rl, command)(given, renderer="mujoco_warp", progress=lambda *_: None)
+
+
+def test_a_renderer_that_there_is_not():
+    with pytest.raises(InputError, match="renderer='opengl' is unknown; give one of: raytrace"):
+        drone_rl.make_env(1, renderer="opengl")
+    with pytest.raises(InputError, match="renderer='opengl' is unknown; give raytrace, mujoco"):
+        drone_rl.TrainSettings(renderer="opengl")

@@ -37,7 +37,7 @@ class Prover:
     def __init__(self):
         self.weights = []
 
-    def __call__(self, policy, *, folder, limit_s, progress):
+    def __call__(self, policy, *, folder, limit_s, renderer, progress):
         boxes = LOSING[int(folder.name)]
         lost = sum(upper - lower for ((lower, upper),) in boxes) / 12
         outcomes = [outcome("all_cubes", 1 - lost, [[[-6.0, 6.0]]])]

@@ -5,8 +5,11 @@ from types import SimpleNamespace
 import pytest
 
 from drone_rl.bench import speed
-from drone_rl.sim.rendering import make_renderer
-from drone_rl.sim.rendering.warp import WarpRenderer
+from drone_rl.sim.rendering import View
+
+
+def view(modality=("rgb",), **size):
+    return View(cameras=("front",), modalities=modality, **size)
 
 
 @pytest.fixture
@@ -14,10 +17,10 @@ def worlds(monkeypatch):
     """Worlds of which nothing is drawn; tells who drew and whether they were closed."""
     made = []
 
-    def make_worlds(num_envs, device, renderer=make_renderer):
+    def make_worlds(num_envs, device, renderer="raytrace"):
         env = SimpleNamespace(closed=False, renderer=renderer)
-        env.worlds = SimpleNamespace(state=None, render=lambda state, view=None: "frames")
-        env.worlds.view = lambda **size: size
+        env.worlds = SimpleNamespace(state=None, policy_view=None, view=view)
+        env.worlds.render_all = lambda state, view: {"rgb": "frames", "depth": "frames"}
         env.reset = lambda: None
         env.close = lambda: setattr(env, "closed", True)
         made.append(env)
@@ -34,16 +37,19 @@ def test_raw_drawing(worlds, monkeypatch):
 
     def paired(first, second, seconds, rounds):
         asked.append((first.args[1], second.args[1]))
-        return first(), second(), 11.0
+        return first(), second(), 11.0 + rounds
 
     monkeypatch.setattr(speed, "paired", paired)
     assert speed.bench_render(2, "cpu", quick=True) == {
         "raw_render_fps": 3.0,
-        "render_over_warp": {"25x64": 11.0, "64x64": 11.0, "100x256": 11.0},
+        "raw_render_fps_64": 3.0,
+        "render_over_warp": {"25x64": 14.0, "64x64": 14.0, "100x256": 14.0},
+        "render_all_over_rgb": 20.0,
     }
-    assert asked[2] == ({"height": 100, "width": 256},) * 2
-    ours, theirs = [make_renderer] * 3, [WarpRenderer] * 3
-    assert [env.renderer for env in worlds[1:]] == [*sum(zip(ours, theirs, strict=True), ())]
+    assert asked[2] == (view(height=100, width=256),) * 2
+    colours, everything = asked[3]
+    assert (colours.modalities, len(everything.modalities)) == (("rgb",), 6)
+    assert [env.renderer for env in worlds[1:]] == [*["raytrace", "mujoco_warp"] * 3, "raytrace"]
     assert all(env.closed for env in worlds)
 
 
@@ -63,7 +69,7 @@ def test_collecting_over_drawing(worlds, monkeypatch):
         "collector_over_raw": 0.7,
     }
     assert calls == [(5, 6, 4.0, 9)]  # letters of "batch" and "frames"
-    assert worlds[0].closed and worlds[0].renderer is WarpRenderer
+    assert worlds[0].closed and worlds[0].renderer == "mujoco_warp"
 
 
 @pytest.mark.parametrize(("single", "ratio"), [(4.0, 5.0), (None, None)])

@@ -58,7 +58,11 @@ class Stage:
         changes = {name: value for name, value in given.items() if name not in own}
         check_device(options.device)
         self.worlds = Worlds(
-            num_worlds, _make_task(task, changes), options.camera, device=options.device
+            num_worlds,
+            _make_task(task, changes),
+            options.camera,
+            renderer=options.renderer,
+            device=options.device,
         )
         self._every = torch.arange(num_worlds, device=self.worlds.device)
         self.render_mode = options.render_mode

@@ -1,8 +1,8 @@
 """Pictures of worlds: what is asked for, how things look, and who draws them."""
 
 from drone_rl.sim.rendering.appearance import Appearance
-from drone_rl.sim.rendering.default import make_renderer
 from drone_rl.sim.rendering.devices import check_device
+from drone_rl.sim.rendering.named import find_renderer
 from drone_rl.sim.rendering.raytrace import Raytracer
 from drone_rl.sim.rendering.renderer import MakeRenderer, Poses, Renderer
 from drone_rl.sim.rendering.scene import Scene
@@ -17,5 +17,5 @@ __all__ = [
     "Scene",
     "View",
     "check_device",
-    "make_renderer",
+    "find_renderer",
 ]

@@ -1,6 +1,6 @@
 """Where pictures are drawn, and Warp, which does it, started without a word."""
 
-from contextlib import nullcontext
+from contextlib import AbstractContextManager, nullcontext
 
 import torch
 import warp as wp
@@ -33,3 +33,10 @@ def start_warp(device: str) -> None:
     wp.config.log_level = max(wp.config.log_level, quiet)
     with standard_error_closed() if device == "cpu" else nullcontext():
         wp.init()  # its native part tells, whatever the level
+
+
+def on_torch_stream(device: torch.device) -> AbstractContextManager:
+    """Puts Warp's launches in order with torch's on a GPU; a CPU has no streams."""
+    if device.type == "cpu":
+        return nullcontext()
+    return wp.ScopedStream(wp.stream_from_torch(torch.cuda.current_stream(device)))

@@ -1,3 +1,4 @@
+# ruff: noqa: RUF046, UP018
 # pyright: reportIndexIssue=false
 # pyright: reportReturnType=false
 # pyright: reportArgumentType=false
@@ -5,330 +6,198 @@
 # pyright: reportOperatorIssue=false
 # pyright: reportGeneralTypeIssues=false
 # pyright: reportAttributeAccessIssue=false
-# (Warp compiles this file; Python's types say nothing about it.)
-"""The ray tracer itself: one geom after the other, each only where it can be seen.
+# (Warp compiles this file; Python's types say nothing about it, and what a loop changes is
+# declared by its type.)
+"""The ray tracer on a CPU: one picture after the other, geom by geom, then pixel by pixel.
 
-It draws whole worlds, one at a time, into pictures of sky alone. It takes the geoms in order and
-casts rays at each in the rectangle of pixels around its projection alone, in the geom's
-own frame; what is nearer than all before is painted over it. All geoms are convex and closed, or
-planes seen from above, so a ray enters each at most once, and there is no other hit to look for.
+First it finds out what is where. It takes the geoms in order and casts rays at each in the
+rectangle of pixels around its projection alone, in the geom's own frame; what is nearer than all
+before takes the pixel. All geoms are convex and closed, or planes seen from above, so a ray enters
+each at most once, and there is no other hit to look for. Then it writes what each pixel shows,
+which is worked out once for pixels in a row that show the same flat face.
+
+Pixels are counted by `while`: what Warp makes of `for` is several times as slow on a CPU.
 """
 
 import warp as wp
 
-from drone_rl.sim.rendering.raytrace_solids import PLANE, enter, meet_plane
+from drone_rl.sim.rendering.raytrace_rows import fill_floats, fill_ints, meet_level
+from drone_rl.sim.rendering.raytrace_sight import around, look_at
+from drone_rl.sim.rendering.raytrace_solids import (
+    FAR_AWAY,
+    PLANE,
+    ROUND,
+    SAME,
+    UPPER,
+    enter,
+    is_nearest,
+    meet_plane,
+    outward,
+)
+from drone_rl.sim.rendering.raytrace_structs import Geoms, Looks, Pictures, Poses, Sight, View
+from drone_rl.sim.rendering.raytrace_surface import put_run, show_geom, show_sky
 
-RGB, DEPTH, SEGMENTATION = wp.constant(0), wp.constant(1), wp.constant(2)
-DRONE_FRAME = wp.constant(1)
-"""The only frame that turns; 0 is the world's and the props' follow."""
+_FACES = wp.constant(8)
+"""Room for the faces of a geom."""
+_NOTHING = wp.constant(-1)
+"""Owner of the sky."""
 
-_SAME = wp.constant(1e-6)
-"""Relative distance within which the later of two geoms is in front, as in OpenGL."""
-_FAR_AWAY = wp.constant(1e10)
-_IN_FRONT = wp.constant(1e-3)
-"""Metres before the camera from which corners are projected."""
-
-
-@wp.struct
-class Camera:
-    """One camera and its picture."""
-
-    frame: int
-    position: wp.vec3
-    """In its frame, metres."""
-    attitude: wp.vec4
-    """In its frame, (w, x, y, z); it looks along its own -z, with y up."""
-    half_width: float
-    """Of the picture at a distance of 1."""
-    half_height: float
-    width: int
-    height: int
-    far: float
-    """Metres along the axis beyond which nothing is drawn."""
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 
 @wp.struct
-class Geoms:
-    """What is drawn, in the model's order."""
+class Desk:
+    """Room to work for one picture at a time; first dimension: workers."""
 
-    kind: wp.array[int]
-    number: wp.array[int]
-    """In the model."""
-    frame: wp.array[int]
-    position: wp.array[wp.vec3]
-    attitude: wp.array[wp.vec4]
-    size: wp.array[wp.vec3]
-    reach: wp.array[wp.vec3]
-    """Half extents of the box around each, in its own frame."""
-
-
-@wp.struct
-class Sight:
-    """One geom as one world's camera sees it."""
-
-    kind: int
-    number: int
-    size: wp.vec3
-    reach: wp.vec3
-    eye: wp.vec3
-    """The camera's place in the geom's frame."""
-    into: wp.mat33
-    """Turns directions from the camera's frame to the geom's."""
-    axes: wp.mat33
-    """The same from the geom's to the world's."""
-
-
-@wp.struct
-class Looks:
-    """Colours and light; first dimension: one for all worlds or one for each."""
-
-    colors: wp.array2d[wp.vec3]
-    ambient: wp.array2d[wp.vec3]
-    diffuse: wp.array2d[wp.vec3]
-    direction: wp.array2d[wp.vec3]
+    nearest: wp.array2d[float]
+    """How far along its ray the nearest surface is, one a pixel."""
+    owner: wp.array2d[int]
+    """Whose that is: `_FACES` times the geom's place among those drawn, and the face."""
+    sights: wp.array2d[Sight]
+    """One a geom."""
 
 
 @wp.func
-def _product(a: wp.vec4, b: wp.vec4) -> wp.vec4:
-    return wp.vec4(
-        a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
-        a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
-        a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
-        a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
-    )
-
-
-@wp.func
-def _rotation(q: wp.vec4) -> wp.mat33:
-    ww, xx, yy, zz = q[0] * q[0], q[1] * q[1], q[2] * q[2], q[3] * q[3]
-    wx, wy, wz = q[0] * q[1], q[0] * q[2], q[0] * q[3]
-    xy, xz, yz = q[1] * q[2], q[1] * q[3], q[2] * q[3]
-    return wp.mat33(
-        ww + xx - yy - zz,
-        2.0 * (xy - wz),
-        2.0 * (xz + wy),
-        2.0 * (xy + wz),
-        ww - xx + yy - zz,
-        2.0 * (yz - wx),
-        2.0 * (xz - wy),
-        2.0 * (yz + wx),
-        ww - xx - yy + zz,
-    )
-
-
-@wp.func
-def _frame_attitude(frame: int, drone: wp.vec4) -> wp.vec4:
-    if frame == DRONE_FRAME:
-        return drone
-    return wp.vec4(1.0, 0.0, 0.0, 0.0)
-
-
-@wp.func
-def _shade(looks: Looks, world: int, geom: int, normal: wp.vec3) -> wp.vec3:
-    """Lambert's law under distant lights, from 0 to 255. Normal: world frame."""
-    own = looks.colors[world % looks.colors.shape[0], geom]
-    row = world % looks.ambient.shape[0]
-    color = wp.vec3()
-    for light in range(looks.ambient.shape[1]):
-        color += wp.cw_mul(own, looks.ambient[row, light])
-    for light in range(looks.ambient.shape[1]):
-        facing = wp.max(0.0, wp.dot(normal, -looks.direction[row, light]))
-        color += wp.cw_mul(own, looks.diffuse[row, light] * facing)
-    return 255.0 * wp.vec3(
-        wp.clamp(color[0], 0.0, 1.0), wp.clamp(color[1], 0.0, 1.0), wp.clamp(color[2], 0.0, 1.0)
-    )
-
-
-@wp.func
-def _first(place: float, half: float, count: int) -> int:
-    """The first pixel that can show a place, given along an axis at a distance of 1."""
-    pixel = (place / half + 1.0) * 0.5 * float(count) - 1.5
-    return int(wp.clamp(wp.floor(pixel), 0.0, float(count)))
-
-
-@wp.func
-def _around(camera: Camera, sight: Sight) -> wp.vec4i:
-    """Columns and rows, from and to, outside which no ray meets a geom."""
-    lowest = wp.vec2(_FAR_AWAY, _FAR_AWAY)
-    highest = wp.vec2(-_FAR_AWAY, -_FAR_AWAY)
-    behind = 0
-    for corner in range(8):
-        sides = wp.vec3(
-            float(corner & 1) * 2.0 - 1.0,
-            float((corner >> 1) & 1) * 2.0 - 1.0,
-            float((corner >> 2) & 1) * 2.0 - 1.0,
-        )
-        at = wp.transpose(sight.into) @ (wp.cw_mul(sides, sight.reach) - sight.eye)
-        if -at[2] < _IN_FRONT:
-            behind += 1
-        else:
-            seen = wp.vec2(at[0] / -at[2], -at[1] / -at[2])
-            lowest = wp.min(lowest, seen)
-            highest = wp.max(highest, seen)
-    if behind == 8:
-        return wp.vec4i(0, 0, 0, 0)
-    if behind > 0:
-        return wp.vec4i(0, camera.width, 0, camera.height)
-    return wp.vec4i(
-        _first(lowest[0], camera.half_width, camera.width),
-        wp.min(_first(highest[0], camera.half_width, camera.width) + 3, camera.width),
-        _first(lowest[1], camera.half_height, camera.height),
-        wp.min(_first(highest[1], camera.half_height, camera.height) + 3, camera.height),
-    )
-
-
-@wp.func
-def _is_nearest(along: float, so_far: float, ray: wp.vec3, far: float) -> bool:
-    return along >= 0.0 and along - so_far <= _SAME * wp.max(so_far, 1.0) and along * -ray[2] <= far
-
-
-@wp.func
-def _paint(rgb: wp.array2d[wp.uint8], world: int, pixel: int, color: wp.vec3) -> None:
-    rgb[world, 3 * pixel] = wp.uint8(color[0])
-    rgb[world, 3 * pixel + 1] = wp.uint8(color[1])
-    rgb[world, 3 * pixel + 2] = wp.uint8(color[2])
-
-
-@wp.func
-def _put(
-    what: int,
-    world: int,
-    pixel: int,
-    along: float,
-    ray: wp.vec3,
-    sight: Sight,
-    color: wp.vec3,
-    nearest: wp.array[float],
-    rgb: wp.array2d[wp.uint8],
-    depths: wp.array2d[float],
-    numbers: wp.array2d[int],
-) -> None:
-    nearest[pixel] = along
-    if what == RGB:
-        _paint(rgb, world, pixel, color)
-    elif what == DEPTH:
-        depths[world, pixel] = along * -ray[2]
-    else:
-        numbers[world, pixel] = sight.number
-
-
-@wp.func
-def _draw_plane(
-    what: int,
-    world: int,
-    camera: Camera,
+def _find_plane(
+    view: View,
     rays: wp.array[wp.vec3],
     sight: Sight,
-    looks: Looks,
+    geom: int,
     nearest: wp.array[float],
-    rgb: wp.array2d[wp.uint8],
-    depths: wp.array2d[float],
-    numbers: wp.array2d[int],
+    owner: wp.array[int],
 ) -> None:
-    """Of one colour, in the rows that end below its horizon."""
-    color = _shade(looks, world, sight.number, sight.axes @ wp.vec3(0.0, 0.0, 1.0))
-    width = camera.width
-    for start in range(0, camera.height * width, width):
-        left = wp.dot(sight.into[2], rays[start])
-        right = wp.dot(sight.into[2], rays[start + width - 1])
-        if left < 0.0 or right < 0.0:
-            for pixel in range(start, start + width):
+    """In the rows that end below its horizon; what both ends of a row show lies between, too."""
+    mark = geom * _FACES + UPPER
+    start = int(0)
+    while start < view.height * view.width:
+        end = start + view.width
+        left = sight.into @ rays[start]
+        right = sight.into @ rays[end - 1]
+        if left[2] < 0.0 or right[2] < 0.0:
+            pixel = start
+            leftmost, rightmost = rays[start], rays[end - 1]
+            if _is_seen(view, sight, leftmost, left) and _is_seen(view, sight, rightmost, right):
+                down, height = sight.into[2], -sight.eye[2]
+                meet_level(nearest, owner, start, end, rays, down, height, SAME, mark)
+                pixel = end
+            while pixel < end:
                 ray = rays[pixel]
                 along = meet_plane(sight.size, sight.eye, sight.into @ ray)
-                if _is_nearest(along, nearest[pixel], ray, camera.far):
-                    _put(
-                        what, world, pixel, along, ray, sight, color, nearest, rgb, depths, numbers
-                    )
+                if is_nearest(along, nearest[pixel], -ray[2], view.far):
+                    nearest[pixel] = along
+                    owner[pixel] = mark
+                pixel += 1
+        start = end
 
 
 @wp.func
-def _draw_solid(
-    what: int,
-    world: int,
-    camera: Camera,
+def _is_seen(view: View, sight: Sight, ray: wp.vec3, into: wp.vec3) -> bool:
+    """Whether a ray meets a plane."""
+    along = meet_plane(sight.size, sight.eye, into)
+    return along >= 0.0 and along * -ray[2] <= view.far
+
+
+@wp.func
+def _find_solid(
+    view: View,
+    part: wp.vec4i,
     rays: wp.array[wp.vec3],
     sight: Sight,
-    looks: Looks,
+    geom: int,
     nearest: wp.array[float],
-    rgb: wp.array2d[wp.uint8],
-    depths: wp.array2d[float],
-    numbers: wp.array2d[int],
+    owner: wp.array[int],
 ) -> None:
-    """In the rectangle of pixels around it."""
-    part = _around(camera, sight)
-    for row in range(part[2], part[3]):
-        for pixel in range(row * camera.width + part[0], row * camera.width + part[1]):
+    """In a part of the picture."""
+    row = part[2]
+    while row < part[3]:
+        pixel = row * view.width + part[0]
+        end = row * view.width + part[1]
+        while pixel < end:
             ray = rays[pixel]
-            along, normal = enter(sight.kind, sight.size, sight.eye, sight.into @ ray)
-            if _is_nearest(along, nearest[pixel], ray, camera.far):
-                color = wp.vec3()
-                if what == RGB:
-                    color = _shade(looks, world, sight.number, sight.axes @ normal)
-                _put(what, world, pixel, along, ray, sight, color, nearest, rgb, depths, numbers)
+            along, face = enter(sight.kind, sight.size, sight.eye, sight.into @ ray)
+            if is_nearest(along, nearest[pixel], -ray[2], view.far):
+                nearest[pixel] = along
+                owner[pixel] = geom * _FACES + face
+            pixel += 1
+        row += 1
 
 
 @wp.func
-def _look_at(
-    geoms: Geoms, geom: int, frame: wp.vec3, turned: wp.vec4, eye: wp.vec3, looking: wp.mat33
-) -> Sight:
-    """A geom whose frame is there and turned so, seen by a camera."""
-    centre = frame + _rotation(turned) @ geoms.position[geom]
-    sight = Sight()
-    sight.kind = geoms.kind[geom]
-    sight.number = geoms.number[geom]
-    sight.size = geoms.size[geom]
-    sight.reach = geoms.reach[geom]
-    sight.axes = _rotation(_product(turned, geoms.attitude[geom]))
-    sight.eye = wp.transpose(sight.axes) @ (eye - centre)
-    sight.into = wp.transpose(sight.axes) @ looking
-    return sight
+def _show(
+    view: View,
+    rays: wp.array[wp.vec3],
+    cosines: wp.array[float],
+    looks: Looks,
+    world: int,
+    row: int,
+    sights: wp.array[Sight],
+    nearest: wp.array[float],
+    owners: wp.array[int],
+    pictures: Pictures,
+) -> None:
+    """Writes what each pixel shows."""
+    count = view.height * view.width
+    start = int(0)
+    while start < count:
+        owner = owners[start]
+        end = start + 1
+        if owner == _NOTHING or owner % _FACES != ROUND:
+            while end < count and owners[end] == owner:
+                end += 1
+        shown = show_sky(looks, world)
+        if owner == _NOTHING:
+            fill_floats(nearest, start, end, 0.0)
+        else:
+            sight = sights[owner // _FACES]
+            into = sight.into @ rays[start]
+            face = owner % _FACES
+            normal = outward(sight.kind, sight.size, face, sight.eye, into, nearest[start])
+            shown = show_geom(looks, world, sight.number, sight.axes @ normal)
+        put_run(pictures, view.what, row, start, end, shown, nearest, cosines)
+        start = end
 
 
-@wp.kernel(enable_backward=False)
+@wp.kernel
 def draw(
     first: int,
     last: int,
-    what: int,
-    camera: Camera,
-    rays: wp.array[wp.vec3],
+    member: int,
+    view: View,
     geoms: Geoms,
-    places: wp.array2d[wp.vec3],
-    attitudes: wp.array[wp.vec4],
+    poses: Poses,
     looks: Looks,
-    nearest: wp.array[float],
-    rgb: wp.array2d[wp.uint8],
-    depths: wp.array2d[float],
-    numbers: wp.array2d[int],
+    desk: Desk,
+    pictures: Pictures,
 ) -> None:
-    """Draws worlds one after the other, by a single worker: launch it with a dimension of 1.
+    """Draws pictures one after the other, by a single worker: launch it with a dimension of 1.
 
     Args:
-        first: The first world.
+        first: The first picture.
         last: The one after the last.
-        what: `RGB`, `DEPTH` or `SEGMENTATION`.
-        camera: Whose picture.
-        rays: Directions of length 1 in the camera's frame, of all pixels, row by row.
+        member: Which of the desk's places to work at.
+        view: What is asked for.
         geoms: What is drawn.
-        places: Of the frames. Shape: (num_worlds, num_frames).
-        attitudes: Of the drones, quaternions (w, x, y, z) of length 1. Shape: (num_worlds,).
+        poses: Where it is.
         looks: Colours and light.
-        nearest: To work with, one a pixel: how far along its ray the nearest surface is.
-        rgb: Pictures of the sky, three bytes a pixel, to draw into. First dimension: worlds.
-        depths: The same for depths.
-        numbers: The same for numbers of geoms.
+        desk: To work at.
+        pictures: To draw into.
     """
-    for world in range(first, last):
-        drone = attitudes[world]
-        turned = _frame_attitude(camera.frame, drone)
-        eye = places[world, camera.frame] + _rotation(turned) @ camera.position
-        looking = _rotation(_product(turned, camera.attitude))
-        for pixel in range(camera.height * camera.width):
-            nearest[pixel] = _FAR_AWAY
+    nearest = desk.nearest[member]
+    owner = desk.owner[member]
+    sights = desk.sights[member]
+    for row in range(first, last):
+        world = row // view.cameras.shape[0]
+        camera = view.cameras[row % view.cameras.shape[0]]
+        rays = view.rays[row % view.cameras.shape[0]]
+        cosines = view.cosines[row % view.cameras.shape[0]]
+        fill_floats(nearest, 0, view.height * view.width, FAR_AWAY)
+        fill_ints(owner, 0, view.height * view.width, _NOTHING)
         for geom in range(geoms.kind.shape[0]):
-            frame = geoms.frame[geom]
-            turned = _frame_attitude(frame, drone)
-            sight = _look_at(geoms, geom, places[world, frame], turned, eye, looking)
+            sight = look_at(geoms, geom, poses, world, camera)
+            sights[geom] = sight
             if sight.kind == PLANE:
-                _draw_plane(what, world, camera, rays, sight, looks, nearest, rgb, depths, numbers)
+                _find_plane(view, rays, sight, geom, nearest, owner)
             else:
-                _draw_solid(what, world, camera, rays, sight, looks, nearest, rgb, depths, numbers)
+                part = around(view, camera, sight)
+                _find_solid(view, part, rays, sight, geom, nearest, owner)
+        _show(view, rays, cosines, looks, world, row, sights, nearest, owner, pictures)

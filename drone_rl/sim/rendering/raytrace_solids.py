@@ -1,3 +1,4 @@
+# ruff: noqa: RUF046, UP018
 # pyright: reportIndexIssue=false
 # pyright: reportReturnType=false
 # pyright: reportArgumentType=false
@@ -5,7 +6,8 @@
 # pyright: reportOperatorIssue=false
 # pyright: reportGeneralTypeIssues=false
 # pyright: reportAttributeAccessIssue=false
-# (Warp compiles this file; Python's types say nothing about it.)
+# (Warp compiles this file; Python's types say nothing about it, and what a loop changes is
+# declared by its type.)
 """Where rays meet the solids and planes that a world is made of, each in its own frame.
 
 All solids are convex and closed, so a ray from outside enters each at most once; of a ray from
@@ -23,30 +25,47 @@ ELLIPSOID = wp.constant(int(mujoco.mjtGeom.mjGEOM_ELLIPSOID))
 CYLINDER = wp.constant(int(mujoco.mjtGeom.mjGEOM_CYLINDER))
 BOX = wp.constant(int(mujoco.mjtGeom.mjGEOM_BOX))
 
+ROUND = wp.constant(6)
+"""Number of the round part of a surface; its flat ones have 0 to 5: those that look along -x, +x,
+-y, +y, -z, +z."""
+UPPER = wp.constant(5)
+"""Number of the face of a plane that can be seen."""
+FAR_AWAY = wp.constant(1e10)
+"""Metres to where nothing is."""
+SAME = wp.constant(1e-6)
+"""Relative distance within which the later of two geoms is in front, as in OpenGL."""
+
 _PARALLEL = wp.constant(1e-15)
 """Component of a ray's direction below which it never meets a plane across it."""
-_FAR_AWAY = wp.constant(1e10)
 
 
 @wp.func
-def _enter_box(size: wp.vec3, point: wp.vec3, ray: wp.vec3) -> tuple[float, wp.vec3]:
+def _enter_box(size: wp.vec3, point: wp.vec3, ray: wp.vec3) -> tuple[float, int]:
+    """By one of the three faces at most that the point is in front of."""
     nearest = -1.0
-    normal = wp.vec3()
+    face = int(0)
     for i in range(3):
         if wp.abs(ray[i]) > _PARALLEL:
             side = -wp.sign(ray[i])
-            along = (side * size[i] - point[i]) / ray[i]
-            j = (i + 1) % 3
-            k = (i + 2) % 3
-            inside = (
-                wp.abs(point[j] + along * ray[j]) <= size[j]
-                and wp.abs(point[k] + along * ray[k]) <= size[k]
-            )
-            if inside and (nearest < 0.0 or along < nearest):
-                nearest = along
-                normal = wp.vec3()
-                normal[i] = side
-    return nearest, normal
+            if side * point[i] >= size[i]:
+                along = (side * size[i] - point[i]) / ray[i]
+                j = (i + 1) % 3
+                k = (i + 2) % 3
+                inside = (
+                    wp.abs(point[j] + along * ray[j]) <= size[j]
+                    and wp.abs(point[k] + along * ray[k]) <= size[k]
+                )
+                if inside and (nearest < 0.0 or along < nearest):
+                    nearest = along
+                    face = _flat(i, side)
+    return nearest, face
+
+
+@wp.func
+def _flat(axis: int, side: float) -> int:
+    if side > 0.0:
+        return 2 * axis + 1
+    return 2 * axis
 
 
 @wp.func
@@ -61,47 +80,44 @@ def _enter_ball(radius: float, point: wp.vec3, ray: wp.vec3) -> float:
 
 
 @wp.func
-def _enter_tube(radius: float, half: float, point: wp.vec3, ray: wp.vec3) -> tuple[float, wp.vec3]:
+def _enter_tube(radius: float, half: float, point: wp.vec3, ray: wp.vec3) -> tuple[float, int]:
     """A cylinder with flat ends: what lies in an endless tube and between two planes."""
     a = ray[0] * ray[0] + ray[1] * ray[1]
     b = ray[0] * point[0] + ray[1] * point[1]
     c = point[0] * point[0] + point[1] * point[1] - radius * radius
-    tube_in = -_FAR_AWAY
-    tube_out = _FAR_AWAY
+    tube_in = -FAR_AWAY
+    tube_out = FAR_AWAY
     if a > _PARALLEL:
         inside = b * b - a * c
         if inside <= 0.0:
-            return -1.0, wp.vec3()
+            return -1.0, ROUND
         tube_in = (-b - wp.sqrt(inside)) / a
         tube_out = (-b + wp.sqrt(inside)) / a
     elif c > 0.0:
-        return -1.0, wp.vec3()
-    ends_in = -_FAR_AWAY
-    ends_out = _FAR_AWAY
+        return -1.0, ROUND
+    ends_in = -FAR_AWAY
+    ends_out = FAR_AWAY
     side = -wp.sign(ray[2])
     if wp.abs(ray[2]) > _PARALLEL:
         ends_in = (side * half - point[2]) / ray[2]
         ends_out = (-side * half - point[2]) / ray[2]
     elif wp.abs(point[2]) > half:
-        return -1.0, wp.vec3()
+        return -1.0, ROUND
     along = wp.max(tube_in, ends_in)
     if along > wp.min(tube_out, ends_out):
-        return -1.0, wp.vec3()
-    normal = wp.vec3(0.0, 0.0, side)
+        return -1.0, ROUND
     if tube_in > ends_in:
-        normal = wp.normalize(wp.vec3(point[0] + along * ray[0], point[1] + along * ray[1], 0.0))
-    return along, normal
+        return along, ROUND
+    return along, _flat(2, side)
 
 
 @wp.func
-def _enter_capsule(
-    radius: float, half: float, point: wp.vec3, ray: wp.vec3
-) -> tuple[float, wp.vec3]:
+def _enter_capsule(radius: float, half: float, point: wp.vec3, ray: wp.vec3) -> float:
     """The nearest of its round side and its two balls; inside it, no ray enters."""
     inside = point - wp.vec3(0.0, 0.0, wp.clamp(point[2], -half, half))
     if wp.length_sq(inside) < radius * radius:
-        return -1.0, wp.vec3()
-    nearest = float(_FAR_AWAY)
+        return -1.0
+    nearest = float(FAR_AWAY)
     a = ray[0] * ray[0] + ray[1] * ray[1]
     b = ray[0] * point[0] + ray[1] * point[1]
     c = point[0] * point[0] + point[1] * point[1] - radius * radius
@@ -114,32 +130,50 @@ def _enter_capsule(
         along = _enter_ball(radius, point - end, ray)
         if along >= 0.0 and along < nearest:
             nearest = along
-    if nearest == _FAR_AWAY:
-        return -1.0, wp.vec3()
-    hit = point + nearest * ray
-    return nearest, wp.normalize(hit - wp.vec3(0.0, 0.0, wp.clamp(hit[2], -half, half)))
+    if nearest == FAR_AWAY:
+        return -1.0
+    return nearest
 
 
 @wp.func
-def enter(kind: int, size: wp.vec3, point: wp.vec3, ray: wp.vec3) -> tuple[float, wp.vec3]:
-    """Where a ray enters a geom: how far along it, negative for nowhere, and the normal there."""
+def enter(kind: int, size: wp.vec3, point: wp.vec3, ray: wp.vec3) -> tuple[float, int]:
+    """Where a ray enters a geom: how far along it, negative for nowhere, and by which face."""
     if kind == BOX:
-        along, normal = _enter_box(size, point, ray)
-        return along, normal
+        along, face = _enter_box(size, point, ray)
+        return along, face
     if kind == CYLINDER:
-        along, normal = _enter_tube(size[0], size[1], point, ray)
-        return along, normal
+        along, face = _enter_tube(size[0], size[1], point, ray)
+        return along, face
     if kind == CAPSULE:
-        along, normal = _enter_capsule(size[0], size[1], point, ray)
-        return along, normal
-    radii = size
+        return _enter_capsule(size[0], size[1], point, ray), ROUND
+    radii = _radii(kind, size)
+    return _enter_ball(1.0, wp.cw_div(point, radii), wp.cw_div(ray, radii)), ROUND
+
+
+@wp.func
+def outward(
+    kind: int, size: wp.vec3, face: int, point: wp.vec3, ray: wp.vec3, along: float
+) -> wp.vec3:
+    """The normal where a ray has entered a geom, in the geom's frame."""
+    if face != ROUND:
+        normal = wp.vec3()
+        normal[face // 2] = 2.0 * float(face % 2) - 1.0
+        return normal
+    hit = point + along * ray
+    if kind == CYLINDER:
+        return wp.normalize(wp.vec3(hit[0], hit[1], 0.0))
+    if kind == CAPSULE:
+        return wp.normalize(hit - wp.vec3(0.0, 0.0, wp.clamp(hit[2], -size[1], size[1])))
+    radii = _radii(kind, size)
+    round_hit = wp.cw_div(point, radii) + along * wp.cw_div(ray, radii)
+    return wp.normalize(wp.cw_div(round_hit, radii))
+
+
+@wp.func
+def _radii(kind: int, size: wp.vec3) -> wp.vec3:
     if kind == SPHERE:
-        radii = wp.vec3(size[0], size[0], size[0])
-    round_point = wp.cw_div(point, radii)
-    round_ray = wp.cw_div(ray, radii)
-    along = _enter_ball(1.0, round_point, round_ray)
-    hit = round_point + along * round_ray
-    return along, wp.normalize(wp.cw_div(hit, radii))
+        return wp.vec3(size[0], size[0], size[0])
+    return size
 
 
 @wp.func
@@ -153,3 +187,16 @@ def meet_plane(size: wp.vec3, point: wp.vec3, ray: wp.vec3) -> float:
     if size[1] > 0.0 and wp.abs(point[1] + along * ray[1]) > size[1]:
         return -1.0
     return along
+
+
+@wp.func
+def is_nearest(along: float, so_far: float, cosine: float, far: float) -> bool:
+    """Whether a hit is in front of the nearest before it.
+
+    Args:
+        along: How far along the ray it is; negative for none.
+        so_far: The same of the nearest before it.
+        cosine: Of the angle between the ray and the camera's axis.
+        far: Metres along the axis beyond which nothing is drawn.
+    """
+    return along >= 0.0 and along - so_far <= SAME * wp.max(so_far, 1.0) and along * cosine <= far

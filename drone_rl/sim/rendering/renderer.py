@@ -8,7 +8,7 @@ from torch import Tensor
 from drone_rl.sim.batch import Batch
 from drone_rl.sim.rendering.appearance import Appearance
 from drone_rl.sim.rendering.scene import Scene
-from drone_rl.sim.rendering.view import View
+from drone_rl.sim.rendering.view import Modality, View
 
 
 @dataclasses.dataclass
@@ -34,7 +34,9 @@ class Renderer(Protocol):
         """
         ...
 
-    def render(self, view: View, poses: Poses, appearance: Appearance | None = None) -> Tensor:
+    def render(
+        self, view: View, poses: Poses, appearance: Appearance | None = None
+    ) -> dict[Modality, Tensor]:
         """Draws any number of worlds.
 
         Args:
@@ -43,9 +45,12 @@ class Renderer(Protocol):
             appearance: How it looks; as in the model by default.
 
         Returns:
-            By modality: "rgb" uint8 (num_worlds, H, W, 3); "depth" float32 (num_worlds, H, W),
-            metres along the optical axis, 0 where nothing is hit; "segmentation" int32
-            (num_worlds, H, W), number of the geom, -1 where nothing is hit.
+            What is asked for, by name. Shapes: (num_worlds, num_cameras, H, W, *). "rgb": uint8,
+            3 numbers a pixel; "gray": float32, what the transform `GrayPixels` makes of these;
+            "depth", "distance": float32, metres along the camera's axis or along the pixel's own
+            ray, 0 where nothing is hit; "segmentation": int32, number of the geom, -1 where
+            nothing is hit; "normals": float32, 3 numbers a pixel, the direction of length 1 in
+            which the surface looks, world frame, all 0 where nothing is hit.
 
         Raises:
             InputError: It can't draw such a view.

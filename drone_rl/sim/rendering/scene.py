@@ -5,9 +5,14 @@
 import dataclasses
 
 import mujoco
+import numpy as np
+from numpy.typing import NDArray
 
 from drone_rl.sim.meaning import Meaning
 from drone_rl.utils.errors import InputError
+
+_UNSET = (0.5, 0.5, 0.5, 1.0)
+"""Of a geom that was given none."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -27,8 +32,24 @@ class Scene:
         return [i for i, found in enumerate(self.meanings) if found is meaning]
 
     def seen(self, show_drone: bool) -> list[int]:
-        """Numbers of the geoms that a view shows."""
-        return [i for i, m in enumerate(self.meanings) if show_drone or m is not Meaning.DRONE]
+        """Numbers of the geoms that a view shows; none of those that nothing is to be seen of."""
+        of_things = zip(self.meanings, self.colors[:, 3], strict=True)
+        return [
+            i
+            for i, (meaning, opacity) in enumerate(of_things)
+            if opacity > 0 and (show_drone or meaning is not Meaning.DRONE)
+        ]
+
+    @property
+    def colors(self) -> NDArray[np.float32]:
+        """Red, green, blue and opacity of each geom.
+
+        As in MuJoCo, the material's where the geom has the colour that it has by default.
+        """
+        model, colors = self.model, self.model.geom_rgba.copy()
+        is_materials = (model.geom_matid >= 0) & (colors == _UNSET).all(1)
+        colors[is_materials] = model.mat_rgba[model.geom_matid[is_materials]]
+        return colors
 
     def camera(self, name: str) -> int:
         """Number of a camera.

@@ -1,4 +1,4 @@
-"""What is asked of a renderer: which camera, how large, and what of it."""
+"""What is asked of a renderer: which cameras, how large, and what of it."""
 
 import dataclasses
 from collections.abc import Container
@@ -9,38 +9,50 @@ from torch import Tensor
 
 from drone_rl.utils.errors import InputError
 
-Modality = Literal["rgb", "depth", "segmentation"]
-"""What a pixel says: colour, distance or the geom that is there."""
+Modality = Literal["rgb", "gray", "depth", "distance", "segmentation", "normals"]
+"""What a pixel says: colour, brightness, how far away (along the camera's axis, along the pixel's
+own ray), which geom, which way its surface looks."""
 MODALITIES: tuple[Modality, ...] = get_args(Modality)
-_DTYPES = {"rgb": torch.uint8, "depth": torch.float32, "segmentation": torch.int32}
+_KINDS: dict[Modality, tuple[torch.dtype, tuple[int, ...]]] = {
+    "rgb": (torch.uint8, (3,)),
+    "gray": (torch.float32, ()),
+    "depth": (torch.float32, ()),
+    "distance": (torch.float32, ()),
+    "segmentation": (torch.int32, ()),
+    "normals": (torch.float32, (3,)),
+}
+"""Type and shape of a pixel."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class View:
-    """One camera's picture of every world.
+    """Pictures of every world: what each of some cameras shows, all of one size.
 
     Raises:
-        InputError: The size is out of range or the modality unknown.
+        InputError: The size is out of range, nothing is asked for, or a modality is unknown.
     """
 
-    camera: str
-    """Full name of the camera in the model, such as "drone/front_center"."""
+    cameras: tuple[str, ...]
+    """Full names of cameras in the model, such as "drone/front_center"."""
     height: int
     width: int
-    modality: Modality = "rgb"
+    modalities: tuple[Modality, ...] = ("rgb",)
     show_drone: bool = False
     """Whether the drone's own body is drawn; its own cameras leave it out."""
 
     def __post_init__(self) -> None:
         """Refuses what can't be drawn."""
-        if self.modality not in MODALITIES:
-            raise InputError(
-                f"modality={self.modality!r} is unknown; give rgb, depth or segmentation"
-            )
+        if not self.cameras:
+            raise InputError("cameras=() shows nothing; name a camera or more")
+        if not self.modalities:
+            raise InputError(f"modalities=() shows nothing; give {_one_of(MODALITIES)}")
+        for modality in self.modalities:
+            if modality not in MODALITIES:
+                raise InputError(f"modality={modality!r} is unknown; give {_one_of(MODALITIES)}")
         if not (1 <= self.height <= 4096 and 1 <= self.width <= 4096):
             raise InputError(f"view of {self.height}x{self.width} pixels; give 1 to 4096 each way")
 
-    def check_modality(self, renderer: object, drawn: Container[str]) -> None:
+    def check_modalities(self, renderer: object, drawn: Container[str]) -> None:
         """Refuses a view that a renderer does not know.
 
         Args:
@@ -48,16 +60,27 @@ class View:
             drawn: Modalities that it knows.
 
         Raises:
-            InputError: This one's is none of them.
+            InputError: One of this one's is none of them.
         """
-        if self.modality not in drawn:
-            known = ", ".join(name for name in MODALITIES if name in drawn)
-            raise InputError(
-                f"view {self.modality!r} can't be drawn by {type(renderer).__name__}; "
-                f"ask for one of: {known}"
-            )
+        for modality in self.modalities:
+            if modality not in drawn:
+                known = ", ".join(name for name in MODALITIES if name in drawn)
+                raise InputError(
+                    f"view {modality!r} can't be drawn by {type(renderer).__name__}; "
+                    f"ask for one of: {known}"
+                )
 
-    def new_pictures(self, num_worlds: int, device: torch.device | str = "cpu") -> Tensor:
+    def new_pictures(
+        self, num_worlds: int, device: torch.device | str = "cpu"
+    ) -> dict[Modality, Tensor]:
         """Pictures to be drawn into; see `Renderer.render` for their shapes."""
-        shape = (num_worlds, self.height, self.width, *([3] if self.modality == "rgb" else []))
-        return torch.empty(shape, dtype=_DTYPES[self.modality], device=device)
+        size = (num_worlds, len(self.cameras), self.height, self.width)
+        pictures: dict[Modality, Tensor] = {}
+        for modality in self.modalities:
+            dtype, pixel = _KINDS[modality]
+            pictures[modality] = torch.empty((*size, *pixel), dtype=dtype, device=device)
+        return pictures
+
+
+def _one_of(names: tuple[str, ...]) -> str:
+    return f"{', '.join(names[:-1])} or {names[-1]}"

@@ -3,6 +3,7 @@
 It draws any model, and is what `Raytracer` is held against.
 """
 
+import dataclasses
 import threading
 
 import torch
@@ -12,14 +13,15 @@ from torch import Tensor
 from drone_rl.sim.rendering.appearance import Appearance
 from drone_rl.sim.rendering.crew import Crew
 from drone_rl.sim.rendering.devices import start_warp
+from drone_rl.sim.rendering.gray import to_gray
 from drone_rl.sim.rendering.renderer import Poses
 from drone_rl.sim.rendering.scene import Scene
-from drone_rl.sim.rendering.view import View
+from drone_rl.sim.rendering.view import Modality, View
 from drone_rl.sim.rendering.warp_shard import Shard
 
 _BUILDING = threading.Lock()
 """Held while kernels are built, which Warp can't do twice at a time."""
-DRAWN = ("rgb", "depth", "segmentation")
+DRAWN = ("rgb", "gray", "depth", "segmentation")
 """Modalities that it knows."""
 
 
@@ -57,16 +59,33 @@ class WarpRenderer:
         """Makes buffers and kernels for a view.
 
         Raises:
-            InputError: The scene has no such camera, or the modality is not one of `DRAWN`.
+            InputError: The scene has no such camera, or a modality is not one of `DRAWN`.
         """
-        if view not in self._shards:
-            self._shards[view] = self._make_shards(view)
+        view.check_modalities(self, DRAWN)
+        for camera in view.cameras:
+            for modality in view.modalities:
+                self._shards_of(_single(view, camera, modality))
 
-    def render(self, view: View, poses: Poses, appearance: Appearance | None = None) -> Tensor:
-        """Draws worlds; see `Renderer.render`."""
-        self.prepare(view)
-        out = view.new_pictures(len(poses), self.device)
-        shards = self._shards[view]
+    def render(
+        self, view: View, poses: Poses, appearance: Appearance | None = None
+    ) -> dict[Modality, Tensor]:
+        """Draws worlds, each camera and modality by itself; see `Renderer.render`."""
+        view.check_modalities(self, DRAWN)
+        pictures = view.new_pictures(len(poses), self.device)
+        for modality, several in pictures.items():
+            for i, camera in enumerate(view.cameras):
+                drawn = self._draw(_single(view, camera, modality), poses, appearance)
+                several[:, i] = to_gray(drawn) if modality == "gray" else drawn
+        return pictures
+
+    def close(self) -> None:
+        """Ends the threads."""
+        self._crew.close()
+
+    def _draw(self, single: View, poses: Poses, appearance: Appearance | None) -> Tensor:
+        shards = self._shards_of(single)
+        (out,) = single.new_pictures(len(poses), self.device).values()
+        out = out[:, 0]
 
         def work(member: int, first: int, last: int) -> None:
             rows = slice(first, last)
@@ -77,18 +96,24 @@ class WarpRenderer:
             self._crew.share_out(first, min(first + self._together, len(poses)), work)
         return out
 
-    def close(self) -> None:
-        """Ends the threads."""
-        self._crew.close()
+    def _shards_of(self, single: View) -> list[Shard]:
+        if single not in self._shards:
+            self._shards[single] = self._make_shards(single)
+        return self._shards[single]
 
-    def _make_shards(self, view: View) -> list[Shard]:
-        view.check_modality(self, DRAWN)
-        camera = self.scene.camera(view.camera)
+    def _make_shards(self, single: View) -> list[Shard]:
+        camera = self.scene.camera(single.cameras[0])
         count = self._crew.size
         share = -(-self._together // count)
         with _BUILDING, wp.ScopedDevice(str(self.device)):
-            shards = [Shard(self.scene, view, camera, share) for _ in range(count)]
+            shards = [Shard(self.scene, single, camera, share) for _ in range(count)]
             shards[0].warm_up()
         for shard in shards[1:]:
             shard.share_kernel_of(shards[0])
         return shards
+
+
+def _single(view: View, camera: str, modality: Modality) -> View:
+    """A view of one camera and one modality, of which gray is made later."""
+    drawn: Modality = "rgb" if modality == "gray" else modality
+    return dataclasses.replace(view, cameras=(camera,), modalities=(drawn,))

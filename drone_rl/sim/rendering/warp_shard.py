@@ -2,8 +2,6 @@
 # (MuJoCo's compiled bindings are untyped.)
 """Buffers and kernels of MuJoCo Warp that draw one share of a batch of worlds."""
 
-from contextlib import AbstractContextManager, nullcontext
-
 import mujoco
 import mujoco_warp as mjw
 import torch
@@ -12,6 +10,7 @@ from torch import Tensor
 
 from drone_rl.sim.meaning import Meaning
 from drone_rl.sim.rendering.appearance import Appearance, each
+from drone_rl.sim.rendering.devices import on_torch_stream
 from drone_rl.sim.rendering.renderer import Poses
 from drone_rl.sim.rendering.scene import Scene
 from drone_rl.sim.rendering.view import View
@@ -29,13 +28,14 @@ class Shard:
 
         Args:
             scene: What is drawn.
-            view: How it is looked at.
-            camera: The view's camera, by number.
+            view: How it is looked at, in one modality.
+            camera: The view's only camera, by number.
             capacity: Most worlds in one call.
         """
         model = scene.model
         data = mujoco.MjData(model)
         mujoco.mj_forward(model, data)
+        (self._modality,) = view.modalities
         self._model = mjw.put_model(model)
         self._data = mjw.put_data(model, data, nworld=capacity)
         self._context = mjw.create_render_context(
@@ -43,9 +43,9 @@ class Shard:
             nworld=capacity,
             cam_res=(view.width, view.height),
             cam_active=[camera],
-            render_rgb=view.modality == "rgb",
-            render_depth=view.modality == "depth",
-            render_seg=view.modality == "segmentation",
+            render_rgb=self._modality == "rgb",
+            render_depth=self._modality == "depth",
+            render_seg=self._modality == "segmentation",
             enabled_geom_groups=sorted(
                 {int(model.geom_group[i]) for i in scene.seen(view.show_drone)}
             ),
@@ -77,12 +77,12 @@ class Shard:
         self._looks.wear(appearance, num_worlds)
         self._launch(num_worlds)
         out.copy_(self._unpack(self._pixels[:num_worlds]))
-        if appearance is not None and self._view.modality == "rgb":
+        if appearance is not None and self._modality == "rgb":
             self._fill_sky(appearance, out)
 
     def _launch(self, num_worlds: int) -> None:
         self._data.nworld = num_worlds
-        with _on_torch_stream(self._qpos.device):
+        with on_torch_stream(self._qpos.device):
             mjw.kinematics(self._model, self._data)
             mjw.camlight(self._model, self._data)
             mjw.refit_bvh(self._model, self._data, self._context)
@@ -91,9 +91,9 @@ class Shard:
     def _buffer(self) -> Tensor:
         """A torch view of what the kernel writes. First dimension: worlds."""
         context = self._context
-        if self._view.modality == "depth":
+        if self._modality == "depth":
             return wp.to_torch(context.depth_data)
-        if self._view.modality == "segmentation":
+        if self._modality == "segmentation":
             return wp.to_torch(context.seg_data)
         packed = context.rgb_data
         as_int = wp.array(
@@ -112,15 +112,8 @@ class Shard:
 
     def _unpack(self, rows: Tensor) -> Tensor:
         shape = (rows.shape[0], self._view.height, self._view.width)
-        if self._view.modality == "depth":
+        if self._modality == "depth":
             return rows.view(shape)
-        if self._view.modality == "segmentation":
+        if self._modality == "segmentation":
             return rows.view(*shape, 2)[..., 0]
         return rows.view(*shape, 4)[..., :3].flip(-1)  # packed as blue, green, red, alpha
-
-
-def _on_torch_stream(device: torch.device) -> AbstractContextManager:
-    """Puts Warp's launches in order with torch's on a GPU; a CPU has no streams."""
-    if device.type == "cpu":
-        return nullcontext()
-    return wp.ScopedStream(wp.stream_from_torch(torch.cuda.current_stream(device)))

@@ -4,13 +4,16 @@ from drone_rl.sim.settings.camera import CameraSettings
 from drone_rl.sim.settings.cubes import TaskSettings
 from drone_rl.sim.settings.pillars import PillarsSettings
 from drone_rl.sim.settings.registry import TASKS, named_settings, read_task, settings_of
+from drone_rl.sim.settings.renderers import RENDERERS, RendererName
 from drone_rl.sim.settings.task import BaseTaskSettings
 
 __all__ = [
+    "RENDERERS",
     "TASKS",
     "BaseTaskSettings",
     "CameraSettings",
     "PillarsSettings",
+    "RendererName",
     "TaskSettings",
     "named_settings",
     "read_task",

@@ -53,7 +53,7 @@ def test_mistakes_name_the_option(options, message):
 
 def test_a_task_without_settings_takes_none():
     assert Stage(1, Posts(), {}).worlds.task.name == "posts"
-    with pytest.raises(InputError, match=r"^num_cubes is unknown; there are: observations, .*e$"):
+    with pytest.raises(InputError, match=r"^num_cubes is unknown; .*: observations, .*, renderer$"):
         Stage(1, Posts(), {"num_cubes": 2})
 
 

@@ -14,7 +14,9 @@ from drone_rl.sim.rendering.raytrace_solids import (
     ELLIPSOID,
     SPHERE,
     enter,
+    is_nearest,
     meet_plane,
+    outward,
 )
 
 
@@ -27,9 +29,9 @@ def try_solid(
     along: wp.array[float],
     normal: wp.array[wp.vec3],
 ):
-    distance, direction = enter(kind, size, point, ray)
+    distance, face = enter(kind, size, point, ray)
     along[0] = distance
-    normal[0] = direction
+    normal[0] = outward(kind, size, face, point, ray, distance)
 
 
 @wp.kernel(enable_backward=False)
@@ -107,3 +109,26 @@ def test_a_plane_is_met_from_above_and_within_its_size():
 def test_kinds_have_mujocos_numbers():
     numbers = [solids.PLANE, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX]
     assert [int(n) for n in numbers] == [0, 2, 3, 4, 5, 6]
+
+
+@wp.kernel(enable_backward=False)
+def try_nearest(hits: wp.array[wp.vec4], nearest: wp.array[int]):
+    i = wp.tid()
+    hit = hits[i]
+    nearest[i] = int(is_nearest(hit[0], hit[1], hit[2], hit[3]))
+
+
+def test_the_nearest_is_in_front_and_not_too_far():
+    cases = [
+        ((4.0, 5.0, 1.0, 50.0), True),
+        ((5.0, 4.0, 1.0, 50.0), False),
+        ((4.000001, 4.0, 1.0, 50.0), True),  # as near: the later is in front
+        ((4.0001, 4.0, 1.0, 50.0), False),
+        ((-1.0, 1e10, 1.0, 50.0), False),  # no hit
+        ((60.0, 1e10, 1.0, 50.0), False),  # too far along the axis
+        ((60.0, 1e10, 0.5, 50.0), True),  # but not along this one's
+    ]
+    hits = wp.array([hit for hit, _ in cases], dtype=wp.vec4, device="cpu")
+    nearest = wp.zeros(len(cases), dtype=int, device="cpu")
+    wp.launch(try_nearest, len(cases), inputs=[hits, nearest], device="cpu")
+    assert nearest.numpy().astype(bool).tolist() == [expected for _, expected in cases]

@@ -19,8 +19,7 @@ class OneColour:
         self.scene, self.prepared, self.is_closed = scene, [], False
 
     def prepare(self, view):
-        if view.modality != "rgb":
-            raise InputError(f"view {view.modality!r} can't be drawn by OneColour; ask for rgb")
+        view.check_modalities(self, {"rgb"})
         self.prepared.append(view)
 
     def render(self, view, poses, appearance=None):
@@ -29,7 +28,9 @@ class OneColour:
         if appearance is not None:
             color = appearance.colors.get(Meaning.SKY, color)
         pixels = (torch.tensor(color) * 255).to(torch.uint8)
-        return pixels.expand(len(poses), view.height, view.width, 3).clone()
+        pictures = view.new_pictures(len(poses))
+        pictures["rgb"][:] = pixels
+        return pictures
 
     def close(self):
         self.is_closed = True
@@ -46,7 +47,9 @@ def test_worlds_draw_by_it():
 
 def test_a_view_that_it_cannot_draw_is_refused_in_one_line():
     worlds = Worlds(2, renderer=OneColour)
-    with pytest.raises(InputError, match="'depth' can't be drawn by OneColour; ask for rgb"):
+    with pytest.raises(
+        InputError, match="'depth' can't be drawn by OneColour; ask for one of: rgb"
+    ):
         worlds.render(worlds.state, worlds.view(modality="depth"))
 
 

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 import torch
 
+from drone_rl.envs import GrayPixels
 from drone_rl.sim.composer_task import make_environment
 from drone_rl.sim.entities.arena import FLOOR_COLOR
 from drone_rl.sim.entities.cameras import CHASE, DRONE_CAMERAS
 from drone_rl.sim.meaning import Meaning
-from drone_rl.sim.rendering import Appearance, Raytracer, View
+from drone_rl.sim.rendering import Appearance, Raytracer
 from drone_rl.sim.rendering.warp import WarpRenderer
 from drone_rl.sim.settings import CameraSettings, TaskSettings
 from drone_rl.sim.worlds import Worlds
@@ -83,6 +84,28 @@ def test_every_camera_can_be_asked_for(worlds, camera):
     assert picture.shape == (3, 20, 30, 3)
 
 
+def test_cameras_and_modalities_of_one_call_are_those_of_calls_of_their_own(worlds):
+    cameras, modalities = ("bottom_center", "chase", "front_left"), ("segmentation", "gray", "rgb")
+    pictures = worlds.render_all(worlds.state, worlds.view(cameras, modalities, 20, 30))
+    assert list(pictures) == list(modalities)
+    assert pictures["rgb"].shape == (3, 3, 20, 30, 3)
+    for i, camera in enumerate(cameras):
+        for modality, several in pictures.items():
+            alone = worlds.render(worlds.state, worlds.view(camera, modality, 20, 30))
+            assert torch.equal(several[:, i], alone), (camera, modality)
+
+
+def test_gray_is_what_the_transform_makes_of_rgb_to_the_last_bit(worlds):
+    draw = torch.Generator().manual_seed(0)
+    several = {m: torch.rand(60, 3, generator=draw) for m in Meaning}
+    states = worlds.state[torch.arange(60) % 3]
+    view = worlds.view(modality=("rgb", "gray"))
+    for appearance in (None, Appearance(colors=several)):
+        pictures = worlds.render_all(states, view, appearance)
+        expected = GrayPixels()._apply_transform(pictures["rgb"])
+        assert torch.equal(pictures["gray"], expected[:, :, 0])
+
+
 def test_drone_is_unseen_by_itself_and_seen_by_the_chase_camera(worlds):
     view = worlds.view(CHASE.name, "segmentation", 40, 60, show_drone=True)
     assert "drone/hull" in names_seen(worlds, worlds.render(worlds.state, view))
@@ -100,14 +123,16 @@ def test_vanished_cube_is_not_drawn(worlds):
 def test_bad_requests_are_refused(worlds):
     with pytest.raises(InputError, match="choose from"):
         worlds.render(worlds.state, worlds.view("no_such_camera"))
-    with pytest.raises(InputError, match="rgb, depth or segmentation"):
-        View(camera="x", height=1, width=1, modality="normals")
+    with pytest.raises(InputError, match="segmentation or normals"):
+        worlds.view(modality="heat")
+    with pytest.raises(InputError, match="is more than one picture; take render_all"):
+        worlds.render(worlds.state, worlds.view(modality=("rgb", "depth")))
 
 
 def test_a_view_that_it_does_not_know_is_refused_in_one_line(worlds, renderer):
     view = worlds.view()
-    object.__setattr__(view, "modality", "normals")  # as another renderer's view may have it
-    with pytest.raises(InputError, match=f"'normals' can't be drawn by {renderer.__name__}; ask"):
+    object.__setattr__(view, "modalities", ("heat",))  # as another renderer's view may have it
+    with pytest.raises(InputError, match=f"'heat' can't be drawn by {renderer.__name__}; ask"):
         worlds.prepare(view)
 
 

@@ -1,4 +1,5 @@
 import mujoco
+import numpy as np
 import pytest
 
 from drone_rl.sim.meaning import Meaning
@@ -7,7 +8,8 @@ from drone_rl.utils.errors import InputError
 
 
 def test_geoms_are_found_by_what_they_mean():
-    model = mujoco.MjModel.from_xml_string("<mujoco/>")
+    geoms = '<geom size="1"/>' * 4
+    model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{geoms}</worldbody></mujoco>")
     meanings = (Meaning.GROUND, Meaning.TARGET, Meaning.DRONE, Meaning.TARGET)
     scene = Scene(model, meanings, (-1, 0, -1, 1), (0.0, 0.0, 1.0))
     assert scene.geoms(Meaning.TARGET) == [1, 3]
@@ -23,3 +25,15 @@ def test_cameras_are_found_by_name():
     assert (scene.camera("a"), scene.camera("b")) == (0, 1)
     with pytest.raises(InputError, match="camera 'c' is not in the model; choose from: a, b"):
         scene.camera("c")
+
+
+def test_colours_are_the_materials_where_a_geom_has_none_of_its_own():
+    xml = """<mujoco><asset><material name="m" rgba=".1 .2 .3 1"/></asset><worldbody>
+    <geom size="1"/><geom size="1" material="m"/><geom size="1" material="m" rgba="1 0 0 1"/>
+    <geom size="1" rgba="1 1 1 0"/></worldbody></mujoco>"""
+    scene = Scene(
+        mujoco.MjModel.from_xml_string(xml), (Meaning.TARGET,) * 4, (-1,) * 4, (0.0, 0.0, 1.0)
+    )
+    colors = [[0.5, 0.5, 0.5, 1], [0.1, 0.2, 0.3, 1], [1, 0, 0, 1], [1, 1, 1, 0]]
+    np.testing.assert_allclose(scene.colors, colors, atol=1e-7)
+    assert scene.seen(show_drone=True) == [0, 1, 2]  # of the last there is nothing to be seen

@@ -6,12 +6,12 @@ import torch
 from drone_rl.sim.rendering import View
 from drone_rl.utils.errors import InputError
 
-VIEW = View(camera="drone/front_center", height=25, width=64)
+VIEW = View(cameras=("drone/front_center",), height=25, width=64)
 
 
 def test_a_view_is_a_fact_by_which_things_can_be_kept():
-    assert {VIEW: 1}[View(camera="drone/front_center", height=25, width=64)] == 1
-    assert dataclasses.replace(VIEW, modality="depth") != VIEW
+    assert {VIEW: 1}[View(cameras=("drone/front_center",), height=25, width=64)] == 1
+    assert dataclasses.replace(VIEW, modalities=("depth",)) != VIEW
     with pytest.raises(dataclasses.FrozenInstanceError):
         VIEW.height = 3
 
@@ -19,7 +19,12 @@ def test_a_view_is_a_fact_by_which_things_can_be_kept():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"modality": "normals"}, "give rgb, depth or segmentation"),
+        (
+            {"modalities": ("rgb", "heat")},
+            "modality='heat' is unknown; give rgb, gray, depth, distance, segmentation or normals",
+        ),
+        ({"modalities": ()}, "shows nothing; give rgb, gray"),
+        ({"cameras": ()}, "shows nothing; name a camera or more"),
         ({"height": 0}, "view of 0x64 pixels; give 1 to 4096"),
         ({"width": 4097}, "view of 25x4097 pixels; give 1 to 4096"),
     ],
@@ -32,18 +37,23 @@ def test_what_no_camera_shows_is_refused(change, message):
 @pytest.mark.parametrize(
     ("modality", "shape", "dtype"),
     [
-        ("rgb", (5, 25, 64, 3), torch.uint8),
-        ("depth", (5, 25, 64), torch.float32),
-        ("segmentation", (5, 25, 64), torch.int32),
+        ("rgb", (5, 2, 25, 64, 3), torch.uint8),
+        ("gray", (5, 2, 25, 64), torch.float32),
+        ("depth", (5, 2, 25, 64), torch.float32),
+        ("distance", (5, 2, 25, 64), torch.float32),
+        ("segmentation", (5, 2, 25, 64), torch.int32),
+        ("normals", (5, 2, 25, 64, 3), torch.float32),
     ],
 )
 def test_pictures_have_the_shape_and_type_of_what_they_show(modality, shape, dtype):
-    pictures = dataclasses.replace(VIEW, modality=modality).new_pictures(5)
-    assert (tuple(pictures.shape), pictures.dtype) == (shape, dtype)
+    view = dataclasses.replace(VIEW, cameras=("a", "b"), modalities=(modality, "rgb"))
+    pictures = view.new_pictures(5)
+    assert set(pictures) == {modality, "rgb"}
+    assert (tuple(pictures[modality].shape), pictures[modality].dtype) == (shape, dtype)
 
 
 def test_what_a_renderer_does_not_know_is_refused():
-    VIEW.check_modality(object(), {"rgb"})
-    depth = dataclasses.replace(VIEW, modality="depth")
+    VIEW.check_modalities(object(), {"rgb"})
+    depth = dataclasses.replace(VIEW, modalities=("rgb", "depth"))
     with pytest.raises(InputError, match=r"'depth' can't be drawn by object; ask for one of: rgb$"):
-        depth.check_modality(object(), {"rgb"})
+        depth.check_modalities(object(), {"rgb"})

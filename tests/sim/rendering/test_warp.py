@@ -28,7 +28,7 @@ def test_several_threads_may_build_and_draw_at_a_time():
 @pytest.mark.gpu
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a CUDA GPU")
 def test_gpu_draws_what_the_cpu_draws():
-    on_cpu, on_gpu = started(), started(device="cuda")
+    on_cpu, on_gpu = started(), started(device="cuda", renderer=WarpRenderer)
     picture = on_gpu.render(on_gpu.state).cpu()
     difference = (picture.int() - on_cpu.render(on_cpu.state).int()).abs()
     assert float(difference.float().mean()) < 0.5

@@ -10,7 +10,7 @@ from drone_rl.sim.rendering import Appearance, Poses, View
 from drone_rl.sim.rendering.warp_shard import Shard
 from drone_rl.sim.worlds import Worlds
 
-VIEW = View(camera="drone/front_center", height=9, width=12)
+VIEW = View(cameras=("drone/front_center",), height=9, width=12)
 
 
 @pytest.fixture(scope="module")
@@ -22,7 +22,7 @@ def scene():
 
 @pytest.fixture
 def shard(scene):
-    camera = mujoco.mj_name2id(scene.model, mujoco.mjtObj.mjOBJ_CAMERA, VIEW.camera)
+    camera = mujoco.mj_name2id(scene.model, mujoco.mjtObj.mjOBJ_CAMERA, VIEW.cameras[0])
     with wp.ScopedDevice("cpu"):
         shard = Shard(scene, VIEW, camera, 3)
         shard.warm_up()
