@@ -184,7 +184,7 @@ def _build(
     config, origin = as_config(settings), provenance()
     description = describe(config).as_dict()
     # sums depend on how many threads make them: on as many everywhere, whatever the machine has
-    torch.set_num_threads(settings.collector.num_threads)
+    torch.set_num_threads(settings.trainer.num_threads)
     bound_kernels()
     made = build_collector(settings, practice)
     noted = {"config": config, "description": description, **origin}

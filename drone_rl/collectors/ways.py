@@ -6,7 +6,7 @@ nothing but maps from picture to picture stands between worlds and actor, there 
 both give the same, bit for bit.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any, Protocol, cast
 
 import torch
@@ -18,7 +18,8 @@ from torchrl.envs import EnvBase, TransformedEnv
 from drone_rl.collectors.worlds_collector import take_rows
 from drone_rl.envs import DroneEnv
 from drone_rl.envs.pipeline import on_pixels
-from drone_rl.envs.transforms import PixelTransform
+from drone_rl.envs.transforms import GrayPixels, PixelTransform
+from drone_rl.sim.tasks import State
 
 Entries = dict[NestedKey, Tensor]
 FLAGS = ("reward", "done", "terminated", "truncated")
@@ -80,20 +81,27 @@ class TorchrlWay:
 
 
 class StraightWay:
-    """By the worlds themselves; nothing is drawn of one that has ended, for nobody will look."""
+    """By the worlds themselves; nothing is drawn of one that has ended, for nobody will look.
+
+    Where the first of the transforms makes pictures gray, they are drawn so.
+    """
 
     def __init__(
-        self, env: EnvBase, see: Callable[[Tensor], Tensor], kept: Iterable[NestedKey]
+        self, env: EnvBase, transforms: Sequence[PixelTransform], kept: Iterable[NestedKey]
     ) -> None:
         """Takes an environment's worlds over.
 
         Args:
             env: Whose worlds they are.
-            see: What becomes of their pictures.
+            transforms: What becomes of their pictures.
             kept: Of the reward, the end flags and "info".
         """
-        self._env, self._see, self._kept = env, see, tuple(kept)
+        self._env, self._kept = env, tuple(kept)
         self._base: DroneEnv = cast(Any, env).base_env
+        self._worlds = self._base.worlds
+        is_gray = type(next(iter(transforms), None)) is GrayPixels
+        self._view = self._worlds.view(modality="gray") if is_gray else self._worlds.policy_view
+        self._see = on_pixels(transforms[1:] if is_gray else transforms)
         self._names = [(key, str(key[2])) for key in self._kept if len(key) == 3]
 
     def begin(self, worlds: Tensor) -> TensorDictBase:
@@ -102,7 +110,7 @@ class StraightWay:
 
     def step(self, worlds: Tensor, action: Tensor) -> tuple[Entries, TensorDictBase]:
         """See `Way`."""
-        simulated = self._base.worlds
+        simulated = self._worlds
         reward = simulated.step(worlds, action).float()[:, None]
         is_whole = len(worlds) == simulated.num_worlds
         state = simulated.state if is_whole else simulated.state[worlds]
@@ -114,10 +122,14 @@ class StraightWay:
             info = simulated.info(state)
             told.update((key, info[name]) for key, name in self._names)
         on = (~done[:, 0]).nonzero()[:, 0]
-        pictures = self._base.last_pixels[:0]
-        if len(on):
-            pictures = simulated.render(state if len(on) == len(worlds) else state[on])
-        return {key: told[key] for key in self._kept}, self._seen(self._see(pictures))
+        going = state if len(on) == len(worlds) else state[on]
+        return {key: told[key] for key in self._kept}, self._look(going)
+
+    def _look(self, state: State) -> TensorDictBase:
+        picture = self._worlds.render(state, self._view)
+        if self._view.modalities == ("gray",):
+            picture = picture[:, None]
+        return self._seen(self._see(picture))
 
     def _seen(self, pixels: Tensor) -> TensorDictBase:
         return TensorDict({"pixels": pixels}, [len(pixels)], device=pixels.device)
@@ -138,5 +150,5 @@ def find_way(env: EnvBase, observed: Iterable[NestedKey], kept: Iterable[NestedK
         told = {("next", name) for name in FLAGS}
         told |= {("next", "info", name) for name in env.base_env.worlds.entries}
         if are_maps and observed == ("pixels",) and set(kept) <= told:
-            return StraightWay(env, on_pixels(transforms), kept)
+            return StraightWay(env, transforms, kept)
     return TorchrlWay(env, observed, kept)

@@ -11,11 +11,11 @@ from drone_rl.utils.schema import Real, Whole
 class Collector(Variant):
     """Which workers, and how many."""
 
-    num_envs: Annotated[int, Whole(1, unit="worlds")] = 64
+    num_envs: Annotated[int, Whole(1, unit="worlds")] = 32
     """Worlds, each with one episode in a batch, or with as many steps as the others."""
-    num_threads: Annotated[int, Whole(1, unit="threads")] = 2
-    """Groups of worlds collected at the same time, each on a thread or worker of its own: the cores
-    to use. Each draws its actions from its own stream: this is part of what a seed means."""
+    num_threads: Annotated[int, Whole(1, unit="threads")] = 1
+    """Groups of worlds collected at the same time, each on a thread or worker of its own. Each
+    draws its actions from its own stream: this is part of what a seed means."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -30,6 +30,9 @@ class Ray(Collector):
     """Batches of complete episodes from workers on a Ray cluster."""
 
     target: ClassVar[str] = "drone_rl.api.collecting.ray_collector"
+    num_threads: Annotated[int, Whole(1, unit="workers")] = 2
+    """Workers, each with its share of the worlds and a stream of actions of its own: this is part
+    of what a seed means."""
     address: str | None = None
     """Of the cluster, such as auto or ray://host:10001; none starts one on this machine."""
     num_cpus: Annotated[float, Real(0.0, is_above=True, unit="cores")] = 1.0
@@ -46,3 +49,5 @@ class Rollouts(Collector):
     """
 
     target: ClassVar[str] = "drone_rl.api.collecting.rollout_collector"
+    num_envs: Annotated[int, Whole(1, unit="worlds")] = 64
+    """Worlds."""

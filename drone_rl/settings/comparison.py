@@ -16,7 +16,7 @@ def modern(config: Mapping[str, Any]) -> dict[str, Any]:
 
     Until version 0.1 the group of networks was called policy, the collector's maker stood under
     "make", and settings told Hydra how to make things (`_partial_`, and `_target_` of task and
-    camera).
+    camera). Until 0.2 a training learned on as many threads as it collected on.
 
     Args:
         config: Of any version, as it stands in a checkpoint or a sweep's folder.
@@ -30,7 +30,10 @@ def modern(config: Mapping[str, Any]) -> dict[str, Any]:
         "collector": _collector,
         "transforms": _transforms,
     }
-    return {name: changes.get(name, lambda group: group)(group) for name, group in groups.items()}
+    groups = {name: changes.get(name, lambda group: group)(group) for name, group in groups.items()}
+    if {"trainer", "collector"} <= groups.keys():
+        groups["trainer"] = _trainer(groups["trainer"], groups["collector"])
+    return groups
 
 
 def check_same_config(
@@ -71,6 +74,12 @@ def _collector(group: Any) -> Any:
     maker = group["make"]
     target = _MOVED.get(maker, maker) if isinstance(maker, str) else maker
     return {"_target_": target, **_without(group, "make")}
+
+
+def _trainer(group: Any, collector: Any) -> Any:
+    if not (isinstance(group, Mapping) and isinstance(collector, Mapping)):
+        return group
+    return {"num_threads": collector.get("num_threads", 1), **group}
 
 
 def _transforms(group: Any) -> Any:

@@ -27,8 +27,8 @@ class Reinforce(Objective):
     """REINFORCE without a critic."""
 
     target: ClassVar[str] = "drone_rl.objectives.ReinforceLoss"
-    entropy_coeff: Weight = 0.0
-    """Weight of the entropy bonus; 0 for none."""
+    entropy_coeff: Weight = 0.01
+    """Weight of the entropy bonus, which keeps a policy from giving up a side early; 0 for none."""
     reduction: Annotated[str, OneOf(("mean", "sum"))] = "mean"
     """Over a batch's steps: mean, or sum as in Algorithm 4."""
 

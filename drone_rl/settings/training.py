@@ -33,6 +33,8 @@ class TrainerSettings(Settings):
     """Clip the gradient to this norm; none for no clipping."""
     minibatch_frames: Annotated[int, Whole(1, unit="frames")] = 512
     """Frames in one forward and backward pass; bounds memory, changes nothing else."""
+    num_threads: Annotated[int, Whole(1, unit="threads")] = 2
+    """Threads that learn, wherever this runs; sums depend on how many there are."""
     checkpoint_interval_s: Annotated[float, Real(0.0, unit="s")] = 15.0
     """Seconds between two checkpoints."""
 

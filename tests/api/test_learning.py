@@ -27,7 +27,8 @@ from drone_rl.utils.errors import InputError
 
 TASK = TaskSettings(num_cubes=2, first_distance=4.0, spacing=4.0, front_margin=2.0, step_limit=29)
 TINY = TrainSettings(task=TASK, trainer=TrainerSettings(total_frames=300)).replace(
-    objective=Ppo(num_steps=12, minibatch_size=30), collector=Rollouts(num_envs=5)
+    objective=Ppo(num_steps=12, minibatch_size=30),
+    collector=Rollouts(num_envs=5, num_threads=2),
 )
 STACKED = {"transforms": (Gray(), Stack(), EpisodeReward())}
 KINDS = {

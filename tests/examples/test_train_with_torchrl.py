@@ -26,5 +26,6 @@ def test_it_is_short():
 
 
 @pytest.mark.slow
-def test_it_reaches_the_target(example):
-    assert example.train().running_reward >= 2.97
+def test_it_learns(example):  # `drone-rl bench peers` has it go on until it has solved the task
+    done = example.train(target=1.5, max_frames=100_000)
+    assert done.running_reward >= 1.5 and done.frames < 100_000

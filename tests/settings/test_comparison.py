@@ -34,13 +34,20 @@ def test_old_configurations_are_told_in_todays_words():
     assert modern(NEW) == NEW
 
 
+def test_a_training_of_old_learned_on_as_many_threads_as_it_collected_on():
+    old = {"collector": {"num_threads": 3}, "trainer": {"total_frames": 10}}
+    assert modern(old)["trainer"] == {"total_frames": 10, "num_threads": 3}
+    new = {**old, "trainer": {"num_threads": 2}}
+    assert modern(new) == new
+
+
 def test_a_run_of_old_goes_on_only_as_it_was():
     check_same_config(OLD, NEW, [])
     with pytest.raises(InputError, match=r"network.hidden=\[9\]: .* network.hidden=\[8\]"):
         check_same_config(OLD, {**NEW, "network": {**NEW["network"], "hidden": [9]}}, [])
 
 
-@pytest.mark.parametrize("part", ["task", "collector", "transforms", "policy"])
+@pytest.mark.parametrize("part", ["task", "collector", "transforms", "policy", "trainer"])
 @pytest.mark.parametrize("rubbish", [None, 3, [1], {"make": 3}, {"_target_": [1]}, {"a": {"b": 1}}])
 def test_rubbish_of_a_file_is_no_bug(part, rubbish):
     assert isinstance(modern({**OLD, part: rubbish}), dict)
