@@ -12,6 +12,7 @@ import torch
 import yaml
 
 from drone_rl.api.collecting import build_collector
+from drone_rl.api.confirming import Confirmation
 from drone_rl.api.learning import build_learner
 from drone_rl.api.policy import Policy, load_policy
 from drone_rl.api.progress import Bar, Progress
@@ -145,7 +146,7 @@ def learn(
     """
     if state is not None:
         check_same_config(_own(state["config"]), as_config(settings), MAY_CHANGE)
-    trainer, checkpoints = _build(settings, folder, callbacks, practice)
+    trainer, checkpoints, confirmation = _build(settings, folder, callbacks, practice)
     if state is not None:
         trainer.load_state_dict(state)
         checkpoints.best = _read_best(state.get("best"))
@@ -157,7 +158,8 @@ def learn(
         trainer.collector.shutdown()
     progress = dataclasses.asdict(trainer.progress)
     largest = as_task(settings.task).largest_reward
-    return {"reason": reason, **progress, "largest_reward": largest}
+    told = {} if confirmation is None else confirmation.told
+    return {"reason": reason, **progress, "largest_reward": largest, **told}
 
 
 def finish(settings: TrainSettings, folder: Path, result: dict[str, Any]) -> Training:
@@ -180,7 +182,7 @@ def finish(settings: TrainSettings, folder: Path, result: dict[str, Any]) -> Tra
 
 def _build(
     settings: TrainSettings, folder: Path, callbacks: Sequence[Callback], practice: Practice | None
-) -> tuple[Trainer, CheckpointCallback]:
+) -> tuple[Trainer, CheckpointCallback, Confirmation | None]:
     config, origin = as_config(settings), provenance()
     description = describe(config).as_dict()
     # sums depend on how many threads make them: on as many everywhere, whatever the machine has
@@ -196,18 +198,20 @@ def _build(
         extra={"config": config, "description": description, "provenance": origin},
     )
     share = limits.target_share
+    confirmation = Confirmation(settings, made.network) if limits.confirm_episodes else None
     trainer = Trainer(
         collector=made.collector,
         learner=build_learner(settings, made),
         callbacks=[CsvCallback(folder / "metrics.csv"), checkpoints, *callbacks],
         generators=made.generators,
         target=None if share is None else share * as_task(settings.task).largest_reward,
+        confirm=confirmation,
         total_frames=limits.total_frames,
         total_episodes=limits.total_episodes,
         running_decay=limits.running_decay,
         ends=as_task(settings.task).ends,
     )
-    return trainer, checkpoints
+    return trainer, checkpoints, confirmation
 
 
 class Tell(Callback):

@@ -27,6 +27,11 @@ class TrainerSettings(Settings):
     """Stop once this many episodes were collected; none for no limit."""
     target_share: Annotated[float, Real(0.0, 1.0, is_above=True)] | None = 0.99
     """Stop once the running mean reaches this share of the greatest reward; none for never."""
+    confirm_episodes: Annotated[int, Whole(0, unit="episodes")] = 200
+    """Flights by the most probable actions, in other worlds, that must confirm a policy which has
+    reached the target before training stops; 0 for none."""
+    confirm_share: Annotated[float, Real(0.0, 1.0)] = 1.0
+    """Share of them that must reach every goal."""
     running_decay: Annotated[float, Real(0.0, 1.0, is_below=True)] = 0.99
     """Weight of the old value in the running mean, per episode: 0.99 looks back about 100."""
     max_grad_norm: Annotated[float, Real(0.0, is_above=True)] | None = None

@@ -6,7 +6,7 @@ import enum
 import signal
 import threading
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from types import FrameType
 from typing import Any, Protocol
 
@@ -59,6 +59,7 @@ class Trainer:
         total_frames: int = 2_000_000,
         total_episodes: int | None = None,
         target: float | None = 2.97,
+        confirm: Callable[[int], bool] | None = None,
         running_decay: float = 0.99,
         ends: Iterable[enum.IntEnum] = (),
     ) -> None:
@@ -72,6 +73,8 @@ class Trainer:
             total_frames: Stop once this many were collected.
             total_episodes: Stop once this many were collected; None for no limit.
             target: Stop once the running mean of the episodes' rewards reaches it; None for never.
+            confirm: Whether the policy, after so many updates, has solved its task in earnest;
+                asked whenever the target is reached, until it has. By default nobody asks.
             running_decay: Weight of the old value in the running mean, per episode.
             ends: Why an episode may end (`Task.ends`), to be told of; the batches have them as
                 ("next", "info", "end_reason").
@@ -83,6 +86,7 @@ class Trainer:
         self.total_frames = total_frames
         self.total_episodes = total_episodes
         self.target = target
+        self.confirm = confirm
         self.running_decay = running_decay
         self.ends = tuple(ends)
         self.progress = Progress()
@@ -161,11 +165,20 @@ class Trainer:
             return self.stop_signal.name
         if self.stop_request:
             return self.stop_request
-        if self.target is not None and progress.running_reward >= self.target:
+        if self._is_solved():
             return "solved"
         if self.total_episodes is not None and progress.episodes >= self.total_episodes:
             return "episodes"
         return "frames" if progress.frames >= self.total_frames else ""
+
+    def _is_solved(self) -> bool:
+        progress = self.progress
+        if self.target is None or progress.running_reward < self.target:
+            return False
+        begin = time.perf_counter()
+        is_so = self.confirm is None or self.confirm(progress.updates)
+        progress.seconds += time.perf_counter() - begin
+        return is_so
 
     def _notify(self, hook: str, *args: object) -> None:
         for callback in self.callbacks:

@@ -27,6 +27,8 @@ class Stream(enum.IntEnum):
     CRITIC_INIT = 6
     MINIBATCHES = 7
     """The order in which a learner goes through the steps of a batch."""
+    CONFIRMATION = 8
+    """Worlds in which a training makes sure that it has solved its task."""
 
 
 def seed_sequence(seed: int, *key: int) -> np.random.SeedSequence:

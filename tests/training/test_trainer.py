@@ -110,6 +110,23 @@ def test_stops_when_solved(make_trainer):
     assert trainer.progress.running_reward >= 0.5
 
 
+def test_is_solved_only_once_that_is_confirmed(make_trainer):
+    asked = []
+
+    def confirm(update):
+        asked.append(update)
+        return len(asked) == 3
+
+    trainer = make_trainer(target=0.5, running_decay=0.9, total_frames=100_000)
+    trainer.run()
+    first = trainer.progress.updates
+    trainer = make_trainer(target=0.5, running_decay=0.9, total_frames=100_000)
+    trainer.confirm = confirm
+    assert trainer.run() == "solved"
+    assert asked[0] == first and asked[2] == trainer.progress.updates
+    assert asked == sorted(set(asked)) and trainer.progress.running_reward >= 0.5
+
+
 def test_stops_at_episodes(make_trainer):
     trainer = make_trainer(total_episodes=16)
     assert trainer.run() == "episodes"
