@@ -1,28 +1,20 @@
-"""Ways from the actions of some worlds to what is seen in those that go on.
+"""Ways through episodes: from the actions of some worlds to what is seen in those that go on.
 
-A step of TorchRL's copies every entry of every world, whether or not it still flies, through each
-transform. With few worlds that takes longer than simulating, drawing and acting together. So where
-nothing but maps from picture to picture stands between worlds and actor, there is a straight way;
-both give the same, bit for bit.
+There is TorchRL's way, and a straight one (`Sight`); both give the same, bit for bit.
 """
 
-from collections.abc import Iterable, Sequence
-from typing import Any, Protocol, cast
+from collections.abc import Iterable
+from typing import Any, Protocol
 
 import torch
-from tensordict import TensorDict, TensorDictBase
+from tensordict import TensorDictBase
 from tensordict.utils import NestedKey
 from torch import Tensor
-from torchrl.envs import EnvBase, TransformedEnv
+from torchrl.envs import EnvBase
 
+from drone_rl.collectors.sight import Entries, Sight
 from drone_rl.collectors.worlds_collector import take_rows
-from drone_rl.envs import DroneEnv
-from drone_rl.envs.pipeline import on_pixels
-from drone_rl.envs.transforms import GrayPixels, PixelTransform
 from drone_rl.sim.tasks import State
-
-Entries = dict[NestedKey, Tensor]
-FLAGS = ("reward", "done", "terminated", "truncated")
 
 
 class Way(Protocol):
@@ -83,56 +75,30 @@ class TorchrlWay:
 class StraightWay:
     """By the worlds themselves; nothing is drawn of one that has ended, for nobody will look.
 
-    Where the first of the transforms makes pictures gray, they are drawn so.
+    The worlds of the environment stay as they were at the start.
     """
 
-    def __init__(
-        self, env: EnvBase, transforms: Sequence[PixelTransform], kept: Iterable[NestedKey]
-    ) -> None:
-        """Takes an environment's worlds over.
-
-        Args:
-            env: Whose worlds they are.
-            transforms: What becomes of their pictures.
-            kept: Of the reward, the end flags and "info".
-        """
-        self._env, self._kept = env, tuple(kept)
-        self._base: DroneEnv = cast(Any, env).base_env
-        self._worlds = self._base.worlds
-        is_gray = type(next(iter(transforms), None)) is GrayPixels
-        self._view = self._worlds.view(modality="gray") if is_gray else self._worlds.policy_view
-        self._see = on_pixels(transforms[1:] if is_gray else transforms)
-        self._names = [(key, str(key[2])) for key in self._kept if len(key) == 3]
+    def __init__(self, sight: Sight) -> None:
+        """Takes an environment's worlds over."""
+        self._sight = sight
+        self._going: Any = None
 
     def begin(self, worlds: Tensor) -> TensorDictBase:
         """See `Way`."""
-        return self._seen(self._env.reset().get("pixels")[worlds])
+        env, simulated = self._sight.env, self._sight.worlds
+        env.start(torch.arange(simulated.num_worlds, device=env.device))
+        return self._look(simulated.state[worlds])
 
     def step(self, worlds: Tensor, action: Tensor) -> tuple[Entries, TensorDictBase]:
         """See `Way`."""
-        simulated = self._worlds
-        reward = simulated.step(worlds, action).float()[:, None]
-        is_whole = len(worlds) == simulated.num_worlds
-        state = simulated.state if is_whole else simulated.state[worlds]
-        reason = state.end_reason[:, None]
-        truncated, done = reason == simulated.task.truncation, reason != 0
-        flags = (reward, done, done & ~truncated, truncated)
-        told: Entries = {("next", name): flag for name, flag in zip(FLAGS, flags, strict=True)}
-        if self._names:
-            info = simulated.info(state)
-            told.update((key, info[name]) for key, name in self._names)
+        state, reward = self._sight.worlds.advance(self._going, action)
+        entries, done = self._sight.tell(state, reward)
         on = (~done[:, 0]).nonzero()[:, 0]
-        going = state if len(on) == len(worlds) else state[on]
-        return {key: told[key] for key in self._kept}, self._look(going)
+        return entries, self._look(state if len(on) == len(worlds) else state[on])
 
     def _look(self, state: State) -> TensorDictBase:
-        picture = self._worlds.render(state, self._view)
-        if self._view.modalities == ("gray",):
-            picture = picture[:, None]
-        return self._seen(self._see(picture))
-
-    def _seen(self, pixels: Tensor) -> TensorDictBase:
-        return TensorDict({"pixels": pixels}, [len(pixels)], device=pixels.device)
+        self._going = state
+        return self._sight.look(state)
 
 
 def find_way(env: EnvBase, observed: Iterable[NestedKey], kept: Iterable[NestedKey]) -> Way:
@@ -144,11 +110,5 @@ def find_way(env: EnvBase, observed: Iterable[NestedKey], kept: Iterable[NestedK
         kept: ("next", ...) entries that are kept of each step.
     """
     observed, kept = tuple(observed), tuple(kept)
-    if type(env) is TransformedEnv and type(env.base_env) is DroneEnv and env.base_env.pixels:
-        transforms: list[Any] = list(cast(Any, env.transform))
-        are_maps = all(isinstance(t, PixelTransform) and t.is_in_place for t in transforms)
-        told = {("next", name) for name in FLAGS}
-        told |= {("next", "info", name) for name in env.base_env.worlds.entries}
-        if are_maps and observed == ("pixels",) and set(kept) <= told:
-            return StraightWay(env, transforms, kept)
-    return TorchrlWay(env, observed, kept)
+    sight = Sight.find(env, observed, kept)
+    return TorchrlWay(env, observed, kept) if sight is None else StraightWay(sight)

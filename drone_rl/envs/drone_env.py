@@ -7,7 +7,6 @@
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
 import torch
 from tensordict import TensorDict, TensorDictBase
 from torch import Tensor
@@ -163,10 +162,17 @@ class DroneEnv(EnvBase):
     def _reset(self, tensordict: TensorDictBase | None = None, **kwargs: object) -> TensorDictBase:
         mask = None if tensordict is None else tensordict.get("_reset", None)
         worlds = self._indices(mask)
-        streams: list[np.random.RandomState] = [self._random_states[i] for i in worlds.tolist()]
-        self.worlds.reset(worlds, streams)
+        self.start(worlds)
         self._draw(worlds)
         return self._observe({name: self._false() for name in _DONE_KEYS})
+
+    def start(self, worlds: Tensor) -> None:
+        """Starts an episode in some worlds, each out of its own stream; draws nothing.
+
+        Args:
+            worlds: Indices. Shape: (k,).
+        """
+        self.worlds.reset(worlds, [self._random_states[i] for i in worlds.tolist()])
 
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
         worlds = self._indices(tensordict.get("_step", None))

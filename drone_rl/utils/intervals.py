@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import bdtr, betaincinv  # scipy.stats would take half a second to import
 
 
 def proportion(successes: int, trials: int, confidence: float = 0.95) -> dict[str, Any]:
@@ -16,6 +15,8 @@ def proportion(successes: int, trials: int, confidence: float = 0.95) -> dict[st
         trials: Out of how many; 0 gives a share of None and the interval [0, 1].
         confidence: Coverage of the interval.
     """
+    from scipy.special import betaincinv  # slow to import, and trainings report no interval
+
     tail, failures = (1.0 - confidence) / 2, trials - successes
     lower = float(betaincinv(successes, failures + 1, tail)) if successes else 0.0
     upper = float(betaincinv(successes + 1, failures, 1.0 - tail)) if failures else 1.0
@@ -97,6 +98,8 @@ def median_bounds(values: ArrayLike, confidence: float = 0.95) -> tuple[float, f
         Two of the values; None if even the least and the greatest don't hold the median so surely
         (fewer than six values at 95%).
     """
+    from scipy.special import bdtr  # see `proportion`
+
     ordered = np.sort(np.asarray(values, np.float64).ravel())
     below = bdtr(np.arange(len(ordered) + 1), len(ordered), 0.5)  # as many lie below the median
     rank = int(np.searchsorted(below, (1.0 - confidence) / 2)) if len(ordered) else 0

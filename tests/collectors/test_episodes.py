@@ -174,9 +174,9 @@ def test_each_action_was_taken_on_the_frame_beside_it(make_pipeline):
 def test_no_frame_is_dropped_or_used_twice(make_pipeline):
     env, actor = make_pipeline(4, task=SHORT)
     moved = []
-    step = env.base_env.worlds.step
-    env.base_env.worlds.step = lambda worlds, action: (
-        moved.append(len(worlds)) or step(worlds, action)
+    advance = env.base_env.worlds.advance
+    env.base_env.worlds.advance = lambda state, action: (
+        moved.append(len(state)) or advance(state, action)
     )
     collector = EpisodeCollector(env, actor)
     total = sum(len(collector.collect()) for _ in range(3))

@@ -38,7 +38,7 @@ def on_ray():
 
 @pytest.fixture
 def on_threads():
-    collector = build(Threads(num_envs=6))
+    collector = build(Threads(num_envs=6, num_threads=2))
     yield collector
     collector.shutdown()
 

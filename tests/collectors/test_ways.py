@@ -10,7 +10,6 @@ from drone_rl.envs import (
     CropRows,
     DroneEnv,
     GrayPixels,
-    RgbPixels,
     StandardizePixels,
     with_transforms,
 )
@@ -75,21 +74,6 @@ def test_maps_from_picture_to_picture_are_in_nobodys_way():
     env = make_env(GrayPixels(), CropRows(5, 25), StandardizePixels())
     assert isinstance(find_way(env, ["pixels"], [*KEPT, REASON]), StraightWay)
     assert isinstance(find_way(env.base_env, ["pixels"], KEPT), TorchrlWay)
-    env.close()
-
-
-@pytest.mark.parametrize(
-    ("first", "modality"), [(GrayPixels(), "gray"), (RgbPixels(), "rgb"), (GrayPixels, "rgb")]
-)
-def test_gray_is_drawn_gray_and_the_same(first, modality):
-    if isinstance(first, type):  # one of its own kind may make something else of pictures
-        first = type("Dark", (first,), {})()
-    env = make_env(first, CropRows(5, 25))
-    way = find_way(env, ["pixels"], KEPT)
-    assert way._view.modalities == (modality,)
-    seen = way.begin(torch.arange(5))
-    state = env.base_env.worlds.state
-    assert torch.equal(way._look(state)["pixels"], seen["pixels"])  # drawn by the environment
     env.close()
 
 

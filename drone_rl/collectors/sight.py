@@ -1,0 +1,94 @@
+"""Pictures as an actor sees them, straight from the worlds.
+
+A step of TorchRL's copies every entry of every world, whether or not it still flies, through each
+transform. With few worlds that takes longer than simulating, drawing and acting together. So where
+nothing but maps from picture to picture stands between worlds and actor, collectors go without it.
+"""
+
+from collections.abc import Iterable, Sequence
+from typing import Any, Self
+
+from tensordict import TensorDict, TensorDictBase
+from tensordict.utils import NestedKey
+from torch import Tensor
+from torchrl.envs import Compose, EnvBase, TransformedEnv
+
+from drone_rl.envs import DroneEnv
+from drone_rl.envs.pipeline import on_pixels
+from drone_rl.envs.transforms import GrayPixels, PixelTransform
+from drone_rl.sim.tasks import State
+
+Entries = dict[NestedKey, Tensor]
+FLAGS = ("reward", "done", "terminated", "truncated")
+
+
+class Sight:
+    """What an actor sees of worlds, and what is told of a step, without steps of TorchRL.
+
+    Where the first of the transforms makes pictures gray, they are drawn so.
+    """
+
+    def __init__(
+        self, env: DroneEnv, transforms: Sequence[PixelTransform], kept: Iterable[NestedKey]
+    ) -> None:
+        """Takes an environment's worlds over.
+
+        Args:
+            env: Whose worlds they are.
+            transforms: What becomes of their pictures.
+            kept: Which ("next", ...) entries of a step are told.
+        """
+        self.env, self.worlds = env, env.worlds
+        is_gray = type(next(iter(transforms), None)) is GrayPixels
+        self.view = self.worlds.view(modality="gray") if is_gray else self.worlds.policy_view
+        self._see = on_pixels(transforms[1:] if is_gray else transforms)
+        self._kept = tuple(kept)
+        self._names = [(key, str(key[2])) for key in self._kept if len(key) == 3]
+
+    @classmethod
+    def find(
+        cls, env: EnvBase, observed: Iterable[NestedKey], kept: Iterable[NestedKey]
+    ) -> Self | None:
+        """That of an environment, if it has one.
+
+        Args:
+            env: Any batch of worlds.
+            observed: What the actor looks at.
+            kept: ("next", ...) entries that are kept of each step.
+        """
+        if type(env) is not TransformedEnv or type(env.base_env) is not DroneEnv:
+            return None
+        one: Any = env.transform
+        transforms: list[Any] = list(one) if isinstance(one, Compose) else [one]
+        are_maps = all(isinstance(t, PixelTransform) and t.is_in_place for t in transforms)
+        told = {("next", name) for name in FLAGS}
+        told |= {("next", "info", name) for name in env.base_env.worlds.entries}
+        is_straight = env.base_env.pixels and are_maps and tuple(observed) == ("pixels",)
+        return cls(env.base_env, transforms, kept) if is_straight and set(kept) <= told else None
+
+    def look(self, state: State) -> TensorDictBase:
+        """What is seen of worlds. First dimension: the state's."""
+        picture = self.worlds.render(state, self.view)
+        if self.view.modalities == ("gray",):
+            picture = picture[:, None]
+        pixels = self._see(picture)
+        return TensorDict({"pixels": pixels}, [len(pixels)], device=pixels.device)
+
+    def tell(self, state: State, reward: Tensor) -> tuple[Entries, Tensor]:
+        """What is kept of a step.
+
+        Args:
+            state: After it.
+            reward: For it. Shape: (num_worlds,), float64.
+
+        Returns:
+            Each entry, and which worlds' episodes have ended. Shapes: (num_worlds, *).
+        """
+        reason = state.end_reason[:, None]
+        truncated, done = reason == self.worlds.task.truncation, reason != 0
+        flags = (reward.float()[:, None], done, done & ~truncated, truncated)
+        told: Entries = {("next", name): flag for name, flag in zip(FLAGS, flags, strict=True)}
+        if self._names:
+            info = self.worlds.info(state)
+            told.update((key, info[name]) for key, name in self._names)
+        return {key: told[key] for key in self._kept}, done

@@ -1,0 +1,44 @@
+"""What is seen without TorchRL's steps is what is seen with them."""
+
+import pytest
+import torch
+
+from drone_rl.collectors.sight import FLAGS, Sight
+from drone_rl.envs import CropRows, DroneEnv, GrayPixels, RgbPixels, with_transforms
+from drone_rl.sim.settings import TaskSettings
+
+SHORT = TaskSettings(num_cubes=2, first_distance=3.0, spacing=3.0, step_limit=5)
+KEPT = [("next", name) for name in FLAGS]
+
+
+class Dark(GrayPixels):
+    """One of its own kind, which may make something else of pictures."""
+
+
+@pytest.mark.parametrize(
+    ("first", "modality"), [(GrayPixels(), "gray"), (RgbPixels(), "rgb"), (Dark(), "rgb")]
+)
+def test_gray_is_drawn_gray_and_the_same(first, modality):
+    env = with_transforms(DroneEnv(3, SHORT), [first, CropRows(5, 25)])
+    sight = Sight.find(env, ["pixels"], KEPT)
+    assert sight.view.modalities == (modality,)
+    seen = env.reset()["pixels"]
+    assert torch.equal(sight.look(env.base_env.worlds.state)["pixels"], seen)
+    env.close()
+
+
+def test_a_step_is_told_as_torchrl_tells_it():
+    reason = ("next", "info", "end_reason")
+    env = with_transforms(DroneEnv(3, SHORT), [GrayPixels()])
+    sight = Sight.find(env, ["pixels"], [*KEPT, reason])
+    state = env.reset()
+    action = torch.tensor([0, 1, 2])
+    for step in range(5):
+        moved, reward = sight.worlds.advance(sight.worlds.state, action)  # changes nothing
+        state = env.step(state.set("action", action))
+        told, done = sight.tell(moved, reward)
+        assert set(told) == {*KEPT, reason}
+        assert all(torch.equal(value, state[key]) for key, value in told.items())
+        assert torch.equal(done, state["next", "done"]) and bool(done.all()) is (step == 4)
+        state = state["next"]
+    env.close()
