@@ -20,6 +20,7 @@ from drone_rl.sim.tasks import State
 
 Entries = dict[NestedKey, Tensor]
 FLAGS = ("reward", "done", "terminated", "truncated")
+_REASON = ("next", "info", "end_reason")
 
 
 class Sight:
@@ -43,7 +44,7 @@ class Sight:
         self.view = self.worlds.view(modality="gray") if is_gray else self.worlds.policy_view
         self._see = on_pixels(transforms[1:] if is_gray else transforms)
         self._kept = tuple(kept)
-        self._names = [(key, str(key[2])) for key in self._kept if len(key) == 3]
+        self._asked = [(key, str(key[2])) for key in self._kept if len(key) == 3 and key != _REASON]
 
     @classmethod
     def find(
@@ -88,7 +89,8 @@ class Sight:
         truncated, done = reason == self.worlds.task.truncation, reason != 0
         flags = (reward.float()[:, None], done, done & ~truncated, truncated)
         told: Entries = {("next", name): flag for name, flag in zip(FLAGS, flags, strict=True)}
-        if self._names:
+        told[_REASON] = reason
+        if self._asked:
             info = self.worlds.info(state)
-            told.update((key, info[name]) for key, name in self._names)
+            told.update((key, info[name]) for key, name in self._asked)
         return {key: told[key] for key in self._kept}, done

@@ -5,10 +5,11 @@ from typing import cast
 import torch
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
+from torch import Tensor
 from torchrl.envs import EnvBase
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
-from drone_rl.collectors import EpisodeCollector
+from drone_rl.collectors import EpisodeCollector, take_rows
 from drone_rl.envs import worlds_of
 from drone_rl.evaluation.metrics import Episodes
 
@@ -38,8 +39,8 @@ def run_episodes(
     with set_exploration_type(kind):
         while count < num_episodes:
             batch = collector.collect()
-            done = batch["next", "done"][:, 0]
-            finals.append(batch["next", "info"][done])
+            done = cast(Tensor, batch["next", "done"])[:, 0].nonzero()[:, 0]
+            finals.append(take_rows(cast(TensorDictBase, batch["next", "info"]), done))
             lengths.append(batch["collector", "traj_ids"].unique(return_counts=True)[1])
             count += len(lengths[-1])
     info = cast(TensorDictBase, torch.cat(finals)[:num_episodes].cpu())

@@ -20,6 +20,7 @@ from drone_rl.sim.rendering.appearance import Appearance
 from drone_rl.sim.rendering.devices import on_torch_stream, start_warp
 from drone_rl.sim.rendering.raytrace_looks import Looks
 from drone_rl.sim.rendering.raytrace_painters import CorePainter, GpuPainter
+from drone_rl.sim.rendering.raytrace_places import Places
 from drone_rl.sim.rendering.raytrace_scene import Frames, check_scene, make_geoms, make_view
 from drone_rl.sim.rendering.renderer import Poses
 from drone_rl.sim.rendering.scene import Scene
@@ -64,6 +65,7 @@ class Raytracer:
         self._painter = CorePainter(num_worlds, num_shards) if is_cpu else GpuPainter(device)
         self._frames, self._looks = Frames(scene), Looks(scene, device)
         self._views: dict[View, tuple[structs.View, structs.Geoms]] = {}
+        self._places = Places(self.device)
 
     def prepare(self, view: View) -> None:
         """Loads kernels and makes what they need for a view.
@@ -91,21 +93,13 @@ class Raytracer:
         with on_torch_stream(self.device):
             looks = self._looks.of(appearance, len(poses))
             count = len(poses) * len(view.cameras)
-            self._painter.paint(count, made, geoms, _poses(poses), looks, _pictures(pictures))
+            there = self._places.of(poses)
+            self._painter.paint(count, made, geoms, there, looks, _pictures(pictures))
         return pictures
 
     def close(self) -> None:
         """Ends the threads."""
         self._painter.close()
-
-
-def _poses(poses: Poses) -> structs.Poses:
-    world = poses.props.new_zeros(len(poses), 1, 3)
-    places = torch.cat([world, poses.position[:, None], poses.props], 1).float()
-    made = structs.Poses()
-    made.places = wp.from_torch(places, dtype=wp.vec3)
-    made.attitudes = wp.from_torch(poses.attitude.float().contiguous(), dtype=wp.vec4)
-    return made
 
 
 def _pictures(pictures: Mapping[Modality, Tensor]) -> structs.Pictures:

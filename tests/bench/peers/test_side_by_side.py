@@ -13,22 +13,23 @@ def test_lists_by_seed_in_the_order_of_seeds_by_turns(tmp_path, monkeypatch):
     told = []
 
     def measured(name, seed, episodes):
-        told.append((name, seed))
-        assert episodes == 3
+        told.append((name, seed, episodes))
         return {"seconds": 10.0 + seed, "seconds_without_imports": 5.0, "is_solved": True}
 
     def ours(arguments, *, seed, episodes, folder):
-        assert tuple(arguments) == OURS[folder.name]
+        short = () if episodes else ("trainer.total_frames=1",)
+        assert tuple(arguments) == (*OURS[folder.name], *short)
         return measured(folder.name, seed, episodes)
 
     def theirs(name, settings, *, seed, episodes, max_frames):
-        assert (settings, max_frames) == (THEIRS[name], 1_000_000)
+        assert (settings, max_frames) == (THEIRS[name], 1_000_000 if episodes else 1)
         return measured(name, seed, episodes)
 
     monkeypatch.setattr(side_by_side, "train_ours", ours)
     monkeypatch.setattr(side_by_side, "train_theirs", theirs)
     found = bench_peers(tmp_path / "runs" / "peers", [5, 4], 3, quick=False)["peers"]
-    assert told == [(name, seed) for seed in (5, 4) for name in LABELS]
+    measured_first = [(name, seed, 3) for seed in (5, 4) for name in LABELS]
+    assert told == [*((name, 5, 0) for name in LABELS), *measured_first]
     assert [*found] == [*LABELS]
     assert all(measured["seconds"] == [15.0, 14.0] for measured in found.values())
     assert (tmp_path / "peers.png").stat().st_size > 10_000
