@@ -25,10 +25,10 @@ OURS: Mapping[str, Sequence[str]] = {
     "reinforce": [
         "optimiser.lr=2e-3",
         "optimiser.lr=3e-3",
-        "optimiser.lr=2e-3 collector.num_envs=32",
-        "optimiser.lr=3e-3 collector.num_envs=32",
-        "optimiser.lr=2e-3 collector.num_envs=16",
-        "optimiser.lr=3e-3 collector.num_envs=16",
+        "optimiser.lr=1e-3 collector.num_envs=16",
+        "optimiser.lr=3e-3 collector.num_envs=64",
+        "objective.entropy_coeff=0",
+        "objective.entropy_coeff=0.02",
     ],
     "a2c": [
         "objective=a2c optimiser.lr=2e-3",
