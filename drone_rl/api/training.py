@@ -41,6 +41,8 @@ MAY_CHANGE = (
     "trainer.total_frames",
     "trainer.total_episodes",
     "trainer.target_share",
+    "trainer.confirm_episodes",
+    "trainer.confirm_share",
     "trainer.checkpoint_interval_s",
     "evaluate_after",
     "renderer",

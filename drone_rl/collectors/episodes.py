@@ -55,7 +55,8 @@ class EpisodeCollector(WorldsCollector):
     @torch.no_grad()
     def collect(self, num_worlds: int | None = None) -> TensorDictBase:
         """Runs one episode in every world, or in the first `num_worlds`. Shape: (T_total,)."""
-        flying = self.env.batch_size[0] if num_worlds is None else num_worlds
+        count = self.env.batch_size[0]
+        flying = count if num_worlds is None else min(num_worlds, count)
         indices = torch.arange(flying, device=self.env.device)
         worlds: list[Tensor] = []
         steps: list[dict[NestedKey, Tensor]] = []
@@ -68,7 +69,7 @@ class EpisodeCollector(WorldsCollector):
             worlds.append(indices)
             steps.append(step | after)
             indices = indices[~after["next", "done"].flatten()]
-        batch = _join(steps, worlds, self.env.batch_size[0])
+        batch = _join(steps, worlds, count)
         batch["collector", "traj_ids"] += self.episodes
         return self._finish(batch, flying)
 

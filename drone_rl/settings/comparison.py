@@ -16,7 +16,8 @@ def modern(config: Mapping[str, Any]) -> dict[str, Any]:
 
     Until version 0.1 the group of networks was called policy, the collector's maker stood under
     "make", and settings told Hydra how to make things (`_partial_`, and `_target_` of task and
-    camera). Until 0.2 a training learned on as many threads as it collected on.
+    camera). Until 0.2 a training learned on as many threads as it collected on,
+    and took its running mean at its word.
 
     Args:
         config: Of any version, as it stands in a checkpoint or a sweep's folder.
@@ -79,7 +80,8 @@ def _collector(group: Any) -> Any:
 def _trainer(group: Any, collector: Any) -> Any:
     if not (isinstance(group, Mapping) and isinstance(collector, Mapping)):
         return group
-    return {"num_threads": collector.get("num_threads", 1), **group}
+    unasked = {"confirm_episodes": 0, "confirm_share": 1.0}
+    return {"num_threads": collector.get("num_threads", 1), **unasked, **group}
 
 
 def _transforms(group: Any) -> Any:

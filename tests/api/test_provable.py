@@ -20,7 +20,7 @@ from drone_rl.utils.errors import InputError
 TINY = TrainSettings(
     task=TaskSettings(num_cubes=1, first_distance=8.0, step_limit=60),
     collector=Threads(num_envs=4),
-    trainer=TrainerSettings(total_frames=3000, target_share=0.01),
+    trainer=TrainerSettings(total_frames=3000, target_share=0.01, confirm_episodes=0),
 )
 HOW = ProvableSettings(rounds=3, frames=200, share=1.0, margin=0.25, flights=0)
 LOSING = [[[[2.0, 3.0]], [[5.0, 6.0]]], [[[1.0, 1.5]]], []]

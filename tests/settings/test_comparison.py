@@ -36,8 +36,9 @@ def test_old_configurations_are_told_in_todays_words():
 
 def test_a_training_of_old_learned_on_as_many_threads_as_it_collected_on():
     old = {"collector": {"num_threads": 3}, "trainer": {"total_frames": 10}}
-    assert modern(old)["trainer"] == {"total_frames": 10, "num_threads": 3}
-    new = {**old, "trainer": {"num_threads": 2}}
+    unasked = {"confirm_episodes": 0, "confirm_share": 1.0}
+    assert modern(old)["trainer"] == {"total_frames": 10, "num_threads": 3, **unasked}
+    new = {**old, "trainer": {"num_threads": 2, "confirm_episodes": 5, "confirm_share": 0.5}}
     assert modern(new) == new
 
 

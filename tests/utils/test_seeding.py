@@ -45,6 +45,7 @@ def test_streams_have_the_numbers_on_which_all_figures_rest():
         "SEARCH": 5,
         "CRITIC_INIT": 6,
         "MINIBATCHES": 7,
+        "CONFIRMATION": 8,
     }
     drawn = world_random_state(7, 2).uniform()
     child = np.random.SeedSequence(7, spawn_key=(Stream.WORLDS, 2))
