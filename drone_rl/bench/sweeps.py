@@ -135,10 +135,11 @@ def _seconds(program: tuple[str, ...], *args: str) -> float:
 
 def _kill_all_that_name(words: str) -> None:
     """Ends (kill -9) every process with these words on its command line, but for this one."""
-    for path in Path("/proc").glob("[0-9]*/cmdline"):
-        with contextlib.suppress(OSError):
-            if int(path.parent.name) != os.getpid() and words.encode() in path.read_bytes():
-                os.kill(int(path.parent.name), signal.SIGKILL)
+    for name in os.listdir("/proc"):  # what ends meanwhile has no file any more
+        with contextlib.suppress(OSError, ValueError):
+            number, said = int(name), Path("/proc", name, "cmdline").read_bytes()
+            if number != os.getpid() and words.encode() in said:
+                os.kill(number, signal.SIGKILL)
 
 
 def _outcome(run: Path) -> tuple[dict[str, Any], dict[str, list]]:

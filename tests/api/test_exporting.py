@@ -119,6 +119,7 @@ def test_an_onnx_model_that_agrees_is_left_with_its_command(tmp_path):
 @pytest.mark.parametrize("wrong", [1 / 3 + 1.1e-5, float("nan")])
 def test_an_onnx_model_that_does_otherwise_is_not_left(tmp_path, monkeypatch, wrong):
     """A policy that always goes left is said to have one chance in three."""
+    monkeypatch.setattr(exporting, "_STEPS", 3)
     monkeypatch.setattr(exporting, "make_onnx", lambda *_: b"a model")
     monkeypatch.setattr(exporting, "open_onnx", lambda _: lambda f: torch.full((len(f), 3), wrong))
     (tmp_path / "mine.onnx").write_text("an older one")
@@ -132,6 +133,7 @@ def test_the_limit_is_one_in_a_hundred_thousand(tmp_path, monkeypatch, added, is
     """A policy that surely goes left, whatever it sees."""
     always = torch.tensor([0.0, 1.0, 0.0], dtype=torch.float64)
     other = (always - added * always).expand(100, 3)
+    monkeypatch.setattr(exporting, "_STEPS", 3)
     monkeypatch.setattr(exporting, "make_onnx", lambda *_: b"a model")
     monkeypatch.setattr(exporting, "open_onnx", lambda _: lambda f: other)
     policy = drone_rl.load_policy("poor")
@@ -144,6 +146,7 @@ def test_the_limit_is_one_in_a_hundred_thousand(tmp_path, monkeypatch, added, is
 
 
 def test_a_place_for_an_onnx_model_that_is_none(tmp_path, monkeypatch):
+    monkeypatch.setattr(exporting, "_STEPS", 3)
     monkeypatch.setattr(exporting, "MOST_DIFFERENCE", 2.0)
     monkeypatch.setattr(exporting, "make_onnx", lambda *_: b"a model")
     monkeypatch.setattr(exporting, "open_onnx", lambda _: lambda f: torch.zeros(len(f), 3))
