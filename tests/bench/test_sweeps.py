@@ -3,6 +3,8 @@
 import json
 import subprocess
 import sys
+import time
+from pathlib import Path
 
 import pytest
 import torch
@@ -61,6 +63,8 @@ def test_only_processes_of_the_sweep_are_killed(tmp_path):
         subprocess.Popen([sys.executable, "-c", code, words])
         for words in (f"dir={tmp_path}/killed", f"dir={tmp_path}/spared")
     )
+    while not Path(f"/proc/{named.pid}/cmdline").read_bytes():
+        time.sleep(0.01)  # a program that has only just begun has no command line yet
     try:
         sweeps._kill_all_that_name(f"{tmp_path}/killed")
         assert named.wait(10) == -9
