@@ -13,12 +13,13 @@ from drone_rl.collectors import (
     WorldsCollector,
 )
 from drone_rl.policies import PolicyNetwork, make_actor
-from drone_rl.settings.collecting import Ray
+from drone_rl.settings.collecting import Episodes, Ray
 from drone_rl.settings.configuration import as_config, from_config
 from drone_rl.settings.objectives import WithCritic
 from drone_rl.settings.training import TrainSettings
 from drone_rl.settings.variant import locate
 from drone_rl.sim.tasks import Practice
+from drone_rl.utils.provenance import num_cores
 from drone_rl.utils.seeding import Stream, torch_generator
 from drone_rl.zoo import describe
 
@@ -53,7 +54,8 @@ def build_collector(settings: TrainSettings, practice: Practice | None = None) -
 
 def threaded_collector(settings: TrainSettings, practice: Practice | None = None) -> Collecting:
     """`Threads`: complete episodes from threads of this process."""
-    return _threaded(settings, practice, EpisodeCollector)
+    threads = min(settings.collector.num_envs, settings.collector.num_threads)
+    return _threaded(settings, practice, _episodes(settings, max(1, num_cores() // threads)))
 
 
 def rollout_collector(settings: TrainSettings, practice: Practice | None = None) -> Collecting:
@@ -71,7 +73,9 @@ def _threaded(
     shares = _shares(settings, is_one=settings.device.startswith("cuda"))
     network, collectors, generators = None, [], {}
     for i in range(len(shares)):
-        collector, network, actions = build_share(settings, shares, i, network, practice, collect)
+        collector, network, actions = build_share(
+            settings, shares, i, network, practice, collect=collect
+        )
         collectors.append(collector)
         generators[f"actions_{i}"] = actions
     assert network is not None  # there is at least one share
@@ -85,7 +89,7 @@ def ray_collector(settings: TrainSettings, practice: Practice | None = None) -> 
     asked = settings.collector
     assert isinstance(asked, Ray)
     shares = _shares(settings)
-    local, network, _ = build_share(settings, [1], 0)
+    local, network, _ = build_share(settings, [1], 0, collect=EpisodeCollector)
     local.shutdown()
     config = as_config(settings)
     workers = range(len(shares))
@@ -108,7 +112,8 @@ def build_share(
     number: int,
     network: PolicyNetwork | None = None,
     practice: Practice | None = None,
-    collect: Callable[..., C] = EpisodeCollector,
+    *,
+    collect: Callable[..., C],
 ) -> tuple[C, PolicyNetwork, torch.Generator]:
     """One worker's worlds, with the network that all share, and the stream of its actions.
 
@@ -142,7 +147,16 @@ def _remote_share(
 ) -> tuple[EpisodeCollector, PolicyNetwork, torch.Generator]:
     """`build_share` from what can be sent."""
     settings = from_config(TrainSettings, config)
-    return build_share(settings, shares, number, practice=practice)
+    assert isinstance(settings.collector, Ray)
+    collect = _episodes(settings, max(1, int(settings.collector.num_cpus)))
+    return build_share(settings, shares, number, practice=practice, collect=collect)
+
+
+def _episodes(settings: TrainSettings, cores: int) -> Callable[..., EpisodeCollector]:
+    """Makes collectors of complete episodes, each on so many cores."""
+    asked = settings.collector
+    is_compiled = isinstance(asked, Episodes) and asked.compiled
+    return functools.partial(EpisodeCollector, is_compiled=is_compiled, num_cores=cores)
 
 
 def _shares(settings: TrainSettings, is_one: bool = False) -> list[int]:

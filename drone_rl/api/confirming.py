@@ -1,9 +1,11 @@
 """Is a policy that seems to have solved its task as good by its most probable actions?"""
 
+import functools
 from collections.abc import Mapping
 from typing import Any
 
 from torch import nn
+from torchrl.envs import TransformedEnv
 
 from drone_rl.evaluation import run_episodes
 from drone_rl.policies import make_actor
@@ -45,21 +47,31 @@ class Confirmation:
             update: Number of the update after which this is asked; each is asked in other worlds.
         """
         settings, episodes = self._settings, self._settings.trainer.confirm_episodes
-        env = self._description.build_env(
-            min(_WORLDS, episodes),
+        env = self._env
+        worlds: Any = env.base_env
+        worlds.first_world = update * _WORLDS
+        env.set_seed(settings.seed)
+        actor = make_actor(self._network, env.action_spec)
+        flown = run_episodes(env, actor, episodes, is_compiled=True)
+        self.flights += episodes
+        self.succeeded = int(flown.success.sum())
+        return self.succeeded >= settings.trainer.confirm_share * episodes
+
+    @functools.cached_property
+    def _env(self) -> TransformedEnv:
+        settings = self._settings
+        return self._description.build_env(
+            min(_WORLDS, settings.trainer.confirm_episodes),
             seed=settings.seed,
             stream=Stream.CONFIRMATION,
             device=settings.device,
             renderer=settings.renderer,
-            first_world=update * _WORLDS,
         )
-        try:
-            flown = run_episodes(env, make_actor(self._network, env.action_spec), episodes)
-        finally:
-            env.close()
-        self.flights += episodes
-        self.succeeded = int(flown.success.sum())
-        return self.succeeded >= settings.trainer.confirm_share * episodes
+
+    def close(self) -> None:
+        """Ends the worlds, if any were flown in."""
+        if "_env" in vars(self):
+            self._env.close()
 
     @property
     def told(self) -> Mapping[str, Any]:

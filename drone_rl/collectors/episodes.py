@@ -11,6 +11,8 @@ from tensordict.utils import NestedKey
 from torch import Tensor
 from torchrl.envs import EnvBase
 
+from drone_rl.collectors.flight import Flight
+from drone_rl.collectors.sight import Sight
 from drone_rl.collectors.ways import find_way
 from drone_rl.collectors.worlds_collector import WorldsCollector
 
@@ -35,6 +37,8 @@ class EpisodeCollector(WorldsCollector):
         actor: TensorDictModuleBase,
         *,
         keep_observations: bool = True,
+        is_compiled: bool = False,
+        num_cores: int = 1,
         **kwargs: Any,
     ) -> None:
         """Connects an environment and a policy.
@@ -43,6 +47,9 @@ class EpisodeCollector(WorldsCollector):
             env: A batched environment that honours TorchRL's "_step" masks.
             actor: Writes the action.
             keep_observations: Whether to keep what the actor saw and made of it.
+            is_compiled: Whether a kernel may fly whole episodes, see `Flight`. It draws actions in
+                another order, and sums in the network may differ in the last place.
+            num_cores: That such a kernel takes; no result depends on it.
             kwargs: See `WorldsCollector`.
 
         Raises:
@@ -51,12 +58,22 @@ class EpisodeCollector(WorldsCollector):
         super().__init__(env, actor, **kwargs)
         self._keep_observations = keep_observations
         self._way = find_way(env, self._observed, self._kept)
+        sight = Sight.find(env, self._observed, self._kept) if is_compiled else None
+        self._flight = Flight.find(sight, actor, num_cores)
 
     @torch.no_grad()
     def collect(self, num_worlds: int | None = None) -> TensorDictBase:
         """Runs one episode in every world, or in the first `num_worlds`. Shape: (T_total,)."""
         count = self.env.batch_size[0]
         flying = count if num_worlds is None else min(num_worlds, count)
+        if self._flight is not None and self._flight.can_act():
+            batch = self._flight.fly(flying, self._keep_observations)
+        else:
+            batch = self._step_by_step(flying)
+        batch["collector", "traj_ids"] += self.episodes
+        return self._finish(batch, flying)
+
+    def _step_by_step(self, flying: int) -> TensorDictBase:
         indices = torch.arange(flying, device=self.env.device)
         worlds: list[Tensor] = []
         steps: list[dict[NestedKey, Tensor]] = []
@@ -69,9 +86,15 @@ class EpisodeCollector(WorldsCollector):
             worlds.append(indices)
             steps.append(step | after)
             indices = indices[~after["next", "done"].flatten()]
-        batch = _join(steps, worlds, count)
-        batch["collector", "traj_ids"] += self.episodes
-        return self._finish(batch, flying)
+        return _join(steps, worlds, flying)
+
+    def shutdown(
+        self, timeout: float | None = None, close_env: bool = True, raise_on_error: bool = True
+    ) -> None:
+        """See `WorldsCollector`."""
+        if self._flight is not None:
+            self._flight.close()
+        super().shutdown(timeout, close_env, raise_on_error)
 
     def state_dict(self) -> dict:
         """Counters and the environment's random streams, as they stand between two batches."""

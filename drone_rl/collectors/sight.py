@@ -42,9 +42,16 @@ class Sight:
         self.env, self.worlds = env, env.worlds
         is_gray = type(next(iter(transforms), None)) is GrayPixels
         self.view = self.worlds.view(modality="gray") if is_gray else self.worlds.policy_view
-        self._see = on_pixels(transforms[1:] if is_gray else transforms)
+        self.after: Sequence[Any] = transforms[1:] if is_gray else transforms
+        """What becomes of pictures once they are drawn."""
+        self._see = on_pixels(self.after)
         self._kept = tuple(kept)
         self._asked = [(key, str(key[2])) for key in self._kept if len(key) == 3 and key != _REASON]
+
+    @property
+    def is_brief(self) -> bool:
+        """Whether nothing is told of a step but reward, flags and why an episode ended."""
+        return not self._asked
 
     @classmethod
     def find(
@@ -67,9 +74,14 @@ class Sight:
         is_straight = env.base_env.pixels and are_maps and tuple(observed) == ("pixels",)
         return cls(env.base_env, transforms, kept) if is_straight and set(kept) <= told else None
 
-    def look(self, state: State) -> TensorDictBase:
-        """What is seen of worlds. First dimension: the state's."""
-        picture = self.worlds.render(state, self.view)
+    def look(self, state: State, worlds: Tensor | None = None) -> TensorDictBase:
+        """What is seen of worlds. First dimension: the state's.
+
+        Args:
+            state: Theirs.
+            worlds: Which of the environment's they are; all by default. Shape: (k,).
+        """
+        picture = self.worlds.render(state, self.view, self.env.looks.drawn(worlds))
         if self.view.modalities == ("gray",):
             picture = picture[:, None]
         pixels = self._see(picture)
@@ -85,11 +97,11 @@ class Sight:
         Returns:
             Each entry, and which worlds' episodes have ended. Shapes: (num_worlds, *).
         """
-        reason = state.end_reason[:, None]
-        truncated, done = reason == self.worlds.task.truncation, reason != 0
-        flags = (reward.float()[:, None], done, done & ~truncated, truncated)
+        terminated, truncated = (flag[:, None] for flag in self.worlds.ends(state))
+        done = terminated | truncated
+        flags = (reward.float()[:, None], done, terminated, truncated)
         told: Entries = {("next", name): flag for name, flag in zip(FLAGS, flags, strict=True)}
-        told[_REASON] = reason
+        told[_REASON] = state.end_reason[:, None]
         if self._asked:
             info = self.worlds.info(state)
             told.update((key, info[name]) for key, name in self._asked)

@@ -13,6 +13,7 @@ from torch import Tensor
 from torchrl.envs import EnvBase
 
 from drone_rl.collectors.sight import Entries, Sight
+from drone_rl.collectors.worlds_collector import ballast
 
 
 class WorldStream(Protocol):
@@ -58,8 +59,7 @@ class TorchrlStream:
     ) -> None:
         """See `find_stream`."""
         self._env, self._observed, self._kept = env, tuple(observed), tuple(kept)
-        first = {key if isinstance(key, str) else key[0] for key in self._observed}
-        self._dropped = {env.reward_key, "info"} - first
+        self._dropped = ballast(env, self._observed)
         self._state: TensorDictBase | None = None
 
     @property
@@ -99,7 +99,7 @@ class TorchrlStream:
         self._state = begun
 
     def _without_ballast(self, state: TensorDictBase) -> TensorDictBase:
-        """Without entries that no step reads, which make each step dearer."""
+        """Without entries that no step reads; see `ballast`."""
         return state.exclude(*self._dropped, *self._env.done_keys)
 
     def forget(self) -> None:
@@ -145,8 +145,7 @@ class StraightStream:
 
     def _begin(self) -> Tensor:
         if self._pixels is None:
-            env, worlds = self._sight.env, self._sight.worlds
-            env.start(torch.arange(worlds.num_worlds, device=env.device))
+            self._sight.env.start()
             self._pixels = self._look()
         return self._pixels
 
@@ -165,7 +164,7 @@ class StraightStream:
         """See `WorldStream`."""
         begun = ended.flatten().nonzero()[:, 0]
         self._sight.env.start(begun)
-        fresh = self._sight.look(self._sight.worlds.state[begun]).get("pixels")
+        fresh = self._sight.look(self._sight.worlds.state[begun], begun).get("pixels")
         self._pixels = self._begin().index_copy(0, begun, fresh)
 
     def forget(self) -> None:

@@ -13,7 +13,7 @@ from torch import Tensor
 from torchrl.envs import EnvBase
 
 from drone_rl.collectors.sight import Entries, Sight
-from drone_rl.collectors.worlds_collector import take_rows
+from drone_rl.collectors.worlds_collector import ballast, take_rows
 from drone_rl.sim.tasks import State
 
 
@@ -45,8 +45,7 @@ class TorchrlWay:
     ) -> None:
         """See `find_way`."""
         self._env, self._observed, self._kept = env, tuple(observed), tuple(kept)
-        first = {key if isinstance(key, str) else key[0] for key in self._observed}
-        self._dropped = {env.reward_key, "info"} - first
+        self._dropped = ballast(env, self._observed)
         self._state: Any = None
 
     def begin(self, worlds: Tensor) -> TensorDictBase:
@@ -64,7 +63,7 @@ class TorchrlWay:
         after = env.step(state.set(env.action_key, action))
         entries = {key: after.get(key)[worlds] for key in self._kept}
         self._state = state = after.get("next")
-        for key in self._dropped:  # entries that no step reads make each step dearer
+        for key in self._dropped:
             state.pop(key, None)
         return entries, self._seen(worlds[~state.get("done")[worlds].flatten()])
 
@@ -85,20 +84,21 @@ class StraightWay:
 
     def begin(self, worlds: Tensor) -> TensorDictBase:
         """See `Way`."""
-        env, simulated = self._sight.env, self._sight.worlds
-        env.start(torch.arange(simulated.num_worlds, device=env.device))
-        return self._look(simulated.state[worlds])
+        self._sight.env.start()
+        return self._look(self._sight.worlds.state[worlds], worlds)
 
     def step(self, worlds: Tensor, action: Tensor) -> tuple[Entries, TensorDictBase]:
         """See `Way`."""
         state, reward = self._sight.worlds.advance(self._going, action)
         entries, done = self._sight.tell(state, reward)
         on = (~done[:, 0]).nonzero()[:, 0]
-        return entries, self._look(state if len(on) == len(worlds) else state[on])
+        if len(on) < len(worlds):
+            state, worlds = state[on], worlds[on]
+        return entries, self._look(state, worlds)
 
-    def _look(self, state: State) -> TensorDictBase:
+    def _look(self, state: State, worlds: Tensor) -> TensorDictBase:
         self._going = state
-        return self._sight.look(state)
+        return self._sight.look(state, worlds)
 
 
 def find_way(env: EnvBase, observed: Iterable[NestedKey], kept: Iterable[NestedKey]) -> Way:

@@ -56,8 +56,6 @@ class WorldsCollector(BaseCollector):
         flags = (env.reward_key, *env.done_keys)
         observable = {("next", *_as_tuple(key)) for key in env.observation_spec.keys(True, True)}
         self._kept = (*(("next", key) for key in flags), *(k for k in keep if k in observable))
-        observed = {key if isinstance(key, str) else key[0] for key in self._observed}
-        self._dropped = {env.reward_key, "info"} - observed
 
     @property
     def worlds(self) -> Any:
@@ -118,6 +116,16 @@ def copy_weights(source: Any, actor: TensorDictModuleBase) -> None:
         weights.data.update_(source.data)
     else:
         actor.load_state_dict(source.state_dict() if isinstance(source, nn.Module) else source)
+
+
+def ballast(env: EnvBase, observed: Iterable[NestedKey]) -> set[NestedKey]:
+    """Entries of a state that no step reads, and which make each step of TorchRL's dearer.
+
+    Args:
+        env: Whose states they are.
+        observed: What the actor looks at.
+    """
+    return {env.reward_key, "info"} - {_as_tuple(key)[0] for key in observed}
 
 
 def take_rows(tensordict: TensorDictBase, rows: Tensor) -> TensorDictBase:

@@ -12,10 +12,16 @@ from torchrl.envs.utils import ExplorationType, set_exploration_type
 from drone_rl.collectors import EpisodeCollector, take_rows
 from drone_rl.envs import worlds_of
 from drone_rl.evaluation.metrics import Episodes
+from drone_rl.utils.provenance import num_cores
 
 
 def run_episodes(
-    env: EnvBase, actor: TensorDictModuleBase, num_episodes: int, *, greedy: bool = True
+    env: EnvBase,
+    actor: TensorDictModuleBase,
+    num_episodes: int,
+    *,
+    greedy: bool = True,
+    is_compiled: bool = False,
 ) -> Episodes:
     """Runs complete episodes, `env.batch_size[0]` at a time.
 
@@ -27,13 +33,21 @@ def run_episodes(
         actor: The policy.
         num_episodes: How many; what a last batch has more is not used.
         greedy: Whether to take the most probable action instead of drawing one.
+        is_compiled: Whether a kernel may fly them, see `EpisodeCollector`.
 
     Returns:
         The episodes, on the CPU.
     """
     task = worlds_of(env).task
     keep = tuple(("next", "info", name) for name in (*task.scored, "end_reason"))
-    collector = EpisodeCollector(env, actor, keep=keep, keep_observations=False)
+    collector = EpisodeCollector(
+        env,
+        actor,
+        keep=keep,
+        keep_observations=False,
+        is_compiled=is_compiled,
+        num_cores=num_cores(),
+    )
     kind = ExplorationType.DETERMINISTIC if greedy else ExplorationType.RANDOM
     finals, lengths, count = [], [], 0
     with set_exploration_type(kind):

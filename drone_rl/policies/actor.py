@@ -34,19 +34,15 @@ class SeededCategorical(Categorical):
     @torch.no_grad()
     def sample(self, sample_shape: Sequence[int] = ()) -> Tensor:
         """Draws by inverting the cumulative distribution. Shape: (*sample_shape, *batch)."""
-        return _draw(self.probs, self._source, sample_shape)
+        generator = None if self._source is None else self._source.generator
+        shape = (*sample_shape, *self.logits.shape[:-1], 1)
+        draw = torch.rand(shape, generator=generator, device=self.logits.device)
+        return (draw > self.probs.cumsum(-1)[..., :-1]).sum(-1)
 
     @property
     def deterministic_sample(self) -> Tensor:
         """The most probable class. Shape: batch."""
         return self.logits.argmax(-1)
-
-
-def _draw(probs: Tensor, source: RandomSource | None, sample_shape: Sequence[int] = ()) -> Tensor:
-    generator = None if source is None else source.generator
-    shape = (*sample_shape, *probs.shape[:-1], 1)
-    draw = torch.rand(shape, generator=generator, device=probs.device)
-    return (draw > probs.cumsum(-1)[..., :-1]).sum(-1)
 
 
 class CategoricalActor(ProbabilisticActor):
@@ -71,12 +67,9 @@ class CategoricalActor(ProbabilisticActor):
         if tensordict_out is not None or kwargs or not straight:
             return super().forward(tensordict, tensordict_out, **kwargs)
         logits = network.module(tensordict.get(network.in_keys[0]))
-        with torch.no_grad():  # what `SeededCategorical` does, without its making
-            action = logits - logits.logsumexp(-1, keepdim=True)
-            if how == ExplorationType.RANDOM:
-                action = _draw(action.softmax(-1), head.distribution_kwargs["source"])
-            else:
-                action = action.argmax(-1)
+        distribution = head.distribution_class(logits=logits, **head.distribution_kwargs)
+        random = how == ExplorationType.RANDOM
+        action = distribution.sample() if random else distribution.deterministic_sample
         tensordict.set(network.out_keys[0], logits)
         return tensordict.set(head.out_keys[0], action)
 

@@ -11,7 +11,7 @@ from drone_rl.utils.schema import Real, Whole
 class Collector(Variant):
     """Which workers, and how many."""
 
-    num_envs: Annotated[int, Whole(1, unit="worlds")] = 32
+    num_envs: Annotated[int, Whole(1, unit="worlds")] = 16
     """Worlds, each with one episode in a batch, or with as many steps as the others."""
     num_threads: Annotated[int, Whole(1, unit="threads")] = 1
     """Groups of worlds collected at the same time, each on a thread or worker of its own. Each
@@ -19,14 +19,24 @@ class Collector(Variant):
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Threads(Collector):
+class Episodes(Collector):
+    """Batches of complete episodes."""
+
+    compiled: bool = True
+    """Whether whole episodes are flown by one compiled kernel, where task, pictures and network are
+    such as it knows: many times as fast on a CPU. It draws its actions in another order, so this is
+    part of what a seed means."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Threads(Episodes):
     """Batches of complete episodes from threads of this process."""
 
     target: ClassVar[str] = "drone_rl.api.collecting.threaded_collector"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Ray(Collector):
+class Ray(Episodes):
     """Batches of complete episodes from workers on a Ray cluster."""
 
     target: ClassVar[str] = "drone_rl.api.collecting.ray_collector"

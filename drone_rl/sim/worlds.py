@@ -42,6 +42,7 @@ class Worlds:
         renderer: str | MakeRenderer = "raytrace",
         device: str = "cpu",
         num_shards: int | None = None,
+        appearance: Appearance | None = None,
     ) -> None:
         """Makes the worlds; the model is compiled when something is to be drawn.
 
@@ -53,10 +54,13 @@ class Worlds:
             renderer: Who draws, see `find_renderer`.
             device: "cpu", "cuda" or "cuda:N".
             num_shards: See `MakeRenderer`.
+            appearance: How all of them look, where nothing else is said; as the task has it by
+                default.
 
         Raises:
             InputError: There is no such renderer.
         """
+        self.appearance = appearance
         self.num_worlds = num_worlds
         self.task = as_task(task)
         self.camera = camera or CameraSettings()
@@ -87,10 +91,15 @@ class Worlds:
         pose = {"drone": state.body.position.float(), "attitude": state.body.attitude.float()}
         return {**self.task.info(state), **pose}
 
-    def ends(self) -> tuple[Tensor, Tensor]:
-        """Which worlds have terminated, and which were truncated. Shapes: (num_worlds,)."""
-        truncated = self.state.end_reason == self.task.truncation
-        return (self.state.end_reason != 0) & ~truncated, truncated
+    def ends(self, state: State | None = None) -> tuple[Tensor, Tensor]:
+        """Which worlds have terminated, and which were truncated. Shapes: (number of worlds,).
+
+        Args:
+            state: Of other worlds; of these by default.
+        """
+        reason = (self.state if state is None else state).end_reason
+        truncated = reason == self.task.truncation
+        return (reason != 0) & ~truncated, truncated
 
     @functools.cached_property
     def scene(self) -> Scene:
@@ -179,7 +188,7 @@ class Worlds:
         Args:
             state: What to draw; any number of worlds.
             view: Of one camera and one modality; the policy's by default.
-            appearance: How they look; as the task has it by default.
+            appearance: How they look otherwise than all of these worlds do.
 
         Returns:
             See `Renderer.render`, without the dimension of cameras. First dimension: the state's
@@ -200,7 +209,8 @@ class Worlds:
         self, state: State, view: View, appearance: Appearance | None = None
     ) -> dict[Modality, Tensor]:
         """The same of any number of cameras and modalities, in one pass; see `Renderer.render`."""
-        return self.renderer.render(view, self.poses(state), appearance)
+        look = self.appearance if appearance is None else appearance.over(self.appearance)
+        return self.renderer.render(view, self.poses(state), look)
 
     def poses(self, state: State) -> Poses:
         """Where a renderer must draw everything."""

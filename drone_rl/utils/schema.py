@@ -178,6 +178,31 @@ class Several:
 
 
 @dataclasses.dataclass(frozen=True)
+class Span:
+    """One value of a kind, or a range of them: the pair of its lowest and its highest."""
+
+    kind: Kind
+
+    def read(self, value: Any, where: str) -> Any:
+        """See `Kind`."""
+        if not self._is_range(value):
+            return self.kind.read(value, where)
+        low, high = (self.kind.read(item, f"{where}[{i}]") for i, item in enumerate(value))
+        pairs = zip(low, high, strict=True) if isinstance(low, tuple) else [(low, high)]
+        for least, most in pairs:
+            if least > most:
+                raise InputError(
+                    f"{where} goes from {least:g} to {most:g}, which is less; give the lower first"
+                )
+        return low, high
+
+    def _is_range(self, value: Any) -> bool:
+        if not isinstance(value, list | tuple) or len(value) != 2:
+            return False
+        return not isinstance(self.kind, Several) or isinstance(value[0], list | tuple)
+
+
+@dataclasses.dataclass(frozen=True)
 class Listed:
     """One text or a list of them, as a tuple."""
 

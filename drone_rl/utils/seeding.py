@@ -29,6 +29,10 @@ class Stream(enum.IntEnum):
     """The order in which a learner goes through the steps of a batch."""
     CONFIRMATION = 8
     """Worlds in which a training makes sure that it has solved its task."""
+    SHIFTED = 9
+    """Worlds in which a policy is flown under other conditions than it was trained in."""
+    SHIFTS = 10
+    """How these conditions differ from world to world and from step to step."""
 
 
 def seed_sequence(seed: int, *key: int) -> np.random.SeedSequence:
@@ -47,6 +51,17 @@ def world_random_state(
 ) -> np.random.RandomState:
     """The stream from which one world draws all its episodes."""
     return np.random.RandomState(np.random.PCG64(seed_sequence(seed, stream, world)))
+
+
+def side_stream(random_state: np.random.RandomState, *key: int) -> np.random.Generator:
+    """A stream beside that of a world, which is left where it stands.
+
+    It follows from where that one stands and from the key alone, so it needs no seed of its own,
+    and begins the same wherever the world's goes on from a saved state.
+    """
+    own = get_state(random_state)
+    child = np.random.SeedSequence([own["state"], own["inc"]], spawn_key=key)
+    return np.random.Generator(np.random.PCG64(child))
 
 
 def torch_generator(

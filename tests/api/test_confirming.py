@@ -51,13 +51,14 @@ def test_the_share_is_that_of_flights_that_reach_everything():
 def test_worlds_are_of_their_own_after_each_update(monkeypatch):
     asked, fly = [], confirming.run_episodes
 
-    def note(env, actor, episodes):
+    def note(env, actor, episodes, **how):
         base = env.base_env
         base.reset()
         asked.append(
-            (base.stream, base.first_world, len(base.worlds.state), base.worlds.state.cubes)
+            (base.stream, base.first_world, len(base.worlds.state), base.worlds.state.cubes.clone())
         )
-        return fly(env, actor, episodes)
+        base.set_seed(SETTINGS.seed)
+        return fly(env, actor, episodes, **how)
 
     monkeypatch.setattr(confirming, "run_episodes", note)
     confirmation = Confirmation(SETTINGS, always(1.0, 0.0, 0.0))
@@ -73,7 +74,9 @@ def test_a_training_goes_on_until_it_is_confirmed(tmp_path, episodes, reason):
     trainer = SETTINGS.trainer.replace(
         total_frames=400, target_share=1e-3, confirm_episodes=episodes
     )
-    settings = SETTINGS.replace(trainer=trainer, collector=SETTINGS.collector.replace(num_envs=4))
+    collector = SETTINGS.collector.replace(num_envs=4)
+    optimiser = SETTINGS.optimiser.replace(lr=1e-9)
+    settings = SETTINGS.replace(trainer=trainer, collector=collector, optimiser=optimiser)
     done = drone_rl.train(settings, folder=tmp_path / "run", progress=silent)
     assert done.reason == reason
     assert done.result.get("confirming_flights", 0) % 8 == 0

@@ -188,7 +188,7 @@ def test_finished_worlds_are_not_drawn(make_pipeline):
     env, actor = make_pipeline(4, task=SHORT)
     drawn = []
     render = env.base_env.worlds.render
-    env.base_env.worlds.render = lambda s, *view: drawn.append(len(s)) or render(s, *view)
+    env.base_env.worlds.render = lambda s, *view, **look: drawn.append(len(s)) or render(s, *view)
     batch = EpisodeCollector(env, actor).collect()
     assert sum(drawn) == len(batch)  # what was acted upon, and nothing else
 

@@ -38,6 +38,7 @@ def test_a_step_is_told_as_torchrl_tells_it():
         state = env.step(state.set("action", action))
         told, done = sight.tell(moved, reward)
         assert set(told) == {*KEPT, reason}
+        assert not (told["next", "terminated"] & told["next", "truncated"]).any()
         assert all(torch.equal(value, state[key]) for key, value in told.items())
         assert torch.equal(done, state["next", "done"]) and bool(done.all()) is (step == 4)
         state = state["next"]

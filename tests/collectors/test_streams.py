@@ -11,14 +11,14 @@ from drone_rl.collectors.sight import FLAGS
 from drone_rl.collectors.streams import StraightStream, TorchrlStream, find_stream
 from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, with_transforms
 from drone_rl.policies import SmallCNN, make_actor
-from drone_rl.sim.settings import PillarsSettings, TaskSettings
+from drone_rl.sim.settings import AppearanceSettings, PillarsSettings, TaskSettings
 
 SHORT = TaskSettings(num_cubes=2, first_distance=3.0, spacing=3.0, step_limit=12, front_margin=3.0)
 KEPT = [("next", name) for name in FLAGS]
 
 
-def collector(is_straight, task, keep=(("next", "info", "end_reason"),)):
-    env = with_transforms(DroneEnv(5, task), [GrayPixels(), StandardizePixels()])
+def collector(is_straight, task, keep=(("next", "info", "end_reason"),), look=None):
+    env = with_transforms(DroneEnv(5, task, appearance=look), [GrayPixels(), StandardizePixels()])
     generator = torch.Generator().manual_seed(0)
     shape = tuple(env.observation_spec["pixels"].shape[1:])
     network = SmallCNN(shape, 3, channels=(4,), hidden=(8,), generator=generator)
@@ -48,11 +48,12 @@ def test_both_streams_give_the_same_bit_for_bit(task):
 
 @pytest.mark.parametrize("saved", [True, False])
 @pytest.mark.parametrize("loaded", [True, False])
-def test_either_goes_on_with_what_the_other_left(saved, loaded):
-    first, drawn = collector(saved, SHORT)
+@pytest.mark.parametrize("look", [None, AppearanceSettings(fog_visibility=(5.0, 50.0))])
+def test_either_goes_on_with_what_the_other_left(saved, loaded, look):
+    first, drawn = collector(saved, SHORT, look=look)
     first.collect()
     state, stream = copy.deepcopy(first.state_dict()), drawn.get_state()
-    second, drawn = collector(loaded, SHORT)
+    second, drawn = collector(loaded, SHORT, look=look)
     second.load_state_dict(state)
     drawn.set_state(stream)
     check_same(second.collect(), first.collect())

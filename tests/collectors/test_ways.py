@@ -7,17 +7,21 @@ from torchrl.envs import CatFrames, RewardSum
 from drone_rl.collectors import EpisodeCollector
 from drone_rl.collectors.ways import StraightWay, TorchrlWay, find_way
 from drone_rl.envs import (
+    Blur,
     CropRows,
     DroneEnv,
     GrayPixels,
+    LateFrames,
+    Noise,
     StandardizePixels,
     with_transforms,
 )
 from drone_rl.policies import SmallCNN, make_actor
-from drone_rl.sim.settings import PillarsSettings, TaskSettings
+from drone_rl.sim.settings import AppearanceSettings, PillarsSettings, TaskSettings
 
 SHORT = TaskSettings(num_cubes=2, first_distance=3.0, spacing=3.0, step_limit=12, front_margin=3.0)
 KEPT = [("next", name) for name in ("reward", "done", "terminated", "truncated")]
+LOOK = AppearanceSettings(fog_visibility=(5.0, 50.0), ground_texture=("none", "grid"), shadows=0.5)
 REASON = ("next", "info", "end_reason")
 
 
@@ -25,8 +29,8 @@ def make_env(*transforms, task=SHORT, **kwargs):
     return with_transforms(DroneEnv(5, task, **kwargs), transforms)
 
 
-def collector(is_straight, task, keep=(REASON,), transforms=(GrayPixels, StandardizePixels)):
-    env = make_env(*(transform() for transform in transforms), task=task)
+def collector(is_straight, task, keep=(REASON,), look=None):
+    env = make_env(GrayPixels(), StandardizePixels(), task=task, appearance=look)
     generator = torch.Generator().manual_seed(0)
     shape = tuple(env.observation_spec["pixels"].shape[1:])
     network = SmallCNN(shape, 3, channels=(4,), hidden=(8,), generator=generator)
@@ -39,9 +43,10 @@ def collector(is_straight, task, keep=(REASON,), transforms=(GrayPixels, Standar
 
 @pytest.mark.parametrize("task", [SHORT, PillarsSettings(num_rows=1)])
 @pytest.mark.parametrize("worlds", [None, 3])
-def test_both_ways_give_the_same_bit_for_bit(task, worlds):
+@pytest.mark.parametrize("look", [None, LOOK])
+def test_both_ways_give_the_same_bit_for_bit(task, worlds, look):
     keep = (REASON, ("next", "info", "drone"))
-    ways = [collector(is_straight, task, keep) for is_straight in (True, False)]
+    ways = [collector(is_straight, task, keep, look) for is_straight in (True, False)]
     lengths = set()
     for _ in range(3):  # the streams of worlds and actions go on alike
         one, other = (way.collect(worlds) for way in ways)
@@ -58,6 +63,8 @@ def test_both_ways_give_the_same_bit_for_bit(task, worlds):
     [
         ([GrayPixels(), CatFrames(2, dim=-3, in_keys=["pixels"])], {}, ["pixels"], []),
         ([GrayPixels(), RewardSum()], {}, ["pixels"], []),
+        ([GrayPixels(), Noise(), StandardizePixels()], {}, ["pixels"], []),
+        ([GrayPixels(), LateFrames(), StandardizePixels()], {}, ["pixels"], []),
         ([GrayPixels(out_keys=["gray"])], {}, ["gray"], []),
         ([GrayPixels()], {}, ["pixels", ("info", "drone")], []),
         ([GrayPixels()], {}, ["pixels"], [("next", "pixels")]),
@@ -71,7 +78,7 @@ def test_where_something_is_in_the_way_steps_are_torchrls(transforms, options, o
 
 
 def test_maps_from_picture_to_picture_are_in_nobodys_way():
-    env = make_env(GrayPixels(), CropRows(5, 25), StandardizePixels())
+    env = make_env(GrayPixels(), CropRows(5, 25), Blur(), StandardizePixels())
     assert isinstance(find_way(env, ["pixels"], [*KEPT, REASON]), StraightWay)
     assert isinstance(find_way(env.base_env, ["pixels"], KEPT), TorchrlWay)
     env.close()

@@ -13,6 +13,7 @@ from drone_rl.utils.schema import (
     Real,
     Record,
     Several,
+    Span,
     Text,
     Whole,
     shown,
@@ -135,3 +136,13 @@ def test_what_is_shown_is_short_and_on_one_line():
     assert len(shown(10**400)) == 80
     assert shown([1]) == "(list)"
     assert shown(None) == "None"
+
+
+def test_a_span_is_a_value_or_two_in_order():
+    assert Span(Real(0.0)).read(3, "x") == 3.0
+    assert Span(Real(0.0)).read([1, 2], "x") == (1.0, 2.0)
+    assert Span(Several(Real(0.0), 2, 2)).read([3, 2], "x") == (3.0, 2.0)
+    assert Span(Several(Real(0.0), 2, 2)).read([[1, 2], [3, 2]], "x") == ((1.0, 2.0), (3.0, 2.0))
+    for kind, value in ((Real(0.0), [2, 1]), (Several(Real(0.0), 2, 2), [[1, 2], [3, 1]])):
+        with pytest.raises(InputError, match="x goes from 2 to 1, which is less"):
+            Span(kind).read(value, "x")

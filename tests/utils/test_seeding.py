@@ -10,6 +10,7 @@ from drone_rl.utils.seeding import (
     get_state,
     seed_sequence,
     set_state,
+    side_stream,
     torch_generator,
     world_random_state,
 )
@@ -46,6 +47,8 @@ def test_streams_have_the_numbers_on_which_all_figures_rest():
         "CRITIC_INIT": 6,
         "MINIBATCHES": 7,
         "CONFIRMATION": 8,
+        "SHIFTED": 9,
+        "SHIFTS": 10,
     }
     drawn = world_random_state(7, 2).uniform()
     child = np.random.SeedSequence(7, spawn_key=(Stream.WORLDS, 2))
@@ -106,3 +109,19 @@ def test_bad_seed_is_refused(seed):
 
 def test_numpy_integers_are_seeds():
     assert seed_sequence(np.int64(3)).entropy == 3
+
+
+def test_a_stream_beside_a_worlds_own_leaves_it_where_it_stands():
+    world = world_random_state(3, 1)
+    before = get_state(world)
+    drawn = side_stream(world, 5).random(4)
+    assert get_state(world) == before
+    assert np.array_equal(side_stream(world, 5).random(4), drawn)
+    other = world_random_state(0, 0)
+    set_state(other, before)
+    assert np.array_equal(side_stream(other, 5).random(4), drawn)
+    world.uniform()
+    others = [side_stream(s, *k) for s, k in [(world, (5,)), (other, (6,)), (other, (5, 0))]]
+    assert not any(np.isin(stream.random(4), drawn).any() for stream in others)
+    child = np.random.SeedSequence([before["state"], before["inc"]], spawn_key=(5,))
+    assert np.array_equal(np.random.Generator(np.random.PCG64(child)).random(4), drawn)

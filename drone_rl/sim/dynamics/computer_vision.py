@@ -24,7 +24,8 @@ class ComputerVision:
             step_length: Metres.
         """
         self.step_length = step_length
-        self._moves = torch.tensor(DIRECTIONS, dtype=torch.float64) * step_length
+        self.moves = torch.tensor(DIRECTIONS, dtype=torch.float64) * step_length
+        """Metres, world frame. Shape: (number of actions, 3), float64."""
 
     def start(self, position: Tensor) -> BodyState:
         """Drones that are level and at rest."""
@@ -32,5 +33,5 @@ class ComputerVision:
 
     def step(self, body: BodyState, action: Tensor) -> BodyState:
         """The same drones a move farther on."""
-        moves = self._moves.to(action.device)
+        moves = self.moves.to(action.device)
         return dataclasses.replace(body, position=body.position + moves[action])

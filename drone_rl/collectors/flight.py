@@ -1,0 +1,237 @@
+# pyright: reportAttributeAccessIssue=false
+# pyright: reportGeneralTypeIssues=false
+# pyright: reportCallIssue=false
+# (Warp's structures are untyped, and torch's modules hold anything.)
+"""Complete episodes flown by one kernel, with no Python between their steps.
+
+Where Python takes each step, it takes most of the time: a small network is asked about a picture in
+ten microseconds, and a picture drawn in as many.
+"""
+
+from collections.abc import Mapping
+from typing import Any, Self
+
+import torch
+import warp as wp
+from tensordict import TensorDict, TensorDictBase
+from tensordict.nn import TensorDictModuleBase
+from torch import Tensor
+from torchrl.envs.utils import ExplorationType, exploration_type
+
+from drone_rl.collectors import flight_kernel
+from drone_rl.collectors.sight import Entries, Sight
+from drone_rl.envs.transforms import StandardizePixels
+from drone_rl.policies.actor import CategoricalActor
+from drone_rl.policies.packing import PackedNetwork
+from drone_rl.sim.rendering.crew import Crew
+from drone_rl.sim.rendering.raytrace import Raytracer
+from drone_rl.sim.rendering.raytrace_structs import Pictures
+from drone_rl.sim.tasks.collect_cubes.flying import FlyingCubes
+
+_LONGEST = 64
+"""Steps that are flown at a time; most episodes end within them."""
+_MOST_NUMBERS = 2**23
+"""Of the pictures that are flown through at a time."""
+
+
+class Flight:
+    """Flies the policy of an actor in the worlds of an environment."""
+
+    def __init__(
+        self,
+        sight: Sight,
+        actor: CategoricalActor,
+        network: PackedNetwork,
+        worlds: FlyingCubes,
+        num_cores: int,
+    ) -> None:
+        """Makes what the kernel needs; see `find`."""
+        self._sight, self._actor, self._network, self._worlds = sight, actor, network, worlds
+        count, view = sight.worlds.num_worlds, sight.view
+        self._crew = Crew(count, num_cores)
+        tools = sight.worlds.renderer.tools(view, self._crew.size)
+        self._eye = flight_kernel.Eye()
+        self._eye.view, self._eye.geoms, self._eye.looks, self._eye.desk = tools
+        self._eye.mean, self._eye.deviation = _standard(sight)
+        self._rooms = wp.empty((self._crew.size, network.room), dtype=float, device="cpu")
+        pixels = view.height * view.width
+        self._length = max(1, min(_LONGEST, _MOST_NUMBERS // (count * pixels)))
+        rows = count * self._length
+        self._pictures = torch.empty(rows, 1, view.height, view.width)
+        self._logits = torch.empty(rows, len(sight.worlds.dynamics.actions.names))
+        self._actions, self._reasons = (torch.empty(rows, dtype=torch.int32) for _ in range(2))
+        self._rewards = torch.empty(rows)
+        self._log = self._make_log()
+        wp.load_module(flight_kernel, device="cpu")
+
+    @classmethod
+    def find(cls, sight: Sight | None, actor: TensorDictModuleBase, num_cores: int) -> Self | None:
+        """The same, where task, pictures, network and renderer are such as the kernel knows.
+
+        Args:
+            sight: Of the environment, if it has one.
+            actor: The policy.
+            num_cores: Shares of the worlds, each on a thread; no result depends on it.
+        """
+        if sight is None or type(actor) is not CategoricalActor:
+            return None
+        worlds, renderer = sight.worlds, sight.worlds.renderer
+        parts: Any = actor.module
+        is_drawn = type(renderer) is Raytracer and renderer.device.type == "cpu"
+        if not is_drawn or sight.view.modalities != ("gray",) or _standard(sight) is None:
+            return None
+        if worlds.appearance is not None:
+            return None
+        network = PackedNetwork.find(parts[0].module, flight_kernel.TOGETHER)
+        flown = FlyingCubes.find(worlds.task, worlds.dynamics, worlds.num_worlds)
+        if network is None or flown is None:
+            return None
+        return cls(sight, actor, network, flown, num_cores)
+
+    def can_act(self) -> bool:
+        """Whether actions shall be drawn, or the most probable be taken."""
+        return _how(self._actor) in (ExplorationType.RANDOM, ExplorationType.DETERMINISTIC)
+
+    def fly(self, num_worlds: int, keep_observations: bool = True) -> TensorDictBase:
+        """Runs an episode in the first worlds; the environment's stay as they were at the start.
+
+        Args:
+            num_worlds: How many.
+            keep_observations: Whether to return "pixels" and "logits".
+
+        Returns:
+            Episode after episode: what was seen, "action", what `Sight.tell` tells, and
+            ("collector", "traj_ids"), from 0. Shape: (T_total,).
+        """
+        self._sight.env.start()
+        state: Any = self._sight.worlds.state
+        self._worlds.begin(state)
+        self._network.update()
+        taken, reasons = self._worlds.steps[:num_worlds], self._worlds.end_reasons[:num_worlds]
+        parts = []
+        while not (parts and bool(reasons.all())):
+            before = taken.clone()
+            self._go_on(num_worlds)
+            parts.append(self._read(taken - before, keep_observations))
+        world, logged = _join(parts)
+        told = self._told(logged) if self._sight.is_brief else self._replayed(world, logged)
+        batch = TensorDict({}, [len(world)])
+        for key in ("pixels", "logits", "action"):
+            if key in logged:
+                batch.set(key, logged[key])
+        for key, value in told.items():
+            batch.set(key, value)
+        return batch.set(("collector", "traj_ids"), world)
+
+    def close(self) -> None:
+        """Ends the threads."""
+        self._crew.close()
+
+    def _go_on(self, num_worlds: int) -> None:
+        draws = torch.full((num_worlds, self._length), -1.0)
+        if _how(self._actor) == ExplorationType.RANDOM:
+            draws.uniform_(generator=_generator(self._actor))
+        given = [
+            self._eye,
+            self._network.layers,
+            self._rooms,
+            self._worlds.flights,
+            self._worlds.poses,
+            wp.from_torch(draws),
+            self._log,
+        ]
+
+        def work(member: int, first: int, last: int) -> None:
+            inputs = [first, last, member, *given]
+            wp.launch(flight_kernel.fly, 1, inputs=inputs, device="cpu")
+
+        self._crew.share_out(0, num_worlds, work)
+
+    def _read(self, lengths: Tensor, keep_observations: bool) -> "_Part":
+        """What was written down of steps, world after world.
+
+        Args:
+            lengths: Steps of each world. Shape: (num_worlds,).
+            keep_observations: Whether to read what was seen.
+        """
+        is_step = torch.arange(self._length) < lengths[:, None]
+        rows = is_step.flatten().nonzero()[:, 0]
+        read = {"action": self._actions, "reward": self._rewards, "end_reason": self._reasons}
+        if keep_observations:
+            read |= {"pixels": self._pictures, "logits": self._logits}
+        logged = {name: values.index_select(0, rows) for name, values in read.items()}
+        logged["action"] = logged["action"].long()
+        return rows // self._length, logged
+
+    def _told(self, logged: Mapping[str, Tensor]) -> Entries:
+        """What is told of steps of which nothing is asked but what the kernel wrote down."""
+        reason = logged["end_reason"].long()[:, None]
+        done, truncated = reason != 0, reason == self._sight.worlds.task.truncation
+        return {
+            ("next", "reward"): logged["reward"][:, None],
+            ("next", "done"): done,
+            ("next", "terminated"): done & ~truncated,
+            ("next", "truncated"): truncated,
+            ("next", "info", "end_reason"): reason,
+        }
+
+    def _replayed(self, world: Tensor, logged: Mapping[str, Tensor]) -> Entries:
+        """What is told of steps, by the rules that know everything: nothing is drawn again."""
+        worlds = self._sight.worlds
+        lengths = world.bincount()
+        first = lengths.cumsum(0) - lengths
+        state, going, entries = worlds.state, torch.arange(len(lengths)), Entries()
+        state = state if len(state) == len(going) else state[going]
+        for step in range(int(lengths.max())):
+            is_on = lengths[going] > step
+            if not bool(is_on.all()):
+                state, going = state[is_on], going[is_on]
+            rows = first[going] + step
+            state, reward = worlds.advance(state, logged["action"][rows])
+            for key, value in self._sight.tell(state, reward)[0].items():
+                if step == 0:
+                    entries[key] = value.new_empty(len(world), *value.shape[1:])
+                entries[key].index_copy_(0, rows, value)
+        return entries
+
+    def _make_log(self) -> flight_kernel.Log:
+        log, pictures = flight_kernel.Log(), Pictures()
+        pictures.gray = wp.from_torch(self._pictures.flatten(1))
+        log.pictures, log.logits = pictures, wp.from_torch(self._logits)
+        log.actions, log.rewards = wp.from_torch(self._actions), wp.from_torch(self._rewards)
+        log.end_reasons = wp.from_torch(self._reasons)
+        return log
+
+
+_Part = tuple[Tensor, dict[str, Tensor]]
+"""Worlds of steps, in order, and what was written down of these."""
+
+
+def _join(parts: list[_Part]) -> _Part:
+    """Parts of the same episodes, in order, to episode after episode."""
+    if len(parts) == 1:
+        return parts[0]
+    world = torch.cat([worlds for worlds, _ in parts])
+    order = world.argsort(stable=True)
+    names = parts[0][1]
+    return world[order], {n: torch.cat([part[n] for _, part in parts])[order] for n in names}
+
+
+def _standard(sight: Sight) -> tuple[float, float] | None:
+    """Mean and deviation by which gray pictures are standardised, if nothing else is done."""
+    after = sight.after
+    if not after:
+        return 0.0, 1.0
+    is_known = len(after) == 1 and type(after[0]) is StandardizePixels
+    return (after[0].mean, after[0].std) if is_known else None
+
+
+def _how(actor: CategoricalActor) -> ExplorationType | None:
+    head: Any = actor.module
+    return exploration_type() or head[1].default_interaction_type
+
+
+def _generator(actor: CategoricalActor) -> torch.Generator | None:
+    head: Any = actor.module
+    source = head[1].distribution_kwargs["source"]
+    return None if source is None else source.generator
