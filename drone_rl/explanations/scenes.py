@@ -9,6 +9,7 @@ from torch.nn import functional
 from torchrl.envs import CatFrames, Transform, TransformedEnv
 
 from drone_rl.envs import CropRows, RgbPixels, worlds_of
+from drone_rl.envs.pipeline import memory_of, see_film
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.tasks import State
 
@@ -39,8 +40,7 @@ class Scenes:
         self._transforms = [t for t in pipeline if "pixels" in (t.in_keys or [])]
         self.is_color: bool = any(isinstance(t, RgbPixels) for t in self._transforms)
         """Whether the channels of what the policy gets are red, green and blue."""
-        stacks = [t.N for t in self._transforms if isinstance(t, CatFrames)]
-        self.memory: int = max(stacks, default=1) - 1
+        self.memory: int = memory_of(self._transforms)
         """Pictures before the present one that the policy gets."""
 
     def frames(self, state: State, appearance: Appearance | None = None) -> Tensor:
@@ -61,15 +61,7 @@ class Scenes:
         Returns:
             Shape: (T, C, h, w).
         """
-        film = [*earlier, frames]
-        for transform in self._transforms:
-            if isinstance(transform, CatFrames):
-                shown = film[-transform.N :]
-                shown = shown[:1] * (transform.N - len(shown)) + shown
-                film = [torch.cat(shown, dim=transform.dim)]
-            else:
-                film = [transform._apply_transform(pixels) for pixels in film]
-        return film[-1]
+        return see_film(self._transforms, [*earlier, frames])
 
     def to_frame(self, maps: Tensor) -> Tensor:
         """Heat maps over what the policy gets, put back to where that is in the camera's frame.

@@ -1,6 +1,6 @@
 """Pictures of worlds: what is asked for, how things look, and who draws them."""
 
-from drone_rl.sim.rendering.appearance import Appearance
+from drone_rl.sim.rendering.appearance import Appearance, Texture
 from drone_rl.sim.rendering.devices import check_device
 from drone_rl.sim.rendering.named import find_renderer
 from drone_rl.sim.rendering.raytrace import Raytracer
@@ -15,6 +15,7 @@ __all__ = [
     "Raytracer",
     "Renderer",
     "Scene",
+    "Texture",
     "View",
     "check_device",
     "find_renderer",

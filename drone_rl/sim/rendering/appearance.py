@@ -1,4 +1,4 @@
-"""How things look: colours and light, which may differ from world to world within one call."""
+"""How things look: colours, light, textures and air, which may differ from world to world."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -13,6 +13,21 @@ Color = tuple[float, float, float]
 """Red, green, blue, from 0 to 1."""
 Several = Color | Tensor
 """One for all worlds, or one for each: shape (num_worlds, 3)."""
+Numbers = float | Tensor
+"""One for all worlds, or one for each: shape (num_worlds,)."""
+_LIGHTS = ("ambient", "sun", "sun_direction")
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Texture:
+    """A picture that covers things, tile by tile; its colours are multiplied by theirs."""
+
+    pictures: tuple[str, ...]
+    """Names or files, see `textures.load`: all of those that worlds choose from."""
+    size: Numbers
+    """Edge of a tile, metres."""
+    choice: Numbers = 0
+    """Which of the pictures, a whole number; -1 for none."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -27,6 +42,24 @@ class Appearance:
     """Light of the sun."""
     sun_direction: Several | None = None
     """Where its light goes, world frame; need not be of length 1."""
+    zenith: Several | None = None
+    """Colour of the sky overhead; the sky's own is then that at the horizon, and between them it
+    goes with the sine of the elevation."""
+    fog: Numbers | None = None
+    """Visibility in metres: at this distance 95% of a thing's contrast to the horizon is lost
+    (meteorological optical range, WMO-No. 8). Infinite for clear air."""
+    shadows: Numbers | None = None
+    """Whether solids keep the sun from what is behind them: 1 or 0."""
+    exposure: Numbers | None = None
+    """The camera multiplies all colours by it before it cuts them off at white."""
+    textures: Mapping[Meaning, Texture] = dataclasses.field(default_factory=dict)
+    """Of things with a meaning, but for the sky."""
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether every face of a thing, and the whole sky, has one colour."""
+        is_shaded = bool(torch.as_tensor(0 if self.shadows is None else self.shadows).any())
+        return self.zenith is None and self.fog is None and not is_shaded and not self.textures
 
     def lights(self, num_worlds: int) -> dict[str, Tensor]:
         """Those that are given, of each world, by name; directions have length 1.
@@ -37,18 +70,26 @@ class Appearance:
         Returns:
             Shapes: (num_worlds, 3), float64.
         """
-        names = ("ambient", "sun", "sun_direction")
-        given = {name: getattr(self, name) for name in names}
+        given = {name: getattr(self, name) for name in _LIGHTS}
         lights = {name: each(v, num_worlds) for name, v in given.items() if v is not None}
         if "sun_direction" in lights:
             direction = lights["sun_direction"]
             lights["sun_direction"] = direction / direction.norm(dim=-1, keepdim=True)
         return lights
 
-    def __getitem__(self, worlds: slice) -> "Appearance":
+    def over(self, other: "Appearance | None") -> "Appearance":
+        """The same, with what it does not give taken from another."""
+        if other is None:
+            return self
+        own = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
+        given = {name: value for name, value in own.items() if value is not None}
+        for name in ("colors", "textures"):
+            given[name] = {**getattr(other, name), **own[name]}
+        return dataclasses.replace(other, **given)
+
+    def __getitem__(self, worlds: slice | Tensor) -> "Appearance":
         """Returns that of some worlds."""
-        cut = {f.name: _cut(getattr(self, f.name), worlds) for f in dataclasses.fields(self)}
-        return Appearance(**cut)
+        return _cut(self, worlds)
 
 
 def each(value: Several, num_worlds: int) -> Tensor:
@@ -56,7 +97,20 @@ def each(value: Several, num_worlds: int) -> Tensor:
     return torch.as_tensor(value, dtype=torch.float64).expand(num_worlds, 3)
 
 
-def _cut(value: Any, worlds: slice) -> Any:
+def each_number(value: Numbers, num_worlds: int) -> Tensor:
+    """The same of numbers. Shape: (num_worlds,), float64."""
+    return torch.as_tensor(value, dtype=torch.float64).expand(num_worlds)
+
+
+_NUMBERS = frozenset({"fog", "shadows", "exposure", "size", "choice"})
+
+
+def _cut(value: Any, worlds: slice | Tensor, shared: int = 1) -> Any:
+    """What some worlds have of anything; a tensor of at most so many dimensions is for all."""
     if isinstance(value, Mapping):
-        return {meaning: _cut(color, worlds) for meaning, color in value.items()}
-    return value[worlds] if isinstance(value, Tensor) and value.dim() > 1 else value
+        return {meaning: _cut(of, worlds) for meaning, of in value.items()}
+    if isinstance(value, Appearance | Texture):
+        names = (field.name for field in dataclasses.fields(value))
+        cut = {n: _cut(getattr(value, n), worlds, 0 if n in _NUMBERS else 1) for n in names}
+        return type(value)(**cut)
+    return value[worlds] if isinstance(value, Tensor) and value.dim() > shared else value

@@ -10,16 +10,18 @@ under distant lights: the same pictures, twenty times as fast.
 
 from collections.abc import Mapping
 from types import MappingProxyType
+from typing import NamedTuple
 
 import torch
 import warp as wp
 from torch import Tensor
 
+from drone_rl.sim.rendering import raytrace_kernel
 from drone_rl.sim.rendering import raytrace_structs as structs
 from drone_rl.sim.rendering.appearance import Appearance
 from drone_rl.sim.rendering.devices import on_torch_stream, start_warp
 from drone_rl.sim.rendering.raytrace_looks import Looks
-from drone_rl.sim.rendering.raytrace_painters import CorePainter, GpuPainter
+from drone_rl.sim.rendering.raytrace_painters import CorePainter, GpuPainter, make_desk
 from drone_rl.sim.rendering.raytrace_places import Places
 from drone_rl.sim.rendering.raytrace_scene import Frames, check_scene, make_geoms, make_view
 from drone_rl.sim.rendering.renderer import Poses
@@ -74,14 +76,8 @@ class Raytracer:
             InputError: The scene has no such camera, or a modality is unknown.
         """
         if view not in self._views:
-            view.check_modalities(self, _BITS)
-            where = str(self.device)
-            with on_torch_stream(self.device):
-                made = make_view(self.scene, self._frames, view, where)
-                geoms = make_geoms(self.scene, self._frames, view.show_drone, where)
-            made.what = sum({_BITS[modality] for modality in view.modalities})
             self._painter.load()
-            self._views[view] = (made, geoms)
+            self._views[view] = self._make(view)
 
     def render(
         self, view: View, poses: Poses, appearance: Appearance | None = None
@@ -91,15 +87,48 @@ class Raytracer:
         made, geoms = self._views[view]
         pictures = view.new_pictures(len(poses), self.device)
         with on_torch_stream(self.device):
-            looks = self._looks.of(appearance, len(poses))
+            looks, scenery = self._looks.of(appearance, len(poses))
             count = len(poses) * len(view.cameras)
             there = self._places.of(poses)
-            self._painter.paint(count, made, geoms, there, looks, _pictures(pictures))
+            drawn = _pictures(pictures)
+            self._painter.paint(count, made, geoms, there, looks, drawn, scenery)
         return pictures
+
+    def tools(self, view: View, num_workers: int) -> "Tools":
+        """What a kernel of somebody else's draws with, as `raytrace_kernel.draw_picture` takes it.
+
+        Args:
+            view: That will be drawn, as the model looks.
+            num_workers: At the same time.
+
+        Raises:
+            InputError: See `prepare`.
+        """
+        made, geoms = self._make(view)
+        desk = make_desk(num_workers, view.height * view.width, len(geoms.kind))
+        return Tools(made, geoms, self._looks.of(None, 1)[0], desk)
 
     def close(self) -> None:
         """Ends the threads."""
         self._painter.close()
+
+    def _make(self, view: View) -> tuple[structs.View, structs.Geoms]:
+        view.check_modalities(self, _BITS)
+        where = str(self.device)
+        with on_torch_stream(self.device):
+            made = make_view(self.scene, self._frames, view, where)
+            geoms = make_geoms(self.scene, self._frames, view.show_drone, where)
+        made.what = sum({_BITS[modality] for modality in view.modalities})
+        return made, geoms
+
+
+class Tools(NamedTuple):
+    """What draws one view on a CPU."""
+
+    view: structs.View
+    geoms: structs.Geoms
+    looks: structs.Looks
+    desk: raytrace_kernel.Desk
 
 
 def _pictures(pictures: Mapping[Modality, Tensor]) -> structs.Pictures:

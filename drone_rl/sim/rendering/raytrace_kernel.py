@@ -37,9 +37,9 @@ from drone_rl.sim.rendering.raytrace_solids import (
 from drone_rl.sim.rendering.raytrace_structs import Geoms, Looks, Pictures, Poses, Sight, View
 from drone_rl.sim.rendering.raytrace_surface import put_run, show_geom, show_sky
 
-_FACES = wp.constant(8)
+FACES = wp.constant(8)
 """Room for the faces of a geom."""
-_NOTHING = wp.constant(-1)
+NOTHING = wp.constant(-1)
 """Owner of the sky."""
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
@@ -52,7 +52,11 @@ class Desk:
     nearest: wp.array2d[float]
     """How far along its ray the nearest surface is, one a pixel."""
     owner: wp.array2d[int]
-    """Whose that is: `_FACES` times the geom's place among those drawn, and the face."""
+    """Whose that is: `FACES` times the geom's place among those drawn, and the face."""
+    dark: wp.array2d[int]
+    """Whether that is in shadow, where there may be any."""
+    colors: wp.array2d[wp.vec3ub]
+    """What is seen, where it is not the same for many pixels."""
     sights: wp.array2d[Sight]
     """One a geom."""
 
@@ -67,7 +71,7 @@ def _find_plane(
     owner: wp.array[int],
 ) -> None:
     """In the rows that end below its horizon; what both ends of a row show lies between, too."""
-    mark = geom * _FACES + UPPER
+    mark = geom * FACES + UPPER
     start = int(0)
     while start < view.height * view.width:
         end = start + view.width
@@ -117,7 +121,7 @@ def _find_solid(
             along, face = enter(sight.kind, sight.size, sight.eye, sight.into @ ray)
             if is_nearest(along, nearest[pixel], -ray[2], view.far):
                 nearest[pixel] = along
-                owner[pixel] = geom * _FACES + face
+                owner[pixel] = geom * FACES + face
             pixel += 1
         row += 1
 
@@ -141,20 +145,74 @@ def _show(
     while start < count:
         owner = owners[start]
         end = start + 1
-        if owner == _NOTHING or owner % _FACES != ROUND:
+        if owner == NOTHING or owner % FACES != ROUND:
             while end < count and owners[end] == owner:
                 end += 1
         shown = show_sky(looks, world)
-        if owner == _NOTHING:
+        if owner == NOTHING:
             fill_floats(nearest, start, end, 0.0)
         else:
-            sight = sights[owner // _FACES]
+            sight = sights[owner // FACES]
             into = sight.into @ rays[start]
-            face = owner % _FACES
+            face = owner % FACES
             normal = outward(sight.kind, sight.size, face, sight.eye, into, nearest[start])
             shown = show_geom(looks, world, sight.number, sight.axes @ normal)
         put_run(pictures, view.what, row, start, end, shown, nearest, cosines)
         start = end
+
+
+@wp.func
+def find(
+    view: View, camera: int, geoms: Geoms, poses: Poses, world: int, desk: Desk, member: int
+) -> None:
+    """Finds out what is where, and leaves it on the desk; see `draw_picture`."""
+    nearest = desk.nearest[member]
+    owner = desk.owner[member]
+    sights = desk.sights[member]
+    rays = view.rays[camera]
+    fill_floats(nearest, 0, view.height * view.width, FAR_AWAY)
+    fill_ints(owner, 0, view.height * view.width, NOTHING)
+    for geom in range(geoms.kind.shape[0]):
+        sight = look_at(geoms, geom, poses, world, view.cameras[camera])
+        sights[geom] = sight
+        if sight.kind == PLANE:
+            _find_plane(view, rays, sight, geom, nearest, owner)
+        else:
+            part = around(view, view.cameras[camera], sight)
+            _find_solid(view, part, rays, sight, geom, nearest, owner)
+
+
+@wp.func
+def draw_picture(
+    view: View,
+    camera: int,
+    geoms: Geoms,
+    poses: Poses,
+    world: int,
+    looks: Looks,
+    desk: Desk,
+    member: int,
+    pictures: Pictures,
+    row: int,
+) -> None:
+    """Draws one camera's picture of a world.
+
+    Args:
+        view: What is asked for.
+        camera: Which of its cameras.
+        geoms: What is drawn.
+        poses: Where it is.
+        world: Which of these.
+        looks: Colours and light.
+        desk: To work at.
+        member: Which of its places to work at.
+        pictures: To draw into.
+        row: Which of these.
+    """
+    find(view, camera, geoms, poses, world, desk, member)
+    nearest, owner = desk.nearest[member], desk.owner[member]
+    rays, cosines = view.rays[camera], view.cosines[camera]
+    _show(view, rays, cosines, looks, world, row, desk.sights[member], nearest, owner, pictures)
 
 
 @wp.kernel
@@ -182,22 +240,7 @@ def draw(
         desk: To work at.
         pictures: To draw into.
     """
-    nearest = desk.nearest[member]
-    owner = desk.owner[member]
-    sights = desk.sights[member]
     for row in range(first, last):
         world = row // view.cameras.shape[0]
-        camera = view.cameras[row % view.cameras.shape[0]]
-        rays = view.rays[row % view.cameras.shape[0]]
-        cosines = view.cosines[row % view.cameras.shape[0]]
-        fill_floats(nearest, 0, view.height * view.width, FAR_AWAY)
-        fill_ints(owner, 0, view.height * view.width, _NOTHING)
-        for geom in range(geoms.kind.shape[0]):
-            sight = look_at(geoms, geom, poses, world, camera)
-            sights[geom] = sight
-            if sight.kind == PLANE:
-                _find_plane(view, rays, sight, geom, nearest, owner)
-            else:
-                part = around(view, camera, sight)
-                _find_solid(view, part, rays, sight, geom, nearest, owner)
-        _show(view, rays, cosines, looks, world, row, sights, nearest, owner, pictures)
+        camera = row % view.cameras.shape[0]
+        draw_picture(view, camera, geoms, poses, world, looks, desk, member, pictures, row)

@@ -7,7 +7,12 @@
 
 import warp as wp
 
-from drone_rl.sim.rendering import raytrace_kernel, raytrace_pixels
+from drone_rl.sim.rendering import (
+    raytrace_kernel,
+    raytrace_pixels,
+    raytrace_scenic,
+    raytrace_scenic_pixels,
+)
 from drone_rl.sim.rendering import raytrace_structs as structs
 from drone_rl.sim.rendering.crew import Crew
 
@@ -18,6 +23,7 @@ class CorePainter:
     def __init__(self, num_worlds: int, num_shards: int | None) -> None:
         """Starts the threads; see `Raytracer`."""
         self._crew = Crew(num_worlds, num_shards)
+        self._is_scenic = False
         self._desks: dict[tuple[int, int], raytrace_kernel.Desk] = {}
 
     def load(self) -> None:
@@ -32,6 +38,7 @@ class CorePainter:
         poses: structs.Poses,
         looks: structs.Looks,
         pictures: structs.Pictures,
+        scenery: "structs.Scenery | None" = None,
     ) -> None:
         """Draws pictures.
 
@@ -42,29 +49,28 @@ class CorePainter:
             poses: Where it is.
             looks: Colours and light.
             pictures: To draw into.
+            scenery: What there is besides, if anything.
         """
         size = (view.height * view.width, len(geoms.kind))
         if size not in self._desks:
-            self._desks[size] = self._desk(*size)
+            self._desks[size] = make_desk(self._crew.size, *size)
         desk = self._desks[size]
-        given = [view, geoms, poses, looks, desk, pictures]
+        plain = scenery is None
+        draw = raytrace_kernel.draw if plain else raytrace_scenic.draw_scenic
+        if not (plain or self._is_scenic):
+            wp.load_module(raytrace_scenic, device="cpu")  # not by several threads at a time
+            self._is_scenic = True
+        given = [view, geoms, poses, looks, *([] if plain else [scenery]), desk, pictures]
 
         def work(member: int, first: int, last: int) -> None:
             inputs = [first, last, member, *given]
-            wp.launch(raytrace_kernel.draw, 1, inputs=inputs, device="cpu")
+            wp.launch(draw, 1, inputs=inputs, device="cpu")
 
         self._crew.share_out(0, count, work)
 
     def close(self) -> None:
         """Ends the threads."""
         self._crew.close()
-
-    def _desk(self, pixels: int, geoms: int) -> raytrace_kernel.Desk:
-        desk, size = raytrace_kernel.Desk(), self._crew.size
-        desk.nearest = wp.empty((size, pixels), dtype=float, device="cpu")
-        desk.owner = wp.empty((size, pixels), dtype=int, device="cpu")
-        desk.sights = wp.empty((size, geoms), dtype=structs.Sight, device="cpu")
-        return desk
 
 
 class GpuPainter:
@@ -86,15 +92,39 @@ class GpuPainter:
         poses: structs.Poses,
         looks: structs.Looks,
         pictures: structs.Pictures,
+        scenery: "structs.Scenery | None" = None,
     ) -> None:
         """See `CorePainter`."""
-        size = (count, len(geoms.kind))
-        sights = wp.empty(size, dtype=structs.Sight, device=self._device)
+        pixels = view.height * view.width
+        sights = wp.empty((count, len(geoms.kind)), dtype=structs.Sight, device=self._device)
         aimed = [view, geoms, poses, sights]
-        wp.launch(raytrace_pixels.aim, size, inputs=aimed, device=self._device)
-        drawn = [view, sights, looks, pictures]
-        size = (count, view.height * view.width)
-        wp.launch(raytrace_pixels.draw_pixels, size, inputs=drawn, device=self._device)
+        wp.launch(raytrace_pixels.aim, sights.shape, inputs=aimed, device=self._device)
+        if scenery is None:
+            draw, drawn = raytrace_pixels.draw_pixels, [view, sights, looks, pictures]
+        else:
+            desk = make_desk(count, pixels, 1, self._device)
+            draw = raytrace_scenic_pixels.draw_scenic_pixels
+            drawn = [view, poses, sights, looks, scenery, desk, pictures]
+        wp.launch(draw, (count, pixels), inputs=drawn, device=self._device)
 
     def close(self) -> None:
         """Ends nothing: there are no threads."""
+
+
+def make_desk(
+    num_workers: int, pixels: int, geoms: int, device: str = "cpu"
+) -> raytrace_kernel.Desk:
+    """Room to work.
+
+    Args:
+        num_workers: At the same time, a picture each.
+        pixels: Of a picture.
+        geoms: That are drawn.
+        device: Where.
+    """
+    desk, size = raytrace_kernel.Desk(), (num_workers, pixels)
+    desk.nearest = wp.empty(size, dtype=float, device=device)
+    desk.owner, desk.dark = (wp.empty(size, dtype=int, device=device) for _ in range(2))
+    desk.colors = wp.empty(size, dtype=wp.vec3ub, device=device)
+    desk.sights = wp.empty((num_workers, geoms), dtype=structs.Sight, device=device)
+    return desk

@@ -44,6 +44,28 @@ def aim(view: View, geoms: Geoms, poses: Poses, sights: wp.array2d[Sight]) -> No
     sights[row, geom] = look_at(geoms, geom, poses, row // view.cameras.shape[0], camera)
 
 
+@wp.func
+def find_nearest(view: View, sights: wp.array[Sight], ray: wp.vec3) -> tuple[float, int, int]:
+    """What a ray meets first: how far along it, which geom, -1 for none, and which of its faces."""
+    nearest = float(FAR_AWAY)
+    owner = int(-1)
+    face = int(0)
+    for geom in range(sights.shape[0]):
+        sight = sights[geom]
+        into = sight.into @ ray
+        along = float(-1.0)
+        found = int(UPPER)
+        if sight.kind == PLANE:
+            along = meet_plane(sight.size, sight.eye, into)
+        else:
+            along, found = enter(sight.kind, sight.size, sight.eye, into)
+        if is_nearest(along, nearest, -ray[2], view.far):
+            nearest = along
+            owner = geom
+            face = found
+    return nearest, owner, face
+
+
 @wp.kernel
 def draw_pixels(view: View, sights: wp.array2d[Sight], looks: Looks, pictures: Pictures) -> None:
     """Draws pixels. Launch it with a dimension of pictures and of pixels.
@@ -57,22 +79,7 @@ def draw_pixels(view: View, sights: wp.array2d[Sight], looks: Looks, pictures: P
     row, pixel = wp.tid()
     world = row // view.cameras.shape[0]
     ray = view.rays[row % view.cameras.shape[0], pixel]
-    nearest = float(FAR_AWAY)
-    owner = int(-1)
-    face = int(0)
-    for geom in range(sights.shape[1]):
-        sight = sights[row, geom]
-        into = sight.into @ ray
-        along = float(-1.0)
-        found = int(UPPER)
-        if sight.kind == PLANE:
-            along = meet_plane(sight.size, sight.eye, into)
-        else:
-            along, found = enter(sight.kind, sight.size, sight.eye, into)
-        if is_nearest(along, nearest, -ray[2], view.far):
-            nearest = along
-            owner = geom
-            face = found
+    nearest, owner, face = find_nearest(view, sights[row], ray)
     if owner < 0:
         put_pixel(pictures, view.what, row, pixel, show_sky(looks, world), 0.0, -ray[2])
     else:

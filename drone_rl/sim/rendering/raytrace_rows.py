@@ -81,3 +81,31 @@ def meet_level(
         mark: For the owner.
     """
     ...
+
+
+@wp.func_native("""
+#pragma clang fp contract(off)
+for (int i = first; i < last; ++i) {
+    const wp::vec_t<3, unsigned char> color = colors.data[i];
+    const float two = (float)((double)((float)color[0] * red) + (double)color[1] * (double)green);
+    gray.data[i] = (float)((double)two + (double)((float)color[2] * blue));
+}""")
+def mix_gray(
+    gray: wp.array[float],
+    first: int,
+    last: int,
+    colors: wp.array[wp.vec3ub],
+    red: float,
+    green: float,
+    blue: float,
+) -> None:
+    """Gray of colours by weights, each sum rounded as by torch on x86."""
+    ...
+
+
+@wp.func_native("for (int i = first; i < last; ++i) values.data[i] = given.data[i];")
+def copy_colors(
+    values: wp.array[wp.vec3ub], first: int, last: int, given: wp.array[wp.vec3ub]
+) -> None:
+    """Writes the colours of others."""
+    ...

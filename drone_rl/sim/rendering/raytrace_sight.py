@@ -12,10 +12,10 @@
 
 import warp as wp
 
+from drone_rl.sim.rendering.raytrace_solids import FAR_AWAY
 from drone_rl.sim.rendering.raytrace_structs import DRONE_FRAME, Camera, Geoms, Poses, Sight, View
 
-_FAR_AWAY = wp.constant(1e10)
-_IN_FRONT = wp.constant(1e-3)
+IN_FRONT = wp.constant(1e-3)
 """Metres before the camera from which corners are projected."""
 
 
@@ -41,14 +41,21 @@ def look_at(geoms: Geoms, geom: int, poses: Poses, world: int, camera: Camera) -
 
 
 @wp.func
+def upward(camera: Camera, poses: Poses, world: int) -> wp.vec3:
+    """What a ray of a camera is multiplied by to find how far it goes up."""
+    turned = _frame_attitude(camera.frame, poses.attitudes[world])
+    return wp.transpose(_rotation(_product(turned, camera.attitude))) @ wp.vec3(0.0, 0.0, 1.0)
+
+
+@wp.func
 def around(view: View, camera: Camera, sight: Sight) -> wp.vec4i:
     """Columns and rows, from and to, outside which no ray meets a geom."""
-    lowest = wp.vec2(_FAR_AWAY, _FAR_AWAY)
-    highest = wp.vec2(-_FAR_AWAY, -_FAR_AWAY)
+    lowest = wp.vec2(FAR_AWAY, FAR_AWAY)
+    highest = wp.vec2(-FAR_AWAY, -FAR_AWAY)
     behind = int(0)
     for corner in range(8):
         at = _corner(sight, corner)
-        if -at[2] < _IN_FRONT:
+        if -at[2] < IN_FRONT:
             behind += 1 << corner
         else:
             seen = wp.vec2(at[0] / -at[2], -at[1] / -at[2])
@@ -61,15 +68,15 @@ def around(view: View, camera: Camera, sight: Sight) -> wp.vec4i:
             one, other = edge // 3, (edge // 3) ^ (1 << (edge % 3))
             if ((behind >> one) & 1) == 0 and ((behind >> other) & 1) == 1:
                 at, back = _corner(sight, one), _corner(sight, other)
-                at += (at[2] + _IN_FRONT) / (at[2] - back[2]) * (back - at)
-                seen = wp.vec2(at[0], -at[1]) / _IN_FRONT
+                at += (at[2] + IN_FRONT) / (at[2] - back[2]) * (back - at)
+                seen = wp.vec2(at[0], -at[1]) / IN_FRONT
                 lowest = wp.min(lowest, seen)
                 highest = wp.max(highest, seen)
     return wp.vec4i(
-        _first(lowest[0], camera.half_width, view.width),
-        wp.min(_first(highest[0], camera.half_width, view.width) + 3, view.width),
-        _first(lowest[1], camera.half_height, view.height),
-        wp.min(_first(highest[1], camera.half_height, view.height) + 3, view.height),
+        first_pixel(lowest[0], camera.half_width, view.width),
+        wp.min(first_pixel(highest[0], camera.half_width, view.width) + 3, view.width),
+        first_pixel(lowest[1], camera.half_height, view.height),
+        wp.min(first_pixel(highest[1], camera.half_height, view.height) + 3, view.height),
     )
 
 
@@ -85,7 +92,7 @@ def _corner(sight: Sight, corner: int) -> wp.vec3:
 
 
 @wp.func
-def _first(place: float, half: float, count: int) -> int:
+def first_pixel(place: float, half: float, count: int) -> int:
     """The first pixel that can show a place, given along an axis at a distance of 1."""
     pixel = (place / half + 1.0) * 0.5 * float(count) - 1.5
     return int(wp.clamp(wp.floor(pixel), 0.0, float(count)))

@@ -85,6 +85,28 @@ class Looks:
 
 
 @wp.struct
+class Scenery:
+    """What makes a world look like something; first dimension as in `Looks`."""
+
+    zenith: wp.array[wp.vec3]
+    """Of the sky overhead, from 0 to 255; at the horizon it has `Looks.sky`."""
+    fog: wp.array[float]
+    """Share of the light that is lost in a metre, by its logarithm; 0 for none."""
+    shadows: wp.array[int]
+    """Whether the first light casts any."""
+    texture: wp.array2d[int]
+    """Of each geom in the model; -1 for none."""
+    tiles: wp.array2d[float]
+    """Of each geom, in a metre."""
+    sides: wp.array[int]
+    """Of each texture, texels: a power of 2."""
+    starts: wp.array[int]
+    """Where the texels of each texture begin: its own, then those of half the side, down to 1."""
+    texels: wp.array[wp.uint32]
+    """Red in the lowest 8 bits, then green, then blue."""
+
+
+@wp.struct
 class Pictures:
     """What is drawn into, a row a picture: all cameras of the first world, of the second, ..."""
 

@@ -13,10 +13,12 @@ import warp as wp
 from drone_rl.sim.rendering.gray import WEIGHTS
 from drone_rl.sim.rendering.raytrace_rows import (
     copy,
+    copy_colors,
     fill_bytes,
     fill_floats,
     fill_ints,
     fill_vectors,
+    mix_gray,
     multiply,
 )
 from drone_rl.sim.rendering.raytrace_structs import (
@@ -137,6 +139,17 @@ def put_run(
         fill_ints(pictures.segmentation[row], first, last, shown.number)
     if (what & NORMALS) != 0:
         fill_vectors(pictures.normals[row], first, last, shown.normal)
+
+
+@wp.func
+def put_colors(
+    pictures: Pictures, what: int, row: int, first: int, last: int, colors: wp.array[wp.vec3ub]
+) -> None:
+    """Writes colours, each pixel its own; see `put_run`."""
+    if (what & RGB) != 0:
+        copy_colors(pictures.rgb[row], first, last, colors)
+    if (what & GRAY) != 0:
+        mix_gray(pictures.gray[row], first, last, colors, _RED, _GREEN, _BLUE)
 
 
 @wp.func

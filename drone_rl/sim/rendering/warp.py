@@ -18,6 +18,7 @@ from drone_rl.sim.rendering.renderer import Poses
 from drone_rl.sim.rendering.scene import Scene
 from drone_rl.sim.rendering.view import Modality, View
 from drone_rl.sim.rendering.warp_shard import Shard
+from drone_rl.utils.errors import InputError
 
 _BUILDING = threading.Lock()
 """Held while kernels are built, which Warp can't do twice at a time."""
@@ -69,7 +70,16 @@ class WarpRenderer:
     def render(
         self, view: View, poses: Poses, appearance: Appearance | None = None
     ) -> dict[Modality, Tensor]:
-        """Draws worlds, each camera and modality by itself; see `Renderer.render`."""
+        """Draws worlds, each camera and modality by itself; see `Renderer.render`.
+
+        Raises:
+            InputError: The appearance is more than flat colours and light.
+        """
+        if appearance is not None and not (appearance.is_plain and appearance.exposure is None):
+            raise InputError(
+                "fog, shadows, textures, a sky of two colours and an exposure can't be drawn by "
+                "WarpRenderer; give renderer=raytrace"
+            )
         view.check_modalities(self, DRAWN)
         pictures = view.new_pictures(len(poses), self.device)
         for modality, several in pictures.items():

@@ -1,5 +1,6 @@
 """What can be chosen about tasks and the camera; known without what they are made of."""
 
+from drone_rl.sim.settings.appearance import MINIMAL, AppearanceSettings
 from drone_rl.sim.settings.camera import CameraSettings
 from drone_rl.sim.settings.cubes import TaskSettings
 from drone_rl.sim.settings.pillars import PillarsSettings
@@ -8,8 +9,10 @@ from drone_rl.sim.settings.renderers import RENDERERS, RendererName
 from drone_rl.sim.settings.task import BaseTaskSettings
 
 __all__ = [
+    "MINIMAL",
     "RENDERERS",
     "TASKS",
+    "AppearanceSettings",
     "BaseTaskSettings",
     "CameraSettings",
     "PillarsSettings",

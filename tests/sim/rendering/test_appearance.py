@@ -1,7 +1,7 @@
 import torch
 
 from drone_rl.sim.meaning import Meaning
-from drone_rl.sim.rendering import Appearance
+from drone_rl.sim.rendering import Appearance, Texture
 from drone_rl.sim.rendering.appearance import each
 
 RED = (1.0, 0.0, 0.0)
@@ -31,3 +31,30 @@ def test_lights_that_are_given_are_those_of_each_world():
     assert set(lights) == {"sun", "sun_direction"}
     assert torch.equal(lights["sun"].float(), SEVERAL)
     torch.testing.assert_close(lights["sun_direction"].float(), torch.tensor([[0, 0.6, -0.8]] * 3))
+
+
+def test_what_one_gives_is_over_what_another_does():
+    below = Appearance(colors={Meaning.SKY: RED, Meaning.GROUND: RED}, fog=50.0, shadows=1)
+    above = Appearance(colors={Meaning.SKY: (0.0, 0.0, 1.0)}, fog=10.0)
+    both = above.over(below)
+    assert both.colors == {Meaning.SKY: (0.0, 0.0, 1.0), Meaning.GROUND: RED}
+    assert (both.fog, both.shadows, both.sun) == (10.0, 1, None)
+    assert above.over(None) is above
+    assert Appearance(shadows=0).over(below).shadows == 0
+
+
+def test_numbers_and_textures_are_cut_too():
+    texture = Texture(pictures=("grid",), size=2.0, choice=torch.tensor([0, -1, 0]))
+    appearance = Appearance(
+        fog=torch.tensor([1.0, 2.0, 3.0]), textures={Meaning.GROUND: texture}, exposure=2.0
+    )
+    part = appearance[1:]
+    assert part.fog.tolist() == [2.0, 3.0] and part.exposure == 2.0
+    assert part.textures[Meaning.GROUND].choice.tolist() == [-1, 0]
+    assert part.textures[Meaning.GROUND].size == 2.0
+
+
+def test_flat_colours_alone_are_plain():
+    assert Appearance(colors={Meaning.SKY: RED}, shadows=torch.zeros(3), exposure=2.0).is_plain
+    assert not Appearance(shadows=torch.tensor([0, 1])).is_plain
+    assert not Appearance(zenith=RED).is_plain and not Appearance(fog=1.0).is_plain

@@ -5,8 +5,10 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 import torch
 
+from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.rendering.warp import WarpRenderer
 from drone_rl.sim.worlds import Worlds
+from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import world_random_state
 
 
@@ -32,3 +34,11 @@ def test_gpu_draws_what_the_cpu_draws():
     picture = on_gpu.render(on_gpu.state).cpu()
     difference = (picture.int() - on_cpu.render(on_cpu.state).int()).abs()
     assert float(difference.float().mean()) < 0.5
+
+
+@pytest.mark.parametrize("look", [{"fog": 50.0}, {"exposure": 2.0}, {"shadows": 1}])
+def test_what_it_can_not_draw_is_refused_before_it_draws(look):
+    worlds = started(renderer=WarpRenderer, num_shards=1, appearance=Appearance(**look))
+    with pytest.raises(InputError, match="give renderer=raytrace"):
+        worlds.render(worlds.state)
+    worlds.close()
