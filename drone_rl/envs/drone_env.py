@@ -7,6 +7,7 @@
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
 import torch
 from tensordict import TensorDict, TensorDictBase
 from torch import Tensor
@@ -14,13 +15,14 @@ from torchrl.data import Binary, Bounded, Categorical, Composite, TensorSpec, Un
 from torchrl.envs import EnvBase
 
 from drone_rl.sim.actions import Entry
+from drone_rl.sim.appearances import Appearances
 from drone_rl.sim.dynamics import Dynamics
 from drone_rl.sim.rendering import MakeRenderer, check_device
-from drone_rl.sim.settings import BaseTaskSettings, CameraSettings
+from drone_rl.sim.settings import MINIMAL, AppearanceSettings, BaseTaskSettings, CameraSettings
 from drone_rl.sim.tasks import Task
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.seeding import Stream, get_state, set_state, world_random_state
+from drone_rl.utils.seeding import Stream, get_state, set_state, side_stream, world_random_state
 
 
 class DroneEnv(EnvBase):
@@ -51,6 +53,7 @@ class DroneEnv(EnvBase):
         device: str = "cpu",
         dynamics: Dynamics | None = None,
         renderer: str | MakeRenderer = "raytrace",
+        appearance: AppearanceSettings | None = None,
     ) -> None:
         """Builds the worlds.
 
@@ -66,14 +69,16 @@ class DroneEnv(EnvBase):
             device: "cpu", "cuda" or "cuda:N".
             dynamics: How the drones move; the task's own choice by default.
             renderer: Who draws, see `drone_rl.sim.rendering.find_renderer`.
+            appearance: How worlds look; what it leaves open is drawn at every reset.
 
         Raises:
-            InputError: A setting is out of range.
+            InputError: A setting is out of range, or a texture can't be read.
         """
         if not (isinstance(num_envs, int) and num_envs >= 1):
             raise InputError(f"num_envs={num_envs} is out of range; give a whole number from 1")
         check_device(device)
         super().__init__(device=torch.device(device), batch_size=torch.Size([num_envs]))
+        self.looks = Appearances(appearance or MINIMAL, num_envs, device)
         self.worlds = Worlds(
             num_envs,
             task,
@@ -82,6 +87,7 @@ class DroneEnv(EnvBase):
             renderer=renderer,
             device=device,
             num_shards=num_shards,
+            appearance=self.looks.middle,
         )
         self.pixels = pixels
         if pixels:
@@ -114,7 +120,8 @@ class DroneEnv(EnvBase):
 
     def running_state(self) -> dict[str, Any]:
         """The worlds themselves and their streams: enough to go on within episodes."""
-        return {**self.state_dict(), "worlds": self.worlds.state.tensors()}
+        looks = {"looks": self.looks.values} if self.looks.varies else {}
+        return {**self.state_dict(), "worlds": self.worlds.state.tensors(), **looks}
 
     def load_running_state(self, state: Mapping[str, Any]) -> None:
         """Goes on within the episodes of a `running_state`, whose pictures are drawn anew.
@@ -124,7 +131,18 @@ class DroneEnv(EnvBase):
         """
         self.load_state_dict(dict(state))
         self.worlds.state = self.worlds.state.with_tensors(state["worlds"])
+        if self.looks.varies:
+            self.looks.load(state["looks"])
         self._draw(self._indices(None))
+
+    def side_streams(self, worlds: Tensor, *key: int) -> list[np.random.Generator]:
+        """Random streams for what is drawn beside the task's own, in episodes that have just begun.
+
+        Args:
+            worlds: Indices. Shape: (k,).
+            key: Tells apart what they are for.
+        """
+        return [side_stream(self._random_states[i], *key) for i in worlds.tolist()]
 
     @property
     def last_pixels(self) -> Tensor:
@@ -166,13 +184,16 @@ class DroneEnv(EnvBase):
         self._draw(worlds)
         return self._observe({name: self._false() for name in _DONE_KEYS})
 
-    def start(self, worlds: Tensor) -> None:
-        """Starts an episode in some worlds, each out of its own stream; draws nothing.
+    def start(self, worlds: Tensor | None = None) -> None:
+        """Starts an episode in worlds, each out of its own stream; draws nothing.
 
         Args:
-            worlds: Indices. Shape: (k,).
+            worlds: Indices; all by default. Shape: (k,).
         """
-        self.worlds.reset(worlds, [self._random_states[i] for i in worlds.tolist()])
+        worlds = self._indices(None) if worlds is None else worlds
+        random_states = [self._random_states[i] for i in worlds.tolist()]
+        self.looks.reset(worlds, random_states)
+        self.worlds.reset(worlds, random_states)
 
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
         worlds = self._indices(tensordict.get("_step", None))
@@ -190,7 +211,7 @@ class DroneEnv(EnvBase):
             return
         is_whole = len(worlds) == len(self._pixels)
         state = self.worlds.state if is_whole else self.worlds.state[worlds]
-        pixels = self.worlds.render(state)
+        pixels = self.worlds.render(state, appearance=self.looks.drawn(worlds))
         if is_whole:
             self._pixels = pixels
         else:

@@ -2,8 +2,9 @@
 
 from collections.abc import Callable, Iterable, Sequence
 
+import torch
 from torch import Tensor
-from torchrl.envs import Compose, EnvBase, Transform, TransformedEnv
+from torchrl.envs import CatFrames, Compose, EnvBase, Transform, TransformedEnv
 
 
 def with_transforms(env: EnvBase, transforms: Sequence[Transform] = ()) -> TransformedEnv:
@@ -31,3 +32,25 @@ def on_pixels(transforms: Iterable[Transform]) -> Callable[[Tensor], Tensor]:
         return pictures
 
     return apply
+
+
+def memory_of(transforms: Iterable[Transform]) -> int:
+    """Pictures before the present one that are seen with it: more than 0 of stacks of frames."""
+    return max((t.N for t in transforms if isinstance(t, CatFrames)), default=1) - 1
+
+
+def see_film(transforms: Iterable[Transform], film: Sequence[Tensor]) -> Tensor:
+    """What transforms make of the last of some pictures; stacks of frames hold earlier ones.
+
+    Args:
+        transforms: Of pixels, in order.
+        film: Pictures of one time after the other; the first repeats what is missing before it.
+    """
+    for transform in transforms:
+        if isinstance(transform, CatFrames):
+            shown = film[-transform.N :]
+            shown = [*shown[:1]] * (transform.N - len(shown)) + [*shown]
+            film = [torch.cat(shown, dim=transform.dim)]
+        else:
+            film = [transform._apply_transform(pixels) for pixels in film]
+    return film[-1]

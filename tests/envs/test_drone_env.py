@@ -8,7 +8,7 @@ from torchrl.envs import Compose, ParallelEnv, RewardSum, SerialEnv, Transformed
 from torchrl.envs.utils import check_env_specs
 
 from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels
-from drone_rl.sim.settings import TaskSettings
+from drone_rl.sim.settings import AppearanceSettings, TaskSettings
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
 from drone_rl.utils.errors import InputError
 
@@ -109,7 +109,7 @@ def test_partial_reset_touches_and_draws_only_masked_worlds():
     after = env.step(state.set("action", actions(env, 0)))["next"]
     drawn = []
     render = env.worlds.render
-    env.worlds.render = lambda state: drawn.append(len(state.drone)) or render(state)
+    env.worlds.render = lambda state, **look: drawn.append(len(state.drone)) or render(state)
     mask = torch.tensor([[False], [True], [False]])
     reset = env.reset(after.clone().exclude("reward").set("_reset", mask))
     assert drawn == [1]
@@ -168,6 +168,48 @@ def test_running_state_goes_on_within_episodes():
     assert torch.equal(*(e.reset()["info", "cube_positions"] for e in (env, other)))
     with pytest.raises(InputError, match="num_envs=2"):
         DroneEnv(3, SHORT, pixels=False).load_running_state(saved)
+
+
+FOGGY = AppearanceSettings(fog_visibility=(5.0, 50.0), ground_texture="checker", ground_tile=1.0)
+
+
+def test_each_episode_has_its_own_look_and_worlds_are_the_same_in_any():
+    plain, foggy = DroneEnv(3, SHORT), DroneEnv(3, SHORT, appearance=FOGGY)
+    alone = DroneEnv(1, SHORT, appearance=FOGGY)
+    for episode in range(2):
+        seen, now, single = (env.reset() for env in (plain, foggy, alone))
+        assert torch.equal(seen["info", "drone"], now["info", "drone"])
+        assert torch.equal(plain.worlds.state.cubes, foggy.worlds.state.cubes)
+        assert (now["pixels"] != seen["pixels"]).double().mean() > 0.2
+        assert torch.equal(now["pixels"][0], single["pixels"][0])
+        assert len(foggy.looks.values[:, 14].unique()) == 3
+        if episode == 0:
+            before = foggy.looks.values
+    assert not (foggy.looks.values[:, 14] == before[:, 14]).any()
+    for env in (plain, foggy, alone):
+        env.close()
+
+
+def test_a_look_stays_for_an_episode_and_is_gone_on_with():
+    env, other = (DroneEnv(2, SHORT, appearance=FOGGY, seed=i) for i in range(2))
+    started = env.reset()
+    env.step(started.set("action", actions(env, 0)))
+    other.reset()
+    other.load_running_state(env.running_state())
+    assert torch.equal(other.last_pixels, env.last_pixels)
+    looks = env.looks.values
+    env.reset(TensorDict({"_reset": torch.tensor([[True], [False]])}, [2]))
+    assert torch.equal(env.looks.values[1], looks[1])
+    assert not torch.equal(env.looks.values[0], looks[0])
+    env.close()
+    other.close()
+
+
+def test_a_texture_that_is_none_is_refused_before_anything_is_drawn(tmp_path):
+    path = tmp_path / "ground.png"
+    path.write_text("no picture")
+    with pytest.raises(InputError, match=r"ground\.png.* no picture"):
+        DroneEnv(1, SHORT, appearance=AppearanceSettings(ground_texture=str(path)))
 
 
 @pytest.mark.parametrize("num_envs", [0, -1, 2.0])

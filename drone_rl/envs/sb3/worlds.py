@@ -16,7 +16,7 @@ from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvStepReturn
 
 from drone_rl.envs.pipeline import on_pixels
-from drone_rl.settings.transforms import Stack, Transform
+from drone_rl.settings.transforms import Fault, Stack, Transform
 from drone_rl.utils.errors import InputError
 
 
@@ -46,6 +46,10 @@ class Sb3Worlds(VecEnv):
             )
         if any(isinstance(transform, Stack) for transform in transforms):
             raise InputError("transforms stack frames; use Stable-Baselines3's VecFrameStack")
+        if strange := [t.name for t in transforms if isinstance(t, Fault)]:
+            raise InputError(
+                f"the transform {strange[0]} is for TorchRL's environments; leave it out here"
+            )
         self.env = env
         self._look = on_pixels([transform.make() for transform in transforms])
         self._actions: NDArray[Any] = np.zeros(env.num_envs, np.int64)

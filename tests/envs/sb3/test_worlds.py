@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import drone_rl
-from drone_rl.settings.transforms import Crop, Gray, Stack, Standardize
+from drone_rl.settings.transforms import Crop, Gray, LateFrames, Stack, Standardize
 from drone_rl.utils.errors import InputError
 
 gymnasium = pytest.importorskip("gymnasium", reason="Gymnasium is not installed")
@@ -131,6 +131,8 @@ def test_mistakes_are_told_in_a_line(make):
         drone_rl.Sb3Worlds(gymnasium.make_vec(NAME, num_envs=2))
     with pytest.raises(InputError, match=r"^transforms stack frames; use .* VecFrameStack$"):
         make([Gray(), Stack()])
+    with pytest.raises(InputError, match=r"^the transform late_frames is for TorchRL's"):
+        make([Gray(), LateFrames()])
     with pytest.raises(InputError, match=r"^GrayPixels got torch.float32 frames"):
         make([Gray()], observations="state")
     env = make(num_envs=2)
