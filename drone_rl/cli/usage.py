@@ -16,6 +16,7 @@ commands
   prove      how does it end from every placement of the cubes? exactly, as a certificate
   check      does a certificate hold? flown anew; as JSON and as an exit status
   places     what does it do about one cube, wherever that stands? exactly, as a map
+  shifts     under which other conditions is it good? light, camera, sizes, faults, motion
   chain      how probable each end of an episode is, exactly, if moves are drawn
   export     write a policy as safetensors with a model card, or as an ONNX model
   sweep-report  compare the runs of a sweep: CSV, JSON, one HTML page
@@ -32,6 +33,6 @@ examples
 """
 COMMANDS = (
     *("train", "evaluate", "play", "explain", "report", "verdict"),
-    *("prove", "check", "places", "chain", "export", "sweep-report", "bench"),
+    *("prove", "check", "places", "shifts", "chain", "export", "sweep-report", "bench"),
 )
 """Each a module of `drone_rl.cli` and a file in conf/; `demo` runs three of them."""

@@ -1,0 +1,178 @@
+"""Flights of a policy under other conditions than its own, as an object that shows itself."""
+
+import dataclasses
+import json
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
+
+from drone_rl.api.foreign import as_pilot
+from drone_rl.api.pilot import Pilot
+from drone_rl.api.progress import Bar, Progress
+from drone_rl.api.showing import paragraph, picture, table
+from drone_rl.conditions.axes import check_axes, find_axes
+from drone_rl.conditions.axis import Axis
+from drone_rl.conditions.condition import Condition
+from drone_rl.conditions.domain import Prober
+from drone_rl.conditions.flying import Airfield, Subject
+from drone_rl.conditions.modes import Mode
+from drone_rl.conditions.oracle import OracleEyes
+from drone_rl.conditions.strips import make_strip
+from drone_rl.conditions.suite import Suite
+from drone_rl.envs import worlds_of
+from drone_rl.policies.foreign import Logits
+from drone_rl.report.shifts import chart, strips
+from drone_rl.settings.shifting import ShiftSettings
+from drone_rl.sim.settings import MINIMAL, BaseTaskSettings
+from drone_rl.sim.tasks import as_task
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.provenance import provenance
+from drone_rl.words.licence import say
+from drone_rl.words.shifts import SHIFTS, rows
+
+
+@dataclasses.dataclass(frozen=True)
+class Shifts:
+    """How often a policy succeeds under other conditions, and under which it stays good."""
+
+    policy: Pilot
+    settings: ShiftSettings
+    numbers: dict[str, Any] = dataclasses.field(repr=False)
+    """As in `shifts.json`."""
+    pictures: Mapping[str, Sequence[NDArray | None]] = dataclasses.field(repr=False)
+    """By axis, what the camera shows with nothing different and at each of the five strengths; none
+    where the task can't be so. Shapes: (H, W, 3), uint8."""
+
+    @property
+    def area(self) -> float:
+        """Mean over axes of the area under success over strength."""
+        areas = [along["areas"]["constant"] for along in self.numbers["axes"].values()]
+        known = [area for area in areas if area is not None]
+        return sum(known) / max(len(known), 1)
+
+    @property
+    def sentence(self) -> str:
+        """Under which conditions it is good, for a person."""
+        return say(SHIFTS, self.numbers)
+
+    def save(self, folder: Path) -> None:
+        """Writes `shifts.json`, `shifts.png` (curves) and `strips.png` (pictures)."""
+        (folder / "shifts.json").write_text(json.dumps(self.numbers | provenance(), indent=2))
+        chart(self.numbers).savefig(folder / "shifts.png", dpi=110)
+        strips(self.numbers, self.pictures).save(folder / "strips.png")
+
+    def __str__(self) -> str:
+        """The table and what it comes to."""
+        lines = rows(self.numbers)
+        widths = [2 + max(map(len, column)) for column in zip(*lines, strict=True)]
+        drawn = ["".join(map(str.ljust, line, widths)).rstrip() for line in lines]
+        return "\n".join([*drawn, self.sentence])
+
+    def _repr_html_(self) -> str:
+        head, *lines = rows(self.numbers)
+        return table(head, lines) + paragraph(self.sentence) + picture(chart(self.numbers))
+
+
+def shifts(
+    policy: str | Path | Pilot | Logits,
+    settings: ShiftSettings | None = None,
+    *,
+    task: Mapping[str, Any] | None = None,
+    outputs: str | Path = "outputs",
+    progress: Progress | None = None,
+    **changes: Any,
+) -> Shifts:
+    """Flies a policy under other conditions than its own, one axis at a time and all together.
+
+    Args:
+        policy: The policy, what `load_policy` takes, or a callable, see `policy_from`.
+        settings: Which conditions, and how often.
+        task: What to change of the policy's task.
+        outputs: See `load_policy`.
+        progress: Told of what is being flown; a bar by default.
+        changes: Settings to change, as in `shifts("good", axes=["light"])`.
+
+    Raises:
+        InputError: The policy or a setting is unusable, or there is no such axis or strength.
+    """
+    settings, progress = (settings or ShiftSettings()).replace(**changes), progress or Bar()
+    check_axes(settings.axes or ())
+    pilot = as_pilot(policy, outputs).in_task(**(task or {}))
+    begin = time.perf_counter()
+    subject = make_subject(pilot, settings)
+    axes = find_axes(settings.axes, subject)
+    total, done = len(axes) * (len(settings.strengths) + settings.domain) + 1, 0
+
+    def tell(text: str) -> None:
+        nonlocal done
+        progress(text, done, total)
+        done += 1
+
+    counts = (settings.episodes, settings.domain_episodes, 1)
+    beds = [Airfield(subject, count, settings.seed) for count in counts]
+    bed, wide, filmed = beds
+    try:
+        suite = Suite(bed, [Mode(mode) for mode in settings.modes], settings.possible_share)
+        found = suite.run(axes, settings.strengths, tell)
+        domain = _domain(wide, axes, settings, tell) if settings.domain else None
+        pictures = {axis.name: make_strip(filmed, axis) for axis in axes}
+    finally:
+        for made in beds:
+            made.close()
+    progress("flown", total, total)
+    numbers = {
+        "policy": pilot.name,
+        "task": subject.task.values(),
+        "camera": subject.camera.values(),
+        "settings": settings.values(),
+        "terms": as_task(subject.task).terms.as_dict(),
+        **found,
+        "domain": domain,
+        "seconds": time.perf_counter() - begin,
+    }
+    return Shifts(pilot, settings, numbers, pictures)
+
+
+def _domain(
+    bed: Airfield, axes: Sequence[Axis], settings: ShiftSettings, tell: Callable[[str], None]
+) -> dict[str, Any]:
+    """Where it is surely good: "plain", and "ranges" by axis.
+
+    Raises:
+        InputError: Nobody knows how to do the task, to be compared with.
+    """
+    task = as_task(bed.subject.task)
+    if task.oracle is None:
+        raise InputError(f"task={task.name} has no oracle to compare with; give domain=false")
+    oracle = bed.fly(Condition(), eyes=OracleEyes(looks=False)).episodes
+    prober, ranges = Prober(bed, oracle, settings.good_share), {}
+    for axis in axes:
+        tell(f"range of {axis.name}")
+        ranges[axis.name] = prober.search(axis)
+    return {"plain": prober.plain, "ranges": ranges}
+
+
+def make_subject(pilot: Pilot, settings: ShiftSettings) -> Subject:
+    """What is flown: the policy's network, and the task and the camera that it has.
+
+    Raises:
+        InputError: The task has no settings that could be changed.
+    """
+    task: Any = pilot.task
+    task = task if isinstance(task, BaseTaskSettings) else getattr(task, "settings", None)
+    if not isinstance(task, BaseTaskSettings):
+        raise InputError(
+            f"policy={pilot.name} flies in a task without settings; give one with some"
+        )
+    env: Any = pilot.make_env(1, device=settings.device, renderer=settings.renderer)
+    try:
+        camera, transforms = worlds_of(env).camera, [*env.transform]
+    finally:
+        env.close()
+    network = pilot.make_network(settings.device).eval()
+    described = getattr(pilot, "description", None)  # of who comes from a file
+    look = MINIMAL if described is None else described.appearance
+    return Subject(network, task, camera, transforms, look, settings.device, settings.renderer)

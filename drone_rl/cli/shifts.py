@@ -1,0 +1,42 @@
+"""`drone-rl shifts`."""
+
+import dataclasses
+import logging
+from pathlib import Path
+
+import drone_rl
+from drone_rl.hydra_app.names import policies as prepare  # noqa: F401 -- of what was typed
+from drone_rl.settings.changes import TaskChanges, no_changes
+from drone_rl.settings.paths import PathsSettings
+from drone_rl.settings.shifting import ShiftSettings
+
+_log = logging.getLogger(__name__)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Command(ShiftSettings):
+    """What `drone-rl shifts` can be told."""
+
+    policy: str = "latest"
+    """Of whom, see `drone_rl.load_policy`."""
+    task: TaskChanges = no_changes()
+    """What to change of the policy's task."""
+    paths: PathsSettings = PathsSettings()
+    """Folders."""
+
+
+def run(settings: Command, folder: Path) -> tuple[int, float]:
+    """Flies one policy. Returns the exit status and the mean area under success over strength."""
+    from drone_rl.api.progress import log
+
+    done = drone_rl.shifts(
+        settings.policy,
+        settings.narrowed(ShiftSettings),
+        task=settings.task,
+        outputs=settings.paths.outputs,
+        progress=log,
+    )
+    done.save(folder)
+    print(done)
+    _log.info("written: shifts.json, shifts.png and strips.png in %s", folder)
+    return 0, done.area

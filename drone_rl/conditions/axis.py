@@ -1,0 +1,72 @@
+"""An axis: one thing that can be different, in a unit, at five strengths fixed before any test."""
+
+import dataclasses
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+from drone_rl.conditions.condition import Condition
+from drone_rl.conditions.flying import Subject
+
+NUMBERS = (1, 2, 3, 4, 5)
+"""Of the strengths, from the weakest on."""
+TOGETHER = 3
+"""The strength at which all axes are tried together."""
+
+
+class Scale(NamedTuple):
+    """Along which steps of an axis are compared: areas are taken and middles are found on it."""
+
+    there: Callable[[float], float]
+    back: Callable[[float], float]
+
+
+LINEAR = Scale(float, float)
+FACTORS = Scale(math.log, math.exp)
+"""Half as much is as far as twice as much."""
+INVERSE = Scale(lambda x: 1.0 / x, lambda x: math.inf if x == 0 else 1.0 / x)
+"""Infinitely much is none."""
+
+
+def _as_it_is(strength: float, subject: Subject) -> float:
+    return strength
+
+
+@dataclasses.dataclass(frozen=True)
+class Axis:
+    """One thing that can be different."""
+
+    name: str
+    group: str
+    """One of the ten kinds of shift."""
+    unit: str
+    """Of its values."""
+    neutral: float
+    """The strength of no difference."""
+    strengths: tuple[float, float, float, float, float]
+    """From the weakest on; those of an axis with two ends lie on both sides of the neutral one."""
+    make: Callable[[float, Subject], Condition]
+    """What a strength makes different for a policy.
+
+    Raises:
+        InputError: This task has no such thing.
+    """
+    value: Callable[[float, Subject], float] = _as_it_is
+    """A strength in the axis's unit, where strengths are told by what the policy has itself."""
+    own: Callable[[Subject], float] | None = None
+    """What the neutral strength is for a policy, where that is not the same for all."""
+    scale: Scale = LINEAR
+    whole: bool = False
+    """Whether there is nothing between whole numbers."""
+
+    def position(self, strength: float) -> float:
+        """Where a strength lies on the axis's scale; 0 where nothing is different."""
+        return self.scale.there(strength) - self.scale.there(self.neutral)
+
+    def between(self, low: float, high: float) -> float | None:
+        """The strength in the middle of two; None where there is none."""
+        there, back = self.scale
+        if self.whole:
+            middle = math.floor((low + high) / 2)
+            return None if middle in (low, high) else float(middle)
+        return back((there(low) + there(high)) / 2)

@@ -1,0 +1,117 @@
+"""Who flies: a policy that sees pictures, or who acts without looking."""
+
+from collections.abc import Callable, Iterable
+from typing import NamedTuple, Protocol
+
+import torch
+from torch import Tensor
+from torchrl.envs import Transform
+
+from drone_rl.envs import GrayPixels
+from drone_rl.envs.pipeline import memory_of, see_film
+from drone_rl.policies import PictureNetwork
+from drone_rl.sim.rendering import Appearance, Poses
+from drone_rl.sim.rendering.view import Modality
+from drone_rl.sim.tasks import State
+from drone_rl.sim.worlds import Worlds
+
+
+class Sight(NamedTuple):
+    """What there is to see at one step of the worlds that still fly, n of num_worlds."""
+
+    worlds: Worlds
+    state: State
+    flying: Tensor
+    """Which of all worlds these are. Shape: (n,)."""
+    poses: Poses
+    """Where the camera has everything."""
+    appearance: Appearance | None
+    spoil: Callable[..., Tensor]
+    """What becomes of pictures, see `faults.Spoiling`."""
+    pending: list[Tensor]
+    """Actions decided but not yet taken, oldest first. Shapes: (n,)."""
+
+    def draw(self, modality: Modality) -> Tensor:
+        """What the policy's camera takes. Shape: (n, H, W, *)."""
+        view = self.worlds.view(modality=modality)
+        return self.worlds.renderer.render(view, self.poses, self.appearance)[modality][:, 0]
+
+
+class Eyes(Protocol):
+    """Who acts, from the start of a flight on."""
+
+    @property
+    def knows_truth(self) -> bool:
+        """Whether only faults that hide things matter to it."""
+        ...
+
+    def act(self, sight: Sight) -> tuple[Tensor, Tensor | None]:
+        """What to do.
+
+        Returns:
+            An action for each world, shape (n,), and what was seen, if anything was, from 0 to 1 as
+            the camera gave it or in any other units, shape (n, *).
+        """
+        ...
+
+
+class PolicyEyes:
+    """A policy that takes the most probable action."""
+
+    knows_truth = False
+
+    def __init__(
+        self, network: PictureNetwork, transforms: Iterable[Transform], num_worlds: int
+    ) -> None:
+        """Has seen nothing yet.
+
+        Args:
+            network: The policy's.
+            transforms: What becomes of pictures before it sees them.
+            num_worlds: That fly.
+        """
+        looking = [t for t in transforms if "pixels" in (t.in_keys or [])]
+        self._network, self._first, self._rest = network, looking[0], looking[1:]
+        self._memory, self._num_worlds = memory_of(self._rest), num_worlds
+        self._film: list[Tensor] = []
+
+    def act(self, sight: Sight) -> tuple[Tensor, Tensor | None]:
+        """See `Eyes`."""
+        if type(self._first) is GrayPixels:
+            pictures = sight.draw("gray")[:, None]
+        else:
+            pictures = self._first._apply_transform(sight.draw("rgb"))
+        pictures = sight.spoil(pictures, sight.flying)
+        film = [*(earlier[sight.flying] for earlier in self._film), pictures]
+        seen = see_film(self._rest, film)
+        self._keep(pictures, sight.flying)
+        return sight.worlds.dynamics.actions.chosen(self._network(seen)), pictures
+
+    def _keep(self, pictures: Tensor, flying: Tensor) -> None:
+        if self._memory:
+            newest = pictures.new_zeros(self._num_worlds, *pictures.shape[1:])
+            newest[flying] = pictures
+            self._film = [*self._film, newest][-self._memory :]
+
+
+class BlindEyes:
+    """One action always, or any action alike."""
+
+    knows_truth = True
+
+    def __init__(self, action: int | None, num_actions: int, generator: torch.Generator) -> None:
+        """Takes what to do.
+
+        Args:
+            action: Which; none for random ones.
+            num_actions: How many there are.
+            generator: Of random ones.
+        """
+        self._action, self._num_actions, self._generator = action, num_actions, generator
+
+    def act(self, sight: Sight) -> tuple[Tensor, Tensor | None]:
+        """See `Eyes`."""
+        if self._action is not None:
+            return torch.full_like(sight.flying, self._action), None
+        drawn = torch.randint(self._num_actions, sight.flying.shape, generator=self._generator)
+        return drawn.to(sight.flying.device), None

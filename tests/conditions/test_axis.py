@@ -1,0 +1,32 @@
+import math
+
+import pytest
+
+from drone_rl.conditions.axis import FACTORS, INVERSE, LINEAR, Axis
+from drone_rl.conditions.condition import Condition
+
+
+def axis(scale=LINEAR, neutral=0.0, **kwargs):
+    strengths = (1.0, 2.0, 3.0, 4.0, 5.0)
+    return Axis("a", "b", "m", neutral, strengths, lambda s, _: Condition(), scale=scale, **kwargs)
+
+
+def test_half_as_much_is_as_far_as_twice_as_much():
+    of_factors = axis(FACTORS, 1.0)
+    assert of_factors.position(2.0) == -of_factors.position(0.5) == pytest.approx(math.log(2))
+    assert of_factors.between(1.0, 0.25) == pytest.approx(0.5)
+    assert of_factors.position(1.0) == 0
+
+
+def test_infinitely_much_may_be_none():
+    of_visibility = axis(INVERSE, math.inf)
+    assert of_visibility.position(50.0) == pytest.approx(0.02)
+    assert of_visibility.between(math.inf, 50.0) == pytest.approx(100.0)
+    assert INVERSE.back(0.0) == math.inf
+
+
+def test_between_whole_numbers_there_may_be_none():
+    steps = axis(whole=True)
+    assert steps.between(1.0, 4.0) == 2.0
+    assert steps.between(1.0, 2.0) is None
+    assert axis().between(1.0, 2.0) == 1.5
