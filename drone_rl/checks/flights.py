@@ -75,9 +75,7 @@ class Simulator:
         self._task = require_cubes(described.task, "what a certificate states")
         every: Iterable[Transform] = self._env.transform  # type: ignore[assignment]
         self._transforms = [t for t in every if "pixels" in (t.in_keys or [])]
-        self._network = described.build_network(torch.Generator().manual_seed(0))
-        self._network.load_state_dict(dict(weights))
-        self._network.to(self._worlds.device)
+        self._network = described.load_network(weights).to(self._worlds.device)
 
     def fly(self, placements: NDArray[np.float64], tell: Tell = lambda done, total: None) -> Flown:
         """Flies flights to their ends, so many in a batch.

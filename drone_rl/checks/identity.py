@@ -40,7 +40,8 @@ def refuse_another(
         task: That it must be stated of; any by default.
 
     Raises:
-        InputError: It is of another network, camera or task, or the policy remembers pictures.
+        InputError: It is of another network, camera or task, or the policy remembers pictures, or
+            its camera goes wrong.
     """
     if certificate.weights != (own := fingerprint(weights)):
         raise InputError(
@@ -48,8 +49,8 @@ def refuse_another(
             f"policy's has {own[:12]}...; give policy= the file that was proved"
         )
     stated, own_parts = certificate.description.as_dict(), described.as_dict()
-    for part in ("camera", "transforms", "network"):
-        if stated[part] != own_parts[part]:
+    for part in ("appearance", "camera", "transforms", "network"):
+        if stated.get(part) != own_parts.get(part):
             raise InputError(
                 f"the certificate and the policy differ in {part}; give policy= the file that was "
                 "proved"
@@ -64,4 +65,9 @@ def refuse_another(
         raise InputError(
             "the policy remembers pictures (transform stack); certificates are of policies that "
             "act by the present picture alone"
+        )
+    if described.faults:
+        raise InputError(
+            f"the policy's camera goes wrong (transform {described.faults[0]}); certificates are "
+            "of pictures as they are drawn"
         )

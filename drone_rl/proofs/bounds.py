@@ -13,6 +13,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from drone_rl.policies import PolicyNetwork
+from drone_rl.policies.answering import Answers
 from drone_rl.utils.errors import InputError
 
 
@@ -35,7 +36,7 @@ class Bounds:
         if not isinstance(last, nn.Linear):
             raise InputError("the network's last layer is not linear; prove a policy whose is")
         self.gap = gap
-        self._network = network
+        self._answers = Answers(network)
         scale, self._steps = 2, []
         for layer in inner:
             self._steps.append(_step(layer, scale))
@@ -98,7 +99,7 @@ class Bounds:
         Returns:
             The bits, and the gap between the two highest logits. Shapes: (N,).
         """
-        logits = self._network(pictures)
+        logits = self._answers(pictures)
         first, second = torch.tensor(self._pairs).T
         highest = logits.topk(2).values
         bits = self._bits(logits[:, first] - logits[:, second] > self.gap)

@@ -5,6 +5,7 @@ where it started: i ahead and j to the left.
 """
 
 import dataclasses
+import functools
 import math
 from collections.abc import Iterator
 
@@ -36,7 +37,7 @@ class Place:
     is_fork: bool = False
     """Whether another way could have been taken instead, as far as is known."""
 
-    @property
+    @functools.cached_property
     def turn(self) -> tuple:
         """Sorts places so that none comes before one that leads to it."""
         order = (0, self.left, -self.left)[self.came]

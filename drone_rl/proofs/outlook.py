@@ -298,6 +298,10 @@ def runs(outlook: Outlook, spans: NDArray[np.int64], most: int) -> Iterator[tupl
         Of each piece: its block; first and last cell of each cube, shape (cubes, 2); its bits.
     """
     rows = (spans[:, 1:, 1] - spans[:, 1:, 0] + 1).prod(-1)
+    if rows.sum() <= most:
+        if len(spans):
+            yield _runs(outlook.table, spans, np.arange(len(spans)))
+        return
     parts = np.searchsorted(np.cumsum(rows), np.arange(most, rows.sum() + most, most))
     for part in np.split(np.arange(len(spans)), np.unique(parts)[:-1] + 1):
         if len(part):

@@ -63,6 +63,8 @@ class Prover:
         """The most steps that forks took to where they are; their places count none."""
         self.fork_ends: dict[Ending | None, list[Boxes]] = defaultdict(list)
         """What became of that; None for what is not followed to its end."""
+        self.boxes_under_way = 0
+        """Of all placements that are not yet followed to their end."""
         self.num_places = self.pictures = self.most_boxes = 0
         self.decided = 0.0
         """Volume of what is known: of the part under way, what ended without forks."""
@@ -85,11 +87,6 @@ class Prover:
         return type(self._subject.worlds.renderer).__name__
 
     @property
-    def boxes_under_way(self) -> int:
-        """Of all placements that are not yet followed to their end."""
-        return sum(len(b) for boxes in self.waiting.values() for b in boxes)
-
-    @property
     def is_finished(self) -> bool:
         """Whether every placement has been followed to its end."""
         return not self.waiting and not len(self.parts)
@@ -98,11 +95,12 @@ class Prover:
         """Visits the next place; returns it."""
         if not self.waiting:
             self.part, self.parts = self.parts[:1], self.parts[1:]
-            self.waiting[Place(0, 0)].append(self.part)
+            self.wait(Place(0, 0), self.part)
         place = min(self.waiting, key=lambda p: p.turn)
         self._arrive(place.ahead)
         self._foresee(place)
         boxes = np.concatenate(self.waiting.pop(place))
+        self.boxes_under_way -= len(boxes)
         boxes = unite(boxes) if place.is_fork else merge(boxes)
         if place.is_fork:
             place = dataclasses.replace(place, steps=self.longest.pop(place))
@@ -119,6 +117,11 @@ class Prover:
         if not self.waiting:
             self._settle()
         return place
+
+    def wait(self, place: Place, boxes: Boxes) -> None:
+        """Notes placements that must be followed from a place on."""
+        self.waiting[place].append(boxes)
+        self.boxes_under_way += len(boxes)
 
     def _settle(self) -> None:
         """Settles the forks of a part that is done, and forgets how it came to that."""
@@ -141,7 +144,7 @@ class Prover:
             if ending := self.lattice.ending(moved):
                 self._end(moved, ending, part)
             elif not moved.is_fork:
-                self.waiting[moved].append(part)
+                self.wait(moved, part)
             else:
                 self._gather(moved, part)
 
@@ -158,7 +161,7 @@ class Prover:
         there = dataclasses.replace(place, steps=0)
         steps = max(place.steps, self.longest.get(there, 0))
         self.longest[there] = steps
-        self.waiting[there].append(boxes)
+        self.wait(there, boxes)
 
     def _end(self, place: Place, ending: Ending, boxes: Boxes) -> None:
         if place.is_fork:
@@ -189,7 +192,7 @@ class Prover:
                 pieces[:, cube, 1] = np.minimum(pieces[:, cube, 1], limits[last + 1])
             is_some = (pieces[..., 0] < pieces[..., 1]).all(-1)
             pieces, bits = pieces[is_some], bits[is_some]
-            for kind in np.unique(bits):
+            for kind in np.flatnonzero(np.bincount(bits)):
                 found[int(kind)].append(merge(pieces[bits == kind]))
         for kind, parts in found.items():
             yield kind, merge(np.concatenate(parts))

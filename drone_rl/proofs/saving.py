@@ -101,8 +101,9 @@ def load(prover: Prover, path: Path, subject: str) -> None:
     if saved != subject:
         raise InputError(f"{path} is of another proof; delete it, or give another folder")
     prover.waiting.clear()
+    prover.boxes_under_way = 0
     for place, longest, boxes in waiting:
-        prover.waiting[place].append(boxes)
+        prover.wait(place, boxes)
         if place.is_fork:
             prover.longest[place] = longest
     for key, boxes in ended:

@@ -118,7 +118,7 @@ class Seeing:
             The pictures, and which of them are on no border, so that they must be the renderer's.
         """
         count = len(cubes)
-        pictures = self.background.repeat(count, 1, 1, 1)
+        shown = np.full((count, *self.background.shape[:2]), NOTHING, np.uint8)
         is_clear = np.ones(count, bool)
         gone = self._gone(cubes, places)
         for k in reversed(range(cubes.shape[1])):
@@ -129,17 +129,16 @@ class Seeing:
                 if not len(those):
                     continue
                 seen = distance - camera_ahead()
-                faces = torch.from_numpy(self._eye.faces(seen, left[those]))
-                shown = self.colors[faces.long()]
-                index = torch.from_numpy(those)
-                hidden = (faces == NOTHING)[..., None]
-                pictures[index] = torch.where(hidden, pictures[index], shown)
+                faces = self._eye.faces(seen, left[those])
+                shown[those] = np.where(faces == NOTHING, shown[those], faces)
                 borders, errors = self._eye.borders(seen)
                 if len(borders):
                     near = np.abs(left[those, None] - borders) <= errors
                     is_clear[those] &= ~near.any(-1)
                 is_clear[those] &= not self._eye.grazed(seen).any()
-        return pictures, is_clear
+        colored = self.colors.numpy()[shown]
+        pictures = np.where((shown == NOTHING)[..., None], self.background.numpy(), colored)
+        return torch.from_numpy(pictures), is_clear
 
     def check(self, count: int, random_state: np.random.RandomState) -> int:
         """Compares the two on random placements and places.

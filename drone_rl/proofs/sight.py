@@ -6,7 +6,7 @@ import torch
 from torch import Tensor
 from torchrl.envs import CatFrames, Transform, TransformedEnv
 
-from drone_rl.envs import worlds_of
+from drone_rl.envs import CameraFault, worlds_of
 from drone_rl.proofs.chain import Ask
 from drone_rl.proofs.graph import Graph
 from drone_rl.sim.tasks.collect_cubes.rules import WorldState
@@ -27,7 +27,8 @@ class Sight:
             network: Pictures (N, C, H, W) to logits (N, A).
 
         Raises:
-            InputError: The policy remembers pictures, so that a node doesn't decide what it does.
+            InputError: The policy remembers pictures or its camera goes wrong, so that a node
+                doesn't decide what it does.
         """
         self.pictures = 0
         """Drawn so far."""
@@ -39,6 +40,11 @@ class Sight:
             raise InputError(
                 f"the policy stacks {max(stacks)} frames, so that its moves depend on the past; "
                 "give a policy that sees one picture"
+            )
+        if faults := [t for t in self._transforms if isinstance(t, CameraFault)]:
+            raise InputError(
+                f"the policy's camera goes wrong ({faults[0]}), so that its moves depend on chance "
+                "or the past; give a policy without"
             )
 
     def on(self, graph: Graph) -> Ask:

@@ -19,7 +19,7 @@ from drone_rl.zoo import PolicyDescription
 
 _SHADES = ("gray", "standardize")
 """Transforms of each pixel alone, by which a brighter pixel stays brighter."""
-_MONOTONE = (*_SHADES, "crop", "resize")
+_MONOTONE = (*_SHADES, "crop", "resize", "blur")
 """Transforms by which brighter pixels make nothing darker."""
 _BLIND = ("step_count", "episode_reward")
 """Transforms that leave pictures alone."""
@@ -75,6 +75,11 @@ def make_subject(
     """
     task = require_cubes(description.task, "what is proved")
     check_task(task)
+    if not description.appearance.is_minimal:
+        raise InputError(
+            "the policy sees worlds of another appearance than minimal, whose pictures have no "
+            "closed form; prove one that was trained with appearance=minimal"
+        )
     if network.actions is not MOVES:
         raise InputError(f"the policy does not choose among {', '.join(MOVES.names)}; prove one")
     lattice, eye = Lattice(task), Eye.of(task, description.camera)
@@ -108,7 +113,7 @@ def make_painter(description: PolicyDescription, seeing: Seeing) -> Painter:
     """What the policy's transforms make of what its camera shows.
 
     Raises:
-        InputError: A transform remembers, or makes something darker of brighter pixels.
+        InputError: A transform remembers, goes wrong, or makes something darker of brighter pixels.
     """
     chosen = [choice for choice in description.transforms if choice.name not in _BLIND]
     names = [choice.name for choice in chosen]
@@ -116,6 +121,11 @@ def make_painter(description: PolicyDescription, seeing: Seeing) -> Painter:
         raise InputError(
             "the policy sees a stack of frames, so what it does depends on the past; prove one "
             "without memory"
+        )
+    if description.faults:
+        raise InputError(
+            f"the policy's camera goes wrong (transform {description.faults[0]}), so what it does "
+            "depends on chance or the past; prove one without"
         )
     if strange := [name for name in names if name not in _MONOTONE]:
         raise InputError(

@@ -63,3 +63,11 @@ def test_a_policy_that_remembers_is_refused(one_sided, policy):
     described = parse({**policy.description.as_dict(), "transforms": steps})
     with pytest.raises(InputError, match="remembers pictures"):
         refuse_another(certificate, described, policy.state["policy"])
+
+
+def test_a_policy_whose_camera_goes_wrong_is_refused(one_sided, policy):
+    steps = [{"name": "gray"}, {"name": "late_frames", "frames": 1}]
+    certificate = changed(one_sided, "transforms", steps)
+    described = parse({**policy.description.as_dict(), "transforms": steps})
+    with pytest.raises(InputError, match=r"camera goes wrong \(transform late_frames\)"):
+        refuse_another(certificate, described, policy.state["policy"])

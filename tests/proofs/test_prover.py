@@ -105,7 +105,10 @@ def test_parts_that_are_not_begun_with_are_undecided():
     assert count > 2 and shares(prover.findings(), bound=2.0) == ({}, pytest.approx(1.0))
     prover.advance()
     while prover.waiting:
+        waiting = [len(part) for parts in prover.waiting.values() for part in parts]
+        assert prover.boxes_under_way == sum(waiting)
         prover.advance()
+    assert prover.boxes_under_way == 0
     subject.close()
     parts, undecided = shares(prover.findings(), bound=2.0)
     assert len(prover.parts) == count - 1 and not prover.is_finished

@@ -51,7 +51,7 @@ def test_stopped_within_a_part_or_between_two(tmp_path, places):
     assert len(stopped.parts) == 1 and bool(stopped.waiting) == bool(places)
     save(stopped, path, "this")
     load(later, path, "this")
-    assert len(later.parts) == 1
+    assert len(later.parts) == 1 and later.boxes_under_way == stopped.boxes_under_way
     assert finish(later) == finish(Prover(subject, 100))
     subject.close()
 

@@ -4,7 +4,7 @@ import pytest
 import torch
 from torchrl.envs import CatFrames
 
-from drone_rl.envs import DroneEnv, GrayPixels, with_transforms
+from drone_rl.envs import DroneEnv, GrayPixels, LateFrames, with_transforms
 from drone_rl.proofs.graph import explore
 from drone_rl.proofs.sight import Sight
 from drone_rl.sim.settings import TaskSettings
@@ -41,5 +41,14 @@ def test_a_policy_with_a_memory_is_refused():
         [GrayPixels(), CatFrames(N=2, dim=-3, in_keys=["pixels"])],
     )
     with pytest.raises(InputError, match=r"stacks 2 frames.*give a policy that sees one picture"):
+        Sight(env, lambda pixels: pixels)
+    env.close()
+
+
+def test_a_camera_that_goes_wrong_is_refused():
+    env = with_transforms(DroneEnv(1, TaskSettings(num_cubes=1)), [GrayPixels(), LateFrames(1)])
+    with pytest.raises(
+        InputError, match=r"goes wrong \(LateFrames\(frames=1\)\).*a policy without"
+    ):
         Sight(env, lambda pixels: pixels)
     env.close()

@@ -9,7 +9,7 @@ import torch
 import drone_rl
 from drone_rl.proofs.cells import Cells
 from drone_rl.proofs.subject import check_task, make_painter, make_subject
-from drone_rl.sim.settings import TaskSettings
+from drone_rl.sim.settings import AppearanceSettings, TaskSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.zoo import parse
 
@@ -53,6 +53,16 @@ def test_transforms_after_the_shades_are_applied(subject):
     assert float(picture[0, 0, 0, 0]) == pytest.approx((sky - 0.5) / 0.25, abs=1e-5)
 
 
+def test_a_blurred_picture_is_bounded_by_its_blurred_bounds(subject):
+    blur = {"name": "blur", "width": 1.0}
+    painter = make_painter(with_transforms("gray", blur), subject.seeing)
+    nothing = painter.paint([], 1)[0]
+    brighter = nothing.clone()
+    brighter[0, 12, 32] += 0.1
+    dark, bright = painter.see(nothing), painter.see(brighter)
+    assert (bright >= dark).all() and (bright > dark)[0, 0, 10:15, 30:35].all()
+
+
 def test_cells_are_those_of_a_cubes_distance(subject):
     """The second cube is 24 m ahead of the start, so 19.6 m of the camera after 4 steps."""
     cells = subject.cells(1, 4, -3.0, 3.0)
@@ -66,6 +76,14 @@ def test_memory_is_refused(subject):
     stack = {"name": "stack", "N": 2}
     with pytest.raises(InputError, match="sees a stack of frames"):
         make_painter(with_transforms("gray", stack), subject.seeing)
+
+
+@pytest.mark.parametrize(
+    "fault", [{"name": "late_frames", "frames": 1}, {"name": "frozen_frames", "share": 0.1}]
+)
+def test_a_camera_that_goes_wrong_is_refused(subject, fault):
+    with pytest.raises(InputError, match=rf"goes wrong \(transform {fault['name']}\).*prove one"):
+        make_painter(with_transforms("gray", fault), subject.seeing)
 
 
 @pytest.mark.parametrize(
@@ -93,6 +111,15 @@ def test_what_the_parts_refuse_is_refused(change, message):
     policy = drone_rl.load_policy("good").in_task(**change)
     with pytest.raises(InputError, match=message):
         make_subject(policy.description, policy.make_network(), 1e-4)
+
+
+def test_worlds_of_another_look_are_refused():
+    policy = drone_rl.load_policy("good")
+    foggy = dataclasses.replace(
+        policy.description, appearance=AppearanceSettings(fog_visibility=50.0)
+    )
+    with pytest.raises(InputError, match="appearance=minimal"):
+        make_subject(foggy, policy.make_network(), 1e-4)
 
 
 def test_the_networks_actions_must_be_moves():
