@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from drone_rl.api.policy import Policy, load_policy
     from drone_rl.api.provable import train_until_proved
     from drone_rl.api.proving import Proof, load_proof, prove
+    from drone_rl.api.shifting import Shifts, shifts
     from drone_rl.api.training import Training, train
     from drone_rl.envs.gymnasium.world import DroneWorld
     from drone_rl.envs.gymnasium.worlds import DroneWorlds
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from drone_rl.settings.mapping import PlacesSettings
     from drone_rl.settings.provable import ProvableSettings
     from drone_rl.settings.proving import ProveSettings
+    from drone_rl.settings.shifting import ShiftSettings
     from drone_rl.settings.training import TrainerSettings, TrainSettings
     from drone_rl.sim.settings import CameraSettings, PillarsSettings, TaskSettings
     from drone_rl.utils.errors import InputError
@@ -53,6 +55,7 @@ _PLACES = {
     "api.policy": ("Policy", "load_policy"),
     "api.provable": ("train_until_proved",),
     "api.proving": ("Proof", "load_proof", "prove"),
+    "api.shifting": ("Shifts", "shifts"),
     "api.training": ("Training", "train"),
     "envs.gymnasium.world": ("DroneWorld",),
     "envs.gymnasium.worlds": ("DroneWorlds",),
@@ -66,6 +69,7 @@ _PLACES = {
     "settings.mapping": ("PlacesSettings",),
     "settings.provable": ("ProvableSettings",),
     "settings.proving": ("ProveSettings",),
+    "settings.shifting": ("ShiftSettings",),
     "settings.training": ("TrainSettings", "TrainerSettings"),
     "sim.settings": ("CameraSettings", "PillarsSettings", "TaskSettings"),
     "utils.errors": ("InputError",),
@@ -98,6 +102,8 @@ __all__ = [
     "Sb3Logits",
     "Sb3Trunk",
     "Sb3Worlds",
+    "ShiftSettings",
+    "Shifts",
     "TaskSettings",
     "TrainSettings",
     "TrainerSettings",
@@ -114,6 +120,7 @@ __all__ = [
     "places",
     "policy_from",
     "prove",
+    "shifts",
     "train",
     "train_until_proved",
 ]

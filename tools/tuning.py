@@ -23,11 +23,11 @@ _PPO = "objective=ppo"
 _SB3 = {"num_envs": 64, "n_steps": 64, "n_epochs": 4, "batch_size": 512, "ent_coef": 0.01}
 OURS: Mapping[str, Sequence[str]] = {
     "reinforce": [
-        "optimiser.lr=2e-3",
-        "optimiser.lr=3e-3",
-        "optimiser.lr=1e-3 collector.num_envs=16",
-        "optimiser.lr=3e-3 collector.num_envs=64",
-        "objective.entropy_coeff=0",
+        "collector.num_envs=16 optimiser.lr=1e-3",
+        "collector.num_envs=16 optimiser.lr=1.5e-3",
+        "collector.num_envs=12 optimiser.lr=1e-3",
+        "collector.num_envs=24 optimiser.lr=1.5e-3",
+        "collector.num_envs=32 optimiser.lr=2e-3",
         "objective.entropy_coeff=0.02",
     ],
     "a2c": [

@@ -66,9 +66,7 @@ class Policy(Pilot):
 
     def make_network(self, device: str | torch.device = "cpu") -> PolicyNetwork:
         """Its network."""
-        network = self.description.build_network(torch.Generator().manual_seed(0))
-        network.load_state_dict(self.state["policy"])
-        return network.to(device)
+        return self.description.load_network(self.state["policy"]).to(device)
 
     def _repr_html_(self) -> str:
         """Shows itself in a notebook."""

@@ -158,6 +158,8 @@ def learn(
         raise InputError(f"{error}; the last good checkpoint is {checkpoints.last_path}") from error
     finally:
         trainer.collector.shutdown()
+        if confirmation is not None:
+            confirmation.close()
     progress = dataclasses.asdict(trainer.progress)
     largest = as_task(settings.task).largest_reward
     told = {} if confirmation is None else confirmation.told

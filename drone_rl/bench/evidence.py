@@ -7,6 +7,8 @@ import copy
 from collections.abc import Mapping
 from typing import Any
 
+from drone_rl.words.terms import CUBES
+
 Plain = dict[str, Any]
 
 
@@ -269,3 +271,50 @@ SWEEP: Plain = {
     ],
 }  # fmt: skip
 """`summary.json` of a small sweep with something of everything."""
+
+
+def _level(number: int, value: float, position: float, successes: int, oracle: int) -> Plain:
+    success = _share(successes, 200, successes / 200 - 0.05, successes / 200 + 0.05)
+    return {
+        "number": number,
+        "value": value,
+        "position": position,
+        "refused": None,
+        "oracle": _share(oracle, 200, oracle / 200 - 0.05, oracle / 200 + 0.05),
+        "impossible": oracle < 150,
+        "modes": {"constant": {"success": success, "unchanged": False}},
+    }
+
+
+def _along(unit: str, neutral: float, *levels: Plain) -> Plain:
+    return {"unit": unit, "neutral": neutral, "areas": {"constant": 0.75}, "levels": [*levels]}
+
+
+def _found(low: float, high: float, positions: list[float], **more: Any) -> Plain:
+    ends = {"low_open": None, "high_open": None, "failed": [], "tests": 5}
+    return {"low": low, "high": high, "positions": positions, **ends, **more}
+
+
+_DARK = {
+    "good": False, "bad": True, "refused": None, "success": 0.4, "value": 0.8,
+    "worst": {"side": "right", "share": 0.47},
+}  # fmt: skip
+SHIFTS: Plain = {
+    "terms": CUBES.as_dict(),
+    "settings": {"domain_episodes": 400},
+    "plain": {"success": _share(200, 200, 0.98, 1.0), "oracle": _share(200, 200, 0.98, 1.0)},
+    "axes": {
+        "sun": _along("degrees", 55.0, _level(1, 60, 5, 199, 200), _level(5, 0, -55, 20, 90)),
+        "blur": _along("pixels", 0.0, _level(1, 0.5, 0.5, 200, 200), _level(5, 2, 2, 190, 200)),
+        "brightness": _along("times", 1.0, _level(1, 0.8, -0.2, 80, 200)),
+    },
+    "together": _level(3, 0.0, 0.0, 3, 180),
+    "domain": {
+        "plain": {"good": True},
+        "ranges": {
+            "sun": _found(21.07, 60.0, [-33.93, 5.0], low_open=False, high_open=True),
+            "blur": _found(0.0, 1.5, [0.0, 1.5], high_open=False),
+            "brightness": _found(1.0, 1.0, [0.0, 0.0], low_open=False, failed=[_DARK]),
+        },
+    },
+}

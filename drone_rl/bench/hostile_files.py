@@ -18,6 +18,7 @@ import torch
 from safetensors.torch import save
 
 from drone_rl.bench.hostile_folders import hostile_folders
+from drone_rl.sim.settings import MINIMAL
 from drone_rl.zoo import parse
 
 DESCRIPTION: dict[str, Any] = {
@@ -43,6 +44,7 @@ DESCRIPTION: dict[str, Any] = {
     "network": {"name": "small_cnn", "patch": 4, "channels": [2], "hidden": []},
 }
 """A policy that would be accepted."""
+_LOOK = MINIMAL.values()
 _PROGRESS = {"frames": 1, "episodes": 1, "updates": 1, "seconds": 1.0, "running_reward": 0.5}
 _ORIGIN = {"versions": {"torch": "2"}, "git_revision": None}
 ABOUT = {
@@ -129,6 +131,11 @@ def _exported(folder: Path) -> list[tuple[str, list[str], str]]:
         "tiny_steps": ("task.step_length", 1e-320),
         "home": ("task.spacing", "${oc.env:HOSTILE_SECRET}"),
         "camera": ("camera", {"width": 4096, "height": 4096, "horizontal_fov": 90.0}),
+        "fog": ("appearance", {**_LOOK, "fog_visibility": 0.0}),
+        "texture": (
+            "appearance",
+            {**_LOOK, "ground_texture": [str(folder / "canary" / "secret.txt")]},
+        ),
         "wide_layer": ("network.hidden", [10**9]),
         "many_parameters": ("network.hidden", [4096] * 8),
         "many_layers": ("network.hidden", [1] * 10**4),

@@ -19,9 +19,9 @@ from drone_rl.sim.rendering import MakeRenderer
 from drone_rl.sim.settings import CameraSettings, TaskSettings
 
 
-def default_collector(num_envs: int, num_threads: int, device: str) -> ThreadedCollector:
+def default_collector(num_envs: int, device: str) -> ThreadedCollector:
     """The collector of `drone-rl train`, with a policy that has learned nothing yet."""
-    threads = Threads(num_envs=num_envs, num_threads=num_threads)
+    threads = Threads(num_envs=num_envs)
     collector = build_collector(TrainSettings(collector=threads, device=device)).collector
     assert isinstance(collector, ThreadedCollector)
     return collector

@@ -19,10 +19,11 @@ from drone_rl.bench.proving import bench_many_cubes, bench_prove, bench_tamperin
 from drone_rl.bench.render_truth import bench_render_truth
 from drone_rl.bench.scaling import bench_scaling
 from drone_rl.bench.sentences import bench_sentences
+from drone_rl.bench.shifts import bench_shifts
 from drone_rl.bench.speed import bench_collector, bench_dm_control, bench_render
 from drone_rl.bench.startup import bench_startup
 from drone_rl.bench.sweeps import bench_kills, bench_ray, bench_sweeps
-from drone_rl.bench.training import bench_pillars, bench_solve
+from drone_rl.bench.training import bench_large, bench_pillars, bench_seeds, bench_solve
 from drone_rl.bench.verdicts import bench_verdicts
 from drone_rl.utils.errors import InputError
 
@@ -38,7 +39,7 @@ BENCHMARKS: dict[str, Benchmark] = {
         lambda s: bench_render(s.worlds, s.device, s.quick), "main", (*_DRAWING, "bench/speed")
     ),
     "collector": Benchmark(
-        lambda s: bench_collector(s.worlds, s.threads, s.device, s.quick),
+        lambda s: bench_collector(s.worlds, s.device, s.quick),
         "main",
         (*_COLLECTING, "bench/speed"),
     ),
@@ -59,6 +60,16 @@ BENCHMARKS: dict[str, Benchmark] = {
         lambda s: bench_solve(s.runs, s.seeds, s.episodes, s.device, s.quick),
         "main",
         (*_TRAINING, "evaluation", "conf", "bench/training"),
+    ),
+    "seeds": Benchmark(
+        lambda s: bench_seeds(s.runs / "seeds", s.device, s.quick),
+        "main",
+        (*_TRAINING, "evaluation", "conf", "bench/training"),
+    ),
+    "large": Benchmark(
+        lambda s: bench_large(s.runs, s.device, s.quick),
+        "main",
+        (*_TRAINING, "conf", "bench/training"),
     ),
     "coverage": Benchmark(
         lambda s: bench_coverage(s.quick),
@@ -88,6 +99,11 @@ BENCHMARKS: dict[str, Benchmark] = {
         lambda s: bench_verdicts(s.runs, s.device, s.quick),
         "truth",
         (*_JUDGING, "bench/verdicts", "bench/scripted"),
+    ),
+    "shifts": Benchmark(
+        lambda s: bench_shifts(s.quick),
+        "truth",
+        (*_JUDGING, "conditions", "api/shifting", "bench/shifts"),
     ),
     "render_truth": Benchmark(
         lambda s: bench_render_truth(s.quick),

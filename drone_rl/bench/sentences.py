@@ -4,8 +4,18 @@ import dataclasses
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from drone_rl.bench.evidence import CARD, EXPLANATION, GROUP, HIGHER, PROOF, SWEEP, VERDICT, changed
-from drone_rl.words import advice, card, report, sweep, truth, verdict
+from drone_rl.bench.evidence import (
+    CARD,
+    EXPLANATION,
+    GROUP,
+    HIGHER,
+    PROOF,
+    SHIFTS,
+    SWEEP,
+    VERDICT,
+    changed,
+)
+from drone_rl.words import advice, card, report, shifts, sweep, truth, verdict
 from drone_rl.words.licence import Sentence, said
 
 Changes = Mapping[str, Any]
@@ -13,6 +23,7 @@ SPOKEN: dict[str, tuple[tuple[Sentence, ...], Mapping[str, Any]]] = {
     "verdict": (verdict.SENTENCES, VERDICT),
     "explanation": ((*advice.SENTENCES, *report.SENTENCES, *truth.SENTENCES), EXPLANATION),
     "card": (card.SENTENCES, CARD),
+    "shifts": (shifts.SHIFTS, SHIFTS),
     "sweep": (sweep.SENTENCES, SWEEP),
     "setting": (sweep.GROUP_SENTENCES, GROUP),
 }
@@ -258,10 +269,39 @@ _OF_SETTINGS = (
     ("group.unknown", {"judged": 6}),
     ("group.unfinished", {"unfinished": 0}),
 )
+_NOT_GOOD = {
+    "domain.plain.good": False,
+    "domain.ranges.sun.positions": None,
+    "domain.ranges.blur.positions": None,
+    "domain.ranges.brightness.positions": None,
+}
+_SURE_BLUR = "axes.blur.levels.1.modes.constant.unchanged"
+_TOO_FEW = {"domain.ranges.brightness.failed.0.bad": False}
+_OF_SHIFTS = (
+    ("shifts.good", _NOT_GOOD),
+    ("shifts.good", {"domain.ranges.sun.low": 40.0}),
+    ("shifts.good", {"domain.ranges.sun.high_open": False}),
+    ("shifts.good", {_SURE_BLUR: True}),
+    ("shifts.good", {"domain": None}),
+    ("shifts.not", _NOT_GOOD),
+    ("shifts.not", _TOO_FEW),
+    ("shifts.not", {"domain.ranges.brightness.failed.0.worst": {"side": "left", "share": 0.2}}),
+    ("shifts.not", {"domain.ranges.brightness.positions": [-0.1, 0.0]}),
+    ("shifts.too_few", {"domain.ranges.brightness.failed.0.bad": True}, _TOO_FEW),
+    ("shifts.none", {"domain.plain.good": True}, _NOT_GOOD),
+    ("shifts.none", {"domain": None}, _NOT_GOOD),
+    ("shifts.untested", {_SURE_BLUR: False}, {_SURE_BLUR: True}),
+    ("shifts.impossible", {"axes.sun.levels.1.impossible": False}),
+    ("shifts.impossible", {"axes.sun.levels.1.oracle.share": 0.3}),
+    ("shifts.together", {"together.refused": "task.cube_size=99"}),
+    ("shifts.together", {"together.modes.constant.success.share": 0.5}),
+    ("shifts.scope", _NOT_GOOD),
+)  # fmt: skip
 PLANTS = (
     *_plants("verdict", _OF_VERDICTS),
     *_plants("explanation", (*_OF_REPORTS, *_OF_MAPS)),
     *_plants("card", _OF_CARDS),
+    *_plants("shifts", _OF_SHIFTS),
     *_plants("sweep", _OF_SWEEPS),
     *_plants("setting", _OF_SETTINGS),
 )

@@ -17,7 +17,8 @@ def bench_solve(
 
     Returns:
         Per seed: seconds from the start of the command to its end, whether it reached the target
-        and the lower end of the exact 95% interval of the share of complete episodes.
+        and the lower end of the exact 95% interval of the share of complete episodes. And
+        "learning_fps", the median of frames a second of collecting and learning together.
     """
     tried = seeds[:1] if quick else seeds
     settings = ["experiment=smoke"] if quick else []
@@ -25,11 +26,42 @@ def bench_solve(
     return {
         "time_to_solve_s": done["seconds"],
         "frames_to_solve": done["frames"],
+        "learning_fps": float(np.median(np.divide(done["frames"], done["trained_s"]))),
         "success_lower95": done["lower95"],
         "median_time_to_solve_s": float(np.median(done["seconds"])),
         "seeds_solved": done["reason"].count("solved"),
         "seeds_tried": len(tried),
     }
+
+
+def bench_seeds(folder: Path, device: str, quick: bool) -> dict[str, Any]:
+    """Trains with the defaults from 20 seeds that no setting was chosen by, and evaluates each.
+
+    Returns:
+        How many reach the target, and of each the seconds from the start of the command to its
+        end, the frames, and the lower end of the share of 1,000 episodes with everything done.
+    """
+    tried, settings = (range(2), ["experiment=smoke"]) if quick else (range(200, 220), [])
+    done = _train(folder, tried, settings, 50 if quick else 1000, device)
+    return {
+        "seeds_solved_of_20": done["reason"].count("solved"),
+        "seeds_s": done["seconds"],
+        "seeds_frames": done["frames"],
+        "seeds_lower95": done["lower95"],
+    }
+
+
+def bench_large(folder: Path, device: str, quick: bool) -> dict[str, Any]:
+    """Trains `experiment=large` for a while.
+
+    Returns:
+        Frames a second of collecting and learning together, kernels loaded.
+    """
+    frames = 500 if quick else 20_000
+    limits = (f"trainer.total_frames={frames}", "trainer.target_share=null")
+    train(folder / "large_first", "experiment=large", f"device={device}", *limits)
+    _, result = train(folder / "large", "experiment=large", f"device={device}", *limits)
+    return {"learning_fps_large": result["frames"] / result["seconds"]}
 
 
 def bench_pillars(
@@ -57,12 +89,14 @@ def _train(
     folder: Path, seeds: Sequence[int], settings: Iterable[str], episodes: int, device: str
 ) -> dict[str, list]:
     """Trains from each seed and evaluates, by the commands that a user gives."""
-    results: dict[str, list] = {"seconds": [], "frames": [], "reason": [], "lower95": []}
+    names = ("seconds", "frames", "trained_s", "reason", "lower95")
+    results: dict[str, list] = {name: [] for name in names}
     for seed in seeds:
         run = folder / f"train_{seed}"
         seconds, result = train(run, f"seed={seed}", f"device={device}", *settings)
         results["seconds"].append(seconds)
         results["frames"].append(result["frames"])
+        results["trained_s"].append(result["seconds"])
         results["reason"].append(result["reason"])
         call(
             "evaluate",

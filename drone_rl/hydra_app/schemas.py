@@ -20,10 +20,17 @@ from drone_rl.settings.returns import Returns
 from drone_rl.settings.training import TrainerSettings
 from drone_rl.settings.transforms import Transform
 from drone_rl.settings.variant import Variant
-from drone_rl.sim.settings import TASKS, BaseTaskSettings, CameraSettings, TaskSettings
+from drone_rl.sim.settings import (
+    TASKS,
+    AppearanceSettings,
+    BaseTaskSettings,
+    CameraSettings,
+    TaskSettings,
+)
 from drone_rl.utils.settings import Settings, kinds_of, snake_case, types_of
 
 GROUPS: dict[str, type[Settings]] = {
+    "appearance": AppearanceSettings,
     "camera": CameraSettings,
     "trainer": TrainerSettings,
     "provable": ProvableSettings,

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from drone_rl.sim.settings import MINIMAL
 from drone_rl.utils.errors import InputError
 
 _MOVED = {
@@ -17,7 +18,7 @@ def modern(config: Mapping[str, Any]) -> dict[str, Any]:
     Until version 0.1 the group of networks was called policy, the collector's maker stood under
     "make", and settings told Hydra how to make things (`_partial_`, and `_target_` of task and
     camera). Until 0.2 a training learned on as many threads as it collected on,
-    and took its running mean at its word.
+    took its running mean at its word, and took every step in Python, and worlds had one look.
 
     Args:
         config: Of any version, as it stands in a checkpoint or a sweep's folder.
@@ -34,6 +35,8 @@ def modern(config: Mapping[str, Any]) -> dict[str, Any]:
     groups = {name: changes.get(name, lambda group: group)(group) for name, group in groups.items()}
     if {"trainer", "collector"} <= groups.keys():
         groups["trainer"] = _trainer(groups["trainer"], groups["collector"])
+    if "task" in groups:
+        groups.setdefault("appearance", MINIMAL.values())
     return groups
 
 
@@ -70,11 +73,12 @@ def _without(group: Any, *names: str) -> Any:
 
 
 def _collector(group: Any) -> Any:
-    if not isinstance(group, Mapping) or "make" not in group:
+    if not isinstance(group, Mapping):
         return group
-    maker = group["make"]
+    maker = group.get("make", group.get("_target_"))
     target = _MOVED.get(maker, maker) if isinstance(maker, str) else maker
-    return {"_target_": target, **_without(group, "make")}
+    made = {**_without(group, "make"), **({} if target is None else {"_target_": target})}
+    return {"compiled": False, **made} if target in _MOVED.values() else made
 
 
 def _trainer(group: Any, collector: Any) -> Any:

@@ -19,7 +19,7 @@ class Adam(Optimiser):
     """Steps as long as the gradient is sure of itself."""
 
     target: ClassVar[str] = "torch.optim.Adam"
-    lr: LearningRate = 2e-3
+    lr: LearningRate = 1e-3
     """Learning rate."""
 
 

@@ -9,7 +9,13 @@ from drone_rl.settings.networks import Network, SmallCnn
 from drone_rl.settings.objectives import Objective, Reinforce
 from drone_rl.settings.returns import Gae, LeaveOneOut, Returns
 from drone_rl.settings.transforms import Gray, Standardize, Transform
-from drone_rl.sim.settings import BaseTaskSettings, CameraSettings, RendererName, TaskSettings
+from drone_rl.sim.settings import (
+    AppearanceSettings,
+    BaseTaskSettings,
+    CameraSettings,
+    RendererName,
+    TaskSettings,
+)
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Instance, Real, Several, Whole
 from drone_rl.utils.settings import Settings
@@ -50,6 +56,8 @@ class TrainSettings(Settings):
 
     task: BaseTaskSettings = TaskSettings()
     """What the drone has to do."""
+    appearance: AppearanceSettings = AppearanceSettings()
+    """How its worlds look."""
     camera: CameraSettings = CameraSettings()
     """The picture that the drone takes."""
     transforms: Annotated[
@@ -81,6 +89,11 @@ class TrainSettings(Settings):
 
     def check(self) -> None:
         """Refuses parts that can't work together."""
+        if self.renderer != "raytrace" and not self.appearance.is_minimal:
+            raise InputError(
+                f"renderer={self.renderer} draws the minimal appearance alone; give "
+                "renderer=raytrace or appearance=minimal"
+            )
         needs, objective = self.objective.needs, self.objective.name
         for name, part in needs.items():
             given = getattr(self, name)

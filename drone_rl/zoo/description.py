@@ -1,4 +1,4 @@
-"""A policy as plain data: task, camera, transforms and network, by registered names and values.
+"""A policy as plain data: its worlds, camera, transforms and network, by names and values.
 
 The same description stands in checkpoints, exported files and run folders. It is all that is needed
 to build a policy, and all that a file can ask for.
@@ -15,7 +15,13 @@ from torchrl.envs import Transform, TransformedEnv
 from drone_rl.envs import DroneEnv, with_transforms
 from drone_rl.policies import PolicyNetwork
 from drone_rl.sim.actions import Actions
-from drone_rl.sim.settings import BaseTaskSettings, CameraSettings, read_task
+from drone_rl.sim.settings import (
+    MINIMAL,
+    AppearanceSettings,
+    BaseTaskSettings,
+    CameraSettings,
+    read_task,
+)
 from drone_rl.sim.tasks import Task, as_task
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Record, Several, as_mapping, shown
@@ -32,6 +38,8 @@ MOST_NUMBERS = 2**20
 """Of one picture after any transform."""
 MOST_TRANSFORMS = 16
 _KEYS = ("format", "format_version", "task", "camera", "transforms", "network")
+_LOOK = "appearance"
+"""The key that may be missing."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -64,6 +72,8 @@ class PolicyDescription:
     transforms: tuple[Choice, ...]
     """In the order in which they are applied."""
     network: Choice
+    appearance: AppearanceSettings = MINIMAL
+    """How the worlds look; files without it mean the minimal one."""
 
     def __post_init__(self) -> None:
         """Refuses what could not be built, or only with much memory."""
@@ -98,8 +108,19 @@ class PolicyDescription:
         """How many frames the network sees at once."""
         return math.prod(c.values["N"] for c in self.transforms if c.name == "stack")
 
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """Names of the transforms by which the camera goes wrong, by chance or with memory."""
+        return tuple(c.name for c in self.transforms if TRANSFORMS[c.name].is_fault)
+
+    def without_faults(self) -> "PolicyDescription":
+        """The same behind a camera of which none is known."""
+        sound = tuple(c for c in self.transforms if not TRANSFORMS[c.name].is_fault)
+        return dataclasses.replace(self, transforms=sound)
+
     def as_dict(self) -> dict[str, Any]:
         """As in files; `parse` undoes it."""
+        look = {} if self.appearance.is_minimal else {"appearance": self.appearance.values()}
         return {
             "format": FORMAT,
             "format_version": FORMAT_VERSION,
@@ -107,6 +128,7 @@ class PolicyDescription:
             "camera": self.camera.values(),
             "transforms": [choice.as_dict() for choice in self.transforms],
             "network": self.network.as_dict(),
+            **look,
         }
 
     def build_env(
@@ -136,6 +158,7 @@ class PolicyDescription:
             seed=seed,
             device=device,
             pixels=pixels,
+            appearance=self.appearance,
             **kwargs,
         )
         return with_transforms(env, self.make_transforms() if pixels else ())
@@ -152,6 +175,16 @@ class PolicyDescription:
         """
         return self._network(as_task(self.task).make_dynamics().actions, generator)
 
+    def load_network(self, weights: Mapping[str, torch.Tensor]) -> PolicyNetwork:
+        """The described network with given weights; none are drawn before, which takes longer.
+
+        Args:
+            weights: Names, shapes and types as in `expected_weights`.
+        """
+        network = self._without_weights().to_empty(device="cpu")
+        network.load_state_dict(weights)
+        return network
+
     def build_critic(self, generator: torch.Generator | None = None) -> PolicyNetwork:
         """A network like the described one, from a picture to one number.
 
@@ -162,9 +195,12 @@ class PolicyDescription:
 
     def expected_weights(self) -> dict[str, torch.Tensor]:
         """Names, shapes and types of the network's weights, without the weights themselves."""
+        return dict(self._without_weights().state_dict())
+
+    def _without_weights(self) -> PolicyNetwork:
         actions = as_task(self.task).make_dynamics().actions
         with torch.device("meta"):  # nothing is computed here: that would load a compiler's algebra
-            return dict(self._network(actions).state_dict())
+            return self._network(actions)
 
     def _network(self, actions: Actions, generator: torch.Generator | None = None) -> PolicyNetwork:
         network = self._layers(len(actions.names), generator)
@@ -193,8 +229,8 @@ def parse(data: Any) -> PolicyDescription:
             f"format_version={shown(data['format_version'])}: this program reads "
             f"{FORMAT_VERSION}; use the version of drone_rl that wrote it"
         )
-    if set(data) != set(_KEYS):
-        names = ", ".join(shown(key) for key in sorted(set(data) ^ set(_KEYS)))
+    if set(data) - {_LOOK} != set(_KEYS):
+        names = ", ".join(shown(key) for key in sorted((set(data) - {_LOOK}) ^ set(_KEYS)))
         raise InputError(
             f"the policy's description has exactly {', '.join(_KEYS)}; not so: {names}"
         )
@@ -206,6 +242,7 @@ def parse(data: Any) -> PolicyDescription:
         CameraSettings.read(data["camera"], "camera"),
         chosen,
         _ChoiceOf(NETWORKS).read(data["network"], "network"),
+        AppearanceSettings.read(data[_LOOK], _LOOK) if _LOOK in data else MINIMAL,
     )
 
 

@@ -18,9 +18,14 @@ from drone_rl import envs
 from drone_rl.policies import MLP, OriginalCNN, SmallCNN
 from drone_rl.settings.networks import Mlp, OriginalCnn, SmallCnn
 from drone_rl.settings.transforms import (
+    Blur,
     Crop,
+    DeadRows,
     EpisodeReward,
+    FrozenFrames,
     Gray,
+    LateFrames,
+    Noise,
     Resize,
     Rgb,
     Stack,
@@ -29,7 +34,7 @@ from drone_rl.settings.transforms import (
 )
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Kind, Record, shown
-from drone_rl.utils.settings import kinds_of
+from drone_rl.utils.settings import below, kinds_of
 
 ENTRY_POINTS = "drone_rl.policies"
 """Group of the modules that register parts of their own."""
@@ -59,6 +64,8 @@ class Part:
     """Arguments that are always the same."""
     change: Callable[[Picture, Mapping[str, Any]], Picture] = lambda picture, _: picture
     """What a transform makes of a picture, given its parameters."""
+    is_fault: bool = False
+    """Whether a transform is what goes wrong in a camera, and no part of a policy's own program."""
 
 
 NETWORKS: dict[str, Part] = {}
@@ -88,6 +95,7 @@ def register_transform(
     *targets: str,
     fixed: Mapping[str, Any] | None = None,
     change: Callable[[Picture, Mapping[str, Any]], Picture] = lambda picture, _: picture,
+    is_fault: bool = False,
 ) -> None:
     """Makes a transform known to descriptions, in files too.
 
@@ -98,10 +106,10 @@ def register_transform(
         targets: `_target_`s that mean it; by default the place where it is defined.
         fixed: Arguments that are always the same.
         change: What it makes of a picture's shape; nothing by default.
+        is_fault: Whether it is a `CameraFault`.
     """
-    TRANSFORMS[name] = Part(
-        make, Record(parameters), targets or (_place(make),), dict(fixed or {}), change
-    )
+    targets = targets or (_place(make),)
+    TRANSFORMS[name] = Part(make, Record(parameters), targets, dict(fixed or {}), change, is_fault)
 
 
 def find_part(parts: Mapping[str, Part], name: object, where: str) -> Part:
@@ -152,10 +160,27 @@ def _crop(picture: Picture, values: Mapping[str, Any]) -> Picture:
     return Picture((*picture.shape[:-2], bottom - top, picture.shape[-1]), picture.is_float)
 
 
+def _floats(name: str) -> Callable[[Picture, Mapping[str, Any]], Picture]:
+    """A change of levels alone, of pictures from 0 to 1."""
+
+    def change(picture: Picture, _: Mapping[str, Any]) -> Picture:
+        if not picture.is_float:
+            raise InputError(f"the transform {name} needs floats; let gray come first")
+        return picture
+
+    return change
+
+
+def _dead_rows(picture: Picture, values: Mapping[str, Any]) -> Picture:
+    floats = _floats("dead_rows")(picture, values)
+    with below("transforms.dead_rows"):
+        DeadRows(**values).check_height(floats.shape[-2])
+    return floats
+
+
 def _resize(picture: Picture, values: Mapping[str, Any]) -> Picture:
-    if not picture.is_float:
-        raise InputError("the transform resize needs floats; let gray come first")
-    return Picture((picture.shape[0], values["height"], values["width"]), True)
+    floats = _floats("resize")(picture, values)
+    return Picture((floats.shape[0], values["height"], values["width"]), True)
 
 
 def _stack(picture: Picture, values: Mapping[str, Any]) -> Picture:
@@ -216,4 +241,37 @@ register_transform(
     StepCounter,
     kinds_of(StepCount),
     *(StepCount.target, "torchrl.envs.transforms.StepCounter"),
+)
+register_transform("blur", envs.Blur, kinds_of(Blur), Blur.target, change=_floats("blur"))
+register_transform(
+    "noise",
+    envs.Noise,
+    kinds_of(Noise),
+    Noise.target,
+    change=_floats("noise"),
+    is_fault=True,
+)
+register_transform(
+    "dead_rows",
+    envs.DeadRows,
+    kinds_of(DeadRows),
+    DeadRows.target,
+    change=_dead_rows,
+    is_fault=True,
+)
+register_transform(
+    "frozen_frames",
+    envs.FrozenFrames,
+    kinds_of(FrozenFrames),
+    FrozenFrames.target,
+    change=_floats("frozen_frames"),
+    is_fault=True,
+)
+register_transform(
+    "late_frames",
+    envs.LateFrames,
+    kinds_of(LateFrames),
+    LateFrames.target,
+    change=_floats("late_frames"),
+    is_fault=True,
 )

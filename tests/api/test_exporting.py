@@ -1,5 +1,6 @@
 """Where an exported policy says that it comes from."""
 
+import dataclasses
 import json
 
 import pytest
@@ -12,6 +13,7 @@ from drone_rl.settings.judging import FlightSettings
 from drone_rl.sweeps import Run, Sweep
 from drone_rl.utils.errors import InputError
 from drone_rl.verdicts.rule import Rule
+from drone_rl.zoo import open_onnx, parse
 from tests.checks.making import of_every_place
 
 METRICS = "frames,train/running_reward\n100,1.5\n"
@@ -114,6 +116,22 @@ def test_an_onnx_model_that_agrees_is_left_with_its_command(tmp_path):
     assert 0 < found.difference <= 1e-5
     assert b'"drone-rl train"' in target.read_bytes()
     assert [path.name for path in tmp_path.iterdir()] == ["mine.onnx"]
+
+
+def test_an_onnx_model_is_of_the_policy_and_not_of_what_goes_wrong_in_its_camera(
+    tmp_path, monkeypatch
+):
+    monkeypatch.setattr(exporting, "_STEPS", 3)
+    policy = drone_rl.load_policy("good")
+    described = policy.description.as_dict()
+    described["transforms"].insert(1, {"name": "noise", "strength": 0.2, "correlation_time": 0.0})
+    described["transforms"].insert(2, {"name": "late_frames", "frames": 2})
+    trained = dataclasses.replace(policy, description=parse(described))
+    assert drone_rl.export_onnx(trained, tmp_path / "mine.onnx").difference <= 1e-5
+    drone_rl.export_onnx(policy, tmp_path / "clean.onnx")
+    frames = torch.randint(0, 256, (2, 25, 64, 3), dtype=torch.uint8)
+    models = [open_onnx((tmp_path / f"{n}.onnx").read_bytes()) for n in ("mine", "clean")]
+    assert torch.equal(models[0](frames), models[1](frames))
 
 
 @pytest.mark.parametrize("wrong", [1 / 3 + 1.1e-5, float("nan")])

@@ -118,7 +118,7 @@ def test_a_resumed_run_learns_as_it_did(trained):
         ({"task": {"num_cubes": 1}}, r"task=\(dict\) is no BaseTaskSettings"),
         ({"returns": 3}, "returns=3 is no Returns"),
         ({"transforms": (3,)}, r"transforms\[0\]=3 is no Transform"),
-        ({"wind": 3}, "wind is unknown; there are: task, camera"),
+        ({"wind": 3}, "wind is unknown; there are: task, appearance, camera"),
     ],
 )
 def test_mistakes_name_the_argument(change, message, tmp_path):

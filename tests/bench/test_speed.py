@@ -54,21 +54,29 @@ def test_raw_drawing(worlds, monkeypatch):
 
 
 def test_collecting_over_drawing(worlds, monkeypatch):
-    collector = SimpleNamespace(collect=lambda: "batch", shutdown=lambda: None)
-    monkeypatch.setattr(speed, "default_collector", lambda n, threads, device: collector)
-    calls = []
+    made, calls = [], []
+
+    def default_collector(num_envs, device):
+        made.append(num_envs)
+        return SimpleNamespace(collect=lambda: "b" * num_envs, shutdown=lambda: made.append("shut"))
+
+    monkeypatch.setattr(speed, "default_collector", default_collector)
+    monkeypatch.setattr(speed, "rate", lambda work, seconds: seconds * (100 - abs(work() - 65)))
 
     def paired(first, second, seconds, rounds):
         calls.append((first(), second(), seconds, rounds))
         return 6.0, 8.0, 0.7
 
     monkeypatch.setattr(speed, "paired", paired)
-    assert speed.bench_collector(2, 1, "cpu", quick=False) == {
+    assert speed.bench_collector(2, "cpu", quick=False) == {
         "collector_fps": 6.0,
+        "collector_worlds": 64,
+        "collector_fps_16": 4.0 * 51,
         "raw_render_beside_collector_fps": 8.0,
         "collector_over_raw": 0.7,
     }
-    assert calls == [(5, 6, 4.0, 9)]  # letters of "batch" and "frames"
+    assert calls == [(64, 6, 4.0, 9)]  # frames of a batch, and letters of "frames"
+    assert made[::2] == [16, 32, 64, 128, 256, 64] and made[1::2] == ["shut"] * 6
     assert worlds[0].closed and worlds[0].renderer == "mujoco_warp"
 
 

@@ -13,7 +13,7 @@ from drone_rl.cli.bench import prepare
         (["--help"], ["--help"]),
         (
             ["--quick"],
-            ["only=[render,collector,dm_control,scaling,memory,solve]", "quick=true"],
+            ["only=[render,collector,dm_control,scaling,memory,solve,seeds,large]", "quick=true"],
         ),
         (["many"], ["only=[sweeps,kills,ray]"]),
     ],

@@ -115,7 +115,7 @@ def test_resume_with_a_changed_setting(run, in_process):
     before = (run / "checkpoints" / "last.pt").read_bytes()
     line = error_line(in_process("train", f"resume={run}", "optimiser.lr=0.5", cwd=run))
     assert "optimiser.lr=0.5" in line
-    assert "optimiser.lr=0.002" in line
+    assert "optimiser.lr=0.001" in line
     assert (run / "checkpoints" / "last.pt").read_bytes() == before
 
 

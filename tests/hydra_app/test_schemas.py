@@ -83,7 +83,9 @@ def test_every_setting_of_every_choice_is_typed(group, name, config):
         assert dataclasses.is_dataclass(typing.cast(typing.Any, step)._metadata.object_type)
 
 
-@pytest.mark.parametrize(("group", "name"), files("task", "camera", "transforms", "network"))
+@pytest.mark.parametrize(
+    ("group", "name"), files("task", "appearance", "camera", "transforms", "network")
+)
 def test_every_choice_of_what_a_policy_is_builds(group, name, settings):
     frame = ["camera=frame"] if name == "original" else []  # whose rows are of that frame
     told = settings("train", f"{group}={name}", *frame).narrowed(TrainSettings)
@@ -134,7 +136,7 @@ def test_every_value_of_every_sweep_is_understood(name, settings):
 
 @pytest.mark.parametrize(
     "command",
-    ["evaluate", "play", "verdict", "prove", "check", "places", "chain", "explain"],
+    ["evaluate", "play", "verdict", "prove", "check", "places", "shifts", "chain", "explain"],
 )
 def test_any_setting_of_the_task_can_be_changed_for_a_trained_policy(command, config, settings):
     assert set(config(command).task) == set(kinds_of(TaskSettings)) | set(kinds_of(PillarsSettings))

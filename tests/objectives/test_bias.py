@@ -167,7 +167,7 @@ def test_written_out_default_is_that_of_the_classes(kind):
 @pytest.mark.parametrize(
     ("settings", "degrees"),
     [
-        ({}, {3: 10.71, 8: 3.86, 32: 0.53, 64: 0.25}),
+        ({}, {3: 10.71, 8: 3.86, 16: 1.19, 32: 0.53, 64: 0.25}),
         ({"mean": False}, {3: 8.72, 8: 2.61, 64: 0.10}),  # scaled only
         ({"scale": False}, {2: 3.80, 8: 1.14, 64: 0.15}),  # mean only
     ],

@@ -3,6 +3,7 @@
 import pytest
 
 from drone_rl.settings.comparison import check_same_config, modern
+from drone_rl.sim.settings import MINIMAL
 from drone_rl.utils.errors import InputError
 
 OLD = {
@@ -17,6 +18,7 @@ OLD = {
     "seed": 0,
 }
 NEW = {
+    "appearance": MINIMAL.values(),
     "task": {"num_cubes": 3},
     "camera": {"width": 64},
     "transforms": {
@@ -24,7 +26,11 @@ NEW = {
         "stack": {"_target_": "torchrl.envs.CatFrames", "N": 2},
     },
     "network": {"_target_": "drone_rl.policies.MLP", "hidden": [8]},
-    "collector": {"_target_": "drone_rl.api.collecting.threaded_collector", "num_envs": 4},
+    "collector": {
+        "_target_": "drone_rl.api.collecting.threaded_collector",
+        "num_envs": 4,
+        "compiled": False,
+    },
     "seed": 0,
 }
 
@@ -32,6 +38,14 @@ NEW = {
 def test_old_configurations_are_told_in_todays_words():
     assert modern(OLD) == NEW
     assert modern(NEW) == NEW
+
+
+def test_a_training_of_old_took_each_step_in_python():
+    for name, is_compiled in (("threaded_collector", False), ("rollout_collector", None)):
+        old = {"collector": {"_target_": f"drone_rl.api.collecting.{name}"}}
+        assert modern(old)["collector"].get("compiled") is is_compiled
+        new = {"collector": {**old["collector"], "compiled": True}}
+        assert modern(new) == new
 
 
 def test_a_training_of_old_learned_on_as_many_threads_as_it_collected_on():

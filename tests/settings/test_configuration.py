@@ -10,7 +10,7 @@ from drone_rl.settings.learning import Adam, Optimiser
 from drone_rl.settings.networks import Mlp
 from drone_rl.settings.training import TrainerSettings, TrainSettings
 from drone_rl.settings.transforms import Crop, Gray
-from drone_rl.sim.settings import TaskSettings
+from drone_rl.sim.settings import AppearanceSettings, TaskSettings
 from drone_rl.utils.errors import InputError
 
 
@@ -67,3 +67,13 @@ def test_settings_import_nothing_heavy():
     code = "import sys, drone_rl.settings.training, drone_rl.settings.judging\n"
     code += "assert not {'torch', 'hydra', 'mujoco', 'scipy', 'numpy'} & set(sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_the_other_renderer_draws_the_minimal_look_alone():
+    look = AppearanceSettings(fog_visibility=50.0)
+    with pytest.raises(InputError, match=r"^renderer=mujoco_warp draws the minimal appearance"):
+        TrainSettings(renderer="mujoco_warp", appearance=look)
+    assert TrainSettings(appearance=look).replace(seed=1).appearance is look
+    given = from_config(TrainSettings, {"appearance": {"fog_visibility": 50.0}})
+    assert given.appearance == look
+    assert from_config(TrainSettings, as_config(given)) == given

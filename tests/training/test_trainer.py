@@ -5,6 +5,7 @@ import pytest
 import torch
 
 from drone_rl.training import Callback, CheckpointCallback, NotANumberError, load_checkpoint
+from drone_rl.training import trainer as trainer_module
 from drone_rl.training.metrics import episode_rewards, running_mean
 
 
@@ -125,6 +126,16 @@ def test_is_solved_only_once_that_is_confirmed(make_trainer):
     assert trainer.run() == "solved"
     assert asked[0] == first and asked[2] == trainer.progress.updates
     assert asked == sorted(set(asked)) and trainer.progress.running_reward >= 0.5
+
+
+def test_memory_is_given_back_now_and_then(make_trainer, monkeypatch):
+    given, trainer = [], make_trainer(total_frames=100_000)
+    monkeypatch.setattr(
+        trainer_module, "return_freed_memory", lambda: given.append(trainer.progress.updates)
+    )
+    trainer.callbacks.append(At(40, lambda t: setattr(t, "stop_request", "enough")))
+    trainer.run()
+    assert given == [16, 32]
 
 
 def test_stops_at_episodes(make_trainer):

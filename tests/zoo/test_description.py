@@ -7,6 +7,7 @@ import sys
 import pytest
 import torch
 
+from drone_rl.sim.settings import AppearanceSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.zoo import parse
 
@@ -33,6 +34,7 @@ DEFAULT = {
     "network": {"name": "small_cnn", "patch": 4, "channels": [16, 32], "hidden": [128]},
 }
 GRAY, STACK = {"name": "gray"}, {"name": "stack", "N": 2}
+DEAD = {"name": "dead_rows", "count": 0, "rows": [], "level": 0.0}
 
 
 def changed(where, value):
@@ -127,6 +129,23 @@ def test_pictures_are_of_the_foretold_shape(camera, transforms, shape):
         ("transforms", [GRAY, {"name": "crop", "top": 9, "bottom": 9}], "9 to 9 of 25"),
         ("transforms", [GRAY, {"name": "crop", "top": 0, "bottom": 26}], "0 to 26 of 25"),
         ("transforms", [{"name": "resize", "height": 9, "width": 9}], "resize needs floats"),
+        ("transforms", [{"name": "blur", "width": 1.0}, GRAY], "blur needs floats"),
+        ("transforms", [GRAY, {"name": "blur", "width": 17.0}], r"width=17\.0"),
+        (
+            "transforms",
+            [GRAY, {**DEAD, "count": 26}],
+            r"^transforms\.dead_rows\.count=26 of a picture of 25 rows",
+        ),
+        (
+            "transforms",
+            [GRAY, {**DEAD, "rows": [25]}],
+            r"^transforms\.dead_rows\.rows=\[25\] of a picture of 25 rows",
+        ),
+        (
+            "transforms",
+            [GRAY, {**DEAD, "rows": [3, 3]}],
+            r"^transforms\.dead_rows\.rows=\[3, 3\] names a row twice",
+        ),
         ("transforms", [GRAY, {**STACK, "N": 17}], "N=17"),
         ("transforms", [GRAY, {**STACK, "N": 16}, {**STACK, "N": 16}, {**STACK, "N": 16}], "shape"),
         ("transforms.1.std", 0.0, r"transforms\[1\]\.std=0\.0"),
@@ -185,3 +204,36 @@ def test_frames_seen_at_once_are_those_of_all_stacks():
     assert parse(DEFAULT).frames == 1
     stacks = [{"name": "gray"}, {"name": "stack", "N": 2}, {"name": "stack", "N": 3}]
     assert parse({**DEFAULT, "transforms": stacks}).frames == 6
+
+
+def test_given_weights_are_taken_as_they_are_laid_out():
+    description = parse(DEFAULT)
+    built = description.build_network(torch.Generator().manual_seed(0))
+    loaded = description.load_network(built.state_dict())
+    pairs = zip(built.parameters(), loaded.parameters(), strict=True)
+    for one, other in pairs:
+        assert torch.equal(one, other) and one.stride() == other.stride()
+        assert one.data_ptr() != other.data_ptr() and other.requires_grad
+    assert loaded.actions is built.actions and loaded.training
+
+
+def test_what_a_policy_sees_through_a_camera_of_which_no_fault_is_known():
+    blur, late = {"name": "blur", "width": 1.0}, {"name": "late_frames", "frames": 2}
+    described = parse({**DEFAULT, "transforms": [GRAY, blur, DEAD, late]})
+    assert described.faults == ("dead_rows", "late_frames")
+    assert described.without_faults() == parse({**DEFAULT, "transforms": [GRAY, blur]})
+    assert parse(DEFAULT).without_faults() == parse(DEFAULT)
+
+
+def test_a_look_is_told_where_it_is_not_minimal():
+    assert "appearance" not in parse(DEFAULT).as_dict() and parse(DEFAULT).appearance.is_minimal
+    look = AppearanceSettings(fog_visibility=(20.0, 50.0), ground_texture="grid").values()
+    described = parse({**DEFAULT, "appearance": look})
+    assert described.as_dict()["appearance"] == look
+    assert parse(described.as_dict()) == described
+    env = described.build_env(1, seed=0, device="cpu")
+    assert 20.0 <= env.base_env.looks.values[0, 14] <= 50.0
+    env.close()
+    for wrong in ({**look, "fog_visibility": 0.0}, {"fog_visibility": 5.0}, 3):
+        with pytest.raises(InputError, match="appearance"):
+            parse({**DEFAULT, "appearance": wrong})

@@ -91,8 +91,9 @@ def test_frames_of_another_camera_are_refused_by_the_runtime(linear):
         (31, 77, [GRAY, {"name": "resize", "height": 13, "width": 40}, STANDARD], LINEAR),
         (7, 9, [GRAY, {"name": "resize", "height": 10, "width": 20}], LINEAR),
         (5, 6, [STANDARD], {"name": "mlp", "hidden": [4]}),
+        (9, 11, [GRAY, {"name": "blur", "width": 0.8}, STANDARD], LINEAR),
     ],
-    ids=["default", "original", "averaged unevenly", "enlarged", "in colour"],
+    ids=["default", "original", "averaged unevenly", "enlarged", "in colour", "blurred"],
 )
 def test_it_agrees_with_the_pipeline_in_flight(height, width, transforms, network):
     description = described(height, width, transforms, network)

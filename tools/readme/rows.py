@@ -110,6 +110,15 @@ TRUTH = (
         "0; all; 1; 2",
     ),
     Row(
+        "shifts",
+        "seconds of a policy's flights under ten kinds of other conditions, five strengths each, "
+        "200 episodes; mean area under success over strength, policy good",
+        lambda f: (
+            f"{f['shift_suite_s']:.0f} with {f['shift_suite_axes']} axes; {f['shift_area']:.2f}"
+        ),
+        "480",
+    ),
+    Row(
         "mutants",
         "mutants killed, of those sampled that change anything (`make mutants` before it)",
         lambda f: (
@@ -217,6 +226,24 @@ MAIN = (
         is_claim=True,
     ),
     Row(
+        "seeds",
+        "seeds of 20 others that reach it, and the least of their lower ends",
+        lambda f: f"{f['seeds_solved_of_20']}; {min(f['seeds_lower95']):.3f}",
+        "20",
+    ),
+    Row(
+        "solve",
+        "collecting and learning together, frames/s",
+        lambda f: f"{f['learning_fps']:,.0f}",
+        "16,000",
+    ),
+    Row(
+        "large",
+        "the same with pictures of 100x256 (`experiment=large`)",
+        lambda f: f"{f['learning_fps_large']:,.0f}",
+        "2,440",
+    ),
+    Row(
         "render",
         "drawing at 25x64, frames/s, and over MuJoCo Warp's renderer at 25x64; 64x64; 100x256",
         _drawing,
@@ -240,6 +267,16 @@ MAIN = (
         "collector, policy in the loop, over what MuJoCo Warp draws alone, 25x64, frames/s",
         _rates,
         "0.7",
+    ),
+    Row(
+        "collector",
+        "collector, policy in the loop, frames/s, with as many worlds as are best; with 16",
+        lambda f: (
+            f"{f['collector_fps']:,.0f} ({f['collector_worlds']} worlds); "
+            f"{f['collector_fps_16']:,.0f}"
+        ),
+        "40,000; 15,000",
+        is_claim=True,
     ),
     Row(
         "dm_control",
@@ -340,6 +377,12 @@ GUESTS = (
         _beside,
         "ours the least",
         is_claim=True,
+    ),
+    Row(
+        "peers",
+        "our default's seconds over those of the best of the others",
+        lambda f: f"{f['solve_over_best_peer']:.2f}",
+        "0.6",
     ),
     Row(
         "gymnasium",

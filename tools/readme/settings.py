@@ -17,12 +17,13 @@ from drone_rl.hydra_app.schemas import GROUPS, PARTS, SEVERAL
 from drone_rl.settings.changes import ChangesOfTask
 from drone_rl.settings.variant import Variant
 from drone_rl.sim.settings import TASKS, BaseTaskSettings
-from drone_rl.utils.schema import Flag, Instance, Kind, Listed, Maybe, OneOf, Several
+from drone_rl.utils.schema import Flag, Instance, Kind, Listed, Maybe, OneOf, Several, Span
 from drone_rl.utils.settings import Settings, kinds_of, plain, snake_case
 
 BAR = "&#124;"
 """A bar within a cell."""
 _TASK = "task"
+_OR = {Maybe: "; or null", Span: ", or a range of it"}
 _HEAD = "| setting | may be | unit | default | meaning |\n| --- | --- | --- | --- | --- |"
 
 
@@ -125,8 +126,8 @@ def _about(cls: type) -> str:
 def _may_be(kind: Kind) -> str:
     """What a kind takes, in words."""
     match kind:
-        case Maybe():
-            return f"{_may_be(kind.kind)}; or null"
+        case Maybe() | Span():
+            return f"{_may_be(kind.kind)}{_OR[type(kind)]}"
         case Several(kind=Instance(of=cls)) | Instance(of=cls):
             return _link(cls)
         case Several():
