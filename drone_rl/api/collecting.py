@@ -54,8 +54,8 @@ def build_collector(settings: TrainSettings, practice: Practice | None = None) -
 
 def threaded_collector(settings: TrainSettings, practice: Practice | None = None) -> Collecting:
     """`Threads`: complete episodes from threads of this process."""
-    threads = min(settings.collector.num_envs, settings.collector.num_threads)
-    return _threaded(settings, practice, _episodes(settings, max(1, num_cores() // threads)))
+    cores = max(1, num_cores() // _num_workers(settings))
+    return _threaded(settings, practice, _episodes(settings, cores))
 
 
 def rollout_collector(settings: TrainSettings, practice: Practice | None = None) -> Collecting:
@@ -70,7 +70,7 @@ def _threaded(
     settings: TrainSettings, practice: Practice | None, collect: Callable[..., WorldsCollector]
 ) -> Collecting:
     """The worlds shared out to threads, each with a collector made of worlds and an actor."""
-    shares = _shares(settings, is_one=settings.device.startswith("cuda"))
+    shares = _shares(settings)
     network, collectors, generators = None, [], {}
     for i in range(len(shares)):
         collector, network, actions = build_share(
@@ -159,8 +159,14 @@ def _episodes(settings: TrainSettings, cores: int) -> Callable[..., EpisodeColle
     return functools.partial(EpisodeCollector, is_compiled=is_compiled, num_cores=cores)
 
 
-def _shares(settings: TrainSettings, is_one: bool = False) -> list[int]:
+def _num_workers(settings: TrainSettings) -> int:
+    """How many share the worlds; threads would only wait for each other at a GPU."""
+    asked = settings.collector
+    is_one = settings.device.startswith("cuda") and not isinstance(asked, Ray)
+    return 1 if is_one else min(asked.num_envs, asked.num_threads)
+
+
+def _shares(settings: TrainSettings) -> list[int]:
     """Worlds of each worker."""
-    worlds = settings.collector.num_envs
-    workers = 1 if is_one else min(worlds, settings.collector.num_threads)
+    worlds, workers = settings.collector.num_envs, _num_workers(settings)
     return [worlds // workers + (i < worlds % workers) for i in range(workers)]

@@ -12,8 +12,7 @@ from torch import Tensor
 from torchrl.envs import EnvBase
 
 from drone_rl.collectors.flight import Flight
-from drone_rl.collectors.sight import Sight
-from drone_rl.collectors.ways import find_way
+from drone_rl.collectors.ways import StraightWay, find_way
 from drone_rl.collectors.worlds_collector import WorldsCollector
 
 
@@ -58,8 +57,9 @@ class EpisodeCollector(WorldsCollector):
         super().__init__(env, actor, **kwargs)
         self._keep_observations = keep_observations
         self._way = find_way(env, self._observed, self._kept)
-        sight = Sight.find(env, self._observed, self._kept) if is_compiled else None
-        self._flight = Flight.find(sight, actor, num_cores)
+        self._flight = None
+        if is_compiled and isinstance(self._way, StraightWay):
+            self._flight = Flight.find(self._way.sight, actor, num_cores)
 
     @torch.no_grad()
     def collect(self, num_worlds: int | None = None) -> TensorDictBase:

@@ -16,7 +16,7 @@ import warp as wp
 from tensordict import TensorDict, TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
-from torchrl.envs.utils import ExplorationType, exploration_type
+from torchrl.envs.utils import ExplorationType
 
 from drone_rl.collectors import flight_kernel
 from drone_rl.collectors.sight import Entries, Sight
@@ -65,24 +65,23 @@ class Flight:
         wp.load_module(flight_kernel, device="cpu")
 
     @classmethod
-    def find(cls, sight: Sight | None, actor: TensorDictModuleBase, num_cores: int) -> Self | None:
+    def find(cls, sight: Sight, actor: TensorDictModuleBase, num_cores: int) -> Self | None:
         """The same, where task, pictures, network and renderer are such as the kernel knows.
 
         Args:
-            sight: Of the environment, if it has one.
+            sight: Of the environment.
             actor: The policy.
             num_cores: Shares of the worlds, each on a thread; no result depends on it.
         """
-        if sight is None or type(actor) is not CategoricalActor:
+        if type(actor) is not CategoricalActor:
             return None
         worlds, renderer = sight.worlds, sight.worlds.renderer
-        parts: Any = actor.module
         is_drawn = type(renderer) is Raytracer and renderer.device.type == "cpu"
         if not is_drawn or sight.view.modalities != ("gray",) or _standard(sight) is None:
             return None
         if worlds.appearance is not None:
             return None
-        network = PackedNetwork.find(parts[0].module, flight_kernel.TOGETHER)
+        network = PackedNetwork.find(actor.network, flight_kernel.TOGETHER)
         flown = FlyingCubes.find(worlds.task, worlds.dynamics, worlds.num_worlds)
         if network is None or flown is None:
             return None
@@ -90,7 +89,7 @@ class Flight:
 
     def can_act(self) -> bool:
         """Whether actions shall be drawn, or the most probable be taken."""
-        return _how(self._actor) in (ExplorationType.RANDOM, ExplorationType.DETERMINISTIC)
+        return self._actor.exploration in (ExplorationType.RANDOM, ExplorationType.DETERMINISTIC)
 
     def fly(self, num_worlds: int, keep_observations: bool = True) -> TensorDictBase:
         """Runs an episode in the first worlds; the environment's stay as they were at the start.
@@ -114,7 +113,10 @@ class Flight:
             self._go_on(num_worlds)
             parts.append(self._read(taken - before, keep_observations))
         world, logged = _join(parts)
-        told = self._told(logged) if self._sight.is_brief else self._replayed(world, logged)
+        if self._sight.is_brief:
+            told = self._sight.flags(logged["reward"], logged["end_reason"])
+        else:
+            told = self._replayed(world, logged)
         batch = TensorDict({}, [len(world)])
         for key in ("pixels", "logits", "action"):
             if key in logged:
@@ -129,8 +131,8 @@ class Flight:
 
     def _go_on(self, num_worlds: int) -> None:
         draws = torch.full((num_worlds, self._length), -1.0)
-        if _how(self._actor) == ExplorationType.RANDOM:
-            draws.uniform_(generator=_generator(self._actor))
+        if self._actor.exploration == ExplorationType.RANDOM:
+            draws.uniform_(generator=self._actor.generator)
         given = [
             self._eye,
             self._network.layers,
@@ -160,20 +162,9 @@ class Flight:
         if keep_observations:
             read |= {"pixels": self._pictures, "logits": self._logits}
         logged = {name: values.index_select(0, rows) for name, values in read.items()}
-        logged["action"] = logged["action"].long()
+        for name in ("action", "end_reason"):
+            logged[name] = logged[name].long()
         return rows // self._length, logged
-
-    def _told(self, logged: Mapping[str, Tensor]) -> Entries:
-        """What is told of steps of which nothing is asked but what the kernel wrote down."""
-        reason = logged["end_reason"].long()[:, None]
-        done, truncated = reason != 0, reason == self._sight.worlds.task.truncation
-        return {
-            ("next", "reward"): logged["reward"][:, None],
-            ("next", "done"): done,
-            ("next", "terminated"): done & ~truncated,
-            ("next", "truncated"): truncated,
-            ("next", "info", "end_reason"): reason,
-        }
 
     def _replayed(self, world: Tensor, logged: Mapping[str, Tensor]) -> Entries:
         """What is told of steps, by the rules that know everything: nothing is drawn again."""
@@ -224,14 +215,3 @@ def _standard(sight: Sight) -> tuple[float, float] | None:
         return 0.0, 1.0
     is_known = len(after) == 1 and type(after[0]) is StandardizePixels
     return (after[0].mean, after[0].std) if is_known else None
-
-
-def _how(actor: CategoricalActor) -> ExplorationType | None:
-    head: Any = actor.module
-    return exploration_type() or head[1].default_interaction_type
-
-
-def _generator(actor: CategoricalActor) -> torch.Generator | None:
-    head: Any = actor.module
-    source = head[1].distribution_kwargs["source"]
-    return None if source is None else source.generator

@@ -97,12 +97,23 @@ class Sight:
         Returns:
             Each entry, and which worlds' episodes have ended. Shapes: (num_worlds, *).
         """
-        terminated, truncated = (flag[:, None] for flag in self.worlds.ends(state))
-        done = terminated | truncated
-        flags = (reward.float()[:, None], done, terminated, truncated)
-        told: Entries = {("next", name): flag for name, flag in zip(FLAGS, flags, strict=True)}
-        told[_REASON] = state.end_reason[:, None]
+        told = self.flags(reward, state.end_reason)
         if self._asked:
             info = self.worlds.info(state)
             told.update((key, info[name]) for key, name in self._asked)
-        return {key: told[key] for key in self._kept}, done
+        return {key: told[key] for key in self._kept}, told["next", "done"]
+
+    def flags(self, reward: Tensor, end_reason: Tensor) -> Entries:
+        """What is told of every step.
+
+        Args:
+            reward: For it. Shape: (num_worlds,).
+            end_reason: After it, 0 where the episode goes on. Shape: (num_worlds,).
+
+        Returns:
+            ("next", ...) "reward", float32, the flags, and why it ended. Shapes: (num_worlds, 1).
+        """
+        terminated, truncated = self.worlds.ends(end_reason)
+        values = (reward.float(), terminated | truncated, terminated, truncated, end_reason)
+        keys = (*(("next", name) for name in FLAGS), _REASON)
+        return {key: value[:, None] for key, value in zip(keys, values, strict=True)}

@@ -79,18 +79,18 @@ class StraightWay:
 
     def __init__(self, sight: Sight) -> None:
         """Takes an environment's worlds over."""
-        self._sight = sight
+        self.sight = sight
         self._going: Any = None
 
     def begin(self, worlds: Tensor) -> TensorDictBase:
         """See `Way`."""
-        self._sight.env.start()
-        return self._look(self._sight.worlds.state[worlds], worlds)
+        self.sight.env.start()
+        return self._look(self.sight.worlds.state[worlds], worlds)
 
     def step(self, worlds: Tensor, action: Tensor) -> tuple[Entries, TensorDictBase]:
         """See `Way`."""
-        state, reward = self._sight.worlds.advance(self._going, action)
-        entries, done = self._sight.tell(state, reward)
+        state, reward = self.sight.worlds.advance(self._going, action)
+        entries, done = self.sight.tell(state, reward)
         on = (~done[:, 0]).nonzero()[:, 0]
         if len(on) < len(worlds):
             state, worlds = state[on], worlds[on]
@@ -98,7 +98,7 @@ class StraightWay:
 
     def _look(self, state: State, worlds: Tensor) -> TensorDictBase:
         self._going = state
-        return self._sight.look(state, worlds)
+        return self.sight.look(state, worlds)
 
 
 def find_way(env: EnvBase, observed: Iterable[NestedKey], kept: Iterable[NestedKey]) -> Way:

@@ -52,6 +52,26 @@ class CategoricalActor(ProbabilisticActor):
     takes longer than a small network does for one picture. The results are the same.
     """
 
+    @property
+    def network(self) -> nn.Module:
+        """Pictures to logits."""
+        return self._parts[0].module
+
+    @property
+    def exploration(self) -> ExplorationType | None:
+        """How it acts now: as `set_exploration_type` says, else by default."""
+        return exploration_type() or self._parts[1].default_interaction_type
+
+    @property
+    def generator(self) -> torch.Generator | None:
+        """What actions are drawn from; None for torch's global one."""
+        source = self._parts[1].distribution_kwargs["source"]
+        return None if source is None else source.generator
+
+    @property
+    def _parts(self) -> Any:
+        return self.module  # torch's modules are annotated to hold anything
+
     @dispatch(auto_batch_size=False)
     def forward(  # pyright: ignore[reportIncompatibleVariableOverride] (dispatch is untyped)
         self,
@@ -60,9 +80,8 @@ class CategoricalActor(ProbabilisticActor):
         **kwargs: object,
     ) -> TensorDictBase:
         """Writes logits and actions."""
-        parts: Any = self.module  # torch's modules are annotated to hold anything
-        network, head = parts
-        how = exploration_type() or head.default_interaction_type
+        network, head = self._parts
+        how = self.exploration
         straight = how in (ExplorationType.RANDOM, ExplorationType.DETERMINISTIC)
         if tensordict_out is not None or kwargs or not straight:
             return super().forward(tensordict, tensordict_out, **kwargs)

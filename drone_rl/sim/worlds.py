@@ -91,13 +91,13 @@ class Worlds:
         pose = {"drone": state.body.position.float(), "attitude": state.body.attitude.float()}
         return {**self.task.info(state), **pose}
 
-    def ends(self, state: State | None = None) -> tuple[Tensor, Tensor]:
+    def ends(self, end_reason: Tensor | None = None) -> tuple[Tensor, Tensor]:
         """Which worlds have terminated, and which were truncated. Shapes: (number of worlds,).
 
         Args:
-            state: Of other worlds; of these by default.
+            end_reason: Why others' episodes ended, 0 where they go on; these worlds' by default.
         """
-        reason = (self.state if state is None else state).end_reason
+        reason = self.state.end_reason if end_reason is None else end_reason
         truncated = reason == self.task.truncation
         return (reason != 0) & ~truncated, truncated
 

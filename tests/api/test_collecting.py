@@ -23,12 +23,17 @@ def collected(**settings):
 
 
 @pytest.mark.parametrize(
-    ("worlds", "workers", "is_one", "shares"),
-    [(7, 3, False, [3, 2, 2]), (2, 5, False, [1, 1]), (6, 2, True, [6]), (4, 4, False, [1] * 4)],
+    ("collector", "device", "shares"),
+    [
+        (Threads(num_envs=7, num_threads=3), "cpu", [3, 2, 2]),
+        (Threads(num_envs=2, num_threads=5), "cpu", [1, 1]),
+        (Threads(num_envs=6, num_threads=2), "cuda:0", [6]),
+        (Threads(num_envs=4, num_threads=4), "cpu", [1] * 4),
+        (Ray(num_envs=3, num_threads=2), "cuda", [2, 1]),
+    ],
 )
-def test_worlds_are_shared_out_evenly(worlds, workers, is_one, shares):
-    settings = TrainSettings(collector=Threads(num_envs=worlds, num_threads=workers))
-    assert _shares(settings, is_one) == shares
+def test_worlds_are_shared_out_evenly(collector, device, shares):
+    assert _shares(TrainSettings(collector=collector, device=device)) == shares
 
 
 def test_threads_share_one_network_and_draw_from_streams_of_their_own():
