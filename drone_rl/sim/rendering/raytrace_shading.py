@@ -113,47 +113,80 @@ def shade_even(
     ...
 
 
+_AT_ONCE = """
+#ifdef __CUDA_ARCH__
+const int at_once = 1;
+#else
+const int at_once = 64;
+#endif
+"""
+"""Pixels; where texels are read one by one between sums over all of these, both are faster."""
+
+
 @wp.func_native(f"""
-const wp::vec_t<3, float> right_on = cover.across, down_on = cover.down, against = cover.facing;
+{_AT_ONCE}
+const float x_on = cover.across[0], y_on = cover.across[1], z_on = cover.across[2];
+const float x_down = cover.down[0], y_down = cover.down[1], z_down = cover.down[2];
+const float x_against = cover.facing[0], y_against = cover.facing[1], z_against = cover.facing[2];
 const float corner_x = cover.corner[0], corner_y = cover.corner[1], area = cover.area;
 const int begin = cover.start, whole_side = cover.side;
 const unsigned *const stored = texels.data;
-for (int i = first; i < last; ++i) {{
-    {_FADE}
-    const wp::vec_t<3, float> ray = rays.data[i];
-    const float along = nearest.data[i], cosine = -ray[2];
-    const float facing = wp::dot(against, ray);
+const wp::vec_t<3, float> *const seen = rays.data;
+const float *const far = nearest.data;
+int of_a[at_once], of_b[at_once], of_c[at_once], of_d[at_once];
+int lower[at_once], right[at_once];
+unsigned a[at_once], b[at_once], c[at_once], d[at_once];
+for (int from = first; from < last; from += at_once) {{
+const int count = last - from < at_once ? last - from : at_once;
+for (int k = 0; k < count; ++k) {{
+    const float x = seen[from + k][0], y = seen[from + k][1], z = seen[from + k][2];
+    const float along = far[from + k];
+    const float facing = x_against * x + y_against * y + z_against * z;
     union {{ int bits; float number; }} covered;
-    covered.number = area * along * along * cosine * cosine * cosine
-        / (facing > 1e-3f ? facing : 1e-3f);
+    covered.number = -area * along * along * z * z * z / (facing > 1e-3f ? facing : 1e-3f);
     int level = ((covered.bits >> 23) - 126) >> 1;
     level = level < 0 ? 0 : level;
     const int finer = whole_side >> (level < 31 ? level : 31);
     const int side = finer > 1 ? finer : 1, mask = side - 1;
     const int start = begin + (whole_side * whole_side - side * side) / 3 * 4;
-    const float across = (corner_x + along * wp::dot(right_on, ray)) * side - 0.5f;
-    const float down = (corner_y + along * wp::dot(down_on, ray)) * side - 0.5f;
+    const float across = (corner_x + along * (x_on * x + y_on * y + z_on * z)) * side - 0.5f;
+    const float down = (corner_y + along * (x_down * x + y_down * y + z_down * z)) * side - 0.5f;
     const int column = (int)across - (across < (float)(int)across);
     const int row = (int)down - (down < (float)(int)down);
-    const unsigned right = wp::min((int)((across - column) * 256.0f), 255);
-    const unsigned lower = wp::min((int)((down - row) * 256.0f), 255);
+    const int share_right = (int)((across - column) * 256.0f);
+    const int share_lower = (int)((down - row) * 256.0f);
+    right[k] = share_right < 255 ? share_right : 255;
+    lower[k] = share_lower < 255 ? share_lower : 255;
     const int above = start + (row & mask) * side, below = start + ((row + 1) & mask) * side;
-    const unsigned a = stored[above + (column & mask)];
-    const unsigned b = stored[above + ((column + 1) & mask)];
-    const unsigned c = stored[below + (column & mask)];
-    const unsigned d = stored[below + ((column + 1) & mask)];
-    const unsigned of_d = (right * lower) >> 8, of_b = right - of_d, of_c = lower - of_d;
-    const unsigned of_a = 256u - right - of_c;
-    const unsigned red_and_blue = of_a * (a & 0xff00ffu) + of_b * (b & 0xff00ffu)
-        + of_c * (c & 0xff00ffu) + of_d * (d & 0xff00ffu);
-    const unsigned green = of_a * ((a >> 8) & 255u) + of_b * ((b >> 8) & 255u)
-        + of_c * ((c >> 8) & 255u) + of_d * ((d >> 8) & 255u);
+    of_a[k] = above + (column & mask);
+    of_b[k] = above + ((column + 1) & mask);
+    of_c[k] = below + (column & mask);
+    of_d[k] = below + ((column + 1) & mask);
+}}
+#pragma clang loop vectorize(disable)
+for (int k = 0; k < count; ++k) {{
+    a[k] = stored[of_a[k]];
+    b[k] = stored[of_b[k]];
+    c[k] = stored[of_c[k]];
+    d[k] = stored[of_d[k]];
+}}
+for (int k = 0; k < count; ++k) {{
+    const int i = from + k;
+    {_FADE}
+    const unsigned share_d = (right[k] * lower[k]) >> 8;
+    const unsigned share_b = right[k] - share_d, share_c = lower[k] - share_d;
+    const unsigned share_a = 256u - right[k] - share_c;
+    const unsigned red_and_blue = share_a * (a[k] & 0xff00ffu) + share_b * (b[k] & 0xff00ffu)
+        + share_c * (c[k] & 0xff00ffu) + share_d * (d[k] & 0xff00ffu);
+    const unsigned green = share_a * ((a[k] >> 8) & 255u) + share_b * ((b[k] >> 8) & 255u)
+        + share_c * ((c[k] >> 8) & 255u) + share_d * ((d[k] >> 8) & 255u);
     const float in_sun = dark.data[i] ? 0.0f : 1.0f, unit = 1.0f / 65280.0f;
     const float color[3] = {{
         (shaded[0] + in_sun * (lit[0] - shaded[0])) * unit * (int)(red_and_blue & 0xffffu),
         (shaded[1] + in_sun * (lit[1] - shaded[1])) * unit * (int)green,
         (shaded[2] + in_sun * (lit[2] - shaded[2])) * unit * (int)(red_and_blue >> 16)}};
     {_WRITE}
+}}
 }}""")
 def shade_covered(
     colors: wp.array[wp.vec3ub],
