@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from drone_rl.api.foreign import as_pilot
 from drone_rl.api.pilot import Pilot
 from drone_rl.api.progress import Bar, Progress
-from drone_rl.api.showing import paragraph, picture, table
+from drone_rl.api.showing import aligned, paragraph, picture, table
 from drone_rl.conditions.axes import check_axes, find_axes
 from drone_rl.conditions.axis import Axis
 from drone_rl.conditions.condition import Condition
@@ -66,10 +66,7 @@ class Shifts:
 
     def __str__(self) -> str:
         """The table and what it comes to."""
-        lines = rows(self.numbers)
-        widths = [2 + max(map(len, column)) for column in zip(*lines, strict=True)]
-        drawn = ["".join(map(str.ljust, line, widths)).rstrip() for line in lines]
-        return "\n".join([*drawn, self.sentence])
+        return f"{aligned(rows(self.numbers))}\n{self.sentence}"
 
     def _repr_html_(self) -> str:
         head, *lines = rows(self.numbers)
