@@ -13,7 +13,7 @@ from torch import Tensor
 
 from drone_rl.api.policy import Policy, load_policy
 from drone_rl.api.progress import Bar, Progress
-from drone_rl.api.showing import paragraph, table
+from drone_rl.api.showing import aligned, paragraph, table
 from drone_rl.proofs.chain import Outcomes, follow_chances
 from drone_rl.proofs.chance_bounds import Bounded, bound_success
 from drone_rl.proofs.graph import explore, shape_of
@@ -102,10 +102,7 @@ class Chances:
 
     def __str__(self) -> str:
         """The table for a terminal."""
-        rows = self.rows()
-        widths = [2 + max(map(len, column)) for column in zip(*rows, strict=True)]
-        aligned = [[f"{row[0]:{widths[0]}}", *map(str.rjust, row[1:], widths[1:])] for row in rows]
-        return "\n".join([*("".join(nodes) for nodes in aligned), self._about()])
+        return f"{aligned(self.rows(), are_numbers=True)}\n{self._about()}"
 
     def _repr_html_(self) -> str:
         head, *rows = self.rows()

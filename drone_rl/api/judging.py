@@ -14,7 +14,7 @@ from drone_rl.api.foreign import as_pilot
 from drone_rl.api.pilot import Pilot
 from drone_rl.api.progress import Bar, Progress
 from drone_rl.api.quoting import find_claim
-from drone_rl.api.showing import paragraph, table
+from drone_rl.api.showing import aligned, paragraph, table
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation import run_episodes, summarise
 from drone_rl.policies.foreign import Logits
@@ -76,10 +76,7 @@ class Evaluation:
 
     def __str__(self) -> str:
         """The table for a terminal."""
-        rows = self.rows()
-        widths = [2 + max(map(len, column)) for column in zip(*rows, strict=True)]
-        aligned = [[f"{row[0]:{widths[0]}}", *map(str.rjust, row[1:], widths[1:])] for row in rows]
-        return "\n".join("".join(cells) for cells in aligned)
+        return aligned(self.rows(), are_numbers=True)
 
     def _repr_html_(self) -> str:
         head, *rows = self.rows()

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from drone_rl.api.policy import Policy, load_policy
 from drone_rl.api.progress import Bar, Progress
-from drone_rl.api.showing import paragraph, picture, table
+from drone_rl.api.showing import aligned, paragraph, picture, table
 from drone_rl.proofs.arrangement import Window
 from drone_rl.proofs.painting import Painter
 from drone_rl.proofs.places import Look, PlaceMap, map_places
@@ -72,10 +72,7 @@ class Places:
 
     def __str__(self) -> str:
         """The table and what it comes to."""
-        lines = rows(self.numbers, MOVES.names)
-        widths = [2 + max(map(len, column)) for column in zip(*lines, strict=True)]
-        drawn = ["".join(map(str.ljust, line, widths)).rstrip() for line in lines]
-        return "\n".join([*drawn, self._about()])
+        return f"{aligned(rows(self.numbers, MOVES.names))}\n{self._about()}"
 
     def _repr_html_(self) -> str:
         head, *lines = rows(self.numbers, MOVES.names)

@@ -12,7 +12,7 @@ import numpy as np
 
 from drone_rl.api.policy import Policy, load_policy
 from drone_rl.api.progress import Bar, Progress
-from drone_rl.api.showing import paragraph, table
+from drone_rl.api.showing import aligned, paragraph, table
 from drone_rl.proofs.certificate import certify, weights_hash
 from drone_rl.proofs.prover import Prover
 from drone_rl.proofs.saving import load, save
@@ -80,10 +80,7 @@ class Proof:
 
     def __str__(self) -> str:
         """The table and what it comes to."""
-        rows = self.rows()
-        widths = [2 + max(map(len, column)) for column in zip(*rows, strict=True)]
-        lines = ["".join(map(str.ljust, row, widths)).rstrip() for row in rows]
-        return "\n".join([*lines, sentence(self.certificate)])
+        return f"{aligned(self.rows())}\n{sentence(self.certificate)}"
 
     def _repr_html_(self) -> str:
         head, *rows = self.rows()

@@ -1,9 +1,11 @@
 """Flights of a policy under other conditions than its own, as an object that shows itself."""
 
 import dataclasses
+import itertools
 import json
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +14,7 @@ from numpy.typing import NDArray
 from drone_rl.api.foreign import as_pilot
 from drone_rl.api.pilot import Pilot
 from drone_rl.api.progress import Bar, Progress
-from drone_rl.api.showing import paragraph, picture, table
+from drone_rl.api.showing import aligned, paragraph, picture, table
 from drone_rl.conditions.axes import check_axes, find_axes
 from drone_rl.conditions.axis import Axis
 from drone_rl.conditions.condition import Condition
@@ -66,10 +68,7 @@ class Shifts:
 
     def __str__(self) -> str:
         """The table and what it comes to."""
-        lines = rows(self.numbers)
-        widths = [2 + max(map(len, column)) for column in zip(*lines, strict=True)]
-        drawn = ["".join(map(str.ljust, line, widths)).rstrip() for line in lines]
-        return "\n".join([*drawn, self.sentence])
+        return f"{aligned(rows(self.numbers))}\n{self.sentence}"
 
     def _repr_html_(self) -> str:
         head, *lines = rows(self.numbers)
@@ -104,24 +103,11 @@ def shifts(
     begin = time.perf_counter()
     subject = make_subject(pilot, settings)
     axes = find_axes(settings.axes, subject)
-    total, done = len(axes) * (len(settings.strengths) + settings.domain) + 1, 0
-
-    def tell(text: str) -> None:
-        nonlocal done
-        progress(text, done, total)
-        done += 1
-
-    counts = (settings.episodes, settings.domain_episodes, 1)
-    beds = [Airfield(subject, count, settings.seed) for count in counts]
-    bed, wide, filmed = beds
-    try:
-        suite = Suite(bed, [Mode(mode) for mode in settings.modes], settings.possible_share)
-        found = suite.run(axes, settings.strengths, tell)
-        domain = _domain(wide, axes, settings, tell) if settings.domain else None
+    total = len(axes) * (len(settings.strengths) + settings.domain) + 1
+    done = itertools.count()
+    found = _fly(subject, axes, settings, lambda text: progress(text, next(done), total))
+    with closing(Airfield(subject, 1, settings.seed)) as filmed:
         pictures = {axis.name: make_strip(filmed, axis) for axis in axes}
-    finally:
-        for made in beds:
-            made.close()
     progress("flown", total, total)
     numbers = {
         "policy": pilot.name,
@@ -130,10 +116,26 @@ def shifts(
         "settings": settings.values(),
         "terms": as_task(subject.task).terms.as_dict(),
         **found,
-        "domain": domain,
         "seconds": time.perf_counter() - begin,
     }
     return Shifts(pilot, settings, numbers, pictures)
+
+
+def _fly(
+    subject: Subject, axes: Sequence[Axis], settings: ShiftSettings, tell: Callable[[str], None]
+) -> dict[str, Any]:
+    """What the suite finds, and "domain", see `_domain`; none if nobody wants it.
+
+    Raises:
+        InputError: See `_domain`.
+    """
+    with closing(Airfield(subject, settings.episodes, settings.seed)) as bed:
+        suite = Suite(bed, [Mode(mode) for mode in settings.modes], settings.possible_share)
+        found = suite.run(axes, settings.strengths, tell)
+    if not settings.domain:
+        return {**found, "domain": None}
+    with closing(Airfield(subject, settings.domain_episodes, settings.seed)) as wide:
+        return {**found, "domain": _domain(wide, axes, settings, tell)}
 
 
 def _domain(

@@ -1,4 +1,4 @@
-"""Tables and figures as HTML, for results that show themselves in a notebook."""
+"""Tables and figures of results: as text for a terminal, as HTML for a notebook."""
 
 import base64
 import html
@@ -8,6 +8,19 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+def aligned(rows: Sequence[Sequence[str]], *, are_numbers: bool = False) -> str:
+    """A table as text, each column as wide as its longest cell.
+
+    Args:
+        rows: Texts, as many in each row as there are columns.
+        are_numbers: Whether cells stand at the right, but for those of the first column.
+    """
+    rest = str.rjust if are_numbers else str.ljust
+    first, *others = (2 + max(map(len, column)) for column in zip(*rows, strict=True))
+    lines = (row[0].ljust(first) + "".join(map(rest, row[1:], others)) for row in rows)
+    return "\n".join(line.rstrip() for line in lines)
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

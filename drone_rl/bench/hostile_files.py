@@ -120,8 +120,12 @@ def changed(where: str, value: Any) -> dict[str, Any]:
 
 
 def _exported(folder: Path) -> list[tuple[str, list[str], str]]:
-    own = weights()
-    bias, weight = "layers.logits.bias", "layers.logits.weight"
+    contents = {**_descriptions(folder), **_weights(), **_texts(), **_damages()}
+    return [_policy(folder, f"exported_{n}.safetensors", c) for n, c in contents.items()]
+
+
+def _descriptions(folder: Path) -> dict[str, bytes]:
+    """Policies that are described as none can be."""
     described = {
         "cubes": ("task.num_cubes", 10**9),
         "steps": ("task.step_limit", 0),
@@ -154,9 +158,14 @@ def _exported(folder: Path) -> list[tuple[str, list[str], str]]:
         "missing_key": ("camera", ...),
         "future": ("format_version", 99),
     }
-    contents = {name: exported(changed(*change)) for name, change in described.items()}
-    size = len(contents["future"])
-    contents |= {
+    return {name: exported(changed(*change)) for name, change in described.items()}
+
+
+def _weights() -> dict[str, bytes]:
+    """Weights that are no numbers, or not the described network's."""
+    own = weights()
+    bias, weight = "layers.logits.bias", "layers.logits.weight"
+    return {
         "weights_nan": exported(tensors={**own, bias: own[bias] * float("nan")}),
         "weights_infinite": exported(tensors={**own, bias: own[bias] / 0.0}),
         "weights_whole": exported(tensors={**own, bias: own[bias].long()}),
@@ -167,6 +176,12 @@ def _exported(folder: Path) -> list[tuple[str, list[str], str]]:
         "weights_large": exported(tensors={**own, bias: torch.zeros(10**6)}),
         "weights_of_another": exported(tensors={n: torch.zeros(1) for n in own}),
         "weights_empty": exported(tensors={n: torch.zeros(0) for n in own}),
+    }
+
+
+def _texts() -> dict[str, bytes]:
+    """Texts that are no JSON, too much of it, or meant for a terminal or a shell."""
+    return {
         "deep": exported('{"a":' * 50_000 + "1" + "}" * 50_000),
         "huge_number": exported('{"format": 1' + "0" * 400 + "}"),
         "key_twice": exported('{"format": 1, "format": "drone_rl policy"}'),
@@ -176,13 +191,19 @@ def _exported(folder: Path) -> list[tuple[str, list[str], str]]:
         "escape": exported(command="drone-rl train \x1b]0;owned\x07"),
         "negative_progress": exported(progress={**_PROGRESS, "frames": -1}),
         "huge_progress": exported(progress={**_PROGRESS, "seconds": 10**400}),
-        "truncated": exported()[: size // 2],
-        "longer": exported() + bytes(100),
+    }
+
+
+def _damages() -> dict[str, bytes]:
+    """Files that end too early, too late, or say something else of their own size."""
+    whole = exported()
+    return {
+        "truncated": whole[: len(whole) // 2],
+        "longer": whole + bytes(100),
         "header_of_a_terabyte": struct.pack("<Q", 2**40) + b"{}",
         "only_a_header": struct.pack("<Q", 2) + b"{}",
-        "wrong_magic": b"GIF89a" + exported(),
+        "wrong_magic": b"GIF89a" + whole,
     }
-    return [_policy(folder, f"exported_{n}.safetensors", c) for n, c in contents.items()]
 
 
 def _old(folder: Path) -> list[tuple[str, list[str], str]]:

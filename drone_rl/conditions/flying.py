@@ -181,7 +181,8 @@ class _Flight:
                 now, flying = now[on], flying[on]
             if not len(flying):
                 break
-        return Flown(_episodes(worlds, done), trace.cpu())
+        episodes = Episodes.ended(worlds.task, worlds.info(done), done.steps)
+        return Flown(episodes, trace.cpu())
 
     def _stage(
         self, worlds: Worlds, condition: Condition
@@ -220,13 +221,3 @@ def _dress(
     for mount, sway in zip(condition.mounts, way[count:], strict=True):
         poses = mount(poses, sway)
     return appearance, poses
-
-
-def _episodes(worlds: Worlds, state: State) -> Episodes:
-    task, info = worlds.task, worlds.info(state)
-    return Episodes(
-        task=task,
-        goals=task.score({name: info[name].cpu() for name in task.scored}),
-        end_reason=state.end_reason.cpu(),
-        length=state.steps.cpu(),
-    )

@@ -1,5 +1,6 @@
 """Runs a policy on many worlds at once and gathers how the episodes ended."""
 
+from collections.abc import Mapping
 from typing import cast
 
 import torch
@@ -57,10 +58,5 @@ def run_episodes(
             finals.append(take_rows(cast(TensorDictBase, batch["next", "info"]), done))
             lengths.append(batch["collector", "traj_ids"].unique(return_counts=True)[1])
             count += len(lengths[-1])
-    info = cast(TensorDictBase, torch.cat(finals)[:num_episodes].cpu())
-    return Episodes(
-        task=task,
-        goals=task.score({name: info[name] for name in task.scored}),
-        end_reason=info["end_reason"][:, 0],
-        length=torch.cat(lengths)[:num_episodes].cpu(),
-    )
+    info = cast(Mapping[str, Tensor], torch.cat(finals)[:num_episodes])
+    return Episodes.ended(task, info, torch.cat(lengths)[:num_episodes])

@@ -5,6 +5,7 @@ So every interval rests on one value an episode.
 """
 
 import dataclasses
+from collections.abc import Mapping
 from typing import Any
 
 from torch import Tensor
@@ -24,6 +25,18 @@ class Episodes:
     """Why each ended, one of the task's ends."""
     length: Tensor  # (n,) int64
     """Steps of each."""
+
+    @classmethod
+    def ended(cls, task: Task[Any], info: Mapping[str, Tensor], length: Tensor) -> "Episodes":
+        """Episodes by what was true of them when they ended; on the CPU.
+
+        Args:
+            task: Theirs.
+            info: The task's `scored` and "end_reason", as in `Worlds.info`. Shapes: (n, *).
+            length: Steps of each. Shape: (n,).
+        """
+        goals = task.score({name: info[name].cpu() for name in task.scored})
+        return cls(task, goals, info["end_reason"][:, 0].cpu(), length.cpu())
 
     def __len__(self) -> int:
         """Returns the number of episodes."""

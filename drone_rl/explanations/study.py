@@ -58,35 +58,46 @@ def explain_policy(
         InputError: The folder can't be written or a setting doesn't fit the policy.
     """
     context = Context(env, network, settings, claim)
-    numbers: dict[str, Any] = {}
-    arrays: dict[str, NDArray] = {}
-    seconds: dict[str, float] = {}
-    left_out: dict[str, str] = {}
+    found = _Found()
     for title, section in (find_sections() if sections is None else sections).items():
         progress(title.replace("_", " "))
-        began = time.perf_counter()
-        try:
-            its_numbers, its_arrays = section(context)
-        except LeftOutError as error:
-            left_out[title] = str(error)
-            continue
-        numbers |= its_numbers
-        arrays |= its_arrays
-        seconds[title] = round(time.perf_counter() - began, 2)
+        found.add(title, section, context)
     written = {
         "format": "drone_rl explanation",
         "format_version": FORMAT_VERSION,
         "name": name,
         "settings": dataclasses.asdict(settings),
-        "seconds": seconds,
+        "seconds": found.seconds,
         "actions": context.scenes.actions.as_dict(),
         "terms": context.scenes.task.terms.as_dict(),
-        **numbers,
-        **({"left_out": left_out} if left_out else {}),
+        **found.numbers,
+        **({"left_out": found.left_out} if found.left_out else {}),
         "provenance": provenance,
     }
-    _write(folder, written, arrays, context)
+    _write(folder, written, found.arrays, context)
     return written
+
+
+@dataclasses.dataclass
+class _Found:
+    """What sections have said so far."""
+
+    numbers: dict[str, Any] = dataclasses.field(default_factory=dict)
+    arrays: dict[str, NDArray] = dataclasses.field(default_factory=dict)
+    seconds: dict[str, float] = dataclasses.field(default_factory=dict)
+    left_out: dict[str, str] = dataclasses.field(default_factory=dict)
+
+    def add(self, title: str, section: Section, context: Context) -> None:
+        """Asks one more."""
+        began = time.perf_counter()
+        try:
+            numbers, arrays = section(context)
+        except LeftOutError as error:
+            self.left_out[title] = str(error)
+            return
+        self.numbers |= numbers
+        self.arrays |= arrays
+        self.seconds[title] = round(time.perf_counter() - began, 2)
 
 
 def _write(

@@ -157,30 +157,23 @@ def map_places(
         )
     borders = find_borders(eye, window)
     cells = arrange(borders, window, most_cells)
-    places, areas = cells.inner_points(), cells.areas()
-    left = cells.areas(above=touch_distance)
-    not_right = cells.areas(above=-touch_distance)
-    sides = np.stack([left, not_right - left, areas - not_right], -1)
-
-    @torch.no_grad()
-    def decide(faces: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-        highest = network(look(faces)).topk(2)
-        gap = highest.values[:, 0] - highest.values[:, 1]
-        is_unseen = (faces == NOTHING).all((1, 2))
-        return highest.indices[:, 0].numpy(), gap.double().numpy(), is_unseen
-
-    (alone,), _, _ = decide(np.full((1, len(eye.up), len(eye.left)), NOTHING, np.uint8))
+    places = cells.inner_points()
+    (alone,), _ = _decide(look, network, _no_faces(eye))
     parts = np.split(places, range(_BATCH, len(places), _BATCH))
+
+    def decide(part: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+        faces = eye.faces(*part.T)
+        return *_decide(look, network, faces), (faces == NOTHING).all((1, 2))
+
     with ThreadPoolExecutor(
         num_cores(), "places", initializer=torch.set_num_threads, initargs=(1,)
     ) as pool:
-        found = pool.map(lambda part: decide(eye.faces(*part.T)), parts)
-        action, gap, is_unseen = map(np.concatenate, zip(*found, strict=True))
+        action, gap, is_unseen = map(np.concatenate, zip(*pool.map(decide, parts), strict=True))
     return PlaceMap(
         window=window,
         arrangement=cells,
         places=places,
-        areas=np.where(sides > SAME, sides, 0.0),
+        areas=_areas_by_side(cells, touch_distance),
         action=action,
         gap=gap,
         is_unseen=is_unseen,
@@ -188,6 +181,27 @@ def map_places(
         touch_distance=touch_distance,
         doubtful=doubtful_area(eye, borders, window),
     )
+
+
+def _no_faces(eye: Eye) -> NDArray[np.uint8]:
+    """What pixels show with no cube in sight. Shape: (1, H, W)."""
+    return np.full((1, len(eye.up), len(eye.left)), NOTHING, np.uint8)
+
+
+@torch.no_grad()
+def _decide(look: Look, network: nn.Module, faces: NDArray[np.uint8]) -> tuple[NDArray, NDArray]:
+    """Actions, and the gaps to the next best. Shapes: (N,)."""
+    highest = network(look(faces)).topk(2)
+    gap = highest.values[:, 0] - highest.values[:, 1]
+    return highest.indices[:, 0].numpy(), gap.double().numpy()
+
+
+def _areas_by_side(cells: Arrangement, touch_distance: float) -> NDArray[np.float64]:
+    """Square metres of each cell, by `SIDES`. Shape: (cells, 3)."""
+    left = cells.areas(above=touch_distance)
+    not_right = cells.areas(above=-touch_distance)
+    sides = np.stack([left, not_right - left, cells.areas() - not_right], -1)
+    return np.where(sides > SAME, sides, 0.0)
 
 
 def _share(area: float, total: float) -> float:

@@ -34,7 +34,7 @@ from drone_rl.settings.transforms import (
 )
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Kind, Record, shown
-from drone_rl.utils.settings import below, kinds_of
+from drone_rl.utils.settings import below, kinds_of, snake_case
 
 ENTRY_POINTS = "drone_rl.policies"
 """Group of the modules that register parts of their own."""
@@ -64,8 +64,11 @@ class Part:
     """Arguments that are always the same."""
     change: Callable[[Picture, Mapping[str, Any]], Picture] = lambda picture, _: picture
     """What a transform makes of a picture, given its parameters."""
-    is_fault: bool = False
-    """Whether a transform is what goes wrong in a camera, and no part of a policy's own program."""
+
+    @property
+    def is_fault(self) -> bool:
+        """Whether it is what goes wrong in a camera, and no part of a policy's own program."""
+        return isinstance(self.make, type) and issubclass(self.make, envs.CameraFault)
 
 
 NETWORKS: dict[str, Part] = {}
@@ -95,7 +98,6 @@ def register_transform(
     *targets: str,
     fixed: Mapping[str, Any] | None = None,
     change: Callable[[Picture, Mapping[str, Any]], Picture] = lambda picture, _: picture,
-    is_fault: bool = False,
 ) -> None:
     """Makes a transform known to descriptions, in files too.
 
@@ -106,10 +108,9 @@ def register_transform(
         targets: `_target_`s that mean it; by default the place where it is defined.
         fixed: Arguments that are always the same.
         change: What it makes of a picture's shape; nothing by default.
-        is_fault: Whether it is a `CameraFault`.
     """
     targets = targets or (_place(make),)
-    TRANSFORMS[name] = Part(make, Record(parameters), targets, dict(fixed or {}), change, is_fault)
+    TRANSFORMS[name] = Part(make, Record(parameters), targets, dict(fixed or {}), change)
 
 
 def find_part(parts: Mapping[str, Part], name: object, where: str) -> Part:
@@ -242,36 +243,12 @@ register_transform(
     kinds_of(StepCount),
     *(StepCount.target, "torchrl.envs.transforms.StepCounter"),
 )
-register_transform("blur", envs.Blur, kinds_of(Blur), Blur.target, change=_floats("blur"))
-register_transform(
-    "noise",
-    envs.Noise,
-    kinds_of(Noise),
-    Noise.target,
-    change=_floats("noise"),
-    is_fault=True,
-)
-register_transform(
-    "dead_rows",
-    envs.DeadRows,
-    kinds_of(DeadRows),
-    DeadRows.target,
-    change=_dead_rows,
-    is_fault=True,
-)
-register_transform(
-    "frozen_frames",
-    envs.FrozenFrames,
-    kinds_of(FrozenFrames),
-    FrozenFrames.target,
-    change=_floats("frozen_frames"),
-    is_fault=True,
-)
-register_transform(
-    "late_frames",
-    envs.LateFrames,
-    kinds_of(LateFrames),
-    LateFrames.target,
-    change=_floats("late_frames"),
-    is_fault=True,
-)
+for make, settings, change in (
+    (envs.Blur, Blur, _floats("blur")),
+    (envs.Noise, Noise, _floats("noise")),
+    (envs.DeadRows, DeadRows, _dead_rows),
+    (envs.FrozenFrames, FrozenFrames, _floats("frozen_frames")),
+    (envs.LateFrames, LateFrames, _floats("late_frames")),
+):
+    kinds, target = kinds_of(settings), settings.target
+    register_transform(snake_case(settings), make, kinds, target, change=change)

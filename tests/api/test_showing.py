@@ -1,6 +1,6 @@
 from matplotlib.figure import Figure
 
-from drone_rl.api.showing import page, paragraph, picture, table
+from drone_rl.api.showing import aligned, page, paragraph, picture, table
 
 NASTY = '<script>alert("x")</script>'
 
@@ -16,6 +16,16 @@ def test_a_table():
         "<table><thead><tr><th>a</th><th>b</th></tr></thead>"
         "<tbody><tr><td>1</td><td>2</td></tr></tbody></table>"
     )
+
+
+def test_texts_stand_at_the_left_and_figures_at_the_right():
+    rows = [["", "a", "bcd"], ["share", "10", ""], ["x", "2", "3"]]
+    assert aligned(rows).splitlines() == ["       a   bcd", "share  10", "x      2   3"]
+    assert aligned(rows, are_numbers=True).splitlines() == [
+        "          a  bcd",
+        "share    10",
+        "x         2    3",
+    ]
 
 
 def test_a_picture_needs_no_file():

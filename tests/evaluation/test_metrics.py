@@ -23,6 +23,19 @@ def episodes():
     )
 
 
+def test_episodes_by_what_was_true_when_they_ended():
+    info = {
+        "passed": torch.tensor([[True, True], [True, False]]),
+        "sides": torch.tensor([[0, 1], [1, -1]]),
+        "end_reason": torch.tensor([[End.THROUGH], [End.TOUCHED]]),
+    }
+    flown = Episodes.ended(Posts(), info, torch.tensor([8, 9]))
+    assert flown.success.tolist() == [1.0, 0.0]
+    assert flown.goals.stratum.tolist() == [[0, 1], [1, -1]]
+    assert flown.end_reason.tolist() == [End.THROUGH, End.TOUCHED]
+    assert flown.length.tolist() == [8, 9]
+
+
 def test_summary_by_hand(episodes):
     summary = summarise(episodes)
     assert summary["success"] == proportion(1, 3)

@@ -16,7 +16,7 @@ Planes cast none, as they are seen from one side alone. The sun is a scene's fir
 
 import warp as wp
 
-from drone_rl.sim.rendering.raytrace_sight import IN_FRONT, first_pixel
+from drone_rl.sim.rendering.raytrace_sight import IN_FRONT, rectangle
 from drone_rl.sim.rendering.raytrace_solids import FAR_AWAY, PLANE, enter
 from drone_rl.sim.rendering.raytrace_structs import Camera, Sight, View
 
@@ -155,12 +155,7 @@ def around_shadow(view: View, camera: Camera, sight: Sight, way: wp.vec3) -> wp.
                 seen = wp.vec2(at[0], -at[1]) / IN_FRONT
                 lowest = wp.min(lowest, seen)
                 highest = wp.max(highest, seen)
-    return wp.vec4i(
-        first_pixel(lowest[0], camera.half_width, view.width),
-        wp.min(first_pixel(highest[0], camera.half_width, view.width) + 3, view.width),
-        first_pixel(lowest[1], camera.half_height, view.height),
-        wp.min(first_pixel(highest[1], camera.half_height, view.height) + 3, view.height),
-    )
+    return rectangle(view, camera, lowest, highest)
 
 
 @wp.func

@@ -72,12 +72,7 @@ def around(view: View, camera: Camera, sight: Sight) -> wp.vec4i:
                 seen = wp.vec2(at[0], -at[1]) / IN_FRONT
                 lowest = wp.min(lowest, seen)
                 highest = wp.max(highest, seen)
-    return wp.vec4i(
-        first_pixel(lowest[0], camera.half_width, view.width),
-        wp.min(first_pixel(highest[0], camera.half_width, view.width) + 3, view.width),
-        first_pixel(lowest[1], camera.half_height, view.height),
-        wp.min(first_pixel(highest[1], camera.half_height, view.height) + 3, view.height),
-    )
+    return rectangle(view, camera, lowest, highest)
 
 
 @wp.func
@@ -92,7 +87,25 @@ def _corner(sight: Sight, corner: int) -> wp.vec3:
 
 
 @wp.func
-def first_pixel(place: float, half: float, count: int) -> int:
+def rectangle(view: View, camera: Camera, lowest: wp.vec2, highest: wp.vec2) -> wp.vec4i:
+    """Columns and rows, from and to, that can show what lies between two places.
+
+    Args:
+        view: Whose pixels.
+        camera: Who looks.
+        lowest: To the right and downwards, at a distance of 1.
+        highest: The other end.
+    """
+    return wp.vec4i(
+        _first_pixel(lowest[0], camera.half_width, view.width),
+        wp.min(_first_pixel(highest[0], camera.half_width, view.width) + 3, view.width),
+        _first_pixel(lowest[1], camera.half_height, view.height),
+        wp.min(_first_pixel(highest[1], camera.half_height, view.height) + 3, view.height),
+    )
+
+
+@wp.func
+def _first_pixel(place: float, half: float, count: int) -> int:
     """The first pixel that can show a place, given along an axis at a distance of 1."""
     pixel = (place / half + 1.0) * 0.5 * float(count) - 1.5
     return int(wp.clamp(wp.floor(pixel), 0.0, float(count)))
