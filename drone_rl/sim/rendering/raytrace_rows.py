@@ -27,7 +27,14 @@ def fill_bytes(values: wp.array[wp.vec3ub], first: int, last: int, value: wp.vec
     ...
 
 
-@wp.func_native(_FILL)
+@wp.func_native("""
+const float x = value[0], y = value[1], z = value[2];
+float *const at = (float *)values.data;
+for (int i = first; i < last; ++i) {
+    at[3 * i] = x;
+    at[3 * i + 1] = y;
+    at[3 * i + 2] = z;
+}""")
 def fill_vectors(values: wp.array[wp.vec3], first: int, last: int, value: wp.vec3) -> None:
     """The same of vectors."""
     ...
