@@ -7,11 +7,13 @@ from typing import Any
 
 import torch
 
+from drone_rl.api.domains import find_domain
 from drone_rl.api.foreign import as_pilot
 from drone_rl.api.pilot import Pilot
 from drone_rl.api.progress import Bar, Progress
 from drone_rl.api.quoting import find_claim
 from drone_rl.api.showing import page
+from drone_rl.conditions.measured import Measured
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.explanations.study import explain_policy
 from drone_rl.policies.foreign import Logits
@@ -55,6 +57,7 @@ def explain(
     *,
     folder: str | Path = "outputs/explain/notebook",
     num_envs: int = 128,
+    outputs: str | Path = "outputs",
     progress: Progress | None = None,
     **changes: Any,
 ) -> Explanations:
@@ -66,6 +69,7 @@ def explain(
         settings: What to compute.
         folder: Where explanations and report go.
         num_envs: Worlds in one batch; bounds memory.
+        outputs: Where flights under other conditions are looked for, see `find_domain`.
         progress: Told of what is being done; a bar by default.
         changes: Settings to change, as in `explain("good", frames=100)`.
 
@@ -82,7 +86,14 @@ def explain(
     try:
         folders = {n: folder / f"{i}_{to_file_name(n)}" for i, n in enumerate(chosen)}
         numbers = {
-            name: _explain(policy, settings, folders[name], num_envs, progress)
+            name: _explain(
+                policy,
+                settings,
+                folders[name],
+                num_envs,
+                progress,
+                find_domain(policy, None, outputs),
+            )
             for name, policy in chosen.items()
         }
     finally:
@@ -107,7 +118,12 @@ def _named(policies: Given | Sequence[Given]) -> dict[str, Pilot]:
 
 
 def _explain(
-    policy: Pilot, settings: ExplainSettings, folder: Path, num_envs: int, progress: Progress
+    policy: Pilot,
+    settings: ExplainSettings,
+    folder: Path,
+    num_envs: int,
+    progress: Progress,
+    measured: Measured | None,
 ) -> dict[str, Any]:
     env = policy.make_env(num_envs, seed=settings.seed, renderer=settings.renderer)
     origin = {**policy.origin, **provenance()}
@@ -121,6 +137,7 @@ def _explain(
             provenance=origin,
             progress=lambda title: progress(f"{policy.name}: {title}"),
             claim=find_claim(policy),
+            measured=measured,
         )
     finally:
         env.close()

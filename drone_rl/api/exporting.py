@@ -5,6 +5,7 @@ import shlex
 from pathlib import Path
 from typing import Any
 
+from drone_rl.api.domains import find_domain
 from drone_rl.api.policy import Policy, load_policy
 from drone_rl.api.quoting import find_claim
 from drone_rl.evaluation import Agreement, agreement
@@ -16,7 +17,8 @@ from drone_rl.utils.files import write_atomically
 from drone_rl.utils.overrides import read_overrides
 from drone_rl.verdicts.judge import judge_policy
 from drone_rl.words.certificate import is_quoted
-from drone_rl.zoo import certificate_path, export_policy, make_onnx, open_onnx
+from drone_rl.words.domain import is_quoted as is_told
+from drone_rl.zoo import certificate_path, export_policy, make_onnx, open_onnx, shifts_path
 
 MOST_DIFFERENCE = 1e-5
 """Of a probability that an ONNX model gives, from PyTorch's."""
@@ -31,6 +33,8 @@ def export(
     *,
     command: str | None = None,
     certificate: str | Path | None = None,
+    shifts: str | Path | None = None,
+    outputs: str | Path = "outputs",
 ) -> None:
     """Judges a policy and writes it as safetensors, with a model card beside it.
 
@@ -41,13 +45,16 @@ def export(
         command: That trained it; None names what its file or folder says.
         certificate: A proof's file for the card to quote and for the policy to have beside it; by
             default the one that lies with the policy already.
+        shifts: The same of a file of flights under other conditions, see `find_domain`.
+        outputs: See `find_domain`.
 
     Raises:
-        InputError: It can't be written, or the certificate that is given is unusable.
+        InputError: It can't be written, or a file that is given is unusable.
     """
     seed, device = settings.seed, settings.device
     claim = find_claim(policy, certificate)
     claim = None if claim is None or claim.refused else claim  # a card tells of what is
+    measured = find_domain(policy, shifts, outputs)
     with policy.flying(
         settings.num_worlds, seed=seed, device=device, renderer=settings.renderer
     ) as (env, actor):
@@ -60,7 +67,10 @@ def export(
         verdict=verdict,
         seed=seed,
         chosen=chosen,
+        shifts=None if measured is None else measured.numbers,
     )
+    if measured is not None and is_told({"shifts": measured.evidence, "verdict": verdict}):
+        _carry(measured.path, shifts_path(target))
     if claim is not None and is_quoted(verdict):
         _carry(claim.path, certificate_path(target))
 
@@ -107,12 +117,12 @@ def export_onnx(
     return found
 
 
-def _carry(certificate: Path, target: Path) -> None:
-    """Puts a certificate beside the policy that it is of."""
+def _carry(quoted: Path, target: Path) -> None:
+    """Puts what a card quotes beside the policy that it is of."""
     try:
-        write_atomically(target, certificate.read_bytes())
+        write_atomically(target, quoted.read_bytes())
     except OSError as error:
-        raise InputError(f"certificate {target} can't be written ({error})") from error
+        raise InputError(f"{target} can't be written ({error})") from error
 
 
 def origin_of(path: Path, state: dict[str, Any]) -> tuple[str, dict[str, Any] | None]:

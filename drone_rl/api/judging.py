@@ -10,11 +10,13 @@ from typing import Any
 from tensordict.nn import TensorDictModuleBase
 from torchrl.envs import EnvBase
 
+from drone_rl.api.domains import Coverage, beside, find_domain, require, sentence
 from drone_rl.api.foreign import as_pilot
 from drone_rl.api.pilot import Pilot
 from drone_rl.api.progress import Bar, Progress
 from drone_rl.api.quoting import find_claim
 from drone_rl.api.showing import aligned, paragraph, table
+from drone_rl.conditions.measured import Measured
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation import run_episodes, summarise
 from drone_rl.policies.foreign import Logits
@@ -92,6 +94,10 @@ class Judgement:
     verdict: Verdict
     certificate: Path | None = None
     """That lies with the policy or was given, whether it is quoted or not."""
+    measured: Measured | None = None
+    """Its flights under other conditions, if there are any."""
+    coverage: Coverage | None = None
+    """What was required beside its operating domain, if something was."""
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values, as in `verdict.json`."""
@@ -99,18 +105,28 @@ class Judgement:
         return {
             "policy": self.name,
             "certificate": path,
+            "shifts": None if self.measured is None else str(self.measured.path),
+            "domain": self.domain or None,
+            "required_domain": None if self.coverage is None else self.coverage.as_dict(),
             **self.verdict.as_dict(),
             **provenance(),
         }
+
+    @property
+    def domain(self) -> str:
+        """Under which conditions it is good, for a person; nothing if that was not measured."""
+        return "" if self.measured is None else sentence(_told(self.measured, self.verdict))
 
     def save(self, path: Path) -> None:
         """Writes `verdict.json`."""
         path.write_text(json.dumps(self.as_dict(), indent=2))
 
     def __str__(self) -> str:
-        """One line."""
+        """One line, and others of an operating domain and of what it does not cover."""
         certainty = "" if self.verdict.certain else " (not certain)"
-        return f"{self.verdict.kind.value}{certainty}: {self.verdict.sentence}"
+        line = f"{self.verdict.kind.value}{certainty}: {self.verdict.sentence}"
+        required = "" if self.coverage is None else str(self.coverage)
+        return "\n".join(filter(None, (line, self.domain, required)))
 
     def _repr_html_(self) -> str:
         quantities = self.verdict.as_dict()["quantities"]
@@ -118,7 +134,8 @@ class Judgement:
             [name, *("" if q[k] is None else f"{q[k]:.3f}" for k in ("value", "lower", "upper"))]
             for name, q in quantities.items()
         ]
-        return paragraph(str(self)) + table(["quantity", "value", "lower", "upper"], rows)
+        lines = "".join(paragraph(line) for line in str(self).splitlines())
+        return lines + table(["quantity", "value", "lower", "upper"], rows)
 
 
 def evaluate(
@@ -164,6 +181,8 @@ def judge(
     *,
     task: Mapping[str, Any] | None = None,
     certificate: str | Path | None = None,
+    shifts: str | Path | None = None,
+    require_domain: str | Path | None = None,
     outputs: str | Path = "outputs",
     progress: Progress | None = None,
     **changes: Any,
@@ -177,29 +196,33 @@ def judge(
         task: What to change of the policy's task or, for a baseline, of the default one.
         certificate: A proof's file to quote; by default the one that lies with the policy, see
             `drone_rl.zoo.certificate_path`, if it is of this task.
+        shifts: A file of its flights under other conditions to quote; by default what lies with the
+            policy or the newest under `outputs`, see `drone_rl.api.domains.find_domain`.
+        require_domain: A file that says under which conditions it has to be good, see
+            `drone_rl.conditions.needs.read_needs`.
         outputs: Folder under which runs are kept.
         progress: Told of what is being done; a bar by default.
         changes: Settings to change, as in `judge("good", episodes=1000)`.
 
     Raises:
-        InputError: The policy, a setting or the certificate that is given is unusable.
+        InputError: The policy, a setting or a file that is given is unusable, or a domain is
+            required of whom none was measured.
     """
     settings = (settings or JudgeSettings()).replace(**changes)
     progress = progress or Bar()
     progress("policy, luck and oracle", 0, 1)
     pilot = None if policy in BASELINES else as_pilot(policy, outputs)
     name = str(policy) if pilot is None or isinstance(policy, str | Path) else pilot.name
-    claim = None
-    if pilot is None and certificate is not None:
-        raise InputError(
-            f"certificate={certificate}, but policy={name} has no network; give certificate= with "
-            "the policy that was proved"
-        )
+    claim = measured = coverage = None
+    if pilot is None:
+        _refuse_files(name, certificate=certificate, shifts=shifts, require_domain=require_domain)
     if pilot is None:
         changed = Changes(TaskSettings).read(task or {}, "task")
         worlds = _baseline(name, TaskSettings(**changed), settings)
     else:
         pilot = pilot.in_task(**(task or {}))
+        measured = find_domain(pilot, shifts, outputs)
+        coverage = require(pilot, require_domain, measured) if require_domain is not None else None
         claim = find_claim(
             pilot,
             certificate,
@@ -213,7 +236,25 @@ def judge(
     with worlds as (env, actor):
         verdict = judge_policy(env, actor, settings.episodes, rule=rule, sampled=draws, claim=claim)
     progress("judged", 1, 1)
-    return Judgement(name, settings, verdict, None if claim is None else claim.path)
+    done = Judgement(name, settings, verdict, claim and claim.path, measured)
+    if coverage is None or measured is None:
+        return done
+    return dataclasses.replace(done, coverage=beside(coverage, _told(measured, verdict)))
+
+
+def _told(measured: Measured, verdict: Verdict) -> dict[str, Any]:
+    """Evidence of what may be quoted."""
+    return {"shifts": measured.evidence, "verdict": verdict.evidence}
+
+
+def _refuse_files(name: str, **given: str | Path | None) -> None:
+    """A baseline has no network that a file could be of."""
+    for setting, path in given.items():
+        if path is not None:
+            raise InputError(
+                f"{setting}={path}, but policy={name} has no network; give {setting}= with the "
+                "policy that it is of"
+            )
 
 
 def _flying(

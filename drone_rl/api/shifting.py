@@ -9,20 +9,25 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
+import yaml
 from numpy.typing import NDArray
 
 from drone_rl.api.foreign import as_pilot
 from drone_rl.api.pilot import Pilot
+from drone_rl.api.policy import Policy
 from drone_rl.api.progress import Bar, Progress
 from drone_rl.api.showing import aligned, paragraph, picture, table
+from drone_rl.checks import fingerprint
 from drone_rl.conditions.axes import check_axes, find_axes
 from drone_rl.conditions.axis import Axis
 from drone_rl.conditions.condition import Condition
 from drone_rl.conditions.domain import Prober
 from drone_rl.conditions.flying import Airfield, Subject
+from drone_rl.conditions.measured import FORMAT, FORMAT_VERSION
 from drone_rl.conditions.modes import Mode
+from drone_rl.conditions.needs import ranges_of
 from drone_rl.conditions.oracle import OracleEyes
-from drone_rl.conditions.strips import make_strip
+from drone_rl.conditions.strips import make_strip, packed
 from drone_rl.conditions.suite import Suite
 from drone_rl.envs import worlds_of
 from drone_rl.policies.foreign import Logits
@@ -61,8 +66,20 @@ class Shifts:
         return say(SHIFTS, self.numbers)
 
     def save(self, folder: Path) -> None:
-        """Writes `shifts.json`, `shifts.png` (curves) and `strips.png` (pictures)."""
-        (folder / "shifts.json").write_text(json.dumps(self.numbers | provenance(), indent=2))
+        """Writes what was found.
+
+        `shifts.json` is what verdicts, cards and reports quote; `domain.yaml`, if ranges were
+        looked for, has them as `drone-rl verdict require_domain=FILE` reads what is needed;
+        `shifts.png` are curves, `strips.png` pictures.
+        """
+        shown = {
+            name: [None if one is None else packed(one) for one in strip]
+            for name, strip in self.pictures.items()
+        }
+        written = {**self.numbers, "pictures": shown, **provenance()}
+        (folder / "shifts.json").write_text(json.dumps(written, indent=2))
+        if self.numbers["domain"] is not None:
+            (folder / "domain.yaml").write_text(yaml.safe_dump(ranges_of(self.numbers)))
         chart(self.numbers).savefig(folder / "shifts.png", dpi=110)
         strips(self.numbers, self.pictures).save(folder / "strips.png")
 
@@ -110,9 +127,10 @@ def shifts(
         pictures = {axis.name: make_strip(filmed, axis) for axis in axes}
     progress("flown", total, total)
     numbers = {
+        "format": FORMAT,
+        "format_version": FORMAT_VERSION,
         "policy": pilot.name,
-        "task": subject.task.values(),
-        "camera": subject.camera.values(),
+        "network": _identity(pilot),
         "settings": settings.values(),
         "terms": as_task(subject.task).terms.as_dict(),
         **found,
@@ -150,11 +168,20 @@ def _domain(
     if task.oracle is None:
         raise InputError(f"task={task.name} has no oracle to compare with; give domain=false")
     oracle = bed.fly(Condition(), eyes=OracleEyes(looks=False)).episodes
-    prober, ranges = Prober(bed, oracle, settings.good_share), {}
+    prober = Prober(bed, oracle, settings.good_share, settings.possible_share)
+    ranges: dict[str, Any] = {}
     for axis in axes:
         tell(f"range of {axis.name}")
         ranges[axis.name] = prober.search(axis)
     return {"plain": prober.plain, "ranges": ranges}
+
+
+def _identity(pilot: Pilot) -> dict[str, Any] | None:
+    """By what it is known whose flights these are; None of who was made elsewhere."""
+    if not isinstance(pilot, Policy):
+        return None
+    described = pilot.description.as_dict()
+    return {"weights": fingerprint(pilot.state["policy"]), "description": described}
 
 
 def make_subject(pilot: Pilot, settings: ShiftSettings) -> Subject:

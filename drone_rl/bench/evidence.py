@@ -286,27 +286,33 @@ def _level(number: int, value: float, position: float, successes: int, oracle: i
     }
 
 
-def _along(unit: str, neutral: float, *levels: Plain) -> Plain:
-    return {"unit": unit, "neutral": neutral, "areas": {"constant": 0.75}, "levels": [*levels]}
+def _along(group: str, unit: str, neutral: float, *levels: Plain) -> Plain:
+    along = {"group": group, "unit": unit, "neutral": neutral}
+    return {**along, "areas": {"constant": 0.75}, "levels": [*levels]}
 
 
 def _found(low: float, high: float, positions: list[float], **more: Any) -> Plain:
-    ends = {"low_open": None, "high_open": None, "failed": [], "tests": 5}
+    ends = {"low_open": None, "high_open": None, "failed": [], "flown": []}
     return {"low": low, "high": high, "positions": positions, **ends, **more}
 
 
 _DARK = {
     "good": False, "bad": True, "refused": None, "success": 0.4, "value": 0.8,
-    "worst": {"side": "right", "share": 0.47},
+    "worst": {"side": "right", "share": 0.47}, "end": "low", "impossible": False,
+    "oracle": _share(400, 400, 0.99, 1.0),
 }  # fmt: skip
 SHIFTS: Plain = {
     "terms": CUBES.as_dict(),
-    "settings": {"domain_episodes": 400},
+    "settings": {"domain_episodes": 400, "episodes": 200, "seed": 0, "good_share": 0.9},
     "plain": {"success": _share(200, 200, 0.98, 1.0), "oracle": _share(200, 200, 0.98, 1.0)},
     "axes": {
-        "sun": _along("degrees", 55.0, _level(1, 60, 5, 199, 200), _level(5, 0, -55, 20, 90)),
-        "blur": _along("pixels", 0.0, _level(1, 0.5, 0.5, 200, 200), _level(5, 2, 2, 190, 200)),
-        "brightness": _along("times", 1.0, _level(1, 0.8, -0.2, 80, 200)),
+        "sun": _along(
+            "light", "degrees", 55.0, _level(1, 60, 5, 199, 200), _level(5, 0, -55, 20, 90)
+        ),
+        "blur": _along(
+            "sensor", "pixels", 0.0, _level(1, 0.5, 0.5, 200, 200), _level(5, 2, 2, 190, 200)
+        ),
+        "brightness": _along("light", "times", 1.0, _level(1, 0.8, -0.2, 80, 200)),
     },
     "together": _level(3, 0.0, 0.0, 3, 180),
     "domain": {

@@ -15,13 +15,16 @@ from drone_rl.bench.evidence import (
     VERDICT,
     changed,
 )
-from drone_rl.words import advice, card, report, shifts, sweep, truth, verdict
+from drone_rl.words import advice, card, domain, report, shifts, sweep, truth, verdict
 from drone_rl.words.licence import Sentence, said
 
 Changes = Mapping[str, Any]
 SPOKEN: dict[str, tuple[tuple[Sentence, ...], Mapping[str, Any]]] = {
     "verdict": (verdict.SENTENCES, VERDICT),
-    "explanation": ((*advice.SENTENCES, *report.SENTENCES, *truth.SENTENCES), EXPLANATION),
+    "explanation": (
+        (*advice.SENTENCES, *report.SENTENCES, *truth.SENTENCES, *domain.QUOTED),
+        EXPLANATION,
+    ),
     "card": (card.SENTENCES, CARD),
     "shifts": (shifts.SHIFTS, SHIFTS),
     "sweep": (sweep.SENTENCES, SWEEP),
@@ -116,6 +119,9 @@ _NO_SIDE = {"asymmetry.dataset.signed.upper95": 0.1}
 _NO_MAP = {"places": {"refused": "it has a memory"}}
 _ALL_HEIGHTS = {"response.rows": [*EXPLANATION["response"]["rows"], *HIGHER]}
 _LEFT_BLIND = "response.rows.0.blind"
+_FLOWN = {"shifts": SHIFTS, "verdict.kind": "good", "verdict.certain": True}
+_UNFLOWN = {"shifts": {"refused": "it is of another task"}}
+_OTHER_KIND = {"verdict.kind": "poor", "verdict.certain": True}
 _OF_REPORTS = (
     ("advice.more", {"verdict.certain": True}, _NOT_CERTAIN),
     ("advice.more", {"verdict.enough": None}, _NOT_CERTAIN),
@@ -123,7 +129,14 @@ _OF_REPORTS = (
     ("advice.use", {"verdict.kind": "poor"}, _CERTAIN_GOOD),
     ("advice.refuse", _CERTAIN_GOOD),
     ("advice.refuse", {"verdict.exit_code": 10}),
-    ("scope.one_look", {"verdict": VERDICT, "shifts": {"colour": 12}}),
+    ("scope.one_look", _FLOWN),
+    ("scope.one_look", {"shifts.axes.blur.group": "color"}, _FLOWN),
+    ("domain.quoted", _UNFLOWN, _FLOWN),
+    ("domain.quoted", {"shifts.domain.ranges.blur.high": 1.0}, _FLOWN),
+    ("domain.quoted", _OTHER_KIND, _FLOWN),
+    ("domain.quoted", {"verdict.good_share": 0.99}, _FLOWN),
+    ("domain.refused", _FLOWN, _UNFLOWN),
+    ("domain.refused", {"shifts.refused": "it is of another network"}, _UNFLOWN),
     ("dataset.size", {"dataset.episodes": 31}),
     ("dataset.actions", _ONE_ACTION),
     ("dataset.one_action", {"dataset.action_shares": [0.001, 0.999, 0.0]}, _ONE_ACTION),
@@ -218,6 +231,10 @@ _OF_CARDS = (
     ("card.chosen", {"chosen.episodes": None}),
     ("card.not_chosen", {"chosen": {"runs": 3, "episodes": 200}}, {"chosen": None}),
     ("card.tested", {"task.vertical_bound": 1.2}),
+    ("card.tested", _FLOWN),
+    ("card.domain", {"shifts": None}, _FLOWN),
+    ("card.domain", {"shifts.domain.ranges.sun.low": 40.0}, _FLOWN),
+    ("card.domain", _OTHER_KIND, _FLOWN),
     ("card.greedy_only", {"verdict.sampled": VERDICT["sampled"]}, {"verdict.sampled": None}),
 )
 _ALL_CERTAIN = {"certain": 5}
@@ -287,12 +304,15 @@ _OF_SHIFTS = (
     ("shifts.not", _TOO_FEW),
     ("shifts.not", {"domain.ranges.brightness.failed.0.worst": {"side": "left", "share": 0.2}}),
     ("shifts.not", {"domain.ranges.brightness.positions": [-0.1, 0.0]}),
+    ("shifts.not", {"domain.ranges.brightness.failed.0.impossible": True}),
     ("shifts.too_few", {"domain.ranges.brightness.failed.0.bad": True}, _TOO_FEW),
     ("shifts.none", {"domain.plain.good": True}, _NOT_GOOD),
     ("shifts.none", {"domain": None}, _NOT_GOOD),
     ("shifts.untested", {_SURE_BLUR: False}, {_SURE_BLUR: True}),
     ("shifts.impossible", {"axes.sun.levels.1.impossible": False}),
     ("shifts.impossible", {"axes.sun.levels.1.oracle.share": 0.3}),
+    ("shifts.impossible", {"domain.ranges.brightness.failed.0.impossible": False},
+     {"domain.ranges.brightness.failed.0.impossible": True}),
     ("shifts.together", {"together.refused": "task.cube_size=99"}),
     ("shifts.together", {"together.modes.constant.success.share": 0.5}),
     ("shifts.scope", _NOT_GOOD),

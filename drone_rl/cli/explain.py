@@ -42,6 +42,7 @@ def run(settings: Command, folder: Path) -> tuple[int, str]:
         settings.narrowed(ExplainSettings),
         folder=folder,
         num_envs=settings.num_envs,
+        outputs=settings.paths.outputs,
         progress=log,
     )
     print(done)

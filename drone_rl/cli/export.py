@@ -30,16 +30,19 @@ class Command(FlightSettings):
     """The command that trained it, for the card; none names the run's own settings."""
     certificate: str | None = None
     """A proof's file for the card to quote; none takes the one that lies with the policy."""
+    shifts: str | None = None
+    """A file of drone-rl shifts for the card; none takes the policy's, or the newest of its own."""
     paths: PathsSettings = PathsSettings()
     """Folders."""
 
     def check(self) -> None:
-        """A certificate is quoted on a card, and beside an ONNX model lies none."""
-        if self.format == "onnx" and self.certificate is not None:
-            raise InputError(
-                "certificate is for the card, which format=onnx has not; leave it out or use "
-                "format=safetensors"
-            )
+        """Proofs and flights are quoted on a card, and beside an ONNX model lies none."""
+        for name, given in (("certificate", self.certificate), ("shifts", self.shifts)):
+            if self.format == "onnx" and given is not None:
+                raise InputError(
+                    f"{name} is for the card, which format=onnx has not; leave it out or use "
+                    "format=safetensors"
+                )
 
 
 def run(settings: Command, folder: Path) -> tuple[int, str]:
@@ -53,7 +56,14 @@ def run(settings: Command, folder: Path) -> tuple[int, str]:
         difference = f"{found.difference:.1e} in {found.frames:,} pictures"
         _log.info("written: %s, which differs from PyTorch by at most %s", target, difference)
         return 0, str(target)
-    given = settings.certificate
-    export(policy, target, settings, command=settings.command, certificate=given)
+    export(
+        policy,
+        target,
+        settings,
+        command=settings.command,
+        certificate=settings.certificate,
+        shifts=settings.shifts,
+        outputs=settings.paths.outputs,
+    )
     _log.info("written: %s and %s", target, target.with_suffix(".md").name)
     return 0, str(target)

@@ -6,12 +6,13 @@ from pathlib import Path
 from typing import Annotated
 
 import drone_rl
+from drone_rl.api.judging import Judgement
 from drone_rl.hydra_app.names import policies as prepare  # noqa: F401 -- of what was typed
 from drone_rl.settings.changes import TaskChanges, no_changes
 from drone_rl.settings.judging import JudgeSettings
 from drone_rl.settings.paths import PathsSettings
 from drone_rl.utils.schema import OneOf
-from drone_rl.verdicts.kinds import NOT_PROVED
+from drone_rl.verdicts.kinds import NOT_COVERED, NOT_PROVED
 
 _log = logging.getLogger(__name__)
 
@@ -26,6 +27,10 @@ class Command(JudgeSettings):
     """A proof's file to quote; none takes the one that lies with the policy, if there is one."""
     require: Annotated[str, OneOf(("proved",))] | None = None
     """Refuse (exit status 16) what is not proved for every placement; none judges by flights."""
+    shifts: str | None = None
+    """A file of drone-rl shifts to quote; none takes the policy's, or the newest of its own."""
+    require_domain: str | None = None
+    """Refuse (exit status 17) what is not good where this file says; none asks for no range."""
     task: TaskChanges = no_changes()
     """What to change of the policy's task."""
     paths: PathsSettings = PathsSettings()
@@ -42,15 +47,24 @@ def run(settings: Command, folder: Path) -> tuple[int, str]:
         settings,
         task=settings.task,
         certificate=settings.certificate,
+        shifts=settings.shifts,
+        require_domain=settings.require_domain,
         outputs=outputs,
         progress=silent,
     )
     done.save(folder / "verdict.json")
     print(done)
     _log.info("written: %s", folder / "verdict.json")
-    status = done.verdict.exit_code
-    if settings.require is not None:
-        status = 0 if done.verdict.is_proved else NOT_PROVED
-        if done.verdict.evidence["proof"] is None:
-            _log.info("no certificate lies with it; make one by drone-rl prove, give certificate=")
-    return status, done.verdict.kind.value
+    if settings.require is not None and done.verdict.evidence["proof"] is None:
+        _log.info("no certificate lies with it; make one by drone-rl prove, give certificate=")
+    return _status(done, settings), done.verdict.kind.value
+
+
+def _status(done: Judgement, settings: Command) -> int:
+    """The verdict's own exit status, or that of what is required."""
+    if settings.require is not None and not done.verdict.is_proved:
+        return NOT_PROVED
+    if done.coverage is not None and not done.coverage.is_covered:
+        return NOT_COVERED
+    is_required = settings.require is not None or done.coverage is not None
+    return 0 if is_required else done.verdict.exit_code

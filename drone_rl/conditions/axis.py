@@ -63,10 +63,15 @@ class Axis:
         """Where a strength lies on the axis's scale; 0 where nothing is different."""
         return self.scale.there(strength) - self.scale.there(self.neutral)
 
-    def between(self, low: float, high: float) -> float | None:
-        """The strength in the middle of two; None where there is none."""
+    def between(self, low: float, high: float, share: float = 0.5) -> float | None:
+        """The strength a share of the way from one to another; None where there is none."""
         there, back = self.scale
-        if self.whole:
-            middle = math.floor((low + high) / 2)
-            return None if middle in (low, high) else float(middle)
-        return back((there(low) + there(high)) / 2)
+        if not self.whole:
+            return back(there(low) + share * (there(high) - there(low)))
+        inside = round(abs(high - low)) - 1
+        nearer = 1 + min(math.floor(share * inside), inside - 1)
+        return math.copysign(nearer, high - low) + low if inside > 0 else None
+
+    def at(self, position: float) -> float:
+        """The strength that lies there on the axis's scale."""
+        return self.scale.back(position + self.scale.there(self.neutral))

@@ -1,34 +1,65 @@
 """The operating domain: how far each axis may go while the policy surely stays good.
 
-From no difference outwards every strength of the table is tried until one is not surely good; then
-the range between that one and the last good one is halved a few times. So every limit has been
-flown at, and so have all strengths of the table within it: that nothing is worse between them is
-taken for granted, that nothing nearer is worse is not.
+From no difference outwards a course is flown: every strength of the table and, before each, one
+that is drawn at random between it and the one before, which nobody can have prepared for. Where the
+policy is not surely good the course ends, whatever would follow; the gap before that strength is
+gone through once more, in `PARTS` steps. So all that was flown within a range was surely good.
+
+That is certain whatever lies where. A range is wrong only if the first strength of a course that is
+not good in truth passes, or the first such strength within the gap that is gone through. Both are
+known before anything is flown, but for which gap it is: the former may pass with the error of a
+course (`WALKING`), the latter with that of a gap (`REFINING`), and both ends of an axis, with all
+their gaps, share 5%. Nothing is assumed of how flights at different strengths depend on each other,
+nor that what is stronger is worse.
 """
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
+
+import torch
 
 from drone_rl.conditions.axis import Axis
 from drone_rl.conditions.condition import Condition
 from drone_rl.conditions.flying import Airfield
+from drone_rl.conditions.oracle import OracleEyes, has_oracle
 from drone_rl.conditions.suite import finite
 from drone_rl.evaluation import Episodes
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.intervals import proportion
+from drone_rl.utils.seeding import Stream, torch_generator
 from drone_rl.verdicts.judge import measure
 from drone_rl.verdicts.kinds import Kind
 from drone_rl.verdicts.rule import Quantity, Rule, kinds_within
 
-HALVINGS = 4
-TESTS = 5 + 2 * HALVINGS
-"""Strengths of an axis that are tried at most, all of which count when its limits are certain."""
+PARTS = 4
+"""Of the gap in which a range ends."""
+WALKING = 1 / 4
+"""Of an axis's error, for each of two courses."""
+REFINING = 1 / 20
+"""The same for each of ten gaps: five strengths, and one before each."""
+_BETWEEN = 2000
+"""Number of the stream of strengths between those of the table."""
+
+
+@dataclasses.dataclass
+class _End:
+    """How far a course leads."""
+
+    limit: float
+    """The last strength that is surely good."""
+    flown: list[tuple[float, bool]]
+    """Strengths, and whether each is surely good."""
+    failed: tuple[float, dict[str, Any]] | None = None
+    """The first strength of the course that is not, and what was found there."""
 
 
 class Prober:
     """Says at which strengths a policy is surely good."""
 
-    def __init__(self, bed: Airfield, oracle: Episodes, good_share: float) -> None:
+    def __init__(
+        self, bed: Airfield, oracle: Episodes, good_share: float, possible_share: float = 0.9
+    ) -> None:
         """Takes what good is measured by.
 
         Args:
@@ -36,19 +67,23 @@ class Prober:
             oracle: Of the task's oracle where nothing is different: what is hard for it, too, is no
                 excuse.
             good_share: See `Rule`.
+            possible_share: See `Suite`.
         """
         task = oracle.task
-        self._bed, self._oracle = bed, oracle
-        rule = Rule(good_share=good_share, strata=task.strata, luck=task.luck)
-        self._rule = dataclasses.replace(rule, error_rate=rule.error_rate / TESTS)
+        self._bed, self._oracle, self._possible = bed, oracle, possible_share
+        self._rule = Rule(good_share=good_share, strata=task.strata, luck=task.luck)
         self._luck: dict[Any, dict[str, Episodes]] = {}
-        self.plain = self.probe(Condition())
+        self.plain = self.probe(Condition(), WALKING)
 
-    def probe(self, condition: Condition) -> dict[str, Any]:
+    def probe(self, condition: Condition, part: float) -> dict[str, Any]:
         """Whether it is surely good under a condition.
 
         That is: the verdict is good, certainly, and it is surely better than luck, so that who
         looks at nothing is never called good, however easy a condition makes the task.
+
+        Args:
+            condition: Which.
+            part: Of the axis's error, that this may take.
 
         Returns:
             "good" and "bad", surely: neither where too few were flown; "success", a share; "worst":
@@ -62,14 +97,15 @@ class Prober:
         flown = self._bed.fly(condition).episodes
         if key not in self._luck:  # who sees nothing minds neither look nor camera
             self._luck[key] = self._bed.fly_blindly(condition)
+        rule = dataclasses.replace(self._rule, error_rate=part * self._rule.error_rate)
         baselines = {**self._luck[key], "oracle": self._oracle}
-        found = dict(zip(self._rule.quantities, measure(flown, baselines, self._rule), strict=True))
+        found = dict(zip(rule.quantities, measure(flown, baselines, rule), strict=True))
         return {
-            "good": is_surely_good(found, self._rule),
-            "bad": Kind.GOOD not in _kinds(found, self._rule),
+            "good": is_surely_good(found, rule),
+            "bad": Kind.GOOD not in _kinds(found, rule),
             "refused": None,
             "success": float(flown.success.mean()),
-            "worst": _worst(found, self._rule),
+            "worst": _worst(found, rule),
         }
 
     def search(self, axis: Axis) -> dict[str, Any]:
@@ -79,67 +115,83 @@ class Prober:
             "low", "high": its ends, values of the axis, None for an infinite one; "positions": the
             same on the axis's scale, None if not even no difference is good; "low_open",
             "high_open": whether the strongest that was tried there is still good, None where none
-            was; "failed": the first strengths of the table that are not surely good, with what was
-            found there; "tests": how many strengths were flown.
+            was; "failed": where courses end, the lower one first: "end", "value", what was found
+            there, how often who knows where all is that the camera shows succeeds there ("oracle",
+            None where nobody does), and whether that shows it to be "impossible"; "flown": all that
+            was tried, from the lowest on: "value", "position", and whether it is "good".
         """
-        sides = [
-            sorted((s for s in axis.strengths if is_there(axis.position(s))), key=_away(axis))
-            for is_there in (lambda p: p < 0, lambda p: p > 0)
-        ]
-        value = self._valued(axis)
         if not self.plain["good"]:
-            nothing = {"low": None, "high": None, "positions": None, "failed": [], "tests": 0}
+            nothing = {"low": None, "high": None, "positions": None, "failed": [], "flown": []}
             return {**nothing, "low_open": None, "high_open": None}
-        ends = [self._walk(axis, side) for side in sides]
-        (low, low_failed, _), (high, high_failed, _) = ends
+        sides = {"low": _side(axis, -1), "high": _side(axis, 1)}
+        ends = {name: self._walk(axis, strengths) for name, strengths in sides.items()}
         failed = [
-            {"value": value(strength), **found}
-            for end in ends
-            if end[1]
-            for strength, found in [end[1]]
+            {"end": name, "value": self._value(axis, end.failed[0])}
+            | self._explain(axis, *end.failed)
+            for name, end in ends.items()
+            if end.failed
         ]
+        flown = sorted(
+            (axis.position(strength), self._value(axis, strength), good)
+            for end in ends.values()
+            for strength, good in end.flown
+        )
         return {
-            "low": finite(value(low)),
-            "high": finite(value(high)),
-            "positions": [axis.position(low), axis.position(high)],
-            "low_open": low_failed is None if sides[0] else None,
-            "high_open": high_failed is None if sides[1] else None,
+            **{name: self._value(axis, end.limit) for name, end in ends.items()},
+            "positions": [axis.position(end.limit) for end in ends.values()],
+            **{
+                f"{name}_open": end.failed is None if sides[name] else None
+                for name, end in ends.items()
+            },
             "failed": failed,
-            "tests": sum(end[2] for end in ends),
+            "flown": [{"position": p, "value": v, "good": good} for p, v, good in flown],
         }
 
-    def _walk(
-        self, axis: Axis, side: list[float]
-    ) -> tuple[float, tuple[float, dict[str, Any]] | None, int]:
-        """Finds one end.
-
-        Returns:
-            The last good strength; the first of the table that is not, with what was found there;
-            and how many were tried.
-        """
-        good, failed, tests = axis.neutral, None, 0
-        for strength in side:
-            found, tests = self._at(axis, strength), tests + 1
+    def _walk(self, axis: Axis, side: list[float]) -> _End:
+        """Finds one end."""
+        end = _End(axis.neutral, [])
+        for strength in self._course(axis, side):
+            found = self._at(axis, strength, WALKING, end)
             if not found["good"]:
-                failed = (strength, found)
+                end.failed = (strength, found)
                 break
-            good = strength
-        if failed is None:
-            return good, None, tests
-        far = failed[0]
-        for _ in range(HALVINGS):
-            middle = axis.between(good, far)
-            if middle is None:
+        if end.failed is None:
+            return end
+        near, far = end.limit, end.failed[0]
+        for strength in _inside(axis, near, far, [part / PARTS for part in range(1, PARTS)]):
+            if not self._at(axis, strength, REFINING, end)["good"]:
                 break
-            is_good, tests = self._at(axis, middle)["good"], tests + 1
-            good, far = (middle, far) if is_good else (good, middle)
-        return good, failed, tests
+        return end
 
-    def _at(self, axis: Axis, strength: float) -> dict[str, Any]:
-        return self.probe(axis.make(strength, self._bed.subject))
+    def _course(self, axis: Axis, side: list[float]) -> Iterator[float]:
+        """The strengths of one side, from the weakest on, and one before each."""
+        generator = torch_generator(self._bed.seed, Stream.SHIFTS, number=_BETWEEN)
+        shares = torch.rand(len(axis.strengths), generator=generator, dtype=torch.float64)
+        before = axis.neutral
+        for strength, share in zip(side, shares.tolist(), strict=False):
+            yield from _inside(axis, before, strength, [share])
+            yield strength
+            before = strength
 
-    def _valued(self, axis: Axis) -> Callable[[float], float]:
-        return lambda strength: axis.value(strength, self._bed.subject)
+    def _at(self, axis: Axis, strength: float, part: float, end: _End) -> dict[str, Any]:
+        """Flies at a strength, and notes it."""
+        found = self.probe(axis.make(strength, self._bed.subject), part)
+        end.flown.append((strength, found["good"]))
+        if found["good"]:
+            end.limit = strength
+        return found
+
+    def _explain(self, axis: Axis, strength: float, found: dict[str, Any]) -> dict[str, Any]:
+        """Whether it is the policy that fails, or whether nobody could do it."""
+        if found["refused"] is not None or not has_oracle(self._oracle.task):
+            return {**found, "oracle": None, "impossible": False}
+        condition = axis.make(strength, self._bed.subject)
+        success = self._bed.fly(condition, eyes=OracleEyes()).episodes.success
+        seen = proportion(int(success.sum()), len(success))
+        return {**found, "oracle": seen, "impossible": seen["upper95"] < self._possible}
+
+    def _value(self, axis: Axis, strength: float) -> float | None:
+        return finite(axis.value(strength, self._bed.subject))
 
 
 def is_surely_good(found: Mapping[str, Quantity], rule: Rule) -> bool:
@@ -169,5 +221,13 @@ def _worst(found: Mapping[str, Quantity], rule: Rule) -> dict[str, Any] | None:
     return {"side": side, "share": known[side]}
 
 
-def _away(axis: Axis) -> Callable[[float], float]:
-    return lambda strength: abs(axis.position(strength))
+def _side(axis: Axis, sign: int) -> list[float]:
+    """The strengths of the table on one side of no difference, from the weakest on."""
+    there = [strength for strength in axis.strengths if sign * axis.position(strength) > 0]
+    return sorted(there, key=lambda strength: abs(axis.position(strength)))
+
+
+def _inside(axis: Axis, near: float, far: float, shares: list[float]) -> list[float]:
+    """Strengths between two, from the nearer on, each once."""
+    there = (axis.between(near, far, share) for share in shares)
+    return list(dict.fromkeys(strength for strength in there if strength is not None))

@@ -1,5 +1,10 @@
 """What a condition looks like: one picture of each strength, from the same place."""
 
+import base64
+import math
+import zlib
+
+import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
@@ -55,3 +60,30 @@ def _picture(bed: Airfield, condition: Condition) -> NDArray | None:
     except InputError:
         return None
     return None if eyes.picture is None else eyes.picture.cpu().numpy()
+
+
+def packed(picture: NDArray) -> str:
+    """A picture as text for a file."""
+    return base64.b64encode(zlib.compress(picture.tobytes(), 9)).decode()
+
+
+def unpacked(text: str, shape: tuple[int, ...], where: str) -> NDArray:
+    """A picture out of such text.
+
+    Args:
+        text: From `packed`, perhaps.
+        shape: That it must have, as uint8.
+        where: Its name, for people.
+
+    Raises:
+        InputError: It is none, or of another shape.
+    """
+    size = math.prod(shape)
+    try:
+        unpacking = zlib.decompressobj()
+        content = unpacking.decompress(base64.b64decode(text, validate=True), size + 1)
+    except (ValueError, zlib.error):
+        content = b""
+    if len(content) != size:
+        raise InputError(f"{where} is no picture of {shape[0]} rows and {shape[1]} columns")
+    return np.frombuffer(content, np.uint8).reshape(shape)

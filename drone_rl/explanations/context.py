@@ -11,6 +11,7 @@ from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 from torchrl.envs import TransformedEnv
 
+from drone_rl.conditions.measured import Measured
 from drone_rl.explanations.attribution import Explainer
 from drone_rl.explanations.dataset import RolloutDataset
 from drone_rl.explanations.hooks import feature_layer, features
@@ -36,6 +37,7 @@ class Context:
         network: PictureNetwork,
         settings: ExplainSettings,
         claim: Claim | None = None,
+        measured: Measured | None = None,
     ) -> None:
         """Takes the policy and its worlds.
 
@@ -44,11 +46,13 @@ class Context:
             network: The policy's, on the CPU.
             settings: What to compute.
             claim: A certificate of it in the task of these worlds, if there is one.
+            measured: Its flights under other conditions, if there are any.
 
         Raises:
             InputError: A setting doesn't fit the policy.
         """
         self.env, self.network, self.settings, self.claim = env, network, settings, claim
+        self.measured = measured
         self.scenes = Scenes(env)
         self.layer = settings.layer or feature_layer(network)
         """Whose features are embedded; None of a policy of which no layers are known."""

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from torchrl.envs import TransformedEnv
 
+from drone_rl.conditions.measured import Measured
 from drone_rl.explanations.context import Context, LeftOutError
 from drone_rl.explanations.sections import Section, find_sections
 from drone_rl.explanations.settings import ExplainSettings
@@ -35,6 +36,7 @@ def explain_policy(
     progress: Callable[[str], None] = lambda _: None,
     sections: Mapping[str, Section] | None = None,
     claim: Claim | None = None,
+    measured: Measured | None = None,
 ) -> dict[str, Any]:
     """Computes everything about one policy and writes it to a folder.
 
@@ -49,6 +51,7 @@ def explain_policy(
         sections: What to compute, in this order, which changes nothing but the time of each; all
             of `explanations/sections` by default.
         claim: A certificate of the policy in the task of these worlds, if there is one.
+        measured: Its flights under other conditions in that task, if there are any.
 
     Returns:
         The numbers, as in `explanation.json`; "left_out" says of sections that can't be made of
@@ -57,7 +60,7 @@ def explain_policy(
     Raises:
         InputError: The folder can't be written or a setting doesn't fit the policy.
     """
-    context = Context(env, network, settings, claim)
+    context = Context(env, network, settings, claim, measured)
     found = _Found()
     for title, section in (find_sections() if sections is None else sections).items():
         progress(title.replace("_", " "))

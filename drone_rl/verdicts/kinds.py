@@ -10,6 +10,9 @@ NOT_CERTAIN = 13
 NOT_PROVED = 16
 """Exit status where a proof for every placement is required, and no certificate gives it."""
 
+NOT_COVERED = 17
+"""Exit status where conditions are required in which the policy was not found to be good."""
+
 
 class Kind(enum.StrEnum):
     """What a policy is."""

@@ -1,6 +1,8 @@
 """What to do about a verdict, and what it does not cover. Evidence: `explanation.json`."""
 
+from drone_rl.words.domain import is_quoted, untested
 from drone_rl.words.licence import Evidence, Sentence
+from drone_rl.words.numbers import listed
 
 
 def _more(evidence: Evidence) -> str:
@@ -44,11 +46,11 @@ ADVICE = (
 SCOPE = (
     Sentence(
         "scope.one_look",
-        "no other look of the task was flown",
-        lambda e: not e.get("shifts"),
+        "other colours, light or sizes were not flown",
+        lambda e: bool(untested(e)),
         lambda e: (
-            "Tested in one look and one light only, those of its task: nothing here tests other "
-            "colours, light or sizes."
+            f"{'The verdict is of' if is_quoted(e) else 'Tested in'} one look and one light only, "
+            f"those of its task: nothing here tests other {listed(untested(e), 'or')}."
         ),
     ),
 )

@@ -1,7 +1,10 @@
 """What a policy's card may say. Evidence: the verdict and where it comes from, see `zoo.card`."""
 
 from drone_rl.words.certificate import is_quoted
-from drone_rl.words.licence import Evidence, Sentence
+from drone_rl.words.domain import QUOTED, untested
+from drone_rl.words.domain import is_quoted as has_domain
+from drone_rl.words.licence import Evidence, Sentence, say
+from drone_rl.words.numbers import listed
 from drone_rl.words.terms import terms_of
 
 _NUMBERS = {1: "one cube", 2: "two cubes", 3: "three cubes", 4: "four cubes", 5: "five cubes"}
@@ -47,10 +50,10 @@ def _chosen(card: Evidence) -> str:
 
 def _tested(card: Evidence) -> str:
     tested = terms_of(card["verdict"]).tested or some_cubes(card["task"])
-    return (
-        f"Tested with {tested}, in this task's look and light only: nothing is known of other "
-        "colours, light or sizes."
-    )
+    unknown = listed(untested(card), "or")
+    but = f": nothing is known of other {unknown}" if unknown else ", but for what is said here"
+    what = "The verdict is of" if has_domain(card) else "Tested with"
+    return f"{what} {tested}, in this task's look and light only{but}."
 
 
 SENTENCES = (
@@ -82,7 +85,13 @@ SENTENCES = (
         lambda c: c["chosen"] is None,
         lambda c: "Whether it was chosen among several trainings, and how, is not recorded.",
     ),
-    Sentence("card.tested", "nothing else was tested", lambda c: True, _tested),
+    Sentence("card.tested", "always", lambda c: True, _tested),
+    Sentence(
+        "card.domain",
+        "flights under other conditions are of this network and task, and none speak against them",
+        has_domain,
+        lambda c: say(QUOTED, c),
+    ),
     Sentence(
         "card.greedy_only",
         "no flights with drawn actions were made",

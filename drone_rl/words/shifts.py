@@ -103,7 +103,7 @@ def _ranges(e: Evidence) -> Mapping[str, Any]:
     return (e["domain"] or {}).get("ranges", {})
 
 
-def _is_tested(e: Evidence, name: str) -> bool:
+def is_tested(e: Evidence, name: str) -> bool:
     """Whether its strongest change was seen, or made flights go otherwise."""
     flown = [v["modes"]["constant"] for v in e["axes"][name]["levels"] if v["refused"] is None]
     return bool(flown) and not flown[-1]["unchanged"]
@@ -113,7 +113,7 @@ def _wide(e: Evidence) -> Iterator[str]:
     """Axes with a range in which it is good."""
     for name, found in _ranges(e).items():
         has_width = found["positions"] is not None and found["positions"][0] < found["positions"][1]
-        if has_width and _is_tested(e, name):
+        if has_width and is_tested(e, name):
             yield name
 
 
@@ -128,9 +128,14 @@ def _shut(e: Evidence, is_sure: bool) -> list[str]:
         name
         for name, found in _ranges(e).items()
         if found["positions"] == [0.0, 0.0]
-        and found["failed"]
-        and any(failed["bad"] for failed in found["failed"]) == is_sure
+        and (failed := _own_failures(found))
+        and any(failure["bad"] for failure in failed) == is_sure
     ]
+
+
+def _own_failures(found: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """Those of the policy, where it could have done better."""
+    return [failure for failure in found["failed"] if not failure["impossible"]]
 
 
 def inward(value: float, up: bool) -> str:
@@ -153,10 +158,11 @@ def _range(e: Evidence, name: str) -> str:
     if found["high"] is not None:
         limits["least"] = inward(found["high"], True)  # of what is stronger where it is less
     text = RANGES[name].format(objects=_objects(e), **limits)
-    is_open = [end for end in ends if found[f"{end}_open"]]
     most = {"low": "no less", "high": "no more"}
-    tried = listed([most[end] for end in is_open])
-    return f"{text} ({tried} was tried)" if tried else text
+    tried = listed([most[end] for end in ends if found[f"{end}_open"]])
+    lost = listed([f"{most[f['end']]} is possible" for f in found["failed"] if f["impossible"]])
+    aside = listed([*([f"{tried} was tried"] if tried else []), *([lost] if lost else [])])
+    return f"{text} ({aside})" if aside else text
 
 
 def _good(e: Evidence) -> str:
@@ -167,7 +173,7 @@ def _good(e: Evidence) -> str:
 def _not(e: Evidence) -> str:
     parts = []
     for name in _shut(e, True):
-        found = next(f for f in _ranges(e)[name]["failed"] if f["bad"])
+        found = next(f for f in _own_failures(_ranges(e)[name]) if f["bad"])
         parts.append(f"{_at(e, name, found['value'])}{_why(e, found)}")
     return f"Not with {listed(parts)}."
 
@@ -176,7 +182,7 @@ def _too_few(e: Evidence) -> str:
     parts = [
         _at(e, name, found["value"])
         for name in _shut(e, False)
-        for found in _ranges(e)[name]["failed"][:1]
+        for found in _own_failures(_ranges(e)[name])[:1]
     ]
     count = e["settings"]["domain_episodes"]
     return f"Whether it is good with {listed(parts, 'or')} {count} flights do not tell."
@@ -201,16 +207,18 @@ def _objects(e: Evidence) -> str:
 
 
 def _impossible(e: Evidence) -> list[str]:
-    return [
-        f"{_at(e, name, level['value'])}, {percent(level['oracle']['share'])}"
+    """Strengths of the table and ends of ranges, the flights of the former where both were made."""
+    found = {
+        _at(e, name, at["value"]): percent(at["oracle"]["share"])
         for name, along in e["axes"].items()
-        for level in along["levels"]
-        if level["impossible"]
-    ]
+        for at in (*_ranges(e).get(name, {"failed": []})["failed"], *along["levels"])
+        if at["impossible"]
+    }
+    return [f"{at}, {share}" for at, share in found.items()]
 
 
 def _untested(e: Evidence) -> list[str]:
-    return [NAMES[name] for name in e["axes"] if not _is_tested(e, name)]
+    return [NAMES[name] for name in e["axes"] if not is_tested(e, name)]
 
 
 def _together(e: Evidence) -> str:
@@ -262,7 +270,8 @@ SHIFTS = (
     ),
     Sentence(
         "shifts.impossible",
-        "who knows where all is that the camera shows surely fails too often",
+        "who knows where all is that the camera shows surely fails too often, at a strength of the "
+        "table or where a range ends",
         lambda e: bool(_impossible(e)),
         lambda e: (
             "Impossible even for who knows where all is that the camera shows: "
@@ -280,8 +289,9 @@ SHIFTS = (
         "a range was found",
         lambda e: any(True for _ in _wide(e)),
         lambda e: (
-            "Limits, and the strengths of the table within them, were flown at; between these "
-            "nothing was, nor several axes at once but as said here."
+            "Within each range its limits, the strengths of the table and one drawn at random "
+            "between each two were flown at, always constantly different; nothing else was, nor "
+            "several axes at once but as said here."
         ),
     ),
 )

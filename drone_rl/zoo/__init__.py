@@ -10,6 +10,7 @@ from drone_rl.zoo.files import (
     policy_path,
     read_checkpoint,
     read_policy,
+    shifts_path,
 )
 from drone_rl.zoo.migration import describe
 from drone_rl.zoo.onnx_model import make_onnx, open_onnx
@@ -31,4 +32,5 @@ __all__ = [
     "read_policy",
     "register_network",
     "register_transform",
+    "shifts_path",
 ]

@@ -93,6 +93,17 @@ def certificate_path(policy: Path) -> Path:
     return policy.absolute().parent.parent / "certificate.json"
 
 
+def shifts_path(policy: Path) -> Path:
+    """Where the flights of a policy under other conditions lie, if it has any.
+
+    Args:
+        policy: See `certificate_path`.
+    """
+    if policy.suffix == ".safetensors":
+        return policy.with_suffix(".shifts.json")
+    return policy.absolute().parent.parent / "shifts.json"
+
+
 def read_policy(path: Path) -> dict[str, Any]:
     """A policy out of a file: its description, weights that fit it, and where it comes from.
 
@@ -143,6 +154,7 @@ def export_policy(
     verdict: Mapping[str, Any],
     seed: int,
     chosen: Mapping[str, Any] | None,
+    shifts: Mapping[str, Any] | None = None,
 ) -> None:
     """Writes a checkpoint's policy and its model card beside it.
 
@@ -154,6 +166,7 @@ def export_policy(
         seed: Root of these worlds' random streams.
         chosen: "runs" of the sweep in which it was made, and "episodes" by which it was judged
             there, if it was; None if it was made in no sweep.
+        shifts: As in shifts.json, for the card; None if there are none.
 
     Raises:
         InputError: It can't be written.
@@ -171,7 +184,8 @@ def export_policy(
     try:
         write_exported(path, checkpoint["policy"], checkpoint["description"], about)
         digest = hashlib.sha256(path.read_bytes()).hexdigest()
-        card = write_card(path.stem, digest, {**about, "task": checkpoint["description"]["task"]})
+        told = {**about, "task": checkpoint["description"]["task"], "shifts": shifts}
+        card = write_card(path.stem, digest, told)
         path.with_suffix(".md").write_text(card)
     except (OSError, SafetensorError) as error:
         raise InputError(f"policy {path} can't be written ({error})") from error

@@ -27,6 +27,14 @@ def test_infinitely_much_may_be_none():
 
 def test_between_whole_numbers_there_may_be_none():
     steps = axis(whole=True)
-    assert steps.between(1.0, 4.0) == 2.0
+    assert [steps.between(4.0, 8.0, share) for share in (0.0, 0.5, 0.9999)] == [5.0, 6.0, 7.0]
+    assert [steps.between(8.0, 4.0, share) for share in (0.0, 0.9999)] == [7.0, 5.0]
     assert steps.between(1.0, 2.0) is None
     assert axis().between(1.0, 2.0) == 1.5
+    assert axis().between(2.0, 1.0, 0.25) == 1.75
+
+
+def test_a_position_is_that_of_one_strength():
+    for one in (axis(), axis(FACTORS, 1.0), axis(INVERSE, math.inf)):
+        assert one.at(one.position(4.0)) == pytest.approx(4.0)
+        assert one.at(0.0) == pytest.approx(one.neutral)

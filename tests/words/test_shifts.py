@@ -53,6 +53,7 @@ def test_an_axis_that_changes_nothing_is_claimed_nowhere():
 
 def test_what_the_task_cannot_have():
     refused = {"bad": True, "good": False, "refused": "task.cube_size=9", "value": 9.0}
+    refused |= {"end": "high", "oracle": None, "impossible": False}
     text = said(SHIFTS, changed(EVIDENCE, {"domain.ranges.brightness.failed": [refused]}))
     assert text["shifts.not"] == "Not with brightness at 9 times, which the task can't have."
 
@@ -72,3 +73,14 @@ def test_the_table():
     ]
     refused = {"axes.sun.levels.0.refused": "task.cube_size=9", "axes.sun.areas.constant": None}
     assert rows(changed(EVIDENCE, refused))[1][1:7] == ["60: -", "", "", "", "0: 10%*", ""]
+
+
+def test_what_nobody_can_is_not_the_policys_failure():
+    failed = EVIDENCE["domain"]["ranges"]["brightness"]["failed"][0]
+    failed = {**failed, "impossible": True, "oracle": {"share": 0.3}}
+    text = said(SHIFTS, changed(EVIDENCE, {"domain.ranges.brightness.failed": [failed]}))
+    assert "shifts.not" not in text and "shifts.too_few" not in text
+    assert "brightness at 0.8 times, 30%" in text["shifts.impossible"]
+    end = {**failed, "end": "high", "value": 2.0}
+    text = said(SHIFTS, changed(EVIDENCE, {"domain.ranges.blur.failed": [end]}))
+    assert "blur of up to 1.5 pixels (no more is possible)" in text["shifts.good"]

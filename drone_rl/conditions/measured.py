@@ -1,0 +1,308 @@
+"""Flights under other conditions out of a file: read strictly, and of the policy that is asked of.
+
+What was counted can't be told from a file, but all else is held against what this program knows:
+axes, units, strengths and their values, sums, and limits against what was flown at.
+"""
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import torch
+from numpy.typing import NDArray
+
+from drone_rl.checks import fingerprint
+from drone_rl.conditions.axes import AXES, GROUPS
+from drone_rl.conditions.axis import Axis
+from drone_rl.conditions.strips import unpacked
+from drone_rl.conditions.suite import finite
+from drone_rl.settings.shifting import MODES, ShiftSettings
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.files import parse_json, read_bytes
+from drone_rl.utils.schema import (
+    Flag,
+    Kind,
+    Maybe,
+    OneOf,
+    Plain,
+    Real,
+    Record,
+    Several,
+    Text,
+    Whole,
+    as_mapping,
+)
+from drone_rl.words.terms import terms_of
+from drone_rl.zoo import PolicyDescription, parse
+
+FORMAT = "drone_rl shifts"
+FORMAT_VERSION = 1
+MOST_BYTES = 2**26
+_MOST_PICTURE = 2**22
+"""Characters of one picture."""
+_CLOSE = 1e-9
+"""Rounding of values, relative."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Measured:
+    """Flights under other conditions that were found, or why they are not quoted."""
+
+    path: Path
+    """Their file."""
+    numbers: dict[str, Any] | None
+    """As in `shifts.json`, without pictures; None if they are refused."""
+    pictures: Mapping[str, list[NDArray | None]] = dataclasses.field(default_factory=dict)
+    """See `Shifts.pictures`."""
+    refused: str | None = None
+    """Why, in one line."""
+
+    @property
+    def evidence(self) -> dict[str, Any]:
+        """What sentences are made of."""
+        return {"refused": self.refused} if self.numbers is None else self.numbers
+
+    @property
+    def has_ranges(self) -> bool:
+        """Whether an operating domain was looked for."""
+        return self.numbers is not None and self.numbers["domain"] is not None
+
+
+def read_measured(
+    path: Path, described: PolicyDescription, weights: Mapping[str, torch.Tensor]
+) -> Measured:
+    """Flights under other conditions out of a file.
+
+    Args:
+        path: Of the JSON file.
+        described: The policy's, in the task that counts.
+        weights: Of its network.
+
+    Raises:
+        InputError: It is missing, damaged, of another network, camera or task, or contradicts
+            itself.
+    """
+    content = read_bytes(path, MOST_BYTES)
+    try:
+        data = dict(as_mapping(parse_json(content, "it"), "it"))
+        pictures = as_mapping(data.pop("pictures", None), "pictures")
+        _WHOLE.read(data, "shifts")
+        numbers = data
+        _refuse_another(numbers, described, weights)
+        terms_of(numbers)
+        for name, along in numbers["axes"].items():
+            _check_axis(_own(AXES[name], described), along, described, f"axes.{name}")
+        _check_domain(numbers, described)
+        shape = (described.camera.height, described.camera.width, 3)
+        shown = {name: _read_strip(pictures.get(name), shape, name) for name in numbers["axes"]}
+    except InputError as error:
+        raise InputError(f"shifts {path} can't be used: {error}") from None
+    return Measured(path, numbers, shown)
+
+
+class _Named:
+    """The kind of value that gives values of a kind by some names."""
+
+    def __init__(self, names: Any, kind: Kind) -> None:
+        self._names, self._kind = OneOf(tuple(names)), kind
+
+    def read(self, value: Any, where: str) -> dict[str, Any]:
+        """See `drone_rl.utils.schema.Kind`."""
+        given = as_mapping(value, where)
+        return {
+            self._names.read(key, f"a name in {where}"): self._kind.read(item, f"{where}.{key}")
+            for key, item in given.items()
+        }
+
+
+class _Counted:
+    """The kind of value that is a share of flights, which must be what was counted."""
+
+    def read(self, value: Any, where: str) -> dict[str, Any]:
+        """See `drone_rl.utils.schema.Kind`."""
+        read = _SHARE.read(value, where)
+        right = read["successes"] / read["trials"] if read["trials"] else None
+        if read["successes"] > read["trials"] or read["share"] != right:
+            raise InputError(f"{where}.share is not what was counted; run drone-rl shifts again")
+        return read
+
+
+_ANY = Real(-1e12, 1e12)
+_COUNT, _PART = Whole(0, 10**9), Real(0.0, 1.0)
+_SHARE = Record(
+    {
+        "share": Maybe(_PART),
+        "lower95": _PART,
+        "upper95": _PART,
+        "successes": _COUNT,
+        "trials": _COUNT,
+    }
+)
+_FREE = Plain(most=1000, deepest=3)
+_FIGURES = {"success": _Counted(), "difference": _FREE, "paired": _FREE, "shares": _FREE} | {
+    "ends": _FREE,
+    "unchanged": Flag(),
+}
+_FLOWN = {
+    "refused": Maybe(Text()),
+    "oracle": Maybe(_Counted()),
+    "impossible": Maybe(Flag()),
+    "modes": _Named(MODES, Record(_FIGURES)),
+}
+_LEVEL = Record({"number": Whole(1, 5), "value": _ANY, "position": _ANY, **_FLOWN})
+_AXIS = Record(
+    {
+        "group": OneOf(GROUPS),
+        "unit": Text(),
+        "neutral": Maybe(_ANY),
+        "areas": _Named(MODES, Maybe(_PART)),
+        "levels": Several(_LEVEL, 1, 5),
+    }
+)
+_WORST = Record({"side": Text(200), "share": _PART})
+_PROBE: dict[str, Kind] = {
+    "good": Flag(),
+    "bad": Flag(),
+    "refused": Maybe(Text()),
+    "success": _PART,
+    "worst": Maybe(_WORST),
+}
+_UNLESS_REFUSED = frozenset({"success", "worst"})
+_FAILED = Record(
+    {
+        "end": OneOf(("low", "high")),
+        "value": Maybe(_ANY),
+        "oracle": Maybe(_Counted()),
+        "impossible": Flag(),
+        **_PROBE,
+    },
+    optional=_UNLESS_REFUSED,
+)
+_RANGE = Record(
+    {
+        "low": Maybe(_ANY),
+        "high": Maybe(_ANY),
+        "positions": Maybe(Several(_ANY, 2, 2)),
+        "low_open": Maybe(Flag()),
+        "high_open": Maybe(Flag()),
+        "failed": Several(_FAILED, 0, 2),
+        "flown": Several(Record({"position": _ANY, "value": Maybe(_ANY), "good": Flag()}), 0, 100),
+    }
+)
+_ORIGIN = {"versions": _FREE, "git_revision": _FREE, "machine": _FREE}
+_WHOLE = Record(
+    {
+        "format": OneOf((FORMAT,)),
+        "format_version": Whole(FORMAT_VERSION, FORMAT_VERSION),
+        "policy": Text(),
+        "network": Record({"weights": Text(64), "description": Plain(most=1000)}),
+        "settings": Plain(most=1000),
+        "terms": Plain(),
+        "plain": Record({"oracle": Maybe(_Counted()), **_FIGURES}),
+        "axes": _Named(AXES, _AXIS),
+        "together": Record(_FLOWN),
+        "domain": Maybe(
+            Record(
+                {
+                    "plain": Record(_PROBE, optional=_UNLESS_REFUSED),
+                    "ranges": _Named(AXES, _RANGE),
+                }
+            )
+        ),
+        "seconds": Real(0.0),
+        **_ORIGIN,
+    },
+    optional=frozenset(_ORIGIN),
+)
+
+
+def _refuse_another(
+    numbers: Mapping[str, Any], described: PolicyDescription, weights: Mapping[str, torch.Tensor]
+) -> None:
+    """Makes sure that it is of this network, camera and task, flown by settings that there are."""
+    stated = numbers["network"]["weights"]
+    if stated != (own := fingerprint(weights)):
+        raise InputError(
+            f"it is of a network with the hash {stated[:12]}..., the policy's has {own[:12]}..."
+        )
+    of, mine = parse(numbers["network"]["description"]).as_dict(), described.as_dict()
+    for part in ("task", "appearance", "camera", "transforms", "network"):
+        if of.get(part) != mine.get(part):
+            raise InputError(f"it is of another {part} than the policy's")
+    ShiftSettings.read(numbers["settings"], "settings")
+
+
+def _own(axis: Axis, described: PolicyDescription) -> Axis:
+    """With the policy's own neutral strength."""
+    of: Any = described
+    return axis if axis.own is None else dataclasses.replace(axis, neutral=axis.own(of))
+
+
+def _check_axis(axis: Axis, along: Mapping[str, Any], of: Any, where: str) -> None:
+    """An axis's group, unit and strengths are those of this program."""
+    levels = along["levels"]
+    known = (axis.group, axis.unit, finite(axis.value(axis.neutral, of)))
+    is_own = (along["group"], along["unit"], along["neutral"]) == known
+    strengths = [axis.strengths[level["number"] - 1] for level in levels]
+    flown = [(level["value"], level["position"]) for level in levels]
+    if not is_own or flown != [(axis.value(s, of), axis.position(s)) for s in strengths]:
+        raise InputError(f"{where} has other strengths or units than drone-rl shifts flies")
+    if any(not level["refused"] and MODES[0] not in level["modes"] for level in levels):
+        raise InputError(f"{where} tells nothing of constant conditions")
+
+
+def _check_domain(numbers: Mapping[str, Any], of: Any) -> None:
+    """Limits are those of what was flown at, and nobody is good on an axis who is not without."""
+    domain = numbers["domain"]
+    if domain is None:
+        return
+    for name, found in domain["ranges"].items():
+        axis = _own(AXES[name], of)
+        if name not in numbers["axes"] or not _is_sound(axis, found, of, domain["plain"]["good"]):
+            raise InputError(f"domain.ranges.{name} contradicts what was flown at")
+
+
+def _is_sound(axis: Axis, found: Mapping[str, Any], of: Any, is_good: bool) -> bool:
+    if found["positions"] is None or not is_good:
+        return found["positions"] is None and not is_good
+    values = all(_is_at(axis, at["position"], at["value"], of) for at in found["flown"])
+    sides = (("low", -1, found["positions"][0]), ("high", 1, found["positions"][1]))
+    return values and all(
+        _is_at(axis, limit, found[end], of) and _is_end(axis, found, end, sign * limit, sign)
+        for end, sign, limit in sides
+    )
+
+
+def _is_end(axis: Axis, found: Mapping[str, Any], end: str, limit: float, sign: int) -> bool:
+    """Whether a limit, how far it lies from no difference, follows from what was flown at."""
+    flown = {sign * at["position"]: at["good"] for at in found["flown"]}
+    flown = {at: good for at, good in flown.items() if at > 0}
+    table = {at for at in (sign * axis.position(s) for s in axis.strengths) if at > 0}
+    bad = [at for at, good in flown.items() if not good]
+    first = min(bad, default=math.inf)
+    is_last = limit == max((at for at in flown if at < first), default=0.0)
+    is_open = None if not table else not bad
+    failed = any(failure["end"] == end for failure in found["failed"])
+    return (
+        is_last
+        and found[f"{end}_open"] == is_open
+        and failed == bool(bad)
+        and all(at in flown for at in table if at < max(limit, first if bad else math.inf))
+    )
+
+
+def _is_at(axis: Axis, position: float, value: float | None, of: Any) -> bool:
+    """Whether a value is what lies at a position."""
+    there = finite(axis.value(axis.at(position), of))
+    if there is None or value is None:
+        return there == value
+    return math.isclose(there, value, rel_tol=_CLOSE, abs_tol=_CLOSE)
+
+
+def _read_strip(value: Any, shape: tuple[int, int, int], name: str) -> list[NDArray | None]:
+    texts = Several(Maybe(Text(_MOST_PICTURE)), 6, 6).read(value, f"pictures.{name}")
+    if texts[0] is None:
+        raise InputError(f"pictures.{name} does not show the world as it is")
+    return [None if t is None else unpacked(t, shape, f"pictures.{name}") for t in texts]

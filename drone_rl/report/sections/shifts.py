@@ -1,0 +1,44 @@
+"""Under which conditions it is good: curves, what the camera shows there, and ranges."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from drone_rl.report import shifts
+from drone_rl.report.explanation import Explanation
+from drone_rl.report.part import Drawn, Part, Rows
+from drone_rl.words.domain import QUOTED, is_quoted
+from drone_rl.words.shifts import rows
+
+
+def draw(explanation: Explanation) -> Drawn:
+    """Curves, and strips of pictures; nothing of what is not believed."""
+    if not is_quoted(explanation.numbers):
+        return {}
+    numbers = explanation.numbers["shifts"]
+    pictures = {name: [*explanation.arrays[f"shifts_{name}"]] for name in numbers["axes"]}
+    return {
+        "shifts": shifts.chart(numbers),
+        "conditions": shifts.strips(numbers, pictures),
+    }
+
+
+def tables(explanation: Explanation) -> dict[str, Rows]:
+    """Success at every strength."""
+    return {"shifts": rows(explanation.numbers["shifts"])} if is_quoted(explanation.numbers) else {}
+
+
+def extras(explanation: Explanation) -> Mapping[str, Any]:
+    """The table."""
+    return {"rows": tables(explanation).get("shifts", [])}
+
+
+PART = Part(
+    title="Under which conditions it is good",
+    label="Conditions",
+    place=15,
+    needs=("shifts",),
+    words={"shifts": QUOTED},
+    draw=draw,
+    tables=tables,
+    extras=extras,
+)
