@@ -13,6 +13,7 @@ from drone_rl.utils.when_imported import when_imported
 if TYPE_CHECKING:
     from drone_rl.api.chances import Chances, chances
     from drone_rl.api.checking import Check, check
+    from drone_rl.api.domains import Coverage
     from drone_rl.api.environment import make_env
     from drone_rl.api.explaining import Explanations, explain
     from drone_rl.api.exporting import export_onnx
@@ -46,6 +47,7 @@ __version__ = "0.1.0"
 _PLACES = {
     "api.chances": ("Chances", "chances"),
     "api.checking": ("Check", "check"),
+    "api.domains": ("Coverage",),
     "api.environment": ("make_env",),
     "api.explaining": ("Explanations", "explain"),
     "api.exporting": ("export_onnx",),
@@ -82,6 +84,7 @@ __all__ = [
     "Chances",
     "Check",
     "CheckSettings",
+    "Coverage",
     "DroneWorld",
     "DroneWorlds",
     "EvaluateSettings",

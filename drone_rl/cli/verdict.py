@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Annotated
 
 import drone_rl
-from drone_rl.api.judging import Judgement
 from drone_rl.hydra_app.names import policies as prepare  # noqa: F401 -- of what was typed
 from drone_rl.settings.changes import TaskChanges, no_changes
 from drone_rl.settings.judging import JudgeSettings
@@ -60,7 +59,7 @@ def run(settings: Command, folder: Path) -> tuple[int, str]:
     return _status(done, settings), done.verdict.kind.value
 
 
-def _status(done: Judgement, settings: Command) -> int:
+def _status(done: "drone_rl.Judgement", settings: Command) -> int:
     """The verdict's own exit status, or that of what is required."""
     if settings.require is not None and not done.verdict.is_proved:
         return NOT_PROVED

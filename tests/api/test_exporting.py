@@ -8,6 +8,7 @@ import torch
 
 import drone_rl
 from drone_rl.api import exporting
+from drone_rl.api.domains import find_domain
 from drone_rl.api.exporting import export, origin_of
 from drone_rl.settings.judging import FlightSettings
 from drone_rl.sweeps import Run, Sweep
@@ -15,6 +16,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.verdicts.rule import Rule
 from drone_rl.zoo import open_onnx, parse
 from tests.checks.making import of_every_place
+from tests.conditions.making import shifts_of
 
 METRICS = "frames,train/running_reward\n100,1.5\n"
 FIGURES = {"frames": 100, "episodes": 9, "seconds": 1.0, "running_reward": 1.5, "num_cubes": 3}
@@ -107,6 +109,24 @@ def test_a_certificate_of_another_is_no_word_of_a_card(tmp_path):
     export(drone_rl.load_policy(target), tmp_path / "again.safetensors", FEW)
     assert "ertificate" not in (tmp_path / "again.md").read_text()
     assert not (tmp_path / "again.certificate.json").exists()
+
+
+@pytest.mark.parametrize(("name", "is_good"), [("good", True), ("right_and_forward", False)])
+def test_a_card_quotes_conditions_that_then_travel_with_the_policy(tmp_path, name, is_good):
+    """Those of one whom the card's verdict surely finds to be something else are not believed."""
+    policy, made = drone_rl.load_policy(name), tmp_path / "made.json"
+    made.write_text(json.dumps(shifts_of(policy)))
+    settings = dataclasses.replace(FEW, episodes=4 if is_good else 300, num_envs=300)
+    export(policy, tmp_path / "mine.safetensors", settings, shifts=made)
+    card = (tmp_path / "mine.md").read_text()
+    assert ("with blur of up to 1 pixels and up to 4 dead rows" in card) == is_good
+    assert "nothing is known of other colours, light or sizes" in card
+    beside = tmp_path / "mine.shifts.json"
+    assert beside.exists() == is_good
+    if is_good:
+        assert beside.read_bytes() == made.read_bytes()
+        again = drone_rl.load_policy(tmp_path / "mine.safetensors")
+        assert find_domain(again).path == beside
 
 
 def test_an_onnx_model_that_agrees_is_left_with_its_command(tmp_path):

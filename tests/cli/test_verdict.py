@@ -7,6 +7,7 @@ import pytest
 import drone_rl
 from tests.checks.making import of_every_place
 from tests.cli.running import error_line
+from tests.conditions.making import shifts_of
 
 
 @pytest.mark.parametrize(
@@ -57,11 +58,48 @@ def test_without_a_certificate_nothing_is_proved(in_process):
 
 
 @pytest.mark.parametrize(
+    ("needed", "status", "words"),
+    [
+        ("blur: {high: 1, unit: pixels}", 0, "covered: blur"),
+        ("blur: {high: 2, unit: pixels}", 17, "not covered: blur: needed 0 to 2 pixels, good 0"),
+    ],
+)
+def test_conditions_can_be_required(in_process, tmp_path, good, needed, status, words):
+    (tmp_path / "s.json").write_text(json.dumps(shifts_of(good)))
+    (tmp_path / "needs.yaml").write_text(needed)
+    done = in_process(*ONE, "shifts=s.json", "require_domain=needs.yaml", "hydra.run.dir=v")
+    assert done.returncode == status, done.stderr
+    assert f"\n{words}" in done.stdout
+    kept = json.loads((tmp_path / "v" / "verdict.json").read_text())
+    assert bool(kept["required_domain"]["lacking"]) == (status == 17)
+    both = in_process(*ONE, "shifts=s.json", "require_domain=needs.yaml", "require=proved")
+    assert both.returncode == 16
+
+
+@pytest.mark.parametrize(
+    ("needed", "words"),
+    [
+        ("blur: {high: 1, unit: pixels}", ["no domain", "run drone-rl shifts policy="]),
+        ("rain: {high: 1, unit: mm}", ["'rain' is no axis", "object_color"]),
+        ("blur: {high: 1, unit: m}", ["blur.unit='m'", "unit: pixels"]),
+        ("blur: {low: 2, high: 1, unit: pixels}", ["from 2 to 1", "the lower first"]),
+        (None, ["needs.yaml can't be read"]),
+    ],
+)
+def test_conditions_that_cannot_be_required(in_process, tmp_path, needed, words):
+    if needed is not None:
+        (tmp_path / "needs.yaml").write_text(needed)
+    line = error_line(in_process(*ONE, "require_domain=needs.yaml"))
+    assert all(word in line for word in words), line
+
+
+@pytest.mark.parametrize(
     ("command", "words"),
     [
         (["verdict", "policy=good", "require=good"], ["require='good'", "proved"]),
         (["verdict", "policy=good", "certificate=none.json"], ["none.json can't be read"]),
         (["verdict", "policy=left", "certificate=c.json"], ["policy=left has no network"]),
+        (["verdict", "policy=left", "shifts=s.json"], ["shifts=s.json", "has no network"]),
         (["verdict", "policy=good", "episodes=0"], ["episodes=0", "1 or more"]),
         (["verdict", "policy=good", "good_share=1"], ["good_share=1", "below 1"]),
     ],

@@ -4,8 +4,10 @@ import json
 import re
 import shutil
 
+import numpy as np
 import pytest
 
+from drone_rl.bench.evidence import SHIFTS
 from drone_rl.report import write_report
 from drone_rl.report.sections import find_parts
 from drone_rl.utils.errors import InputError
@@ -48,7 +50,7 @@ def test_names_and_paths_are_escaped(report):
 
 def test_every_part_is_there_in_order_with_a_link_to_it(report):
     page = report.read_text()
-    order = [name for name in (*find_parts(), "provenance") if name != "left_out"]
+    order = [name for name in (*find_parts(), "provenance") if name not in ("left_out", "shifts")]
     assert re.findall(r'<section id="([^"]+)">', page) == order
     assert re.findall(r'<a href="#([^"]+)">', page) == order
     assert order[0] == "evaluation"
@@ -74,6 +76,23 @@ def test_figures_are_saved_with_their_numbers(report):
     assert total == pytest.approx(1, abs=1e-3)
     assert "trusted" in json.loads((figures / "1_second_truth.json").read_text())
     assert (figures / "1_second_episode.mp4").stat().st_size > 0
+
+
+def test_conditions_are_shown_where_they_were_flown(explanations, tmp_path):
+    folder = tmp_path / "flown"
+    shutil.copytree(explanations[1], folder)
+    numbers = json.loads((folder / "explanation.json").read_text())
+    good = {**numbers["verdict"], "kind": "good", "certain": True, "good_share": 0.9}
+    numbers |= {"shifts": SHIFTS, "verdict": good}
+    (folder / "explanation.json").write_text(json.dumps(numbers))
+    arrays = {f"shifts_{name}": np.zeros((6, 5, 16, 3), np.uint8) for name in SHIFTS["axes"]}
+    with np.load(folder / "arrays.npz") as kept:
+        np.savez_compressed(folder / "arrays.npz", **{**kept, **arrays})
+    page = write_report([folder], tmp_path).read_text()
+    part = page[page.index('<section id="shifts">') :].split("</section>")[0]
+    assert "the sun 21.1 to 60 degrees high" in part and part.count("data:image/png") == 2
+    assert "none flown anew here" in part and "<td>height of the sun</td>" in part
+    assert "nothing here tests other colours or sizes" in page
 
 
 def test_what_is_missing_is_left_out(changed, tmp_path):

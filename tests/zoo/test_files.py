@@ -19,6 +19,7 @@ from drone_rl.zoo import (
     policy_names,
     policy_path,
     read_policy,
+    shifts_path,
 )
 from tests.words.test_card import VERDICT
 from tests.zoo.test_description import DEFAULT
@@ -199,6 +200,7 @@ def test_each_is_what_its_name_says(name, kind):
 
 
 def test_where_certificates_lie(tmp_path, monkeypatch):
+    assert shifts_path(policy_path("good")).name == "good.shifts.json"
     assert certificate_path(policy_path("good")).name == "good.certificate.json"
     assert certificate_path(policy_path("good")).parent == policy_path("good").parent
     run = tmp_path / "run"
