@@ -6,7 +6,9 @@ from typing import Annotated, ClassVar
 from drone_rl.settings.variant import Variant
 from drone_rl.utils.schema import Real, Whole
 
-LearningRate = Annotated[float, Real(0.0, is_above=True)]
+LearningRate = Annotated[float, Real(0.0, 1e30, is_above=True)]
+"""Bounded so that a step is a number in float32, of which Adam's first takes ten times the rate;
+above that torch fails with an error of its own. Which rates make sense is for training to find."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -29,6 +29,7 @@ def test_usage_and_help(tmp_path):
         (["train", "camera.height=2", "camera.width=2"], ["2x2", "too small"]),
         (["train", "seed=-1"], ["seed=-1", "0 or more"]),
         (["train", "optimiser.lr=0"], ["optimiser.lr=0.0", "above 0"]),
+        (["train", "optimiser.lr=1e38"], ["optimiser.lr=1e+38", "up to 1e+30"]),
         (["train", "returns.gamma=2"], ["gamma=2", "0 to 1"]),
         (["train", "trainer.target_share=2.97"], ["target_share=2.97", "up to 1"]),
         (["train", "collector.num_envs=0"], ["num_envs=0", "1 or more"]),

@@ -120,7 +120,7 @@ def test_resume_with_a_changed_setting(run, in_process):
 
 
 def test_nan_names_itself_and_the_last_good_checkpoint(in_process, tmp_path):
-    sgd = ["optimiser=sgd", "optimiser.lr=1e38", "trainer.total_frames=4000"]
+    sgd = ["optimiser=sgd", "optimiser.lr=1e30", "trainer.total_frames=4000"]
     line = error_line(in_process("train", *TINY, *sgd, "hydra.run.dir=nan"))
     assert "NaN or infinite" in line
     assert "nan/checkpoints/last.pt" in line
