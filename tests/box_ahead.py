@@ -20,6 +20,7 @@ def view(what):
     camera.attitude = wp.vec4(1.0, 0.0, 0.0, 0.0)
     camera.half_width = camera.half_height = 1.0
     made = structs.View()
+    made.count = 1
     rays = make_rays(camera, SIZE, SIZE).reshape(1, -1, 3)
     made.cameras = array([camera], structs.Camera)
     made.rays, made.cosines = array(rays, wp.vec3), array(-rays[..., 2], float)

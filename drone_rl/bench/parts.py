@@ -16,7 +16,7 @@ from drone_rl.policies import PolicyNetwork, SmallCNN, make_actor
 from drone_rl.settings.collecting import Threads
 from drone_rl.settings.training import TrainSettings
 from drone_rl.sim.rendering import MakeRenderer
-from drone_rl.sim.settings import CameraSettings, TaskSettings
+from drone_rl.sim.settings import AppearanceSettings, CameraSettings, TaskSettings
 
 
 def default_collector(num_envs: int, device: str) -> ThreadedCollector:
@@ -51,10 +51,11 @@ def make_worlds(
     num_cubes: int = 3,
     renderer: str | MakeRenderer = "raytrace",
     camera: CameraSettings | None = None,
+    appearance: AppearanceSettings | None = None,
 ) -> DroneEnv:
     """A batch of worlds on all cores."""
     task = TaskSettings(num_cubes=num_cubes)
-    return DroneEnv(num_envs, task, camera, device=device, renderer=renderer)
+    return DroneEnv(num_envs, task, camera, device=device, renderer=renderer, appearance=appearance)
 
 
 def rate(work: Callable[[], int], seconds: float) -> float:

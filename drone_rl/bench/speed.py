@@ -8,14 +8,35 @@ import sys
 from functools import partial
 from typing import Any
 
+import torch
+
 from drone_rl.bench.parts import default_collector, make_worlds, paired, random_walk, rate
+from drone_rl.envs import DroneEnv
 from drone_rl.sim.rendering import View
 from drone_rl.sim.rendering.view import MODALITIES
+from drone_rl.sim.settings import AppearanceSettings
 from drone_rl.sim.worlds import Worlds
 
 SIZES = ((25, 64), (64, 64), (100, 256))
 """Heights and widths at which renderers are compared."""
 _COMPARED_WORLDS = 128
+BLOCKS = AppearanceSettings(
+    sun_elevation=40.0,
+    sun_azimuth=140.0,
+    sun_color=(1.0, 0.96, 0.88),
+    ambient_strength=0.42,
+    shadows=1.0,
+    sky_horizon=(0.8, 0.87, 0.94),
+    sky_zenith=(0.25, 0.46, 0.8),
+    fog_visibility=400.0,
+    ground_color=(0.62, 0.63, 0.62),
+    ground_texture="grid",
+    object_texture="bricks",
+    distractors=26,
+    distractor_size=(1.5, 5.0),
+    distractor_distance=(1.5, 24.0),
+)
+"""`appearance=blocks`: with the ground and three cubes, 30 geoms."""
 _COLLECTED = (16, 32, 64, 128, 256)
 """Numbers of worlds that are tried."""
 
@@ -24,8 +45,9 @@ def bench_render(num_envs: int, device: str, quick: bool) -> dict[str, Any]:
     """Raw drawing of a batch of worlds on all cores.
 
     Returns:
-        Frames a second at 25x64 and 64x64 pixels, how many times as many as by MuJoCo Warp's
-        renderer, and the time of all modalities in one pass over that of RGB.
+        Frames a second at 25x64 and 64x64 pixels, and at the latter with `appearance=blocks`; how
+        many times as many as by MuJoCo Warp's renderer, and the time of all modalities in one pass
+        over that of RGB.
     """
     seconds = 0.5 if quick else 10.0
     env = make_worlds(num_envs, device)
@@ -34,9 +56,14 @@ def bench_render(num_envs: int, device: str, quick: bool) -> dict[str, Any]:
     larger = partial(_draw, env.worlds, env.worlds.view(height=64, width=64))
     frames_64 = rate(larger, seconds)
     env.close()
+    blocks = make_worlds(num_envs, device, appearance=BLOCKS)
+    blocks.reset()
+    frames_blocks = rate(partial(_draw_looks, blocks), seconds)
+    blocks.close()
     return {
         "raw_render_fps": frames,
         "raw_render_fps_64": frames_64,
+        "raw_render_blocks_fps_64": frames_blocks,
         "render_over_warp": {f"{h}x{w}": _over_warp(h, w, device, seconds / 10) for h, w in SIZES},
         "render_all_over_rgb": _all_over_rgb(device, seconds / 20),
     }
@@ -72,6 +99,13 @@ def _over_warp(height: int, width: int, device: str, seconds: float) -> float:
     for env in (ours, theirs):
         env.close()
     return ratio
+
+
+def _draw_looks(env: DroneEnv) -> int:
+    """Draws every world as it looks, at 64x64 pixels."""
+    every = torch.arange(env.worlds.num_worlds)
+    view = env.worlds.view(height=64, width=64)
+    return len(env.worlds.render(env.worlds.state, view, env.looks.drawn(every)))
 
 
 def _draw(worlds: Worlds, view: View | None = None) -> int:

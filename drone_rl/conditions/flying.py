@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 from torchrl.envs import Transform
 
-from drone_rl.conditions.clutter import Cluttered, draw_places
+from drone_rl.conditions.clutter import clutter, draw_places, told_by
 from drone_rl.conditions.condition import Condition
 from drone_rl.conditions.eyes import BlindEyes, Eyes, PolicyEyes, Sight
 from drone_rl.conditions.faults import Spoiling
@@ -18,7 +18,7 @@ from drone_rl.conditions.modes import ONSET_STEP, Mode, sways
 from drone_rl.evaluation import Episodes
 from drone_rl.policies import PictureNetwork
 from drone_rl.sim.appearances import Appearances
-from drone_rl.sim.rendering import Appearance, Poses
+from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.settings import MINIMAL, AppearanceSettings, BaseTaskSettings, CameraSettings
 from drone_rl.sim.tasks import State, as_task
 from drone_rl.sim.worlds import Worlds
@@ -66,7 +66,9 @@ class Airfield:
         self.subject, self.episodes, self.seed = subject, episodes, seed
         task = as_task(subject.task)
         streams = [world_random_state(seed, i, Stream.SHIFTED) for i in range(episodes)]
-        self.looks = Appearances(subject.appearance, episodes, subject.device)
+        self.looks = Appearances(
+            subject.appearance, episodes, subject.device, task=task, camera=subject.camera
+        )
         self.looks.reset(torch.arange(episodes), streams)
         self._drawn = torch.stack([task.draw(stream) for stream in streams])
         self._built: dict[tuple[Any, ...], Worlds] = {}
@@ -92,15 +94,13 @@ class Airfield:
         task, camera = self.settings(condition)
         key = (task, camera, condition.clutter)
         if key not in self._built:
-            rules: Any = as_task(task)
-            if condition.clutter:
-                rules = Cluttered(rules, task, condition.clutter)
             self._built[key] = Worlds(
                 self.episodes,
-                rules,
+                task,
                 camera,
                 renderer=self.subject.renderer,
                 device=self.subject.device,
+                distractors=self.looks.distractors + condition.clutter,
             )
         return self._built[key]
 
@@ -135,9 +135,9 @@ class Airfield:
         return flown
 
     def beside(self) -> Tensor:
-        """Where distractors stand, see `clutter.draw_places`."""
+        """Where the distractors of a condition stand, see `clutter.draw_places`."""
         generator = torch_generator(self.seed, Stream.SHIFTS, number=_CLUTTER)
-        places = draw_places(self.subject.task, self.episodes, generator)
+        places = draw_places(told_by(self.subject.task), self.episodes, generator)
         return places.to(self.subject.device)
 
     def close(self) -> None:
@@ -201,23 +201,24 @@ class _Flight:
             way = [part.to(worlds.device)[flying] for part in next(ways)]
             own = bed.looks.drawn(flying) if bed.looks.varies else same
             look = own if plain is None or own is None else own.over(plain)
-            poses = worlds.poses(now)
+            appearance = _dress(condition, look or plain, way)
             if beside is not None:
-                poses.props = torch.cat([poses.props, beside[flying, : condition.clutter]], 1)
-            appearance, poses = _dress(condition, look or plain, poses, way)
+                things, places = told_by(bed.subject.task), beside[flying, : condition.clutter]
+                appearance = clutter(appearance, things, places)
+            poses = worlds.poses(now, appearance)
             return Sight(worlds, now, flying, poses, appearance, spoil, pending)
 
         return see
 
 
 def _dress(
-    condition: Condition, own: Appearance | None, poses: Poses, way: Sequence[Tensor]
-) -> tuple[Appearance | None, Poses]:
-    """How worlds look, and where their cameras have everything."""
+    condition: Condition, own: Appearance | None, way: Sequence[Tensor]
+) -> Appearance | None:
+    """How worlds look, through their cameras."""
     appearance, count = own, len(condition.looks)
     for look, sway in zip(condition.looks, way[:count], strict=True):
         assert appearance is not None
         appearance = look(appearance, sway)
     for mount, sway in zip(condition.mounts, way[count:], strict=True):
-        poses = mount(poses, sway)
-    return appearance, poses
+        appearance = mount(appearance, sway)
+    return appearance

@@ -13,8 +13,9 @@ from drone_rl.sim.rendering.appearance import Several
 
 
 def look_of(scene: Scene) -> Appearance:
-    """How a scene looks, with all of it given."""
-    colors = {m: tuple(scene.colors[scene.geoms(m)[0], :3].tolist()) for m in scene.meanings}
+    """How a scene looks, with all of it given but for distractors, which are told one by one."""
+    known = [m for m in scene.meanings if m is not Meaning.DISTRACTOR]
+    colors = {m: tuple(scene.colors[scene.geoms(m)[0], :3].tolist()) for m in known}
     model = scene.model
     lights = (model.light_ambient[0], model.light_diffuse[0], model.light_dir[0])
     ambient, sun, direction = (tuple(light.tolist()) for light in lights)

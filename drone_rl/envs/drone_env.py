@@ -19,7 +19,7 @@ from drone_rl.sim.appearances import Appearances
 from drone_rl.sim.dynamics import Dynamics
 from drone_rl.sim.rendering import MakeRenderer, check_device
 from drone_rl.sim.settings import MINIMAL, AppearanceSettings, BaseTaskSettings, CameraSettings
-from drone_rl.sim.tasks import Task
+from drone_rl.sim.tasks import Task, as_task
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import Stream, get_state, set_state, side_stream, world_random_state
@@ -72,13 +72,15 @@ class DroneEnv(EnvBase):
             appearance: How worlds look; what it leaves open is drawn at every reset.
 
         Raises:
-            InputError: A setting is out of range, or a texture can't be read.
+            InputError: A setting is out of range, a texture can't be read, or there is no room for
+                the camera or for distractors.
         """
         if not (isinstance(num_envs, int) and num_envs >= 1):
             raise InputError(f"num_envs={num_envs} is out of range; give a whole number from 1")
         check_device(device)
         super().__init__(device=torch.device(device), batch_size=torch.Size([num_envs]))
-        self.looks = Appearances(appearance or MINIMAL, num_envs, device)
+        task = as_task(task)
+        self.looks = Appearances(appearance or MINIMAL, num_envs, device, task=task, camera=camera)
         self.worlds = Worlds(
             num_envs,
             task,
@@ -88,6 +90,7 @@ class DroneEnv(EnvBase):
             device=device,
             num_shards=num_shards,
             appearance=self.looks.middle,
+            distractors=self.looks.distractors,
         )
         self.pixels = pixels
         if pixels:

@@ -16,6 +16,7 @@ from drone_rl.sim.settings import (
     RendererName,
     TaskSettings,
 )
+from drone_rl.sim.settings.placing import check_appearance
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Instance, Real, Several, Whole
 from drone_rl.utils.settings import Settings
@@ -94,6 +95,7 @@ class TrainSettings(Settings):
                 f"renderer={self.renderer} draws the minimal appearance alone; give "
                 "renderer=raytrace or appearance=minimal"
             )
+        check_appearance(self.appearance, self.camera, self.task.things, self.task.name)
         needs, objective = self.objective.needs, self.objective.name
         for name, part in needs.items():
             given = getattr(self, name)

@@ -9,36 +9,59 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from drone_rl.sim.clutter import WIDTH, draw_distractors, most_distractors, things_of
 from drone_rl.sim.meaning import Meaning
-from drone_rl.sim.rendering import Appearance, Texture, textures
-from drone_rl.sim.settings import AppearanceSettings
+from drone_rl.sim.rendering import Appearance, Beside, Mounting, Texture, textures
+from drone_rl.sim.rendering.mounting import product, turned, zoom_of
+from drone_rl.sim.settings import AppearanceSettings, BaseTaskSettings, CameraSettings
 from drone_rl.sim.settings.appearance import NO_TEXTURE, Names
+from drone_rl.sim.settings.placing import check_appearance
+from drone_rl.sim.tasks import Task, as_task
 
 _OBJECTS = (Meaning.TARGET, Meaning.OBSTACLE)
 _APART = 7919
 """Keeps the draws of an appearance apart from those of the task."""
+_STILL = (0.0, 0.0, 0.0)
+_OF_CAMERA = 7
+"""Numbers that say how the camera is mounted."""
 
 
 class Appearances:
     """Draws them, and says what worlds look like."""
 
-    def __init__(self, settings: AppearanceSettings, num_worlds: int, device: str = "cpu") -> None:
+    def __init__(
+        self,
+        settings: AppearanceSettings,
+        num_worlds: int,
+        device: str = "cpu",
+        *,
+        task: BaseTaskSettings | Task[Any] | None = None,
+        camera: CameraSettings | None = None,
+    ) -> None:
         """Reads all textures; every world looks as in the middle of all ranges at first.
 
         Args:
             settings: What is drawn from.
             num_worlds: How many.
             device: Where they are drawn.
+            task: What there is to do in them; the original study's by default.
+            camera: The policy's.
 
         Raises:
-            InputError: A texture can't be read, or is too large.
+            InputError: A texture can't be read, or is too large; there is no room for the camera or
+                for distractors.
         """
+        task, self._camera = as_task(task), camera or CameraSettings()
+        self._things = things_of(task)
+        check_appearance(settings, self._camera, self._things, task.name)
         self._settings, self._device = settings, device
+        self.distractors = most_distractors(settings)
+        """How many things the worlds need that stand beside the way."""
         for name in {*(settings.ground_texture or ()), *(settings.object_texture or ())}:
             if name != NO_TEXTURE:
                 textures.load(name)
-        middle = _draw(settings, None)
-        self.varies = _draw(settings, np.random.RandomState(0)) != middle
+        middle = self._draw(None)
+        self.varies = self._draw(np.random.RandomState(0)) != middle
         """Whether worlds look otherwise from episode to episode."""
         self.middle = (
             None if settings.is_minimal else self._made(torch.tensor(middle, dtype=torch.float64))
@@ -58,7 +81,7 @@ class Appearances:
         """
         if not self.varies or not len(worlds):
             return
-        rows = [_draw(self._settings, _beside(state)) for state in random_states]
+        rows = [self._draw(_beside(state)) for state in random_states]
         self.values = self.values.clone()
         self.values[worlds.cpu()] = torch.tensor(rows, dtype=torch.float64)
         self._now = None
@@ -80,6 +103,11 @@ class Appearances:
         if self._now is None:
             self._now = self._made(self.values)
         return self._now
+
+    def _draw(self, source: np.random.RandomState | None) -> list[float]:
+        """What `_made` reads; what was added later is drawn later, so that all else stays."""
+        look, camera = _draw(self._settings, source), _draw_camera(self._settings, source)
+        return [*look, *camera, *draw_distractors(self._settings, self._things, source)]
 
     def _made(self, values: Tensor) -> Appearance:
         """Of rows as `_draw` makes them, or of a single one. Shape: (num_worlds, *) or (*)."""
@@ -105,6 +133,7 @@ class Appearances:
             Meaning.GROUND: _cover(settings.ground_texture, number(), number()),
             **dict.fromkeys(_OBJECTS, _cover(settings.object_texture, number(), number())),
         }
+        mounting = self._mounting(torch.stack([number() for _ in range(_OF_CAMERA)], -1))
         level = -torch.cos(up)
         direction = [level * torch.cos(around), level * torch.sin(around), -torch.sin(up)]
         return Appearance(
@@ -117,7 +146,28 @@ class Appearances:
             shadows=shadows if settings.shadows else None,
             exposure=None if settings.exposure == 1.0 else exposure,
             textures={meaning: cover for meaning, cover in covers.items() if cover is not None},
+            camera=mounting,
+            beside=self._beside(list(columns)),
         )
+
+    def _mounting(self, values: Tensor) -> Mounting | None:
+        """Of offset, turn and widening."""
+        s = self._settings
+        is_moved = s.camera_offset != _STILL or s.camera_turn != _STILL
+        if not is_moved and s.camera_widening == 0.0:
+            return None
+        roll, pitch, yaw = values[..., 3:6].unbind(-1)
+        turn = product(turned("yaw", yaw), product(turned("pitch", pitch), turned("roll", roll)))
+        own = self._camera.horizontal_fov
+        zoom = None if s.camera_widening == 0.0 else zoom_of(own, own + values[..., 6])
+        return Mounting(offset=values[..., :3], turn=turn, zoom=zoom)
+
+    def _beside(self, columns: list[Tensor]) -> Beside | None:
+        """Of what `draw_distractors` draws."""
+        if not columns:
+            return None
+        rows = torch.stack(columns, -1).unflatten(-1, (self.distractors, WIDTH))
+        return Beside(places=rows[..., :3], sizes=rows[..., 3], colors=rows[..., 4:])
 
 
 def _draw(settings: AppearanceSettings, source: np.random.RandomState | None) -> list[float]:
@@ -149,6 +199,22 @@ def _draw(settings: AppearanceSettings, source: np.random.RandomState | None) ->
     drawn += [*color(s.object_color or (0.0, 0.0, 0.0)), number(s.exposure)]
     drawn += [texture(s.ground_texture), number(s.ground_tile)]
     return [*drawn, texture(s.object_texture), number(s.object_tile)]
+
+
+def _draw_camera(settings: AppearanceSettings, source: np.random.RandomState | None) -> list[float]:
+    """Offset, turn and widening."""
+    ends = [*_pairs(settings.camera_offset), *_pairs(settings.camera_turn)]
+    widening = settings.camera_widening
+    ends.append(widening if isinstance(widening, tuple) else (widening, widening))
+    return [
+        (low + high) / 2 if source is None or low == high else source.uniform(low, high)
+        for low, high in ends
+    ]
+
+
+def _pairs(value: Any) -> list[tuple[float, float]]:
+    low, high = value if isinstance(value[0], tuple) else (value, value)
+    return [*zip(low, high, strict=True)]
 
 
 def _beside(random_state: np.random.RandomState) -> np.random.RandomState:

@@ -15,6 +15,7 @@ from dm_env import specs
 
 from drone_rl.sim.dynamics import BodyState, Dynamics
 from drone_rl.sim.entities.arena import SKY_COLOR, Field
+from drone_rl.sim.entities.distractor import make_distractors
 from drone_rl.sim.entities.drone import Drone
 from drone_rl.sim.meaning import Meaning
 from drone_rl.sim.rendering.scene import Scene
@@ -39,6 +40,7 @@ class ComposerTask(composer.Task):
         *,
         dynamics: Dynamics | None = None,
         pixels: bool = True,
+        distractors: int = 0,
     ) -> None:
         """Assembles the world.
 
@@ -47,6 +49,7 @@ class ComposerTask(composer.Task):
             camera: Picture size and field of view; 64x25 pixels and 135 degrees by default.
             dynamics: How the drone moves; computer-vision mode by default.
             pixels: Whether to observe the front-center camera, which needs OpenGL.
+            distractors: Things that mean nothing, behind the task's own props.
         """
         self.rules = as_task(task)
         self.dynamics = dynamics or self.rules.make_dynamics()
@@ -55,7 +58,7 @@ class ComposerTask(composer.Task):
         self._arena.mjcf_model.option.gravity = (0, 0, 0)
         self._drone = Drone(size=self.rules.drone_size, camera=self.camera)
         self._arena.add_free_entity(self._drone)
-        self._props = self.rules.make_props()
+        self._props = [*self.rules.make_props(), *make_distractors(distractors)]
         self._frames = [self._arena.attach(prop) for prop in self._props]
         for frame in self._frames:
             frame.mocap = True

@@ -11,3 +11,4 @@ class Meaning(enum.IntEnum):
     TARGET = 2
     OBSTACLE = 3
     DRONE = 4
+    DISTRACTOR = 5

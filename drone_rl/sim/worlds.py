@@ -9,6 +9,7 @@ import torch
 from torch import Tensor
 
 from drone_rl.sim.actions import Entry
+from drone_rl.sim.clutter import HIDDEN_DEPTH
 from drone_rl.sim.composer_task import ComposerTask
 from drone_rl.sim.dynamics import BodyState, Dynamics
 from drone_rl.sim.entities.cameras import FRONT_CENTER
@@ -43,6 +44,7 @@ class Worlds:
         device: str = "cpu",
         num_shards: int | None = None,
         appearance: Appearance | None = None,
+        distractors: int = 0,
     ) -> None:
         """Makes the worlds; the model is compiled when something is to be drawn.
 
@@ -56,11 +58,12 @@ class Worlds:
             num_shards: See `MakeRenderer`.
             appearance: How all of them look, where nothing else is said; as the task has it by
                 default.
+            distractors: How many there may be; appearances say where they stand.
 
         Raises:
             InputError: There is no such renderer.
         """
-        self.appearance = appearance
+        self.appearance, self.distractors = appearance, distractors
         self.num_worlds = num_worlds
         self.task = as_task(task)
         self.camera = camera or CameraSettings()
@@ -104,7 +107,13 @@ class Worlds:
     @functools.cached_property
     def scene(self) -> Scene:
         """What dm_control simulates, compiled."""
-        task = ComposerTask(self.task, self.camera, dynamics=self.dynamics, pixels=False)
+        task = ComposerTask(
+            self.task,
+            self.camera,
+            dynamics=self.dynamics,
+            pixels=False,
+            distractors=self.distractors,
+        )
         return task.compile()
 
     @functools.cached_property
@@ -210,11 +219,25 @@ class Worlds:
     ) -> dict[Modality, Tensor]:
         """The same of any number of cameras and modalities, in one pass; see `Renderer.render`."""
         look = self.appearance if appearance is None else appearance.over(self.appearance)
-        return self.renderer.render(view, self.poses(state), look)
+        return self.renderer.render(view, self.poses(state, look), look)
 
-    def poses(self, state: State) -> Poses:
-        """Where a renderer must draw everything."""
-        return Poses(state.body.position, state.body.attitude, self.task.places(state))
+    def poses(self, state: State, appearance: Appearance | None = None) -> Poses:
+        """Where a renderer must draw everything.
+
+        Args:
+            state: Of the worlds.
+            appearance: Which says where distractors are; out of sight by default.
+        """
+        props = self.task.places(state)
+        if self.distractors:
+            props = torch.cat([props, self._beside(appearance, len(props)).to(props)], 1)
+        return Poses(state.body.position, state.body.attitude, props)
+
+    def _beside(self, appearance: Appearance | None, count: int) -> Tensor:
+        beside = None if appearance is None else appearance.beside
+        if beside is not None:
+            return beside.of(count).places
+        return torch.tensor([0.0, 0.0, -HIDDEN_DEPTH]).expand(count, self.distractors, 3)
 
     def prepare(self, view: View | None = None) -> None:
         """Makes the renderer ready for a view, which its first picture would do otherwise."""

@@ -3,9 +3,13 @@
 from types import SimpleNamespace
 
 import pytest
+import yaml
 
 from drone_rl.bench import speed
+from drone_rl.hydra_app.composition import conf_dir
+from drone_rl.settings.configuration import from_config
 from drone_rl.sim.rendering import View
+from drone_rl.sim.settings import AppearanceSettings
 
 
 def view(modality=("rgb",), **size):
@@ -17,10 +21,12 @@ def worlds(monkeypatch):
     """Worlds of which nothing is drawn; tells who drew and whether they were closed."""
     made = []
 
-    def make_worlds(num_envs, device, renderer="raytrace"):
+    def make_worlds(num_envs, device, renderer="raytrace", appearance=None):
         env = SimpleNamespace(closed=False, renderer=renderer)
-        env.worlds = SimpleNamespace(state=None, policy_view=None, view=view)
+        env.looks = SimpleNamespace(drawn=lambda worlds: [appearance] * len(worlds))
+        env.worlds = SimpleNamespace(state=None, policy_view=None, view=view, num_worlds=num_envs)
         env.worlds.render_all = lambda state, view: {"rgb": "frames", "depth": "frames"}
+        env.worlds.render = lambda state, view, looks: looks
         env.reset = lambda: None
         env.close = lambda: setattr(env, "closed", True)
         made.append(env)
@@ -43,14 +49,21 @@ def test_raw_drawing(worlds, monkeypatch):
     assert speed.bench_render(2, "cpu", quick=True) == {
         "raw_render_fps": 3.0,
         "raw_render_fps_64": 3.0,
+        "raw_render_blocks_fps_64": 1.0,
         "render_over_warp": {"25x64": 14.0, "64x64": 14.0, "100x256": 14.0},
         "render_all_over_rgb": 20.0,
     }
     assert asked[2] == (view(height=100, width=256),) * 2
     colours, everything = asked[3]
     assert (colours.modalities, len(everything.modalities)) == (("rgb",), 6)
-    assert [env.renderer for env in worlds[1:]] == [*["raytrace", "mujoco_warp"] * 3, "raytrace"]
+    assert [env.renderer for env in worlds[2:]] == [*["raytrace", "mujoco_warp"] * 3, "raytrace"]
     assert all(env.closed for env in worlds)
+
+
+def test_the_blocks_that_are_timed_are_those_of_the_settings():
+    told = yaml.safe_load((conf_dir() / "appearance" / "blocks.yaml").read_text())
+    del told["defaults"]
+    assert from_config(AppearanceSettings, told) == speed.BLOCKS
 
 
 def test_collecting_over_drawing(worlds, monkeypatch):

@@ -1,13 +1,12 @@
 import pytest
 import torch
 
-from drone_rl.conditions.clutter import MOST, Cluttered, as_bright, draw_places, told_by
+from drone_rl.conditions.clutter import MOST, as_bright, clutter, draw_places, told_by
 from drone_rl.conditions.condition import Condition
 from drone_rl.conditions.flying import Airfield
 from drone_rl.conditions.oracle import OracleEyes
 from drone_rl.sim.meaning import Meaning
 from drone_rl.sim.settings import CameraSettings, PillarsSettings, TaskSettings
-from drone_rl.sim.tasks import as_task
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 from tests.conditions.subjects import subject
@@ -27,7 +26,7 @@ def test_they_are_blue_and_as_bright():
 
 
 def test_they_stand_beside_the_way():
-    places = draw_places(CUBES, 500, torch.Generator().manual_seed(0))
+    places = draw_places(CUBES.things, 500, torch.Generator().manual_seed(0))
     assert places.shape == (500, MOST, 3)
     x, y, z = places.flatten(0, 1).T
     assert 7.5 <= x.min() < 8 and 40 < x.max() <= 7.5 + 33
@@ -36,13 +35,22 @@ def test_they_stand_beside_the_way():
     assert (z == 2.5).all()
 
 
-def test_a_task_has_them_behind_its_own_props():
-    task = as_task(CUBES)
-    worlds = Worlds(1, Cluttered(task, CUBES, 4), num_shards=1)
+def test_they_are_as_large_as_what_matters_and_come_after_those_that_were_there():
+    places = torch.arange(12.0).reshape(2, 2, 3)
+    look = clutter(None, CUBES.things, places)
+    assert look.beside.sizes.tolist() == [[2.5, 2.5]] * 2
+    assert look.beside.colors[1, 0].tolist() == pytest.approx(as_bright(CUBES.cube_color))
+    both = clutter(look, CUBES.things, 1 + places[:, :1])
+    assert both.beside.places.tolist() == torch.cat([places, 1 + places[:, :1]], 1).tolist()
+
+
+def test_they_are_behind_the_props_of_a_task():
+    worlds = Worlds(2, CUBES, num_shards=1, distractors=4)
     scene = worlds.scene
-    assert [m for m in scene.meanings if m is Meaning.OBSTACLE] == [Meaning.OBSTACLE] * 4
+    assert len(scene.geoms(Meaning.DISTRACTOR)) == 4
     assert {*scene.props} == {-1, 0, 1, 2, 3, 4, 5, 6}
-    assert worlds.task.largest_reward == task.largest_reward
+    hidden = worlds.poses(worlds.state).props
+    assert hidden.shape == (2, 7, 3) and (hidden[:, 3:, 2] == -100.0).all()
     worlds.close()
 
 
@@ -54,10 +62,11 @@ def test_who_knows_what_is_what_does_not_mind_them():
 
 
 def test_tasks_of_which_nothing_is_known():
-    assert told_by(PillarsSettings())[0] == 1.0
+    assert told_by(PillarsSettings()).size == 1.0
 
     class Other(PillarsSettings):
         name = "other"
+        things = None
 
     with pytest.raises(InputError, match="axes=distractors is not for task=other"):
         told_by(Other())

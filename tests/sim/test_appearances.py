@@ -91,6 +91,45 @@ def test_only_worlds_that_begin_draw_anew():
     assert torch.equal(looks.drawn().fog, before[:, 14])
 
 
+MOUNTED = DRAWN.replace(
+    distractors=(1, 3), camera_offset=((-1, 0, 0), (1, 0, 0.5)), camera_turn=(0, 0, 90)
+)
+
+
+def test_what_was_added_later_changes_nothing_that_was_drawn():
+    before, after = reset(DRAWN, 5), reset(MOUNTED, 5)
+    own = before.values.shape[1] - 7  # those of the camera come last, then those of distractors
+    assert torch.equal(before.values[:, :own], after.values[:, :own])
+    assert after.values.shape[1] == own + 7 + 3 * 7
+
+
+def test_camera_and_distractors_of_each_world():
+    looks = reset(MOUNTED, 50)
+    look = looks.drawn()
+    forward, left, up = look.camera.offset.T
+    assert -1 <= forward.min() < -0.8 and 0.8 < forward.max() <= 1
+    assert (left == 0).all() and 0 <= up.min() < up.max() <= 0.5
+    half = math.sqrt(0.5)
+    assert look.camera.turn.tolist() == [pytest.approx([half, 0, 0, half])] * 50
+    assert look.camera.zoom is None and looks.distractors == 3
+    assert look.beside.places.shape == (50, 3, 3)
+    part = looks.drawn(torch.tensor([4, 7]))
+    assert torch.equal(part.beside.places, look.beside.places[[4, 7]])
+    assert torch.equal(look[torch.tensor([4, 7])].beside.colors, part.beside.colors)
+    assert looks.middle.beside.of(2).sizes.shape == (2, 3)
+
+
+def test_a_wider_camera_shows_things_smaller():
+    look = reset(AppearanceSettings(camera_widening=(15.0, 15.0)), 2).middle
+    wanted = math.tan(math.radians(67.5)) / math.tan(math.radians(75.0))
+    assert float(look.camera.zoom) == pytest.approx(wanted)
+
+
+def test_what_has_no_room_is_refused_at_once():
+    with pytest.raises(InputError, match="puts the camera into the ground"):
+        Appearances(AppearanceSettings(camera_offset=(0, 0, -5)), 1)
+
+
 @pytest.mark.parametrize("size", [None, (4097, 2)])
 def test_textures_are_read_at_once(tmp_path, size):
     path = tmp_path / "ground.png"

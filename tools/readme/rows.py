@@ -258,6 +258,12 @@ MAIN = (
     ),
     Row(
         "render",
+        "the same with `appearance=blocks`: 30 geoms, textures, shadows, fog",
+        lambda f: f"{f['raw_render_blocks_fps_64']:,.0f}",
+        "25,000",
+    ),
+    Row(
+        "render",
         "time of RGB, gray, depth, distance, segmentation and normals in one pass over that of RGB",
         lambda f: f"{f['render_all_over_rgb']:.2f}",
         "at most 1.6",

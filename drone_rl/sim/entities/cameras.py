@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 from dm_control import mjcf
 
+from drone_rl.sim.settings.camera import FRONT
+
 
 class CameraSpec(NamedTuple):
     """Where a camera sits on the drone. Metres, drone frame: x forward, y left, z up."""
@@ -17,7 +19,7 @@ class CameraSpec(NamedTuple):
 
 
 _FORWARD = (0, -1, 0, 0, 0, 1)
-FRONT_CENTER = CameraSpec("front_center", (0.4, 0, 0), _FORWARD)
+FRONT_CENTER = CameraSpec("front_center", FRONT, _FORWARD)
 FRONT_RIGHT = CameraSpec("front_right", (0.4, -0.25, 0), _FORWARD)
 FRONT_LEFT = CameraSpec("front_left", (0.4, 0.25, 0), _FORWARD)
 BOTTOM_CENTER = CameraSpec("bottom_center", (0, 0, -0.1), (0, -1, 0, 1, 0, 0))

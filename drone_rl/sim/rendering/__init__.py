@@ -1,7 +1,8 @@
 """Pictures of worlds: what is asked for, how things look, and who draws them."""
 
-from drone_rl.sim.rendering.appearance import Appearance, Texture
+from drone_rl.sim.rendering.appearance import Appearance, Beside, Texture
 from drone_rl.sim.rendering.devices import check_device
+from drone_rl.sim.rendering.mounting import Mounting
 from drone_rl.sim.rendering.named import find_renderer
 from drone_rl.sim.rendering.raytrace import Raytracer
 from drone_rl.sim.rendering.renderer import MakeRenderer, Poses, Renderer
@@ -10,7 +11,9 @@ from drone_rl.sim.rendering.view import View
 
 __all__ = [
     "Appearance",
+    "Beside",
     "MakeRenderer",
+    "Mounting",
     "Poses",
     "Raytracer",
     "Renderer",

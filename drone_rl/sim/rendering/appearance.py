@@ -8,6 +8,7 @@ import torch
 from torch import Tensor
 
 from drone_rl.sim.meaning import Meaning
+from drone_rl.sim.rendering.mounting import Mounting
 
 Color = tuple[float, float, float]
 """Red, green, blue, from 0 to 1."""
@@ -28,6 +29,37 @@ class Texture:
     """Edge of a tile, metres."""
     choice: Numbers = 0
     """Which of the pictures, a whole number; -1 for none."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Beside:
+    """The distractors; those of one world for all, or of each."""
+
+    places: Tensor
+    """Metres, world frame. Shape: (num_worlds, count, 3) or (count, 3)."""
+    sizes: Tensor
+    """Edges or diameters, metres: factors, for they are 1 m in the model.
+    Shape: (num_worlds, count) or (count,)."""
+    colors: Tensor
+    """Shape: as that of `places`."""
+
+    def of(self, num_worlds: int) -> "Beside":
+        """Those of so many worlds, each with its own."""
+        count = self.places.shape[-2]
+        return Beside(
+            places=self.places.expand(num_worlds, count, 3),
+            sizes=self.sizes.expand(num_worlds, count),
+            colors=self.colors.expand(num_worlds, count, 3),
+        )
+
+    def and_more(self, other: "Beside") -> "Beside":
+        """These, then others of as many worlds."""
+        own = self.of(len(other.places))
+        return Beside(
+            places=torch.cat([own.places, other.places], 1),
+            sizes=torch.cat([own.sizes, other.sizes], 1),
+            colors=torch.cat([own.colors, other.colors], 1),
+        )
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -54,6 +86,11 @@ class Appearance:
     """The camera multiplies all colours by it before it cuts them off at white."""
     textures: Mapping[Meaning, Texture] = dataclasses.field(default_factory=dict)
     """Of things with a meaning, but for the sky."""
+    camera: Mounting | None = None
+    """How a camera differs from the model's."""
+    beside: Beside | None = None
+    """The distractors: their colours and sizes are drawn so; who draws worlds puts their places
+    behind those of the task's props."""
 
     @property
     def is_plain(self) -> bool:
@@ -102,15 +139,18 @@ def each_number(value: Numbers, num_worlds: int) -> Tensor:
     return torch.as_tensor(value, dtype=torch.float64).expand(num_worlds)
 
 
-_NUMBERS = frozenset({"fog", "shadows", "exposure", "size", "choice"})
+_NUMBERS = frozenset({"fog", "shadows", "exposure", "size", "choice", "zoom"})
+_OF_BESIDE = {"places": 2, "sizes": 1, "colors": 2}
+"""Dimensions of what is one for all worlds."""
 
 
 def _cut(value: Any, worlds: slice | Tensor, shared: int = 1) -> Any:
     """What some worlds have of anything; a tensor of at most so many dimensions is for all."""
     if isinstance(value, Mapping):
         return {meaning: _cut(of, worlds) for meaning, of in value.items()}
-    if isinstance(value, Appearance | Texture):
-        names = (field.name for field in dataclasses.fields(value))
-        cut = {n: _cut(getattr(value, n), worlds, 0 if n in _NUMBERS else 1) for n in names}
-        return type(value)(**cut)
+    if isinstance(value, Beside):
+        return Beside(**{n: _cut(v, worlds, _OF_BESIDE[n]) for n, v in vars(value).items()})
+    if isinstance(value, Appearance | Texture | Mounting):
+        given = vars(value).items()
+        return type(value)(**{n: _cut(v, worlds, 0 if n in _NUMBERS else 1) for n, v in given})
     return value[worlds] if isinstance(value, Tensor) and value.dim() > shared else value

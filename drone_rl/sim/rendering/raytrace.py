@@ -20,6 +20,7 @@ from drone_rl.sim.rendering import raytrace_kernel
 from drone_rl.sim.rendering import raytrace_structs as structs
 from drone_rl.sim.rendering.appearance import Appearance
 from drone_rl.sim.rendering.devices import on_torch_stream, start_warp
+from drone_rl.sim.rendering.raytrace_cameras import Cameras
 from drone_rl.sim.rendering.raytrace_looks import Looks
 from drone_rl.sim.rendering.raytrace_painters import CorePainter, GpuPainter, make_desk
 from drone_rl.sim.rendering.raytrace_places import Places
@@ -66,7 +67,7 @@ class Raytracer:
         is_cpu = self.device.type == "cpu"
         self._painter = CorePainter(num_worlds, num_shards) if is_cpu else GpuPainter(device)
         self._frames, self._looks = Frames(scene), Looks(scene, device)
-        self._views: dict[View, tuple[structs.View, structs.Geoms]] = {}
+        self._views: dict[View, tuple[Cameras, structs.Geoms]] = {}
         self._places = Places(self.device)
 
     def prepare(self, view: View) -> None:
@@ -77,19 +78,21 @@ class Raytracer:
         """
         if view not in self._views:
             self._painter.load()
-            self._views[view] = self._make(view)
+            made, geoms = self._make(view)
+            self._views[view] = Cameras(view, made, self.device), geoms
 
     def render(
         self, view: View, poses: Poses, appearance: Appearance | None = None
     ) -> dict[Modality, Tensor]:
         """Draws worlds; see `Renderer.render`."""
         self.prepare(view)
-        made, geoms = self._views[view]
+        cameras, geoms = self._views[view]
         pictures = view.new_pictures(len(poses), self.device)
         with on_torch_stream(self.device):
             looks, scenery = self._looks.of(appearance, len(poses))
+            made = cameras.of(None if appearance is None else appearance.camera, len(poses))
             count = len(poses) * len(view.cameras)
-            there = self._places.of(poses)
+            there = self._places.of(poses, None if appearance is None else appearance.beside)
             drawn = _pictures(pictures)
             self._painter.paint(count, made, geoms, there, looks, drawn, scenery)
         return pictures

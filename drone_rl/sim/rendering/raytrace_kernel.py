@@ -241,6 +241,6 @@ def draw(
         pictures: To draw into.
     """
     for row in range(first, last):
-        world = row // view.cameras.shape[0]
+        world = row // view.count
         camera = row % view.cameras.shape[0]
         draw_picture(view, camera, geoms, poses, world, looks, desk, member, pictures, row)

@@ -74,6 +74,9 @@ class Looks:
                 values["sky"][:] = colored
             else:
                 values["colors"][:, self._scene.geoms(meaning)] = colored[:, None]
+        if appearance.beside is not None:
+            beside = appearance.beside.of(num_worlds)
+            values["colors"][:, self._scene.geoms(Meaning.DISTRACTOR)] = beside.colors.double()
         for name, value in appearance.lights(num_worlds).items():
             values[_LIGHTS[name]][:] = value[:, None]
         zenith = values["sky"] if appearance.zenith is None else each(appearance.zenith, num_worlds)

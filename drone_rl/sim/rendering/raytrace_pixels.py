@@ -41,7 +41,7 @@ def aim(view: View, geoms: Geoms, poses: Poses, sights: wp.array2d[Sight]) -> No
     """
     row, geom = wp.tid()
     camera = view.cameras[row % view.cameras.shape[0]]
-    sights[row, geom] = look_at(geoms, geom, poses, row // view.cameras.shape[0], camera)
+    sights[row, geom] = look_at(geoms, geom, poses, row // view.count, camera)
 
 
 @wp.func
@@ -77,7 +77,7 @@ def draw_pixels(view: View, sights: wp.array2d[Sight], looks: Looks, pictures: P
         pictures: To draw into.
     """
     row, pixel = wp.tid()
-    world = row // view.cameras.shape[0]
+    world = row // view.count
     ray = view.rays[row % view.cameras.shape[0], pixel]
     nearest, owner, face = find_nearest(view, sights[row], ray)
     if owner < 0:

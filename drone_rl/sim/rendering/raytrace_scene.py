@@ -119,7 +119,7 @@ def make_view(scene: Scene, frames: Frames, view: View, device: str) -> structs.
     made.cameras = wp.array(cameras, dtype=structs.Camera, device=device)
     made.rays = wp.array(rays, dtype=wp.vec3, device=device)
     made.cosines = wp.array(-rays[..., 2], dtype=float, device=device)
-    made.width, made.height = view.width, view.height
+    made.count, made.width, made.height = len(cameras), view.width, view.height
     made.far = float(model.vis.map.zfar * model.stat.extent)
     return made
 

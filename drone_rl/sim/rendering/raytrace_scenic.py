@@ -173,7 +173,7 @@ def draw_scenic(
         pictures: To draw into.
     """
     for row in range(first, last):
-        world = row // view.cameras.shape[0]
+        world = row // view.count
         number = row % view.cameras.shape[0]
         find(view, number, geoms, poses, world, desk, member)
         fill_ints(desk.dark[member], 0, view.height * view.width, 0)

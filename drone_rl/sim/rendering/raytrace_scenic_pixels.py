@@ -54,7 +54,7 @@ def draw_scenic_pixels(
         pictures: To draw into.
     """
     row, pixel = wp.tid()
-    world = row // view.cameras.shape[0]
+    world = row // view.count
     number = row % view.cameras.shape[0]
     camera, rays = view.cameras[number], view.rays[number]
     nearest, dark, colors = desk.nearest[row], desk.dark[row], desk.colors[row]

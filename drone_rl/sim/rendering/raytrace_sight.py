@@ -34,6 +34,9 @@ def look_at(geoms: Geoms, geom: int, poses: Poses, world: int, camera: Camera) -
     sight.number = geoms.number[geom]
     sight.size = geoms.size[geom]
     sight.reach = geoms.reach[geom]
+    if poses.scales:
+        sight.size *= poses.scales[world, frame]
+        sight.reach *= poses.scales[world, frame]
     sight.axes = _rotation(_product(turned, geoms.attitude[geom]))
     sight.eye = wp.transpose(sight.axes) @ (eye - centre)
     sight.into = wp.transpose(sight.axes) @ looking

@@ -34,7 +34,10 @@ class Camera:
 class View:
     """All cameras of a view, whose pictures are of one size."""
 
+    count: int
+    """Of cameras of a world."""
     cameras: wp.array[Camera]
+    """Of all worlds alike, or those of the first world, of the second, ..."""
     rays: wp.array2d[wp.vec3]
     """Directions of length 1 in each camera's frame, of all pixels, row by row."""
     cosines: wp.array2d[float]
@@ -70,6 +73,9 @@ class Poses:
     """Shape: (num_worlds, num_frames)."""
     attitudes: wp.array[wp.vec4]
     """Of the drones, quaternions (w, x, y, z) of length 1. Shape: (num_worlds,)."""
+    scales: wp.array2d[float]
+    """How many times as large as in the model what a frame carries is; none where nothing differs.
+    Shape: as that of `places`."""
 
 
 @wp.struct

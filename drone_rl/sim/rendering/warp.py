@@ -75,10 +75,10 @@ class WarpRenderer:
         Raises:
             InputError: The appearance is more than flat colours and light.
         """
-        if appearance is not None and not (appearance.is_plain and appearance.exposure is None):
+        if appearance is not None and not _is_drawn(appearance):
             raise InputError(
-                "fog, shadows, textures, a sky of two colours and an exposure can't be drawn by "
-                "WarpRenderer; give renderer=raytrace"
+                "fog, shadows, textures, a sky of two colours, an exposure and other fields of "
+                "view can't be drawn by WarpRenderer; give renderer=raytrace"
             )
         view.check_modalities(self, DRAWN)
         pictures = view.new_pictures(len(poses), self.device)
@@ -121,6 +121,11 @@ class WarpRenderer:
         for shard in shards[1:]:
             shard.share_kernel_of(shards[0])
         return shards
+
+
+def _is_drawn(appearance: Appearance) -> bool:
+    zoom = None if appearance.camera is None else appearance.camera.zoom
+    return appearance.is_plain and appearance.exposure is None and zoom is None
 
 
 def _single(view: View, camera: str, modality: Modality) -> View:

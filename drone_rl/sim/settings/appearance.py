@@ -4,13 +4,16 @@ import dataclasses
 from typing import Annotated
 
 from drone_rl.sim.settings.task import Color
-from drone_rl.utils.schema import Listed, Real, Several, Span
+from drone_rl.utils.schema import Listed, Real, Several, Span, Whole
 from drone_rl.utils.settings import Settings
 
 Number = float | tuple[float, float]
 """A number, or a range in which every one is as likely."""
 Tint = Color | tuple[Color, Color]
 """Red, green, blue from 0 to 1, or a range of each."""
+Triple = tuple[float, float, float]
+Triples = Triple | tuple[Triple, Triple]
+"""Three numbers, or a range of each."""
 Names = str | tuple[str, ...]
 """A name or several; kept as several."""
 NO_TEXTURE = "none"
@@ -20,11 +23,13 @@ _Tint = Span(Several(Real(0.0, 1.0), 3, 3))
 _Light = Span(Real(0.0, 10.0))
 _Tile = Span(Real(0.05, 1000.0, unit="m"))
 _Textures = Listed("texture", most=32)
+_Place = Span(Several(Real(-10.0, 10.0, unit="m"), 3, 3))
+_Turn = Span(Several(Real(-90.0, 90.0, unit="degrees"), 3, 3))
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class AppearanceSettings(Settings):
-    """Sun, sky, air, colours, textures and the camera's exposure.
+    """Sun, sky, air, colours, textures, things beside the way, and the policy's camera.
 
     The defaults are the look of the tasks themselves.
 
@@ -65,6 +70,22 @@ class AppearanceSettings(Settings):
     """The same of targets and obstacles."""
     object_tile: Annotated[Number, _Tile] = 2.0
     """Edge of a tile of it, in metres."""
+    distractors: Annotated[int | tuple[int, int], Span(Whole(0, 64, "distractors"))] = 0
+    """Boxes, balls and cylinders beside the way, which mean nothing."""
+    distractor_size: Annotated[Number, Span(Real(0.1, 50.0, unit="m"))] = (1.0, 4.0)
+    """Edge or diameter of each, in metres."""
+    distractor_color: Annotated[Tint, _Tint] | None = None
+    """Colour of each; none for one of six, in turn."""
+    distractor_distance: Annotated[Number, Span(Real(0.1, 200.0, unit="m"))] = (2.0, 14.0)
+    """How far each is from where targets and obstacles may stand, to the side, in metres."""
+    camera_offset: Annotated[Triples, _Place] = (0.0, 0.0, 0.0)
+    """Where the policy's camera sits beside its place on the drone: forward, to the left and up, in
+    metres."""
+    camera_turn: Annotated[Triples, _Turn] = (0.0, 0.0, 0.0)
+    """How it is turned there: roll (to the right), pitch (down) and yaw (to the left), degrees."""
+    camera_widening: Annotated[Number, Span(Real(-160.0, 160.0, unit="degrees"))] = 0.0
+    """By how much its horizontal field of view is wider than that of the camera's settings, in
+    degrees."""
     exposure: Annotated[Number, Span(Real(0.01, 100.0))] = 1.0
     """Factor of the camera on all colours."""
 

@@ -7,6 +7,9 @@ from typing import Annotated
 from drone_rl.utils.schema import Real, Whole
 from drone_rl.utils.settings import Settings
 
+FRONT = (0.4, 0.0, 0.0)
+"""Where it sits on the drone. Metres, drone frame: x forward, y left, z up."""
+
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class CameraSettings(Settings):

@@ -8,7 +8,7 @@ import dataclasses
 import math
 from typing import Annotated, ClassVar
 
-from drone_rl.sim.settings.task import FIRST, BaseTaskSettings, Bound, Color, Length
+from drone_rl.sim.settings.task import FIRST, BaseTaskSettings, Bound, Color, Length, Things
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Whole
 
@@ -70,6 +70,18 @@ class TaskSettings(BaseTaskSettings):
     def side_bound(self) -> float:
         """|y| beyond which the drone is out of bounds, in metres."""
         return self.lateral_bound + self.side_margin
+
+    @property
+    def things(self) -> Things:
+        """The cubes."""
+        return Things(
+            self.cube_size,
+            self.cube_color,
+            self.lateral_bound,
+            self.first_distance,
+            self.last_distance,
+            self.altitude,
+        )
 
     def check(self) -> None:
         """Refuses what could not be simulated or never be solved."""

@@ -6,7 +6,7 @@ import random
 from collections.abc import Iterator
 from typing import Annotated, ClassVar
 
-from drone_rl.sim.settings.task import BaseTaskSettings, Color, Length
+from drone_rl.sim.settings.task import BaseTaskSettings, Color, Length, Things
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Real, Whole
 
@@ -78,6 +78,18 @@ class PillarsSettings(BaseTaskSettings):
     def finish(self) -> float:
         """X of the line, in metres."""
         return self.last_distance + self.finish_margin
+
+    @property
+    def things(self) -> Things:
+        """The pillars."""
+        return Things(
+            self.width,
+            self.pillar_color,
+            self.spread,
+            self.first_distance,
+            self.last_distance,
+            self.altitude,
+        )
 
     def check(self) -> None:
         """Refuses what could not be simulated or never be crossed."""

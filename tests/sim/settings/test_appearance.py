@@ -39,6 +39,13 @@ def test_only_the_defaults_are_minimal():
         ({"ground_texture": ["grid", "grid"]}, "each once"),
         ({"ground_tile": 0}, "ground_tile=0 is out of range"),
         ({"exposure": 0}, "exposure=0 is out of range"),
+        ({"distractors": 1.5}, "distractors=1.5 is out of range; give a whole number from 0 to 64"),
+        ({"distractors": [5, 2]}, "distractors goes from 5 to 2"),
+        ({"distractor_size": 0}, "distractor_size=0 is out of range"),
+        ({"camera_offset": [0, 0]}, "camera_offset=.* is out of range"),
+        ({"camera_offset": [[0, 0, 1], [0, 0, 0]]}, "camera_offset goes from 1 to 0"),
+        ({"camera_turn": [0, 100, 0]}, r"camera_turn\[1\]=100 is out of range"),
+        ({"camera_widening": [3, -3]}, "camera_widening goes from 3 to -3"),
     ],
 )
 def test_what_can_not_be_is_refused_in_one_line(given, words):
