@@ -17,6 +17,7 @@ from drone_rl.bench.places import bench_places
 from drone_rl.bench.provable import bench_provable
 from drone_rl.bench.proving import bench_many_cubes, bench_prove, bench_tampering
 from drone_rl.bench.render_truth import bench_render_truth
+from drone_rl.bench.robust import bench_robust
 from drone_rl.bench.scaling import bench_scaling
 from drone_rl.bench.sentences import bench_sentences
 from drone_rl.bench.shifts import bench_shifts
@@ -104,6 +105,11 @@ BENCHMARKS: dict[str, Benchmark] = {
         lambda s: bench_shifts(s.quick),
         "truth",
         (*_JUDGING, "conditions", "api/shifting", "bench/shifts"),
+    ),
+    "robust": Benchmark(
+        lambda s: bench_robust(s.runs / "robust", s.seeds[:3], s.quick),
+        "truth",
+        (*_TRAINING, "evaluation", "conditions", "conf", "bench/robust"),
     ),
     "render_truth": Benchmark(
         lambda s: bench_render_truth(s.quick),

@@ -28,6 +28,23 @@ _ANGLES = (1.0, 3.0, 9.0, 18.0, 27.0)
 _METRES = (0.1, 0.25, 0.5, 1.0, 2.0)
 
 
+def _below(part: str, *names: str) -> tuple[str, ...]:
+    return tuple(f"{part}.{name}" for name in names)
+
+
+_OBJECTS = (
+    *_below("appearance", "object_color", "object_texture", "object_tile"),
+    *_below("task", "cube_color", "pillar_color"),
+)
+_LIGHT = _below("appearance", "sun_strength", "sun_color", "ambient_strength")
+_TURNED = ("transforms.shift", "appearance.camera_turn")
+"""A picture that stands aside looks as if the camera had been turned."""
+_MOVED = ("appearance.camera_offset",)
+_DISTRACTORS = _below(
+    *("appearance", "distractors", "distractor_size", "distractor_color", "distractor_distance")
+)
+
+
 def _size(subject: Subject) -> str:
     name = subject.task.name
     if name not in _SIZES:
@@ -65,103 +82,125 @@ AXES: dict[str, Axis] = {
         Axis(
             *("object_color", "color", "of each color", 0.0, (0.025, 0.05, 0.1, 0.2, 0.3)),
             lambda s, _: Condition(looks=(Tinted(_THINGS, s),)),
+            touched_by=_OBJECTS,
         ),
         Axis(
             *("object_white", "color", "of white", 0.0, (0.1, 0.2, 0.4, 0.6, 0.8)),
             lambda s, _: Condition(looks=(Whitened(_THINGS, s),)),
+            touched_by=_OBJECTS,
         ),
         Axis(
             *("floor_color", "color", "of each color", 0.0, (0.025, 0.05, 0.1, 0.2, 0.3)),
             lambda s, _: Condition(looks=(Tinted((Meaning.GROUND,), s),)),
+            touched_by=_below("appearance", "ground_color", "ground_texture", "ground_tile"),
         ),
         Axis(
             *("camera_yaw", "camera angle", "degrees", 0.0, _ANGLES),
             lambda s, _: Condition(mounts=(Mount(turn="yaw", degrees=s),)),
+            touched_by=_TURNED,
         ),
         Axis(
             *("camera_pitch", "camera angle", "degrees", 0.0, _ANGLES),
             lambda s, _: Condition(mounts=(Mount(turn="pitch", degrees=s),)),
+            touched_by=_TURNED,
         ),
         Axis(
             *("camera_roll", "camera angle", "degrees", 0.0, _ANGLES),
             lambda s, _: Condition(mounts=(Mount(turn="roll", degrees=s),)),
+            touched_by=("appearance.camera_turn",),
         ),
         Axis(
             *("camera_height", "camera position", "m", 0.0, _METRES),
             lambda s, _: Condition(mounts=(Mount(offset=(0.0, 0.0, s)),)),
+            touched_by=_MOVED,
         ),
         Axis(
             *("camera_sideways", "camera position", "m", 0.0, _METRES),
             lambda s, _: Condition(mounts=(Mount(offset=(0.0, s, 0.0)),)),
+            touched_by=_MOVED,
         ),
         Axis(
             *("field_of_view", "field of view", "degrees", 0.0, (-10.0, 10.0, -20.0, 20.0, -45.0)),
             lambda s, of: Condition(camera={"horizontal_fov": of.camera.horizontal_fov + s}),
             value=lambda s, of: of.camera.horizontal_fov + s,
+            touched_by=("camera.horizontal_fov", "appearance.camera_widening"),
         ),
         Axis(
             *("sun", "light", "degrees", 55.2, (60.0, 30.0, 15.0, 5.0, 0.0)),
             lambda s, _: Condition(looks=(SunAt(s),)),
             own=lambda of: _middle(of.appearance.sun_elevation),
+            touched_by=(*_LIGHT, *_below("appearance", "sun_elevation", "sun_azimuth", "shadows")),
         ),
         Axis(
             *("brightness", "light", "times", 1.0, (0.8, 1.25, 0.4, 2.5, 0.1)),
             lambda s, of: _drawn(of, Condition(looks=(Exposed(s),))),
             scale=FACTORS,
+            touched_by=("appearance.exposure", *_LIGHT),
         ),
         Axis(
             *("fog", "fog", "m of sight", math.inf, (100.0, 60.0, 40.0, 25.0, 15.0)),
             lambda s, of: _drawn(of, Condition(looks=(Fogged(s),))),
             own=lambda of: _middle(of.appearance.fog_visibility or math.inf),
             scale=INVERSE,
+            touched_by=_below("appearance", "fog_visibility", "sky_horizon", "sky_zenith"),
         ),
         Axis(
             *("object_size", "object size", "m", 1.0, _FACTORS),
             lambda s, of: Condition(task={_size(of): _times(_size(of), s, of)}),
             value=lambda s, of: _times(_size(of), s, of),
             scale=FACTORS,
+            touched_by=_below("task", *_SIZES.values()),
         ),
         Axis(
             *("distractors", "distractors", "of them", 0.0, (1.0, 2.0, 4.0, 8.0, 16.0)),
             lambda s, of: _cluttered(of, round(s)),
             whole=True,
+            touched_by=_DISTRACTORS,
         ),
         Axis(
             *("noise", "sensor", "of 255", 0.0, (2.0, 4.0, 8.0, 16.0, 32.0)),
             lambda s, _: Condition(faults=(Noise(s / 255),)),
+            touched_by=("transforms.noise",),
         ),
         Axis(
             *("slow_noise", "sensor", "of 255", 0.0, (2.0, 4.0, 8.0, 16.0, 32.0)),
             lambda s, _: Condition(faults=(Noise(s / 255, CORRELATION_TIME),)),
+            touched_by=("transforms.noise",),
         ),
         Axis(
             *("blur", "sensor", "pixels", 0.0, (0.5, 0.75, 1.0, 1.5, 2.0)),
             lambda s, _: Condition(faults=(Blur(s),)),
+            touched_by=("transforms.blur",),
         ),
         Axis(
             *("dead_rows", "sensor", "rows", 0.0, (1.0, 2.0, 4.0, 8.0, 12.0)),
             lambda s, _: Condition(faults=(DeadRows(round(s)),)),
             whole=True,
+            touched_by=("transforms.dead_rows",),
         ),
         Axis(
             *("frozen_frames", "sensor", "of frames", 0.0, (0.1, 0.2, 0.4, 0.6, 0.8)),
             lambda s, _: Condition(faults=(Frozen(s),)),
+            touched_by=("transforms.frozen_frames",),
         ),
         Axis(
             *("late_frames", "sensor", "frames", 0.0, (1.0, 2.0, 3.0, 4.0, 5.0)),
             lambda s, _: Condition(faults=(Late(round(s)),)),
             whole=True,
+            touched_by=("transforms.late_frames",),
         ),
         Axis(
             *("step_length", "dynamics", "m", 1.0, _FACTORS),
             lambda s, of: Condition(task={"step_length": _times("step_length", s, of)}),
             value=lambda s, of: _times("step_length", s, of),
             scale=FACTORS,
+            touched_by=("task.step_length",),
         ),
         Axis(
             *("action_delay", "dynamics", "steps", 0.0, (1.0, 2.0, 3.0, 4.0, 5.0)),
             lambda s, _: Condition(delay=round(s)),
             whole=True,
+            touched_by=("transforms.late_frames",),  # to who sees, late is late
         ),
     )
 }

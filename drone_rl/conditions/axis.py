@@ -58,6 +58,9 @@ class Axis:
     scale: Scale = LINEAR
     whole: bool = False
     """Whether there is nothing between whole numbers."""
+    touched_by: tuple[str, ...] = ()
+    """Settings of a training that make a difference of this kind, as in appearance.exposure: a
+    training in which one of them is not as by default knows the axis."""
 
     def position(self, strength: float) -> float:
         """Where a strength lies on the axis's scale; 0 where nothing is different."""

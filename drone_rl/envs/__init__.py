@@ -2,7 +2,7 @@
 
 from drone_rl.envs.camera_fault import CameraFault
 from drone_rl.envs.drone_env import DroneEnv, worlds_of
-from drone_rl.envs.fault_transforms import Blur, DeadRows, FrozenFrames, LateFrames, Noise
+from drone_rl.envs.fault_transforms import Blur, DeadRows, FrozenFrames, LateFrames, Noise, Shift
 from drone_rl.envs.pipeline import on_pixels, with_transforms
 from drone_rl.envs.transforms import CropRows, GrayPixels, Resize, RgbPixels, StandardizePixels
 
@@ -18,6 +18,7 @@ __all__ = [
     "Noise",
     "Resize",
     "RgbPixels",
+    "Shift",
     "StandardizePixels",
     "on_pixels",
     "with_transforms",

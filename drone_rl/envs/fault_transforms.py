@@ -150,3 +150,34 @@ class LateFrames(CameraFault):
 
     def __repr__(self) -> str:
         return f"LateFrames(frames={self.frames})"
+
+
+class Shift(CameraFault):
+    """Shows pictures aside, each episode by as much as is drawn for it.
+
+    Raises:
+        InputError: A shift is out of range.
+    """
+
+    def __init__(self, down: int = 4, across: int = 6) -> None:
+        """See `drone_rl.settings.transforms.Shift`."""
+        super().__init__()
+        told = settings.Shift(down=down, across=across)
+        self.down, self.across = told.down, told.across
+
+    def begin(self, pictures: Tensor, streams: Streams) -> Tensor:
+        """See `CameraFault`; how far down and to the right."""
+        most = torch.tensor([self.down, self.across], device=pictures.device)
+        drawn = uniform(streams, (2,), pictures.device)
+        return (drawn * (2 * most + 1)).long() - most
+
+    def go_on(self, memory: Tensor, pictures: Tensor, streams: Streams) -> Tensor:
+        """See `CameraFault`."""
+        return memory
+
+    def show(self, memory: Tensor, pictures: Tensor) -> Tensor:
+        """See `CameraFault`."""
+        return faults.shift(pictures, memory)
+
+    def __repr__(self) -> str:
+        return f"Shift(down={self.down}, across={self.across})"

@@ -71,6 +71,22 @@ def _convolved(pictures: Tensor, weights: list[float], dim: int) -> Tensor:
     return total
 
 
+def shift(pictures: Tensor, by: Tensor) -> Tensor:
+    """Pictures that stand aside; what comes in is as on the edge.
+
+    Args:
+        pictures: Shape (*, C, H, W).
+        by: How far down and to the right, pixels. Shape: (*, 2), int64.
+    """
+    for dim, far in ((-2, by[..., :1]), (-1, by[..., 1:])):
+        size = pictures.shape[dim]
+        there = torch.arange(size, device=pictures.device)
+        rows = (there - far).clamp(0, size - 1)[..., None, :]
+        rows = rows[..., None] if dim == -2 else rows[..., None, :]
+        pictures = pictures.gather(dim, rows.expand(pictures.shape))
+    return pictures
+
+
 def choose_rows(numbers: Tensor, count: int) -> Tensor:
     """Which rows are dead: those of the smallest numbers, so that more rows include fewer.
 

@@ -162,3 +162,14 @@ class LateFrames(Fault):
     target: ClassVar[str] = "drone_rl.envs.fault_transforms.LateFrames"
     frames: Annotated[int, Whole(0, 16, "frames")] = 1
     """How late."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Shift(Fault):
+    """A picture that stands a little aside all through an episode, as of a camera fixed askew."""
+
+    target: ClassVar[str] = "drone_rl.envs.fault_transforms.Shift"
+    down: Annotated[int, Whole(0, 1023, "pixels")] = 4
+    """How far up or down at most; every shift is as likely."""
+    across: Annotated[int, Whole(0, 1023, "pixels")] = 6
+    """How far to the left or right at most."""

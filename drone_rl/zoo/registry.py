@@ -28,6 +28,7 @@ from drone_rl.settings.transforms import (
     Noise,
     Resize,
     Rgb,
+    Shift,
     Stack,
     Standardize,
     StepCount,
@@ -249,6 +250,7 @@ for make, settings, change in (
     (envs.DeadRows, DeadRows, _dead_rows),
     (envs.FrozenFrames, FrozenFrames, _floats("frozen_frames")),
     (envs.LateFrames, LateFrames, _floats("late_frames")),
+    (envs.Shift, Shift, _floats("shift")),
 ):
     kinds, target = kinds_of(settings), settings.target
     register_transform(snake_case(settings), make, kinds, target, change=change)

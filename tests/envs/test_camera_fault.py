@@ -20,6 +20,7 @@ from drone_rl.envs import (
     GrayPixels,
     LateFrames,
     Noise,
+    Shift,
     StandardizePixels,
     with_transforms,
 )
@@ -37,6 +38,7 @@ KINDS = {
     "frozen": lambda: [FrozenFrames(0.5)],
     "late": lambda: [LateFrames(2)],
     "all": lambda: [Blur(), Noise(), Noise(0.1, 3.0), DeadRows(), FrozenFrames(0.3), LateFrames()],
+    "shift": lambda: [Shift()],
 }
 
 
@@ -161,7 +163,7 @@ def test_worlds_outside_a_step_stand_still_and_meet_later_what_they_would_have_m
     assert torch.equal(now, expected)
 
 
-@pytest.mark.parametrize("fault", [Noise(), DeadRows(), FrozenFrames(0.5), LateFrames(2)])
+@pytest.mark.parametrize("fault", [Noise(), DeadRows(), FrozenFrames(0.5), LateFrames(2), Shift()])
 def test_pictures_once_shown_stay_as_they_were(fault):
     env = with_transforms(DroneEnv(3, SHORT, SMALL), [GrayPixels(), fault])
     state, shown = env.reset(), []
@@ -229,7 +231,7 @@ def test_a_state_of_another_number_of_worlds_is_refused():
 
 def test_pictures_that_are_none_from_0_to_1_are_refused():
     base = DroneEnv(1, SHORT, SMALL)
-    for kind in (Noise, DeadRows, FrozenFrames, LateFrames):
+    for kind in (Noise, DeadRows, FrozenFrames, LateFrames, Shift):
         with pytest.raises(InputError, match=rf"{kind.__name__} got torch.uint8 .* gray or rgb"):
             with_transforms(base, [kind()]).reset()
         for standard in (StandardizePixels(1.0, 1.0), StandardizePixels(0.0, 0.5)):

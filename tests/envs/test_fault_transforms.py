@@ -11,6 +11,7 @@ from drone_rl.envs import (
     GrayPixels,
     LateFrames,
     Noise,
+    Shift,
     faults,
     with_transforms,
 )
@@ -106,12 +107,32 @@ def test_blur_is_the_function():
     assert torch.equal(shown, faults.blur(clean, 1.0))
 
 
+def test_a_shift_stays_for_an_episode_and_every_one_is_drawn():
+    shown, clean = film(Shift(1, 1), steps=2, episodes=30)
+    ways = torch.cartesian_prod(torch.arange(-1, 2), torch.arange(-1, 2))
+    drawn = set()
+    for t in range(0, 60, 2):
+        for world in range(N):
+            fits = [
+                {
+                    i
+                    for i, way in enumerate(ways)
+                    if torch.equal(shown[step, world], faults.shift(clean[step, world], way))
+                }
+                for step in (t, t + 1)
+            ]
+            assert fits[0] & fits[1]
+            drawn |= fits[0] if len(fits[0]) == 1 else set()
+    assert drawn == set(range(9))
+
+
 def test_parameters_are_shown():
     assert repr(Blur(0.5)) == "Blur(width=0.5)"
     assert repr(Noise(0.1, 3)) == "Noise(strength=0.1, correlation_time=3)"
     assert repr(DeadRows(2, (1,), 0.5)) == "DeadRows(count=2, rows=(1,), level=0.5)"
     assert repr(FrozenFrames(0.1)) == "FrozenFrames(share=0.1)"
     assert repr(LateFrames(3)) == "LateFrames(frames=3)"
+    assert repr(Shift(1, 2)) == "Shift(down=1, across=2)"
 
 
 @pytest.mark.parametrize(
@@ -127,6 +148,8 @@ def test_parameters_are_shown():
         (lambda: DeadRows(level=2.0), r"^level=2\.0 is out of range"),
         (lambda: FrozenFrames(1.1), r"^share=1\.1 is out of range; give a number from 0 to 1"),
         (lambda: LateFrames(17), r"^frames=17 is out of range; give a whole number from 0 to 16"),
+        (lambda: Shift(-1), r"^down=-1 is out of range; give a whole number from 0 to 1023"),
+        (lambda: Shift(0, 2000), r"^across=2000 is out of range"),
         (lambda: film(DeadRows(9), steps=1), r"^count=9 of a picture of 8 rows.*; give at most 8"),
         (lambda: film(DeadRows(7, (0, 1)), steps=1), r"of which 2 are always dead; .* at most 6"),
         (lambda: film(DeadRows(0, (8,)), steps=1), r"^rows=\[8\] of a picture .* give at most 7"),

@@ -114,3 +114,12 @@ def test_frozen_pictures_are_those_before():
 )
 def test_a_late_film_shows_its_first_picture_until_the_second_arrives(frames, shown):
     assert faults.delay(torch.arange(4), frames).tolist() == shown
+
+
+def test_a_shift_by_hand():
+    picture = torch.arange(6.0).reshape(1, 1, 2, 3).repeat(3, 1, 1, 1)
+    by = torch.tensor([[0, 0], [1, 0], [-1, 2]])  # down, to the right
+    stays, down, up_and_right = faults.shift(picture, by)[:, 0].tolist()
+    assert stays == [[0, 1, 2], [3, 4, 5]]
+    assert down == [[0, 1, 2], [0, 1, 2]]
+    assert up_and_right == [[3, 3, 3], [3, 3, 3]]

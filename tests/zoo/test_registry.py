@@ -35,6 +35,7 @@ def test_every_variant_can_be_named_by_a_file_within_the_bounds_of_its_settings(
         ("dead_rows", {"count": 23, "rows": (0, 24), "level": 0.0}, GRAY, GRAY),
         ("frozen_frames", {"share": 0.5}, GRAY, GRAY),
         ("late_frames", {"frames": 2}, GRAY, GRAY),
+        ("shift", {"down": 1, "across": 2}, GRAY, GRAY),
     ],
 )
 def test_what_becomes_of_a_picture(name, values, picture, after):
@@ -46,7 +47,10 @@ def test_a_name_that_nobody_registered():
         find_part(NETWORKS, "x", "network.name")
 
 
-@pytest.mark.parametrize("name", ["blur", "noise", "dead_rows", "frozen_frames", "late_frames"])
+_OF_FLOATS = ["blur", "noise", "dead_rows", "frozen_frames", "late_frames", "shift"]
+
+
+@pytest.mark.parametrize("name", _OF_FLOATS)
 def test_what_goes_wrong_in_a_camera_goes_wrong_with_floats(name):
     with pytest.raises(InputError, match=f"{name} needs floats; let gray come first"):
         TRANSFORMS[name].change(RGB, {"count": 0, "rows": (), "level": 0.0})
@@ -54,5 +58,5 @@ def test_what_goes_wrong_in_a_camera_goes_wrong_with_floats(name):
 
 def test_faults_are_those_by_chance_or_with_memory():
     faults = {name for name, part in TRANSFORMS.items() if part.is_fault}
-    assert faults == {"noise", "dead_rows", "frozen_frames", "late_frames"}
+    assert faults == {"noise", "dead_rows", "frozen_frames", "late_frames", "shift"}
     assert faults == {snake_case(variant) for variant in Fault.variants()}

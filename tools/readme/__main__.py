@@ -8,6 +8,7 @@ from tools.readme.blocks import replace_blocks
 from tools.readme.layers import draw_layers, list_packages, read_contracts
 from tools.readme.notebook import make_notebook
 from tools.readme.peers import make_peers
+from tools.readme.robust import make_robust
 from tools.readme.rows import CLAIMS, GUESTS, MAIN, PROOF, TRUTH
 from tools.readme.settings import list_commands, list_groups, list_parts, list_presets
 from tools.readme.stale import tell_ages
@@ -22,6 +23,7 @@ PAGES = (
     "docs/onnx.md",
     "docs/results.md",
     "docs/settings.md",
+    "docs/trust.md",
 )
 """Which have blocks that are made."""
 NOTEBOOK = "docs/tutorials/notebook"
@@ -36,6 +38,7 @@ def make_blocks(root: Path) -> dict[str, str]:
     return {
         **{name: make_table(rows, ledger.figures) for name, rows in tables.items()},
         "peers": make_peers(ledger.figures),
+        "robust": make_robust(ledger.figures),
         "figures": list_figures(ledger),
         "origins": list_origins(ledger),
         "packages": list_packages(contracts, root / "drone_rl"),

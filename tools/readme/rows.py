@@ -119,6 +119,16 @@ TRUTH = (
         "480",
     ),
     Row(
+        "robust",
+        "`experiment=robust` over the default, points of successful flights under the kinds of "
+        "shift that training does not touch, three seeds; cost where nothing is different",
+        lambda f: (
+            f"{f['robust_gain_points']:+.1f} of {f['robust_room_points']:.1f} that there are to "
+            f"gain; {f['robust_cost_points']:.1f}"
+        ),
+        "+15; at most 1",
+    ),
+    Row(
         "mutants",
         "mutants killed, of those sampled that change anything (`make mutants` before it)",
         lambda f: (

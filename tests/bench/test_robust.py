@@ -1,0 +1,94 @@
+"""What trainings in other worlds gain: figures by hand, of runs that nobody flew."""
+
+import json
+
+import pytest
+
+from drone_rl.bench import commands, robust
+from drone_rl.bench.robust import ARMS, bench_robust, fly
+from drone_rl.conditions.axes import AXES
+from drone_rl.conditions.comparing import PLAIN
+from drone_rl.settings.configuration import as_config
+from drone_rl.settings.training import TrainSettings
+from drone_rl.settings.transforms import Gray, Noise, Shift, Standardize
+from drone_rl.sim.settings import AppearanceSettings
+
+LOOKS = AppearanceSettings(
+    exposure=(0.5, 2.0), fog_visibility=(40.0, 100.0), ground_color=((0, 0, 0), (1, 1, 1))
+)
+
+
+@pytest.fixture
+def called(monkeypatch, tmp_path):
+    """Trainings that take no time; those of the arm "all" know looks, shifts and noise."""
+    commands_ = []
+
+    def call(*command):
+        commands_.append(command)
+        run = next(c for c in command if "run.dir" in c).split("=", 1)[1]
+        (tmp_path / run).mkdir(parents=True)
+        (tmp_path / run / "result.json").write_text(json.dumps({"frames": len(commands_)}))
+
+    steps = (Gray(), Noise(), Shift(), Standardize())
+    config = as_config(TrainSettings(appearance=LOOKS, transforms=steps))
+    monkeypatch.setattr(commands, "call", call)
+    monkeypatch.setattr(robust, "read_checkpoint", lambda path: {"config": config})
+    return commands_
+
+
+def test_the_figures(called, monkeypatch, tmp_path):
+    def flown(runs, episodes):
+        shares = {}
+        for run in runs:
+            good = 0.5 + 0.1 * int(run.name[-1]) if run.name.startswith("all") else 0.4
+            plain = 0.98 if run.name.startswith("all") else 1.0
+            shares[run] = {PLAIN: plain, **dict.fromkeys(AXES, 1.0)}
+            shares[run] |= {"camera_height": good, "camera_sideways": good, "distractors": 0.4}
+        return shares
+
+    monkeypatch.setattr(robust, "fly", flown)
+    found = bench_robust(tmp_path, [1, 2], quick=False)
+    kinds = ["camera position", "field of view", "object size", "distractors", "dynamics"]
+    assert found["robust_untouched"] == kinds
+    # of five kinds one differs: by 0.2 with seed 1, by 0.3 with seed 2
+    assert found["robust_gain_by_seed"] == pytest.approx([100 * 0.2 / 5, 100 * 0.3 / 5])
+    assert found["robust_gain_points"] == pytest.approx(5.0)
+    # of seven axes two do
+    assert found["robust_gain_by_axis_points"] == pytest.approx(100 * 0.25 * 2 / 7)
+    assert found["robust_room_points"] == pytest.approx(100 * 1.2 / 5)
+    assert found["robust_cost_points"] == pytest.approx(2.0)
+    arms = found["robust_arms"]
+    assert list(arms) == list(ARMS) and arms["all"]["frames"] == [9, 10]
+    assert arms["all"]["camera position"] == pytest.approx([0.6, 0.7])
+    assert arms["none"][PLAIN] == [1.0, 1.0] and arms["none"]["light"] == [1.0, 1.0]
+    assert called[0][:2] == ("train", "seed=1") and "experiment=robust" not in called[0]
+    assert {"experiment=robust", "transforms=gray"} <= set(called[4])
+    assert len(called) == 10
+
+
+def test_a_quick_one_trains_one_seed_for_a_moment(called, monkeypatch, tmp_path):
+    told = []
+
+    def flown(runs, episodes):
+        told.append(episodes)
+        return {run: {PLAIN: 1.0, **dict.fromkeys(AXES, 1.0)} for run in runs}
+
+    monkeypatch.setattr(robust, "fly", flown)
+    found = bench_robust(tmp_path, [1, 2], quick=True)
+    assert len(called) == 5 and all("trainer.total_frames=1000" in c for c in called)
+    assert told == [5] and found["robust_gain_points"] == 0.0
+
+
+def test_policies_are_flown_in_worlds_of_minimal_look(monkeypatch, tmp_path):
+    seen = {}
+
+    def compare(bed, subjects, axes, **how):
+        seen.update(subjects)
+        return {name: {PLAIN: 1.0} for name in subjects}
+
+    monkeypatch.setattr(robust, "compare", compare)
+    from drone_rl.api.policy import load_policy
+
+    found = fly([load_policy("good").path, load_policy("poor").path], 2)
+    assert [shares[PLAIN] for shares in found.values()] == [1.0, 1.0]
+    assert all(subject.appearance.is_minimal for subject in seen.values())

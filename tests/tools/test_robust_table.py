@@ -1,0 +1,20 @@
+"""The table of the ablation."""
+
+from drone_rl.bench.robust import ARMS
+from drone_rl.conditions.axes import GROUPS
+from tools.readme.robust import make_robust
+from tools.readme.tables import UNKNOWN
+
+
+def test_a_line_for_each_kind_and_a_column_for_each_arm():
+    kinds = {kind: [0.8, 0.9] for kind in GROUPS}
+    arm = {"plain": [1.0, 0.99], "untouched": [0.5, 0.75], **kinds}
+    table = make_robust({"robust_arms": {"all": arm}, "robust_untouched": ["dynamics"]})
+    head, _, *lines = table.splitlines()
+    assert head == "| successful flights, % | " + " | ".join(ARMS) + " |"
+    assert len(lines) == 1 + len(GROUPS) + 1
+    assert lines[0].startswith("| the world as it is |")
+    assert lines[0].endswith(f"| {UNKNOWN} | 100 (99 to 100) |")
+    assert lines[-2].startswith("| **dynamics** |") and lines[-2].endswith("| 85 (80 to 90) |")
+    assert lines[-1].endswith("| 62 (50 to 75) |")
+    assert lines[1].startswith(f"| {GROUPS[0]} |")
