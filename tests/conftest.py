@@ -4,13 +4,20 @@ import os
 import subprocess
 import sys
 
+# Tests run side by side, one a core: threads of theirs would only wait for each other's.
+os.environ.update(OMP_NUM_THREADS="1", OMP_WAIT_POLICY="PASSIVE")
+
 import pytest
 import torch
 
 from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, with_transforms
 from drone_rl.policies import SmallCNN, make_actor
 
-torch.set_num_threads(1)
+
+@pytest.fixture(autouse=True)
+def one_thread():
+    """Whatever the test before has left."""
+    torch.set_num_threads(1)
 
 
 @pytest.fixture(scope="session")
