@@ -8,7 +8,7 @@ MUTANTS = {
     "same": (None, "", 60.0),
     "noticed": ("small/module.py", MODULE.replace("2", "3"), 60.0),
     "unnoticed": ("small/module.py", MODULE.replace("2 * x", "x + 3"), 60.0),
-    "crash": ("small/module.py", MODULE.replace("return", "import os; os.abort()"), 60.0),
+    "crash": ("small/module.py", MODULE.replace("return", "import os; os.abort(); return"), 60.0),
     "endless": ("small/module.py", MODULE.replace("return 2", "while True: 2"), 3.0),
 }
 
