@@ -206,7 +206,7 @@ def test_a_collector_that_keeps_no_next_observations(monkeypatch, tmp_path):
 
 def test_a_rate_far_too_high_fails_by_name(tmp_path):
     """Numbers overflow: one line, and the checkpoint before it."""
-    settings = TINY.replace(optimiser=Sgd(lr=1e38))
+    settings = TINY.replace(optimiser=Sgd(lr=1e30))
     with pytest.raises(InputError, match=r"NaN or infinite at update .*lower optimiser\.lr"):
         drone_rl.train(settings, folder=tmp_path, progress=silent)
     state = load_checkpoint(tmp_path / "checkpoints" / "last.pt")
