@@ -29,7 +29,7 @@ class Training:
 def train(
     *,
     target: float = 2.97,
-    max_frames: int = 1_000_000,
+    max_frames: int = 960_000,
     num_envs: int = 16,
     steps: int = 200,
     lr: float = 2e-3,

@@ -16,7 +16,7 @@ def test_a_model_is_trained_saved_judged_and_explained(example, tmp_path, capsys
     kept = ("attribution", "dataset", "embedding", "evaluation")
     few = {name: find_sections()[name] for name in kept}
     monkeypatch.setattr(study, "find_sections", lambda: few)  # all of them take a minute
-    example.train(64, num_envs=4, steps=16).save(tmp_path / "ppo.zip")
+    example.train(512, num_envs=32, steps=16).save(tmp_path / "ppo.zip")
     model = sb3.PPO.load(tmp_path / "ppo.zip")
     example.trust(model, str(tmp_path), frames=40, episodes=6, perplexity=5)
     verdict, report = capsys.readouterr().out.splitlines()

@@ -9,8 +9,8 @@ PATH = Path(__file__).parents[2] / "examples" / "sb3.py"
 
 
 def test_an_update_and_a_few_flights(example):
-    model = example.train(128, num_envs=8, steps=16)
-    assert (model.num_timesteps, model.n_envs) == (128, 8)
+    model = example.train(512, num_envs=32, steps=16)
+    assert (model.num_timesteps, model.n_envs) == (512, 32)
     assert model.observation_space.shape == (1, 25, 64)
     assert 0 <= example.success(model, episodes=4) <= 1
 

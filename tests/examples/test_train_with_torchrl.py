@@ -1,6 +1,5 @@
 """The example runs as it stands, in short form, and is short itself."""
 
-import math
 from pathlib import Path
 
 import pytest
@@ -13,12 +12,12 @@ def test_two_updates(example):
         example.train(num_envs=4, steps=160, max_frames=1280, seed=seed) for seed in (0, 0, 1)
     )
     assert done.frames == 1280 and 0 < done.running_reward < 3
-    assert math.isfinite(sum(p.sum() for p in done.network.parameters()))
+    assert all(p.isfinite().all() for p in done.network.parameters())
     assert done.running_reward == again.running_reward != other.running_reward
 
 
 def test_it_stops_at_the_target(example):
-    assert example.train(num_envs=4, steps=160, max_frames=10_000, target=0.0).frames == 640
+    assert example.train(num_envs=4, steps=160, max_frames=9600, target=0.0).frames == 640
 
 
 def test_it_is_short():
@@ -27,5 +26,5 @@ def test_it_is_short():
 
 @pytest.mark.slow
 def test_it_learns(example):  # `drone-rl bench peers` has it go on until it has solved the task
-    done = example.train(target=1.5, max_frames=100_000)
-    assert done.running_reward >= 1.5 and done.frames < 100_000
+    done = example.train(target=1.5, max_frames=99_200)
+    assert done.running_reward >= 1.5 and done.frames < 99_200

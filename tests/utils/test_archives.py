@@ -2,6 +2,7 @@
 
 import io
 import struct
+import warnings
 import zipfile
 
 import numpy as np
@@ -13,7 +14,8 @@ from drone_rl.utils.errors import InputError
 
 def archive(members, method=zipfile.ZIP_STORED):
     file = io.BytesIO()
-    with zipfile.ZipFile(file, "w", method) as target:
+    with zipfile.ZipFile(file, "w", method) as target, warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Duplicate name")
         for name, data in members:
             target.writestr(name, data)
     return file.getvalue()
@@ -42,7 +44,6 @@ def test_members_come_in_order():
     ],
     ids=range(7),  # a name made of the content would tell the time
 )
-@pytest.mark.filterwarnings("ignore:Duplicate name")
 def test_damaged_or_too_large(content, message):
     with pytest.raises(InputError, match=message):
         list(read_members(content, "x", most=2))

@@ -90,7 +90,7 @@ def test_advantages_at_the_end_the_time_limit_and_the_end_of_the_batch(
     values = [1.0, 4.0, 2.0, 1.0, 2.0, 3.0]
     targets = [a + v for a, v in zip(WANTED, values, strict=True)]
     assert steps["value_target"].flatten().tolist() == pytest.approx(targets)
-    chances = learner.network(batch["pixels"]).log_softmax(-1)
+    chances = learner.network(batch["pixels"]).log_softmax(-1).detach()
     taken = chances.gather(-1, batch["action"][..., None]).flatten()
     torch.testing.assert_close(steps["action_log_prob"], taken)
     assert entropy == pytest.approx(float(-(chances.exp() * chances).sum(-1).mean()))
@@ -209,7 +209,7 @@ def test_it_learns_what_to_do_and_what_that_is_worth(make_learner, kind, own):
     for _ in range(60):
         learner.update(batch)
     assert (learner.network(look).softmax(-1)[..., 2] > 0.9).all()
-    value = learner._look(look[:, 0])["state_value"]
+    value = learner._look(look[:, 0])["state_value"].detach()
     assert float(value.mean()) == pytest.approx(1 / 3, abs=0.1)  # of the batch that it was shown
 
 

@@ -78,7 +78,11 @@ def trainer(tmp_path):
     """On TorchRL's own collector: 4 worlds, 5 steps of each a batch, episodes of up to 3."""
     actor = make_actor()
     collector = Collector(
-        TransformedEnv(ThreeStateEnv(4), RewardSum()), actor, frames_per_batch=20, total_frames=-1
+        TransformedEnv(ThreeStateEnv(4), RewardSum()),
+        actor,
+        frames_per_batch=20,
+        total_frames=-1,
+        auto_register_policy_transforms=False,
     )
     yield Trainer(
         collector=collector,
@@ -93,7 +97,7 @@ def trainer(tmp_path):
 def leaving(learner):
     """Probability of the action that earns something, in state 0."""
     start = TensorDict({"observation": torch.tensor([1.0, 0.0, 0.0])}, [])
-    return float(learner.actor.get_dist(start).probs[1])
+    return float(learner.actor.get_dist(start).probs[1].detach())
 
 
 def test_a_critic_learns_from_pieces_of_episodes(trainer, tmp_path):

@@ -17,7 +17,7 @@ def test_minibatches_add_up_to_the_whole_batch(make_trainer, reduction):
         trainer = make_trainer(minibatch_frames=size)
         learner = trainer.learner
         learner.loss.reduction = reduction
-        learner.optimiser.step = lambda: None
+        learner.optimiser.step, learner.scheduler = lambda: None, None
         learner.update(trainer.collector.collect())
         gradients.append(learner.network.weight.grad.clone())
     torch.testing.assert_close(*gradients)
