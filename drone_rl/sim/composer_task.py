@@ -13,15 +13,21 @@ from dm_control import composer, mjcf
 from dm_control.composer.observation import observable
 from dm_env import specs
 
+from drone_rl.sim.appearances import Appearances
+from drone_rl.sim.clutter import things_of
 from drone_rl.sim.dynamics import BodyState, Dynamics
-from drone_rl.sim.entities.arena import SKY_COLOR, Field
+from drone_rl.sim.entities.arena import DRAW_DISTANCE, SKY_COLOR, Field
 from drone_rl.sim.entities.distractor import make_distractors
-from drone_rl.sim.entities.drone import Drone
+from drone_rl.sim.entities.drone import Drone, hide_drone
 from drone_rl.sim.meaning import Meaning
+from drone_rl.sim.rendering import Appearance, opengl_looks
+from drone_rl.sim.rendering.opengl_looks import OpenGlLooks
 from drone_rl.sim.rendering.scene import Scene
-from drone_rl.sim.settings import BaseTaskSettings, CameraSettings
+from drone_rl.sim.settings import AppearanceSettings, BaseTaskSettings, CameraSettings
 from drone_rl.sim.tasks import State, Task, as_task
 
+_SKY = 0.69 * DRAW_DISTANCE
+"""Metres behind which there is nothing: MuJoCo's sky is a ball of 0.7 of the drawing distance."""
 CONTROL_TIMESTEP_S = 0.1
 """Simulated time of one step, seconds. Computer-vision mode has no physics to depend on it."""
 
@@ -41,6 +47,7 @@ class ComposerTask(composer.Task):
         dynamics: Dynamics | None = None,
         pixels: bool = True,
         distractors: int = 0,
+        appearance: AppearanceSettings | None = None,
     ) -> None:
         """Assembles the world.
 
@@ -49,11 +56,20 @@ class ComposerTask(composer.Task):
             camera: Picture size and field of view; 64x25 pixels and 135 degrees by default.
             dynamics: How the drone moves; computer-vision mode by default.
             pixels: Whether to observe the front-center camera, which needs OpenGL.
-            distractors: Things that mean nothing, behind the task's own props.
+            distractors: Things that mean nothing, behind the task's own props; as many as the
+                appearance has where it is given.
+            appearance: How the world looks, see `OpenGlLooks`; as the task has it by default.
+
+        Raises:
+            InputError: A texture can't be read, or there is no room for camera or distractors.
         """
         self.rules = as_task(task)
         self.dynamics = dynamics or self.rules.make_dynamics()
         self.camera = camera or CameraSettings()
+        self._looks = self._worn = None
+        if appearance is not None and not appearance.is_minimal:
+            self._looks = Appearances(appearance, 1, task=self.rules, camera=self.camera)
+            distractors = self._looks.distractors
         self._arena = Field()
         self._arena.mjcf_model.option.gravity = (0, 0, 0)
         self._drone = Drone(size=self.rules.drone_size, camera=self.camera)
@@ -64,7 +80,10 @@ class ComposerTask(composer.Task):
             frame.mocap = True
         self._reward = 0.0
         self._begin(np.random.RandomState(0))
-        self._drone.observables.front_center.enabled = pixels
+        self._pixels = self._drone.observables.front_center.enabled = pixels
+        self._look: Appearance | None = None
+        if self._looks is not None:
+            self._prepare()
         self._task_observables = {
             name: observable.Generic(lambda _, name=name: self._read(name))
             for name in self.rules.observed
@@ -116,7 +135,12 @@ class ComposerTask(composer.Task):
         self, physics: mjcf.Physics, random_state: np.random.RandomState
     ) -> None:
         """Puts the drone at its origin and everything else where it is drawn."""
+        if self._looks is not None:
+            self._looks.reset(torch.arange(1), [random_state])
+            self._look = self._looks.drawn() or self._looks.middle
         self._begin(random_state)
+        if self._look is not None:
+            self._wear(physics, self._look)
         self._show(physics)
 
     def before_step(
@@ -169,8 +193,40 @@ class ComposerTask(composer.Task):
         """Puts the drone and the props where the state has them."""
         body = self._state.body
         self._drone.set_pose(physics, body.position[0].numpy(), body.attitude[0].numpy())
-        for frame, place in zip(self._frames, self.rules.places(self._state)[0], strict=True):
+        places = self.rules.places(self._state)[0]
+        if self._look is not None and self._look.beside is not None:
+            places = torch.cat([places, self._look.beside.of(1).places[0]])
+        for frame, place in zip(self._frames, places, strict=True):
             physics.bind(frame).mocap_pos = place.numpy()
+
+    def _prepare(self) -> None:
+        """Makes room for textures, and sees to it that the camera shows what there is to show."""
+        root: Any = self._arena.mjcf_model
+        opengl_looks.prepare(root)
+        camera = self._drone.observables.front_center
+        camera.render_flag_overrides = opengl_looks.RENDER_FLAGS
+        camera.corruptor = self._in_fog
+
+    def _wear(self, physics: mjcf.Physics, look: Appearance) -> None:
+        if self._worn is None:
+            things = things_of(self.rules)
+            middle = 0.0 if things is None else (things.first + things.last) / 2
+            self._worn = OpenGlLooks(self.compile(), middle)
+        self._worn.wear(physics, look, self._pixels)
+        self._physics = physics
+
+    def _in_fog(self, picture: np.ndarray, random_state: np.random.RandomState) -> np.ndarray:
+        """What the camera shows, by its distance."""
+        del random_state
+        if self._look is None or self._look.fog is None:
+            return picture
+        model, camera = self._physics.model, self._drone.front_center.full_identifier
+        number = model.name2id(camera, "camera")
+        height, width = picture.shape[:2]
+        option = hide_drone()
+        depth = self._physics.render(height, width, number, depth=True, scene_option=option)
+        fovy = float(model.cam_fovy[number])
+        return opengl_looks.in_fog(picture, depth, self._look, fovy, _SKY)
 
     def _read(self, name: str) -> np.ndarray:
         return self.rules.info(self._state)[name][0].numpy()
@@ -183,10 +239,11 @@ def make_environment(
     dynamics: Dynamics | None = None,
     pixels: bool = True,
     random_state: np.random.RandomState | int | None = None,
+    appearance: AppearanceSettings | None = None,
 ) -> composer.Environment:
     """The task as a plain dm_control environment, for its viewer and other users of `dm_env`."""
     return composer.Environment(
-        ComposerTask(task, camera, dynamics=dynamics, pixels=pixels),
+        ComposerTask(task, camera, dynamics=dynamics, pixels=pixels, appearance=appearance),
         random_state=random_state,
         strip_singleton_obs_buffer_dim=True,
         recompile_mjcf_every_episode=False,

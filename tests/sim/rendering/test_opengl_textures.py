@@ -1,0 +1,41 @@
+"""Sides of skies and boxes, texel by texel."""
+
+import numpy as np
+import pytest
+
+from drone_rl.sim.rendering.opengl_textures import box_sides, flat, sky_sides
+
+QUARTERS = np.array([[[10] * 3, [20] * 3], [[30] * 3, [40] * 3]], np.uint8)
+"""Upper left, upper right, lower left, lower right."""
+
+
+def test_a_sky_goes_from_the_horizon_to_the_zenith():
+    sides = sky_sides(9, np.zeros(3), np.ones(3))
+    assert sides.shape == (6, 9, 9, 3) and (sides[3] == 0).all()  # below
+    assert (sides[2, 4, 4] == 255).all()  # overhead
+    for side in (0, 1, 4, 5):
+        assert (sides[side, 4:] == 0).all()  # the horizon and below
+        # in the middle of the top row: 8/9 up at 1 ahead
+        assert sides[side, 0, 4, 0] == round(255 * (8 / 9) / np.hypot(8 / 9, 1.0))
+
+
+def test_a_box_is_covered_from_the_middle_of_each_side():
+    sides = box_sides(4, QUARTERS, np.array([1.0, 1.0, 1.0]), 1.0)
+    assert sides.shape == (6, 4, 4, 3)
+    # seen from above, +z: x to the right, y up; a tile to the right of and below the middle
+    assert sides[4, 2:, 2:, 0].tolist() == [[10, 20], [30, 40]]
+    assert sides[4, :2, :2, 0].tolist() == [[10, 20], [30, 40]]
+    # +x: OpenGL's columns run against z, its rows against y; the texture runs with y and against z
+    assert sides[0, :2, 2:, 0].tolist() == [[20, 40], [10, 30]]
+
+
+def test_tiles_that_are_small_are_seen_by_their_mean():
+    sides = box_sides(4, QUARTERS, np.array([1.0, 1.0, 1.0]), 0.25)
+    assert (sides == 25).all()
+
+
+@pytest.mark.parametrize("side", [1, 4])
+def test_textures_at_another_size(side):
+    assert (flat(None, side) == 255).all()
+    assert flat(QUARTERS, side).shape == (side, side, 3)
+    assert flat(QUARTERS, 4)[0, :, 0].tolist() == [10, 10, 20, 20]
