@@ -17,6 +17,7 @@ from drone_rl.api.policy import Policy
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation.video import film_episode, write_video
 from drone_rl.sim.composer_task import make_environment
+from drone_rl.sim.settings import AppearanceSettings
 from drone_rl.utils.errors import InputError
 
 _log = logging.getLogger(__name__)
@@ -31,6 +32,7 @@ def film(
     seed: int = 0,
     device: str = "cpu",
     renderer: str = "raytrace",
+    appearance: AppearanceSettings | None = None,
 ) -> list[Path]:
     """Writes videos of a policy in unseen worlds.
 
@@ -42,12 +44,14 @@ def film(
         seed: Root of the worlds' random streams.
         device: Where to draw.
         renderer: Who draws, see `drone_rl.sim.rendering.find_renderer`.
+        appearance: How worlds look; as in the policy's training by default.
 
     Returns:
         The files.
     """
     files: list[Path] = []
-    with policy.flying(1, seed=seed, device=device, renderer=renderer) as (env, actor):
+    look = {} if appearance is None else {"appearance": appearance}
+    with policy.flying(1, seed=seed, device=device, renderer=renderer, **look) as (env, actor):
         for episode in range(episodes):
             frames = list(film_episode(env, actor, greedy=greedy))
             files += write_video(frames, folder / f"episode_{episode}")
@@ -63,6 +67,7 @@ def view(
     seed: int = 0,
     device: str = "cpu",
     renderer: str = "raytrace",
+    appearance: AppearanceSettings | None = None,
 ) -> None:
     """Opens dm_control's viewer on the composer task, flown by a policy.
 
@@ -77,17 +82,25 @@ def view(
     import dm_env
     from dm_control import viewer
 
-    env = policy.make_env(1, seed=seed, device=device, renderer=renderer)
-    actor, worlds = policy.make_actor(env, seed=seed), cast(DroneEnv, env.base_env).worlds
+    look = {} if appearance is None else {"appearance": appearance}
+    env = policy.make_env(1, seed=seed, device=device, renderer=renderer, **look)
+    base = cast(DroneEnv, env.base_env)
+    actor, worlds = policy.make_actor(env, seed=seed), base.worlds
     shown = make_environment(
-        worlds.task, worlds.camera, dynamics=worlds.dynamics, pixels=False, random_state=seed
+        worlds.task,
+        worlds.camera,
+        dynamics=worlds.dynamics,
+        pixels=False,
+        random_state=seed,
+        appearance=base.looks.settings,
     )
     kind = ExplorationType.DETERMINISTIC if greedy else ExplorationType.RANDOM
 
     @torch.no_grad()
     def act(timestep: dm_env.TimeStep) -> int:
         del timestep
-        pixels = worlds.render(shown.task.state.to(worlds.device))
+        state = shown.task.state.to(worlds.device)
+        pixels = worlds.render(state, appearance=shown.task.look)
         seen = env.transform(TensorDict({"pixels": pixels}, [1], device=worlds.device))
         with set_exploration_type(kind):
             return int(actor(seen)["action"])

@@ -8,7 +8,7 @@ import drone_rl
 from drone_rl.hydra_app.names import policies as prepare  # noqa: F401 -- of what was typed
 from drone_rl.settings.changes import TaskChanges, no_changes
 from drone_rl.settings.paths import PathsSettings
-from drone_rl.sim.settings import RendererName
+from drone_rl.sim.settings import AppearanceSettings, RendererName
 from drone_rl.utils.schema import Whole
 from drone_rl.utils.settings import Settings
 
@@ -31,6 +31,8 @@ class Command(Settings):
     """Where worlds are drawn and the policy runs: cpu, cuda or cuda:N."""
     renderer: RendererName = "raytrace"
     """Who draws: raytrace, our own, or mujoco_warp, MuJoCo Warp's."""
+    appearance: AppearanceSettings | None = None
+    """How worlds look; none for as in the policy's training."""
     task: TaskChanges = no_changes()
     """What to change of the policy's task."""
     paths: PathsSettings = PathsSettings()
@@ -43,7 +45,8 @@ def run(settings: Command, folder: Path) -> tuple[int, None]:
     from drone_rl.api.filming import film, view  # after what is slow to import
 
     policy = policy.in_task(**settings.task)
-    chosen = {name: getattr(settings, name) for name in ("greedy", "seed", "device", "renderer")}
+    names = ("greedy", "seed", "device", "renderer", "appearance")
+    chosen = {name: getattr(settings, name) for name in names}
     if settings.viewer:
         view(policy, **chosen)
     else:

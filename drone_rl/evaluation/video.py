@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import imageio.v3 as iio
 import numpy as np
@@ -14,15 +14,36 @@ from torch import Tensor
 from torchrl.envs import TransformedEnv
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
-from drone_rl.envs import DroneEnv, worlds_of
+from drone_rl.envs import DroneEnv
 from drone_rl.sim.actions import MOVES, Actions
-from drone_rl.sim.entities.cameras import CHASE
+from drone_rl.sim.entities.cameras import (
+    BACK_CENTER,
+    BOTTOM_CENTER,
+    CHASE,
+    FRONT_CENTER,
+    FRONT_LEFT,
+    FRONT_RIGHT,
+)
 from drone_rl.sim.tasks import Task
 from drone_rl.utils.errors import InputError
 
-PANEL_HEIGHT, PANEL_WIDTH = 360, 640
+WIDTH, HEIGHT = 1280, 720
+CHASE_HEIGHT, STRIP_HEIGHT, GAP = 532, 144, 5
+INSET_WIDTH = 320
+"""Pixels of the policy's own picture, enlarged."""
 FRAMES_PER_SECOND = 10
+_STRIP = CHASE_HEIGHT + GAP
+_BOTTOM = _STRIP + STRIP_HEIGHT + 9
+_FIVE = tuple(c.name for c in (FRONT_LEFT, FRONT_CENTER, FRONT_RIGHT, BACK_CENTER, BOTTOM_CENTER))
 _BACKGROUND, _TEXT, _CHOSEN, _BAR = (24, 26, 31), (235, 235, 240), (226, 74, 51), (120, 130, 150)
+
+
+class _Seen(NamedTuple):
+    """Pictures of one moment. Shapes: (height, width, 3); of the five: (5, height, width, 3)."""
+
+    inside: Tensor
+    outside: Tensor
+    five: Tensor
 
 
 @torch.no_grad()
@@ -37,25 +58,21 @@ def film_episode(
         greedy: Whether to take the most probable action instead of drawing one.
 
     Yields:
-        RGB pictures, uint8. Shape: (360 + 40, 2 * 640, 3).
+        RGB pictures, uint8. Shape: (720, 1280, 3).
     """
-    worlds, base = worlds_of(env), cast(DroneEnv, env.base_env)
-    actions = worlds.dynamics.actions
-    chase = worlds.view(CHASE.name, height=PANEL_HEIGHT, width=PANEL_WIDTH, show_drone=True)
+    base = cast(DroneEnv, env.base_env)
+    worlds = base.worlds
     kind = ExplorationType.DETERMINISTIC if greedy else ExplorationType.RANDOM
     state, earned = env.reset(), 0.0
     with set_exploration_type(kind):
         while True:
-            outside = worlds.render(worlds.state, chase)[0]
             acted = actor(state.clone(False))
-            inside = base.last_pixels[0]
-            yield _compose(inside, outside, _caption(worlds.task, state, earned), acted, actions)
+            caption = _caption(worlds.task, state, earned)
+            yield _compose(_look(base), caption, acted, worlds.dynamics.actions)
             state = env.step(state.set("action", acted["action"]))["next"]
             earned += float(state["reward"][0])
             if bool(state["done"].all()):
-                outside = worlds.render(worlds.state, chase)[0]
-                inside = base.last_pixels[0]
-                yield _compose(inside, outside, _caption(worlds.task, state, earned))
+                yield _compose(_look(base), _caption(worlds.task, state, earned))
                 return
 
 
@@ -77,7 +94,10 @@ def write_video(frames: list[np.ndarray], path: Path) -> list[Path]:
         path.parent.mkdir(parents=True, exist_ok=True)
         iio.imwrite(files[0], np.stack(frames), fps=FRAMES_PER_SECOND, codec="libx264")
         half = [Image.fromarray(f).resize((f.shape[1] // 2, f.shape[0] // 2)) for f in frames]
-        palette = [image.quantize(64, dither=Image.Dither.NONE) for image in half]
+        palette = [
+            image.quantize(128, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+            for image in half
+        ]
         palette[0].save(
             files[1],
             save_all=True,
@@ -98,23 +118,42 @@ def _caption(task: Task[Any], state: TensorDictBase, earned: float) -> str:
     return f"{task.terms.goals} {earned:g}" + ended.replace("_", " ")
 
 
+def _look(base: DroneEnv) -> _Seen:
+    """What there is to see of the first world."""
+    worlds, look = base.worlds, base.looks.drawn()
+    chase = worlds.view(CHASE.name, height=CHASE_HEIGHT, width=WIDTH, show_drone=True)
+    five = worlds.view(_FIVE, height=STRIP_HEIGHT, width=(WIDTH + GAP) // len(_FIVE) - GAP)
+    outside = worlds.render(worlds.state, chase, look)[0]
+    strip = worlds.render_all(worlds.state, five, look)["rgb"][0]
+    return _Seen(base.last_pixels[0], outside, strip)
+
+
 def _compose(
-    inside: Tensor,
-    outside: Tensor,
+    seen: _Seen,
     caption: str,
     acted: TensorDictBase | None = None,
     actions: Actions = MOVES,
 ) -> np.ndarray:
-    """The drone's view, enlarged, left; the chase view right; words and bars below."""
-    canvas = Image.new("RGB", (2 * PANEL_WIDTH, PANEL_HEIGHT + 40), _BACKGROUND)
-    view = Image.fromarray(inside.cpu().numpy())
-    height = min(PANEL_HEIGHT, PANEL_WIDTH * view.height // view.width)
-    view = view.resize((PANEL_WIDTH, height), Image.Resampling.NEAREST)
-    canvas.paste(view, (0, (PANEL_HEIGHT - height) // 2))
-    canvas.paste(Image.fromarray(outside.cpu().numpy()), (PANEL_WIDTH, 0))
+    """The drone from behind, on it the policy's picture; below all five cameras, words and bars."""
+    canvas = Image.new("RGB", (WIDTH, HEIGHT), _BACKGROUND)
     draw, font = ImageDraw.Draw(canvas), ImageFont.load_default(16)
-    draw.text((12, 10), "what the policy's camera sees", _TEXT, font)
-    draw.text((12, PANEL_HEIGHT + 10), caption, _TEXT, font)
+    canvas.paste(Image.fromarray(seen.outside.cpu().numpy()), (0, 0))
+    inside = Image.fromarray(seen.inside.cpu().numpy())
+    size = (
+        INSET_WIDTH,
+        max(1, min(CHASE_HEIGHT // 2, INSET_WIDTH * inside.height // inside.width)),
+    )
+    draw.rectangle((12, 12, 17 + size[0], 41 + size[1]), _BACKGROUND)
+    draw.text((20, 16), "what the policy sees", _TEXT, font)
+    canvas.paste(inside.resize(size, Image.Resampling.NEAREST), (15, 39))
+    for i, (name, picture) in enumerate(zip(_FIVE, seen.five.cpu().numpy(), strict=True)):
+        x = i * (WIDTH + GAP) // len(_FIVE)
+        canvas.paste(Image.fromarray(picture), (x, _STRIP))
+        label = name.replace("_", " ")
+        width = draw.textlength(label, font)
+        draw.rectangle((x, _STRIP, x + width + 12, _STRIP + 23), _BACKGROUND)
+        draw.text((x + 6, _STRIP + 2), label, _TEXT, font)
+    draw.text((12, _BOTTOM), caption, _TEXT, font)
     if acted is not None:
         _draw_bars(draw, font, acted, actions)
     return np.asarray(canvas)
@@ -132,7 +171,7 @@ def _draw_bars(
     wish = torch.eye(len(names))[chosen] if logits is None else actions.wish(logits[0])
     room = 960 // len(names)
     for i, action in enumerate(actions.order):
-        x, y = 300 + room * i, PANEL_HEIGHT + 10
+        x, y = 300 + room * i, _BOTTOM
         share = float(wish[action])
         draw.text((x, y), f"{names[action]} {share:.2f}", _TEXT, font)
         color = _CHOSEN if action == chosen else _BAR

@@ -1,6 +1,7 @@
 """Settings as nested plain data and back: what stands in checkpoints and what Hydra composes."""
 
 import dataclasses
+import types
 import typing
 from collections.abc import Mapping
 from typing import Any, ClassVar, TypeVar
@@ -106,6 +107,7 @@ def _read(hint: Any, value: Any, where: str) -> Any:
     if part is not None and not isinstance(value, tuple):
         items = as_mapping(value, where).items()
         return tuple(variant_of(part, v, f"{where}.{k}") for k, v in items if v is not None)
+    hint = _given(hint) if value is not None else hint
     if not isinstance(hint, type) or not issubclass(hint, Settings) or isinstance(value, Settings):
         return value
     if issubclass(hint, Variant):
@@ -113,6 +115,13 @@ def _read(hint: Any, value: Any, where: str) -> Any:
     if issubclass(hint, BaseTaskSettings) and hint is not TaskSettings:
         hint, value = named_settings(value, where)
     return from_config(hint, value, where)
+
+
+def _given(hint: Any) -> Any:
+    """The settings themselves, where there may be none."""
+    inner = [of for of in typing.get_args(hint) if of is not types.NoneType]
+    is_settings = len(inner) == 1 and isinstance(inner[0], type) and issubclass(inner[0], Settings)
+    return inner[0] if is_settings else hint
 
 
 def _another(part: type[Variant], target: str, given: Mapping[str, Any]) -> Variant:

@@ -54,7 +54,7 @@ class Appearances:
         task, self._camera = as_task(task), camera or CameraSettings()
         self._things = things_of(task)
         check_appearance(settings, self._camera, self._things, task.name)
-        self._settings, self._device = settings, device
+        self.settings, self._device = settings, device
         self.distractors = most_distractors(settings)
         """How many things the worlds need that stand beside the way."""
         for name in {*(settings.ground_texture or ()), *(settings.object_texture or ())}:
@@ -106,12 +106,12 @@ class Appearances:
 
     def _draw(self, source: np.random.RandomState | None) -> list[float]:
         """What `_made` reads; what was added later is drawn later, so that all else stays."""
-        look, camera = _draw(self._settings, source), _draw_camera(self._settings, source)
-        return [*look, *camera, *draw_distractors(self._settings, self._things, source)]
+        look, camera = _draw(self.settings, source), _draw_camera(self.settings, source)
+        return [*look, *camera, *draw_distractors(self.settings, self._things, source)]
 
     def _made(self, values: Tensor) -> Appearance:
         """Of rows as `_draw` makes them, or of a single one. Shape: (num_worlds, *) or (*)."""
-        settings, values = self._settings, values.to(self._device)
+        settings, values = self.settings, values.to(self._device)
         columns = iter(values.unbind(-1))
 
         def number() -> Tensor:
@@ -152,7 +152,7 @@ class Appearances:
 
     def _mounting(self, values: Tensor) -> Mounting | None:
         """Of offset, turn and widening."""
-        s = self._settings
+        s = self.settings
         is_moved = s.camera_offset != _STILL or s.camera_turn != _STILL
         if not is_moved and s.camera_widening == 0.0:
             return None

@@ -108,6 +108,11 @@ class ComposerTask(composer.Task):
         return self._state
 
     @property
+    def look(self) -> Appearance | None:
+        """How the world looks in the running episode; none for as the task has it."""
+        return self._look
+
+    @property
     def task_observables(self) -> dict[str, observable.Generic]:
         """What `Task.info` tells of `Task.observed`, such as why the episode ended."""
         return self._task_observables

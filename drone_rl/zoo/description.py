@@ -158,8 +158,7 @@ class PolicyDescription:
             seed=seed,
             device=device,
             pixels=pixels,
-            appearance=self.appearance,
-            **kwargs,
+            **{"appearance": self.appearance, **kwargs},
         )
         return with_transforms(env, self.make_transforms() if pixels else ())
 

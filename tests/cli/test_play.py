@@ -14,7 +14,7 @@ def test_viewer_without_a_display(run, in_process):
 
 
 def test_play_films(run):
-    args = ["play", f"checkpoint={run}", "episodes=1", "greedy=false", "hydra.run.dir=films"]
+    args = ["play", f"checkpoint={run}", "episodes=1", "appearance=blocks", "hydra.run.dir=films"]
     done = drone_rl(*args, cwd=run)
     assert done.returncode == 0, done.stderr
     assert {p.name for p in (run / "films").glob("episode_0.*")} == {

@@ -3,9 +3,10 @@ import pytest
 import torch
 from tensordict import TensorDict
 
-from drone_rl.evaluation.video import _draw_bars, film_episode, write_video
+from drone_rl.evaluation.video import _draw_bars, _look, film_episode, write_video
 from drone_rl.sim.actions import MOVES
-from drone_rl.sim.settings import TaskSettings
+from drone_rl.sim.meaning import Meaning
+from drone_rl.sim.settings import AppearanceSettings, TaskSettings
 from drone_rl.utils.errors import InputError
 from tests.five_actions import FIVE
 from tests.second_task import Posts
@@ -29,11 +30,24 @@ def test_film_and_files(make_pipeline, tmp_path):
     env, actor = make_pipeline(1, task=settings)
     frames = list(film_episode(env, actor))
     assert 2 <= len(frames) <= 5
-    assert frames[0].shape == (400, 1280, 3)
+    assert frames[0].shape == (720, 1280, 3)
     assert len({f.tobytes() for f in frames}) == len(frames)
     files = write_video(frames, tmp_path / "sub" / "episode")
     assert [f.suffix for f in files] == [".mp4", ".gif"]
     assert all(f.stat().st_size > 1000 for f in files)
+
+
+def test_a_film_shows_the_world_as_it_was_drawn(make_pipeline):
+    look = AppearanceSettings(ground_color=((0.9, 0.0, 0.0), (1.0, 0.1, 0.1)))
+    env, _ = make_pipeline(1, appearance=look)
+    env.reset()
+    seen = _look(env.base_env)
+    assert seen.outside.shape == (532, 1280, 3) and seen.five.shape == (5, 144, 252, 3)
+    own = env.base_env.looks.drawn().colors[Meaning.GROUND][0]
+    below = seen.five[4, -1, 0].double()  # the ground, in full light
+    sun = 0.35 + 0.75 * 0.82
+    assert below.tolist() == pytest.approx((255 * sun * own).tolist(), abs=3)
+    assert torch.equal(seen.inside, env.base_env.last_pixels[0])
 
 
 def test_video_that_cannot_be_written(tmp_path):
@@ -44,7 +58,7 @@ def test_video_that_cannot_be_written(tmp_path):
 
 def test_another_task_is_filmed_too(make_pipeline):
     frames = list(film_episode(*make_pipeline(1, task=Posts())))
-    assert 2 <= len(frames) <= 13 and frames[0].shape == (400, 1280, 3)
+    assert 2 <= len(frames) <= 13 and frames[0].shape == (720, 1280, 3)
 
 
 @pytest.mark.parametrize("actions", [MOVES, FIVE])

@@ -5,6 +5,7 @@ import sys
 
 import pytest
 
+from drone_rl.cli.play import Command
 from drone_rl.settings.configuration import as_config, from_config, variant_of
 from drone_rl.settings.learning import Adam, Optimiser
 from drone_rl.settings.networks import Mlp
@@ -77,3 +78,16 @@ def test_the_other_renderer_draws_the_minimal_look_alone():
     given = from_config(TrainSettings, {"appearance": {"fog_visibility": 50.0}})
     assert given.appearance == look
     assert from_config(TrainSettings, as_config(given)) == given
+
+
+def test_settings_that_may_be_none_are_made_of_mappings_too():
+    given = {"appearance": {"exposure": 2.0}}
+    assert from_config(Command, given).appearance == AppearanceSettings(exposure=2.0)
+    assert from_config(Command, {"appearance": None}).appearance is None
+    with pytest.raises(InputError, match=r"^appearance\.exposure=0 is out of range"):
+        from_config(Command, {"appearance": {"exposure": 0}})
+
+
+def test_an_appearance_without_room_is_refused_with_the_training():
+    with pytest.raises(InputError, match="puts the camera into the ground"):
+        TrainSettings(appearance=AppearanceSettings(camera_offset=(0.0, 0.0, -3.0)))
