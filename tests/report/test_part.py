@@ -18,10 +18,10 @@ def part(**kwargs):
 def test_a_module_with_a_part_is_found_at_its_place(tmp_path, monkeypatch):
     (tmp_path / "tides.py").write_text(
         "from drone_rl.report.part import Part\n"
-        "PART = Part(title='Tides', label='tides', place=15, needs=('tides',))\n"
+        "PART = Part(title='Tides', label='tides', place=16, needs=('tides',))\n"
     )
     monkeypatch.setattr(sections, "__path__", [*sections.__path__, str(tmp_path)])
-    assert list(find_parts())[:3] == ["evaluation", "tides", "dataset"]
+    assert list(find_parts())[:4] == ["evaluation", "shifts", "tides", "dataset"]
 
 
 def test_each_section_of_an_explanation_has_a_part_and_each_part_a_template():
