@@ -22,7 +22,7 @@ Pixels are counted by `while`: what Warp makes of `for` is several times as slow
 import warp as wp
 
 from drone_rl.sim.rendering.raytrace_rows import fill_floats, fill_ints, meet_level
-from drone_rl.sim.rendering.raytrace_sight import around, look_at
+from drone_rl.sim.rendering.raytrace_sight import around, look_at, stand
 from drone_rl.sim.rendering.raytrace_solids import (
     FAR_AWAY,
     PLANE,
@@ -172,8 +172,9 @@ def find(
     rays = view.rays[camera]
     fill_floats(nearest, 0, view.height * view.width, FAR_AWAY)
     fill_ints(owner, 0, view.height * view.width, NOTHING)
+    there = stand(view.cameras[camera], poses, world)
     for geom in range(geoms.kind.shape[0]):
-        sight = look_at(geoms, geom, poses, world, view.cameras[camera])
+        sight = look_at(geoms, geom, poses, world, there)
         sights[geom] = sight
         if sight.kind == PLANE:
             _find_plane(view, rays, sight, geom, nearest, owner)

@@ -13,7 +13,7 @@
 
 import warp as wp
 
-from drone_rl.sim.rendering.raytrace_sight import look_at
+from drone_rl.sim.rendering.raytrace_sight import look_at, stand
 from drone_rl.sim.rendering.raytrace_solids import (
     FAR_AWAY,
     PLANE,
@@ -41,7 +41,8 @@ def aim(view: View, geoms: Geoms, poses: Poses, sights: wp.array2d[Sight]) -> No
     """
     row, geom = wp.tid()
     camera = view.cameras[row % view.cameras.shape[0]]
-    sights[row, geom] = look_at(geoms, geom, poses, row // view.count, camera)
+    world = row // view.count
+    sights[row, geom] = look_at(geoms, geom, poses, world, stand(camera, poses, world))
 
 
 @wp.func

@@ -21,10 +21,12 @@ from drone_rl.sim.rendering.raytrace_kernel import FACES, NOTHING, Desk, find
 from drone_rl.sim.rendering.raytrace_rows import fill_floats, fill_ints
 from drone_rl.sim.rendering.raytrace_scenic_surface import color_geom, color_sky
 from drone_rl.sim.rendering.raytrace_shadows import (
+    MAYBE,
     around_shadow,
     find_ground,
     hide_by_box,
     is_behind,
+    mark_near,
     shadow_length,
 )
 from drone_rl.sim.rendering.raytrace_solids import BOX, PLANE, ROUND, outward
@@ -79,10 +81,10 @@ def _hide(
     sun: wp.vec3,
 ) -> None:
     """The same as `hide_by_box`, by any solid."""
+    mark_near(dark, first, last, rays, nearest, owners, FACES, geom, sight, sun, MAYBE)
     pixel = first
     while pixel < last:
-        owner = owners[pixel]
-        if owner != NOTHING and owner // FACES != geom and dark[pixel] == 0:
+        if dark[pixel] == MAYBE:
             dark[pixel] = int(is_behind(sight, rays[pixel], nearest[pixel], sun))
         pixel += 1
 

@@ -43,18 +43,27 @@ const float z_per = 1.0f / (wp::abs(sun[2]) < 1e-9f ? 1e-9f : sun[2]);
 const float x_half = wp::abs(x_per) * sight.size[0];
 const float y_half = wp::abs(y_per) * sight.size[1];
 const float z_half = wp::abs(z_per) * sight.size[2];
+const float a = sight.into.data[0][0], b = sight.into.data[0][1], c = sight.into.data[0][2];
+const float d = sight.into.data[1][0], e = sight.into.data[1][1], f = sight.into.data[1][2];
+const float g = sight.into.data[2][0], h = sight.into.data[2][1], k = sight.into.data[2][2];
+const float x_eye = sight.eye[0], y_eye = sight.eye[1], z_eye = sight.eye[2];
+const wp::vec_t<3, float> *const seen = rays.data;
+const float *const far = nearest.data;
+const int *const owner = owners.data;
+int *const hidden = dark.data;
+const int own = geom * faces, next = own + faces;
 for (int i = first; i < last; ++i) {
-    const wp::vec_t<3, float> into = wp::mul(sight.into, rays.data[i]);
-    const float x = (sight.eye[0] + nearest.data[i] * into[0]) * x_per;
-    const float y = (sight.eye[1] + nearest.data[i] * into[1]) * y_per;
-    const float z = (sight.eye[2] + nearest.data[i] * into[2]) * z_per;
+    const float u = seen[i][0], v = seen[i][1], w = seen[i][2];
+    const float x = (x_eye + far[i] * (a * u + b * v + c * w)) * x_per;
+    const float y = (y_eye + far[i] * (d * u + e * v + f * w)) * y_per;
+    const float z = (z_eye + far[i] * (g * u + h * v + k * w)) * z_per;
     float enter = x - x_half, leave = x + x_half;
     enter = enter > y - y_half ? enter : y - y_half;
     leave = leave < y + y_half ? leave : y + y_half;
     enter = enter > z - z_half ? enter : z - z_half;
     leave = leave < z + z_half ? leave : z + z_half;
-    const bool is_other = (owners.data[i] >= 0) & (owners.data[i] / faces != geom);
-    dark.data[i] |= (enter >= 0.0f) & (enter <= leave) & is_other;
+    const bool is_other = (owner[i] >= 0) & ((owner[i] < own) | (owner[i] >= next));
+    hidden[i] |= (enter >= 0.0f) & (enter <= leave) & is_other;
 }""")
 def hide_by_box(
     dark: wp.array[int],
@@ -81,6 +90,64 @@ def hide_by_box(
         geom: The box, which is not in its own way.
         sight: The same.
         sun: Where the sun's light goes, in the box's frame.
+    """
+    ...
+
+
+MAYBE = wp.constant(2)
+"""What a pixel is marked with whose place may be in a geom's shadow."""
+
+
+@wp.func_native("""
+const float a = sight.into.data[0][0], b = sight.into.data[0][1], c = sight.into.data[0][2];
+const float d = sight.into.data[1][0], e = sight.into.data[1][1], f = sight.into.data[1][2];
+const float g = sight.into.data[2][0], h = sight.into.data[2][1], k = sight.into.data[2][2];
+const float x_eye = sight.eye[0], y_eye = sight.eye[1], z_eye = sight.eye[2];
+const float x_sun = sun[0], y_sun = sun[1], z_sun = sun[2];
+const float speed = x_sun * x_sun + y_sun * y_sun + z_sun * z_sun;
+const float reach = 1.001f * speed * wp::dot(sight.reach, sight.reach), loss = 1e-5f * speed;
+const wp::vec_t<3, float> *const seen = rays.data;
+const float *const far = nearest.data;
+const int *const owner = owners.data;
+int *const hidden = dark.data;
+const int own = geom * faces, next = own + faces;
+for (int i = first; i < last; ++i) {
+    const float u = seen[i][0], v = seen[i][1], w = seen[i][2];
+    const float x = x_eye + far[i] * (a * u + b * v + c * w);
+    const float y = y_eye + far[i] * (d * u + e * v + f * w);
+    const float z = z_eye + far[i] * (g * u + h * v + k * w);
+    const float p = y * z_sun - z * y_sun, q = z * x_sun - x * z_sun, r = x * y_sun - y * x_sun;
+    const bool is_near = p * p + q * q + r * r <= reach + loss * (x * x + y * y + z * z);
+    const bool is_other = (owner[i] >= 0) & ((owner[i] < own) | (owner[i] >= next));
+    hidden[i] = (hidden[i] == 0) & is_near & is_other ? maybe : hidden[i];
+}""")
+def mark_near(
+    dark: wp.array[int],
+    first: int,
+    last: int,
+    rays: wp.array[wp.vec3],
+    nearest: wp.array[float],
+    owners: wp.array[int],
+    faces: int,
+    geom: int,
+    sight: Sight,
+    sun: wp.vec3,
+    maybe: int,
+) -> None:
+    """Marks the pixels in a row from which the sun's light passes the ball around a geom.
+
+    Args:
+        dark: Is written where it is 0; see `hide_by_box`, as what is not told here.
+        first: The first pixel.
+        last: The one after the last.
+        rays: Of the pixels.
+        nearest: How far along its ray each surface is.
+        owners: Whose it is.
+        faces: How many times.
+        geom: Whose ball.
+        sight: The same.
+        sun: Where the sun's light goes, in the geom's frame.
+        maybe: The mark.
     """
     ...
 

@@ -19,15 +19,30 @@ IN_FRONT = wp.constant(1e-3)
 """Metres before the camera from which corners are projected."""
 
 
+@wp.struct
+class Stand:
+    """Where a camera is, world frame."""
+
+    eye: wp.vec3
+    looking: wp.mat33
+    """From the camera's frame."""
+
+
 @wp.func
-def look_at(geoms: Geoms, geom: int, poses: Poses, world: int, camera: Camera) -> Sight:
+def stand(camera: Camera, poses: Poses, world: int) -> Stand:
+    """Where a camera of a world is."""
+    turned = _frame_attitude(camera.frame, poses.attitudes[world])
+    found = Stand()
+    found.eye = poses.places[world, camera.frame] + _rotation(turned) @ camera.position
+    found.looking = _rotation(_product(turned, camera.attitude))
+    return found
+
+
+@wp.func
+def look_at(geoms: Geoms, geom: int, poses: Poses, world: int, there: Stand) -> Sight:
     """A geom of a world, seen by a camera."""
-    drone = poses.attitudes[world]
-    turned = _frame_attitude(camera.frame, drone)
-    eye = poses.places[world, camera.frame] + _rotation(turned) @ camera.position
-    looking = _rotation(_product(turned, camera.attitude))
     frame = geoms.frame[geom]
-    turned = _frame_attitude(frame, drone)
+    turned = _frame_attitude(frame, poses.attitudes[world])
     centre = poses.places[world, frame] + _rotation(turned) @ geoms.position[geom]
     sight = Sight()
     sight.kind = geoms.kind[geom]
@@ -38,8 +53,8 @@ def look_at(geoms: Geoms, geom: int, poses: Poses, world: int, camera: Camera) -
         sight.size *= poses.scales[world, frame]
         sight.reach *= poses.scales[world, frame]
     sight.axes = _rotation(_product(turned, geoms.attitude[geom]))
-    sight.eye = wp.transpose(sight.axes) @ (eye - centre)
-    sight.into = wp.transpose(sight.axes) @ looking
+    sight.eye = wp.transpose(sight.axes) @ (there.eye - centre)
+    sight.into = wp.transpose(sight.axes) @ there.looking
     return sight
 
 

@@ -10,10 +10,11 @@ from drone_rl.sim.rendering.raytrace_shadows import (
     find_ground,
     hide_by_box,
     is_behind,
+    mark_near,
     shadow_length,
 )
-from drone_rl.sim.rendering.raytrace_sight import look_at
-from drone_rl.sim.rendering.raytrace_solids import BOX, PLANE
+from drone_rl.sim.rendering.raytrace_sight import look_at, stand
+from drone_rl.sim.rendering.raytrace_solids import BOX, CYLINDER, ELLIPSOID, PLANE, SPHERE
 from tests.box_ahead import SIZE, array, geoms, poses, view
 
 
@@ -29,7 +30,7 @@ def look(
 ):
     camera = seen.cameras[0]
     for geom in range(sights.shape[0]):
-        sights[geom] = look_at(scene, geom, placed, 0, camera)
+        sights[geom] = look_at(scene, geom, placed, 0, stand(camera, placed, 0))
     ground = find_ground(seen, sights, sun)
     length[0] = shadow_length(seen, sights, 0, ground, sun)
     parts[0] = around_shadow(seen, camera, sights[0], sun * length[0])
@@ -122,3 +123,52 @@ def test_a_box_hides_what_is_beyond_it_alone():
     beneath = place - sun / sun[2] * (place[:, 2:] + 0.5)  # back to the box's lower side
     is_under = (place[:, 2] < -0.5) & (np.abs(beneath[:, :2]) <= [1.0, 2.0]).all(1)
     assert dark.numpy()[others & is_under].all()
+
+
+@wp.kernel(enable_backward=False)
+def near(
+    sight: structs.Sight,
+    rays: wp.array[wp.vec3],
+    nearest: wp.array[float],
+    owners: wp.array[int],
+    sun: wp.vec3,
+    dark: wp.array[int],
+    behind: wp.array[int],
+):
+    mark_near(dark, 0, rays.shape[0], rays, nearest, owners, 8, 0, sight, sun, 2)
+    for i in range(rays.shape[0]):
+        behind[i] = int(is_behind(sight, rays[i], nearest[i], sun))
+
+
+@pytest.mark.parametrize(
+    ("kind", "reach"),
+    [(SPHERE, (1.0, 1.0, 1.0)), (CYLINDER, (0.5, 0.5, 2.0)), (ELLIPSOID, (1.0, 2.0, 0.5))],
+)
+def test_what_may_be_in_the_shadow_is_all_that_is(kind, reach):
+    """20,000 places; those by whose way to the sun the ball of that reach lies, and no others."""
+    source = np.random.RandomState(0)
+    rays = source.normal(size=(20_000, 3))
+    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    nearest = source.uniform(0.0, 8.0, 20_000)
+    owners = source.choice([-1, 5, 8, 16], 20_000)  # the sky, the geom itself, two others
+    before = source.choice([0, 1], 20_000)
+    sight = structs.Sight()
+    sight.kind, sight.size, sight.reach = (
+        int(kind),
+        wp.vec3(reach[0], reach[2], 0.0),
+        wp.vec3(reach),
+    )
+    if kind == ELLIPSOID:
+        sight.size = wp.vec3(reach)
+    sight.eye, sight.into = wp.vec3(0.5, 1.0, 2.0), wp.mat33(*np.eye(3).flatten())
+    dark, behind = array(before, int), wp.zeros(20_000, dtype=int, device="cpu")
+    sun = np.array([0.0, 0.6, -0.8])
+    given = [array(rays, wp.vec3), array(nearest, float), array(owners, int), wp.vec3(*sun)]
+    wp.launch(near, 1, inputs=[sight, *given, dark, behind], device="cpu")
+    marked = dark.numpy() == 2
+    is_open = (owners >= 8) & (before == 0)
+    assert (dark.numpy() == before)[~is_open].all()
+    assert marked[is_open & (behind.numpy() == 1)].all() and behind.numpy()[is_open].sum() > 20
+    place = np.array([0.5, 1.0, 2.0]) + nearest[:, None] * rays
+    away = np.linalg.norm(np.cross(place, sun), axis=1) / np.linalg.norm(reach)
+    assert marked[is_open & (away < 0.999)].all() and not marked[away > 1.01].any()

@@ -5,14 +5,14 @@ import pytest
 import warp as wp
 
 from drone_rl.sim.rendering import raytrace_structs as structs
-from drone_rl.sim.rendering.raytrace_sight import around, look_at
+from drone_rl.sim.rendering.raytrace_sight import around, look_at, stand
 from tests.box_ahead import SIZE, geoms, poses, view
 
 
 @wp.kernel(enable_backward=False)
 def find(seen: structs.View, scene: structs.Geoms, placed: structs.Poses, part: wp.array[wp.vec4i]):
     camera = seen.cameras[0]
-    part[0] = around(seen, camera, look_at(scene, 0, placed, 0, camera))
+    part[0] = around(seen, camera, look_at(scene, 0, placed, 0, stand(camera, placed, 0)))
 
 
 def found(position, size=(1.0, 1.0, 1.0)):
