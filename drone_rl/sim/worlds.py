@@ -64,6 +64,8 @@ class Worlds:
             InputError: There is no such renderer.
         """
         self.appearance, self.distractors = appearance, distractors
+        self._looked: tuple[Appearance, Appearance | None] | None = None
+        self._whole: Appearance | None = None
         self.num_worlds = num_worlds
         self.task = as_task(task)
         self.camera = camera or CameraSettings()
@@ -218,8 +220,19 @@ class Worlds:
         self, state: State, view: View, appearance: Appearance | None = None
     ) -> dict[Modality, Tensor]:
         """The same of any number of cameras and modalities, in one pass; see `Renderer.render`."""
-        look = self.appearance if appearance is None else appearance.over(self.appearance)
+        look = self._look(appearance)
         return self.renderer.render(view, self.poses(state, look), look)
+
+    def _look(self, appearance: Appearance | None) -> Appearance | None:
+        """How worlds look in all; the same object as the last time, so that none is read again."""
+        if appearance is None:
+            return self.appearance
+        given = (appearance, self.appearance)
+        if self._looked is None or any(
+            a is not b for a, b in zip(given, self._looked, strict=True)
+        ):
+            self._looked, self._whole = given, appearance.over(self.appearance)
+        return self._whole
 
     def poses(self, state: State, appearance: Appearance | None = None) -> Poses:
         """Where a renderer must draw everything.

@@ -6,6 +6,7 @@ import torch
 from drone_rl.sim.actions import Move
 from drone_rl.sim.composer_task import make_environment
 from drone_rl.sim.meaning import Meaning
+from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.settings import TaskSettings
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
 from drone_rl.sim.worlds import Worlds
@@ -66,3 +67,17 @@ def test_only_all_worlds_in_their_order_are_stepped_as_a_whole():
     assert worlds.state.drone.tolist() == [[0.0, 1.0, 2.5], [1.0, 0.0, 2.5]]
     assert torch.equal(worlds.state.drone, turned.state.drone)
     assert torch.equal(worlds.state.cubes, turned.state.cubes)
+
+
+def test_a_look_is_put_together_once_and_anew_when_either_half_is_another():
+    worlds = Worlds(1, TaskSettings(), appearance=Appearance(fog=50.0))
+    dark = Appearance(exposure=0.5)
+    look = worlds._look(dark)
+    assert look is not None and (look.fog, look.exposure) == (50.0, 0.5)
+    assert worlds._look(dark) is look
+    assert worlds._look(None) is worlds.appearance
+    bright = worlds._look(Appearance(exposure=2.0))
+    assert bright is not None and (bright.fog, bright.exposure) == (50.0, 2.0)
+    worlds.appearance = None
+    changed = worlds._look(dark)
+    assert changed is not None and (changed.fog, changed.exposure) == (None, 0.5)
