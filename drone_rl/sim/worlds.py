@@ -64,8 +64,8 @@ class Worlds:
             InputError: There is no such renderer.
         """
         self.appearance, self.distractors = appearance, distractors
-        self._looked: tuple[Appearance, Appearance | None] | None = None
-        self._whole: Appearance | None = None
+        self._looked: tuple[Appearance, Appearance | None, Appearance] | None = None
+        """What was asked for last, what all look like, and both in one."""
         self.num_worlds = num_worlds
         self.task = as_task(task)
         self.camera = camera or CameraSettings()
