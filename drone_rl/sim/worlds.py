@@ -227,12 +227,11 @@ class Worlds:
         """How worlds look in all; the same object as the last time, so that none is read again."""
         if appearance is None:
             return self.appearance
-        given = (appearance, self.appearance)
-        if self._looked is None or any(
-            a is not b for a, b in zip(given, self._looked, strict=True)
-        ):
-            self._looked, self._whole = given, appearance.over(self.appearance)
-        return self._whole
+        known = self._looked
+        if known is None or known[0] is not appearance or known[1] is not self.appearance:
+            whole = appearance.over(self.appearance)
+            self._looked = known = (appearance, self.appearance, whole)
+        return known[2]
 
     def poses(self, state: State, appearance: Appearance | None = None) -> Poses:
         """Where a renderer must draw everything.
