@@ -36,13 +36,7 @@ def is_behind(sight: Sight, ray: wp.vec3, distance: float, sun: wp.vec3) -> bool
     return along >= 0.0
 
 
-@wp.func_native("""
-const float x_per = 1.0f / (wp::abs(sun[0]) < 1e-9f ? 1e-9f : sun[0]);
-const float y_per = 1.0f / (wp::abs(sun[1]) < 1e-9f ? 1e-9f : sun[1]);
-const float z_per = 1.0f / (wp::abs(sun[2]) < 1e-9f ? 1e-9f : sun[2]);
-const float x_half = wp::abs(x_per) * sight.size[0];
-const float y_half = wp::abs(y_per) * sight.size[1];
-const float z_half = wp::abs(z_per) * sight.size[2];
+_READ = """
 const float a = sight.into.data[0][0], b = sight.into.data[0][1], c = sight.into.data[0][2];
 const float d = sight.into.data[1][0], e = sight.into.data[1][1], f = sight.into.data[1][2];
 const float g = sight.into.data[2][0], h = sight.into.data[2][1], k = sight.into.data[2][2];
@@ -52,19 +46,36 @@ const float *const far = nearest.data;
 const int *const owner = owners.data;
 int *const hidden = dark.data;
 const int own = geom * faces, next = own + faces;
-for (int i = first; i < last; ++i) {
+"""
+"""Before anything is written, which C++ takes for possibly the same memory."""
+_PLACE = """
     const float u = seen[i][0], v = seen[i][1], w = seen[i][2];
-    const float x = (x_eye + far[i] * (a * u + b * v + c * w)) * x_per;
-    const float y = (y_eye + far[i] * (d * u + e * v + f * w)) * y_per;
-    const float z = (z_eye + far[i] * (g * u + h * v + k * w)) * z_per;
-    float enter = x - x_half, leave = x + x_half;
-    enter = enter > y - y_half ? enter : y - y_half;
-    leave = leave < y + y_half ? leave : y + y_half;
-    enter = enter > z - z_half ? enter : z - z_half;
-    leave = leave < z + z_half ? leave : z + z_half;
+    const float x = x_eye + far[i] * (a * u + b * v + c * w);
+    const float y = y_eye + far[i] * (d * u + e * v + f * w);
+    const float z = z_eye + far[i] * (g * u + h * v + k * w);
     const bool is_other = (owner[i] >= 0) & ((owner[i] < own) | (owner[i] >= next));
+"""
+"""Of a pixel, in the geom's frame, and whether somebody else is seen there."""
+
+
+@wp.func_native(f"""
+{_READ}
+const float x_per = 1.0f / (wp::abs(sun[0]) < 1e-9f ? 1e-9f : sun[0]);
+const float y_per = 1.0f / (wp::abs(sun[1]) < 1e-9f ? 1e-9f : sun[1]);
+const float z_per = 1.0f / (wp::abs(sun[2]) < 1e-9f ? 1e-9f : sun[2]);
+const float x_half = wp::abs(x_per) * sight.size[0];
+const float y_half = wp::abs(y_per) * sight.size[1];
+const float z_half = wp::abs(z_per) * sight.size[2];
+for (int i = first; i < last; ++i) {{
+    {_PLACE}
+    const float x_at = x * x_per, y_at = y * y_per, z_at = z * z_per;
+    float enter = x_at - x_half, leave = x_at + x_half;
+    enter = enter > y_at - y_half ? enter : y_at - y_half;
+    leave = leave < y_at + y_half ? leave : y_at + y_half;
+    enter = enter > z_at - z_half ? enter : z_at - z_half;
+    leave = leave < z_at + z_half ? leave : z_at + z_half;
     hidden[i] |= (enter >= 0.0f) & (enter <= leave) & is_other;
-}""")
+}}""")
 def hide_by_box(
     dark: wp.array[int],
     first: int,
@@ -98,29 +109,17 @@ MAYBE = wp.constant(2)
 """What a pixel is marked with whose place may be in a geom's shadow."""
 
 
-@wp.func_native("""
-const float a = sight.into.data[0][0], b = sight.into.data[0][1], c = sight.into.data[0][2];
-const float d = sight.into.data[1][0], e = sight.into.data[1][1], f = sight.into.data[1][2];
-const float g = sight.into.data[2][0], h = sight.into.data[2][1], k = sight.into.data[2][2];
-const float x_eye = sight.eye[0], y_eye = sight.eye[1], z_eye = sight.eye[2];
+@wp.func_native(f"""
+{_READ}
 const float x_sun = sun[0], y_sun = sun[1], z_sun = sun[2];
 const float speed = x_sun * x_sun + y_sun * y_sun + z_sun * z_sun;
 const float reach = 1.001f * speed * wp::dot(sight.reach, sight.reach), loss = 1e-5f * speed;
-const wp::vec_t<3, float> *const seen = rays.data;
-const float *const far = nearest.data;
-const int *const owner = owners.data;
-int *const hidden = dark.data;
-const int own = geom * faces, next = own + faces;
-for (int i = first; i < last; ++i) {
-    const float u = seen[i][0], v = seen[i][1], w = seen[i][2];
-    const float x = x_eye + far[i] * (a * u + b * v + c * w);
-    const float y = y_eye + far[i] * (d * u + e * v + f * w);
-    const float z = z_eye + far[i] * (g * u + h * v + k * w);
+for (int i = first; i < last; ++i) {{
+    {_PLACE}
     const float p = y * z_sun - z * y_sun, q = z * x_sun - x * z_sun, r = x * y_sun - y * x_sun;
     const bool is_near = p * p + q * q + r * r <= reach + loss * (x * x + y * y + z * z);
-    const bool is_other = (owner[i] >= 0) & ((owner[i] < own) | (owner[i] >= next));
     hidden[i] = (hidden[i] == 0) & is_near & is_other ? maybe : hidden[i];
-}""")
+}}""")
 def mark_near(
     dark: wp.array[int],
     first: int,

@@ -1,9 +1,12 @@
 """dm_control's simulation as an appearance has it: in its model, and by its pictures."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 import torch
 
+from drone_rl.bench import speed
 from drone_rl.envs import DroneEnv
 from drone_rl.sim.composer_task import make_environment
 from drone_rl.sim.meaning import Meaning
@@ -12,21 +15,8 @@ from drone_rl.sim.rendering.opengl_looks import in_fog
 from drone_rl.sim.settings import AppearanceSettings, CameraSettings
 from drone_rl.utils.seeding import world_random_state
 
-BLOCKS = AppearanceSettings(
-    sun_elevation=40.0,
-    sun_azimuth=140.0,
-    sun_color=(1.0, 0.96, 0.88),
-    ambient_strength=0.42,
-    shadows=1.0,
-    sky_horizon=(0.8, 0.87, 0.94),
-    sky_zenith=(0.25, 0.46, 0.8),
-    fog_visibility=400.0,
-    ground_color=(0.62, 0.63, 0.62),
-    ground_texture="grid",
-    object_texture="bricks",
-    distractors=26,
-    distractor_size=(1.5, 5.0),
-    distractor_distance=(1.5, 24.0),
+BLOCKS = dataclasses.replace(
+    speed.BLOCKS,
     camera_turn=((-3.0, -3.0, -3.0), (3.0, 3.0, 3.0)),
     camera_widening=(-5.0, 5.0),
 )
