@@ -25,6 +25,14 @@ class BodyState(Batch):
     angular_velocity: Tensor  # (num_worlds, 3) float64
     """Radians a second."""
 
+    @property
+    def is_lost(self) -> Tensor:
+        """Whether a drone's motion has diverged, so that there is nothing more to say of it.
+
+        Shape: (num_worlds,), bool.
+        """
+        return torch.zeros(len(self.position), dtype=torch.bool, device=self.position.device)
+
     @classmethod
     def at_rest(cls, position: Tensor, attitude: Tensor | None = None) -> Self:
         """Bodies that don't move.
