@@ -23,7 +23,7 @@ class BodyState(Batch):
     velocity: Tensor  # (num_worlds, 3) float64
     """Metres a second."""
     angular_velocity: Tensor  # (num_worlds, 3) float64
-    """Radians a second."""
+    """Radians a second; of drones in flight about the body's axes."""
 
     @property
     def is_lost(self) -> Tensor:
@@ -32,6 +32,16 @@ class BodyState(Batch):
         Shape: (num_worlds,), bool.
         """
         return torch.zeros(len(self.position), dtype=torch.bool, device=self.position.device)
+
+    def moved(self, position: Tensor, attitude: Tensor | None = None) -> Self:
+        """The same elsewhere.
+
+        Args:
+            position: Metres. Shape: (num_worlds, 3), float64.
+            attitude: As it is by default. Shape: (num_worlds, 4), float64.
+        """
+        attitude = self.attitude if attitude is None else attitude
+        return dataclasses.replace(self, position=position, attitude=attitude)
 
     @classmethod
     def at_rest(cls, position: Tensor, attitude: Tensor | None = None) -> Self:

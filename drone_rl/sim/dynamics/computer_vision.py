@@ -1,7 +1,5 @@
 """Computer-vision mode (Table 1): an action sets the drone's pose, and there are no forces."""
 
-import dataclasses
-
 import torch
 from torch import Tensor
 
@@ -34,4 +32,4 @@ class ComputerVision:
     def step(self, body: BodyState, action: Tensor) -> BodyState:
         """The same drones a move farther on."""
         moves = self.moves.to(action.device)
-        return dataclasses.replace(body, position=body.position + moves[action])
+        return body.moved(body.position + moves[action])

@@ -118,7 +118,7 @@ for (int i = first; i < last; ++i) {{
     {_PLACE}
     const float p = y * z_sun - z * y_sun, q = z * x_sun - x * z_sun, r = x * y_sun - y * x_sun;
     const bool is_near = p * p + q * q + r * r <= reach + loss * (x * x + y * y + z * z);
-    hidden[i] = (hidden[i] == 0) & is_near & is_other ? maybe : hidden[i];
+    hidden[i] = ((hidden[i] == 0) & is_near & is_other) ? maybe : hidden[i];
 }}""")
 def mark_near(
     dark: wp.array[int],

@@ -21,8 +21,11 @@ class ActionSettings(Settings):
     kind: Annotated[str, OneOf(ACTION_KINDS)] = "moves"
     """moves, the chapter's three of equal length without turning, or velocity: forward speed, speed
     to the left and yaw rate, any of these at once."""
-    move_speed: Speed = 3.0
-    """Of a move in flight, in metres a second; in computer-vision mode a move is the task's step."""
+    move_speed: Speed = 4.0
+    """At which a move in flight shifts the place where the drone is wanted, in metres a second; in
+    computer-vision mode a move is the task's step."""
+    move_lead: Annotated[float, Real(0.01, 100.0, unit="m")] = 0.5
+    """How far ahead of the drone that place may be, in metres."""
     forward_speed: Speed = 4.0
     """The greatest speed forward that can be asked for, in metres a second; none is backward."""
     sideways_speed: Speed = 3.0

@@ -1,0 +1,192 @@
+# ruff: noqa: RUF046, UP018
+# pyright: reportIndexIssue=false
+# pyright: reportGeneralTypeIssues=false
+# pyright: reportOperatorIssue=false
+# pyright: reportAttributeAccessIssue=false
+# pyright: reportReturnType=false
+# pyright: reportArgumentType=false
+# pyright: reportCallIssue=false
+# pyright: reportAssignmentType=false
+# (Warp compiles this file; Python's types say nothing about it, and what a loop changes is declared
+# by its type.)
+"""One tick of a flight: controllers, rotors, air, motion, contacts."""
+
+import warp as wp
+
+from drone_rl.sim.dynamics import cascade, flight_state
+from drone_rl.sim.dynamics.air import gust_after
+from drone_rl.sim.dynamics.airframe import Airframe
+from drone_rl.sim.dynamics.contacts import Overlap, box_overlap, pushed_out
+from drone_rl.sim.dynamics.controllers import climb_memory
+from drone_rl.sim.dynamics.rigid_body import (
+    Motion,
+    advanced,
+    answered,
+    axes_of,
+    drag_of,
+    thrust_of,
+    torque_of,
+)
+
+NO_THING = wp.constant(flight_state.NOTHING)
+GROUND = wp.constant(flight_state.GROUND)
+_MOST_THRUST = wp.constant(50.0)
+"""Metres a second squared that no drone gains in a command, so that none is near unawares."""
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.struct
+class Touch:
+    """The last contact of a command."""
+
+    thing: int
+    normal: wp.vec3
+    point: wp.vec3
+    depth: float
+    tick: int
+
+
+@wp.struct
+class Flight:
+    """All that changes in a flight."""
+
+    motion: Motion
+    rotors: wp.vec4
+    climb: float
+    gust: wp.vec3
+    touch: Touch
+
+
+@wp.func
+def ticked(
+    frame: Airframe,
+    modes: wp.vec4i,
+    goal: cascade.Goal,
+    before: Flight,
+    height: float,
+    seed: wp.int64,
+    past: wp.int64,
+    tick: int,
+) -> Flight:
+    """A flight a tick later, over bare ground.
+
+    Args:
+        frame: The drone.
+        modes: Of the goals, one an axis.
+        goal: What it is told.
+        before: The flight.
+        height: At which the command began, metres.
+        seed: Of the episode's gusts.
+        past: Ticks of the episode before the command.
+        tick: Number of this one within the command.
+    """
+    flight = before
+    motion = before.motion
+    axes = axes_of(motion.attitude)
+    seconds = frame.tick * float(tick)
+    asked = cascade.rotors_wanted(frame, modes, goal, seconds, motion, axes, before.climb)
+    if modes[3] == cascade.VELOCITY or modes[3] == cascade.POSITION:
+        missing = cascade.climb_missing(frame, modes, goal, seconds, motion)
+        flight.climb = climb_memory(frame, missing, before.climb)
+    flight.rotors = answered(frame, before.rotors, asked)
+    if frame.gusts > 0.0:
+        speed = wp.length(motion.velocity - frame.wind - before.gust)
+        flight.gust = gust_after(frame, before.gust, speed, seed, past + wp.int64(tick))
+    lift = thrust_of(frame, flight.rotors)
+    force = lift * axes.up + drag_of(frame, axes, motion.velocity - frame.wind - flight.gust)
+    flight.motion = advanced(frame, motion, force, torque_of(frame, flight.rotors))
+    overlap = Overlap()
+    overlap.normal = wp.vec3(0.0, 0.0, 1.0)
+    overlap.depth = frame.radius - (height + flight.motion.position[2])
+    if overlap.depth >= 0.0:
+        flight.motion = grounded(frame, pushed_out(frame, flight.motion, overlap), lift)
+        flight.touch = touched(frame, before.touch, GROUND, flight.motion, overlap, tick)
+    return flight
+
+
+@wp.func
+def among(
+    frame: Airframe,
+    before: Flight,
+    start: wp.vec3d,
+    centers: wp.array[wp.vec3d],
+    half_sizes: wp.vec3,
+    tick: int,
+) -> Flight:
+    """A flight after what it touches has pushed it back.
+
+    Args:
+        frame: The drone.
+        before: The flight.
+        start: Where the command began, metres.
+        centers: Of the obstacles, metres.
+        half_sizes: Of each, metres.
+        tick: Number of the tick within the command.
+    """
+    flight = before
+    for thing in range(centers.shape[0]):
+        center = flight.motion.position + wp.vec3(start - centers[thing])
+        overlap = box_overlap(center, frame.radius, half_sizes)
+        if overlap.depth > 0.0:
+            flight.motion = pushed_out(frame, flight.motion, overlap)
+            flight.touch = touched(frame, flight.touch, thing, flight.motion, overlap, tick)
+    return flight
+
+
+@wp.func
+def is_near(
+    frame: Airframe,
+    flight: Flight,
+    start: wp.vec3d,
+    centers: wp.array[wp.vec3d],
+    half_sizes: wp.vec3,
+    seconds: float,
+) -> bool:
+    """Whether any obstacle may be touched within so many seconds, see `among`."""
+    fastest = wp.length(flight.motion.velocity) + _MOST_THRUST * seconds
+    near = int(0)
+    for thing in range(centers.shape[0]):
+        center = wp.vec3(start - centers[thing])
+        away = box_overlap(center, frame.radius + fastest * seconds, half_sizes)
+        if away.depth > 0.0:
+            near = 1
+    return near == 1
+
+
+@wp.func
+def grounded(frame: Airframe, motion: Motion, lift: float) -> Motion:
+    """The motion of a drone on the ground: one whose rotors can't carry it stands level."""
+    after = motion
+    if lift < frame.weight:
+        w = motion.attitude[0]
+        z = motion.attitude[3]
+        length = wp.sqrt(wp.max(w * w + z * z, 1.0e-12))
+        after.attitude = wp.vec4(w / length, 0.0, 0.0, z / length)
+        after.rates = wp.vec3(0.0, 0.0, 0.0)
+    return after
+
+
+@wp.func
+def touched(
+    frame: Airframe, before: Touch, thing: int, motion: Motion, overlap: Overlap, tick: int
+) -> Touch:
+    """What is recorded of a contact: obstacles count more than the ground, later ones than earlier.
+
+    Args:
+        frame: The drone.
+        before: The last one.
+        thing: Number of what is touched now.
+        motion: Of the drone, already pushed out.
+        overlap: Before that.
+        tick: When.
+    """
+    if before.thing >= 0 and thing < 0:
+        return before
+    now = Touch()
+    now.thing = thing
+    now.normal = overlap.normal
+    now.depth = overlap.depth
+    now.point = motion.position - frame.radius * overlap.normal
+    now.tick = tick
+    return now

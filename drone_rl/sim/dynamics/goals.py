@@ -1,0 +1,85 @@
+"""What a controller can be told, axis by axis, as SimpleFlight has it."""
+
+import dataclasses
+import enum
+
+import torch
+from torch import Tensor
+
+from drone_rl.utils.errors import InputError
+
+X, Y, HEADING, Z = range(4)
+"""The axes of goals."""
+
+
+class Mode(enum.IntEnum):
+    """What the number of an axis says. Controllers further in are given the rest."""
+
+    THROTTLE = 0
+    """Share of all thrust, 0 to 1."""
+    RATE = 1
+    """Radians a second about the body's axis."""
+    ANGLE = 2
+    """Radians: roll, pitch, heading."""
+    VELOCITY = 3
+    """Metres a second, world frame."""
+    HEADING_VELOCITY = 4
+    """Metres a second, forward and to the left of the heading."""
+    POSITION = 5
+    """Metres, world frame."""
+    ROTOR = 6
+    """Share of a rotor's most thrust, 0 to 1: all four are rotors then, in their order."""
+
+
+_SIDEWAYS = (Mode.RATE, Mode.ANGLE, Mode.VELOCITY, Mode.HEADING_VELOCITY, Mode.POSITION, Mode.ROTOR)
+ALLOWED = (
+    _SIDEWAYS,
+    _SIDEWAYS,
+    (Mode.RATE, Mode.ANGLE, Mode.ROTOR),
+    (Mode.THROTTLE, Mode.VELOCITY, Mode.POSITION, Mode.ROTOR),
+)
+"""Modes of each axis."""
+
+Modes = tuple[Mode, Mode, Mode, Mode]
+
+
+@dataclasses.dataclass(frozen=True)
+class Goals:
+    """What `num_worlds` drones are told, all of them axis by axis in the same modes.
+
+    Raises:
+        InputError: An axis has no such mode, or two that go together differ.
+    """
+
+    modes: Modes
+    """Of x (or roll), y (or pitch), heading and height."""
+    values: Tensor  # (num_worlds, 4) float64
+    """In the units of the modes."""
+    drift: Tensor | None = None  # (num_worlds, 4) float64
+    """How fast positions and headings that are wanted move on, a second; they stay by default."""
+
+    def __post_init__(self) -> None:
+        """Refuses what no controller can do."""
+        for axis, (mode, allowed) in enumerate(zip(self.modes, ALLOWED, strict=True)):
+            if mode not in allowed:
+                known = ", ".join(m.name.lower() for m in allowed)
+                raise InputError(f"modes[{axis}]={mode!r} is unknown; give one of: {known}")
+        for mode in (Mode.ROTOR, Mode.HEADING_VELOCITY):
+            group = self.modes if mode == Mode.ROTOR else self.modes[:2]
+            if 0 < group.count(mode) < len(group):
+                raise InputError(f"modes={self.modes}: {mode.name.lower()} is for all or none")
+        if self.values.dim() != 2 or self.values.shape[1] != len(ALLOWED):
+            raise InputError(
+                f"goals of shape {tuple(self.values.shape)} are not (num_worlds, 4); give a number "
+                "for each axis"
+            )
+
+    @property
+    def drifts(self) -> Tensor:
+        """The same, zeros where nothing drifts."""
+        return torch.zeros_like(self.values) if self.drift is None else self.drift
+
+
+def rotor_goals(rotors: Tensor) -> Goals:
+    """Rotors told one by one, without any controller. Shape: (num_worlds, 4)."""
+    return Goals((Mode.ROTOR, Mode.ROTOR, Mode.ROTOR, Mode.ROTOR), rotors)

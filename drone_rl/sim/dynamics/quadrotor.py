@@ -1,0 +1,168 @@
+# pyright: reportArgumentType=false
+# (Warp's annotations say less than it takes.)
+"""Simple flight (Table 1): a drone with four rotors, flown by SimpleFlight's controller."""
+
+import functools
+from typing import Any
+
+import torch
+import warp as wp
+from torch import Tensor
+
+from drone_rl.sim.actions import MOVES, Actions
+from drone_rl.sim.dynamics import flight_kernel
+from drone_rl.sim.dynamics.airframe import make_airframe
+from drone_rl.sim.dynamics.body import BodyState
+from drone_rl.sim.dynamics.computer_vision import DIRECTIONS
+from drone_rl.sim.dynamics.flight_state import CLIMB, FlightState
+from drone_rl.sim.dynamics.goals import Goals, Mode, rotor_goals
+from drone_rl.sim.dynamics.obstacles import Obstacles
+from drone_rl.sim.rendering.crew import Crew
+from drone_rl.sim.rendering.devices import on_torch_stream, start_warp
+from drone_rl.sim.settings import ActionSettings, DynamicsSettings
+
+_MOVE_MODES = (Mode.POSITION, Mode.POSITION, Mode.ANGLE, Mode.POSITION)
+_LEAST_WORK = 3000
+"""Ticks of all drones together for which a second thread is worth its while."""
+
+
+class Quadrotor:
+    """Flies drones. It holds none: states come in, states go out, as many as they are."""
+
+    def __init__(self, settings: DynamicsSettings, actions: ActionSettings | None = None) -> None:
+        """Takes a drone.
+
+        Args:
+            settings: Its body, controller and air.
+            actions: What policies can tell it; the chapter's three moves by default.
+        """
+        self.settings = settings
+        self.action_settings = actions or ActionSettings()
+        self.frame = make_airframe(settings)
+        self._started: set[torch.device] = set()
+        self._drifts = torch.zeros(len(DIRECTIONS), 4, dtype=torch.float64)
+        self._drifts[:, :2] = torch.tensor(DIRECTIONS, dtype=torch.float64)[:, :2]
+        self._drifts *= self.action_settings.move_speed
+
+    @property
+    def actions(self) -> Actions:
+        """What policies can tell it."""
+        return MOVES
+
+    @property
+    def mount(self) -> str:
+        """How its cameras are mounted, see `DynamicsSettings.camera_mount`."""
+        return self.settings.camera_mount
+
+    @property
+    def is_random(self) -> bool:
+        """Whether episodes differ by the seed that `start` is given."""
+        return self.settings.gusts > 0.0
+
+    @property
+    def needs_obstacles(self) -> bool:
+        """Whether `step` minds what stands around."""
+        return True
+
+    def start(self, position: Tensor, seeds: Tensor | None = None) -> FlightState:
+        """Drones that hover where they are, at rest.
+
+        Args:
+            position: Metres, world frame. Shape: (num_worlds, 3), float64.
+            seeds: Of their gusts; all the same by default. Shape: (num_worlds,).
+        """
+        state = FlightState.at_rest(position, seeds=seeds)
+        state.rotors[:] = self.settings.hover_throttle
+        state.numbers[:, CLIMB.first] = 2.0 * self.settings.hover_throttle - 1.0
+        return state
+
+    def step(
+        self, body: BodyState, action: Tensor, obstacles: Obstacles | None = None
+    ) -> FlightState:
+        """What an action makes of each drone, a control step later; see `Dynamics`."""
+        assert isinstance(body, FlightState)
+        return self.fly(body, self.goals_of(body, action), self.settings.control_ticks, obstacles)
+
+    def goals_of(self, body: FlightState, action: Tensor) -> Goals:
+        """What actions ask for.
+
+        A move of the chapter shifts the place where the drone is wanted, at the speed of a move and
+        along one axis of the world. That place is never farther from the drone, along either
+        axis, than `ActionSettings.move_lead`.
+
+        Args:
+            body: The drones.
+            action: One of `actions` for each. Shape: (num_worlds,).
+        """
+        lead, place = self.action_settings.move_lead, body.position[:, :2]
+        wanted = body.reference.clone()
+        wanted[:, :2] = place + (wanted[:, :2] - place).clamp(-lead, lead)
+        return Goals(_MOVE_MODES, wanted, self._drifts.to(action.device)[action])
+
+    def push(self, body: FlightState, rotors: Tensor, ticks: int = 1) -> FlightState:
+        """The drones under rotors that somebody else commands.
+
+        Args:
+            body: Before.
+            rotors: Shares of their most thrust. Shape: (num_worlds, 4), see `FlightState.rotors`.
+            ticks: How long.
+        """
+        return self.fly(body, rotor_goals(rotors), ticks)
+
+    def fly(
+        self, body: FlightState, goals: Goals, ticks: int, obstacles: Obstacles | None = None
+    ) -> FlightState:
+        """The drones under their controllers; `body` stays as it is.
+
+        Args:
+            body: Before.
+            goals: What they are told, for all of the time.
+            ticks: How long, each of `DynamicsSettings.tick` seconds.
+            obstacles: What they may touch besides the ground.
+        """
+        device, count = body.numbers.device, len(body)
+        self._start(device)
+        after = torch.empty_like(body.numbers)
+        centers, half_sizes = _boxes(obstacles, body)
+        given = [
+            _array(goals.values),
+            _array(goals.drifts),
+            _array(centers, wp.vec3d),
+            wp.vec3(*half_sizes),
+            _array(body.numbers),
+            _array(after),
+        ]
+        modes = wp.vec4i(*(int(mode) for mode in goals.modes))
+
+        def work(member: int, first: int, last: int) -> None:
+            del member
+            inputs = [first, self.frame, ticks, modes, *given]
+            wp.launch(flight_kernel.fly, last - first, inputs=inputs, device=str(device))
+
+        if device.type == "cpu" and count * ticks >= _LEAST_WORK:
+            self._crew.share_out(0, count, work)
+        else:
+            with on_torch_stream(device):
+                work(0, 0, count)
+        return FlightState(after)
+
+    def _start(self, device: torch.device) -> None:
+        """Loads the kernels of a device, once."""
+        if device not in self._started:
+            start_warp(str(device))
+            wp.load_module(flight_kernel, device=str(device))
+            self._started.add(device)
+
+    @functools.cached_property
+    def _crew(self) -> Crew:
+        return Crew(2**30)
+
+
+def _array(value: Tensor, kind: Any = wp.float64) -> Any:
+    return wp.from_torch(value.contiguous(), dtype=kind, return_ctype=True)
+
+
+def _boxes(obstacles: Obstacles | None, body: FlightState) -> tuple[Tensor, tuple[float, ...]]:
+    if obstacles is None:
+        return body.numbers.new_zeros(len(body), 0, 3), (0.0, 0.0, 0.0)
+    return obstacles.centers, obstacles.half_sizes
