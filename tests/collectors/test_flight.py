@@ -11,15 +11,32 @@ from drone_rl.collectors import EpisodeCollector
 from drone_rl.collectors import flight as flight_module
 from drone_rl.envs import CropRows, DroneEnv, GrayPixels, StandardizePixels, with_transforms
 from drone_rl.policies import MLP, SmallCNN, make_actor
-from drone_rl.sim.settings import AppearanceSettings, PillarsSettings, TaskSettings
+from drone_rl.sim.dynamics import Quadrotor
+from drone_rl.sim.settings import (
+    AppearanceSettings,
+    DynamicsSettings,
+    PillarsSettings,
+    TaskSettings,
+)
 
 SHORT = TaskSettings(num_cubes=2, first_distance=3.0, spacing=3.0, step_limit=12, front_margin=3.0)
 REASON = ("next", "info", "end_reason")
 DETERMINISTIC = ExplorationType.DETERMINISTIC
 
 
-def make(task=SHORT, transforms=(GrayPixels, StandardizePixels), num_envs=5, network=None, **how):
-    env = with_transforms(DroneEnv(num_envs, task), [transform() for transform in transforms])
+FLYING = DynamicsSettings(mode="simple_flight", camera_mount="body", wind=(0.5, -1.0, 0.2))
+
+
+def make(
+    task=SHORT,
+    transforms=(GrayPixels, StandardizePixels),
+    num_envs=5,
+    network=None,
+    dynamics=None,
+    **how,
+):
+    env = DroneEnv(num_envs, task, dynamics=dynamics)
+    env = with_transforms(env, [transform() for transform in transforms])
     generator = torch.Generator().manual_seed(0)
     if network is None:
         shape = tuple(env.observation_spec["pixels"].shape[1:])
@@ -30,10 +47,13 @@ def make(task=SHORT, transforms=(GrayPixels, StandardizePixels), num_envs=5, net
     return EpisodeCollector(env, actor, **{"is_compiled": True, **how})
 
 
-def test_replayed_by_torchrls_steps_they_are_the_same_bit_for_bit():
-    collector = make(keep=[REASON, ("next", "info", "collected"), ("next", "info", "drone")])
+@pytest.mark.parametrize("dynamics", [None, Quadrotor(FLYING)])
+def test_replayed_by_torchrls_steps_they_are_the_same_bit_for_bit(dynamics):
+    kept = [REASON, ("next", "info", "collected"), ("next", "info", "drone")]
+    collector = make(keep=kept, dynamics=dynamics)
     assert collector._flight is not None
-    env = with_transforms(DroneEnv(5, SHORT), [GrayPixels(), StandardizePixels()])
+    env = DroneEnv(5, SHORT, dynamics=dynamics)
+    env = with_transforms(env, [GrayPixels(), StandardizePixels()])
     for _ in range(3):
         batch, state = collector.collect(), env.reset()
         ids = batch["collector", "traj_ids"]

@@ -44,7 +44,7 @@ _NUMBERS = wp.constant(fs.NUMBERS)
 _FASTEST = wp.constant(1000.0)
 """Metres or radians a second beyond which a motion has diverged."""
 
-wp.set_module_options({"enable_backward": False, "optimization_level": 3})
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 
 @wp.func

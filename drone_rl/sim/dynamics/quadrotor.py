@@ -21,7 +21,8 @@ from drone_rl.sim.rendering.crew import Crew
 from drone_rl.sim.rendering.devices import on_torch_stream, start_warp
 from drone_rl.sim.settings import ActionSettings, DynamicsSettings
 
-_MOVE_MODES = (Mode.POSITION, Mode.POSITION, Mode.ANGLE, Mode.POSITION)
+MOVE_MODES = (Mode.POSITION, Mode.POSITION, Mode.ANGLE, Mode.POSITION)
+"""Of the chapter's moves."""
 _LEAST_WORK = 3000
 """Ticks of all drones together for which a second thread is worth its while."""
 
@@ -40,9 +41,10 @@ class Quadrotor:
         self.action_settings = actions or ActionSettings()
         self.frame = make_airframe(settings)
         self._started: set[torch.device] = set()
-        self._drifts = torch.zeros(len(DIRECTIONS), 4, dtype=torch.float64)
-        self._drifts[:, :2] = torch.tensor(DIRECTIONS, dtype=torch.float64)[:, :2]
-        self._drifts *= self.action_settings.move_speed
+        self.drifts = torch.zeros(len(DIRECTIONS), 4, dtype=torch.float64)
+        self.drifts[:, :2] = torch.tensor(DIRECTIONS, dtype=torch.float64)[:, :2]
+        self.drifts *= self.action_settings.move_speed
+        """How fast each move shifts the place where a drone is wanted. Shape: (moves, 4)."""
 
     @property
     def actions(self) -> Actions:
@@ -97,7 +99,7 @@ class Quadrotor:
         lead, place = self.action_settings.move_lead, body.position[:, :2]
         wanted = body.reference.clone()
         wanted[:, :2] = place + (wanted[:, :2] - place).clamp(-lead, lead)
-        return Goals(_MOVE_MODES, wanted, self._drifts.to(action.device)[action])
+        return Goals(MOVE_MODES, wanted, self.drifts.to(action.device)[action])
 
     def push(self, body: FlightState, rotors: Tensor, ticks: int = 1) -> FlightState:
         """The drones under rotors that somebody else commands.

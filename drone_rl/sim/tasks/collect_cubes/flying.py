@@ -8,8 +8,9 @@ from typing import Self
 import torch
 import warp as wp
 
-from drone_rl.sim.dynamics import ComputerVision, Dynamics
+from drone_rl.sim.dynamics import ComputerVision, Dynamics, FlightState, Quadrotor
 from drone_rl.sim.dynamics.body import LEVEL
+from drone_rl.sim.dynamics.fleet import FlyingFleet
 from drone_rl.sim.rendering.raytrace_structs import DRONE_FRAME, Poses
 from drone_rl.sim.tasks.collect_cubes.kernel import Flights
 from drone_rl.sim.tasks.collect_cubes.practice import Practice
@@ -21,7 +22,9 @@ from drone_rl.sim.tasks.playable import Playable
 class FlyingCubes:
     """Arrays for as many worlds, written anew with each batch of episodes."""
 
-    def __init__(self, task: CollectCubes, dynamics: ComputerVision, num_worlds: int) -> None:
+    def __init__(
+        self, task: CollectCubes, dynamics: ComputerVision | Quadrotor, num_worlds: int
+    ) -> None:
         """Makes room.
 
         Args:
@@ -46,7 +49,10 @@ class FlyingCubes:
         self.flights.fates = wp.from_torch(self._fates)
         self.flights.steps = wp.from_torch(self.steps)
         self.flights.end_reasons = wp.from_torch(self.end_reasons)
-        self.flights.moves = wp.from_torch(dynamics.moves.contiguous(), dtype=wp.vec3d)
+        if isinstance(dynamics, ComputerVision):
+            self.flights.moves = wp.from_torch(dynamics.moves.contiguous(), dtype=wp.vec3d)
+        self._fleet = FlyingFleet(num_worlds, dynamics if isinstance(dynamics, Quadrotor) else None)
+        self.flights.fleet = self._fleet.fleet
         self.flights.touch_distance = settings.touch_distance
         self.flights.front_bound = settings.front_bound
         self.flights.side_bound = settings.side_bound
@@ -57,14 +63,20 @@ class FlyingCubes:
     @classmethod
     def find(cls, task: Playable, dynamics: Dynamics, num_worlds: int) -> Self | None:
         """The same, if these are rules and moves that the kernel knows."""
-        if type(task) not in (CollectCubes, Practice) or type(dynamics) is not ComputerVision:
+        if type(task) not in (CollectCubes, Practice):
             return None
-        return cls(task, dynamics, num_worlds)
+        if type(dynamics) is ComputerVision or (
+            type(dynamics) is Quadrotor and FlyingFleet.knows(dynamics)
+        ):
+            return cls(task, dynamics, num_worlds)
+        return None
 
     def begin(self, state: WorldState) -> None:
         """Takes worlds over at the start of episodes; the state itself stays as it is."""
         count = len(state)
         self._drones[:count] = state.drone
         self._cubes[:count] = state.cubes
+        if isinstance(state.body, FlightState):
+            self._fleet.begin(state.body)
         for values in (self._fates, self.steps, self.end_reasons):
             values[:count] = 0

@@ -9,13 +9,14 @@
 # pyright: reportAttributeAccessIssue=false
 # (Warp compiles this file; Python's types say nothing about it, and what a loop changes is
 # declared by its type.)
-"""`rules` for kernels that fly whole episodes, a world at a time, in computer-vision mode.
+"""`rules` for kernels that fly whole episodes, a world at a time.
 
 The same numbers, bit for bit: places are of double precision here, too.
 """
 
 import warp as wp
 
+from drone_rl.sim.dynamics.moves_kernel import Fleet, camera_attitude, fly_move, is_flying
 from drone_rl.sim.rendering.raytrace_structs import DRONE_FRAME, Poses
 from drone_rl.sim.tasks.collect_cubes.playing import VANISHED_DEPTH
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
@@ -44,7 +45,9 @@ class Flights:
     steps: wp.array[int]
     end_reasons: wp.array[int]
     moves: wp.array[wp.vec3d]
-    """One an action."""
+    """One an action, in computer-vision mode."""
+    fleet: Fleet
+    """The drones, where they fly."""
     touch_distance: wp.float64
     front_bound: wp.float64
     side_bound: wp.float64
@@ -53,7 +56,7 @@ class Flights:
 
 @wp.func
 def place(flights: Flights, world: int, poses: Poses) -> None:
-    """Says where the drone and the cubes are drawn; its attitude never changes.
+    """Says where the drone and the cubes are drawn; its attitude changes in flight alone.
 
     Args:
         flights: The worlds.
@@ -61,6 +64,8 @@ def place(flights: Flights, world: int, poses: Poses) -> None:
         poses: Of as many worlds.
     """
     poses.places[world, DRONE_FRAME] = wp.vec3(flights.drones[world])
+    if is_flying(flights.fleet):
+        poses.attitudes[world] = camera_attitude(flights.fleet, world)
     for cube in range(flights.cubes.shape[1]):
         at = flights.cubes[world, cube]
         if flights.fates[world, cube] != STANDS:
@@ -70,7 +75,7 @@ def place(flights: Flights, world: int, poses: Poses) -> None:
 
 @wp.func
 def move(flights: Flights, world: int, action: int) -> float:
-    """Moves a drone, as `ComputerVision` does, and applies the rules, as `rules.judge` does.
+    """Moves a drone, as its dynamics do, and applies the rules, as `rules.judge` does.
 
     Args:
         flights: The worlds.
@@ -80,7 +85,11 @@ def move(flights: Flights, world: int, action: int) -> float:
     Returns:
         The reward.
     """
-    drone = flights.drones[world] + flights.moves[action]
+    drone = flights.drones[world]
+    if is_flying(flights.fleet):
+        drone = fly_move(flights.fleet, world, action)
+    else:
+        drone = drone + flights.moves[action]
     flights.drones[world] = drone
     flights.steps[world] = flights.steps[world] + 1
     reward = float(0.0)
