@@ -1,4 +1,3 @@
-# ruff: noqa: RUF046, UP018
 # pyright: reportIndexIssue=false
 # pyright: reportGeneralTypeIssues=false
 # pyright: reportOperatorIssue=false

@@ -1,4 +1,3 @@
-# ruff: noqa: UP018
 # pyright: reportIndexIssue=false
 # pyright: reportGeneralTypeIssues=false
 # pyright: reportOperatorIssue=false
