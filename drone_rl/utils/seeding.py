@@ -33,6 +33,8 @@ class Stream(enum.IntEnum):
     """Worlds in which a policy is flown under other conditions than it was trained in."""
     SHIFTS = 10
     """How these conditions differ from world to world and from step to step."""
+    SENSORS = 11
+    """Noise of what drones sense beside pictures."""
 
 
 def seed_sequence(seed: int, *key: int) -> np.random.SeedSequence:

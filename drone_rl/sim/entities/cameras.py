@@ -7,6 +7,7 @@ from typing import NamedTuple
 from dm_control import mjcf
 
 from drone_rl.sim.settings.camera import FRONT
+from drone_rl.utils.errors import InputError
 
 
 class CameraSpec(NamedTuple):
@@ -28,6 +29,24 @@ DRONE_CAMERAS = (FRONT_CENTER, FRONT_RIGHT, FRONT_LEFT, BOTTOM_CENTER, BACK_CENT
 """In the order of AirSim's camera numbers 0 to 4."""
 
 CHASE = CameraSpec("chase", (-7.0, 0, 3.5), (0, -1, 0, 0.34, 0, 0.94))
+
+
+def find_camera(name: str | int) -> CameraSpec:
+    """A camera by AirSim's name or number.
+
+    Args:
+        name: Such as "back_center", "4" or 4; "" and "fpv" are the one in front.
+
+    Raises:
+        InputError: There is none.
+    """
+    if name in ("", "fpv"):
+        return FRONT_CENTER
+    for number, spec in enumerate(DRONE_CAMERAS):
+        if str(name) in (spec.name, str(number)):
+            return spec
+    names = ", ".join(f"{spec.name} ({i})" for i, spec in enumerate(DRONE_CAMERAS))
+    raise InputError(f"camera {name!r} is unknown; choose from: {names}")
 
 
 def add_camera(body: mjcf.Element, spec: CameraSpec, vertical_fov: float) -> mjcf.Element:

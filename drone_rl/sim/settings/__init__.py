@@ -8,6 +8,7 @@ from drone_rl.sim.settings.dynamics import COMPUTER_VISION, DynamicsSettings
 from drone_rl.sim.settings.pillars import PillarsSettings
 from drone_rl.sim.settings.registry import TASKS, named_settings, read_task, settings_of
 from drone_rl.sim.settings.renderers import RENDERERS, RendererName
+from drone_rl.sim.settings.sensors import SensorSettings
 from drone_rl.sim.settings.task import BaseTaskSettings
 
 __all__ = [
@@ -23,6 +24,7 @@ __all__ = [
     "DynamicsSettings",
     "PillarsSettings",
     "RendererName",
+    "SensorSettings",
     "TaskSettings",
     "named_settings",
     "read_task",

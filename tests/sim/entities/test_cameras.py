@@ -3,6 +3,7 @@ import pytest
 from dm_control import mjcf
 
 from drone_rl.sim.entities import cameras
+from drone_rl.utils.errors import InputError
 
 LOOKS = {
     "front_center": (1, 0, 0),
@@ -26,3 +27,13 @@ def test_each_camera_looks_where_its_name_says_and_stands_upright(spec):
     assert np.sign(spec.pos[1]) == side
     assert up[2] == pytest.approx(1.0) or spec.name == "bottom_center"
     assert right[1] == pytest.approx(1.0 if spec.name == "back_center" else -1.0)
+
+
+def test_cameras_are_found_by_airsims_names_and_numbers():
+    for number, name in enumerate(LOOKS):
+        for known in (name, str(number), number):
+            assert cameras.find_camera(known).name == name
+    assert cameras.find_camera("").name == cameras.find_camera("fpv").name == "front_center"
+    assert cameras.find_camera("3").name == "bottom_center"
+    with pytest.raises(InputError, match=r"camera 'nose' is unknown; choose from: front_c"):
+        cameras.find_camera("nose")

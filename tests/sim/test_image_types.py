@@ -1,0 +1,139 @@
+import math
+
+import pytest
+import torch
+
+from drone_rl.sim.image_types import ImageRequest, ImageType, image, images, pixels
+from drone_rl.sim.segmentation import default_id, object_names, palette
+from drone_rl.sim.settings import CameraSettings
+from drone_rl.sim.worlds import Worlds
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.seeding import world_random_state
+
+DEPTHS = torch.tensor([[[0.0, 2.0], [50.0, 250.0]]])
+"""One world; nothing is hit in the first pixel."""
+
+
+@pytest.fixture(scope="module")
+def worlds():
+    """Cameras of 90 degrees across, 1 m above the ground; three red cubes before them."""
+    fov = CameraSettings(width=15, height=9, horizontal_fov=90.0)
+    made = Worlds(2, camera=fov)
+    made.reset(torch.arange(2), [world_random_state(0, i) for i in range(2)])
+    made.state.body.position[:, 2] = 1.0
+    yield made
+    made.close()
+
+
+def grays(found):
+    assert (found[..., :1] == found).all()
+    return found[..., 0].tolist()
+
+
+@pytest.mark.parametrize("kind", [ImageType.DEPTH_PLANAR, ImageType.DEPTH_PERSPECTIVE])
+def test_depths_are_metres_far_away_where_nothing_is_hit(kind):
+    assert pixels(kind, DEPTHS, as_float=True).tolist() == [[[65504.0, 2.0], [50.0, 250.0]]]
+    assert grays(pixels(kind, DEPTHS)) == [[[255, 2], [50, 250]]]
+    beyond = torch.full((1, 1, 1), 1e6)
+    assert pixels(kind, beyond, as_float=True).item() == 65504.0
+    assert pixels(kind, beyond + 0.0)[0, 0, 0].tolist() == [255, 255, 255]
+
+
+def test_depth_as_a_picture_is_white_from_100_metres_on():
+    found = pixels(ImageType.DEPTH_VIS, DEPTHS, as_float=True)
+    torch.testing.assert_close(found, torch.tensor([[[1.0, 0.02], [0.5, 1.0]]]))
+    assert grays(pixels(ImageType.DEPTH_VIS, DEPTHS)) == [[[255, 5], [128, 255]]]
+
+
+def test_disparity_is_focal_length_times_baseline_over_depth_and_width():
+    """8 pixels * 0.25 m / 2 m = 1 pixel of 2; at 50 m 0.04 pixels; nearer than 1 m all of it."""
+    found = pixels(ImageType.DISPARITY_NORMALIZED, DEPTHS, as_float=True, focal=8.0)
+    torch.testing.assert_close(found, torch.tensor([[[0.0, 0.5], [0.02, 0.004]]]))
+    near = torch.tensor([[[0.5, 0.5]]])
+    found = pixels(ImageType.DISPARITY_NORMALIZED, near, as_float=True, focal=8.0)
+    assert found.tolist() == [[[1.0, 1.0]]]
+    assert grays(pixels(ImageType.DISPARITY_NORMALIZED, DEPTHS, focal=8.0)) == [[[0, 128], [5, 1]]]
+
+
+def test_segments_have_airsims_colours():
+    geoms = torch.tensor([[[-1, 0], [1, 1]]], dtype=torch.int32)
+    found = pixels(ImageType.SEGMENTATION, geoms, ids=torch.tensor([3, 255]))
+    white = [255, 255, 255]
+    assert found.tolist() == [[[[0, 0, 0], [89, 121, 72]], [white, white]]]
+    reds = pixels(ImageType.SEGMENTATION, geoms, ids=torch.tensor([3, 255]), as_float=True)
+    torch.testing.assert_close(reds, torch.tensor([[[0.0, 89 / 255], [1.0, 1.0]]]))
+    own = pixels(ImageType.SEGMENTATION, geoms)
+    assert own[0, 0, 1].tolist() == [0, 0, 0] and own[0, 1, 0].tolist() == [153, 108, 6]
+
+
+def test_normals_are_colours_around_grey():
+    directions = torch.tensor([[[[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]], [[-1.0, 0.0, 0.0]] * 2]])
+    found = pixels(ImageType.SURFACE_NORMALS, directions)
+    side = [0, 128, 128]
+    assert found.tolist() == [[[[0, 0, 0], [128, 128, 255]], [side, side]]]
+    reds = pixels(ImageType.SURFACE_NORMALS, directions, as_float=True)
+    torch.testing.assert_close(reds, torch.tensor([[[0.0, 128 / 255], [0.0, 0.0]]]))
+
+
+def test_scenes_are_what_the_renderer_draws(worlds):
+    found = image(worlds)
+    assert torch.equal(found, worlds.render(worlds.state))
+    assert (tuple(found.shape), found.dtype) == ((2, 9, 15, 3), torch.uint8)
+    reds = image(worlds, as_float=True)
+    torch.testing.assert_close(reds, found[..., 0].float() / 255)
+
+
+@pytest.mark.parametrize("kind", list(ImageType))
+def test_all_types_have_the_same_shapes(worlds, kind):
+    found = image(worlds, worlds.state[:1], "1", kind, height=6, width=8)
+    assert (tuple(found.shape), found.dtype) == ((1, 6, 8, 3), torch.uint8)
+    found = image(worlds, worlds.state[:1], 1, int(kind), height=6, width=8, as_float=True)
+    assert (tuple(found.shape), found.dtype) == ((1, 6, 8), torch.float32)
+    assert found.isfinite().all()
+
+
+def test_the_ground_seen_from_above(worlds):
+    """The camera under the drone is 0.9 m above it; rays 4 of 7.5 pixels aside are longer."""
+    requests = [ImageRequest("bottom_center", kind, as_float=True) for kind in range(1, 5)]
+    planar, rays, visual, disparity = images(worlds, None, requests)
+    middle = (0, 4, 7)
+    torch.testing.assert_close(planar[0], torch.full((9, 15), 0.9), rtol=1e-4, atol=0.0)
+    assert rays[middle].item() == pytest.approx(0.9, rel=1e-4)
+    aside = math.hypot(1.0, 4 / 7.5)
+    assert rays[0, 0, 7].item() == pytest.approx(0.9 * aside, rel=1e-4)
+    assert visual[middle].item() == pytest.approx(0.009, rel=1e-4)
+    assert disparity[middle].item() == pytest.approx(7.5 * 0.25 / 0.9 / 15, rel=1e-4)
+    normals = image(worlds, None, "3", ImageType.SURFACE_NORMALS)
+    assert normals[middle].tolist() == [128, 128, 255]
+    segments = image(worlds, None, "3", ImageType.SEGMENTATION)
+    assert torch.equal(segments[middle], palette()[default_id("ground")])
+    ids = torch.full((worlds.scene.model.ngeom,), 5)
+    segments = image(worlds, None, "3", ImageType.SEGMENTATION, ids=ids)
+    assert segments[middle].tolist() == [206, 190, 59]
+
+
+def test_a_second_camera_sees_the_same_as_many_pixels_aside_as_disparity_says(worlds):
+    """The camera at the right is 0.25 m beside that in the middle; the cube's face is flat."""
+    state = worlds.state[torch.tensor([0])]
+    cube = worlds.task.places(state)[0, 0]
+    state.body.position[0] = cube - torch.tensor([5.0, 0.0, 0.0])
+    names = object_names(worlds.scene)
+    ids = torch.tensor([255 if name == "target_0" else 0 for name in names])
+    kinds = ImageType.SEGMENTATION, ImageType.DISPARITY_NORMALIZED
+    requests = [ImageRequest(camera, kind, as_float=True) for camera in "01" for kind in kinds]
+    seen, share, aside, _ = images(worlds, state, requests, height=90, width=150, ids=ids)
+    middle, other = (picture[0, 45].nonzero().float().mean() for picture in (seen, aside))
+    face = 5.0 - 0.4 - 1.25
+    assert share[0, 45, 75].item() == pytest.approx(75 * 0.25 / face / 150, rel=1e-4)
+    assert (middle - other).item() == pytest.approx(150 * share[0, 45, 75].item(), abs=1.0)
+
+
+def test_what_there_is_not_is_refused(worlds):
+    with pytest.raises(InputError, match=r"image_type=8 is unknown; give one of: 0 \(scene\), 1"):
+        ImageRequest("0", 8)
+    with pytest.raises(InputError, match=r"camera '5' is unknown; choose from: front_center \(0\)"):
+        image(worlds, camera="5")
+    with pytest.raises(InputError, match="don't fit"):
+        image(worlds, image_type=ImageType.SEGMENTATION, ids=torch.tensor([1]))
+    with pytest.raises(InputError, match="shows nothing"):
+        images(worlds, None, [])
