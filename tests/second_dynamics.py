@@ -6,14 +6,14 @@ import math
 import torch
 
 from drone_rl.sim.actions import DiscreteActions
-from drone_rl.sim.dynamics import BodyState
+from drone_rl.sim.dynamics import BodyState, Dynamics
 
 TURN = math.pi / 2
 SPEED = 2.0
 """Metres a second; a step takes 0.1 s."""
 
 
-class Turning:
+class Turning(Dynamics):
     """Flies where its nose points, and turns it: attitude and speeds mean something here."""
 
     actions = DiscreteActions(
@@ -26,13 +26,13 @@ class Turning:
         colors=((0, 0, 0),) * 5,
     )
 
-    def start(self, position):
+    def start(self, position, seeds=None):
         """Already on its way."""
         body = BodyState.at_rest(position)
         body.velocity[:, 0] = SPEED
         return body
 
-    def step(self, body, action):
+    def step(self, body, action, obstacles=None):
         """Turns by a quarter or by half, then flies a tenth of a second."""
         yaw = 2 * torch.atan2(body.attitude[:, 3], body.attitude[:, 0])
         rate = torch.tensor([0.0, TURN, -TURN, 2 * TURN, 0.0], dtype=torch.float64)[action]

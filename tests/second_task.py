@@ -131,6 +131,9 @@ class Posts:
         """Where the posts are."""
         return state.posts
 
+    def obstacles(self, state):
+        """None: touching a post is a rule."""
+
     def info(self, state):
         """See `entries`."""
         return {

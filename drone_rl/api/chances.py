@@ -74,7 +74,7 @@ class Chances:
         rows.append(_row("mean cubes", told.cubes, "{:.4f}".format))
         for i, collected in enumerate(told.collected.unbind(-1)):
             rows.append(_row(f"cube {i + 1} collected", collected, _percent))
-        for reason in list(EndReason)[EndReason.FRONT_BOUNDARY :]:
+        for reason in list(EndReason)[EndReason.FRONT_BOUNDARY : EndReason.LOST_CONTROL]:
             text = f"ended: {reason.name.lower().replace('_', ' ')}"
             rows.append(_row(text, told.reasons[:, reason], _percent))
         rows.append(_row("mean length", told.steps, "{:.2f}".format))

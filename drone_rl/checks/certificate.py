@@ -38,7 +38,9 @@ MOST_CUBES = 8
 MOST_OUTCOMES = 2**11
 _MOST_MARKS = {b"[": 2**23, b"{": 2**13, b'"': 2**20, b",": 2**25}
 """Of each in a file; parsing takes up to a hundred bytes for one."""
-_ENDS = tuple(end.name.lower() for end in EndReason if end != EndReason.RUNNING)
+_NO_ENDS = (EndReason.RUNNING, EndReason.LOST_CONTROL)
+"""Nobody loses control who flies in computer-vision mode."""
+_ENDS = tuple(end.name.lower() for end in EndReason if end not in _NO_ENDS)
 _DIGITS = len(str(10**5))
 
 

@@ -18,7 +18,14 @@ from drone_rl.sim.actions import Entry
 from drone_rl.sim.appearances import Appearances
 from drone_rl.sim.dynamics import Dynamics
 from drone_rl.sim.rendering import MakeRenderer, check_device
-from drone_rl.sim.settings import MINIMAL, AppearanceSettings, BaseTaskSettings, CameraSettings
+from drone_rl.sim.settings import (
+    MINIMAL,
+    ActionSettings,
+    AppearanceSettings,
+    BaseTaskSettings,
+    CameraSettings,
+    DynamicsSettings,
+)
 from drone_rl.sim.tasks import Task, as_task
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
@@ -51,7 +58,8 @@ class DroneEnv(EnvBase):
         num_shards: int | None = None,
         pixels: bool = True,
         device: str = "cpu",
-        dynamics: Dynamics | None = None,
+        dynamics: Dynamics | DynamicsSettings | None = None,
+        actions: ActionSettings | None = None,
         renderer: str | MakeRenderer = "raytrace",
         appearance: AppearanceSettings | None = None,
     ) -> None:
@@ -68,12 +76,13 @@ class DroneEnv(EnvBase):
             pixels: Whether to draw and observe; policies that read the truth don't need it.
             device: "cpu", "cuda" or "cuda:N".
             dynamics: How the drones move; the task's own choice by default.
+            actions: What they can be asked for, where dynamics are settings; moves by default.
             renderer: Who draws, see `drone_rl.sim.rendering.find_renderer`.
             appearance: How worlds look; what it leaves open is drawn at every reset.
 
         Raises:
-            InputError: A setting is out of range, a texture can't be read, or there is no room for
-                the camera or for distractors.
+            InputError: A setting is out of range, a texture can't be read, there is no room for
+                the camera or for distractors, or the dynamics bring actions of their own.
         """
         if not (isinstance(num_envs, int) and num_envs >= 1):
             raise InputError(f"num_envs={num_envs} is out of range; give a whole number from 1")
@@ -86,6 +95,7 @@ class DroneEnv(EnvBase):
             task,
             camera,
             dynamics=dynamics,
+            actions=actions,
             renderer=renderer,
             device=device,
             num_shards=num_shards,

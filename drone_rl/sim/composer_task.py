@@ -15,7 +15,8 @@ from dm_env import specs
 
 from drone_rl.sim.appearances import Appearances
 from drone_rl.sim.clutter import things_of
-from drone_rl.sim.dynamics import BodyState, Dynamics
+from drone_rl.sim.dynamics import BodyState, Dynamics, draw_seeds, make_dynamics
+from drone_rl.sim.dynamics.body import heading_only
 from drone_rl.sim.entities.arena import DRAW_DISTANCE, SKY_COLOR, Field
 from drone_rl.sim.entities.distractor import make_distractors
 from drone_rl.sim.entities.drone import Drone, hide_drone
@@ -23,7 +24,13 @@ from drone_rl.sim.meaning import Meaning
 from drone_rl.sim.rendering import Appearance, opengl_looks
 from drone_rl.sim.rendering.opengl_looks import OpenGlLooks
 from drone_rl.sim.rendering.scene import Scene
-from drone_rl.sim.settings import AppearanceSettings, BaseTaskSettings, CameraSettings
+from drone_rl.sim.settings import (
+    ActionSettings,
+    AppearanceSettings,
+    BaseTaskSettings,
+    CameraSettings,
+    DynamicsSettings,
+)
 from drone_rl.sim.tasks import State, Task, as_task
 
 _SKY = 0.69 * DRAW_DISTANCE
@@ -44,7 +51,8 @@ class ComposerTask(composer.Task):
         task: BaseTaskSettings | Task[Any] | None = None,
         camera: CameraSettings | None = None,
         *,
-        dynamics: Dynamics | None = None,
+        dynamics: Dynamics | DynamicsSettings | None = None,
+        actions: ActionSettings | None = None,
         pixels: bool = True,
         distractors: int = 0,
         appearance: AppearanceSettings | None = None,
@@ -55,16 +63,18 @@ class ComposerTask(composer.Task):
             task: What there is to do; cube collection as in the original study by default.
             camera: Picture size and field of view; 64x25 pixels and 135 degrees by default.
             dynamics: How the drone moves; computer-vision mode by default.
+            actions: What it can be asked for, where dynamics are settings; moves by default.
             pixels: Whether to observe the front-center camera, which needs OpenGL.
             distractors: Things that mean nothing, behind the task's own props; as many as the
                 appearance has where it is given.
             appearance: How the world looks, see `OpenGlLooks`; as the task has it by default.
 
         Raises:
-            InputError: A texture can't be read, or there is no room for camera or distractors.
+            InputError: A texture can't be read, there is no room for camera or distractors, or the
+                dynamics bring actions of their own.
         """
         self.rules = as_task(task)
-        self.dynamics = dynamics or self.rules.make_dynamics()
+        self.dynamics = make_dynamics(self.rules, dynamics, actions)
         self.camera = camera or CameraSettings()
         self._looks = self._worn = None
         if appearance is not None and not appearance.is_minimal:
@@ -154,9 +164,11 @@ class ComposerTask(composer.Task):
         """Moves the drone from wherever it is now."""
         del random_state
         given = torch.as_tensor(action).reshape(1, *self.dynamics.actions.entry.shape)
-        moved = self.dynamics.step(
-            self._found(physics), given.to(self.dynamics.actions.entry.dtype)
-        )
+        given, body = given.to(self.dynamics.actions.entry.dtype), self._found(physics)
+        if self.dynamics.needs_obstacles:
+            moved = self.dynamics.step(body, given, self.rules.obstacles(self._state))
+        else:
+            moved = self.dynamics.step(body, given)
         self._state.body = moved
         self._show(physics)
 
@@ -186,18 +198,32 @@ class ComposerTask(composer.Task):
     def _begin(self, random_state: np.random.RandomState) -> None:
         origin = torch.tensor([self.rules.origin], dtype=torch.float64)
         drawn = self.rules.draw(random_state)
-        self._state = self.rules.start(drawn[None], self.dynamics.start(origin))
+        body = (
+            self.dynamics.start(origin, draw_seeds([random_state]))
+            if self.dynamics.is_random
+            else self.dynamics.start(origin)
+        )
+        self._state = self.rules.start(drawn[None], body)
         self._reward = 0.0
 
     def _found(self, physics: mjcf.Physics) -> BodyState:
         """The drone where MuJoCo has it: its pose may have been set by hand."""
-        pose = [torch.from_numpy(np.array(p))[None] for p in self._drone.get_pose(physics)]
-        return dataclasses.replace(self._state.body, position=pose[0], attitude=pose[1])
+        body = self._state.body
+        position, attitude = (
+            torch.from_numpy(np.array(p))[None] for p in self._drone.get_pose(physics)
+        )
+        if self.dynamics.mount == "gimbal" and _is_same_turn(attitude, self._shown(body)):
+            attitude = body.attitude  # of which the gimbal shows the heading alone
+        return dataclasses.replace(body, position=position, attitude=attitude)
+
+    def _shown(self, body: BodyState) -> torch.Tensor:
+        """The attitude that cameras have. Shape: (1, 4)."""
+        return heading_only(body.attitude) if self.dynamics.mount == "gimbal" else body.attitude
 
     def _show(self, physics: mjcf.Physics) -> None:
         """Puts the drone and the props where the state has them."""
         body = self._state.body
-        self._drone.set_pose(physics, body.position[0].numpy(), body.attitude[0].numpy())
+        self._drone.set_pose(physics, body.position[0].numpy(), self._shown(body)[0].numpy())
         places = self.rules.places(self._state)[0]
         if self._look is not None and self._look.beside is not None:
             places = torch.cat([places, self._look.beside.of(1).places[0]])
@@ -237,18 +263,26 @@ class ComposerTask(composer.Task):
         return self.rules.info(self._state)[name][0].numpy()
 
 
+def _is_same_turn(one: torch.Tensor, other: torch.Tensor) -> bool:
+    """Whether quaternions mean the same, but for rounding."""
+    return 1.0 - float((one * other).sum().abs()) < 1e-12
+
+
 def make_environment(
     task: BaseTaskSettings | Task[Any] | None = None,
     camera: CameraSettings | None = None,
     *,
-    dynamics: Dynamics | None = None,
+    dynamics: Dynamics | DynamicsSettings | None = None,
+    actions: ActionSettings | None = None,
     pixels: bool = True,
     random_state: np.random.RandomState | int | None = None,
     appearance: AppearanceSettings | None = None,
 ) -> composer.Environment:
     """The task as a plain dm_control environment, for its viewer and other users of `dm_env`."""
     return composer.Environment(
-        ComposerTask(task, camera, dynamics=dynamics, pixels=pixels, appearance=appearance),
+        ComposerTask(
+            task, camera, dynamics=dynamics, actions=actions, pixels=pixels, appearance=appearance
+        ),
         random_state=random_state,
         strip_singleton_obs_buffer_dim=True,
         recompile_mjcf_every_episode=False,

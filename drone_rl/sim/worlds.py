@@ -11,7 +11,8 @@ from torch import Tensor
 from drone_rl.sim.actions import Entry
 from drone_rl.sim.clutter import HIDDEN_DEPTH
 from drone_rl.sim.composer_task import ComposerTask
-from drone_rl.sim.dynamics import BodyState, Dynamics
+from drone_rl.sim.dynamics import BodyState, Dynamics, draw_seeds, make_dynamics
+from drone_rl.sim.dynamics.body import heading_only
 from drone_rl.sim.entities.cameras import FRONT_CENTER
 from drone_rl.sim.rendering import (
     Appearance,
@@ -23,7 +24,12 @@ from drone_rl.sim.rendering import (
     find_renderer,
 )
 from drone_rl.sim.rendering.view import Modality
-from drone_rl.sim.settings import BaseTaskSettings, CameraSettings
+from drone_rl.sim.settings import (
+    ActionSettings,
+    BaseTaskSettings,
+    CameraSettings,
+    DynamicsSettings,
+)
 from drone_rl.sim.tasks import State, Task, as_task
 from drone_rl.utils.errors import InputError
 
@@ -39,7 +45,8 @@ class Worlds:
         task: BaseTaskSettings | Task[Any] | None = None,
         camera: CameraSettings | None = None,
         *,
-        dynamics: Dynamics | None = None,
+        dynamics: Dynamics | DynamicsSettings | None = None,
+        actions: ActionSettings | None = None,
         renderer: str | MakeRenderer = "raytrace",
         device: str = "cpu",
         num_shards: int | None = None,
@@ -53,6 +60,8 @@ class Worlds:
             task: What there is to do; cube collection as in the original study by default.
             camera: The policy's.
             dynamics: How the drones move; the task's own choice by default.
+            actions: What they can be asked for, where dynamics are the task's or settings; moves
+                by default.
             renderer: Who draws, see `find_renderer`.
             device: "cpu", "cuda" or "cuda:N".
             num_shards: See `MakeRenderer`.
@@ -61,7 +70,7 @@ class Worlds:
             distractors: How many there may be; appearances say where they stand.
 
         Raises:
-            InputError: There is no such renderer.
+            InputError: There is no such renderer, or the dynamics bring actions of their own.
         """
         self.appearance, self.distractors = appearance, distractors
         self._looked: tuple[Appearance, Appearance | None, Appearance] | None = None
@@ -69,7 +78,7 @@ class Worlds:
         self.num_worlds = num_worlds
         self.task = as_task(task)
         self.camera = camera or CameraSettings()
-        self.dynamics = dynamics or self.task.make_dynamics()
+        self.dynamics = make_dynamics(self.task, dynamics, actions)
         self.device = torch.device(device)
         self._every = torch.arange(num_worlds, device=self.device)
         self._make_renderer, self._num_shards = find_renderer(renderer), num_shards
@@ -146,18 +155,19 @@ class Worlds:
             show_drone=show_drone,
         )
 
-    def start(self, drawn: Tensor) -> State:
+    def start(self, drawn: Tensor, seeds: Tensor | None = None) -> State:
         """States at the start of episodes, be they these worlds' or imagined ones.
 
         Args:
             drawn: What is random about each, as `Task.draw` returns it. First dimension: worlds.
+            seeds: What is random about how drones move, see `Dynamics.start`. Shape: (worlds,).
         """
-        return self.task.start(drawn, self.bodies(len(drawn))).to(self.device)
+        return self.task.start(drawn, self.bodies(len(drawn), seeds)).to(self.device)
 
-    def bodies(self, count: int) -> BodyState:
-        """Drones at the start of episodes, on the CPU."""
-        origin = torch.tensor(self.task.origin, dtype=torch.float64)
-        return self.dynamics.start(origin.repeat(count, 1))
+    def bodies(self, count: int, seeds: Tensor | None = None) -> BodyState:
+        """Drones at the start of episodes, on the CPU; see `start`."""
+        place = torch.tensor(self.task.origin, dtype=torch.float64).repeat(count, 1)
+        return self.dynamics.start(place) if seeds is None else self.dynamics.start(place, seeds)
 
     def reset(self, worlds: Tensor, random_states: Sequence[np.random.RandomState]) -> None:
         """Starts new episodes.
@@ -166,8 +176,11 @@ class Worlds:
             worlds: Indices of the worlds. Shape: (k,).
             random_states: One a world, from which its episode is drawn.
         """
-        if len(worlds):
-            self.state[worlds] = self.start(torch.stack([self.task.draw(r) for r in random_states]))
+        if not len(worlds):
+            return
+        drawn = torch.stack([self.task.draw(r) for r in random_states])
+        seeds = draw_seeds(random_states) if self.dynamics.is_random else None
+        self.state[worlds] = self.start(drawn, seeds)
 
     def step(self, worlds: Tensor, action: Tensor) -> Tensor:
         """Moves the drones of some worlds and applies the rules.
@@ -189,7 +202,10 @@ class Worlds:
 
     def advance(self, state: State, action: Tensor) -> tuple[State, Tensor]:
         """What becomes of worlds, be they these or imagined ones, and the reward of each."""
-        return self.task.judge(state, self.dynamics.step(state.body, action))
+        if not self.dynamics.needs_obstacles:
+            return self.task.judge(state, self.dynamics.step(state.body, action))
+        obstacles = self.task.obstacles(state)
+        return self.task.judge(state, self.dynamics.step(state.body, action, obstacles))
 
     def render(
         self, state: State, view: View | None = None, appearance: Appearance | None = None
@@ -234,7 +250,7 @@ class Worlds:
         return known[2]
 
     def poses(self, state: State, appearance: Appearance | None = None) -> Poses:
-        """Where a renderer must draw everything.
+        """Where a renderer must draw everything; on a gimbal, cameras and drone stay level.
 
         Args:
             state: Of the worlds.
@@ -243,7 +259,10 @@ class Worlds:
         props = self.task.places(state)
         if self.distractors:
             props = torch.cat([props, self._beside(appearance, len(props)).to(props)], 1)
-        return Poses(state.body.position, state.body.attitude, props)
+        attitude = state.body.attitude
+        if self.dynamics.mount == "gimbal":
+            attitude = heading_only(attitude)
+        return Poses(state.body.position, attitude, props)
 
     def _beside(self, appearance: Appearance | None, count: int) -> Tensor:
         beside = None if appearance is None else appearance.beside

@@ -135,6 +135,7 @@ CUBES = Terms(
         "front_boundary": "behind the last cube",
         "side_boundary": "outside the field, left or right",
         "step_limit": "at the step limit",
+        "lost_control": "with the drone out of control",
     },
 )
 """Of cube collection, and of files that say nothing of their words."""

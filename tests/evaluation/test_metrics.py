@@ -46,7 +46,8 @@ def test_summary_by_hand(episodes):
     assert shares["right"] == {**mean_bounds([0.0]), "goals": 1}
     assert summary["never_reached"] == mean_bounds([0.0, 0.0, 0.5])
     ends = {name: end["successes"] for name, end in summary["ends"].items()}
-    assert ends == {"all_cubes": 1, "front_boundary": 1, "side_boundary": 0, "step_limit": 1}
+    none = {"side_boundary": 0, "lost_control": 0}
+    assert ends == {"all_cubes": 1, "front_boundary": 1, "step_limit": 1, **none}
     assert (summary["mean_length"], summary["max_length"]) == (30.0, 60)
 
 

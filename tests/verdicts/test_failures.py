@@ -44,7 +44,7 @@ def test_an_episode_fails_once_at_its_first_miss(episodes):
 
 def test_intervals_of_all_rows_hold_at_once(episodes):
     rows = failure_table(episodes)["rows"]
-    assert len(rows) == 3 + 3 + 4 + 3
+    assert len(rows) == 3 + 3 + 4 + 4
     exact = proportion(1, 2, 1 - 0.05 / len(rows))
     second = next(r for r in rows if r["value"] == "second")
     assert (second["lower95"], second["upper95"]) == (exact["lower95"], exact["upper95"])

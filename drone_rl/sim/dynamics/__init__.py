@@ -5,6 +5,7 @@ from drone_rl.sim.dynamics.computer_vision import ComputerVision
 from drone_rl.sim.dynamics.dynamics import Dynamics
 from drone_rl.sim.dynamics.flight_state import Contact, FlightState
 from drone_rl.sim.dynamics.goals import Goals, Mode
+from drone_rl.sim.dynamics.making import draw_seeds, make_dynamics
 from drone_rl.sim.dynamics.obstacles import Obstacles
 from drone_rl.sim.dynamics.quadrotor import Quadrotor
 
@@ -18,4 +19,6 @@ __all__ = [
     "Mode",
     "Obstacles",
     "Quadrotor",
+    "draw_seeds",
+    "make_dynamics",
 ]

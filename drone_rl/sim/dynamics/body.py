@@ -12,6 +12,21 @@ LEVEL = (1.0, 0.0, 0.0, 0.0)
 """The attitude of a drone that is level and looks forward, quaternion (w, x, y, z)."""
 
 
+def heading_only(attitude: Tensor) -> Tensor:
+    """Attitudes without roll and pitch: what is left is the turn about the world's z axis.
+
+    Args:
+        attitude: Unit quaternions (w, x, y, z). Shape: (*, 4).
+
+    Returns:
+        The same shape; w is not negative.
+    """
+    w, x, y, z = attitude.unbind(-1)
+    half = 0.5 * torch.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    zero = torch.zeros_like(half)
+    return torch.stack([half.cos(), zero, zero, half.sin()], -1)
+
+
 @dataclasses.dataclass
 class BodyState(Batch):
     """The bodies of `num_worlds` drones. World frame (x forward, y left, z up), SI units."""

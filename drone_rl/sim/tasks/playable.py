@@ -10,7 +10,7 @@ from dm_control import mjcf
 from torch import Tensor
 
 from drone_rl.sim.actions import Entry
-from drone_rl.sim.dynamics import BodyState, Dynamics
+from drone_rl.sim.dynamics import BodyState, Dynamics, Obstacles
 from drone_rl.sim.meaning import Meaning
 
 
@@ -148,6 +148,10 @@ class Playable(Protocol[S]):
         Returns:
             Metres, world frame. Shape: (num_worlds, number of props, 3).
         """
+        ...
+
+    def obstacles(self, state: S) -> Obstacles | None:
+        """What the drones can fly into, for dynamics that know contacts; None where nothing is."""
         ...
 
     def info(self, state: S) -> dict[str, Tensor]:

@@ -7,8 +7,12 @@ from torchrl.envs.utils import check_env_specs
 from drone_rl.envs import DroneEnv
 from drone_rl.envs.composer_env import ComposerEnv
 from drone_rl.sim.composer_task import make_environment
+from drone_rl.sim.dynamics import Dynamics
+from drone_rl.sim.settings import MOVES_SETTINGS
+from drone_rl.sim.tasks import CollectCubes
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.seeding import world_random_state
+from tests.fake_flight import FLIGHT, Floating, floating
 from tests.second_dynamics import TURN, Turning
 
 
@@ -68,3 +72,83 @@ def test_torchrl_sees_its_actions_and_its_attitude():
     env.close()
     single = make_environment(dynamics=Turning(), pixels=False, random_state=0)
     assert ComposerEnv(single).action_spec.space.n == 5
+
+
+def test_who_derives_from_it_says_no_more_than_it_must():
+    class Still(Dynamics):
+        pass
+
+    still = Still()
+    assert (still.mount, still.is_random, still.needs_obstacles) == ("body", False, False)
+
+
+def test_an_episode_of_random_dynamics_has_a_seed_of_its_worlds_stream():
+    gusty = Floating(FLIGHT.replace(gusts=1.0), MOVES_SETTINGS)
+    calm = Floating(FLIGHT, MOVES_SETTINGS)
+    states = {}
+    for name, dynamics in (("gusty", gusty), ("calm", calm)):
+        worlds = Worlds(2, dynamics=dynamics)
+        worlds.reset(torch.arange(2), [world_random_state(0, i) for i in range(2)])
+        states[name] = worlds.state
+    assert torch.equal(states["gusty"].cubes, states["calm"].cubes)  # the task draws first
+    expected = []
+    for i in range(2):
+        stream = world_random_state(0, i)
+        CollectCubes().draw(stream)
+        expected.append(stream.randint(2**31 - 1))
+    assert states["gusty"].body.seed.tolist() == expected
+    assert states["calm"].body.seed.tolist() == [0, 0]
+    assert worlds.start(states["calm"].cubes).body.seed.tolist() == [0, 0]
+
+
+def test_dm_control_draws_the_same_seed():
+    gusty = Floating(FLIGHT.replace(gusts=1.0), MOVES_SETTINGS)
+    env = make_environment(dynamics=gusty, pixels=False, random_state=world_random_state(0, 0))
+    env.reset()
+    worlds = Worlds(1, dynamics=gusty)
+    worlds.reset(torch.arange(1), [world_random_state(0, 0)])
+    assert torch.equal(env.task.state.body.seed, worlds.state.body.seed)
+    assert worlds.state.body.seed.item() > 0
+
+
+@pytest.mark.parametrize("mount", ["gimbal", "body"])
+def test_a_gimbal_keeps_cameras_level_wherever_they_are_drawn(mount):
+    dynamics = Floating(FLIGHT.replace(camera_mount=mount), MOVES_SETTINGS)
+    worlds = Worlds(1, dynamics=dynamics)
+    half = 0.5**0.5
+    level = torch.tensor([[half, 0.0, 0.0, half]]).double()  # a quarter turn to the left
+    tilted = worlds.bodies(1).attitude
+    shown = worlds.poses(worlds.state).attitude
+    torch.testing.assert_close(shown, level if mount == "gimbal" else tilted)
+    torch.testing.assert_close(worlds.state.body.attitude, tilted)
+    env = make_environment(dynamics=dynamics, pixels=False, random_state=0)
+    env.reset()
+    env.step(0)
+    torch.testing.assert_close(env.task.state.body.attitude, tilted)
+    attitude = torch.tensor(env.task.drone.get_pose(env.physics)[1])[None]
+    torch.testing.assert_close(attitude, shown)
+    env.task.drone.set_pose(env.physics, [0.0, 0.0, 2.5], [0.0, 0.0, 0.0, 1.0])
+    env.step(0)  # turned by hand
+    assert env.task.state.body.attitude.tolist() == [[0.0, 0.0, 0.0, 1.0]]
+
+
+def test_settings_of_dynamics_do_wherever_dynamics_do(monkeypatch):
+    floating(monkeypatch)
+    windy = FLIGHT.replace(wind=(1.0, 0.0, 0.0))
+    for made in (
+        Worlds(1, dynamics=windy).dynamics,
+        DroneEnv(1, dynamics=windy, pixels=False).worlds.dynamics,
+        make_environment(dynamics=windy, pixels=False).task.dynamics,
+    ):
+        assert isinstance(made, Floating) and made.settings == windy
+        assert made.asked == MOVES_SETTINGS
+
+
+def test_a_lost_drone_ends_its_own_episode_alone():
+    env = DroneEnv(2, dynamics=Floating(FLIGHT, MOVES_SETTINGS), pixels=False)
+    state = env.reset()
+    for _ in range(6):
+        state = env.step(state.set("action", torch.tensor([1, 2])))["next"]
+    assert state["info", "end_reason"].flatten().tolist() == [5, 0]
+    assert state["terminated"].flatten().tolist() == [True, False]
+    env.close()

@@ -85,6 +85,10 @@ class Playing:
         hidden = (~state.present).double() * VANISHED_DEPTH
         return state.cubes - torch.nn.functional.pad(hidden[..., None], (2, 0))
 
+    def obstacles(self, state: WorldState) -> None:
+        """None: cubes are touched, not hit."""
+        del state
+
     def info(self, state: WorldState) -> dict[str, Tensor]:
         """See `entries`."""
         return {

@@ -35,6 +35,8 @@ class EndReason(enum.IntEnum):
     FRONT_BOUNDARY = 2
     SIDE_BOUNDARY = 3
     STEP_LIMIT = 4
+    LOST_CONTROL = 5
+    """Its motion diverged, see `BodyState.is_lost`: counts most of all reasons."""
 
 
 @dataclasses.dataclass
@@ -123,7 +125,8 @@ def judge(settings: TaskSettings, state: WorldState, body: BodyState) -> tuple[W
     """Applies Algorithms 1 and 3 after the drone has moved.
 
     A touched cube is collected and worth 1; a cube left behind vanishes; the episode ends when all
-    cubes are collected, when the drone is out of bounds, or at the step limit, in this order.
+    cubes are collected, when the drone is out of bounds, or at the step limit, in this order; a
+    drone whose motion has diverged ends it before all these.
 
     Args:
         settings: The task's.
@@ -164,10 +167,13 @@ def _sightings(settings: TaskSettings, state: WorldState) -> tuple[Tensor, Tenso
 def _end_reason(settings: TaskSettings, state: WorldState) -> Tensor:
     """The first reason that holds, in the order of Algorithm 3. Shape: (num_worlds,)."""
     x, y, _ = state.drone.unbind(-1)
-    return (
+    reason = (
         torch.zeros_like(state.steps)
         .masked_fill(state.steps >= settings.step_limit, EndReason.STEP_LIMIT)
         .masked_fill(y.abs() > settings.side_bound, EndReason.SIDE_BOUNDARY)
         .masked_fill(x > settings.front_bound, EndReason.FRONT_BOUNDARY)
         .masked_fill(state.collected.all(-1), EndReason.ALL_CUBES)
     )
+    if type(state.body) is BodyState:  # whose motion can't diverge
+        return reason
+    return reason.masked_fill(state.body.is_lost, EndReason.LOST_CONTROL)

@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from drone_rl.sim.actions import Entry
-from drone_rl.sim.dynamics import BodyState, ComputerVision
+from drone_rl.sim.dynamics import BodyState, ComputerVision, Obstacles
 from drone_rl.sim.entities.pillar import Pillar
 from drone_rl.sim.settings import PillarsSettings
 from drone_rl.sim.tasks.pillars import field, rules
@@ -84,6 +84,11 @@ class Playing:
         """The pillars at their places, or under the floor where none stands."""
         hidden = (~state.present).double() * VANISHED_DEPTH
         return state.pillars - torch.nn.functional.pad(hidden[..., None], (2, 0))
+
+    def obstacles(self, state: FieldState) -> Obstacles:
+        """The pillars."""
+        s = self.settings
+        return Obstacles(self.places(state), (s.width / 2, s.width / 2, s.height / 2))
 
     def info(self, state: FieldState) -> dict[str, Tensor]:
         """See `entries`."""

@@ -33,6 +33,8 @@ class EndReason(enum.IntEnum):
     PILLAR_TOUCHED = 2
     SIDE_BOUNDARY = 3
     STEP_LIMIT = 4
+    LOST_CONTROL = 5
+    """Its motion diverged, see `BodyState.is_lost`: counts most of all reasons."""
 
 
 @dataclasses.dataclass
@@ -251,10 +253,13 @@ def _passing(settings: PillarsSettings, rows: int, like: Tensor) -> Tensor:
 def _end_reason(settings: PillarsSettings, state: FieldState) -> Tensor:
     """The reason that counts most of those that hold. Shape: (N,)."""
     x, y, _ = state.drone.unbind(-1)
-    return (
+    reason = (
         torch.zeros_like(state.steps)
         .masked_fill(state.steps >= settings.step_limit, EndReason.STEP_LIMIT)
         .masked_fill(x >= settings.finish, EndReason.FINISH_LINE)
         .masked_fill(y.abs() > settings.spread, EndReason.SIDE_BOUNDARY)
         .masked_fill(state.touched.any(-1), EndReason.PILLAR_TOUCHED)
     )
+    if type(state.body) is BodyState:  # whose motion can't diverge
+        return reason
+    return reason.masked_fill(state.body.is_lost, EndReason.LOST_CONTROL)

@@ -37,6 +37,7 @@ _TERMS = Terms(
         "pillar_touched": "by touching a pillar",
         "side_boundary": "outside the field, left or right",
         "step_limit": "at the step limit",
+        "lost_control": "with the drone out of control",
     },
 )
 

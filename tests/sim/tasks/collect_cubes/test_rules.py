@@ -11,6 +11,7 @@ from drone_rl.sim.dynamics import BodyState, ComputerVision
 from drone_rl.sim.settings import TaskSettings
 from drone_rl.sim.tasks.collect_cubes import rules
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason, Side
+from tests.fake_flight import FLIGHT, Floating
 
 SETTINGS = TaskSettings()  # drone and cubes touch up to 1.65 m on each axis
 
@@ -50,7 +51,10 @@ def test_cubes_are_drawn_within_their_bounds_and_uniformly():
 def test_codes_are_those_of_recorded_files():
     assert [(a.name, a.value) for a in Move] == [("FORWARD", 0), ("LEFT", 1), ("RIGHT", 2)]
     assert [(s.name, s.value) for s in Side] == [("LEFT", 0), ("AHEAD", 1), ("RIGHT", 2)]
-    ends = ("RUNNING", "ALL_CUBES", "FRONT_BOUNDARY", "SIDE_BOUNDARY", "STEP_LIMIT")
+    ends = (
+        *("RUNNING", "ALL_CUBES", "FRONT_BOUNDARY", "SIDE_BOUNDARY", "STEP_LIMIT"),
+        "LOST_CONTROL",
+    )
     assert [(e.name, e.value) for e in EndReason] == [(n, i) for i, n in enumerate(ends)]
 
 
@@ -192,6 +196,21 @@ def test_of_coinciding_ends_the_first_in_the_order_counts(coinciding):
     order = ("ALL_CUBES", "FRONT_BOUNDARY", "SIDE_BOUNDARY", "STEP_LIMIT")
     expected = next((n for n, holds in zip(order, coinciding, strict=True) if holds), "RUNNING")
     assert ended.end_reason.item() == EndReason[expected]
+
+
+def test_a_lost_drone_ends_its_own_episode_and_for_that_reason():
+    cubes = torch.zeros(2, 3, 3).double()
+    cubes[..., 0] = 50.0
+    state = rules.start(SETTINGS, cubes)
+    state.collected[:] = True
+    body = Floating(FLIGHT, None).start(torch.zeros(2, 3).double())
+    body.lost[1] = True
+    ended, _ = rules.judge(SETTINGS, state, body)
+    assert ended.end_reason.tolist() == [EndReason.ALL_CUBES, EndReason.LOST_CONTROL]
+    state.collected[:] = False
+    body.position[:, 1] = 1000.0
+    ended, _ = rules.judge(SETTINGS, state, body)
+    assert ended.end_reason.tolist() == [EndReason.SIDE_BOUNDARY, EndReason.LOST_CONTROL]
 
 
 def test_collecting_but_not_passing_every_cube_ends_the_episode():

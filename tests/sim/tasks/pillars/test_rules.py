@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 from drone_rl.sim.settings import PillarsSettings
 from drone_rl.sim.tasks.pillars import rules
 from drone_rl.sim.tasks.pillars.rules import EndReason, Side
+from tests.fake_flight import FLIGHT, Floating
 from tests.sim.tasks.pillars.conftest import body
 
 L, A, R = Side.LEFT, Side.AHEAD, Side.RIGHT
@@ -23,7 +24,10 @@ def fly(settings, state, *places):
 
 
 def test_codes_are_those_of_recorded_files():
-    ends = ("RUNNING", "FINISH_LINE", "PILLAR_TOUCHED", "SIDE_BOUNDARY", "STEP_LIMIT")
+    ends = (
+        *("RUNNING", "FINISH_LINE", "PILLAR_TOUCHED", "SIDE_BOUNDARY", "STEP_LIMIT"),
+        "LOST_CONTROL",
+    )
     assert [(e.name, e.value) for e in EndReason] == [(n, i) for i, n in enumerate(ends)]
     assert [(s.name, s.value) for s in Side] == [("LEFT", 0), ("AHEAD", 1), ("RIGHT", 2)]
 
@@ -107,6 +111,16 @@ def test_a_pillar_counts_more_than_the_line_and_the_line_more_than_the_limit(set
     short = settings.replace(step_limit=20)
     state, _ = fly(short, field(FAR, FAR), *[(0.0, 0.0)] * 19, (20.0, 0.0))
     assert state.end_reason == EndReason.FINISH_LINE
+
+
+def test_a_lost_drone_counts_more_than_a_pillar(settings, field):
+    state = field((0.0, -6.0), FAR, x=7.0)
+    lost = Floating(FLIGHT, None).start(torch.tensor([[8.5, 0.0, 2.5]]).double())
+    state, _ = rules.judge(settings, state, lost)
+    assert state.end_reason == EndReason.PILLAR_TOUCHED
+    lost.lost[:] = True
+    state, _ = rules.judge(settings, field((0.0, -6.0), FAR, x=7.0), lost)
+    assert state.end_reason == EndReason.LOST_CONTROL and state.touched.any()
 
 
 def test_rows_come_up_one_after_the_other_and_are_passed_behind_them(settings, field):
