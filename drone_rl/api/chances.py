@@ -22,7 +22,7 @@ from drone_rl.proofs.subject import make_subject
 from drone_rl.settings.chances import ChanceSettings
 from drone_rl.settings.proving import ProveSettings
 from drone_rl.sim.settings import TaskSettings
-from drone_rl.sim.tasks.collect_cubes import require_cubes, rules
+from drone_rl.sim.tasks.collect_cubes import require_cubes, require_moves, rules
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.provenance import provenance
@@ -38,6 +38,9 @@ CELLS_AT_A_TIME = 2**22
 """Bounds memory."""
 PLACEMENTS_AT_A_TIME = 20
 """Between two words on progress."""
+
+
+_WHAT = "the chance of each placement"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -174,7 +177,8 @@ def chances(
     progress = progress or Bar()
     policy = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
     policy = policy.in_task(**(task or {}))
-    flown = require_cubes(policy.task, "the chance of each placement")
+    flown, described = require_cubes(policy.task, _WHAT), policy.description
+    require_moves(described.dynamics, described.actions, _WHAT)
     placed = _drawn(flown, settings) if cubes is None else _given(flown, cubes)
     at_a_time = max(1, CELLS_AT_A_TIME // shape_of(flown).nodes)
     parts = placed.split(min(at_a_time, PLACEMENTS_AT_A_TIME))

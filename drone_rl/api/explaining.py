@@ -138,6 +138,7 @@ def _explain(
             progress=lambda title: progress(f"{policy.name}: {title}"),
             claim=find_claim(policy),
             measured=measured,
+            unlike=policy.unlike,
         )
     finally:
         env.close()

@@ -16,7 +16,16 @@ from drone_rl.policies import ForeignNetwork
 from drone_rl.policies.foreign import Logits
 from drone_rl.settings.changes import Changes
 from drone_rl.settings.transforms import Gray, Rgb, Standardize, Transform
-from drone_rl.sim.settings import BaseTaskSettings, CameraSettings, TaskSettings
+from drone_rl.sim.dynamics import make_dynamics
+from drone_rl.sim.settings import (
+    COMPUTER_VISION,
+    MOVES_SETTINGS,
+    ActionSettings,
+    BaseTaskSettings,
+    CameraSettings,
+    DynamicsSettings,
+    TaskSettings,
+)
 from drone_rl.sim.tasks import Task, as_task
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import Stream
@@ -37,6 +46,17 @@ class ForeignPolicy(Pilot):
     camera: CameraSettings
     transforms: tuple[Transform, ...]
     """None: the camera's RGB bytes."""
+    own_dynamics: DynamicsSettings = COMPUTER_VISION  # pyright: ignore[reportIncompatibleMethodOverride] (a field)
+    """How its drone moved when it was made."""
+    actions: ActionSettings = MOVES_SETTINGS
+    """What its logits ask for."""
+    flown: DynamicsSettings | None = None
+    """How its drone moves now; as before by default."""
+
+    @property
+    def dynamics(self) -> DynamicsSettings:
+        """See `Pilot`."""
+        return self.flown or self.own_dynamics
 
     @property
     def task(self) -> BaseTaskSettings | Task[Any]:
@@ -58,6 +78,14 @@ class ForeignPolicy(Pilot):
         with below("task"):
             return dataclasses.replace(self, own_task=self.own_task.replace(**changed))
 
+    def in_dynamics(self, **changes: Any) -> "ForeignPolicy":
+        """See `Pilot`."""
+        changed = Changes(DynamicsSettings).read(changes, "dynamics")
+        with below("dynamics"):
+            flown = self.dynamics.replace(**changed)
+        flown.check_air()
+        return dataclasses.replace(self, flown=flown)
+
     def make_env(
         self,
         num_envs: int,
@@ -69,10 +97,14 @@ class ForeignPolicy(Pilot):
     ) -> TransformedEnv:
         """See `Pilot`."""
         task: Any = self.own_task
+        dynamics = kwargs.pop("dynamics", None) or self.dynamics
+        if isinstance(dynamics, DynamicsSettings):
+            kwargs.setdefault("actions", self.actions)
         return make_env(
             num_envs,
             task=task,
             camera=self.camera,
+            dynamics=dynamics,
             transforms=self.transforms or (Rgb(),),
             seed=seed,
             stream=stream,
@@ -93,7 +125,7 @@ class ForeignPolicy(Pilot):
         return ForeignNetwork(
             self.logits,
             picture.shape,
-            as_task(self.own_task).make_dynamics().actions,
+            make_dynamics(as_task(self.own_task), self.dynamics, self.actions).actions,
             takes_bytes=not self.transforms,
             device=device,
         )
@@ -110,6 +142,8 @@ def policy_from(
     *,
     task: BaseTaskSettings | Task[Any] | None = None,
     camera: CameraSettings | None = None,
+    dynamics: DynamicsSettings = COMPUTER_VISION,
+    actions: ActionSettings = MOVES_SETTINGS,
     transforms: Sequence[Transform] = (Gray(), Standardize()),
     name: str | None = None,
 ) -> ForeignPolicy:
@@ -123,6 +157,8 @@ def policy_from(
             each action (N, number of actions), as a tensor or an array.
         task: What it flies in.
         camera: The picture that the drone takes.
+        dynamics: How it moves.
+        actions: What the logits ask for.
         transforms: What becomes of the picture before it gets it; without any it gets the camera's
             own, RGB bytes (N, H, W, 3).
         name: For people; that of the callable by default.
@@ -140,6 +176,8 @@ def policy_from(
         own_task=task or TaskSettings(),
         camera=camera or CameraSettings(),
         transforms=tuple(transforms),
+        own_dynamics=dynamics,
+        actions=actions,
     )
     policy.make_network()  # refuses now what could not be asked later
     return policy

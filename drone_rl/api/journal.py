@@ -17,7 +17,7 @@ from drone_rl.settings.configuration import as_config
 from drone_rl.settings.provable import ProvableSettings
 from drone_rl.settings.training import TrainSettings
 from drone_rl.sim.settings import TaskSettings
-from drone_rl.sim.tasks.collect_cubes import require_cubes
+from drone_rl.sim.tasks.collect_cubes import require_cubes, require_moves
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import read_bytes, read_json, write_atomically
 from drone_rl.utils.schema import Plain, Real, Record, Several, Whole
@@ -104,7 +104,9 @@ class Journal:
     @property
     def task(self) -> TaskSettings:
         """The task, of which something can be proved."""
-        return require_cubes(self.settings.task, "training until it is proved")
+        told, what = self.settings, "training until it is proved"
+        require_moves(told.dynamics, told.actions, what)
+        return require_cubes(told.task, what)
 
     @property
     def is_proved(self) -> bool:

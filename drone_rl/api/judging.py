@@ -17,12 +17,12 @@ from drone_rl.api.progress import Bar, Progress
 from drone_rl.api.quoting import find_claim
 from drone_rl.api.showing import aligned, paragraph, table
 from drone_rl.conditions.measured import Measured
-from drone_rl.envs import DroneEnv
+from drone_rl.envs import DroneEnv, worlds_of
 from drone_rl.evaluation import run_episodes, summarise
 from drone_rl.policies.foreign import Logits
 from drone_rl.settings.changes import Changes
 from drone_rl.settings.judging import EvaluateSettings, FlightSettings, JudgeSettings
-from drone_rl.sim.settings import TaskSettings
+from drone_rl.sim.settings import DynamicsSettings, TaskSettings
 from drone_rl.sim.tasks import as_task
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.provenance import provenance
@@ -30,6 +30,7 @@ from drone_rl.utils.seeding import Stream, torch_generator
 from drone_rl.verdicts.judge import Verdict, judge_policy
 from drone_rl.verdicts.luck import BASELINES, fly_baselines, make_baseline
 from drone_rl.verdicts.rule import Rule
+from drone_rl.words.verdict import unlike as say_unlike
 
 
 @dataclasses.dataclass(frozen=True)
@@ -71,14 +72,17 @@ class Evaluation:
         return {
             "policy": origin["policy"],
             "seed": self.settings.seed,
+            **({"unlike": self.policy.unlike} if self.policy.unlike else {}),
             **self.flown,
             **provenance(),
             "trained": origin["trained"] and origin["trained"]["progress"],
         }
 
     def __str__(self) -> str:
-        """The table for a terminal."""
-        return aligned(self.rows(), are_numbers=True)
+        """The table for a terminal; in other dynamics than its own also what differs."""
+        figures = aligned(self.rows(), are_numbers=True)
+        unlike = self.policy.unlike
+        return f"{figures}\n{say_unlike({'unlike': unlike})}" if unlike else figures
 
     def _repr_html_(self) -> str:
         head, *rows = self.rows()
@@ -161,7 +165,7 @@ def evaluate(
     policy = as_pilot(policy)
     episodes, steps = settings.episodes, 3 if settings.baselines else 2
     with _flying(policy, settings) as (env, actor):
-        worlds = env.base_env.state_dict()
+        worlds, dynamics = env.base_env.state_dict(), worlds_of(env).dynamics
         progress("most probable actions", 0, steps)
         flown = {"greedy": run_episodes(env, actor, episodes)}
         env.base_env.load_state_dict(worlds)
@@ -170,7 +174,7 @@ def evaluate(
     if settings.baselines:
         progress("luck and the oracle", 2, steps)
         num_worlds, device = settings.num_worlds, settings.device
-        flown |= fly_baselines(num_worlds, policy.task, worlds, episodes, device)
+        flown |= fly_baselines(num_worlds, policy.task, worlds, episodes, device, dynamics)
     progress("evaluated", steps, steps)
     return Evaluation(policy, settings, {name: summarise(e) for name, e in flown.items()})
 
@@ -180,6 +184,7 @@ def judge(
     settings: JudgeSettings | None = None,
     *,
     task: Mapping[str, Any] | None = None,
+    dynamics: Mapping[str, Any] | None = None,
     certificate: str | Path | None = None,
     shifts: str | Path | None = None,
     require_domain: str | Path | None = None,
@@ -194,6 +199,7 @@ def judge(
             "random", "forward", "left", "right" or "oracle".
         settings: How it is judged.
         task: What to change of the policy's task or, for a baseline, of the default one.
+        dynamics: What to change of how its drone moves, likewise.
         certificate: A proof's file to quote; by default the one that lies with the policy, see
             `drone_rl.zoo.certificate_path`, if it is of this task.
         shifts: A file of its flights under other conditions to quote; by default what lies with the
@@ -218,9 +224,12 @@ def judge(
         _refuse_files(name, certificate=certificate, shifts=shifts, require_domain=require_domain)
     if pilot is None:
         changed = Changes(TaskSettings).read(task or {}, "task")
-        worlds = _baseline(name, TaskSettings(**changed), settings)
+        moved = DynamicsSettings(**Changes(DynamicsSettings).read(dynamics or {}, "dynamics"))
+        moved.check_air()
+        worlds = _baseline(name, TaskSettings(**changed), moved, settings)
     else:
         pilot = pilot.in_task(**(task or {}))
+        pilot = pilot.in_dynamics(**dynamics) if dynamics else pilot
         measured = find_domain(pilot, shifts, outputs)
         coverage = require(pilot, require_domain, measured) if require_domain is not None else None
         claim = find_claim(
@@ -234,7 +243,15 @@ def judge(
         worlds = _flying(pilot, settings)
     draws, rule = settings.sampled and pilot is not None, Rule(good_share=settings.good_share)
     with worlds as (env, actor):
-        verdict = judge_policy(env, actor, settings.episodes, rule=rule, sampled=draws, claim=claim)
+        verdict = judge_policy(
+            env,
+            actor,
+            settings.episodes,
+            rule=rule,
+            sampled=draws,
+            claim=claim,
+            unlike=None if pilot is None else pilot.unlike,
+        )
     progress("judged", 1, 1)
     done = Judgement(name, settings, verdict, claim and claim.path, measured)
     if coverage is None or measured is None:
@@ -271,7 +288,7 @@ def _flying(
 
 @contextmanager
 def _baseline(
-    name: str, task: TaskSettings, settings: FlightSettings
+    name: str, task: TaskSettings, dynamics: DynamicsSettings, settings: FlightSettings
 ) -> Iterator[tuple[EnvBase, TensorDictModuleBase]]:
     """The same worlds and one that sees no picture."""
     env = DroneEnv(
@@ -281,10 +298,11 @@ def _baseline(
         stream=Stream.REPORT,
         pixels=False,
         device=settings.device,
+        dynamics=dynamics,
     )
     generator = torch_generator(settings.seed, Stream.ACTIONS, device=env.device)
     try:
-        yield env, make_baseline(name, task, generator)
+        yield env, make_baseline(name, task, generator, env.worlds.dynamics.actions)
     finally:
         env.close()
 

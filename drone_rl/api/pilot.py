@@ -10,7 +10,7 @@ from tensordict.nn import TensorDictModuleBase
 from torchrl.envs import TransformedEnv
 
 from drone_rl.policies import PictureNetwork, make_actor
-from drone_rl.sim.settings import BaseTaskSettings
+from drone_rl.sim.settings import ActionSettings, BaseTaskSettings, DynamicsSettings
 from drone_rl.sim.tasks import Task
 from drone_rl.utils.seeding import Stream, torch_generator
 
@@ -28,6 +28,29 @@ class Pilot(abc.ABC):
 
     @property
     @abc.abstractmethod
+    def dynamics(self) -> DynamicsSettings:
+        """How its drone moves."""
+
+    @property
+    @abc.abstractmethod
+    def actions(self) -> ActionSettings:
+        """What it can ask for."""
+
+    @property
+    @abc.abstractmethod
+    def own_dynamics(self) -> DynamicsSettings:
+        """How its drone moved when it was made."""
+
+    @property
+    def unlike(self) -> dict[str, dict[str, Any]]:
+        """By what `dynamics` differ from its own: setting to "own" and "flown", plain values."""
+        own, flown = self.own_dynamics.values(), self.dynamics.values()
+        if self.dynamics.is_computer_vision:  # where nothing else counts
+            own, flown = ({"mode": of["mode"]} for of in (own, flown))
+        return {n: {"own": own[n], "flown": v} for n, v in flown.items() if own[n] != v}
+
+    @property
+    @abc.abstractmethod
     def origin(self) -> dict[str, Any]:
         """Where it comes from, as plain values: "policy", and how it was "trained", if known."""
 
@@ -40,6 +63,17 @@ class Pilot(abc.ABC):
 
         Raises:
             InputError: A setting is unknown or out of range; the message begins with "task.".
+        """
+
+    @abc.abstractmethod
+    def in_dynamics(self, **changes: Any) -> Self:
+        """The same policy in another body or air, as `policy.in_dynamics(mode="simple_flight")`.
+
+        Args:
+            changes: Settings of the dynamics; None keeps its own.
+
+        Raises:
+            InputError: A setting is unknown or out of range; the message begins with "dynamics.".
         """
 
     @abc.abstractmethod

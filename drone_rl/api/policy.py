@@ -11,7 +11,7 @@ from drone_rl.api.pilot import Pilot
 from drone_rl.api.showing import table
 from drone_rl.policies import PolicyNetwork
 from drone_rl.settings.changes import Changes
-from drone_rl.sim.settings import BaseTaskSettings
+from drone_rl.sim.settings import ActionSettings, BaseTaskSettings, DynamicsSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import newest
 from drone_rl.utils.seeding import Stream
@@ -37,6 +37,21 @@ class Policy(Pilot):
         return self.description.task
 
     @property
+    def dynamics(self) -> DynamicsSettings:
+        """See `Pilot`."""
+        return self.description.dynamics
+
+    @property
+    def actions(self) -> ActionSettings:
+        """See `Pilot`."""
+        return self.description.actions
+
+    @property
+    def own_dynamics(self) -> DynamicsSettings:
+        """See `Pilot`."""
+        return parse(self.state["description"]).dynamics
+
+    @property
     def origin(self) -> dict[str, Any]:
         """See `Pilot`; of the training "description", "progress", "provenance" and "command"."""
         told = ("description", "progress", "provenance")
@@ -48,6 +63,13 @@ class Policy(Pilot):
         changed = Changes(type(self.task)).read(changes, "task")
         described = self.description.as_dict()
         described["task"] |= changed
+        return dataclasses.replace(self, description=parse(described))
+
+    def in_dynamics(self, **changes: Any) -> "Policy":
+        """See `Pilot`."""
+        changed = Changes(DynamicsSettings).read(changes, "dynamics")
+        described = self.description.as_dict()
+        described["dynamics"] = {**self.dynamics.values(), **changed}
         return dataclasses.replace(self, description=parse(described))
 
     def make_env(

@@ -97,6 +97,7 @@ def shifts(
     settings: ShiftSettings | None = None,
     *,
     task: Mapping[str, Any] | None = None,
+    dynamics: Mapping[str, Any] | None = None,
     outputs: str | Path = "outputs",
     progress: Progress | None = None,
     **changes: Any,
@@ -107,6 +108,7 @@ def shifts(
         policy: The policy, what `load_policy` takes, or a callable, see `policy_from`.
         settings: Which conditions, and how often.
         task: What to change of the policy's task.
+        dynamics: What to change of how its drone moves.
         outputs: See `load_policy`.
         progress: Told of what is being flown; a bar by default.
         changes: Settings to change, as in `shifts("good", axes=["light"])`.
@@ -117,6 +119,7 @@ def shifts(
     settings, progress = (settings or ShiftSettings()).replace(**changes), progress or Bar()
     check_axes(settings.axes or ())
     pilot = as_pilot(policy, outputs).in_task(**(task or {}))
+    pilot = pilot.in_dynamics(**dynamics) if dynamics else pilot
     begin = time.perf_counter()
     subject = make_subject(pilot, settings)
     axes = find_axes(settings.axes, subject)
@@ -204,4 +207,14 @@ def make_subject(pilot: Pilot, settings: ShiftSettings) -> Subject:
     network = pilot.make_network(settings.device).eval()
     described = getattr(pilot, "description", None)  # of who comes from a file
     look = MINIMAL if described is None else described.appearance
-    return Subject(network, task, camera, transforms, look, settings.device, settings.renderer)
+    return Subject(
+        network,
+        task,
+        camera,
+        transforms,
+        look,
+        settings.device,
+        settings.renderer,
+        pilot.dynamics,
+        pilot.actions,
+    )

@@ -2,6 +2,7 @@
 
 import csv
 import dataclasses
+import enum
 import json
 import time
 from collections.abc import Mapping, Sequence
@@ -213,9 +214,16 @@ def _build(
         total_frames=limits.total_frames,
         total_episodes=limits.total_episodes,
         running_decay=limits.running_decay,
-        ends=as_task(settings.task).ends,
+        ends=_ends(settings),
     )
     return trainer, checkpoints, confirmation
+
+
+def _ends(settings: TrainSettings) -> list[enum.IntEnum]:
+    """Why its episodes may end; nothing gets out of control in computer-vision mode."""
+    is_calm = settings.dynamics.is_computer_vision
+    ends = as_task(settings.task).ends
+    return [end for end in ends if not (is_calm and end.name == "LOST_CONTROL")]
 
 
 class Tell(Callback):

@@ -18,7 +18,7 @@ import torch
 from safetensors.torch import save
 
 from drone_rl.bench.hostile_folders import hostile_folders
-from drone_rl.sim.settings import MINIMAL
+from drone_rl.sim.settings import COMPUTER_VISION, MINIMAL, MOVES_SETTINGS
 from drone_rl.zoo import parse
 
 DESCRIPTION: dict[str, Any] = {
@@ -45,6 +45,8 @@ DESCRIPTION: dict[str, Any] = {
 }
 """A policy that would be accepted."""
 _LOOK = MINIMAL.values()
+_FLIGHT = {**COMPUTER_VISION.values(), "mode": "simple_flight"}
+_ACTIONS = MOVES_SETTINGS.values()
 _PROGRESS = {"frames": 1, "episodes": 1, "updates": 1, "seconds": 1.0, "running_reward": 0.5}
 _ORIGIN = {"versions": {"torch": "2"}, "git_revision": None}
 ABOUT = {
@@ -140,6 +142,19 @@ def _descriptions(folder: Path) -> dict[str, bytes]:
             "appearance",
             {**_LOOK, "ground_texture": [str(folder / "canary" / "secret.txt")]},
         ),
+        "heavy": ("dynamics", {**_FLIGHT, "mass": 1e9}),
+        "no_such_body": ("dynamics", {**_FLIGHT, "inertia": [1.0, 1.0, 9.0]}),
+        "wind_nan": ("dynamics", {**_FLIGHT, "wind": [float("nan"), 0.0, 0.0]}),
+        "wind_of_four": ("dynamics", {**_FLIGHT, "wind": [0.0] * 4}),
+        "endless_step": ("dynamics", {**_FLIGHT, "control_ticks": 10**9}),
+        "no_tick": ("dynamics", {**_FLIGHT, "tick": 0.0}),
+        "mode": ("dynamics", {**_FLIGHT, "mode": "os.system"}),
+        "wind_without_air": ("dynamics", {**COMPUTER_VISION.values(), "wind": [5.0, 0.0, 0.0]}),
+        "half_dynamics": ("dynamics", {"mode": "simple_flight"}),
+        "no_dynamics": ("dynamics", None),
+        "fast": ("actions", {**_ACTIONS, "move_speed": 1e300}),
+        "actions_by_import": ("actions", {**_ACTIONS, "kind": "builtins.eval"}),
+        "more_actions": ("actions", {**_ACTIONS, "_target_": "os.system"}),
         "wide_layer": ("network.hidden", [10**9]),
         "many_parameters": ("network.hidden", [4096] * 8),
         "many_layers": ("network.hidden", [1] * 10**4),

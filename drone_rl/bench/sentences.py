@@ -69,6 +69,7 @@ def _plants(of: str, plants: Iterable[tuple[Any, ...]]) -> list[Plant]:
 
 _ALL_LUCK = {"baselines.forward.success.share": 0.95}
 _SURE = {"failures.largest": None, "failures.bound.successes": 0}
+_IN_WIND = {"unlike": {"wind": {"own": [0.0, 0.0, 0.0], "flown": [5.0, 0.0, 0.0]}}}
 _OPEN = {"certain": False, "enough": 1600}
 _PROVED = {"proof": PROOF}
 _IN_PART = {"proof": {**PROOF, "every": False, "share": 0.6, "lost": 0.3, "undecided": 0.1}}
@@ -106,6 +107,8 @@ _OF_VERDICTS = (
     ("failures.largest", {"failures.rows.1.lower95": 0.0}),
     ("failures.never", {"failures.largest": VERDICT["failures"]["largest"]}, _SURE),
     ("failures.never", {"failures.bound.upper95": 0.2}, _SURE),
+    ("unlike", {"unlike": {}}, _IN_WIND),
+    ("unlike", {"unlike": {"wind": {"own": [0.0, 0.0, 0.0], "flown": [8.0, 0.0, 0.0]}}}, _IN_WIND),
     ("drawing", {"drawing.upper95": 0.05}),
     ("drawing", {"drawing": None}),
 )  # fmt: skip

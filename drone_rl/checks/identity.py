@@ -7,6 +7,7 @@ import torch
 
 from drone_rl.checks.certificate import Certificate
 from drone_rl.sim.settings import BaseTaskSettings
+from drone_rl.sim.tasks.collect_cubes import require_moves
 from drone_rl.utils.errors import InputError
 from drone_rl.zoo import PolicyDescription
 
@@ -43,13 +44,15 @@ def refuse_another(
         InputError: It is of another network, camera or task, or the policy remembers pictures, or
             its camera goes wrong.
     """
+    for of in (certificate.description, described):
+        require_moves(of.dynamics, of.actions, "what a certificate states")
     if certificate.weights != (own := fingerprint(weights)):
         raise InputError(
             f"the certificate is of a network with the hash {certificate.weights[:12]}..., the "
             f"policy's has {own[:12]}...; give policy= the file that was proved"
         )
     stated, own_parts = certificate.description.as_dict(), described.as_dict()
-    for part in ("appearance", "camera", "transforms", "network"):
+    for part in ("appearance", "dynamics", "actions", "camera", "transforms", "network"):
         if stated.get(part) != own_parts.get(part):
             raise InputError(
                 f"the certificate and the policy differ in {part}; give policy= the file that was "

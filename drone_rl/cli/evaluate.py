@@ -8,7 +8,7 @@ from typing import Annotated
 
 import drone_rl
 from drone_rl.hydra_app.names import policies as prepare  # noqa: F401 -- of what was typed
-from drone_rl.settings.changes import TaskChanges, no_changes
+from drone_rl.settings.changes import DynamicsChanges, TaskChanges, no_changes
 from drone_rl.settings.judging import EvaluateSettings
 from drone_rl.settings.paths import PathsSettings
 from drone_rl.utils.schema import Whole
@@ -28,6 +28,8 @@ class Command(EvaluateSettings):
     """Whether the films show the most probable actions instead of drawn ones."""
     task: TaskChanges = no_changes()
     """What to change of the policy's task."""
+    dynamics: DynamicsChanges = no_changes()
+    """What to change of how the policy's drone moves."""
     paths: PathsSettings = PathsSettings()
     """Folders."""
 
@@ -38,6 +40,7 @@ def run(settings: Command, folder: Path) -> tuple[int, float]:
 
     policy = drone_rl.load_policy(settings.policy, outputs=settings.paths.outputs)
     policy = policy.in_task(**settings.task)
+    policy = policy.in_dynamics(**settings.dynamics) if settings.dynamics else policy
     done = drone_rl.evaluate(policy, settings, progress=log)
     (folder / "evaluation.json").write_text(json.dumps(done.as_dict(), indent=2))
     print(done)

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import drone_rl
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.hydra_app.names import policies as prepare  # noqa: F401 -- of what was typed
-from drone_rl.settings.changes import TaskChanges, no_changes
+from drone_rl.settings.changes import DynamicsChanges, TaskChanges, no_changes
 from drone_rl.settings.paths import PathsSettings
 from drone_rl.utils.schema import Listed, OneOf, Whole
 from drone_rl.verdicts.kinds import Kind
@@ -28,6 +28,8 @@ class Command(ExplainSettings):
     """Refuse (exit status 10 to 13) a policy whose verdict is not this; none accepts all."""
     task: TaskChanges = no_changes()
     """What to change of the policy's task."""
+    dynamics: DynamicsChanges = no_changes()
+    """What to change of how the policy's drone moves."""
     paths: PathsSettings = PathsSettings()
     """Folders."""
 
@@ -38,7 +40,7 @@ def run(settings: Command, folder: Path) -> tuple[int, str]:
 
     loaded = [drone_rl.load_policy(p, outputs=settings.paths.outputs) for p in settings.policy]
     done = drone_rl.explain(
-        [policy.in_task(**settings.task) for policy in loaded],
+        [p.in_task(**settings.task).in_dynamics(**settings.dynamics) for p in loaded],
         settings.narrowed(ExplainSettings),
         folder=folder,
         num_envs=settings.num_envs,

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import drone_rl
 from drone_rl.hydra_app.names import policies as prepare  # noqa: F401 -- of what was typed
-from drone_rl.settings.changes import TaskChanges, no_changes
+from drone_rl.settings.changes import DynamicsChanges, TaskChanges, no_changes
 from drone_rl.settings.paths import PathsSettings
 from drone_rl.sim.settings import AppearanceSettings, RendererName
 from drone_rl.utils.schema import Whole
@@ -35,6 +35,8 @@ class Command(Settings):
     """How worlds look; none for as in the policy's training."""
     task: TaskChanges = no_changes()
     """What to change of the policy's task."""
+    dynamics: DynamicsChanges = no_changes()
+    """What to change of how the policy's drone moves."""
     paths: PathsSettings = PathsSettings()
     """Folders."""
 
@@ -45,6 +47,7 @@ def run(settings: Command, folder: Path) -> tuple[int, None]:
     from drone_rl.api.filming import film, view  # after what is slow to import
 
     policy = policy.in_task(**settings.task)
+    policy = policy.in_dynamics(**settings.dynamics) if settings.dynamics else policy
     names = ("greedy", "seed", "device", "renderer", "appearance")
     chosen = {name: getattr(settings, name) for name in names}
     if settings.viewer:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import drone_rl
 from drone_rl.hydra_app.names import policies as prepare  # noqa: F401 -- of what was typed
-from drone_rl.settings.changes import TaskChanges, no_changes
+from drone_rl.settings.changes import DynamicsChanges, TaskChanges, no_changes
 from drone_rl.settings.paths import PathsSettings
 from drone_rl.settings.shifting import ShiftSettings
 
@@ -21,6 +21,8 @@ class Command(ShiftSettings):
     """Of whom, see `drone_rl.load_policy`."""
     task: TaskChanges = no_changes()
     """What to change of the policy's task."""
+    dynamics: DynamicsChanges = no_changes()
+    """What to change of how the policy's drone moves."""
     paths: PathsSettings = PathsSettings()
     """Folders."""
 
@@ -33,6 +35,7 @@ def run(settings: Command, folder: Path) -> tuple[int, float]:
         settings.policy,
         settings.narrowed(ShiftSettings),
         task=settings.task,
+        dynamics=settings.dynamics,
         outputs=settings.paths.outputs,
         progress=log,
     )

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import drone_rl
 from drone_rl.hydra_app.names import policies as prepare  # noqa: F401 -- of what was typed
-from drone_rl.settings.changes import TaskChanges, no_changes
+from drone_rl.settings.changes import DynamicsChanges, TaskChanges, no_changes
 from drone_rl.settings.judging import JudgeSettings
 from drone_rl.settings.paths import PathsSettings
 from drone_rl.utils.schema import OneOf
@@ -32,6 +32,8 @@ class Command(JudgeSettings):
     """Refuse (exit status 17) what is not good where this file says; none asks for no range."""
     task: TaskChanges = no_changes()
     """What to change of the policy's task."""
+    dynamics: DynamicsChanges = no_changes()
+    """What to change of how the policy's drone moves."""
     paths: PathsSettings = PathsSettings()
     """Folders."""
 
@@ -45,6 +47,7 @@ def run(settings: Command, folder: Path) -> tuple[int, str]:
         settings.policy,
         settings,
         task=settings.task,
+        dynamics=settings.dynamics,
         certificate=settings.certificate,
         shifts=settings.shifts,
         require_domain=settings.require_domain,

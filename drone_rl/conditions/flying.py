@@ -18,8 +18,18 @@ from drone_rl.conditions.modes import ONSET_STEP, Mode, sways
 from drone_rl.evaluation import Episodes
 from drone_rl.policies import PictureNetwork
 from drone_rl.sim.appearances import Appearances
+from drone_rl.sim.dynamics import draw_seeds, make_dynamics
 from drone_rl.sim.rendering import Appearance
-from drone_rl.sim.settings import MINIMAL, AppearanceSettings, BaseTaskSettings, CameraSettings
+from drone_rl.sim.settings import (
+    COMPUTER_VISION,
+    MINIMAL,
+    MOVES_SETTINGS,
+    ActionSettings,
+    AppearanceSettings,
+    BaseTaskSettings,
+    CameraSettings,
+    DynamicsSettings,
+)
 from drone_rl.sim.tasks import State, as_task
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.seeding import Stream, torch_generator, world_random_state
@@ -40,6 +50,8 @@ class Subject:
     appearance: AppearanceSettings = MINIMAL
     device: str = "cpu"
     renderer: str = "raytrace"
+    dynamics: DynamicsSettings = COMPUTER_VISION
+    actions: ActionSettings = MOVES_SETTINGS
 
 
 @dataclasses.dataclass(frozen=True)
@@ -71,6 +83,8 @@ class Airfield:
         )
         self.looks.reset(torch.arange(episodes), streams)
         self._drawn = torch.stack([task.draw(stream) for stream in streams])
+        dynamics = make_dynamics(task, subject.dynamics, subject.actions)
+        self._seeds = draw_seeds(streams) if dynamics.is_random else None
         self._built: dict[tuple[Any, ...], Worlds] = {}
 
     def settings(self, condition: Condition) -> tuple[BaseTaskSettings, CameraSettings]:
@@ -98,6 +112,8 @@ class Airfield:
                 self.episodes,
                 task,
                 camera,
+                dynamics=self.subject.dynamics,
+                actions=self.subject.actions,
                 renderer=self.subject.renderer,
                 device=self.subject.device,
                 distractors=self.looks.distractors + condition.clutter,
@@ -120,7 +136,7 @@ class Airfield:
         stages = [(0, condition)]
         if mode is Mode.ONSET:
             stages = [(0, Condition()), (ONSET_STEP, condition)]
-        return _Flight(self, mode, eyes).fly(stages, self._drawn)
+        return _Flight(self, mode, eyes).fly(stages, self._drawn, self._seeds)
 
     def fly_blindly(self, condition: Condition) -> dict[str, Episodes]:
         """What luck achieves: each of the task's policies that need no eyes, by name."""
@@ -153,9 +169,11 @@ class _Flight:
         self._bed, self._mode, self._eyes = bed, mode, eyes
 
     @torch.no_grad()
-    def fly(self, stages: Sequence[tuple[int, Condition]], drawn: Tensor) -> Flown:
+    def fly(
+        self, stages: Sequence[tuple[int, Condition]], drawn: Tensor, seeds: Tensor | None
+    ) -> Flown:
         worlds = self._bed.worlds(stages[0][1])
-        now = worlds.start(drawn)
+        now = worlds.start(drawn, seeds)
         flying = torch.arange(len(now), device=worlds.device)
         done, trace = now[flying], torch.zeros(len(now), dtype=torch.float64, device=worlds.device)
         decided: list[Tensor] = []

@@ -191,6 +191,7 @@ _RANGE = Record(
         "flown": Several(Record({"position": _ANY, "value": Maybe(_ANY), "good": Flag()}), 0, 100),
     }
 )
+_PARTS = ("appearance", "dynamics", "actions", "camera", "transforms", "network")
 _ORIGIN = {"versions": _FREE, "git_revision": _FREE, "machine": _FREE}
 _WHOLE = Record(
     {
@@ -228,7 +229,7 @@ def _refuse_another(
             f"it is of a network with the hash {stated[:12]}..., the policy's has {own[:12]}..."
         )
     of, mine = parse(numbers["network"]["description"]).as_dict(), described.as_dict()
-    for part in ("task", "appearance", "camera", "transforms", "network"):
+    for part in ("task", *_PARTS):
         if of.get(part) != mine.get(part):
             raise InputError(f"it is of another {part} than the policy's")
     ShiftSettings.read(numbers["settings"], "settings")

@@ -5,6 +5,8 @@ sections can run in any order.
 """
 
 import functools
+from collections.abc import Mapping
+from typing import Any
 
 from numpy.typing import NDArray
 from tensordict.nn import TensorDictModuleBase
@@ -38,6 +40,7 @@ class Context:
         settings: ExplainSettings,
         claim: Claim | None = None,
         measured: Measured | None = None,
+        unlike: Mapping[str, Any] | None = None,
     ) -> None:
         """Takes the policy and its worlds.
 
@@ -47,12 +50,13 @@ class Context:
             settings: What to compute.
             claim: A certificate of it in the task of these worlds, if there is one.
             measured: Its flights under other conditions, if there are any.
+            unlike: See `drone_rl.verdicts.judge.judge_policy`.
 
         Raises:
             InputError: A setting doesn't fit the policy.
         """
         self.env, self.network, self.settings, self.claim = env, network, settings, claim
-        self.measured = measured
+        self.measured, self.unlike = measured, unlike
         self.scenes = Scenes(env)
         self.layer = settings.layer or feature_layer(network)
         """Whose features are embedded; None of a policy of which no layers are known."""

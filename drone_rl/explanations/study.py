@@ -37,6 +37,7 @@ def explain_policy(
     sections: Mapping[str, Section] | None = None,
     claim: Claim | None = None,
     measured: Measured | None = None,
+    unlike: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Computes everything about one policy and writes it to a folder.
 
@@ -52,6 +53,7 @@ def explain_policy(
             of `explanations/sections` by default.
         claim: A certificate of the policy in the task of these worlds, if there is one.
         measured: Its flights under other conditions in that task, if there are any.
+        unlike: See `drone_rl.verdicts.judge.judge_policy`.
 
     Returns:
         The numbers, as in `explanation.json`; "left_out" says of sections that can't be made of
@@ -60,7 +62,7 @@ def explain_policy(
     Raises:
         InputError: The folder can't be written or a setting doesn't fit the policy.
     """
-    context = Context(env, network, settings, claim, measured)
+    context = Context(env, network, settings, claim, measured, unlike)
     found = _Found()
     for title, section in (find_sections() if sections is None else sections).items():
         progress(title.replace("_", " "))

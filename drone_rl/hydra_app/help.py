@@ -74,6 +74,8 @@ def comments(command: str, conf: Path, chosen: dict[str, str | None]) -> dict[st
         chosen: The file of each group.
     """
     found: dict[str, str] = {}
+    moved = read_comments(conf / "dynamics" / "computer_vision.yaml")
+    found |= {f"dynamics.{key}": text for key, text in moved.items()}
     tasks = conf / "task"
     for path in [*sorted(tasks.glob("*.yaml")), tasks / "collect_cubes.yaml"]:  # its words count
         found |= {f"task.{key}": text for key, text in read_comments(path).items()}

@@ -1,6 +1,7 @@
 """Types for Hydra, made from the settings: what is misspelt or mistyped dies when it composes."""
 
 import dataclasses
+import functools
 import types
 import typing
 from typing import Any
@@ -8,7 +9,7 @@ from typing import Any
 from hydra.core.config_store import ConfigStore
 from omegaconf import MISSING
 
-from drone_rl.settings.changes import ChangesOfTask
+from drone_rl.settings.changes import Changes, ChangesOfTask
 from drone_rl.settings.collecting import Collector
 from drone_rl.settings.learning import Optimiser, Scheduler
 from drone_rl.settings.loggers import Logger
@@ -22,21 +23,28 @@ from drone_rl.settings.transforms import Transform
 from drone_rl.settings.variant import Variant
 from drone_rl.sim.settings import (
     TASKS,
+    ActionSettings,
     AppearanceSettings,
     BaseTaskSettings,
     CameraSettings,
+    DynamicsSettings,
     TaskSettings,
 )
 from drone_rl.utils.settings import Settings, kinds_of, snake_case, types_of
 
 GROUPS: dict[str, type[Settings]] = {
     "appearance": AppearanceSettings,
+    "dynamics": DynamicsSettings,
+    "actions": ActionSettings,
     "camera": CameraSettings,
     "trainer": TrainerSettings,
     "provable": ProvableSettings,
     "paths": PathsSettings,
 }
 """Groups whose files start from the schema `base_<group>`."""
+_CHANGED = (DynamicsSettings,)
+"""Settings of a policy that commands may change: a file of that group gives all of them, so its
+schema is one of changes, too."""
 PARTS: dict[str, type[Variant]] = {
     "network": Network,
     "returns": Returns,
@@ -76,7 +84,15 @@ def register_schemas(**commands: type[Settings]) -> None:
 def schema_of(cls: type[Settings]) -> type:
     """A dataclass of the same fields with no defaults, for those are in conf/."""
     fields = [(name, *_field(cls, name)) for name in types_of(cls)]
-    return dataclasses.make_dataclass(f"{cls.__name__}Schema", [*_named(cls), *fields])
+    bases = (_changes_of(cls),) if cls in _CHANGED else ()
+    return dataclasses.make_dataclass(f"{cls.__name__}Schema", [*_named(cls), *fields], bases=bases)
+
+
+@functools.cache
+def _changes_of(cls: type[Settings]) -> type:
+    """A dataclass of the same fields, of which none need be given."""
+    fields = [(n, _simple(h) | None, None) for n, h in types_of(cls).items()]
+    return dataclasses.make_dataclass(f"{cls.__name__}Changes", fields)
 
 
 def _named(cls: type[Settings]) -> list[tuple[str, Any, Any]]:
@@ -94,6 +110,9 @@ def _field(cls: type[Settings], name: str) -> tuple[Any, Any]:
     if isinstance(kind, ChangesOfTask):
         changes = [(n, _simple(h) | None, None) for n, h in kind.types.items()]
         schema = dataclasses.make_dataclass("TaskChanges", changes)
+        return schema, dataclasses.field(default_factory=schema)
+    if isinstance(kind, Changes):
+        schema = _changes_of(kind.of)
         return schema, dataclasses.field(default_factory=schema)
     return _simple(hint), MISSING
 

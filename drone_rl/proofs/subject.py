@@ -12,7 +12,7 @@ from drone_rl.proofs.seeing import Seeing
 from drone_rl.proofs.silhouettes import FRONT, Eye, camera_ahead
 from drone_rl.sim.actions import MOVES
 from drone_rl.sim.settings import TaskSettings
-from drone_rl.sim.tasks.collect_cubes import require_cubes
+from drone_rl.sim.tasks.collect_cubes import require_cubes, require_moves
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 from drone_rl.zoo import PolicyDescription
@@ -75,6 +75,7 @@ def make_subject(
     """
     task = require_cubes(description.task, "what is proved")
     check_task(task)
+    require_moves(description.dynamics, description.actions, "what is proved")
     if not description.appearance.is_minimal:
         raise InputError(
             "the policy sees worlds of another appearance than minimal, whose pictures have no "

@@ -4,7 +4,7 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-from drone_rl.sim.settings import TASKS
+from drone_rl.sim.settings import TASKS, DynamicsSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import as_mapping
 from drone_rl.utils.settings import Settings, below, check_names, kinds_of, types_of
@@ -50,6 +50,7 @@ class ChangesOfTask:
 
 
 TaskChanges = Annotated[Mapping[str, Any], ChangesOfTask()]
+DynamicsChanges = Annotated[Mapping[str, Any], Changes(DynamicsSettings)]
 
 
 def no_changes() -> Any:

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from drone_rl.sim.settings import MINIMAL
+from drone_rl.sim.settings import COMPUTER_VISION, MINIMAL, MOVES_SETTINGS
 from drone_rl.utils.errors import InputError
 
 _MOVED = {
@@ -18,7 +18,8 @@ def modern(config: Mapping[str, Any]) -> dict[str, Any]:
     Until version 0.1 the group of networks was called policy, the collector's maker stood under
     "make", and settings told Hydra how to make things (`_partial_`, and `_target_` of task and
     camera). Until 0.2 a training learned on as many threads as it collected on,
-    took its running mean at its word, and took every step in Python, and worlds had one look.
+    took its running mean at its word, and took every step in Python, worlds had one look, and
+    drones moved in computer-vision mode alone.
 
     Args:
         config: Of any version, as it stands in a checkpoint or a sweep's folder.
@@ -37,6 +38,8 @@ def modern(config: Mapping[str, Any]) -> dict[str, Any]:
         groups["trainer"] = _trainer(groups["trainer"], groups["collector"])
     if "task" in groups:
         groups.setdefault("appearance", MINIMAL.values())
+        groups.setdefault("dynamics", COMPUTER_VISION.values())
+        groups.setdefault("actions", MOVES_SETTINGS.values())
     return groups
 
 

@@ -3,7 +3,12 @@
 import dataclasses
 from typing import Annotated
 
-from drone_rl.sim.settings import CameraSettings, RendererName
+from drone_rl.sim.settings import (
+    ActionSettings,
+    CameraSettings,
+    DynamicsSettings,
+    RendererName,
+)
 from drone_rl.utils.schema import OneOf
 from drone_rl.utils.settings import Settings
 
@@ -16,6 +21,10 @@ class GymnasiumSettings(Settings):
     """The camera's frame, or the true state in a vector."""
     camera: CameraSettings = CameraSettings()
     """The picture that the drone takes."""
+    dynamics: DynamicsSettings = DynamicsSettings()
+    """How it moves."""
+    actions: ActionSettings = ActionSettings()
+    """What it can be asked for."""
     render_mode: Annotated[str, OneOf(("rgb_array",))] | None = None
     """What `render` returns: none for nothing, rgb_array for the drone from behind."""
     device: str = "cpu"

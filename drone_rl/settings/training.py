@@ -10,9 +10,11 @@ from drone_rl.settings.objectives import Objective, Reinforce
 from drone_rl.settings.returns import Gae, LeaveOneOut, Returns
 from drone_rl.settings.transforms import Gray, Standardize, Transform
 from drone_rl.sim.settings import (
+    ActionSettings,
     AppearanceSettings,
     BaseTaskSettings,
     CameraSettings,
+    DynamicsSettings,
     RendererName,
     TaskSettings,
 )
@@ -59,6 +61,10 @@ class TrainSettings(Settings):
     """What the drone has to do."""
     appearance: AppearanceSettings = AppearanceSettings()
     """How its worlds look."""
+    dynamics: DynamicsSettings = DynamicsSettings()
+    """How it moves."""
+    actions: ActionSettings = ActionSettings()
+    """What the policy can ask for."""
     camera: CameraSettings = CameraSettings()
     """The picture that the drone takes."""
     transforms: Annotated[
@@ -95,6 +101,7 @@ class TrainSettings(Settings):
                 f"renderer={self.renderer} draws the minimal appearance alone; give "
                 "renderer=raytrace or appearance=minimal"
             )
+        self.dynamics.check_air()
         check_appearance(self.appearance, self.camera, self.task.things, self.task.name)
         needs, objective = self.objective.needs, self.objective.name
         for name, part in needs.items():

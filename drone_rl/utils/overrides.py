@@ -24,7 +24,8 @@ _HARMLESS = re.compile(rf"(\+{{0,2}}{_NAME}([./@]{_NAME})*=.*|~{_NAME}([./@]{_NA
 _SCALAR = r"[\w.+-]*"
 _VALUE = rf"({_SCALAR}|\[({_SCALAR}(, ?{_SCALAR})*)?\])"
 _SECTIONS = (
-    "task|camera|trainer|network|policy|returns|objective|optimiser|scheduler|transforms|provable"
+    "task|appearance|dynamics|actions|camera|trainer|network|policy|returns|objective|optimiser|"
+    "scheduler|transforms|provable"
 )
 _TAKEN_OVER = (
     r"(seed|evaluate_after|trial|resume)=\w*",

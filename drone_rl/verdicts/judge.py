@@ -64,6 +64,7 @@ def judge_policy(
     rule: Rule | None = None,
     sampled: bool = True,
     claim: Claim | None = None,
+    unlike: Mapping[str, Any] | None = None,
 ) -> Verdict:
     """Flies a policy, greedily and sampled, and the baselines, all in the same worlds, and judges.
 
@@ -75,6 +76,8 @@ def judge_policy(
         sampled: Whether to fly the policy with drawn actions, too; one that has no probabilities
             to draw from need not.
         claim: A certificate of the policy in the task of the worlds, if there is one.
+        unlike: By what the drones' dynamics differ from those that the policy was made for: setting
+            to "own" and "flown", plain values.
     """
     base: Any = getattr(env, "base_env", env)
     state, worlds = base.state_dict(), worlds_of(env)
@@ -86,7 +89,7 @@ def judge_policy(
     baselines = fly_baselines(
         env.batch_size[0], worlds.task, state, episodes, str(worlds.device), worlds.dynamics
     )
-    return judge(greedy, baselines, rule=rule, sampled=drawn, claim=claim)
+    return judge(greedy, baselines, rule=rule, sampled=drawn, claim=claim, unlike=unlike)
 
 
 def judge(
@@ -96,6 +99,7 @@ def judge(
     rule: Rule | None = None,
     sampled: Episodes | None = None,
     claim: Claim | None = None,
+    unlike: Mapping[str, Any] | None = None,
 ) -> Verdict:
     """Applies the rule.
 
@@ -106,6 +110,7 @@ def judge(
         rule: Thresholds.
         sampled: The policy's episodes with drawn actions, in the same worlds.
         claim: A certificate of the policy in the same task, if there is one.
+        unlike: See `judge_policy`.
 
     Raises:
         ValueError: They were flown in different worlds.
@@ -134,6 +139,7 @@ def judge(
         "failures": failure_table(greedy),
         "quantities": {name: q._asdict() for name, q in zip(rule.quantities, found, strict=True)},
         "enough": len(greedy) if certain else _enough(greedy, baselines, rule),
+        **({"unlike": dict(unlike)} if unlike else {}),
     }
     return Verdict(kind, certain, evidence)
 

@@ -188,9 +188,32 @@ def _misses_or_lacks(evidence: Evidence) -> bool:
     return any(evidence["greedy"]["shares"][side]["mean"] != 1.0 for side in _sides(evidence))
 
 
+def unlike(evidence: Evidence) -> str:
+    """By what drones moved otherwise than those that a policy was made for."""
+    changed = evidence["unlike"].items()
+    parts = [f"{_set(name, of['flown'])} instead of {_said(of['own'])}" for name, of in changed]
+    return f"It was made for another way of moving: here it flew with {_list(parts)}."
+
+
+def _set(name: str, value: Any) -> str:
+    return f"dynamics.{name}={_said(value)}"
+
+
+def _said(value: Any) -> str:
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_said, value))}]"
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
 SENTENCES = (
     Sentence("kind", "the kind is certain", lambda e: e["certain"], _kind),
     Sentence("open", "the kind is not certain", lambda e: not e["certain"], _open),
+    Sentence(
+        "unlike",
+        "drones moved otherwise than those that the policy was made for",
+        lambda e: bool(e.get("unlike")),
+        unlike,
+    ),
     *PROOF,
     Sentence("shares", "a goal was missed, or a side not offered", _misses_or_lacks, _shares),
     Sentence("baselines", "luck is not enough", lambda e: not _luck_suffices(e), _baselines),

@@ -15,17 +15,22 @@ from torchrl.envs import Transform, TransformedEnv
 from drone_rl.envs import DroneEnv, with_transforms
 from drone_rl.policies import PolicyNetwork
 from drone_rl.sim.actions import Actions
+from drone_rl.sim.dynamics import Dynamics, make_dynamics
 from drone_rl.sim.settings import (
+    COMPUTER_VISION,
     MINIMAL,
+    MOVES_SETTINGS,
+    ActionSettings,
     AppearanceSettings,
     BaseTaskSettings,
     CameraSettings,
+    DynamicsSettings,
     read_task,
 )
 from drone_rl.sim.tasks import Task, as_task
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Record, Several, as_mapping, shown
-from drone_rl.utils.settings import plain
+from drone_rl.utils.settings import Settings, plain
 from drone_rl.zoo.registry import NETWORKS, TRANSFORMS, Part, Picture, find_part
 
 FORMAT = "drone_rl policy"
@@ -38,8 +43,12 @@ MOST_NUMBERS = 2**20
 """Of one picture after any transform."""
 MOST_TRANSFORMS = 16
 _KEYS = ("format", "format_version", "task", "camera", "transforms", "network")
-_LOOK = "appearance"
-"""The key that may be missing."""
+_OPTIONAL: dict[str, tuple[type[Settings], Settings]] = {
+    "appearance": (AppearanceSettings, MINIMAL),
+    "dynamics": (DynamicsSettings, COMPUTER_VISION),
+    "actions": (ActionSettings, MOVES_SETTINGS),
+}
+"""The keys that may be missing, with what they then mean."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -74,9 +83,14 @@ class PolicyDescription:
     network: Choice
     appearance: AppearanceSettings = MINIMAL
     """How the worlds look; files without it mean the minimal one."""
+    dynamics: DynamicsSettings = COMPUTER_VISION
+    """How the drone moves; files without it mean computer-vision mode."""
+    actions: ActionSettings = MOVES_SETTINGS
+    """What the network can ask for; files without it mean moves."""
 
     def __post_init__(self) -> None:
         """Refuses what could not be built, or only with much memory."""
+        self.dynamics.check_air()
         pixels = self.camera.width * self.camera.height
         if pixels > MOST_PIXELS:
             raise InputError(f"camera has {pixels} pixels; give at most {MOST_PIXELS}")
@@ -120,7 +134,8 @@ class PolicyDescription:
 
     def as_dict(self) -> dict[str, Any]:
         """As in files; `parse` undoes it."""
-        look = {} if self.appearance.is_minimal else {"appearance": self.appearance.values()}
+        chosen = {name: getattr(self, name) for name in _OPTIONAL}
+        special = {n: s.values() for n, s in chosen.items() if s != _OPTIONAL[n][1]}
         return {
             "format": FORMAT,
             "format_version": FORMAT_VERSION,
@@ -128,7 +143,7 @@ class PolicyDescription:
             "camera": self.camera.values(),
             "transforms": [choice.as_dict() for choice in self.transforms],
             "network": self.network.as_dict(),
-            **look,
+            **special,
         }
 
     def build_env(
@@ -158,9 +173,20 @@ class PolicyDescription:
             seed=seed,
             device=device,
             pixels=pixels,
-            **{"appearance": self.appearance, **kwargs},
+            **{"appearance": self.appearance, **self._moved(kwargs), **kwargs},
         )
         return with_transforms(env, self.make_transforms() if pixels else ())
+
+    def _moved(self, given: Mapping[str, Any]) -> dict[str, Any]:
+        """Dynamics and actions, unless the dynamics that are given bring actions of their own."""
+        dynamics = given.get("dynamics")
+        if dynamics is None or isinstance(dynamics, DynamicsSettings):
+            return {"dynamics": self.dynamics, "actions": self.actions}
+        return {}
+
+    def make_dynamics(self) -> Dynamics:
+        """How the drone moves."""
+        return make_dynamics(as_task(self.task), self.dynamics, self.actions)
 
     def make_transforms(self) -> list[Transform]:
         """The described transforms, in their order."""
@@ -172,7 +198,7 @@ class PolicyDescription:
         Args:
             generator: Source of the initial weights; torch's global one by default.
         """
-        return self._network(as_task(self.task).make_dynamics().actions, generator)
+        return self._network(self.make_dynamics().actions, generator)
 
     def load_network(self, weights: Mapping[str, torch.Tensor]) -> PolicyNetwork:
         """The described network with given weights; none are drawn before, which takes longer.
@@ -197,7 +223,7 @@ class PolicyDescription:
         return dict(self._without_weights().state_dict())
 
     def _without_weights(self) -> PolicyNetwork:
-        actions = as_task(self.task).make_dynamics().actions
+        actions = self.make_dynamics().actions
         with torch.device("meta"):  # nothing is computed here: that would load a compiler's algebra
             return self._network(actions)
 
@@ -228,20 +254,23 @@ def parse(data: Any) -> PolicyDescription:
             f"format_version={shown(data['format_version'])}: this program reads "
             f"{FORMAT_VERSION}; use the version of drone_rl that wrote it"
         )
-    if set(data) - {_LOOK} != set(_KEYS):
-        names = ", ".join(shown(key) for key in sorted((set(data) - {_LOOK}) ^ set(_KEYS)))
+    if (keys := set(data) - set(_OPTIONAL)) != set(_KEYS):
+        names = ", ".join(shown(key) for key in sorted(keys ^ set(_KEYS)))
         raise InputError(
             f"the policy's description has exactly {', '.join(_KEYS)}; not so: {names}"
         )
     chosen = Several(_ChoiceOf(TRANSFORMS), 0, MOST_TRANSFORMS).read(
         data["transforms"], "transforms"
     )
+    special: dict[str, Any] = {
+        name: of.read(data[name], name) for name, (of, _) in _OPTIONAL.items() if name in data
+    }
     return PolicyDescription(
         read_task(data["task"], "task"),
         CameraSettings.read(data["camera"], "camera"),
         chosen,
         _ChoiceOf(NETWORKS).read(data["network"], "network"),
-        AppearanceSettings.read(data[_LOOK], _LOOK) if _LOOK in data else MINIMAL,
+        **special,
     )
 
 

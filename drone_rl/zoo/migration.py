@@ -41,10 +41,11 @@ def describe(config: Any) -> PolicyDescription:
         if key not in config:
             raise InputError(f"config.{key} is missing; use a file that drone-rl train wrote")
     transforms = as_mapping(config["transforms"], "transforms")
-    look = {} if config.get("appearance") is None else {"appearance": config["appearance"]}
+    parts = ("appearance", "dynamics", "actions")
+    special = {name: config[name] for name in parts if config.get(name) is not None}
     return parse(
         {
-            **look,
+            **special,
             "format": FORMAT,
             "format_version": FORMAT_VERSION,
             **{key: _values(config[key], key, target) for key, target in _SETTINGS.items()},

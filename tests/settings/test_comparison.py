@@ -3,7 +3,7 @@
 import pytest
 
 from drone_rl.settings.comparison import check_same_config, modern
-from drone_rl.sim.settings import MINIMAL
+from drone_rl.sim.settings import COMPUTER_VISION, MINIMAL, MOVES_SETTINGS
 from drone_rl.utils.errors import InputError
 
 OLD = {
@@ -19,6 +19,8 @@ OLD = {
 }
 NEW = {
     "appearance": MINIMAL.values(),
+    "dynamics": COMPUTER_VISION.values(),
+    "actions": MOVES_SETTINGS.values(),
     "task": {"num_cubes": 3},
     "camera": {"width": 64},
     "transforms": {

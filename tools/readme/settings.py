@@ -14,7 +14,7 @@ import yaml
 
 from drone_rl.cli.usage import COMMANDS
 from drone_rl.hydra_app.schemas import GROUPS, PARTS, SEVERAL
-from drone_rl.settings.changes import ChangesOfTask
+from drone_rl.settings.changes import Changes, ChangesOfTask
 from drone_rl.settings.variant import Variant
 from drone_rl.sim.settings import TASKS, BaseTaskSettings
 from drone_rl.utils.schema import Flag, Instance, Kind, Listed, Maybe, OneOf, Several, Span
@@ -135,6 +135,8 @@ def _may_be(kind: Kind) -> str:
             return f"{count} values, each {_may_be(kind.kind)}"
         case ChangesOfTask():
             return f"changes to the policy's {_link(BaseTaskSettings)}"
+        case Changes():
+            return f"changes to the policy's {_link(kind.of)}"
         case OneOf():
             return " or ".join(f"`{name}`" for name in kind.names)
         case Listed():

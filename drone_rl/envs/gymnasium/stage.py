@@ -16,7 +16,13 @@ from drone_rl.settings.variant import locate
 from drone_rl.sim.composer_task import CONTROL_TIMESTEP_S
 from drone_rl.sim.entities.cameras import CHASE
 from drone_rl.sim.rendering import check_device
-from drone_rl.sim.settings import BaseTaskSettings, CameraSettings, TaskSettings
+from drone_rl.sim.settings import (
+    ActionSettings,
+    BaseTaskSettings,
+    CameraSettings,
+    DynamicsSettings,
+    TaskSettings,
+)
 from drone_rl.sim.tasks import State, Task, as_task
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
@@ -27,6 +33,12 @@ METADATA: dict[str, Any] = {
     "render_fps": round(1 / CONTROL_TIMESTEP_S),
 }
 """Of every environment."""
+_PARTS: dict[str, type[Settings]] = {
+    "camera": CameraSettings,
+    "dynamics": DynamicsSettings,
+    "actions": ActionSettings,
+}
+"""Options of which some settings may be given in a mapping."""
 FILM_HEIGHT, FILM_WIDTH = 360, 640
 """Pixels of what `render` draws: the drone from behind."""
 END = "end_reason"
@@ -43,24 +55,27 @@ class Stage:
         Args:
             num_worlds: How many.
             task: What there is to do.
-            given: `GymnasiumSettings`, of the camera also some settings in a mapping; and settings
-                of the task.
+            given: `GymnasiumSettings`, of camera, dynamics and actions also some settings in a
+                mapping; and settings of the task.
 
         Raises:
             InputError: An option or setting is unknown or out of range.
         """
         own = kinds_of(GymnasiumSettings)
         options = {name: value for name, value in given.items() if name in own}
-        if isinstance(options.get("camera"), Mapping):
-            camera = Changes(CameraSettings).read(options["camera"], "camera")
-            options["camera"] = CameraSettings(**camera)
+        for name, kind in _PARTS.items():
+            if isinstance(options.get(name), Mapping):
+                options[name] = kind(**Changes(kind).read(options[name], name))
         options = GymnasiumSettings(**options)
+        options.dynamics.check_air()
         changes = {name: value for name, value in given.items() if name not in own}
         check_device(options.device)
         self.worlds = Worlds(
             num_worlds,
             _make_task(task, changes),
             options.camera,
+            dynamics=options.dynamics,
+            actions=options.actions,
             renderer=options.renderer,
             device=options.device,
         )

@@ -13,5 +13,7 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
     """Makes "verdict"."""
     episodes, rule = context.settings.episodes, Rule(good_share=context.settings.good_share)
     actor, claim = context.restart(), context.claim
-    verdict = judge_policy(context.env, actor, episodes, rule=rule, claim=claim)
+    verdict = judge_policy(
+        context.env, actor, episodes, rule=rule, claim=claim, unlike=context.unlike
+    )
     return {"verdict": verdict.as_dict()}, {}

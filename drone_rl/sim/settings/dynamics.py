@@ -127,6 +127,19 @@ class DynamicsSettings(Settings):
                 f"{_HEADROOM * weight / 4:.3g}"
             )
 
+    def check_air(self) -> None:
+        """Refuses moving air where nothing feels it: whoever asks for both has forgotten the mode.
+
+        Raises:
+            InputError: There is wind, or there are gusts, in computer-vision mode.
+        """
+        if self.is_computer_vision and (any(self.wind) or self.gusts):
+            name, value = ("wind", list(self.wind)) if any(self.wind) else ("gusts", self.gusts)
+            raise InputError(
+                f"dynamics.{name}={value} moves nothing in computer-vision mode; give "
+                "dynamics.mode=simple_flight, too"
+            )
+
 
 COMPUTER_VISION = DynamicsSettings()
 """Actions set poses: what files mean that say nothing else."""
