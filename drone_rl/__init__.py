@@ -39,7 +39,13 @@ if TYPE_CHECKING:
     from drone_rl.settings.proving import ProveSettings
     from drone_rl.settings.shifting import ShiftSettings
     from drone_rl.settings.training import TrainerSettings, TrainSettings
-    from drone_rl.sim.settings import CameraSettings, PillarsSettings, TaskSettings
+    from drone_rl.sim.settings import (
+        ActionSettings,
+        CameraSettings,
+        DynamicsSettings,
+        PillarsSettings,
+        TaskSettings,
+    )
     from drone_rl.utils.errors import InputError
 
 __version__ = "0.1.0"
@@ -73,12 +79,19 @@ _PLACES = {
     "settings.proving": ("ProveSettings",),
     "settings.shifting": ("ShiftSettings",),
     "settings.training": ("TrainSettings", "TrainerSettings"),
-    "sim.settings": ("CameraSettings", "PillarsSettings", "TaskSettings"),
+    "sim.settings": (
+        "ActionSettings",
+        "CameraSettings",
+        "DynamicsSettings",
+        "PillarsSettings",
+        "TaskSettings",
+    ),
     "utils.errors": ("InputError",),
 }
 _HOMES = {name: f"drone_rl.{module}" for module, names in _PLACES.items() for name in names}
 
 __all__ = [
+    "ActionSettings",
     "CameraSettings",
     "ChanceSettings",
     "Chances",
@@ -87,6 +100,7 @@ __all__ = [
     "Coverage",
     "DroneWorld",
     "DroneWorlds",
+    "DynamicsSettings",
     "EvaluateSettings",
     "Evaluation",
     "ExplainSettings",

@@ -56,8 +56,8 @@ class Floating:
         position = body.position + moves[action] + wind
         near = body.near
         if obstacles is not None:
-            away = (obstacles.centers - position[:, None]).abs() <= obstacles.half_sizes
-            near = near + away.all(-1).sum(-1)
+            away = (obstacles.centers - position[:, None]).abs()
+            near = near + (away <= torch.tensor(obstacles.half_sizes)).all(-1).sum(-1)
         lost = body.lost | (position[:, 1] > 5.0)
         return dataclasses.replace(body, position=position, lost=lost, near=near)
 

@@ -39,6 +39,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.provenance import provenance
 from drone_rl.words.licence import say
 from drone_rl.words.shifts import SHIFTS, rows
+from drone_rl.words.verdict import unlike as say_unlike
 
 
 @dataclasses.dataclass(frozen=True)
@@ -85,11 +86,18 @@ class Shifts:
 
     def __str__(self) -> str:
         """The table and what it comes to."""
-        return f"{aligned(rows(self.numbers))}\n{self.sentence}"
+        return f"{aligned(rows(self.numbers))}\n{self.sentence}{self._unlike}"
 
     def _repr_html_(self) -> str:
         head, *lines = rows(self.numbers)
-        return table(head, lines) + paragraph(self.sentence) + picture(chart(self.numbers))
+        said = paragraph(self.sentence + self._unlike)
+        return table(head, lines) + said + picture(chart(self.numbers))
+
+    @property
+    def _unlike(self) -> str:
+        """By what its own way of moving was another one; nothing where it was not."""
+        unlike = self.policy.unlike
+        return f" {say_unlike({'unlike': unlike})}" if unlike else ""
 
 
 def shifts(

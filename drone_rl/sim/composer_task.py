@@ -4,7 +4,6 @@
 # (dm_control's models of XML, its tasks' properties and its specs are untyped.)
 """Any task as dm_control knows it: one world, drawn by OpenGL, its rules a batch of one."""
 
-import dataclasses
 from typing import Any
 
 import numpy as np
@@ -209,12 +208,10 @@ class ComposerTask(composer.Task):
     def _found(self, physics: mjcf.Physics) -> BodyState:
         """The drone where MuJoCo has it: its pose may have been set by hand."""
         body = self._state.body
-        position, attitude = (
-            torch.from_numpy(np.array(p))[None] for p in self._drone.get_pose(physics)
-        )
-        if self.dynamics.mount == "gimbal" and _is_same_turn(attitude, self._shown(body)):
-            attitude = body.attitude  # of which the gimbal shows the heading alone
-        return dataclasses.replace(body, position=position, attitude=attitude)
+        pose = [torch.from_numpy(np.array(p))[None] for p in self._drone.get_pose(physics)]
+        if torch.equal(pose[0], body.position) and _is_same_turn(pose[1], self._shown(body)):
+            return body
+        return body.moved(*pose)
 
     def _shown(self, body: BodyState) -> torch.Tensor:
         """The attitude that cameras have. Shape: (1, 4)."""

@@ -110,3 +110,8 @@ def test_the_tables(good):
 def test_mistakes_are_told_in_a_line(good, cubes, change, message):
     with pytest.raises(InputError, match=message):
         drone_rl.chances(good, cubes, progress=silent, **change)
+
+
+def test_flights_have_no_places_that_could_be_counted(good):
+    with pytest.raises(InputError, match="chance of each placement is known of computer-vision"):
+        drone_rl.chances(good.in_dynamics(mode="simple_flight"), progress=silent)

@@ -10,6 +10,8 @@ from drone_rl.sim import worlds as worlds_module
 from drone_rl.sim.rendering import Raytracer
 from drone_rl.utils.errors import InputError
 from drone_rl.zoo import certificate_path, policy_path
+from tests.fake_flight import floating
+from tests.second_dynamics import Turning
 
 
 def test_worlds_as_policies_see_them():
@@ -90,3 +92,15 @@ def test_a_renderer_that_there_is_not():
         drone_rl.make_env(1, renderer="opengl")
     with pytest.raises(InputError, match="renderer='opengl' is unknown; give raytrace, mujoco"):
         drone_rl.TrainSettings(renderer="opengl")
+
+
+def test_settings_of_dynamics_and_actions(monkeypatch):
+    floating(monkeypatch)
+    slow = drone_rl.ActionSettings(move_speed=1.0)
+    windy = drone_rl.DynamicsSettings(mode="simple_flight", wind=(1.0, 0.0, 0.0))
+    env = drone_rl.make_env(2, dynamics=windy, actions=slow)
+    made = env.base_env.worlds.dynamics
+    assert (made.settings, made.asked) == (windy, slow)
+    env.close()
+    with pytest.raises(InputError, match=r"^actions=moves, but dynamics=Turning brings its own"):
+        drone_rl.make_env(1, dynamics=Turning(), actions=slow)

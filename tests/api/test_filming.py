@@ -19,3 +19,9 @@ def test_no_display(monkeypatch):
         monkeypatch.delenv(name, raising=False)
     with pytest.raises(InputError, match="needs a display"):
         view(drone_rl.load_policy("good"))
+
+
+def test_another_body_is_filmed_too(tmp_path):
+    policy = drone_rl.load_policy("good").in_task(num_cubes=1, first_distance=4.0)
+    moved = policy.in_dynamics(mode="simple_flight")
+    assert len(film(moved, tmp_path, 1)) == 2

@@ -9,6 +9,8 @@ from drone_rl.api.foreign import as_pilot
 from drone_rl.api.progress import silent
 from drone_rl.settings.transforms import EpisodeReward, Gray, Resize, Rgb, Stack
 from drone_rl.utils.errors import InputError
+from tests.fake_flight import FLIGHT, floating
+from tests.second_dynamics import Turning
 from tests.second_task import Posts
 
 FEW = {"episodes": 8, "sampled": False, "progress": silent}
@@ -156,3 +158,21 @@ def test_of_a_mere_callable_all_is_explained_that_can_be(network, tmp_path):
     assert "What is left out, and why" in page
     assert "None could be tested" in page
     assert "Grad-CAM; occlusion is shown" in page
+
+
+def test_dynamics_are_those_it_was_made_for_or_others(monkeypatch):
+    floating(monkeypatch)
+    policy = drone_rl.policy_from(left)
+    assert policy.dynamics.is_computer_vision and policy.unlike == {}
+    moved = policy.in_dynamics(mode="simple_flight", gusts=1.0)
+    assert moved.unlike["gusts"] == {"own": 0.0, "flown": 1.0}
+    with moved.flying(1) as (env, _):
+        assert env.base_env.worlds.dynamics.settings == FLIGHT.replace(gusts=1.0)
+    made = drone_rl.policy_from(left, dynamics=FLIGHT)
+    assert made.unlike == {} and made.in_dynamics(mode="computer_vision").unlike == {
+        "mode": {"own": "simple_flight", "flown": "computer_vision"}
+    }
+    with made.flying(1, dynamics=Turning(), pixels=False) as (env, _):
+        assert isinstance(env.base_env.worlds.dynamics, Turning)
+    with pytest.raises(InputError, match=r"^dynamics\.mass=-1\.0"):
+        policy.in_dynamics(mass=-1.0)

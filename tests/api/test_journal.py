@@ -9,7 +9,9 @@ from drone_rl.api.journal import Journal, Round
 from drone_rl.settings.configuration import as_config
 from drone_rl.settings.provable import ProvableSettings
 from drone_rl.settings.training import TrainerSettings, TrainSettings
+from drone_rl.sim.settings import ActionSettings
 from drone_rl.utils.errors import InputError
+from tests.fake_flight import FLIGHT
 
 SETTINGS = TrainSettings(trainer=TrainerSettings(total_frames=1000))
 STATE = {"config": as_config(SETTINGS)}
@@ -104,3 +106,10 @@ def test_damaged_failures_are_refused(tmp_path):
     (tmp_path / "rounds" / "0" / "failures.npy").write_bytes(b"nothing")
     with pytest.raises(InputError, match=r"failures\.npy is damaged"):
         journal.failures()
+
+
+def test_nothing_is_begun_for_who_flies(tmp_path):
+    for changes in ({"dynamics": FLIGHT}, {"actions": ActionSettings(kind="velocity")}):
+        with pytest.raises(InputError, match="training until it is proved is known of"):
+            begin(tmp_path / "new", **changes)
+    assert not (tmp_path / "new").exists()

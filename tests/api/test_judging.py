@@ -11,6 +11,7 @@ from drone_rl.api.progress import silent
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import mean_bounds, proportion
 from tests.checks.making import of_every_place
+from tests.fake_flight import floating
 
 
 @pytest.fixture(scope="module")
@@ -120,3 +121,26 @@ def test_the_table_of_an_evaluation(good):
     assert rows[8].split() == ["ended:", "step", "limit", "1", "1"]
     assert len({len(row) for row in rows}) == 1
     assert all(len(re.split(" {2,}", row)) == 3 for row in rows)  # no two columns touch
+
+
+def test_in_another_body_it_is_said_so(good, monkeypatch):
+    floating(monkeypatch)
+    few = {"episodes": 4, "sampled": False, "progress": silent}
+    done = drone_rl.judge(good, dynamics={"mode": "simple_flight"}, **few)
+    changed = {"mode": {"own": "computer_vision", "flown": "simple_flight"}}
+    assert done.as_dict()["unlike"] == changed
+    assert "here it flew with dynamics.mode=simple_flight instead of computer_vision." in str(done)
+    assert "unlike" not in drone_rl.judge(good, **few).as_dict()
+    luck = drone_rl.judge("forward", dynamics={"mode": "simple_flight"}, **few)
+    assert "unlike" not in luck.as_dict()
+    moved = good.in_dynamics(mode="simple_flight", wind=[-5.0, 0.0, 0.0])
+    done = drone_rl.evaluate(moved, episodes=2, num_envs=2, progress=silent)
+    assert "dynamics.wind=[-5, 0, 0] instead of [0, 0, 0]" in str(done)
+    assert done.as_dict()["unlike"]["wind"]["flown"] == [-5.0, 0.0, 0.0]
+    steps = done.flown["forward"]["mean_length"]  # against half a metre of wind a step
+    assert (
+        steps
+        > drone_rl.evaluate(good, episodes=2, num_envs=2, progress=silent).flown["forward"][
+            "mean_length"
+        ]
+    )

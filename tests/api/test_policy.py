@@ -10,6 +10,7 @@ import drone_rl
 from drone_rl.api.policy import find_policy
 from drone_rl.utils.errors import InputError
 from drone_rl.zoo import policy_path
+from tests.fake_flight import FLIGHT, Floating, floating
 
 
 def test_a_policy_that_travels_with_the_package():
@@ -77,3 +78,36 @@ def test_what_is_not_there(tmp_path):
         drone_rl.load_policy("latest", outputs=tmp_path)
     with pytest.raises(InputError, match=r"policy=nobody does not exist.*good, .*poor"):
         drone_rl.load_policy("nobody")
+
+
+def test_changed_dynamics_change_the_worlds_alone(monkeypatch):
+    floating(monkeypatch)
+    policy = drone_rl.load_policy("good")
+    other = policy.in_dynamics(mode="simple_flight", wind=[5.0, 0.0, 0.0], gusts=None)
+    assert other.dynamics == FLIGHT.replace(wind=(5.0, 0.0, 0.0))
+    assert policy.dynamics.is_computer_vision and other.own_dynamics == policy.dynamics
+    assert policy.unlike == {} and other.unlike == {
+        "mode": {"own": "computer_vision", "flown": "simple_flight"},
+        "wind": {"own": [0.0, 0.0, 0.0], "flown": [5.0, 0.0, 0.0]},
+    }
+    with other.flying(2) as (env, actor):
+        assert isinstance(env.base_env.worlds.dynamics, Floating)
+        assert actor(env.reset())["action"].shape == (2,)
+    back = other.in_dynamics(mode="computer_vision", wind=[0, 0, 0])
+    assert back.unlike == {} and back.description == policy.description
+    with policy.flying(1, dynamics=FLIGHT) as (env, _):
+        assert env.base_env.worlds.dynamics.settings == FLIGHT
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"mass": -1.0}, r"dynamics\.mass=-1\.0 is out of range"),
+        ({"masss": 1}, r"dynamics\.masss is unknown"),
+        ({"wind": [1, 0, 0]}, r"dynamics\.wind=\[1\.0, 0\.0, 0\.0\] moves nothing"),
+        ({"mass": 50.0}, r"dynamics\.rotor_thrust=4\.17945 can't hover"),
+    ],
+)
+def test_dynamics_that_can_not_be(changes, message):
+    with pytest.raises(InputError, match=f"^{message}"):
+        drone_rl.load_policy("good").in_dynamics(**changes)

@@ -90,3 +90,17 @@ def test_a_task_without_an_oracle_has_no_range(monkeypatch):
     found = drone_rl.shifts("good", domain=False, **told)
     assert found.numbers["plain"]["oracle"] is None and found.numbers["domain"] is None
     assert found.numbers["axes"]["noise"]["levels"][0]["impossible"] is None
+
+
+def test_in_another_body_it_is_said_so():
+    found = drone_rl.shifts(
+        "good",
+        axes=["brightness"],
+        modes=["constant"],
+        task={"num_cubes": 1},
+        dynamics={"mode": "simple_flight"},
+        domain=False,
+        **{**FEW, "episodes": 2},
+    )
+    assert "dynamics.mode=simple_flight instead of computer_vision" in str(found)
+    assert found.numbers["network"]["description"]["dynamics"]["mode"] == "simple_flight"

@@ -71,3 +71,9 @@ def test_a_policy_whose_camera_goes_wrong_is_refused(one_sided, policy):
     described = parse({**policy.description.as_dict(), "transforms": steps})
     with pytest.raises(InputError, match=r"camera goes wrong \(transform late_frames\)"):
         refuse_another(certificate, described, policy.state["policy"])
+
+
+def test_a_policy_in_another_body_has_no_certificate(parsed, policy):
+    moved = policy.in_dynamics(mode="simple_flight")
+    with pytest.raises(InputError, match=r"^dynamics\.mode=simple_flight: what a cert"):
+        refuse_another(parsed, moved.description, policy.state["policy"])

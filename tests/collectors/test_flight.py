@@ -217,3 +217,19 @@ def test_worlds_of_another_look_are_flown_step_by_step(visibility):
     batch, plain = collector.collect(), make(num_envs=3).collect()
     assert batch["next", "done"].sum() == 3
     assert batch["pixels"][0].mean() > plain["pixels"][0].mean()  # the fog is bright
+
+
+def test_a_lost_drone_ends_its_episode_in_the_kernel_too():
+    """Speeds beyond all measure are no motion any more: one world's drone is lost at once."""
+    collector = make(dynamics=Quadrotor(FLYING))
+    begin = collector._flight._worlds.begin
+
+    def lose(state):
+        state.body.numbers[2, LOST.first] = 1.0
+        begin(state)
+
+    collector._flight._worlds.begin = lose
+    batch = collector.collect()
+    lengths = batch["collector", "traj_ids"].bincount()
+    assert lengths[2] == 1 and (lengths[[0, 1, 3, 4]] > 1).all()
+    assert batch[REASON].flatten().tolist().count(EndReason.LOST_CONTROL) == 1

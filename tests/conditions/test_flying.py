@@ -12,7 +12,7 @@ from drone_rl.conditions.looks import Whitened
 from drone_rl.conditions.modes import ONSET_STEP, Mode
 from drone_rl.evaluation import run_episodes
 from drone_rl.sim.meaning import Meaning
-from drone_rl.sim.settings import TaskSettings
+from drone_rl.sim.settings import DynamicsSettings, TaskSettings
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import Stream
@@ -123,3 +123,18 @@ def test_the_worlds_are_the_same_under_every_condition(make_bed):
         flown = bed.fly(axis.make(axis.strengths[2], bed.subject)).episodes
         assert torch.equal(flown.goals.world, plain)
     assert TASK.cube_size == 2.5
+
+
+def test_flights_in_another_body_are_those_of_the_environment(make_bed):
+    gusty = DynamicsSettings(mode="simple_flight", wind=(1.0, 0.0, 0.0), gusts=1.0)
+    policy = drone_rl.load_policy("good").in_dynamics(mode="simple_flight", wind=[1, 0, 0], gusts=1)
+    network, described = policy.make_network().eval(), policy.description
+    pipeline = described.make_transforms()
+    told = Subject(network, policy.task, described.camera, pipeline, dynamics=gusty)
+    flown = make_bed(told, 3).fly(Condition()).episodes
+    with policy.flying(3, stream=Stream.SHIFTED) as (env, actor):
+        expected = run_episodes(env, actor, 3)
+    order = [expected.goals.world.tolist().index(world) for world in flown.goals.world.tolist()]
+    assert sorted(order) == [*range(3)]
+    assert torch.equal(flown.length, expected.length[order])
+    assert torch.equal(flown.end_reason, expected.end_reason[order])

@@ -15,7 +15,8 @@ from drone_rl.hydra_app import schemas
 from drone_rl.hydra_app.composition import conf_dir
 from drone_rl.settings.configuration import as_config
 from drone_rl.settings.training import TrainSettings
-from drone_rl.sim.settings import CameraSettings, PillarsSettings, TaskSettings
+from drone_rl.sim.settings import CameraSettings, DynamicsSettings, PillarsSettings, TaskSettings
+from drone_rl.utils.errors import InputError
 from drone_rl.utils.settings import kinds_of, snake_case, types_of
 from drone_rl.zoo import describe
 from tests.hydra_app.conftest import commands
@@ -199,3 +200,37 @@ def test_what_only_the_user_knows_is_passed_on(settings):
 def test_the_cameras_schema_has_the_types_of_the_settings():
     made = {f.name: f.type for f in dataclasses.fields(schemas.schema_of(CameraSettings))}
     assert made == {"width": int, "height": int, "horizontal_fov": float}
+
+
+@pytest.mark.parametrize("command", ["evaluate", "play", "verdict", "shifts", "explain"])
+def test_any_setting_of_the_dynamics_can_be_changed_for_a_trained_policy(command, settings):
+    assert settings(command).dynamics == {}
+    told = settings(command, "dynamics.wind=[5,0,0]", "dynamics.mode=simple_flight")
+    assert told.dynamics == {"mode": "simple_flight", "wind": (5.0, 0.0, 0.0)}
+    whole = settings(command, "dynamics=crazyflie", "dynamics.gusts=1.5").dynamics
+    assert whole.keys() == kinds_of(DynamicsSettings).keys()
+    assert (whole["mass"], whole["gusts"], whole["mode"]) == (0.0319, 1.5, "simple_flight")
+
+
+@pytest.mark.parametrize("override", ["dynamics.mas=1", "dynamics.mass=heavy", "dynamics=no_such"])
+def test_typos_in_dynamics_die_when_composing(override, config):
+    for command in ("train", "verdict"):
+        with pytest.raises(HydraException):
+            config(command, [override])
+
+
+def test_a_training_in_another_body_composes_and_describes_a_policy(settings):
+    told = settings("train", "dynamics=quadrotor", "dynamics.wind=[5,0,0]", "actions.move_speed=2")
+    assert told.dynamics == DynamicsSettings(mode="simple_flight", wind=(5.0, 0.0, 0.0))
+    described = describe(as_config(told.narrowed(TrainSettings)))
+    assert (described.dynamics, described.actions.move_speed) == (told.dynamics, 2.0)
+    assert settings("train", "dynamics=quadrotor", "dynamics.mode=computer_vision") == settings(
+        "train"
+    )
+    with pytest.raises(InputError, match=r"^dynamics\.wind=\[5\.0, 0\.0, 0\.0\] moves nothing"):
+        settings("train", "dynamics.wind=[5,0,0]")
+
+
+def test_a_crazyflie_weighs_32_grams_and_hovers(settings):
+    told = settings("train", "dynamics=crazyflie").dynamics
+    assert told.mass == 0.0319 and 0.64 < told.hover_throttle < 0.66

@@ -1,5 +1,6 @@
 """What can be proved is taken apart; what can't is refused in one line."""
 
+import copy
 import dataclasses
 
 import numpy as np
@@ -9,7 +10,7 @@ import torch
 import drone_rl
 from drone_rl.proofs.cells import Cells
 from drone_rl.proofs.subject import check_task, make_painter, make_subject
-from drone_rl.sim.settings import AppearanceSettings, TaskSettings
+from drone_rl.sim.settings import ActionSettings, AppearanceSettings, DynamicsSettings, TaskSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.zoo import parse
 
@@ -128,3 +129,19 @@ def test_the_networks_actions_must_be_moves():
     network.actions = dataclasses.replace(network.actions)
     with pytest.raises(InputError, match="does not choose among"):
         make_subject(policy.description, network, 1e-4)
+
+
+@pytest.mark.parametrize(
+    ("part", "settings", "message"),
+    [
+        ("dynamics", DynamicsSettings(mode="simple_flight"), "known of computer-vision mode alone"),
+        ("actions", ActionSettings(kind="velocity"), "known of moves alone"),
+    ],
+)
+def test_what_is_proved_flies_by_moves_in_computer_vision_mode(part, settings, message):
+    policy = drone_rl.load_policy("good")
+    network = policy.make_network()
+    other = copy.copy(policy.description)
+    object.__setattr__(other, part, settings)  # whatever its network is
+    with pytest.raises(InputError, match=message):
+        make_subject(other, network, 1e-4)

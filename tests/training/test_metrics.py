@@ -34,6 +34,7 @@ def test_episode_rewards_and_batch_metrics_by_hand():
         "end/front_boundary": 0.5,
         "end/side_boundary": 0.0,
         "end/step_limit": 0.0,
+        "end/lost_control": 0.0,
     }
 
 
@@ -133,5 +134,5 @@ def test_end_of_an_episode_is_read_at_its_last_frame():
     batch["next", "info"] = TensorDict({"end_reason": reasons}, [6])
     metrics = batch_metrics(batch, EndReason)
     assert [metrics[f"end/{end.name.lower()}"] for end in EndReason if end] == pytest.approx(
-        [1 / 3] * 3 + [0]
+        [1 / 3] * 3 + [0, 0]
     )

@@ -184,3 +184,16 @@ def test_drawn_actions_that_differ_beyond_doubt(evidence):
 def test_every_sentence_has_its_condition_in_words():
     assert all(sentence.licence and sentence.name for sentence in SENTENCES)
     assert len({sentence.name for sentence in SENTENCES}) == len(SENTENCES)
+
+
+def test_another_way_of_moving_is_told(evidence):
+    assert "unlike" not in speak(evidence)
+    mode = {"own": "computer_vision", "flown": "simple_flight"}
+    wind = {"own": [0.0, 0.0, 0.0], "flown": [5.0, 0.0, 0.0]}
+    evidence["unlike"] = {"mode": mode, "wind": wind}
+    assert speak(evidence)["unlike"] == (
+        "It was made for another way of moving: here it flew with dynamics.mode=simple_flight "
+        "instead of computer_vision and dynamics.wind=[5, 0, 0] instead of [0, 0, 0]."
+    )
+    evidence["unlike"] = {}
+    assert "unlike" not in speak(evidence)

@@ -7,9 +7,17 @@ import sys
 import pytest
 import torch
 
-from drone_rl.sim.settings import AppearanceSettings
+from drone_rl.sim.dynamics import ComputerVision
+from drone_rl.sim.settings import (
+    COMPUTER_VISION,
+    MOVES_SETTINGS,
+    ActionSettings,
+    AppearanceSettings,
+)
 from drone_rl.utils.errors import InputError
 from drone_rl.zoo import parse
+from tests.fake_flight import FLIGHT, floating
+from tests.second_dynamics import Turning
 
 DEFAULT = {
     "format": "drone_rl policy",
@@ -237,3 +245,55 @@ def test_a_look_is_told_where_it_is_not_minimal():
     for wrong in ({**look, "fog_visibility": 0.0}, {"fog_visibility": 5.0}, 3):
         with pytest.raises(InputError, match="appearance"):
             parse({**DEFAULT, "appearance": wrong})
+
+
+def test_dynamics_and_actions_are_told_where_they_are_not_the_first_ones():
+    plain = parse(DEFAULT)
+    assert plain.dynamics.is_computer_vision and plain.actions == MOVES_SETTINGS
+    windy, fast = FLIGHT.replace(wind=(2.0, 0.0, 0.0)).values(), ActionSettings(move_speed=5.0)
+    described = parse({**DEFAULT, "dynamics": windy, "actions": fast.values()})
+    assert described.as_dict() == {**DEFAULT, "dynamics": windy, "actions": fast.values()}
+    assert parse(described.as_dict()) == described
+    assert [*described.expected_weights()] == [*plain.expected_weights()]
+    still = {"dynamics": plain.dynamics.values(), "actions": plain.actions.values()}
+    assert parse({**DEFAULT, **still}).as_dict() == DEFAULT
+
+
+@pytest.mark.parametrize(
+    ("part", "value", "message"),
+    [
+        ("dynamics", {"mode": "simple_flight"}, r"dynamics\.camera_mount is missing"),
+        ("dynamics", {**FLIGHT.values(), "mass": -1.0}, r"dynamics\.mass=-1\.0"),
+        ("dynamics", {**FLIGHT.values(), "mass": 50.0}, r"dynamics\.rotor_thrust=.*can't hover"),
+        ("dynamics", {**FLIGHT.values(), "inertia": [1.0, 1.0, 3.0]}, r"dynamics\.inertia="),
+        ("dynamics", {**COMPUTER_VISION.values(), "gusts": 1.0}, r"dynamics\.gusts=1\.0 moves"),
+        ("dynamics", {**FLIGHT.values(), "_target_": "os.system"}, "'_target_' is unknown"),
+        ("dynamics", None, "dynamics="),
+        ("actions", {**MOVES_SETTINGS.values(), "kind": "eval"}, r"actions\.kind='eval'"),
+        ("actions", {**MOVES_SETTINGS.values(), "move_speed": True}, r"actions\.move_speed=True"),
+        ("actions", [], "actions="),
+    ],
+)
+def test_dynamics_and_actions_out_of_bounds_are_named(part, value, message):
+    with pytest.raises(InputError, match=message) as error:
+        parse({**DEFAULT, part: value})
+    assert "\n" not in str(error.value)
+
+
+def test_worlds_move_as_described_or_as_told(monkeypatch):
+    floating(monkeypatch)
+    fast = ActionSettings(move_speed=5.0)
+    flight = {"dynamics": FLIGHT.values(), "actions": fast.values()}
+    described = parse({**DEFAULT, **flight})
+
+    def flown(**told):
+        env = described.build_env(1, seed=0, device="cpu", pixels=False, **told)
+        return env.base_env.worlds.dynamics
+
+    own = flown()
+    assert (own.settings, own.asked) == (FLIGHT, fast)
+    windy = FLIGHT.replace(wind=(1.0, 0.0, 0.0))
+    assert (flown(dynamics=windy).settings, flown(dynamics=windy).asked) == (windy, fast)
+    turning = Turning()
+    assert flown(dynamics=turning) is turning
+    assert type(flown(dynamics=COMPUTER_VISION)) is ComputerVision

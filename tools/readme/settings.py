@@ -133,10 +133,8 @@ def _may_be(kind: Kind) -> str:
         case Several():
             count = kind.most if kind.least == kind.most else f"{kind.least} to {kind.most}"
             return f"{count} values, each {_may_be(kind.kind)}"
-        case ChangesOfTask():
-            return f"changes to the policy's {_link(BaseTaskSettings)}"
-        case Changes():
-            return f"changes to the policy's {_link(kind.of)}"
+        case ChangesOfTask() | Changes():
+            return f"changes to the policy's {_link(getattr(kind, 'of', BaseTaskSettings))}"
         case OneOf():
             return " or ".join(f"`{name}`" for name in kind.names)
         case Listed():

@@ -13,18 +13,19 @@ LEVEL = (1.0, 0.0, 0.0, 0.0)
 
 
 def heading_only(attitude: Tensor) -> Tensor:
-    """Attitudes without roll and pitch: what is left is the turn about the world's z axis.
+    """Attitudes without their tilt: the turns about the world's z axis that are nearest to them.
 
     Args:
         attitude: Unit quaternions (w, x, y, z). Shape: (*, 4).
 
     Returns:
-        The same shape; w is not negative.
+        The same shape; level and looking forward for a drone upside down, which has no heading.
     """
-    w, x, y, z = attitude.unbind(-1)
-    half = 0.5 * torch.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-    zero = torch.zeros_like(half)
-    return torch.stack([half.cos(), zero, zero, half.sin()], -1)
+    w, z = attitude[..., 0], attitude[..., 3]
+    length = (w * w + z * z).sqrt()
+    zero, has_one = torch.zeros_like(length), length > 0.0
+    w, z = torch.where(has_one, w / length, 1.0), torch.where(has_one, z / length, 0.0)
+    return torch.stack([w, zero, zero, z], -1)
 
 
 @dataclasses.dataclass

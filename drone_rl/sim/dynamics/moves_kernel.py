@@ -86,7 +86,7 @@ def place_of(fleet: Fleet, world: int) -> wp.vec3d:
 
 @wp.func
 def camera_attitude(fleet: Fleet, world: int) -> wp.vec4:
-    """How a drone's cameras are turned: as its body, or level with its heading."""
+    """How a drone's cameras are turned: as its body, or as `heading_only` has it."""
     numbers = fleet.numbers[world]
     w = numbers[_ATTITUDE]
     x = numbers[_ATTITUDE + 1]
@@ -94,6 +94,8 @@ def camera_attitude(fleet: Fleet, world: int) -> wp.vec4:
     z = numbers[_ATTITUDE + 3]
     if fleet.is_gimballed == 1:
         length = wp.sqrt(w * w + z * z)
+        if length == wp.float64(0.0):
+            return wp.vec4(1.0, 0.0, 0.0, 0.0)
         return wp.vec4(float(w / length), 0.0, 0.0, float(z / length))
     return wp.vec4(float(w), float(x), float(y), float(z))
 

@@ -9,6 +9,7 @@ import torch
 import drone_rl
 from drone_rl.sim.settings import CameraSettings, TaskSettings
 from drone_rl.utils.errors import InputError
+from tests.fake_flight import FLIGHT, floating
 from tests.second_task import Posts
 
 pytest.importorskip("gymnasium", reason="Gymnasium is not installed")
@@ -121,3 +122,17 @@ def test_films_show_the_drone_from_behind():
     film = stage.film()
     assert (film.shape, film.dtype) == ((2, 360, 640, 3), np.uint8)
     assert film[0, :, 320].std() > 10  # sky, drone, ground
+
+
+def test_settings_of_dynamics_and_actions(monkeypatch):
+    floating(monkeypatch)
+    given = {"dynamics": {"mode": "simple_flight"}, "actions": {"move_speed": 1.0}}
+    made = Stage(1, TASK, given).worlds.dynamics
+    assert (made.settings, made.asked.move_speed) == (FLIGHT, 1.0)
+    for wrong, message in (
+        ({"dynamics": {"mas": 1.0}}, r"dynamics\.mas is unknown"),
+        ({"dynamics": {"gusts": 1.0}}, r"dynamics\.gusts=1\.0 moves nothing"),
+        ({"actions": {"kind": "x"}}, r"actions\.kind='x' is unknown"),
+    ):
+        with pytest.raises(InputError, match=f"^{message}"):
+            Stage(1, TASK, wrong)

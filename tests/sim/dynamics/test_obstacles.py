@@ -24,7 +24,7 @@ def test_pillars_are_boxes_where_they_stand_and_far_below_where_they_do_not():
     state = field(task)
     state.present[0, 0] = False
     told = task.obstacles(state)
-    assert isinstance(told, Obstacles) and told.half_sizes.tolist() == [0.25, 0.25, 3.0]
+    assert isinstance(told, Obstacles) and told.half_sizes == (0.25, 0.25, 3.0)
     assert told.centers[0, 0].tolist() == [SETTINGS.first_distance, 0.0, 3.0 - 100.0]
     assert told.centers[0, 1].tolist() == [SETTINGS.first_distance, 0.0, 3.0]
     assert told.centers.shape == (1, SETTINGS.num_pillars, 3)

@@ -16,7 +16,13 @@ The same numbers, bit for bit: places are of double precision here, too.
 
 import warp as wp
 
-from drone_rl.sim.dynamics.moves_kernel import Fleet, camera_attitude, fly_move, is_flying
+from drone_rl.sim.dynamics.moves_kernel import (
+    Fleet,
+    camera_attitude,
+    fly_move,
+    is_flying,
+    is_lost,
+)
 from drone_rl.sim.rendering.raytrace_structs import DRONE_FRAME, Poses
 from drone_rl.sim.tasks.collect_cubes.playing import VANISHED_DEPTH
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
@@ -26,6 +32,7 @@ _ALL_CUBES = wp.constant(int(EndReason.ALL_CUBES))
 _FRONT_BOUNDARY = wp.constant(int(EndReason.FRONT_BOUNDARY))
 _SIDE_BOUNDARY = wp.constant(int(EndReason.SIDE_BOUNDARY))
 _STEP_LIMIT = wp.constant(int(EndReason.STEP_LIMIT))
+_LOST_CONTROL = wp.constant(int(EndReason.LOST_CONTROL))
 _DEPTH = wp.constant(wp.float64(VANISHED_DEPTH))
 
 STANDS = wp.constant(0)
@@ -119,7 +126,10 @@ def _fate(flights: Flights, drone: wp.vec3d, cube: wp.vec3d) -> int:
 
 @wp.func
 def _end_reason(flights: Flights, world: int, drone: wp.vec3d, collected: int) -> int:
-    """The first reason that holds, in the order of Algorithm 3."""
+    """The first reason that holds, in the order of Algorithm 3; a lost drone before all."""
+    if is_flying(flights.fleet):  # noqa: SIM102 (Warp evaluates both sides of "and")
+        if is_lost(flights.fleet, world):
+            return _LOST_CONTROL
     if collected == flights.cubes.shape[1]:
         return _ALL_CUBES
     if drone[0] > flights.front_bound:
