@@ -97,6 +97,11 @@ class Policy(Pilot):
             "network": ", ".join(f"{k}={v}" for k, v in described["network"].items()),
             "sees": " > ".join(step["name"] for step in described["transforms"]),
             "task": ", ".join(f"{k}={v}" for k, v in described["task"].items()),
+            **{
+                part: ", ".join(f"{k}={v}" for k, v in described[part].items())
+                for part in ("dynamics", "actions")
+                if part in described
+            },
             "trained": f"{progress['frames']:,} frames, {progress['episodes']:,} episodes",
             "file": str(self.path),
         }

@@ -13,7 +13,7 @@ from drone_rl.api.progress import silent
 from drone_rl.api.training import _read_best
 from drone_rl.settings.collecting import Threads
 from drone_rl.settings.training import TrainerSettings, TrainSettings
-from drone_rl.sim.settings import TaskSettings
+from drone_rl.sim.settings import DynamicsSettings, TaskSettings
 from drone_rl.training import Callback
 from drone_rl.utils.errors import InputError
 
@@ -118,10 +118,29 @@ def test_a_resumed_run_learns_as_it_did(trained):
         ({"task": {"num_cubes": 1}}, r"task=\(dict\) is no BaseTaskSettings"),
         ({"returns": 3}, "returns=3 is no Returns"),
         ({"transforms": (3,)}, r"transforms\[0\]=3 is no Transform"),
-        ({"wind": 3}, "wind is unknown; there are: task, appearance, camera"),
+        ({"wind": 3}, "wind is unknown; there are: task, appearance, dynamics, actions, camera"),
     ],
 )
 def test_mistakes_name_the_argument(change, message, tmp_path):
     with pytest.raises(InputError, match=f"^{message}"):
         drone_rl.train(folder=tmp_path, **change)
     assert not list(tmp_path.iterdir())
+
+
+def test_a_training_in_flight_is_described_and_goes_on_as_it_was(tmp_path, trained):
+    flight = DynamicsSettings(mode="simple_flight", gusts=1.0)
+    task = TaskSettings(num_cubes=1, first_distance=3.0, step_limit=20, front_margin=2.0)
+    short = TrainerSettings(total_frames=100, confirm_episodes=0)
+    told = TINY.replace(task=task, dynamics=flight, trainer=short)
+    whole = told.replace(trainer=short.replace(total_frames=200))
+    drone_rl.train(told, folder=tmp_path / "parts", progress=silent)
+    parts = drone_rl.train(whole, folder=tmp_path / "parts", resume=True, progress=silent)
+    once = drone_rl.train(whole, folder=tmp_path / "once", progress=silent)
+    own, other = weights(parts.folder), weights(once.folder)
+    assert all(torch.equal(own[name], other[name]) for name in own)
+    assert parts.policy.dynamics == flight and parts.policy.unlike == {}
+    assert "end/lost_control" in parts.metrics()
+    assert "end/lost_control" not in trained[0].metrics()  # where nothing can be lost
+    with pytest.raises(InputError, match=r"^can't resume with dynamics\.gusts=2\.0: "):
+        windy = whole.replace(dynamics=flight.replace(gusts=2.0))
+        drone_rl.train(windy, folder=parts.folder, resume=True, progress=silent)

@@ -12,12 +12,14 @@ from drone_rl.collectors import flight as flight_module
 from drone_rl.envs import CropRows, DroneEnv, GrayPixels, StandardizePixels, with_transforms
 from drone_rl.policies import MLP, SmallCNN, make_actor
 from drone_rl.sim.dynamics import Quadrotor
+from drone_rl.sim.dynamics.flight_state import LOST
 from drone_rl.sim.settings import (
     AppearanceSettings,
     DynamicsSettings,
     PillarsSettings,
     TaskSettings,
 )
+from drone_rl.sim.tasks.collect_cubes.rules import EndReason
 
 SHORT = TaskSettings(num_cubes=2, first_distance=3.0, spacing=3.0, step_limit=12, front_margin=3.0)
 REASON = ("next", "info", "end_reason")
@@ -47,7 +49,10 @@ def make(
     return EpisodeCollector(env, actor, **{"is_compiled": True, **how})
 
 
-@pytest.mark.parametrize("dynamics", [None, Quadrotor(FLYING)])
+GIMBAL = FLYING.replace(camera_mount="gimbal")
+
+
+@pytest.mark.parametrize("dynamics", [None, Quadrotor(FLYING), Quadrotor(GIMBAL)])
 def test_replayed_by_torchrls_steps_they_are_the_same_bit_for_bit(dynamics):
     kept = [REASON, ("next", "info", "collected"), ("next", "info", "drone")]
     collector = make(keep=kept, dynamics=dynamics)
@@ -220,7 +225,7 @@ def test_worlds_of_another_look_are_flown_step_by_step(visibility):
 
 
 def test_a_lost_drone_ends_its_episode_in_the_kernel_too():
-    """Speeds beyond all measure are no motion any more: one world's drone is lost at once."""
+    """Of five drones one is lost from the start."""
     collector = make(dynamics=Quadrotor(FLYING))
     begin = collector._flight._worlds.begin
 
