@@ -16,7 +16,7 @@ from torch import Tensor
 
 from drone_rl.explanations.scenes import Region
 from drone_rl.sim.actions import Actions
-from drone_rl.sim.dynamics import BodyState
+from drone_rl.sim.dynamics import BodyState, Dynamics
 from drone_rl.sim.tasks import State, Task
 from drone_rl.utils.archives import read_arrays
 from drone_rl.utils.errors import InputError
@@ -84,15 +84,22 @@ class RolloutDataset:
         """
         return task.next_offset(self.state(task))[:, :2].numpy()
 
-    def state(self, task: Task[Any]) -> State:
+    def state(self, task: Task[Any], dynamics: Dynamics | None = None) -> State:
         """The worlds as they stood, the drones at rest, ready to be changed and drawn again.
 
         Args:
             task: What was flown.
+            dynamics: By which it goes on; drones that have more than a pose, such as rotors, have
+                it then as at the start of an episode. None if it doesn't.
         """
         kept = {name: self.tensor(name) for name in (*task.remembered, "step")}
         attitude = self.tensor("attitude").double() if "attitude" in self.arrays else None
-        return task.recall(kept, BodyState.at_rest(self.tensor("drone").double(), attitude))
+        place = self.tensor("drone").double()
+        body = BodyState.at_rest(place, attitude)
+        begun = body if dynamics is None else dynamics.start(place)
+        if type(begun) is not BodyState:
+            body = begun.moved(place, attitude)
+        return task.recall(kept, body)
 
     def save(self, path: str | Path, flights: "RolloutDataset | None" = None) -> None:
         """Writes the file.

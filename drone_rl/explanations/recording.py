@@ -142,7 +142,8 @@ def draw(
     arrays = {name: value[rows] for name, value in flights.arrays.items()}
     fields = {**flights.meta["fields"], **SEEN}
     dataset = RolloutDataset(arrays, {}, {**flights.meta, "fields": fields})
-    state = dataset.state(scenes.task).to(scenes.worlds.device)
+    worlds = scenes.worlds
+    state = dataset.state(worlds.task, worlds.dynamics).to(worlds.device)
     observations = dataset.tensor("observations")
     arrays["frames"] = scenes.frames(state).cpu().numpy()
     arrays["regions"] = scenes.regions(state).cpu().numpy()

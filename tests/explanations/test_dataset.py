@@ -8,6 +8,8 @@ from drone_rl.explanations.dataset import SEEN, RolloutDataset, flown_fields
 from drone_rl.explanations.recording import fly
 from drone_rl.explanations.scenes import Region
 from drone_rl.sim.actions import MOVES
+from drone_rl.sim.dynamics import BodyState, ComputerVision, FlightState, Quadrotor
+from drone_rl.sim.settings import DynamicsSettings
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.utils.errors import InputError
 
@@ -78,3 +80,12 @@ def test_a_recorded_attitude_is_that_of_the_recalled_world(dataset):
     dataset.arrays["attitude"][3] = [0.6, 0.0, 0.0, 0.8]
     attitude = dataset.state(CollectCubes()).body.attitude
     torch.testing.assert_close(attitude[3], torch.tensor([0.6, 0.0, 0.0, 0.8]).double())
+
+
+def test_a_recalled_drone_can_go_on_by_the_dynamics_that_it_has(dataset):
+    flight = Quadrotor(DynamicsSettings(mode="simple_flight"))
+    body, plain = (dataset.state(CollectCubes(), of).body for of in (flight, ComputerVision()))
+    assert isinstance(body, FlightState) and type(plain) is BodyState
+    for name in ("position", "attitude", "velocity"):
+        torch.testing.assert_close(getattr(body, name), getattr(plain, name))
+    assert flight.step(body, torch.zeros(len(body), dtype=torch.int64)).velocity.any()

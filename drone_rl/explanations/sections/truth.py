@@ -26,7 +26,9 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
     columns): how far each patch moves the policy, on average.
     """
     data, network, seed = context.dataset, context.network, context.settings.seed
-    state, episode = data.state(context.scenes.task).to(context.device), context.episode
+    worlds = context.scenes.worlds
+    state = data.state(worlds.task, worlds.dynamics).to(context.device)
+    episode = context.episode
     trial = trust.make_trial(context.scenes, network, state, context.actions, episode, seed)
     changes = interventions.intervene(
         context.scenes, network, state, data.tensor("regions"), seed=seed
