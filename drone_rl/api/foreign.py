@@ -48,7 +48,7 @@ class ForeignPolicy(Pilot):
     """None: the camera's RGB bytes."""
     own_dynamics: DynamicsSettings = COMPUTER_VISION  # pyright: ignore[reportIncompatibleMethodOverride] (a field)
     """How its drone moved when it was made."""
-    actions: ActionSettings = MOVES_SETTINGS
+    actions: ActionSettings = MOVES_SETTINGS  # pyright: ignore[reportIncompatibleMethodOverride] (a field)
     """What its logits ask for."""
     flown: DynamicsSettings | None = None
     """How its drone moves now; as before by default."""

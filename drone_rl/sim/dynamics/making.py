@@ -42,7 +42,7 @@ def make_dynamics(
         actions: Moves by default.
 
     Raises:
-        InputError: Actions are chosen for what brings its own.
+        InputError: Actions are chosen for what brings its own, or are not there yet.
     """
     if dynamics is not None and not isinstance(dynamics, DynamicsSettings):
         if actions is not None:
@@ -52,11 +52,9 @@ def make_dynamics(
             )
         return dynamics
     dynamics, actions = dynamics or COMPUTER_VISION, actions or MOVES_SETTINGS
-    if not dynamics.is_computer_vision:
-        return Quadrotor(dynamics, actions)
-    if actions.kind == "moves":
-        return task.make_dynamics()
-    return Kinematic(actions, dynamics.control_timestep)
+    if actions.kind != "moves":
+        return _by_velocity(dynamics, actions)
+    return task.make_dynamics() if dynamics.is_computer_vision else Quadrotor(dynamics, actions)
 
 
 def draw_seeds(random_states: Sequence[np.random.RandomState]) -> Tensor:
@@ -71,9 +69,9 @@ def draw_seeds(random_states: Sequence[np.random.RandomState]) -> Tensor:
     return torch.tensor([int(r.randint(_SEEDS)) for r in random_states], dtype=torch.int64)
 
 
-def Kinematic(actions: ActionSettings, timestep: float) -> Dynamics:  # noqa: N802
-    """Holds the place of a class that is not there yet."""
+def _by_velocity(dynamics: DynamicsSettings, actions: ActionSettings) -> Dynamics:
+    """Holds the place of what flies by velocities, in both modes."""
     raise InputError(
-        f"actions={actions.kind} each {timestep:g} s in computer-vision mode is not there yet; "
-        "give actions=moves"
+        f"actions.kind={actions.kind} is not there yet in dynamics.mode={dynamics.mode}; give "
+        "actions=moves"
     )

@@ -31,16 +31,16 @@ def test_moves_in_computer_vision_mode_are_the_tasks_own_business(dynamics, acti
 
 def test_what_flies_is_made_of_both(monkeypatch):
     floating(monkeypatch)
-    made = make_dynamics(TASK, FLIGHT, VELOCITY)
-    assert isinstance(made, Floating) and (made.settings, made.asked) == (FLIGHT, VELOCITY)
+    slow = ActionSettings(move_speed=1.0)
+    made = make_dynamics(TASK, FLIGHT, slow)
+    assert isinstance(made, Floating) and (made.settings, made.asked) == (FLIGHT, slow)
     assert make_dynamics(TASK, FLIGHT).asked == MOVES_SETTINGS
 
 
-def test_velocities_in_computer_vision_mode_last_a_control_step(monkeypatch):
-    told = []
-    monkeypatch.setattr("drone_rl.sim.dynamics.making.Kinematic", lambda *given: told.append(given))
-    make_dynamics(TASK, DynamicsSettings(control_ticks=50, tick=0.01), VELOCITY)
-    assert told == [(VELOCITY, 0.5)]
+@pytest.mark.parametrize("dynamics", [COMPUTER_VISION, FLIGHT])
+def test_velocities_are_refused_until_something_flies_by_them(dynamics):
+    with pytest.raises(InputError, match=r"^actions\.kind=velocity is not there yet in dynamics"):
+        make_dynamics(TASK, dynamics, VELOCITY)
 
 
 def test_what_moves_drones_is_taken_as_it_is_and_brings_its_actions():
