@@ -58,7 +58,7 @@ class Flight:
         self._length = max(1, min(_LONGEST, _MOST_NUMBERS // (count * pixels)))
         rows = count * self._length
         self._pictures = torch.empty(rows, 1, view.height, view.width)
-        self._logits = torch.empty(rows, len(sight.worlds.dynamics.actions.names))
+        self._logits = torch.empty(rows, sight.worlds.dynamics.actions.num_outputs)
         self._actions, self._reasons = (torch.empty(rows, dtype=torch.int32) for _ in range(2))
         self._rewards = torch.empty(rows)
         self._log = self._make_log()

@@ -10,6 +10,7 @@ from torchrl.envs import Transform
 from drone_rl.envs import GrayPixels
 from drone_rl.envs.pipeline import memory_of, see_film
 from drone_rl.policies import PictureNetwork
+from drone_rl.sim.actions import Actions
 from drone_rl.sim.rendering import Appearance, Poses
 from drone_rl.sim.rendering.view import Modality
 from drone_rl.sim.tasks import State
@@ -29,7 +30,7 @@ class Sight(NamedTuple):
     spoil: Callable[..., Tensor]
     """What becomes of pictures, see `faults.Spoiling`."""
     pending: list[Tensor]
-    """Actions decided but not yet taken, oldest first. Shapes: (n,)."""
+    """Actions decided but not yet taken, oldest first. Shapes: (n, *)."""
 
     def draw(self, modality: Modality) -> Tensor:
         """What the policy's camera takes. Shape: (n, H, W, *)."""
@@ -49,8 +50,8 @@ class Eyes(Protocol):
         """What to do.
 
         Returns:
-            An action for each world, shape (n,), and what was seen, if anything was, from 0 to 1 as
-            the camera gave it or in any other units, shape (n, *).
+            An action for each world, shape (n, *), and what was seen, if anything was, from 0 to 1
+            as the camera gave it or in any other units, shape (n, *).
         """
         ...
 
@@ -85,7 +86,7 @@ class PolicyEyes:
         film = [*(earlier[sight.flying] for earlier in self._film), pictures]
         seen = see_film(self._rest, film)
         self._keep(pictures, sight.flying)
-        return sight.worlds.dynamics.actions.chosen(self._network(seen)), pictures
+        return sight.worlds.dynamics.actions.greedy(self._network(seen)), pictures
 
     def _keep(self, pictures: Tensor, flying: Tensor) -> None:
         if self._memory:
@@ -99,19 +100,21 @@ class BlindEyes:
 
     knows_truth = True
 
-    def __init__(self, action: int | None, num_actions: int, generator: torch.Generator) -> None:
+    def __init__(self, name: str, actions: Actions, generator: torch.Generator) -> None:
         """Takes what to do.
 
         Args:
-            action: Which; none for random ones.
-            num_actions: How many there are.
+            name: Of what is done always, or "random".
+            actions: What can be done.
             generator: Of random ones.
         """
-        self._action, self._num_actions, self._generator = action, num_actions, generator
+        self._actions, self._generator = actions, generator
+        self._action = None if name == "random" else actions.always(name)
 
     def act(self, sight: Sight) -> tuple[Tensor, Tensor | None]:
         """See `Eyes`."""
         if self._action is not None:
-            return torch.full_like(sight.flying, self._action), None
-        drawn = torch.randint(self._num_actions, sight.flying.shape, generator=self._generator)
+            same = self._action.expand(len(sight.flying), *self._action.shape)
+            return same.to(sight.flying.device), None
+        drawn = self._actions.draw(tuple(sight.flying.shape), self._generator)
         return drawn.to(sight.flying.device), None

@@ -141,12 +141,10 @@ class Airfield:
     def fly_blindly(self, condition: Condition) -> dict[str, Episodes]:
         """What luck achieves: each of the task's policies that need no eyes, by name."""
         worlds = self.worlds(condition)
-        names = worlds.dynamics.actions.names
         flown = {}
         for name in worlds.task.luck:
             generator = torch_generator(self.seed, Stream.ACTIONS)
-            action = None if name == "random" else names.index(name)
-            eyes = BlindEyes(action, len(names), generator)
+            eyes = BlindEyes(name, worlds.dynamics.actions, generator)
             flown[name] = self.fly(condition, eyes=eyes).episodes
         return flown
 
@@ -190,7 +188,7 @@ class _Flight:
             action, seen = self._eyes.act(see(now, flying, pending))
             if seen is not None:
                 trace[flying] += (step + 1) * seen.flatten(1).double().sum(-1)
-            decided.append(torch.zeros(len(done), dtype=action.dtype, device=action.device))
+            decided.append(action.new_zeros(len(done), *action.shape[1:]))
             decided[-1][flying] = action
             now, _ = worlds.advance(now, decided[max(step - delay, 0)][flying])
             done[flying] = now

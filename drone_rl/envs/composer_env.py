@@ -2,14 +2,15 @@
 
 import torch
 from dm_control import composer
+from dm_env.specs import DiscreteArray
 from torchrl.data import Categorical
 from torchrl.envs import DMControlWrapper
 
 
 class ComposerEnv(DMControlWrapper):
-    """Wraps a `composer.Environment` with a discrete action, which TorchRL's own wrapper refuses.
+    """Wraps a `composer.Environment`, whose discrete actions TorchRL's own wrapper refuses.
 
-    Actions are indices, as in `DroneEnv`.
+    Those are indices, as in `DroneEnv`.
     """
 
     def _check_kwargs(self, kwargs: dict) -> None:
@@ -18,8 +19,10 @@ class ComposerEnv(DMControlWrapper):
 
     def _make_specs(self, env: composer.Environment) -> None:
         super()._make_specs(env)
-        num_actions = env.action_spec().num_values
-        self.action_spec = Categorical(num_actions, dtype=torch.int64, device=self.device)
+        spec = env.action_spec()
+        if isinstance(spec, DiscreteArray):
+            number = spec.num_values
+            self.action_spec = Categorical(number, dtype=torch.int64, device=self.device)
 
     def _set_seed(self, _seed: int | None) -> None:
         self._env.random_state.seed(_seed)

@@ -15,14 +15,14 @@ from drone_rl.envs import worlds_of
 
 @dataclasses.dataclass(frozen=True)
 class Agreement:
-    """How far two programs agree on the probabilities of actions."""
+    """How far two programs agree on the probabilities of actions, or of their parts."""
 
     frames: int
     """Pictures that both were asked about."""
     difference: float
     """The greatest in any probability; NaN if any is no number."""
     actions_differ: int
-    """Pictures of which they call different actions the most probable."""
+    """Pictures of which they call different actions, or parts, the most probable."""
 
 
 @torch.no_grad()
@@ -37,7 +37,8 @@ def agreement(
     Args:
         env: Worlds of `DroneEnv` behind transforms.
         actor: The policy; it writes "logits".
-        other: Takes RGB pictures (N, H, W, 3), uint8, and gives probabilities (N, A); on the CPU.
+        other: Takes RGB pictures (N, H, W, 3), uint8, and gives probabilities (N, A), see
+            `Actions.wish`; on the CPU.
         steps: Of each world; those whose episode ends begin another.
     """
     base: Any = env.base_env

@@ -5,6 +5,7 @@ from typing import Any
 import torch
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
+from torch import Tensor
 
 from drone_rl.sim.actions import Actions
 from drone_rl.sim.settings import BaseTaskSettings
@@ -17,6 +18,9 @@ class Oracle(TensorDictModuleBase):
 
     def __init__(self, task: BaseTaskSettings | Task[Any], actions: Actions | None = None) -> None:
         """Learns the task's rule.
+
+        It was made for actions of the task's own choice of dynamics. Where drones have others that
+        are called the same, it takes those: full speed forward, or to a side.
 
         Args:
             task: The task, or the settings of cube collection.
@@ -33,12 +37,16 @@ class Oracle(TensorDictModuleBase):
                 f"task={task.name} has no oracle; choose a task that has one, or give this one "
                 "a rule that knows the truth (Task.oracle)"
             )
-        if actions is not None and actions.names != rule.actions.names:
+        known = rule.actions.names
+        if actions is not None and not set(known) <= set(actions.names):
             raise InputError(
-                f"the oracle of task={task.name} acts by {', '.join(rule.actions.names)}, these "
+                f"the oracle of task={task.name} acts by {', '.join(known)}, these "
                 f"drones by {', '.join(actions.names)}; choose dynamics that it can fly"
             )
         self.rule = rule
+        self._given = None
+        if actions is not None and actions != rule.actions:
+            self._given = torch.stack([actions.always(name) for name in known])
         keys = [("info", name) for name in rule.reads]
         self.in_keys = keys  # pyright: ignore[reportAttributeAccessIssue] (untyped in tensordict)
         self.out_keys = ["action"]
@@ -46,47 +54,48 @@ class Oracle(TensorDictModuleBase):
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Writes the action of each world."""
         known = [tensordict.get(key) for key in self.in_keys]
-        return tensordict.set("action", self.rule.act(*known))
+        action = self.rule.act(*known)
+        if self._given is not None:
+            action = self._given.to(action.device)[self.rule.actions.part(action)]
+        return tensordict.set("action", action)
 
 
 class RandomPolicy(TensorDictModuleBase):
     """Draws every action with the same probability."""
 
-    def __init__(self, num_actions: int, generator: torch.Generator) -> None:
+    def __init__(self, actions: Actions, generator: torch.Generator) -> None:
         """Sets the source of its actions.
 
         Args:
-            num_actions: How many there are.
+            actions: What can be done.
             generator: Where they are drawn from.
         """
         super().__init__()
         self.in_keys = ["done"]
         self.out_keys = ["action"]
-        self.num_actions = num_actions
+        self.actions = actions
         self.generator = generator
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Writes the action of each world."""
-        shape, device = tensordict.batch_size, self.generator.device
-        action = torch.randint(self.num_actions, shape, generator=self.generator, device=device)
-        return tensordict.set("action", action)
+        return tensordict.set("action", self.actions.draw(tensordict.batch_size, self.generator))
 
 
 class ConstantPolicy(TensorDictModuleBase):
     """Takes the same action whatever happens."""
 
-    def __init__(self, action: int) -> None:
+    def __init__(self, action: int | Tensor) -> None:
         """Sets the action.
 
         Args:
-            action: Taken at every step.
+            action: Taken at every step: a number, or of the shape and type of one world's.
         """
         super().__init__()
         self.in_keys = ["done"]
         self.out_keys = ["action"]
-        self.action = action
+        self.action = torch.as_tensor(action)
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Writes the action of each world."""
-        action = tensordict["done"][..., 0].long() * 0 + int(self.action)
-        return tensordict.set("action", action)
+        action = self.action.expand(*tensordict.batch_size, *self.action.shape)
+        return tensordict.set("action", action.to(tensordict["done"].device, copy=True))

@@ -166,7 +166,7 @@ def _draw_bars(
     draw: ImageDraw.ImageDraw, font: Font, acted: TensorDictBase, actions: Actions
 ) -> None:
     """One bar an action, as long as it is wished for; the chosen one in red (as in Fig. 13)."""
-    chosen, names = int(acted["action"][0]), actions.names
+    chosen, names = int(actions.part(acted["action"][0])), actions.names
     logits = acted.get("logits", None)
     wish = torch.eye(len(names))[chosen] if logits is None else actions.wish(logits[0])
     room = 960 // len(names)

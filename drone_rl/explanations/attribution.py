@@ -9,7 +9,7 @@ from captum.attr import IntegratedGradients, LayerGradCam, Saliency
 from torch import Tensor
 from torch.nn import functional
 
-from drone_rl.explanations.hooks import find_layer, probabilities, spatial_layers
+from drone_rl.explanations.hooks import actions_of, find_layer, probabilities, spatial_layers
 from drone_rl.explanations.patches import replaced
 from drone_rl.policies import PictureNetwork
 from drone_rl.utils.errors import InputError
@@ -172,9 +172,9 @@ class Explainer:
     def _forward(self, objective: Objective) -> Callable[[Tensor], Tensor]:
         if objective not in ("probability", "logit"):
             raise InputError(f"objective={objective!r} is unknown; give probability or logit")
-        if objective == "logit":
-            return self.network
-        return lambda x: self.network(x).softmax(-1)
+        actions = actions_of(self.network)
+        make = actions.scores if objective == "logit" else actions.wish
+        return lambda x: make(self.network(x))
 
 
 def _in_batches(

@@ -179,7 +179,7 @@ def visualise(
     """
     generator = torch.Generator().manual_seed(seed)
     shape = network.in_shape
-    num_actions = network.num_actions
+    num_actions = len(actions_of(network).names)
     starts = torch.rand(settings.starts, *shape, generator=generator)
     start = statistics.low + (statistics.high - statistics.low) * starts
     pictures = start.repeat(num_actions, 1, 1, 1)
@@ -227,11 +227,12 @@ def _objective(
     network: PictureNetwork, pictures: Tensor, action: Tensor, settings: ClassModelSettings
 ) -> Tensor:
     """What each picture should have more of. Shape: (N,)."""
-    logits = network(pictures)
+    actions, outputs = actions_of(network), network(pictures)
     if settings.objective == "probability":
-        value = actions_of(network).wish(logits).gather(1, action[:, None])[:, 0]
+        value = actions.wish(outputs).gather(1, action[:, None])[:, 0]
     else:
-        value = (logits - logits.mean(-1, keepdim=True)).gather(1, action[:, None])[:, 0]
+        scores = actions.scores(outputs)
+        value = (scores - scores.mean(-1, keepdim=True)).gather(1, action[:, None])[:, 0]
     return value - settings.total_variation * _differences(pictures)
 
 

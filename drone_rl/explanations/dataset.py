@@ -37,7 +37,7 @@ def flown_fields(task: Task[Any], actions: Actions) -> dict[str, str]:
     """What is known of each frame; in the file also of every step flown, as "flights/..."."""
     ends = ", ".join(f"{end.value} {end.name.lower()}" for end in task.ends)
     return {
-        "actions": "action taken: " + ", ".join(f"{i} {n}" for i, n in enumerate(actions.names)),
+        **actions.fields(),
         "rewards": "reward of the action, float32 (T,)",
         "event": "1 where the action reaches a goal, -1 where it misses one, else 0, int8 (T,)",
         "drone": "position before the action, metres, world frame: x forward, y left, z up (T, 3)",

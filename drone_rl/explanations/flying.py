@@ -1,11 +1,15 @@
 """What comes of a scene: the policy flies on from it, greedily, by the rules of the task."""
 
 import torch
+from torch import Tensor
 
-from drone_rl.explanations.hooks import probabilities
+from drone_rl.explanations.hooks import outputs
 from drone_rl.explanations.scenes import Scenes
 from drone_rl.policies import PictureNetwork
 from drone_rl.sim.tasks import State
+
+_SAME = 1e-9
+"""Metres, and parts of a quaternion: those of a move there and back differ by rounding."""
 
 
 @torch.no_grad()
@@ -13,7 +17,7 @@ def fly_on(scenes: Scenes, network: PictureNetwork, state: State) -> State:
     """Flies until it is settled which targets are reached.
 
     That is when the flight ends, when no target is left, or when a policy that remembers nothing
-    turns back to where it came from: it would go back and forth until the step limit.
+    is back where it was two steps before: it would go back and forth, or stay, to the step limit.
 
     Args:
         scenes: Where the flights are drawn.
@@ -25,19 +29,26 @@ def fly_on(scenes: Scenes, network: PictureNetwork, state: State) -> State:
     """
     task, actions, device = scenes.task, scenes.actions, state.body.position.device
     flying = torch.arange(len(state), device=device)
-    done, now, last, earlier = state[flying], state, None, []
+    done, now, earlier = state[flying], state, []
+    before: Tensor | None = None
     is_new = torch.ones_like(flying, dtype=torch.bool)
     while len(flying):
         frames = scenes.frames(now)
-        wish = probabilities(network, scenes.transform(frames, earlier))
-        action = actions.chosen(wish).to(device)
+        action = actions.greedy(outputs(network, scenes.transform(frames, earlier))).to(device)
+        here = _pose(now)
         now, reward = scenes.worlds.advance(now, action)
-        if last is not None and not scenes.memory:
-            now.end_reason[actions.undoes(action, last) & ~is_new] = task.truncation
+        if before is not None and not scenes.memory:
+            is_back = ((_pose(now) - before).abs() < _SAME).all(-1)
+            now.end_reason[is_back & ~is_new] = task.truncation
         done[flying] = now
         on = (now.end_reason == 0) & ~task.next_offset(now)[:, 0].isnan()
         earlier = [*earlier, frames][-scenes.memory :] if scenes.memory else []
         earlier = [pictures[on] for pictures in earlier]
         is_new = (reward != 0)[on]  # a target less is another scene
-        now, flying, last = now[on], flying[on], action[on]
+        now, flying, before = now[on], flying[on], here[on]
     return done
+
+
+def _pose(state: State) -> Tensor:
+    """Where drones are and how they are turned. Shape: (n, 7)."""
+    return torch.cat([state.body.position, state.body.attitude], -1)

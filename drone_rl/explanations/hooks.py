@@ -107,10 +107,15 @@ def features(network: PictureNetwork, observations: Tensor, layer: str) -> Tenso
 
 
 @torch.no_grad()
+def outputs(network: PictureNetwork, observations: Tensor) -> Tensor:
+    """What the network gives. Shape: (T, C, H, W) to (T, number of outputs)."""
+    return torch.cat([network(part) for part in observations.split(BATCH)])
+
+
+@torch.no_grad()
 def probabilities(network: PictureNetwork, observations: Tensor) -> Tensor:
-    """What the policy wishes for (Eq. 9). Shape: (T, C, H, W) to (T, number of outputs)."""
-    actions = actions_of(network)
-    return torch.cat([actions.wish(network(part)) for part in observations.split(BATCH)])
+    """What the policy wishes for (Eq. 9). Shape: (T, C, H, W) to (T, number of parts)."""
+    return actions_of(network).wish(outputs(network, observations))
 
 
 def actions_of(network: nn.Module) -> Actions:

@@ -31,7 +31,7 @@ def find_loops(dataset: RolloutDataset, actions: Actions, min_reversals: int = 2
         min_reversals: Two turns: back where it was, and away again.
     """
     moves, episode = dataset.tensor("actions"), dataset.episode
-    sways = actions.can_be_undone(moves)
+    sways = actions.sways({name: dataset.tensor(name) for name in actions.fields()})
     turns = actions.undoes(moves[1:], moves[:-1])
     loops, start = [], 0
     for t in range(1, len(moves) + 1):

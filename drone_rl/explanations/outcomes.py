@@ -14,7 +14,7 @@ from torch import Tensor
 
 from drone_rl.explanations.alternatives import DARK_GROUND
 from drone_rl.explanations.causal import spread
-from drone_rl.explanations.hooks import probabilities
+from drone_rl.explanations.hooks import outputs
 from drone_rl.explanations.intervals import episode_means
 from drone_rl.explanations.scenes import Scenes
 from drone_rl.policies import PictureNetwork
@@ -119,9 +119,9 @@ def fly(
         seen = scenes.frames(now[flying], appearance)
         past = [pictures[flying] for pictures in earlier]
         action = torch.full_like(target, -1)
-        wish = probabilities(network, scenes.transform(seen, past))
-        action[flying] = scenes.actions.chosen(wish)
-        now[flying] = scenes.worlds.advance(now[flying], action[flying])[0]
+        given = scenes.actions.greedy(outputs(network, scenes.transform(seen, past)))
+        action[flying] = scenes.actions.part(given)
+        now[flying] = scenes.worlds.advance(now[flying], given.to(target.device))[0]
         decided[flying] += 1
         actions.append(action)
         lateral.append(now.body.position[:, 1].clone())

@@ -25,6 +25,7 @@ from drone_rl.explanations.dataset import SEEN, RolloutDataset, flown_fields
 from drone_rl.explanations.hooks import features, probabilities
 from drone_rl.explanations.scenes import Scenes
 from drone_rl.policies import PictureNetwork
+from drone_rl.sim.actions import Actions
 from drone_rl.sim.tasks import Task
 from drone_rl.utils.errors import InputError
 
@@ -92,7 +93,8 @@ def fly(
     fields = flown_fields(worlds.task, worlds.dynamics.actions)
     described = {**fields, "observations": SEEN["observations"]}
     about = {"greedy": greedy, **(meta or {}), "fields": described}
-    return RolloutDataset(_arrays(torch.cat(batches), worlds.task), {}, about)
+    arrays = _arrays(torch.cat(batches), worlds.task, worlds.dynamics.actions)
+    return RolloutDataset(arrays, {}, about)
 
 
 def spread(episode: NDArray, num_frames: int) -> NDArray:
@@ -168,14 +170,14 @@ class _WithTruth(TensorDictModuleBase):
         return self.actor(tensordict)
 
 
-def _arrays(batch: TensorDictBase, task: Task[Any]) -> dict[str, NDArray]:
+def _arrays(batch: TensorDictBase, task: Task[Any], actions: Actions) -> dict[str, NDArray]:
     info: TensorDict = batch["info"]
     episode = batch["collector", "traj_ids"]
     starts = torch.cat([episode.new_ones(1, dtype=torch.bool), episode[1:] != episode[:-1]])
     first = starts.nonzero()[:, 0][starts.cumsum(0) - 1]
     arrays = {
         "observations": batch["pixels"],
-        "actions": batch["action"],
+        **actions.kept(batch["action"]),
         "rewards": batch["next", "reward"][:, 0],
         "event": _events(task, info, starts, batch["next", "info", "end_reason"][:, 0]),
         **{name: info[name] for name in _POSE},

@@ -91,14 +91,17 @@ class Scenes:
     def needed(self, offset: Tensor) -> Tensor:
         """The action that a target calls for which stands there; -1 where nobody knows.
 
-        A task tells what to do with the actions of its own choice of dynamics, and no others.
+        A task tells what to do with the actions of its own choice of dynamics; among others it is
+        the part that is called the same.
 
         Args:
             offset: Metres from the drone, world frame. Shape: (N, 3).
         """
-        if self.actions.names != self.task.make_dynamics().actions.names:
+        names, known = self.actions.names, self.task.make_dynamics().actions.names
+        if not set(known) <= set(names):
             return torch.full(offset.shape[:1], -1)
-        return self.task.needed(offset)
+        same = torch.tensor([*(names.index(name) for name in known), -1], device=offset.device)
+        return same[self.task.needed(offset)]  # -1 reads the last entry
 
     def observe(self, state: State) -> Tensor:
         """Scenes as the policy gets them. Shape: (T, C, h, w)."""

@@ -1,4 +1,4 @@
-"""From a network to an actor: logits to actions."""
+"""From a network to an actor: outputs to actions."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -12,16 +12,8 @@ from torchrl.data import TensorSpec
 from torchrl.envs.utils import ExplorationType, exploration_type
 from torchrl.modules import ProbabilisticActor
 
-
-class RandomSource:
-    """A torch generator that copies of a module share, so that no draw is made twice."""
-
-    def __init__(self, generator: torch.Generator) -> None:
-        self.generator = generator
-
-    def __deepcopy__(self, memo: dict) -> "RandomSource":
-        """Returns itself: the stream is one, however many copies draw from it."""
-        return self
+from drone_rl.policies.random_source import RandomSource
+from drone_rl.policies.squashed_normal import SquashedNormal
 
 
 class SeededCategorical(Categorical):
@@ -45,7 +37,7 @@ class SeededCategorical(Categorical):
         return self.logits.argmax(-1)
 
 
-class CategoricalActor(ProbabilisticActor):
+class StraightActor(ProbabilisticActor):
     """A `ProbabilisticActor` that takes the straight way from network to action.
 
     The way around through TensorDict's modules, which `get_dist` and everything else still go,
@@ -54,7 +46,7 @@ class CategoricalActor(ProbabilisticActor):
 
     @property
     def network(self) -> nn.Module:
-        """Pictures to logits."""
+        """Pictures to outputs."""
         return self._parts[0].module
 
     @property
@@ -79,7 +71,7 @@ class CategoricalActor(ProbabilisticActor):
         tensordict_out: TensorDictBase | None = None,
         **kwargs: object,
     ) -> TensorDictBase:
-        """Writes logits and actions."""
+        """Writes "logits", a network's outputs, and actions."""
         network, head = self._parts
         how = self.exploration
         straight = how in (ExplorationType.RANDOM, ExplorationType.DETERMINISTIC)
@@ -93,24 +85,35 @@ class CategoricalActor(ProbabilisticActor):
         return tensordict.set(head.out_keys[0], action)
 
 
+class CategoricalActor(StraightActor):
+    """One that chooses between actions that are counted."""
+
+
+def distribution_of(dtype: torch.dtype) -> type[SeededCategorical | SquashedNormal]:
+    """How a network's outputs become actions of a type: whole numbers are chosen among."""
+    return SquashedNormal if dtype.is_floating_point else SeededCategorical
+
+
 def make_actor(
     network: nn.Module, action_spec: TensorSpec, generator: torch.Generator | None = None
-) -> CategoricalActor:
+) -> StraightActor:
     """A stochastic policy: "pixels" to "logits" to "action" (chapter, Eq. 9).
 
-    It samples by default and takes the most probable action under
-    `set_exploration_type(ExplorationType.DETERMINISTIC)`.
+    It samples by default and takes the most probable action, or of continuous ones the median,
+    under `set_exploration_type(ExplorationType.DETERMINISTIC)`.
 
     Args:
-        network: Pictures (*, C, H, W) to logits (*, num_actions).
-        action_spec: The environment's.
+        network: Pictures (*, C, H, W) to outputs (*, num_outputs): logits of counted actions.
+        action_spec: The environment's; its type decides how actions are drawn.
         generator: Source of the sampled actions; torch's global one by default.
     """
-    return CategoricalActor(
+    kind = distribution_of(action_spec.dtype)
+    make = CategoricalActor if kind is SeededCategorical else StraightActor
+    return make(
         TensorDictModule(network, in_keys=["pixels"], out_keys=["logits"]),
         in_keys=["logits"],
         spec=action_spec,
         default_interaction_type=InteractionType.RANDOM,
-        distribution_class=SeededCategorical,
+        distribution_class=kind,
         distribution_kwargs={"source": None if generator is None else RandomSource(generator)},
     )

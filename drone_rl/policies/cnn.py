@@ -40,7 +40,7 @@ class PolicyNetwork(PictureNetwork):
 
     @property
     def num_actions(self) -> int:
-        """Number of logits."""
+        """Number of outputs: logits, where actions are counted."""
         return len(self.layers.get_parameter("logits.weight"))
 
     @property

@@ -11,7 +11,7 @@ from tensordict.nn import (
 )
 from torch import Tensor, nn
 
-from drone_rl.policies.actor import SeededCategorical
+from drone_rl.policies.actor import distribution_of
 from drone_rl.policies.cnn import PolicyNetwork, orthogonal
 from drone_rl.utils.errors import InputError
 
@@ -57,7 +57,7 @@ class ActorCritic(nn.Module):
             ProbabilisticTensorDictModule(
                 in_keys=["logits"],
                 out_keys=["action"],
-                distribution_class=SeededCategorical,
+                distribution_class=distribution_of(network.actions.entry.dtype),
                 return_log_prob=True,
                 log_prob_key=LOG_PROB,
             ),

@@ -6,7 +6,10 @@ from drone_rl.sim.actions import MOVES, Actions
 
 
 class PictureNetwork(nn.Module):
-    """From pictures to one logit an action; any number of leading batch dimensions."""
+    """From pictures to what actions are chosen by; any number of leading batch dimensions.
+
+    Of actions that are counted that is a logit for each, see `Actions.num_outputs`.
+    """
 
     in_shape: tuple[int, ...]
     """Shape (C, H, W) of one picture."""
@@ -17,8 +20,8 @@ class PictureNetwork(nn.Module):
 
     @property
     def num_actions(self) -> int:
-        """Number of logits."""
-        return len(self.actions.names)
+        """Number of outputs: logits, where actions are counted."""
+        return self.actions.num_outputs
 
     @property
     def has_weights(self) -> bool:

@@ -1,23 +1,24 @@
 """What a policy can do: the names of its actions, their mirror images, and how far they lie apart.
 
-A network's outputs become a *wish*: of discrete actions, the probability of each. Whoever compares
-policies compares wishes, by the functions that stand here, and need not know how many actions there
-are nor that they are discrete.
+A network's outputs become a *wish*: what is asked for, as shares of named *parts* that add up to
+1. Of discrete actions the parts are the actions, and a share is an action's probability; continuous
+ones are of a kind each, such as "left", and a share is the probability of that kind. Whoever
+compares policies compares wishes, by the functions that stand here, and need not know how many
+actions there are nor whether they are discrete.
 """
 
 import dataclasses
 import enum
-from typing import Any, NamedTuple, Protocol, TypeVar
+from collections.abc import Mapping
+from typing import Any, NamedTuple, Protocol
 
-import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-Wish = TypeVar("Wish", Tensor, NDArray)
-"""One wish or many: the last dimension is a wish's own, those before it count wishes."""
-Rgb = tuple[int, int, int]
-"""Red, green, blue, 0 to 255."""
+from drone_rl.sim.parts import Parts, Rgb, Wish
+
+__all__ = ["MOVES", "Actions", "DiscreteActions", "Entry", "Move", "Rgb", "Wish"]
 
 
 class Entry(NamedTuple):
@@ -30,7 +31,10 @@ class Entry(NamedTuple):
 
 
 class Actions(Protocol):
-    """A set of actions. Wishes may be tensors or NumPy arrays."""
+    """A set of actions. Wishes may be tensors or NumPy arrays.
+
+    An *action* is what dynamics take, shaped as `entry` says; a *part* is a number, int64.
+    """
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -47,12 +51,45 @@ class Actions(Protocol):
         """One world's action."""
         ...
 
+    @property
+    def num_outputs(self) -> int:
+        """How many numbers a network gives."""
+        ...
+
     def wish(self, outputs: Tensor) -> Tensor:
-        """What a network's outputs ask for. Shapes: (*, len(names)) both."""
+        """What a network's outputs ask for. Shapes: (*, num_outputs), (*, len(names))."""
+        ...
+
+    def scores(self, outputs: Tensor) -> Tensor:
+        """A number that each part's share grows with, without bounds. Shapes as of `wish`."""
+        ...
+
+    def greedy(self, outputs: Tensor) -> Tensor:
+        """The action of who draws nothing. Shapes: (*, num_outputs); (*), then the entry's."""
         ...
 
     def chosen(self, wish: Tensor) -> Tensor:
-        """The action that is wished for most. Shape: (*), then the entry's."""
+        """The part that is wished for most. Shape: (*)."""
+        ...
+
+    def part(self, action: Tensor) -> Tensor:
+        """What part actions are. Shapes: (*), then the entry's; (*)."""
+        ...
+
+    def always(self, name: str) -> Tensor:
+        """The action that is that part, and that as much as can be. Shape: the entry's."""
+        ...
+
+    def draw(self, shape: tuple[int, ...], generator: torch.Generator) -> Tensor:
+        """Actions, all alike probable, on the generator's device. Shape: `shape`, the entry's."""
+        ...
+
+    def fields(self) -> dict[str, str]:
+        """What is kept of an action, and what that means, in words."""
+        ...
+
+    def kept(self, action: Tensor) -> dict[str, Tensor]:
+        """These of actions. "actions" are the parts. Shapes: (T), then the entry's; (T, *)."""
         ...
 
     def mirror(self, wish: Wish) -> Wish:
@@ -71,16 +108,19 @@ class Actions(Protocol):
         """How opposed two wishes are, 0 to 1; below 0 where the second leans left. Shape: (*)."""
         ...
 
-    def undoes(self, action: Tensor, before: Tensor) -> Tensor:
-        """Whether an action undoes the one before it. Shape: (*), bool."""
+    def undoes(self, part: Tensor, before: Tensor) -> Tensor:
+        """Whether a part undoes the one before it. Shape: (*), bool."""
         ...
 
-    def can_be_undone(self, action: Tensor) -> Tensor:
-        """Whether any action undoes these; going back and forth is made of such. Shape: (*)."""
+    def sways(self, kept: Mapping[str, Tensor]) -> Tensor:
+        """Whether actions, as `kept`, can be undone and lead nowhere. Shape: (T,), bool.
+
+        Going back and forth is made of such.
+        """
         ...
 
-    def turns(self, action: Tensor) -> Tensor:
-        """Whether an action is another one in a mirror. Shape: (*), bool."""
+    def turns(self, part: Tensor) -> Tensor:
+        """Whether a part is another one in a mirror. Shape: (*), bool."""
         ...
 
     def as_dict(self) -> dict[str, Any]:
@@ -89,112 +129,59 @@ class Actions(Protocol):
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class DiscreteActions:
-    """A few actions, known by number; a wish is the probability of each.
-
-    Raises:
-        ValueError: A mirror image or opposite is not among them, or not mutual.
-    """
-
-    names: tuple[str, ...]
-    """What people call each."""
-    mirrored: tuple[int, ...]
-    """What each becomes in a mirror."""
-    opposite: tuple[int, ...]
-    """What undoes each; itself where nothing does."""
-    left: int
-    """The one that goes left; its mirror image goes right."""
-    order: tuple[int, ...]
-    """All of them, from left to right, as they are drawn."""
-    arrows: tuple[tuple[float, float], ...]
-    """Where each points on a page, to the right and up; length 1, or 0 if it points nowhere."""
-    colors: tuple[Rgb, ...]
-    """Of each."""
-
-    def __post_init__(self) -> None:
-        """Refuses a set that contradicts itself."""
-        every = list(range(len(self.names)))
-        for name in ("mirrored", "opposite"):
-            pairs = getattr(self, name)
-            if sorted(pairs) != every or [pairs[pairs[i]] for i in every] != every:
-                raise ValueError(f"{name}={pairs} must pair actions, or an action with itself")
-        if sorted(self.order) != every:
-            raise ValueError(f"order={self.order} must name every action once")
-        if not len(self.arrows) == len(self.colors) == len(every):
-            raise ValueError(f"give an arrow and a colour to each of {len(every)} actions")
-        if self.mirrored[self.left] == self.left:
-            raise ValueError(f"left={self.left} is its own mirror image; give one that turns")
-
-    def __len__(self) -> int:
-        """Returns how many there are."""
-        return len(self.names)
-
-    @property
-    def right(self) -> int:
-        """The one that goes right."""
-        return self.mirrored[self.left]
+class DiscreteActions(Parts):
+    """A few actions, known by number; a wish is the probability of each."""
 
     @property
     def entry(self) -> Entry:
         """One world's action: a number."""
         return Entry((), torch.int64, 0, len(self) - 1)
 
+    @property
+    def num_outputs(self) -> int:
+        """A logit for each."""
+        return len(self)
+
     def wish(self, outputs: Tensor) -> Tensor:
         """Probabilities of logits (Eq. 9)."""
         return outputs.softmax(-1)
 
-    def chosen(self, wish: Tensor) -> Tensor:
+    def scores(self, outputs: Tensor) -> Tensor:
+        """The logits."""
+        return outputs
+
+    def greedy(self, outputs: Tensor) -> Tensor:
         """The most probable action."""
-        return wish.argmax(-1)
+        return outputs.argmax(-1)
 
-    def mirror(self, wish: Wish) -> Wish:
-        """Each action's probability becomes that of its mirror image."""
-        return wish[..., list(self.mirrored)]
+    def part(self, action: Tensor) -> Tensor:
+        """The action itself."""
+        return action
 
-    def distance(self, wish: Wish, other: Wish) -> Wish:
-        """Total variation: half the sum of the absolute differences."""
-        return 0.5 * abs(wish - other).sum(-1)  # pyright: ignore[reportReturnType] (of arrays and tensors)
+    def always(self, name: str) -> Tensor:
+        """That action."""
+        return torch.tensor(self.names.index(name))
 
-    def leaning(self, wish: Wish) -> Wish:
-        """The probability of the action that goes left."""
-        return wish[..., self.left]
+    def draw(self, shape: tuple[int, ...], generator: torch.Generator) -> Tensor:
+        """Whole numbers."""
+        return torch.randint(len(self), shape, generator=generator, device=generator.device)
 
-    def opposition(self, wish: NDArray, other: NDArray) -> NDArray:
-        """The lesser of the swings to the left and to the right; 0 unless both go one way.
+    def fields(self) -> dict[str, str]:
+        """Its number."""
+        return {"actions": "action taken: " + listed(self.names)}
 
-        0 says that both want the same, 1 that one surely goes left and the other surely right.
-        """
-        swing = wish - other
-        to_left, to_right = swing[..., self.left], -swing[..., self.right]
-        agreed = np.sign(to_left) == np.sign(to_right)
-        least = np.minimum(np.abs(to_left), np.abs(to_right))
-        return np.where(agreed, np.sign(to_left) * least, 0.0)
+    def kept(self, action: Tensor) -> dict[str, Tensor]:
+        """Its number."""
+        return {"actions": action}
 
-    def undoes(self, action: Tensor, before: Tensor) -> Tensor:
-        """Whether an action is the opposite of the one before, and another one."""
-        return (action == self._opposite_of(before)) & (action != before)
+    def sways(self, kept: Mapping[str, Tensor]) -> Tensor:
+        """Whether they have an opposite."""
+        return self.can_be_undone(kept["actions"])
 
-    def can_be_undone(self, action: Tensor) -> Tensor:
-        """Whether an action has an opposite."""
-        return self._opposite_of(action) != action
 
-    def turns(self, action: Tensor) -> Tensor:
-        """Whether an action's mirror image is another one."""
-        return torch.tensor(self.mirrored, device=action.device)[action] != action
-
-    def _opposite_of(self, action: Tensor) -> Tensor:
-        return torch.tensor(self.opposite, device=action.device)[action]
-
-    def as_dict(self) -> dict[str, Any]:
-        """As in `explanation.json`."""
-        return {
-            "names": list(self.names),
-            "order": [int(action) for action in self.order],
-            "arrows": [list(arrow) for arrow in self.arrows],
-            "mirrored": [int(action) for action in self.mirrored],
-            "left": int(self.left),
-            "colors": [list(color) for color in self.colors],
-        }
+def listed(names: tuple[str, ...]) -> str:
+    """Names with their numbers."""
+    return ", ".join(f"{number} {name}" for number, name in enumerate(names))
 
 
 class Move(enum.IntEnum):

@@ -41,8 +41,8 @@ def make_baseline(
     if name == "oracle":
         return Oracle(task, actions)
     if name == "random":
-        return RandomPolicy(len(actions.names), generator)
-    return ConstantPolicy(actions.names.index(name))
+        return RandomPolicy(actions, generator)
+    return ConstantPolicy(actions.always(name))
 
 
 def fly_baselines(

@@ -228,7 +228,7 @@ class PolicyDescription:
             return self._network(actions)
 
     def _network(self, actions: Actions, generator: torch.Generator | None = None) -> PolicyNetwork:
-        network = self._layers(len(actions.names), generator)
+        network = self._layers(actions.num_outputs, generator)
         network.actions = actions
         return network
 

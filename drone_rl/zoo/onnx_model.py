@@ -16,8 +16,8 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.extras import extra
 from drone_rl.zoo.description import PolicyDescription
 
-FRAMES, PROBABILITIES = "frames", "probabilities"
-"""Names of the model's input and output."""
+FRAMES, PROBABILITIES, ACTION = "frames", "probabilities", "action"
+"""Names of the model's input and outputs."""
 _ASKED_BY = "format=onnx"
 
 
@@ -38,9 +38,19 @@ class SeeingPolicy(nn.Module):
         self._network = network
         self._transform = on_pixels(description.make_transforms())
 
-    def forward(self, frames: Tensor) -> Tensor:
-        """RGB (N, H, W, 3), uint8, to the probability of each action (N, A), float32."""
-        return self._network.actions.wish(self._network(self._transform(frames)))
+    @property
+    def tells_action(self) -> bool:
+        """Whether the action is told, too: it is more than the most probable part's number."""
+        return bool(self._network.actions.entry.shape)
+
+    def forward(self, frames: Tensor) -> Tensor | tuple[Tensor, Tensor]:
+        """RGB (N, H, W, 3), uint8, to the probability of each part (N, A), float32.
+
+        And to the greedy action, (N, 3), float32, where probabilities don't tell it.
+        """
+        actions, outputs = self._network.actions, self._network(self._transform(frames))
+        wish = actions.wish(outputs)
+        return (wish, actions.greedy(outputs)) if self.tells_action else wish
 
 
 def make_onnx(
@@ -49,8 +59,10 @@ def make_onnx(
     """A policy as an ONNX model.
 
     The model's input is "frames", RGB of the policy's camera, uint8 (N, H, W, 3) for any N from 1;
-    its output "probabilities", of each action, float32 (N, A). Its metadata are JSON texts: all
-    that the description says, by its keys, and "actions", their names in the output's order.
+    its output "probabilities", of each action, float32 (N, A). Where actions are continuous these
+    are of their parts, see `Actions.wish`, and a second output, "action", float32 (N, 3), is what
+    to do. Its metadata are JSON texts: all that the description says, by its keys, and "actions",
+    names in the order of the first output.
 
     Args:
         description: Of the policy.
@@ -72,7 +84,7 @@ def make_onnx(
                 (sample,),
                 dynamo=True,
                 input_names=[FRAMES],
-                output_names=[PROBABILITIES],
+                output_names=[PROBABILITIES, ACTION][: 1 + policy.tells_action],
                 dynamic_shapes=({0: torch.export.Dim("N")},),
                 verbose=False,
             )

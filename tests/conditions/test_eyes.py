@@ -4,6 +4,7 @@ from torchrl.envs import CatFrames
 from drone_rl.conditions.eyes import BlindEyes, PolicyEyes, Sight
 from drone_rl.envs import GrayPixels, RgbPixels
 from drone_rl.policies import PictureNetwork
+from drone_rl.sim.actions import MOVES
 from drone_rl.sim.settings import CameraSettings
 from drone_rl.sim.worlds import Worlds
 from tests.conditions.subjects import TASK
@@ -68,9 +69,9 @@ def test_who_looks_at_nothing_does_the_same_always_or_anything_alike():
     worlds = make_worlds()
     where = sight(worlds, torch.arange(3))
     generator = torch.Generator().manual_seed(0)
-    action, seen = BlindEyes(2, 3, generator).act(where)
+    action, seen = BlindEyes("right", MOVES, generator).act(where)
     assert (action.tolist(), seen) == ([2, 2, 2], None)
-    eyes = BlindEyes(None, 3, generator)
+    eyes = BlindEyes("random", MOVES, generator)
     drawn = torch.cat([eyes.act(where)[0] for _ in range(200)])
     worlds.close()
     assert (drawn.bincount() / 600 - 1 / 3).abs().max() < 0.08

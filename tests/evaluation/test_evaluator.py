@@ -4,7 +4,7 @@ import torch
 from drone_rl.collectors import EpisodeCollector
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation import ConstantPolicy, Oracle, RandomPolicy, run_episodes, summarise
-from drone_rl.sim.actions import Move
+from drone_rl.sim.actions import MOVES, Move
 from drone_rl.sim.settings import TaskSettings
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
 from drone_rl.utils.seeding import Stream
@@ -22,7 +22,7 @@ def test_oracle_collects_everything(settings):
 
 def test_random_policy_collects_what_the_original_studys_did():
     env = DroneEnv(500, pixels=False)
-    policy = RandomPolicy(3, torch.Generator().manual_seed(0))
+    policy = RandomPolicy(MOVES, torch.Generator().manual_seed(0))
     summary = summarise(run_episodes(env, policy, 500))
     assert 0.7 < summary["mean_goals"] < 1.0  # 0.84 there
     assert 125 < summary["mean_length"] < 142  # 133 there

@@ -3,7 +3,7 @@ import torch
 from tensordict import TensorDict
 
 from drone_rl.evaluation import ConstantPolicy, Oracle, RandomPolicy
-from drone_rl.sim.actions import Move
+from drone_rl.sim.actions import MOVES, Move
 from drone_rl.sim.settings import TaskSettings
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.utils.errors import InputError
@@ -33,6 +33,6 @@ def test_a_task_without_an_oracle_says_so_in_one_line():
 
 def test_chance_draws_all_actions_alike_and_habit_takes_one():
     done = TensorDict({"done": torch.zeros(3000, 1, dtype=torch.bool)}, [3000])
-    drawn = RandomPolicy(3, torch.Generator().manual_seed(0))(done)["action"]
+    drawn = RandomPolicy(MOVES, torch.Generator().manual_seed(0))(done)["action"]
     assert all(900 < int((drawn == action).sum()) < 1100 for action in Move)
     assert ConstantPolicy(Move.RIGHT)(done)["action"].unique().tolist() == [2]

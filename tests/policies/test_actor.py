@@ -1,15 +1,18 @@
 import copy
+import math
 
 import pytest
 import torch
 from tensordict import TensorDict
 from torch import nn
-from torchrl.data import Categorical
+from torchrl.data import Bounded, Categorical
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 from torchrl.modules import ProbabilisticActor
 
 from drone_rl.policies import make_actor
-from drone_rl.policies.actor import RandomSource, SeededCategorical
+from drone_rl.policies.actor import SeededCategorical, distribution_of
+from drone_rl.policies.random_source import RandomSource
+from drone_rl.policies.squashed_normal import SquashedNormal
 
 
 class Fixed(nn.Module):
@@ -73,3 +76,41 @@ def test_log_prob_and_entropy():
     distribution = SeededCategorical(torch.tensor([[0.0, 0.0]]))
     assert distribution.log_prob(torch.tensor([1])).exp().item() == 0.5
     assert distribution.sample((7,)).shape == (7, 1)
+
+
+class Leaning(nn.Module):
+    """Means 0, 1 and -1 of deviation exp(-0.5)."""
+
+    def forward(self, pixels):
+        outputs = torch.tensor([0.0, *(sign * 3 * math.atanh(1 / 3) for sign in (1, -1)), 0, 0, 0])
+        return outputs.expand(len(pixels), 6)
+
+
+def lean(seed=0):
+    spec = Bounded(-1, 1, (3,), dtype=torch.float32)
+    return make_actor(Leaning(), spec, torch.Generator().manual_seed(seed))
+
+
+def test_numbers_within_bounds_are_drawn_from_squashed_normals():
+    drawn = act(lean())
+    assert drawn.shape == (20_000, 3) and drawn.dtype == torch.float32
+    normal = drawn.double().atanh()
+    expected = torch.tensor([0.0, 1.0, -1.0], dtype=torch.float64)
+    assert (normal.mean(0) - expected).abs().max() < 4 * math.exp(-0.5) / 20_000**0.5
+    assert (normal.std(0) - math.exp(-0.5)).abs().max() < 0.02
+    with set_exploration_type(ExplorationType.DETERMINISTIC):
+        torch.testing.assert_close(act(lean(), 2)[1].double(), expected.tanh(), atol=1e-6, rtol=0)
+
+
+@pytest.mark.parametrize("how", [ExplorationType.RANDOM, ExplorationType.DETERMINISTIC])
+def test_of_numbers_too_the_straight_way_ends_where_torchrls_own_does(how):
+    pixels = TensorDict({"pixels": torch.zeros(500, 1)}, [500])
+    straight, around = lean(3), lean(3)
+    with set_exploration_type(how):
+        one, two = straight(pixels.clone()), ProbabilisticActor.forward(around, pixels.clone())
+    assert all(torch.equal(one[key], two[key]) for key in ("logits", "action"))
+
+
+def test_the_type_of_actions_says_how_they_are_drawn():
+    assert distribution_of(torch.int64) is SeededCategorical
+    assert distribution_of(torch.float32) is SquashedNormal

@@ -5,7 +5,7 @@ import torch
 
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation import ConstantPolicy, Oracle, RandomPolicy, run_episodes
-from drone_rl.sim.actions import Move
+from drone_rl.sim.actions import MOVES, Move
 from drone_rl.sim.settings import TaskSettings
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
@@ -21,7 +21,7 @@ def policies():
     """What each baseline is; luck has a random stream of its own, which no policy's actions use."""
     generator = torch_generator(0, Stream.ACTIONS, number=1)
     fixed = {action.name.lower(): ConstantPolicy(action) for action in Move}
-    return {"oracle": Oracle(TASK), "random": RandomPolicy(3, generator), **fixed}
+    return {"oracle": Oracle(TASK), "random": RandomPolicy(MOVES, generator), **fixed}
 
 
 def test_baselines_are_flown_in_the_same_worlds_one_by_one(policies, monkeypatch):

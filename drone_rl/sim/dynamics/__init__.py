@@ -5,6 +5,7 @@ from drone_rl.sim.dynamics.computer_vision import ComputerVision
 from drone_rl.sim.dynamics.dynamics import Dynamics
 from drone_rl.sim.dynamics.flight_state import Contact, FlightState
 from drone_rl.sim.dynamics.goals import Goals, Mode
+from drone_rl.sim.dynamics.kinematic import Kinematic
 from drone_rl.sim.dynamics.making import draw_seeds, make_dynamics
 from drone_rl.sim.dynamics.obstacles import Obstacles
 from drone_rl.sim.dynamics.quadrotor import Quadrotor
@@ -16,6 +17,7 @@ __all__ = [
     "Dynamics",
     "FlightState",
     "Goals",
+    "Kinematic",
     "Mode",
     "Obstacles",
     "Quadrotor",

@@ -1,0 +1,13 @@
+import copy
+
+import torch
+from torch import nn
+
+from drone_rl.policies.random_source import RandomSource
+
+
+def test_a_copy_is_the_same_stream():
+    module = nn.Module()
+    module.source = RandomSource(torch.Generator().manual_seed(0))
+    other = copy.deepcopy(module)
+    assert other is not module and other.source is module.source

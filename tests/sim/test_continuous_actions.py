@@ -1,0 +1,152 @@
+import math
+
+import numpy as np
+import pytest
+import torch
+
+from drone_rl.sim.actions import MOVES
+from drone_rl.sim.continuous_actions import ContinuousActions, normal_of
+from drone_rl.sim.settings import ActionSettings
+
+SETTINGS = ActionSettings(kind="velocity", forward_speed=4, sideways_speed=3, yaw_rate=45)
+ALL = ContinuousActions.of(SETTINGS)
+STRAIGHT = ContinuousActions.of(SETTINGS.replace(yaw_rate=0.0))
+EDGE = math.atanh(1 / 3)
+DEVIATION = math.exp(-0.5)
+
+
+def outputs(forward=0.0, left=0.0, yaw=0.0):
+    """Outputs of these means, below 3, and of deviation exp(-0.5)."""
+    means = [3 * math.atanh(mean / 3) for mean in (forward, left, yaw)]
+    return torch.tensor([*means, 0.0, 0.0, 0.0], dtype=torch.float64)
+
+
+def phi(x):
+    return 0.5 * math.erfc(-x / math.sqrt(2))
+
+
+def test_names_are_those_of_the_moves_and_of_turns():
+    assert STRAIGHT.names == MOVES.names and STRAIGHT.order == MOVES.order
+    assert ALL.names == ("forward", "left", "right", "turn left", "turn right")
+    assert ALL.names[ALL.order[0]] == "turn left"
+    assert ALL.entry == ((3,), torch.float32, -1.0, 1.0)
+    assert ALL.num_outputs == 6 and (len(ALL), len(STRAIGHT)) == (5, 3)
+    assert ContinuousActions.of(SETTINGS) == ALL != STRAIGHT
+
+
+def test_rates_are_in_units():
+    action = torch.tensor([[-1.0, 0, 0], [1, 1, 1], [0, -0.5, -1], [9, -9, 9]])
+    turn = math.pi / 4
+    expected = [[0, 0, 0], [4, 3, turn], [2, -1.5, -turn], [4, -3, turn]]
+    assert ALL.to_rates(action).tolist() == expected
+    assert ALL.to_rates(action).dtype == torch.float64
+
+
+def test_outputs_of_zero_are_half_speed_ahead_and_an_open_mind():
+    mean, deviation = normal_of(torch.zeros(2, 6, dtype=torch.float64))
+    assert mean.tolist() == [[0.0] * 3] * 2
+    torch.testing.assert_close(deviation, torch.full_like(deviation, DEVIATION))
+    most, least = (normal_of(torch.full((2,), end)) for end in (99.0, -99.0))
+    assert (most[0].item(), most[1].item()) == pytest.approx((3.0, 1.0))
+    assert (least[0].item(), least[1].item()) == pytest.approx((-3.0, math.exp(-3)))
+
+
+def test_a_wish_is_the_probability_of_each_part_by_hand():
+    left, right = phi((0.5 - EDGE) / DEVIATION), phi((-0.5 - EDGE) / DEVIATION)
+    wish = STRAIGHT.wish(outputs(left=0.5))
+    assert wish.tolist() == pytest.approx([1 - left - right, left, right])
+    turn = phi(-EDGE / DEVIATION)  # to either side
+    wish = ALL.wish(outputs(left=0.5))
+    both = [
+        (1 - left - right) * (1 - 2 * turn),
+        left * (1 - turn),
+        right * (1 - turn),
+        turn * (1 - (left + right) / 2),
+        turn * (1 - (left + right) / 2),
+    ]
+    assert wish.tolist() == pytest.approx(both) and wish.sum().item() == pytest.approx(1)
+
+
+def test_a_wish_is_what_drawn_actions_are():
+    given = outputs(1.0, 0.3, -0.4)
+    mean, deviation = normal_of(given)
+    draws = torch.randn(100_000, 3, generator=torch.Generator().manual_seed(0), dtype=mean.dtype)
+    drawn = (mean + deviation * draws).tanh()
+    aside, turned = drawn[:, 1].abs() > 1 / 3, drawn[:, 2].abs() > 1 / 3
+    weight = torch.where(aside & turned, 0.5, 1.0)
+    shares = torch.stack(
+        [
+            (~aside & ~turned).double(),
+            weight * (drawn[:, 1] > 1 / 3),
+            weight * (drawn[:, 1] < -1 / 3),
+            weight * (drawn[:, 2] > 1 / 3),
+            weight * (drawn[:, 2] < -1 / 3),
+        ],
+        -1,
+    )
+    assert (shares.mean(0) - ALL.wish(given)).abs().max() < 0.007  # 4 deviations of 0.5 / 316
+
+
+def test_of_uniform_actions_a_third_goes_to_each_side():
+    drawn = ALL.draw((30_000,), torch.Generator().manual_seed(0))
+    assert drawn.shape == (30_000, 3) and drawn.abs().max() <= 1
+    still = torch.stack([drawn[:, 0], drawn[:, 1], torch.zeros(30_000)], -1)
+    assert (ALL.part(still).bincount() / 30_000 - 1 / 3).abs().max() < 0.012
+
+
+def test_what_part_an_action_is():
+    action = torch.tensor(
+        [[1, 0, 0], [1, 0.5, 0], [-1, -0.5, 0], [1, 0.5, -0.6], [0, 0.2, 0.9], [1, 0.3, -0.3]]
+    )
+    assert ALL.part(action).tolist() == [0, 1, 2, 4, 3, 0]
+    assert STRAIGHT.part(action).tolist() == [0, 1, 2, 1, 0, 0]  # where turns are none
+    for number, name in enumerate(ALL.names):
+        assert ALL.part(ALL.always(name)) == number
+    assert ALL.to_rates(ALL.always("left")).tolist() == [0, 3, 0]
+
+
+def test_the_mirror_image_of_a_wish_is_the_wish_of_mirrored_means():
+    there = ALL.wish(outputs(0.5, -0.7, 0.2))
+    torch.testing.assert_close(ALL.mirror(ALL.wish(outputs(0.5, 0.7, -0.2))), there)
+    assert ALL.leaning(there) == there[1] + there[3]
+    assert STRAIGHT.leaning(STRAIGHT.wish(outputs())) == STRAIGHT.wish(outputs())[1]
+
+
+def test_going_left_and_turning_right_are_opposed():
+    one, other = np.array([0, 1.0, 0, 0, 0]), np.array([0, 0, 0, 0, 1.0])
+    assert ALL.opposition(one, other) == 1.0 and ALL.opposition(other, one) == -1.0
+    part, before = torch.tensor([1, 3, 3, 0]), torch.tensor([2, 4, 2, 0])
+    assert ALL.undoes(part, before).tolist() == [True, True, False, False]
+    assert ALL.turns(torch.arange(5)).tolist() == [False, True, True, True, True]
+
+
+def test_shares_have_gradients_by_the_outputs_and_scores_everywhere():
+    free = torch.tensor([0.3, -0.2, 0.4, 0.1, -0.5, 0.7], dtype=torch.float64, requires_grad=True)
+    assert torch.autograd.gradcheck(ALL.wish, free)
+    given = torch.tensor([1.0, 2.0, 3.0, 9.0, 9.0, 9.0])
+    assert ALL.scores(given).tolist() == [1.0, 2.0, -2.0, 3.0, -3.0]
+    assert STRAIGHT.scores(given).tolist() == [1.0, 2.0, -2.0]
+
+
+def test_who_draws_nothing_takes_the_means():
+    expected = torch.tensor([1.0, -0.5, 0.25], dtype=torch.float64).tanh()
+    torch.testing.assert_close(ALL.greedy(outputs(1.0, -0.5, 0.25)), expected)
+
+
+def test_what_is_kept_of_actions():
+    kept = ALL.kept(torch.tensor([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]))
+    assert set(kept) == set(ALL.fields())
+    assert kept["actions"].tolist() == [0, 1]
+    assert kept["rates"].tolist() == [[4, 0, 0], [2, 3, 0]]
+    assert "3 turn left" in ALL.fields()["actions"]
+
+
+def test_going_aside_is_swaying_where_it_gets_nowhere():
+    action = torch.tensor([[-1.0, 0.5, 0], [-0.3, 0.5, 0], [-0.4, 0, -0.5], [-1, 0.2, 0.2]])
+    assert ALL.sways(ALL.kept(action)).tolist() == [True, False, True, False]
+
+
+def test_a_report_can_name_and_draw_them():
+    told = ALL.as_dict()
+    assert told["names"] == list(ALL.names) and told["left"] == 1
+    assert all(math.hypot(*arrow) == pytest.approx(1) for arrow in told["arrows"])

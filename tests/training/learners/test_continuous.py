@@ -1,0 +1,185 @@
+"""Continuous actions are learned by what learns discrete ones; gradients by hand."""
+
+import math
+
+import pytest
+import torch
+from tensordict import TensorDict
+from torchrl.objectives import A2CLoss, ClipPPOLoss
+
+from drone_rl.collectors import EpisodeCollector, RolloutCollector
+from drone_rl.evaluation import run_episodes
+from drone_rl.objectives import Advantages, ReinforceLoss
+from drone_rl.objectives.estimators import LeaveOneOut
+from drone_rl.policies import MLP, ActorCritic, make_actor
+from drone_rl.policies.squashed_normal import SquashedNormal
+from drone_rl.sim.continuous_actions import ContinuousActions
+from drone_rl.training import ActorCriticLearner, ReinforceLearner
+from tests.continuous import SETTINGS, make_policy, make_worlds
+
+ACTIONS = ContinuousActions.of(SETTINGS)
+SHAPE = (1, 1, 2)
+DEVIATION = math.exp(-0.5)
+"""Of each number of an untrained policy."""
+
+
+def generator(seed=0):
+    return torch.Generator().manual_seed(seed)
+
+
+@pytest.fixture
+def policy():
+    """Linear, with weights of zero: means 0 and deviations exp(-0.5) whatever it sees."""
+    network = MLP(SHAPE, 6, hidden=(), generator=generator())
+    network.actions = ACTIONS
+    torch.nn.init.zeros_(network.layers[-1].weight)
+    env = make_worlds(1)
+    actor = make_actor(network, env.action_spec, generator(1))
+    env.close()
+    return network, actor
+
+
+def steps(count=7):
+    pixels = torch.randn(count, *SHAPE, generator=generator(2))
+    action = ACTIONS.draw((count,), generator(3))
+    returns = torch.randn(count, 1, generator=generator(4))
+    return TensorDict({"pixels": pixels, "action": action, "return_to_go": returns}, [count])
+
+
+def pushes(action):
+    """d log p / d outputs, where these are 0. Shape: (n, 6).
+
+    Of the mean (u - 0) / s^2, of the deviation's output (z^2 - 1) times its logarithm's slope.
+    """
+    number = action.atanh()
+    return torch.cat([number / DEVIATION**2, ((number / DEVIATION) ** 2 - 1) * 5 / 12], -1)
+
+
+def test_reinforces_gradient_is_the_analytic_one(policy):
+    network, actor = policy
+    batch = steps()
+    ReinforceLoss(actor)(batch)["loss_actor"].backward()
+    weighted = pushes(batch["action"]) * batch["return_to_go"]
+    expected = -(weighted.T @ batch["pixels"].reshape(7, 2)) / 7
+    torch.testing.assert_close(network.layers[-1].weight.grad, expected, rtol=1e-4, atol=1e-5)
+
+
+def test_the_entropy_bonus_raises_the_entropy_of_actions(policy):
+    network, actor = policy
+    batch = steps()
+    ReinforceLoss(actor, entropy_coeff=0.1)(batch)["loss_entropy"].backward()
+    bias = torch.zeros(6, requires_grad=True)
+    (-0.1 * SquashedNormal(bias).entropy()).backward()
+    torch.testing.assert_close(network.layers[-1].bias.grad, bias.grad)
+    assert (bias.grad[3:] < 0).all()  # deviations are below those of the most uniform actions
+    assert bias.grad[:3].abs().max() < 1e-6  # and means in the middle
+
+
+@pytest.mark.parametrize("kind", [A2CLoss, ClipPPOLoss])
+def test_before_the_first_step_a_critics_gradient_is_the_policys(policy, kind):
+    network, _ = policy
+    model = ActorCritic(network, None, generator())
+    learner = learner_of(network, model, kind)
+    batch = steps()
+    given = TensorDict({"pixels": batch["pixels"], "action": batch["action"]}, [7])
+    advantage = batch["return_to_go"]
+    with torch.no_grad():
+        chances = model.actor.get_dist(model.trunk(given.clone()))
+        assert type(chances) is SquashedNormal
+        given.set("action_log_prob", chances.log_prob(batch["action"]))
+        values = model.critic(model.trunk(given.clone()))["state_value"]
+    given = given.set("advantage", advantage).set("value_target", values)
+    learner._losses(given)["loss_objective"].backward()
+    expected = -((pushes(batch["action"]) * advantage).T @ batch["pixels"].reshape(7, 2)) / 7
+    torch.testing.assert_close(network.layers[-1].weight.grad, expected, rtol=1e-4, atol=1e-5)
+
+
+def learner_of(network, model, kind, rate=0.02, **kwargs):
+    return ActorCriticLearner(
+        network=network,
+        model=model,
+        estimator=Advantages(0.98, 0.95, True),
+        loss=kind(model.actor, model.critic, functional=False, entropy_coeff=0.001),
+        optimiser=torch.optim.Adam(model.parameters(), lr=rate),
+        generator=generator(5),
+        **kwargs,
+    )
+
+
+def test_reinforces_mean_gradient_is_that_of_the_expected_reward(policy):
+    """One step that earns its forward number: dJ / d mean = E[1 - tanh^2], by a fine sum."""
+    network, actor = policy
+    number = torch.linspace(-8, 8, 10_001, dtype=torch.float64) * DEVIATION
+    weight = (-0.5 * (number / DEVIATION) ** 2).exp()
+    slope = float(((1 - number.tanh() ** 2) * weight).sum() / weight.sum())
+    estimates = []
+    for _ in range(40):
+        batch = TensorDict({"pixels": torch.zeros(2000, *SHAPE)}, [2000])
+        batch = actor(batch)
+        batch["return_to_go"] = batch["action"][:, :1]
+        network.zero_grad()
+        ReinforceLoss(actor)(batch)["loss_actor"].backward()
+        estimates.append(-network.layers[-1].bias.grad.clone())
+    estimates = torch.stack(estimates)
+    error = estimates.std(0) / 40**0.5
+    assert error[0] < 0.02 * slope
+    expected = torch.tensor([slope, 0, 0, 0, 0, 0])
+    assert ((estimates.mean(0) - expected).abs() < 4 * error + 1e-4).all()
+
+
+@pytest.mark.parametrize("kind", [None, A2CLoss, ClipPPOLoss])
+def test_a_step_that_earns_most_at_one_action_leads_there(policy, kind):
+    """-|a - target|^2 is what an action earns; the policy gets near, and surer of itself."""
+    network, actor = policy
+    target = torch.tensor([0.5, -0.3, 0.0])
+    if kind is None:
+        optimiser = torch.optim.Adam(network.parameters(), lr=0.02)
+        loss = ReinforceLoss(actor)
+        learner = ReinforceLearner(
+            network=network, estimator=LeaveOneOut(1.0), loss=loss, optimiser=optimiser
+        )
+    else:
+        model = ActorCritic(network, None, generator())
+        learner = learner_of(network, model, kind, epochs=2)
+    told = {}
+    for _ in range(120):
+        batch = actor(TensorDict({"pixels": torch.ones(128, *SHAPE)}, [128]))
+        reward = -((batch["action"] - target) ** 2).sum(-1, keepdim=True)
+        ends = torch.ones(128, 1, dtype=torch.bool)
+        after = {"pixels": batch["pixels"], "reward": reward, "done": ends, "terminated": ends}
+        batch = batch.exclude("logits").set("next", TensorDict(after, [128]))
+        told = learner.update(batch if kind is None else batch.unsqueeze(1))
+    with torch.no_grad():
+        outputs = network(torch.ones(1, *SHAPE))
+        assert (ACTIONS.greedy(outputs)[0] - target).abs().max() < 0.12
+        assert SquashedNormal(outputs).scale.max() < 0.45 < DEVIATION
+    assert all(math.isfinite(value) for value in told.values())
+
+
+@pytest.mark.parametrize("kind", ["reinforce", "ppo"])
+def test_a_policy_learns_to_fly_to_a_cube(kind):
+    env, unseen = make_worlds(32), make_worlds(50, seed=9)
+    network, actor = make_policy(env)
+
+    def success():
+        return float(run_episodes(unseen, actor, 50).success.mean())
+
+    before = success()
+    if kind == "reinforce":
+        optimiser = torch.optim.Adam(network.parameters(), lr=3e-3)
+        loss, estimator = ReinforceLoss(actor, entropy_coeff=0.01), LeaveOneOut(0.98)
+        learner = ReinforceLearner(
+            network=network, estimator=estimator, loss=loss, optimiser=optimiser
+        )
+        collector, updates = EpisodeCollector(env, actor), 30
+    else:
+        model = ActorCritic(network, None, generator(2))
+        learner = learner_of(network, model, ClipPPOLoss, 3e-3, epochs=4, minibatch_size=256)
+        collector, updates = RolloutCollector(env, actor, 32), 12
+    for _ in range(updates):
+        batch = collector.collect()
+        learner.update(batch)
+    assert batch["action"].dtype == torch.float32 and batch["action"].shape[-1] == 3
+    assert before < 0.5 and success() >= 0.94
+    collector.shutdown()
+    unseen.close()
