@@ -81,7 +81,7 @@ class ForeignNetwork(PictureNetwork):
         """
         flat = pixels.reshape(-1, *self.in_shape)
         made = self._logits(self._given(flat))
-        wanted, names = (len(flat), self.num_actions), ", ".join(self.actions.names)
+        wanted, names = (len(flat), self.num_actions), ", ".join(self.actions.output_names)
         if not isinstance(made, Tensor | np.ndarray):
             raise InputError(
                 f"the network gives a {type(made).__name__}; give a callable that gives logits of "

@@ -7,6 +7,7 @@ import numpy as np
 import torch
 from torch import Tensor
 from torch.distributions import Distribution
+from torch.distributions.constraints import Constraint
 from torch.nn import functional
 
 from drone_rl.policies.random_source import RandomSource
@@ -20,7 +21,6 @@ _NODES = 32
 class SquashedNormal(Distribution):
     """tanh of independent normal numbers, drawn from a generator of its own, not the global one."""
 
-    arg_constraints: dict = {}  # noqa: RUF012 (torch annotates it so)
     has_rsample = False
 
     def __init__(self, logits: Tensor, source: RandomSource | None = None) -> None:
@@ -35,6 +35,11 @@ class SquashedNormal(Distribution):
         self._source = source
         shape = self.loc.shape
         super().__init__(shape[:-1], shape[-1:], validate_args=False)
+
+    @property
+    def arg_constraints(self) -> dict[str, Constraint]:
+        """None: outputs may be any numbers."""
+        return {}
 
     @property
     def deterministic_sample(self) -> Tensor:

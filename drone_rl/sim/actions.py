@@ -56,6 +56,11 @@ class Actions(Protocol):
         """How many numbers a network gives."""
         ...
 
+    @property
+    def output_names(self) -> tuple[str, ...]:
+        """What each of them is for."""
+        ...
+
     def wish(self, outputs: Tensor) -> Tensor:
         """What a network's outputs ask for. Shapes: (*, num_outputs), (*, len(names))."""
         ...
@@ -141,6 +146,11 @@ class DiscreteActions(Parts):
     def num_outputs(self) -> int:
         """A logit for each."""
         return len(self)
+
+    @property
+    def output_names(self) -> tuple[str, ...]:
+        """The same as the actions'."""
+        return self.names
 
     def wish(self, outputs: Tensor) -> Tensor:
         """Probabilities of logits (Eq. 9)."""

@@ -102,6 +102,12 @@ class ContinuousActions(Parts):
         """A mean and a deviation for each of three numbers."""
         return 6
 
+    @property
+    def output_names(self) -> tuple[str, ...]:
+        """First those for the means."""
+        numbers = ("forward", "left", "turn left")
+        return (*(f"{n} mean" for n in numbers), *(f"{n} deviation" for n in numbers))
+
     def to_rates(self, action: Tensor) -> Tensor:
         """Actions in units: m/s forward, m/s to the left, rad/s to the left; the drone's own frame.
 

@@ -18,6 +18,7 @@ from drone_rl.envs import (
 )
 from drone_rl.policies import SmallCNN, make_actor
 from drone_rl.sim.settings import AppearanceSettings, PillarsSettings, TaskSettings
+from tests.continuous import make_policy, make_worlds
 
 SHORT = TaskSettings(num_cubes=2, first_distance=3.0, spacing=3.0, step_limit=12, front_margin=3.0)
 KEPT = [("next", name) for name in ("reward", "done", "terminated", "truncated")]
@@ -56,6 +57,24 @@ def test_both_ways_give_the_same_bit_for_bit(task, worlds, look):
         first = one["collector", "traj_ids"].min()
         lengths |= {*torch.bincount(one["collector", "traj_ids"] - first).tolist()}
     assert len(lengths) > 1 or task is not SHORT  # some went on alone
+
+
+def test_both_ways_fly_at_speeds_that_are_drawn():
+    ways = []
+    for is_straight in (True, False):
+        env = make_worlds(5)
+        made = EpisodeCollector(env, make_policy(env)[1], keep=(REASON,), is_compiled=True)
+        assert isinstance(made._way, StraightWay) and made._flight is None
+        if not is_straight:
+            made._way = TorchrlWay(env, made._observed, made._kept)
+        ways.append(made)
+    for _ in range(2):
+        one, other = (way.collect() for way in ways)
+        assert one["action"].shape == (len(one), 3) and one["action"].dtype == torch.float32
+        for key in ("action", REASON, ("next", "reward"), ("collector", "traj_ids")):
+            assert torch.equal(one[key], other[key]), key
+    for way in ways:
+        way.shutdown()
 
 
 @pytest.mark.parametrize(

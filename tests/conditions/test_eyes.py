@@ -5,9 +5,11 @@ from drone_rl.conditions.eyes import BlindEyes, PolicyEyes, Sight
 from drone_rl.envs import GrayPixels, RgbPixels
 from drone_rl.policies import PictureNetwork
 from drone_rl.sim.actions import MOVES
+from drone_rl.sim.continuous_actions import ContinuousActions
 from drone_rl.sim.settings import CameraSettings
 from drone_rl.sim.worlds import Worlds
 from tests.conditions.subjects import TASK
+from tests.continuous import SETTINGS
 
 
 class Looking(PictureNetwork):
@@ -75,3 +77,12 @@ def test_who_looks_at_nothing_does_the_same_always_or_anything_alike():
     drawn = torch.cat([eyes.act(where)[0] for _ in range(200)])
     worlds.close()
     assert (drawn.bincount() / 600 - 1 / 3).abs().max() < 0.08
+
+
+def test_who_looks_at_nothing_may_have_speeds_to_choose():
+    worlds, actions = make_worlds(), ContinuousActions.of(SETTINGS)
+    where, generator = sight(worlds, torch.arange(2)), torch.Generator().manual_seed(0)
+    action, _ = BlindEyes("forward", actions, generator).act(where)
+    assert action.tolist() == [[1, 0, 0]] * 2
+    assert BlindEyes("random", actions, generator).act(where)[0].shape == (2, 3)
+    worlds.close()

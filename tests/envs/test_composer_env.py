@@ -4,7 +4,9 @@ from torchrl.envs.utils import check_env_specs
 
 from drone_rl.envs.composer_env import ComposerEnv
 from drone_rl.sim.composer_task import make_environment
+from drone_rl.sim.dynamics import Kinematic
 from drone_rl.sim.settings import TaskSettings
+from tests.continuous import SETTINGS
 
 SHORT = TaskSettings(step_limit=32)
 
@@ -36,6 +38,17 @@ def test_time_limit_is_truncation_and_boundary_termination(env):
     state = env.rollout(40, policy=lambda td: td.set("action", torch.tensor(next(turn))))
     assert state["next", "truncated"][-1].item()
     assert len(state) == 32
+
+
+def test_speeds_are_numbers_within_bounds():
+    dynamics = Kinematic(SETTINGS)
+    env = ComposerEnv(make_environment(SHORT, pixels=False, random_state=0, dynamics=dynamics))
+    check_env_specs(env)
+    assert env.action_spec.shape == (3,) and env.action_spec.dtype.is_floating_point
+    fastest = torch.tensor([1.0, 1.0, 0.0], dtype=torch.float64)
+    env.rollout(5, policy=lambda td: td.set("action", fastest))
+    position = env._env.task.state.body.position[0]
+    assert position[:2].tolist() == pytest.approx([2.0, 1.5])
 
 
 def test_wraps_composer_only():

@@ -5,9 +5,11 @@ from tensordict import TensorDict
 
 from drone_rl.evaluation.video import _draw_bars, _look, film_episode, write_video
 from drone_rl.sim.actions import MOVES
+from drone_rl.sim.continuous_actions import ContinuousActions
 from drone_rl.sim.meaning import Meaning
 from drone_rl.sim.settings import AppearanceSettings, TaskSettings
 from drone_rl.utils.errors import InputError
+from tests.continuous import SETTINGS
 from tests.five_actions import FIVE
 from tests.second_task import Posts
 
@@ -77,6 +79,14 @@ def test_there_is_a_bar_for_each_action_from_left_to_right_as_long_as_it_is_prob
     assert chosen[1] == 960 // count - 140 and all(
         b[1] == 1 for b in canvas.bars if b is not chosen
     )
+
+
+def test_of_speeds_there_is_a_bar_for_each_part():
+    canvas, actions = Canvas(), ContinuousActions.of(SETTINGS)
+    acted = {"action": torch.tensor([[0.0, 0.9, 0.0]]), "logits": torch.zeros(1, 6)}
+    _draw_bars(canvas, None, TensorDict(acted, [1]), actions)
+    assert len({color for *_, color in canvas.bars[:1] + canvas.bars[2:]}) == 1
+    assert canvas.texts[1][1].startswith("left 0.") and canvas.bars[1][2] != canvas.bars[0][2]
 
 
 def test_who_has_no_logits_is_sure():

@@ -3,6 +3,7 @@ import torch
 from drone_rl.envs import CropRows, DroneEnv, GrayPixels, Resize, RgbPixels, with_transforms
 from drone_rl.explanations.scenes import Region, Scenes, empty_scene, place_target
 from drone_rl.sim.settings import CameraSettings
+from tests.continuous import make_worlds
 from tests.second_dynamics import Turning
 
 
@@ -61,4 +62,10 @@ def test_what_is_needed_is_known_of_the_tasks_own_actions_alone(scenes):
     assert scenes.needed(left).tolist() == [1]
     env = with_transforms(DroneEnv(1, dynamics=Turning()), [GrayPixels()])
     assert Scenes(env).needed(left).tolist() == [-1]
+    env.close()
+
+
+def test_what_is_needed_is_the_part_of_the_same_name():
+    env, places = make_worlds(1), torch.tensor([[6.0, y, 0.0] for y in (4.0, 0.0, -4.0)])
+    assert Scenes(env).needed(places).tolist() == [1, 0, 2]
     env.close()

@@ -12,6 +12,27 @@ def test_numbers_of_the_moves_are_those_of_files_and_policies():
     assert (MOVES.left, MOVES.right, MOVES.order) == (1, 2, (1, 0, 2))
     assert (len(MOVES), len(FIVE), FIVE.right) == (3, 5, 3)
     assert MOVES.entry == ((), torch.int64, 0, 2)
+    assert MOVES.output_names == MOVES.names and (MOVES.num_outputs, FIVE.num_outputs) == (3, 5)
+
+
+def test_what_is_done_blindly():
+    assert (MOVES.always("right"), FIVE.always("stay")) == (2, 4)
+    drawn = FIVE.draw((5000,), torch.Generator().manual_seed(0))
+    assert (drawn.bincount() / 5000 - 0.2).abs().max() < 0.03
+    assert FIVE.draw((2, 3), torch.Generator()).shape == (2, 3)
+
+
+def test_of_outputs_the_greatest_is_taken_and_scored_as_it_is():
+    outputs = torch.tensor([[0.0, 3.0, 1.0], [2.0, 0.0, 1.0]])
+    assert MOVES.greedy(outputs).tolist() == [1, 0]
+    assert torch.equal(MOVES.scores(outputs), outputs)
+
+
+def test_an_action_is_a_part_and_is_kept_so():
+    action = torch.tensor([0, 4, 2])
+    assert FIVE.part(action) is action and FIVE.kept(action) == {"actions": action}
+    assert FIVE.fields() == {"actions": "action taken: 0 up, 1 down, 2 left, 3 right, 4 stay"}
+    assert FIVE.sways(FIVE.kept(action)).tolist() == [True, False, True]
 
 
 def test_a_wish_is_the_softmax_and_the_chosen_action_its_peak():

@@ -30,7 +30,7 @@ def test_names_are_those_of_the_moves_and_of_turns():
     assert ALL.names == ("forward", "left", "right", "turn left", "turn right")
     assert ALL.names[ALL.order[0]] == "turn left"
     assert ALL.entry == ((3,), torch.float32, -1.0, 1.0)
-    assert ALL.num_outputs == 6 and (len(ALL), len(STRAIGHT)) == (5, 3)
+    assert ALL.num_outputs == len(ALL.output_names) == 6 and (len(ALL), len(STRAIGHT)) == (5, 3)
     assert ContinuousActions.of(SETTINGS) == ALL != STRAIGHT
 
 

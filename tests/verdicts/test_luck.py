@@ -11,6 +11,7 @@ from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import Stream, torch_generator
 from drone_rl.verdicts.luck import BASELINES, fly_baselines
+from tests.continuous import make_worlds
 from tests.second_task import Posts
 
 TASK = TaskSettings(num_cubes=1)
@@ -46,6 +47,22 @@ def test_another_task_has_luck_of_its_own():
     assert tuple(flown) == ("random", "forward", "oracle")
     assert flown["oracle"].success.all() and flown["forward"].success.all()
     assert flown["random"].success.mean() < 0.5
+
+
+def test_luck_flies_at_full_speed_where_speeds_are_asked_for():
+    env = make_worlds(6)
+    flown = fly_baselines(
+        6,
+        env.base_env.worlds.task,
+        env.base_env.state_dict(),
+        6,
+        dynamics=env.base_env.worlds.dynamics,
+    )
+    env.close()
+    assert tuple(flown) == BASELINES and flown["oracle"].success.all()
+    assert flown["forward"].length.max() == 10  # x = 9 m is the bound; 4 m/s for 0.25 s
+    assert flown["left"].length.tolist() == [10] * 6  # y = 7 m; 3 m/s for 0.25 s
+    assert len(set(flown["random"].length.tolist())) > 1
 
 
 def test_a_task_without_an_oracle_says_so_in_one_line():

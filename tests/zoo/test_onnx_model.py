@@ -10,11 +10,14 @@ import onnxruntime
 import pytest
 import torch
 
+from drone_rl.envs import on_pixels
 from drone_rl.evaluation import agreement
 from drone_rl.policies import MLP, make_actor
+from drone_rl.sim.continuous_actions import ContinuousActions
 from drone_rl.utils.errors import InputError
 from drone_rl.zoo import make_onnx, open_onnx, parse, register_network
 from drone_rl.zoo.registry import NETWORKS
+from tests.continuous import SETTINGS
 from tests.zoo.test_description import DEFAULT
 
 GRAY, STANDARD = {"name": "gray"}, {"name": "standardize", "mean": 0.53, "std": 0.21}
@@ -67,6 +70,34 @@ def test_inputs_outputs_and_what_they_mean_are_told(linear):
     assert told.pop("actions") == ["forward", "left", "right"]
     assert told.pop("command") == "drone-rl train seed=7"
     assert parse(told) == described(1, 2, [GRAY], LINEAR)
+
+
+def test_speeds_are_told_beside_the_probabilities_of_their_parts():
+    description = described(1, 2, [GRAY], LINEAR)
+    network = MLP((1, 1, 2), 6, hidden=(), generator=torch.Generator().manual_seed(0))
+    network.actions = ContinuousActions.of(SETTINGS)
+    content = make_onnx(description, network, {})
+    session = onnxruntime.InferenceSession(content)
+    told = json.loads(session.get_modelmeta().custom_metadata_map["actions"])
+    assert told == ["forward", "left", "right", "turn left", "turn right"]
+    frames = torch.tensor([[[[255, 0, 0], [9, 99, 255]]]], dtype=torch.uint8)
+    found = dict(
+        zip(
+            (o.name for o in session.get_outputs()),
+            session.run(None, {"frames": frames.numpy()}),
+            strict=True,
+        )
+    )
+    with torch.no_grad():
+        outputs = network(on_pixels(description.make_transforms())(frames))
+    assert set(found) == {"probabilities", "action"}
+    expected = {
+        "probabilities": network.actions.wish(outputs),
+        "action": outputs[:, :3].div(3).tanh().mul(3).tanh(),
+    }
+    for name, values in expected.items():
+        torch.testing.assert_close(torch.from_numpy(found[name]), values, atol=1e-6, rtol=0)
+    torch.testing.assert_close(open_onnx(content)(frames), torch.from_numpy(found["probabilities"]))
 
 
 def test_it_is_a_valid_model_that_tells_nothing_of_the_machine(linear):
