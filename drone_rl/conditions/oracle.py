@@ -39,7 +39,7 @@ class OracleEyes:
         info = worlds.info(dataclasses.replace(sight.state, body=body))  # pyright: ignore[reportArgumentType] (a dataclass)
         if self._looks:
             info["next_cube"] = self._first_seen(sight, info["next_cube"])
-        return rule.act(*(info[name] for name in rule.reads)), None
+        return rule.decide([info[name] for name in rule.reads], worlds.dynamics.actions), None
 
     def _first_seen(self, sight: Sight, next_cube: Tensor) -> Tensor:
         """The nearest standing cube that shows; their number if none does. Shape: (n, 1)."""

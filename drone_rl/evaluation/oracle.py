@@ -19,9 +19,6 @@ class Oracle(TensorDictModuleBase):
     def __init__(self, task: BaseTaskSettings | Task[Any], actions: Actions | None = None) -> None:
         """Learns the task's rule.
 
-        It was made for actions of the task's own choice of dynamics. Where drones have others that
-        are called the same, it takes those: full speed forward, or to a side.
-
         Args:
             task: The task, or the settings of cube collection.
             actions: What it may do; the actions of the task's own choice of dynamics by default.
@@ -37,16 +34,12 @@ class Oracle(TensorDictModuleBase):
                 f"task={task.name} has no oracle; choose a task that has one, or give this one "
                 "a rule that knows the truth (Task.oracle)"
             )
-        known = rule.actions.names
-        if actions is not None and not set(known) <= set(actions.names):
+        if actions is not None and not rule.can_fly(actions):
             raise InputError(
-                f"the oracle of task={task.name} acts by {', '.join(known)}, these "
+                f"the oracle of task={task.name} acts by {', '.join(rule.actions.names)}, these "
                 f"drones by {', '.join(actions.names)}; choose dynamics that it can fly"
             )
-        self.rule = rule
-        self._given = None
-        if actions is not None and actions != rule.actions:
-            self._given = torch.stack([actions.always(name) for name in known])
+        self.rule, self.actions = rule, actions or rule.actions
         keys = [("info", name) for name in rule.reads]
         self.in_keys = keys  # pyright: ignore[reportAttributeAccessIssue] (untyped in tensordict)
         self.out_keys = ["action"]
@@ -54,10 +47,7 @@ class Oracle(TensorDictModuleBase):
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Writes the action of each world."""
         known = [tensordict.get(key) for key in self.in_keys]
-        action = self.rule.act(*known)
-        if self._given is not None:
-            action = self._given.to(action.device)[self.rule.actions.part(action)]
-        return tensordict.set("action", action)
+        return tensordict.set("action", self.rule.decide(known, self.actions))
 
 
 class RandomPolicy(TensorDictModuleBase):

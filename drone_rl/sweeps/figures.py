@@ -28,6 +28,7 @@ COLORS = {
 MAX_PANELS = 6
 UNIFORM = float(np.log(len(MOVES.names)))
 """Entropy of the chapter's actions where all are as probable, nats."""
+_ROUNDING = 1e-4
 
 
 @dataclasses.dataclass
@@ -169,8 +170,11 @@ def _sides(axes: Axes, layout: Layout, groups: list[Group]) -> None:
 
 def _entropies(axes: Axes, layout: Layout, groups: list[Group]) -> None:
     _dots(axes, layout, groups, lambda row: row.entropy)
-    axes.axhline(UNIFORM, color="0.5", linewidth=0.8, zorder=0)
-    axes.set(ylabel="entropy at the end, nats", ylim=(-0.06, 1.06 * UNIFORM))
+    axes.set(ylabel="entropy at the end, nats")
+    known = [row.entropy for group in groups for row in group.rows if row.entropy is not None]
+    if all(0.0 <= entropy <= UNIFORM + _ROUNDING for entropy in known):  # not of continuous actions
+        axes.axhline(UNIFORM, color="0.5", linewidth=0.8, zorder=0)
+        axes.set(ylim=(-0.06, 1.06 * UNIFORM))
 
 
 def _dots(

@@ -5,6 +5,9 @@ from pathlib import Path
 TARGETS: dict[str, tuple[str, ...]] = {
     "sim/tasks/collect_cubes/rules": ("sim/tasks/collect_cubes/test_rules", "sim/test_worlds"),
     "sim/actions": ("sim/test_actions",),
+    "sim/parts": ("sim/test_parts", "sim/test_actions"),
+    "sim/continuous_actions": ("sim/test_continuous_actions",),
+    "policies/squashed_normal": ("policies/test_squashed_normal",),
     "sim/tasks/collect_cubes/changes": (
         "sim/tasks/collect_cubes/test_changes",
         "explanations/test_outcomes",

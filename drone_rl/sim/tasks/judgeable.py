@@ -2,9 +2,10 @@
 
 import dataclasses
 import enum
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
+import torch
 from torch import Tensor
 
 from drone_rl.sim.actions import Actions
@@ -34,6 +35,28 @@ class OracleRule(NamedTuple):
     entry's."""
     actions: Actions
     """What it acts with."""
+
+    def can_fly(self, actions: Actions) -> bool:
+        """Whether others have parts that are called as its own actions are."""
+        return set(self.actions.names) <= set(actions.names)
+
+    def decide(self, known: Sequence[Tensor], actions: Actions) -> Tensor:
+        """What to do with a set of actions.
+
+        Where they are not its own, it takes what is called the same, at full speed.
+
+        Args:
+            known: What it reads. Each shape: (num_worlds, *).
+            actions: Such as it can fly.
+
+        Returns:
+            Shape: (num_worlds,), then the entry's.
+        """
+        own = self.act(*known)
+        if actions == self.actions:
+            return own
+        same = torch.stack([actions.always(name) for name in self.actions.names])
+        return same.to(own.device)[self.actions.part(own)]
 
 
 class Judgeable(Protocol):
