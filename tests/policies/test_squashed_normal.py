@@ -91,6 +91,14 @@ def test_the_entropy_is_greatest_where_actions_are_about_uniform():
     assert mean[0] > mean[1]
 
 
+def test_what_is_drawn_has_the_mean_and_the_deviation_that_outputs_ask_for():
+    source = RandomSource(torch.Generator().manual_seed(0))
+    given = SquashedNormal(torch.tensor([1.0, -0.5, 0.0, 0.0, -2.0, 9.0]), source)
+    drawn = given.sample((40_000,)).double().atanh()
+    assert ((drawn.mean(0) - given.loc).abs() < 4 * given.scale / 200).all()
+    assert (drawn.std(0) / given.scale - 1).abs().max() < 4 / 280
+
+
 def test_draws_are_its_own_and_copies_go_on_with_them():
     torch.manual_seed(0)
     before = torch.get_rng_state()
@@ -102,4 +110,6 @@ def test_draws_are_its_own_and_copies_go_on_with_them():
     assert torch.equal(same.sample(), one)
     assert torch.equal(torch.get_rng_state(), before)
     assert same.sample((7,)).shape == (7, 50, 3)
+    assert (same.batch_shape, same.event_shape) == ((50,), (3,))
+    assert SquashedNormal(torch.zeros(2, 50, 6)).batch_shape == (2, 50)
     assert torch.equal(SquashedNormal(torch.zeros(50, 6)).deterministic_sample, torch.zeros(50, 3))

@@ -102,7 +102,9 @@ def test_what_part_an_action_is():
     assert STRAIGHT.part(action).tolist() == [0, 1, 2, 1, 0, 0]  # where turns are none
     for number, name in enumerate(ALL.names):
         assert ALL.part(ALL.always(name)) == number
-    assert ALL.to_rates(ALL.always("left")).tolist() == [0, 3, 0]
+    expected = [[4, 0, 0], [0, 3, 0], [0, -3, 0], [0, 0, math.pi / 4], [0, 0, -math.pi / 4]]
+    always = torch.stack([ALL.always(name) for name in ALL.names])
+    assert ALL.to_rates(always).tolist() == expected
 
 
 def test_the_mirror_image_of_a_wish_is_the_wish_of_mirrored_means():
@@ -123,9 +125,9 @@ def test_going_left_and_turning_right_are_opposed():
 def test_shares_have_gradients_by_the_outputs_and_scores_everywhere():
     free = torch.tensor([0.3, -0.2, 0.4, 0.1, -0.5, 0.7], dtype=torch.float64, requires_grad=True)
     assert torch.autograd.gradcheck(ALL.wish, free)
-    given = torch.tensor([1.0, 2.0, 3.0, 9.0, 9.0, 9.0])
-    assert ALL.scores(given).tolist() == [1.0, 2.0, -2.0, 3.0, -3.0]
-    assert STRAIGHT.scores(given).tolist() == [1.0, 2.0, -2.0]
+    given = torch.tensor([[1.0, 2.0, 3.0, 9.0, 9.0, 9.0], [0.0, -1.0, 4.0, 9.0, 9.0, 9.0]])
+    assert ALL.scores(given).tolist() == [[1.0, 2.0, -2.0, 3.0, -3.0], [0.0, -1.0, 1.0, 4.0, -4.0]]
+    assert STRAIGHT.scores(given).tolist() == [[1.0, 2.0, -2.0], [0.0, -1.0, 1.0]]
 
 
 def test_who_draws_nothing_takes_the_means():
@@ -150,3 +152,9 @@ def test_a_report_can_name_and_draw_them():
     told = ALL.as_dict()
     assert told["names"] == list(ALL.names) and told["left"] == 1
     assert all(math.hypot(*arrow) == pytest.approx(1) for arrow in told["arrows"])
+    for (across, up), other in zip(told["arrows"], told["mirrored"], strict=True):
+        assert told["arrows"][other] == [-across, up]
+    assert (
+        told["colors"][:3] == MOVES.as_dict()["colors"]
+        and len(set(map(tuple, told["colors"]))) == 5
+    )
