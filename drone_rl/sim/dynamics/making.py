@@ -8,6 +8,7 @@ import torch
 from torch import Tensor
 
 from drone_rl.sim.dynamics.dynamics import Dynamics
+from drone_rl.sim.dynamics.kinematic import Kinematic
 from drone_rl.sim.dynamics.quadrotor import Quadrotor
 from drone_rl.sim.settings import (
     COMPUTER_VISION,
@@ -70,7 +71,9 @@ def draw_seeds(random_states: Sequence[np.random.RandomState]) -> Tensor:
 
 
 def _by_velocity(dynamics: DynamicsSettings, actions: ActionSettings) -> Dynamics:
-    """Holds the place of what flies by velocities, in both modes."""
+    """What flies at the speeds that are asked for; holds the place of a drone with a body."""
+    if dynamics.is_computer_vision:
+        return Kinematic(actions, dynamics.control_timestep)
     raise InputError(
         f"actions.kind={actions.kind} is not there yet in dynamics.mode={dynamics.mode}; give "
         "actions=moves"

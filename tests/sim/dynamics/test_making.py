@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 import torch
 
-from drone_rl.sim.dynamics import ComputerVision, draw_seeds, make_dynamics
+from drone_rl.sim.continuous_actions import ContinuousActions
+from drone_rl.sim.dynamics import ComputerVision, Kinematic, draw_seeds, make_dynamics
 from drone_rl.sim.settings import (
     COMPUTER_VISION,
     MOVES_SETTINGS,
@@ -37,10 +38,15 @@ def test_what_flies_is_made_of_both(monkeypatch):
     assert make_dynamics(TASK, FLIGHT).asked == MOVES_SETTINGS
 
 
-@pytest.mark.parametrize("dynamics", [COMPUTER_VISION, FLIGHT])
-def test_velocities_are_refused_until_something_flies_by_them(dynamics):
+def test_speeds_in_computer_vision_mode_last_a_control_step():
+    made = make_dynamics(TASK, COMPUTER_VISION, VELOCITY)
+    assert type(made) is Kinematic and made.timestep == COMPUTER_VISION.control_timestep
+    assert made.actions == ContinuousActions.of(VELOCITY)
+
+
+def test_velocities_are_refused_until_something_flies_by_them():
     with pytest.raises(InputError, match=r"^actions\.kind=velocity is not there yet in dynamics"):
-        make_dynamics(TASK, dynamics, VELOCITY)
+        make_dynamics(TASK, FLIGHT, VELOCITY)
 
 
 def test_what_moves_drones_is_taken_as_it_is_and_brings_its_actions():
