@@ -26,7 +26,7 @@ REASON = ("next", "info", "end_reason")
 DETERMINISTIC = ExplorationType.DETERMINISTIC
 
 
-FLYING = DynamicsSettings(mode="simple_flight", camera_mount="body", wind=(0.5, -1.0, 0.2))
+FLYING = DynamicsSettings(mode="simple_flight", wind=(0.5, -1.0, 0.2))
 
 
 def make(

@@ -8,7 +8,8 @@ import warp as wp
 
 from drone_rl.sim.dynamics.flight_state import NUMBERS, FlightState
 from drone_rl.sim.dynamics.moves_kernel import Fleet
-from drone_rl.sim.dynamics.quadrotor import MOVE_MODES, Quadrotor
+from drone_rl.sim.dynamics.quadrotor import Quadrotor
+from drone_rl.sim.dynamics.steering import Moves
 
 
 class FlyingFleet:
@@ -28,17 +29,19 @@ class FlyingFleet:
         fleet.goals, fleet.drifts = (wp.zeros((count, 4), dtype=wp.float64) for _ in range(2))
         fleet.centers = wp.zeros((count, 0), dtype=wp.vec3d)
         if quadrotor is not None:
+            steering = quadrotor.steering
+            assert isinstance(steering, Moves)
             fleet.frame = quadrotor.frame
             fleet.ticks = quadrotor.settings.control_ticks
-            fleet.modes = wp.vec4i(*(int(mode) for mode in MOVE_MODES))
-            fleet.lead = quadrotor.action_settings.move_lead
+            fleet.modes = wp.vec4i(*(int(mode) for mode in steering.MODES))
+            fleet.lead = steering.lead
             fleet.is_gimballed = int(quadrotor.mount == "gimbal")
-            fleet.moves = wp.from_torch(quadrotor.drifts.contiguous())
+            fleet.moves = wp.from_torch(steering.drifts.contiguous())
 
     @classmethod
     def knows(cls, quadrotor: Quadrotor) -> bool:
         """Whether kernels fly all that the drones can be told."""
-        return quadrotor.action_settings.kind == "moves"
+        return isinstance(quadrotor.steering, Moves)
 
     def begin(self, state: FlightState) -> None:
         """Takes drones over at the start of episodes; the state itself stays as it is."""

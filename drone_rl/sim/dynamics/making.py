@@ -43,7 +43,7 @@ def make_dynamics(
         actions: Moves by default.
 
     Raises:
-        InputError: Actions are chosen for what brings its own, or are not there yet.
+        InputError: Actions are chosen for what brings its own.
     """
     if dynamics is not None and not isinstance(dynamics, DynamicsSettings):
         if actions is not None:
@@ -53,9 +53,11 @@ def make_dynamics(
             )
         return dynamics
     dynamics, actions = dynamics or COMPUTER_VISION, actions or MOVES_SETTINGS
-    if actions.kind != "moves":
-        return _by_velocity(dynamics, actions)
-    return task.make_dynamics() if dynamics.is_computer_vision else Quadrotor(dynamics, actions)
+    if not dynamics.is_computer_vision:
+        return Quadrotor(dynamics, actions)
+    if actions.kind == "moves":
+        return task.make_dynamics()
+    return Kinematic(actions, dynamics.control_timestep)
 
 
 def draw_seeds(random_states: Sequence[np.random.RandomState]) -> Tensor:
@@ -68,13 +70,3 @@ def draw_seeds(random_states: Sequence[np.random.RandomState]) -> Tensor:
         Shape: (number of episodes,), int64.
     """
     return torch.tensor([int(r.randint(_SEEDS)) for r in random_states], dtype=torch.int64)
-
-
-def _by_velocity(dynamics: DynamicsSettings, actions: ActionSettings) -> Dynamics:
-    """What flies at the speeds that are asked for; holds the place of a drone with a body."""
-    if dynamics.is_computer_vision:
-        return Kinematic(actions, dynamics.control_timestep)
-    raise InputError(
-        f"actions.kind={actions.kind} is not there yet in dynamics.mode={dynamics.mode}; give "
-        "actions=moves"
-    )

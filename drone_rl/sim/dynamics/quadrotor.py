@@ -9,20 +9,18 @@ import torch
 import warp as wp
 from torch import Tensor
 
-from drone_rl.sim.actions import MOVES, Actions
+from drone_rl.sim.actions import Actions
 from drone_rl.sim.dynamics import flight_kernel
 from drone_rl.sim.dynamics.airframe import make_airframe
 from drone_rl.sim.dynamics.body import BodyState
-from drone_rl.sim.dynamics.computer_vision import DIRECTIONS
 from drone_rl.sim.dynamics.flight_state import CLIMB, FlightState
-from drone_rl.sim.dynamics.goals import Goals, Mode, rotor_goals
+from drone_rl.sim.dynamics.goals import Goals, rotor_goals
 from drone_rl.sim.dynamics.obstacles import Obstacles
+from drone_rl.sim.dynamics.steering import make_steering
 from drone_rl.sim.rendering.crew import Crew
 from drone_rl.sim.rendering.devices import on_torch_stream, start_warp
 from drone_rl.sim.settings import ActionSettings, DynamicsSettings
 
-MOVE_MODES = (Mode.POSITION, Mode.POSITION, Mode.ANGLE, Mode.POSITION)
-"""Of the chapter's moves."""
 _LEAST_WORK = 3000
 """Ticks of all drones together for which a second thread is worth its while."""
 
@@ -38,18 +36,14 @@ class Quadrotor:
             actions: What policies can tell it; the chapter's three moves by default.
         """
         self.settings = settings
-        self.action_settings = actions or ActionSettings()
+        self.steering = make_steering(actions or ActionSettings())
         self.frame = make_airframe(settings)
         self._started: set[torch.device] = set()
-        self.drifts = torch.zeros(len(DIRECTIONS), 4, dtype=torch.float64)
-        self.drifts[:, :2] = torch.tensor(DIRECTIONS, dtype=torch.float64)[:, :2]
-        self.drifts *= self.action_settings.move_speed
-        """How fast each move shifts the place where a drone is wanted. Shape: (moves, 4)."""
 
     @property
     def actions(self) -> Actions:
         """What policies can tell it."""
-        return MOVES
+        return self.steering.actions
 
     @property
     def mount(self) -> str:
@@ -83,23 +77,9 @@ class Quadrotor:
     ) -> FlightState:
         """What an action makes of each drone, a control step later; see `Dynamics`."""
         assert isinstance(body, FlightState)
-        return self.fly(body, self.goals_of(body, action), self.settings.control_ticks, obstacles)
-
-    def goals_of(self, body: FlightState, action: Tensor) -> Goals:
-        """What actions ask for.
-
-        A move of the chapter shifts the place where the drone is wanted, at the speed of a move and
-        along one axis of the world. That place is never farther from the drone, along either
-        axis, than `ActionSettings.move_lead`.
-
-        Args:
-            body: The drones.
-            action: One of `actions` for each. Shape: (num_worlds,).
-        """
-        lead, place = self.action_settings.move_lead, body.position[:, :2]
-        wanted = body.reference.clone()
-        wanted[:, :2] = place + (wanted[:, :2] - place).clamp(-lead, lead)
-        return Goals(MOVE_MODES, wanted, self.drifts.to(action.device)[action])
+        return self.fly(
+            body, self.steering.goals(body, action), self.settings.control_ticks, obstacles
+        )
 
     def push(self, body: FlightState, rotors: Tensor, ticks: int = 1) -> FlightState:
         """The drones under rotors that somebody else commands.

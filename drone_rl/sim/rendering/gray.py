@@ -10,5 +10,11 @@ WEIGHTS = tuple((torch.tensor(LUMA) / 255.0).tolist())
 
 
 def to_gray(rgb: Tensor) -> Tensor:
-    """RGB bytes to gray from 0 to 1. Shapes: (*, 3), uint8, to (*), float32."""
-    return rgb.float() @ torch.tensor(WEIGHTS, device=rgb.device)
+    """RGB bytes to gray from 0 to 1. Shapes: (*, 3), uint8, to (*), float32.
+
+    Each sum is rounded as kernels round it, so that gray is the same on every machine: a product of
+    matrices would be rounded as its library likes.
+    """
+    red, green, blue = rgb.unbind(-1)
+    two = (red * WEIGHTS[0]).double() + green.double() * WEIGHTS[1]
+    return (two.float().double() + (blue * WEIGHTS[2]).double()).float()

@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from drone_rl.sim.continuous_actions import ContinuousActions
-from drone_rl.sim.dynamics import ComputerVision, Kinematic, draw_seeds, make_dynamics
+from drone_rl.sim.dynamics import ComputerVision, Kinematic, Quadrotor, draw_seeds, make_dynamics
 from drone_rl.sim.settings import (
     COMPUTER_VISION,
     MOVES_SETTINGS,
@@ -44,9 +44,9 @@ def test_speeds_in_computer_vision_mode_last_a_control_step():
     assert made.actions == ContinuousActions.of(VELOCITY)
 
 
-def test_velocities_are_refused_until_something_flies_by_them():
-    with pytest.raises(InputError, match=r"^actions\.kind=velocity is not there yet in dynamics"):
-        make_dynamics(TASK, FLIGHT, VELOCITY)
+def test_speeds_are_flown_by_a_drone_with_a_body():
+    made = make_dynamics(TASK, FLIGHT, VELOCITY)
+    assert type(made) is Quadrotor and made.actions == ContinuousActions.of(VELOCITY)
 
 
 def test_what_moves_drones_is_taken_as_it_is_and_brings_its_actions():
