@@ -57,7 +57,7 @@ def test_a_random_walk_solved_by_hand(small, place):
 def test_the_step_limit_by_hand(small, place):
     settings = small.replace(step_limit=2)
     done = constant(settings, place(settings, [0.0]), 1 / 3, 1 / 3, 1 / 3)
-    expected = [0.0, 5 / 9, 0.0, 2 / 9, 2 / 9]
+    expected = [0.0, 5 / 9, 0.0, 2 / 9, 2 / 9, 0.0]  # nobody loses control
     assert done.reasons[0].tolist() == pytest.approx(expected, abs=1e-15)
     assert float(done.steps[0]) == pytest.approx(1 + 2 / 3)
     assert float(done.undecided[0]) == 0.0
