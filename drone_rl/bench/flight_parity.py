@@ -1,3 +1,5 @@
+# pyright: reportAttributeAccessIssue=false
+# (MuJoCo's classes are untyped.)
 """How far the batched flight and MuJoCo's own integration of the same forces drift apart."""
 
 import dataclasses

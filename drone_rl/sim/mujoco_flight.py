@@ -84,7 +84,7 @@ class MujocoFlight:
             for geom in prop.find_all("geom"):
                 geom.set_attributes(contype=0, conaffinity=_OBSTACLE)
                 self._things[geom.full_identifier] = number
-        self._places: NDArray | None = None
+        self._mounted: tuple[NDArray, NDArray] | None = None
 
     @property
     def timesteps(self) -> tuple[float, float]:
@@ -106,9 +106,9 @@ class MujocoFlight:
         }
         cameras = [self.drone.mjcf_model.find("camera", spec.name) for spec in DRONE_CAMERAS]
         self._cameras = physics.bind(cameras).element_id
-        if self._places is None:
-            self._places = model.cam_pos[self._cameras].copy()
-            self._turns = model.cam_quat[self._cameras].copy()
+        if self._mounted is None:
+            places, turns = model.cam_pos[self._cameras], model.cam_quat[self._cameras]
+            self._mounted = places.copy(), turns.copy()
         self._state, self._goals, self._tick = body, None, 0
         self._is_grounded = False
         self._put(physics)
@@ -169,7 +169,7 @@ class MujocoFlight:
 
     def level_cameras(self, physics: mjcf.Physics) -> None:
         """Turns cameras on a gimbal so that they are level, and look where the drone is headed."""
-        if self.quadrotor.mount != "gimbal":
+        if self.quadrotor.mount != "gimbal" or self._mounted is None:
             return
         w, x, y, z = physics.data.qpos[self._pose][3:]
         length = math.hypot(w, z) or 1.0
@@ -177,7 +177,7 @@ class MujocoFlight:
         turn, place, quat = np.empty(4), np.empty(3), np.empty(4)
         mujoco.mju_mulQuat(turn, np.array([w, -x, -y, -z]), level)
         model = physics.model.ptr
-        for camera, at, turned in zip(self._cameras, self._places, self._turns, strict=True):
+        for camera, at, turned in zip(self._cameras, *self._mounted, strict=True):
             mujoco.mju_rotVecQuat(place, at, turn)
             mujoco.mju_mulQuat(quat, turn, turned)
             model.cam_pos[camera], model.cam_quat[camera] = place, quat
