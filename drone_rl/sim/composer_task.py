@@ -14,12 +14,13 @@ from dm_env import specs
 
 from drone_rl.sim.appearances import Appearances
 from drone_rl.sim.clutter import things_of
-from drone_rl.sim.dynamics import BodyState, Dynamics, draw_seeds, make_dynamics
+from drone_rl.sim.dynamics import BodyState, Dynamics, Quadrotor, draw_seeds, make_dynamics
 from drone_rl.sim.dynamics.body import heading_only
 from drone_rl.sim.entities.arena import DRAW_DISTANCE, SKY_COLOR, Field
 from drone_rl.sim.entities.distractor import make_distractors
 from drone_rl.sim.entities.drone import Drone, hide_drone
 from drone_rl.sim.meaning import Meaning
+from drone_rl.sim.mujoco_flight import MujocoFlight
 from drone_rl.sim.rendering import Appearance, opengl_looks
 from drone_rl.sim.rendering.opengl_looks import OpenGlLooks
 from drone_rl.sim.rendering.scene import Scene
@@ -41,7 +42,8 @@ CONTROL_TIMESTEP_S = 0.1
 class ComposerTask(composer.Task):
     """Puts a task's props and the drone into a field, and moves them as its rules say.
 
-    The drone's motion is its dynamics' business: MuJoCo knows neither gravity nor contacts here.
+    The drone's motion is its dynamics' business: MuJoCo knows neither gravity nor contacts here,
+    unless the drone is a quadrotor: that is integrated by MuJoCo, see `MujocoFlight`.
     The discount is 0 where an episode terminates and 1 where it is truncated.
     """
 
@@ -87,6 +89,7 @@ class ComposerTask(composer.Task):
         self._frames = [self._arena.attach(prop) for prop in self._props]
         for frame in self._frames:
             frame.mocap = True
+        self._flight = self._make_flight()
         self._reward = 0.0
         self._begin(np.random.RandomState(0))
         self._pixels = self._drone.observables.front_center.enabled = pixels
@@ -99,7 +102,8 @@ class ComposerTask(composer.Task):
         }
         for info in self._task_observables.values():
             info.enabled = True
-        self.set_timesteps(CONTROL_TIMESTEP_S, CONTROL_TIMESTEP_S)
+        steps = (CONTROL_TIMESTEP_S, CONTROL_TIMESTEP_S)
+        self.set_timesteps(*(steps if self._flight is None else self._flight.timesteps))
 
     @property
     def root_entity(self) -> Field:
@@ -153,6 +157,8 @@ class ComposerTask(composer.Task):
             self._looks.reset(torch.arange(1), [random_state])
             self._look = self._looks.drawn() or self._looks.middle
         self._begin(random_state)
+        if self._flight is not None:
+            self._flight.begin(physics, self._state.body)
         if self._look is not None:
             self._wear(physics, self._look)
         self._show(physics)
@@ -163,7 +169,11 @@ class ComposerTask(composer.Task):
         """Moves the drone from wherever it is now."""
         del random_state
         given = torch.as_tensor(action).reshape(1, *self.dynamics.actions.entry.shape)
-        given, body = given.to(self.dynamics.actions.entry.dtype), self._found(physics)
+        given = given.to(self.dynamics.actions.entry.dtype)
+        if self._flight is not None:
+            self._state.body = self._flight.command(physics, given)
+            return
+        body = self._found(physics)
         if self.dynamics.needs_obstacles:
             moved = self.dynamics.step(body, given, self.rules.obstacles(self._state))
         else:
@@ -171,10 +181,26 @@ class ComposerTask(composer.Task):
         self._state.body = moved
         self._show(physics)
 
+    def before_substep(
+        self, physics: mjcf.Physics, action: np.ndarray, random_state: np.random.RandomState
+    ) -> None:
+        """Applies what moves a quadrotor."""
+        del action, random_state
+        if self._flight is not None:
+            self._flight.push(physics)
+
+    def after_substep(self, physics: mjcf.Physics, random_state: np.random.RandomState) -> None:
+        """Notes what a quadrotor has touched."""
+        del random_state
+        if self._flight is not None:
+            self._flight.moved(physics)
+
     def after_step(self, physics: mjcf.Physics, random_state: np.random.RandomState) -> None:
         """Applies the rules at the place where the drone now is."""
         del random_state
-        self._state, reward = self.rules.judge(self._state, self._found(physics))
+        flight = self._flight
+        body = self._found(physics) if flight is None else flight.finished(physics)
+        self._state, reward = self.rules.judge(self._state, body)
         self._reward = float(reward)
         self._show(physics)
         physics.forward()  # what is observed next must not show things that have just vanished
@@ -220,12 +246,20 @@ class ComposerTask(composer.Task):
     def _show(self, physics: mjcf.Physics) -> None:
         """Puts the drone and the props where the state has them."""
         body = self._state.body
-        self._drone.set_pose(physics, body.position[0].numpy(), self._shown(body)[0].numpy())
+        if self._flight is None:
+            self._drone.set_pose(physics, body.position[0].numpy(), self._shown(body)[0].numpy())
         places = self.rules.places(self._state)[0]
         if self._look is not None and self._look.beside is not None:
             places = torch.cat([places, self._look.beside.of(1).places[0]])
         for frame, place in zip(self._frames, places, strict=True):
             physics.bind(frame).mocap_pos = place.numpy()
+
+    def _make_flight(self) -> MujocoFlight | None:
+        """What lets MuJoCo fly a quadrotor; before the model is compiled."""
+        if not isinstance(self.dynamics, Quadrotor):
+            return None
+        solid = [p.mjcf_model for p in self._props if p.meaning == Meaning.OBSTACLE]
+        return MujocoFlight(self.dynamics, self._arena, self._drone, solid)
 
     def _prepare(self) -> None:
         """Makes room for textures, and sees to it that the camera shows what there is to show."""

@@ -34,7 +34,8 @@ def gust_after(
     Args:
         frame: How strong gusts are, and how long.
         gust: Before. Metres a second, world frame.
-        airspeed: Of the drone, metres a second.
+        airspeed: Of the drone through air without gusts, metres a second. (With them, gusts that
+            blow against the wind would last longer than others, and the mean be less than it.)
         seed: Of the episode.
         tick: Number of the tick in the episode; each is of its own randomness.
     """

@@ -42,6 +42,8 @@ _TIME = wp.constant(fs.TIME.first)
 _NUMBERS = wp.constant(fs.NUMBERS)
 _FASTEST = wp.constant(1000.0)
 """Metres or radians a second beyond which a motion has diverged."""
+_FARTHEST = wp.constant(1.0e18)
+"""Square metres beyond which nothing is."""
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
@@ -49,11 +51,20 @@ wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 @wp.func
 def is_sound(motion: Motion) -> bool:
     """Whether all numbers are numbers, and none is absurd; NaN is less than nothing."""
+    place = wp.length_sq(motion.position)
     speed = wp.length_sq(motion.velocity)
     spin = wp.length_sq(motion.rates)
     turn = wp.length_sq(motion.attitude)
     most = _FASTEST * _FASTEST
-    return speed < most and spin < most and turn > 0.5 and turn < 2.0
+    near = place < most * most
+    return near and speed < most and spin < most and turn > 0.5 and turn < 2.0
+
+
+@wp.func
+def is_told(goal: Goal, start: wp.vec3d) -> bool:
+    """Whether a place and what is wanted there are numbers."""
+    wanted = wp.length_sq(goal.values) + wp.length_sq(goal.drift)
+    return wanted < _FARTHEST and wp.length_sq(start) < wp.float64(_FARTHEST)
 
 
 @wp.func
@@ -204,6 +215,7 @@ def command(
     height = float(start[2])
     goal = goal_of(goals, drifts, modes, world, start)
     flight = loaded(before, world)
+    lost = before[world, _LOST] != wp.float64(0.0) or not is_told(goal, start)
     near = False
     if centers.shape[1] > 0:
         seconds = frame.tick * float(ticks)
@@ -214,7 +226,7 @@ def command(
             flight = among(frame, flight, start, centers[world], half_sizes, tick)
     for i in range(_NUMBERS):
         after[world, i] = before[world, i]
-    if not is_sound(flight.motion):
+    if lost or not is_sound(flight.motion):
         after[world, _LOST] = wp.float64(1.0)
         for i in range(_SPEED, _SPIN + 3):
             after[world, i] = wp.float64(0.0)

@@ -19,6 +19,7 @@ from drone_rl.sim.dynamics.airframe import Airframe
 from drone_rl.sim.dynamics.contacts import Overlap, box_overlap, pushed_out
 from drone_rl.sim.dynamics.controllers import climb_memory
 from drone_rl.sim.dynamics.rigid_body import (
+    Axes,
     Motion,
     advanced,
     answered,
@@ -30,8 +31,8 @@ from drone_rl.sim.dynamics.rigid_body import (
 
 NO_THING = wp.constant(flight_state.NOTHING)
 GROUND = wp.constant(flight_state.GROUND)
-_MOST_THRUST = wp.constant(50.0)
-"""Metres a second squared that no drone gains in a command, so that none is near unawares."""
+_WILDEST = wp.constant(10.0)
+"""Standard deviations that no gust is beyond."""
 
 wp.set_module_options({"enable_backward": False})
 
@@ -59,6 +60,50 @@ class Flight:
 
 
 @wp.func
+def driven(
+    frame: Airframe,
+    modes: wp.vec4i,
+    goal: cascade.Goal,
+    before: Flight,
+    axes: Axes,
+    seed: wp.int64,
+    past: wp.int64,
+    tick: int,
+) -> Flight:
+    """A flight whose controllers, rotors and air are a tick later; it has not moved yet.
+
+    Args:
+        frame: The drone.
+        modes: Of the goals, one an axis.
+        goal: What it is told.
+        before: The flight.
+        axes: The body's.
+        seed: Of the episode's gusts.
+        past: Ticks of the episode before the command.
+        tick: Number of this one within the command.
+    """
+    flight = before
+    motion = before.motion
+    seconds = frame.tick * float(tick)
+    asked = cascade.rotors_wanted(frame, modes, goal, seconds, motion, axes, before.climb)
+    if modes[3] == cascade.VELOCITY or modes[3] == cascade.POSITION:
+        missing = cascade.climb_missing(frame, modes, goal, seconds, motion)
+        flight.climb = climb_memory(frame, missing, before.climb)
+    flight.rotors = answered(frame, before.rotors, asked)
+    if frame.gusts > 0.0:
+        speed = wp.length(motion.velocity - frame.wind)
+        flight.gust = gust_after(frame, before.gust, speed, seed, past + wp.int64(tick))
+    return flight
+
+
+@wp.func
+def force_on(frame: Airframe, flight: Flight, axes: Axes) -> wp.vec3:
+    """What rotors and air do to a drone, newtons, world frame; weight is left out."""
+    through = flight.motion.velocity - frame.wind - flight.gust
+    return thrust_of(frame, flight.rotors) * axes.up + drag_of(frame, axes, through)
+
+
+@wp.func
 def ticked(
     frame: Airframe,
     modes: wp.vec4i,
@@ -81,21 +126,11 @@ def ticked(
         past: Ticks of the episode before the command.
         tick: Number of this one within the command.
     """
-    flight = before
-    motion = before.motion
-    axes = axes_of(motion.attitude)
-    seconds = frame.tick * float(tick)
-    asked = cascade.rotors_wanted(frame, modes, goal, seconds, motion, axes, before.climb)
-    if modes[3] == cascade.VELOCITY or modes[3] == cascade.POSITION:
-        missing = cascade.climb_missing(frame, modes, goal, seconds, motion)
-        flight.climb = climb_memory(frame, missing, before.climb)
-    flight.rotors = answered(frame, before.rotors, asked)
-    if frame.gusts > 0.0:
-        speed = wp.length(motion.velocity - frame.wind - before.gust)
-        flight.gust = gust_after(frame, before.gust, speed, seed, past + wp.int64(tick))
+    axes = axes_of(before.motion.attitude)
+    flight = driven(frame, modes, goal, before, axes, seed, past, tick)
     lift = thrust_of(frame, flight.rotors)
-    force = lift * axes.up + drag_of(frame, axes, motion.velocity - frame.wind - flight.gust)
-    flight.motion = advanced(frame, motion, force, torque_of(frame, flight.rotors))
+    force = force_on(frame, flight, axes)
+    flight.motion = advanced(frame, before.motion, force, torque_of(frame, flight.rotors))
     overlap = Overlap()
     overlap.normal = wp.vec3(0.0, 0.0, 1.0)
     overlap.depth = frame.radius - (height + flight.motion.position[2])
@@ -143,8 +178,13 @@ def is_near(
     half_sizes: wp.vec3,
     seconds: float,
 ) -> bool:
-    """Whether any obstacle may be touched within so many seconds, see `among`."""
-    fastest = wp.length(flight.motion.velocity) + _MOST_THRUST * seconds
+    """Whether any obstacle may be touched within so many seconds, see `among`.
+
+    Rotors and weight gain no more speed than without air, and air no more than its own twice over.
+    """
+    air = wp.length(frame.wind) + wp.length(flight.gust) + _WILDEST * frame.gusts
+    gain = frame.per_mass * (4.0 * frame.rotor_thrust + frame.weight) * seconds
+    fastest = wp.length(flight.motion.velocity) + 2.0 * air + gain
     near = int(0)
     for thing in range(centers.shape[0]):
         center = wp.vec3(start - centers[thing])

@@ -64,14 +64,20 @@ class Goals:
             if mode not in allowed:
                 known = ", ".join(m.name.lower() for m in allowed)
                 raise InputError(f"modes[{axis}]={mode!r} is unknown; give one of: {known}")
-        for mode in (Mode.ROTOR, Mode.HEADING_VELOCITY):
-            group = self.modes if mode == Mode.ROTOR else self.modes[:2]
-            if 0 < group.count(mode) < len(group):
-                raise InputError(f"modes={self.modes}: {mode.name.lower()} is for all or none")
+        names = ", ".join(m.name.lower() for m in self.modes)
+        if 0 < self.modes.count(Mode.ROTOR) < len(ALLOWED):
+            raise InputError(f"modes={names}: rotor is for all axes; give it to all or none")
+        if self.modes[X] != self.modes[Y]:
+            raise InputError(f"modes={names}: the first two go together; give both the same")
         if self.values.dim() != 2 or self.values.shape[1] != len(ALLOWED):
             raise InputError(
                 f"goals of shape {tuple(self.values.shape)} are not (num_worlds, 4); give a number "
                 "for each axis"
+            )
+        if self.drift is not None and self.drift.shape != self.values.shape:
+            raise InputError(
+                f"drift of shape {tuple(self.drift.shape)} is not that of the goals; give "
+                f"{tuple(self.values.shape)}"
             )
 
     @property

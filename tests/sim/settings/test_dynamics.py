@@ -1,6 +1,7 @@
 """A drone is data, of which some can't be."""
 
 import dataclasses
+import math
 
 import pytest
 
@@ -48,3 +49,39 @@ def test_air_moves_nothing_in_computer_vision_mode(air, message):
     COMPUTER_VISION.check_air()
     with pytest.raises(InputError, match=f"^{message}"):
         dataclasses.replace(COMPUTER_VISION, **air).check_air()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"camera_mount": "wing"}, "camera_mount="),
+        ({"mass": math.nan}, "mass=nan"),
+        ({"inertia": (1.0, 1.0)}, "inertia"),
+        ({"inertia": (-0.01, 0.01, 0.01)}, "inertia"),
+        ({"wind": (0.0, 0.0, 51.0)}, "wind"),
+        ({"gusts": -1.0}, "gusts=-1.0"),
+        ({"gust_length": 0.0}, "gust_length=0.0"),
+        ({"tick": 0.0}, "tick=0.0"),
+        ({"control_ticks": 0}, "control_ticks=0"),
+        ({"restitution": 1.1}, "restitution=1.1"),
+        ({"angle_limit": 1.6}, "angle_limit=1.6"),
+        ({"rate_gain": (1.0, -1.0, 1.0)}, "rate_gain"),
+        ({"rotor_time_constant": -0.1}, "rotor_time_constant=-0.1"),
+    ],
+)
+def test_what_no_drone_has_is_named(change, message):
+    with pytest.raises(InputError, match=message):
+        dataclasses.replace(FLIGHT, **change)
+
+
+def test_the_thrust_that_is_asked_for_is_enough():
+    needed = 1.1 * 2.0 * 9.81 / 4
+    dataclasses.replace(FLIGHT, mass=2.0, rotor_thrust=needed * 1.001)
+    with pytest.raises(InputError, match="can't hover"):
+        dataclasses.replace(FLIGHT, mass=2.0, rotor_thrust=needed * 0.999)
+
+
+def test_a_flat_plate_is_a_body():
+    """Its moment about the normal is the sum of the other two."""
+    plate = dataclasses.replace(FLIGHT, inertia=(0.1, 0.2, 0.3))
+    assert plate.inertia == (0.1, 0.2, 0.3)

@@ -1,0 +1,231 @@
+# pyright: reportAttributeAccessIssue=false
+# pyright: reportOptionalMemberAccess=false
+# (dm_control's models of XML are untyped.)
+"""A flight that MuJoCo integrates: a drone's forces at every tick, and what it touches.
+
+Contacts are MuJoCo's own: springs that bounce and rub about as the settings say. A ball touches
+obstacles; four feet, which stand as far down, touch the ground, so that a drone rests level.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import mujoco
+import numpy as np
+import torch
+from dm_control import mjcf
+from numpy.typing import NDArray
+from torch import Tensor
+
+from drone_rl.sim.dynamics import BodyState, FlightState, Goals, Quadrotor
+from drone_rl.sim.dynamics import flight_state as fs
+from drone_rl.sim.dynamics.forces import forces, told
+from drone_rl.sim.entities.cameras import DRONE_CAMERAS
+from drone_rl.sim.entities.drone import Drone
+from drone_rl.sim.settings import DynamicsSettings
+from drone_rl.sim.settings.dynamics import GRAVITY
+
+_GROUND, _OBSTACLE = 2, 4
+"""Bits of what touches what."""
+_UNSEEN = 5
+"""A group of geoms that nobody draws."""
+_STIFFNESS = 0.3
+"""Of contacts: radians of their swing in a tick, so that a bounce takes ten of them."""
+_CALM = 0.5
+"""Share of its spin that a drone on the ground loses in a tick, where rotors can't carry it."""
+
+
+class MujocoFlight:
+    """Flies one drone of a dm_control model, whose geoms and timestep it prepares."""
+
+    def __init__(
+        self,
+        quadrotor: Quadrotor,
+        arena: Any,
+        drone: Drone,
+        obstacles: Sequence[mjcf.RootElement],
+    ) -> None:
+        """Gives a model mass, gravity and contacts, before it is compiled.
+
+        Args:
+            quadrotor: How the drone flies.
+            arena: With its floor. (dm_control's arenas are untyped.)
+            drone: Already attached to it.
+            obstacles: What the drone can fly into, in the order of `Obstacles`.
+        """
+        self.quadrotor, self.drone = quadrotor, drone
+        self._settings = settings = quadrotor.settings
+        option = arena.mjcf_model.option
+        option.set_attributes(gravity=(0.0, 0.0, -GRAVITY), integrator="Euler", cone="elliptic")
+        option.flag.eulerdamp = "disable"
+        drone.body.add("inertial", pos=(0, 0, 0), mass=settings.mass, diaginertia=settings.inertia)
+        touch = _contact(settings)
+        bodies = {"group": _UNSEEN, "rgba": (0, 0, 0, 0), "type": "sphere", "conaffinity": 0}
+        small, place = 0.1 * settings.radius, 0.8 * settings.radius
+        drone.body.add(
+            "geom", name="ball", size=(settings.radius,), contype=_OBSTACLE, **bodies, **touch
+        )
+        for name, x, y in (("a", 1, 1), ("b", 1, -1), ("c", -1, 1), ("d", -1, -1)):
+            pos = (x * place, y * place, small - settings.radius)
+            drone.body.add(
+                "geom",
+                name=f"foot_{name}",
+                size=(small,),
+                pos=pos,
+                contype=_GROUND,
+                **bodies,
+                **touch,
+            )
+        floor = arena.mjcf_model.find("geom", "floor")
+        floor.set_attributes(contype=0, conaffinity=_GROUND)
+        self._things = {floor.full_identifier: fs.GROUND}
+        for number, prop in enumerate(obstacles):
+            for geom in prop.find_all("geom"):
+                geom.set_attributes(contype=0, conaffinity=_OBSTACLE)
+                self._things[geom.full_identifier] = number
+        self._mounted: tuple[NDArray, NDArray] | None = None
+
+    @property
+    def timesteps(self) -> tuple[float, float]:
+        """Seconds from action to action, and of a tick."""
+        return self._settings.control_timestep, self._settings.tick
+
+    def begin(self, physics: mjcf.Physics, body: BodyState) -> None:
+        """Puts the drone where an episode begins, with the motion that it has."""
+        assert isinstance(body, FlightState)
+        model = physics.model.ptr
+        joint = mjcf.get_attachment_frame(self.drone.mjcf_model).freejoint.full_identifier
+        number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, joint)
+        place, speed = model.jnt_qposadr[number], model.jnt_dofadr[number]
+        self._pose, self._motion = slice(place, place + 7), slice(speed, speed + 6)
+        self._body = physics.bind(self.drone.body).element_id
+        self._names = {
+            mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, name): thing
+            for name, thing in self._things.items()
+        }
+        cameras = [self.drone.mjcf_model.find("camera", spec.name) for spec in DRONE_CAMERAS]
+        self._cameras = physics.bind(cameras).element_id
+        if self._mounted is None:
+            places, turns = model.cam_pos[self._cameras], model.cam_quat[self._cameras]
+            self._mounted = places.copy(), turns.copy()
+        self._state, self._goals, self._tick = body, None, 0
+        self._is_grounded = False
+        self._put(physics)
+        self.level_cameras(physics)
+
+    def found(self, physics: mjcf.Physics) -> FlightState:
+        """The drone where MuJoCo has it; one moved by hand is told to stay there."""
+        now = self._state.numbers.clone()
+        now[0, fs.POSITION.first : fs.ATTITUDE.last] = torch.from_numpy(
+            physics.data.qpos[self._pose]
+        )
+        now[0, fs.VELOCITY.first : fs.RATES.last] = torch.from_numpy(
+            physics.data.qvel[self._motion]
+        )
+        state = FlightState(now)
+        is_moved = not np.array_equal(physics.data.qpos[self._pose], self._left)
+        return state.settled() if is_moved else state
+
+    def command(self, physics: mjcf.Physics, action: Tensor) -> FlightState:
+        """Takes what the drone is told from now on, and says where it is.
+
+        Args:
+            physics: In which it flies.
+            action: One of the dynamics' actions. Shape: (1,), then the entry's.
+        """
+        body = self.found(physics)
+        self.tell(physics, body, self.quadrotor.goals_of(body, action))
+        return body
+
+    def tell(self, physics: mjcf.Physics, body: FlightState, goals: Goals) -> None:
+        """The same of goals, for a drone whose motion MuJoCo has already."""
+        self._state, self._goals, self._tick = body, goals, 0
+        self._left = physics.data.qpos[self._pose].copy()
+
+    def push(self, physics: mjcf.Physics) -> None:
+        """Applies a tick's forces, before MuJoCo's step."""
+        if self._goals is None:
+            return
+        self._left = physics.data.qpos[self._pose].copy()
+        body, pushes = forces(self.quadrotor.frame, self.found(physics), self._goals, self._tick)
+        physics.data.xfrc_applied[self._body] = pushes[0].numpy()
+        if self._is_grounded and pushes[0, 2] < self._settings.mass * GRAVITY:
+            physics.data.xfrc_applied[self._body, 3:] -= self._rocking(physics)
+        self._state, self._tick = body, self._tick + 1
+
+    def moved(self, physics: mjcf.Physics) -> None:
+        """Notes what was touched, after MuJoCo's step."""
+        self._left = physics.data.qpos[self._pose].copy()
+        self._touch(physics)
+
+    def finished(self, physics: mjcf.Physics) -> FlightState:
+        """The drone at the end of a command."""
+        assert self._goals is not None
+        body = self.found(physics)
+        self._state = told(body, self._goals, self._tick * self._settings.tick)
+        self.level_cameras(physics)
+        return self._state
+
+    def level_cameras(self, physics: mjcf.Physics) -> None:
+        """Turns cameras on a gimbal so that they are level, and look where the drone is headed."""
+        if self.quadrotor.mount != "gimbal" or self._mounted is None:
+            return
+        w, x, y, z = physics.data.qpos[self._pose][3:]
+        length = math.hypot(w, z) or 1.0
+        level = np.array([w / length, 0.0, 0.0, z / length])
+        turn, place, quat = np.empty(4), np.empty(3), np.empty(4)
+        mujoco.mju_mulQuat(turn, np.array([w, -x, -y, -z]), level)
+        model = physics.model.ptr
+        for camera, at, turned in zip(self._cameras, *self._mounted, strict=True):
+            mujoco.mju_rotVecQuat(place, at, turn)
+            mujoco.mju_mulQuat(quat, turn, turned)
+            model.cam_pos[camera], model.cam_quat[camera] = place, quat
+
+    def _put(self, physics: mjcf.Physics) -> None:
+        numbers = self._state.numbers[0].numpy()
+        physics.data.qpos[self._pose] = numbers[fs.POSITION.first : fs.ATTITUDE.last]
+        physics.data.qvel[self._motion] = numbers[fs.VELOCITY.first : fs.RATES.last]
+        physics.data.xfrc_applied[self._body] = 0.0
+        self._left = physics.data.qpos[self._pose].copy()
+
+    def _rocking(self, physics: mjcf.Physics) -> NDArray:
+        """The torque that calms a drone on the ground, which else would rock from foot to foot."""
+        data, share = physics.data, _CALM / self._settings.tick
+        turn = data.xmat[self._body].reshape(3, 3)
+        return turn @ (share * np.array(self._settings.inertia) * data.qvel[self._motion][3:])
+
+    def _touch(self, physics: mjcf.Physics) -> None:
+        """Obstacles count more than the ground, as in `flight_tick.touched`."""
+        data, row = physics.data, self._state.numbers[0]
+        self._is_grounded = False
+        for contact in data.contact[: data.ncon]:
+            things = [self._names.get(int(geom)) for geom in contact.geom]
+            known = [thing for thing in things if thing is not None]
+            if not known or contact.dist > 0.0:
+                continue
+            now = self._state.ticks.item() * self._settings.tick
+            self._is_grounded |= known[0] == fs.GROUND
+            if known[0] < 0 <= row[fs.THING.first] and row[fs.TIME.first] > now - self.timesteps[0]:
+                continue
+            sign = 1.0 if things[0] is not None else -1.0
+            row[fs.THING.first] = known[0]
+            row[fs.NORMAL.first : fs.NORMAL.last] = torch.tensor(sign * contact.frame[:3])
+            row[fs.POINT.first : fs.POINT.last] = torch.tensor(contact.pos)
+            row[fs.DEPTH.first] = -float(contact.dist)
+            row[fs.TIME.first] = now
+
+
+def _contact(settings: DynamicsSettings) -> dict[str, Any]:
+    """MuJoCo's numbers of a contact: a spring and a damper that give back a share of speed.
+
+    A damped spring gives back exp(-pi z / sqrt(1 - z^2)) of it, where z is its damping ratio.
+    """
+    loss = -math.log(max(settings.restitution, 1e-3))
+    ratio, swing = loss / math.hypot(math.pi, loss), _STIFFNESS / settings.tick
+    return {
+        "solref": (-(swing**2), -2.0 * ratio * swing),
+        "solimp": (0.99, 0.99, 0.001, 0.5, 2),
+        "friction": (settings.friction, 0.0, 0.0),
+        "priority": 1,
+    }

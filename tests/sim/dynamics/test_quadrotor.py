@@ -1,0 +1,67 @@
+import pytest
+import torch
+
+from drone_rl.sim.actions import Move
+from drone_rl.sim.dynamics import Quadrotor
+from drone_rl.sim.settings import ActionSettings
+from tests.flying import PLACES, numbers, quadrotor, settings, still, told
+
+
+def test_it_starts_in_a_hover():
+    drone = quadrotor(mass=1.2)
+    state = drone.start(numbers((1.0, 2.0, 3.0)), torch.tensor([9]))
+    after = drone.fly(state, told(PLACES, 1.0, 2.0, 0.0, 3.0), 333)
+    torch.testing.assert_close(after.position, state.position, atol=1e-6, rtol=0)
+    torch.testing.assert_close(after.rotors, state.rotors, atol=1e-5, rtol=0)
+    assert state.rotors[0, 0].item() == pytest.approx(1.2 * 9.81 / (4 * 4.179446268))
+
+
+def test_moves_shift_where_it_is_wanted():
+    """By 0.4 m in 0.1 s, at 4 m/s."""
+    drone = quadrotor()
+    state = still(drone, count=3)
+    moved = drone.step(state, torch.tensor([Move.FORWARD, Move.LEFT, Move.RIGHT]))
+    expected = [[0.396, 0, 0, 100], [0, 0.396, 0, 100], [0, -0.396, 0, 100]]
+    torch.testing.assert_close(moved.reference, numbers(*expected))
+    assert moved.position[0, 0] > 0 and moved.position[1, 1] > 0 > moved.position[2, 1]
+    assert not state.position[:, :2].any() and moved.ticks.tolist() == [33] * 3
+
+
+def test_the_place_where_it_is_wanted_runs_ahead_only_so_far():
+    drone = Quadrotor(settings(), ActionSettings(move_lead=0.25))
+    state = still(drone)
+    state.reference[0, 0] = 10.0
+    assert drone.goals_of(state, torch.tensor([0])).values[0].tolist() == [0.25, 0, 0, 100]
+
+
+def test_ten_moves_forward_become_a_flight():
+    drone = quadrotor()
+    state = still(drone)
+    for _ in range(30):
+        state = drone.step(state, torch.tensor([Move.FORWARD]))
+    assert state.velocity[0, 0].item() == pytest.approx(4.0, rel=0.15)
+    assert state.position[0, 1:].tolist() == pytest.approx([0.0, 100.0], abs=0.05)
+
+
+def test_what_it_is_told_about_itself():
+    drone = quadrotor(camera_mount="body")
+    assert drone.mount == "body" and drone.needs_obstacles and not drone.is_random
+    assert drone.actions.entry.high == 2
+
+
+def test_no_drone_is_flown_without_complaint():
+    drone = quadrotor()
+    empty = drone.start(torch.zeros(0, 3, dtype=torch.float64))
+    assert len(drone.step(empty, torch.zeros(0, dtype=torch.int64)).position) == 0
+
+
+@pytest.mark.gpu
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a CUDA GPU")
+def test_a_gpu_flies_the_same():
+    drone = quadrotor(gusts=1.0)
+    state, goals = still(drone, count=8), told(PLACES, 3.0, 1.0, 1.0, 101.0, count=8)
+    here = drone.fly(state, goals, 330)
+    moved = told(PLACES, 3.0, 1.0, 1.0, 101.0, count=8)
+    there = type(goals)(moved.modes, moved.values.cuda())
+    away = drone.fly(type(state)(state.numbers.cuda()), there, 330)
+    torch.testing.assert_close(away.numbers.cpu(), here.numbers, atol=1e-3, rtol=0)
