@@ -40,19 +40,26 @@ class Cockpit:
         """Puts a drone on the ground.
 
         Args:
-            dynamics: Drone and air; AirSim's generic drone in still air by default.
+            dynamics: Drone and air; by default those of `worlds` if they fly, and else AirSim's
+                generic drone in still air.
             start: Where, x and y, metres.
             yaw: How it is turned, degrees to the left of the world's x.
             seed: Of gusts.
-            obstacles: What it may touch besides the ground, in one world.
-            worlds: A single world, in which it takes pictures.
+            obstacles: What it may touch besides the ground, in one world; what stands in `worlds`
+                now by default.
+            worlds: A single world, of which it takes pictures.
             changes: Settings of dynamics, such as wind=[5, 0, 0].
 
         Raises:
             InputError: A setting can't be.
         """
-        if worlds is not None and worlds.num_worlds != 1:
-            raise InputError(f"worlds has {worlds.num_worlds} of them; give Worlds(1, ...)")
+        if worlds is not None:
+            if worlds.num_worlds != 1:
+                raise InputError(f"worlds has {worlds.num_worlds} of them; give Worlds(1, ...)")
+            if dynamics is None and isinstance(worlds.dynamics, Quadrotor):
+                dynamics = worlds.dynamics.settings
+            if obstacles is None:
+                obstacles = worlds.task.obstacles(worlds.state)
         quadrotor = _quadrotor(dynamics, changes)
         if len(start) != 2:
             raise InputError(f"start={start!r} is no place on the ground; give (x, y)")

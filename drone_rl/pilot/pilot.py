@@ -7,6 +7,7 @@ from torch import Tensor
 from drone_rl.pilot.auto_flight import AutoFlight
 from drone_rl.pilot.errors import PilotError
 from drone_rl.pilot.navigation import Navigation
+from drone_rl.sim.dynamics.body import heading_only
 from drone_rl.sim.entities.cameras import FRONT_CENTER
 from drone_rl.sim.rendering.view import Modality
 
@@ -36,7 +37,7 @@ class Pilot(AutoFlight, Navigation):
         height: int | None = None,
         width: int | None = None,
     ) -> Tensor:
-        """What one of the drone's cameras sees of its `worlds`.
+        """What one of the drone's cameras sees of its `worlds`; level if they hang in a gimbal.
 
         Args:
             camera: One of AirSim's five, by name.
@@ -49,6 +50,7 @@ class Pilot(AutoFlight, Navigation):
         """
         if self.worlds is None:
             raise PilotError("picture: there is nothing to see; give worlds=Worlds(1, ...)")
-        state = copy.copy(self.worlds.state)
-        state.body = self._drone.body
+        state, body = copy.copy(self.worlds.state), self._drone.body
+        is_level = self._drone.quadrotor.mount == "gimbal"
+        state.body = body.moved(body.position, heading_only(body.attitude)) if is_level else body
         return self.worlds.render(state, self.worlds.view(camera, modality, height, width))[0]

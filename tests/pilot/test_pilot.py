@@ -6,7 +6,7 @@ import torch
 
 from drone_rl.pilot.errors import PilotError
 from drone_rl.pilot.pilot import Pilot
-from drone_rl.sim.settings import CameraSettings
+from drone_rl.sim.settings import CameraSettings, DynamicsSettings, PillarsSettings
 from drone_rl.sim.worlds import Worlds
 
 
@@ -33,6 +33,34 @@ def test_pictures():
     pilot.take_off()
     assert (pilot.picture() != low).any()
     assert pilot.picture("bottom_center", height=4, width=6).shape == (4, 6, 3)
+
+
+def test_cameras_hang_in_a_gimbal_or_tilt_with_the_body():
+    camera = CameraSettings(width=64, height=24)
+    level, tilted = (
+        Pilot(worlds=Worlds(1, camera=camera), camera_mount=mount) for mount in ("gimbal", "body")
+    )
+    pictures = []
+    for pilot in (level, tilted):
+        pilot._drone.body.attitude[0] = torch.tensor([math.cos(0.2), 0, math.sin(0.2), 0]).double()
+        pictures.append(pilot.picture())
+    assert torch.equal(pictures[0], Pilot(worlds=Worlds(1, camera=camera)).picture())
+    assert (pictures[0] != pictures[1]).any()
+
+
+def test_what_stands_in_its_worlds_is_in_the_way():
+    pillars = Worlds(
+        1, PillarsSettings(), dynamics=DynamicsSettings(mode="simple_flight", mass=1.1)
+    )
+    pillars.reset(torch.tensor([0]), [np.random.RandomState(0)])
+    x, y, _ = pillars.task.places(pillars.state)[0, 0].tolist()
+    pilot = Pilot(worlds=pillars, start=(x - 3, y))
+    assert pilot.settings.mass == 1.1
+    pilot.arm()
+    pilot.take_off()
+    assert pilot.move_to(x + 3, y, 2, speed=2, timeout=8) is False
+    assert pilot.state.collision.thing.startswith("obstacle")
+    assert pilot.trajectory.positions[:, 0].max() < x
 
 
 def test_without_worlds_there_is_nothing_to_see(flying):
