@@ -29,6 +29,13 @@ if TYPE_CHECKING:
     from drone_rl.envs.gymnasium.worlds import DroneWorlds
     from drone_rl.envs.sb3.worlds import Sb3Worlds
     from drone_rl.explanations.settings import ExplainSettings
+    from drone_rl.pilot.errors import PilotError
+    from drone_rl.pilot.future import FlightFuture
+    from drone_rl.pilot.pilot import Pilot
+    from drone_rl.pilot.state import PilotState
+    from drone_rl.pilot.sticks import Sticks
+    from drone_rl.pilot.trajectory import Trajectory
+    from drone_rl.pilot.turning import Drivetrain, YawMode
     from drone_rl.policies.sb3.logits import Sb3Logits
     from drone_rl.policies.sb3.trunk import Sb3Trunk
     from drone_rl.settings.chances import ChanceSettings
@@ -69,6 +76,13 @@ _PLACES = {
     "envs.gymnasium.worlds": ("DroneWorlds",),
     "envs.sb3.worlds": ("Sb3Worlds",),
     "explanations.settings": ("ExplainSettings",),
+    "pilot.errors": ("PilotError",),
+    "pilot.future": ("FlightFuture",),
+    "pilot.pilot": ("Pilot",),
+    "pilot.state": ("PilotState",),
+    "pilot.sticks": ("Sticks",),
+    "pilot.trajectory": ("Trajectory",),
+    "pilot.turning": ("Drivetrain", "YawMode"),
     "policies.sb3.logits": ("Sb3Logits",),
     "policies.sb3.trunk": ("Sb3Trunk",),
     "settings.chances": ("ChanceSettings",),
@@ -98,6 +112,7 @@ __all__ = [
     "Check",
     "CheckSettings",
     "Coverage",
+    "Drivetrain",
     "DroneWorld",
     "DroneWorlds",
     "DynamicsSettings",
@@ -105,11 +120,15 @@ __all__ = [
     "Evaluation",
     "ExplainSettings",
     "Explanations",
+    "FlightFuture",
     "ForeignPolicy",
     "InputError",
     "JudgeSettings",
     "Judgement",
     "PillarsSettings",
+    "Pilot",
+    "PilotError",
+    "PilotState",
     "Places",
     "PlacesSettings",
     "Policy",
@@ -121,10 +140,13 @@ __all__ = [
     "Sb3Worlds",
     "ShiftSettings",
     "Shifts",
+    "Sticks",
     "TaskSettings",
     "TrainSettings",
     "TrainerSettings",
     "Training",
+    "Trajectory",
+    "YawMode",
     "chances",
     "check",
     "evaluate",
