@@ -1,17 +1,12 @@
-"""Finding and building a firmware, with a source of one line; the real one where it was built."""
+"""Finding and building a firmware, with a source of one line."""
 
 import sys
 
 import pytest
-import torch
 
 from drone_rl.loops import firmware
-from drone_rl.loops.course import Course, fly_course
 from drone_rl.loops.firmware import build_firmware, find_firmware, find_source, firmware_path
-from drone_rl.loops.flight import LoopedDrone
-from drone_rl.loops.sitl import Betaflight
 from drone_rl.utils.errors import InputError
-from tests.loops.simple_body import SETTINGS, SimpleBody
 
 MAKEFILE = """\
 all:
@@ -80,20 +75,3 @@ def test_its_command(tools, monkeypatch, tmp_path, capsys):
     monkeypatch.setattr(firmware, "find_source", lambda: tools)
     firmware.main()
     assert capsys.readouterr().out == f"{firmware_path()}\n"
-
-
-@pytest.mark.slow
-def test_the_real_one_flies(own_network, tmp_path):
-    try:
-        program = find_firmware()
-    except InputError as error:
-        pytest.skip(str(error))
-    torch.set_num_threads(1)
-    body = SimpleBody()
-    with Betaflight([str(program)], tmp_path) as flown:
-        drone = LoopedDrone(body, body.start(), flown, SETTINGS)
-        report = fly_course(drone, Course(height=1.5, side=3.0, speed=0.75, hover=4.0))
-    assert report.hover_error_m < 0.3
-    assert report.path_error_m < 0.5
-    assert report.landing_error_m < 0.5
-    assert flown.missed < 0.02 * flown.steps
