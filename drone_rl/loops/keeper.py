@@ -5,6 +5,7 @@ there and hands them out; and ends the firmware when it is told to, or when whoe
 gone, however that came about. Requests and replies are lines of JSON over a Unix socket.
 """
 
+import contextlib
 import ctypes
 import fcntl
 import json
@@ -47,8 +48,8 @@ def _keep_ids(user: int, group: int) -> None:
     """Files in a new user's namespace go on belonging to who we are."""
     values = {"setgroups": "deny", "uid_map": f"{user} {user} 1", "gid_map": f"{group} {group} 1"}
     for name, value in values.items():
-        with open(f"/proc/self/{name}", "w") as file:
-            file.write(value)
+        with contextlib.suppress(OSError), open(f"/proc/self/{name}", "w") as file:
+            file.write(value)  # where that can't be, we are nobody, who can do all that is needed
 
 
 def _bring_up(interface: str) -> None:
