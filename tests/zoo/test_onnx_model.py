@@ -128,7 +128,7 @@ def test_frames_of_another_camera_are_refused_by_the_runtime(linear):
 )
 def test_it_agrees_with_the_pipeline_in_flight(height, width, transforms, network):
     description = described(height, width, transforms, network)
-    policy = built(description, scale=30.0)
+    policy = built(description, scale=20.0)
     env = description.build_env(8, seed=0, device="cpu")
     actor = make_actor(policy, env.action_spec, torch.Generator().manual_seed(0))
     found = agreement(env, actor, open_onnx(make_onnx(description, policy, {})), 40)

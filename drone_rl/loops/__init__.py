@@ -1,0 +1,1 @@
+"""Flight controllers that aren't ours: software (Betaflight) and hardware (MAVLink) in the loop."""
