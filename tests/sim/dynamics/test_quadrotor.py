@@ -31,7 +31,7 @@ def test_the_place_where_it_is_wanted_runs_ahead_only_so_far():
     drone = Quadrotor(settings(), ActionSettings(move_lead=0.25))
     state = still(drone)
     state.reference[0, 0] = 10.0
-    assert drone.goals_of(state, torch.tensor([0])).values[0].tolist() == [0.25, 0, 0, 100]
+    assert drone.steering.goals(state, torch.tensor([0])).values[0].tolist() == [0.25, 0, 0, 100]
 
 
 def test_ten_moves_forward_become_a_flight():
