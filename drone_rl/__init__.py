@@ -11,6 +11,7 @@ from drone_rl.utils.garbage import collecting_no_garbage
 from drone_rl.utils.when_imported import when_imported
 
 if TYPE_CHECKING:
+    from drone_rl.api.bodies import Bodies, bodies
     from drone_rl.api.chances import Chances, chances
     from drone_rl.api.checking import Check, check
     from drone_rl.api.domains import Coverage
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
     from drone_rl.pilot.turning import Drivetrain, YawMode
     from drone_rl.policies.sb3.logits import Sb3Logits
     from drone_rl.policies.sb3.trunk import Sb3Trunk
+    from drone_rl.settings.bodies import BodiesSettings
     from drone_rl.settings.chances import ChanceSettings
     from drone_rl.settings.checking import CheckSettings
     from drone_rl.settings.judging import EvaluateSettings, JudgeSettings
@@ -58,6 +60,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _PLACES = {
+    "api.bodies": ("Bodies", "bodies"),
     "api.chances": ("Chances", "chances"),
     "api.checking": ("Check", "check"),
     "api.domains": ("Coverage",),
@@ -85,6 +88,7 @@ _PLACES = {
     "pilot.turning": ("Drivetrain", "YawMode"),
     "policies.sb3.logits": ("Sb3Logits",),
     "policies.sb3.trunk": ("Sb3Trunk",),
+    "settings.bodies": ("BodiesSettings",),
     "settings.chances": ("ChanceSettings",),
     "settings.checking": ("CheckSettings",),
     "settings.judging": ("EvaluateSettings", "JudgeSettings"),
@@ -106,6 +110,8 @@ _HOMES = {name: f"drone_rl.{module}" for module, names in _PLACES.items() for na
 
 __all__ = [
     "ActionSettings",
+    "Bodies",
+    "BodiesSettings",
     "CameraSettings",
     "ChanceSettings",
     "Chances",
@@ -147,6 +153,7 @@ __all__ = [
     "Training",
     "Trajectory",
     "YawMode",
+    "bodies",
     "chances",
     "check",
     "evaluate",

@@ -17,6 +17,7 @@ commands
   check      does a certificate hold? flown anew; as JSON and as an exit status
   places     what does it do about one cube, wherever that stands? exactly, as a map
   shifts     under which other conditions is it good? light, camera, sizes, faults, motion
+  bodies     what becomes of its verdict when its drone gets a body? wind, motors, cameras
   chain      how probable each end of an episode is, exactly, if moves are drawn
   export     write a policy as safetensors with a model card, or as an ONNX model
   sweep-report  compare the runs of a sweep: CSV, JSON, one HTML page
@@ -33,6 +34,6 @@ examples
 """
 COMMANDS = (
     *("train", "evaluate", "play", "explain", "report", "verdict"),
-    *("prove", "check", "places", "shifts", "chain", "export", "sweep-report", "bench"),
+    *("prove", "check", "places", "shifts", "bodies", "chain", "export", "sweep-report", "bench"),
 )
 """Each a module of `drone_rl.cli` and a file in conf/; `demo` runs three of them."""

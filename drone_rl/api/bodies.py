@@ -1,0 +1,104 @@
+"""The same policies in other bodies and other air, as an object that shows itself."""
+
+import dataclasses
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from drone_rl.api.foreign import as_pilot
+from drone_rl.api.judging import judge
+from drone_rl.api.pilot import Pilot
+from drone_rl.api.progress import Bar, Progress, silent
+from drone_rl.api.showing import aligned, picture, table
+from drone_rl.report.bodies import chart
+from drone_rl.settings.bodies import BodiesSettings
+from drone_rl.settings.judging import JudgeSettings
+from drone_rl.sim.settings import DynamicsSettings
+from drone_rl.utils.provenance import provenance
+from drone_rl.words.bodies import rows
+
+GUSTS = 0.25
+"""Standard deviation of the wind along each axis, as a share of its mean."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Bodies:
+    """What becomes of verdicts when policies get a body."""
+
+    settings: BodiesSettings
+    numbers: dict[str, Any] = dataclasses.field(repr=False)
+    """As in `bodies.json`: by policy and body the verdict's evidence."""
+
+    def save(self, folder: Path) -> None:
+        """Writes `bodies.json`, `bodies.png` and `bodies.svg`."""
+        (folder / "bodies.json").write_text(json.dumps({**self.numbers, **provenance()}, indent=2))
+        figure = chart(self.numbers)
+        for kind in ("png", "svg"):
+            figure.savefig(folder / f"bodies.{kind}", dpi=130)
+
+    def __str__(self) -> str:
+        """The table: a policy a row, a body a column."""
+        return aligned(rows(self.numbers))
+
+    def _repr_html_(self) -> str:
+        head, *lines = rows(self.numbers)
+        return table(head, lines) + picture(chart(self.numbers))
+
+
+def bodies(
+    policies: str | Path | Pilot | list[Any] | tuple[Any, ...] | None = None,
+    settings: BodiesSettings | None = None,
+    *,
+    outputs: str | Path = "outputs",
+    progress: Progress | None = None,
+    **changes: Any,
+) -> Bodies:
+    """Judges policies in computer-vision mode, in flight, in wind, and with worse drones.
+
+    Args:
+        policies: One or several of what `judge` takes; those of the settings by default.
+        settings: Which, and how.
+        outputs: See `load_policy`.
+        progress: Told of what is being flown; a bar by default.
+        changes: Settings to change, as in `bodies("good", episodes=100)`.
+
+    Raises:
+        InputError: A policy or a setting is unusable.
+    """
+    settings = (settings or BodiesSettings()).replace(**changes)
+    progress = progress or Bar()
+    given = list(settings.policies) if policies is None else policies
+    whom = given if isinstance(given, list | tuple) else [given]
+    pilots = [as_pilot(one, outputs) for one in whom]
+    asked = settings.narrowed(JudgeSettings)
+    found: dict[str, dict[str, Any]] = {}
+    steps = len(pilots) * len(settings.bodies)
+    for pilot in pilots:
+        flown = found.setdefault(pilot.name, {})
+        for body in settings.bodies:
+            count = sum(map(len, found.values()))
+            progress(f"{pilot.name}: {body}", count, steps)
+            changed = changes_of(body, pilot.dynamics)
+            done = judge(pilot, asked, dynamics=changed, outputs=outputs, progress=silent)
+            flown[body] = done.verdict.as_dict()
+    progress("flown", steps, steps)
+    return Bodies(settings, {"bodies": list(settings.bodies), "policies": found})
+
+
+def changes_of(body: str, own: DynamicsSettings) -> Mapping[str, Any]:
+    """What a body of that name changes of the dynamics that a policy was made for.
+
+    Wind blows from the right, with gusts of a quarter of its speed along each axis; else the air is
+    still. A policy's own drone keeps its own parameters.
+    """
+    still = {"wind": [0.0, 0.0, 0.0], "gusts": 0.0}
+    if body == "computer vision":
+        return {"mode": "computer_vision", **still}
+    flying = {"mode": "simple_flight", "camera_mount": "gimbal", **still}
+    if body.startswith("wind"):
+        speed = float(body.split()[1])
+        return {**flying, "wind": [0.0, speed, 0.0], "gusts": GUSTS * speed}
+    if body == "motors twice as slow":
+        return {**flying, "rotor_time_constant": 2.0 * own.rotor_time_constant}
+    return {**flying, "camera_mount": "body"} if body == "camera on the body" else flying

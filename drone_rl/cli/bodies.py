@@ -1,0 +1,31 @@
+"""`drone-rl bodies`."""
+
+import dataclasses
+import logging
+from pathlib import Path
+
+import drone_rl
+from drone_rl.settings.bodies import BodiesSettings
+from drone_rl.settings.paths import PathsSettings
+
+_log = logging.getLogger(__name__)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Command(BodiesSettings):
+    """What `drone-rl bodies` can be told."""
+
+    paths: PathsSettings = PathsSettings()
+    """Folders."""
+
+
+def run(settings: Command, folder: Path) -> tuple[int, int]:
+    """Flies policies in several bodies. Returns the exit status and how many verdicts there are."""
+    from drone_rl.api.progress import silent
+
+    asked = settings.narrowed(BodiesSettings)
+    done = drone_rl.bodies(settings=asked, outputs=settings.paths.outputs, progress=silent)
+    done.save(folder)
+    print(done)
+    _log.info("written: bodies.json, bodies.png and bodies.svg in %s", folder)
+    return 0, sum(map(len, done.numbers["policies"].values()))

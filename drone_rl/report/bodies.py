@@ -1,0 +1,53 @@
+"""Policies in several bodies as a table in colours: what became of each verdict."""
+
+import textwrap
+from collections.abc import Mapping
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+
+from drone_rl.words.bodies import failure
+
+_COLORS = {"good": "#b9e0b0", "poor": "#f2b5ad", "one-sided": "#f7d7a0", "none": "#e3e6ea"}
+_INK, _FAINT = "#1e2024", "#5b616b"
+_WIDTH, _HEIGHT = 1.75, 0.95
+"""Inches of a cell."""
+
+
+def chart(numbers: Mapping[str, Any]) -> Figure:
+    """A row a policy, a column a body: verdict, share with 95% interval, what fails most.
+
+    Args:
+        numbers: As in `bodies.json`.
+    """
+    bodies, policies = numbers["bodies"], numbers["policies"]
+    size = (_WIDTH * (len(bodies) + 1), _HEIGHT * len(policies) + 0.6)
+    figure = Figure(figsize=size, layout="constrained")
+    axes = figure.subplots()
+    axes.set(xlim=(-1, len(bodies)), ylim=(len(policies), -0.55))
+    axes.axis("off")
+    for x, body in enumerate(bodies):
+        axes.text(x + 0.5, -0.25, body, ha="center", va="center", fontsize=10, color=_INK)
+    for y, (name, flown) in enumerate(policies.items()):
+        axes.text(-0.05, y + 0.5, name, ha="right", va="center", fontsize=11, color=_INK)
+        for x, body in enumerate(bodies):
+            _cell(axes, x, y, flown[body])
+    return figure
+
+
+def _cell(axes: Axes, x: int, y: int, verdict: Mapping[str, Any]) -> None:
+    color = _COLORS[verdict["kind"].split()[0]]
+    box = {"facecolor": color, "edgecolor": "white", "linewidth": 2}
+    axes.add_patch(Rectangle((x, y), 1, 1, **box))
+    success, unsure = verdict["greedy"]["success"], "" if verdict["certain"] else " ?"
+    share = f"{100 * success['share']:.1f}%"
+    ends = f"{100 * success['lower95']:.0f} to {100 * success['upper95']:.0f}"
+    lines = (
+        (0.2, f"{verdict['kind']}{unsure}", 9.0, _INK),
+        (0.45, f"{share}  ({ends})", 9.5, _INK),
+        (0.77, textwrap.fill(failure(verdict), 26), 7.0, _FAINT),
+    )
+    for height, text, points, ink in lines:
+        axes.text(x + 0.5, y + height, text, ha="center", va="center", fontsize=points, color=ink)
