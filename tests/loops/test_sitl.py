@@ -17,7 +17,7 @@ def standing(step):
 
 
 def test_it_is_set_up_once_and_then_armed(stub, tmp_path):
-    with Betaflight(stub(), tmp_path / "new") as firmware:
+    with Betaflight(stub(), tmp_path / "new", answer_within=2.0) as firmware:
         assert "set yaw_srate = 20" in (tmp_path / "new" / MEMORY).read_text()
         for step in range(40):
             assert firmware.step(standing(step), AT_REST).tolist() == [0.0] * 4
