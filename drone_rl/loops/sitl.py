@@ -40,9 +40,10 @@ MEMORY = "eeprom.bin"
 """The file in its folder in which the firmware keeps how it was set up."""
 STICKS_EVERY = 0.01
 """Seconds of simulated time from one packet of sticks to the next."""
-STARTS = 5
+STARTS = 3
 """How often it is started at most, until it steps."""
 _AWAKE = 10
+_WAKES_WITHIN = 0.05
 _STANDING = Senses(
     time=0.0,
     position=np.zeros(3),
@@ -73,7 +74,8 @@ class Betaflight:
             folder: For its memory and its words; made if it isn't there. A memory that is there is
                 used, else the firmware is set up anew.
             isolated: See `Keeping`.
-            patience: Seconds of silence after which the firmware counts as gone.
+            patience: Seconds of silence after which the firmware counts as gone; half of them
+                while it starts.
             answer_within: Seconds to wait for its answer to one state; then the rotors go on as
                 they did.
         """
@@ -177,7 +179,7 @@ class Betaflight:
         """
         for _ in range(STARTS):
             self._keeping.start(self.program, self.folder, self.log)
-            end = time.monotonic() + self.patience / STARTS
+            end = time.monotonic() + self.patience / 2
             while time.monotonic() < end:
                 if self._answers(_STANDING):
                     self._heard = time.monotonic()
@@ -189,6 +191,7 @@ class Betaflight:
         for _ in range(_AWAKE):
             self._drop_late_answers()
             self._send(self._state, pack_state(senses, 0.0))
+            self._hear.settimeout(_WAKES_WITHIN)  # before it listens, what is sent is lost
             try:
                 self._hear.recv(64)
             except TimeoutError:
