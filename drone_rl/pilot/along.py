@@ -16,6 +16,8 @@ AUTOMATIC = -1.0
 _PERIODS_AHEAD = 30.0
 _PERIODS_AHEAD_FIXED = 40.0
 """Where the lookahead doesn't adapt."""
+_SLOWEST = 0.6
+"""Metres a second below which no drone brakes before its end, lest wind keep it from there."""
 _VERTICAL_BRAKING = 0.5
 """Seconds; climbs are controlled more tightly than what goes sideways."""
 
@@ -114,7 +116,7 @@ class AlongPath(Command):
         place = place_at(paths, self.along)
         self._ahead = self.lookahead + self.adaptive * (position - place).norm(dim=-1)
         ahead = place_at(paths, self.along + self._ahead) - position
-        pace = self._pace(self._left(body))
+        pace = torch.maximum(self._pace(self._left(body)), self.speed.clamp(max=_SLOWEST))
         sideways = ahead[:, :2] * (pace / ahead.norm(dim=-1).clamp(min=1e-9))[:, None]
         heading = self.turning.goal(ahead, ACCURACY)
         values = torch.cat([sideways, heading[:, None], place[:, 2:]], 1)

@@ -46,6 +46,28 @@ def real(
     return number
 
 
+def numbers(values: Any, name: str, count: int, low: float, high: float) -> list[float]:
+    """So many finite numbers within bounds.
+
+    Args:
+        values: What was given.
+        name: Its name, for people.
+        count: How many there must be.
+        low: The least that each may be.
+        high: The most.
+
+    Raises:
+        InputError: They are others, more or fewer.
+    """
+    try:
+        given = list(values)
+    except TypeError:
+        given = []
+    if len(given) != count:
+        raise InputError(f"{name}={values!r} can't be; give {count} numbers")
+    return [real(value, f"{name}[{i}]", low, high) for i, value in enumerate(given)]
+
+
 def duration(value: Any) -> float:
     """Seconds that a command lasts.
 

@@ -21,6 +21,7 @@ from drone_rl.sim.dynamics import Obstacles, Quadrotor
 from drone_rl.sim.settings import DynamicsSettings
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.schema import Whole
 
 
 class Cockpit:
@@ -44,7 +45,7 @@ class Cockpit:
                 generic drone in still air.
             start: Where, x and y, metres.
             yaw: How it is turned, degrees to the left of the world's x.
-            seed: Of gusts.
+            seed: Of gusts, a whole number.
             obstacles: What it may touch besides the ground, in one world; what stands in `worlds`
                 now by default.
             worlds: A single world, of which it takes pictures.
@@ -61,12 +62,10 @@ class Cockpit:
             if obstacles is None:
                 obstacles = worlds.task.obstacles(worlds.state)
         quadrotor = _quadrotor(dynamics, changes)
-        if len(start) != 2:
-            raise InputError(f"start={start!r} is no place on the ground; give (x, y)")
-        x, y = (checks.real(v, f"start[{i}]", unit="m") for i, v in enumerate(start))
+        x, y = checks.numbers(start, "start", 2, -checks.FARTHEST, checks.FARTHEST)
         place = torch.tensor([x, y, quadrotor.settings.radius], dtype=torch.float64)
         heading = math.radians(checks.real(yaw, "yaw", unit="degrees"))
-        self._drone = Drone(quadrotor, place, heading, seed)
+        self._drone = Drone(quadrotor, place, heading, Whole(0, 2**31 - 1).read(seed, "seed"))
         self._drone.obstacles = obstacles
         self._runner = Runner(self._drone)
         self.worlds = worlds

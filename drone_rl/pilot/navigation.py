@@ -84,9 +84,7 @@ class Navigation(Cockpit):
         self, shares: Sequence[float], duration: float, *, wait: bool = True
     ) -> bool | FlightFuture:
         """Sets all rotors: front right, rear left, front left, rear right, each from 0 to 1."""
-        if len(shares) != 4:
-            raise InputError(f"shares={shares!r} are not those of four rotors; give four numbers")
-        a, b, c, d = (checks.real(v, f"shares[{i}]", 0.0, 1.0) for i, v in enumerate(shares))
+        a, b, c, d = checks.numbers(shares, "shares", 4, 0.0, 1.0)
         command = ByRotors((a, b, c, d), checks.duration(duration))
         return self._fly("move_by_rotors", command, wait)
 

@@ -74,10 +74,13 @@ class Turning:
                 isn't turned.
 
         Raises:
-            InputError: A rate is given to a drone that goes forward only.
+            InputError: A rate is given to a drone that goes forward only, or there is no such
+                choice.
         """
         self.is_forward = read_drivetrain(drivetrain) == Drivetrain.FORWARD_ONLY
         self.yaw_mode = yaw_mode or YawMode(is_rate=not self.is_forward)
+        if not isinstance(self.yaw_mode, YawMode):
+            raise InputError(f"yaw_mode={yaw_mode!r} is none; give YawMode(is_rate, yaw_or_rate)")
         if self.is_forward and self.yaw_mode.is_rate:
             raise InputError(
                 f"yaw_mode={self.yaw_mode} turns at a rate, but drivetrain=forward_only looks "

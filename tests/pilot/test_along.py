@@ -59,10 +59,17 @@ def test_it_climbs_at_the_speed_of_the_path(hovering):
 
 def test_it_brakes_for_the_end_alone(hovering):
     body = hovering((0, 0, 5), (0, 0, 5))
-    points = rows([[1, 0, 5], [1, 0, 5]], [[1, 0, 5], [9, 0, 5]])
+    points = rows([[1, 0, 5], [2, 0, 5]], [[1, 0, 5], [9, 0, 5]])
     command = AlongPath(points, 4.0, 60.0, braking=2.0)
     command.begin(body)
-    assert command.goals(body).values[:, 0].tolist() == pytest.approx([0.5, 4.0])
+    assert command.goals(body).values[:, 0].tolist() == pytest.approx([1.0, 4.0])
+
+
+def test_it_never_brakes_so_much_that_wind_stops_it(hovering):
+    body = hovering((0, 0, 5), (0, 0, 5))
+    command = AlongPath(rows([[0.8, 0, 5]], [[0.8, 0, 5]]), rows(4.0, 0.3), 60.0, braking=2.0)
+    command.begin(body)
+    assert command.goals(body).values[:, 0].tolist() == pytest.approx([0.6, 0.3])
 
 
 def test_drones_of_a_batch_fly_paths_of_their_own_at_speeds_of_their_own(quadrotor, hovering):

@@ -30,6 +30,12 @@ def test_bounds_are_told():
         checks.height(-5)
 
 
+def test_so_many_numbers():
+    assert checks.numbers(np.array([1, 2]), "start", 2, 0, 5) == [1.0, 2.0]
+    with pytest.raises(InputError, match=r"start\[1\]=9 can't be"):
+        checks.numbers((1, 9), "start", 2, 0, 5)
+
+
 def test_a_path():
     assert checks.path([(1, 2, 3), (4, 5, 6)]).tolist() == [[[1, 2, 3], [4, 5, 6]]]
 

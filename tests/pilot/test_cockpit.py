@@ -32,7 +32,10 @@ def test_settings_one_by_one():
         ({"mass": -1}, "mass=-1"),
         ({"mass": 3}, "can't hover"),
         ({"wings": 2}, "wings is unknown"),
-        ({"start": (0, 0, 5)}, "is no place on the ground"),
+        ({"start": (0, 0, 5)}, r"start=\(0, 0, 5\) can't be; give 2 numbers"),
+        ({"start": 5}, "start=5 can't be"),
+        ({"seed": 0.5}, "seed=0.5"),
+        ({"yaw": "north"}, "yaw='north'"),
         ({"start": (0, math.inf)}, r"start\[1\]=inf"),
     ],
 )

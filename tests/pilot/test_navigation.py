@@ -98,7 +98,7 @@ def test_sticks_are_read_while_time_passes(flying):
         ("move_by_angle", (0, 0, 1), {"yaw": 3, "yaw_rate": 2}, "yaw=3 and yaw_rate=2"),
         ("move_by_angle", (0, 0, 1), {"throttle": 1.5}, "throttle=1.5"),
         ("move_by_rates", (0, math.nan, 0, 1), {}, "pitch=nan"),
-        ("move_by_rotors", ([0.5] * 3, 1), {}, "not those of four rotors"),
+        ("move_by_rotors", ([0.5] * 3, 1), {}, "give 4 numbers"),
         ("move_by_rotors", ([0.5, 0.5, 2, 0.5], 1), {}, r"shares\[2\]=2"),
         ("rotate_to", (math.nan,), {}, "yaw=nan"),
         ("rotate_to", (9,), {"margin": 0}, "margin=0"),

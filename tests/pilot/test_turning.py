@@ -43,5 +43,7 @@ def test_what_does_not_go_together():
         Turning("forward_only", YawMode(True, 10.0))
     with pytest.raises(InputError, match="drivetrain='sideways' is unknown; give one of: forward_"):
         read_drivetrain("sideways")
+    with pytest.raises(InputError, match=r"yaw_mode=\(False, 9\) is none; give YawMode"):
+        Turning("forward_only", (False, 9))
     with pytest.raises(InputError, match="yaw_or_rate=nan"):
         YawMode(False, math.nan)
