@@ -136,7 +136,7 @@ class MujocoFlight:
             action: One of the dynamics' actions. Shape: (1,), then the entry's.
         """
         body = self.found(physics)
-        self.tell(physics, body, self.quadrotor.goals_of(body, action))
+        self.tell(physics, body, self.quadrotor.steering.goals(body, action))
         return body
 
     def tell(self, physics: mjcf.Physics, body: FlightState, goals: Goals) -> None:
