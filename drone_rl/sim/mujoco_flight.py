@@ -20,6 +20,7 @@ from torch import Tensor
 
 from drone_rl.sim.dynamics import BodyState, FlightState, Goals, Quadrotor
 from drone_rl.sim.dynamics import flight_state as fs
+from drone_rl.sim.dynamics.body import heading_only
 from drone_rl.sim.dynamics.forces import forces, told
 from drone_rl.sim.entities.cameras import DRONE_CAMERAS
 from drone_rl.sim.entities.drone import Drone
@@ -171,11 +172,10 @@ class MujocoFlight:
         """Turns cameras on a gimbal so that they are level, and look where the drone is headed."""
         if self.quadrotor.mount != "gimbal" or self._mounted is None:
             return
-        w, x, y, z = physics.data.qpos[self._pose][3:]
-        length = math.hypot(w, z) or 1.0
-        level = np.array([w / length, 0.0, 0.0, z / length])
+        attitude = physics.data.qpos[self._pose][3:]
+        level = heading_only(torch.tensor(attitude)).numpy()
         turn, place, quat = np.empty(4), np.empty(3), np.empty(4)
-        mujoco.mju_mulQuat(turn, np.array([w, -x, -y, -z]), level)
+        mujoco.mju_mulQuat(turn, attitude * (1.0, -1.0, -1.0, -1.0), level)
         model = physics.model.ptr
         for camera, at, turned in zip(self._cameras, *self._mounted, strict=True):
             mujoco.mju_rotVecQuat(place, at, turn)

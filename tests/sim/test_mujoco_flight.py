@@ -8,11 +8,21 @@ import torch
 
 from drone_rl.sim.actions import Move
 from drone_rl.sim.composer_task import ComposerTask, make_environment
-from drone_rl.sim.dynamics import FlightState, Mode, Obstacles
+from drone_rl.sim.dynamics import FlightState, Mode, Obstacles, Quadrotor
 from drone_rl.sim.dynamics.flight_state import GROUND, NOTHING
-from drone_rl.sim.settings import PillarsSettings
+from drone_rl.sim.settings import ActionSettings, PillarsSettings
 from drone_rl.utils.seeding import world_random_state
-from tests.flying import PLACES, SPEEDS, angles, degrees_between, matrix, numbers, quadrotor, told
+from tests.flying import (
+    PLACES,
+    SPEEDS,
+    angles,
+    degrees_between,
+    matrix,
+    numbers,
+    quadrotor,
+    settings,
+    told,
+)
 
 DROP = (Mode.ROTOR,) * 4
 FAR = numbers((50.0, 50.0, 3.0))
@@ -143,6 +153,17 @@ def test_an_environment_flies_like_the_batch(task):
     env.reset()
     assert env.task.state.body.position.tolist() == [[0, 0, 2.5]]
     assert not env.task.state.body.velocity.any()
+
+
+def test_an_environment_takes_velocities_too():
+    drone = Quadrotor(settings(), ActionSettings(kind="velocity"))
+    env = make_environment(dynamics=drone, pixels=False, random_state=3)
+    env.reset()
+    state = FlightState(env.task.state.body.numbers.clone())
+    for action in ((0.5, 0.3, -0.4), (1.0, -1.0, 0.8)) * 5:
+        env.step(np.array(action))
+        state = drone.step(state, torch.tensor([action], dtype=drone.actions.entry.dtype))
+    torch.testing.assert_close(env.task.state.body.numbers, state.numbers, atol=1e-3, rtol=0)
 
 
 def test_a_drone_moved_by_hand_is_told_to_stay_there():

@@ -1,10 +1,16 @@
+from pathlib import Path
+
+import numpy as np
 import pytest
 import torch
+import yaml
 
 from drone_rl.sim.actions import Move
 from drone_rl.sim.dynamics import Quadrotor
-from drone_rl.sim.settings import ActionSettings
-from tests.flying import PLACES, numbers, quadrotor, settings, still, told
+from drone_rl.sim.settings import ActionSettings, DynamicsSettings
+from tests.flying import PLACES, angles, history, numbers, quadrotor, settings, still, told
+
+CONF = Path(__file__).parents[3] / "conf" / "dynamics"
 
 
 def test_it_starts_in_a_hover():
@@ -53,6 +59,29 @@ def test_no_drone_is_flown_without_complaint():
     drone = quadrotor()
     empty = drone.start(torch.zeros(0, 3, dtype=torch.float64))
     assert len(drone.step(empty, torch.zeros(0, dtype=torch.int64)).position) == 0
+
+
+@pytest.mark.parametrize("name", ["quadrotor", "crazyflie"])
+def test_a_drone_out_of_a_file_hovers_steps_and_flies_moves(name):
+    """A drone is data; what it answers is bounded, and dies away."""
+    values = yaml.safe_load((CONF / f"{name}.yaml").read_text())
+    del values["defaults"]
+    drone = Quadrotor(DynamicsSettings(**values))
+    hover = drone.fly(still(drone), told(PLACES, 0.0, 0.0, 0.0, 100.0), 3300)
+    assert float((hover.position - still(drone).position).norm()) < 1e-3
+    states = history(drone, still(drone), told(PLACES, 2.0, -1.0, 1.0, 101.0), 3630, 33)
+    path = torch.cat([state.position for state in states])
+    assert path[:, 0].max() < 2.0 * 1.35 and path[:, 1].min() > -1.0 * 1.35
+    assert path[:, 2].max() < 101.1
+    last = states[-1]
+    np.testing.assert_allclose(last.position[0], (2.0, -1.0, 101.0), atol=0.02)
+    assert last.heading.item() == pytest.approx(1.0, abs=0.01)
+    assert float(last.velocity.norm()) < 0.02 and float(last.angular_velocity.norm()) < 0.02
+    state = still(drone)
+    for action in [Move.FORWARD] * 20 + [Move.LEFT] * 10 + [Move.RIGHT] * 10:
+        state = drone.step(state, torch.tensor([action]))
+        assert not state.is_lost.item() and float(angles(state)[0, :2].abs().max()) < 0.7
+        assert float((state.position[0, 2] - 100.0).abs()) < 0.2
 
 
 @pytest.mark.gpu

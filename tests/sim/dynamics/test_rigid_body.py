@@ -7,7 +7,16 @@ import pytest
 import torch
 
 from drone_rl.sim.dynamics.goals import rotor_goals
-from tests.flying import GRAVITY, falling, history, matrix, numbers, quadrotor, rotation
+from tests.flying import (
+    GRAVITY,
+    falling,
+    history,
+    matrix,
+    numbers,
+    quadrotor,
+    rotation,
+    still,
+)
 
 VACUUM = {"air_density": 0.0}
 AT_ONCE = {"rotor_time_constant": 0.0}
@@ -158,3 +167,65 @@ def test_attitudes_stay_of_length_one():
     states = history(quadrotor(), state, rotor_goals(torch.full((20, 4), 0.2).double()), 990, 33)
     lengths = torch.stack([s.attitude.norm(dim=-1) for s in states])
     assert float((lengths - 1).abs().max()) < 1e-6
+
+
+MASS, ARM, MOST, RATIO = 0.0319, 0.03253, 0.12, 0.00735
+INERTIA = np.diag((16.8e-6, 16.8e-6, 29.8e-6))
+CURVE = np.array([0.0, -5.382196214637237e-7, 2.4582929831265485e-10])
+
+
+def theirs(models, attitude, velocity, rates, speeds):
+    """Accelerations, metres and radians a second squared. Shapes: (count, 3) both."""
+    mixing = np.array([[-1, -1, 1, 1], [-1, 1, 1, -1], [-1, 1, -1, 1]], float)
+    _, _, linear, angular, _ = models.dynamics(
+        np.zeros_like(velocity),
+        attitude[:, [1, 2, 3, 0]],
+        velocity,
+        rates,
+        speeds,
+        mass=MASS,
+        L=ARM,
+        prop_inertia=0.0,
+        gravity_vec=np.array([0.0, 0.0, -9.81]),
+        J=INERTIA,
+        J_inv=np.linalg.inv(INERTIA),
+        rpm2thrust=CURVE,
+        rpm2torque=CURVE * RATIO,
+        mixing_matrix=mixing,
+        drag_matrix=np.zeros((3, 3)),
+        rotor_dyn_coef=np.ones(4),
+    )
+    return linear, angular
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_rotors_accelerate_a_crazyflie_as_they_do_there():
+    """Beside the package drone-models. Drag, which is linear there, is left out, as is what this
+    drone has not: the spin of its propellers, and curves of their torques of their own."""
+    models = pytest.importorskip(
+        "drone_models.first_principles", reason="needs drone-models", exc_type=ImportError
+    )
+    source, count = np.random.default_rng(0), 50
+    drone = quadrotor(
+        mass=MASS,
+        inertia=tuple(np.diag(INERTIA).tolist()),
+        arm_length=ARM * 2**0.5,
+        rotor_thrust=MOST,
+        rotor_torque=MOST * RATIO,
+        rotor_time_constant=0.0,
+        air_density=0.0,
+    )
+    state = still(drone, count=count)
+    attitude, speeds = source.normal(size=(count, 4)), source.uniform(5000, 23000, (count, 4))
+    attitude /= np.linalg.norm(attitude, axis=1, keepdims=True)
+    velocity, rates = source.normal(size=(2, count, 3))
+    state.attitude[:], state.velocity[:] = numbers(*attitude), numbers(*velocity)
+    state.angular_velocity[:] = numbers(*rates)
+    shares = (CURVE[1] * speeds + CURVE[2] * speeds**2) / MOST
+    ours = [0, 2, 3, 1]  # theirs: front right, rear right, rear left, front left
+    after = drone.push(state, torch.tensor(shares[:, ours]))
+    linear, angular = theirs(models, attitude, velocity, rates, speeds)
+    tick = drone.settings.tick
+    np.testing.assert_allclose((after.velocity - state.velocity) / tick, linear, atol=2e-3)
+    turned = (after.angular_velocity - state.angular_velocity) / tick
+    np.testing.assert_allclose(turned, angular, rtol=1e-4, atol=1e-2)
