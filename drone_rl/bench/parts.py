@@ -16,13 +16,21 @@ from drone_rl.policies import PolicyNetwork, SmallCNN, make_actor
 from drone_rl.settings.collecting import Threads
 from drone_rl.settings.training import TrainSettings
 from drone_rl.sim.rendering import MakeRenderer
-from drone_rl.sim.settings import AppearanceSettings, CameraSettings, TaskSettings
+from drone_rl.sim.settings import (
+    COMPUTER_VISION,
+    AppearanceSettings,
+    CameraSettings,
+    DynamicsSettings,
+    TaskSettings,
+)
 
 
-def default_collector(num_envs: int, device: str) -> ThreadedCollector:
+def default_collector(
+    num_envs: int, device: str, dynamics: DynamicsSettings = COMPUTER_VISION
+) -> ThreadedCollector:
     """The collector of `drone-rl train`, with a policy that has learned nothing yet."""
-    threads = Threads(num_envs=num_envs)
-    collector = build_collector(TrainSettings(collector=threads, device=device)).collector
+    settings = TrainSettings(collector=Threads(num_envs=num_envs), device=device, dynamics=dynamics)
+    collector = build_collector(settings).collector
     assert isinstance(collector, ThreadedCollector)
     return collector
 

@@ -1,11 +1,16 @@
 """All benchmarks, by name."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from typing import Any
 
 from drone_rl.bench.benchmark import Benchmark
 from drone_rl.bench.coverage import bench_coverage
 from drone_rl.bench.exact_coverage import bench_exact_coverage
 from drone_rl.bench.explain import bench_explain
+from drone_rl.bench.flight_parity import bench_flight_parity
+from drone_rl.bench.flight_paths import bench_flight_paths
+from drone_rl.bench.flight_speed import bench_flight_speed
+from drone_rl.bench.flight_training import bench_flight_training
 from drone_rl.bench.gymnasium import bench_gymnasium
 from drone_rl.bench.hostile import bench_hostile
 from drone_rl.bench.maps import bench_maps
@@ -34,6 +39,12 @@ _TRAINING = (*_COLLECTING, "objectives", "training")
 _JUDGING = (*_DRAWING, "policies", "evaluation", "verdicts")
 _PROVING = (*_DRAWING, "policies", "proofs", "checks")
 _EXPLAINING = (*_JUDGING, "explanations")
+
+
+def _trained_in_flight(asked: Any, experiment: str, seeds: Sequence[int]) -> dict[str, Any]:
+    runs = asked.runs / experiment
+    return bench_flight_training(experiment, runs, seeds, asked.episodes, asked.device, asked.quick)
+
 
 BENCHMARKS: dict[str, Benchmark] = {
     "render": Benchmark(
@@ -185,10 +196,34 @@ BENCHMARKS: dict[str, Benchmark] = {
         "guests",
         (*_DRAWING, "bench/gymnasium"),
     ),
+    "flight_speed": Benchmark(
+        lambda s: bench_flight_speed(s.quick), "flight", (*_COLLECTING, "bench/flight_speed")
+    ),
+    "flight_parity": Benchmark(
+        lambda s: bench_flight_parity(s.quick), "flight", ("sim", "bench/flight_parity")
+    ),
+    "flight_paths": Benchmark(
+        lambda s: bench_flight_paths(s.quick), "flight", ("sim", "pilot", "bench/flight_paths")
+    ),
+    "flight_moves": Benchmark(
+        lambda s: _trained_in_flight(s, "flight", s.seeds),
+        "flight",
+        (*_TRAINING, "evaluation", "conf", "bench/flight_training"),
+    ),
+    "flight_velocity": Benchmark(
+        lambda s: _trained_in_flight(s, "flight_velocity", s.seeds[:3]),
+        "flight",
+        (*_TRAINING, "evaluation", "conf", "bench/flight_training"),
+    ),
+    "flight_pillars": Benchmark(
+        lambda s: _trained_in_flight(s, "flight_pillars", s.seeds[:3]),
+        "flight",
+        (*_TRAINING, "evaluation", "conf", "bench/flight_training"),
+    ),
 }  # fmt: skip
 GROUPS = tuple(dict.fromkeys(benchmark.group for benchmark in BENCHMARKS.values()))
 """Names of several at once: the main job, whether what is said is true, proofs, many trainings,
-what works with programs of others."""
+what works with programs of others, drones in flight."""
 
 
 def find_benchmarks(words: Iterable[str]) -> list[str]:

@@ -22,7 +22,7 @@ def bench_solve(
     """
     tried = seeds[:1] if quick else seeds
     settings = ["experiment=smoke"] if quick else []
-    done = _train(folder, tried, settings, 50 if quick else episodes, device)
+    done = train_and_evaluate(folder, tried, settings, 50 if quick else episodes, device)
     return {
         "time_to_solve_s": done["seconds"],
         "frames_to_solve": done["frames"],
@@ -42,7 +42,7 @@ def bench_seeds(folder: Path, device: str, quick: bool) -> dict[str, Any]:
         end, the frames, and the lower end of the share of 1,000 episodes with everything done.
     """
     tried, settings = (range(2), ["experiment=smoke"]) if quick else (range(200, 220), [])
-    done = _train(folder, tried, settings, 50 if quick else 1000, device)
+    done = train_and_evaluate(folder, tried, settings, 50 if quick else 1000, device)
     return {
         "seeds_solved_of_20": done["reason"].count("solved"),
         "seeds_s": done["seconds"],
@@ -76,7 +76,7 @@ def bench_pillars(
     """
     tried = seeds[:1] if quick else seeds
     settings = ["experiment=pillars", *(["trainer.total_frames=4000"] if quick else [])]
-    done = _train(folder, tried, settings, 50 if quick else episodes, device)
+    done = train_and_evaluate(folder, tried, settings, 50 if quick else episodes, device)
     return {
         "pillars_train_s": done["seconds"],
         "pillars_frames": done["frames"],
@@ -85,10 +85,21 @@ def bench_pillars(
     }
 
 
-def _train(
+def train_and_evaluate(
     folder: Path, seeds: Sequence[int], settings: Iterable[str], episodes: int, device: str
 ) -> dict[str, list]:
-    """Trains from each seed and evaluates, by the commands that a user gives."""
+    """Trains from each seed and evaluates, by the commands that a user gives.
+
+    Args:
+        folder: For the runs.
+        seeds: Of the trainings.
+        settings: Of each.
+        episodes: Held-out flights of each policy.
+        device: Where to train.
+
+    Returns:
+        Per seed: "seconds" of the command, "frames", "trained_s", "reason" and "lower95".
+    """
     names = ("seconds", "frames", "trained_s", "reason", "lower95")
     results: dict[str, list] = {name: [] for name in names}
     for seed in seeds:

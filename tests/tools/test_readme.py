@@ -10,8 +10,10 @@ from drone_rl.bench.ledger import Ledger, Origin, digest_code, make_origin
 from drone_rl.bench.registry import BENCHMARKS
 from tools.readme.__main__ import PAGES, ROOT, keep, main, make_blocks, make_files
 from tools.readme.blocks import marked_blocks, replace_blocks
+from tools.readme.flight_rows import FLIGHT
+from tools.readme.guest_rows import GUESTS
 from tools.readme.layers import draw_layers, list_packages
-from tools.readme.rows import CLAIMS, GUESTS, MAIN, PROOF, TRUTH
+from tools.readme.rows import CLAIMS, MAIN, PROOF, TRUTH
 from tools.readme.stale import tell_ages
 from tools.readme.tables import UNKNOWN, Row, list_figures, list_origins, make_table
 
@@ -77,7 +79,7 @@ def test_a_figure_that_is_missing_leaves_its_cell_unmeasured():
 
 
 def test_every_row_names_a_benchmark_and_every_benchmark_with_figures_has_a_row():
-    rows = (*MAIN, *TRUTH, *PROOF, *GUESTS)
+    rows = (*MAIN, *FLIGHT, *TRUTH, *PROOF, *GUESTS)
     named = {row.bench for row in rows}
     assert named <= set(BENCHMARKS)
     assert set(BENCHMARKS) - named == {"scaling"}  # which is a picture
@@ -101,7 +103,7 @@ def test_rows_say_what_the_figures_are():
         "onnx_frames": 40_000,
         "onnx_actions_differ": 3,
     }
-    text = "".join(make_table(rows, figures) for rows in (MAIN, TRUTH, PROOF, GUESTS))
+    text = "".join(make_table(rows, figures) for rows in (MAIN, FLIGHT, TRUTH, PROOF, GUESTS))
     assert "| 2.6e-06 on 40,000 pictures |" in text and "| 3 of 40,000 |" in text
     for cell in ("20 to 41, median 25", "0.991", "1024 MiB", "44 of 45 certain, of 55", "7.9%"):
         assert f"| {cell} |" in text

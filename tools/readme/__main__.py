@@ -5,11 +5,13 @@ from pathlib import Path
 
 from drone_rl.bench.ledger import Ledger
 from tools.readme.blocks import replace_blocks
+from tools.readme.flight_rows import FLIGHT
+from tools.readme.guest_rows import GUESTS
 from tools.readme.layers import draw_layers, list_packages, read_contracts
 from tools.readme.notebook import make_notebook
 from tools.readme.peers import make_peers
 from tools.readme.robust import make_robust
-from tools.readme.rows import CLAIMS, GUESTS, MAIN, PROOF, TRUTH
+from tools.readme.rows import CLAIMS, MAIN, PROOF, TRUTH
 from tools.readme.settings import list_commands, list_groups, list_parts, list_presets
 from tools.readme.stale import tell_ages
 from tools.readme.tables import list_figures, list_origins, make_table
@@ -34,7 +36,14 @@ def make_blocks(root: Path) -> dict[str, str]:
     """Every block as it should be, by name."""
     ledger = Ledger(root / "docs" / "results.json")
     contracts = read_contracts(root)
-    tables = {"claims": CLAIMS, "main": MAIN, "truth": TRUTH, "proof": PROOF, "guests": GUESTS}
+    tables = {
+        "claims": CLAIMS,
+        "main": MAIN,
+        "flight": FLIGHT,
+        "truth": TRUTH,
+        "proof": PROOF,
+        "guests": GUESTS,
+    }
     return {
         **{name: make_table(rows, ledger.figures) for name, rows in tables.items()},
         "peers": make_peers(ledger.figures),
