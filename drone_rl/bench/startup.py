@@ -1,5 +1,6 @@
 """How long a user waits: for an import, for the first update of a training, for a verdict."""
 
+import os
 import statistics
 import subprocess
 import sys
@@ -24,13 +25,15 @@ def bench_startup(folder: Path, device: str, quick: bool) -> dict[str, float]:
         quick: Whether once is enough.
 
     Returns:
-        "import_s" of the package alone, "start_to_first_update_s" of `drone-rl train`, "verdict_s"
+        "import_s" of the package alone, "start_to_first_update_s" of `drone-rl train`,
+        "first_compile_s" that the same takes longer where no kernels are cached, "verdict_s"
         of `drone-rl verdict policy=good`, with its 400 episodes; "import_torch_s", which tells how
         fast the machine is, and the two times as they would be where that takes 1 s.
     """
     times = range(1 if quick else 3)
     import_seconds()  # the first one compiles Python's files
     first_update_seconds(folder / "warm", device)  # and this one the kernels
+    cold = first_update_seconds(folder / "cold", device, folder / "kernels")
     updates = [first_update_seconds(folder / f"update_{i}", device) for i in times]
     verdicts = [verdict_seconds(folder / f"verdict_{i}", device) for i in times]
     torch_s = statistics.median(import_seconds("torch") for _ in times)
@@ -38,6 +41,7 @@ def bench_startup(folder: Path, device: str, quick: bool) -> dict[str, float]:
     return {
         "import_s": statistics.median(import_seconds() for _ in times),
         "start_to_first_update_s": update_s,
+        "first_compile_s": cold - update_s,
         "verdict_s": verdict_s,
         "import_torch_s": torch_s,
         "start_to_first_update_scaled_s": update_s * TORCH_S / torch_s,
@@ -51,8 +55,13 @@ def import_seconds(name: str = "drone_rl") -> float:
     return float(subprocess.run(command, capture_output=True, check=True).stdout)
 
 
-def first_update_seconds(folder: Path, device: str) -> float:
+def first_update_seconds(folder: Path, device: str, kernels: Path | None = None) -> float:
     """Of `drone-rl train`, until metrics.csv tells of an update.
+
+    Args:
+        folder: Its own.
+        device: Where it draws.
+        kernels: Folder of the cache of kernels; the usual one by default.
 
     Raises:
         RuntimeError: It ended without one.
@@ -60,7 +69,10 @@ def first_update_seconds(folder: Path, device: str) -> float:
     metrics, begin = folder / "metrics.csv", time.perf_counter()
     told = ["trainer.total_frames=1", f"device={device}", f"hydra.run.dir={folder}"]
     nowhere = subprocess.DEVNULL
-    process = subprocess.Popen([*PROGRAM, "train", *told], stdout=nowhere, stderr=nowhere)
+    cache = {} if kernels is None else {"WARP_CACHE_PATH": str(kernels)}
+    process = subprocess.Popen(
+        [*PROGRAM, "train", *told], stdout=nowhere, stderr=nowhere, env={**os.environ, **cache}
+    )
     while not (metrics.is_file() and metrics.stat().st_size):
         if process.poll() is not None:
             raise RuntimeError(f"drone-rl train ended with status {process.returncode}")

@@ -81,7 +81,7 @@ def judge_policy(
     """
     base: Any = getattr(env, "base_env", env)
     state, worlds = base.state_dict(), worlds_of(env)
-    greedy = run_episodes(env, actor, episodes)
+    greedy = run_episodes(env, actor, episodes, is_compiled=True)
     drawn = None
     if sampled:
         base.load_state_dict(state)

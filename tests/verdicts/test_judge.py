@@ -217,9 +217,9 @@ def test_another_task_is_judged_by_its_own_strata_and_luck():
 def test_a_policy_is_flown_greedily_and_with_drawn_actions_in_the_same_worlds(monkeypatch):
     flown = []
 
-    def run(env, actor, episodes, *, greedy=True):
-        flown.append((greedy, episodes, env.state_dict()))
-        return run_episodes(env, actor, episodes, greedy=greedy)
+    def run(env, actor, episodes, **how):
+        flown.append((how.get("greedy", True), episodes, env.state_dict()))
+        return run_episodes(env, actor, episodes, **how)
 
     monkeypatch.setattr("drone_rl.verdicts.judge.run_episodes", run)
     task = TaskSettings(num_cubes=1)

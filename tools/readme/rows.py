@@ -334,6 +334,12 @@ MAIN = (
         lambda f: f"{f['verdict_s']:.1f} s; {f['verdict_scaled_s']:.1f} s",
         "6 s",
     ),
+    Row(
+        "startup",
+        "the same without a cache of kernels, which are compiled then: seconds more",
+        lambda f: f"{f['first_compile_s']:.0f} s",
+        "15 s",
+    ),
     Row("startup", "`import drone_rl`", lambda f: f"{f['import_s']:.2f} s", "0.3 s"),
     Row(
         "explain",
