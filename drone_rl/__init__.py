@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from drone_rl.settings.proving import ProveSettings
     from drone_rl.settings.shifting import ShiftSettings
     from drone_rl.settings.training import TrainerSettings, TrainSettings
+    from drone_rl.sim.image_types import ImageRequest, ImageType
     from drone_rl.sim.settings import (
         ActionSettings,
         CameraSettings,
@@ -55,6 +56,7 @@ if TYPE_CHECKING:
         PillarsSettings,
         TaskSettings,
     )
+    from drone_rl.sim.settings.sensors import SensorSettings
     from drone_rl.utils.errors import InputError
 
 __version__ = "0.1.0"
@@ -97,6 +99,7 @@ _PLACES = {
     "settings.proving": ("ProveSettings",),
     "settings.shifting": ("ShiftSettings",),
     "settings.training": ("TrainSettings", "TrainerSettings"),
+    "sim.image_types": ("ImageRequest", "ImageType"),
     "sim.settings": (
         "ActionSettings",
         "CameraSettings",
@@ -104,6 +107,7 @@ _PLACES = {
         "PillarsSettings",
         "TaskSettings",
     ),
+    "sim.settings.sensors": ("SensorSettings",),
     "utils.errors": ("InputError",),
 }
 _HOMES = {name: f"drone_rl.{module}" for module, names in _PLACES.items() for name in names}
@@ -128,6 +132,8 @@ __all__ = [
     "Explanations",
     "FlightFuture",
     "ForeignPolicy",
+    "ImageRequest",
+    "ImageType",
     "InputError",
     "JudgeSettings",
     "Judgement",
@@ -144,6 +150,7 @@ __all__ = [
     "Sb3Logits",
     "Sb3Trunk",
     "Sb3Worlds",
+    "SensorSettings",
     "ShiftSettings",
     "Shifts",
     "Sticks",

@@ -44,7 +44,8 @@ def make_pipeline():
         envs.append(env)
         generator = torch.Generator().manual_seed(seed)
         shape = tuple(env.observation_spec["pixels"].shape[1:])
-        network = SmallCNN(shape, 3, channels=(4,), hidden=(8,), generator=generator)
+        count = env.base_env.worlds.dynamics.actions.num_outputs
+        network = SmallCNN(shape, count, channels=(4,), hidden=(8,), generator=generator)
         return env, make_actor(network, env.action_spec, generator)
 
     yield build

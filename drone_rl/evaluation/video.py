@@ -15,16 +15,18 @@ from torchrl.envs import TransformedEnv
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 from drone_rl.envs import DroneEnv
+from drone_rl.evaluation import chase, instruments
 from drone_rl.sim.actions import MOVES, Actions
+from drone_rl.sim.dynamics import FlightState, Quadrotor
 from drone_rl.sim.entities.cameras import (
     BACK_CENTER,
     BOTTOM_CENTER,
-    CHASE,
     FRONT_CENTER,
     FRONT_LEFT,
     FRONT_RIGHT,
 )
 from drone_rl.sim.tasks import Task
+from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 
 WIDTH, HEIGHT = 1280, 720
@@ -44,6 +46,8 @@ class _Seen(NamedTuple):
     inside: Tensor
     outside: Tensor
     five: Tensor
+    panel: Image.Image | None = None
+    """Instruments, if the drone flies."""
 
 
 @torch.no_grad()
@@ -115,17 +119,27 @@ def write_video(frames: list[np.ndarray], path: Path) -> list[Path]:
 def _caption(task: Task[Any], state: TensorDictBase, earned: float) -> str:
     end = task.ends(int(state["info", "end_reason"][0]))
     ended = "" if end == 0 else f"   ended: {end.name.lower()}"
-    return f"{task.terms.goals} {earned:g}" + ended.replace("_", " ")
+    return f"{task.terms.goals} {earned:.3g}" + ended.replace("_", " ")
 
 
 def _look(base: DroneEnv) -> _Seen:
     """What there is to see of the first world."""
     worlds, look = base.worlds, base.looks.drawn()
-    chase = worlds.view(CHASE.name, height=CHASE_HEIGHT, width=WIDTH, show_drone=True)
     five = worlds.view(_FIVE, height=STRIP_HEIGHT, width=(WIDTH + GAP) // len(_FIVE) - GAP)
-    outside = worlds.render(worlds.state, chase, look)[0]
+    outside = chase.film(worlds, look, CHASE_HEIGHT, WIDTH)[0]
     strip = worlds.render_all(worlds.state, five, look)["rgb"][0]
-    return _Seen(base.last_pixels[0], outside, strip)
+    return _Seen(base.last_pixels[0], outside, strip, _panel(worlds))
+
+
+def _panel(worlds: Worlds) -> Image.Image | None:
+    """Instruments of the first world's drone, if it flies."""
+    body, dynamics = worlds.state.body, worlds.dynamics
+    if not (isinstance(body, FlightState) and isinstance(dynamics, Quadrotor)):
+        return None
+    settings = dynamics.settings
+    return instruments.panel(
+        instruments.read(body), settings.velocity_limit, settings.hover_throttle
+    )
 
 
 def _compose(
@@ -146,6 +160,8 @@ def _compose(
     draw.rectangle((12, 12, 17 + size[0], 41 + size[1]), _BACKGROUND)
     draw.text((20, 16), "what the policy sees", _TEXT, font)
     canvas.paste(inside.resize(size, Image.Resampling.NEAREST), (15, 39))
+    if seen.panel is not None:
+        canvas.paste(seen.panel, (WIDTH - 12 - instruments.WIDTH, 12))
     for i, (name, picture) in enumerate(zip(_FIVE, seen.five.cpu().numpy(), strict=True)):
         x = i * (WIDTH + GAP) // len(_FIVE)
         canvas.paste(Image.fromarray(picture), (x, _STRIP))

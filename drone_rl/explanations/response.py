@@ -99,7 +99,7 @@ def find_blind(actions: Actions, wishes: Tensor, alone: Tensor, needed: Tensor) 
     """
     unmoved = actions.distance(wishes, alone) < BLIND
     calls = (needed >= 0) & actions.turns(needed)
-    return unmoved & calls & (actions.chosen(wishes) != needed)
+    return unmoved & calls & ~actions.agrees(actions.chosen(wishes), needed)
 
 
 def outcome_map(

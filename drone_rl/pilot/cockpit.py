@@ -13,12 +13,14 @@ from drone_rl.pilot.drone import Drone
 from drone_rl.pilot.errors import PilotError
 from drone_rl.pilot.future import FlightFuture
 from drone_rl.pilot.runner import Runner
+from drone_rl.pilot.sensing import Sensors
 from drone_rl.pilot.showing import shown
 from drone_rl.pilot.state import PilotState
 from drone_rl.pilot.sticks import Sticks
 from drone_rl.pilot.trajectory import Trajectory
 from drone_rl.sim.dynamics import Obstacles, Quadrotor
 from drone_rl.sim.settings import DynamicsSettings
+from drone_rl.sim.settings.sensors import SensorSettings
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Whole
@@ -36,6 +38,7 @@ class Cockpit:
         seed: int = 0,
         obstacles: Obstacles | None = None,
         worlds: Worlds | None = None,
+        sensors: SensorSettings | None = None,
         **changes: Any,
     ) -> None:
         """Puts a drone on the ground.
@@ -45,10 +48,11 @@ class Cockpit:
                 generic drone in still air.
             start: Where, x and y, metres.
             yaw: How it is turned, degrees to the left of the world's x.
-            seed: Of gusts, a whole number.
+            seed: Of gusts and of sensors' noise, a whole number.
             obstacles: What it may touch besides the ground, in one world; what stands in `worlds`
                 now by default.
             worlds: A single world, of which it takes pictures.
+            sensors: Of which kind its sensors are, which are then turned on from the start.
             changes: Settings of dynamics, such as wind=[5, 0, 0].
 
         Raises:
@@ -65,10 +69,13 @@ class Cockpit:
         x, y = checks.numbers(start, "start", 2, -checks.FARTHEST, checks.FARTHEST)
         place = torch.tensor([x, y, quadrotor.settings.radius], dtype=torch.float64)
         heading = math.radians(checks.real(yaw, "yaw", unit="degrees"))
-        self._drone = Drone(quadrotor, place, heading, Whole(0, 2**31 - 1).read(seed, "seed"))
+        self._seed = Whole(0, 2**31 - 1).read(seed, "seed")
+        self._drone = Drone(quadrotor, place, heading, self._seed)
         self._drone.obstacles = obstacles
         self._runner = Runner(self._drone)
         self.worlds = worlds
+        if sensors is not None:
+            self._drone.sensors = Sensors(self._drone.body, sensors, self._seed)
         self.sticks = Sticks()
         """Where the sticks stand, for `move_by_manual`; to be replaced at any time."""
 
@@ -99,6 +106,18 @@ class Cockpit:
     def trajectory(self) -> Trajectory:
         """Where it has been, for plots."""
         return self._drone.trajectory
+
+    @property
+    def sensors(self) -> Sensors:
+        """What it reads beside pictures.
+
+        Where no sensors were asked for, AirSim's are turned on when this is first looked at: until
+        then they cost nothing.
+        """
+        drone = self._drone
+        if drone.sensors is None:
+            drone.sensors = Sensors(drone.body, SensorSettings(), self._seed)
+        return drone.sensors
 
     @property
     def settings(self) -> DynamicsSettings:

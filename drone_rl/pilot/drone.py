@@ -7,6 +7,7 @@ from torch import Tensor
 
 from drone_rl.pilot.batch import period_ticks
 from drone_rl.pilot.command import hold
+from drone_rl.pilot.sensing import Sensors
 from drone_rl.pilot.state import LandedState, PilotState, attitude_of, collision_of, triple
 from drone_rl.pilot.trajectory import Trajectory
 from drone_rl.sim.dynamics import FlightState, Goals, Obstacles, Quadrotor
@@ -40,6 +41,7 @@ class Drone:
         attitude = torch.tensor([turned], dtype=torch.float64)
         self.body = FlightState.at_rest(start[None], attitude, torch.tensor([seed]))
         self.obstacles: Obstacles | None = None
+        self.sensors: Sensors | None = None
         self.armed = False
         self.landed = LandedState.LANDED
         self.period = period_ticks(quadrotor.settings)
@@ -107,6 +109,8 @@ class Drone:
         if self.is_lost:  # it stays where it was last seen
             self.body.numbers[:, TICKS.first] += ticks
         self.trajectory.note(self.time, self.body)
+        if self.sensors is not None:
+            self.sensors.update(self.body, ticks * self.tick)
         self._notice()
 
     def settle(self) -> None:

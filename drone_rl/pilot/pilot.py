@@ -1,6 +1,7 @@
 """One drone and all that its pilot can tell it."""
 
 import copy
+from collections.abc import Sequence
 
 from torch import Tensor
 
@@ -9,7 +10,10 @@ from drone_rl.pilot.errors import PilotError
 from drone_rl.pilot.navigation import Navigation
 from drone_rl.sim.dynamics.body import heading_only
 from drone_rl.sim.entities.cameras import FRONT_CENTER
+from drone_rl.sim.image_types import ImageRequest, images
 from drone_rl.sim.rendering.view import Modality
+from drone_rl.sim.tasks import State
+from drone_rl.sim.worlds import Worlds
 
 
 class Pilot(AutoFlight, Navigation):
@@ -48,9 +52,42 @@ class Pilot(AutoFlight, Navigation):
         Raises:
             PilotError: It has no worlds to see.
         """
+        worlds, state = self._seen("picture")
+        return worlds.render(state, worlds.view(camera, modality, height, width))[0]
+
+    def images(
+        self,
+        requests: Sequence[ImageRequest],
+        *,
+        height: int | None = None,
+        width: int | None = None,
+    ) -> list[Tensor]:
+        """AirSim's images of its `worlds`, all of one size: any of five cameras, of seven types.
+
+        Args:
+            requests: Which camera and type each is of.
+            height: Pixels; the worlds' choice by default.
+            width: Pixels.
+
+        Returns:
+            One each. Shapes: (H, W, 3), uint8; or (H, W), float32, of those asked for as numbers.
+
+        Raises:
+            PilotError: It has no worlds to see.
+            InputError: Nothing is asked for, or a size is out of range.
+        """
+        worlds, state = self._seen("images")
+        return [found[0] for found in images(worlds, state, requests, height=height, width=width)]
+
+    def _seen(self, name: str) -> tuple[Worlds, State]:
+        """Its worlds, and what they are like with its own drone in them.
+
+        Raises:
+            PilotError: It has none.
+        """
         if self.worlds is None:
-            raise PilotError("picture: there is nothing to see; give worlds=Worlds(1, ...)")
+            raise PilotError(f"{name}: there is nothing to see; give worlds=Worlds(1, ...)")
         state, body = copy.copy(self.worlds.state), self._drone.body
         is_level = self._drone.quadrotor.mount == "gimbal"
         state.body = body.moved(body.position, heading_only(body.attitude)) if is_level else body
-        return self.worlds.render(state, self.worlds.view(camera, modality, height, width))[0]
+        return self.worlds, state

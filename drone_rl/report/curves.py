@@ -15,8 +15,9 @@ _KINDS = {"deletion": "lower is better", "insertion": "higher is better"}
 def curves_chart(explanation: Explanation) -> Figure:
     """The mean effect of each patch; deletion and insertion by action, placebos dashed."""
     curves = explanation.numbers["truth"]["curves"]
-    figure = Figure(figsize=(17, 7), layout="constrained")
-    axes = figure.subplots(2, 1 + len(explanation.actions.names))
+    columns = 1 + len(explanation.actions.names)
+    figure = Figure(figsize=(max(17.0, 3.8 * columns), 7), layout="constrained")
+    axes = figure.subplots(2, columns)
     _effects(axes[0, 0], explanation)
     axes[1, 0].axis("off")
     actions = explanation.actions
@@ -24,7 +25,7 @@ def curves_chart(explanation: Explanation) -> Figure:
     for column, action in zip(axes.T[1:], shown, strict=True):
         for axis, (kind, better) in zip(column, _KINDS.items(), strict=True):
             _curves(axis, curves, action, kind)
-            axis.set_title(f"{action}, {kind} ({better})", fontsize=11)
+            axis.set_title(f"{action}, {kind}\n({better})", fontsize=11)
     handles, labels = axes[0, 2].get_legend_handles_labels()
     axes[1, 0].legend(handles, labels, loc="center", fontsize=9, frameon=False)
     return figure

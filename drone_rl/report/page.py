@@ -65,6 +65,7 @@ class Policy:
         return {
             "name": self.explanation.name,
             "numbers": self.explanation.numbers,
+            "actions": self.explanation.actions,
             "pictures": _save(part.draw(self.explanation), self.folder, f"{self.prefix}_"),
             "words": {n: say(may, self.explanation.numbers) for n, may in part.words.items()},
             "terms": self.explanation.terms,

@@ -128,6 +128,10 @@ class Actions(Protocol):
         """Whether a part is another one in a mirror. Shape: (*), bool."""
         ...
 
+    def agrees(self, part: Tensor, other: Tensor) -> Tensor:
+        """Whether parts are the same, or lead to the same side. Shape: (*), bool."""
+        ...
+
     def as_dict(self) -> dict[str, Any]:
         """All that a report needs to name and draw them, as plain values."""
         ...

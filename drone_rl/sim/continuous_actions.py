@@ -20,7 +20,7 @@ shares, which are smooth in the outputs.
 import dataclasses
 import math
 from collections.abc import Mapping
-from typing import Self
+from typing import Any, Self
 
 import torch
 from torch import Tensor
@@ -173,6 +173,11 @@ class ContinuousActions(Parts):
     def kept(self, action: Tensor) -> dict[str, Tensor]:
         """The part it is, and what it is in units."""
         return {"actions": self.part(action), "rates": self.to_rates(action)}
+
+    def as_dict(self) -> dict[str, Any]:
+        """As in `explanation.json`; "speeds" are the greatest, turning in degrees a second."""
+        forward, aside, turning = self.speeds
+        return {**super().as_dict(), "speeds": [forward, aside, math.degrees(turning)]}
 
     def sways(self, kept: Mapping[str, Tensor]) -> Tensor:
         """Whether they go or turn aside, and forward at no more than a third of full speed."""

@@ -107,6 +107,14 @@ class Parts:
         """Whether a part's mirror image is another one."""
         return torch.tensor(self.mirrored, device=part.device)[part] != part
 
+    def agrees(self, part: Tensor, other: Tensor) -> Tensor:
+        """Whether parts are the same, or lead to the same side. Shape: of both, broadcast."""
+        sides = torch.zeros(len(self), dtype=torch.int64)
+        for left in self.lefts:
+            sides[left], sides[self.mirrored[left]] = 1, -1
+        here, there = (sides.to(p.device)[p] for p in (part, other))
+        return (part == other) | ((here == there) & (here != 0))
+
     def _opposite_of(self, part: Tensor) -> Tensor:
         return torch.tensor(self.opposite, device=part.device)[part]
 

@@ -23,6 +23,8 @@ class ShownActions:
     """Where each points on the page: to the right and up; 0, 0 if nowhere."""
     colors: tuple[tuple[int, int, int], ...]
     """Red, green, blue, 0 to 255."""
+    speeds: tuple[float, float, float] | None = None
+    """The greatest, where actions are speeds: forward and to a side, m/s; of turning, degrees/s."""
 
     def css(self, action: int) -> str:
         """The colour of an action, as style sheets have it."""
@@ -56,7 +58,8 @@ def shown_actions(numbers: Mapping[str, Any]) -> ShownActions:
         raise InputError(f"actions of order {shown(str(given['order']))} are not all there, once")
     if not len(given["arrows"]) == len(given["colors"]) == count:
         raise InputError(f"actions have {count} names; give each an arrow and a colour")
-    return ShownActions(names, given["order"], given["arrows"], given["colors"])
+    speeds = given.get("speeds")
+    return ShownActions(names, given["order"], given["arrows"], given["colors"], speeds)
 
 
 class _Name:
@@ -79,6 +82,7 @@ _FIELDS = Record(
         "colors": Several(Several(Whole(0, 255), 3, 3), 1, MOST),
         "mirrored": _NUMBERS,
         "left": Whole(0, MOST - 1),
+        "speeds": Several(Real(0.0, 1e6), 3, 3),
     },
-    optional=frozenset({"mirrored", "left"}),
+    optional=frozenset({"mirrored", "left", "speeds"}),
 )

@@ -7,7 +7,13 @@ from drone_rl.evaluation.video import _draw_bars, _look, film_episode, write_vid
 from drone_rl.sim.actions import MOVES
 from drone_rl.sim.continuous_actions import ContinuousActions
 from drone_rl.sim.meaning import Meaning
-from drone_rl.sim.settings import AppearanceSettings, TaskSettings
+from drone_rl.sim.settings import (
+    ActionSettings,
+    AppearanceSettings,
+    DynamicsSettings,
+    PillarsSettings,
+    TaskSettings,
+)
 from drone_rl.utils.errors import InputError
 from tests.continuous import SETTINGS
 from tests.five_actions import FIVE
@@ -93,3 +99,15 @@ def test_who_has_no_logits_is_sure():
     canvas = Canvas()
     _draw_bars(canvas, None, TensorDict({"action": torch.tensor([2])}, [1]), MOVES)
     assert [text for _, text in canvas.texts] == ["left 0.00", "forward 0.00", "right 1.00"]
+
+
+@pytest.mark.parametrize(
+    "task", [TaskSettings(num_cubes=1, first_distance=4.0), PillarsSettings(num_rows=1)]
+)
+@pytest.mark.parametrize("actions", [ActionSettings(), SETTINGS])
+def test_in_flight_there_are_instruments(make_pipeline, task, actions):
+    flying = DynamicsSettings(mode="simple_flight")
+    pipeline = make_pipeline(1, task=task, dynamics=flying, actions=actions)
+    films = film_episode(*pipeline), film_episode(*make_pipeline(1, task=task))
+    shown, other = (next(film)[12:202, 792:1268] for film in films)
+    assert tuple(shown[0, 0]) == (24, 26, 31) != tuple(other[0, 0])

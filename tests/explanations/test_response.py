@@ -15,7 +15,9 @@ from drone_rl.explanations.response import (
 )
 from drone_rl.explanations.scenes import Scenes, place_target
 from drone_rl.sim.actions import MOVES
+from drone_rl.sim.continuous_actions import ContinuousActions
 from drone_rl.sim.settings import TaskSettings
+from tests.continuous import SETTINGS
 
 IDLE, LEFT = [1.0, 0.0, 0.0], [0.1, 0.9, 0.0]
 
@@ -94,6 +96,14 @@ def test_blind_is_where_a_turn_is_called_for_and_nothing_changes():
         {"height": 0.0, "side": "ahead", "blind": 0.0, "collected": 1, "places": 1},
         {"height": 0.0, "side": "right", "blind": 0.5, "collected": 0, "places": 0},
     ]
+
+
+def test_who_turns_to_the_side_where_he_is_to_go_is_not_blind():
+    actions = ContinuousActions.of(SETTINGS)
+    turns_left, turns_right = np.eye(5)[3], np.eye(5)[4]
+    for wish, is_blind in ((turns_left, False), (turns_right, True)):
+        wishes = torch.tensor(wish).view(1, 1, 1, 5)
+        assert find_blind(actions, wishes, wishes[0, 0, 0], torch.tensor([1])).item() is is_blind
 
 
 def test_who_flies_straight_on_by_nature_is_blind_only_beyond_its_reach(scenes):

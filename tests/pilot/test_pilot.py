@@ -6,6 +6,7 @@ import torch
 
 from drone_rl.pilot.errors import PilotError
 from drone_rl.pilot.pilot import Pilot
+from drone_rl.sim.image_types import ImageRequest, ImageType
 from drone_rl.sim.settings import CameraSettings, DynamicsSettings, PillarsSettings
 from drone_rl.sim.worlds import Worlds
 
@@ -48,6 +49,23 @@ def test_cameras_hang_in_a_gimbal_or_tilt_with_the_body():
     assert (pictures[0] != pictures[1]).any()
 
 
+def test_images_of_several_types_and_cameras():
+    worlds = Worlds(1, camera=CameraSettings(width=64, height=24))
+    worlds.reset(torch.tensor([0]), [np.random.RandomState(0)])
+    pilot = Pilot(worlds=worlds)
+    asked = [
+        ImageRequest(),
+        ImageRequest("bottom_center", ImageType.DEPTH_PLANAR, as_float=True),
+        ImageRequest(4, ImageType.SEGMENTATION),
+    ]
+    scene, below, behind = pilot.images(asked)
+    assert torch.equal(scene, pilot.picture())
+    assert below.tolist() == [[pytest.approx(0.2)] * 64] * 24  # 0.1 m below 0.3 m
+    assert behind.dtype == torch.uint8 and behind.shape == (24, 64, 3)
+    (small,) = pilot.images(asked[:1], height=6, width=8)
+    assert small.shape == (6, 8, 3)
+
+
 def test_what_stands_in_its_worlds_is_in_the_way():
     pillars = Worlds(
         1, PillarsSettings(), dynamics=DynamicsSettings(mode="simple_flight", mass=1.1)
@@ -66,3 +84,5 @@ def test_what_stands_in_its_worlds_is_in_the_way():
 def test_without_worlds_there_is_nothing_to_see(flying):
     with pytest.raises(PilotError, match="picture: there is nothing to see; give worlds"):
         flying.picture()
+    with pytest.raises(PilotError, match="images: there is nothing to see; give worlds"):
+        flying.images([ImageRequest()])

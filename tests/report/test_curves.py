@@ -11,7 +11,7 @@ def test_methods_have_their_colour_and_placebos_are_dashed(explanations):
     methods = [n for n in curves if n in NAMES]
     assert len(methods) == 5 and len(curves) == 5 + 7 + 1
     for action in ("left", "forward", "right"):
-        lines = axes[f"{action}, deletion (lower is better)"].lines
+        lines = axes[f"{action}, deletion\n(lower is better)"].lines
         dashed = [line for line in lines if line.get_linestyle() == "--"]
         assert (len(dashed), len(lines)) == (7, 12)
         wanted = curves[methods[0]][action]["deletion"]["curve"]

@@ -29,6 +29,13 @@ def test_what_leads_to_the_left_is_one_part_or_several():
     assert both.opposition(one, other) == 0.5  # 0.5 and 0.5
 
 
+def test_parts_agree_that_are_the_same_or_lead_to_the_same_side():
+    both, every = Both(**vars(FOUR)), torch.arange(4)
+    assert FOUR.agrees(every, torch.tensor(0)).tolist() == [True, False, False, False]
+    assert both.agrees(every, torch.tensor(0)).tolist() == [True, False, True, False]
+    assert FOUR.agrees(every, every).all()
+
+
 def test_parts_that_are_not_one_anothers_mirror_images_are_refused():
     with pytest.raises(ValueError, match="mirrored"):
         Parts(**{**vars(FOUR), "mirrored": (1, 2, 3, 0)})

@@ -1,0 +1,143 @@
+"""What a pilot would read off: an artificial horizon, three speeds, and how hard motors push."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+
+from drone_rl.pilot.state import Attitude, attitude_of
+from drone_rl.sim.dynamics import FlightState
+
+WIDTH, HEIGHT = 476, 190
+"""Pixels of the panel."""
+_BACKGROUND, _TEXT, _FAINT = (24, 26, 31), (235, 235, 240), (120, 130, 150)
+_SKY, _GROUND, _NEEDLE = (70, 130, 200), (140, 95, 50), (255, 205, 60)
+_BAR = (90, 190, 120)
+_RADIUS, _DIAL = 68, (84, 102)
+"""Pixels of the horizon, and its middle."""
+_DEGREES = 40.0
+"""Of pitch from the middle of the horizon to its edge."""
+_SHARPER = 3
+"""The horizon is drawn so many times as large, then made smaller."""
+_SPEEDS, _BARS = (172, 30), 140
+"""Where speeds are written, and the width of their bars."""
+_MOTORS = (330, 30)
+_STILL = 0.05
+"""Metres a second that count as none."""
+_WORDS = (("forward", "backward"), ("left", "right"), ("climbs", "sinks"))
+_PLACES = {"front left": 2, "front right": 0, "rear left": 1, "rear right": 3}
+"""Numbers of the rotors in `FlightState.rotors`, as they lie when seen from above."""
+
+
+class Reading(NamedTuple):
+    """What there is to read of one drone."""
+
+    attitude: Attitude
+    """Degrees."""
+    speeds: tuple[float, float, float]
+    """Forward, to the left and up, metres a second, where forward is level."""
+    rotors: tuple[float, ...]
+    """Share of its most thrust that each gives."""
+
+
+def read(body: FlightState) -> Reading:
+    """Of the first of some drones."""
+    w, x, y, z = body.attitude[0].tolist()
+    x_speed, y_speed, climb = body.velocity[0].tolist()
+    heading = float(body.heading[0])
+    cos, sin = math.cos(heading), math.sin(heading)
+    speeds = (cos * x_speed + sin * y_speed, cos * y_speed - sin * x_speed, climb)
+    return Reading(attitude_of((w, x, y, z)), speeds, tuple(body.rotors[0].tolist()))
+
+
+def panel(reading: Reading, most: float, hover: float) -> Image.Image:
+    """A picture of it.
+
+    Args:
+        reading: Of the drone.
+        most: Metres a second for which bars of speed are full.
+        hover: Share of all thrust that carries the drone: a mark on each motor's bar.
+
+    Returns:
+        Size: (WIDTH, HEIGHT).
+    """
+    image = Image.new("RGB", (WIDTH, HEIGHT), _BACKGROUND)
+    draw = ImageDraw.Draw(image)
+    _draw_horizon(image, draw, reading.attitude)
+    _draw_speeds(draw, reading.speeds, most)
+    _draw_motors(draw, reading.rotors, hover)
+    return image
+
+
+def horizon(attitude: Attitude) -> Image.Image:
+    """The world beyond the dial: the drone's wings stay level, the ground tilts and rises.
+
+    Returns:
+        Size: twice the radius each way.
+    """
+    size = 2 * _RADIUS * _SHARPER
+    across = (np.arange(size) + 0.5) / size * 2.0 - 1.0
+    x, y = np.meshgrid(across, -across)
+    roll = math.radians(attitude.roll)
+    above = y * math.cos(roll) - x * math.sin(roll) - attitude.pitch / _DEGREES
+    along = x * math.cos(roll) + y * math.sin(roll)
+    colors = np.where(above[..., None] < 0.0, _GROUND, _SKY).astype(np.uint8)
+    for degrees in (-20.0, -10.0, 0.0, 10.0, 20.0):
+        is_long = 2.0 if degrees == 0.0 else 0.2
+        is_on = (abs(above - degrees / _DEGREES) < 0.013) & (abs(along) < is_long)
+        colors[is_on] = _TEXT
+    colors[x * x + y * y > 1.0] = _BACKGROUND
+    return Image.fromarray(colors).resize((2 * _RADIUS, 2 * _RADIUS), Image.Resampling.BOX)
+
+
+def _font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
+    return ImageFont.load_default(size)
+
+
+def _draw_horizon(image: Image.Image, draw: ImageDraw.ImageDraw, attitude: Attitude) -> None:
+    x, y = _DIAL
+    draw.text((x - _RADIUS, 8), "horizon", _FAINT, _font(13))
+    image.paste(horizon(attitude), (x - _RADIUS, y - _RADIUS))
+    for side in (-1, 1):
+        ends = sorted((x + side * 12, x + side * 40))
+        draw.rectangle((ends[0], y - 2, ends[1], y + 1), _NEEDLE)
+    draw.rectangle((x - 2, y - 2, x + 1, y + 1), _NEEDLE)
+    side, nose = "right" if attitude.roll > 0 else "left", "down" if attitude.pitch > 0 else "up"
+    text = f"{abs(attitude.roll):.0f}° {side}, {abs(attitude.pitch):.0f}° {nose}"
+    draw.text((x, HEIGHT - 12), text, _TEXT, _font(13), anchor="mm")
+
+
+def _draw_speeds(
+    draw: ImageDraw.ImageDraw, speeds: tuple[float, float, float], most: float
+) -> None:
+    left, top = _SPEEDS
+    middle = left + _BARS // 2
+    draw.text((left, 8), "speed", _FAINT, _font(13))
+    for row, (speed, words) in enumerate(zip(speeds, _WORDS, strict=True)):
+        y = top + 53 * row
+        word = words[speed < -_STILL]
+        draw.text((left, y), word, _TEXT, _font(15))
+        text = f"{abs(speed):.1f} m/s"
+        draw.text((left + _BARS, y), text, _TEXT, _font(15), anchor="ra")
+        draw.rectangle((left, y + 24, left + _BARS, y + 36), (50, 54, 63))
+        share = max(-1.0, min(1.0, speed / most))
+        is_mirrored = row == 1  # to the left is on the left
+        end = middle + round(_BARS / 2 * (-share if is_mirrored else share))
+        draw.rectangle((min(middle, end), y + 24, max(middle, end), y + 36), _BAR)
+        draw.line((middle, y + 21, middle, y + 39), _TEXT, 2)
+
+
+def _draw_motors(draw: ImageDraw.ImageDraw, rotors: tuple[float, ...], hover: float) -> None:
+    left, top = _MOTORS
+    draw.text((left, 8), "motors (line: hovering)", _FAINT, _font(13))
+    tall, wide = 54, 34
+    for i, (name, rotor) in enumerate(_PLACES.items()):
+        x, y = left + 12 + 72 * (i % 2), top + 78 * (i // 2)
+        share = max(0.0, min(1.0, rotors[rotor]))
+        draw.rectangle((x, y, x + wide, y + tall), (50, 54, 63))
+        full = y + tall - round(tall * share)
+        draw.rectangle((x, full, x + wide, y + tall), _BAR)
+        mark = y + tall - round(tall * hover)
+        draw.line((x - 4, mark, x + wide + 4, mark), _TEXT, 2)
+        draw.text((x + wide / 2, y + tall + 9), name, _TEXT, _font(12), anchor="mm")
