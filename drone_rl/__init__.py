@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from drone_rl.pilot.errors import PilotError
     from drone_rl.pilot.future import FlightFuture
     from drone_rl.pilot.pilot import Pilot
+    from drone_rl.pilot.sensing import Sensors
     from drone_rl.pilot.state import PilotState
     from drone_rl.pilot.sticks import Sticks
     from drone_rl.pilot.trajectory import Trajectory
@@ -84,6 +85,7 @@ _PLACES = {
     "pilot.errors": ("PilotError",),
     "pilot.future": ("FlightFuture",),
     "pilot.pilot": ("Pilot",),
+    "pilot.sensing": ("Sensors",),
     "pilot.state": ("PilotState",),
     "pilot.sticks": ("Sticks",),
     "pilot.trajectory": ("Trajectory",),
@@ -151,6 +153,7 @@ __all__ = [
     "Sb3Trunk",
     "Sb3Worlds",
     "SensorSettings",
+    "Sensors",
     "ShiftSettings",
     "Shifts",
     "Sticks",

@@ -15,6 +15,7 @@ from drone_rl.report.bodies import chart
 from drone_rl.settings.bodies import BodiesSettings
 from drone_rl.settings.judging import JudgeSettings
 from drone_rl.sim.settings import DynamicsSettings
+from drone_rl.utils.errors import InputError
 from drone_rl.utils.provenance import provenance
 from drone_rl.words.bodies import rows
 
@@ -71,6 +72,7 @@ def bodies(
     given = list(settings.policies) if policies is None else policies
     whom = given if isinstance(given, list | tuple) else [given]
     pilots = [as_pilot(one, outputs) for one in whom]
+    _check_names([pilot.name for pilot in pilots])
     asked = settings.narrowed(JudgeSettings)
     found: dict[str, dict[str, Any]] = {}
     steps = len(pilots) * len(settings.bodies)
@@ -84,6 +86,19 @@ def bodies(
             flown[body] = done.verdict.as_dict()
     progress("flown", steps, steps)
     return Bodies(settings, {"bodies": list(settings.bodies), "policies": found})
+
+
+def _check_names(names: list[str]) -> None:
+    """Refuses what no table can show.
+
+    Raises:
+        InputError: There is none, or two have the same.
+    """
+    if not names:
+        raise InputError("policies=[] names nobody; give a policy or more")
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"two policies are called {name}; give each once, or rename a file")
 
 
 def changes_of(body: str, own: DynamicsSettings) -> Mapping[str, Any]:

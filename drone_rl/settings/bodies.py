@@ -4,6 +4,7 @@ import dataclasses
 from typing import Annotated
 
 from drone_rl.settings.judging import JudgeSettings
+from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Listed, OneOf, Several, Whole
 
 BODIES = (
@@ -36,3 +37,9 @@ class BodiesSettings(JudgeSettings):
     """Worlds in one batch; bounds memory."""
     sampled: bool = False
     """Whether to fly with drawn actions, too."""
+
+    def check(self) -> None:
+        """Refuses bodies twice."""
+        super().check()
+        if len({*self.bodies}) < len(self.bodies):
+            raise InputError(f"bodies={[*self.bodies]} has one twice; give each once")
