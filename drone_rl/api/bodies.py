@@ -10,7 +10,8 @@ from drone_rl.api.foreign import as_pilot
 from drone_rl.api.judging import judge
 from drone_rl.api.pilot import Pilot
 from drone_rl.api.progress import Bar, Progress, silent
-from drone_rl.api.showing import aligned, picture, table
+from drone_rl.api.showing import aligned, paragraph, picture, table
+from drone_rl.loops.errors import LoopError
 from drone_rl.report.bodies import chart
 from drone_rl.settings.bodies import BodiesSettings
 from drone_rl.settings.judging import JudgeSettings
@@ -18,6 +19,7 @@ from drone_rl.sim.settings import DynamicsSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.provenance import provenance
 from drone_rl.words.bodies import rows
+from drone_rl.words.looped import LOOPED, reasons
 
 GUSTS = 0.25
 """Standard deviation of the wind along each axis, as a share of its mean."""
@@ -29,7 +31,8 @@ class Bodies:
 
     settings: BodiesSettings
     numbers: dict[str, Any] = dataclasses.field(repr=False)
-    """As in `bodies.json`: by policy and body the verdict's evidence."""
+    """As in `bodies.json`: by policy and body the verdict's evidence, and by policy what became of
+    flights with software in the loop, if there were any."""
 
     def save(self, folder: Path) -> None:
         """Writes `bodies.json`, `bodies.png` and `bodies.svg`."""
@@ -39,12 +42,13 @@ class Bodies:
             figure.savefig(folder / f"bodies.{kind}", dpi=130)
 
     def __str__(self) -> str:
-        """The table: a policy a row, a body a column."""
-        return aligned(rows(self.numbers))
+        """The table: a policy a row, a body a column; and why flights were left out, if any."""
+        return "\n".join([aligned(rows(self.numbers)), *reasons(self.numbers)])
 
     def _repr_html_(self) -> str:
         head, *lines = rows(self.numbers)
-        return table(head, lines) + picture(chart(self.numbers))
+        left_out = "".join(map(paragraph, reasons(self.numbers)))
+        return table(head, lines) + left_out + picture(chart(self.numbers))
 
 
 def bodies(
@@ -75,7 +79,7 @@ def bodies(
     _check_names([pilot.name for pilot in pilots])
     asked = settings.narrowed(JudgeSettings)
     found: dict[str, dict[str, Any]] = {}
-    steps = len(pilots) * len(settings.bodies)
+    steps = len(pilots) * (len(settings.bodies) + bool(settings.loop_flights))
     for pilot in pilots:
         flown = found.setdefault(pilot.name, {})
         for body in settings.bodies:
@@ -84,8 +88,26 @@ def bodies(
             changed = changes_of(body, pilot.dynamics)
             done = judge(pilot, asked, dynamics=changed, outputs=outputs, progress=silent)
             flown[body] = done.verdict.as_dict()
+    numbers: dict[str, Any] = {"bodies": list(settings.bodies), "policies": found}
+    if settings.loop_flights:
+        looped = numbers[LOOPED] = {}
+        for pilot in pilots:
+            progress(f"{pilot.name}: {LOOPED}", steps - len(pilots) + len(looped), steps)
+            looped[pilot.name] = _looped(pilot, settings)
     progress("flown", steps, steps)
-    return Bodies(settings, {"bodies": list(settings.bodies), "policies": found})
+    return Bodies(settings, numbers)
+
+
+def _looped(pilot: Pilot, settings: BodiesSettings) -> dict[str, Any]:
+    """A policy's flights through a firmware, in still air; or why there are none."""
+    from drone_rl.api.looped import fly_in_the_loop
+
+    still = pilot.in_dynamics(**changes_of("simple flight", pilot.dynamics))
+    count, seed = settings.loop_flights, settings.seed
+    try:
+        return fly_in_the_loop(still, count, seed, progress=silent).as_dict()
+    except (InputError, LoopError) as error:
+        return {"left_out": str(error)}
 
 
 def _check_names(names: list[str]) -> None:

@@ -95,6 +95,10 @@ SETUP = (
     # As for any large frame: its defaults are those of small ones, which turn ten times as readily.
     "set p_yaw = 250",
     "set i_yaw = 20",
+    # How fast sticks move it measures by the clock on the wall, which simulation doesn't keep to:
+    # fed forward, the same sticks would tilt it by 30 degrees now and by 80 then.
+    "set angle_feedforward = 0",
+    "set f_yaw = 0",
 )
 """Lines for the command line of a firmware that was never set up, without `save`."""
 

@@ -31,6 +31,8 @@ class Wish:
     """Metres a second, world frame."""
     heading: float = 0.0
     """Where to look: radians to the left of the world's x."""
+    yaw_rate: float | None = None
+    """How fast to turn instead, wherever that leads: radians a second to the left."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -116,12 +118,13 @@ def sticks_for(
     up = float(missing[2])
     integral = _within(climb.integral + settings.climb_integral * up * seconds)
     throttle = 0.5 + 0.5 * _within(settings.climb_gain * up + integral)
-    turn = math.remainder(wish.heading - senses.heading, math.tau)
+    turn = HEADING_GAIN * math.remainder(wish.heading - senses.heading, math.tau)
+    rate = turn if wish.yaw_rate is None else wish.yaw_rate
     sticks = Sticks(
         roll=-tilt * _within(settings.velocity_gain * float(left)),
         pitch=tilt * _within(settings.velocity_gain * float(ahead)),
         throttle=max(throttle, IN_FLIGHT),
-        yaw=_within(HEADING_GAIN * turn / FULL_YAW_RATE),
+        yaw=_within(rate / FULL_YAW_RATE),
         armed=True,
     )
     return sticks, Climb(integral)

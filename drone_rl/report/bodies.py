@@ -9,6 +9,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from drone_rl.words.bodies import failure
+from drone_rl.words.looped import LOOPED
+from drone_rl.words.looped import looped as said
 
 _COLORS = {"good": "#b9e0b0", "poor": "#f2b5ad", "one-sided": "#f7d7a0", "none": "#e3e6ea"}
 _INK, _FAINT = "#1e2024", "#5b616b"
@@ -22,7 +24,9 @@ def chart(numbers: Mapping[str, Any]) -> Figure:
     Args:
         numbers: As in `bodies.json`.
     """
-    bodies, policies = numbers["bodies"], numbers["policies"]
+    policies = numbers["policies"]
+    looped = numbers.get(LOOPED, {})
+    bodies = [*numbers["bodies"], *([LOOPED] if looped else [])]
     size = (_WIDTH * (len(bodies) + 1), _HEIGHT * len(policies) + 0.6)
     figure = Figure(figsize=size, layout="constrained")
     axes = figure.subplots()
@@ -32,9 +36,18 @@ def chart(numbers: Mapping[str, Any]) -> Figure:
         axes.text(x + 0.5, -0.25, body, ha="center", va="center", fontsize=10, color=_INK)
     for y, (name, flown) in enumerate(policies.items()):
         axes.text(-0.05, y + 0.5, name, ha="right", va="center", fontsize=11, color=_INK)
-        for x, body in enumerate(bodies):
+        for x, body in enumerate(numbers["bodies"]):
             _cell(axes, x, y, flown[body])
+        if looped:
+            _looped_cell(axes, len(bodies) - 1, y, looped[name])
     return figure
+
+
+def _looped_cell(axes: Axes, x: int, y: int, flights: Mapping[str, Any]) -> None:
+    box = {"facecolor": _COLORS["none"], "edgecolor": "white", "linewidth": 2, "hatch": ".."}
+    axes.add_patch(Rectangle((x, y), 1, 1, **box))
+    text, ink = textwrap.fill(said(flights), 22), _INK
+    axes.text(x + 0.5, y + 0.5, text, ha="center", va="center", fontsize=8.0, color=ink)
 
 
 def _cell(axes: Axes, x: int, y: int, verdict: Mapping[str, Any]) -> None:

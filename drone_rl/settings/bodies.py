@@ -37,6 +37,8 @@ class BodiesSettings(JudgeSettings):
     """Worlds in one batch; bounds memory."""
     sampled: bool = False
     """Whether to fly with drawn actions, too."""
+    loop_flights: Annotated[int, Whole(0, 1000, "flights")] = 0
+    """Of each policy with the firmware Betaflight on board, in real time; 0 for none."""
 
     def check(self) -> None:
         """Refuses bodies twice."""

@@ -3,6 +3,7 @@
 from typing import Any
 
 from drone_rl.words.licence import Evidence, percent
+from drone_rl.words.looped import with_loops
 from drone_rl.words.terms import terms_of
 
 
@@ -13,7 +14,7 @@ def rows(numbers: Evidence) -> list[list[str]]:
         [name, *(cell(flown[body]) for body in bodies)]
         for name, flown in numbers["policies"].items()
     ]
-    return [["", *bodies], *cells]
+    return with_loops([["", *bodies], *cells], numbers)
 
 
 def cell(verdict: Evidence) -> str:

@@ -55,6 +55,14 @@ def test_headings_take_the_short_way():
     assert over_pi.yaw == pytest.approx(-0.15 / math.radians(200))
 
 
+def test_turning_wherever_that_leads():
+    """Half of 200 degrees a second, be the heading what it may."""
+    sticks, _ = hands(Wish((0.0, 0.0, 0.0), heading=2.0, yaw_rate=math.radians(100)), senses())
+    assert sticks.yaw == pytest.approx(0.5)
+    faster, _ = hands(Wish((0.0, 0.0, 0.0), yaw_rate=-9.0), senses())
+    assert faster.yaw == -1.0
+
+
 def test_the_climb_remembers():
     sticks, climb = hands(Wish((0.0, 0.0, 0.2)), senses(), Climb(0.1), seconds=0.5)
     assert climb.integral == pytest.approx(0.1 + 2.0 * 0.2 * 0.5)
