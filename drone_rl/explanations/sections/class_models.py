@@ -1,12 +1,18 @@
 """The picture that each action is waiting for."""
 
+import copy
 import dataclasses
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 from numpy.typing import NDArray
 
 from drone_rl.explanations import class_model
+from drone_rl.explanations.attribution import Objective
 from drone_rl.explanations.context import Context, LeftOutError
+
+OBJECTIVES: tuple[Objective, ...] = ("probability", "logit")
+"""Of which an action shall have more."""
 
 
 def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
@@ -22,10 +28,14 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
         "color": context.scenes.is_color,
     }
     arrays = {}
-    for objective in ("probability", "logit"):
-        search = class_model.search(
-            context.network, statistics, objective, seed=context.settings.seed
-        )
+
+    def seek(objective: Objective) -> class_model.ClassModel:
+        network = copy.deepcopy(context.network)  # gradients are gathered in it
+        return class_model.search(network, statistics, objective, seed=context.settings.seed)
+
+    with ThreadPoolExecutor(len(OBJECTIVES)) as pool:  # steps of small pictures take one core
+        found = dict(zip(OBJECTIVES, pool.map(seek, OBJECTIVES), strict=True))
+    for objective, search in found.items():
         arrays[f"class_model_{objective}"] = search.pictures.numpy()
         numbers[objective] = search.summary()
     return {"class_model": numbers}, arrays
