@@ -225,6 +225,14 @@ _OF_MAPS = (
     ("truth.integral", {"truth.integration_error": None}),
 )
 _OTHER_RULE = {"verdict.certain": False}
+_BODY = {
+    "mode": "simple_flight",
+    "wind": [0.0, 3.0, 4.0],
+    "gusts": 1.5,
+    "mass": 1.0,
+    "control_ticks": 66,
+    "tick": 0.003,
+}
 _OF_CARDS = (
     ("card.verdict", _OTHER_RULE),
     ("card.verdict", {"verdict.kind": "good"}),
@@ -235,6 +243,8 @@ _OF_CARDS = (
     ("card.not_chosen", {"chosen": {"runs": 3, "episodes": 200}}, {"chosen": None}),
     ("card.tested", {"task.vertical_bound": 1.2}),
     ("card.tested", _FLOWN),
+    ("card.body", {"dynamics": None}, {"dynamics": _BODY}),
+    ("card.body", {"dynamics.wind": [0.0, 0.0, 0.0]}, {"dynamics": _BODY}),
     ("card.domain", {"shifts": None}, _FLOWN),
     ("card.domain", {"shifts.domain.ranges.sun.low": 40.0}, _FLOWN),
     ("card.domain", _OTHER_KIND, _FLOWN),

@@ -56,6 +56,25 @@ def _tested(card: Evidence) -> str:
     return f"{what} {tested}, in this task's look and light only{but}."
 
 
+def _flies(card: Evidence) -> bool:
+    dynamics = card.get("dynamics")
+    return dynamics is not None and dynamics["mode"] == "simple_flight"
+
+
+def _body(card: Evidence) -> str:
+    dynamics = card["dynamics"]
+    speed = sum(along**2 for along in dynamics["wind"]) ** 0.5
+    gusts = f"gusts of {dynamics['gusts']:g} m/s" if dynamics["gusts"] else ""
+    wind = f"wind of {speed:.3g} m/s" if speed else ""
+    air = " and ".join(filter(None, (wind, gusts))) or "still air"
+    every = dynamics["control_ticks"] * dynamics["tick"]
+    return (
+        f"Its drone has a body: a quadrotor of {dynamics['mass']:g} kg in {air}, told what to do "
+        f"every {every:.3g} s; nothing is known here of other drones, air or modes (drone-rl "
+        "bodies)."
+    )
+
+
 SENTENCES = (
     Sentence("card.verdict", "always", lambda c: True, _verdict),
     Sentence(
@@ -86,6 +105,7 @@ SENTENCES = (
         lambda c: "Whether it was chosen among several trainings, and how, is not recorded.",
     ),
     Sentence("card.tested", "always", lambda c: True, _tested),
+    Sentence("card.body", "its drone has a body", _flies, _body),
     Sentence(
         "card.domain",
         "flights under other conditions are of this network and task, and none speak against them",

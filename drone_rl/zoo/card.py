@@ -20,7 +20,7 @@ def write_card(name: str, digest: str, about: Evidence) -> str:
         about: What the file says of it: "command", "progress", "provenance", "verdict" (as in
             verdict.json), "worlds" (the stream of worlds that it rests on), "seed" (theirs),
             "chosen" (None, or "runs" and "episodes" of the sweep in which it was made), "task",
-            "shifts" (None, or as in shifts.json).
+            "dynamics" (None in computer-vision mode), "shifts" (None, or as in shifts.json).
     """
     sentences = said(SENTENCES, about)
     verdict = sentences.pop("card.verdict")

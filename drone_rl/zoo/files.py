@@ -184,7 +184,13 @@ def export_policy(
     try:
         write_exported(path, checkpoint["policy"], checkpoint["description"], about)
         digest = hashlib.sha256(path.read_bytes()).hexdigest()
-        told = {**about, "task": checkpoint["description"]["task"], "shifts": shifts}
+        described = checkpoint["description"]
+        told = {
+            **about,
+            "task": described["task"],
+            "dynamics": described.get("dynamics"),
+            "shifts": shifts,
+        }
         card = write_card(path.stem, digest, told)
         path.with_suffix(".md").write_text(card)
     except (OSError, SafetensorError) as error:

@@ -87,6 +87,22 @@ def test_evidence_changes_a_sentence(name, evidence, part):
     assert found[name] != said(SENTENCES, CARD).get(name)
 
 
+BODY = {
+    **{"mode": "simple_flight", "wind": [0.0, 3.0, 4.0], "gusts": 1.5, "mass": 1.2},
+    **{"control_ticks": 66, "tick": 0.003},
+}
+
+
+def test_a_body_is_told_with_its_air():
+    told = said(SENTENCES, {**CARD, "dynamics": BODY})["card.body"]
+    assert "a quadrotor of 1.2 kg in wind of 5 m/s and gusts of 1.5 m/s, told" in told
+    assert "every 0.198 s" in told and "other drones, air or modes" in told
+    still = {**BODY, "wind": [0.0, 0.0, 0.0], "gusts": 0.0}
+    assert "kg in still air" in said(SENTENCES, {**CARD, "dynamics": still})["card.body"]
+    for none in (None, {**BODY, "mode": "computer_vision"}):
+        assert "card.body" not in said(SENTENCES, {**CARD, "dynamics": none})
+
+
 @pytest.mark.parametrize(
     ("name", "evidence"),
     [
