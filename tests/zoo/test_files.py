@@ -191,6 +191,11 @@ def test_the_policies_travel_with_their_cards():
         ("pillars_good", "good"),
         ("pillars_reckless", "poor"),
         ("pillars_timid", "poor"),
+        ("flight", "good"),
+        ("flight_wind", "good"),
+        ("flight_velocity", "good"),
+        ("flight_pillars", "good"),
+        ("robust", "good"),
     ],
 )
 def test_each_is_what_its_name_says(name, kind):
