@@ -95,10 +95,12 @@ def _mujoco_warp(count: int) -> Any:
         mjw.step(warp_model, warp_data)  # compiles
         with wp.ScopedCapture() as capture:
             mjw.step(warp_model, warp_data)
+    graph = capture.graph
+    assert graph is not None  # a CPU records, too
 
     def step() -> int:
         for _ in range(FLYING.control_ticks):
-            wp.capture_launch(capture.graph)
+            wp.capture_launch(graph)
         return count
 
     return step
