@@ -28,6 +28,16 @@ def heading_only(attitude: Tensor) -> Tensor:
     return torch.stack([w, zero, zero, z], -1)
 
 
+def heading_of(attitude: Tensor) -> Tensor:
+    """Where drones look, radians to the left of the world's x.
+
+    Args:
+        attitude: Unit quaternions (w, x, y, z). Shape: (*, 4).
+    """
+    w, x, y, z = attitude.unbind(-1)
+    return torch.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+
+
 @dataclasses.dataclass
 class BodyState(Batch):
     """The bodies of `num_worlds` drones. World frame (x forward, y left, z up), SI units."""

@@ -3,11 +3,10 @@
 import dataclasses
 from typing import NamedTuple, Self
 
-import torch
 from torch import Tensor
 
 from drone_rl.sim.batch import Batch
-from drone_rl.sim.dynamics.body import LEVEL, BodyState
+from drone_rl.sim.dynamics.body import LEVEL, BodyState, heading_of
 
 NOTHING, GROUND = -2, -1
 """Numbers of what is touched: no thing, and the ground. Obstacles count from 0."""
@@ -126,8 +125,7 @@ class FlightState(BodyState):
     @property
     def heading(self) -> Tensor:
         """To the left of the world's x, radians. Shape: (num_worlds,)."""
-        w, x, y, z = self.attitude.unbind(-1)
-        return torch.atan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
+        return heading_of(self.attitude)
 
     @property
     def rotors(self) -> Tensor:

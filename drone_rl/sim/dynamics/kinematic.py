@@ -6,7 +6,7 @@ import torch
 from torch import Tensor
 
 from drone_rl.sim.continuous_actions import ContinuousActions
-from drone_rl.sim.dynamics.body import BodyState
+from drone_rl.sim.dynamics.body import BodyState, heading_of
 from drone_rl.sim.dynamics.obstacles import Obstacles
 from drone_rl.sim.settings.actions import ActionSettings
 
@@ -54,13 +54,3 @@ class Kinematic:
             velocity=velocity,
             angular_velocity=torch.stack([zero, zero, rate], -1),
         )
-
-
-def heading_of(attitude: Tensor) -> Tensor:
-    """Where drones look, radians to the left of the world's x.
-
-    Args:
-        attitude: Unit quaternions (w, x, y, z). Shape: (*, 4).
-    """
-    w, x, y, z = attitude.unbind(-1)
-    return torch.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))

@@ -38,7 +38,6 @@ class Quadrotor:
         self.settings = settings
         self.steering = make_steering(actions or ActionSettings())
         self.frame = make_airframe(settings)
-        self._started: set[torch.device] = set()
 
     @property
     def actions(self) -> Actions:
@@ -103,7 +102,7 @@ class Quadrotor:
             obstacles: What they may touch besides the ground.
         """
         device, count = body.numbers.device, len(body)
-        self._start(device)
+        _load_kernels(str(device))
         after = torch.empty_like(body.numbers)
         centers, half_sizes = _boxes(obstacles, body)
         given = [
@@ -128,16 +127,15 @@ class Quadrotor:
                 work(0, 0, count)
         return FlightState(after)
 
-    def _start(self, device: torch.device) -> None:
-        """Loads the kernels of a device, once."""
-        if device not in self._started:
-            start_warp(str(device))
-            wp.load_module(flight_kernel, device=str(device))
-            self._started.add(device)
-
     @functools.cached_property
     def _crew(self) -> Crew:
         return Crew(2**30)
+
+
+@functools.cache
+def _load_kernels(device: str) -> None:
+    start_warp(device)
+    wp.load_module(flight_kernel, device=device)
 
 
 def _array(value: Tensor, kind: Any = wp.float64) -> Any:

@@ -1,5 +1,6 @@
 """Where pictures are drawn, and Warp, which does it, started without a word."""
 
+import functools
 from contextlib import AbstractContextManager, nullcontext
 
 import torch
@@ -22,8 +23,9 @@ def check_device(device: str) -> None:
         raise InputError(f"device={device}, but no CUDA GPU is usable here; give device=cpu")
 
 
+@functools.cache
 def start_warp(device: str) -> None:
-    """Starts Warp; on a CPU it says nothing of the CUDA that is missing.
+    """Starts Warp, once; on a CPU it says nothing of the CUDA that is missing.
 
     Raises:
         InputError: There is no such device.

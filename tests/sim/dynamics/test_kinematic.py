@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from drone_rl.sim.dynamics import Kinematic
-from drone_rl.sim.dynamics.kinematic import heading_of
+from drone_rl.sim.dynamics.body import heading_of
 from drone_rl.sim.settings import ActionSettings
 
 SETTINGS = ActionSettings(kind="velocity", forward_speed=4, sideways_speed=3, yaw_rate=90)
