@@ -7,6 +7,7 @@ the kinds of shift of which `experiment=robust` touches nothing, as its settings
 
 import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -23,14 +24,18 @@ from drone_rl.sim.settings import MINIMAL
 from drone_rl.zoo import read_checkpoint
 
 DEFAULT, ALL = "default", "all"
+_GRAY = ("transforms=shifted", "transforms.shift.down=6", "transforms.shift.across=9")
 ARMS: Mapping[str, tuple[str, ...]] = {
     DEFAULT: (),
-    "none": ("experiment=robust", "appearance=minimal", "transforms=gray"),
-    "light and color": ("experiment=robust", "transforms=gray"),
+    "all, in gray": ("experiment=robust", *_GRAY),
+    "none": ("experiment=robust", "appearance=minimal", "transforms=chromaticity"),
+    "light and color": ("experiment=robust", "transforms=chromaticity"),
     "shift": ("experiment=robust", "appearance=minimal"),
     ALL: ("experiment=robust",),
 }
-"""Settings of each arm's trainings."""
+"""Settings of each arm's trainings. Those of the ablation see colors as `ALL` does."""
+_AT_ONCE = 2
+"""Trainings, of which each takes one thread for the most part."""
 _BRIEF = ("trainer.total_frames=1000", "trainer.confirm_episodes=0")
 
 
@@ -49,14 +54,20 @@ def bench_robust(folder: Path, seeds: Sequence[int], quick: bool) -> dict[str, A
         seeds of "frames", "plain", "untouched" and each kind's mean share of successful flights.
     """
     seeds, brief = (seeds[:1], _BRIEF) if quick else (seeds, ())
-    runs, frames = {}, {}
-    for arm, settings in ARMS.items():
-        for seed in seeds:
-            name = f"{arm.replace(' ', '_')}_{seed}"
-            _, result = train(folder / name, f"seed={seed}", *settings, *brief)
-            runs[arm, seed], frames[arm, seed] = folder / name, result["frames"]
+    runs = {
+        (arm, seed): folder / f"{arm.replace(', ', '_').replace(' ', '_')}_{seed}"
+        for arm in ARMS
+        for seed in seeds
+    }
+
+    def frames_of(one: tuple[str, int]) -> int:
+        _, result = train(runs[one], f"seed={one[1]}", *ARMS[one[0]], *brief)
+        return result["frames"]
+
+    with ThreadPoolExecutor(_AT_ONCE) as pool:
+        frames = dict(zip(runs, pool.map(frames_of, runs), strict=True))
     kinds = untouched_kinds(settings_of(read_checkpoint(last_of(runs[ALL, seeds[0]]))["config"]))
-    shares = fly(runs.values(), 5 if quick else 100)
+    shares = fly(runs.values(), 5, 1) if quick else fly(runs.values(), 100)
     told = {arm: [_told(shares[runs[arm, s]], kinds) for s in seeds] for arm in ARMS}
     return {
         **_points(told[DEFAULT], told[ALL]),
@@ -71,18 +82,24 @@ def bench_robust(folder: Path, seeds: Sequence[int], quick: bool) -> dict[str, A
     }
 
 
-def fly(runs: Iterable[Path], episodes: int) -> dict[Path, dict[str, float]]:
+def fly(
+    runs: Iterable[Path], episodes: int, strengths: int | None = None
+) -> dict[Path, dict[str, float]]:
     """How often policies succeed along every axis, all in the same worlds of minimal look.
 
     Args:
         runs: Folders of trainings.
         episodes: In each condition.
+        strengths: How many of each axis; all by default.
     """
     asked = ShiftSettings(episodes=episodes)
     subjects = {str(run): _in_plain_worlds(run, asked) for run in runs}
     bed = Airfield(next(iter(subjects.values())), episodes, asked.seed)
     try:
-        axes = find_axes(None, bed.subject)
+        axes = [
+            dataclasses.replace(axis, strengths=axis.strengths[:strengths])
+            for axis in find_axes(None, bed.subject)
+        ]
         found = compare(bed, subjects, axes, possible_share=asked.possible_share)
     finally:
         bed.close()

@@ -70,6 +70,41 @@ class RgbPixels(PixelTransform):
         return obs.movedim(-1, -3).float() / 255.0
 
 
+class ChromaticityPixels(PixelTransform):
+    """Colors (*, 3, H, W) to shares of red and blue in each (*, 2, H, W), less a third.
+
+    Light, shadow and exposure change brightness and not these; every gray becomes 0. Shares are of
+    the sum of red, green and blue, and of `floor`, or else the noise of a dark pixel would look
+    like a color. From -1/3 to 2/3.
+
+    Raises:
+        InputError: There are not three channels, or the floor is not above 0.
+    """
+
+    def __init__(
+        self,
+        floor: float = 0.15,
+        in_keys: list[NestedKey] | None = None,
+        out_keys: list[NestedKey] | None = None,
+    ) -> None:
+        super().__init__(in_keys, out_keys)
+        if not floor > 0:
+            raise InputError(f"ChromaticityPixels(floor={floor}): give a floor above 0")
+        self.floor = float(floor)
+
+    def _apply_transform(self, obs: Tensor) -> Tensor:
+        if obs.shape[-3] != 3:
+            raise InputError(
+                f"ChromaticityPixels got pictures of shape {tuple(obs.shape)}; let rgb come before"
+            )
+        total = obs.sum(-3, keepdim=True)
+        red_and_blue = torch.stack((obs[..., 0, :, :], obs[..., 2, :, :]), -3)
+        return (red_and_blue - total / 3).div_(total + self.floor)
+
+    def __repr__(self) -> str:
+        return f"ChromaticityPixels(floor={self.floor:g})"
+
+
 class CropRows(PixelTransform):
     """Keeps the rows `top` to `bottom` (exclusive) of frames (*, C, H, W).
 

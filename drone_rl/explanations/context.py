@@ -4,6 +4,7 @@ Each shared thing is made when it is first asked for, and is the same whoever as
 sections can run in any order.
 """
 
+import copy
 import functools
 from collections.abc import Mapping
 from typing import Any
@@ -72,6 +73,18 @@ class Context:
         self.env.base_env.load_state_dict(self._start)
         generator = torch_generator(self.settings.seed, Stream.REPORT, device=self.device)
         return make_actor(self.network, self.env.action_spec, generator)
+
+    def aside(self) -> "Context":
+        """The same for another thread, which may read the data set and must not move the worlds.
+
+        Its network is a copy: what hooks, or gathers gradients in, the one meets not the other.
+        """
+        _ = self.dataset  # made by the thread that has the worlds
+        twin = copy.copy(self)
+        if self.network.is_differentiable:
+            twin.network = copy.deepcopy(self.network)
+            twin.explainer = Explainer(twin.network, self.absent, self.settings.grad_cam_layer)
+        return twin
 
     @functools.cached_property
     def flights(self) -> RolloutDataset:

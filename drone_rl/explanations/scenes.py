@@ -8,7 +8,7 @@ from torch import Tensor
 from torch.nn import functional
 from torchrl.envs import CatFrames, Transform, TransformedEnv
 
-from drone_rl.envs import CropRows, RgbPixels, worlds_of
+from drone_rl.envs import ChromaticityPixels, CropRows, RgbPixels, worlds_of
 from drone_rl.envs.pipeline import memory_of, see_film
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.tasks import State
@@ -22,6 +22,13 @@ class Region(enum.IntEnum):
     HORIZON = 2
     GROUND = 3
     SKY = 4
+
+
+def _channels(transforms: Iterable[Transform]) -> str:
+    kinds = {type(transform) for transform in transforms}
+    if ChromaticityPixels in kinds:
+        return "chromaticity"
+    return "rgb" if RgbPixels in kinds else "gray"
 
 
 class Scenes:
@@ -38,8 +45,8 @@ class Scenes:
         self.actions = self.worlds.dynamics.actions
         pipeline: Iterable[Transform] = env.transform  # type: ignore[assignment]
         self._transforms = [t for t in pipeline if "pixels" in (t.in_keys or [])]
-        self.is_color: bool = any(isinstance(t, RgbPixels) for t in self._transforms)
-        """Whether the channels of what the policy gets are red, green and blue."""
+        self.channels: str = _channels(self._transforms)
+        """Of what the policy gets: "gray", "rgb", or "chromaticity" (of red and blue)."""
         self.memory: int = memory_of(self._transforms)
         """Pictures before the present one that the policy gets."""
 

@@ -7,6 +7,7 @@ import dataclasses
 import json
 import time
 from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from drone_rl.conditions.measured import Measured
 from drone_rl.explanations.context import Context, LeftOutError
 from drone_rl.explanations.sections import Section, find_sections
 from drone_rl.explanations.settings import ExplainSettings
+from drone_rl.explanations.threads import is_aside
 from drone_rl.policies import PictureNetwork
 from drone_rl.utils.errors import InputError
 from drone_rl.verdicts.proof import Claim
@@ -63,10 +65,7 @@ def explain_policy(
         InputError: The folder can't be written or a setting doesn't fit the policy.
     """
     context = Context(env, network, settings, claim, measured, unlike)
-    found = _Found()
-    for title, section in (find_sections() if sections is None else sections).items():
-        progress(title.replace("_", " "))
-        found.add(title, section, context)
+    found = _ask(find_sections() if sections is None else sections, context, progress)
     written = {
         "format": "drone_rl explanation",
         "format_version": FORMAT_VERSION,
@@ -83,6 +82,48 @@ def explain_policy(
     return written
 
 
+def _ask(
+    sections: Mapping[str, Section], context: Context, progress: Callable[[str], None]
+) -> "_Found":
+    """Asks all; those that read the data set alone in a thread of their own, beside the others."""
+    said: dict[str, _Said] = {}
+    twin = context.aside()
+    with ThreadPoolExecutor(1) as pool:
+        waiting = {}
+        for title, section in sections.items():
+            if is_aside(section):
+                progress(f"{title} (aside)".replace("_", " "))
+                waiting[title] = pool.submit(_say, section, twin)
+        for title, section in sections.items():
+            if title not in waiting:
+                progress(title.replace("_", " "))
+                said[title] = _say(section, context)
+        said |= {title: future.result() for title, future in waiting.items()}
+    found = _Found()
+    for title in sections:
+        found.add(title, said[title])
+    return found
+
+
+@dataclasses.dataclass(frozen=True)
+class _Said:
+    """What one section said."""
+
+    numbers: dict[str, Any]
+    arrays: dict[str, NDArray]
+    seconds: float
+    left_out: str | None = None
+
+
+def _say(section: Section, context: Context) -> _Said:
+    began = time.perf_counter()
+    try:
+        numbers, arrays = section(context)
+    except LeftOutError as error:
+        return _Said({}, {}, 0.0, str(error))
+    return _Said(numbers, arrays, round(time.perf_counter() - began, 2))
+
+
 @dataclasses.dataclass
 class _Found:
     """What sections have said so far."""
@@ -92,17 +133,14 @@ class _Found:
     seconds: dict[str, float] = dataclasses.field(default_factory=dict)
     left_out: dict[str, str] = dataclasses.field(default_factory=dict)
 
-    def add(self, title: str, section: Section, context: Context) -> None:
-        """Asks one more."""
-        began = time.perf_counter()
-        try:
-            numbers, arrays = section(context)
-        except LeftOutError as error:
-            self.left_out[title] = str(error)
+    def add(self, title: str, said: _Said) -> None:
+        """Takes in one more."""
+        if said.left_out is not None:
+            self.left_out[title] = said.left_out
             return
-        self.numbers |= numbers
-        self.arrays |= arrays
-        self.seconds[title] = round(time.perf_counter() - began, 2)
+        self.numbers |= said.numbers
+        self.arrays |= said.arrays
+        self.seconds[title] = said.seconds
 
 
 def _write(

@@ -13,6 +13,8 @@ from drone_rl.words.actions import MOVES, ShownActions
 
 SCALE = 5
 """Screen pixels to one of the policy's in a single picture."""
+_CHANNELS = {"gray": 1, "rgb": 3, "chromaticity": 2}
+"""Of each frame that a policy gets."""
 
 
 def tint(frame: NDArray, color: Color, strength: float = 0.4) -> NDArray:
@@ -115,18 +117,24 @@ def gridded(pictures: Sequence[Image.Image], columns: int, gap: int = 12) -> Ima
     return canvas
 
 
-def shown_picture(observation: NDArray, low: float, high: float, *, color: bool) -> NDArray:
-    """What a policy gets, as bytes: its newest colours, or its newest channel in gray.
+def shown_picture(observation: NDArray, low: float, high: float, channels: str) -> NDArray:
+    """What a policy gets, as bytes: the newest frame's colors, or its gray.
 
     Args:
-        observation: Shape (C, H, W).
+        observation: Shape (C, H, W), of one frame or several.
         low: Becomes black.
         high: Becomes white.
-        color: Whether the channels are red, green and blue, of one frame or several.
+        channels: What they are: "gray", "rgb", or "chromaticity" of red and blue, to which green
+            is shown as what they leave.
 
     Returns:
         Shape: (H, W, 3).
     """
-    channels = observation[-3:] if color else observation[-1:].repeat(3, 0)
-    share = (np.moveaxis(channels, 0, -1).astype(np.float64) - low) / max(high - low, 1e-12)
-    return (share.clip(0, 1) * 255).astype(np.uint8)
+    newest = observation[-_CHANNELS.get(channels, 1) :].astype(np.float64)
+    share = ((newest - low) / max(high - low, 1e-12)).clip(0, 1)
+    if channels == "chromaticity":
+        red, blue = share
+        share = np.stack([red, 1 - (red + blue) / 2, blue])
+    elif channels != "rgb":
+        share = share.repeat(3, 0)
+    return (np.moveaxis(share, 0, -1) * 255).astype(np.uint8)

@@ -28,6 +28,15 @@ class Rgb(Transform):
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
+class Chromaticity(Transform):
+    """Shares of red and blue in each color, less a third: 0 for every gray, however bright."""
+
+    target: ClassVar[str] = "drone_rl.envs.transforms.ChromaticityPixels"
+    floor: Annotated[float, Real(0.0, 3.0, is_above=True)] = 0.15
+    """Added to the sum of red, green and blue, so that the dark is gray."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class Standardize(Transform):
     """Shifted and scaled: (x - mean) / std."""
 

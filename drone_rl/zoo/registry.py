@@ -19,6 +19,7 @@ from drone_rl.policies import MLP, OriginalCNN, SmallCNN
 from drone_rl.settings.networks import Mlp, OriginalCnn, SmallCnn
 from drone_rl.settings.transforms import (
     Blur,
+    Chromaticity,
     Crop,
     DeadRows,
     EpisodeReward,
@@ -146,6 +147,12 @@ def _rgb(picture: Picture, _: Mapping[str, Any]) -> Picture:
     return _of_bytes("rgb", picture, 3)
 
 
+def _chromaticity(picture: Picture, _: Mapping[str, Any]) -> Picture:
+    if not picture.is_float or picture.shape[0] != 3:
+        raise InputError("the transform chromaticity needs three colors; let rgb come before")
+    return Picture((2, *picture.shape[1:]), True)
+
+
 def _of_bytes(name: str, picture: Picture, channels: int) -> Picture:
     if picture.is_float or picture.shape[-1] != 3:
         raise InputError(f"the transform {name} needs the camera's own RGB; let it come first")
@@ -211,6 +218,13 @@ register_transform(
     change=_gray,
 )
 register_transform("rgb", envs.RgbPixels, kinds_of(Rgb), Rgb.target, change=_rgb)
+register_transform(
+    "chromaticity",
+    envs.ChromaticityPixels,
+    kinds_of(Chromaticity),
+    Chromaticity.target,
+    change=_chromaticity,
+)
 register_transform(
     "standardize",
     envs.StandardizePixels,

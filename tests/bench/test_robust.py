@@ -21,13 +21,16 @@ LOOKS = AppearanceSettings(
 @pytest.fixture
 def called(monkeypatch, tmp_path):
     """Trainings that take no time; those of the arm "all" know looks, shifts and noise."""
-    commands_ = []
+    commands_, arms = [], list(ARMS)
 
     def call(*command):
         commands_.append(command)
         run = next(c for c in command if "run.dir" in c).split("=", 1)[1]
         (tmp_path / run).mkdir(parents=True)
-        (tmp_path / run / "result.json").write_text(json.dumps({"frames": len(commands_)}))
+        arm, seed = run.rsplit("/", 1)[-1].rsplit("_", 1)
+        number = [a.replace(", ", "_").replace(" ", "_") for a in arms].index(arm)
+        told = {"frames": 10 * number + int(seed)}
+        (tmp_path / run / "result.json").write_text(json.dumps(told))
 
     steps = (Gray(), Noise(), Shift(), Standardize())
     config = as_config(TrainSettings(appearance=LOOKS, transforms=steps))
@@ -40,8 +43,9 @@ def test_the_figures(called, monkeypatch, tmp_path):
     def flown(runs, episodes):
         shares = {}
         for run in runs:
-            good = 0.5 + 0.1 * int(run.name[-1]) if run.name.startswith("all") else 0.4
-            plain = 0.98 if run.name.startswith("all") else 1.0
+            is_all = run.name[:-2] == "all"
+            good = 0.5 + 0.1 * int(run.name[-1]) if is_all else 0.4
+            plain = 0.98 if is_all else 1.0
             shares[run] = {PLAIN: plain, **dict.fromkeys(AXES, 1.0)}
             shares[run] |= {"camera_height": good, "camera_sideways": good, "distractors": 0.4}
         return shares
@@ -58,25 +62,29 @@ def test_the_figures(called, monkeypatch, tmp_path):
     assert found["robust_room_points"] == pytest.approx(100 * 1.2 / 5)
     assert found["robust_cost_points"] == pytest.approx(2.0)
     arms = found["robust_arms"]
-    assert list(arms) == list(ARMS) and arms["all"]["frames"] == [9, 10]
+    assert list(arms) == list(ARMS) and arms["all"]["frames"] == [51, 52]
     assert arms["all"]["camera position"] == pytest.approx([0.6, 0.7])
     assert arms["none"][PLAIN] == [1.0, 1.0] and arms["none"]["light"] == [1.0, 1.0]
-    assert called[0][:2] == ("train", "seed=1") and "experiment=robust" not in called[0]
-    assert {"experiment=robust", "transforms=gray"} <= set(called[4])
-    assert len(called) == 10
+    by_run = {
+        next(c for c in command if "run.dir" in c).rsplit("/", 1)[-1]: command for command in called
+    }
+    assert "experiment=robust" not in by_run["default_1"] and "seed=1" in by_run["default_1"]
+    assert {"experiment=robust", "transforms=shifted", "seed=2"} <= set(by_run["all_in_gray_2"])
+    assert {"appearance=minimal", "transforms=chromaticity"} <= set(by_run["none_1"])
+    assert len(by_run) == 12
 
 
 def test_a_quick_one_trains_one_seed_for_a_moment(called, monkeypatch, tmp_path):
     told = []
 
-    def flown(runs, episodes):
-        told.append(episodes)
+    def flown(runs, episodes, strengths):
+        told.append((episodes, strengths))
         return {run: {PLAIN: 1.0, **dict.fromkeys(AXES, 1.0)} for run in runs}
 
     monkeypatch.setattr(robust, "fly", flown)
     found = bench_robust(tmp_path, [1, 2], quick=True)
-    assert len(called) == 5 and all("trainer.total_frames=1000" in c for c in called)
-    assert told == [5] and found["robust_gain_points"] == 0.0
+    assert len(called) == 6 and all("trainer.total_frames=1000" in c for c in called)
+    assert told == [(5, 1)] and found["robust_gain_points"] == 0.0
 
 
 def test_policies_are_flown_in_worlds_of_minimal_look(monkeypatch, tmp_path):

@@ -4,7 +4,15 @@ from torchrl.envs import CatFrames, Compose, StepCounter, ToTensorImage, Transfo
 from torchrl.envs.transforms import GrayScale, RewardSum
 from torchrl.envs.utils import check_env_specs
 
-from drone_rl.envs import CropRows, DroneEnv, GrayPixels, Resize, RgbPixels, StandardizePixels
+from drone_rl.envs import (
+    ChromaticityPixels,
+    CropRows,
+    DroneEnv,
+    GrayPixels,
+    Resize,
+    RgbPixels,
+    StandardizePixels,
+)
 from drone_rl.utils.errors import InputError
 
 
@@ -18,6 +26,7 @@ def base():
 PIPELINES = {
     "gray": lambda: [GrayPixels()],
     "rgb": lambda: [RgbPixels()],
+    "chromaticity": lambda: [RgbPixels(), ChromaticityPixels()],
     "standardize": lambda: [GrayPixels(), StandardizePixels()],
     "crop": lambda: [GrayPixels(), CropRows(5, 20)],
     "resize": lambda: [GrayPixels(), Resize(height=10, width=32)],
@@ -108,3 +117,35 @@ def test_bad_sizes_are_refused():
     for transform in (GrayPixels(), RgbPixels()):
         with pytest.raises(InputError, match=r"Pixels got torch.float32 frames of .*; give uint8"):
             transform._apply_transform(torch.zeros(2, 2, 3))
+
+
+def as_picture(*colors):
+    return torch.tensor(colors).T[:, None]
+
+
+def test_chromaticity_is_each_colors_share_less_a_third():
+    seen = ChromaticityPixels(floor=0.5)._apply_transform(
+        as_picture((1.0, 0.0, 0.0), (0.2, 0.2, 0.2), (0.0, 0.5, 1.0))
+    )
+    thirds = [[2 / 3 / 1.5, 0.0, -0.5 / 2.0], [-1 / 3 / 1.5, 0.0, 0.5 / 2.0]]
+    torch.testing.assert_close(seen, torch.tensor(thirds)[:, None])
+
+
+def test_light_changes_chromaticity_little_and_hue_much():
+    cube, dim, blue = (0.75, 0.12, 0.08), (0.375, 0.06, 0.04), (0.15, 0.30, 0.74)
+    seen = ChromaticityPixels()._apply_transform(as_picture(cube, dim, blue))[0, 0]
+    assert abs(seen[0] - seen[1]) < 0.06 < 0.5 < seen[0] - seen[2]
+
+
+def test_chromaticity_of_the_dark_is_that_of_gray():
+    noise = 2 / 255 * torch.rand(3, 4, 4)
+    assert ChromaticityPixels()._apply_transform(noise).abs().max() < 0.05
+
+
+def test_chromaticity_of_what_is_no_color_is_refused():
+    with pytest.raises(InputError, match=r"shape \(1, 4, 4\); let rgb come before"):
+        ChromaticityPixels()._apply_transform(torch.zeros(1, 4, 4))
+    for floor in (0.0, -1.0, float("nan")):
+        with pytest.raises(InputError, match="give a floor above 0"):
+            ChromaticityPixels(floor=floor)
+    assert repr(ChromaticityPixels()) == "ChromaticityPixels(floor=0.15)"

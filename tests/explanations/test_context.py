@@ -44,3 +44,23 @@ def test_frames_are_of_the_flights_and_maps_of_the_frames(make_pipeline):
     first = context.explainer.saliency(context.observations[:2], context.actions[:2])
     torch.testing.assert_close(context.maps["saliency"][:2], first)
     assert set(context.maps) == set(context.frame_maps)
+
+
+def test_another_thread_has_the_same_data_and_a_network_of_its_own(make_pipeline):
+    env, actor = make_pipeline(num_envs=30)
+    network = actor.module[0].module
+    context = Context(env, network, SMALL)
+    twin = context.aside()
+    assert twin.dataset is context.dataset
+    assert twin.network is not network and twin.explainer.network is twin.network
+    met = []
+    handle = network.register_forward_hook(lambda *_: met.append("hook"))
+    assert torch.equal(twin.network(context.observations), network(context.observations))
+    handle.remove()
+    assert met == ["hook"]
+
+
+def test_what_has_no_gradients_is_shared_with_another_thread(make_pipeline):
+    env, _ = make_pipeline(num_envs=30)
+    network = ForeignNetwork(lambda x: x.detach().flatten(1)[:, :3], (1, 25, 64), MOVES)
+    assert Context(env, network, SMALL).aside().network is network

@@ -1,6 +1,14 @@
 import torch
 
-from drone_rl.envs import CropRows, DroneEnv, GrayPixels, Resize, RgbPixels, with_transforms
+from drone_rl.envs import (
+    ChromaticityPixels,
+    CropRows,
+    DroneEnv,
+    GrayPixels,
+    Resize,
+    RgbPixels,
+    with_transforms,
+)
 from drone_rl.explanations.scenes import Region, Scenes, empty_scene, place_target
 from drone_rl.sim.settings import CameraSettings
 from tests.continuous import make_worlds
@@ -52,9 +60,14 @@ def test_maps_go_back_to_where_the_pipeline_took_the_picture_from():
 
 
 def test_whether_the_channels_are_colours(scenes):
-    env = with_transforms(DroneEnv(1), [RgbPixels()])
-    assert Scenes(env).is_color and not scenes.is_color
-    env.close()
+    assert scenes.channels == "gray"
+    for pipeline, channels in (
+        ([RgbPixels()], "rgb"),
+        ([RgbPixels(), ChromaticityPixels()], "chromaticity"),
+    ):
+        env = with_transforms(DroneEnv(1), pipeline)
+        assert Scenes(env).channels == channels
+        env.close()
 
 
 def test_what_is_needed_is_known_of_the_tasks_own_actions_alone(scenes):

@@ -56,7 +56,7 @@ def test_pictures_are_enlarged_captioned_stacked_and_gridded():
 
 def test_a_gray_picture_shows_the_newest_channel_between_its_bounds():
     observation = np.stack([np.full((1, 3), 9.0), np.array([[-1.0, 0.5, 2.0]])])
-    gray = pictures.shown_picture(observation, low=0.0, high=1.0, color=False)
+    gray = pictures.shown_picture(observation, low=0.0, high=1.0, channels="gray")
     assert gray[0, :, 0].tolist() == [0, 127, 255]
     assert (gray == gray[..., :1]).all()
 
@@ -64,8 +64,15 @@ def test_a_gray_picture_shows_the_newest_channel_between_its_bounds():
 def test_a_picture_in_colours_shows_the_newest_ones():
     older, newer = np.zeros((3, 1, 1)), np.array([-1.0, 0.5, 2.0])[:, None, None]
     for observation in (newer, np.concatenate([older, newer])):
-        shown = pictures.shown_picture(observation, low=0.0, high=1.0, color=True)
+        shown = pictures.shown_picture(observation, low=0.0, high=1.0, channels="rgb")
         assert shown.tolist() == [[[0, 127, 255]]]
+
+
+def test_chromaticity_shows_red_blue_and_what_they_leave():
+    red, blue, gray = [1.0, 0.0], [0.0, 1.0], [0.0, 0.0]
+    observation = np.array([red, blue, gray]).T[:, None]
+    shown = pictures.shown_picture(observation, 0.0, 1.0, channels="chromaticity")
+    assert shown.tolist() == [[[255, 127, 0], [0, 127, 255], [0, 255, 0]]]
 
 
 def test_a_probed_frame_has_its_own_bars():

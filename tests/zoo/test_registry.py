@@ -25,6 +25,7 @@ def test_every_variant_can_be_named_by_a_file_within_the_bounds_of_its_settings(
     [
         ("gray", {}, RGB, Picture((1, 25, 64), True)),
         ("rgb", {}, RGB, Picture((3, 25, 64), True)),
+        ("chromaticity", {"floor": 0.1}, Picture((3, 25, 64), True), Picture((2, 25, 64), True)),
         ("standardize", {}, Picture((1, 25, 64)), Picture((1, 25, 64), True)),
         ("crop", {"top": 5, "bottom": 20}, Picture((1, 25, 64), True), Picture((1, 15, 64), True)),
         ("resize", {"height": 4, "width": 9}, Picture((2, 5, 5), True), Picture((2, 4, 9), True)),

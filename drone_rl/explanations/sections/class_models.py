@@ -10,11 +10,13 @@ from numpy.typing import NDArray
 from drone_rl.explanations import class_model
 from drone_rl.explanations.attribution import Objective
 from drone_rl.explanations.context import Context, LeftOutError
+from drone_rl.explanations.threads import aside
 
 OBJECTIVES: tuple[Objective, ...] = ("probability", "logit")
 """Of which an action shall have more."""
 
 
+@aside
 def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
     """Makes "class_model"; arrays "class_model_probability" and "..._logit" (3, C, h, w)."""
     if not context.network.is_differentiable:
@@ -25,7 +27,7 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
     statistics = class_model.PictureStatistics.of(context.observations)
     numbers: dict[str, Any] = {
         "statistics": dataclasses.asdict(statistics),
-        "color": context.scenes.is_color,
+        "channels": context.scenes.channels,
     }
     arrays = {}
 

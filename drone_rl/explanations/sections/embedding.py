@@ -7,8 +7,10 @@ from numpy.typing import NDArray
 
 from drone_rl.explanations import tsne
 from drone_rl.explanations.context import Context, LeftOutError
+from drone_rl.explanations.threads import aside
 
 
+@aside
 def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
     """Makes "tsne"; arrays "tsne_features" and "tsne_pixels" (T, 2)."""
     if context.layer is None:

@@ -17,12 +17,13 @@ def grid(explanations: Sequence[Explanation]) -> Image.Image:
         who = f"{explanation.name[:18]}: " if len(explanations) > 1 else ""
         statistics = explanation.numbers["class_model"]["statistics"]
         low, high = statistics["low"], statistics["high"]
-        color = explanation.numbers["class_model"].get("color", False)
+        told = explanation.numbers["class_model"]
+        channels = told.get("channels", "rgb" if told.get("color") else "gray")  # as once written
         for objective in ("probability", "logit"):
             reached = explanation.numbers["class_model"][objective]["probabilities"]
             shown = explanation.arrays[f"class_model_{objective}"]
             for action in explanation.actions.order:
-                picture = pictures.shown_picture(shown[action], low, high, color=color)
+                picture = pictures.shown_picture(shown[action], low, high, channels)
                 name = explanation.actions.names[action]
                 caption = f"{who}{name} {reached[action]:.3f} (by {objective})"
                 tiles.append(pictures.titled(pictures.enlarge(picture), caption))

@@ -23,14 +23,14 @@ def test_both_objectives_are_sought_in_the_range_of_the_pictures(monkeypatch):
         observations=observations,
         network=network,
         settings=SimpleNamespace(seed=7),
-        scenes=SimpleNamespace(is_color=True),
+        scenes=SimpleNamespace(channels="rgb"),
     )
     numbers, arrays = section(context)
     assert [call[0] for call in calls] == [network, network]
     assert [call[3:] for call in calls] == [("probability", 7), ("logit", 7)]
     assert numbers["class_model"]["logit"] == {"sought": "logit"}
     assert numbers["class_model"]["statistics"]["low"] == calls[0][1] < calls[0][2]
-    assert numbers["class_model"]["color"] is True
+    assert numbers["class_model"]["channels"] == "rgb"
     assert (arrays["class_model_probability"] == 1).all()
     assert (arrays["class_model_logit"] == 2).all()
 

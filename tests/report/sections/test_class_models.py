@@ -32,7 +32,7 @@ def test_colours_are_shown_as_such(explanation):
     for name in ("class_model_probability", "class_model_logit"):
         explanation.arrays[name] = np.zeros((3, 3, 4, 30))
         explanation.arrays[name][1, 0] = 1.0  # the picture for left is red
-    explanation.numbers["class_model"]["color"] = True
+    explanation.numbers["class_model"]["channels"] = "rgb"
     assert grid([explanation]).getpixel((75, 30)) == (255, 0, 0)
 
 
