@@ -24,10 +24,8 @@ from drone_rl.sim.settings import MINIMAL
 from drone_rl.zoo import read_checkpoint
 
 DEFAULT, ALL = "default", "all"
-_GRAY = ("transforms=shifted", "transforms.shift.down=6", "transforms.shift.across=9")
 ARMS: Mapping[str, tuple[str, ...]] = {
     DEFAULT: (),
-    "all, in gray": ("experiment=robust", *_GRAY),
     "none": ("experiment=robust", "appearance=minimal", "transforms=chromaticity"),
     "light and color": ("experiment=robust", "transforms=chromaticity"),
     "shift": ("experiment=robust", "appearance=minimal"),
@@ -55,9 +53,7 @@ def bench_robust(folder: Path, seeds: Sequence[int], quick: bool) -> dict[str, A
     """
     seeds, brief = (seeds[:1], _BRIEF) if quick else (seeds, ())
     runs = {
-        (arm, seed): folder / f"{arm.replace(', ', '_').replace(' ', '_')}_{seed}"
-        for arm in ARMS
-        for seed in seeds
+        (arm, seed): folder / f"{arm.replace(' ', '_')}_{seed}" for arm in ARMS for seed in seeds
     }
 
     def frames_of(one: tuple[str, int]) -> int:
