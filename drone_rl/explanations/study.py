@@ -65,26 +65,29 @@ def explain_policy(
         InputError: The folder can't be written or a setting doesn't fit the policy.
     """
     context = Context(env, network, settings, claim, measured, unlike)
-    found = _ask(find_sections() if sections is None else sections, context, progress)
+    said = _ask(find_sections() if sections is None else sections, context, progress)
+    made = {title: one for title, one in said.items() if one.left_out is None}
+    left_out = {title: one.left_out for title, one in said.items() if title not in made}
     written = {
         "format": "drone_rl explanation",
         "format_version": FORMAT_VERSION,
         "name": name,
         "settings": dataclasses.asdict(settings),
-        "seconds": found.seconds,
+        "seconds": {title: one.seconds for title, one in made.items()},
         "actions": context.scenes.actions.as_dict(),
         "terms": context.scenes.task.terms.as_dict(),
-        **found.numbers,
-        **({"left_out": found.left_out} if found.left_out else {}),
+        **{key: value for one in made.values() for key, value in one.numbers.items()},
+        **({"left_out": left_out} if left_out else {}),
         "provenance": provenance,
     }
-    _write(folder, written, found.arrays, context)
+    arrays = {key: value for one in made.values() for key, value in one.arrays.items()}
+    _write(folder, written, arrays, context)
     return written
 
 
 def _ask(
     sections: Mapping[str, Section], context: Context, progress: Callable[[str], None]
-) -> "_Found":
+) -> dict[str, "_Said"]:
     """Asks all; those that read the data set alone in a thread of their own, beside the others."""
     said: dict[str, _Said] = {}
     twin = context.aside()
@@ -99,10 +102,7 @@ def _ask(
                 progress(title.replace("_", " "))
                 said[title] = _say(section, context)
         said |= {title: future.result() for title, future in waiting.items()}
-    found = _Found()
-    for title in sections:
-        found.add(title, said[title])
-    return found
+    return {title: said[title] for title in sections}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -122,25 +122,6 @@ def _say(section: Section, context: Context) -> _Said:
     except LeftOutError as error:
         return _Said({}, {}, 0.0, str(error))
     return _Said(numbers, arrays, round(time.perf_counter() - began, 2))
-
-
-@dataclasses.dataclass
-class _Found:
-    """What sections have said so far."""
-
-    numbers: dict[str, Any] = dataclasses.field(default_factory=dict)
-    arrays: dict[str, NDArray] = dataclasses.field(default_factory=dict)
-    seconds: dict[str, float] = dataclasses.field(default_factory=dict)
-    left_out: dict[str, str] = dataclasses.field(default_factory=dict)
-
-    def add(self, title: str, said: _Said) -> None:
-        """Takes in one more."""
-        if said.left_out is not None:
-            self.left_out[title] = said.left_out
-            return
-        self.numbers |= said.numbers
-        self.arrays |= said.arrays
-        self.seconds[title] = said.seconds
 
 
 def _write(

@@ -8,6 +8,7 @@ from drone_rl.explanations.context import LeftOutError
 from drone_rl.explanations.sections import find_sections
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.explanations.study import explain_policy
+from drone_rl.explanations.threads import aside
 from drone_rl.policies import MLP
 from drone_rl.utils.errors import InputError
 
@@ -67,6 +68,25 @@ def test_a_section_that_can_not_be_made_is_told_of_and_the_others_are(make_pipel
     assert numbers["dataset"]["frames"] == 60 and "eyes" not in numbers["seconds"]
     del sections["eyes"]
     assert "left_out" not in explain(env, actor.module[0].module, tmp_path, sections=sections)
+
+
+def test_sections_aside_meet_a_copy_of_the_network_and_stand_in_their_order(
+    make_pipeline, tmp_path
+):
+    env, actor = make_pipeline(num_envs=6)
+    network, met = actor.module[0].module, {}
+
+    def meet(name):
+        def section(context):
+            met[name] = context.network
+            return {name: 1}, {}
+
+        return section
+
+    sections = {"first": aside(meet("first")), "second": meet("second")}
+    written = explain(env, network, tmp_path, sections=sections)
+    assert met["second"] is network and met["first"] is not network
+    assert [*written["seconds"]] == [k for k in written if k in sections] == [*sections]
 
 
 def test_an_unknown_layer_is_refused_before_any_work(make_pipeline, tmp_path):

@@ -28,11 +28,14 @@ def test_actions_stand_from_left_to_right_and_objectives_below_each_other(explan
     assert middles == [(255,) * 3, (0,) * 3, (0,) * 3]
 
 
-def test_colours_are_shown_as_such(explanation):
+@pytest.mark.parametrize(
+    "told", [{"channels": "rgb"}, {"color": True}]
+)  # the latter as once written
+def test_colours_are_shown_as_such(explanation, told):
     for name in ("class_model_probability", "class_model_logit"):
         explanation.arrays[name] = np.zeros((3, 3, 4, 30))
         explanation.arrays[name][1, 0] = 1.0  # the picture for left is red
-    explanation.numbers["class_model"]["channels"] = "rgb"
+    explanation.numbers["class_model"] |= told
     assert grid([explanation]).getpixel((75, 30)) == (255, 0, 0)
 
 
