@@ -55,13 +55,21 @@ class PolicyNetwork(PictureNetwork):
         weight.mul_(factor[:, None])
         bias.mul_(factor).add_(shift)
 
-    def forward(self, pixels: Tensor) -> Tensor:
-        """See `PictureNetwork`."""
+    def check(self, pixels: Tensor) -> None:
+        """Refuses pictures of another shape.
+
+        Raises:
+            InputError: They are.
+        """
         if tuple(pixels.shape[-3:]) != self.in_shape:
             raise InputError(
                 f"the policy was built for pictures of shape {self.in_shape}, not "
                 f"{tuple(pixels.shape[-3:])}; use the camera and transforms it was trained with"
             )
+
+    def forward(self, pixels: Tensor) -> Tensor:
+        """See `PictureNetwork`."""
+        self.check(pixels)
         logits = self.layers(pixels.reshape(-1, *self.in_shape))
         return logits.reshape(*pixels.shape[:-3], logits.shape[-1])
 

@@ -36,12 +36,13 @@ _TILES = (
     + """
 const float* input = given.data + given_at;
 float* output = made.data + made_at;
+const int panel = 16 * (1 + lines * length);
 auto tile = [&](auto* shape, int row, int outs) __attribute__((always_inline)) {
     constexpr int ROWS = sizeof(*shape) / sizeof((*shape)[0]);
     constexpr int PARTS = sizeof((*shape)[0]) / sizeof(numbers);
     numbers sums[ROWS][PARTS];
     const float* from[ROWS];
-    const float* now = weights.data + weights_at + outs;
+    const float* now = weights.data + weights_at + outs / 16 * panel;
     int column = row % columns;
     const float* first = input + row / columns * down + column * across;
     #pragma unroll
@@ -51,16 +52,16 @@ auto tile = [&](auto* shape, int row, int outs) __attribute__((always_inline)) {
         first += is_last ? down - (columns - 1) * across : across;
         column = is_last ? 0 : column;
         #pragma unroll
-        for (int p = 0; p < PARTS; ++p) sums[r][p] = *(const anywhere*)(now + p * 16);
+        for (int p = 0; p < PARTS; ++p) sums[r][p] = *(const anywhere*)(now + p * panel);
     }
     for (int line = 0; line < lines; ++line) {
         for (int i = 0; i < length; ++i) {
-            now += num_outs;
+            now += 16;
             #pragma unroll
             for (int r = 0; r < ROWS; ++r) {
                 #pragma unroll
                 for (int p = 0; p < PARTS; ++p)
-                    sums[r][p] = add(sums[r][p], from[r][i], *(const anywhere*)(now + p * 16));
+                    sums[r][p] = add(sums[r][p], from[r][i], *(const anywhere*)(now + p * panel));
             }
         }
         #pragma unroll
@@ -72,25 +73,28 @@ auto tile = [&](auto* shape, int row, int outs) __attribute__((always_inline)) {
         for (int p = 0; p < PARTS; ++p) {
             numbers sum = sums[r][p];
             if (is_rectified) sum = sum > 0.0f ? sum : numbers{};
-            *(anywhere*)(output + (row + r) * num_outs + outs + p * 16) = sum;
+            *(anywhere*)(output + (row + r) * made_down + outs + p * 16) = sum;
         }
     }
 };
+auto cover = [&](auto* many, auto* one, int outs) __attribute__((always_inline)) {
+    constexpr int ROWS = sizeof(*many) / sizeof(*one);
+    int row = 0;
+    for (; row + ROWS <= rows; row += ROWS) tile(many, row, outs);
+    for (; row < rows; ++row) tile(one, row, outs);
+};
+// As many as there are registers for: 32 of 16 numbers, or 16 of 8.
+int outs = 0;
+#ifdef __AVX512F__
 typedef numbers eight_by_two[8][2];
 typedef numbers one_by_two[1][2];
-typedef numbers eight_by_one[8][1];
+for (; outs + 32 <= num_outs; outs += 32) cover((eight_by_two*)nullptr, (one_by_two*)nullptr, outs);
+typedef numbers many_by_one[8][1];
+#else
+typedef numbers many_by_one[4][1];
+#endif
 typedef numbers one_by_one[1][1];
-int outs = 0;
-for (; outs + 32 <= num_outs; outs += 32) {
-    int row = 0;
-    for (; row + 8 <= rows; row += 8) tile((eight_by_two*)nullptr, row, outs);
-    for (; row < rows; ++row) tile((one_by_two*)nullptr, row, outs);
-}
-for (; outs < num_outs; outs += 16) {
-    int row = 0;
-    for (; row + 8 <= rows; row += 8) tile((eight_by_one*)nullptr, row, outs);
-    for (; row < rows; ++row) tile((one_by_one*)nullptr, row, outs);
-}
+for (; outs < num_outs; outs += 16) cover((many_by_one*)nullptr, (one_by_one*)nullptr, outs);
 """
 )
 
@@ -111,6 +115,7 @@ def multiply(
     length: int,
     next_line: int,
     num_outs: int,
+    made_down: int,
     is_rectified: int,
 ) -> None:
     """A layer.
@@ -118,7 +123,7 @@ def multiply(
     Args:
         given: What it looks at.
         given_at: Where that begins.
-        weights: The biases, then for each number of a row those of all outputs.
+        weights: Of `WIDTH` outputs at a time their biases, then for each input their weights.
         weights_at: Where these begin.
         made: Takes the outputs, row after row.
         made_at: Where these begin.
@@ -130,6 +135,7 @@ def multiply(
         length: Of a line of the patch.
         next_line: How much farther the patch's next line begins.
         num_outs: Of each row, a multiple of `WIDTH`.
+        made_down: How much farther each row of outputs begins.
         is_rectified: Whether outputs below 0 become 0.
     """
     ...
@@ -210,6 +216,7 @@ def _apply(
         layers.steps[layer, 7],
         layers.steps[layer, 8],
         layers.steps[layer, 9],
+        layers.steps[layer, 10],
         layers.steps[layer, 10],
         layers.steps[layer, 11],
     )

@@ -6,6 +6,7 @@ import warp as wp
 from torch.nn import functional
 
 from drone_rl.policies.layers_kernel import multiply
+from drone_rl.policies.packed_layer import in_panels
 from drone_rl.sim.rendering.devices import start_warp
 
 start_warp("cpu")
@@ -36,10 +37,15 @@ def run(
         sizes[6],
         sizes[7],
         sizes[8],
+        sizes[9],
     )
 
 
-def multiplied(given, weights, num_made, *sizes):
+def multiplied(given, weights, num_made, *sizes, made_down=None):
+    """What is made; weights by input, as `multiply` wants them in panels."""
+    *sizes, is_rectified = sizes
+    sizes = (*sizes, made_down or sizes[-1], is_rectified)
+    weights = in_panels(weights)
     made = torch.full((OFFSET + num_made + 1,), torch.inf)
     arrays = [wp.from_torch(functional.pad(v.flatten(), (OFFSET, 0))) for v in (given, weights)]
     sizes = wp.array(sizes, dtype=int, device="cpu")
@@ -67,6 +73,14 @@ def test_linear_layers(rows, num_outs):
     weights = torch.cat([bias[None], weight])
     made = multiplied(given, weights, rows * num_outs, rows, 1, 37, 0, 1, 37, 0, num_outs, 0)
     assert torch.allclose(made.view(rows, -1), given @ weight + bias, atol=1e-4)
+
+
+def test_rows_may_lie_apart():
+    given, weights = torch.randn(9, 37), torch.randn(38, 32)
+    sizes = (9, 1, 37, 0, 1, 37, 0, 32, 0)
+    made = multiplied(given, weights, 9 * 48, *sizes, made_down=48).view(9, 48)
+    assert torch.equal(made[:, :32].flatten(), multiplied(given, weights, 9 * 32, *sizes))
+    assert made[:, 32:].isinf().all()
 
 
 def test_a_row_does_not_depend_on_those_beside_it():

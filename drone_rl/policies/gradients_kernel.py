@@ -1,0 +1,364 @@
+# ruff: noqa: UP018
+# pyright: reportIndexIssue=false
+# pyright: reportGeneralTypeIssues=false
+# pyright: reportArgumentType=false
+# pyright: reportCallIssue=false
+# pyright: reportOperatorIssue=false
+# (Warp compiles this file; Python's types say nothing about it.)
+"""From the gradient of a small network's logits to that of its weights, or pictures, on a CPU.
+
+A block of pictures at a time goes back through all layers, on one core, so that what is read again
+is still near.
+"""
+
+import warp as wp
+
+from drone_rl.policies.layers_back_kernel import accumulate, fold, rectify
+from drone_rl.policies.layers_kernel import multiply
+
+BLOCK = wp.constant(64)
+"""Pictures at a time."""
+
+
+@wp.struct
+class Lesson:
+    """A network that learns."""
+
+    geometry: wp.array2d[int]
+    """A row a layer: what `multiply` takes from `rows` to `num_outs`."""
+    weights_at: wp.array[int]
+    """Where those of each layer begin."""
+    weights: wp.array[float]
+    back_at: wp.array[int]
+    """Where those of each layer the other way begin."""
+    back: wp.array[float]
+    strides: wp.array[int]
+    """How much farther the outputs of each layer begin with each picture."""
+    made_at: wp.array[int]
+    """Sums of the strides of layers before."""
+    num_convolutions: int
+
+
+@wp.kernel
+def answer(
+    first: int,
+    last: int,
+    lesson: Lesson,
+    pictures: wp.array2d[float],
+    made: wp.array[float],
+) -> None:
+    """Outputs of all layers for a share of the pictures.
+
+    Args:
+        first: The first picture.
+        last: The one after the last: launch it with a dimension of 1.
+        lesson: The network.
+        pictures: Gray. Shape: (pictures, pixels).
+        made: Takes the outputs: of each layer those of all pictures.
+    """
+    count = pictures.shape[0]
+    num_layers = lesson.geometry.shape[0]
+    for block in range(first, last, BLOCK):
+        end = wp.min(block + BLOCK, last)
+        for picture in range(block, end):
+            for layer in range(lesson.num_convolutions):
+                to = count * lesson.made_at[layer] + picture * lesson.strides[layer]
+                rows = lesson.geometry[layer, 0]
+                down = lesson.geometry[layer, 2]
+                outs = lesson.geometry[layer, 7]
+                if layer == 0:
+                    _forward(lesson, layer, pictures[picture], 0, made, to, rows, down, outs)
+                else:
+                    at = count * lesson.made_at[layer - 1] + picture * lesson.strides[layer - 1]
+                    _forward(lesson, layer, made, at, made, to, rows, down, outs)
+        for layer in range(lesson.num_convolutions, num_layers):
+            down = lesson.strides[layer - 1]
+            at = count * lesson.made_at[layer - 1] + block * down
+            outs = lesson.strides[layer]
+            to = count * lesson.made_at[layer] + block * outs
+            _forward(lesson, layer, made, at, made, to, end - block, down, outs)
+
+
+@wp.func
+def _forward(
+    lesson: Lesson,
+    layer: int,
+    given: wp.array[float],
+    given_at: int,
+    made: wp.array[float],
+    made_at: int,
+    rows: int,
+    down: int,
+    made_down: int,
+) -> None:
+    multiply(
+        given,
+        given_at,
+        lesson.weights,
+        lesson.weights_at[layer],
+        made,
+        made_at,
+        rows,
+        lesson.geometry[layer, 1],
+        down,
+        lesson.geometry[layer, 3],
+        lesson.geometry[layer, 4],
+        lesson.geometry[layer, 5],
+        lesson.geometry[layer, 6],
+        lesson.geometry[layer, 7],
+        made_down,
+        wp.where(layer < lesson.geometry.shape[0] - 1, 1, 0),
+    )
+
+
+@wp.kernel
+def learn(
+    first: int,
+    last: int,
+    member: int,
+    lesson: Lesson,
+    pictures: wp.array2d[float],
+    made: wp.array[float],
+    slopes: wp.array2d[float],
+    rooms: wp.array2d[float],
+    patches: wp.array2d[float],
+    gradients: wp.array2d[float],
+    seen: wp.array2d[float],
+) -> None:
+    """What a share of the pictures, or the weights, have to do with the logits.
+
+    Args:
+        first: The first picture.
+        last: The one after the last: launch it with a dimension of 1.
+        member: Which of the rooms to work in, and which gradients to add to.
+        lesson: The network.
+        pictures: Gray. Shape: (pictures, pixels).
+        made: The outputs of `answer`.
+        slopes: Gradient of the logits. Shape: (pictures, actions).
+        rooms: For gradients of outputs, one a member.
+        patches: For those of inputs of one convolution, one a member.
+        gradients: Of the weights, to be added to, one a member; or of shape (0, 0).
+        seen: Gradient of the pictures, to be written; or of shape (0, 0).
+    """
+    room = rooms[member]
+    total = room
+    if gradients.shape[0] > 0:
+        total = gradients[member]
+    count = pictures.shape[0]
+    top = lesson.geometry.shape[0] - 1
+    for block in range(first, last, BLOCK):
+        end = wp.min(block + BLOCK, last)
+        for picture in range(block, end):
+            at = BLOCK * lesson.made_at[top] + (picture - block) * lesson.strides[top]
+            _begin(room, at, lesson.geometry[top, 7], slopes[picture])
+        for down in range(top + 1):
+            layer = top - down
+            if gradients.shape[0] > 0:
+                _notice(lesson, layer, block, end, pictures, made, room, total)
+            if layer >= lesson.num_convolutions:
+                _linear(lesson, layer, block, end, count, made, room)
+            else:
+                for picture in range(block, end):
+                    _convolution(
+                        lesson, layer, picture, block, count, made, room, patches[member], seen
+                    )
+
+
+@wp.func
+def _begin(room: wp.array[float], at: int, num_outs: int, slopes: wp.array[float]) -> None:
+    """Writes the gradient of a picture's logits; of those that fill up it is 0."""
+    for action in range(num_outs):
+        slope = float(0.0)
+        if action < slopes.shape[0]:
+            slope = slopes[action]
+        room[at + action] = slope
+
+
+@wp.func
+def _notice(
+    lesson: Lesson,
+    layer: int,
+    block: int,
+    end: int,
+    pictures: wp.array2d[float],
+    made: wp.array[float],
+    room: wp.array[float],
+    gradients: wp.array[float],
+) -> None:
+    """Adds to the gradient of a layer's weights."""
+    count = pictures.shape[0]
+    deltas_at = BLOCK * lesson.made_at[layer]
+    stride = lesson.strides[layer]
+    if layer >= lesson.num_convolutions:
+        across = lesson.strides[layer - 1]
+        at = count * lesson.made_at[layer - 1] + block * across
+        _add(
+            lesson, layer, made, at, room, deltas_at, gradients, end - block, end - block, 0, across
+        )
+        return
+    rows = lesson.geometry[layer, 0]
+    columns = lesson.geometry[layer, 1]
+    down = lesson.geometry[layer, 2]
+    across = lesson.geometry[layer, 3]
+    for picture in range(block, end):
+        by = deltas_at + (picture - block) * stride
+        if layer == 0:
+            given = pictures[picture]
+            _add(lesson, layer, given, 0, room, by, gradients, rows, columns, down, across)
+        else:
+            at = count * lesson.made_at[layer - 1] + picture * lesson.strides[layer - 1]
+            _add(lesson, layer, made, at, room, by, gradients, rows, columns, down, across)
+
+
+@wp.func
+def _add(
+    lesson: Lesson,
+    layer: int,
+    given: wp.array[float],
+    given_at: int,
+    room: wp.array[float],
+    deltas_at: int,
+    gradients: wp.array[float],
+    rows: int,
+    columns: int,
+    down: int,
+    across: int,
+) -> None:
+    outs = lesson.geometry[layer, 7]
+    accumulate(
+        given,
+        given_at,
+        room,
+        deltas_at,
+        gradients,
+        lesson.weights_at[layer],
+        rows,
+        columns,
+        down,
+        across,
+        lesson.geometry[layer, 4],
+        lesson.geometry[layer, 5],
+        lesson.geometry[layer, 6],
+        outs,
+        wp.where(layer < lesson.num_convolutions, outs, lesson.strides[layer]),
+    )
+
+
+@wp.func
+def _linear(
+    lesson: Lesson,
+    layer: int,
+    block: int,
+    end: int,
+    count: int,
+    made: wp.array[float],
+    room: wp.array[float],
+) -> None:
+    """From the gradient of a linear layer's outputs to that of its inputs."""
+    size = lesson.geometry[layer, 5]
+    stride = lesson.strides[layer - 1]
+    before_at = BLOCK * lesson.made_at[layer - 1]
+    _back(
+        lesson,
+        layer,
+        room,
+        BLOCK * lesson.made_at[layer],
+        room,
+        before_at,
+        end - block,
+        lesson.strides[layer],
+        size,
+        stride,
+    )
+    given_at = count * lesson.made_at[layer - 1] + block * stride
+    for row in range(end - block):
+        rectify(room, before_at + row * stride, made, given_at + row * stride, size)
+
+
+@wp.func
+def _convolution(
+    lesson: Lesson,
+    layer: int,
+    picture: int,
+    block: int,
+    count: int,
+    made: wp.array[float],
+    room: wp.array[float],
+    patches: wp.array[float],
+    seen: wp.array2d[float],
+) -> None:
+    """The same of a convolution and one picture; the first is asked only if that is wanted."""
+    if layer == 0 and seen.shape[0] == 0:
+        return
+    outs = lesson.geometry[layer, 7]
+    size = lesson.geometry[layer, 4] * lesson.geometry[layer, 5]
+    deltas_at = BLOCK * lesson.made_at[layer] + (picture - block) * lesson.strides[layer]
+    rows = lesson.geometry[layer, 0]
+    _back(lesson, layer, room, deltas_at, patches, 0, rows, outs, size, size)
+    if layer == 0:
+        _fold(lesson, layer, patches, seen[picture], 0, seen.shape[1])
+        return
+    before = layer - 1
+    before_at = BLOCK * lesson.made_at[before] + (picture - block) * lesson.strides[before]
+    num_made = lesson.geometry[before, 0] * lesson.geometry[before, 7]
+    _fold(lesson, layer, patches, room, before_at, num_made)
+    given_at = count * lesson.made_at[before] + picture * lesson.strides[before]
+    rectify(room, before_at, made, given_at, num_made)
+
+
+@wp.func
+def _back(
+    lesson: Lesson,
+    layer: int,
+    deltas: wp.array[float],
+    deltas_at: int,
+    made: wp.array[float],
+    made_at: int,
+    rows: int,
+    down: int,
+    num_outs: int,
+    made_down: int,
+) -> None:
+    outs = lesson.geometry[layer, 7]
+    multiply(
+        deltas,
+        deltas_at,
+        lesson.back,
+        lesson.back_at[layer],
+        made,
+        made_at,
+        rows,
+        1,
+        down,
+        0,
+        1,
+        outs,
+        0,
+        num_outs,
+        made_down,
+        0,
+    )
+
+
+@wp.func
+def _fold(
+    lesson: Lesson,
+    layer: int,
+    patches: wp.array[float],
+    made: wp.array[float],
+    made_at: int,
+    size: int,
+) -> None:
+    fold(
+        patches,
+        made,
+        made_at,
+        size,
+        lesson.geometry[layer, 0],
+        lesson.geometry[layer, 1],
+        lesson.geometry[layer, 2],
+        lesson.geometry[layer, 3],
+        lesson.geometry[layer, 4],
+        lesson.geometry[layer, 5],
+        lesson.geometry[layer, 6],
+    )

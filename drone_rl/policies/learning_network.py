@@ -1,0 +1,185 @@
+# pyright: reportAttributeAccessIssue=false
+# pyright: reportGeneralTypeIssues=false
+# pyright: reportIncompatibleMethodOverride=false
+# (Warp's structures are untyped, and so is what autograd calls.)
+"""A network whose gradients a kernel works out, where it knows the layers."""
+
+import math
+from collections.abc import Sequence
+from itertools import accumulate
+from typing import Any, Literal, Self
+
+import torch
+import warp as wp
+from torch import Tensor, nn
+from torch.autograd.function import once_differentiable
+
+from drone_rl.policies import gradients_kernel
+from drone_rl.policies.cnn import PolicyNetwork
+from drone_rl.policies.gradients_kernel import BLOCK, Lesson
+from drone_rl.policies.layers_kernel import WIDTH
+from drone_rl.policies.network import PictureNetwork
+from drone_rl.policies.packed_layer import Order, PackedLayer, packed_layers
+from drone_rl.sim.rendering.crew import Crew
+from drone_rl.sim.rendering.devices import start_warp
+
+Of = Literal["weights", "pictures"]
+"""What has gradients."""
+
+
+class LearningNetwork(PictureNetwork):
+    """Gives what a network gives, and its weights the gradients, in less time than torch does.
+
+    On a small network torch spends most of its time between products; here each layer's product
+    is made where its numbers lie, in blocks of pictures that stay near.
+    """
+
+    def __init__(self, network: PolicyNetwork, num_threads: int = 1, *, of: Of = "weights") -> None:
+        """Wraps a network; `find` tells whether that can be done.
+
+        Args:
+            network: From pictures to logits.
+            num_threads: That share the pictures; sums over these depend on how many there are.
+            of: What has gradients: the weights, or the pictures. For those of pictures the weights
+                stay what they are at first.
+        """
+        super().__init__()
+        self.network, self.in_shape, self.actions = network, network.in_shape, network.actions
+        self._num_threads, self._of = num_threads, of
+        self._work: _Work | None = None
+
+    @classmethod
+    def find(cls, network: nn.Module, num_threads: int = 1, *, of: Of = "weights") -> Self | None:
+        """The same, if the network is of such layers and on the CPU."""
+        layers = packed_layers(network)
+        if layers is None or (of == "pictures" and not layers[0].has_way_back):
+            return None
+        assert isinstance(network, PolicyNetwork)
+        return cls(network, num_threads, of=of)
+
+    def forward(self, pixels: Tensor) -> Tensor:
+        """See `PictureNetwork`.
+
+        Raises:
+            InputError: The pictures are of another shape than the network was built for.
+        """
+        if self._work is None:
+            layers = packed_layers(self.network) or []
+            self._work = _Work(layers, self._num_threads, is_fixed=self._of == "pictures")
+        self.network.check(pixels)
+        flat = pixels.reshape(-1, math.prod(self.in_shape))
+        learning = self._work.parameters if self._of == "weights" else ()
+        logits = _Logits.apply(self._work, flat, *learning)
+        return logits.reshape(*pixels.shape[:-3], -1)
+
+
+class _Logits(torch.autograd.Function):
+    """The way there and back."""
+
+    @staticmethod
+    def forward(ctx: Any, work: "_Work", pictures: Tensor, *parameters: Tensor) -> Tensor:
+        ctx.work, ctx.of = work, "weights" if parameters else "pictures"
+        ctx.pictures, ctx.made = pictures, work.answer(pictures)
+        return work.logits(ctx.made, len(pictures))
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, slopes: Tensor) -> tuple[Tensor | None, ...]:
+        if ctx.made is None:
+            raise RuntimeError("the way back was gone once; its numbers were given away")
+        made, ctx.made = ctx.made, None
+        if ctx.of == "pictures":
+            return None, ctx.work.look_back(ctx.pictures, made, slopes)
+        return None, None, *ctx.work.learn(ctx.pictures, made, slopes)
+
+
+class _Work:
+    """Packed layers, and room to work in."""
+
+    def __init__(self, layers: Sequence[PackedLayer], num_threads: int, *, is_fixed: bool) -> None:
+        start_warp("cpu")
+        self._layers = layers
+        self._crew = Crew(num_threads, num_threads)
+        self._order = order = Order(layers)
+        self._weights = torch.zeros(order.weights_at[-1])
+        self._back = torch.zeros(order.back_at[-1])
+        self._strides = [_odd(layer.num_made) for layer in layers]
+        made_at = list(accumulate(self._strides, initial=0))
+        self._size = made_at[-1]
+        lesson = Lesson()
+        lesson.geometry = _ints([layer.geometry for layer in layers])
+        lesson.weights_at, lesson.back_at = _ints(order.weights_at), _ints(order.back_at)
+        lesson.weights, lesson.back = wp.from_torch(self._weights), wp.from_torch(self._back)
+        lesson.strides, lesson.made_at = _ints(self._strides), _ints(made_at)
+        lesson.num_convolutions = sum(layer.is_convolution for layer in layers)
+        self._lesson = lesson
+        self._rooms = torch.empty(self._crew.size, int(BLOCK) * self._size)
+        most = max(v.num_inputs * v.geometry[0] for v in layers if v.is_convolution)
+        self._patches = torch.empty(self._crew.size, most)
+        self._spare: Tensor | None = None
+        """Of outputs that nobody needs any more; new memory takes longer than a layer."""
+        self._gradients = torch.empty(self._crew.size, *self._weights.shape)
+        self._is_fixed = is_fixed
+        order.pack(self._weights, self._back)
+        wp.load_module(gradients_kernel, device="cpu")
+
+    @property
+    def parameters(self) -> list[Tensor]:
+        """Weight and bias of each layer."""
+        return [parameter for layer in self._layers for parameter in layer.parameters]
+
+    def answer(self, pictures: Tensor) -> Tensor:
+        """Outputs of all layers, flat: of each those of all pictures."""
+        if not self._is_fixed:
+            self._order.pack(self._weights, self._back)
+        size, spare, self._spare = len(pictures) * self._size, self._spare, None
+        made = torch.empty(size) if spare is None or len(spare) < size else spare[:size]
+        given = [self._lesson, wp.from_torch(pictures), wp.from_torch(made)]
+
+        def work(member: int, first: int, last: int) -> None:
+            del member
+            inputs = [first, last, *given]
+            wp.launch(gradients_kernel.answer, 1, inputs=inputs, device="cpu")
+
+        self._crew.share_out(0, len(pictures), work)
+        return made
+
+    def logits(self, made: Tensor, count: int) -> Tensor:
+        """Those of the last layer. Shape: (count, num_actions)."""
+        last = made[count * (self._size - self._strides[-1]) :].view(count, -1)
+        return last[:, : len(self._layers[-1].layer.weight)].clone()
+
+    def learn(self, pictures: Tensor, made: Tensor, slopes: Tensor) -> list[Tensor]:
+        """Gradients of the parameters by those of the logits; takes `made` for the next answer."""
+        self._gradients.zero_()
+        self._go_back(pictures, made, slopes, self._gradients, torch.empty(0, 0))
+        return self._order.unpack(self._gradients.sum(0))
+
+    def look_back(self, pictures: Tensor, made: Tensor, slopes: Tensor) -> Tensor:
+        """Gradient of the pictures by those of the logits; takes `made` for the next answer."""
+        seen = torch.empty_like(pictures)
+        self._go_back(pictures, made, slopes, torch.empty(0, 0), seen)
+        return seen
+
+    def _go_back(
+        self, pictures: Tensor, made: Tensor, slopes: Tensor, gradients: Tensor, seen: Tensor
+    ) -> None:
+        arrays = (pictures, made, slopes.contiguous(), self._rooms, self._patches, gradients, seen)
+        given = [self._lesson, *(wp.from_torch(array) for array in arrays)]
+
+        def work(member: int, first: int, last: int) -> None:
+            inputs = [first, last, member, *given]
+            wp.launch(gradients_kernel.learn, 1, inputs=inputs, device="cpu")
+
+        self._crew.share_out(0, len(pictures), work)
+        self._spare = made
+
+
+def _odd(size: int) -> int:
+    """Room for so many numbers: an odd number of cache lines, or rows would push each other out."""
+    lines = -(-size // WIDTH)
+    return WIDTH * (lines + 1 - lines % 2)
+
+
+def _ints(values: Any) -> wp.array:
+    return wp.from_torch(torch.tensor(values, dtype=torch.int32))
