@@ -1,7 +1,11 @@
 """What learns, out of a training's settings and what it collects with."""
 
+import torch
+from torch import nn
+
 from drone_rl.api.collecting import Collecting
-from drone_rl.policies import ActorCritic
+from drone_rl.policies import ActorCritic, make_actor
+from drone_rl.policies.learning_network import LearningNetwork
 from drone_rl.settings.configuration import as_config
 from drone_rl.settings.objectives import WithCritic
 from drone_rl.settings.training import TrainSettings
@@ -30,7 +34,7 @@ def reinforce_learner(settings: TrainSettings, made: Collecting) -> ReinforceLea
     return ReinforceLearner(
         network=made.network,
         estimator=settings.returns.make().to(settings.device),
-        loss=settings.objective.make(made.collector.actor).to(settings.device),
+        loss=settings.objective.make(_learning_actor(settings, made)).to(settings.device),
         optimiser=optimiser,
         scheduler=settings.scheduler.make(optimiser),
         max_grad_norm=settings.trainer.max_grad_norm,
@@ -58,3 +62,13 @@ def actor_critic_learner(settings: TrainSettings, made: Collecting) -> ActorCrit
         chunk_frames=settings.trainer.minibatch_frames,
         **objective.passes,
     )
+
+
+def _learning_actor(settings: TrainSettings, made: Collecting) -> nn.Module:
+    """The actor; its network by a kernel, if that is asked for and there is one that knows it."""
+    actor, trainer = made.collector.actor, settings.trainer
+    network = LearningNetwork.find(made.network, trainer.num_threads) if trainer.compiled else None
+    if network is None:
+        return actor
+    torch.set_num_threads(1)  # what is left to torch is small, and its threads wait in loops
+    return make_actor(network, actor.spec["action"])

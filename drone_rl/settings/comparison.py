@@ -17,9 +17,9 @@ def modern(config: Mapping[str, Any]) -> dict[str, Any]:
 
     Until version 0.1 the group of networks was called policy, the collector's maker stood under
     "make", and settings told Hydra how to make things (`_partial_`, and `_target_` of task and
-    camera). Until 0.2 a training learned on as many threads as it collected on,
-    took its running mean at its word, and took every step in Python, worlds had one look, and
-    drones moved in computer-vision mode alone.
+    camera). Until 0.2 a training learned on as many threads as it collected on, took its running
+    mean at its word, and took every step and gradient in Python; worlds had one look,
+    and drones moved in computer-vision mode alone.
 
     Args:
         config: Of any version, as it stands in a checkpoint or a sweep's folder.
@@ -87,8 +87,9 @@ def _collector(group: Any) -> Any:
 def _trainer(group: Any, collector: Any) -> Any:
     if not (isinstance(group, Mapping) and isinstance(collector, Mapping)):
         return group
-    unasked = {"confirm_episodes": 0, "confirm_share": 1.0}
-    return {"num_threads": collector.get("num_threads", 1), **unasked, **group}
+    flights = {"confirm_episodes": 0, "confirm_share": 1.0}
+    learning = {"num_threads": collector.get("num_threads", 1), "compiled": False}
+    return {**learning, **flights, **group}
 
 
 def _transforms(group: Any) -> Any:

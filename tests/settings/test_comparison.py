@@ -52,9 +52,11 @@ def test_a_training_of_old_took_each_step_in_python():
 
 def test_a_training_of_old_learned_on_as_many_threads_as_it_collected_on():
     old = {"collector": {"num_threads": 3}, "trainer": {"total_frames": 10}}
-    unasked = {"confirm_episodes": 0, "confirm_share": 1.0}
+    flights = {"confirm_episodes": 0, "confirm_share": 1.0}
+    unasked = {**flights, "compiled": False}
     assert modern(old)["trainer"] == {"total_frames": 10, "num_threads": 3, **unasked}
-    new = {**old, "trainer": {"num_threads": 2, "confirm_episodes": 5, "confirm_share": 0.5}}
+    now = {"confirm_episodes": 5, "confirm_share": 0.5, "compiled": True}
+    new = {**old, "trainer": {"num_threads": 2, **now}}
     assert modern(new) == new
 
 
