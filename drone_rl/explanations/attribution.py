@@ -6,12 +6,13 @@ from typing import Literal
 
 import torch
 from captum.attr import IntegratedGradients, LayerGradCam, Saliency
-from torch import Tensor
+from torch import Tensor, nn
 from torch.nn import functional
 
 from drone_rl.explanations.hooks import actions_of, find_layer, probabilities, spatial_layers
 from drone_rl.explanations.patches import replaced
 from drone_rl.policies import PictureNetwork
+from drone_rl.policies.learning_network import LearningNetwork
 from drone_rl.utils.errors import InputError
 
 Objective = Literal["probability", "logit"]
@@ -155,7 +156,8 @@ class Explainer:
 
     def _integrated(self, observations: Tensor, actions: Tensor) -> Tensor:
         """The path integral of each channel of each pixel. Shape: (T, C, H, W)."""
-        method = IntegratedGradients(self._forward("probability"))
+        quick = LearningNetwork.find(self.network, of="pictures")
+        method = IntegratedGradients(self._forward("probability", quick))
 
         def attribute(x: Tensor, a: Tensor) -> Tensor:
             return method.attribute(
@@ -169,12 +171,15 @@ class Explainer:
 
         return _in_batches(attribute, observations, actions)
 
-    def _forward(self, objective: Objective) -> Callable[[Tensor], Tensor]:
+    def _forward(
+        self, objective: Objective, network: nn.Module | None = None
+    ) -> Callable[[Tensor], Tensor]:
         if objective not in ("probability", "logit"):
             raise InputError(f"objective={objective!r} is unknown; give probability or logit")
         actions = actions_of(self.network)
         make = actions.scores if objective == "logit" else actions.wish
-        return lambda x: make(self.network(x))
+        answer = self.network if network is None else network
+        return lambda x: make(answer(x))
 
 
 def _in_batches(

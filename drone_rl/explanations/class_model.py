@@ -10,6 +10,7 @@ from torch.nn import functional
 
 from drone_rl.explanations.hooks import actions_of
 from drone_rl.policies import PictureNetwork
+from drone_rl.policies.learning_network import LearningNetwork
 from drone_rl.utils.errors import InputError
 
 AS_PROBABLE = 0.01
@@ -185,7 +186,8 @@ def visualise(
     pictures = start.repeat(num_actions, 1, 1, 1)
     action = torch.arange(num_actions).repeat_interleave(settings.starts)
     ascend = _ascend_fourier if settings.parameterisation == "fourier" else _ascend_pixels
-    reached = ascend(network, pictures, action, statistics, settings, generator)
+    quick = LearningNetwork.find(network, of="pictures") or network
+    reached = ascend(quick, pictures, action, statistics, settings, generator)
     with torch.no_grad():
         each = actions_of(network).wish(network(reached)).gather(1, action[:, None])[:, 0]
     by_action = (num_actions, settings.starts)

@@ -9,6 +9,7 @@ import functools
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
@@ -22,9 +23,13 @@ from drone_rl.explanations.recording import draw, fly, spread
 from drone_rl.explanations.response import ResponseMap, response_map
 from drone_rl.explanations.scenes import Scenes, empty_scene
 from drone_rl.explanations.settings import ExplainSettings
+from drone_rl.explanations.threads import Once
 from drone_rl.policies import PictureNetwork, make_actor
 from drone_rl.utils.seeding import Stream, torch_generator
 from drone_rl.verdicts.proof import Claim
+
+FILMED = 0
+"""The flight that is shown: the first, whatever it is like."""
 
 
 class LeftOutError(Exception):
@@ -66,6 +71,8 @@ class Context:
         self.explainer = Explainer(network, self.absent, settings.grad_cam_layer)
         if self.layer is not None:
             features(network, self.absent[None], self.layer)  # refuses an unknown layer now
+        self._maps: Once[dict[str, Tensor]] = Once()
+        self._frame_maps: Once[dict[str, Tensor]] = Once()
         self._start = env.base_env.state_dict()
 
     def restart(self) -> TensorDictModuleBase:
@@ -78,8 +85,9 @@ class Context:
         """The same for another thread, which may read the data set and must not move the worlds.
 
         Its network is a copy: what hooks, or gathers gradients in, the one meets not the other.
+        Maps are made once, by whichever of the two asks first.
         """
-        _ = self.dataset  # made by the thread that has the worlds
+        _ = self.dataset, self.film  # made by the thread that has the worlds
         twin = copy.copy(self)
         if self.network.is_differentiable:
             twin.network = copy.deepcopy(self.network)
@@ -104,6 +112,12 @@ class Context:
         layers = () if self.layer is None else (self.layer,)
         return draw(self.flights, rows, self.scenes, self.network, layers)
 
+    @functools.cached_property
+    def film(self) -> RolloutDataset:
+        """Every step of the flight that is shown."""
+        rows = np.flatnonzero(self.flights.episode == FILMED)
+        return draw(self.flights, rows, self.scenes, self.network)
+
     @property
     def device(self) -> str:
         """Where the worlds are."""
@@ -124,16 +138,18 @@ class Context:
         """What it did. Shape: (T,)."""
         return self.dataset.tensor("actions")
 
-    @functools.cached_property
+    @property
     def maps(self) -> dict[str, Tensor]:
         """Heat maps of the actions taken by each method, as the policy's pictures: (T, h, w)."""
+        seen = self.observations, self.actions
         methods = self.explainer.methods()
-        return {name: of(self.observations, self.actions) for name, of in methods.items()}
+        return self._maps.get(lambda: {name: of(*seen) for name, of in methods.items()})
 
-    @functools.cached_property
+    @property
     def frame_maps(self) -> dict[str, Tensor]:
         """The same, put back to where they are in the camera's frame: (T, H, W)."""
-        return {name: self.scenes.to_frame(maps) for name, maps in self.maps.items()}
+        maps, back = self.maps, self.scenes.to_frame
+        return self._frame_maps.get(lambda: {name: back(one) for name, one in maps.items()})
 
     @functools.cached_property
     def response(self) -> ResponseMap:

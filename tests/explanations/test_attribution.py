@@ -66,7 +66,7 @@ def test_what_has_no_gradients_has_but_occlusion(explainer, frames):
 def test_integrated_gradients_add_up_to_the_change_of_a_linear_policy():
     network = MLP((1, 2, 2), 2, hidden=())
     explainer = Explainer(network, torch.zeros(1, 2, 2))
-    explainer._forward = lambda objective: network  # a linear function: the sum is exact
+    explainer._forward = lambda *_: network  # a linear function: the sum is exact
     x = torch.rand(1, 1, 2, 2)
     maps = explainer.integrated_gradients(x, torch.tensor([1]))
     expected = (x[0, 0] * network.layers.logits.weight[1].view(2, 2)).abs().detach()

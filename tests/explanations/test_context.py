@@ -51,7 +51,8 @@ def test_another_thread_has_the_same_data_and_a_network_of_its_own(make_pipeline
     network = actor.module[0].module
     context = Context(env, network, SMALL)
     twin = context.aside()
-    assert twin.dataset is context.dataset
+    assert twin.dataset is context.dataset and twin.film is context.film
+    assert twin.maps is context.maps and context.frame_maps is twin.frame_maps
     assert twin.network is not network and twin.explainer.network is twin.network
     met = []
     handle = network.register_forward_hook(lambda *_: met.append("hook"))

@@ -7,18 +7,17 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from drone_rl.explanations.context import Context
-from drone_rl.explanations.recording import draw
+from drone_rl.explanations.context import FILMED, Context
 from drone_rl.explanations.sequence import key_frames
+from drone_rl.explanations.threads import aside
 
-FILMED = 0
-"""The flight that is shown: the first, whatever it is like."""
 SHOWN = ("grad_cam", "grad_cam_logit")
 """Maps of the film: the second where the first has no heat at all."""
 INSTEAD = ("saliency", "occlusion")
 """The first that there is, of a policy without Grad-CAM."""
 
 
+@aside
 def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
     """Makes "attribution".
 
@@ -26,9 +25,8 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
     "film_frames" (n, H, W, 3), "film_heat" (n, H, W), "film_probabilities" and "film_actions".
     """
     arrays = {f"map_{name}": _peak(maps) for name, maps in context.frame_maps.items()}
-    flights, explainer = context.flights, context.explainer
-    rows = np.flatnonzero(flights.episode == FILMED)
-    film = draw(flights, rows, context.scenes, context.network)
+    flights, explainer, film = context.flights, context.explainer, context.film
+    first = int(np.flatnonzero(flights.episode == FILMED)[0])
     methods = [name for name in SHOWN if name in context.maps]
     methods = methods or [name for name in INSTEAD if name in context.maps][:1]
     heat = torch.zeros(film.frames.shape[:-1])
@@ -52,7 +50,7 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
             "episode": FILMED,
             "heat_by": by,
             "key_steps": [
-                {"step": frame - int(rows[0]), "why": why}
+                {"step": frame - first, "why": why}
                 for frame, why in key_frames(flights, FILMED, context.scenes.task)
             ],
         },

@@ -6,8 +6,10 @@ from numpy.typing import NDArray
 
 from drone_rl.explanations import contradictions, loops
 from drone_rl.explanations.context import Context
+from drone_rl.explanations.threads import aside
 
 
+@aside
 def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
     """Makes "contradictions", of the frames analysed, and "loops", of the whole flights."""
     data, flights = context.dataset, context.flights

@@ -1,9 +1,11 @@
 """Are the heat maps true? Held to what changing the scene does, beside maps that know nothing."""
 
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from torch import Tensor
 
 from drone_rl.explanations import interventions, trust, truth
 from drone_rl.explanations.context import Context
@@ -56,12 +58,14 @@ def _maps(context: Context, trial: Trial) -> dict[str, Any]:
     """The tests of all methods, and curves of methods and placebos."""
     methods = trust.method_maps(context.explainer) if context.network.has_weights else {}
     maps = {name: trial.maps(method) for name, method in methods.items()}
-    curves = {
-        name: deletion_insertion(
-            trial.network, trial.observations, trial.actions, m, context.absent, trial.episode
-        )
-        for name, m in {**maps, **trial.placebos}.items()
-    }
+    every = {**maps, **trial.placebos}
+    asked = trial.network, trial.observations, trial.actions
+
+    def curve(heat: Tensor) -> dict[str, Any]:
+        return deletion_insertion(*asked, heat, context.absent, trial.episode)
+
+    with ThreadPoolExecutor(2) as pool:
+        curves = dict(zip(every, pool.map(curve, every.values()), strict=True))
     return {**trust.check_maps(trial, methods, maps), "curves": {"shares": SHARES, **curves}}
 
 
