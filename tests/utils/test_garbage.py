@@ -47,6 +47,7 @@ class Loop: pass
 looks = []
 gc.callbacks.append(lambda phase, info: looks.append(phase))
 look_for_garbage_rarely()
+gc.collect(); looks.clear()
 loop = Loop(); loop.itself = loop; gone = weakref.ref(loop); del loop
 kept = [[] for _ in range(40_000)]
 print(len(looks), gone() is None)
@@ -54,3 +55,14 @@ more = [[] for _ in range(20_000)]
 print(len(looks) > 0, gone() is None)"""
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "0 False\nTrue True\n"
+
+
+def test_after_the_first_look_it_looks_more_often():
+    code = """import gc
+from drone_rl.utils.garbage import look_for_garbage_rarely
+look_for_garbage_rarely()
+print(gc.get_threshold()[0])
+gc.collect()
+print(gc.get_threshold()[0], len(gc.callbacks))"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "700000\n50000 0\n"
