@@ -23,6 +23,8 @@ from drone_rl.policies.packed_layer import Order, PackedLayer, packed_layers
 from drone_rl.sim.rendering.crew import Crew
 from drone_rl.sim.rendering.devices import start_warp
 
+MOST_WEIGHTS = 2**20
+"""Of a network; more of them don't stay near a core, and torch is as fast."""
 Of = Literal["weights", "pictures"]
 """What has gradients."""
 
@@ -50,9 +52,11 @@ class LearningNetwork(PictureNetwork):
 
     @classmethod
     def find(cls, network: nn.Module, num_threads: int = 1, *, of: Of = "weights") -> Self | None:
-        """The same, if the network is of such layers and on the CPU."""
+        """The same, if the network is of such layers, small, and on the CPU."""
         layers = packed_layers(network)
         if layers is None or (of == "pictures" and not layers[0].has_way_back):
+            return None
+        if sum(p.numel() for p in network.parameters()) > MOST_WEIGHTS:
             return None
         assert isinstance(network, PolicyNetwork)
         return cls(network, num_threads, of=of)

@@ -78,7 +78,8 @@ def test_a_run_of_version_0_1_goes_on(tmp_path):
     (tmp_path / "checkpoints").mkdir()
     shutil.copy(OLD, tmp_path / "checkpoints" / "last.pt")
     before = drone_rl.load_policy(tmp_path).state["progress"]
-    more = TrainerSettings(total_frames=before["frames"] + 50, num_threads=1)  # as it was
+    was = {"num_threads": 1, "compiled": False, "minibatch_frames": 512}
+    more = TrainerSettings(total_frames=before["frames"] + 50, **was)
     done = drone_rl.train(folder=tmp_path, resume=True, trainer=more, progress=silent)
     assert done.result["updates"] > before["updates"]
     assert done.result["frames"] >= before["frames"] + 50

@@ -88,6 +88,8 @@ def test_only_what_the_kernel_knows():
     assert LearningNetwork.find(MLP((1, 25, 64), 3), 1) is None
     assert LearningNetwork.find(OriginalCNN((1, 25, 64), 3), 1) is None
     assert LearningNetwork.find(SmallCNN((2, 25, 64), 3), 1) is None
+    assert LearningNetwork.find(SmallCNN((1, 25, 64), 3, hidden=(500,)), 1) is not None
+    assert LearningNetwork.find(SmallCNN((1, 25, 64), 3, hidden=(600,)), 1) is None  # too many
 
 
 def test_rows_begin_an_odd_number_of_cache_lines_apart():
