@@ -1,5 +1,7 @@
 """What learns, out of a training's settings and what it collects with."""
 
+from typing import Any
+
 import torch
 from torch import nn
 
@@ -71,4 +73,5 @@ def _learning_actor(settings: TrainSettings, made: Collecting) -> nn.Module:
     if network is None:
         return actor
     torch.set_num_threads(1)  # what is left to torch is small, and its threads wait in loops
-    return make_actor(network, actor.spec["action"])
+    spec: Any = actor.spec  # torch's modules are annotated to hold anything
+    return make_actor(network, spec["action"])

@@ -1,5 +1,6 @@
 # ruff: noqa: UP018
 # pyright: reportIndexIssue=false
+# pyright: reportAttributeAccessIssue=false
 # pyright: reportGeneralTypeIssues=false
 # pyright: reportArgumentType=false
 # pyright: reportCallIssue=false
