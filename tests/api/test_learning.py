@@ -14,6 +14,7 @@ from drone_rl.api.collecting import build_collector
 from drone_rl.api.exporting import export
 from drone_rl.api.learning import build_learner
 from drone_rl.api.progress import silent
+from drone_rl.policies.learning_network import LearningNetwork
 from drone_rl.settings.collecting import Rollouts, Threads
 from drone_rl.settings.judging import FlightSettings
 from drone_rl.settings.learning import Sgd
@@ -55,6 +56,28 @@ def test_every_objective_has_its_learner():
         assert isinstance(learner, kind)
         assert learner.network is made.network
         made.collector.shutdown()
+
+
+def test_gradients_by_the_kernel_teach_what_those_of_torch_do():
+    learned = {}
+    for is_compiled in (True, False):
+        limits = TrainerSettings(compiled=is_compiled, minibatch_frames=40)
+        settings = TrainSettings(task=TASK, trainer=limits, optimiser=Sgd(lr=1.0))
+        made = build_collector(settings)
+        learner = build_learner(settings, made)
+        network = learner.loss.actor_network.module[0].module
+        assert isinstance(network, LearningNetwork) is is_compiled
+        before = [p.detach().clone() for p in made.network.parameters()]
+        batch = next(iter(made.collector))
+        assert len(batch) > 2 * limits.minibatch_frames
+        learner.update(batch)
+        made.collector.shutdown()
+        learned[is_compiled] = [
+            p.detach() - b for p, b in zip(made.network.parameters(), before, strict=True)
+        ]
+    for by_kernel, by_torch in zip(learned[True], learned[False], strict=True):
+        assert by_torch.any()
+        assert (by_kernel - by_torch).norm() < 0.01 * by_torch.norm()  # but for an output near 0
 
 
 @pytest.mark.parametrize("shares", [True, False])
