@@ -48,8 +48,8 @@ class TrainerSettings(Settings):
     minibatch_frames: Annotated[int, Whole(1, unit="frames")] = 1024
     """Frames in one forward and backward pass; bounds memory, changes nothing else."""
     compiled: bool = True
-    """Whether a compiled kernel works out gradients, where it knows the network: twice as fast on a
-    CPU. It adds in another order, so this is part of what a seed means."""
+    """Whether a compiled kernel works out gradients, where it knows the network: sooner than
+    torch on a CPU. It adds in another order, so this is part of what a seed means."""
     num_threads: Annotated[int, Whole(1, unit="threads")] = 2
     """Threads that learn, wherever this runs; sums depend on how many there are."""
     checkpoint_interval_s: Annotated[float, Real(0.0, unit="s")] = 15.0
