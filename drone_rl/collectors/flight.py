@@ -24,6 +24,7 @@ from drone_rl.envs.transforms import StandardizePixels
 from drone_rl.policies.actor import CategoricalActor
 from drone_rl.policies.packing import PackedNetwork
 from drone_rl.sim.rendering.crew import Crew
+from drone_rl.sim.rendering.devices import loading
 from drone_rl.sim.rendering.raytrace import Raytracer
 from drone_rl.sim.rendering.raytrace_structs import Pictures
 from drone_rl.sim.tasks.collect_cubes.flying import FlyingCubes
@@ -62,7 +63,7 @@ class Flight:
         self._actions, self._reasons = (torch.empty(rows, dtype=torch.int32) for _ in range(2))
         self._rewards = torch.empty(rows)
         self._log = self._make_log()
-        wp.load_module(flight_kernel, device="cpu")
+        loading(flight_kernel)
 
     @classmethod
     def find(cls, sight: Sight, actor: TensorDictModuleBase, num_cores: int) -> Self | None:
@@ -102,6 +103,7 @@ class Flight:
             Episode after episode: what was seen, "action", what `Sight.tell` tells, and
             ("collector", "traj_ids"), from 0. Shape: (T_total,).
         """
+        loading(flight_kernel).result()
         self._sight.env.start()
         state: Any = self._sight.worlds.state
         self._worlds.begin(state)

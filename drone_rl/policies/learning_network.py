@@ -21,7 +21,7 @@ from drone_rl.policies.layers_kernel import WIDTH
 from drone_rl.policies.network import PictureNetwork
 from drone_rl.policies.packed_layer import Order, PackedLayer, packed_layers
 from drone_rl.sim.rendering.crew import Crew
-from drone_rl.sim.rendering.devices import start_warp
+from drone_rl.sim.rendering.devices import loading
 
 MOST_WEIGHTS = 2**20
 """Of a network; more of them don't stay near a core, and torch is as fast."""
@@ -49,6 +49,7 @@ class LearningNetwork(PictureNetwork):
         self.network, self.in_shape, self.actions = network, network.in_shape, network.actions
         self._num_threads, self._of = num_threads, of
         self._work: _Work | None = None
+        loading(gradients_kernel)
 
     @classmethod
     def find(cls, network: nn.Module, num_threads: int = 1, *, of: Of = "weights") -> Self | None:
@@ -101,7 +102,7 @@ class _Work:
     """Packed layers, and room to work in."""
 
     def __init__(self, layers: Sequence[PackedLayer], num_threads: int, *, is_fixed: bool) -> None:
-        start_warp("cpu")
+        loading(gradients_kernel).result()
         self._layers = layers
         self._crew = Crew(num_threads, num_threads)
         self._order = order = Order(layers)
@@ -125,7 +126,6 @@ class _Work:
         self._gradients = torch.empty(self._crew.size, *self._weights.shape)
         self._is_fixed = is_fixed
         order.pack(self._weights, self._back)
-        wp.load_module(gradients_kernel, device="cpu")
 
     @property
     def parameters(self) -> list[Tensor]:

@@ -1,7 +1,10 @@
 """Where pictures are drawn, and Warp, which does it, started without a word."""
 
 import functools
+import os
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import AbstractContextManager, nullcontext
+from types import ModuleType
 
 import torch
 import warp as wp
@@ -35,6 +38,32 @@ def start_warp(device: str) -> None:
     wp.config.log_level = max(wp.config.log_level, quiet)
     with standard_error_closed() if device == "cpu" else nullcontext():
         wp.init()  # its native part tells, whatever the level
+
+
+def loading(kernels: ModuleType) -> Future[None]:
+    """Kernels for the CPU, compiled on a thread aside or taken from the cache, once a process.
+
+    The first time a compiler works for seconds at each module, and at several at once on as many
+    cores: so ask early, and wait for the result before the first launch.
+
+    Args:
+        kernels: The module that has them.
+    """
+    start_warp("cpu")
+    return _loading(kernels, os.getpid())
+
+
+@functools.cache
+def _loading(kernels: ModuleType, process: int) -> Future[None]:
+    del process  # none of its threads goes on in a fork
+    aside = ThreadPoolExecutor(1, "compile")
+    loaded = aside.submit(_load, kernels)
+    aside.shutdown(wait=False)
+    return loaded
+
+
+def _load(kernels: ModuleType) -> None:
+    wp.load_module(kernels, device="cpu")
 
 
 def on_torch_stream(device: torch.device) -> AbstractContextManager:

@@ -1,10 +1,13 @@
 import subprocess
 import sys
+import types
+from threading import get_ident
 
 import pytest
 import torch
 
-from drone_rl.sim.rendering.devices import check_device
+from drone_rl.sim.rendering import devices
+from drone_rl.sim.rendering.devices import check_device, loading
 from drone_rl.utils.errors import InputError
 
 
@@ -23,3 +26,31 @@ def test_warp_starts_without_a_word():
     code = "from drone_rl.sim.rendering.devices import start_warp; start_warp('cpu')"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert (done.stdout, done.stderr) == ("", "")
+
+
+def test_kernels_are_loaded_once_on_a_thread_aside(monkeypatch):
+    loaded = []
+    monkeypatch.setattr(devices.wp, "load_module", lambda *_, **__: loaded.append(get_ident()))
+    kernels = types.ModuleType("kernels")
+    first = loading(kernels)
+    assert loading(kernels) is first
+    assert first.result() is None
+    assert len(loaded) == 1
+    assert loaded[0] != get_ident()
+
+
+def test_what_a_compiler_refuses_is_told_to_who_waits(monkeypatch):
+    def refuse(*_, **__):
+        raise RuntimeError("no such kernel")
+
+    monkeypatch.setattr(devices.wp, "load_module", refuse)
+    with pytest.raises(RuntimeError, match="no such kernel"):
+        loading(types.ModuleType("kernels")).result()
+
+
+def test_another_process_loads_kernels_anew(monkeypatch):
+    monkeypatch.setattr(devices.wp, "load_module", lambda *_, **__: None)
+    kernels = types.ModuleType("kernels")
+    here = loading(kernels)
+    monkeypatch.setattr(devices.os, "getpid", lambda: -1)  # as in a fork
+    assert loading(kernels) is not here
