@@ -24,11 +24,14 @@ from drone_rl.sim.settings import MINIMAL
 from drone_rl.zoo import read_checkpoint
 
 DEFAULT, ALL = "default", "all"
+ALL_KINDS = "all_kinds"
+"""What the mean over all kinds of shift is called: no training can choose what is in it."""
 ARMS: Mapping[str, tuple[str, ...]] = {
     DEFAULT: (),
     "none": ("experiment=robust", "appearance=minimal", "transforms=chromaticity"),
     "light and color": ("experiment=robust", "transforms=chromaticity"),
     "shift": ("experiment=robust", "appearance=minimal"),
+    "all but the camera": ("experiment=robust", "appearance=relit"),
     ALL: ("experiment=robust",),
 }
 """Settings of each arm's trainings. Those of the ablation see colors as `ALL` does."""
@@ -47,8 +50,9 @@ def bench_robust(folder: Path, seeds: Sequence[int], quick: bool) -> dict[str, A
 
     Returns:
         In points, means over seeds: "robust_gain_points" on kinds of shift that training does not
-        touch, "robust_room_points", all that could be gained there, and "robust_cost_points" where
-        nothing is different. "robust_untouched": these kinds. "robust_arms": by arm, lists over
+        touch, "robust_room_points", all that could be gained there, "robust_gain_all_kinds_points"
+        on all kinds, touched or not, and "robust_cost_points" where nothing is different.
+        "robust_untouched": the kinds that are not. "robust_arms": by arm, lists over
         seeds of "frames", "plain", "untouched" and each kind's mean share of successful flights.
     """
     seeds, brief = (seeds[:1], _BRIEF) if quick else (seeds, ())
@@ -114,20 +118,22 @@ def _told(shares: Mapping[str, float], untouched: Sequence[str]) -> dict[str, fl
         PLAIN: shares[PLAIN],
         "untouched": mean([kinds[kind] for kind in untouched]),
         "untouched_axes": mean(axes),
+        ALL_KINDS: mean([*kinds.values()]),
         **kinds,
     }
 
 
 def _points(default: Sequence[Mapping[str, float]], robust: Sequence[Mapping[str, float]]) -> Any:
     """Differences between policies of one seed, and what there was to gain."""
-    gains, by_axis, losses = (
+    gains, by_axis, everywhere, losses = (
         [100 * (r[name] - d[name]) for d, r in zip(default, robust, strict=True)]
-        for name in ("untouched", "untouched_axes", PLAIN)
+        for name in ("untouched", "untouched_axes", ALL_KINDS, PLAIN)
     )
     return {
         "robust_gain_points": mean(gains),
         "robust_gain_by_seed": gains,
         "robust_gain_by_axis_points": mean(by_axis),
+        "robust_gain_all_kinds_points": mean(everywhere),
         "robust_room_points": 100 * (1.0 - mean([d["untouched"] for d in default])),
         "robust_cost_points": -mean(losses),
     }

@@ -57,12 +57,14 @@ def test_the_figures(called, monkeypatch, tmp_path):
     # of five kinds one differs: by 0.2 with seed 1, by 0.3 with seed 2
     assert found["robust_gain_by_seed"] == pytest.approx([100 * 0.2 / 5, 100 * 0.3 / 5])
     assert found["robust_gain_points"] == pytest.approx(5.0)
+    # of ten kinds one does, whether training touches them or not
+    assert found["robust_gain_all_kinds_points"] == pytest.approx(100 * 0.25 / 10)
     # of seven axes two do
     assert found["robust_gain_by_axis_points"] == pytest.approx(100 * 0.25 * 2 / 7)
     assert found["robust_room_points"] == pytest.approx(100 * 1.2 / 5)
     assert found["robust_cost_points"] == pytest.approx(2.0)
     arms = found["robust_arms"]
-    assert list(arms) == list(ARMS) and arms["all"]["frames"] == [41, 42]
+    assert list(arms) == list(ARMS) and arms["all"]["frames"] == [51, 52]
     assert arms["all"]["camera position"] == pytest.approx([0.6, 0.7])
     assert arms["none"][PLAIN] == [1.0, 1.0] and arms["none"]["light"] == [1.0, 1.0]
     by_run = {
@@ -71,7 +73,7 @@ def test_the_figures(called, monkeypatch, tmp_path):
     assert "experiment=robust" not in by_run["default_1"] and "seed=1" in by_run["default_1"]
     assert {"experiment=robust", "seed=2"} <= set(by_run["all_2"])
     assert {"appearance=minimal", "transforms=chromaticity"} <= set(by_run["none_1"])
-    assert len(by_run) == 10
+    assert len(by_run) == 12
 
 
 def test_a_quick_one_trains_one_seed_for_a_moment(called, monkeypatch, tmp_path):
@@ -83,7 +85,7 @@ def test_a_quick_one_trains_one_seed_for_a_moment(called, monkeypatch, tmp_path)
 
     monkeypatch.setattr(robust, "fly", flown)
     found = bench_robust(tmp_path, [1, 2], quick=True)
-    assert len(called) == 5 and all("trainer.total_frames=1000" in c for c in called)
+    assert len(called) == 6 and all("trainer.total_frames=1000" in c for c in called)
     assert told == [(5, 1)] and found["robust_gain_points"] == 0.0
 
 

@@ -8,13 +8,14 @@ from tools.readme.tables import UNKNOWN
 
 def test_a_line_for_each_kind_and_a_column_for_each_arm():
     kinds = {kind: [0.8, 0.9] for kind in GROUPS}
-    arm = {"plain": [1.0, 0.99], "untouched": [0.5, 0.75], **kinds}
+    arm = {"plain": [1.0, 0.99], "untouched": [0.5, 0.75], "all_kinds": [0.4, 0.6], **kinds}
     table = make_robust({"robust_arms": {"all": arm}, "robust_untouched": ["dynamics"]})
     head, _, *lines = table.splitlines()
     assert head == "| successful flights, % | " + " | ".join(ARMS) + " |"
-    assert len(lines) == 1 + len(GROUPS) + 1
+    assert len(lines) == 1 + len(GROUPS) + 2
     assert lines[0].startswith("| the world as it is |")
     assert lines[0].endswith(f"| {UNKNOWN} | 100 (99 to 100) |")
-    assert lines[-2].startswith("| **dynamics** |") and lines[-2].endswith("| 85 (80 to 90) |")
-    assert lines[-1].endswith("| 62 (50 to 75) |")
+    assert lines[-3].startswith("| **dynamics** |") and lines[-3].endswith("| 85 (80 to 90) |")
+    assert lines[-2].endswith("| 62 (50 to 75) |")
+    assert lines[-1].startswith("| mean of all kinds |") and lines[-1].endswith("| 50 (40 to 60) |")
     assert lines[1].startswith(f"| {GROUPS[0]} |")

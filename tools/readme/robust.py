@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from drone_rl.bench.robust import ARMS
+from drone_rl.bench.robust import ALL_KINDS, ARMS
 from drone_rl.conditions.axes import GROUPS
 from drone_rl.conditions.comparing import PLAIN, mean
 from tools.readme.tables import UNKNOWN
@@ -14,7 +14,7 @@ _UNTOUCHED = "untouched"
 def make_robust(figures: Mapping[str, Any]) -> str:
     """A table in Markdown, a line for each kind of shift; a column for each arm of the ablation."""
     measured, untouched = figures.get("robust_arms", {}), figures.get("robust_untouched", ())
-    names = [PLAIN, *GROUPS, _UNTOUCHED]
+    names = [PLAIN, *GROUPS, _UNTOUCHED, ALL_KINDS]
     lines = [_line(["successful flights, %", *ARMS]), _line(["---"] * (1 + len(ARMS)))]
     for name in names:
         cells = [_cell(measured.get(arm, {}).get(name)) for arm in ARMS]
@@ -27,6 +27,8 @@ def _title(name: str, untouched: Sequence[str]) -> str:
         return "the world as it is"
     if name == _UNTOUCHED:
         return "**mean of the kinds that are not touched**"
+    if name == ALL_KINDS:
+        return "mean of all kinds"
     return f"**{name}**" if name in untouched else name
 
 
