@@ -15,6 +15,7 @@ from drone_rl.sim.rendering import (
 )
 from drone_rl.sim.rendering import raytrace_structs as structs
 from drone_rl.sim.rendering.crew import Crew
+from drone_rl.sim.rendering.devices import loading
 
 
 class CorePainter:
@@ -23,12 +24,11 @@ class CorePainter:
     def __init__(self, num_worlds: int, num_shards: int | None) -> None:
         """Starts the threads; see `Raytracer`."""
         self._crew = Crew(num_worlds, num_shards)
-        self._is_scenic = False
         self._desks: dict[tuple[int, int], raytrace_kernel.Desk] = {}
 
     def load(self) -> None:
-        """Compiles the kernel or takes it from the cache."""
-        wp.load_module(raytrace_kernel, device="cpu")
+        """Begins to compile the kernel, or to take it from the cache."""
+        loading(raytrace_kernel)
 
     def paint(
         self,
@@ -56,10 +56,8 @@ class CorePainter:
             self._desks[size] = make_desk(self._crew.size, *size)
         desk = self._desks[size]
         plain = scenery is None
+        loading(raytrace_kernel if plain else raytrace_scenic).result()
         draw = raytrace_kernel.draw if plain else raytrace_scenic.draw_scenic
-        if not (plain or self._is_scenic):
-            wp.load_module(raytrace_scenic, device="cpu")  # not by several threads at a time
-            self._is_scenic = True
         given = [view, geoms, poses, looks, *([] if plain else [scenery]), desk, pictures]
 
         def work(member: int, first: int, last: int) -> None:
