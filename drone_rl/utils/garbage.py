@@ -21,18 +21,19 @@ def look_for_garbage_rarely() -> None:
     """Lets Python's collector look once in 50,000 new objects, not in 700: it finds next to none.
 
     For programs, not for libraries: half a million objects come with torch, and looking through
-    all of them, as Python does again and again while they are made, takes most of a second. So the
-    first look comes once there are more than these.
+    them, even once, takes a third of a second. So when there are more than these, whatever is there
+    is set aside for good, and only what is made from then on is looked at.
     """
     gc.set_threshold(700_000, 50, 100)
     gc.callbacks.append(_from_now_on)
 
 
 def _from_now_on(phase: str, info: dict[str, int]) -> None:
-    del info
-    if phase == "stop":
-        gc.callbacks.remove(_from_now_on)
-        gc.set_threshold(50_000, 50, 100)
+    """Is called before the first look: it finds nothing to look at."""
+    del phase, info
+    gc.callbacks.remove(_from_now_on)
+    gc.freeze()
+    gc.set_threshold(50_000, 50, 100)
 
 
 def leave_garbage_to_the_system() -> None:

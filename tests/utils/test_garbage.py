@@ -66,3 +66,19 @@ gc.collect()
 print(gc.get_threshold()[0], len(gc.callbacks))"""
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "700000\n50000 0\n"
+
+
+def test_what_came_with_the_imports_is_never_looked_through():
+    code = """import gc, weakref
+from drone_rl.utils.garbage import look_for_garbage_rarely
+class Loop: pass
+look_for_garbage_rarely()
+early = Loop(); early.itself = early; gone = weakref.ref(early); del early
+before = gc.get_freeze_count()
+gc.collect(0)
+print(gc.get_freeze_count() > before + 1000, len(gc.get_objects()) < 100, gone() is None)
+late = Loop(); late.itself = late; gone = weakref.ref(late); del late
+gc.collect()
+print(gone() is None)"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "True True False\nTrue\n"
