@@ -117,12 +117,13 @@ TRUTH = (
     Row(
         "robust",
         "`experiment=robust` over the default, points of successful flights under the kinds of "
-        "shift that training does not touch, three seeds; cost where nothing is different",
+        "shift that training does not touch, three seeds; under all kinds; cost where nothing is "
+        "different",
         lambda f: (
             f"{f['robust_gain_points']:+.1f} of {f['robust_room_points']:.1f} that there are to "
-            f"gain; {f['robust_cost_points']:.1f}"
+            f"gain; {f['robust_gain_all_kinds_points']:+.1f}; {f['robust_cost_points']:.1f}"
         ),
-        "+15; at most 1",
+        "+15; -; at most 1",
     ),
     Row(
         "mutants",
