@@ -28,7 +28,7 @@ def bench_startup(folder: Path, device: str, quick: bool) -> dict[str, float]:
         "import_s" of the package alone, "start_to_first_update_s" of `drone-rl train`,
         "first_compile_s" that the same takes longer where no kernels are cached, "verdict_s"
         of `drone-rl verdict policy=good`, with its 400 episodes; "import_torch_s", which tells how
-        fast the machine is, and the two times as they would be where that takes 1 s.
+        fast the machine is, and the three times as they would be where that takes 1 s.
     """
     times = range(1 if quick else 3)
     import_seconds()  # the first one compiles Python's files
@@ -45,6 +45,7 @@ def bench_startup(folder: Path, device: str, quick: bool) -> dict[str, float]:
         "verdict_s": verdict_s,
         "import_torch_s": torch_s,
         "start_to_first_update_scaled_s": update_s * TORCH_S / torch_s,
+        "first_compile_scaled_s": (cold - update_s) * TORCH_S / torch_s,
         "verdict_scaled_s": verdict_s * TORCH_S / torch_s,
     }
 

@@ -39,4 +39,5 @@ def test_medians_of_three_after_a_first_run(tmp_path, monkeypatch):
         **{"import_s": 0.1, "start_to_first_update_s": 4.0, "verdict_s": 6.0},
         "first_compile_s": 8.0,
         **{"import_torch_s": 2.0, "start_to_first_update_scaled_s": 2.0, "verdict_scaled_s": 3.0},
+        "first_compile_scaled_s": 4.0,
     }
