@@ -2,6 +2,7 @@
 
 import functools
 import os
+import threading
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import AbstractContextManager, nullcontext
 from types import ModuleType
@@ -50,7 +51,12 @@ def loading(kernels: ModuleType) -> Future[None]:
         kernels: The module that has them.
     """
     start_warp("cpu")
-    return _loading(kernels, os.getpid())
+    with _ONE_AT_A_TIME:
+        return _loading(kernels, os.getpid())
+
+
+_ONE_AT_A_TIME = threading.Lock()
+"""Asks: two threads that draw may both be the first."""
 
 
 @functools.cache

@@ -71,7 +71,7 @@ class Raytracer:
         self._places = Places(self.device)
 
     def prepare(self, view: View) -> None:
-        """Loads kernels and makes what they need for a view.
+        """Makes what kernels need for a view; on a CPU they are loaded by the first picture.
 
         Raises:
             InputError: The scene has no such camera, or a modality is unknown.

@@ -27,8 +27,7 @@ class CorePainter:
         self._desks: dict[tuple[int, int], raytrace_kernel.Desk] = {}
 
     def load(self) -> None:
-        """Begins to compile the kernel, or to take it from the cache."""
-        loading(raytrace_kernel)
+        """Leaves them to the first picture: a training whose flights are one kernel paints none."""
 
     def paint(
         self,

@@ -27,7 +27,7 @@ class Renderer(Protocol):
     """Draws worlds of one scene."""
 
     def prepare(self, view: View) -> None:
-        """Makes everything ready for a view, which the first picture would do otherwise.
+        """Makes ready what a view needs; kernels may be left to the first picture.
 
         Raises:
             InputError: It can't draw such a view; the message says what it can draw.

@@ -1,6 +1,9 @@
+import functools
 import subprocess
 import sys
+import time
 import types
+from concurrent.futures import ThreadPoolExecutor
 from threading import get_ident
 
 import pytest
@@ -54,3 +57,16 @@ def test_another_process_loads_kernels_anew(monkeypatch):
     here = loading(kernels)
     monkeypatch.setattr(devices.os, "getpid", lambda: -1)  # as in a fork
     assert loading(kernels) is not here
+
+
+def test_threads_that_ask_at_once_load_once(monkeypatch):
+    loaded = []
+    monkeypatch.setattr(devices.wp, "load_module", lambda *_, **__: loaded.append(get_ident()))
+    begin = devices._loading.__wrapped__
+    slow = functools.cache(lambda *key: time.sleep(0.05) or begin(*key))
+    monkeypatch.setattr(devices, "_loading", slow)
+    kernels = types.ModuleType("kernels")
+    with ThreadPoolExecutor(4) as pool:
+        asked = [f.result() for f in [pool.submit(loading, kernels) for _ in range(4)]]
+    assert len({id(future) for future in asked}) == 1
+    assert asked[0].result() is None and len(loaded) == 1
