@@ -29,8 +29,9 @@ ALL_KINDS = "all_kinds"
 ARMS: Mapping[str, tuple[str, ...]] = {
     DEFAULT: (),
     "none": ("experiment=robust", "appearance=minimal", "transforms=chromaticity"),
-    "light and color": ("experiment=robust", "transforms=chromaticity"),
+    "light and color": ("experiment=robust", "appearance=relit", "transforms=chromaticity"),
     "shift": ("experiment=robust", "appearance=minimal"),
+    "all but the shift": ("experiment=robust", "transforms=chromaticity"),
     "all but the camera": ("experiment=robust", "appearance=relit"),
     ALL: ("experiment=robust",),
 }

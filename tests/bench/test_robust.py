@@ -64,7 +64,7 @@ def test_the_figures(called, monkeypatch, tmp_path):
     assert found["robust_room_points"] == pytest.approx(100 * 1.2 / 5)
     assert found["robust_cost_points"] == pytest.approx(2.0)
     arms = found["robust_arms"]
-    assert list(arms) == list(ARMS) and arms["all"]["frames"] == [51, 52]
+    assert list(arms) == list(ARMS) and arms["all"]["frames"] == [61, 62]
     assert arms["all"]["camera position"] == pytest.approx([0.6, 0.7])
     assert arms["none"][PLAIN] == [1.0, 1.0] and arms["none"]["light"] == [1.0, 1.0]
     by_run = {
@@ -73,7 +73,9 @@ def test_the_figures(called, monkeypatch, tmp_path):
     assert "experiment=robust" not in by_run["default_1"] and "seed=1" in by_run["default_1"]
     assert {"experiment=robust", "seed=2"} <= set(by_run["all_2"])
     assert {"appearance=minimal", "transforms=chromaticity"} <= set(by_run["none_1"])
-    assert len(by_run) == 12
+    assert {"appearance=relit", "transforms=chromaticity"} <= set(by_run["light_and_color_1"])
+    assert "appearance=relit" not in by_run["all_but_the_shift_1"]
+    assert len(by_run) == 14
 
 
 def test_a_quick_one_trains_one_seed_for_a_moment(called, monkeypatch, tmp_path):
@@ -85,7 +87,7 @@ def test_a_quick_one_trains_one_seed_for_a_moment(called, monkeypatch, tmp_path)
 
     monkeypatch.setattr(robust, "fly", flown)
     found = bench_robust(tmp_path, [1, 2], quick=True)
-    assert len(called) == 6 and all("trainer.total_frames=1000" in c for c in called)
+    assert len(called) == 7 and all("trainer.total_frames=1000" in c for c in called)
     assert told == [(5, 1)] and found["robust_gain_points"] == 0.0
 
 
