@@ -7,6 +7,7 @@
 # (Warp compiles the kernel; Python's types say nothing about it.)
 """A small network asked about many pictures on one core, in half of torch's time."""
 
+import sys
 import threading
 
 import torch
@@ -15,7 +16,7 @@ from torch import Tensor, nn
 
 from drone_rl.policies.layers_kernel import Layers, decide, look
 from drone_rl.policies.packing import PackedNetwork
-from drone_rl.sim.rendering.devices import start_warp
+from drone_rl.sim.rendering.devices import loading, start_warp
 
 _TOGETHER = wp.constant(16)
 """Pictures whose linear layers are worked out together."""
@@ -57,7 +58,7 @@ class Answers:
         self._own = threading.local()
         if self._packed is not None:
             self._packed.update()
-            wp.load_module(__name__, device="cpu")
+            loading(sys.modules[__name__]).result()
 
     @torch.no_grad()
     def __call__(self, pictures: Tensor) -> Tensor:
