@@ -67,6 +67,5 @@ def pictures(**dtypes):
 def drawn(painter, name, what, dtype, scene=None):
     """One picture by a painter. Shape: (SIZE, SIZE, *)."""
     out = pictures(**{name: dtype})
-    painter.load()
     painter.paint(1, view(int(what)), scene or geoms(), poses(), looks(), out)
     return np.squeeze(getattr(out, name).numpy()).reshape(SIZE, SIZE, -1)

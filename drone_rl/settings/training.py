@@ -46,7 +46,7 @@ class TrainerSettings(Settings):
     max_grad_norm: Annotated[float, Real(0.0, is_above=True)] | None = None
     """Clip the gradient to this norm; none for no clipping."""
     minibatch_frames: Annotated[int, Whole(1, unit="frames")] = 1024
-    """Frames in one forward and backward pass; bounds memory, changes nothing else."""
+    """Frames in one forward and backward pass; bounds memory. Sums are rounded by it."""
     compiled: bool = True
     """Whether a compiled kernel works out gradients, where it knows the network: sooner than
     torch on a CPU. It adds in another order, so this is part of what a seed means."""

@@ -121,7 +121,8 @@ TRUTH = (
         "different",
         lambda f: (
             f"{f['robust_gain_points']:+.1f} of {f['robust_room_points']:.1f} that there are to "
-            f"gain; {f['robust_gain_all_kinds_points']:+.1f}; {f['robust_cost_points']:.1f}"
+            f"gain; {f['robust_gain_all_kinds_points']:+.1f}; "
+            f"{round(f['robust_cost_points'], 1) + 0.0:.1f}"
         ),
         "+15; -; at most 1",
     ),

@@ -50,7 +50,7 @@ class Raytracer:
     def __init__(
         self, scene: Scene, *, num_worlds: int, num_shards: int | None = None, device: str = "cpu"
     ) -> None:
-        """Notes what will be drawn; kernels are loaded with the first picture of a view.
+        """Notes what will be drawn; kernels are loaded with the first picture.
 
         Args:
             scene: What will be drawn.
@@ -71,13 +71,12 @@ class Raytracer:
         self._places = Places(self.device)
 
     def prepare(self, view: View) -> None:
-        """Makes what kernels need for a view; on a CPU they are loaded by the first picture.
+        """Makes what kernels need for a view; kernels are loaded by the first picture.
 
         Raises:
             InputError: The scene has no such camera, or a modality is unknown.
         """
         if view not in self._views:
-            self._painter.load()
             made, geoms = self._make(view)
             self._views[view] = Cameras(view, made, self.device), geoms
 

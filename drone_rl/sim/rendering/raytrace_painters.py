@@ -3,7 +3,10 @@
 # pyright: reportCallIssue=false
 # pyright: reportAttributeAccessIssue=false
 # (Warp's structures are untyped.)
-"""Who runs the ray tracer's kernels: the cores of a CPU, a share of the pictures each, or a GPU."""
+"""Who runs the ray tracer's kernels: the cores of a CPU, a share of the pictures each, or a GPU.
+
+Kernels are left to the first picture: a training whose flights are one kernel paints none.
+"""
 
 import warp as wp
 
@@ -25,9 +28,6 @@ class CorePainter:
         """Starts the threads; see `Raytracer`."""
         self._crew = Crew(num_worlds, num_shards)
         self._desks: dict[tuple[int, int], raytrace_kernel.Desk] = {}
-
-    def load(self) -> None:
-        """Leaves them to the first picture: a training whose flights are one kernel paints none."""
 
     def paint(
         self,
@@ -76,10 +76,6 @@ class GpuPainter:
     def __init__(self, device: str) -> None:
         """Takes the GPU, "cuda" or "cuda:N"; a CPU does, too, but slowly."""
         self._device = device
-
-    def load(self) -> None:
-        """See `CorePainter`."""
-        wp.load_module(raytrace_pixels, device=self._device)
 
     def paint(
         self,

@@ -40,7 +40,7 @@ class ReinforceLearner:
             scheduler: Stepped after each update.
             max_grad_norm: Clip the gradient to this norm; None for no clipping.
             minibatch_frames: Gradients are accumulated over chunks of this size, which bounds
-                memory and changes nothing else.
+                memory; sums are rounded by it in their last places.
         """
         self.network = network
         self.estimator = estimator
