@@ -19,6 +19,7 @@ from torch import Tensor
 from torchrl.envs.utils import ExplorationType
 
 from drone_rl.collectors import flight_kernel
+from drone_rl.collectors.logbook import Logbook
 from drone_rl.collectors.sight import Entries, Sight
 from drone_rl.envs.transforms import StandardizePixels
 from drone_rl.policies.actor import CategoricalActor
@@ -62,7 +63,7 @@ class Flight:
         self._logits = torch.empty(rows, sight.worlds.dynamics.actions.num_outputs)
         self._actions, self._reasons = (torch.empty(rows, dtype=torch.int32) for _ in range(2))
         self._rewards = torch.empty(rows)
-        self._log = self._make_log()
+        self._log, self._book = self._make_log(), Logbook()
         loading(flight_kernel)
 
     @classmethod
@@ -108,13 +109,9 @@ class Flight:
         state: Any = self._sight.worlds.state
         self._worlds.begin(state)
         self._network.update()
-        taken, reasons = self._worlds.steps[:num_worlds], self._worlds.end_reasons[:num_worlds]
-        parts = []
-        while not (parts and bool(reasons.all())):
-            before = taken.clone()
-            self._go_on(num_worlds)
-            parts.append(self._read(taken - before, keep_observations))
-        world, logged = _join(parts)
+        world, logged = self._flown(num_worlds, keep_observations)
+        for name in ("action", "end_reason"):
+            logged[name] = logged[name].long()
         if self._sight.is_brief:
             told = self._sight.flags(logged["reward"], logged["end_reason"])
         else:
@@ -130,6 +127,23 @@ class Flight:
     def close(self) -> None:
         """Ends the threads."""
         self._crew.close()
+
+    def _flown(self, num_worlds: int, keep_observations: bool) -> tuple[Tensor, dict[str, Tensor]]:
+        """Worlds of steps, episode after episode, and what was written down of these."""
+        log = {"action": self._actions, "reward": self._rewards, "end_reason": self._reasons}
+        if keep_observations:
+            log |= {"pixels": self._pictures, "logits": self._logits}
+        taken, reasons = self._worlds.steps[:num_worlds], self._worlds.end_reasons[:num_worlds]
+        self._book.begin()
+        while True:
+            before = taken.clone()
+            self._go_on(num_worlds)
+            worlds, rows = self._written(taken - before)
+            if bool(reasons.all()) and not len(self._book):  # no need to write it twice
+                return worlds, {name: values.index_select(0, rows) for name, values in log.items()}
+            self._book.add(worlds, rows, log)
+            if bool(reasons.all()):
+                return self._book.take()
 
     def _go_on(self, num_worlds: int) -> None:
         draws = torch.full((num_worlds, self._length), -1.0)
@@ -151,22 +165,15 @@ class Flight:
 
         self._crew.share_out(0, num_worlds, work)
 
-    def _read(self, lengths: Tensor, keep_observations: bool) -> "_Part":
-        """What was written down of steps, world after world.
+    def _written(self, lengths: Tensor) -> tuple[Tensor, Tensor]:
+        """Worlds and rows of the log, world after world.
 
         Args:
             lengths: Steps of each world. Shape: (num_worlds,).
-            keep_observations: Whether to read what was seen.
         """
         is_step = torch.arange(self._length) < lengths[:, None]
         rows = is_step.flatten().nonzero()[:, 0]
-        read = {"action": self._actions, "reward": self._rewards, "end_reason": self._reasons}
-        if keep_observations:
-            read |= {"pixels": self._pictures, "logits": self._logits}
-        logged = {name: values.index_select(0, rows) for name, values in read.items()}
-        for name in ("action", "end_reason"):
-            logged[name] = logged[name].long()
-        return rows // self._length, logged
+        return rows // self._length, rows
 
     def _replayed(self, world: Tensor, logged: Mapping[str, Tensor]) -> Entries:
         """What is told of steps, by the rules that know everything: nothing is drawn again."""
@@ -194,20 +201,6 @@ class Flight:
         log.actions, log.rewards = wp.from_torch(self._actions), wp.from_torch(self._rewards)
         log.end_reasons = wp.from_torch(self._reasons)
         return log
-
-
-_Part = tuple[Tensor, dict[str, Tensor]]
-"""Worlds of steps, in order, and what was written down of these."""
-
-
-def _join(parts: list[_Part]) -> _Part:
-    """Parts of the same episodes, in order, to episode after episode."""
-    if len(parts) == 1:
-        return parts[0]
-    world = torch.cat([worlds for worlds, _ in parts])
-    order = world.argsort(stable=True)
-    names = parts[0][1]
-    return world[order], {n: torch.cat([part[n] for _, part in parts])[order] for n in names}
 
 
 def _standard(sight: Sight) -> tuple[float, float] | None:
