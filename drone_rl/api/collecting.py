@@ -13,6 +13,7 @@ from drone_rl.collectors import (
     WorldsCollector,
 )
 from drone_rl.policies import PolicyNetwork, make_actor
+from drone_rl.policies.known_outputs import KnownOutputs
 from drone_rl.settings.collecting import Episodes, Ray
 from drone_rl.settings.configuration import as_config, from_config
 from drone_rl.settings.objectives import WithCritic
@@ -36,6 +37,8 @@ class Collecting(NamedTuple):
     network: PolicyNetwork
     generators: dict[str, torch.Generator]
     """Random streams of this process, by name."""
+    known: KnownOutputs | None = None
+    """What the network made of the pictures of the last batch, if that is kept."""
 
 
 def build_collector(settings: TrainSettings, practice: Practice | None = None) -> Collecting:
@@ -55,7 +58,8 @@ def build_collector(settings: TrainSettings, practice: Practice | None = None) -
 def threaded_collector(settings: TrainSettings, practice: Practice | None = None) -> Collecting:
     """`Threads`: complete episodes from threads of this process."""
     cores = max(1, num_cores() // _num_workers(settings))
-    return _threaded(settings, practice, _episodes(settings, cores))
+    is_learned_from = settings.trainer.compiled and not isinstance(settings.objective, WithCritic)
+    return _threaded(settings, practice, _episodes(settings, cores, keep_outputs=is_learned_from))
 
 
 def rollout_collector(settings: TrainSettings, practice: Practice | None = None) -> Collecting:
@@ -79,7 +83,8 @@ def _threaded(
         collectors.append(collector)
         generators[f"actions_{i}"] = actions
     assert network is not None  # there is at least one share
-    return Collecting(ThreadedCollector(collectors), network, generators)
+    known = collectors[0].known_outputs if len(collectors) == 1 else None
+    return Collecting(ThreadedCollector(collectors), network, generators, known)
 
 
 def ray_collector(settings: TrainSettings, practice: Practice | None = None) -> Collecting:
@@ -152,11 +157,14 @@ def _remote_share(
     return build_share(settings, shares, number, practice=practice, collect=collect)
 
 
-def _episodes(settings: TrainSettings, cores: int) -> Callable[..., EpisodeCollector]:
+def _episodes(
+    settings: TrainSettings, cores: int, *, keep_outputs: bool = False
+) -> Callable[..., EpisodeCollector]:
     """Makes collectors of complete episodes, each on so many cores."""
     asked = settings.collector
     is_compiled = isinstance(asked, Episodes) and asked.compiled
-    return functools.partial(EpisodeCollector, is_compiled=is_compiled, num_cores=cores)
+    how = {"is_compiled": is_compiled, "num_cores": cores, "keep_outputs": keep_outputs}
+    return functools.partial(EpisodeCollector, **how)
 
 
 def _num_workers(settings: TrainSettings) -> int:

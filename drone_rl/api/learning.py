@@ -69,7 +69,9 @@ def actor_critic_learner(settings: TrainSettings, made: Collecting) -> ActorCrit
 def _learning_actor(settings: TrainSettings, made: Collecting) -> nn.Module:
     """The actor; its network by a kernel, if that is asked for and there is one that knows it."""
     actor, trainer = made.collector.actor, settings.trainer
-    network = LearningNetwork.find(made.network, trainer.num_threads) if trainer.compiled else None
+    network = None
+    if trainer.compiled:
+        network = LearningNetwork.find(made.network, trainer.num_threads, known=made.known)
     if network is None:
         return actor
     torch.set_num_threads(1)  # what is left to torch is small, and its threads wait in loops

@@ -14,6 +14,7 @@ from torchrl.envs import EnvBase
 from drone_rl.collectors.flight import Flight
 from drone_rl.collectors.ways import StraightWay, find_way
 from drone_rl.collectors.worlds_collector import WorldsCollector
+from drone_rl.policies.known_outputs import KnownOutputs
 
 
 class EpisodeCollector(WorldsCollector):
@@ -38,6 +39,7 @@ class EpisodeCollector(WorldsCollector):
         keep_observations: bool = True,
         is_compiled: bool = False,
         num_cores: int = 1,
+        keep_outputs: bool = False,
         **kwargs: Any,
     ) -> None:
         """Connects an environment and a policy.
@@ -49,6 +51,8 @@ class EpisodeCollector(WorldsCollector):
             is_compiled: Whether a kernel may fly whole episodes, see `Flight`. It draws actions in
                 another order, and sums in the network may differ in the last place.
             num_cores: That such a kernel takes; no result depends on it.
+            keep_outputs: Whether it keeps what the network's layers made of the last batch, for
+                who learns from it, see `known_outputs`; no result depends on it.
             kwargs: See `WorldsCollector`.
 
         Raises:
@@ -59,7 +63,7 @@ class EpisodeCollector(WorldsCollector):
         self._way = find_way(env, self._observed, self._kept)
         self._flight = None
         if is_compiled and isinstance(self._way, StraightWay):
-            self._flight = Flight.find(self._way.sight, actor, num_cores)
+            self._flight = Flight.find(self._way.sight, actor, num_cores, keep_outputs=keep_outputs)
 
     @torch.no_grad()
     def collect(self, num_worlds: int | None = None) -> TensorDictBase:
@@ -87,6 +91,11 @@ class EpisodeCollector(WorldsCollector):
             steps.append(step | after)
             indices = indices[~after["next", "done"].flatten()]
         return _join(steps, worlds, flying)
+
+    @property
+    def known_outputs(self) -> KnownOutputs | None:
+        """See `WorldsCollector`."""
+        return None if self._flight is None else self._flight.known
 
     def shutdown(
         self, timeout: float | None = None, close_env: bool = True, raise_on_error: bool = True

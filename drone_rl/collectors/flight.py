@@ -9,6 +9,7 @@ ten microseconds, and a picture drawn in as many.
 """
 
 from collections.abc import Mapping
+from itertools import count
 from typing import Any, Self
 
 import torch
@@ -23,6 +24,7 @@ from drone_rl.collectors.logbook import Logbook
 from drone_rl.collectors.sight import Entries, Sight
 from drone_rl.envs.transforms import StandardizePixels
 from drone_rl.policies.actor import CategoricalActor
+from drone_rl.policies.known_outputs import KnownOutputs
 from drone_rl.policies.packing import PackedNetwork
 from drone_rl.sim.rendering.crew import Crew
 from drone_rl.sim.rendering.devices import loading
@@ -34,6 +36,8 @@ _LONGEST = 64
 """Steps that are flown at a time; most episodes end within them."""
 _MOST_NUMBERS = 2**23
 """Of the pictures that are flown through at a time."""
+_MOST_OUTPUTS = 2**24
+"""Numbers that layers make of pictures and that are kept: 64 MiB."""
 
 
 class Flight:
@@ -46,6 +50,8 @@ class Flight:
         network: PackedNetwork,
         worlds: FlyingCubes,
         num_cores: int,
+        *,
+        keep_outputs: bool = False,
     ) -> None:
         """Makes what the kernel needs; see `find`."""
         self._sight, self._actor, self._network, self._worlds = sight, actor, network, worlds
@@ -63,17 +69,28 @@ class Flight:
         self._logits = torch.empty(rows, sight.worlds.dynamics.actions.num_outputs)
         self._actions, self._reasons = (torch.empty(rows, dtype=torch.int32) for _ in range(2))
         self._rewards = torch.empty(rows)
+        parts = _MOST_OUTPUTS // (rows * network.num_outputs) if keep_outputs else 0
+        self.known = KnownOutputs(parts * rows, network.num_outputs) if parts else None
+        """What all layers made of the pictures of the last batch, if that is kept."""
         self._log, self._book = self._make_log(), Logbook()
         loading(flight_kernel)
 
     @classmethod
-    def find(cls, sight: Sight, actor: TensorDictModuleBase, num_cores: int) -> Self | None:
+    def find(
+        cls,
+        sight: Sight,
+        actor: TensorDictModuleBase,
+        num_cores: int,
+        *,
+        keep_outputs: bool = False,
+    ) -> Self | None:
         """The same, where task, pictures, network and renderer are such as the kernel knows.
 
         Args:
             sight: Of the environment.
             actor: The policy.
             num_cores: Shares of the worlds, each on a thread; no result depends on it.
+            keep_outputs: Whether to keep what all layers made, where it is not too much.
         """
         if type(actor) is not CategoricalActor:
             return None
@@ -87,7 +104,7 @@ class Flight:
         flown = FlyingCubes.find(worlds.task, worlds.dynamics, worlds.num_worlds)
         if network is None or flown is None:
             return None
-        return cls(sight, actor, network, flown, num_cores)
+        return cls(sight, actor, network, flown, num_cores, keep_outputs=keep_outputs)
 
     def can_act(self) -> bool:
         """Whether actions shall be drawn, or the most probable be taken."""
@@ -108,6 +125,8 @@ class Flight:
         self._sight.env.start()
         state: Any = self._sight.worlds.state
         self._worlds.begin(state)
+        if self.known is not None:
+            self.known.forget()
         self._network.update()
         world, logged = self._flown(num_worlds, keep_observations)
         for name in ("action", "end_reason"):
@@ -130,12 +149,25 @@ class Flight:
 
     def _flown(self, num_worlds: int, keep_observations: bool) -> tuple[Tensor, dict[str, Tensor]]:
         """Worlds of steps, episode after episode, and what was written down of these."""
+        worlds, logged = self._in_parts(num_worlds, keep_observations)
+        if self.known is not None:
+            rows = logged.pop("outputs")
+            if keep_observations and int(rows.max()) < len(self.known.outputs):
+                self.known.note(logged["pixels"], rows, self._network.weights)
+        return worlds, logged
+
+    def _in_parts(
+        self, num_worlds: int, keep_observations: bool
+    ) -> tuple[Tensor, dict[str, Tensor]]:
+        """The same, as many steps at a time as the log has room for."""
         log = {"action": self._actions, "reward": self._rewards, "end_reason": self._reasons}
         if keep_observations:
             log |= {"pixels": self._pictures, "logits": self._logits}
         taken, reasons = self._worlds.steps[:num_worlds], self._worlds.end_reasons[:num_worlds]
         self._book.begin()
-        while True:
+        for part in count():
+            if self.known is not None:
+                log["outputs"] = self._open_outputs(part)
             before = taken.clone()
             self._go_on(num_worlds)
             worlds, rows = self._written(taken - before)
@@ -143,7 +175,15 @@ class Flight:
                 return worlds, {name: values.index_select(0, rows) for name, values in log.items()}
             self._book.add(worlds, rows, log)
             if bool(reasons.all()):
-                return self._book.take()
+                break
+        return self._book.take()
+
+    def _open_outputs(self, part: int) -> Tensor:
+        """Lets a part write what layers make behind those before, while there is room; where."""
+        assert self.known is not None
+        rows = torch.arange(part * len(self._actions), (part + 1) * len(self._actions))
+        self._log.outputs = wp.from_torch(self.known.outputs[rows[0] : rows[-1] + 1])
+        return rows
 
     def _go_on(self, num_worlds: int) -> None:
         draws = torch.full((num_worlds, self._length), -1.0)

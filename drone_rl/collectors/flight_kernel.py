@@ -16,7 +16,7 @@ once for all of them.
 
 import warp as wp
 
-from drone_rl.policies.layers_kernel import Layers, decide, look
+from drone_rl.policies.layers_kernel import Layers, decide, keep, look
 from drone_rl.sim.rendering.raytrace_kernel import Desk, draw_picture
 from drone_rl.sim.rendering.raytrace_structs import Geoms, Pictures, Poses, View
 from drone_rl.sim.rendering.raytrace_structs import Looks as SceneLooks
@@ -53,6 +53,8 @@ class Log:
     rewards: wp.array[float]
     end_reasons: wp.array[int]
     """0 where the flight goes on."""
+    outputs: wp.array2d[float]
+    """Of all layers; or of shape (0, 0)."""
 
 
 @wp.func_native("""
@@ -117,6 +119,8 @@ def _see(
             picture = log.pictures.gray[row]
             standardise(picture, picture.shape[0], eye.mean, eye.deviation)
             look(layers, picture, room, going)
+            if log.outputs.shape[0] > 0:
+                keep(layers, 0, layers.num_convolutions, room, going, log.outputs[row])
             going += 1
     return going
 
@@ -134,6 +138,7 @@ def _act(
 ) -> None:
     """Acts in the same worlds, once it is decided."""
     at = int(layers.logits_at)
+    count = int(0)
     for world in range(first, last):
         if flights.end_reasons[world] == 0:
             row = world * draws.shape[1] + step
@@ -143,7 +148,11 @@ def _act(
             log.actions[row] = chosen
             log.rewards[row] = move(flights, world, chosen)
             log.end_reasons[row] = flights.end_reasons[world]
+            if log.outputs.shape[0] > 0:
+                num_layers = layers.steps.shape[0]
+                keep(layers, layers.num_convolutions, num_layers, room, count, log.outputs[row])
             at += layers.num_outs
+            count += 1
 
 
 @wp.kernel

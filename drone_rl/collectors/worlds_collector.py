@@ -15,6 +15,7 @@ from torch import Tensor, nn
 from torchrl.collectors import BaseCollector
 from torchrl.envs import EnvBase
 
+from drone_rl.policies.known_outputs import KnownOutputs
 from drone_rl.utils.errors import InputError
 
 
@@ -61,6 +62,11 @@ class WorldsCollector(BaseCollector):
     def worlds(self) -> Any:
         """The environment itself, without the transforms before it."""
         return getattr(self.env, "base_env", self.env)
+
+    @property
+    def known_outputs(self) -> KnownOutputs | None:
+        """What the network made of the pictures of the last batch, if that is kept."""
+        return None
 
     @abc.abstractmethod
     def collect(self) -> TensorDictBase:

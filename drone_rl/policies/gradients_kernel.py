@@ -15,7 +15,7 @@ is still near.
 import warp as wp
 
 from drone_rl.policies.layers_back_kernel import accumulate, fold, rectify
-from drone_rl.policies.layers_kernel import multiply
+from drone_rl.policies.layers_kernel import copy, multiply
 
 BLOCK = wp.constant(64)
 """Pictures at a time."""
@@ -33,11 +33,11 @@ class Lesson:
     back_at: wp.array[int]
     """Where those of each layer the other way begin."""
     back: wp.array[float]
-    strides: wp.array[int]
-    """How much farther the outputs of each layer begin with each picture."""
     made_at: wp.array[int]
-    """Sums of the strides of layers before."""
+    """Where the outputs of each layer begin among those of a picture, and where these end."""
     num_convolutions: int
+    near: int
+    """How much farther each picture's inputs of linear layers begin, once they are side by side."""
 
 
 @wp.kernel
@@ -55,29 +55,39 @@ def answer(
         last: The one after the last: launch it with a dimension of 1.
         lesson: The network.
         pictures: Gray. Shape: (pictures, pixels).
-        made: Takes the outputs: of each layer those of all pictures.
+        made: Takes the outputs: of each picture those of all layers.
     """
-    count = pictures.shape[0]
+    size = _size(lesson)
     num_layers = lesson.geometry.shape[0]
     for block in range(first, last, BLOCK):
         end = wp.min(block + BLOCK, last)
         for picture in range(block, end):
             for layer in range(lesson.num_convolutions):
-                to = count * lesson.made_at[layer] + picture * lesson.strides[layer]
+                to = picture * size + lesson.made_at[layer]
                 rows = lesson.geometry[layer, 0]
                 down = lesson.geometry[layer, 2]
                 outs = lesson.geometry[layer, 7]
                 if layer == 0:
                     _forward(lesson, layer, pictures[picture], 0, made, to, rows, down, outs)
                 else:
-                    at = count * lesson.made_at[layer - 1] + picture * lesson.strides[layer - 1]
+                    at = picture * size + lesson.made_at[layer - 1]
                     _forward(lesson, layer, made, at, made, to, rows, down, outs)
         for layer in range(lesson.num_convolutions, num_layers):
-            down = lesson.strides[layer - 1]
-            at = count * lesson.made_at[layer - 1] + block * down
-            outs = lesson.strides[layer]
-            to = count * lesson.made_at[layer] + block * outs
-            _forward(lesson, layer, made, at, made, to, end - block, down, outs)
+            at = block * size + lesson.made_at[layer - 1]
+            to = block * size + lesson.made_at[layer]
+            _forward(lesson, layer, made, at, made, to, end - block, size, size)
+
+
+@wp.func
+def _size(lesson: Lesson) -> int:
+    """Room that the outputs of a picture take."""
+    return lesson.made_at[lesson.geometry.shape[0]]
+
+
+@wp.func
+def _stride(lesson: Lesson, layer: int) -> int:
+    """Room that those of a layer take."""
+    return lesson.made_at[layer + 1] - lesson.made_at[layer]
 
 
 @wp.func
@@ -120,8 +130,10 @@ def learn(
     lesson: Lesson,
     pictures: wp.array2d[float],
     made: wp.array[float],
+    rows: wp.array[int],
     slopes: wp.array2d[float],
     rooms: wp.array2d[float],
+    sides: wp.array2d[float],
     patches: wp.array2d[float],
     gradients: wp.array2d[float],
     seen: wp.array2d[float],
@@ -134,9 +146,11 @@ def learn(
         member: Which of the rooms to work in, and which gradients to add to.
         lesson: The network.
         pictures: Gray. Shape: (pictures, pixels).
-        made: The outputs of `answer`.
+        made: Outputs, as `answer` writes them.
+        rows: Which of them each picture has.
         slopes: Gradient of the logits. Shape: (pictures, actions).
         rooms: For gradients of outputs, one a member.
+        sides: For inputs of linear layers, of a block's pictures side by side, one a member.
         patches: For those of inputs of one convolution, one a member.
         gradients: Of the weights, to be added to, one a member; or of shape (0, 0).
         seen: Gradient of the pictures, to be written; or of shape (0, 0).
@@ -145,23 +159,36 @@ def learn(
     total = room
     if gradients.shape[0] > 0:
         total = gradients[member]
-    count = pictures.shape[0]
+    side = sides[member]
+    size = _size(lesson)
     top = lesson.geometry.shape[0] - 1
     for block in range(first, last, BLOCK):
         end = wp.min(block + BLOCK, last)
         for picture in range(block, end):
-            at = BLOCK * lesson.made_at[top] + (picture - block) * lesson.strides[top]
+            at = BLOCK * lesson.made_at[top] + (picture - block) * _stride(lesson, top)
             _begin(room, at, lesson.geometry[top, 7], slopes[picture])
+            inputs_at = lesson.made_at[lesson.num_convolutions - 1]
+            given_at = rows[picture] * size + inputs_at
+            num_inputs = lesson.made_at[top] - inputs_at
+            copy(made, given_at, side, (picture - block) * lesson.near, num_inputs)
         for down in range(top + 1):
             layer = top - down
             if gradients.shape[0] > 0:
-                _notice(lesson, layer, block, end, pictures, made, room, total)
+                _notice(lesson, layer, block, end, pictures, made, rows, side, room, total)
             if layer >= lesson.num_convolutions:
-                _linear(lesson, layer, block, end, count, made, room)
+                _linear(lesson, layer, end - block, side, room)
             else:
                 for picture in range(block, end):
                     _convolution(
-                        lesson, layer, picture, block, count, made, room, patches[member], seen
+                        lesson,
+                        layer,
+                        picture,
+                        block,
+                        made,
+                        rows[picture] * size,
+                        room,
+                        patches[member],
+                        seen,
                     )
 
 
@@ -183,21 +210,21 @@ def _notice(
     end: int,
     pictures: wp.array2d[float],
     made: wp.array[float],
+    rows: wp.array[int],
+    side: wp.array[float],
     room: wp.array[float],
     gradients: wp.array[float],
 ) -> None:
     """Adds to the gradient of a layer's weights."""
-    count = pictures.shape[0]
     deltas_at = BLOCK * lesson.made_at[layer]
-    stride = lesson.strides[layer]
+    stride = _stride(lesson, layer)
+    count = end - block
     if layer >= lesson.num_convolutions:
-        across = lesson.strides[layer - 1]
-        at = count * lesson.made_at[layer - 1] + block * across
-        _add(
-            lesson, layer, made, at, room, deltas_at, gradients, end - block, end - block, 0, across
-        )
+        at = lesson.made_at[layer - 1] - lesson.made_at[lesson.num_convolutions - 1]
+        near = lesson.near
+        _add(lesson, layer, side, at, room, deltas_at, gradients, count, count, 0, near)
         return
-    rows = lesson.geometry[layer, 0]
+    places = lesson.geometry[layer, 0]
     columns = lesson.geometry[layer, 1]
     down = lesson.geometry[layer, 2]
     across = lesson.geometry[layer, 3]
@@ -205,10 +232,10 @@ def _notice(
         by = deltas_at + (picture - block) * stride
         if layer == 0:
             given = pictures[picture]
-            _add(lesson, layer, given, 0, room, by, gradients, rows, columns, down, across)
+            _add(lesson, layer, given, 0, room, by, gradients, places, columns, down, across)
         else:
-            at = count * lesson.made_at[layer - 1] + picture * lesson.strides[layer - 1]
-            _add(lesson, layer, made, at, room, by, gradients, rows, columns, down, across)
+            at = rows[picture] * _size(lesson) + lesson.made_at[layer - 1]
+            _add(lesson, layer, made, at, room, by, gradients, places, columns, down, across)
 
 
 @wp.func
@@ -241,23 +268,17 @@ def _add(
         lesson.geometry[layer, 5],
         lesson.geometry[layer, 6],
         outs,
-        wp.where(layer < lesson.num_convolutions, outs, lesson.strides[layer]),
+        wp.where(layer < lesson.num_convolutions, outs, _stride(lesson, layer)),
     )
 
 
 @wp.func
 def _linear(
-    lesson: Lesson,
-    layer: int,
-    block: int,
-    end: int,
-    count: int,
-    made: wp.array[float],
-    room: wp.array[float],
+    lesson: Lesson, layer: int, count: int, side: wp.array[float], room: wp.array[float]
 ) -> None:
     """From the gradient of a linear layer's outputs to that of its inputs."""
     size = lesson.geometry[layer, 5]
-    stride = lesson.strides[layer - 1]
+    stride = _stride(lesson, layer - 1)
     before_at = BLOCK * lesson.made_at[layer - 1]
     _back(
         lesson,
@@ -266,14 +287,14 @@ def _linear(
         BLOCK * lesson.made_at[layer],
         room,
         before_at,
-        end - block,
-        lesson.strides[layer],
+        count,
+        _stride(lesson, layer),
         size,
         stride,
     )
-    given_at = count * lesson.made_at[layer - 1] + block * stride
-    for row in range(end - block):
-        rectify(room, before_at + row * stride, made, given_at + row * stride, size)
+    given_at = lesson.made_at[layer - 1] - lesson.made_at[lesson.num_convolutions - 1]
+    for row in range(count):
+        rectify(room, before_at + row * stride, side, given_at + row * lesson.near, size)
 
 
 @wp.func
@@ -282,8 +303,8 @@ def _convolution(
     layer: int,
     picture: int,
     block: int,
-    count: int,
     made: wp.array[float],
+    made_at: int,
     room: wp.array[float],
     patches: wp.array[float],
     seen: wp.array2d[float],
@@ -293,18 +314,17 @@ def _convolution(
         return
     outs = lesson.geometry[layer, 7]
     size = lesson.geometry[layer, 4] * lesson.geometry[layer, 5]
-    deltas_at = BLOCK * lesson.made_at[layer] + (picture - block) * lesson.strides[layer]
+    deltas_at = BLOCK * lesson.made_at[layer] + (picture - block) * _stride(lesson, layer)
     rows = lesson.geometry[layer, 0]
     _back(lesson, layer, room, deltas_at, patches, 0, rows, outs, size, size)
     if layer == 0:
         _fold(lesson, layer, patches, seen[picture], 0, seen.shape[1])
         return
     before = layer - 1
-    before_at = BLOCK * lesson.made_at[before] + (picture - block) * lesson.strides[before]
+    before_at = BLOCK * lesson.made_at[before] + (picture - block) * _stride(lesson, before)
     num_made = lesson.geometry[before, 0] * lesson.geometry[before, 7]
     _fold(lesson, layer, patches, room, before_at, num_made)
-    given_at = count * lesson.made_at[before] + picture * lesson.strides[before]
-    rectify(room, before_at, made, given_at, num_made)
+    rectify(room, before_at, made, made_at + lesson.made_at[before], num_made)
 
 
 @wp.func

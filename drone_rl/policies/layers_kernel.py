@@ -141,6 +141,18 @@ def multiply(
     ...
 
 
+@wp.func_native("""
+const float* from = given.data + given_at;
+float* to = made.data + made_at;
+for (int i = 0; i < size; ++i) to[i] = from[i];
+""")
+def copy(
+    given: wp.array[float], given_at: int, made: wp.array[float], made_at: int, size: int
+) -> None:
+    """Copies so many numbers."""
+    ...
+
+
 @wp.struct
 class Layers:
     """A network: convolutions, of one picture after the other, then layers of many at once."""
@@ -155,6 +167,8 @@ class Layers:
     """Where logits are in the room to work, `WIDTH` numbers a picture or a multiple of it."""
     num_outs: int
     """Of these for each picture."""
+    outputs_at: wp.array[int]
+    """Where those of each layer begin, where all of a picture are kept."""
 
 
 @wp.func
@@ -190,6 +204,28 @@ def decide(layers: Layers, room: wp.array[float], count: int) -> None:
     for layer in range(layers.num_convolutions, layers.steps.shape[0]):
         given_at, made_at = layers.steps[layer, 0], layers.steps[layer, 1]
         _apply(layers, layer, room, given_at, room, made_at, count)
+
+
+@wp.func
+def keep(
+    layers: Layers, first: int, last: int, room: wp.array[float], row: int, outputs: wp.array[float]
+) -> None:
+    """Copies what layers made of a picture, before the next one takes their room.
+
+    Args:
+        layers: The network.
+        first: The first of the layers.
+        last: The one after the last.
+        room: Where they worked.
+        row: Number of the picture among those that are decided on together.
+        outputs: Takes them.
+    """
+    for layer in range(first, last):
+        size = layers.steps[layer, 3] * layers.steps[layer, 10]
+        at = layers.steps[layer, 1]
+        if layer >= layers.num_convolutions - 1:
+            at += row * size
+        copy(room, at, outputs, layers.outputs_at[layer], size)
 
 
 @wp.func

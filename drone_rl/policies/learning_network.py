@@ -6,8 +6,7 @@
 
 import math
 from collections.abc import Sequence
-from itertools import accumulate
-from typing import Any, Literal, Self
+from typing import Any, Literal, NamedTuple, Self
 
 import torch
 import warp as wp
@@ -17,9 +16,15 @@ from torch.autograd.function import once_differentiable
 from drone_rl.policies import gradients_kernel
 from drone_rl.policies.cnn import PolicyNetwork
 from drone_rl.policies.gradients_kernel import BLOCK, Lesson
-from drone_rl.policies.layers_kernel import WIDTH
+from drone_rl.policies.known_outputs import KnownOutputs
 from drone_rl.policies.network import PictureNetwork
-from drone_rl.policies.packed_layer import Order, PackedLayer, packed_layers
+from drone_rl.policies.packed_layer import (
+    Order,
+    PackedLayer,
+    odd_lines,
+    outputs_at,
+    packed_layers,
+)
 from drone_rl.sim.rendering.crew import Crew
 from drone_rl.sim.rendering.devices import loading
 
@@ -36,7 +41,14 @@ class LearningNetwork(PictureNetwork):
     is made where its numbers lie, in blocks of pictures that stay near.
     """
 
-    def __init__(self, network: PolicyNetwork, num_threads: int = 1, *, of: Of = "weights") -> None:
+    def __init__(
+        self,
+        network: PolicyNetwork,
+        num_threads: int = 1,
+        *,
+        of: Of = "weights",
+        known: KnownOutputs | None = None,
+    ) -> None:
         """Wraps a network; `find` tells whether that can be done.
 
         Args:
@@ -44,15 +56,23 @@ class LearningNetwork(PictureNetwork):
             num_threads: That share the pictures; sums over these depend on how many there are.
             of: What has gradients: the weights, or the pictures. For those of pictures the weights
                 stay what they are at first.
+            known: Outputs that somebody else has made by the same network; looked for at each call.
         """
         super().__init__()
         self.network, self.in_shape, self.actions = network, network.in_shape, network.actions
-        self._num_threads, self._of = num_threads, of
+        self._num_threads, self._of, self._known = num_threads, of, known
         self._work: _Work | None = None
         loading(gradients_kernel)
 
     @classmethod
-    def find(cls, network: nn.Module, num_threads: int = 1, *, of: Of = "weights") -> Self | None:
+    def find(
+        cls,
+        network: nn.Module,
+        num_threads: int = 1,
+        *,
+        of: Of = "weights",
+        known: KnownOutputs | None = None,
+    ) -> Self | None:
         """The same, if the network is of such layers, small, and on the CPU."""
         layers = packed_layers(network)
         if layers is None or (of == "pictures" and not layers[0].has_way_back):
@@ -60,7 +80,7 @@ class LearningNetwork(PictureNetwork):
         if sum(p.numel() for p in network.parameters()) > MOST_WEIGHTS:
             return None
         assert isinstance(network, PolicyNetwork)
-        return cls(network, num_threads, of=of)
+        return cls(network, num_threads, of=of, known=known)
 
     def forward(self, pixels: Tensor) -> Tensor:
         """See `PictureNetwork`.
@@ -70,12 +90,24 @@ class LearningNetwork(PictureNetwork):
         """
         if self._work is None:
             layers = packed_layers(self.network) or []
-            self._work = _Work(layers, self._num_threads, is_fixed=self._of == "pictures")
+            is_fixed = self._of == "pictures"
+            self._work = _Work(layers, self._num_threads, self._known, is_fixed=is_fixed)
         self.network.check(pixels)
         flat = pixels.reshape(-1, math.prod(self.in_shape))
         learning = self._work.parameters if self._of == "weights" else ()
         logits = _Logits.apply(self._work, flat, *learning)
         return logits.reshape(*pixels.shape[:-3], -1)
+
+
+class _Made(NamedTuple):
+    """Outputs of all layers."""
+
+    outputs: Tensor
+    """A row a picture, one after the other; there may be room behind. Flat."""
+    rows: Tensor
+    """Which of them each picture has."""
+    times: int | None
+    """Of `KnownOutputs`, if they are such."""
 
 
 class _Logits(torch.autograd.Function):
@@ -85,7 +117,7 @@ class _Logits(torch.autograd.Function):
     def forward(ctx: Any, work: "_Work", pictures: Tensor, *parameters: Tensor) -> Tensor:
         ctx.work, ctx.of = work, "weights" if parameters else "pictures"
         ctx.pictures, ctx.made = pictures, work.answer(pictures)
-        return work.logits(ctx.made, len(pictures))
+        return work.logits(ctx.made)
 
     @staticmethod
     @once_differentiable
@@ -101,24 +133,32 @@ class _Logits(torch.autograd.Function):
 class _Work:
     """Packed layers, and room to work in."""
 
-    def __init__(self, layers: Sequence[PackedLayer], num_threads: int, *, is_fixed: bool) -> None:
+    def __init__(
+        self,
+        layers: Sequence[PackedLayer],
+        num_threads: int,
+        known: KnownOutputs | None,
+        *,
+        is_fixed: bool,
+    ) -> None:
         loading(gradients_kernel).result()
-        self._layers = layers
+        self._layers, self._known = layers, known
         self._crew = Crew(num_threads, num_threads)
         self._order = order = Order(layers)
         self._weights = torch.zeros(order.weights_at[-1])
         self._back = torch.zeros(order.back_at[-1])
-        self._strides = [_odd(layer.num_made) for layer in layers]
-        made_at = list(accumulate(self._strides, initial=0))
-        self._size = made_at[-1]
+        made_at = outputs_at(layers)
+        self._logits_at, self._size = made_at[-2:]
         lesson = Lesson()
         lesson.geometry = _ints([layer.geometry for layer in layers])
         lesson.weights_at, lesson.back_at = _ints(order.weights_at), _ints(order.back_at)
         lesson.weights, lesson.back = wp.from_torch(self._weights), wp.from_torch(self._back)
-        lesson.strides, lesson.made_at = _ints(self._strides), _ints(made_at)
+        lesson.made_at = _ints(made_at)
         lesson.num_convolutions = sum(layer.is_convolution for layer in layers)
+        lesson.near = odd_lines(self._logits_at - made_at[lesson.num_convolutions - 1])
         self._lesson = lesson
         self._rooms = torch.empty(self._crew.size, int(BLOCK) * self._size)
+        self._sides = torch.empty(self._crew.size, int(BLOCK) * lesson.near)
         most = max(v.num_inputs * v.geometry[0] for v in layers if v.is_convolution)
         self._patches = torch.empty(self._crew.size, most)
         self._spare: Tensor | None = None
@@ -132,10 +172,14 @@ class _Work:
         """Weight and bias of each layer."""
         return [parameter for layer in self._layers for parameter in layer.parameters]
 
-    def answer(self, pictures: Tensor) -> Tensor:
-        """Outputs of all layers, flat: of each those of all pictures; there may be room behind."""
+    def answer(self, pictures: Tensor) -> _Made:
+        """Outputs of all layers."""
         if not self._is_fixed:
             self._order.pack(self._weights, self._back)
+        if self._known is not None:
+            rows = self._known.find(pictures, self._weights)
+            if rows is not None:
+                return _Made(self._known.outputs.view(-1), rows, self._known.times)
         size, spare, self._spare = len(pictures) * self._size, self._spare, None
         made = torch.empty(size) if spare is None or len(spare) < size else spare
         given = [self._lesson, wp.from_torch(pictures), wp.from_torch(made)]
@@ -146,29 +190,32 @@ class _Work:
             wp.launch(gradients_kernel.answer, 1, inputs=inputs, device="cpu")
 
         self._crew.share_out(0, len(pictures), work)
-        return made
+        return _Made(made, torch.arange(len(pictures), dtype=torch.int32), None)
 
-    def logits(self, made: Tensor, count: int) -> Tensor:
-        """Those of the last layer. Shape: (count, num_actions)."""
-        last = made[count * (self._size - self._strides[-1]) : count * self._size].view(count, -1)
-        return last[:, : len(self._layers[-1].layer.weight)].clone()
+    def logits(self, made: _Made) -> Tensor:
+        """Those of the last layer. Shape: (num_pictures, num_actions)."""
+        last = self._logits_at + torch.arange(len(self._layers[-1].layer.weight))
+        return made.outputs.take(made.rows[:, None].long() * self._size + last)
 
-    def learn(self, pictures: Tensor, made: Tensor, slopes: Tensor) -> list[Tensor]:
+    def learn(self, pictures: Tensor, made: _Made, slopes: Tensor) -> list[Tensor]:
         """Gradients of the parameters by those of the logits; takes `made` for the next answer."""
         self._gradients.zero_()
         self._go_back(pictures, made, slopes, self._gradients, torch.empty(0, 0))
         return self._order.unpack(self._gradients.sum(0))
 
-    def look_back(self, pictures: Tensor, made: Tensor, slopes: Tensor) -> Tensor:
+    def look_back(self, pictures: Tensor, made: _Made, slopes: Tensor) -> Tensor:
         """Gradient of the pictures by those of the logits; takes `made` for the next answer."""
         seen = torch.empty_like(pictures)
         self._go_back(pictures, made, slopes, torch.empty(0, 0), seen)
         return seen
 
     def _go_back(
-        self, pictures: Tensor, made: Tensor, slopes: Tensor, gradients: Tensor, seen: Tensor
+        self, pictures: Tensor, made: _Made, slopes: Tensor, gradients: Tensor, seen: Tensor
     ) -> None:
-        arrays = (pictures, made, slopes.contiguous(), self._rooms, self._patches, gradients, seen)
+        if self._known is not None and made.times not in (None, self._known.times):
+            raise RuntimeError("pictures were flown through between the way there and the way back")
+        rooms = (self._rooms, self._sides, self._patches)
+        arrays = (pictures, made.outputs, made.rows, slopes.contiguous(), *rooms, gradients, seen)
         given = [self._lesson, *(wp.from_torch(array) for array in arrays)]
 
         def work(member: int, first: int, last: int) -> None:
@@ -176,13 +223,8 @@ class _Work:
             wp.launch(gradients_kernel.learn, 1, inputs=inputs, device="cpu")
 
         self._crew.share_out(0, len(pictures), work)
-        self._spare = made
-
-
-def _odd(size: int) -> int:
-    """Room for so many numbers: an odd number of cache lines, or rows would push each other out."""
-    lines = -(-size // WIDTH)
-    return WIDTH * (lines + 1 - lines % 2)
+        if made.times is None:
+            self._spare = made.outputs
 
 
 def _ints(values: Any) -> wp.array:

@@ -138,6 +138,18 @@ class Order:
         return [part.view(p.shape) for part, p in zip(parts, parameters, strict=True)]
 
 
+def outputs_at(layers: Sequence[PackedLayer]) -> list[int]:
+    """Where the outputs of each layer begin among those of a picture, and where these end."""
+    begins = list(accumulate((odd_lines(layer.num_made) for layer in layers), initial=0))
+    return [*begins[:-1], odd_lines(begins[-1])]
+
+
+def odd_lines(size: int) -> int:
+    """Room for so many numbers: an odd number of cache lines, or rows would push each other out."""
+    lines = -(-size // WIDTH)
+    return WIDTH * (lines + 1 - lines % 2)
+
+
 def in_panels(by_row: Tensor) -> Tensor:
     """Numbers of `WIDTH` columns, row by row, after those of the columns before. Flat."""
     return by_row.view(len(by_row), -1, WIDTH).transpose(0, 1).flatten()

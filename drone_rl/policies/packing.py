@@ -11,7 +11,7 @@ import warp as wp
 from torch import nn
 
 from drone_rl.policies.layers_kernel import Layers
-from drone_rl.policies.packed_layer import Order, PackedLayer, packed_layers
+from drone_rl.policies.packed_layer import Order, PackedLayer, outputs_at, packed_layers
 
 
 class PackedNetwork:
@@ -25,14 +25,18 @@ class PackedNetwork:
             num_pictures: That are decided on together.
         """
         self._order = Order(packed)
-        self._weights = torch.zeros(self._order.weights_at[-1])
+        self.weights = torch.zeros(self._order.weights_at[-1])
+        """As they are laid out."""
         steps, self.room = self._lay_out(packed, num_pictures)
         made = Layers()
         made.steps = wp.from_torch(torch.tensor(steps, dtype=torch.int32))
-        made.weights = wp.from_torch(self._weights)
+        made.weights = wp.from_torch(self.weights)
         made.num_convolutions = sum(layer.is_convolution for layer in packed)
         made.picture_size = packed[made.num_convolutions].num_inputs
         made.logits_at, made.num_outs = steps[-1][1], packed[-1].num_outs
+        *places, self.num_outputs = outputs_at(packed)
+        """Numbers that all layers make of a picture, and room between them."""
+        made.outputs_at = wp.from_torch(torch.tensor(places, dtype=torch.int32))
         self.layers = made
         """For kernels."""
         self.num_actions = len(packed[-1].layer.weight)
@@ -45,7 +49,7 @@ class PackedNetwork:
 
     def update(self) -> None:
         """Takes over what the network has learned."""
-        self._order.pack(self._weights)
+        self._order.pack(self.weights)
 
     def _lay_out(
         self, packed: Sequence[PackedLayer], num_pictures: int

@@ -14,6 +14,7 @@ from drone_rl.api.collecting import build_collector
 from drone_rl.api.exporting import export
 from drone_rl.api.learning import build_learner
 from drone_rl.api.progress import silent
+from drone_rl.policies.known_outputs import KnownOutputs
 from drone_rl.policies.learning_network import LearningNetwork
 from drone_rl.settings.collecting import Rollouts, Threads
 from drone_rl.settings.judging import FlightSettings
@@ -78,6 +79,28 @@ def test_gradients_by_the_kernel_teach_what_those_of_torch_do():
     for by_kernel, by_torch in zip(learned[True], learned[False], strict=True):
         assert by_torch.any()
         assert (by_kernel - by_torch).norm() < 0.01 * by_torch.norm()  # but for an output near 0
+
+
+def test_what_was_made_in_flight_is_taken_and_teaches_the_same(monkeypatch):
+    learned, taken = [], []
+    for is_known in (True, False):
+        find = KnownOutputs.find
+
+        def note(self, *given, find=find, is_known=is_known):
+            taken.append(find(self, *given))
+            return taken[-1] if is_known else None
+
+        monkeypatch.setattr(KnownOutputs, "find", note)
+        settings = TrainSettings(task=TASK, trainer=TrainerSettings(minibatch_frames=40))
+        made = build_collector(settings)
+        learner, batches = build_learner(settings, made), iter(made.collector)
+        for _ in range(3):
+            learner.update(next(batches))
+        made.collector.shutdown()
+        learned.append([p.detach().clone() for p in made.network.parameters()])
+        monkeypatch.undo()
+    assert len(taken) > 12 and all(rows is not None for rows in taken)
+    assert all(torch.equal(*pair) for pair in zip(*learned, strict=True))
 
 
 @pytest.mark.parametrize("shares", [True, False])

@@ -11,6 +11,7 @@ from drone_rl.collectors import EpisodeCollector
 from drone_rl.collectors import flight as flight_module
 from drone_rl.envs import CropRows, DroneEnv, GrayPixels, StandardizePixels, with_transforms
 from drone_rl.policies import MLP, SmallCNN, make_actor
+from drone_rl.policies.learning_network import LearningNetwork
 from drone_rl.sim.dynamics import Quadrotor
 from drone_rl.sim.dynamics.flight_state import LOST
 from drone_rl.sim.settings import (
@@ -156,6 +157,77 @@ def test_fewer_worlds_than_there_are():
 def test_observations_may_be_left_out():
     batch = make(keep_observations=False).collect()
     assert "pixels" not in batch and "logits" not in batch and "action" in batch
+
+
+def learned(network, by, batch):
+    """Logits of a batch, and the gradients of a sum of them."""
+    network.zero_grad()
+    logits = by(batch["pixels"])
+    (logits * torch.linspace(-1, 1, logits.numel()).view(logits.shape)).sum().backward()
+    return [logits.detach(), *(p.grad.clone() for p in network.parameters())]
+
+
+@pytest.mark.parametrize("longest", [64, 2])
+@pytest.mark.parametrize("is_greedy", [True, False])
+def test_what_the_layers_made_is_what_they_would_make_again(longest, is_greedy, monkeypatch):
+    monkeypatch.setattr(flight_module, "_LONGEST", longest)
+    collector = make(num_envs=35, num_cores=2, keep_outputs=True)
+    network = collector.actor.module[0].module
+    known = collector.known_outputs
+    quick, plain = LearningNetwork(network, 2, known=known), LearningNetwork(network, 2)
+    weights = collector._flight._network.weights
+    for _ in range(2):
+        kind = DETERMINISTIC if is_greedy else ExplorationType.RANDOM
+        with set_exploration_type(kind):
+            batch = collector.collect()
+        assert known.find(batch["pixels"].flatten(1), weights) is not None
+        half = batch[len(batch) // 2 :]
+        for part in (batch, half):
+            found, expected = learned(network, quick, part), learned(network, plain, part)
+            assert all(torch.equal(*pair) for pair in zip(found, expected, strict=True))
+            assert torch.equal(found[0], part["logits"])
+        with torch.no_grad():
+            network.layers.fc1.weight.add_(0.1)  # no longer what made them
+        quick_logits, logits = quick(batch["pixels"]), plain(batch["pixels"])
+        assert torch.equal(quick_logits, logits) and not torch.equal(logits, batch["logits"])
+
+
+def test_another_flight_writes_over_what_was_made():
+    collector = make(keep_outputs=True)
+    network = LearningNetwork(collector.actor.module[0].module, known=collector.known_outputs)
+    batch = collector.collect()
+    logits = network(batch["pixels"])
+    other = collector.collect()
+    with pytest.raises(RuntimeError, match="flown through"):
+        logits.sum().backward()
+    again = network(batch["pixels"])
+    assert torch.allclose(again, batch["logits"], atol=1e-5)
+    again.sum().backward()
+    assert torch.equal(network(other["pixels"]), other["logits"])
+
+
+@pytest.mark.parametrize(("parts", "is_known"), [(0, False), (2, False), (6, True)])
+def test_what_the_layers_made_is_kept_as_far_as_there_is_room(parts, is_known, monkeypatch):
+    size = make(keep_outputs=True).known_outputs.outputs.shape[1]
+    monkeypatch.setattr(flight_module, "_LONGEST", 2)
+    monkeypatch.setattr(flight_module, "_MOST_OUTPUTS", parts * 5 * 2 * size)
+    collector = make(keep_outputs=True)
+    batch = collector.collect()
+    assert 4 < batch["collector", "traj_ids"].bincount().max() <= 12
+    known = collector.known_outputs
+    assert (known is None) is (parts == 0)
+    if known is not None:
+        rows = known.find(batch["pixels"].flatten(1), collector._flight._network.weights)
+        assert (rows is not None) is is_known
+    network = LearningNetwork(collector.actor.module[0].module, known=known)
+    assert torch.equal(network(batch["pixels"]), batch["logits"])
+
+
+def test_nothing_is_kept_that_nobody_asked_for_or_that_has_no_pictures():
+    assert make().known_outputs is None
+    assert make(is_compiled=False, keep_outputs=True).known_outputs is None
+    collector = make(keep_observations=False, keep_outputs=True)
+    assert "pixels" not in collector.collect()
 
 
 def test_goes_on_from_a_state_as_if_it_had_never_stopped():

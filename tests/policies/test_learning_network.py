@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from drone_rl.policies import MLP, OriginalCNN, SmallCNN
-from drone_rl.policies.learning_network import LearningNetwork, _odd
+from drone_rl.policies.learning_network import LearningNetwork
 from drone_rl.utils.errors import InputError
 from tests.policies.halves import draw_weights, halves, made, taught
 
@@ -90,7 +90,3 @@ def test_only_what_the_kernel_knows():
     assert LearningNetwork.find(SmallCNN((2, 25, 64), 3), 1) is None
     assert LearningNetwork.find(SmallCNN((1, 25, 64), 3, hidden=(500,)), 1) is not None
     assert LearningNetwork.find(SmallCNN((1, 25, 64), 3, hidden=(600,)), 1) is None  # too many
-
-
-def test_rows_begin_an_odd_number_of_cache_lines_apart():
-    assert [_odd(n) for n in (1, 16, 17, 32, 33, 1792)] == [16, 16, 48, 48, 48, 1808]

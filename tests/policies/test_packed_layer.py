@@ -4,7 +4,14 @@ import torch
 
 from drone_rl.policies import SmallCNN
 from drone_rl.policies.layers_kernel import WIDTH
-from drone_rl.policies.packed_layer import Order, PackedLayer, in_panels, packed_layers
+from drone_rl.policies.packed_layer import (
+    Order,
+    PackedLayer,
+    in_panels,
+    odd_lines,
+    outputs_at,
+    packed_layers,
+)
 
 
 def small():
@@ -21,6 +28,13 @@ def test_geometry_by_hand():
     assert logits.geometry == [1, 1, 16, 16, 1, 16, 0, 16]
     assert [layer.num_made for layer in (conv, hidden, logits)] == [64, 16, 16]
     assert [layer.is_convolution for layer in (conv, hidden, logits)] == [True, False, False]
+
+
+def test_outputs_of_a_picture_and_of_a_layer_take_an_odd_number_of_cache_lines():
+    assert [odd_lines(n) for n in (1, 16, 17, 32, 33, 1792)] == [16, 16, 48, 48, 48, 1808]
+    _, layers = small()
+    assert outputs_at(layers) == [0, 80, 96, 112]  # five lines, one and one
+    assert outputs_at(layers[:2]) == [0, 80, 112]  # five and one, and one that is empty
 
 
 def test_order_by_hand():

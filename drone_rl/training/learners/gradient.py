@@ -23,7 +23,8 @@ def accumulate(
     Args:
         batch: Steps. Shape: (num_steps,).
         losses: Gives the terms of the loss, `loss_*`, and figures beside them.
-        chunk_frames: Steps in one forward and backward pass; changes nothing but memory.
+        chunk_frames: Steps in one forward and backward pass; bounds memory; sums are
+            rounded by it in their last places.
         is_sum: Whether the terms are sums over steps; means otherwise.
 
     Returns:
