@@ -9,7 +9,6 @@ ten microseconds, and a picture drawn in as many.
 """
 
 from collections.abc import Mapping
-from itertools import count
 from typing import Any, Self
 
 import torch
@@ -64,15 +63,20 @@ class Flight:
         self._rooms = wp.empty((self._crew.size, network.room), dtype=float, device="cpu")
         pixels = view.height * view.width
         self._length = max(1, min(_LONGEST, _MOST_NUMBERS // (count * pixels)))
-        rows = count * self._length
-        self._pictures = torch.empty(rows, 1, view.height, view.width)
-        self._logits = torch.empty(rows, sight.worlds.dynamics.actions.num_outputs)
-        self._actions, self._reasons = (torch.empty(rows, dtype=torch.int32) for _ in range(2))
-        self._rewards = torch.empty(rows)
+        self._num_rows = rows = count * self._length
+        num_actions = sight.worlds.dynamics.actions.num_outputs
+        self._book = Logbook(
+            {
+                "pixels": torch.empty(rows, 1, view.height, view.width),
+                "logits": torch.empty(rows, num_actions),
+                "action": torch.empty(rows, dtype=torch.int32),
+                "reward": torch.empty(rows),
+                "end_reason": torch.empty(rows, dtype=torch.int32),
+            }
+        )
         parts = _MOST_OUTPUTS // (rows * network.num_outputs) if keep_outputs else 0
         self.known = KnownOutputs(parts * rows, network.num_outputs) if parts else None
         """What all layers made of the pictures of the last batch, if that is kept."""
-        self._log, self._book = self._make_log(), Logbook()
         loading(flight_kernel)
 
     @classmethod
@@ -149,43 +153,35 @@ class Flight:
 
     def _flown(self, num_worlds: int, keep_observations: bool) -> tuple[Tensor, dict[str, Tensor]]:
         """Worlds of steps, episode after episode, and what was written down of these."""
-        worlds, logged = self._in_parts(num_worlds, keep_observations)
-        if self.known is not None:
-            rows = logged.pop("outputs")
-            if keep_observations and int(rows.max()) < len(self.known.outputs):
-                self.known.note(logged["pixels"], rows, self._network.weights)
+        taken, reasons = self._worlds.steps[:num_worlds], self._worlds.end_reasons[:num_worlds]
+        seen = ("pixels", "logits") if keep_observations else ()
+        names, parts = ("action", "reward", "end_reason", *seen), []
+        while not (parts and bool(reasons.all())):
+            before, first = taken.clone(), len(parts) * self._num_rows
+            self._go_on(num_worlds, self._open_log(len(parts), names))
+            worlds, rows = self._written(taken - before)
+            parts.append((worlds, rows + first))
+        worlds, rows = (torch.cat(column) for column in zip(*parts, strict=True))
+        order = worlds.argsort(stable=True)
+        worlds, rows = worlds[order], rows[order]
+        logged = self._book.read(rows, names)
+        if self.known is not None and keep_observations:
+            self.known.note(logged["pixels"], rows, self._network.weights)
         return worlds, logged
 
-    def _in_parts(
-        self, num_worlds: int, keep_observations: bool
-    ) -> tuple[Tensor, dict[str, Tensor]]:
-        """The same, as many steps at a time as the log has room for."""
-        log = {"action": self._actions, "reward": self._rewards, "end_reason": self._reasons}
-        if keep_observations:
-            log |= {"pixels": self._pictures, "logits": self._logits}
-        taken, reasons = self._worlds.steps[:num_worlds], self._worlds.end_reasons[:num_worlds]
-        self._book.begin()
-        for part in count():
-            if self.known is not None:
-                log["outputs"] = self._open_outputs(part)
-            before = taken.clone()
-            self._go_on(num_worlds)
-            worlds, rows = self._written(taken - before)
-            if bool(reasons.all()) and not len(self._book):  # no need to write it twice
-                return worlds, {name: values.index_select(0, rows) for name, values in log.items()}
-            self._book.add(worlds, rows, log)
-            if bool(reasons.all()):
-                break
-        return self._book.take()
+    def _open_log(self, part: int, kept: tuple[str, ...]) -> flight_kernel.Log:
+        """Where a part is written, and what of it is kept."""
+        log, pictures, room = flight_kernel.Log(), Pictures(), self._book.open(part, kept)
+        pictures.gray = wp.from_torch(room["pixels"].flatten(1))
+        log.pictures, log.logits = pictures, wp.from_torch(room["logits"])
+        log.actions, log.rewards = wp.from_torch(room["action"]), wp.from_torch(room["reward"])
+        log.end_reasons = wp.from_torch(room["end_reason"])
+        if self.known is not None:
+            first, last = part * self._num_rows, (part + 1) * self._num_rows
+            log.outputs = wp.from_torch(self.known.outputs[first:last])  # none, if there is no room
+        return log
 
-    def _open_outputs(self, part: int) -> Tensor:
-        """Lets a part write what layers make behind those before, while there is room; where."""
-        assert self.known is not None
-        rows = torch.arange(part * len(self._actions), (part + 1) * len(self._actions))
-        self._log.outputs = wp.from_torch(self.known.outputs[rows[0] : rows[-1] + 1])
-        return rows
-
-    def _go_on(self, num_worlds: int) -> None:
+    def _go_on(self, num_worlds: int, log: flight_kernel.Log) -> None:
         draws = torch.full((num_worlds, self._length), -1.0)
         if self._actor.exploration == ExplorationType.RANDOM:
             draws.uniform_(generator=self._actor.generator)
@@ -196,7 +192,7 @@ class Flight:
             self._worlds.flights,
             self._worlds.poses,
             wp.from_torch(draws),
-            self._log,
+            log,
         ]
 
         def work(member: int, first: int, last: int) -> None:
@@ -233,14 +229,6 @@ class Flight:
                     entries[key] = value.new_empty(len(world), *value.shape[1:])
                 entries[key].index_copy_(0, rows, value)
         return entries
-
-    def _make_log(self) -> flight_kernel.Log:
-        log, pictures = flight_kernel.Log(), Pictures()
-        pictures.gray = wp.from_torch(self._pictures.flatten(1))
-        log.pictures, log.logits = pictures, wp.from_torch(self._logits)
-        log.actions, log.rewards = wp.from_torch(self._actions), wp.from_torch(self._rewards)
-        log.end_reasons = wp.from_torch(self._reasons)
-        return log
 
 
 def _standard(sight: Sight) -> tuple[float, float] | None:

@@ -1,58 +1,70 @@
-"""What was written down of episodes that were flown in parts."""
+"""What is written down of flights, and read when all have ended."""
 
-from collections.abc import Mapping
+import sys
+from collections.abc import Iterable, Mapping
 
 import torch
 from torch import Tensor
 
 
 class Logbook:
-    """Takes part after part, and gives episode after episode.
+    """A row a step, part after part, as long as any flight goes on.
 
-    Its memory is used again: new memory for as many pictures takes longer to get than to fill.
+    Its memory is used again, and so is that of what was read once nobody holds any of it: new
+    memory for as many pictures takes longer to get than to fill.
     """
 
-    def __init__(self) -> None:
-        """Nothing is taken down yet."""
-        self._room: dict[str, Tensor] = {}
-        self._worlds: list[Tensor] = []
-        self._names: tuple[str, ...] = ()
+    def __init__(self, part: Mapping[str, Tensor]) -> None:
+        """Takes over room for one part, by name. Shapes: (num_rows, *), of all the same rows."""
+        self._room = dict(part)
+        self._num_rows = len(next(iter(self._room.values())))
+        self._read: dict[str, Tensor] = {}
 
-    def begin(self) -> None:
-        """Forgets what was taken down, if anything was."""
-        self._worlds = []
-
-    def __len__(self) -> int:
-        """Steps that were taken down."""
-        return sum(map(len, self._worlds))
-
-    def add(self, worlds: Tensor, rows: Tensor, log: Mapping[str, Tensor]) -> None:
-        """Takes steps down.
+    def open(self, part: int, kept: Iterable[str]) -> dict[str, Tensor]:
+        """Room for a part, to be written. Shapes: (num_rows, *).
 
         Args:
-            worlds: Whose they are, each world's in the order in which they were taken. Shape: (k,).
-            rows: Of the log, where they stand. Shape: (k,).
-            log: By name, the same names as in the parts before. Shapes: (num_rows, *).
+            part: Its number, from 0.
+            kept: Names of what shall be behind that of the parts before, which stays; the rest of
+                each part is written over the first.
         """
-        self._names = tuple(log)
-        first, last = len(self), len(self) + len(rows)
-        for name, values in log.items():
-            room = self._room_of(name, values, last)
-            torch.index_select(values, 0, rows, out=room[first:last])
-        self._worlds.append(worlds)
+        first, last = part * self._num_rows, (part + 1) * self._num_rows
+        opened = {name: room[: self._num_rows] for name, room in self._room.items()}
+        for name in kept:
+            room = self._room[name]
+            if len(room) < last:
+                wider = self._room[name] = room.new_empty(2 * last, *room.shape[1:])
+                wider[:first] = room[:first]
+            opened[name] = self._room[name][first:last]
+        return opened
 
-    def take(self) -> tuple[Tensor, dict[str, Tensor]]:
-        """Worlds of steps, episode after episode, and what was taken down of these, a copy."""
-        worlds = torch.cat(self._worlds)
-        order = worlds.argsort(stable=True)
-        return worlds[order], {n: self._room[n].index_select(0, order) for n in self._names}
+    def read(self, rows: Tensor, names: Iterable[str]) -> dict[str, Tensor]:
+        """A copy of rows of all parts, by name. Shapes: (k, *).
 
-    def _room_of(self, name: str, values: Tensor, count: int) -> Tensor:
-        """Where so many rows fit, with what is there already."""
-        room = self._room.get(name)
-        if room is None or len(room) < count:
-            wider = values.new_empty(2 * count, *values.shape[1:])
-            if room is not None:
-                wider[: len(self)] = room[: len(self)]
-            room = self._room[name] = wider
-        return room
+        Args:
+            rows: Which, the first part's first. Shape: (k,).
+            names: What of them; of several parts only what was kept.
+        """
+        read = {name: self._to_read(name, len(rows)) for name in names}
+        for name, values in read.items():
+            torch.index_select(self._room[name], 0, rows, out=values)
+        return read
+
+    def _to_read(self, name: str, count: int) -> Tensor:
+        """Memory for so many rows: that of the last copy, if it is wide enough and free again."""
+        last = self._read.get(name)
+        if last is None or len(last) < count or not is_free(last):
+            room = self._room[name]
+            last = self._read[name] = room.new_empty(count + count // 4, *room.shape[1:])
+        return last[:count]
+
+
+def is_free(tensor: Tensor) -> bool:
+    """Whether nobody else holds the memory of a tensor: no view, and no array over it."""
+    return _holders(tensor) == _holders(torch.empty(1))
+
+
+def _holders(tensor: Tensor) -> tuple[int, int]:
+    """Tensors over the memory of one, and who holds that by itself; who asks among them."""
+    storage = tensor.untyped_storage()
+    return torch._C._storage_Use_Count(storage._cdata), sys.getrefcount(storage)

@@ -31,15 +31,16 @@ class KnownOutputs:
         self._pictures = torch.empty(0)
 
     def note(self, pictures: Tensor, rows: Tensor, weights: Tensor) -> None:
-        """Says what the outputs are of.
+        """Says what the outputs are of, if there was room for those of all.
 
         Args:
             pictures: As the network saw them. Shape: (num_pictures, *).
-            rows: Of `outputs`, where each one's are. Shape: (num_pictures,).
+            rows: Of `outputs`, where each one's are, or would be. Shape: (num_pictures,).
             weights: By which they were made, as they are packed; they must stay until `forget`.
         """
-        self._pictures, self._version = pictures.flatten(1), pictures._version
-        self._rows, self._weights = rows.int(), weights
+        if int(rows.max()) < len(self.outputs):
+            self._pictures, self._version = pictures.flatten(1), pictures._version
+            self._rows, self._weights = rows.int(), weights
 
     def find(self, pictures: Tensor, weights: Tensor) -> Tensor | None:
         """Rows of the outputs, if they are of these very pictures, unchanged, by equal weights.

@@ -1,57 +1,101 @@
-"""What was taken down in parts is given episode after episode."""
+"""What was written down is read as it was written, however many parts there are."""
 
 import pytest
 import torch
+import warp as wp
+from tensordict import TensorDict
 
-from drone_rl.collectors.logbook import Logbook
+from drone_rl.collectors.logbook import Logbook, is_free
+from drone_rl.sim.rendering.devices import start_warp
 
-
-def logged(*numbers):
-    numbers = torch.tensor(numbers)
-    return {"action": numbers, "pixels": numbers[:, None] * torch.tensor([1.0, 0.5])}
-
-
-def test_episodes_follow_each_other_and_steps_keep_their_order():
-    book = Logbook()
-    book.begin()
-    book.add(torch.tensor([0, 0, 1]), torch.tensor([0, 1, 3]), logged(10, 11, 99, 20))
-    book.add(torch.tensor([0, 1, 1]), torch.tensor([2, 0, 1]), logged(21, 22, 12))
-    assert len(book) == 6
-    worlds, taken = book.take()
-    assert worlds.tolist() == [0, 0, 0, 1, 1, 1]
-    assert taken["action"].tolist() == [10, 11, 12, 20, 21, 22]
-    assert taken["pixels"].tolist() == [[n, n / 2] for n in (10, 11, 12, 20, 21, 22)]
+start_warp("cpu")
 
 
-@pytest.mark.parametrize("count", [1, 2, 3, 9])
-def test_there_is_room_for_any_number_of_parts(count):
-    book = Logbook()
-    book.begin()
-    for part in range(9):
-        rows = torch.arange(count)
-        book.add(torch.full([count], 9 - part), rows, {"reward": rows + 100 * part})
-    worlds, taken = book.take()
-    assert worlds.tolist() == [world for world in range(1, 10) for _ in range(count)]
-    expected = [100 * part + row for part in range(8, -1, -1) for row in range(count)]
-    assert taken["reward"].tolist() == expected
+def make(num_rows=4):
+    return Logbook({"action": torch.zeros(num_rows, dtype=int), "pixels": torch.zeros(num_rows, 2)})
 
 
-def test_what_was_given_stays_when_the_memory_is_used_again():
-    book = Logbook()
-    given = []
-    for number in (1, 2):
-        book.begin()
-        book.add(torch.tensor([0]), torch.tensor([0]), logged(number))
-        given.append(book.take()[1]["action"])
-    assert [values.tolist() for values in given] == [[1], [2]]
+def write(room, *numbers):
+    room["action"][:] = torch.tensor(numbers)
+    room["pixels"][:] = torch.tensor(numbers)[:, None] * torch.tensor([1.0, 0.5])
 
 
-def test_an_interrupted_flight_leaves_nothing_behind():
-    book = Logbook()
-    book.begin()
-    book.add(torch.tensor([0, 0]), torch.tensor([0, 1]), logged(1, 2))
-    book.begin()
-    assert not len(book)
-    book.add(torch.tensor([0]), torch.tensor([0]), {"action": torch.tensor([3])})
-    worlds, taken = book.take()
-    assert worlds.tolist() == [0] and {n: v.tolist() for n, v in taken.items()} == {"action": [3]}
+def test_rows_of_all_parts_in_any_order():
+    book = make()
+    for part in range(3):
+        write(book.open(part, ("action", "pixels")), *(10 * part + row for row in range(4)))
+    read = book.read(torch.tensor([9, 0, 3, 4]), ("action", "pixels"))
+    assert read["action"].tolist() == [21, 0, 3, 10]
+    assert read["pixels"].tolist() == [[n, n / 2] for n in (21, 0, 3, 10)]
+    assert [*book.read(torch.tensor([11]), ["action"]).items()] == [("action", torch.tensor([23]))]
+
+
+@pytest.mark.parametrize("num_parts", [1, 2, 3, 9])
+def test_there_is_room_for_any_number_of_parts(num_parts):
+    book = make(3)
+    for _ in range(2):  # and again in what has grown
+        for part in range(num_parts):
+            write(book.open(part, ("action", "pixels")), part, part + 100, part + 200)
+        rows = torch.arange(3 * num_parts)
+        expected = [part + hundreds for part in range(num_parts) for hundreds in (0, 100, 200)]
+        assert book.read(rows, ["action"])["action"].tolist() == expected
+
+
+def test_what_is_not_kept_takes_no_more_room():
+    book = make()
+    for part in range(50):
+        room = book.open(part, ("action",))
+        write(room, *[part] * 4)
+        assert room["pixels"].data_ptr() == book.open(0, ())["pixels"].data_ptr()
+    assert book.read(torch.arange(0, 200, 4), ["action"])["action"].tolist() == [*range(50)]
+    assert book.open(0, ())["pixels"].untyped_storage().nbytes() == 4 * 2 * 4
+
+
+def given(book, *numbers):
+    write(book.open(0, ()), *numbers[:4])
+    return book.read(torch.arange(len(numbers)) % 4, ["pixels"])["pixels"]
+
+
+def test_memory_is_given_again_once_nobody_holds_it():
+    book = make()
+    first = given(book, 1, 2, 3, 4)
+    where = first.data_ptr()
+    del first
+    again = given(book, 5, 6, 7, 8, 5)  # a quarter more fits
+    assert again.data_ptr() == where and again[:, 0].tolist() == [5, 6, 7, 8, 5]
+    del again
+    assert given(book, 5, 6, 7, 8, 5, 6).shape == (6, 2)
+
+
+@pytest.mark.parametrize(
+    "hold",
+    [
+        lambda v: v,
+        lambda v: v[2:],
+        lambda v: v.detach(),
+        lambda v: v.numpy(),
+        lambda v: v[1].numpy(),
+        lambda v: memoryview(v.numpy()),
+        lambda v: TensorDict({"pixels": v}, [4]).reshape(-1).split(2)[1],
+        lambda v: wp.from_torch(v),
+        lambda v: torch.from_dlpack(v),
+        lambda v: v.untyped_storage(),
+    ],
+)
+def test_what_anybody_holds_stays_as_it_was(hold):
+    book = make()
+    first = given(book, 1, 2, 3, 4)
+    where, held = first.data_ptr(), hold(first)
+    del first
+    second = given(book, 5, 6, 7, 8)
+    assert second.data_ptr() != where and second[:, 0].tolist() == [5, 6, 7, 8]
+    del held
+
+
+def test_free_is_what_one_alone_holds():
+    tensor = torch.zeros(4)
+    assert is_free(tensor) and is_free(tensor)
+    view = tensor[1:]
+    assert not is_free(tensor) and not is_free(view)
+    del view
+    assert is_free(tensor)

@@ -72,6 +72,14 @@ def test_not_once_they_are_forgotten():
     assert known.find(pictures, WEIGHTS) is None and known.times == 2
 
 
+def test_nothing_is_known_where_there_was_no_room_for_all():
+    pictures = torch.rand(2, 10)
+    for last, is_known in ((7, True), (8, False)):
+        known = KnownOutputs(8, 3)
+        known.note(pictures, torch.tensor([0, last]), WEIGHTS)
+        assert (known.find(pictures, WEIGHTS) is not None) is is_known
+
+
 def test_nothing_is_known_at_first_and_of_what_has_no_history():
     pictures = torch.rand(4, 10)
     assert KnownOutputs(8, 3).find(pictures, WEIGHTS) is None
