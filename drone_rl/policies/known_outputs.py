@@ -57,7 +57,7 @@ class KnownOutputs:
         is_alike = pictures.stride() == known.stride() and pictures.shape[1] == known.shape[1]
         if here != there or not is_alike:
             return None
-        numbers = pictures.storage_offset() - known.storage_offset()
+        numbers = int(pictures.storage_offset()) - int(known.storage_offset())
         first, beside = divmod(numbers, known.shape[1])
         is_known = not beside and torch.equal(weights, self._weights)
         return self._rows[first : first + len(pictures)] if is_known else None
