@@ -317,7 +317,7 @@ MAIN = (
     Row(
         "memory",
         "growth of memory over 1,000,000 frames after the first 100,000",
-        lambda f: f"{f['memory_growth_mib_per_million_frames']:.0f} MiB",
+        lambda f: f"{round(f['memory_growth_mib_per_million_frames'], 1) + 0.0:.1f} MiB",
         "5 MiB",
     ),
     Row(
