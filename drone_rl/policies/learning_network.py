@@ -116,7 +116,8 @@ class _Logits(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, work: "_Work", pictures: Tensor, *parameters: Tensor) -> Tensor:
         ctx.work, ctx.of = work, "weights" if parameters else "pictures"
-        ctx.pictures, ctx.made = pictures, work.answer(pictures)
+        ctx.pictures = pictures.detach()  # Warp asks arrays for gradients, which torch warns of
+        ctx.made = work.answer(ctx.pictures)
         return work.logits(ctx.made)
 
     @staticmethod

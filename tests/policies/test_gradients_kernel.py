@@ -33,6 +33,7 @@ def test_gradients_are_torchs(shape, options, num_threads):
         draw_weights(network)
 
 
+@pytest.mark.filterwarnings("error")  # pictures that are made of others have no gradient to give
 @pytest.mark.parametrize(
     ("shape", "options"),
     [((1, 25, 64), {"hidden": (128,)}), ((1, 25, 64), {"channels": (5, 6, 7), "hidden": (9,)})],
@@ -48,6 +49,6 @@ def test_gradients_of_pictures_are_torchs(shape, options):
     assert expected.any()
     torch.testing.assert_close(found, expected)
     assert all(p.grad is None for p in network.parameters())
-    (learning(pictures) * weights).sum().backward()
+    (learning(pictures * 1.0) * weights).sum().backward()
     assert all(p.grad is None for p in network.parameters())
     torch.testing.assert_close(pictures.grad, found)
