@@ -13,7 +13,6 @@ from drone_rl.collectors import (
     WorldsCollector,
 )
 from drone_rl.policies import PolicyNetwork, make_actor
-from drone_rl.policies.known_outputs import KnownOutputs
 from drone_rl.settings.collecting import Episodes, Ray
 from drone_rl.settings.configuration import as_config, from_config
 from drone_rl.settings.objectives import WithCritic
@@ -37,8 +36,6 @@ class Collecting(NamedTuple):
     network: PolicyNetwork
     generators: dict[str, torch.Generator]
     """Random streams of this process, by name."""
-    known: KnownOutputs | None = None
-    """What the network made of the pictures of the last batch, if that is kept."""
 
 
 def build_collector(settings: TrainSettings, practice: Practice | None = None) -> Collecting:
@@ -58,8 +55,7 @@ def build_collector(settings: TrainSettings, practice: Practice | None = None) -
 def threaded_collector(settings: TrainSettings, practice: Practice | None = None) -> Collecting:
     """`Threads`: complete episodes from threads of this process."""
     cores = max(1, num_cores() // _num_workers(settings))
-    is_learned_from = settings.trainer.compiled and not isinstance(settings.objective, WithCritic)
-    return _threaded(settings, practice, _episodes(settings, cores, keep_outputs=is_learned_from))
+    return _threaded(settings, practice, _episodes(settings, cores))
 
 
 def rollout_collector(settings: TrainSettings, practice: Practice | None = None) -> Collecting:
@@ -83,8 +79,7 @@ def _threaded(
         collectors.append(collector)
         generators[f"actions_{i}"] = actions
     assert network is not None  # there is at least one share
-    known = collectors[0].known_outputs if len(collectors) == 1 else None
-    return Collecting(ThreadedCollector(collectors), network, generators, known)
+    return Collecting(ThreadedCollector(collectors), network, generators)
 
 
 def ray_collector(settings: TrainSettings, practice: Practice | None = None) -> Collecting:
@@ -157,14 +152,11 @@ def _remote_share(
     return build_share(settings, shares, number, practice=practice, collect=collect)
 
 
-def _episodes(
-    settings: TrainSettings, cores: int, *, keep_outputs: bool = False
-) -> Callable[..., EpisodeCollector]:
+def _episodes(settings: TrainSettings, cores: int) -> Callable[..., EpisodeCollector]:
     """Makes collectors of complete episodes, each on so many cores."""
     asked = settings.collector
     is_compiled = isinstance(asked, Episodes) and asked.compiled
-    how = {"is_compiled": is_compiled, "num_cores": cores, "keep_outputs": keep_outputs}
-    return functools.partial(EpisodeCollector, **how)
+    return functools.partial(EpisodeCollector, is_compiled=is_compiled, num_cores=cores)
 
 
 def _num_workers(settings: TrainSettings) -> int:

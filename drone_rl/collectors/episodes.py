@@ -39,7 +39,6 @@ class EpisodeCollector(WorldsCollector):
         keep_observations: bool = True,
         is_compiled: bool = False,
         num_cores: int = 1,
-        keep_outputs: bool = False,
         **kwargs: Any,
     ) -> None:
         """Connects an environment and a policy.
@@ -51,8 +50,6 @@ class EpisodeCollector(WorldsCollector):
             is_compiled: Whether a kernel may fly whole episodes, see `Flight`. It draws actions in
                 another order, and sums in the network may differ in the last place.
             num_cores: That such a kernel takes; no result depends on it.
-            keep_outputs: Whether it keeps what the network's layers made of the last batch, for
-                who learns from it, see `known_outputs`; no result depends on it.
             kwargs: See `WorldsCollector`.
 
         Raises:
@@ -63,7 +60,7 @@ class EpisodeCollector(WorldsCollector):
         self._way = find_way(env, self._observed, self._kept)
         self._flight = None
         if is_compiled and isinstance(self._way, StraightWay):
-            self._flight = Flight.find(self._way.sight, actor, num_cores, keep_outputs=keep_outputs)
+            self._flight = Flight.find(self._way.sight, actor, num_cores)
 
     @torch.no_grad()
     def collect(self, num_worlds: int | None = None) -> TensorDictBase:
@@ -92,10 +89,9 @@ class EpisodeCollector(WorldsCollector):
             indices = indices[~after["next", "done"].flatten()]
         return _join(steps, worlds, flying)
 
-    @property
-    def known_outputs(self) -> KnownOutputs | None:
+    def keep_outputs(self) -> KnownOutputs | None:
         """See `WorldsCollector`."""
-        return None if self._flight is None else self._flight.known
+        return None if self._flight is None else self._flight.keep_outputs()
 
     def shutdown(
         self, timeout: float | None = None, close_env: bool = True, raise_on_error: bool = True

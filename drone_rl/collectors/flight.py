@@ -49,8 +49,6 @@ class Flight:
         network: PackedNetwork,
         worlds: FlyingCubes,
         num_cores: int,
-        *,
-        keep_outputs: bool = False,
     ) -> None:
         """Makes what the kernel needs; see `find`."""
         self._sight, self._actor, self._network, self._worlds = sight, actor, network, worlds
@@ -74,27 +72,17 @@ class Flight:
                 "end_reason": torch.empty(rows, dtype=torch.int32),
             }
         )
-        parts = _MOST_OUTPUTS // (rows * network.num_outputs) if keep_outputs else 0
-        self.known = KnownOutputs(parts * rows, network.num_outputs) if parts else None
-        """What all layers made of the pictures of the last batch, if that is kept."""
+        self._known: KnownOutputs | None = None
         loading(flight_kernel)
 
     @classmethod
-    def find(
-        cls,
-        sight: Sight,
-        actor: TensorDictModuleBase,
-        num_cores: int,
-        *,
-        keep_outputs: bool = False,
-    ) -> Self | None:
+    def find(cls, sight: Sight, actor: TensorDictModuleBase, num_cores: int) -> Self | None:
         """The same, where task, pictures, network and renderer are such as the kernel knows.
 
         Args:
             sight: Of the environment.
             actor: The policy.
             num_cores: Shares of the worlds, each on a thread; no result depends on it.
-            keep_outputs: Whether to keep what all layers made, where it is not too much.
         """
         if type(actor) is not CategoricalActor:
             return None
@@ -108,11 +96,18 @@ class Flight:
         flown = FlyingCubes.find(worlds.task, worlds.dynamics, worlds.num_worlds)
         if network is None or flown is None:
             return None
-        return cls(sight, actor, network, flown, num_cores, keep_outputs=keep_outputs)
+        return cls(sight, actor, network, flown, num_cores)
 
     def can_act(self) -> bool:
         """Whether actions shall be drawn, or the most probable be taken."""
         return self._actor.exploration in (ExplorationType.RANDOM, ExplorationType.DETERMINISTIC)
+
+    def keep_outputs(self) -> KnownOutputs | None:
+        """Keeps what all layers make of pictures from now on, where it is not too much."""
+        parts = _MOST_OUTPUTS // (self._num_rows * self._network.num_outputs)
+        if self._known is None and parts:
+            self._known = KnownOutputs(parts * self._num_rows, self._network.num_outputs)
+        return self._known
 
     def fly(self, num_worlds: int, keep_observations: bool = True) -> TensorDictBase:
         """Runs an episode in the first worlds; the environment's stay as they were at the start.
@@ -129,8 +124,8 @@ class Flight:
         self._sight.env.start()
         state: Any = self._sight.worlds.state
         self._worlds.begin(state)
-        if self.known is not None:
-            self.known.forget()
+        if self._known is not None:
+            self._known.forget()
         self._network.update()
         world, logged = self._flown(num_worlds, keep_observations)
         for name in ("action", "end_reason"):
@@ -165,8 +160,8 @@ class Flight:
         order = worlds.argsort(stable=True)
         worlds, rows = worlds[order], rows[order]
         logged = self._book.read(rows, names)
-        if self.known is not None and keep_observations:
-            self.known.note(logged["pixels"], rows, self._network.weights)
+        if self._known is not None and keep_observations:
+            self._known.note(logged["pixels"], rows, self._network.weights)
         return worlds, logged
 
     def _open_log(self, part: int, kept: tuple[str, ...]) -> flight_kernel.Log:
@@ -176,9 +171,11 @@ class Flight:
         log.pictures, log.logits = pictures, wp.from_torch(room["logits"])
         log.actions, log.rewards = wp.from_torch(room["action"]), wp.from_torch(room["reward"])
         log.end_reasons = wp.from_torch(room["end_reason"])
-        if self.known is not None:
+        if self._known is not None:
             first, last = part * self._num_rows, (part + 1) * self._num_rows
-            log.outputs = wp.from_torch(self.known.outputs[first:last])  # none, if there is no room
+            log.outputs = wp.from_torch(
+                self._known.outputs[first:last]
+            )  # none, if there is no room
         return log
 
     def _go_on(self, num_worlds: int, log: flight_kernel.Log) -> None:

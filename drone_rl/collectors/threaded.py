@@ -13,6 +13,7 @@ from tensordict.nn import TensorDictModuleBase
 from torchrl.collectors import BaseCollector
 
 from drone_rl.collectors.worlds_collector import WorldsCollector
+from drone_rl.policies.known_outputs import KnownOutputs
 
 
 class ThreadedCollector(BaseCollector):
@@ -48,6 +49,10 @@ class ThreadedCollector(BaseCollector):
     def actor(self) -> TensorDictModuleBase:
         """The policy that learns."""
         return self.collectors[0].actor
+
+    def keep_outputs(self) -> KnownOutputs | None:
+        """See `WorldsCollector`; None where batches are joined, whose pictures are copies."""
+        return self.collectors[0].keep_outputs() if len(self.collectors) == 1 else None
 
     def iterator(self) -> Iterator[TensorDictBase]:
         """Yields batches without end; what a `for` over the collector goes through."""

@@ -63,9 +63,14 @@ class WorldsCollector(BaseCollector):
         """The environment itself, without the transforms before it."""
         return getattr(self.env, "base_env", self.env)
 
-    @property
-    def known_outputs(self) -> KnownOutputs | None:
-        """What the network made of the pictures of the last batch, if that is kept."""
+    def keep_outputs(self) -> KnownOutputs | None:
+        """Keeps what the network makes of pictures from the next batch on, for who learns from it.
+
+        No result depends on it.
+
+        Returns:
+            That of the last batch, while there is no other; None where it can't be kept.
+        """
         return None
 
     @abc.abstractmethod

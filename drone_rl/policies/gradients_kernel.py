@@ -160,17 +160,11 @@ def learn(
     if gradients.shape[0] > 0:
         total = gradients[member]
     side = sides[member]
-    size = _size(lesson)
     top = lesson.geometry.shape[0] - 1
     for block in range(first, last, BLOCK):
         end = wp.min(block + BLOCK, last)
         for picture in range(block, end):
-            at = BLOCK * lesson.made_at[top] + (picture - block) * _stride(lesson, top)
-            _begin(room, at, lesson.geometry[top, 7], slopes[picture])
-            inputs_at = lesson.made_at[lesson.num_convolutions - 1]
-            given_at = rows[picture] * size + inputs_at
-            num_inputs = lesson.made_at[top] - inputs_at
-            copy(made, given_at, side, (picture - block) * lesson.near, num_inputs)
+            _begin(lesson, picture, picture - block, made, rows, slopes[picture], room, side)
         for down in range(top + 1):
             layer = top - down
             if gradients.shape[0] > 0:
@@ -180,22 +174,28 @@ def learn(
             else:
                 for picture in range(block, end):
                     _convolution(
-                        lesson,
-                        layer,
-                        picture,
-                        block,
-                        made,
-                        rows[picture] * size,
-                        room,
-                        patches[member],
-                        seen,
+                        lesson, layer, picture, block, made, rows, room, patches[member], seen
                     )
 
 
 @wp.func
-def _begin(room: wp.array[float], at: int, num_outs: int, slopes: wp.array[float]) -> None:
-    """Writes the gradient of a picture's logits; of those that fill up it is 0."""
-    for action in range(num_outs):
+def _begin(
+    lesson: Lesson,
+    picture: int,
+    number: int,
+    made: wp.array[float],
+    rows: wp.array[int],
+    slopes: wp.array[float],
+    room: wp.array[float],
+    side: wp.array[float],
+) -> None:
+    """Writes the gradient of a picture's logits, of those that fill up 0, and its linear inputs."""
+    inputs_at = lesson.made_at[lesson.num_convolutions - 1]
+    top = lesson.geometry.shape[0] - 1
+    given_at = rows[picture] * _size(lesson) + inputs_at
+    copy(made, given_at, side, number * lesson.near, lesson.made_at[top] - inputs_at)
+    at = BLOCK * lesson.made_at[top] + number * _stride(lesson, top)
+    for action in range(lesson.geometry[top, 7]):
         slope = float(0.0)
         if action < slopes.shape[0]:
             slope = slopes[action]
@@ -304,7 +304,7 @@ def _convolution(
     picture: int,
     block: int,
     made: wp.array[float],
-    made_at: int,
+    rows: wp.array[int],
     room: wp.array[float],
     patches: wp.array[float],
     seen: wp.array2d[float],
@@ -315,8 +315,8 @@ def _convolution(
     outs = lesson.geometry[layer, 7]
     size = lesson.geometry[layer, 4] * lesson.geometry[layer, 5]
     deltas_at = BLOCK * lesson.made_at[layer] + (picture - block) * _stride(lesson, layer)
-    rows = lesson.geometry[layer, 0]
-    _back(lesson, layer, room, deltas_at, patches, 0, rows, outs, size, size)
+    places = lesson.geometry[layer, 0]
+    _back(lesson, layer, room, deltas_at, patches, 0, places, outs, size, size)
     if layer == 0:
         _fold(lesson, layer, patches, seen[picture], 0, seen.shape[1])
         return
@@ -324,7 +324,8 @@ def _convolution(
     before_at = BLOCK * lesson.made_at[before] + (picture - block) * _stride(lesson, before)
     num_made = lesson.geometry[before, 0] * lesson.geometry[before, 7]
     _fold(lesson, layer, patches, room, before_at, num_made)
-    rectify(room, before_at, made, made_at + lesson.made_at[before], num_made)
+    given_at = rows[picture] * _size(lesson) + lesson.made_at[before]
+    rectify(room, before_at, made, given_at, num_made)
 
 
 @wp.func

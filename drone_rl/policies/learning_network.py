@@ -41,14 +41,7 @@ class LearningNetwork(PictureNetwork):
     is made where its numbers lie, in blocks of pictures that stay near.
     """
 
-    def __init__(
-        self,
-        network: PolicyNetwork,
-        num_threads: int = 1,
-        *,
-        of: Of = "weights",
-        known: KnownOutputs | None = None,
-    ) -> None:
+    def __init__(self, network: PolicyNetwork, num_threads: int = 1, *, of: Of = "weights") -> None:
         """Wraps a network; `find` tells whether that can be done.
 
         Args:
@@ -56,23 +49,17 @@ class LearningNetwork(PictureNetwork):
             num_threads: That share the pictures; sums over these depend on how many there are.
             of: What has gradients: the weights, or the pictures. For those of pictures the weights
                 stay what they are at first.
-            known: Outputs that somebody else has made by the same network; looked for at each call.
         """
         super().__init__()
         self.network, self.in_shape, self.actions = network, network.in_shape, network.actions
-        self._num_threads, self._of, self._known = num_threads, of, known
+        self._num_threads, self._of = num_threads, of
+        self.known: KnownOutputs | None = None
+        """Outputs that somebody else makes by the same network; looked for at each call."""
         self._work: _Work | None = None
         loading(gradients_kernel)
 
     @classmethod
-    def find(
-        cls,
-        network: nn.Module,
-        num_threads: int = 1,
-        *,
-        of: Of = "weights",
-        known: KnownOutputs | None = None,
-    ) -> Self | None:
+    def find(cls, network: nn.Module, num_threads: int = 1, *, of: Of = "weights") -> Self | None:
         """The same, if the network is of such layers, small, and on the CPU."""
         layers = packed_layers(network)
         if layers is None or (of == "pictures" and not layers[0].has_way_back):
@@ -80,7 +67,7 @@ class LearningNetwork(PictureNetwork):
         if sum(p.numel() for p in network.parameters()) > MOST_WEIGHTS:
             return None
         assert isinstance(network, PolicyNetwork)
-        return cls(network, num_threads, of=of, known=known)
+        return cls(network, num_threads, of=of)
 
     def forward(self, pixels: Tensor) -> Tensor:
         """See `PictureNetwork`.
@@ -91,7 +78,7 @@ class LearningNetwork(PictureNetwork):
         if self._work is None:
             layers = packed_layers(self.network) or []
             is_fixed = self._of == "pictures"
-            self._work = _Work(layers, self._num_threads, self._known, is_fixed=is_fixed)
+            self._work = _Work(layers, self._num_threads, self.known, is_fixed=is_fixed)
         self.network.check(pixels)
         flat = pixels.reshape(-1, math.prod(self.in_shape))
         learning = self._work.parameters if self._of == "weights" else ()

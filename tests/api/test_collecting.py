@@ -7,10 +7,8 @@ import torch
 
 from drone_rl.api.collecting import _shares, build_collector
 from drone_rl.collectors import ThreadedCollector
-from drone_rl.settings.collecting import Ray, Rollouts, Threads
-from drone_rl.settings.objectives import Ppo
-from drone_rl.settings.returns import Gae
-from drone_rl.settings.training import TrainerSettings, TrainSettings
+from drone_rl.settings.collecting import Ray, Threads
+from drone_rl.settings.training import TrainSettings
 from drone_rl.sim.settings import TaskSettings
 from drone_rl.utils.errors import InputError
 
@@ -54,24 +52,6 @@ def test_a_seed_means_the_same_network_and_the_same_batch():
     assert all(torch.equal(weights[name], same[name]) for name in weights)
     other = collected(collector=Threads(num_envs=3), seed=1)[0].network.state_dict()
     assert not any(torch.equal(weights[n], other[n]) for n in weights if n.endswith("weight"))
-
-
-@pytest.mark.parametrize(
-    ("settings", "is_kept"),
-    [
-        ({}, True),
-        ({"trainer": TrainerSettings(compiled=False)}, False),
-        ({"collector": Threads(num_envs=4, num_threads=2)}, False),
-        ({"collector": Threads(compiled=False)}, False),
-        ({"objective": Ppo(), "collector": Rollouts(), "returns": Gae()}, False),
-    ],
-)
-def test_what_the_network_made_is_kept_where_it_is_learned_from(settings, is_kept):
-    made = build_collector(TrainSettings(task=TASK, **settings))
-    assert (made.known is not None) is is_kept
-    if is_kept:
-        assert made.known is made.collector.collectors[0].known_outputs
-    made.collector.shutdown()
 
 
 def test_ray_that_is_not_installed(monkeypatch):

@@ -19,7 +19,9 @@ from drone_rl.policies.learning_network import LearningNetwork
 from drone_rl.settings.collecting import Rollouts, Threads
 from drone_rl.settings.judging import FlightSettings
 from drone_rl.settings.learning import Sgd
+from drone_rl.settings.networks import SmallCnn
 from drone_rl.settings.objectives import A2c, Ppo
+from drone_rl.settings.returns import Gae
 from drone_rl.settings.training import TrainerSettings, TrainSettings
 from drone_rl.settings.transforms import EpisodeReward, Gray, Stack
 from drone_rl.sim.settings import TaskSettings
@@ -79,6 +81,29 @@ def test_gradients_by_the_kernel_teach_what_those_of_torch_do():
     for by_kernel, by_torch in zip(learned[True], learned[False], strict=True):
         assert by_torch.any()
         assert (by_kernel - by_torch).norm() < 0.01 * by_torch.norm()  # but for an output near 0
+
+
+@pytest.mark.parametrize(
+    ("settings", "is_kept"),
+    [
+        ({}, True),
+        ({"trainer": TrainerSettings(compiled=False)}, False),
+        ({"collector": Threads(num_envs=4, num_threads=2)}, False),
+        ({"collector": Threads(compiled=False)}, False),
+        ({"network": SmallCnn(hidden=(600,))}, False),  # too many weights to learn by the kernel
+        ({"objective": Ppo(), "collector": Rollouts(), "returns": Gae()}, False),
+    ],
+)
+def test_what_the_network_made_is_kept_where_it_is_learned_from(settings, is_kept):
+    settings = TrainSettings(task=TASK).replace(**settings)
+    made = build_collector(settings)
+    learner = build_learner(settings, made)
+    flights = [getattr(part, "_flight", None) for part in made.collector.collectors]
+    kept = [flight._known for flight in flights if flight is not None and flight._known is not None]
+    assert (len(kept) == 1) is is_kept and bool(kept) is is_kept
+    if is_kept:
+        assert kept[0] is learner.loss.actor_network.module[0].module.known
+    made.collector.shutdown()
 
 
 def test_what_was_made_in_flight_is_taken_and_teaches_the_same(monkeypatch):

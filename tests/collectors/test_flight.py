@@ -171,10 +171,10 @@ def learned(network, by, batch):
 @pytest.mark.parametrize("is_greedy", [True, False])
 def test_what_the_layers_made_is_what_they_would_make_again(longest, is_greedy, monkeypatch):
     monkeypatch.setattr(flight_module, "_LONGEST", longest)
-    collector = make(num_envs=35, num_cores=2, keep_outputs=True)
+    collector = make(num_envs=35, num_cores=2)
     network = collector.actor.module[0].module
-    known = collector.known_outputs
-    quick, plain = LearningNetwork(network, 2, known=known), LearningNetwork(network, 2)
+    quick, plain = LearningNetwork(network, 2), LearningNetwork(network, 2)
+    quick.known = known = collector.keep_outputs()
     weights = collector._flight._network.weights
     for _ in range(2):
         kind = DETERMINISTIC if is_greedy else ExplorationType.RANDOM
@@ -194,8 +194,9 @@ def test_what_the_layers_made_is_what_they_would_make_again(longest, is_greedy, 
 
 
 def test_another_flight_writes_over_what_was_made():
-    collector = make(keep_outputs=True)
-    network = LearningNetwork(collector.actor.module[0].module, known=collector.known_outputs)
+    collector = make()
+    network = LearningNetwork(collector.actor.module[0].module)
+    network.known = collector.keep_outputs()
     batch = collector.collect()
     logits = network(batch["pixels"])
     other = collector.collect()
@@ -209,25 +210,28 @@ def test_another_flight_writes_over_what_was_made():
 
 @pytest.mark.parametrize(("parts", "is_known"), [(0, False), (2, False), (6, True)])
 def test_what_the_layers_made_is_kept_as_far_as_there_is_room(parts, is_known, monkeypatch):
-    size = make(keep_outputs=True).known_outputs.outputs.shape[1]
+    size = make().keep_outputs().outputs.shape[1]
     monkeypatch.setattr(flight_module, "_LONGEST", 2)
     monkeypatch.setattr(flight_module, "_MOST_OUTPUTS", parts * 5 * 2 * size)
-    collector = make(keep_outputs=True)
+    collector = make()
+    known = collector.keep_outputs()
     batch = collector.collect()
     assert 4 < batch["collector", "traj_ids"].bincount().max() <= 12
-    known = collector.known_outputs
     assert (known is None) is (parts == 0)
     if known is not None:
         rows = known.find(batch["pixels"].flatten(1), collector._flight._network.weights)
         assert (rows is not None) is is_known
-    network = LearningNetwork(collector.actor.module[0].module, known=known)
+    network = LearningNetwork(collector.actor.module[0].module)
+    network.known = known
     assert torch.equal(network(batch["pixels"]), batch["logits"])
 
 
 def test_nothing_is_kept_that_nobody_asked_for_or_that_has_no_pictures():
-    assert make().known_outputs is None
-    assert make(is_compiled=False, keep_outputs=True).known_outputs is None
-    collector = make(keep_observations=False, keep_outputs=True)
+    assert make()._flight._known is None
+    assert make(is_compiled=False).keep_outputs() is None
+    collector = make(keep_observations=False)
+    known = collector.keep_outputs()
+    assert known is not None and collector.keep_outputs() is known
     assert "pixels" not in collector.collect()
 
 
