@@ -62,6 +62,8 @@ class Journal:
     settings: TrainSettings
     how: ProvableSettings
     rounds: list[Round]
+    is_noted: bool = dataclasses.field(default=True, compare=False)
+    """Whether its file says what this says."""
 
     @classmethod
     def open(
@@ -73,6 +75,8 @@ class Journal:
         changes: Mapping[str, Any],
     ) -> Self:
         """Begins a journal, or goes on with the one that is in the folder.
+
+        Where there is a checkpoint, nothing is written before `note`.
 
         Args:
             folder: Of the training.
@@ -89,17 +93,24 @@ class Journal:
         if settings is None and state is not None:
             settings = settings_of(saved["settings"] if saved else state["config"])
         settings = (settings or TrainSettings()).replace(**changes)
-        if saved is None:
-            shutil.rmtree(folder / "rounds", ignore_errors=True)
-        else:
+        if saved is not None:
             how = how or ProvableSettings.read(saved["how"], "how")
             check_same_config(saved["settings"], as_config(settings), MAY_CHANGE)
             check_same_config(saved["how"], how.values(), HOW_MAY_CHANGE)
             rounds = [Round.read(row, "rounds") for row in saved["rounds"]]
-        journal = cls(folder, settings, how or ProvableSettings(rounds=10), rounds)
+        journal = cls(folder, settings, how or ProvableSettings(rounds=10), rounds, is_noted=False)
         _ = journal.task  # refused before anything is written
-        journal._write()
+        if state is None:  # whoever is killed from here on finds the rounds of this training
+            journal.note()
         return journal
+
+    def note(self) -> None:
+        """Writes it, once the training has accepted the settings; forgets what lay there before."""
+        if self.is_noted:
+            return
+        if not self.rounds:
+            shutil.rmtree(self.folder / "rounds", ignore_errors=True)
+        self._write()
 
     @property
     def task(self) -> TaskSettings:
@@ -167,6 +178,7 @@ class Journal:
             "rounds": [done.values() for done in self.rounds],
         }
         write_atomically(self.folder / "provable.json", json.dumps(noted, indent=2))
+        self.is_noted = True
 
 
 _JOURNAL = Record({"settings": Plain(), "how": Plain(), "rounds": Several(Plain(), 0, 10_000)})

@@ -15,7 +15,15 @@ from drone_rl.api.journal import Journal, Round
 from drone_rl.api.policy import Policy, load_policy
 from drone_rl.api.progress import Bar, Progress
 from drone_rl.api.proving import Proof, prove
-from drone_rl.api.training import Tell, Training, finish, last_of, learn, new_folder
+from drone_rl.api.training import (
+    Tell,
+    Training,
+    finish,
+    hand_on_signal,
+    last_of,
+    learn,
+    new_folder,
+)
 from drone_rl.evaluation.searching import find_failures
 from drone_rl.proofs.boxes import volumes
 from drone_rl.settings.provable import ProvableSettings
@@ -23,6 +31,7 @@ from drone_rl.settings.training import TrainSettings
 from drone_rl.sim.tasks import Practice
 from drone_rl.sim.tasks.collect_cubes.practice import inflated
 from drone_rl.training import Callback
+from drone_rl.training.progress import OngoingTraining
 from drone_rl.utils.files import folder_lock, write_atomically
 from drone_rl.utils.seeding import Stream
 from drone_rl.zoo import read_checkpoint
@@ -59,6 +68,9 @@ def train_until_proved(
     Raises:
         InputError: A setting is unusable, nothing can be proved of such a policy, or learning broke
             down.
+        KeyboardInterrupt: Ctrl-C stopped it, see `train`; a search for failures ends at once, and
+            is repeated by a resume.
+        SystemExit: SIGTERM stopped it, see `train`.
     """
     folder = new_folder() if folder is None else Path(folder)
     state = read_checkpoint(last_of(folder)) if resume else None
@@ -66,19 +78,31 @@ def train_until_proved(
     progress = progress or Bar()
     with folder_lock(folder):
         journal = Journal.open(folder, settings, how, state, changes)
-        result = _learn(journal, state, [*callbacks, Tell(progress)])
+        callbacks = [_Note(journal), *callbacks, Tell(progress)]
+        result = _learn(journal, state, callbacks)
         while not (journal.is_over or result["reason"].startswith("SIG")):
             _search(journal, progress)
             if not journal.is_over:
                 state = read_checkpoint(last_of(folder))
-                result = _learn(journal, state, [*callbacks, Tell(progress)])
+                result = _learn(journal, state, callbacks)
         certificate = journal.certificate
         if certificate is not None:
             write_atomically(folder / "certificate.json", certificate.read_bytes())
-        if journal.is_proved:
+        if journal.is_proved and not result["reason"].startswith("SIG"):
             result["reason"] = "proved"
         result["rounds"] = [done.values() for done in journal.rounds]
-        return finish(journal.settings, folder, result)
+        done = finish(journal.settings, folder, result)
+    return hand_on_signal(done)
+
+
+class _Note(Callback):
+    """Writes the journal once the training has accepted its settings."""
+
+    def __init__(self, journal: Journal) -> None:
+        self._journal = journal
+
+    def on_start(self, training: OngoingTraining) -> None:
+        self._journal.note()
 
 
 def _learn(

@@ -4,6 +4,7 @@ import csv
 import dataclasses
 import enum
 import json
+import signal
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -103,6 +104,9 @@ def train(
 ) -> Training:
     """Trains one policy, or goes on with it.
 
+    Ctrl-C and SIGTERM let the current update finish; its state is saved before they act. In other
+    threads than the main one they are not watched.
+
     Args:
         settings: What is learned, how, and for how long; those of the run if it is resumed.
         folder: Where everything is left; by default a new one under outputs/train/runs.
@@ -113,6 +117,9 @@ def train(
 
     Raises:
         InputError: A setting is unusable, or learning broke down.
+        KeyboardInterrupt: Ctrl-C stopped it; its attribute `training` is the result so far.
+        SystemExit: SIGTERM stopped it (status 143); likewise. If the caller has a handler of its
+            own for the signal, that handler is called instead; if it returns, so does this.
     """
     folder = new_folder() if folder is None else Path(folder)
     state = read_checkpoint(last_of(folder)) if resume else None
@@ -122,7 +129,37 @@ def train(
     folder.mkdir(parents=True, exist_ok=True)
     with folder_lock(folder):
         told = [*callbacks, Tell(progress or Bar())]
-        return finish(settings, folder, learn(settings, folder, state, told))
+        done = finish(settings, folder, learn(settings, folder, state, told))
+    return hand_on_signal(done)
+
+
+def hand_on_signal(training: Training) -> Training:
+    """Lets a signal that stopped a training act, now that its state is saved.
+
+    Args:
+        training: Its result, which is returned if no signal stopped it, or if the caller's own
+            handler of that signal returns.
+
+    Raises:
+        KeyboardInterrupt: Ctrl-C stopped it. Not a subclass: Python ends itself by SIGINT, which
+            shells want to see, only for this very class.
+        SystemExit: SIGTERM stopped it.
+    """
+    if not training.reason.startswith("SIG"):
+        return training
+    number = signal.Signals[training.reason]
+    handler = signal.getsignal(number)
+    if callable(handler) and handler is not signal.default_int_handler:
+        signal.raise_signal(number)
+        return training
+    remedy = f"drone_rl.train(folder={str(training.folder)!r}, resume=True)"
+    stop = (
+        KeyboardInterrupt(f"training stopped, its state is saved; go on with {remedy}")
+        if number == signal.SIGINT
+        else SystemExit(128 + number)
+    )
+    vars(stop)["training"] = training
+    raise stop
 
 
 def learn(
@@ -150,10 +187,11 @@ def learn(
     if state is not None:
         check_same_config(_own(state["config"]), as_config(settings), MAY_CHANGE)
     trainer, checkpoints, confirmation = _build(settings, folder, callbacks, practice)
-    if state is not None:
-        trainer.load_state_dict(state)
-        checkpoints.best = _read_best(state.get("best"))
     try:
+        if state is not None:
+            trainer.load_state_dict(state)
+            checkpoints.best = _read_best(state.get("best"))
+        _note(folder, checkpoints.extra)
         reason = trainer.run()
     except NotANumberError as error:
         raise InputError(f"{error}; the last good checkpoint is {checkpoints.last_path}") from error
@@ -194,8 +232,6 @@ def _build(
     torch.set_num_threads(settings.trainer.num_threads)
     bound_kernels()
     made = build_collector(settings, practice)
-    noted = {"config": config, "description": description, **origin}
-    (folder / "run.yaml").write_text(yaml.safe_dump(noted, sort_keys=False))
     limits = settings.trainer
     checkpoints = CheckpointCallback(
         folder / "checkpoints",
@@ -217,6 +253,12 @@ def _build(
         ends=_ends(settings),
     )
     return trainer, checkpoints, confirmation
+
+
+def _note(folder: Path, extra: Mapping[str, Any]) -> None:
+    """Writes `run.yaml`: the settings, what they describe, versions and machine."""
+    noted = {"config": extra["config"], "description": extra["description"], **extra["provenance"]}
+    (folder / "run.yaml").write_text(yaml.safe_dump(noted, sort_keys=False))
 
 
 def _ends(settings: TrainSettings) -> list[enum.IntEnum]:

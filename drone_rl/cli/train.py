@@ -6,12 +6,12 @@ import logging
 import signal
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import drone_rl
+from drone_rl.hydra_app import resuming
 from drone_rl.hydra_app.launchers import LocalLauncher, RayLauncher, SlurmLauncher, register_plugins
 from drone_rl.hydra_app.optuna_sweeper import OptunaSweeper
-from drone_rl.hydra_app.resuming import complete as prepare  # noqa: F401 -- of what was typed
 from drone_rl.settings.loggers import Logger, Tensorboard
 from drone_rl.settings.paths import PathsSettings
 from drone_rl.settings.provable import ProvableSettings
@@ -19,7 +19,12 @@ from drone_rl.settings.training import TrainSettings
 from drone_rl.utils.schema import Instance, Several, Whole
 from drone_rl.words.proof import found
 
+if TYPE_CHECKING:
+    from drone_rl.training import Callback
+
 _log = logging.getLogger(__name__)
+prepare = resuming.complete
+"""What `drone_rl.hydra_app.composition` does with what was typed."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -54,22 +59,44 @@ def run(settings: Command, folder: Path) -> tuple[int, float]:
     """Trains one policy. Returns the exit status and the running mean of rewards."""
     train = _training(settings.provable)  # slow to import; a sweep leaves it to its runs
     from drone_rl.api.progress import silent
-    from drone_rl.sweeps.pruning import PruneCallback
-    from drone_rl.training import LoggerCallback, ProgressCallback
 
-    loggers = LoggerCallback([logger.make() for logger in settings.logger])
-    searching = [] if settings.trial is None else [PruneCallback(folder.parent, settings.trial)]
-    done = train(
-        settings.narrowed(TrainSettings),
-        folder=folder,
-        resume=settings.resume is not None,
-        callbacks=[loggers, ProgressCallback(), *searching],
-        progress=silent,
-    )
+    try:
+        done = train(
+            settings.narrowed(TrainSettings),
+            folder=folder,
+            resume=settings.resume is not None,
+            callbacks=_callbacks(settings, folder),
+            progress=silent,
+        )
+    except (KeyboardInterrupt, SystemExit) as stop:
+        if "training" not in vars(stop):  # nothing was saved since the last checkpoint
+            raise
+        done = vars(stop)["training"]
     _log.info("run folder: %s", folder)
     for row in done.result.get("rounds", ()):
         _log.info(found(row))
     if not done.reason.startswith("SIG"):
         return 0, done.running_reward
-    _log.info("go on with: drone-rl train resume=%s", folder)
+    _log.info("go on with: %s", resuming.resume_command(folder))
     return 128 + signal.Signals[done.reason].value, done.running_reward
+
+
+def _callbacks(settings: Command, folder: Path) -> list["Callback"]:
+    """What is done besides learning. A run that is resumed is left as it is until it goes on."""
+    from drone_rl.sweeps.pruning import PruneCallback
+    from drone_rl.training import Callback, LoggerCallback, ProgressCallback
+
+    class Note(Callback):
+        """Notes the settings of a resumed run once its state has been accepted."""
+
+        def on_start(self, training: object) -> None:
+            resuming.note_settings(folder)
+
+    def make() -> list[Any]:
+        return [logger.make() for logger in settings.logger]
+
+    searching = [] if settings.trial is None else [PruneCallback(folder.parent, settings.trial)]
+    if settings.resume is None:
+        return [LoggerCallback(make()), ProgressCallback(), *searching]
+    resuming.check_folder(settings.resume, folder)
+    return [LoggerCallback(make), Note(), ProgressCallback(), *searching]

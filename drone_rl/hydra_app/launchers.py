@@ -31,6 +31,7 @@ from omegaconf import DictConfig, OmegaConf, open_dict
 from drone_rl.sweeps import LocalExecutor, Run, Sweep, open_sweep, read_result
 from drone_rl.sweeps.executors import Executor, RayExecutor, SlurmExecutor
 from drone_rl.sweeps.runs import read_failure
+from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock
 
 NAMESPACE = "hydra_plugins.drone_rl"
@@ -52,6 +53,8 @@ class SweepLauncher(Launcher):
         """Takes what Hydra hands over."""
         self.hydra_context, self.config = hydra_context, config
         self.task_function = task_function
+        noted = Path(str(config.hydra.sweep.dir)) / "multirun.yaml"
+        self._noted = noted, noted.read_bytes() if noted.is_file() else None
 
     def executor(self, folder: Path) -> Executor:
         """Where the processes run."""
@@ -66,14 +69,26 @@ class SweepLauncher(Launcher):
         folder = Path(str(self.config.hydra.sweep.dir)).absolute()
         runs = [self._run(folder, initial_job_idx + i, o) for i, o in enumerate(job_overrides)]
         folder.mkdir(parents=True, exist_ok=True)
-        with folder_lock(folder), _sigterm_as_interrupt():
-            sweep = open_sweep(folder, _command(), self._settings(), runs)
-            finished = sum(read_result(run.folder) is not None for run in runs)
-            _log.info("sweep of %d runs, %d finished before: %s", len(runs), finished, folder)
-            failed = self._finish(sweep, runs)
+        try:
+            with folder_lock(folder), _sigterm_as_interrupt():
+                sweep = open_sweep(folder, _command(), self._settings(), runs)
+                finished = sum(read_result(run.folder) is not None for run in runs)
+                _log.info("sweep of %d runs, %d finished before: %s", len(runs), finished, folder)
+                failed = self._finish(sweep, runs)
+        except InputError:
+            self._leave_as_it_was()
+            raise
         if failed:
             self.task_function.statuses.append(1)  # what `drone-rl` exits with
         return [_job_return(run) for run in runs]
+
+    def _leave_as_it_was(self) -> None:
+        """Undoes what Hydra's sweeper has noted of a sweep that is refused."""
+        path, content = self._noted
+        if content is None:
+            path.unlink(missing_ok=True)
+        else:
+            path.write_bytes(content)
 
     def _finish(self, sweep: Sweep, runs: Sequence[Run]) -> int:
         """Returns how many runs failed."""
@@ -88,6 +103,9 @@ class SweepLauncher(Launcher):
             for done, (run, status) in enumerate(endings, start=1):
                 failed += status != 0
                 _log.info("[%d/%d] %s: %s", done, len(unfinished), run.folder.name, _outcome(run))
+        except KeyboardInterrupt:
+            _log.info("go on with the same command: %s", sweep.command)
+            raise
         finally:
             _log.info("report: %s", write_sweep_report(sweep))
         return failed

@@ -6,7 +6,7 @@ import logging
 import os
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -146,9 +146,20 @@ class CsvCallback(Callback):
 class LoggerCallback(Callback):
     """Passes the metrics, by frames, to any of TorchRL's loggers."""
 
-    def __init__(self, loggers: Sequence[Logger]) -> None:
-        """Sets the loggers."""
-        self.loggers = list(loggers)
+    def __init__(self, loggers: Sequence[Logger] | Callable[[], Sequence[Logger]]) -> None:
+        """Sets the loggers.
+
+        Args:
+            loggers: Themselves, or a function that makes them when training starts. A logger may
+                write as soon as it is made, which must wait until a resumed run is accepted.
+        """
+        self._make = loggers if callable(loggers) else None
+        self.loggers = [] if callable(loggers) else list(loggers)
+
+    def on_start(self, training: OngoingTraining) -> None:
+        """Makes the loggers, if that is left to do."""
+        if self._make is not None:
+            self.loggers, self._make = list(self._make()), None
 
     def on_update(self, training: OngoingTraining, metrics: Mapping[str, float]) -> None:
         """Logs each metric."""

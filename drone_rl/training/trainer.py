@@ -100,12 +100,13 @@ class Trainer:
     def run(self) -> str:
         """Trains until solved, out of budget or told to stop.
 
-        Ctrl-C and SIGTERM let the current update finish, so that nothing is lost; a second Ctrl-C
-        aborts at once.
+        Ctrl-C and SIGTERM let the current update finish, so that nothing is lost; a second signal
+        acts at once. Signals are watched in the main thread only.
 
         Returns:
             Why it stopped: "solved", "frames" (also if the collector has no more), "episodes", a
-            signal's name or what a callback gave as `stop_request`.
+            signal's name or what a callback gave as `stop_request`. A signal that arrives while
+            the training ends for another reason is returned too: the caller must hand it on.
 
         Raises:
             NotANumberError: A loss or gradient was NaN or infinite.
@@ -127,7 +128,7 @@ class Trainer:
                 self._notify("on_failure")
                 raise
             self._notify("on_end", reason)
-        return reason
+        return reason if self.stop_signal is None else self.stop_signal.name
 
     def _update(self, batches: Iterator[TensorDictBase]) -> dict[str, float] | None:
         """Collects and learns. Returns what is to be told; None if there was no batch left."""
@@ -169,7 +170,10 @@ class Trainer:
             return self.stop_signal.name
         if self.stop_request:
             return self.stop_request
-        if self._is_solved():
+        is_solved = self._is_solved()
+        if self.stop_signal is not None:  # it came during the confirmation, which a resume repeats
+            return self.stop_signal.name
+        if is_solved:
             return "solved"
         if self.total_episodes is not None and progress.episodes >= self.total_episodes:
             return "episodes"
@@ -195,7 +199,8 @@ class Trainer:
             yield
             return
         watched = (signal.SIGINT, signal.SIGTERM)
-        before = {number: signal.getsignal(number) for number in watched}
+        found = {number: signal.getsignal(number) for number in watched}
+        before = {n: handler for n, handler in found.items() if handler is not None}
 
         def restore() -> None:
             for number, handler in before.items():
@@ -206,7 +211,7 @@ class Trainer:
             self.stop_signal = signal.Signals(number)
             restore()
 
-        for number in watched:
+        for number in before:  # one set outside Python can't be restored, so it is left alone
             signal.signal(number, note)
         try:
             yield

@@ -6,7 +6,7 @@ who wrote it, it may not.
 
 import re
 import shlex
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,11 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import read_bytes
 from drone_rl.utils.schema import Kind, Several, Text, shown
 
+_OF_ONE_FOLDER = re.compile(r"\+{0,2}(resume|trial|paths(\.\w+)?)")
+"""Settings that say where a run was or which sweep it was a part of: not what it learns.
+
+The folder that is given counts, so that a run can be moved or copied.
+"""
 MOST_OVERRIDES = 200
 """Settings of one run."""
 _LONGEST = 500
@@ -28,7 +33,7 @@ _SECTIONS = (
     "scheduler|transforms|provable"
 )
 _TAKEN_OVER = (
-    r"(seed|evaluate_after|trial|resume)=\w*",
+    r"(seed|evaluate_after)=\w*",
     r"device=(cpu|cuda)(:\d+)?",
     rf"({_SECTIONS}|collector|logger|experiment|sweep)=[A-Za-z][\w-]*",
     rf"\+{{0,2}}({_SECTIONS})(\.{_NAME}){{1,2}}={_VALUE}",
@@ -108,14 +113,27 @@ def taken_over(folder: Path, typed: Collection[str]) -> list[str]:
         InputError: A setting may not be taken over from a file.
     """
     keys = {_key(override) for override in typed}
-    found = [o for o in read_overrides(folder) if _key(o) not in keys and _key(o) != "resume"]
-    for override in found:
-        if not any(re.fullmatch(pattern, override) for pattern in _TAKEN_OVER):
-            raise InputError(
-                f"{folder}/.hydra/overrides.yaml sets {shown(override)}, which is not taken over "
-                "from a file; if it is yours, give it on the command line too"
-            )
+    found = [o for o in read_overrides(folder) if _key(o) not in keys and not _is_of_one_folder(o)]
+    for override in must_be_typed(found):
+        raise InputError(
+            f"{folder}/.hydra/overrides.yaml sets {shown(override)}, which is not taken over "
+            "from a file; if it is yours, give it on the command line too"
+        )
     return found
+
+
+def must_be_typed(overrides: Iterable[str]) -> list[str]:
+    """The settings of a run that `taken_over` refuses, so that a person gives them again."""
+    return [
+        override
+        for override in overrides
+        if not _is_of_one_folder(override)
+        and not any(re.fullmatch(pattern, override) for pattern in _TAKEN_OVER)
+    ]
+
+
+def _is_of_one_folder(override: str) -> bool:
+    return bool(_OF_ONE_FOLDER.fullmatch(override.partition("=")[0]))
 
 
 def _key(override: str) -> str:

@@ -82,6 +82,20 @@ def test_only_the_budget_may_change(tmp_path):
         begin(tmp_path, None, STATE, seed=4)
 
 
+def test_one_that_goes_on_is_noted_only_once_it_is_accepted(tmp_path):
+    begin(tmp_path).add(search(100), np.empty((1, 3, 2)))
+    before = (tmp_path / "provable.json").read_bytes()
+    again = begin(tmp_path, HOW.replace(rounds=9), STATE)
+    assert (tmp_path / "provable.json").read_bytes() == before
+    again.note()
+    assert begin(tmp_path, None, STATE, None).how.rounds == 9
+    (tmp_path / "provable.json").unlink()
+    usual = begin(tmp_path, None, STATE)  # as if the rounds were of an earlier training
+    assert (tmp_path / "rounds").exists() and not (tmp_path / "provable.json").exists()
+    usual.note()
+    assert (tmp_path / "provable.json").exists() and not (tmp_path / "rounds").exists()
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [

@@ -1,6 +1,7 @@
 """Training until proved: its rounds, what they practise, and that it goes on bit for bit."""
 
 import json
+import signal
 
 import numpy as np
 import pytest
@@ -156,6 +157,30 @@ def test_killed_in_a_proof(whole, tmp_path, monkeypatch, prover):
 def test_a_usual_run_is_made_provable(whole, tmp_path):
     drone_rl.train(TINY, folder=tmp_path, progress=silent)
     done = drone_rl.train_until_proved(None, HOW, folder=tmp_path, resume=True, progress=silent)
+    assert done.reason == "proved" and done.result["frames"] == whole.result["frames"]
+
+
+def test_a_usual_run_that_is_refused_stays_one(tmp_path):
+    drone_rl.train(TINY, folder=tmp_path, progress=silent)
+    with pytest.raises(InputError, match="can't resume with seed=9"):
+        drone_rl.train_until_proved(None, HOW, folder=tmp_path, resume=True, seed=9)
+    assert not (tmp_path / "provable.json").exists()
+
+
+class Interrupt(Callback):
+    def on_update(self, training, metrics):
+        signal.raise_signal(signal.SIGINT)
+
+
+def test_ctrl_c_ends_it_and_a_resume_goes_on(whole, tmp_path):
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt) as stopped:
+            train(tmp_path, callbacks=[Interrupt()])
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert stopped.value.training.result["updates"] == 1
+    done = drone_rl.train_until_proved(folder=tmp_path, resume=True, progress=silent)
     assert done.reason == "proved" and done.result["frames"] == whole.result["frames"]
 
 

@@ -2,6 +2,10 @@
 
 import json
 import shutil
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -145,3 +149,150 @@ def test_a_training_in_flight_is_described_and_goes_on_as_it_was(tmp_path, train
     with pytest.raises(InputError, match=r"^can't resume with dynamics\.gusts=2\.0: "):
         windy = whole.replace(dynamics=flight.replace(gusts=2.0))
         drone_rl.train(windy, folder=parts.folder, resume=True, progress=silent)
+
+
+class Stop(Callback):
+    """Sends signals to this process after an update, or before the first."""
+
+    def __init__(self, *numbers, update=1):
+        self.numbers, self.update = numbers, update
+
+    def send(self):
+        for number in self.numbers:
+            signal.raise_signal(number)
+
+    def on_start(self, training):
+        if self.update == 0:
+            self.send()
+
+    def on_update(self, training, metrics):
+        if training.progress.updates == self.update:
+            self.send()
+
+
+@pytest.fixture
+def handlers():
+    """Python's own handlers, whatever this process was started with; returns what sets others."""
+    defaults = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
+    before = {number: signal.signal(number, handler) for number, handler in defaults.items()}
+    yield signal.signal
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+def assert_goes_on(folder, trained):
+    """What is learned is that of the training which nobody stopped."""
+    drone_rl.train(folder=folder, resume=True, progress=silent)
+    there, whole = weights(folder), weights(trained[0].folder)
+    assert all(torch.equal(there[name], whole[name]) for name in whole)
+
+
+@pytest.mark.parametrize("update", [0, 1])
+@pytest.mark.parametrize(
+    ("number", "raised", "args"),
+    [
+        (signal.SIGINT, KeyboardInterrupt, "resume=True"),
+        (signal.SIGTERM, SystemExit, "143"),
+    ],
+)
+def test_a_signal_acts_once_the_state_is_saved(
+    trained, tmp_path, handlers, number, raised, args, update
+):
+    with pytest.raises(raised, match=args) as stopped:
+        drone_rl.train(TINY, folder=tmp_path, callbacks=[Stop(number, update=update)])
+    done = stopped.value.training
+    assert done.reason == number.name
+    assert json.loads((tmp_path / "result.json").read_text()) == done.result
+    assert done.result["updates"] == update
+    assert_goes_on(tmp_path, trained)
+
+
+def test_a_second_ctrl_c_does_not_wait_for_the_state(trained, tmp_path, handlers):
+    with pytest.raises(KeyboardInterrupt) as stopped:
+        drone_rl.train(TINY, folder=tmp_path, callbacks=[Stop(signal.SIGINT, signal.SIGINT)])
+    assert not hasattr(stopped.value, "training")
+    assert not (tmp_path / "result.json").exists()
+    assert_goes_on(tmp_path, trained)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_handler_of_the_callers_own_decides(tmp_path, handlers, number):
+    got = []
+    handlers(number, lambda n, frame: got.append(n))
+    done = drone_rl.train(TINY, folder=tmp_path, callbacks=[Stop(number)], progress=silent)
+    assert got == [number] and done.reason == number.name
+
+
+def test_a_signal_that_is_ignored_stops_training_too(tmp_path, handlers):
+    """As in a process started in the background of a script, which ignores Ctrl-C."""
+    handlers(signal.SIGINT, signal.SIG_IGN)
+    with pytest.raises(KeyboardInterrupt):
+        drone_rl.train(TINY, folder=tmp_path, callbacks=[Stop(signal.SIGINT)], progress=silent)
+    assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+
+
+def test_a_stopped_confirmation_is_repeated(tmp_path, handlers, monkeypatch):
+    flown = []
+
+    def confirm(self, update):
+        flown.append(update)
+        if len(flown) == 1:
+            signal.raise_signal(signal.SIGINT)
+        return True
+
+    monkeypatch.setattr("drone_rl.api.confirming.Confirmation.__call__", confirm)
+    easy = TINY.replace(trainer=TINY.trainer.replace(target_share=1e-9))
+    with pytest.raises(KeyboardInterrupt):
+        drone_rl.train(easy, folder=tmp_path, progress=silent)
+    done = drone_rl.train(folder=tmp_path, resume=True, progress=silent)
+    assert done.reason == "solved" and len(flown) == 2 and flown[0] == flown[1]
+
+
+@pytest.mark.parametrize(
+    ("number", "statuses"),
+    [
+        (signal.SIGINT, (-signal.SIGINT, 1)),  # 1 where Ray is installed: what it does at exit
+        (signal.SIGTERM, (143,)),
+    ],
+)
+def test_a_signal_ends_a_loop_of_trainings(tmp_path, number, statuses):
+    code = (
+        "import signal, drone_rl\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "short = drone_rl.TrainerSettings(total_frames=10_000_000)\n"
+        "for seed in range(3):\n"
+        "    drone_rl.train(folder=f'run{seed}', seed=seed, trainer=short)\n"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", code], cwd=tmp_path, stderr=subprocess.PIPE, text=True
+    )
+    while not (tmp_path / "run0" / "metrics.csv").exists():
+        assert process.poll() is None
+        time.sleep(0.02)
+    process.send_signal(number)
+    _, printed = process.communicate(timeout=60)
+    assert process.returncode in statuses, printed
+    assert ("KeyboardInterrupt: training stopped" in printed) == (number == signal.SIGINT)
+    assert [path.name for path in tmp_path.iterdir()] == ["run0"]
+    state = drone_rl.load_policy(tmp_path / "run0").state["progress"]
+    rows = (tmp_path / "run0" / "metrics.csv").read_text().splitlines()
+    assert state["updates"] == len(rows) - 1
+
+
+def contents(folder):
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_a_refused_resume_changes_nothing(trained, tmp_path):
+    folder = shutil.copytree(trained[0].folder, tmp_path / "run")
+    before = contents(folder)
+    with pytest.raises(InputError, match="can't resume with seed=9"):
+        drone_rl.train(folder=folder, resume=True, seed=9)
+    assert contents(folder) == before
+    state = torch.load(folder / "checkpoints" / "last.pt", weights_only=False)
+    torch.save({**state, "optimiser": {}}, folder / "checkpoints" / "last.pt")
+    before = contents(folder)
+    longer = TINY.trainer.replace(total_frames=900)
+    with pytest.raises(InputError):
+        drone_rl.train(folder=folder, resume=True, trainer=longer)
+    assert contents(folder) == before

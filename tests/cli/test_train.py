@@ -1,8 +1,11 @@
 """Trainings as a user runs them: repeated, killed, gone on with, told impossible things."""
 
 import json
+import logging
 import os
 import re
+import shlex
+import shutil
 import signal
 import subprocess
 import sys
@@ -11,7 +14,8 @@ import time
 import pytest
 import torch
 
-from drone_rl.training import load_checkpoint
+from drone_rl.training import CsvCallback, load_checkpoint
+from drone_rl.utils.overrides import read_overrides
 from tests.cli.running import TINY, drone_rl, error_line
 
 
@@ -117,6 +121,95 @@ def test_resume_with_a_changed_setting(run, in_process):
     assert "optimiser.lr=0.5" in line
     assert "optimiser.lr=0.001" in line
     assert (run / "checkpoints" / "last.pt").read_bytes() == before
+
+
+def contents(folder):
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        ["seed=9"],
+        ["provable.rounds=1", "seed=9"],
+        ["logger=tensorboard", "optimiser.lr=0.5"],
+        ["trainer.total_frames=800", "hydra.run.dir=elsewhere"],
+        ["task.num_cubes=0"],
+    ],
+)
+def test_a_refused_resume_changes_nothing(run, in_process, tmp_path, wrong):
+    folder = shutil.copytree(run, tmp_path / "copy")
+    (folder / "train.log").unlink()
+    before = contents(folder)
+    error_line(in_process("train", f"resume={folder}", *wrong))
+    assert contents(folder) == before
+    longer = "trainer.total_frames=500"
+    assert in_process("train", f"resume={folder}", longer, "logger=tensorboard").returncode == 0
+    assert list(folder.glob("tensorboard/events*"))
+    noted = read_overrides(folder)
+    assert longer in noted and "logger=tensorboard" in noted
+
+
+@pytest.mark.parametrize("noted", ["seed: 3", None])
+def test_a_refused_sweep_changes_nothing(in_process, tmp_path, noted):
+    (tmp_path / "s" / "0").mkdir(parents=True)
+    (tmp_path / "s" / "0" / "run.yaml").write_text("")
+    (tmp_path / "s" / ".lock").write_text("")
+    if noted is not None:
+        (tmp_path / "s" / "multirun.yaml").write_text(noted)
+    before = contents(tmp_path / "s")
+    line = error_line(in_process("train", "-m", "seed=0,1", "hydra.sweep.dir=s"))
+    assert "holds runs of something else" in line
+    assert contents(tmp_path / "s") == before
+
+
+def test_a_run_resumes_from_wherever_its_folder_is(in_process, tmp_path):
+    outputs = tmp_path / "first, place"
+    begun = in_process("train", *TINY, "seed=3", f"paths.outputs='{outputs}'")
+    assert begun.returncode == 0, begun.stderr
+    (folder,) = (outputs / "train" / "runs").iterdir()
+    moved = tmp_path / "another place"
+    outputs.rename(moved)
+    again = [f"resume={moved / folder.relative_to(outputs)}", "trainer.total_frames=600"]
+    done = in_process("train", *again)
+    assert done.returncode == 0, done.stderr
+    assert not outputs.exists()
+    (folder,) = (moved / "train" / "runs").iterdir()
+    state = load_checkpoint(folder / "checkpoints" / "last.pt")
+    assert state["config"]["seed"] == 3 and state["progress"]["frames"] >= 600
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_the_command_that_is_printed_goes_on_with_a_stopped_run(
+    in_process, tmp_path, number, caplog
+):
+    caplog.set_level(logging.INFO)
+
+    class Stop(CsvCallback):
+        def on_update(self, training, metrics):
+            super().on_update(training, metrics)
+            if training.progress.updates == 2:
+                signal.raise_signal(number)
+
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    logs = ["logger=tensorboard", "logger.tensorboard.exp_name=my logs"]  # not out of a file
+    own = [*(o for o in TINY if o != "logger=csv"), *logs, "paths.outputs=my runs"]
+    try:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr("drone_rl.api.training.CsvCallback", Stop)
+            stopped = in_process("train", *own)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert stopped.returncode == 128 + number, stopped.stderr
+    (folder,) = (tmp_path / "my runs" / "train" / "runs").iterdir()
+    hint = re.search("go on with: drone-rl (.*)", caplog.text)
+    assert hint, caplog.text
+    (tmp_path / "elsewhere").mkdir()
+    done = in_process(*shlex.split(hint[1]), cwd=tmp_path / "elsewhere")
+    assert done.returncode == 0, done.stderr
+    result = json.loads((folder / "result.json").read_text())
+    assert result["reason"] == "frames"
+    assert not list((tmp_path / "elsewhere").iterdir())
 
 
 def test_nan_names_itself_and_the_last_good_checkpoint(in_process, tmp_path):

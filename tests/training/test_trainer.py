@@ -1,5 +1,6 @@
 import enum
 import signal
+import threading
 
 import pytest
 import torch
@@ -66,6 +67,48 @@ def test_signal_saves_and_stops_after_the_update(make_trainer, tmp_path, number)
     assert trainer.progress.updates == 3
     assert load_checkpoint(tmp_path / "last.pt")["progress"]["updates"] == 3
     assert signal.getsignal(number) == before
+
+
+def test_a_signal_during_the_confirmation_stops_after_it(make_trainer):
+    """Even if it succeeds: otherwise nobody would learn of the signal."""
+    asked = []
+
+    def confirm(update):
+        asked.append(update)
+        signal.raise_signal(signal.SIGTERM)
+        return True
+
+    trainer = make_trainer(target=-1e6, confirm=confirm)
+    assert trainer.run() == "SIGTERM"
+    assert asked == [0]
+
+
+def test_a_signal_while_the_last_state_is_saved_is_returned(make_trainer):
+    class Late(Callback):
+        def on_end(self, training, reason):
+            assert reason == "frames"
+            signal.raise_signal(signal.SIGTERM)
+
+    assert make_trainer(callbacks=[Late()]).run() == "SIGTERM"
+
+
+def test_other_threads_watch_no_signals(make_trainer):
+    before = signal.getsignal(signal.SIGTERM)
+    seen = []
+    look = At(1, lambda _: seen.append(signal.getsignal(signal.SIGTERM)))
+    trainer = make_trainer(callbacks=[look])
+    thread = threading.Thread(target=trainer.run)
+    thread.start()
+    thread.join()
+    assert seen == [before] and trainer.progress.frames >= trainer.total_frames
+
+
+def test_a_handler_from_outside_python_is_left_alone(make_trainer, monkeypatch):
+    installed = []
+    monkeypatch.setattr(signal, "getsignal", lambda number: None)
+    monkeypatch.setattr(signal, "signal", lambda *args: installed.append(args))
+    assert make_trainer().run() == "frames"
+    assert installed == []
 
 
 def test_second_ctrl_c_aborts_at_once(make_trainer):

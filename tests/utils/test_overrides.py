@@ -4,7 +4,13 @@ import pytest
 import yaml
 
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.overrides import COMMAND, check_harmless, read_overrides, taken_over
+from drone_rl.utils.overrides import (
+    COMMAND,
+    check_harmless,
+    must_be_typed,
+    read_overrides,
+    taken_over,
+)
 
 
 @pytest.fixture
@@ -20,7 +26,7 @@ def noted(tmp_path):
 
 def test_settings_of_a_training_are_taken_over(noted):
     settings = [
-        *("seed=1", "device=cuda:0", "evaluate_after=200", "trial=null"),
+        *("seed=1", "device=cuda:0", "evaluate_after=200"),
         *("experiment=smoke", "logger=csv", "policy=mlp", "collector=ray", "transforms=stack"),
         *("policy.hidden=[128,64]", "policy.hidden=[128, 64]", "policy.channels=[]"),
         *("optimiser.lr=1e-3", "task.spacing=-9.5", "trainer.total_episodes=null"),
@@ -35,15 +41,22 @@ def test_nothing_noted_is_nothing(tmp_path):
 
 
 def test_what_is_told_anew_is_not_taken_over(noted):
-    folder = noted(["seed=1", "paths.outputs=/somewhere", "resume=x", "policy=mlp"])
-    assert taken_over(folder, ["paths.outputs=/here", "+seed=2"]) == ["policy=mlp"]
+    folder = noted(["seed=1", "optimiser.lr=1", "policy=mlp"])
+    assert taken_over(folder, ["optimiser.lr=2", "+seed=2"]) == ["policy=mlp"]
+
+
+def test_where_a_run_was_does_not_matter(noted):
+    """It may have been moved or copied, or out of a sweep that is not there any more."""
+    place = ["paths.outputs=/x", "+paths.outputs=/x", "paths=mine", "resume=x", "trial=3"]
+    assert taken_over(noted([*place, "seed=1"]), []) == ["seed=1"]
+    assert must_be_typed([*place, "seed=1", "collector.make=a"]) == ["collector.make=a"]
 
 
 @pytest.mark.parametrize(
     "setting",
     [
         *("policy._target_=os.system", "policy={_target_:os.system}", "+a={_target_:os.system}"),
-        *("hydra.run.dir=/x", "hydra/launcher=ray", "+hydra.job.name=x", "paths.outputs=/x"),
+        *("hydra.run.dir=/x", "hydra/launcher=ray", "+hydra.job.name=x", "pathsx.outputs=/x"),
         *("logger.tensorboard.log_dir=/x", "collector.address=ray://x", "collector.make=os.system"),
         *("policy=../x", "policy=/x", "policy=a/b", "experiment=[a,b]", "+policy=mlp"),
         *("seed=${oc.env:HOME}", "task.spacing=${task.num_cubes}", "seed=1,2", "seed=range(9)"),
