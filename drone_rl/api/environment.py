@@ -1,6 +1,6 @@
 """Worlds as a TorchRL environment, with the pixels that policies see."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from torchrl.envs import TransformedEnv
@@ -10,16 +10,19 @@ from drone_rl.settings.transforms import Gray, Standardize, Transform
 from drone_rl.sim.dynamics import Dynamics
 from drone_rl.sim.settings import (
     ActionSettings,
+    AppearanceSettings,
     BaseTaskSettings,
     CameraSettings,
     DynamicsSettings,
 )
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.schema import shown
 
 
 def make_env(
     num_envs: int = 1,
     *,
-    task: BaseTaskSettings | None = None,
+    task: BaseTaskSettings | str | None = None,
     camera: CameraSettings | None = None,
     dynamics: DynamicsSettings | Dynamics | None = None,
     actions: ActionSettings | None = None,
@@ -32,7 +35,7 @@ def make_env(
 
     Args:
         num_envs: How many.
-        task: What the drone has to do.
+        task: What the drone has to do: settings, or a name such as "pillars" for its defaults.
         camera: The picture that it takes.
         dynamics: How it moves; in computer-vision mode by default.
         actions: What it can be asked for, where dynamics are settings; moves by default.
@@ -44,6 +47,24 @@ def make_env(
     Raises:
         InputError: A setting is out of range; the message begins with its name.
     """
+    _check(camera, "camera", CameraSettings)
+    _check(actions, "actions", ActionSettings)
+    if isinstance(dynamics, str | Mapping):
+        _check(dynamics, "dynamics", DynamicsSettings)
+    _check(kwargs.get("appearance"), "appearance", AppearanceSettings)
+    several = isinstance(transforms, Sequence) and not isinstance(transforms, str)
+    for transform in transforms if several else (transforms,):
+        _check(transform, "transforms", Transform)
     motion = {"dynamics": dynamics, "actions": actions}
     base = envs.DroneEnv(num_envs, task, camera, seed=seed, device=device, **motion, **kwargs)
     return envs.with_transforms(base, [transform.make() for transform in transforms])
+
+
+def _check(value: Any, name: str, kind: type) -> None:
+    """Refuses a value of another type, such as the name of a file in conf/.
+
+    Raises:
+        InputError: It is one; the message names the class to give.
+    """
+    if value is not None and not isinstance(value, kind):
+        raise InputError(f"{name}={shown(value)} is no {kind.__name__}; give a {kind.__name__}")

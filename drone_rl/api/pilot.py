@@ -7,11 +7,13 @@ from typing import Any, Self
 
 import torch
 from tensordict.nn import TensorDictModuleBase
-from torchrl.envs import TransformedEnv
+from torchrl.envs import EnvBase, TransformedEnv
 
 from drone_rl.policies import PictureNetwork, make_actor
 from drone_rl.sim.settings import ActionSettings, BaseTaskSettings, DynamicsSettings
 from drone_rl.sim.tasks import Task
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.schema import shown
 from drone_rl.utils.seeding import Stream, torch_generator
 
 
@@ -101,15 +103,25 @@ class Pilot(abc.ABC):
         """Its network."""
 
     def make_actor(
-        self, env: TransformedEnv, *, seed: int = 0, stream: Stream = Stream.REPORT
+        self, env: EnvBase | None = None, *, seed: int = 0, stream: Stream = Stream.REPORT
     ) -> TensorDictModuleBase:
-        """It as a TorchRL actor, which draws its actions from a stream of its own.
+        """Return a TorchRL actor, which samples its actions from a stream of its own.
 
         Args:
-            env: From `make_env`.
+            env: From `make_env`, for whose device and actions the actor is made; by default for
+                those that `make_env` gives on a CPU.
             seed: Of the stream.
             stream: Which.
+
+        Raises:
+            InputError: The environment is none of TorchRL's.
         """
+        if env is None:
+            own = self.make_env(1, pixels=False)
+            own.close()
+            return self.make_actor(own, seed=seed, stream=stream)
+        if not isinstance(env, EnvBase):
+            raise InputError(f"env={shown(env)} is no TorchRL environment; give policy.make_env(n)")
         device = str(env.device or "cpu")
         generator = torch_generator(seed, stream, device=device)
         return make_actor(self.make_network(device), env.action_spec, generator)

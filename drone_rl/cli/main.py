@@ -4,7 +4,8 @@ import importlib
 import sys
 from typing import cast
 
-from drone_rl.cli.usage import COMMANDS, USAGE
+import drone_rl
+from drone_rl.cli.usage import COMMANDS, DEMO_USAGE, USAGE
 from drone_rl.utils.compiler import leave_compiler_unloaded
 from drone_rl.utils.garbage import leave_garbage_to_the_system, look_for_garbage_rarely
 
@@ -15,9 +16,15 @@ def main() -> None:
     if not args or args[0] in ("-h", "--help", "help"):
         print(USAGE)
         return
+    if args[0] in ("-V", "--version"):
+        print(f"drone-rl {drone_rl.__version__}")
+        return
     name, overrides = args[0], args[1:]
     if name not in ("demo", *COMMANDS):
         sys.exit(f"error: command {name!r} is unknown; use one of: demo, {', '.join(COMMANDS)}")
+    if name == "demo" and {"-h", "--help"} & set(overrides):
+        print(DEMO_USAGE)
+        return
     look_for_garbage_rarely()
     from drone_rl.hydra_app.messages import guarded  # usage and typing errors don't wait for Hydra
 

@@ -31,6 +31,17 @@ examples
   drone-rl evaluate                    test the newest policy
   drone-rl explain policy=good         explain a policy that travels with the package
   drone-rl COMMAND --help              every setting of a command
+  drone-rl --version                   the version
+"""
+DEMO_USAGE = """\
+drone-rl demo [setting=value ...]
+
+Runs three commands, each into a folder of its own under outputs/:
+  drone-rl train [setting=value ...]   with the settings that you give
+  drone-rl evaluate                    the policy that came out
+  drone-rl explain                     the same policy
+
+The settings are those of drone-rl train; drone-rl train --help lists them.
 """
 COMMANDS = (
     *("train", "evaluate", "play", "explain", "report", "verdict"),

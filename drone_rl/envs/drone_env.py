@@ -49,7 +49,7 @@ class DroneEnv(EnvBase):
     def __init__(
         self,
         num_envs: int,
-        task: BaseTaskSettings | Task[Any] | None = None,
+        task: BaseTaskSettings | Task[Any] | str | None = None,
         camera: CameraSettings | None = None,
         *,
         seed: int = 0,
@@ -67,7 +67,8 @@ class DroneEnv(EnvBase):
 
         Args:
             num_envs: How many.
-            task: What there is to do; the settings of cube collection will do.
+            task: What there is to do: its settings, its name or itself; cube collection by
+                default.
             camera: The policy's camera.
             seed: Root of all the worlds' random streams.
             stream: What the worlds are for; training and evaluation never share one.

@@ -13,6 +13,7 @@ from hydra.core.hydra_config import HydraConfig
 from hydra.types import RunMode
 from omegaconf import DictConfig, OmegaConf
 
+from drone_rl.hydra_app.choices import check_choices
 from drone_rl.hydra_app.help import show_help
 from drone_rl.hydra_app.messages import one_line
 from drone_rl.hydra_app.schemas import register_schemas
@@ -57,6 +58,7 @@ def run_command(name: str, command: Command, overrides: Sequence[str]) -> int:
         Exit status.
     """
     overrides = getattr(command, "prepare", list)(overrides)
+    check_choices(overrides, conf_dir())
     register_schemas(**{name: command.Command})
     getattr(command, "register", lambda: None)()
     if {"--help", "-h"} & set(overrides):

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from hydra.errors import HydraException
 from omegaconf.errors import OmegaConfBaseException
 
+from drone_rl.hydra_app.choices import without_schemas
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.quiet import ignore_noise
 
@@ -35,7 +36,7 @@ def one_line(error: BaseException) -> str:
         if isinstance(cause, InputError):
             return "".join(c if c.isprintable() else "?" for c in str(cause))
         cause = cause.__cause__ or cause.__context__
-    text = " ".join(str(error).split()) or type(error).__name__
+    text = without_schemas(" ".join(str(error).split())) or type(error).__name__
     if isinstance(error.__cause__, OmegaConfBaseException):
         text += f": {str(error.__cause__).splitlines()[0]}"
     if "is not in struct" in text or "Could not override" in text:

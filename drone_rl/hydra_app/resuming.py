@@ -17,8 +17,9 @@ from drone_rl.utils.files import refuse_links, write_atomically
 from drone_rl.utils.overrides import must_be_typed, taken_over
 
 _FOLDER = "hydra.sweep.dir=${paths.outputs}/${hydra.job.config_name}/multiruns/"
-_WRITE_NOTHING = "hydra.output_subdir=null"
-"""Hydra would note the settings before anybody has checked them; `note_settings` does it after."""
+_WRITE_NOTHING = ("hydra.output_subdir=null", "++hydra.job_logging.handlers.file.delay=true")
+"""Hydra would note the settings before anybody has checked them (`note_settings` does it after),
+and open a log."""
 _PLAIN = re.compile(r"[\w./+-]*")
 """Values that mean the same to Hydra's grammar with and without quotes."""
 
@@ -37,14 +38,14 @@ def complete(overrides: Sequence[str]) -> list[str]:
     if not folders or folders[-1] in ("", "null"):
         return typed
     if any(o.startswith("hydra.run.dir=") for o in typed):
-        return [*typed, _WRITE_NOTHING]  # a sweep gives all settings itself
+        return [*typed, *_WRITE_NOTHING]  # a sweep gives all settings itself
     folder = Path(_unquoted(folders[-1]))
     if not (folder / "checkpoints" / "last.pt").is_file():
         raise InputError(f"resume={folder} has no checkpoints/last.pt; give the folder of a run")
     refuse_links(folder)
     kept = networks(taken_over(folder, [*typed, *former(typed)]))
     plain = [_resume(folder) if o.startswith("resume=") else o for o in typed]
-    own = ["hydra.mode=RUN", f"hydra.run.dir={quoted(str(folder))}", _WRITE_NOTHING]
+    own = ["hydra.mode=RUN", f"hydra.run.dir={quoted(str(folder))}", *_WRITE_NOTHING]
     return [*kept, *plain, *own]
 
 

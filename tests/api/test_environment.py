@@ -8,6 +8,7 @@ from drone_rl.api.filming import film
 from drone_rl.settings.transforms import Gray, Resize
 from drone_rl.sim import worlds as worlds_module
 from drone_rl.sim.rendering import Raytracer
+from drone_rl.sim.tasks import Pillars
 from drone_rl.utils.errors import InputError
 from drone_rl.zoo import certificate_path, policy_path
 from tests.fake_flight import floating
@@ -27,6 +28,30 @@ def test_other_pictures():
     env = drone_rl.make_env(1, camera=camera, transforms=[Gray(), Resize(height=5, width=8)])
     assert env.reset()["pixels"].shape == (1, 1, 5, 8)
     env.close()
+
+
+def test_a_task_by_its_name():
+    env = drone_rl.make_env(1, task="pillars")
+    assert isinstance(env.base_env.worlds.task, Pillars)
+    env.close()
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"task": "pillar"}, "task='pillar' is unknown; there are: collect_cubes, pillars"),
+        ({"task": 3}, "task=3 is no task; give one of collect_cubes, pillars"),
+        ({"camera": "tiny"}, "camera='tiny' is no CameraSettings; give a CameraSettings"),
+        ({"dynamics": "simple_flight"}, "dynamics='simple_flight' is no DynamicsSettings"),
+        ({"actions": "velocity"}, "actions='velocity' is no ActionSettings"),
+        ({"appearance": "fog"}, "appearance='fog' is no AppearanceSettings"),
+        ({"transforms": "gray"}, "transforms='gray' is no Transform"),
+        ({"transforms": [Gray(), 3]}, "transforms=3 is no Transform"),
+    ],
+)
+def test_values_of_another_type_are_refused_by_name(given, message):
+    with pytest.raises(InputError, match=f"^{message}"):
+        drone_rl.make_env(1, **given)
 
 
 def test_a_seed_means_the_same_worlds():

@@ -63,6 +63,19 @@ def test_its_network_has_its_weights():
     assert all(torch.equal(weights[k], v) for k, v in policy.state["policy"].items())
 
 
+def test_an_actor_needs_no_environment():
+    policy = drone_rl.load_policy("good")
+    env = policy.make_env(2, seed=3)
+    flown = []
+    for actor in (policy.make_actor(), policy.make_actor(env)):
+        env.set_seed(3)
+        flown.append(env.rollout(4, actor)["action"])
+    env.close()
+    assert torch.equal(*flown)
+    with pytest.raises(drone_rl.InputError, match=r"env=2 is no TorchRL environment; give policy"):
+        policy.make_actor(2)
+
+
 def test_what_latest_and_a_folder_mean(tmp_path):
     runs = tmp_path / "train" / "runs"
     for number, name in enumerate(("b", "a")):

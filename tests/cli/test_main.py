@@ -1,8 +1,12 @@
 """Usage, help, and one line for each of the mistakes that any command can be given."""
 
+import sys
+
 import pytest
 
-from drone_rl.cli.usage import USAGE
+import drone_rl as drone_rl_package
+from drone_rl.cli.main import main
+from drone_rl.cli.usage import DEMO_USAGE, USAGE
 from tests.cli.running import drone_rl, error_line
 
 
@@ -12,6 +16,23 @@ def test_usage_and_help(tmp_path):
     assert "optimiser: adam, sgd" in help_text
     assert "# Cubes placed in every episode." in help_text
     assert "num_cubes: 3" in help_text
+
+
+@pytest.mark.parametrize(
+    ("args", "printed"),
+    [
+        (["--version"], f"drone-rl {drone_rl_package.__version__}"),
+        (["-V"], f"drone-rl {drone_rl_package.__version__}"),
+        (["demo", "--help"], DEMO_USAGE),
+        (["demo", "seed=1", "-h"], DEMO_USAGE),
+    ],
+)
+def test_what_is_printed_without_running_anything(monkeypatch, capsys, tmp_path, args, printed):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", ["drone-rl", *args])
+    main()  # returns, so that the exit status is 0
+    assert capsys.readouterr().out.strip() == printed.strip()
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(
@@ -44,6 +65,11 @@ def test_usage_and_help(tmp_path):
         (["sweep-report"], ["folder=latest", "drone-rl train -m"]),
         (["sweep-report", "no/such"], ["no/such", "sweep.json"]),
         (["bench", "speed"], ["speed", "render"]),
+        (["train", "task=base_task"], ["base_task", "collect_cubes, collect_one, pillars"]),
+        (["train", "dynamics=base_dynamics"], ["base_dynamics", "one of: computer_vision,"]),
+        (["train", "sweep=nope"], ["sweep/nope", "learning_rate"]),
+        (["train", "task=nope"], ["task/nope", "one of: collect_cubes, collect_one, pillars"]),
+        (["train", "-m", "task=collect_one,base_task"], ["base_task", "collect_one"]),
     ],
 )
 def test_mistakes_get_one_line_with_the_value_and_the_remedy(in_process, args, words):

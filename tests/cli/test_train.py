@@ -110,6 +110,14 @@ def test_an_extra_that_is_not_installed(in_process, monkeypatch, module, extra, 
     assert f"pip install 'drone-rl[{extra}]'" in error_line(in_process("train", *args))
 
 
+def test_a_logger_whose_package_is_missing(in_process, monkeypatch, tmp_path):
+    monkeypatch.setattr("torchrl.record.loggers.wandb._has_wandb", False)
+    wandb = "+logger.wandb._target_=torchrl.record.loggers.wandb.WandbLogger"
+    told = [*TINY, wandb, "+logger.wandb.exp_name=x", "hydra.run.dir=run"]
+    assert "pip install wandb" in error_line(in_process("train", *told))
+    assert not (tmp_path / "run" / "checkpoints").exists()
+
+
 @pytest.mark.skipif(torch.cuda.is_available(), reason="there is a GPU")
 def test_cuda_without_a_gpu(in_process):
     assert "give device=cpu" in error_line(in_process("train", "device=cuda"))

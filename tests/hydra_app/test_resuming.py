@@ -33,7 +33,8 @@ def test_a_run_that_goes_on_takes_over_its_settings_in_todays_words(run):
     assert complete(told) == [
         *("network=mlp", "network.hidden=[8]"),
         *told,
-        *("hydra.mode=RUN", f"hydra.run.dir='{run}'", "hydra.output_subdir=null"),
+        *("hydra.mode=RUN", f"hydra.run.dir='{run}'"),
+        *("hydra.output_subdir=null", "++hydra.job_logging.handlers.file.delay=true"),
     ]
 
 

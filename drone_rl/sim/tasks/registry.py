@@ -3,11 +3,18 @@
 from collections.abc import Callable
 from typing import Any
 
-from drone_rl.sim.settings import TASKS, BaseTaskSettings, PillarsSettings, TaskSettings
+from drone_rl.sim.settings import (
+    TASKS,
+    BaseTaskSettings,
+    PillarsSettings,
+    TaskSettings,
+    settings_of,
+)
 from drone_rl.sim.tasks.collect_cubes import CollectCubes
 from drone_rl.sim.tasks.pillars import Pillars
 from drone_rl.sim.tasks.task import Task
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.schema import shown
 
 MAKERS: dict[type[BaseTaskSettings], Callable[[Any], Task[Any]]] = {
     TaskSettings: CollectCubes,
@@ -31,14 +38,21 @@ def register_task(settings: type[BaseTaskSettings], make: Callable[[Any], Task[A
     TASKS[settings.name], MAKERS[settings] = settings, make
 
 
-def as_task(task: BaseTaskSettings | Task[Any] | None) -> Task[Any]:
-    """The task of some settings; the original study's by default.
+def as_task(task: BaseTaskSettings | Task[Any] | str | None) -> Task[Any]:
+    """The task of some settings, or of a name such as "pillars"; the original study's by default.
 
     Raises:
         InputError: Nothing is known to make it.
     """
     task = TaskSettings() if task is None else task
+    if isinstance(task, str):
+        task = settings_of(task, "task")()
     if not isinstance(task, BaseTaskSettings):
+        if not hasattr(task, "largest_reward"):  # of every task, and of no plain value
+            raise InputError(
+                f"task={shown(task)} is no task; give one of {', '.join(TASKS)}, settings such as "
+                "drone_rl.TaskSettings(num_cubes=2), or a task of your own"
+            )
         return task
     if type(task) not in MAKERS:
         raise InputError(

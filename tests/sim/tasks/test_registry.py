@@ -22,6 +22,12 @@ def test_settings_ask_for_their_task():
     assert isinstance(as_task(PillarsSettings()), Pillars)
     task = Posts()
     assert as_task(task) is task
+    assert isinstance(as_task("pillars"), Pillars)
+    assert as_task("collect_cubes").settings == TaskSettings()
+    with pytest.raises(InputError, match="task='pillar' is unknown; there are: collect_cubes, p"):
+        as_task("pillar")
+    with pytest.raises(InputError, match=r"task=\(dict\) is no task; give one of collect_cubes"):
+        as_task({"num_cubes": 1})
     with pytest.raises(InputError, match="PostsSettings is the settings of no task; call"):
         as_task(PostsSettings())
 
