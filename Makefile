@@ -6,7 +6,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: demo test check format bench readme keep stale docs count mutants clean
+.PHONY: demo test check format bench readme keep stale docs count mutants clean clean-outputs
 
 $(STAMP): pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
@@ -58,5 +58,16 @@ mutants: $(STAMP)
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[$(EXTRAS),mutants]'
 	@$(BIN)/python -m tools.mutants $(MUTANTS)
 
+# What is made again by itself: the environment, the site, caches, packages. Results are kept.
 clean:
-	rm -rf $(VENV) outputs/* site .pytest_cache .ruff_cache
+	rm -rf $(VENV) site dist build .pytest_cache .ruff_cache .import_linter_cache *.egg-info
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# Deletes trainings, reports and figures that may have taken hours, after asking.
+clean-outputs:
+	@printf 'Delete everything in outputs/ (%s)? [y/N] ' "$$(du -sh outputs 2>/dev/null | cut -f1)"; \
+	read -r answer || answer=; \
+	case "$$answer" in \
+	  y|Y|yes) rm -rf outputs && echo 'deleted outputs/';; \
+	  *) echo 'kept outputs/';; \
+	esac

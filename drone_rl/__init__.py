@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from drone_rl.api.gymnasium import register
 from drone_rl.utils.garbage import collecting_no_garbage
-from drone_rl.utils.when_imported import when_imported
+from drone_rl.utils.when_imported import import_quietly, when_imported
 
 if TYPE_CHECKING:
     from drone_rl.api.bodies import Bodies, bodies
@@ -182,6 +182,9 @@ __all__ = [
 ]
 
 when_imported("gymnasium", register)
+# dm_control looks for a screen; TorchRL derives classes from one that it deprecates
+import_quietly("dm_control._render.glfw_renderer", "GLFWError", "DISPLAY")
+import_quietly("torchrl.collectors.weight_update", "DeprecationWarning", "WeightUpdaterBase")
 
 
 def __getattr__(name: str) -> Any:

@@ -25,6 +25,21 @@ def test_nothing_heavy_is_imported():
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
+@pytest.mark.parametrize("flags", [["default"], ["error::DeprecationWarning:abc"]])
+def test_no_import_prints_a_warning(flags):
+    """Not even of modules that nobody imports through `drone_rl` itself."""
+    code = (
+        "import warnings, drone_rl.training, drone_rl.envs, drone_rl.sim.composer_task\n"
+        "drone_rl.make_env().close()\n"
+        "warnings.warn('GLFW: DISPLAY WeightUpdaterBase', DeprecationWarning)\n"
+    )
+    command = [sys.executable, "-W", *flags, "-c", code]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    (line,) = [line for line in done.stderr.splitlines() if "Warning" in line]
+    assert line.startswith("<string>:3: DeprecationWarning: GLFW: DISPLAY")
+    assert (done.stdout, len(done.stderr.splitlines())) == ("", 1)
+
+
 def test_importing_the_api_says_nothing():
     code = "import warnings; warnings.simplefilter('default'); import drone_rl; drone_rl.judge"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

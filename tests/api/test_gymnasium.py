@@ -1,5 +1,6 @@
 """Names that Gymnasium knows, whoever is imported first."""
 
+import re
 import subprocess
 import sys
 import tomllib
@@ -12,6 +13,7 @@ from drone_rl.api.gymnasium import ENVIRONMENTS, register
 from drone_rl.settings.variant import locate
 from drone_rl.sim.tasks import as_task
 
+ROOT = Path(__file__).parents[2]
 gymnasium = pytest.importorskip("gymnasium", reason="Gymnasium is not installed")
 
 
@@ -42,6 +44,29 @@ def test_each_is_made_of_a_task_with_settings(name):
     assert spec.kwargs == {"task": ENVIRONMENTS[name]}
     assert spec.max_episode_steps is None  # the task's own limit counts, once
     assert as_task(locate(spec.kwargs["task"])()).largest_reward > 0
+
+
+PAGES = (ROOT / "README.md", *ROOT.glob("docs/**/*.md"), *ROOT.glob("examples/*.py"))
+
+
+def test_every_example_registers_what_it_makes():
+    """Gymnasium 1 looks for no plug-ins, so that without `import drone_rl` it knows no name."""
+    found = 0
+    for page in PAGES:
+        text = page.read_text()
+        blocks = re.findall(r"```python\n(.*?)```", text, re.S) if page.suffix == ".md" else [text]
+        for block in blocks:
+            if re.search(r"gymnasium\.make|make_vec\(", block) and "drone_rl/" in block:
+                found += 1
+                assert re.search(r"^import drone_rl\b|\"drone_rl:", block, re.M), (page, block)
+    assert found >= 4
+
+
+def test_the_example_of_the_readme_works_in_a_fresh_interpreter():
+    text = (ROOT / "README.md").read_text()
+    (block,) = re.findall(r"```python\n(import gymnasium.*?)```", text, re.S)
+    code = block.replace("num_envs=64", "num_envs=1").replace("drone_rl.judge(logits)", "#")
+    subprocess.run([sys.executable, "-c", f"{code}\nassert worlds.num_envs == 1"], check=True)
 
 
 def test_what_is_known_already_stays():

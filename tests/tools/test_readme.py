@@ -1,5 +1,6 @@
 """What is made from files in README.md and docs/ is that of today's files."""
 
+import dataclasses
 import json
 import re
 
@@ -187,7 +188,14 @@ def test_every_figure_is_listed_with_the_benchmark_and_where_it_was_run(tmp_path
         ["| `phases`", "2 entries"], ["| `names`", "9 entries"], ["| `lost`", "none"],
         ["| `by_day`", "none"],
     ]  # fmt: skip
-    assert list_origins(ledger).splitlines()[2] == "| `sea` | 2026-11-22 | unknown | 2 cores |"
+    assert "| `days` | 3 | `sea` | unknown | 2026-11-22 |" in list_figures(ledger)
+    assert list_origins(ledger, ["moon", "sea"]).splitlines()[2:] == [
+        "| `moon` | not measured yet |  |  |",
+        "| `sea` | 2026-11-22 | unknown | 2 cores |",
+    ]
+    changed = dataclasses.replace(origin, revision="0123456789abcdef-dirty")
+    ledger.add("sea", figures, changed)
+    assert "| 2026-11-22 | `0123456789ab-dirty` |" in list_origins(ledger)
 
 
 def test_newer_figures_replace_those_of_their_benchmarks_alone(measured, tmp_path):

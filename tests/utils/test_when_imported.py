@@ -1,9 +1,13 @@
 """A package that is waited for, in interpreters of its own."""
 
+import importlib
 import subprocess
 import sys
+import warnings
 
 import pytest
+
+from drone_rl.utils.when_imported import import_quietly
 
 WAITING = (
     "import importlib.util, sys; from drone_rl.utils.when_imported import when_imported\n"
@@ -43,3 +47,28 @@ def test_a_package_that_is_nowhere_is_still_missing():
         "else: raise AssertionError\n"
         "assert not done\n"
     )
+
+
+def test_a_warning_of_one_module_is_hidden_while_it_is_imported(tmp_path, monkeypatch):
+    warn = "import warnings\nwarnings.simplefilter('always')\n" + "".join(
+        f"warnings.warn('{text}', {kind})\n"
+        for text, kind in [
+            ("old words", "DeprecationWarning"),
+            ("old words", "UserWarning"),
+            ("other", "DeprecationWarning"),
+        ]
+    )
+    for name in ("noisy_one", "noisy_two"):
+        (tmp_path / f"{name}.py").write_text(warn)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(sys, "meta_path", list(sys.meta_path))
+    import_quietly("noisy_one", "DeprecationWarning", "old words")
+    with warnings.catch_warnings(record=True) as seen:
+        warnings.simplefilter("always")
+        importlib.import_module("noisy_one")
+        one = [(str(w.message), w.category) for w in seen]
+        importlib.import_module("noisy_two")
+    assert one == [("old words", UserWarning), ("other", DeprecationWarning)]
+    assert len(seen) == 5
+    for name in ("noisy_one", "noisy_two"):
+        del sys.modules[name]

@@ -4,6 +4,7 @@ import sys
 from pathlib import Path
 
 from drone_rl.bench.ledger import Ledger
+from drone_rl.bench.registry import BENCHMARKS
 from tools.readme.blocks import replace_blocks
 from tools.readme.flight_rows import FLIGHT
 from tools.readme.guest_rows import GUESTS
@@ -49,7 +50,7 @@ def make_blocks(root: Path) -> dict[str, str]:
         "peers": make_peers(ledger.figures),
         "robust": make_robust(ledger.figures),
         "figures": list_figures(ledger),
-        "origins": list_origins(ledger),
+        "origins": list_origins(ledger, BENCHMARKS),
         "packages": list_packages(contracts, root / "drone_rl"),
         "layers": draw_layers(contracts),
         "groups": list_groups(),
@@ -79,8 +80,6 @@ def keep(source: Path, target: Path) -> list[str]:
 def main(words: list[str]) -> int:
     """Returns the exit status."""
     if words == ["stale"]:
-        from drone_rl.bench.registry import BENCHMARKS  # slow; nothing else needs it
-
         ledger = Ledger(ROOT / "docs" / "results.json")
         print(*tell_ages(BENCHMARKS, ledger, ROOT / "drone_rl"), sep="\n")
         return 0

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple
 
-from drone_rl.bench.ledger import Ledger
+from drone_rl.bench.ledger import Ledger, Origin
 
 Figures = Mapping[str, Any]
 UNKNOWN = "not measured yet"
@@ -30,20 +30,41 @@ def make_table(rows: Iterable[Row], figures: Figures) -> str:
 
 
 def list_figures(ledger: Ledger) -> str:
-    """A table in Markdown: every figure by its key, with the benchmark that measured it."""
-    lines = ["| figure | value | `drone-rl bench` |", "| --- | --- | --- |"]
+    """A table in Markdown: every figure by its key, its benchmark, and when that was run."""
+    lines = [
+        "| figure | value | `drone-rl bench` | revision | day |",
+        "| --- | --- | --- | --- | --- |",
+    ]
     for name, origin in sorted(ledger.origins.items()):
-        lines += [f"| `{k}` | {_short(ledger.figures[k])} | `{name}` |" for k in origin.keys]
+        of = f"`{name}` | {_revision(origin)} | {origin.date}"
+        lines += [f"| `{k}` | {_short(ledger.figures[k])} | {of} |" for k in origin.keys]
     return "\n".join(lines)
 
 
-def list_origins(ledger: Ledger) -> str:
-    """A table in Markdown: when, where and at which revision each benchmark was run."""
+def list_origins(ledger: Ledger, names: Iterable[str] = ()) -> str:
+    """A table in Markdown: when, where and at which revision each benchmark was run.
+
+    Args:
+        ledger: What was measured.
+        names: Of all benchmarks; one that was never run is listed as such.
+    """
     lines = ["| `drone-rl bench` | run | revision | on |", "| --- | --- | --- | --- |"]
-    for name, origin in sorted(ledger.origins.items()):
-        revision = f"`{origin.revision[:12]}`" if origin.revision else "unknown"
-        lines.append(f"| `{name}` | {origin.date} | {revision} | {origin.machine} |")
+    for name in sorted({*ledger.origins, *names}):
+        origin = ledger.origins.get(name)
+        if origin is None:
+            lines.append(f"| `{name}` | {UNKNOWN} |  |  |")
+        else:
+            line = f"| `{name}` | {origin.date} | {_revision(origin)} | {origin.machine} |"
+            lines.append(line)
     return "\n".join(lines)
+
+
+def _revision(origin: Origin) -> str:
+    """Of the measured checkout, abbreviated; with "-dirty" if it had changes."""
+    if not origin.revision:
+        return "unknown"
+    commit, *changed = origin.revision.split("-")
+    return f"`{'-'.join([commit[:12], *changed])}`"
 
 
 def _short(value: Any) -> str:

@@ -17,6 +17,8 @@ _ONLY = torch.zeros(1, dtype=torch.int64)
 class DroneWorld(gymnasium.Env[NDArray[Any], Any]):
     """A drone with a task: `gymnasium.make("drone_rl/CollectCubes-v0", num_cubes=2)`.
 
+    `import drone_rl` registers the name; `"drone_rl:drone_rl/CollectCubes-v0"` needs no import.
+
     Observations are the camera's frame, RGB bytes (height, width, 3), or, with
     `observations="state"`, the truth in a vector of float32: the entries of `info` but for
     "end_reason" and "is_success", in their order. `info` is the truth, see `Stage.info`. The task's
