@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from drone_rl.bench.random_scenes import CAMERA, NEAR, NUDGED, RandomScenes
 from drone_rl.sim.rendering import Poses, Raytracer, Scene, View
+from drone_rl.utils.errors import InputError
 
 SIZE = 128
 """Pixels across and down."""
@@ -154,12 +155,20 @@ def summary(compared: Iterable[Compared]) -> dict[str, Any]:
 
 
 def bench_render_truth(quick: bool) -> dict[str, Any]:
-    """Figures of 1,000 scenes, 50 if quick; none where there is no EGL."""
+    """Figures of 1,000 scenes, 50 if quick.
+
+    Raises:
+        InputError: They can't be rendered by OpenGL here. No figures would look like a measurement.
+    """
     command = [sys.executable, "-m", "drone_rl.bench.render_truth", "50" if quick else "1000"]
     environment = {**os.environ, "MUJOCO_GL": "egl"}
     done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
     if done.returncode != 0:
-        return {}
+        reason = (done.stderr.strip().splitlines() or [f"exit status {done.returncode}"])[-1]
+        raise InputError(
+            f"render_truth needs OpenGL by EGL, which failed ({reason[:200]}); install a driver "
+            "such as libegl-mesa0"
+        )
     return json.loads(done.stdout.strip().splitlines()[-1])
 
 

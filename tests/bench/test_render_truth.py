@@ -9,6 +9,7 @@ import pytest
 
 from drone_rl.bench import render_truth
 from drone_rl.bench.render_truth import Compared, compare, compare_scenes, summary
+from drone_rl.utils.errors import InputError
 
 
 def picture():
@@ -93,16 +94,21 @@ def test_figures_over_scenes():
     }
 
 
-@pytest.mark.parametrize(("status", "found"), [(0, {"render_truth_scenes": 50}), (1, {})])
-def test_a_process_of_its_own_draws_by_opengl_or_there_are_no_figures(monkeypatch, status, found):
-    asked = []
+@pytest.mark.parametrize("status", [0, 1])
+def test_a_process_of_its_own_draws_by_opengl_or_says_why_not(monkeypatch, status):
+    asked, found = [], {"render_truth_scenes": 50}
 
     def run(command, env, **kwargs):
         asked.append((command[-1], env["MUJOCO_GL"]))
-        return SimpleNamespace(returncode=status, stdout=f"noise\n{json.dumps(found)}\n")
+        printed = f"noise\n{json.dumps(found)}\n"
+        return SimpleNamespace(returncode=status, stdout=printed, stderr="Traceback\nno EGL\n")
 
     monkeypatch.setattr(subprocess, "run", run)
-    assert render_truth.bench_render_truth(quick=True) == found
+    if status == 0:
+        assert render_truth.bench_render_truth(quick=True) == found
+    else:
+        with pytest.raises(InputError, match=r"needs OpenGL by EGL, which failed \(no EGL\)"):
+            render_truth.bench_render_truth(quick=True)
     assert asked == [("50", "egl")]
 
 
