@@ -15,7 +15,13 @@ from drone_rl.report.saving import save_drawn, save_numbers, save_rows
 from drone_rl.report.sections import find_parts
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import to_file_name
+from drone_rl.utils.pages import content_security_policy, page_environment, static_text
 from drone_rl.words.licence import percent, say
+
+STYLES = ("style.css", "report.css")
+"""Files of the page's one style element."""
+SCRIPTS = ("map.js", "zoom.js")
+"""Files of the page's one script element; parts give them data in elements of type JSON."""
 
 
 def write_report(folders: Sequence[Path], target: Path) -> Path:
@@ -74,17 +80,17 @@ class Policy:
 
 
 def _render(policies: Sequence[Policy]) -> str:
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("drone_rl.report"),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-    )
-    environment.filters |= {"percent": _short, "script": _script, "json": _json}
+    environment = page_environment("drone_rl.report")
+    environment.filters |= {"percent": _short, "json": _json}
     several = len(policies) > 1
+    style, script = static_text(environment, STYLES), static_text(environment, SCRIPTS)
     return environment.get_template("report.html").render(
         title="Can these policies be trusted?" if several else "Can this policy be trusted?",
         parts=_parts(environment, policies),
         policies=[policy.explanation for policy in policies],
+        policy=content_security_policy(style, script),
+        style=style,
+        script=script,
     )
 
 
@@ -130,8 +136,3 @@ def _short(share: float) -> str:
 
 def _json(value: Any) -> str:
     return json.dumps(value, indent=1)
-
-
-def _script(value: Any) -> Markup:
-    """Plain values within a script: "<" is the one character by which a name could leave it."""
-    return Markup(json.dumps(value).replace("<", "\\u003c"))

@@ -4,11 +4,9 @@ import base64
 import json
 import re
 from collections.abc import Mapping, Sequence
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
-import jinja2
 from markupsafe import Markup, escape
 
 from drone_rl.sweeps import figures
@@ -18,6 +16,10 @@ from drone_rl.sweeps.rows import read_rows
 from drone_rl.sweeps.summary import summarise_sweep, to_csv
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import write_atomically
+from drone_rl.utils.pages import content_security_policy, page_environment, static_text
+
+STYLES = ("style.css", "sweep.css")
+"""Files of the page's one style element."""
 
 
 def write_sweep_report(sweep: Sweep) -> Path:
@@ -83,18 +85,18 @@ def _paragraph(sentences: Mapping[str, str], of: str) -> str:
 
 
 def _render(name: str, summary: dict[str, Any], pictures: list[dict[str, str]]) -> str:
-    source = resources.files("drone_rl.sweeps").joinpath("templates/report.html").read_text()
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("drone_rl.report"),  # the style that all reports share
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-    )
+    environment = page_environment("drone_rl.sweeps", "drone_rl.report")  # which share a style
     environment.filters |= {"figure": _figure, "code": _code}
+    style = static_text(environment, STYLES)
     parts = ("runs", "verdicts", "best", "settings")
     texts = {part: _paragraph(summary["sentences"], f"{part}.") for part in parts}
-    return environment.from_string(source).render(
-        name=name, figures=summary, pictures=pictures, texts=texts
+    return environment.get_template("report.html").render(
+        name=name,
+        figures=summary,
+        pictures=pictures,
+        texts=texts,
+        policy=content_security_policy(style),
+        style=style,
     )
 
 

@@ -1,4 +1,6 @@
+import base64
 import csv
+import hashlib
 import html
 import json
 import re
@@ -45,7 +47,20 @@ def test_names_and_paths_are_escaped(report):
     page = report.read_text()
     assert NASTY not in page
     assert html.escape(NASTY, quote=False)[:20] in page.replace("&#34;", '"')
-    assert page.count("</script>") == page.count("<script>") == 2
+    assert page.count("</script>") == page.count("<script") == 3  # the program, data of two maps
+
+
+def test_the_policy_allows_the_pages_own_style_and_script_alone(report):
+    page = report.read_text()
+    policy = html.unescape(re.findall(r'<meta http-equiv="[^"]+" content="([^"]+)">', page)[0])
+    assert "unsafe" not in policy
+    for source in ("default-src", "base-uri", "form-action", "object-src"):
+        assert f"{source} 'none'" in policy
+    for element in ("style", "script"):
+        (text,) = re.findall(f"<{element}>(.*?)</{element}>", page, re.S)
+        digest = base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
+        assert f"{element}-src 'sha256-{digest}'" in policy
+    assert not re.findall(r"\sstyle=|\son\w+=", page)
 
 
 def test_every_part_is_there_in_order_with_a_link_to_it(report):

@@ -15,7 +15,7 @@ def test_report_is_whole_and_escapes_what_it_shows(sweep):
     assert "&lt;b&gt;NaN" in page
     assert page.count("data:image/png;base64,") == 10  # five figures, light and dark
     assert "drone-rl train optimiser.lr=1e-3 seed=0" in page
-    assert 'href="2/"' in page
+    assert 'href="./2/"' in page
     assert "http:" not in page
     assert "https:" not in page
     summary = json.loads((sweep.folder / "summary.json").read_text())
