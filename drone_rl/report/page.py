@@ -17,6 +17,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import to_file_name
 from drone_rl.utils.pages import content_security_policy, page_environment, static_text
 from drone_rl.words.licence import percent, say
+from drone_rl.words.source import SENTENCES as SOURCE
 
 STYLES = ("style.css", "report.css")
 """Files of the page's one style element."""
@@ -44,7 +45,7 @@ def write_report(folders: Sequence[Path], target: Path) -> Path:
     try:
         (target / "figures").mkdir(parents=True, exist_ok=True)
         path = target / "report.html"
-        path.write_text(_render(policies), encoding="utf-8")
+        path.write_text(render_page(policies), encoding="utf-8")
     except OSError as error:
         raise InputError(
             f"report in {target} can't be written ({error.strerror}); choose another folder"
@@ -79,7 +80,8 @@ class Policy:
         }
 
 
-def _render(policies: Sequence[Policy]) -> str:
+def render_page(policies: Sequence[Policy]) -> str:
+    """Return the page of some policies, as HTML."""
     environment = page_environment("drone_rl.report")
     environment.filters |= {"percent": _short, "json": _json}
     several = len(policies) > 1
@@ -88,10 +90,16 @@ def _render(policies: Sequence[Policy]) -> str:
         title="Can these policies be trusted?" if several else "Can this policy be trusted?",
         parts=_parts(environment, policies),
         policies=[policy.explanation for policy in policies],
+        sources=[_source(policy.explanation) for policy in policies],
         policy=content_security_policy(style, script),
         style=style,
         script=script,
     )
+
+
+def _source(explanation: Explanation) -> str:
+    """Which file the figures of a policy were read from."""
+    return say(SOURCE, {**explanation.numbers, "source": explanation.source})
 
 
 def _parts(environment: jinja2.Environment, policies: Sequence[Policy]) -> list[dict[str, Any]]:

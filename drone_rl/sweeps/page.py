@@ -34,7 +34,7 @@ def write_sweep_report(sweep: Sweep) -> Path:
     write_atomically(sweep.folder / "summary.json", json.dumps(summary, indent=2))
     pictures = _pictures(make_groups(rows), summary["sentences"])
     page = sweep.folder / "report.html"
-    write_atomically(page, _render(sweep.folder.name, summary, pictures))
+    write_atomically(page, render_page(sweep.folder.name, summary, pictures))
     return page
 
 
@@ -84,7 +84,14 @@ def _paragraph(sentences: Mapping[str, str], of: str) -> str:
     return " ".join(text for name, text in sentences.items() if name.startswith(of))
 
 
-def _render(name: str, summary: dict[str, Any], pictures: list[dict[str, str]]) -> str:
+def render_page(name: str, summary: dict[str, Any], pictures: list[dict[str, str]]) -> str:
+    """Return the page of a sweep, as HTML.
+
+    Args:
+        name: Of the sweep.
+        summary: From `summarise_sweep`.
+        pictures: Each with "title", "text", and data URIs for a "light" and for a "dark" page.
+    """
     environment = page_environment("drone_rl.sweeps", "drone_rl.report")  # which share a style
     environment.filters |= {"figure": _figure, "code": _code}
     style = static_text(environment, STYLES)

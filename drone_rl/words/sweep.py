@@ -24,6 +24,15 @@ _OF_THE_RUNS = (
         ),
     ),
     Sentence(
+        "runs.read",
+        "a run has ended",
+        lambda e: ended(e) > 0,
+        lambda e: (
+            f"All figures of {in_words(ended(e))} were read from files in their folders and not "
+            "measured again."
+        ),
+    ),
+    Sentence(
         "runs.failed",
         "a run failed",
         lambda e: e["failed"] > 0,
