@@ -1,6 +1,7 @@
 """From explanations to one HTML file that needs nothing else."""
 
 import dataclasses
+import functools
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -82,8 +83,7 @@ class Policy:
 
 def render_page(policies: Sequence[Policy]) -> str:
     """Return the page of some policies, as HTML."""
-    environment = page_environment("drone_rl.report")
-    environment.filters |= {"percent": _short, "json": _json}
+    environment = _environment()
     several = len(policies) > 1
     style, script = static_text(environment, STYLES), static_text(environment, SCRIPTS)
     return environment.get_template("report.html").render(
@@ -95,6 +95,14 @@ def render_page(policies: Sequence[Policy]) -> str:
         style=style,
         script=script,
     )
+
+
+@functools.cache
+def _environment() -> jinja2.Environment:
+    """The templates of this page, compiled once."""
+    environment = page_environment("drone_rl.report")
+    environment.filters |= {"percent": _short, "json": _json}
+    return environment
 
 
 def _source(explanation: Explanation) -> str:
