@@ -116,6 +116,7 @@ class _Forged(Explanation):
     """An explanation whose terms and actions no reader has checked."""
 
     text: str = ""
+    made: Terms | None = None
 
     @property
     def name(self) -> str:
@@ -129,14 +130,14 @@ class _Forged(Explanation):
         names = tuple(f"{self.text}{name}" for name in known.names)
         return dataclasses.replace(known, names=names)
 
-    @functools.cached_property
+    @property
     def terms(self) -> Terms:
         """See `Explanation`."""
-        known = super().terms.as_dict()
-        if not self.text:
-            return Terms(**known)
-        kept = [place for place in places(known) if not (place[1] and len(place[0]) == 1)]
-        return Terms(**put(known, frozenset(kept), self.text))
+        if self.made is None:
+            known = super().terms.as_dict()
+            kept = [place for place in places(known) if not (place[1] and len(place[0]) == 1)]
+            self.made = Terms(**put(known, frozenset(kept if self.text else ()), self.text))
+        return self.made
 
 
 @dataclasses.dataclass(frozen=True)

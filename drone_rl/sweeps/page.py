@@ -114,13 +114,22 @@ def _figure(value: object) -> str:
     if isinstance(value, dict):
         if value["share"] is None:
             return ""
-        certain = value.get("certain", value["successes"])
-        few = "" if certain == value["successes"] else f", {certain} certain"
-        count = f"{value['successes']}/{value['trials']}{few}"
-        return f"{count} [{value['lower95']:.2f}, {value['upper95']:.2f}]"
+        return _share(value)
     if value is None:
         return ""
     return _number(value) if isinstance(value, float) else str(value)
+
+
+def _share(value: Mapping[str, Any]) -> str:
+    """A share of the runs of which it is known, with the interval that allows for the others."""
+    unknown = value.get("unknown", 0)
+    if unknown == value["trials"]:
+        return "not known"
+    certain = value.get("certain", value["successes"])
+    few = "" if certain == value["successes"] else f", {certain} certain"
+    more = f", {unknown} not known" if unknown else ""
+    count = f"{value['successes']}/{value['trials'] - unknown}{few}{more}"
+    return f"{count} [{value['lower95']:.2f}, {value['upper95']:.2f}]"
 
 
 def _median(value: Mapping[str, Any]) -> str:

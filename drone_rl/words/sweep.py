@@ -134,7 +134,7 @@ _OF_THE_BEST = (
         "best.none",
         "no run was judged",
         lambda e: e["best"] is None,
-        lambda e: "None: no run has been judged by the present rule.",
+        lambda e: "No run has been judged by the present rule, so that no best run is known.",
     ),
     Sentence(
         "best.chosen",
