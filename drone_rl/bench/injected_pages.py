@@ -203,6 +203,10 @@ def _is_tried(place: Place, names: bool) -> bool:
     return names and (path[-1] not in _sources() or bool(_OPEN.intersection(path[:-1])))
 
 
+_MORE = {"left_out": {"embedding": "why"}, "shifts": {"refused": "why"}, "other": {"name": "text"}}
+"""Parts of the page that not every explanation has."""
+
+
 class Pages:
     """Makes pages out of an explanation and a summary of a sweep."""
 
@@ -220,6 +224,7 @@ class Pages:
         (folder / "figures").mkdir(parents=True, exist_ok=True)
         self._folder, self._source = folder, explanation
         self._known = Explanation.load(explanation)
+        self._known.numbers = {**_MORE, **self._known.numbers}
         self._summary = dict(summary)
         self._extras = {embedding.PART.title: embedding.PART.extras(self._known)}
         self._sections = 0
@@ -234,11 +239,13 @@ class Pages:
         """Return the pages that hold a text, by name."""
         numbers = self._known.numbers
         picture = {"title": text, "text": text, "light": PIXEL, "dark": PIXEL}
-        forged = self._report(put(numbers, self.of_templates, text), text)
+        other = {text: {text: text}}
+        forged = self._report({**put(numbers, self.of_templates, text), **other}, text)
+        read = self._read({**put(numbers, self.of_files, text), **other})
         sweep = render_sweep(text, put(self._summary, self.of_sweeps, text), [picture])
         return {
             "report": forged,
-            "report_of_files": self._report(self._read(put(numbers, self.of_files, text)), ""),
+            "report_of_files": self._report(read, ""),
             "report_without_policy": without_policy(forged),
             "sweep": sweep,
             "sweep_without_policy": without_policy(sweep),
