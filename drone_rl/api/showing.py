@@ -50,8 +50,11 @@ def picture(figure: "Figure") -> str:
 
 
 def page(document: str, height: int = 800) -> str:
-    """A whole HTML page inside another one, where its style and scripts touch nothing else."""
+    """A whole HTML page inside another one, where its style and scripts touch nothing else.
+
+    Its scripts run in an origin of their own, so that they can't reach the notebook.
+    """
     return (
-        f'<iframe srcdoc="{html.escape(document)}" style="width: 100%; height: {height}px; '
-        'border: 0"></iframe>'
+        f'<iframe sandbox="allow-scripts" srcdoc="{html.escape(document)}" '
+        f'style="width: 100%; height: {height}px; border: 0"></iframe>'
     )

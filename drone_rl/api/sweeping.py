@@ -67,7 +67,7 @@ def _lines(figures: dict[str, Any]) -> str:
         lines.append(f"{choice or 'all':44} {'; '.join(group['sentences'].values())}")
     lines += [f"run {r['run']} {r['state']}: {r['error']}" for r in figures["runs"] if r["error"]]
     best = " ".join(text for name, text in sentences.items() if name.startswith("best."))
-    lines.append(f"best run: {best}")
+    lines.append(f"best run: {best}" if figures["best"] else best)
     if figures["best"]:
         lines.append(f"the same again: {figures['best']['command']}")
     return "\n".join(lines)

@@ -132,6 +132,9 @@ def _side(share: float, actions: list[float], unseen: float, blind: float) -> Pl
 
 
 EXPLANATION: Plain = {
+    "source": "a/explanation.json",
+    "date": "2026-01-31T12:00:00+00:00",
+    "provenance": {"git_revision": "0123abc"},
     "verdict": VERDICT,
     "dataset": {
         "frames": 600,

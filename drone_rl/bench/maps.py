@@ -97,11 +97,13 @@ def expert(scenes: Scenes, state: WorldState) -> Tensor:
 
 
 def shipped(pictures: Pictures) -> dict[str, PictureNetwork]:
-    """The policies that travel with the package and were made for such pictures."""
+    """The policies that travel with the package and choose among moves on such pictures."""
     networks = {}
     for name in policy_names():
         exported = load_exported(policy_path(name))
-        if parse(exported["description"]).picture.shape != tuple(pictures.absent.shape):
+        description = parse(exported["description"])
+        is_of_moves = description.actions.kind == "moves"  # others' outputs are no three logits
+        if description.picture.shape != tuple(pictures.absent.shape) or not is_of_moves:
             continue
         parameters = exported["policy"]
         network = SmallCNN(pictures.absent.shape, 3, hidden=(128,))

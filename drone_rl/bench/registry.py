@@ -13,6 +13,7 @@ from drone_rl.bench.flight_speed import bench_flight_speed
 from drone_rl.bench.flight_training import bench_flight_training
 from drone_rl.bench.gymnasium import bench_gymnasium
 from drone_rl.bench.hostile import bench_hostile
+from drone_rl.bench.injections import bench_injections
 from drone_rl.bench.maps import bench_maps
 from drone_rl.bench.memory import bench_memory
 from drone_rl.bench.mutants import bench_mutants
@@ -96,6 +97,12 @@ BENCHMARKS: dict[str, Benchmark] = {
         "truth",
         ("utils", "zoo", "training", "sweeps", "report", "bench/hostile", "bench/hostile_files",
          "bench/hostile_folders"),
+    ),
+    "injections": Benchmark(
+        lambda s: bench_injections(s.runs / "injections"),
+        "truth",
+        ("words", "report", "sweeps", "api/showing", "utils/pages", "bench/injections",
+         "bench/injected_pages", "bench/injection_payloads"),
     ),
     "maps": Benchmark(
         lambda s: bench_maps(s.runs, s.quick),

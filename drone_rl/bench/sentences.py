@@ -15,14 +15,20 @@ from drone_rl.bench.evidence import (
     VERDICT,
     changed,
 )
-from drone_rl.words import advice, card, domain, report, shifts, sweep, truth, verdict
+from drone_rl.words import advice, card, domain, report, shifts, source, sweep, truth, verdict
 from drone_rl.words.licence import Sentence, said
 
 Changes = Mapping[str, Any]
 SPOKEN: dict[str, tuple[tuple[Sentence, ...], Mapping[str, Any]]] = {
     "verdict": (verdict.SENTENCES, VERDICT),
     "explanation": (
-        (*advice.SENTENCES, *report.SENTENCES, *truth.SENTENCES, *domain.QUOTED),
+        (
+            *source.SENTENCES,
+            *advice.SENTENCES,
+            *report.SENTENCES,
+            *truth.SENTENCES,
+            *domain.QUOTED,
+        ),
         EXPLANATION,
     ),
     "card": (card.SENTENCES, CARD),
@@ -126,6 +132,9 @@ _FLOWN = {"shifts": SHIFTS, "verdict.kind": "good", "verdict.certain": True}
 _UNFLOWN = {"shifts": {"refused": "it is of another task"}}
 _OTHER_KIND = {"verdict.kind": "poor", "verdict.certain": True}
 _OF_REPORTS = (
+    ("source.file", {"source": "b/explanation.json"}),
+    ("source.file", {"date": None}),
+    ("source.file", {"provenance.git_revision": None}),
     ("advice.more", {"verdict.certain": True}, _NOT_CERTAIN),
     ("advice.more", {"verdict.enough": None}, _NOT_CERTAIN),
     ("advice.use", {"verdict.certain": False}, _CERTAIN_GOOD),
@@ -257,6 +266,7 @@ _NOT_JUDGED = {"judged": 0, "certain": 0}
 _NOTHING_ENDED = {"unfinished": 9, "finished": 0, "failed": 0, "damaged": 0}
 _OF_SWEEPS = (
     ("runs.counts", {"failed": 2}),
+    ("runs.read", _NOTHING_ENDED),
     ("runs.failed", {"failed": 0}),
     ("runs.damaged", {"damaged": 0}),
     ("runs.unfinished", {"unfinished": 0}),

@@ -8,6 +8,7 @@ import json
 import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -72,6 +73,7 @@ def explain_policy(
         "format": "drone_rl explanation",
         "format_version": FORMAT_VERSION,
         "name": name,
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "settings": dataclasses.asdict(settings),
         "seconds": {title: one.seconds for title, one in made.items()},
         "actions": context.scenes.actions.as_dict(),

@@ -7,16 +7,28 @@ from typing import Any
 from numpy.typing import NDArray
 
 from drone_rl.utils.archives import read_arrays
+from drone_rl.utils.consistency import check_intervals
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import parse_json, read_bytes, refuse_links
 from drone_rl.utils.schema import Text, as_mapping
+from drone_rl.verdicts.consistency import check_verdict
 from drone_rl.words.actions import ShownActions, shown_actions
 from drone_rl.words.terms import Terms, terms_of
 
 FORMAT = "drone_rl explanation"
 FORMAT_VERSION = 3
 FRAME = frozenset(
-    {"format", "format_version", "name", "settings", "seconds", "actions", "terms", "provenance"}
+    {
+        "format",
+        "format_version",
+        "name",
+        "date",
+        "settings",
+        "seconds",
+        "actions",
+        "terms",
+        "provenance",
+    }
 )
 """Entries of explanation.json that are no section's."""
 MOST_BYTES = 2**26
@@ -33,6 +45,8 @@ class Explanation:
     """arrays.npz"""
     data: dict[str, NDArray]
     """The arrays of dataset.npz."""
+    source: str = "explanation.json"
+    """What the file of the numbers is called, for people."""
 
     @property
     def name(self) -> str:
@@ -71,6 +85,10 @@ class Explanation:
             terms_of(numbers)
             if "name" in numbers:
                 Text(1000).read(numbers["name"], "name")
+            Text(40).read(numbers.get("date", ""), "date")
+            check_intervals(numbers, "explanation")
+            if numbers.get("verdict") is not None:
+                check_verdict(numbers["verdict"])
         except (InputError, OSError) as error:
             raise InputError(
                 f"explanation {folder} can't be read ({error}); run drone-rl explain again"
@@ -80,4 +98,4 @@ class Explanation:
                 f"{folder} holds no explanation of format version {FORMAT_VERSION}; "
                 "run drone-rl explain again"
             )
-        return cls(numbers, arrays, data)
+        return cls(numbers, arrays, data, f"{folder.name}/explanation.json")

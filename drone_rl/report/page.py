@@ -1,6 +1,7 @@
 """From explanations to one HTML file that needs nothing else."""
 
 import dataclasses
+import functools
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -15,7 +16,14 @@ from drone_rl.report.saving import save_drawn, save_numbers, save_rows
 from drone_rl.report.sections import find_parts
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import to_file_name
+from drone_rl.utils.pages import content_security_policy, page_environment, static_text
 from drone_rl.words.licence import percent, say
+from drone_rl.words.source import SENTENCES as SOURCE
+
+STYLES = ("style.css", "report.css")
+"""Files of the page's one style element."""
+SCRIPTS = ("map.js", "zoom.js")
+"""Files of the page's one script element; parts give them data in elements of type JSON."""
 
 
 def write_report(folders: Sequence[Path], target: Path) -> Path:
@@ -38,7 +46,7 @@ def write_report(folders: Sequence[Path], target: Path) -> Path:
     try:
         (target / "figures").mkdir(parents=True, exist_ok=True)
         path = target / "report.html"
-        path.write_text(_render(policies), encoding="utf-8")
+        path.write_text(render_page(policies), encoding="utf-8")
     except OSError as error:
         raise InputError(
             f"report in {target} can't be written ({error.strerror}); choose another folder"
@@ -73,19 +81,33 @@ class Policy:
         }
 
 
-def _render(policies: Sequence[Policy]) -> str:
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("drone_rl.report"),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-    )
-    environment.filters |= {"percent": _short, "script": _script, "json": _json}
+def render_page(policies: Sequence[Policy]) -> str:
+    """Return the page of some policies, as HTML."""
+    environment = _environment()
     several = len(policies) > 1
+    style, script = static_text(environment, STYLES), static_text(environment, SCRIPTS)
     return environment.get_template("report.html").render(
         title="Can these policies be trusted?" if several else "Can this policy be trusted?",
         parts=_parts(environment, policies),
         policies=[policy.explanation for policy in policies],
+        sources=[_source(policy.explanation) for policy in policies],
+        policy=content_security_policy(style, script),
+        style=style,
+        script=script,
     )
+
+
+@functools.cache
+def _environment() -> jinja2.Environment:
+    """The templates of this page, compiled once."""
+    environment = page_environment("drone_rl.report")
+    environment.filters |= {"percent": _short, "json": _json}
+    return environment
+
+
+def _source(explanation: Explanation) -> str:
+    """Which file the figures of a policy were read from."""
+    return say(SOURCE, {**explanation.numbers, "source": explanation.source})
 
 
 def _parts(environment: jinja2.Environment, policies: Sequence[Policy]) -> list[dict[str, Any]]:
@@ -130,8 +152,3 @@ def _short(share: float) -> str:
 
 def _json(value: Any) -> str:
     return json.dumps(value, indent=1)
-
-
-def _script(value: Any) -> Markup:
-    """Plain values within a script: "<" is the one character by which a name could leave it."""
-    return Markup(json.dumps(value).replace("<", "\\u003c"))

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from markupsafe import escape
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch, PathPatch
@@ -97,7 +98,7 @@ def svg(numbers: Mapping[str, Any], arrays: Mapping[str, NDArray], names: ShownA
     for label, ways in _ways(arrays).items():
         is_action = label < len(names.names)
         fill = names.css(label) if is_action else "url(#unseen)"
-        title = f"goes {names.names[label]}" if is_action else ""
+        title = escape(f"goes {names.names[label]}") if is_action else ""
         inner = f"<title>{title}</title>" if title else ""
         style = "" if is_action else ' pointer-events="none"'
         parts.append(
@@ -149,7 +150,7 @@ def _key(names: ShownActions, side: float, unit: float) -> list[str]:
             f'<rect x="{x:g}" y="{y:g}" width="{unit:g}" height="{unit:g}" '
             f'fill="{names.css(action)}"/>',
             f'<text fill="currentColor" x="{x + 1.4 * unit:g}" y="{y + 0.9 * unit:g}">goes '
-            f"{names.names[action]}</text>",
+            f"{escape(names.names[action])}</text>",
         ]
     return parts
 

@@ -25,10 +25,20 @@ COLORS = {
     "none of these": "0.5",
     FAILED: "tab:purple",
 }
+_OTHER_KIND = "tab:cyan"
 MAX_PANELS = 6
+LOG_FROM = 3.0
+"""Greatest to least value from which on the axis is logarithmic."""
+MOST_LABELS = 7
+"""Labels side by side that an axis has room for."""
 UNIFORM = float(np.log(len(MOVES.names)))
 """Entropy of the chapter's actions where all are as probable, nats."""
 _ROUNDING = 1e-4
+
+
+def color_of(kind: str | None) -> str:
+    """Return the colour of a kind of policy."""
+    return COLORS.get(str(kind), _OTHER_KIND)
 
 
 @dataclasses.dataclass
@@ -149,15 +159,15 @@ def _no_label(values: NDArray) -> list[str]:
 
 def _verdicts(axes: Axes, layout: Layout, groups: list[Group]) -> None:
     places = _places(axes, layout, groups)
-    for i, kind in enumerate(COLORS):
+    for i, kind in enumerate((*KINDS, FAILED)):
         shares = [group.verdicts[kind] for group in groups]
         known = [(x, s) for x, s in zip(places, shares, strict=True) if s["trials"]]
         if not any(s["successes"] for _, s in known):
             continue
-        x = _aside(axes, np.array([place for place, _ in known]), 0.08 * (i - 2))
+        x = _aside(axes, np.array([place for place, _ in known]), 0.08 * (i - 2), places)
         y, low, high = (np.array([s[k] for _, s in known]) for k in ("share", "lower95", "upper95"))
         error = np.abs([y - low, high - y])
-        axes.errorbar(x, y, yerr=error, marker="o", markersize=4, capsize=2, color=COLORS[kind])
+        axes.errorbar(x, y, yerr=error, marker="o", markersize=4, capsize=2, color=color_of(kind))
     axes.set(ylabel="share of runs", ylim=(-0.03, 1.03))
     _explain_colours(axes)
 
@@ -181,22 +191,27 @@ def _dots(
     axes: Axes, layout: Layout, groups: list[Group], value: Callable[[Row], float | None]
 ) -> None:
     """A dot for every run that was judged, hollow if not certainly; like values side by side."""
-    for place, group in zip(_places(axes, layout, groups), groups, strict=True):
+    places = _places(axes, layout, groups)
+    for place, group in zip(places, groups, strict=True):
         judged = [(value(row), row) for row in group.finished if row.kind in KINDS]
         rows = [(y, row) for y, row in judged if y is not None]
         heights = np.round([y for y, _ in rows], 1)
         for level in np.unique(heights):
             beside = [row for row, height in zip(rows, heights, strict=True) if height == level]
             for i, (y, row) in enumerate(sorted(beside, key=lambda r: KINDS.index(r[1].kind))):
-                x = _aside(axes, np.array([place]), 0.05 * (i - (len(beside) - 1) / 2))
+                shift = 0.05 * (i - (len(beside) - 1) / 2)
+                x = _aside(axes, np.array([place]), shift, places)
                 fill = "full" if row.is_certain else "none"
-                axes.plot(x, [y], "o", markersize=4, color=COLORS[str(row.kind)], fillstyle=fill)
+                axes.plot(x, [y], "o", markersize=4, color=color_of(row.kind), fillstyle=fill)
     _explain_colours(axes)
 
 
-def _aside(axes: Axes, places: NDArray, shift: float) -> NDArray:
-    """Places moved along the axis a little, by a share of the way to the next."""
-    return places * 3.0**shift if axes.get_xscale() == "log" else places + shift
+def _aside(axes: Axes, places: NDArray, shift: float, every: Sequence[float]) -> NDArray:
+    """Places moved along the axis a little, by a share of the way between the nearest two."""
+    is_log = axes.get_xscale() == "log"
+    at = np.unique(np.log(every) if is_log else every)
+    step = float(np.diff(at).min()) if len(at) > 1 else (np.log(3.0) if is_log else 1.0)
+    return places * np.exp(shift * step) if is_log else places + shift * step
 
 
 def _explain_colours(axes: Axes) -> None:
@@ -204,8 +219,9 @@ def _explain_colours(axes: Axes) -> None:
     figure = axes.get_figure()
     if figure is None or figure.legends:
         return
-    handles = [Line2D([], [], marker="o", color=COLORS[kind], label=kind) for kind in COLORS]
-    figure.legend(handles=handles, loc="outside upper center", ncols=len(COLORS), fontsize=8)
+    kinds = (*KINDS, FAILED)
+    handles = [Line2D([], [], marker="o", color=color_of(kind), label=kind) for kind in kinds]
+    figure.legend(handles=handles, loc="outside upper center", ncols=len(kinds), fontsize=8)
 
 
 def _costs(axes: Axes, layout: Layout, groups: list[Group]) -> None:
@@ -238,11 +254,24 @@ def _places(axes: Axes, layout: Layout, groups: list[Group]) -> list[float]:
     except ValueError:
         axes.set_xticks(range(len(names)), [_literal(n) for n in names], rotation=20, fontsize=7)
         return [float(i) for i in range(len(names))]
-    if min(places) > 0 and max(places) / min(places) > 20:
+    if min(places) > 0 and max(places) / min(places) >= LOG_FROM:
         axes.set_xscale("log")
+    axes.set_xticks(places, _labels(axes, places, names), fontsize=8)
+    axes.set_xticks([], minor=True)
     axes.update_datalim([(place, 0.0) for place in places])
     axes.autoscale_view()
     return places
+
+
+def _labels(axes: Axes, places: Sequence[float], names: Sequence[str]) -> list[str]:
+    """A label for each place, empty where it would overlap the one before it."""
+    at = np.log(places) if axes.get_xscale() == "log" else np.asarray(places)
+    room = np.ptp(at) / MOST_LABELS
+    labels, last = [""] * len(names), -np.inf
+    for i in np.argsort(at, kind="stable"):
+        if at[i] - last >= room and at[i] > last:
+            labels[i], last = _literal(names[i]), at[i]
+    return labels
 
 
 def _literal(text: str) -> str:

@@ -94,6 +94,8 @@ def read_sweep(folder: Path) -> Sweep:
         ]
         if len({run.number for run in runs}) < len(runs):
             raise InputError("two runs have one number")
+        if len({run.folder for run in runs}) < len(runs):
+            raise InputError("two runs have one folder, so that one result would count twice")
         settings = dict(as_mapping(content["settings"], "settings"))
         return Sweep(folder, content["command"], settings, runs)
     except InputError as error:

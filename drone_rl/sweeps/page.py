@@ -4,11 +4,9 @@ import base64
 import json
 import re
 from collections.abc import Mapping, Sequence
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
-import jinja2
 from markupsafe import Markup, escape
 
 from drone_rl.sweeps import figures
@@ -18,6 +16,10 @@ from drone_rl.sweeps.rows import read_rows
 from drone_rl.sweeps.summary import summarise_sweep, to_csv
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import write_atomically
+from drone_rl.utils.pages import content_security_policy, page_environment, static_text
+
+STYLES = ("style.css", "sweep.css")
+"""Files of the page's one style element."""
 
 
 def write_sweep_report(sweep: Sweep) -> Path:
@@ -32,7 +34,7 @@ def write_sweep_report(sweep: Sweep) -> Path:
     write_atomically(sweep.folder / "summary.json", json.dumps(summary, indent=2))
     pictures = _pictures(make_groups(rows), summary["sentences"])
     page = sweep.folder / "report.html"
-    write_atomically(page, _render(sweep.folder.name, summary, pictures))
+    write_atomically(page, render_page(sweep.folder.name, summary, pictures))
     return page
 
 
@@ -82,19 +84,26 @@ def _paragraph(sentences: Mapping[str, str], of: str) -> str:
     return " ".join(text for name, text in sentences.items() if name.startswith(of))
 
 
-def _render(name: str, summary: dict[str, Any], pictures: list[dict[str, str]]) -> str:
-    source = resources.files("drone_rl.sweeps").joinpath("templates/report.html").read_text()
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("drone_rl.report"),  # the style that all reports share
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-    )
+def render_page(name: str, summary: dict[str, Any], pictures: list[dict[str, str]]) -> str:
+    """Return the page of a sweep, as HTML.
+
+    Args:
+        name: Of the sweep.
+        summary: From `summarise_sweep`.
+        pictures: Each with "title", "text", and data URIs for a "light" and for a "dark" page.
+    """
+    environment = page_environment("drone_rl.sweeps", "drone_rl.report")  # which share a style
     environment.filters |= {"figure": _figure, "code": _code}
+    style = static_text(environment, STYLES)
     parts = ("runs", "verdicts", "best", "settings")
     texts = {part: _paragraph(summary["sentences"], f"{part}.") for part in parts}
-    return environment.from_string(source).render(
-        name=name, figures=summary, pictures=pictures, texts=texts
+    return environment.get_template("report.html").render(
+        name=name,
+        figures=summary,
+        pictures=pictures,
+        texts=texts,
+        policy=content_security_policy(style),
+        style=style,
     )
 
 
@@ -105,13 +114,22 @@ def _figure(value: object) -> str:
     if isinstance(value, dict):
         if value["share"] is None:
             return ""
-        certain = value.get("certain", value["successes"])
-        few = "" if certain == value["successes"] else f", {certain} certain"
-        count = f"{value['successes']}/{value['trials']}{few}"
-        return f"{count} [{value['lower95']:.2f}, {value['upper95']:.2f}]"
+        return _share(value)
     if value is None:
         return ""
     return _number(value) if isinstance(value, float) else str(value)
+
+
+def _share(value: Mapping[str, Any]) -> str:
+    """A share of the runs of which it is known, with the interval that allows for the others."""
+    unknown = value.get("unknown", 0)
+    if unknown == value["trials"]:
+        return "not known"
+    certain = value.get("certain", value["successes"])
+    few = "" if certain == value["successes"] else f", {certain} certain"
+    more = f", {unknown} not known" if unknown else ""
+    count = f"{value['successes']}/{value['trials'] - unknown}{few}{more}"
+    return f"{count} [{value['lower95']:.2f}, {value['upper95']:.2f}]"
 
 
 def _median(value: Mapping[str, Any]) -> str:

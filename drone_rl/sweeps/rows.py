@@ -4,7 +4,6 @@ import contextlib
 import csv
 import dataclasses
 import io
-import math
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +12,18 @@ import numpy as np
 from drone_rl.sweeps.manifest import Sweep
 from drone_rl.sweeps.runs import Run, read_failure, read_result
 from drone_rl.sweeps.statistics import Array
+from drone_rl.utils.consistency import read_entry
+from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import read_bytes
 from drone_rl.utils.former_names import with_present_names
+from drone_rl.utils.schema import Real, Whole
+from drone_rl.verdicts.consistency import check_verdict
 from drone_rl.verdicts.kinds import Kind
 from drone_rl.verdicts.rule import SIDES, Rule
 
+_MOST = 1e15
+"""No figure of a run is as large."""
+_ROUNDING = 1e-6
 LAST_UPDATES = 20
 """Updates at the end of a run over which the entropy is averaged."""
 NOT_OFFERED = "not offered"
@@ -147,39 +153,48 @@ def _read_row(run: Run, choice: dict[str, str]) -> Row:
     try:
         _check_result(result)
         curve, _, entropy = _read_metrics(run.folder, result["largest_reward"])
+        _check_curve(curve)
         had = float(result["frames"]), float(result["seconds"])
         row = Row(run, choice, "finished", None, result, curve, *had, entropy)
-        _check_verdict(row)
+        if row.verdict is not None:
+            check_verdict(row.verdict)
         row.plain()
+    except InputError as error:
+        return Row(run, choice, "damaged", f"its files can't be read ({error})")
     except (ValueError, KeyError, TypeError, AttributeError, csv.Error) as error:
         return Row(run, choice, "damaged", f"its files can't be read ({error!r})")
     return row
 
 
+_RESULT = {
+    "frames": Whole(0, 10**15),
+    "episodes": Whole(0, 10**12),
+    "seconds": Real(0.0, 1e10),
+    "largest_reward": Real(0.0, 1e6, is_above=True),
+    "running_reward": Real(-1e6, 1e6),
+}
+"""Figures of `result.json` and what they may be."""
+
+
 def _check_result(result: dict[str, Any]) -> None:
-    for key in ("frames", "episodes", "seconds", "running_reward", "largest_reward"):
-        _check_number(key, result[key])
-    if result["largest_reward"] <= 0:
-        raise ValueError(f"largest_reward is {result['largest_reward']}")
+    for key, kind in _RESULT.items():
+        read_entry(result, key, kind, "result")
+    if result["running_reward"] > result["largest_reward"] * (1 + _ROUNDING):
+        raise InputError(
+            f"running_reward={result['running_reward']} is more than the greatest reward, "
+            f"{result['largest_reward']}"
+        )
+    if result["episodes"] > result["frames"]:
+        raise InputError(f"{result['episodes']} episodes had {result['frames']} frames")
 
 
-def _check_verdict(row: Row) -> None:
-    if row.verdict is None:
-        return
-    if row.kind is None or not isinstance(row.verdict["certain"], bool):
-        raise ValueError(f"certain is {row.verdict['certain']!r}")
-    sides = {side: row.share(side) for side in SIDES}
-    offered = {side: share for side, share in sides.items() if share is not None}
-    greedy = row.verdict["greedy"]
-    figures = {"episodes": greedy["episodes"], "success": greedy["success"]["share"], **offered}
-    for name, value in {**figures, "all": row.share("all")}.items():
-        _check_number(name, value)
-    _check_number("error_rate", row.verdict["error_rate"])
-
-
-def _check_number(name: str, value: object) -> None:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise ValueError(f"{name} is {value!r}")
+def _check_curve(curve: tuple[Array, Array]) -> None:
+    """A learning curve of a run that came to its end."""
+    frames, shares = curve
+    if not (np.isfinite(frames).all() and (np.diff(frames, prepend=0.0) >= 0).all()):
+        raise InputError("metrics.csv: frames decrease or are not finite")
+    if not (np.abs(shares) < _MOST).all() or (shares > 1 + _ROUNDING).any():
+        raise InputError("metrics.csv: a reward is not finite or above the greatest one")
 
 
 def _read_metrics(
@@ -192,4 +207,7 @@ def _read_metrics(
     rewards = np.array([float(row["train/running_reward"]) for row in rows])
     had = (float(rows[-1]["frames"]), float(rows[-1].get("seconds") or 0)) if rows else (0.0, 0.0)
     last = [float(row["loss/entropy"]) for row in rows[-LAST_UPDATES:] if row.get("loss/entropy")]
-    return (frames, rewards / largest_reward), had, float(np.mean(last)) if last else None
+    if not all(0 <= value < _MOST for value in had):
+        raise InputError("metrics.csv: frames or seconds are out of range")
+    entropy = float(np.mean(last)) if last and np.isfinite(last).all() else None
+    return (frames, rewards / largest_reward), had, entropy

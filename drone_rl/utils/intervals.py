@@ -68,23 +68,64 @@ def mean_bounds(
     }
 
 
+def may_bound_mean(
+    interval: tuple[float, float],
+    mean: float,
+    count: int,
+    low: float = 0.0,
+    high: float = 1.0,
+    confidence: float = 0.95,
+) -> bool:
+    """Return whether `mean_bounds` can give this interval to so many values with this mean.
+
+    It can't if the interval is too narrow. The narrowest one is that of values which all equal the
+    mean: the capital of a bet grows by a concave function of each value, and so by Jensen's
+    inequality most where the values are alike.
+
+    Args:
+        interval: Lower and upper end.
+        mean: Of the values.
+        count: How many there are.
+        low: Least possible value.
+        high: Greatest possible value.
+        confidence: Coverage of the interval.
+    """
+    z, lower, upper = ((value - low) / (high - low) for value in (mean, *interval))
+    stakes, needed = _bets(count, (1.0 - confidence) / 2)
+    ends = ((z, lower - _ROUNDING), (1.0 - z, 1.0 - upper - _ROUNDING))
+    return all(
+        end <= 0.0 or _wealth(np.clip([value], 0.0, 1.0), np.array([count]), stakes, end) >= needed
+        for value, end in ends
+    )
+
+
+_ROUNDING = 1e-6
+
+
 def _refuted_below(z: NDArray, tail: float) -> float:
     """The mean up to which every mean is refuted at level `tail`; values in [0, 1]."""
     distinct, counts = np.unique(z, return_counts=True)
-    # shares of the capital that are staked: from about 1 / sqrt(n) to everything
-    stakes = 2.0 ** -np.arange(max(1, math.ceil(math.log2(math.sqrt(len(z))))) + 1)
-    needed = math.log(len(stakes) / tail)
-
-    def is_refuted(mean: float) -> bool:
-        with np.errstate(divide="ignore"):
-            growth = np.log1p(stakes[:, None] * (distinct / mean - 1.0)) @ counts
-        return bool(np.logaddexp.reduce(growth) >= needed)
-
+    stakes, needed = _bets(len(z), tail)
     below, above = 0.0, 1.0
     for _ in range(60):
         middle = (below + above) / 2
-        below, above = (middle, above) if is_refuted(middle) else (below, middle)
+        is_refuted = _wealth(distinct, counts, stakes, middle) >= needed
+        below, above = (middle, above) if is_refuted else (below, middle)
     return below
+
+
+def _bets(count: int, tail: float) -> tuple[NDArray, float]:
+    """Shares of the capital that are staked, and the log of the wealth that refutes a mean."""
+    # from about 1 / sqrt(n) to everything
+    stakes = 2.0 ** -np.arange(max(1, math.ceil(math.log2(math.sqrt(count)))) + 1)
+    return stakes, math.log(len(stakes) / tail)
+
+
+def _wealth(distinct: NDArray, counts: NDArray, stakes: NDArray, mean: float) -> float:
+    """The log of what all bets against a mean have won together; values in [0, 1]."""
+    with np.errstate(divide="ignore"):
+        growth = np.log1p(stakes[:, None] * (distinct / mean - 1.0)) @ counts
+    return float(np.logaddexp.reduce(growth))
 
 
 def median_bounds(values: ArrayLike, confidence: float = 0.95) -> tuple[float, float] | None:

@@ -14,7 +14,7 @@ def _more(evidence: Evidence) -> str:
 
 def _refuse(evidence: Evidence) -> str:
     return (
-        "What to do: do not rely on it; require=good refuses it with exit status "
+        "What to do: do not rely on it; drone-rl verdict with require=good ends with exit status "
         f"{evidence['verdict']['exit_code']}."
     )
 

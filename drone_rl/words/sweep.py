@@ -24,6 +24,15 @@ _OF_THE_RUNS = (
         ),
     ),
     Sentence(
+        "runs.read",
+        "a run has ended",
+        lambda e: ended(e) > 0,
+        lambda e: (
+            f"All figures of {in_words(ended(e))} were read from files in their folders and not "
+            "measured again."
+        ),
+    ),
+    Sentence(
         "runs.failed",
         "a run failed",
         lambda e: e["failed"] > 0,
@@ -125,7 +134,7 @@ _OF_THE_BEST = (
         "best.none",
         "no run was judged",
         lambda e: e["best"] is None,
-        lambda e: "None: no run has been judged by the present rule.",
+        lambda e: "No run has been judged by the present rule, so that no best run is known.",
     ),
     Sentence(
         "best.chosen",

@@ -44,4 +44,6 @@ def test_they_show_their_report(tmp_path):
     verdict = {"kind": "good", "certain": False, "sentence": "It does."}
     shown = Explanations(tmp_path, tmp_path / "report.html", {"x": {"verdict": verdict}})
     assert str(shown) == "x: good (not certain). It does."
-    assert shown._repr_html_().startswith('<iframe srcdoc="&lt;h1&gt;trusted?')
+    assert shown._repr_html_().startswith(
+        '<iframe sandbox="allow-scripts" srcdoc="&lt;h1&gt;trusted?'
+    )

@@ -1,8 +1,10 @@
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import torch
 
-from drone_rl.bench.maps import bench_maps, expert, imagined
+from drone_rl.bench.maps import bench_maps, expert, imagined, shipped
 from drone_rl.explanations.scenes import Scenes
 from drone_rl.sim.actions import Move
 
@@ -12,6 +14,14 @@ def test_no_liar_is_believed_and_true_maps_are_found(tmp_path):
     assert found["placebo_maps_trusted"] == 0 and found["placebo_maps_total"] >= 60
     assert found["planted_maps_found"] == 1.0 and found["planted_maps_total"] >= 3
     assert found["planted_maps_blind_trusted"] == 0 and found["planted_maps_blind_total"] >= 1
+
+
+def test_policies_of_the_package_that_choose_among_moves_are_tried():
+    """Not `flight_velocity`, whose six outputs are no logits of moves, nor those of two frames."""
+    networks = shipped(SimpleNamespace(absent=torch.zeros(1, 25, 64)))
+    assert {"good", "poor", "proved", "flight"} <= networks.keys()
+    assert not networks.keys() & {"flight_velocity", "robust", "pillars_good"}
+    assert all(network(torch.zeros(2, 1, 25, 64)).shape == (2, 3) for network in networks.values())
 
 
 @pytest.fixture

@@ -15,6 +15,20 @@ def test_hovering_comes_back(quadrotor, hovering):
     assert (record.states[-1].position - torch.tensor([1.0, 2.0, 5.0])).norm() < 0.05
 
 
+def test_a_command_keeps_its_own_reference(hovering):
+    """Neither does turning change the drone's reference, nor a later reference the command's."""
+    body = hovering((1, 2, 5))
+    before = body.reference.clone()
+    turning = RotateTo(1.0, 0.01, 10.0)
+    turning.begin(body)
+    assert torch.equal(body.reference, before)
+    staying = Hover(1.0)
+    staying.begin(body)
+    body.reference[:, 0] = 9.0
+    assert torch.equal(staying.rest(body), before)
+    assert turning.rest(body)[0].tolist() == [1.0, 2.0, 1.0, 5.0]
+
+
 def test_turning_the_shorter_way(quadrotor, hovering):
     command = RotateTo(math.radians(-170), math.radians(1), 10.0)
     body = hovering((0, 0, 5))

@@ -50,6 +50,12 @@ def test_the_nearest_place_of_a_part(paths):
     assert point.tolist() == [5, 2]
 
 
+def test_the_nearest_place_is_never_outside_the_part(paths):
+    """The corner, 4 m along, is nearer than all of the part from 5 m to 6 m."""
+    position = rows([4, 0.1, 1], [0, 0, 0])
+    assert of.nearest(paths, position, rows(5, 1), rows(6, 2)).tolist() == [5, 1]
+
+
 def test_a_part_keeps_to_one_way_through_a_crossing():
     """There and back again: the same place is 2 m and 8 m along."""
     paths = of.make_paths(rows([[0, 0, 0], [5, 0, 0], [0, 0, 0]]))

@@ -11,6 +11,7 @@ from torch import nn
 
 from drone_rl.evaluation import run_episodes, summarise
 from drone_rl.policies import make_actor
+from drone_rl.proofs import chain
 from drone_rl.proofs.chain import NEGLIGIBLE, Outcomes, follow_chances
 from drone_rl.proofs.graph import explore
 from drone_rl.proofs.sight import Sight
@@ -52,6 +53,19 @@ def test_a_random_walk_solved_by_hand(small, place):
     assert float(done.reasons[0, EndReason.SIDE_BOUNDARY]) == pytest.approx(2 / 7, abs=1e-14)
     assert float(done.steps[0]) == pytest.approx(15 / 7, abs=1e-13)
     assert 0 < float(done.undecided[0]) < NEGLIGIBLE
+
+
+def test_what_is_dropped_at_several_steps_adds_up(small, place, monkeypatch):
+    """Forward 0.4, left 0.5, right 0.1, and nodes with a mass of at most 0.2 are dropped.
+
+    The place on the right is dropped each time that it is reached: first with 0.1, then with 0.05
+    of that (left and back), and so on: 0.1 / (1 - 0.05).
+    """
+    monkeypatch.setattr(chain, "FAINT", 0.2)
+    done = constant(small, place(small, [0.0]), 0.4, 0.5, 0.1)
+    assert float(done.undecided[0]) == pytest.approx(0.1 / 0.95, abs=1e-12)
+    assert float(done.success[0]) == pytest.approx(0.4 * 1.5 / 0.95, abs=1e-12)
+    assert float(done.steps[0]) == pytest.approx(1.5 / 0.95, abs=1e-12)
 
 
 def test_the_step_limit_by_hand(small, place):

@@ -41,10 +41,7 @@ def browser(explanations, tmp_path_factory):
 
 def points(browser):
     """What the first map knows of its frames."""
-    found = browser.execute_script(
-        """const source = [...document.scripts].map(s => s.textContent).join("");
-        return source.match(/map0"\\), (\\{.*?\\}), "data:/)[1];"""
-    )
+    found = browser.execute_script("return document.querySelector('#map0 script').textContent")
     return json.loads(found)
 
 

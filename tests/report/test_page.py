@@ -1,4 +1,6 @@
+import base64
 import csv
+import hashlib
 import html
 import json
 import re
@@ -8,9 +10,11 @@ import numpy as np
 import pytest
 
 from drone_rl.bench.evidence import SHIFTS
+from drone_rl.bench.evidence import changed as changed_copy
 from drone_rl.report import write_report
 from drone_rl.report.sections import find_parts
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.intervals import proportion
 from tests.report.conftest import NASTY
 
 
@@ -45,7 +49,20 @@ def test_names_and_paths_are_escaped(report):
     page = report.read_text()
     assert NASTY not in page
     assert html.escape(NASTY, quote=False)[:20] in page.replace("&#34;", '"')
-    assert page.count("</script>") == page.count("<script>") == 2
+    assert page.count("</script>") == page.count("<script") == 3  # the program, data of two maps
+
+
+def test_the_policy_allows_the_pages_own_style_and_script_alone(report):
+    page = report.read_text()
+    policy = html.unescape(re.findall(r'<meta http-equiv="[^"]+" content="([^"]+)">', page)[0])
+    assert "unsafe" not in policy
+    for source in ("default-src", "base-uri", "form-action", "object-src"):
+        assert f"{source} 'none'" in policy
+    for element in ("style", "script"):
+        (text,) = re.findall(f"<{element}>(.*?)</{element}>", page, re.S)
+        digest = base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
+        assert f"{element}-src 'sha256-{digest}'" in policy
+    assert not re.findall(r"\sstyle=|\son\w+=", page)
 
 
 def test_every_part_is_there_in_order_with_a_link_to_it(report):
@@ -78,12 +95,50 @@ def test_figures_are_saved_with_their_numbers(report):
     assert (figures / "1_second_episode.mp4").stat().st_size > 0
 
 
+def flown_shifts():
+    """Flights under other conditions with the exact intervals that a reader insists on."""
+    shifts = json.loads(json.dumps(SHIFTS))
+    waiting = [shifts]
+    while waiting:
+        item = waiting.pop()
+        if isinstance(item, dict) and "successes" in item:
+            item |= proportion(item["successes"], item["trials"])
+        waiting += item.values() if isinstance(item, dict) else item
+        waiting = [value for value in waiting if isinstance(value, dict | list)]
+    return shifts
+
+
+def test_the_page_says_which_file_it_repeats(report):
+    page = report.read_text()
+    for folder in "ab":
+        assert f"This page repeats what {folder}/explanation.json says (written 20" in page
+
+
+@pytest.mark.parametrize(
+    "lie",
+    [
+        {"verdict.kind": "good"},
+        {"verdict.greedy.success.share": 7},
+        {"loops.episodes.successes": 1000},
+        {"dataset.entropy.mean": 1e308},
+        {"dataset.episodes": -5},
+        {"date": "x" * 41},
+    ],
+)
+def test_an_explanation_that_contradicts_itself_is_refused(explanations, tmp_path, lie):
+    folder = tmp_path / "lie"
+    shutil.copytree(explanations[1], folder)
+    numbers = json.loads((folder / "explanation.json").read_text())
+    (folder / "explanation.json").write_text(json.dumps(changed_copy(numbers, lie)))
+    with pytest.raises(InputError, match="can't be read"):
+        write_report([folder], tmp_path)
+
+
 def test_conditions_are_shown_where_they_were_flown(explanations, tmp_path):
     folder = tmp_path / "flown"
     shutil.copytree(explanations[1], folder)
     numbers = json.loads((folder / "explanation.json").read_text())
-    good = {**numbers["verdict"], "kind": "good", "certain": True, "good_share": 0.9}
-    numbers |= {"shifts": SHIFTS, "verdict": good}
+    numbers |= {"shifts": flown_shifts()}
     (folder / "explanation.json").write_text(json.dumps(numbers))
     arrays = {f"shifts_{name}": np.zeros((6, 5, 16, 3), np.uint8) for name in SHIFTS["axes"]}
     with np.load(folder / "arrays.npz") as kept:

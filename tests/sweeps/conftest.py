@@ -3,11 +3,14 @@
 import json
 import sys
 
+import numpy as np
 import pytest
 
 from drone_rl.sweeps import Run, open_sweep, process
-from drone_rl.utils.intervals import proportion
-from drone_rl.verdicts.rule import Rule
+from drone_rl.utils.intervals import mean_bounds, proportion
+from drone_rl.verdicts.consistency import _expected
+from drone_rl.verdicts.kinds import Kind
+from drone_rl.verdicts.rule import LUCK, Rule
 
 FAKE = """
 import json, pathlib, sys, time
@@ -45,18 +48,49 @@ def make_verdict():
 
 def _verdict(kind="good", left=1.0, ahead=1.0, right=1.0, *, whole=1.0, certain=True, **others):
     shares = {"all": whole, "left": left, "ahead": ahead, "right": right}
-    return {
+    greedy = _flights(shares, success=round(EPISODES * (whole or 0)))
+    luck = {name: _flights(dict.fromkeys(shares, 0.0), success=0) for name in LUCK}
+    if kind == "poor":  # nearly as many cubes as luck, which gets as many as the policy
+        luck["forward"] = _flights(shares, success=0)
+    oracle = _flights(dict.fromkeys(shares, 1.0), success=EPISODES)
+    evidence = {
         "kind": kind,
         "certain": certain,
+        "exit_code": Kind(kind).exit_code if certain is True and kind in [*Kind] else 13,
         "rule": Rule().text,
         "error_rate": 0.05,
-        "greedy": {
-            "episodes": 200,
-            "success": proportion(round(200 * (whole or 0)), 200),
-            "shares": {name: {"mean": share} for name, share in shares.items()},
-        },
-        **others,
+        "good_share": 0.9,
+        "num_cubes": 3,
+        "greedy": greedy,
+        "baselines": {**luck, "oracle": oracle},
     }
+    return {**evidence, "quantities": _quantities(evidence), **others}
+
+
+EPISODES = 200
+
+
+def _flights(shares, success):
+    """An evaluation in which each episode has the mean share."""
+    means = {
+        name: {**mean_bounds([] if share is None else np.full(EPISODES, share)), "goals": 3}
+        for name, share in shares.items()
+    }
+    return {"episodes": EPISODES, "success": proportion(success, EPISODES), "shares": means}
+
+
+def _quantities(evidence):
+    """The rule's quantities of evaluations whose episodes are all alike."""
+    rule, found = Rule(), {}
+    for name, thresholds in zip(rule.quantities, rule.thresholds, strict=True):
+        value, (low, high), count = _expected(evidence, name, rule)
+        if name.startswith("offered "):
+            bounds = proportion(round(value * count), count, rule.confidence)
+        else:
+            bounds = mean_bounds(np.full(count, value), low, high, rule.confidence)
+        ends = {"lower": bounds["lower95"], "upper": bounds["upper95"]}
+        found[name] = {"value": value, **ends, "thresholds": list(thresholds)}
+    return found
 
 
 CURVE = (

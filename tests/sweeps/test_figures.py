@@ -82,3 +82,32 @@ def test_learners_are_shown_side_by_side(begin_sweep, make_verdict, learners, si
     layout = figures.lay_out(make_groups(read_rows(begin_sweep(runs))))
     assert list(layout.panels) == [f"objective={i}" for i in range(learners)]
     assert struct.unpack(">II", figures.draw_outcome(layout)[16:24]) == size
+
+
+@pytest.mark.parametrize("values", [("1e-3", "3e-3"), ("1", "2", "2.5"), ("0.1", "1", "10")])
+def test_labels_are_the_values_and_do_not_overlap(begin_sweep, make_verdict, values):
+    """What `drone-rl train -m optimiser.lr=1e-3,3e-3` draws: a dot was shifted by 0.05, not 5%."""
+    judged = {"verdict": make_verdict()}
+    groups = make_groups(
+        read_rows(begin_sweep({f"optimiser.lr={v} seed={i}": judged for v in values for i in "01"}))
+    )
+    figure = Figure(figsize=(5, 3), layout="constrained")
+    axes = figure.subplots()
+    figures._entropies(axes, figures.lay_out(groups), groups)
+    figure.draw_without_rendering()
+    labels = [label for label in axes.get_xticklabels(which="both") if label.get_text()]
+    assert [label.get_text() for label in labels] == list(values)
+    boxes = [label.get_window_extent() for label in labels]
+    assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
+    numbers = [float(value) for value in values]
+    dots = [float(dot.get_xdata()[0]) for dot in axes.lines if dot.get_marker() == "o"]
+    assert min(numbers) * 0.8 < min(dots) and max(dots) < max(numbers) * 1.2
+
+
+def test_labels_that_would_overlap_are_left_out(begin_sweep):
+    values = [*map(str, range(1, 30)), "1000"]
+    groups = make_groups(read_rows(begin_sweep({f"optimiser.lr={v}": {} for v in values})))
+    axes = Figure().subplots()
+    figures._costs(axes, figures.lay_out(groups), groups)
+    labels = [label.get_text() for label in axes.get_xticklabels()]
+    assert [label for label in labels if label] == ["1", "3", "9", "25", "1000"]

@@ -68,6 +68,10 @@ def test_no_sweep_and_a_damaged_one(tmp_path):
         ({"runs": [{"number": 0, "overrides": ["a._target_=b"], "folder": "0"}]}, "no plain"),
         ({"runs": [{"number": 0, "overrides": "a", "folder": "0"}]}, "overrides='a'"),
         ({"runs": [{"number": 0, "overrides": [], "folder": "0"}] * 2}, "two runs"),
+        (
+            {"runs": [{"number": i, "overrides": [f"seed={i}"], "folder": "0"} for i in (0, 1)]},
+            "count twice",
+        ),
     ],
 )
 def test_a_sweep_that_nobody_began(tmp_path, make_runs, change, message):

@@ -15,7 +15,7 @@ def test_report_is_whole_and_escapes_what_it_shows(sweep):
     assert "&lt;b&gt;NaN" in page
     assert page.count("data:image/png;base64,") == 10  # five figures, light and dark
     assert "drone-rl train optimiser.lr=1e-3 seed=0" in page
-    assert 'href="2/"' in page
+    assert 'href="./2/"' in page
     assert "http:" not in page
     assert "https:" not in page
     summary = json.loads((sweep.folder / "summary.json").read_text())
@@ -36,7 +36,7 @@ def test_a_sweep_with_nothing_finished_has_a_report_and_no_picture(sweep, tmp_pa
     assert picture.read_bytes().startswith(b"\x89PNG")
     for path in sweep.folder.glob("*/result.json"):
         path.unlink()
-    assert "no run has been judged" in write_sweep_report(sweep).read_text()
+    assert "No run has been judged" in write_sweep_report(sweep).read_text()
     with pytest.raises(InputError, match="evaluate_after"):
         write_picture(sweep, picture)
 
@@ -56,6 +56,8 @@ def test_cells():
     assert _figure(median_of_runs([1.0, 2, 3, 4, 5, 6])) == "3.5 [1, 6]"
     assert _figure(median_of_runs([])) == _figure(None) == _figure(share_of_runs(0, 0, 0)) == ""
     assert _figure(share_of_runs(2, 0, 2)) == "2/2 [0.16, 1.00]"
+    assert _figure(share_of_runs(0, 3, 3)) == "not known"  # nothing was judged
+    assert _figure(share_of_runs(1, 2, 3)) == "1/1, 2 not known [0.01, 1.00]"
     assert _figure({**share_of_runs(2, 0, 2), "certain": 1}) == "2/2, 1 certain [0.16, 1.00]"
 
 

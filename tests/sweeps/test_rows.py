@@ -95,11 +95,68 @@ def test_an_incomplete_result_is_damaged(sweep, broken):
         {"error_rate": None},
         {"whole": None},
         {"left": "much"},
+        {"quantities": {}},
+        {"exit_code": 0},
+        {"good_share": 0.5},
     ],
 )
 def test_an_incomplete_verdict_is_damaged(sweep, make_verdict, broken):
-    rewrite(sweep, 0, verdict=make_verdict(**broken))
+    if broken.keys() & {"whole", "left"}:  # of figures that no verdict has
+        verdict = make_verdict()
+        for name, value in broken.items():
+            verdict["greedy"]["shares"]["all" if name == "whole" else name]["mean"] = value
+    else:
+        verdict = make_verdict(**{"kind": "poor" if "exit_code" in broken else "good", **broken})
+    rewrite(sweep, 0, verdict=verdict)
     assert read_rows(sweep)[0].state == "damaged"
+
+
+def test_an_invented_result_is_damaged(sweep, make_verdict):
+    """A success share of 7, a mean of 1e308 and -5 episodes are not "good, certain"."""
+    verdict = make_verdict()
+    greedy = verdict["greedy"]
+    lies = [
+        {"greedy": {**greedy, "success": {**greedy["success"], "share": 7}}},
+        {"greedy": {**greedy, "shares": {**greedy["shares"], "all": {"mean": 1e308}}}},
+        {"greedy": {**greedy, "episodes": -5}},
+        {"kind": "one-sided (left)", "exit_code": 11},
+    ]
+    for lie in lies:
+        rewrite(sweep, 0, verdict={**verdict, **lie})
+        (row, *_) = read_rows(sweep)
+        assert (row.state, row.kind, row.is_certain) == ("damaged", None, False)
+
+
+@pytest.mark.parametrize(
+    "lie",
+    [
+        {"frames": -1},
+        {"frames": 1.5},
+        {"episodes": 2000},  # of 1000 frames
+        {"running_reward": 3.1},  # of 3 cubes
+        {"num_cubes": 1e308},
+        {"seconds": -1.0},
+    ],
+)
+def test_a_result_out_of_range_is_damaged(sweep, lie):
+    rewrite(sweep, 0, **lie)
+    assert read_rows(sweep)[0].state == "damaged"
+
+
+@pytest.mark.parametrize(
+    "line", ["400,3,1.5,0.5", "1500,3,4,0.5", "1500,3,nan,0.5", "inf,3,1.5,0.5", "1e300,3,1,1"]
+)
+def test_metrics_out_of_range_are_damage(sweep, line):
+    with (sweep.folder / "0" / "metrics.csv").open("a") as file:
+        file.write(f"3,{line}\n")
+    assert read_rows(sweep)[0].state == "damaged"
+
+
+def test_a_run_that_failed_with_no_number_keeps_what_it_had(sweep):
+    with (sweep.folder / "3" / "metrics.csv").open("a") as file:
+        file.write("3,1500,3,nan,nan\n")
+    failed = read_rows(sweep)[3]
+    assert (failed.frames, failed.seconds, failed.entropy) == (1500, 3, None)
 
 
 def test_unreadable_metrics_are_damage_and_an_unreadable_result_must_be_made_again(sweep):

@@ -39,6 +39,7 @@ SWEEP = {
 }
 SAID = {
     "runs.counts": "6 runs: 6 finished, 0 failed, 0 damaged, 0 unfinished.",
+    "runs.read": "All figures of 6 runs were read from files in their folders",
     "verdicts.basis": "last policies of 6 runs, by 200 greedy episodes each in worlds to choose by",
     "verdicts.certain": "error of at most 5%",
     "best.chosen": "Run 3: good, with more than 99% of its cubes; chosen by 200 episodes in worlds",

@@ -83,6 +83,7 @@ def points(explanation: Explanation) -> dict[str, Any]:
         "names": explanation.actions.names,
         "order": explanation.actions.order,
         "colors": explanation.actions.colors,
+        "sprite": to_uri(to_png(sprite(explanation)), "image/png"),
     }
 
 
@@ -119,6 +120,5 @@ PART = Part(
     extras=lambda explanation: {
         "actions": _legend(explanation),
         "points": points(explanation),
-        "sprite": to_uri(to_png(sprite(explanation)), "image/png"),
     },
 )

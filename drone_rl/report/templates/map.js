@@ -1,10 +1,21 @@
+"use strict";
 const tip = document.getElementById("tip");
+function make(tag, text, name) {
+  const element = document.createElement(tag);
+  element.textContent = text;
+  element.className = name || "";
+  return element;
+}
 function bars(points, i) {
   const p = points.probabilities[i], chosen = points.action[i];
-  return points.order.map(a => `<div class="bar ${a === chosen ? "chosen" : ""}"><span>${points.names[a]}</span>` +
-    `<i style="width:${Math.max(1, 100 * p[a])}%"></i><span>${p[a].toFixed(2)}</span></div>`).join("");
+  return points.order.map(a => {
+    const bar = make("div", "", a === chosen ? "bar chosen" : "bar"), length = make("i", "");
+    length.style.width = `${Math.max(1, 100 * p[a])}%`;
+    bar.append(make("span", points.names[a]), length, make("span", p[a].toFixed(2)));
+    return bar;
+  });
 }
-function setUp(root, points, source) {
+function setUp(root, points) {
   const [w, h] = points.tile, canvas = root.querySelector("canvas"), strip = root.querySelector(".strip");
   const sheet = new Image(), n = points.action.length;
   let which = "features", chosen = -1;
@@ -42,8 +53,7 @@ function setUp(root, points, source) {
     tip.style.display = i < 0 ? "none" : "block";
     if (i < 0) return;
     picture(tip.querySelector("canvas"), i, true);
-    tip.querySelector("div").innerHTML = bars(points, i) +
-      `<small>${describe(i)}</small>`;
+    tip.querySelector("div").replaceChildren(...bars(points, i), make("small", describe(i)));
     const x = Math.min(event.clientX + 16, innerWidth - tip.offsetWidth - 8);
     const y = event.clientY + 16 + tip.offsetHeight > innerHeight ? event.clientY - tip.offsetHeight - 16 : event.clientY + 16;
     tip.style.left = `${Math.max(4, x)}px`; tip.style.top = `${Math.max(4, y)}px`;
@@ -60,9 +70,7 @@ function setUp(root, points, source) {
       box.append(small, `step ${points.step[k]}: ${points.names[points.action[k]]}`);
       strip.append(box);
     }
-    const note = document.createElement("div");
-    note.className = "note"; note.textContent = describe(i);
-    strip.append(note);
+    strip.append(make("div", describe(i), "note"));
     draw();
   }
   canvas.addEventListener("mousemove", hover);
@@ -78,5 +86,7 @@ function setUp(root, points, source) {
     draw();
   }));
   sheet.onload = () => { draw(); root.dataset.ready = "true"; };
-  sheet.src = source;
+  sheet.src = points.sprite;
 }
+document.querySelectorAll(".map").forEach(
+  root => setUp(root, JSON.parse(root.querySelector("script").textContent)));

@@ -33,6 +33,15 @@ def test_a_bounce_gives_back_its_share_of_speed(share):
     assert float(after.position[0, 2]) == pytest.approx(0.3, abs=1e-6)
 
 
+def test_friction_takes_what_the_bounce_returns_into_account():
+    """Coulomb: the impulse into the ground, 1 + 0.5 of the speed, times 0.2 is lost sideways."""
+    drone = quadrotor(restitution=0.5, friction=0.2, **VACUUM)
+    after = flown(drone, falling(0.303, (3.0, 0.0, -2.0)), 1)
+    into = 2.0 + 9.81 * 0.003
+    expected = (3.0 - 0.2 * 1.5 * into, 0.0, 0.5 * into)
+    np.testing.assert_allclose(after.velocity[0], expected, atol=1e-5)
+
+
 def test_a_slide_ends_where_friction_has_eaten_it():
     """v^2 / (2 mu g), within what a tick of it is."""
     for friction in (0.5, 0.25):

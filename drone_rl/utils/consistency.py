@@ -1,0 +1,222 @@
+"""Shares, means and intervals that were read from files: refused unless they can be right.
+
+Whoever reads a file can't know whether its figures were measured. But a share follows from its
+counts, and so does its exact interval; and an interval of a mean can't be narrower than the
+narrowest that so many values give. So no file can claim more than its own counts allow.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.intervals import may_bound_mean, proportion
+from drone_rl.utils.schema import Kind, Real, Whole, as_mapping, shown
+
+MOST_VALUES = 10**9
+"""That one share or mean may be of."""
+COUNT = Whole(0, MOST_VALUES)
+_NUMBER = Real(-math.inf)
+_ROUNDING = 1e-6
+_COUNTS = ("episodes", "frames", "steps", "trials", "successes", "count", "goals", "pairs")
+"""Entries that count something where they are numbers."""
+
+
+def check_intervals(given: Any, where: str) -> None:
+    """Check all shares, means and counts in a part of a file, whatever else it holds.
+
+    Args:
+        given: Plain data.
+        where: Its name, for messages.
+
+    Raises:
+        InputError: A share does not follow from its counts, a value is outside its interval, an
+            interval is narrower than its counts allow, or a count is negative.
+    """
+    waiting = [(given, where)]
+    while waiting:
+        item, place = waiting.pop()
+        if isinstance(item, list):
+            waiting += [(value, place) for value in item if isinstance(value, list | Mapping)]
+        if isinstance(item, Mapping):
+            _check_entries(item, place)
+            waiting += [(value, f"{place}.{name}"[:200]) for name, value in item.items()]
+
+
+def _check_entries(given: Mapping[str, Any], where: str) -> None:
+    """One mapping: its counts, and the share or mean that it may be."""
+    for name in _COUNTS:
+        if isinstance(given.get(name), int | float):
+            read_entry(given, name, COUNT, where)
+    if {"successes", "trials", "share"} <= given.keys():
+        check_proportion(given, where)
+    elif {"lower95", "upper95"} <= given.keys():
+        middle = given.get("mean", given.get("share"))
+        if middle is not None:
+            check_order(given, middle, where)
+
+
+def check_proportion(given: Any, where: str, trials: int | None = None) -> int:
+    """Check a share with an exact interval, of 95% or more.
+
+    Args:
+        given: As `utils.intervals.proportion` returns it.
+        where: Its name, for messages.
+        trials: That it must be of.
+
+    Returns:
+        Successes.
+
+    Raises:
+        InputError: It does not follow from its counts.
+    """
+    given = as_mapping(given, where)
+    successes, total = (read_entry(given, key, COUNT, where) for key in ("successes", "trials"))
+    if successes > total:
+        raise InputError(f"{where}: {successes} of {total} is no share; measure it again")
+    if trials is not None:
+        check_same(total, trials, f"{where}.trials")
+    expected = proportion(successes, total)
+    check_same(given.get("share"), expected["share"], f"{where}.share")
+    if total:
+        check_order(given, given["share"], where)
+    check_width(given, expected, where)
+    return successes
+
+
+def check_mean(
+    given: Any, where: str, bounds: tuple[float, float] = (0.0, 1.0), count: int | None = None
+) -> float | None:
+    """Check a mean of bounded values with an interval of 95% or more.
+
+    Args:
+        given: As `utils.intervals.mean_bounds` returns it.
+        where: Its name, for messages.
+        bounds: Least and greatest possible value.
+        count: Of values that it must be of.
+
+    Returns:
+        The mean.
+
+    Raises:
+        InputError: It is out of bounds, or its interval is narrower than the count allows.
+    """
+    given = as_mapping(given, where)
+    number = read_entry(given, "count", COUNT, where)
+    if count is not None:
+        check_same(number, count, f"{where}.count")
+    mean = given.get("mean")
+    if (mean is None) != (number == 0):
+        raise InputError(f"{where}.mean={shown(mean)} is of {number} values; measure it again")
+    if mean is not None:
+        mean = read_entry(given, "mean", Real(*bounds), where)
+        check_order(given, mean, where)
+    interval = tuple(read_entry(given, key, _NUMBER, where) for key in ("lower95", "upper95"))
+    check_mean_width(interval, mean, number, bounds, 0.95, where)
+    return mean
+
+
+def check_order(given: Mapping[str, Any], value: float, where: str) -> None:
+    """Check that an interval holds its value.
+
+    Args:
+        given: With "lower95" and "upper95".
+        value: That they bound.
+        where: Its name, for messages.
+
+    Raises:
+        InputError: It does not.
+    """
+    value = _NUMBER.read(value, where)
+    lower, upper = (read_entry(given, key, _NUMBER, where) for key in ("lower95", "upper95"))
+    if not lower - _ROUNDING <= value <= upper + _ROUNDING:
+        raise InputError(
+            f"{where}={value:g} is outside its interval, {lower:g} to {upper:g}; measure it again"
+        )
+
+
+def check_width(given: Mapping[str, Any], narrowest: Mapping[str, Any], where: str) -> None:
+    """Check that an interval is at least as wide as one that holds.
+
+    Args:
+        given: With "lower95" and "upper95".
+        narrowest: As `given`, of an interval that holds.
+        where: Its name, for messages.
+
+    Raises:
+        InputError: It is narrower.
+    """
+    lower, upper = (read_entry(given, key, _NUMBER, where) for key in ("lower95", "upper95"))
+    if lower > narrowest["lower95"] + _ROUNDING or upper < narrowest["upper95"] - _ROUNDING:
+        raise InputError(
+            f"{where}: {lower:g} to {upper:g} is narrower than its counts allow; measure it again"
+        )
+
+
+def check_mean_width(
+    interval: tuple[float, ...],
+    mean: float | None,
+    count: int,
+    bounds: tuple[float, float],
+    confidence: float,
+    where: str,
+) -> None:
+    """Check that the interval of a mean is at least as wide as one that holds.
+
+    Args:
+        interval: Lower and upper end.
+        mean: Of the values; None of no values.
+        count: How many there are.
+        bounds: Least and greatest possible value.
+        confidence: Coverage that the interval claims.
+        where: Its name, for messages.
+
+    Raises:
+        InputError: It is narrower.
+    """
+    lower, upper = interval
+    if mean is None:
+        possible = (lower, upper) == bounds
+    else:
+        possible = may_bound_mean((lower, upper), mean, count, *bounds, confidence)
+    if not possible:
+        raise InputError(
+            f"{where}: {lower:g} to {upper:g} is narrower than {count} values allow; measure it "
+            "again"
+        )
+
+
+def check_same(given: Any, expected: float | None, where: str) -> None:
+    """Check that a number is what other figures make it.
+
+    Args:
+        given: Out of a file.
+        expected: What it must be, but for rounding.
+        where: Its name, for messages.
+
+    Raises:
+        InputError: It is something else.
+    """
+    if expected is None and given is None:
+        return
+    if (
+        expected is None
+        or type(given) not in (int, float)
+        or not abs(given - expected) <= _ROUNDING * max(1.0, abs(expected))
+    ):
+        raise InputError(f"{where}={shown(given)} contradicts other figures (expected {expected})")
+
+
+def read_entry(given: Mapping[str, Any], key: str, kind: Kind, where: str) -> Any:
+    """Return an entry of a mapping that must be there.
+
+    Args:
+        given: Out of a file.
+        key: Of the entry.
+        kind: Of value that it must be.
+        where: Name of the mapping, for messages.
+
+    Raises:
+        InputError: It is missing or of another kind.
+    """
+    return kind.read(as_mapping(given, where).get(key), f"{where}.{key}")
