@@ -1,6 +1,5 @@
 """One training from its settings to its result."""
 
-import csv
 import dataclasses
 import enum
 import json
@@ -30,6 +29,7 @@ from drone_rl.training import (
     Trainer,
 )
 from drone_rl.training.progress import OngoingTraining
+from drone_rl.utils.csv_table import read_table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock, write_atomically
 from drone_rl.utils.memory import bound_kernels
@@ -75,8 +75,7 @@ class Training:
 
     def metrics(self) -> dict[str, list[float]]:
         """Each column of `metrics.csv`, one value an update."""
-        with (self.folder / "metrics.csv").open(newline="") as file:
-            head, *rows = csv.reader(file)
+        head, *rows = read_table(self.folder / "metrics.csv")
         columns = zip(head, zip(*rows, strict=True), strict=True)
         return {name: [float(value) for value in column] for name, column in columns}
 

@@ -9,10 +9,11 @@ from typing import Any
 
 import torch
 
-from drone_rl.training.unpickling import MOST_BYTES, ForeignError, unpickle
+from drone_rl.training.unpickling import ForeignError, unpickle
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import read_bytes
 from drone_rl.utils.former_names import with_present_names
+from drone_rl.utils.limits import CHECKPOINT_BYTES
 from drone_rl.utils.schema import shown
 
 FORMAT = "drone_rl checkpoint"
@@ -62,7 +63,7 @@ def load_checkpoint(path: str | Path) -> dict[str, Any]:
     path = Path(path)
     if not path.exists():
         raise InputError(f"checkpoint {path} does not exist; give the path of a .pt file")
-    content = read_bytes(path, MOST_BYTES)
+    content = read_bytes(path, CHECKPOINT_BYTES)
     try:
         state = unpickle(content, f"checkpoint {path}")
     except ForeignError as error:

@@ -75,10 +75,13 @@ def test_sizes_are_bounded(one_sided, write, monkeypatch):
     monkeypatch.setattr(module, "MOST_BOXES", 2)
     with pytest.raises(InputError, match="it has 3 boxes; of 1 cubes give at most 2"):
         read_certificate(path)
-    monkeypatch.setitem(module._MOST_MARKS, b"[", 3)
-    with pytest.raises(InputError, match="more than 3 of the sign"):
+    monkeypatch.setattr(module, "MOST_STEPS", 1)
+    with pytest.raises(InputError, match="numbers of steps; give at most 1"):
         read_certificate(path)
-    monkeypatch.setattr(module, "MOST_BYTES", 100)
+    monkeypatch.setattr(module, "CERTIFICATE_VALUES", 3)
+    with pytest.raises(InputError, match="more than 3 values"):
+        read_certificate(path)
+    monkeypatch.setattr(module, "CERTIFICATE_BYTES", 100)
     with pytest.raises(InputError, match="too large"):
         read_certificate(path)
 
