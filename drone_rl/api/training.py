@@ -31,7 +31,7 @@ from drone_rl.training import (
 from drone_rl.training.progress import OngoingTraining
 from drone_rl.utils.csv_table import read_table
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import folder_lock, write_atomically
+from drone_rl.utils.files import folder_lock, remove_leftovers, write_atomically
 from drone_rl.utils.memory import bound_kernels
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.schema import Real
@@ -49,6 +49,8 @@ MAY_CHANGE = (
     "renderer",
 )
 """Settings that a resumed run may change: they don't enter into what is learned."""
+_WRITTEN = ("metrics.csv", "result.json", "run.yaml", "provable.json")
+"""Files in a run's folder that are replaced when they are whole."""
 _NONE_YET = float("-inf")
 """The best running mean before the first update."""
 
@@ -148,6 +150,7 @@ def learn(
     """
     if state is not None:
         check_same_config(_own(state["config"]), as_config(settings), MAY_CHANGE)
+    remove_leftovers(folder, *_WRITTEN)
     trainer, checkpoints, confirmation = _build(settings, folder, callbacks, practice)
     if state is not None:
         trainer.load_state_dict(state)
@@ -194,7 +197,7 @@ def _build(
     bound_kernels()
     made = build_collector(settings, practice)
     noted = {"config": config, "description": description, **origin}
-    (folder / "run.yaml").write_text(yaml.safe_dump(noted, sort_keys=False))
+    write_atomically(folder / "run.yaml", yaml.safe_dump(noted, sort_keys=False))
     limits = settings.trainer
     checkpoints = CheckpointCallback(
         folder / "checkpoints",

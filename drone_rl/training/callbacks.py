@@ -17,7 +17,7 @@ from drone_rl.training.checkpoint import save_checkpoint
 from drone_rl.training.progress import OngoingTraining
 from drone_rl.utils.csv_table import read_table
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import write_atomically
+from drone_rl.utils.files import remove_leftovers, write_atomically
 from drone_rl.utils.former_names import FORMER_NAMES
 from drone_rl.utils.schema import shown
 
@@ -77,7 +77,10 @@ class CheckpointCallback(Callback):
         return self.folder / "best.pt"
 
     def on_start(self, training: OngoingTraining) -> None:
-        """Makes sure, before any work is done, that there is a place to save to."""
+        """Makes sure, before any work is done, that there is a place to save to.
+
+        Deletes the half-written checkpoints of processes that were killed.
+        """
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -85,6 +88,7 @@ class CheckpointCallback(Callback):
                 f"checkpoint folder {self.folder} can't be made ({error.strerror}); "
                 "choose another with hydra.run.dir=..."
             ) from error
+        remove_leftovers(self.folder, self.last_path.name, self.best_path.name)
         if not self.last_path.exists():
             self._save(training)
 

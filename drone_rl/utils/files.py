@@ -9,7 +9,7 @@ import os
 import re
 import stat
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +25,10 @@ from drone_rl.utils.limits import (
 
 _NO_LOCKS = (errno.ENOLCK, errno.ENOTSUP)
 """What file systems answer that know no locks."""
+_PROCESS = re.compile(r"[1-9][0-9]{0,6}")
+"""The number of a process at the end of a temporary file's name."""
+_FORMER_SUFFIX = re.compile(r"[a-z0-9_]{8}")
+"""Such an end in versions until 0.1, which chose it at random."""
 _LONGEST_NUMBER = 19
 """Digits of a whole number in a JSON file."""
 
@@ -174,12 +178,75 @@ def to_file_name(name: str) -> str:
 
 
 def write_atomically(path: Path, content: str | bytes) -> None:
-    """Writes a small file; whoever reads it finds the old one or the new one, never half."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    temporary.unlink(missing_ok=True)
-    with temporary.open("xb") as file:  # never through a link that waits there
-        file.write(content.encode() if isinstance(content, str) else content)
-    os.replace(temporary, path)
+    """Writes a small file; whoever reads it finds the old one or the new one, never half.
+
+    Raises:
+        OSError: It can't be written; its `filename` is the path.
+    """
+    write_all_atomically({path: content})
+
+
+def write_all_atomically(contents: Mapping[Path, str | bytes]) -> None:
+    """Write several files, none of them if one can't be written.
+
+    Args:
+        contents: What goes into each file.
+
+    Raises:
+        OSError: One can't be written; the error's `filename` is its path.
+    """
+    temporaries: dict[Path, Path] = {}
+    now = next(iter(contents))
+    try:
+        for now, content in contents.items():
+            if now.is_dir():
+                raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+            temporary = temporary_of(now)
+            temporary.unlink(missing_ok=True)
+            with temporary.open("xb") as file:  # never through a link that waits there
+                temporaries[temporary] = now
+                file.write(content.encode() if isinstance(content, str) else content)
+        for temporary, now in temporaries.items():
+            os.replace(temporary, now)
+    except OSError as error:
+        for temporary in temporaries:
+            with contextlib.suppress(OSError):
+                temporary.unlink(missing_ok=True)
+        raise OSError(error.errno, error.strerror or str(error), str(now)) from error
+
+
+def temporary_of(path: Path) -> Path:
+    """The file in which this process writes what is going to be another one."""
+    return path.with_name(f".{path.name}.{os.getpid()}")
+
+
+def remove_leftovers(folder: Path, *names: str) -> None:
+    """Delete the temporary files that killed processes left of files with these names.
+
+    Args:
+        folder: In which they lie; it may be missing.
+        names: Of the files that were to be written.
+    """
+    for name in names:
+        for path in folder.glob(f".{name}.*"):
+            suffix = path.name.removeprefix(f".{name}.")
+            is_ours = _PROCESS.fullmatch(suffix) and not _is_alive(int(suffix))
+            if (is_ours or _FORMER_SUFFIX.fullmatch(suffix)) and path.is_file():
+                with contextlib.suppress(OSError):
+                    path.unlink()
+
+
+def _is_alive(process: int) -> bool:
+    """Whether another process has this number."""
+    if process == os.getpid():
+        return False
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):
+        return True
+    return True
 
 
 @contextlib.contextmanager

@@ -119,8 +119,11 @@ def check_json_size(content: bytes | str, where: str, most: int = JSON_VALUES) -
     Raises:
         InputError: It may have more.
     """
-    marks: Sequence[Any] = (",", "[", "{") if isinstance(content, str) else (b",", b"[", b"{")
-    if sum(map(content.count, marks)) >= most:
+    if isinstance(content, str):
+        count = sum(content.count(mark) for mark in ",[{")
+    else:
+        count = sum(content.count(mark) for mark in (b",", b"[", b"{"))
+    if count >= most:
         raise InputError(f"{where} holds more than {most} values; files of its kind have fewer")
 
 
