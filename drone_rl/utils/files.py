@@ -9,7 +9,7 @@ import os
 import re
 import stat
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -141,7 +141,7 @@ def _finite(digits: str) -> float:
     return value
 
 
-_NUMBERS: dict[bool, dict[str, Callable[[str], Any]]] = {
+_NUMBERS: dict[bool, dict[str, Any]] = {
     False: {"parse_int": _whole, "parse_float": _finite, "parse_constant": _finite},
     True: {"parse_int": _whole, "parse_float": float, "parse_constant": float},
 }

@@ -12,7 +12,7 @@ from safetensors.torch import load, save
 
 from drone_rl.training import check_weights, load_checkpoint
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import parse_json, read_bytes, write_all_atomically, write_atomically
+from drone_rl.utils.files import parse_json, read_bytes, write_all_atomically
 from drone_rl.utils.former_names import with_present_names
 from drone_rl.utils.overrides import COMMAND
 from drone_rl.utils.schema import Kind, Maybe, Plain, Real, Record, Text, Whole, as_mapping, shown
@@ -184,7 +184,10 @@ def export_policy(
         "chosen": chosen,
     }
     described = checkpoint["description"]
-    content = exported_bytes(checkpoint["policy"], described, about)
+    try:
+        content = exported_bytes(checkpoint["policy"], described, about)
+    except SafetensorError as error:
+        raise InputError(f"policy {path} can't be written ({error})") from error
     told = {
         **about,
         "task": described["task"],
@@ -199,16 +202,6 @@ def export_policy(
             f"policy {path} can't be written ({error.filename}: {error.strerror}); free some "
             "space or choose another folder with hydra.run.dir=..."
         ) from error
-
-
-def write_exported(
-    path: Path,
-    weights: Mapping[str, torch.Tensor],
-    description: Mapping[str, Any],
-    about: Mapping[str, Any],
-) -> None:
-    """Writes weights with their description and where they come from."""
-    write_atomically(path, exported_bytes(weights, description, about))
 
 
 def exported_bytes(
