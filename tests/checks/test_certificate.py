@@ -86,6 +86,14 @@ def test_sizes_are_bounded(one_sided, write, monkeypatch):
         read_certificate(path)
 
 
+@pytest.mark.parametrize("border", [5e-324, 2.0**-101, -(2.0**-101), 2.0**20 + 1])
+def test_borders_need_no_more_bits_than_exact_sums_can_have(one_sided, border):
+    low, high = sorted((border, 0.0))
+    one_sided["outcomes"][0]["boxes"] = [[[low, high]]]
+    with pytest.raises(InputError, match="has a border below"):
+        parse_certificate(one_sided)
+
+
 @pytest.mark.parametrize("content", [b"{", b"[]", b'{"share": NaN}', b'{"a": 1, "a": 2}'])
 def test_damaged_files_are_refused(write, content):
     with pytest.raises(InputError, match=r"certificate .*json can't be used"):
