@@ -13,7 +13,8 @@ from drone_rl.settings.judging import FlightSettings
 from drone_rl.sweeps import read_sweep
 from drone_rl.sweeps.rows import read_rows
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import write_atomically
+from drone_rl.utils.files import read_bytes, write_atomically
+from drone_rl.utils.limits import CERTIFICATE_BYTES, SHIFTS_BYTES
 from drone_rl.utils.overrides import read_overrides
 from drone_rl.verdicts.judge import judge_policy
 from drone_rl.words.certificate import is_quoted
@@ -60,6 +61,11 @@ def export(
     ) as (env, actor):
         verdict = judge_policy(env, actor, settings.episodes, claim=claim).as_dict()
     noted, chosen = origin_of(policy.path, policy.state)
+    carried = {}
+    if measured is not None and is_told({"shifts": measured.evidence, "verdict": verdict}):
+        carried[shifts_path(target)] = read_bytes(measured.path, SHIFTS_BYTES)
+    if claim is not None and is_quoted(verdict):
+        carried[certificate_path(target)] = read_bytes(claim.path, CERTIFICATE_BYTES)
     export_policy(
         target,
         policy.state,
@@ -68,11 +74,8 @@ def export(
         seed=seed,
         chosen=chosen,
         shifts=None if measured is None else measured.numbers,
+        carried=carried,
     )
-    if measured is not None and is_told({"shifts": measured.evidence, "verdict": verdict}):
-        _carry(measured.path, shifts_path(target))
-    if claim is not None and is_quoted(verdict):
-        _carry(claim.path, certificate_path(target))
 
 
 def export_onnx(
@@ -113,16 +116,11 @@ def export_onnx(
     try:
         write_atomically(Path(target), content)
     except OSError as error:
-        raise InputError(f"policy {target} can't be written ({error})") from error
+        raise InputError(
+            f"policy {target} can't be written ({error.strerror}); free some space or choose "
+            "another folder with hydra.run.dir=..."
+        ) from error
     return found
-
-
-def _carry(quoted: Path, target: Path) -> None:
-    """Puts what a card quotes beside the policy that it is of."""
-    try:
-        write_atomically(target, quoted.read_bytes())
-    except OSError as error:
-        raise InputError(f"{target} can't be written ({error})") from error
 
 
 def origin_of(path: Path, state: dict[str, Any]) -> tuple[str, dict[str, Any] | None]:

@@ -18,13 +18,12 @@ from drone_rl.settings.provable import ProvableSettings
 from drone_rl.settings.training import TrainSettings
 from drone_rl.sim.settings import TaskSettings
 from drone_rl.sim.tasks.collect_cubes import require_cubes, require_moves
+from drone_rl.utils.archives import read_array
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import read_bytes, read_json, write_atomically
+from drone_rl.utils.files import read_json, write_atomically
 from drone_rl.utils.schema import Plain, Real, Record, Several, Whole
 from drone_rl.utils.settings import Settings
 
-MOST_BYTES = 2**30
-"""Of the failures of a round."""
 HOW_MAY_CHANGE = ("rounds", "limit_s")
 """What a resumed run may change of its rounds."""
 _Count = Annotated[int, Whole(0, 2**62)]
@@ -166,10 +165,14 @@ class Journal:
             InputError: They are damaged.
         """
         path = self.folder / "rounds" / str(len(self.rounds) - 1) / "failures.npy"
+        cubes = self.task.num_cubes
         try:
-            return np.load(io.BytesIO(read_bytes(path, MOST_BYTES)), allow_pickle=False)
-        except (ValueError, EOFError) as error:
+            boxes = read_array(path)
+            if boxes.dtype != np.float64 or boxes.shape[1:] != (cubes, 2) or not _are_boxes(boxes):
+                raise InputError(f"it holds no boxes of {cubes} cubes")
+        except InputError as error:
             raise InputError(f"{path} is damaged ({error}); train again") from None
+        return boxes
 
     def _write(self) -> None:
         noted = {
@@ -179,6 +182,10 @@ class Journal:
         }
         write_atomically(self.folder / "provable.json", json.dumps(noted, indent=2))
         self.is_noted = True
+
+
+def _are_boxes(boxes: NDArray[np.float64]) -> bool:
+    return bool(np.isfinite(boxes).all() and (boxes[..., 0] <= boxes[..., 1]).all())
 
 
 _JOURNAL = Record({"settings": Plain(), "how": Plain(), "rounds": Several(Plain(), 0, 10_000)})

@@ -21,9 +21,13 @@ from drone_rl.proofs.threads import one_thread
 from drone_rl.settings.proving import ProveSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock, write_atomically
+from drone_rl.utils.limits import ARRAYS_BYTES
 from drone_rl.utils.provenance import provenance
 from drone_rl.words.numbers import plural
 from drone_rl.words.proof import sentence, why_stopped
+
+_BYTES_PER_SIDE = 64
+"""Of a state, for each cube of each box under way: two borders, kept up to four times."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -141,7 +145,8 @@ def _prove(
     known = json.dumps([weights, policy.description.as_dict(), settings.logit_gap])
     state = None if folder is None else folder / "state.npz"
     if state is not None and state.exists():
-        load(prover, state, known)
+        boxes = settings.most_boxes * policy.description.task.values()["num_cubes"]
+        load(prover, state, known, most=max(ARRAYS_BYTES, _BYTES_PER_SIDE * boxes))
     begin = time.monotonic()
     stopped = _go_on(prover, settings, progress, state, known)
     seconds = time.monotonic() - begin

@@ -1,6 +1,5 @@
 """One training from its settings to its result."""
 
-import csv
 import dataclasses
 import enum
 import json
@@ -31,8 +30,9 @@ from drone_rl.training import (
     Trainer,
 )
 from drone_rl.training.progress import OngoingTraining
+from drone_rl.utils.csv_table import read_table
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import folder_lock, write_atomically
+from drone_rl.utils.files import folder_lock, remove_leftovers, write_atomically
 from drone_rl.utils.memory import bound_kernels
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.schema import Real
@@ -50,6 +50,8 @@ MAY_CHANGE = (
     "renderer",
 )
 """Settings that a resumed run may change: they don't enter into what is learned."""
+_WRITTEN = ("metrics.csv", "result.json", "run.yaml", "provable.json")
+"""Files in a run's folder that are replaced when they are whole."""
 _NONE_YET = float("-inf")
 """The best running mean before the first update."""
 
@@ -76,8 +78,7 @@ class Training:
 
     def metrics(self) -> dict[str, list[float]]:
         """Each column of `metrics.csv`, one value an update."""
-        with (self.folder / "metrics.csv").open(newline="") as file:
-            head, *rows = csv.reader(file)
+        head, *rows = read_table(self.folder / "metrics.csv")
         columns = zip(head, zip(*rows, strict=True), strict=True)
         return {name: [float(value) for value in column] for name, column in columns}
 
@@ -186,6 +187,7 @@ def learn(
     """
     if state is not None:
         check_same_config(_own(state["config"]), as_config(settings), MAY_CHANGE)
+    remove_leftovers(folder, *_WRITTEN)
     trainer, checkpoints, confirmation = _build(settings, folder, callbacks, practice)
     try:
         if state is not None:
@@ -258,7 +260,7 @@ def _build(
 def _note(folder: Path, extra: Mapping[str, Any]) -> None:
     """Writes `run.yaml`: the settings, what they describe, versions and machine."""
     noted = {"config": extra["config"], "description": extra["description"], **extra["provenance"]}
-    (folder / "run.yaml").write_text(yaml.safe_dump(noted, sort_keys=False))
+    write_atomically(folder / "run.yaml", yaml.safe_dump(noted, sort_keys=False))
 
 
 def _ends(settings: TrainSettings) -> list[enum.IntEnum]:

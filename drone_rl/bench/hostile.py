@@ -4,10 +4,12 @@ All commands run as forks of one process that has imported everything, so that w
 the refusal alone.
 """
 
+import contextlib
 import importlib
 import json
 import logging
 import os
+import pkgutil
 import resource
 import signal
 import subprocess
@@ -22,29 +24,44 @@ MOST_SECONDS = 2.0
 """Of a refusal: processor time after the imports, which other work does not change."""
 MOST_MEMORY = 2**30
 """Bytes by which a refusal may grow the process."""
+MOST_ADDRESSES = 2**31
+"""The same of its address space, so that a bomb ends the case and not the machine."""
+NOTED = "noted_"
+"""Begins the names of cases that are no reason to refuse: a report says which run is damaged."""
 PATIENCE_S = 30
 """Until a command counts as hung."""
-_MODULES = ("main", "verdict", "evaluate", "explain", "play", "export", "report", "train")
-_MORE = ("cli.sweep_report", "api.training", "api.judging", "api.filming", "api.exporting")
+_PACKAGES = (
+    *("cli", "api", "sweeps", "report", "checks", "conditions", "verdicts", "evaluation"),
+    *("proofs", "zoo", "training", "explanations", "hydra_app", "utils"),
+)
+"""Imported with all their modules before any case runs."""
+_MORE = ("hydra.core.plugins", "scipy.special", "matplotlib.backends.backend_agg")
 
 _log = logging.getLogger(__name__)
 
 
-def bench_hostile(folder: Path) -> dict[str, int]:
+def bench_hostile(folder: Path) -> dict[str, float]:
     """Opens each of the hostile files with one of the commands that people would.
 
     Args:
         folder: An empty one, for the files; made if need be.
 
     Returns:
-        "hostile_refused" and "hostile_total".
+        "hostile_refused" and "hostile_total"; "hostile_peak_mib" (greatest growth of the resident
+        memory of any case, MiB) and "hostile_max_s" (greatest processor time of any, seconds), both
+        after imports.
     """
     outcomes = run_all(folder)
     for outcome in outcomes:
         if outcome["wrong"]:
             _log.warning("%s: %s", outcome["name"], outcome["wrong"])
     refused = sum(not outcome["wrong"] for outcome in outcomes)
-    return {"hostile_refused": refused, "hostile_total": len(outcomes)}
+    return {
+        "hostile_refused": refused,
+        "hostile_total": len(outcomes),
+        "hostile_peak_mib": max(outcome["mib"] for outcome in outcomes),
+        "hostile_max_s": max(outcome["seconds"] for outcome in outcomes),
+    }
 
 
 def run_all(folder: Path, every: int = 1) -> list[dict[str, Any]]:
@@ -55,7 +72,8 @@ def run_all(folder: Path, every: int = 1) -> list[dict[str, Any]]:
         every: Opens only each so many-th.
 
     Returns:
-        Of each its "name", "why", and "wrong", which says what is wrong; empty if it was refused.
+        Of each its "name", "why", "wrong", which says what is wrong and is empty if it was refused,
+        "mib" (growth of the resident memory) and "seconds" (processor time).
     """
     environment = {
         **os.environ,
@@ -75,9 +93,9 @@ def _main(folder: Path, every: int) -> None:
 
     cases = hostile_files(folder / "files")[::every]
     program = importlib.import_module("drone_rl.cli.main")
-    for name in (*(f"cli.{module}" for module in _MODULES), *_MORE):
-        importlib.import_module(f"drone_rl.{name}")
-    for name in ("hydra.core.plugins", "drone_rl.sweeps.page"):
+    for package in _PACKAGES:
+        _import_all(f"drone_rl.{package}")
+    for name in _MORE:
         importlib.import_module(name)
     sys.modules["hydra.core.plugins"].Plugins.instance()  # looks through all packages, once
     canary = _snapshot(folder / "files" / "canary")
@@ -85,15 +103,33 @@ def _main(folder: Path, every: int) -> None:
     for number, (name, arguments, why) in enumerate(cases):
         here = folder / "work" / str(number)
         here.mkdir(parents=True)
-        wrong = _fork(program.main, arguments, here)
-        if not wrong and _snapshot(folder / "files" / "canary") != canary:
-            wrong = "it touched the canary"
-        outcomes.append({"name": name, "arguments": arguments, "why": why, "wrong": wrong})
+        outcome = _fork(program.main, arguments, here, is_noted=name.startswith(NOTED))
+        if not outcome["wrong"] and _snapshot(folder / "files" / "canary") != canary:
+            outcome["wrong"] = "it touched the canary"
+        outcomes.append({"name": name, "arguments": arguments, "why": why, **outcome})
     (folder / "outcomes.json").write_text(json.dumps(outcomes, indent=1))
 
 
-def _fork(main: Any, arguments: list[str], here: Path) -> str:
-    """Runs one command. Returns what is wrong with how it ended, or an empty text."""
+def _import_all(package: str) -> None:
+    """Imports a package and what is in it, except for what needs a missing extra."""
+    found = importlib.import_module(package)
+    for module in pkgutil.walk_packages(found.__path__, f"{package}."):
+        with contextlib.suppress(ImportError):
+            importlib.import_module(module.name)
+
+
+def _fork(main: Any, arguments: list[str], here: Path, *, is_noted: bool = False) -> dict[str, Any]:
+    """Runs one command.
+
+    Args:
+        main: Of the program.
+        arguments: After its name.
+        here: Folder in which it runs.
+        is_noted: Whether it must succeed and print that something is damaged.
+
+    Returns:
+        "wrong", "mib" and "seconds", see `run_all`.
+    """
     before = _resident_bytes()
     child = os.fork()
     if child == 0:
@@ -102,19 +138,19 @@ def _fork(main: Any, arguments: list[str], here: Path) -> str:
     printed = (here / "stderr").read_text(errors="replace")
     grown = used.ru_maxrss * 1024 - before
     seconds = used.ru_utime + used.ru_stime
-    is_leaked = SECRET in printed or SECRET in (here / "stdout").read_text(errors="replace")
-    lines = printed.splitlines()
+    said = (here / "stdout").read_text(errors="replace")
+    lines, status_code = printed.splitlines(), os.waitstatus_to_exitcode(status)
+    is_line = len(lines) == 1 and lines[0].startswith("error: ")
     checks = {
         f"ended by signal {os.WTERMSIG(status)}": os.WIFSIGNALED(status),
-        f"ended with status {os.waitstatus_to_exitcode(status)}: {printed[-300:]}": (
-            os.waitstatus_to_exitcode(status) != 2
-        ),
-        f"printed {printed[-300:]!r}": len(lines) != 1 or not lines[0].startswith("error: "),
+        f"ended with status {status_code}: {printed[-300:]}": status_code != (0 if is_noted else 2),
+        f"printed {printed[-300:]!r}": "damaged" not in said if is_noted else not is_line,
         f"took {seconds:.1f} s": seconds > MOST_SECONDS,
         f"took {grown / 2**20:.0f} MiB": grown > MOST_MEMORY,
-        "told the secret": is_leaked or _tells(here),
+        "told the secret": SECRET in printed + said or _tells(here),
     }
-    return next((what for what, is_so in checks.items() if is_so), "")
+    wrong = next((what for what, is_so in checks.items() if is_so), "")
+    return {"wrong": wrong, "mib": round(grown / 2**20, 1), "seconds": round(seconds, 3)}
 
 
 def _become(main: Any, arguments: list[str], here: Path) -> None:
@@ -126,7 +162,7 @@ def _become(main: Any, arguments: list[str], here: Path) -> None:
             target = os.open(name, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o644)
             os.dup2(target, number)
         sys.stdout, sys.stderr = os.fdopen(1, "w"), os.fdopen(2, "w")
-        limit = _address_bytes() + MOST_MEMORY
+        limit = _address_bytes() + MOST_ADDRESSES
         resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
         signal.alarm(PATIENCE_S)
         sys.argv = ["drone-rl", *arguments]

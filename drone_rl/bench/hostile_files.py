@@ -17,7 +17,12 @@ from typing import Any
 import torch
 from safetensors.torch import save
 
-from drone_rl.bench.hostile_folders import hostile_folders
+from drone_rl.bench.hostile_arrays import hostile_arrays
+from drone_rl.bench.hostile_claims import hostile_claims
+from drone_rl.bench.hostile_folders import hostile_folders, make_run
+from drone_rl.bench.hostile_json import hostile_json
+from drone_rl.bench.hostile_policies import hostile_policies
+from drone_rl.bench.hostile_runs import hostile_runs
 from drone_rl.sim.settings import COMPUTER_VISION, MINIMAL, MOVES_SETTINGS
 from drone_rl.zoo import parse
 
@@ -71,8 +76,20 @@ def hostile_files(folder: Path) -> list[tuple[str, list[str], str]]:
     (canary / "secret.txt").write_text(os.environ.get("HOSTILE_SECRET", "a secret"))
     (canary / "keep").mkdir()
     (canary / "keep" / "me.txt").write_text("keep me")
-    cases = [*_exported(folder), *_old(folder), *_checkpoints(folder), *_no_files(folder)]
-    return [*cases, *hostile_folders(folder, checkpoint_state())]
+    state = checkpoint_state()
+
+    def run(path: Path) -> Path:
+        return make_run(path, state)
+
+    return [
+        *(*_exported(folder), *_old(folder), *_checkpoints(folder), *_no_files(folder)),
+        *hostile_folders(folder, state),
+        *hostile_policies(folder, weights(), _about()),
+        *hostile_json(folder, run),
+        *hostile_arrays(folder),
+        *hostile_claims(folder, DESCRIPTION),
+        *hostile_runs(folder, run),
+    ]
 
 
 def weights() -> dict[str, torch.Tensor]:
@@ -85,12 +102,16 @@ def exported(
     description: Any = DESCRIPTION, tensors: Mapping[str, Any] | None = None, **about: Any
 ) -> bytes:
     """An exported policy's content."""
-    texts = {
+    return save(dict(tensors or weights()), _about(description, **about))
+
+
+def _about(description: Any = DESCRIPTION, **about: Any) -> dict[str, str]:
+    """What an exported policy's file says besides weights."""
+    return {
         "format": "drone_rl policy",
         "description": description if isinstance(description, str) else json.dumps(description),
         "about": json.dumps({**ABOUT, **about}),
     }
-    return save(dict(tensors or weights()), texts)
 
 
 def checkpoint_state(**changes: Any) -> dict[str, Any]:

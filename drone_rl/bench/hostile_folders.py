@@ -50,7 +50,7 @@ def _runs(folder: Path, state: Mapping[str, Any]) -> list[Case]:
     }
     cases = []
     for name, content in overrides.items():
-        run = _run(folder / f"resume_{name}", state)
+        run = make_run(folder / f"resume_{name}", state)
         (run / ".hydra" / "overrides.yaml").write_text(yaml.safe_dump(content))
         cases.append((run.name, ["train", f"resume={run}"], "settings out of a file"))
     raw = {
@@ -59,23 +59,24 @@ def _runs(folder: Path, state: Mapping[str, Any]) -> list[Case]:
         "deep_yaml": "[" * 5000,
     }
     for name, text in raw.items():
-        run = _run(folder / f"resume_{name}", state)
+        run = make_run(folder / f"resume_{name}", state)
         (run / ".hydra" / "overrides.yaml").write_text(text)
         cases.append((run.name, ["train", f"resume={run}"], "YAML that does more than say"))
     links = {"metrics.csv": "secret.txt", "run.yaml": "ran", ".lock": "ran", "tensorboard": "keep"}
     for name, target in links.items():
-        run = _run(folder / f"resume_link_{name.strip('.').replace('.', '_')}", state)
+        run = make_run(folder / f"resume_link_{name.strip('.').replace('.', '_')}", state)
         (run / name).symlink_to(canary / target)
         cases.append((run.name, ["train", f"resume={run}"], "a link out of the folder"))
     broken = {"no_state": state, "no_tensors": {**state, "optimiser": 5}, "list": [1]}
     for name, content in broken.items():
-        run = _run(folder / f"resume_state_{name}", content)
+        run = make_run(folder / f"resume_state_{name}", content)
         (run / ".hydra" / "overrides.yaml").write_text("- experiment=smoke\n- logger=csv\n")
         cases.append((run.name, ["train", f"resume={run}"], "a state that fits no training"))
     return cases
 
 
-def _run(run: Path, state: Any) -> Path:
+def make_run(run: Path, state: Any) -> Path:
+    """A run's folder with a checkpoint; `state` is what that holds."""
     (run / ".hydra").mkdir(parents=True)
     (run / "checkpoints").mkdir()
     torch.save(state, run / "checkpoints" / "last.pt")

@@ -15,12 +15,11 @@ from typing import Any
 from drone_rl.bench.benchmark import Figures
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import read_json, write_atomically
+from drone_rl.utils.limits import LEDGER_BYTES
 from drone_rl.utils.provenance import git_revision, num_cores
 
 ORIGINS = "benchmarks"
 """The entry that is no figure."""
-MOST_BYTES = 2**24
-"""Of a file."""
 _PACKAGE = Path(__file__).resolve().parents[1]
 
 
@@ -57,7 +56,7 @@ class Ledger:
         self.origins: dict[str, Origin] = {}
         """By the benchmarks' names."""
         if path.exists():
-            self._read(read_json(path, MOST_BYTES))
+            self._read(read_json(path, LEDGER_BYTES))
 
     def _read(self, content: Any) -> None:
         try:

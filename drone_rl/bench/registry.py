@@ -95,8 +95,9 @@ BENCHMARKS: dict[str, Benchmark] = {
     "hostile": Benchmark(
         lambda s: bench_hostile(s.runs / "hostile"),
         "truth",
-        ("utils", "zoo", "training", "sweeps", "report", "bench/hostile", "bench/hostile_files",
-         "bench/hostile_folders"),
+        ("utils", "zoo", "training", "sweeps", "report", "checks", "conditions", "hydra_app",
+         *(f"bench/hostile{part}" for part in
+           ("", "_files", "_folders", "_json", "_arrays", "_policies", "_claims", "_runs"))),
     ),
     "injections": Benchmark(
         lambda s: bench_injections(s.runs / "injections"),

@@ -14,6 +14,7 @@ from drone_rl.sim.tasks.collect_cubes import require_cubes
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import parse_json, read_bytes
+from drone_rl.utils.limits import CERTIFICATE_BYTES, CERTIFICATE_VALUES
 from drone_rl.utils.schema import (
     Flag,
     OneOf,
@@ -30,14 +31,17 @@ from drone_rl.zoo import PolicyDescription, parse
 
 FORMAT = "drone_rl certificate"
 FORMAT_VERSION = 1
-MOST_BYTES = 2**28
-MOST_BOXES = 2**20
-MOST_CORNERS = 2**25
+MOST_BOXES = 2**17
+MOST_CORNERS = 2**20
 """Of all boxes together."""
 MOST_CUBES = 8
 MOST_OUTCOMES = 2**11
-_MOST_MARKS = {b"[": 2**23, b"{": 2**13, b'"': 2**20, b",": 2**25}
-"""Of each in a file; parsing takes up to a hundred bytes for one."""
+MOST_STEPS = 20_000
+"""Numbers of steps in all outcomes together."""
+LEAST_BORDER = 2.0**-100
+"""Metres from 0 to a border that is not 0: exact sums need as many bits as this has zeros."""
+MOST_BORDER = 2.0**20
+"""Metres from 0 to any border."""
 _NO_ENDS = (EndReason.RUNNING, EndReason.LOST_CONTROL)
 """Nobody loses control who flies in computer-vision mode."""
 _ENDS = tuple(end.name.lower() for end in EndReason if end not in _NO_ENDS)
@@ -110,12 +114,9 @@ def read_certificate(path: Path) -> Certificate:
     Raises:
         InputError: It is missing, too large, damaged, or no certificate.
     """
-    content = read_bytes(path, MOST_BYTES)
+    content = read_bytes(path, CERTIFICATE_BYTES)
     try:
-        for mark, most in _MOST_MARKS.items():
-            if content.count(mark) > most:
-                raise InputError(f"it has more than {most} of the sign {mark.decode()}")
-        return parse_certificate(parse_json(content, "it"))
+        return parse_certificate(parse_json(content, "it", most_values=CERTIFICATE_VALUES))
     except InputError as error:
         raise InputError(f"certificate {path} can't be used: {error}") from None
 
@@ -141,6 +142,8 @@ def parse_certificate(data: Any) -> Certificate:
         _read_outcome(one, f"outcomes[{i}]", cubes) for i, one in enumerate(read["outcomes"])
     )
     undecided = _read_boxes(read["undecided"]["boxes"], "undecided.boxes", cubes)
+    if (steps := sum(len(outcome.steps) for outcome in outcomes)) > MOST_STEPS:
+        raise InputError(f"it has {steps} numbers of steps; give at most {MOST_STEPS}")
     count = sum(len(outcome.boxes) for outcome in outcomes) + len(undecided)
     if count > min(MOST_BOXES, MOST_CORNERS >> cubes):
         raise InputError(
@@ -241,6 +244,11 @@ def _read_boxes(value: Any, where: str, cubes: int) -> NDArray[np.float64]:
     boxes = np.array(numbers, np.float64).reshape(len(value), cubes, 2)
     if not np.isfinite(boxes).all():
         raise InputError(f"{where} holds a number that is not finite; {shape}")
+    size = abs(boxes)
+    if ((size < LEAST_BORDER) & (size > 0)).any() or (size > MOST_BORDER).any():
+        raise InputError(
+            f"{where} has a border below {LEAST_BORDER:.1g} m or above {MOST_BORDER:.1g} m; {shape}"
+        )
     empty = np.flatnonzero((boxes[..., 0] >= boxes[..., 1]).any(1))
     if len(empty):
         raise InputError(f"{where}[{empty[0]}] is empty; {shape}, low below high")

@@ -11,7 +11,7 @@ from drone_rl.settings.judging import FlightSettings
 from drone_rl.settings.paths import PathsSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.overrides import COMMAND
-from drone_rl.utils.schema import OneOf
+from drone_rl.utils.schema import FileName, OneOf
 
 _log = logging.getLogger(__name__)
 
@@ -22,7 +22,7 @@ class Command(FlightSettings):
 
     policy: str = "latest"
     """Which policy, see `drone_rl.load_policy`."""
-    name: str = "policy"
+    name: Annotated[str, FileName()] = "policy"
     """Name of the files."""
     format: Annotated[str, OneOf(("safetensors", "onnx"))] = "safetensors"
     """What is written: safetensors with a model card for this program, an ONNX model for any."""

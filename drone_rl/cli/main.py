@@ -1,6 +1,7 @@
 """`drone-rl <command> [setting=value ...]`: finds the command and runs it."""
 
 import importlib
+import os
 import sys
 from typing import cast
 
@@ -9,22 +10,44 @@ from drone_rl.cli.usage import COMMANDS, DEMO_USAGE, USAGE
 from drone_rl.utils.compiler import leave_compiler_unloaded
 from drone_rl.utils.garbage import leave_garbage_to_the_system, look_for_garbage_rarely
 
+CLOSED = 128 + 13
+"""Exit status if nobody reads standard output any more, as of a program that SIGPIPE ends."""
+
 
 def main() -> None:
     """Entry point of `drone-rl`."""
-    args = sys.argv[1:]
+    try:
+        status = _main(sys.argv[1:])
+        sys.stdout.flush()
+    except BrokenPipeError:
+        status = CLOSED
+        _let_output_go()
+    except OSError as error:
+        status = 2
+        print(f"error: standard output can't be written ({error.strerror})", file=sys.stderr)
+        _let_output_go()
+    sys.exit(status)
+
+
+def _let_output_go() -> None:
+    """What is left in the buffer goes nowhere, or the interpreter would try once more."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _main(args: list[str]) -> int:
+    """Runs what was typed. Returns the exit status."""
     if not args or args[0] in ("-h", "--help", "help"):
         print(USAGE)
-        return
+        return 0
     if args[0] in ("-V", "--version"):
         print(f"drone-rl {drone_rl.__version__}")
-        return
+        return 0
     name, overrides = args[0], args[1:]
     if name not in ("demo", *COMMANDS):
         sys.exit(f"error: command {name!r} is unknown; use one of: demo, {', '.join(COMMANDS)}")
     if name == "demo" and {"-h", "--help"} & set(overrides):
         print(DEMO_USAGE)
-        return
+        return 0
     look_for_garbage_rarely()
     from drone_rl.hydra_app.messages import guarded  # usage and typing errors don't wait for Hydra
 
@@ -32,7 +55,7 @@ def main() -> None:
     steps = [("train", overrides), ("evaluate", []), ("explain", [])]
     status = guarded(lambda: _run_all(steps if name == "demo" else [(name, overrides)]))
     leave_garbage_to_the_system()
-    sys.exit(status)
+    return status
 
 
 def _run_all(steps: list[tuple[str, list[str]]]) -> int:

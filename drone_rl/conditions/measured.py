@@ -21,6 +21,7 @@ from drone_rl.conditions.suite import finite
 from drone_rl.settings.shifting import MODES, ShiftSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import parse_json, read_bytes
+from drone_rl.utils.limits import SHIFTS_BYTES
 from drone_rl.utils.schema import (
     Flag,
     Kind,
@@ -39,7 +40,6 @@ from drone_rl.zoo import PolicyDescription, parse
 
 FORMAT = "drone_rl shifts"
 FORMAT_VERSION = 1
-MOST_BYTES = 2**26
 _MOST_PICTURE = 2**22
 """Characters of one picture."""
 _CLOSE = 1e-9
@@ -84,7 +84,7 @@ def read_measured(
         InputError: It is missing, damaged, of another network, camera or task, or contradicts
             itself.
     """
-    content = read_bytes(path, MOST_BYTES)
+    content = read_bytes(path, SHIFTS_BYTES)
     try:
         data = dict(as_mapping(parse_json(content, "it"), "it"))
         pictures = as_mapping(data.pop("pictures", None), "pictures")

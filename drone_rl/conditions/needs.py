@@ -4,15 +4,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from drone_rl.conditions.axes import AXES
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import parse_json, read_bytes
+from drone_rl.utils.limits import YAML_BYTES
+from drone_rl.utils.plain_yaml import parse_yaml
 from drone_rl.utils.schema import Maybe, Real, as_mapping, shown
 from drone_rl.words.shifts import is_tested
 
-MOST_BYTES = 2**16
 _KEYS = ("low", "high", "unit")
 _LIMIT = Maybe(Real(-1e9, 1e9))
 
@@ -62,25 +61,10 @@ def ranges_of(numbers: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
 
 
 def _parsed(path: Path) -> Any:
-    content = read_bytes(path, MOST_BYTES)
+    content = read_bytes(path, YAML_BYTES)
     if path.suffix == ".json":
         return parse_json(content, "the file")
-    try:
-        return yaml.load(content, _Once)  # a safe loader
-    except (yaml.YAMLError, RecursionError, ValueError) as error:
-        reason = " ".join(str(error).split())[:200]
-        raise InputError(f"the file is damaged: no plain YAML ({reason})") from None
-
-
-class _Once(yaml.SafeLoader):
-    """Reads YAML, each name once."""
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        """A mapping."""
-        made = super().construct_mapping(node, deep)
-        if len(made) < len(node.value):
-            raise ValueError("a name stands there twice")
-        return made
+    return parse_yaml(content, "the file")
 
 
 def _read_need(name: str, value: Any) -> Need:

@@ -21,8 +21,11 @@ from drone_rl.sim.tasks import State, Task
 from drone_rl.utils.archives import read_arrays
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import parse_json
+from drone_rl.utils.limits import check_indices
 from drone_rl.utils.schema import as_mapping
 
+MOST_STEPS = 10**7
+"""Numbers of steps or episodes in a data set: arrays are counted by them."""
 SEEN = {
     "observations": "what the policy's network got, float32 (T, C, h, w)",
     "probabilities": "the policy's probability of each action, float32 (T, number of actions)",
@@ -137,6 +140,9 @@ class RolloutDataset:
             names = as_mapping(as_mapping(meta, "meta").get("fields"), "meta.fields")
             arrays = {name: entries.pop(name) for name in names}
             layers = {k: v for k, v in entries.items() if k.startswith("features/")}
+            for name in ("episode", "step"):
+                if name in arrays:
+                    check_indices(arrays[name], MOST_STEPS, name)
             if len({value.shape[:1] for value in arrays.values()}) > 1:
                 raise InputError("its arrays are not of one length")
         except (InputError, KeyError) as error:

@@ -9,13 +9,14 @@ from typing import Any, Protocol
 
 import hydra
 from hydra._internal.hydra import Hydra
+from hydra.core import utils as hydra_utils
 from hydra.core.hydra_config import HydraConfig
 from hydra.types import RunMode
 from omegaconf import DictConfig, OmegaConf
 
 from drone_rl.hydra_app.choices import check_choices
 from drone_rl.hydra_app.help import show_help
-from drone_rl.hydra_app.messages import one_line
+from drone_rl.hydra_app.messages import is_output_closed, one_line
 from drone_rl.hydra_app.schemas import register_schemas
 from drone_rl.settings.configuration import from_config
 from drone_rl.utils.errors import InputError
@@ -70,7 +71,7 @@ def run_command(name: str, command: Command, overrides: Sequence[str]) -> int:
     argv = sys.argv
     sys.argv = [f"drone-rl {name.replace('_', '-')}", *overrides]
     try:
-        with _composed_once(name, overrides):
+        with _composed_once(name, overrides), _named_in_errors():
             wrapped()
     finally:
         sys.argv = argv
@@ -96,6 +97,25 @@ def _composed_once(name: str, overrides: Sequence[str]) -> Iterator[None]:
         Hydra.get_mode = asked
 
 
+@contextlib.contextmanager
+def _named_in_errors() -> Iterator[None]:
+    """Lets an error say which of Hydra's own files it is about."""
+    save = hydra_utils._save_config
+
+    def save_named(cfg: DictConfig, filename: str, output_dir: Path) -> None:
+        try:
+            save(cfg, filename, output_dir)
+        except OSError as error:
+            path = str(error.filename or output_dir / filename)
+            raise OSError(error.errno, error.strerror, path) from error
+
+    hydra_utils._save_config = save_named
+    try:
+        yield
+    finally:
+        hydra_utils._save_config = save
+
+
 def read_settings(cls: type[Settings], config: DictConfig) -> Any:
     """Composed settings, every reference resolved, as those of a command."""
     return from_config(cls, OmegaConf.to_container(config, resolve=True))
@@ -108,7 +128,9 @@ def _job(command: Command, statuses: list[int]) -> Callable[[DictConfig], object
         try:
             settings = read_settings(command.Command, config)
             status, value = command.run(settings, Path(HydraConfig.get().runtime.output_dir))
-        except InputError as error:  # one bad run of a sweep leaves the others alone
+        except (InputError, OSError) as error:  # one bad run of a sweep leaves the others alone
+            if isinstance(error, BrokenPipeError) and is_output_closed():
+                raise
             print(f"error: {one_line(error)}", file=sys.stderr)
             status, value = 2, None
         statuses.append(status)

@@ -2,8 +2,6 @@
 
 import dataclasses
 import io
-import zipfile
-import zlib
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -16,17 +14,17 @@ from drone_rl.proofs.findings import Findings, together
 from drone_rl.proofs.lattice import Ending, Place
 from drone_rl.proofs.prover import Prover
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.utils.archives import read_arrays
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import read_bytes, write_atomically
+from drone_rl.utils.files import write_atomically
+from drone_rl.utils.limits import ARRAYS_BYTES, check_indices
 
-MOST_BYTES = 2**31
 _COUNTS = ("num_places", "pictures", "most_boxes", "least_gap", "largest_band", "decided")
 _SETS = ("waiting", "ended", "ways", "forked", "parts", "part", "done", "undecided")
-_DAMAGE = (
-    *(zipfile.BadZipFile, zlib.error, RuntimeError, EOFError, OSError),
-    *(ValueError, TypeError, LookupError, ArithmeticError),
-)
+_DAMAGE = (*(ValueError, TypeError, LookupError, ArithmeticError, AttributeError),)
 """What the reading of something else raises."""
+_MOST = 2**40
+"""Of any number by which places and endings are known."""
 _NOWHERE = (-1, 0, 0)
 """Stands for what is not followed to its end."""
 
@@ -66,21 +64,20 @@ def save(prover: Prover, path: Path, subject: str) -> None:
     write_atomically(path, buffer.getvalue())
 
 
-def load(prover: Prover, path: Path, subject: str) -> None:
+def load(prover: Prover, path: Path, subject: str, most: int = ARRAYS_BYTES) -> None:
     """Lets a fresh proof go on from a state.
 
     Args:
         prover: The proof; left as it is if the state is refused.
         path: The file.
         subject: As it was saved.
+        most: Bytes that the file may have.
 
     Raises:
         InputError: The file is no such state, or one of another proof.
     """
-    content = read_bytes(path, MOST_BYTES)
     try:
-        with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
-            state = dict(arrays)
+        state = read_arrays(path, most=most)
         saved = bytes(state["subject"]).decode()
         counts = {
             name: type(getattr(prover, name))(count)
@@ -167,7 +164,10 @@ def _unpacked(
     rows, counts, boxes = (state[f"{name}_{part}"] for part in ("rows", "counts", "boxes"))
     if not len(counts):
         return []
-    if boxes.shape != (counts.sum(), *shape) or boxes.dtype != np.float64:
+    check_indices(counts, 1 + len(boxes), f"{name}_counts")
+    check_indices(abs(rows), _MOST, f"{name}_rows")
+    is_sound = boxes.dtype == np.float64 and bool(np.isfinite(boxes).all())
+    if boxes.shape != (counts.sum(), *shape) or not is_sound:
         raise ValueError(f"{name} are {boxes.dtype} of shape {boxes.shape}")
     parts = np.split(boxes, np.cumsum(counts)[:-1])
     return [(tuple(row), b) for row, b in zip(rows.tolist(), parts, strict=True)]

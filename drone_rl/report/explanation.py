@@ -6,10 +6,17 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from drone_rl.report.shapes import check_sizes
 from drone_rl.utils.archives import read_arrays
 from drone_rl.utils.consistency import check_intervals
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import parse_json, read_bytes, refuse_links
+from drone_rl.utils.limits import (
+    ARRAYS_BYTES,
+    EXPLANATION_BYTES,
+    EXPLANATION_VALUES,
+    Allowance,
+)
 from drone_rl.utils.schema import Text, as_mapping
 from drone_rl.verdicts.consistency import check_verdict
 from drone_rl.words.actions import ShownActions, shown_actions
@@ -31,8 +38,6 @@ FRAME = frozenset(
     }
 )
 """Entries of explanation.json that are no section's."""
-MOST_BYTES = 2**26
-"""Of explanation.json."""
 
 
 @dataclasses.dataclass
@@ -64,23 +69,28 @@ class Explanation:
         return terms_of(self.numbers)
 
     @classmethod
-    def load(cls, folder: Path) -> "Explanation":
+    def load(cls, folder: Path, allowance: Allowance | None = None) -> "Explanation":
         """Reads a folder.
 
+        Args:
+            folder: Its own.
+            allowance: Bytes that the arrays of this explanation and others may have together.
+
         Raises:
-            InputError: A file is missing, damaged, or of another version.
+            InputError: A file is missing, damaged, too large, or of another version.
         """
+        allowance = allowance or Allowance(ARRAYS_BYTES)
         try:
             refuse_links(folder, depth=1)
-            content = read_bytes(folder / "explanation.json", MOST_BYTES)
-            numbers = dict(
-                as_mapping(
-                    parse_json(content, "explanation.json", allow_nan=True), "explanation.json"
-                )
+            content = read_bytes(folder / "explanation.json", EXPLANATION_BYTES)
+            parsed = parse_json(
+                content, "explanation.json", allow_nan=True, most_values=EXPLANATION_VALUES
             )
-            arrays = read_arrays(folder / "arrays.npz")
-            data = read_arrays(folder / "dataset.npz")
+            numbers = dict(as_mapping(parsed, "explanation.json"))
+            arrays = read_arrays(folder / "arrays.npz", allowance=allowance)
+            data = read_arrays(folder / "dataset.npz", allowance=allowance)
             data.pop("meta", None)
+            check_sizes(numbers, arrays, data)
             shown_actions(numbers)
             terms_of(numbers)
             if "name" in numbers:

@@ -16,6 +16,7 @@ from drone_rl.report.saving import save_drawn, save_numbers, save_rows
 from drone_rl.report.sections import find_parts
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import to_file_name
+from drone_rl.utils.limits import ARRAYS_BYTES, Allowance
 from drone_rl.utils.pages import content_security_policy, page_environment, static_text
 from drone_rl.words.licence import percent, say
 from drone_rl.words.source import SENTENCES as SOURCE
@@ -39,9 +40,11 @@ def write_report(folders: Sequence[Path], target: Path) -> Path:
     Raises:
         InputError: An explanation can't be read or the report can't be written.
     """
+    allowance = Allowance(ARRAYS_BYTES)
+    loaded = [Explanation.load(folder, allowance) for folder in folders]
     policies = [
         Policy(explanation, target / "figures", f"{number}_{to_file_name(explanation.name)}")
-        for number, explanation in enumerate(Explanation.load(folder) for folder in folders)
+        for number, explanation in enumerate(loaded)
     ]
     try:
         (target / "figures").mkdir(parents=True, exist_ok=True)

@@ -14,6 +14,10 @@ from PIL import Image
 
 from drone_rl.report.part import Rows
 
+_DPI = 90
+"""Pixels to the inch of a chart."""
+_MOST_PIXELS = 2**25
+"""Of a chart."""
 FRAMES_PER_SECOND = 8
 """Of films."""
 
@@ -52,7 +56,10 @@ def to_png(picture: Image.Image | Figure) -> bytes:
     """A picture or chart as the bytes of a PNG file."""
     buffer = io.BytesIO()
     if isinstance(picture, Figure):
-        picture.savefig(buffer, format="png", dpi=90, metadata={"Software": None})
+        width, height = (_DPI * picture.get_size_inches()).tolist()
+        if not width * height <= _MOST_PIXELS:
+            raise ValueError(f"a chart has {width:.0f} x {height:.0f} pixels")
+        picture.savefig(buffer, format="png", dpi=_DPI, metadata={"Software": None})
     else:
         picture.save(buffer, "png", optimize=True)
     return buffer.getvalue()

@@ -11,6 +11,7 @@ from drone_rl.settings.comparison import check_same_config
 from drone_rl.sweeps.runs import Run
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import read_json, refuse_links, write_atomically
+from drone_rl.utils.limits import SWEEP_BYTES
 from drone_rl.utils.overrides import COMMAND, MOST_OVERRIDES, check_harmless
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.schema import Maybe, Plain, Record, Several, Text, Whole, as_mapping, shown
@@ -83,7 +84,7 @@ def read_sweep(folder: Path) -> Sweep:
         )
     try:
         refuse_links(folder)
-        content = _SWEEP.read(read_json(path, 2**25), "sweep")
+        content = _SWEEP.read(read_json(path, SWEEP_BYTES), "sweep")
         runs = [
             Run(
                 run["number"],

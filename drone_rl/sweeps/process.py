@@ -9,7 +9,8 @@ import time
 from pathlib import Path
 
 from drone_rl.sweeps.runs import THREADS, Run, read_result
-from drone_rl.utils.files import is_locked, write_atomically
+from drone_rl.utils.files import is_locked, read_tail, write_atomically
+from drone_rl.utils.limits import LOG_BYTES
 
 PROGRAM = (sys.executable, "-m", "drone_rl.cli.main")
 """What a run is started with."""
@@ -75,7 +76,7 @@ class RunProcess:
         return self.run.folder / "output.log"
 
     def _note_failure(self, status: int) -> None:
-        tail = self._log.read_text(errors="replace")[-20_000:].splitlines()
+        tail = read_tail(self._log, LOG_BYTES).decode(errors="replace").splitlines()
         note_failure(self.run, _error(tail, status))
 
 

@@ -1,9 +1,9 @@
 """The runs of a sweep as rows: what their files tell, whatever has become of them."""
 
 import contextlib
-import csv
 import dataclasses
-import io
+import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +13,10 @@ from drone_rl.sweeps.manifest import Sweep
 from drone_rl.sweeps.runs import Run, read_failure, read_result
 from drone_rl.sweeps.statistics import Array
 from drone_rl.utils.consistency import read_entry
+from drone_rl.utils.csv_table import read_table
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import read_bytes
-from drone_rl.utils.former_names import with_present_names
+from drone_rl.utils.former_names import FORMER_NAMES
+from drone_rl.utils.limits import SWEEP_METRICS_BYTES, SWEEP_RESULTS_BYTES, Allowance
 from drone_rl.utils.schema import Real, Whole
 from drone_rl.verdicts.consistency import check_verdict
 from drone_rl.verdicts.kinds import Kind
@@ -126,12 +127,18 @@ class Row:
 
 
 def read_rows(sweep: Sweep) -> list[Row]:
-    """One row for every run, whatever has become of it."""
+    """One row for every run, whatever has become of it.
+
+    Raises:
+        InputError: The results of all runs together are too large.
+    """
+    _check_results_size(sweep)
+    metrics = Allowance(SWEEP_METRICS_BYTES)
     choices = [_choice(run) for run in sweep.runs]
     keys = list(dict.fromkeys(key for choice in choices for key in choice))
     swept = [key for key in keys if len({choice.get(key) for choice in choices}) > 1]
     return [
-        _read_row(run, {key: choice.get(key, "") for key in swept})
+        _read_row(run, {key: choice.get(key, "") for key in swept}, metrics)
         for run, choice in zip(sweep.runs, choices, strict=True)
     ]
 
@@ -141,18 +148,27 @@ def _choice(run: Run) -> dict[str, str]:
     return {key.lstrip("+"): value for key, _, value in parts if key != "trial"}
 
 
-def _read_row(run: Run, choice: dict[str, str]) -> Row:
+def _check_results_size(sweep: Sweep) -> None:
+    """Bounds what is in memory at a time; each file is bounded by its reader."""
+    allowance = Allowance(SWEEP_RESULTS_BYTES)
+    for run in sweep.runs:
+        for path in (run.folder / "result.json", run.failure):
+            with contextlib.suppress(OSError):
+                allowance.take(path.stat().st_size, f"the results of {sweep.folder}: {path.name}")
+
+
+def _read_row(run: Run, choice: dict[str, str], metrics: Allowance) -> Row:
     result = read_result(run.folder)
     error = read_failure(run)
     if result is None:
         row = Row(run, choice, "unfinished" if error is None else "failed", error)
-        with contextlib.suppress(ValueError, KeyError, TypeError, csv.Error):
+        with contextlib.suppress(ValueError, KeyError, TypeError):
             if error is not None:  # before it failed it may have come some way, or none
-                _, (row.frames, row.seconds), row.entropy = _read_metrics(run.folder, 1)
+                _, (row.frames, row.seconds), row.entropy = _read_metrics(run.folder, 1, metrics)
         return row
     try:
         _check_result(result)
-        curve, _, entropy = _read_metrics(run.folder, result["largest_reward"])
+        curve, _, entropy = _read_metrics(run.folder, result["largest_reward"], metrics)
         _check_curve(curve)
         had = float(result["frames"]), float(result["seconds"])
         row = Row(run, choice, "finished", None, result, curve, *had, entropy)
@@ -161,7 +177,7 @@ def _read_row(run: Run, choice: dict[str, str]) -> Row:
         row.plain()
     except InputError as error:
         return Row(run, choice, "damaged", f"its files can't be read ({error})")
-    except (ValueError, KeyError, TypeError, AttributeError, csv.Error) as error:
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
         return Row(run, choice, "damaged", f"its files can't be read ({error!r})")
     return row
 
@@ -198,16 +214,42 @@ def _check_curve(curve: tuple[Array, Array]) -> None:
 
 
 def _read_metrics(
-    folder: Path, largest_reward: float
+    folder: Path, largest_reward: float, allowance: Allowance
 ) -> tuple[tuple[Array, Array], tuple[float, float], float | None]:
     """The learning curve, frames and seconds until its end, and the entropy there."""
-    text = read_bytes(folder / "metrics.csv", 2**26).decode()
-    rows = [with_present_names(row) for row in csv.DictReader(io.StringIO(text, newline=""))]
-    frames = np.array([float(row["frames"]) for row in rows])
-    rewards = np.array([float(row["train/running_reward"]) for row in rows])
-    had = (float(rows[-1]["frames"]), float(rows[-1].get("seconds") or 0)) if rows else (0.0, 0.0)
-    last = [float(row["loss/entropy"]) for row in rows[-LAST_UPDATES:] if row.get("loss/entropy")]
+    rows = _metrics_columns(folder / "metrics.csv", allowance)
+    frames, rewards, seconds, entropies = rows.T
+    had = (float(frames[-1]), float(seconds[-1])) if len(rows) else (0.0, 0.0)
     if not all(0 <= value < _MOST for value in had):
         raise InputError("metrics.csv: frames or seconds are out of range")
-    entropy = float(np.mean(last)) if last and np.isfinite(last).all() else None
-    return (frames, rewards / largest_reward), had, entropy
+    last = entropies[-LAST_UPDATES:]
+    last = last[~np.isnan(last)]
+    return (frames, rewards / largest_reward), had, float(last.mean()) if len(last) else None
+
+
+_COLUMNS = {
+    "frames": None,
+    "train/running_reward": None,
+    "seconds": 0.0,
+    "loss/entropy": math.nan,
+}
+"""Columns of `metrics.csv` that a report needs, and what stands for an empty cell, if it may."""
+
+
+def _metrics_columns(path: Path, allowance: Allowance) -> Array:
+    """The numbers of `_COLUMNS` at each update. Shape: (num_updates, 4)."""
+    rows = read_table(path, allowance)
+    header = [FORMER_NAMES.get(name, name) for name in next(rows, [])]
+    places = [header.index(name) if name in header else None for name in _COLUMNS]
+    found = [
+        [_number(row, place, empty) for place, empty in zip(places, _COLUMNS.values(), strict=True)]
+        for row in rows
+    ]
+    return np.array(found, np.float64).reshape(len(found), len(_COLUMNS))
+
+
+def _number(row: Sequence[str], place: int | None, empty: float | None) -> float:
+    text = row[place] if place is not None and place < len(row) else ""
+    if not text and empty is not None:
+        return empty
+    return float(text)

@@ -8,6 +8,7 @@ from typing import Any
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import parse_json, read_bytes, read_json
 from drone_rl.utils.former_names import with_present_names
+from drone_rl.utils.limits import RESULT_BYTES
 from drone_rl.utils.schema import Text, as_mapping
 
 THREADS = {"OMP_NUM_THREADS": "1", "OMP_WAIT_POLICY": "PASSIVE"}
@@ -55,7 +56,7 @@ class Run:
 def read_result(folder: Path) -> dict[str, Any] | None:
     """`result.json` of a run that came to its own end; None of one that must go on."""
     try:
-        content = read_bytes(folder / "result.json", 2**20)
+        content = read_bytes(folder / "result.json", RESULT_BYTES)
         result = dict(as_mapping(parse_json(content, "result", allow_nan=True), "result"))
         reason = Text(100).read(result.get("reason"), "reason")
     except InputError:

@@ -2,8 +2,8 @@
 
 import copy
 import csv
+import io
 import logging
-import os
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -15,9 +15,14 @@ from tqdm import tqdm
 
 from drone_rl.training.checkpoint import save_checkpoint
 from drone_rl.training.progress import OngoingTraining
+from drone_rl.utils.csv_table import read_table
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.files import remove_leftovers, write_atomically
 from drone_rl.utils.former_names import FORMER_NAMES
+from drone_rl.utils.schema import shown
 
+_DIGITS = 20
+"""Of the number of an update."""
 _log = logging.getLogger(__name__)
 
 
@@ -72,7 +77,10 @@ class CheckpointCallback(Callback):
         return self.folder / "best.pt"
 
     def on_start(self, training: OngoingTraining) -> None:
-        """Makes sure, before any work is done, that there is a place to save to."""
+        """Makes sure, before any work is done, that there is a place to save to.
+
+        Deletes the half-written checkpoints of processes that were killed.
+        """
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -80,6 +88,7 @@ class CheckpointCallback(Callback):
                 f"checkpoint folder {self.folder} can't be made ({error.strerror}); "
                 "choose another with hydra.run.dir=..."
             ) from error
+        remove_leftovers(self.folder, self.last_path.name, self.best_path.name)
         if not self.last_path.exists():
             self._save(training)
 
@@ -116,15 +125,21 @@ class CsvCallback(Callback):
         """Keeps the rows up to the state that training goes on from."""
         if not self.path.exists():
             return
-        with self.path.open(newline="") as file:
-            rows = [r for r in csv.reader(file)]
+        rows = [*read_table(self.path)] if self.path.stat().st_size else []
         whole = [r for r in rows[1:] if len(r) == len(rows[0])]  # the last may be cut short
         header = [[FORMER_NAMES.get(name, name) for name in row] for row in rows[:1]]
-        kept = header + [r for r in whole if int(r[0]) <= training.progress.updates]
-        temporary = self.path.with_suffix(".tmp")
-        with temporary.open("w", newline="") as file:
-            csv.writer(file).writerows(kept)
-        os.replace(temporary, self.path)
+        kept = header + [r for r in whole if self._update_of(r) <= training.progress.updates]
+        text = io.StringIO(newline="")
+        csv.writer(text).writerows(kept)
+        write_atomically(self.path, text.getvalue())
+
+    def _update_of(self, row: Sequence[str]) -> int:
+        """The number of the update that a row is of."""
+        if not (row[0].isascii() and row[0].isdigit() and len(row[0]) < _DIGITS):
+            raise InputError(
+                f"{self.path} is damaged: {shown(row[0])} is no number of an update; move it away"
+            )
+        return int(row[0])
 
     def on_update(self, training: OngoingTraining, metrics: Mapping[str, float]) -> None:
         """Appends a row."""

@@ -2,17 +2,17 @@
 
 import contextlib
 import os
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import torch
 
-from drone_rl.training.unpickling import MOST_BYTES, ForeignError, unpickle
+from drone_rl.training.unpickling import ForeignError, unpickle
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import read_bytes
+from drone_rl.utils.files import read_bytes, temporary_of
 from drone_rl.utils.former_names import with_present_names
+from drone_rl.utils.limits import CHECKPOINT_BYTES
 from drone_rl.utils.schema import shown
 
 FORMAT = "drone_rl checkpoint"
@@ -32,25 +32,33 @@ def save_checkpoint(path: str | Path, state: Mapping[str, Any]) -> None:
         InputError: The folder can't be written or the disk is full.
     """
     path = Path(path)
-    temporary: str | None = None
+    temporary = temporary_of(path)
     try:
-        with tempfile.NamedTemporaryFile(
-            dir=path.parent, prefix=f".{path.name}.", delete=False
-        ) as file:
-            temporary = file.name
+        temporary.unlink(missing_ok=True)
+        with temporary.open("xb") as file:
             torch.save({"format": FORMAT, "format_version": FORMAT_VERSION, **state}, file)
             file.flush()
             os.fsync(file.fileno())
         os.replace(temporary, path)
     except (OSError, RuntimeError) as error:
-        if temporary is not None:
-            with contextlib.suppress(OSError):
-                os.unlink(temporary)
-        reason = getattr(error, "strerror", None) or str(error).splitlines()[0]
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
+        reason = _reason(error)
+        before = "the previous checkpoint is intact" if path.is_file() else "there is none yet"
         raise InputError(
             f"checkpoint {path} could not be written ({reason}); free some space or choose "
-            "another folder with hydra.run.dir=..., the previous checkpoint is intact"
+            f"another folder with hydra.run.dir=..., {before}"
         ) from error
+
+
+def _reason(error: BaseException) -> str:
+    """What the system said; PyTorch hides it behind an error of its own."""
+    cause: BaseException | None = error
+    while cause is not None:
+        if isinstance(cause, OSError) and cause.strerror:
+            return cause.strerror
+        cause = cause.__cause__ or cause.__context__
+    return (str(error) or type(error).__name__).splitlines()[0]
 
 
 def load_checkpoint(path: str | Path) -> dict[str, Any]:
@@ -62,7 +70,7 @@ def load_checkpoint(path: str | Path) -> dict[str, Any]:
     path = Path(path)
     if not path.exists():
         raise InputError(f"checkpoint {path} does not exist; give the path of a .pt file")
-    content = read_bytes(path, MOST_BYTES)
+    content = read_bytes(path, CHECKPOINT_BYTES)
     try:
         state = unpickle(content, f"checkpoint {path}")
     except ForeignError as error:

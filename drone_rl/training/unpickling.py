@@ -19,11 +19,8 @@ import torch
 from torch import Tensor
 
 from drone_rl.utils.archives import read_members
+from drone_rl.utils.limits import CHECKPOINT_BYTES, DIMENSIONS, PICKLED_BYTES
 
-MOST_BYTES = 2**28
-"""Of a checkpoint."""
-MOST_PICKLED = 2**21
-"""Bytes of the instructions, which tell of everything but the tensors' numbers."""
 _MEMBER = re.compile(r"[^/]+/(data\.pkl|data/\d+|byteorder|version|\.[\w/.]+)")
 _DTYPES = {
     "FloatStorage": torch.float32,
@@ -72,18 +69,20 @@ def unpickle(content: bytes, where: str) -> Any:
         DamagedError: It is damaged.
         ForeignError: It holds something else.
     """
-    members = {}
-    for name, data in read_members(content, where, most=MOST_BYTES):
+    members: dict[str, bytes] = {}
+    for name, data in read_members(content, where, most=CHECKPOINT_BYTES):
         if not _MEMBER.fullmatch(name):
             raise ForeignError(f"a file {name[:80]!r}")
         members[name.partition("/")[2]] = data
     program = members.get("data.pkl")
     if program is None or members.get("byteorder", b"little") != b"little":
         raise DamagedError("it has no data.pkl of this byte order")
-    if len(program) > MOST_PICKLED:
+    if len(program) > PICKLED_BYTES:
         raise ForeignError("more values than a checkpoint has")
+    reader = _Unpickler(program, members)
+    members.clear()
     try:
-        return _Unpickler(program, members).load()
+        return reader.load()
     except (DamagedError, ForeignError):
         raise
     except _DAMAGE as error:
@@ -108,7 +107,7 @@ class _Rebuild:
             raise DamagedError("a tensor without a storage")
         extent = offset + sum((n - 1) * step for n, step in zip(size, stride, strict=True)) + 1
         count = math.prod(size)
-        if len(size) > 8 or count > len(storage) or (count and extent > len(storage)):
+        if len(size) > DIMENSIONS or count > len(storage) or (count and extent > len(storage)):
             raise DamagedError("a tensor is larger than its storage")
         return storage.as_strided(size, stride, offset)
 
@@ -131,8 +130,8 @@ class _Unpickler(pickle._Unpickler):
 
     def __init__(self, program: bytes, members: Mapping[str, bytes]) -> None:
         super().__init__(io.BytesIO(program))
-        self._members = members
-        self._storages: dict[tuple[str, torch.dtype], Tensor] = {}
+        self._members = dict(members)
+        self._storages: dict[str, Tensor] = {}
 
     def load(self) -> Any:
         """Runs the instructions."""
@@ -155,14 +154,15 @@ class _Unpickler(pickle._Unpickler):
         kind, dtype, key, _, length = pid
         if kind != "storage" or not isinstance(dtype, torch.dtype) or not isinstance(key, str):
             raise ForeignError("a reference to something else than a storage")
-        content = self._members[f"data/{key}"]
-        if length * dtype.itemsize != len(content):
-            raise DamagedError("a storage is not as long as it says")
-        if (key, dtype) not in self._storages:
-            empty = not content
-            made = torch.empty(0, dtype=dtype) if empty else _tensor(content, dtype)
-            self._storages[key, dtype] = made
-        return self._storages[key, dtype]
+        if key not in self._storages:  # its bytes are there once: as a member, then as a tensor
+            content = self._members.pop(f"data/{key}")
+            if length * dtype.itemsize != len(content):
+                raise DamagedError("a storage is not as long as it says")
+            self._storages[key] = _tensor(content, dtype)
+        storage = self._storages[key]
+        if storage.dtype != dtype or length != len(storage):
+            raise DamagedError("one storage is named with two types or lengths")
+        return storage
 
     def _ignore_state(self) -> None:
         """What modules note beside their parameters (versions of layers) is not needed."""
@@ -180,4 +180,6 @@ class _Watched(dict):
 
 def _tensor(content: bytes, dtype: torch.dtype) -> Tensor:
     """A tensor that owns its numbers. Shape: (n,)."""
+    if not content:
+        return torch.empty(0, dtype=dtype)
     return torch.frombuffer(bytearray(content), dtype=dtype)

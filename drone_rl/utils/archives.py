@@ -6,17 +6,33 @@ import re
 import struct
 import zipfile
 import zlib
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import read_bytes
+from drone_rl.utils.limits import (
+    ARCHIVE_BYTES,
+    ARRAYS_BYTES,
+    ELEMENTS,
+    MEMBERS,
+    Allowance,
+    check_shape,
+)
 
-MOST_MEMBERS = 10_000
-"""Files in one archive."""
+T = TypeVar("T")
+
+_CHUNK = 2**20
+"""Bytes that are unpacked at a time."""
+_LAST_CHARACTER = 0x10FFFF
+_SURROGATES = 0xD800, 0xDFFF
+"""Numbers that are no characters."""
+_LONGEST_HEADER = 1000
+"""Characters before an array's numbers."""
 _HEADER = re.compile(
     r"\{'descr': '(?P<dtype>[<>|](b1|[iu][1248]|f[248]|U\d{1,6}))', "
     r"'fortran_order': (?P<by_column>True|False), "
@@ -49,57 +65,106 @@ def read_members(
     Raises:
         InputError: The archive is damaged, or its directory tells of more than is allowed.
     """
+    return _members(content, where, Allowance(most), methods, lambda file, size, _: file.read(size))
+
+
+def read_arrays(
+    path: Path, *, most: int = ARRAYS_BYTES, allowance: Allowance | None = None
+) -> dict[str, NDArray]:
+    """The arrays of an .npz file: numbers and texts only, each as large as its bytes.
+
+    Args:
+        path: Of the file.
+        most: Bytes that all arrays together may have.
+        allowance: Bytes that they and those of other files may have, instead of `most`.
+
+    Raises:
+        InputError: The file is unusable, or an array holds objects.
+    """
+    allowance = allowance or Allowance(most)
+    content = read_bytes(path, max(ARCHIVE_BYTES, min(most, 2**31)))
+    methods = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+    return {
+        name.removesuffix(".npy"): array
+        for name, array in _members(content, str(path), allowance, methods, _array)
+    }
+
+
+def read_array(path: Path, most: int = ARRAYS_BYTES) -> NDArray:
+    """The array of an .npy file, see `read_arrays`.
+
+    Args:
+        path: Of the file.
+        most: Bytes that it may have.
+
+    Raises:
+        InputError: The file is unusable, or the array holds objects.
+    """
+    content = read_bytes(path, most)
+    return _array(io.BytesIO(content), len(content), str(path))
+
+
+def _members(
+    content: bytes,
+    where: str,
+    allowance: Allowance,
+    methods: Collection[int],
+    read: Callable[[Any, int, str], T],
+) -> Iterator[tuple[str, T]]:
+    """Name of each file in an archive, and what `read` makes of the opened file and its size."""
     remedy = "the file was damaged or cut short"
-    if content.count(_ENTRY) > MOST_MEMBERS:
-        raise InputError(f"{where} holds more than {MOST_MEMBERS} files")
+    if content.count(_ENTRY) > MEMBERS:
+        raise InputError(f"{where} holds more than {MEMBERS} files")
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             members = archive.infolist()
-            if sum(member.file_size for member in members) > most:
-                raise InputError(f"{where} would unpack to more than {most} bytes")
+            allowance.take(sum(member.file_size for member in members), f"{where}, unpacked,")
             if len({member.filename for member in members}) < len(members):
                 raise InputError(f"{where} holds two files of one name")
             for member in members:
                 if member.compress_type not in methods:
                     raise InputError(f"{where} is compressed in a way that is not accepted")
-                yield member.filename, archive.read(member)
+                name = member.filename
+                with archive.open(member) as file:
+                    yield name, read(file, member.file_size, f"{where}: {name}")
     except InputError:
         raise
     except _DAMAGE as error:
         raise InputError(f"{where} is no whole archive ({error}); {remedy}") from None
 
 
-def read_arrays(path: Path, *, most: int = 2**29) -> dict[str, NDArray]:
-    """The arrays of an .npz file: numbers and texts only, each as large as its bytes.
-
-    Args:
-        path: Of the file.
-        most: Bytes that all arrays together may have.
-
-    Raises:
-        InputError: The file is unusable, or an array holds objects.
-    """
-    content = read_bytes(path, min(most, 2**28))
-    methods = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
-    return {
-        name.removesuffix(".npy"): _array(data, f"{path}: {name}")
-        for name, data in read_members(content, str(path), most=most, methods=methods)
-    }
-
-
-def _array(content: bytes, where: str) -> NDArray:
+def _array(file: Any, size: int, where: str) -> NDArray:
     """One array in NumPy's own format; NumPy itself would allocate what the header asks for."""
-    start = {1: 10, 2: 12}.get(content[6] if content[:6] == b"\x93NUMPY" else 0, 0)
-    end = start + int.from_bytes(content[8:start], "little")
-    header = _HEADER.fullmatch(content[start:end].decode("latin1"))
+    begin = file.read(12)
+    start = {1: 10, 2: 12}.get(begin[6] if begin[:6] == b"\x93NUMPY" else 0, 0)
+    length = int.from_bytes(begin[8:start], "little")
+    header_size = min(length, _LONGEST_HEADER + 1)
+    text = begin[start:] + file.read(max(0, start + header_size - len(begin)))
+    header = _HEADER.fullmatch(text.decode("latin1"))
     if start == 0 or header is None:
         raise InputError(f"{where} is no array of numbers or texts; it was not loaded")
     dtype = np.dtype(header["dtype"])
     shape = tuple(int(length) for length in header["shape"].split(",") if length.strip())
     count = math.prod(shape)
-    if count * dtype.itemsize != len(content) - end:
+    if count * dtype.itemsize != size - start - length:
         raise InputError(f"{where} is said to be {shape} of {dtype}, which its bytes are not")
-    if len(shape) > 8 or dtype.itemsize == 0:
-        raise InputError(f"{where} has {len(shape)} dimensions of {dtype}; it was not loaded")
-    flat = np.frombuffer(content[end:], dtype) if count else np.empty(0, dtype)
-    return flat.reshape(shape, order="F" if header["by_column"] == "True" else "C").copy()
+    check_shape(shape, dtype.itemsize, ELEMENTS * dtype.itemsize, where)
+    flat = np.empty(count, dtype)
+    _fill(flat, file, where)
+    return flat.reshape(shape, order="F" if header["by_column"] == "True" else "C")
+
+
+def _fill(flat: NDArray, file: Any, where: str) -> None:
+    """Reads an array's numbers piece by piece, so that they are never in memory twice."""
+    room = flat.view(np.uint8)
+    for begin in range(0, len(room), _CHUNK):
+        piece = file.read(min(_CHUNK, len(room) - begin))
+        if len(piece) < min(_CHUNK, len(room) - begin):
+            raise InputError(f"{where} is cut short")
+        room[begin : begin + len(piece)] = np.frombuffer(piece, np.uint8)
+    if flat.dtype.kind == "U" and len(flat):
+        codes = flat.view(flat.dtype.newbyteorder("=")).view(np.uint32)
+        codes = codes.byteswap() if flat.dtype.byteorder == ">" else codes
+        low, high = _SURROGATES
+        if codes.max() > _LAST_CHARACTER or ((codes >= low) & (codes <= high)).any():
+            raise InputError(f"{where} holds numbers that are no characters")

@@ -4,18 +4,31 @@ import contextlib
 import errno
 import fcntl
 import json
+import math
 import os
 import re
 import stat
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.limits import (
+    FOLDER_ENTRIES,
+    JSON_VALUES,
+    SMALL_JSON_BYTES,
+    Allowance,
+    check_depth,
+    check_json_size,
+)
 
 _NO_LOCKS = (errno.ENOLCK, errno.ENOTSUP)
 """What file systems answer that know no locks."""
+_PROCESS = re.compile(r"[1-9][0-9]{0,6}")
+"""The number of a process at the end of a temporary file's name."""
+_FORMER_SUFFIX = re.compile(r"[a-z0-9_]{8}")
+"""Such an end in versions until 0.1, which chose it at random."""
 _LONGEST_NUMBER = 19
 """Digits of a whole number in a JSON file."""
 
@@ -48,12 +61,33 @@ def read_bytes(path: Path, most: int) -> bytes:
     return content
 
 
+def read_tail(path: Path, most: int) -> bytes:
+    """Read the last bytes of a plain file, such as a log.
+
+    Args:
+        path: Of the file.
+        most: How many bytes.
+
+    Raises:
+        InputError: It can't be read or is no plain file.
+    """
+    try:
+        with open(path, "rb", opener=_open_at_once) as file:
+            about = os.fstat(file.fileno())
+            if not stat.S_ISREG(about.st_mode):
+                raise InputError(f"{path} is no plain file; move it away")
+            file.seek(max(0, about.st_size - most))
+            return file.read(most)
+    except OSError as error:
+        raise InputError(f"{path} can't be read ({error.strerror}); move it away") from None
+
+
 def newest(paths: Iterable[Path]) -> Path | None:
     """The file or folder that was changed last; None if there is none."""
     return max(paths, key=lambda path: path.stat().st_mtime, default=None)
 
 
-def read_json(path: Path, most: int = 1_000_000) -> Any:
+def read_json(path: Path, most: int = SMALL_JSON_BYTES) -> Any:
     """Plain data out of a JSON file.
 
     Raises:
@@ -62,60 +96,80 @@ def read_json(path: Path, most: int = 1_000_000) -> Any:
     return parse_json(read_bytes(path, most), str(path))
 
 
-def parse_json(content: bytes | str, where: str, *, allow_nan: bool = False) -> Any:
+def parse_json(
+    content: bytes | str, where: str, *, allow_nan: bool = False, most_values: int = JSON_VALUES
+) -> Any:
     """Plain data out of JSON, each key once, no number that isn't one or would fill a page.
 
     Args:
         content: The JSON.
         where: Its name, for people.
         allow_nan: Whether NaN and infinity are accepted.
+        most_values: Values and names that it may have.
 
     Raises:
         InputError: It is no such JSON.
     """
-
-    def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-        mapping = dict(pairs)
-        if len(mapping) < len(pairs):
-            raise ValueError("a name stands there twice")
-        return mapping
-
-    def whole(digits: str) -> int:
-        if len(digits) > _LONGEST_NUMBER:
-            raise ValueError("a number is too long")
-        return int(digits)
-
-    def no_number(name: str) -> float:
-        if not allow_nan:
-            raise ValueError(f"{name} is no number")
-        return float(name)
-
+    check_json_size(content, where, most_values)
     try:
         text = content if isinstance(content, str) else content.decode()
-        return json.loads(text, object_pairs_hook=once, parse_int=whole, parse_constant=no_number)
+        value = json.loads(text, object_pairs_hook=_once, **_NUMBERS[allow_nan])
     except (ValueError, RecursionError) as error:
         reason = "nested too deeply" if isinstance(error, RecursionError) else str(error)
         raise InputError(f"{where} is damaged: no plain JSON ({reason[:200]})") from None
+    check_depth(value, where)
+    return value
 
 
-def refuse_links(folder: Path, depth: int = 3) -> None:
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    mapping = dict(pairs)
+    if len(mapping) < len(pairs):
+        raise ValueError("a name stands there twice")
+    return mapping
+
+
+def _whole(digits: str) -> int:
+    if len(digits) > _LONGEST_NUMBER:
+        raise ValueError("a number is too long")
+    return int(digits)
+
+
+def _finite(digits: str) -> float:
+    value = float(digits)
+    if not math.isfinite(value):
+        raise ValueError(f"{digits[:20]} is no number, or too large")
+    return value
+
+
+_NUMBERS: dict[bool, dict[str, Any]] = {
+    False: {"parse_int": _whole, "parse_float": _finite, "parse_constant": _finite},
+    True: {"parse_int": _whole, "parse_float": float, "parse_constant": float},
+}
+"""How numbers are read, by whether NaN and infinity are accepted."""
+
+
+def refuse_links(folder: Path, depth: int = 3, left: Allowance | None = None) -> None:
     """Makes sure that what is written or read under a folder stays in it.
 
     Args:
         folder: Which came from somewhere else, perhaps.
         depth: Levels of folders to look at.
+        left: How many files and folders may still be looked at.
 
     Raises:
-        InputError: Something in it is a link, or neither a file nor a folder.
+        InputError: Something in it is a link, or neither a file nor a folder, or it holds more
+            files than any run or sweep does.
     """
+    left = left or Allowance(FOLDER_ENTRIES, "files and folders")
     for entry in os.scandir(folder):
+        left.take(1, str(folder))
         if not (entry.is_file(follow_symlinks=False) or entry.is_dir(follow_symlinks=False)):
             raise InputError(
                 f"{entry.path} is a link or a device; give a folder of plain files, "
                 "put there what it points to"
             )
         if depth > 1 and entry.is_dir(follow_symlinks=False):
-            refuse_links(Path(entry.path), depth - 1)
+            refuse_links(Path(entry.path), depth - 1, left)
 
 
 def to_file_name(name: str) -> str:
@@ -124,12 +178,75 @@ def to_file_name(name: str) -> str:
 
 
 def write_atomically(path: Path, content: str | bytes) -> None:
-    """Writes a small file; whoever reads it finds the old one or the new one, never half."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    temporary.unlink(missing_ok=True)
-    with temporary.open("xb") as file:  # never through a link that waits there
-        file.write(content.encode() if isinstance(content, str) else content)
-    os.replace(temporary, path)
+    """Writes a small file; whoever reads it finds the old one or the new one, never half.
+
+    Raises:
+        OSError: It can't be written; its `filename` is the path.
+    """
+    write_all_atomically({path: content})
+
+
+def write_all_atomically(contents: Mapping[Path, str | bytes]) -> None:
+    """Write several files, none of them if one can't be written.
+
+    Args:
+        contents: What goes into each file.
+
+    Raises:
+        OSError: One can't be written; the error's `filename` is its path.
+    """
+    temporaries: dict[Path, Path] = {}
+    now = next(iter(contents))
+    try:
+        for now, content in contents.items():
+            if now.is_dir():
+                raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+            temporary = temporary_of(now)
+            temporary.unlink(missing_ok=True)
+            with temporary.open("xb") as file:  # never through a link that waits there
+                temporaries[temporary] = now
+                file.write(content.encode() if isinstance(content, str) else content)
+        for temporary, now in temporaries.items():
+            os.replace(temporary, now)
+    except OSError as error:
+        for temporary in temporaries:
+            with contextlib.suppress(OSError):
+                temporary.unlink(missing_ok=True)
+        raise OSError(error.errno, error.strerror or str(error), str(now)) from error
+
+
+def temporary_of(path: Path) -> Path:
+    """The file in which this process writes what is going to be another one."""
+    return path.with_name(f".{path.name}.{os.getpid()}")
+
+
+def remove_leftovers(folder: Path, *names: str) -> None:
+    """Delete the temporary files that killed processes left of files with these names.
+
+    Args:
+        folder: In which they lie; it may be missing.
+        names: Of the files that were to be written.
+    """
+    for name in names:
+        for path in folder.glob(f".{name}.*"):
+            suffix = path.name.removeprefix(f".{name}.")
+            is_ours = _PROCESS.fullmatch(suffix) and not _is_alive(int(suffix))
+            if (is_ours or _FORMER_SUFFIX.fullmatch(suffix)) and path.is_file():
+                with contextlib.suppress(OSError):
+                    path.unlink()
+
+
+def _is_alive(process: int) -> bool:
+    """Whether another process has this number."""
+    if process == os.getpid():
+        return False
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):
+        return True
+    return True
 
 
 @contextlib.contextmanager

@@ -10,10 +10,8 @@ from collections.abc import Collection, Iterable
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import read_bytes
+from drone_rl.utils.plain_yaml import read_yaml
 from drone_rl.utils.schema import Kind, Several, Text, shown
 
 _OF_ONE_FOLDER = re.compile(r"\+{0,2}(resume|trial|paths(\.\w+)?)")
@@ -92,12 +90,7 @@ def read_overrides(folder: Path) -> list[str]:
     path = folder / ".hydra" / "overrides.yaml"
     if not path.exists():
         return []
-    try:
-        found = yaml.safe_load(read_bytes(path, 2**16))
-    except (yaml.YAMLError, RecursionError, ValueError) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"{path} is damaged ({type(error).__name__})") from None
+    found = read_yaml(path)
     texts = Several(Text(_LONGEST), 0, MOST_OVERRIDES).read(found, str(path))
     return [check_harmless(text, str(path)) for text in texts]
 

@@ -17,6 +17,8 @@ MOST_VALUES = 20_000
 """Values that a freely shaped part of a file may hold."""
 DEEPEST = 12
 """Levels of such a part."""
+_MOST_BITS = 10_000
+"""Of a whole number in a message."""
 
 
 class Kind(Protocol):
@@ -146,6 +148,24 @@ class Text:
                 "printable characters"
             )
         return value
+
+
+@dataclasses.dataclass(frozen=True)
+class FileName:
+    """The name of one file in a folder, without its ending: no path, and none that is hidden."""
+
+    longest: int = 150
+
+    def read(self, value: Any, where: str) -> str:
+        """See `Kind`."""
+        text = value if isinstance(value, str) else ""
+        is_name = bool(text) and len(text.encode(errors="replace")) <= self.longest
+        if not is_name or not text.isprintable() or {*text} & {*"/\\"} or text[0] in ".~- ":
+            raise InputError(
+                f"{where}={shown(value)} is no name of a file; give one of at most "
+                f"{self.longest} bytes without / and not beginning with a dot"
+            )
+        return text
 
 
 @dataclasses.dataclass(frozen=True)
@@ -285,6 +305,8 @@ def shown(value: Any) -> str:
     """A value as it may stand in a message: short, on one line."""
     if value is not None and not isinstance(value, str | int | float):
         return f"({type(value).__name__})"
+    if isinstance(value, int) and value.bit_length() > _MOST_BITS:  # Python refuses to write it
+        return f"(a number of {value.bit_length()} bits)"
     text = repr(value[:80] if isinstance(value, str) else value)
     return text if len(text) <= 80 else f"{text[:77]}..."
 

@@ -24,7 +24,8 @@ def write_card(name: str, digest: str, about: Evidence) -> str:
     """
     sentences = said(SENTENCES, about)
     verdict = sentences.pop("card.verdict")
-    packages = about["provenance"]["versions"]
+    known = about["provenance"]["versions"]
+    packages = {name: known.get(name, "unknown") for name in ("torch", "torchrl", "mujoco-warp")}
     revision = about["provenance"]["git_revision"] or "unknown"
     points = "\n".join(f"- {text}" for text in sentences.values())
     return f"""# {name}

@@ -8,11 +8,11 @@ from typing import Any
 
 import torch
 from safetensors import SafetensorError
-from safetensors.torch import load, save_file
+from safetensors.torch import load, save
 
 from drone_rl.training import check_weights, load_checkpoint
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import parse_json, read_bytes
+from drone_rl.utils.files import parse_json, read_bytes, write_all_atomically
 from drone_rl.utils.former_names import with_present_names
 from drone_rl.utils.overrides import COMMAND
 from drone_rl.utils.schema import Kind, Maybe, Plain, Real, Record, Text, Whole, as_mapping, shown
@@ -155,8 +155,9 @@ def export_policy(
     seed: int,
     chosen: Mapping[str, Any] | None,
     shifts: Mapping[str, Any] | None = None,
+    carried: Mapping[Path, bytes] | None = None,
 ) -> None:
-    """Writes a checkpoint's policy and its model card beside it.
+    """Writes a checkpoint's policy and its model card beside it, all of it or nothing.
 
     Args:
         path: Where to, ending in .safetensors; the card ends in .md.
@@ -167,6 +168,7 @@ def export_policy(
         chosen: "runs" of the sweep in which it was made, and "episodes" by which it was judged
             there, if it was; None if it was made in no sweep.
         shifts: As in shifts.json, for the card; None if there are none.
+        carried: Further files that the card quotes, by their paths.
 
     Raises:
         InputError: It can't be written.
@@ -181,32 +183,34 @@ def export_policy(
         "seed": seed,
         "chosen": chosen,
     }
+    described = checkpoint["description"]
     try:
-        write_exported(path, checkpoint["policy"], checkpoint["description"], about)
-        digest = hashlib.sha256(path.read_bytes()).hexdigest()
-        described = checkpoint["description"]
-        told = {
-            **about,
-            "task": described["task"],
-            "dynamics": described.get("dynamics"),
-            "shifts": shifts,
-        }
-        card = write_card(path.stem, digest, told)
-        path.with_suffix(".md").write_text(card)
-    except (OSError, SafetensorError) as error:
+        content = exported_bytes(checkpoint["policy"], described, about)
+    except SafetensorError as error:
         raise InputError(f"policy {path} can't be written ({error})") from error
+    told = {
+        **about,
+        "task": described["task"],
+        "dynamics": described.get("dynamics"),
+        "shifts": shifts,
+    }
+    card = write_card(path.stem, hashlib.sha256(content).hexdigest(), told)
+    try:
+        write_all_atomically({path: content, path.with_suffix(".md"): card, **(carried or {})})
+    except OSError as error:
+        raise InputError(
+            f"policy {path} can't be written ({error.filename}: {error.strerror}); free some "
+            "space or choose another folder with hydra.run.dir=..."
+        ) from error
 
 
-def write_exported(
-    path: Path,
-    weights: Mapping[str, torch.Tensor],
-    description: Mapping[str, Any],
-    about: Mapping[str, Any],
-) -> None:
-    """Writes weights with their description and where they come from."""
+def exported_bytes(
+    weights: Mapping[str, torch.Tensor], description: Mapping[str, Any], about: Mapping[str, Any]
+) -> bytes:
+    """Weights with their description and where they come from, as the content of a file."""
     contiguous = {name: value.contiguous() for name, value in weights.items()}
     metadata = {"description": json.dumps(description), "about": json.dumps(about)}
-    save_file(contiguous, path, {"format": FORMAT, **metadata})
+    return save(contiguous, {"format": FORMAT, **metadata})
 
 
 def load_exported(path: Path) -> dict[str, Any]:

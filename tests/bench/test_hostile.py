@@ -85,7 +85,7 @@ def die():
 )
 def test_what_is_no_refusal_is_noticed(tmp_path, monkeypatch, main, wrong):
     monkeypatch.setattr(hostile, "PATIENCE_S", 2)
-    found = hostile._fork(main, ["x"], tmp_path)
+    found = hostile._fork(main, ["x"], tmp_path)["wrong"]
     assert re.fullmatch(wrong + ".*" if wrong else "", found, re.S), found
 
 
@@ -93,7 +93,10 @@ def test_growth_is_measured(tmp_path, monkeypatch):
     monkeypatch.setattr(hostile, "MOST_MEMORY", 2**29)
     monkeypatch.setattr(hostile, "MOST_SECONDS", math.inf)
     monkeypatch.setattr(hostile.resource, "setrlimit", lambda *args: None)
-    assert "MiB" in hostile._fork(grow, ["x"], tmp_path)
+    found = hostile._fork(grow, ["x"], tmp_path)
+    assert "MiB" in found["wrong"]
+    assert found["mib"] > 900
+    assert 0 < found["seconds"] < 30
 
 
 def test_a_canary_that_was_touched_is_seen(tmp_path):
@@ -108,11 +111,14 @@ def test_a_canary_that_was_touched_is_seen(tmp_path):
 
 
 def test_counts(tmp_path, monkeypatch):
-    outcomes = [{"name": "a", "wrong": ""}, {"name": "b", "wrong": "it did"}]
+    refused = {"name": "a", "wrong": "", "mib": 7.0, "seconds": 0.5}
+    outcomes = [refused, {"name": "b", "wrong": "it did", "mib": 3.0, "seconds": 1.5}]
     monkeypatch.setattr(hostile, "run_all", lambda folder: outcomes)
     assert hostile.bench_hostile(tmp_path) == {
         "hostile_refused": 1,
         "hostile_total": 2,
+        "hostile_peak_mib": 7.0,
+        "hostile_max_s": 1.5,
     }
 
 

@@ -75,12 +75,23 @@ def test_sizes_are_bounded(one_sided, write, monkeypatch):
     monkeypatch.setattr(module, "MOST_BOXES", 2)
     with pytest.raises(InputError, match="it has 3 boxes; of 1 cubes give at most 2"):
         read_certificate(path)
-    monkeypatch.setitem(module._MOST_MARKS, b"[", 3)
-    with pytest.raises(InputError, match="more than 3 of the sign"):
+    monkeypatch.setattr(module, "MOST_STEPS", 1)
+    with pytest.raises(InputError, match="numbers of steps; give at most 1"):
         read_certificate(path)
-    monkeypatch.setattr(module, "MOST_BYTES", 100)
+    monkeypatch.setattr(module, "CERTIFICATE_VALUES", 3)
+    with pytest.raises(InputError, match="more than 3 values"):
+        read_certificate(path)
+    monkeypatch.setattr(module, "CERTIFICATE_BYTES", 100)
     with pytest.raises(InputError, match="too large"):
         read_certificate(path)
+
+
+@pytest.mark.parametrize("border", [5e-324, 2.0**-101, -(2.0**-101), 2.0**20 + 1])
+def test_borders_need_no_more_bits_than_exact_sums_can_have(one_sided, border):
+    low, high = sorted((border, 0.0))
+    one_sided["outcomes"][0]["boxes"] = [[[low, high]]]
+    with pytest.raises(InputError, match="has a border below"):
+        parse_certificate(one_sided)
 
 
 @pytest.mark.parametrize("content", [b"{", b"[]", b'{"share": NaN}', b'{"a": 1, "a": 2}'])

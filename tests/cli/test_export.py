@@ -28,6 +28,8 @@ def test_an_export_for_other_programs(in_process, tmp_path):
             ["export", "policy=proved", "format=onnx", "certificate=c.json"],
             ["certificate", "format=safetensors"],
         ),
+        (["export", "policy=none.pt", "name=../x"], ["name='../x'", "without /"]),
+        (["export", "policy=none.pt", "name=a/b"], ["name='a/b'", "without /"]),
         (["export", "policy=good", "episodes=0"], ["episodes=0", "1 or more"]),
     ],
 )

@@ -1,5 +1,7 @@
 """Usage, help, and one line for each of the mistakes that any command can be given."""
 
+import os
+import subprocess
 import sys
 
 import pytest
@@ -7,7 +9,7 @@ import pytest
 import drone_rl as drone_rl_package
 from drone_rl.cli.main import main
 from drone_rl.cli.usage import DEMO_USAGE, USAGE
-from tests.cli.running import drone_rl, error_line
+from tests.cli.running import TINY, drone_rl, error_line
 
 
 def test_usage_and_help(tmp_path):
@@ -75,3 +77,55 @@ def test_what_is_printed_without_running_anything(monkeypatch, capsys, tmp_path,
 def test_mistakes_get_one_line_with_the_value_and_the_remedy(in_process, args, words):
     line = error_line(in_process(*args))
     assert all(word in line for word in words), line
+
+
+@pytest.mark.parametrize("args", [["--help"], ["export", "--help"]])
+def test_a_reader_that_leaves_is_no_error(tmp_path, args):
+    """As in `drone-rl --help | head -1`."""
+    reader, writer = os.pipe()
+    os.close(reader)
+    command = [sys.executable, "-m", "drone_rl.cli.main", *args]
+    done = subprocess.run(
+        command, cwd=tmp_path, stdout=writer, stderr=subprocess.PIPE, text=True, check=False
+    )
+    os.close(writer)
+    assert (done.returncode, done.stderr) == (141, "")
+
+
+def test_an_output_that_is_full_is_one_line(tmp_path):
+    with open("/dev/full", "w") as full:
+        command = [sys.executable, "-m", "drone_rl.cli.main"]
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr == "error: standard output can't be written (No space left on device)\n"
+
+
+@pytest.mark.parametrize("limit", [300, 3000])
+def test_a_full_disk_is_one_line_with_path_and_remedy(tmp_path, limit):
+    """A limit on the sizes of files stands in for a full disk, of Hydra's files and of others."""
+    code = (
+        "import resource, signal; signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
+        "from drone_rl.cli.main import main\n"
+        f"resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, -1)); main()\n"
+    )
+    settings = ["train", *TINY, "logger=tensorboard", "hydra.run.dir=full"]
+    command = [sys.executable, "-c", code, *settings]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    line = error_line(done)
+    assert len(done.stderr.splitlines()) == 1
+    assert "full" in line and "File too large" in line and "free some space" in line
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda run: (run / ".lock").mkdir(), [".lock", "Is a directory", "move it away"]),
+        (lambda run: (run / "train.log").mkdir(), ["train.log", "Is a directory"]),
+    ],
+)
+def test_a_folder_where_a_file_should_be_is_one_line(tmp_path, make, words):
+    (tmp_path / "run").mkdir()
+    make(tmp_path / "run")
+    done = drone_rl("train", *TINY, "hydra.run.dir=run", cwd=tmp_path)
+    assert len(done.stderr.splitlines()) == 1
+    assert all(word in error_line(done) for word in words), done.stderr

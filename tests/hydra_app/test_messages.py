@@ -1,10 +1,15 @@
 """One line, whoever noticed the mistake."""
 
+import errno
+import os
+import sys
+import threading
+
 import pytest
 from hydra.errors import HydraException
 from omegaconf.errors import OmegaConfBaseException
 
-from drone_rl.hydra_app.messages import guarded, one_line
+from drone_rl.hydra_app.messages import file_error, guarded, is_output_closed, one_line
 from drone_rl.utils.errors import InputError
 
 
@@ -55,7 +60,67 @@ def test_statuses(capsys):
     assert guarded(fail(InputError("no"))) == 2
     assert guarded(fail(FileNotFoundError(2, "No such file", "x"))) == 2
     assert capsys.readouterr().err.splitlines() == [
-        *("error: interrupted", "error: no", "error: [Errno 2] No such file: 'x'"),
+        *("error: interrupted", "error: no"),
+        "error: x can't be opened or written (No such file); check the path or choose another "
+        "folder with hydra.run.dir=...",
     ]
     with pytest.raises(ZeroDivisionError):
         guarded(lambda: 1 // 0)
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (
+            OSError(errno.ENOSPC, "No space left", "a/b"),
+            ["a/b", "No space left", "free some space"],
+        ),
+        (OSError(errno.EFBIG, "File too large", "a"), ["a ", "free some space"]),
+        (OSError(errno.EROFS, "Read-only file system", b"a"), ["a ", "who may write"]),
+        (OSError(errno.EISDIR, "Is a directory", "a"), ["a ", "move it away"]),
+        (OSError(errno.EIO, "Input/output error"), ["a file", "check the path"]),
+    ],
+)
+def test_an_error_of_the_file_system_has_path_reason_and_remedy(error, words):
+    line = one_line(error)
+    assert all(word in line for word in [*words, "hydra.run.dir="]), line
+
+
+def test_a_path_can_not_leave_its_line():
+    assert "\n" not in file_error(OSError(errno.EISDIR, "Is a directory", "a\nb"))
+
+
+def test_a_log_that_can_not_be_opened_is_no_bug(capsys):
+    def command():
+        try:
+            raise IsADirectoryError(errno.EISDIR, "Is a directory", "train.log")
+        except OSError as error:
+            raise ValueError("Unable to configure handler 'file'") from error
+
+    assert guarded(command) == 2
+    assert capsys.readouterr().err.startswith("error: train.log can't be opened")
+
+
+def test_a_thread_that_can_not_write_is_told_of_in_one_line(capsys, monkeypatch):
+    monkeypatch.setattr(threading, "excepthook", threading.excepthook)
+
+    def full():
+        raise OSError(errno.ENOSPC, "No space left", "events")
+
+    def command():
+        thread = threading.Thread(target=full)
+        thread.start()
+        thread.join()
+        return 0
+
+    assert guarded(command) == 0
+    assert capsys.readouterr().err.startswith("warning: events can't be opened")
+
+
+def test_an_output_that_nobody_reads(monkeypatch):
+    reader, writer = os.pipe()
+    with os.fdopen(writer, "w") as out:
+        monkeypatch.setattr(sys, "stdout", out)
+        assert not is_output_closed()
+        os.close(reader)
+        assert is_output_closed()

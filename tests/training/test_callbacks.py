@@ -1,5 +1,6 @@
 import csv
 import logging
+import subprocess
 
 import pytest
 from torchrl.record.loggers.csv import CSVLogger
@@ -32,6 +33,24 @@ def test_first_checkpoint_is_there_before_the_first_update(make_trainer, tmp_pat
     callback = CheckpointCallback(tmp_path / "deep" / "folder")
     callback.on_start(make_trainer())
     assert load_checkpoint(callback.last_path)["progress"]["updates"] == 0
+
+
+def test_what_killed_trainings_left_is_deleted(make_trainer, tmp_path):
+    dead = subprocess.Popen(["true"])
+    dead.wait()
+    left = {f".last.pt.{dead.pid}", ".best.pt.ab12cd_3"}
+    kept = {".last.pt.1", ".mine", "mine.pt"}  # process 1 lives
+    for name in left | kept:
+        (tmp_path / name).touch()
+    CheckpointCallback(tmp_path).on_start(make_trainer())
+    assert {path.name for path in tmp_path.iterdir()} == {*kept, "last.pt", "best.pt"}
+
+
+@pytest.mark.parametrize("row", ["x", "-1", "9" * 30, "1.5"])
+def test_damaged_metrics_are_refused(make_trainer, tmp_path, row):
+    (tmp_path / "metrics.csv").write_text(f"update,frames\n{row},2\n")
+    with pytest.raises(InputError, match="no number of an update"):
+        CsvCallback(tmp_path / "metrics.csv").on_start(make_trainer())
 
 
 def test_folder_that_cannot_be_made(make_trainer, tmp_path):

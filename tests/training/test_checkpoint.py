@@ -1,6 +1,8 @@
 import errno
 import os
 import pickle
+import subprocess
+import sys
 
 import pytest
 import torch
@@ -35,6 +37,31 @@ def test_full_disk_leaves_the_previous_checkpoint_and_no_debris(saved, monkeypat
     assert "\n" not in str(error.value)
     assert load_checkpoint(saved)["name"] == "first"
     assert [p.name for p in saved.parent.iterdir()] == ["last.pt"]
+
+
+def test_a_first_checkpoint_that_fails_claims_no_earlier_one(tmp_path, monkeypatch):
+    def full(*args):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(InputError, match="there is none yet") as error:
+        save_checkpoint(tmp_path / "last.pt", {})
+    assert "intact" not in str(error.value)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_system_says_why_pytorch_could_not_write(tmp_path):
+    """A limit on the sizes of files stands in for a full disk."""
+    code = (
+        "import resource, signal, torch; signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
+        "from drone_rl.training import save_checkpoint\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (4096, -1))\n"
+        "save_checkpoint('last.pt', {'a': torch.zeros(10**6)})\n"
+    )
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert "last.pt could not be written (File too large)" in done.stderr
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_folder_that_is_not_there(tmp_path):

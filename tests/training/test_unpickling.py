@@ -169,3 +169,13 @@ def test_other_files_in_the_archive():
     assert unpickle(archive(b"\x80\x02N.", byteorder=b"little"), "x") is None
     with pytest.raises(InputError, match="no whole archive"):
         unpickle(pickle.dumps(Call(os.mkdir, "ran")), "x")
+
+
+@pytest.mark.parametrize(("kind", "length"), [("Int", 4), ("Float", 2)])
+def test_one_storage_has_one_type_and_length(kind, length):
+    one = tensor((4,), (1,))[2:-1]
+    other = tensor((2,), (1,), length=length)[2:-1].replace(b"Float", kind.encode())
+    with pytest.raises(DamagedError, match="two types or lengths"):
+        unpickle(archive(b"\x80\x02]" + one + b"a" + other + b"a.", [FOUR]), "x")
+    found = unpickle(archive(b"\x80\x02]" + one + b"a" + one + b"a.", [FOUR]), "x")
+    assert found[0].data_ptr() == found[1].data_ptr()

@@ -2,14 +2,16 @@
 
 import io
 import struct
+import tracemalloc
 import warnings
 import zipfile
 
 import numpy as np
 import pytest
 
-from drone_rl.utils.archives import read_arrays, read_members
+from drone_rl.utils.archives import read_array, read_arrays, read_members
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.limits import Allowance
 
 
 def archive(members, method=zipfile.ZIP_STORED):
@@ -99,3 +101,42 @@ def test_a_bomb_is_seen_by_its_directory(tmp_path):
     (tmp_path / "a.npz").write_bytes(bomb)
     with pytest.raises(InputError, match="more than 1000000 bytes"):
         read_arrays(tmp_path / "a.npz", most=10**6)
+
+
+def test_a_file_that_is_longer_than_its_directory_says_is_not_unpacked(tmp_path):
+    whole = archive([("a.npy", bytes(2**26))], zipfile.ZIP_DEFLATED)
+    lying = whole.replace(struct.pack("<L", 2**26), struct.pack("<L", 100))
+    tracemalloc.start()
+    with pytest.raises(InputError, match="no whole archive"):
+        list(read_members(lying, "x", most=1000, methods=(zipfile.ZIP_DEFLATED,)))
+    assert tracemalloc.get_traced_memory()[1] < 2**22
+    tracemalloc.stop()
+
+
+def test_archives_share_an_allowance(tmp_path):
+    np.savez(tmp_path / "a.npz", a=np.zeros(100))
+    allowance = Allowance(1500)
+    read_arrays(tmp_path / "a.npz", allowance=allowance)
+    with pytest.raises(InputError, match="more than 1500 bytes, of which"):
+        read_arrays(tmp_path / "a.npz", allowance=allowance)
+
+
+def test_an_array_alone(tmp_path):
+    np.save(tmp_path / "a.npy", np.arange(3.0))
+    assert read_array(tmp_path / "a.npy").tolist() == [0, 1, 2]
+    (tmp_path / "a.npy").write_bytes(npy((10**12,)))
+    with pytest.raises(InputError, match="which its bytes are not"):
+        read_array(tmp_path / "a.npy")
+
+
+@pytest.mark.parametrize("code", [0xD800, 0x110000])
+def test_numbers_that_are_no_characters(tmp_path, code):
+    (tmp_path / "a.npy").write_bytes(npy((1,), dtype="<U1", data=struct.pack("<L", code)))
+    with pytest.raises(InputError, match="no characters"):
+        read_array(tmp_path / "a.npy")
+
+
+def test_dimensions_of_nothing_are_bounded(tmp_path):
+    (tmp_path / "a.npy").write_bytes(npy((0, 2**40)))
+    with pytest.raises(InputError, match="has the shape"):
+        read_array(tmp_path / "a.npy")

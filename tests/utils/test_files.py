@@ -1,8 +1,10 @@
 """Whole files, locked folders, and files that nobody should trust."""
 
+import errno
 import math
 import multiprocessing
 import os
+import subprocess
 
 import pytest
 
@@ -14,8 +16,11 @@ from drone_rl.utils.files import (
     parse_json,
     read_bytes,
     read_json,
+    read_tail,
     refuse_links,
+    remove_leftovers,
     to_file_name,
+    write_all_atomically,
     write_atomically,
 )
 
@@ -149,3 +154,66 @@ def test_a_folder_with_a_link_in_it_is_refused(tmp_path):
 )
 def test_a_name_becomes_that_of_one_file(name, file_name):
     assert to_file_name(name) == file_name
+
+
+def test_several_files_are_written_or_none(tmp_path):
+    (tmp_path / "b").mkdir()
+    with pytest.raises(IsADirectoryError) as error:
+        write_all_atomically({tmp_path / "a": "1", tmp_path / "b": "2"})
+    assert error.value.filename == str(tmp_path / "b")
+    assert [path.name for path in tmp_path.iterdir()] == ["b"]
+    write_all_atomically({tmp_path / "a": "1", tmp_path / "c": b"2"})
+    assert (tmp_path / "a").read_text() + (tmp_path / "c").read_text() == "12"
+
+
+def test_an_error_of_writing_names_the_file_that_was_to_be_written(tmp_path, monkeypatch):
+    def full(*args):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, "replace", full)
+    with pytest.raises(OSError, match="No space left") as error:
+        write_atomically(tmp_path / "a.json", "x")
+    assert error.value.filename == str(tmp_path / "a.json")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_leftovers_of_dead_processes_are_deleted_and_nothing_else(tmp_path):
+    dead = subprocess.Popen(["true"])
+    dead.wait()
+    kept = {".last.pt.1", ".other.pt.99", ".last.pt.notes.txt", "last.pt", ".last.pt.0x"}
+    gone = {f".last.pt.{dead.pid}", f".last.pt.{os.getpid()}", ".best.pt.a1b2_c3d"}
+    for name in kept | gone:
+        (tmp_path / name).touch()
+    (tmp_path / ".best.pt.zzzzzzzz").mkdir()
+    remove_leftovers(tmp_path, "last.pt", "best.pt")
+    assert {path.name for path in tmp_path.iterdir()} == {*kept, ".best.pt.zzzzzzzz"}
+    remove_leftovers(tmp_path / "none", "last.pt")
+
+
+def test_the_end_of_a_log(tmp_path):
+    (tmp_path / "log").write_bytes(b"x" * 100 + b"end")
+    assert read_tail(tmp_path / "log", 5) == b"xxend"
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(InputError, match="no plain file"):
+        read_tail(tmp_path / "pipe", 5)
+    with pytest.raises(InputError, match="can't be read"):
+        read_tail(tmp_path, 5)
+
+
+def test_json_is_bounded(tmp_path):
+    assert parse_json("[1, 2]", "x", most_values=3) == [1, 2]
+    with pytest.raises(InputError, match="more than 2 values"):
+        parse_json("[1, 2]", "x", most_values=2)
+    with pytest.raises(InputError, match="nested more than 64 times"):
+        parse_json("[" * 65 + "]" * 65, "x")
+    with pytest.raises(InputError, match="too large"):
+        parse_json("1e400", "x")
+    assert parse_json("1e400", "x", allow_nan=True) == math.inf
+
+
+def test_a_folder_of_too_many_files(tmp_path, monkeypatch):
+    for name in "abc":
+        (tmp_path / name).touch()
+    monkeypatch.setattr("drone_rl.utils.files.FOLDER_ENTRIES", 2)
+    with pytest.raises(InputError, match="more than 2 files and folders"):
+        refuse_links(tmp_path)

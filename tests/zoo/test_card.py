@@ -50,3 +50,8 @@ def test_a_policy_that_never_failed_has_a_bound():
     assert "| fails | never |" in found
     assert "less than 1%" not in found
     assert "| upper bound | 0.9% of episodes |" in found
+
+
+def test_a_package_that_is_not_noted_is_unknown():
+    found = lines(provenance={"versions": {"torch": "1"}, "git_revision": None})
+    assert "- revision unknown; torch 1, torchrl unknown, mujoco-warp unknown" in found

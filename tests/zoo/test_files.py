@@ -213,3 +213,15 @@ def test_where_certificates_lie(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert certificate_path(Path("last.pt")) == tmp_path.parent / "certificate.json"
     assert certificate_path(Path("/last.pt")) == Path("/certificate.json")
+
+
+@pytest.mark.parametrize("where", ["mine.md", "mine.shifts.json"])
+def test_an_export_that_fails_writes_nothing(tmp_path, where):
+    (tmp_path / where).mkdir()
+    path, carried = tmp_path / "mine.safetensors", {tmp_path / "mine.shifts.json": b"{}"}
+    origin = {"command": "drone-rl train", "seed": 5, "chosen": None, "carried": carried}
+    with pytest.raises(InputError, match=rf"{where}.*free some space"):
+        export_policy(path, CHECKPOINT, verdict=VERDICT, **origin)
+    with pytest.raises(KeyError):
+        export_policy(path, CHECKPOINT, verdict={**VERDICT, "failures": {}}, **origin)
+    assert [found.name for found in tmp_path.iterdir()] == [where]

@@ -1,0 +1,199 @@
+"""Archives of arrays that lie about their sizes, their types or what their numbers count."""
+
+import io
+import json
+import shutil
+import struct
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+Case = tuple[str, list[str], str]
+"""Name, arguments of `drone-rl`, and what would go wrong."""
+_NUMBERS = {"format": "drone_rl explanation", "format_version": 3, "name": "x"}
+
+
+def hostile_arrays(folder: Path) -> list[Case]:
+    """Makes folders of explanations, each with one file that lies.
+
+    Args:
+        folder: Where to.
+    """
+    cases = []
+    for file, contents in (("arrays", _arrays()), ("dataset", _data())):
+        for name, content in contents.items():
+            here = folder / f"explanation_{file}_{name}"
+            here.mkdir()
+            (here / "explanation.json").write_text(json.dumps(_NUMBERS))
+            for other in ("arrays", "dataset"):
+                (here / f"{other}.npz").write_bytes(content if other == file else _npz())
+            cases.append((here.name, ["report", f"explanations={here}"], "arrays that lie"))
+    return [*cases, *_together(folder), *_numbers(folder)]
+
+
+def _arrays() -> dict[str, bytes]:
+    """What can be wrong with an archive or with what an array says of itself."""
+    zeros = np.zeros
+    headers: dict[str, Any] = {
+        "dimensions_of_0": ((0, 2**40), "<f8", b""),
+        "negative": ((-1, 3), "<f8", bytes(24)),
+        "dimensions_30": ((1,) * 30, "<f8", bytes(8)),
+        "more_than_there_is": ((2**40,), "<f8", bytes(8)),
+        "overflow": ((2**40, 2**40), "<f8", b""),
+        "objects": ((1,), "|O", bytes(8)),
+        "complex": ((1,), "<c16", bytes(16)),
+        "records": ((1,), "[('a', '<f8')]", bytes(8)),
+        "dates": ((1,), "<M8[s]", bytes(8)),
+        "raw": ((1,), "|V8", bytes(8)),
+        "no_characters": ((1,), "<U1", b"\xff\xff\xff\x7f"),
+        "call": ("__import__('os').system('touch ran')", "<f8", bytes(8)),
+    }
+    made = {name: _zip({"a.npy": _npy(*of)}) for name, of in headers.items()}
+    made |= {
+        "long_header": _zip({"a.npy": _npy((1,), "<f8" + " " * 60_000, bytes(8))}),
+        "version_3": _zip({"a.npy": _npy((1,), "<f8", bytes(8)).replace(b"Y\x01", b"Y\x03", 1)}),
+        "no_array": _zip({"a.npy": b"hello"}),
+        "unpacks_to_1_gib": _zip({"a.npy": _npy((2**27,), "<f8", bytes(2**30))}, deflated=True),
+        "longer_than_its_directory_says": _shorter(2**29),
+        "many_files": _zip({f"{i}.npy": b"" for i in range(10_001)}),
+        "one_content_for_all": _overlapping(),
+        "method": _zip({"a.npy": b"x"}).replace(b"\x00\x00\x00\x00\x21", b"\x00\x00\x0e\x00\x21"),
+        "encrypted": _flagged(),
+        "checksum": _zip({"a.npy": _npy((1,), "<f8", b"12345678")}).replace(
+            b"12345678", b"12345679"
+        ),
+        "only_a_directory": b"PK\x05\x06" + bytes(18),
+        "directory_elsewhere": b"PK\x05\x06" + struct.pack("<4H2LH", 0, 0, 9, 9, 2**31, 2**31, 0),
+        "film_flat": _npz(film_frames=zeros((4, 4), np.uint8)),
+        "film_of_reals": _npz(film_frames=zeros((1, 4, 4, 3))),
+        "film_wide": _npz(film_frames=zeros((1, 1, 2**20, 3), np.uint8)),
+        "film_actions": _npz(film_actions=np.array([2**40])),
+        "heights": _npz(response_height=zeros(10**6)),
+        "outlines": _npz(places_points=zeros((10**6, 2))),
+        "ends": _npz(places_ends=zeros(10**6, np.int64)),
+        "map_of_3": _npz(tsne_features=zeros((9, 3))),
+        "map_of_texts": _npz(tsne_pixels=np.array([["a", "b"]])),
+        "class_model_large": _npz(class_model_logit=zeros((1, 1, 4096, 4096), np.float16)),
+        "strips": _npz(shifts_fog=zeros((6, 2000, 2000, 3), np.uint8)),
+        "patches": _npz(patch_effects=zeros((2000, 2000))),
+        "many_arrays": _npz(**{f"x{i}": zeros(1) for i in range(3000)}),
+    }
+    return made
+
+
+def _data() -> dict[str, bytes]:
+    """What numbers that are counted or used as indices can be."""
+    return {
+        "episode_2_33": _npz(**{"flights/episode": np.array([2**33])}),
+        "episode_2_40": _npz(**{"flights/episode": np.array([0, 2**40])}),
+        "episode_2_62": _npz(**{"flights/episode": np.array([2**62], np.uint64)}),
+        "episode_negative": _npz(**{"flights/episode": np.array([-1, 0])}),
+        "episode_beyond_its_steps": _npz(**{"flights/episode": np.array([0, 5])}),
+        "episode_of_reals": _npz(**{"flights/episode": np.zeros(3)}),
+        "episode_of_two_dimensions": _npz(**{"flights/episode": np.zeros((3, 3), int)}),
+        "frame_episode": _npz(episode=np.array([2**40])),
+        "frame_step": _npz(step=np.array([-(2**40)])),
+        "action": _npz(actions=np.array([99])),
+        "action_of_texts": _npz(actions=np.array(["left"])),
+        "frames_gray": _npz(frames=np.zeros((3, 4, 4), np.uint8)),
+        "frames_of_4_channels": _npz(frames=np.zeros((3, 4, 4, 4), np.uint8)),
+        "frames_wide": _npz(frames=np.zeros((1, 1, 2**22, 3), np.uint8)),
+        "frames_of_no_height": _zip({"frames.npy": _npy((1, 2**30, 0, 3), "|u1", b"")}),
+        "frames_of_256_mib": _npz(frames=np.zeros((342, 512, 512, 3), np.uint8)),
+        "probabilities_of_2_22": _npz(probabilities=np.zeros((1, 2**22), np.float32)),
+        "meta_of_objects": _zip({"meta.npy": _npy((1,), "|O", bytes(8))}),
+    }
+
+
+def _together(folder: Path) -> list[Case]:
+    """Files that are small enough one by one, but not together."""
+    here = folder / "explanation_arrays_two_of_2_29"
+    here.mkdir()
+    (here / "explanation.json").write_text(json.dumps(_NUMBERS))
+    half = _zip({"a.npy": _npy((2**26 - 16,), "<f8", bytes(2**29 - 128))}, deflated=True)
+    for other in ("arrays", "dataset"):
+        (here / f"{other}.npz").write_bytes(half)
+    several = [here.with_name(f"{here.name}_{i}") for i in range(3)]
+    for copy in several:
+        shutil.copytree(here, copy)
+        (copy / "dataset.npz").write_bytes(_npz())
+    names = ",".join(map(str, several))
+    return [
+        (here.name, ["report", f"explanations={here}"], "two archives of 512 MiB"),
+        (f"{here.name}_3", ["report", f"explanations=[{names}]"], "three archives of 512 MiB"),
+    ]
+
+
+def _numbers(folder: Path) -> list[Case]:
+    """Lists and mappings that a figure would show entry by entry."""
+    parts: dict[str, Any] = {
+        "key_steps": {"attribution": {"film": {"key_steps": [{"step": 0, "why": "x"}] * 1000}}},
+        "methods": {"truth": {"methods": {str(i): {} for i in range(1000)}}},
+        "curves": {"truth": {"curves": {str(i): {} for i in range(1000)}}},
+        "conditions": {"shifts": {"axes": {str(i): {} for i in range(1000)}}},
+        "long_list": {"more": [0] * 30_000},
+        "actions": {"actions": {"names": ["a"] * 1000}},
+        "terms": {"terms": {"goal": "x" * 10**6}},
+        "name": {"name": "x" * 10**6},
+        "name_of_lines": {"name": "a\nb"},
+    }
+    cases = []
+    for name, part in parts.items():
+        here = folder / f"explanation_numbers_{name}"
+        here.mkdir()
+        (here / "explanation.json").write_text(json.dumps({**_NUMBERS, **part}))
+        for other in ("arrays", "dataset"):
+            (here / f"{other}.npz").write_bytes(_npz())
+        cases.append((here.name, ["report", f"explanations={here}"], "too much to show"))
+    return cases
+
+
+def _npz(**arrays: np.ndarray) -> bytes:
+    file = io.BytesIO()
+    # numpy's annotation takes any name for allow_pickle
+    np.savez_compressed(file, **(arrays or {"a": np.zeros(3)}))  # pyright: ignore[reportArgumentType]
+    return file.getvalue()
+
+
+def _npy(shape: Any, dtype: str, data: bytes) -> bytes:
+    header = f"{{'descr': '{dtype}', 'fortran_order': False, 'shape': {shape}, }}\n".encode()
+    return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header + data
+
+
+def _zip(members: Mapping[str, bytes], *, deflated: bool = False) -> bytes:
+    file = io.BytesIO()
+    method = zipfile.ZIP_DEFLATED if deflated else zipfile.ZIP_STORED
+    with zipfile.ZipFile(file, "w", method) as archive:
+        for name, data in members.items():
+            archive.writestr(name, data)
+    return file.getvalue()
+
+
+def _shorter(size: int) -> bytes:
+    """An archive whose directory says that its file has 100 bytes once it is unpacked."""
+    content = _zip({"a.npy": _npy((size // 8,), "<f8", bytes(size))}, deflated=True)
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        said = archive.infolist()[0].file_size
+    return content.replace(struct.pack("<L", said), struct.pack("<L", 100))
+
+
+def _overlapping() -> bytes:
+    """A directory in which 1000 files have the content of the first, of a megabyte."""
+    content = _zip({"a.npy": bytes(2**20)}, deflated=True)
+    begin = content.index(b"PK\x01\x02")
+    end = content.index(b"PK\x05\x06")
+    entry = content[begin:end]
+    entries = b"".join(entry.replace(b"a.npy", b"%05d" % i) for i in range(1000))
+    last = struct.pack("<4s4H2LH", b"PK\x05\x06", 0, 0, 1000, 1000, len(entries), begin, 0)
+    return content[:begin] + entries + last
+
+
+def _flagged() -> bytes:
+    """An archive whose file is said to be encrypted."""
+    content = bytearray(_zip({"a.npy": _npy((1,), "<f8", bytes(8))}))
+    content[content.index(b"PK\x01\x02") + 8] |= 1
+    content[6] |= 1
+    return bytes(content)

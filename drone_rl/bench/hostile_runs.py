@@ -1,0 +1,204 @@
+"""Folders of runs and sweeps with files that are damaged, too large, or no files."""
+
+import io
+import json
+import os
+import socket
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from drone_rl.bench.hostile import NOTED
+
+Case = tuple[str, list[str], str]
+"""Name, arguments of `drone-rl`, and what would go wrong."""
+Make = Callable[[Path], Any]
+_HEADER = b"update,frames,episodes,seconds,train/running_reward,loss/entropy\n"
+_ROW = b"1,100,4,1.0,0.5,0.7\n"
+METRICS: dict[str, bytes] = {
+    "no_text": b"\xff\xfe" + _HEADER,
+    "one_line_of_a_megabyte": b"a" * 2**20,
+    "field_of_a_megabyte": _HEADER + b'"' + b"a" * 2**20 + b'"\n',
+    "commas": b"," * 2**22,
+    "lines": _HEADER + b"\n" * 2**19,
+    "many_rows": _HEADER + _ROW * 200_000,
+}
+"""Contents of `metrics.csv` that no training wrote."""
+
+
+def hostile_runs(folder: Path, checkpoint: Callable[[Path], Path]) -> list[Case]:
+    """Makes the folders.
+
+    Args:
+        folder: Where to.
+        checkpoint: Makes a run's folder with a checkpoint in it.
+    """
+    return [
+        *_resumed(folder, checkpoint),
+        *_proofs(folder, checkpoint),
+        *_sweeps(folder),
+        *_targets(folder),
+    ]
+
+
+def _resumed(folder: Path, checkpoint: Callable[[Path], Path]) -> list[Case]:
+    """A run to go on with, in which something is of another kind."""
+    kinds: dict[str, tuple[str, Make]] = {
+        "lock_folder": (".lock", Path.mkdir),
+        "lock_pipe": (".lock", os.mkfifo),
+        "overrides_folder": (".hydra/overrides.yaml", Path.mkdir),
+        "overrides_pipe": (".hydra/overrides.yaml", os.mkfifo),
+        "overrides_sparse": (".hydra/overrides.yaml", _sparse),
+        "log_folder": ("train.log", Path.mkdir),
+        "log_pipe": ("train.log", os.mkfifo),
+        "rounds_folder": ("provable.json", Path.mkdir),
+        "socket": ("x.socket", _socket),
+        "many_files": ("tensorboard", lambda path: _many(path, 50_100)),
+    }
+    cases = []
+    for name, (where, make) in kinds.items():
+        run = _begun(folder / f"resumed_{name}", checkpoint)
+        if where.endswith("overrides.yaml"):
+            (run / where).unlink()
+        make(run / where)
+        command = ["train", f"resume={run}"]
+        if name == "rounds_folder":
+            command.append("provable.rounds=1")
+        cases.append((run.name, command, "no plain file in a run"))
+    return cases
+
+
+def _proofs(folder: Path, checkpoint: Callable[[Path], Path]) -> list[Case]:
+    """A proof's state to go on with, that is none."""
+    del checkpoint
+    file = io.BytesIO()
+    np.savez(file, subject=np.zeros(4, np.uint8), counts=np.zeros(6))
+    states: dict[str, bytes | Make] = {
+        "archive": b"PK\x03\x04",
+        "others": file.getvalue(),
+        "text": b"hello",
+        "folder": Path.mkdir,
+        "pipe": os.mkfifo,
+        "sparse": _sparse,
+    }
+    cases = []
+    for name, content in states.items():
+        here = folder / f"proof_{name}"
+        here.mkdir()
+        state = here / "state.npz"
+        if isinstance(content, bytes):
+            state.write_bytes(content)
+        else:
+            content(state)
+        settings = ["task.num_cubes=1", "compared=1", f"hydra.run.dir={here}"]
+        command = ["prove", "policy=right_and_forward", *settings]
+        cases.append((here.name, command, "a proof's state that is none"))
+    return cases
+
+
+def _sweeps(folder: Path) -> list[Case]:
+    cases = []
+    for name, content in METRICS.items():
+        sweep = _sweep(folder / f"{NOTED}metrics_{name}", {"0": content})
+        cases.append((sweep.name, ["sweep-report", f"folder={sweep}"], "metrics that are none"))
+    made: dict[str, Make] = {
+        "metrics_large": lambda run: (run / "metrics.csv").write_bytes(_HEADER + _ROW * 3 * 10**6),
+        "metrics_sparse": lambda run: _sparse(run / "metrics.csv"),
+        "metrics_folder": lambda run: (run / "metrics.csv").mkdir(),
+        "metrics_missing": lambda run: None,
+    }
+    for name, make in made.items():
+        sweep = _sweep(folder / f"{NOTED}{name}", {"0": None})
+        make(sweep / "0")
+        cases.append((sweep.name, ["sweep-report", f"folder={sweep}"], "metrics that are none"))
+    sweep = _sweep(folder / f"{NOTED}sweep_of_60_mb", {str(i): None for i in range(4)})
+    for i in range(4):
+        (sweep / str(i) / "metrics.csv").write_bytes(_HEADER + _ROW * 3 * 10**6)
+    cases.append((sweep.name, ["sweep-report", f"folder={sweep}"], "60 MB of metrics a run"))
+    for name in ("summary.csv", "summary.json", "report.html"):
+        sweep = _sweep(folder / f"sweep_{name.replace('.', '_')}_folder", {"0": None})
+        (sweep / name).mkdir()
+        cases.append((sweep.name, ["sweep-report", f"folder={sweep}"], "a folder to write to"))
+    sweep = _sweep(folder / "sweep_of_large_results", {"0": None})
+    data = json.loads((sweep / "sweep.json").read_text())
+    data["runs"] = [{"number": i, "overrides": [], "folder": str(i)} for i in range(70)]
+    (sweep / "sweep.json").write_text(json.dumps(data))
+    result = b'{"reason": "frames", "a": [' + b"{}," * 80_000 + b"{}]}"
+    (sweep / "0" / "result.json").write_bytes(result)
+    for i in range(1, 70):
+        (sweep / str(i)).mkdir()
+        os.link(sweep / "0" / "result.json", sweep / str(i) / "result.json")
+    return [*cases, (sweep.name, ["sweep-report", f"folder={sweep}"], "one result, many times")]
+
+
+def _targets(folder: Path) -> list[Case]:
+    """Names and places to write to that lead elsewhere, or can't be."""
+    del folder
+    names = {
+        "above": "../x",
+        "below": "a/b",
+        "absolute": "/tmp/x",
+        "hidden": ".x",
+        "empty": "''",
+        "home": "'~x'",
+        "lines": '"a\\tb"',
+        "long": "x" * 300,
+    }
+    export = ["export", "policy=good"]
+    cases = [(f"export_{n}", [*export, f"name={v}"], "a name as a path") for n, v in names.items()]
+    for name, where in {
+        "device": "/dev/null/x",
+        "system": "/proc/x",
+        "self": "/proc/self/x",
+    }.items():
+        command = ["check", "certificate=none.json", f"hydra.run.dir={where}"]
+        cases.append((f"target_{name}", command, "a place that can't be written to"))
+    return cases
+
+
+def _begun(run: Path, checkpoint: Callable[[Path], Path]) -> Path:
+    run = checkpoint(run)
+    (run / ".hydra" / "overrides.yaml").write_text("- experiment=smoke\n- logger=csv\n")
+    return run
+
+
+def _sweep(sweep: Path, metrics: dict[str, bytes | None]) -> Path:
+    """The folder of a sweep whose runs came to their ends."""
+    sweep.mkdir()
+    runs = [{"number": int(n), "overrides": [f"seed={n}"], "folder": n} for n in metrics]
+    about = {"format": "drone_rl sweep", "command": "drone-rl train -m seed=0,1", "settings": {}}
+    about |= {"versions": {}, "git_revision": None, "machine": {}}
+    (sweep / "sweep.json").write_text(json.dumps({**about, "runs": runs}))
+    result = {"reason": "frames", "frames": 100, "episodes": 4, "seconds": 1.0}
+    result |= {"running_reward": 0.5, "largest_reward": 3.0}
+    for name, content in metrics.items():
+        (sweep / name).mkdir()
+        (sweep / name / "result.json").write_text(json.dumps(result))
+        if content is not None:
+            (sweep / name / "metrics.csv").write_bytes(content)
+    return sweep
+
+
+def _many(folder: Path, count: int) -> None:
+    folder.mkdir()
+    first = folder / "0"
+    first.touch()
+    for i in range(1, count):
+        os.link(first, folder / str(i))
+
+
+def _socket(path: Path) -> None:
+    with socket.socket(socket.AF_UNIX) as made:
+        here = os.open(path.parent, os.O_RDONLY)
+        try:
+            made.bind(f"/proc/self/fd/{here}/{path.name}")  # a path may have 108 bytes
+        finally:
+            os.close(here)
+
+
+def _sparse(path: Path) -> None:
+    """A terabyte that takes no place."""
+    with path.open("wb") as file:
+        file.truncate(2**40)

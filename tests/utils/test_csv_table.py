@@ -1,0 +1,47 @@
+"""Rows come one by one, and too many of them not at all."""
+
+import pytest
+
+from drone_rl.utils import csv_table
+from drone_rl.utils.csv_table import read_table
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.limits import Allowance
+
+
+@pytest.fixture
+def table(tmp_path):
+    path = tmp_path / "a.csv"
+
+    def write(content):
+        path.write_bytes(content)
+        return path
+
+    return write
+
+
+def test_rows_without_the_empty_ones(table):
+    assert [*read_table(table(b'a,b\r\n1,"2,3"\r\n\r\n4,5'))] == [
+        ["a", "b"],
+        ["1", "2,3"],
+        ["4", "5"],
+    ]
+
+
+def test_sizes_are_bounded(table, monkeypatch):
+    path, allowance = table(b"a,b\n1,2\n3,4\n"), Allowance(20)
+    assert len([*read_table(path, allowance)]) == 3
+    with pytest.raises(InputError, match="8 are left"):
+        [*read_table(path, allowance)]
+    monkeypatch.setattr(csv_table, "METRICS_ROWS", 1)
+    with pytest.raises(InputError, match="more than 1 rows"):
+        [*read_table(path)]
+    monkeypatch.setattr(csv_table, "METRICS_ROWS", 9)
+    monkeypatch.setattr(csv_table, "METRICS_CELLS", 2)
+    with pytest.raises(InputError, match="more than 2 cells"):
+        [*read_table(path)]
+
+
+@pytest.mark.parametrize("content", [b"a\xff\n", b"a\n" + b"b" * 200_000])
+def test_what_is_no_table(table, content):
+    with pytest.raises(InputError, match="no CSV"):
+        [*read_table(table(content))]
