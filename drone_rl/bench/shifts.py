@@ -20,7 +20,7 @@ def bench_shifts(quick: bool) -> dict[str, Any]:
     """
     begin = time.perf_counter()
     episodes = 20 if quick else 200
-    suite = shifts("good", episodes=episodes, modes=["constant"], domain=False, progress=silent)
+    suite = shifts("good", seed=0, episodes=episodes, modes=["constant"], domain=False, progress=silent)
     seconds = time.perf_counter() - begin
     found = {
         "shift_suite_s": seconds,
@@ -28,6 +28,6 @@ def bench_shifts(quick: bool) -> dict[str, Any]:
         "shift_area": suite.area,
     }
     if not quick:
-        whole = shifts("good", strengths=[5], modes=["constant"], progress=silent)
+        whole = shifts("good", seed=0, strengths=[5], modes=["constant"], progress=silent)
         found["shift_domain"] = whole.sentence
     return found

@@ -9,14 +9,18 @@ from numpy.typing import NDArray
 from drone_rl.utils.archives import read_arrays
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import parse_json, read_bytes, refuse_links
-from drone_rl.utils.schema import Text, as_mapping
+from drone_rl.utils.schema import Flag, Maybe, Text, Whole, as_mapping
 from drone_rl.words.actions import ShownActions, shown_actions
+from drone_rl.words.seeds import SEED_KEYS
 from drone_rl.words.terms import Terms, terms_of
 
 FORMAT = "drone_rl explanation"
 FORMAT_VERSION = 3
 FRAME = frozenset(
-    {"format", "format_version", "name", "settings", "seconds", "actions", "terms", "provenance"}
+    {
+        *("format", "format_version", "name", "settings", "seconds", "actions", "terms"),
+        *("provenance", *SEED_KEYS),
+    }
 )
 """Entries of explanation.json that are no section's."""
 MOST_BYTES = 2**26
@@ -71,6 +75,7 @@ class Explanation:
             terms_of(numbers)
             if "name" in numbers:
                 Text(1000).read(numbers["name"], "name")
+            _check_seed(numbers)
         except (InputError, OSError) as error:
             raise InputError(
                 f"explanation {folder} can't be read ({error}); run drone-rl explain again"
@@ -81,3 +86,10 @@ class Explanation:
                 "run drone-rl explain again"
             )
         return cls(numbers, arrays, data)
+
+
+def _check_seed(numbers: dict[str, Any]) -> None:
+    """Refuses a seed that is none; files of version 0.1 have it among their settings alone."""
+    older = as_mapping(numbers.get("settings", {}), "settings").get("seed")
+    Maybe(Whole(0)).read(numbers.get("seed", older), "seed")
+    Flag().read(numbers.get("seed_is_fixed", True), "seed_is_fixed")
