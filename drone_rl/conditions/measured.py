@@ -237,7 +237,10 @@ def _refuse_another(
             raise InputError(f"it is of another {part} than the policy's")
     stated = ShiftSettings.read(numbers["settings"], "settings")
     if stated.seed is None or stated.seed != numbers.get("seed", stated.seed):
-        raise InputError(f"seed={numbers.get('seed')} is not settings.seed={stated.seed}")
+        shown = numbers.get("seed")
+        raise InputError(
+            f"seed={shown} is not settings.seed={stated.seed}; run drone-rl shifts again"
+        )
     if ("seed" in numbers) != ("seed_is_fixed" in numbers):
         raise InputError("it has one of seed and seed_is_fixed; run drone-rl shifts again")
 

@@ -14,7 +14,6 @@ NAMES = (
     "evaluate, callable that looks frames up",
     "shifts, callable that looks frames up",
     "verdict, file of an MLP",
-    "export, file of an MLP",
 )
 
 
