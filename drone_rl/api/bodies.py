@@ -18,8 +18,11 @@ from drone_rl.settings.judging import JudgeSettings
 from drone_rl.sim.settings import DynamicsSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.provenance import provenance
+from drone_rl.utils.seeding import RootSeed, with_seed
 from drone_rl.words.bodies import rows
+from drone_rl.words.licence import say
 from drone_rl.words.looped import LOOPED, reasons
+from drone_rl.words.seeds import BODIES, seed_line
 
 GUSTS = 0.25
 """Standard deviation of the wind along each axis, as a share of its mean."""
@@ -43,12 +46,17 @@ class Bodies:
 
     def __str__(self) -> str:
         """The table: a policy a row, a body a column; and why flights were left out, if any."""
-        return "\n".join([aligned(rows(self.numbers)), *reasons(self.numbers)])
+        return "\n".join([aligned(rows(self.numbers)), *self._notes()])
 
     def _repr_html_(self) -> str:
         head, *lines = rows(self.numbers)
-        left_out = "".join(map(paragraph, reasons(self.numbers)))
-        return table(head, lines) + left_out + picture(chart(self.numbers))
+        notes = "".join(map(paragraph, self._notes()))
+        return table(head, lines) + notes + picture(chart(self.numbers))
+
+    def _notes(self) -> list[str]:
+        """Why flights were left out, if any were, and the seed."""
+        notes = [*reasons(self.numbers), say(BODIES, self.numbers), seed_line(self.numbers)]
+        return [*filter(None, notes)]
 
 
 def bodies(
@@ -71,7 +79,7 @@ def bodies(
     Raises:
         InputError: A policy or a setting is unusable.
     """
-    settings = (settings or BodiesSettings()).replace(**changes)
+    settings, seed = with_seed((settings or BodiesSettings()).replace(**changes))
     progress = progress or Bar()
     given = list(settings.policies) if policies is None else policies
     whom = given if isinstance(given, list | tuple) else [given]
@@ -86,26 +94,37 @@ def bodies(
             count = sum(map(len, found.values()))
             progress(f"{pilot.name}: {body}", count, steps)
             changed = changes_of(body, pilot.dynamics)
-            done = judge(pilot, asked, dynamics=changed, outputs=outputs, progress=silent)
+            done = judge(
+                pilot,
+                asked,
+                dynamics=changed,
+                outputs=outputs,
+                progress=silent,
+                drawn_seed=seed,
+            )
             flown[body] = done.verdict.as_dict()
-    numbers: dict[str, Any] = {"bodies": list(settings.bodies), "policies": found}
+    numbers: dict[str, Any] = {
+        "bodies": list(settings.bodies),
+        **seed.as_dict(),
+        "policies": found,
+    }
     if settings.loop_flights:
         looped = numbers[LOOPED] = {}
         for pilot in pilots:
             progress(f"{pilot.name}: {LOOPED}", steps - len(pilots) + len(looped), steps)
-            looped[pilot.name] = _looped(pilot, settings)
+            looped[pilot.name] = _looped(pilot, settings, seed)
     progress("flown", steps, steps)
     return Bodies(settings, numbers)
 
 
-def _looped(pilot: Pilot, settings: BodiesSettings) -> dict[str, Any]:
+def _looped(pilot: Pilot, settings: BodiesSettings, seed: RootSeed) -> dict[str, Any]:
     """A policy's flights through a firmware, in still air; or why there are none."""
     from drone_rl.api.looped import fly_in_the_loop
 
     still = pilot.in_dynamics(**changes_of("simple flight", pilot.dynamics))
-    count, seed = settings.loop_flights, settings.seed
+    count = settings.loop_flights
     try:
-        return fly_in_the_loop(still, count, seed, progress=silent).as_dict()
+        return fly_in_the_loop(still, count, drawn_seed=seed, progress=silent).as_dict()
     except (InputError, LoopError) as error:
         return {"left_out": str(error)}
 

@@ -26,7 +26,9 @@ from drone_rl.sim.tasks.collect_cubes import require_cubes, require_moves, rules
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.provenance import provenance
-from drone_rl.utils.seeding import Stream, world_random_state
+from drone_rl.utils.seeding import RootSeed, Stream, with_seed, world_random_state
+from drone_rl.words.licence import say
+from drone_rl.words.seeds import CHANCES, seed_line
 
 _BOUNDS = {
     "least": "everywhere at least",
@@ -58,6 +60,8 @@ class Chances:
     """Metres to either side of each cube for which the bounds are."""
     bounded: tuple[Bounded, ...] = ()
     """Bounds on the success of each placement, wherever within these metres the cubes stand."""
+    seed: RootSeed | None = None
+    """Of held-out placements; None of given ones."""
 
     @property
     def success(self) -> float:
@@ -93,6 +97,7 @@ class Chances:
             "policy": self.policy.name,
             "path": str(self.policy.path),
             "task": self.policy.task.values(),
+            **({} if self.seed is None else self.seed.as_dict()),
             "success": self.success,
             "pictures": self.pictures,
             "placements": [self._placement(i) for i in range(len(self.cubes))],
@@ -105,11 +110,19 @@ class Chances:
 
     def __str__(self) -> str:
         """The table for a terminal."""
-        return f"{aligned(self.rows(), are_numbers=True)}\n{self._about()}"
+        return "\n".join([aligned(self.rows(), are_numbers=True), *self._notes()])
 
     def _repr_html_(self) -> str:
         head, *rows = self.rows()
-        return table(head, rows) + paragraph(self._about())
+        return table(head, rows) + "".join(map(paragraph, self._notes()))
+
+    def _notes(self) -> list[str]:
+        """Below the table."""
+        if self.seed is None:
+            return [self._about()]
+        seed = self.seed.as_dict()
+        notes = [self._about(), say(CHANCES, seed), seed_line(seed, "placements")]
+        return [*filter(None, notes)]
 
     def _about(self) -> str:
         """Of what these are the figures."""
@@ -173,13 +186,13 @@ def chances(
         InputError: The policy, a setting or a place is unusable, the policy has a memory, or the
             task has too many nodes.
     """
-    settings = (settings or ChanceSettings()).replace(**changes)
+    settings, seed = with_seed((settings or ChanceSettings()).replace(**changes))
     progress = progress or Bar()
     policy = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
     policy = policy.in_task(**(task or {}))
     flown, described = require_cubes(policy.task, _WHAT), policy.description
     require_moves(described.dynamics, described.actions, _WHAT)
-    placed = _drawn(flown, settings) if cubes is None else _given(flown, cubes)
+    placed = _drawn(flown, settings.placements, seed) if cubes is None else _given(flown, cubes)
     at_a_time = max(1, CELLS_AT_A_TIME // shape_of(flown).nodes)
     parts = placed.split(min(at_a_time, PLACEMENTS_AT_A_TIME))
     env = policy.make_env(1, device=settings.device, renderer=settings.renderer)
@@ -194,7 +207,8 @@ def chances(
     progress("placements", len(placed), len(placed))
     bounded = _bounded(policy, placed, settings, progress) if settings.within else ()
     outcomes = Outcomes.joined(told)
-    return Chances(policy, placed, outcomes, sight.pictures, settings.within, bounded)
+    origin = seed if cubes is None else None
+    return Chances(policy, placed, outcomes, sight.pictures, settings.within, bounded, origin)
 
 
 def _bounded(
@@ -214,10 +228,10 @@ def _bounded(
     return tuple(found)
 
 
-def _drawn(task: TaskSettings, settings: ChanceSettings) -> Tensor:
+def _drawn(task: TaskSettings, count: int, seed: RootSeed) -> Tensor:
     """The first placement of each of so many held-out worlds."""
-    worlds = range(settings.placements)
-    streams = (world_random_state(settings.seed, world, Stream.REPORT) for world in worlds)
+    worlds = range(count)
+    streams = (world_random_state(seed.value, world, Stream.REPORT) for world in worlds)
     return torch.stack([rules.draw_cubes(task, stream) for stream in streams])
 
 

@@ -21,6 +21,9 @@ from drone_rl.settings.checking import CheckSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import newest
 from drone_rl.utils.provenance import provenance
+from drone_rl.utils.seeding import RootSeed, with_seed
+from drone_rl.words.licence import say
+from drone_rl.words.seeds import CHECK, seed_line
 from drone_rl.zoo import policy_names
 
 REFUSED = 14
@@ -39,6 +42,8 @@ class Check:
     certificate: Certificate = dataclasses.field(repr=False)
     """What it states."""
     findings: Findings
+    seed: RootSeed
+    """Of the placements flown."""
 
     @property
     def accepted(self) -> bool:
@@ -56,7 +61,7 @@ class Check:
             "certificate": str(self.path),
             "policy": str(self.policy.path),
             "task": self.policy.task.values(),
-            "seed": self.settings.seed,
+            **self.seed.as_dict(),
             **self.findings.as_dict(),
             **provenance(),
         }
@@ -76,6 +81,8 @@ class Check:
             f"{flown} flights, {self.findings.contradicted} of them ended otherwise than stated",
             *(f"stated: {share}" for share in (*shares, f"{stated.undecided_share:.3g} undecided")),
             *(f"refused: {line}" for line in self.findings.lines()),
+            *(f"note: {line}" for line in filter(None, [say(CHECK, self.seed.as_dict())])),
+            seed_line(self.seed.as_dict(), "placements"),
         ]
 
     def __str__(self) -> str:
@@ -119,7 +126,7 @@ def check(
         InputError: The certificate can't be read or is of another network or task, the policy or a
             setting is unusable.
     """
-    settings = (settings or CheckSettings()).replace(**changes)
+    settings, seed = with_seed((settings or CheckSettings()).replace(**changes))
     path = _find(certificate, outputs)
     stated = read_certificate(path)
     if policy is None:
@@ -132,12 +139,12 @@ def check(
         stated,
         weights,
         flights=settings.flights,
-        seed=settings.seed,
+        seed=seed.value,
         device=settings.device,
         renderer=settings.renderer,
         tell=functools.partial(progress or Bar(), "flown"),
     )
-    return Check(path, flown, settings, stated, findings)
+    return Check(path, flown, settings, stated, findings, seed)
 
 
 def _find(certificate: str | Path, outputs: str | Path) -> Path:

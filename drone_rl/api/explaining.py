@@ -21,6 +21,8 @@ from drone_rl.report import write_report
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import to_file_name
 from drone_rl.utils.provenance import provenance
+from drone_rl.utils.seeding import RootSeed, with_seed
+from drone_rl.words.seeds import seed_line
 
 
 @dataclasses.dataclass(frozen=True)
@@ -33,15 +35,17 @@ class Explanations:
     """One HTML file that needs nothing else."""
     numbers: dict[str, dict[str, Any]]
     """As in `explanation.json`, by the names that were given."""
+    seed: RootSeed
+    """Root of all random streams."""
 
     def __str__(self) -> str:
-        """A line for each verdict."""
+        """A line for each verdict, and the seed."""
         lines = []
         for name, numbers in self.numbers.items():
             verdict = numbers["verdict"]
             certainty = "" if verdict["certain"] else " (not certain)"
             lines.append(f"{name}: {verdict['kind']}{certainty}. {verdict['sentence']}")
-        return "\n".join(lines)
+        return "\n".join([*lines, seed_line(self.seed.as_dict())])
 
     def _repr_html_(self) -> str:
         return page(self.report.read_text(encoding="utf-8"))
@@ -76,7 +80,7 @@ def explain(
     Raises:
         InputError: A policy or a setting is unusable.
     """
-    settings = (settings or ExplainSettings()).replace(**changes)
+    settings, seed = with_seed((settings or ExplainSettings()).replace(**changes))
     if num_envs < 1:
         raise InputError(f"num_envs={num_envs} is out of range; give 1 or more")
     chosen = _named(policies)
@@ -89,6 +93,7 @@ def explain(
             name: _explain(
                 policy,
                 settings,
+                seed,
                 folders[name],
                 num_envs,
                 progress,
@@ -101,7 +106,7 @@ def explain(
     progress("report")
     report = write_report(list(folders.values()), folder)
     progress("explained", 1, 1)
-    return Explanations(folder, report, numbers)
+    return Explanations(folder, report, numbers, seed)
 
 
 def _named(policies: Given | Sequence[Given]) -> dict[str, Pilot]:
@@ -120,12 +125,13 @@ def _named(policies: Given | Sequence[Given]) -> dict[str, Pilot]:
 def _explain(
     policy: Pilot,
     settings: ExplainSettings,
+    seed: RootSeed,
     folder: Path,
     num_envs: int,
     progress: Progress,
     measured: Measured | None,
 ) -> dict[str, Any]:
-    env = policy.make_env(num_envs, seed=settings.seed, renderer=settings.renderer)
+    env = policy.make_env(num_envs, seed=seed.value, renderer=settings.renderer)
     origin = {**policy.origin, **provenance()}
     try:
         return explain_policy(
@@ -139,6 +145,7 @@ def _explain(
             claim=find_claim(policy),
             measured=measured,
             unlike=policy.unlike,
+            seed=seed,
         )
     finally:
         env.close()

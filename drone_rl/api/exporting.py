@@ -16,6 +16,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import read_bytes, write_atomically
 from drone_rl.utils.limits import CERTIFICATE_BYTES, SHIFTS_BYTES
 from drone_rl.utils.overrides import read_overrides
+from drone_rl.utils.seeding import RootSeed, root_seed, with_seed
 from drone_rl.verdicts.judge import judge_policy
 from drone_rl.words.certificate import is_quoted
 from drone_rl.words.domain import is_quoted as is_told
@@ -36,7 +37,7 @@ def export(
     certificate: str | Path | None = None,
     shifts: str | Path | None = None,
     outputs: str | Path = "outputs",
-) -> None:
+) -> RootSeed:
     """Judges a policy and writes it as safetensors, with a model card beside it.
 
     Args:
@@ -49,17 +50,21 @@ def export(
         shifts: The same of a file of flights under other conditions, see `find_domain`.
         outputs: See `find_domain`.
 
+    Returns:
+        Root of the random streams of the verdict's environments.
+
     Raises:
         InputError: It can't be written, or a file that is given is unusable.
     """
-    seed, device = settings.seed, settings.device
+    settings, seed = with_seed(settings)
+    device = settings.device
     claim = find_claim(policy, certificate)
     claim = None if claim is None or claim.refused else claim  # a card tells of what is
     measured = find_domain(policy, shifts, outputs)
     with policy.flying(
-        settings.num_worlds, seed=seed, device=device, renderer=settings.renderer
+        settings.num_worlds, seed=seed.value, device=device, renderer=settings.renderer
     ) as (env, actor):
-        verdict = judge_policy(env, actor, settings.episodes, claim=claim).as_dict()
+        verdict = judge_policy(env, actor, settings.episodes, claim=claim, seed=seed).as_dict()
     noted, chosen = origin_of(policy.path, policy.state)
     carried = {}
     if measured is not None and is_told({"shifts": measured.evidence, "verdict": verdict}):
@@ -71,11 +76,12 @@ def export(
         policy.state,
         command=command or noted,
         verdict=verdict,
-        seed=seed,
+        seed=seed.value,
         chosen=chosen,
         shifts=None if measured is None else measured.numbers,
         carried=carried,
     )
+    return seed
 
 
 def export_onnx(
@@ -83,7 +89,7 @@ def export_onnx(
     target: str | Path,
     *,
     command: str | None = None,
-    seed: int = 0,
+    seed: int | None = None,
 ) -> Agreement:
     """Writes a policy as an ONNX model, if that does what the policy does: all of it on the CPU.
 
@@ -91,7 +97,8 @@ def export_onnx(
         policy: The policy, or what `load_policy` takes.
         target: Of the file, ending in .onnx; what is in it, see `drone_rl.zoo.make_onnx`.
         command: That trained it, for the model's metadata; None names what its file or folder says.
-        seed: Root of the random streams of the worlds in which the two are compared.
+        seed: Root of the random streams of the environments in which the two are compared; a fresh
+            one by default.
 
     Returns:
         How far the model and PyTorch agree, on 10,000 pictures that the policy met.
@@ -105,7 +112,7 @@ def export_onnx(
     content = make_onnx(policy.description, policy.make_network(), told)
     model = open_onnx(content)
     sound = dataclasses.replace(policy, description=policy.description.without_faults())
-    with sound.flying(_WORLDS, seed=seed) as (env, actor):
+    with sound.flying(_WORLDS, seed=root_seed(seed).value) as (env, actor):
         found = agreement(env, actor, model, _STEPS)
     if not found.difference <= MOST_DIFFERENCE:
         raise InputError(

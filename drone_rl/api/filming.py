@@ -19,6 +19,7 @@ from drone_rl.evaluation.video import film_episode, write_video
 from drone_rl.sim.composer_task import make_environment
 from drone_rl.sim.settings import AppearanceSettings
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.seeding import legacy_seed
 
 _log = logging.getLogger(__name__)
 
@@ -91,7 +92,7 @@ def view(
         worlds.camera,
         dynamics=worlds.dynamics,
         pixels=False,
-        random_state=seed,
+        random_state=legacy_seed(seed),
         appearance=base.looks.settings,
     )
     kind = ExplorationType.DETERMINISTIC if greedy else ExplorationType.RANDOM

@@ -26,10 +26,12 @@ from drone_rl.sim.settings import DynamicsSettings, TaskSettings
 from drone_rl.sim.tasks import as_task
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.provenance import provenance
-from drone_rl.utils.seeding import Stream, torch_generator
+from drone_rl.utils.seeding import RootSeed, Stream, torch_generator, with_seed
 from drone_rl.verdicts.judge import Verdict, judge_policy
 from drone_rl.verdicts.luck import BASELINES, fly_baselines, make_baseline
 from drone_rl.verdicts.rule import Rule
+from drone_rl.words.licence import say
+from drone_rl.words.seeds import EVALUATION, seed_line
 from drone_rl.words.verdict import unlike as say_unlike
 
 
@@ -42,6 +44,8 @@ class Evaluation:
     flown: dict[str, dict[str, Any]]
     """Figures of all that was flown, by name, see `drone_rl.evaluation.summarise`: "greedy",
     "sampled" and the baselines."""
+    seed: RootSeed
+    """Root of the environments' random streams."""
 
     @property
     def success(self) -> float:
@@ -71,7 +75,7 @@ class Evaluation:
         origin = self.policy.origin
         return {
             "policy": origin["policy"],
-            "seed": self.settings.seed,
+            **self.seed.as_dict(),
             **({"unlike": self.policy.unlike} if self.policy.unlike else {}),
             **self.flown,
             **provenance(),
@@ -79,14 +83,18 @@ class Evaluation:
         }
 
     def __str__(self) -> str:
-        """The table for a terminal; in other dynamics than its own also what differs."""
-        figures = aligned(self.rows(), are_numbers=True)
-        unlike = self.policy.unlike
-        return f"{figures}\n{say_unlike({'unlike': unlike})}" if unlike else figures
+        """The table for a terminal, and the lines below it."""
+        return "\n".join([aligned(self.rows(), are_numbers=True), *self._notes()])
 
     def _repr_html_(self) -> str:
         head, *rows = self.rows()
-        return table(head, rows)
+        return table(head, rows) + "".join(map(paragraph, self._notes()))
+
+    def _notes(self) -> list[str]:
+        """The seed, what follows from it and, in other dynamics than its own, what differs."""
+        unlike, seed = self.policy.unlike, self.seed.as_dict()
+        said = [say(EVALUATION, seed), say_unlike({"unlike": unlike}) if unlike else ""]
+        return [*filter(None, said), seed_line(seed)]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -126,11 +134,12 @@ class Judgement:
         path.write_text(json.dumps(self.as_dict(), indent=2))
 
     def __str__(self) -> str:
-        """One line, and others of an operating domain and of what it does not cover."""
+        """One line, and others of an operating domain, of what it does not cover, and the seed."""
         certainty = "" if self.verdict.certain else " (not certain)"
         line = f"{self.verdict.kind.value}{certainty}: {self.verdict.sentence}"
         required = "" if self.coverage is None else str(self.coverage)
-        return "\n".join(filter(None, (line, self.domain, required)))
+        seed = seed_line(self.verdict.evidence)
+        return "\n".join(filter(None, (line, self.domain, required, seed)))
 
     def _repr_html_(self) -> str:
         quantities = self.verdict.as_dict()["quantities"]
@@ -160,11 +169,11 @@ def evaluate(
     Raises:
         InputError: The policy or a setting is unusable.
     """
-    settings = (settings or EvaluateSettings()).replace(**changes)
+    settings, seed = with_seed((settings or EvaluateSettings()).replace(**changes))
     progress = progress or Bar()
     policy = as_pilot(policy)
     episodes, steps = settings.episodes, 3 if settings.baselines else 2
-    with _flying(policy, settings) as (env, actor):
+    with _flying(policy, settings, seed) as (env, actor):
         worlds, dynamics = env.base_env.state_dict(), worlds_of(env).dynamics
         progress("most probable actions", 0, steps)
         flown = {"greedy": run_episodes(env, actor, episodes)}
@@ -176,7 +185,7 @@ def evaluate(
         num_worlds, device = settings.num_worlds, settings.device
         flown |= fly_baselines(num_worlds, policy.task, worlds, episodes, device, dynamics)
     progress("evaluated", steps, steps)
-    return Evaluation(policy, settings, {name: summarise(e) for name, e in flown.items()})
+    return Evaluation(policy, settings, {name: summarise(e) for name, e in flown.items()}, seed)
 
 
 def judge(
@@ -190,6 +199,7 @@ def judge(
     require_domain: str | Path | None = None,
     outputs: str | Path = "outputs",
     progress: Progress | None = None,
+    drawn_seed: RootSeed | None = None,
     **changes: Any,
 ) -> Judgement:
     """Good, poor, one-sided or none of these, and whether that is certain.
@@ -208,13 +218,15 @@ def judge(
             `drone_rl.conditions.needs.read_needs`.
         outputs: Folder under which runs are kept.
         progress: Told of what is being done; a bar by default.
+        drawn_seed: The seed of a larger analysis of which this is a part; that of the settings by
+            default.
         changes: Settings to change, as in `judge("good", episodes=1000)`.
 
     Raises:
         InputError: The policy, a setting or a file that is given is unusable, or a domain is
             required of whom none was measured.
     """
-    settings = (settings or JudgeSettings()).replace(**changes)
+    settings, seed = with_seed((settings or JudgeSettings()).replace(**changes), drawn_seed)
     progress = progress or Bar()
     progress("policy, luck and oracle", 0, 1)
     pilot = None if policy in BASELINES else as_pilot(policy, outputs)
@@ -226,7 +238,7 @@ def judge(
         changed = Changes(TaskSettings).read(task or {}, "task")
         moved = DynamicsSettings(**Changes(DynamicsSettings).read(dynamics or {}, "dynamics"))
         moved.check_air()
-        worlds = _baseline(name, TaskSettings(**changed), moved, settings)
+        worlds = _baseline(name, TaskSettings(**changed), moved, settings, seed)
     else:
         pilot = pilot.in_task(**(task or {}))
         pilot = pilot.in_dynamics(**dynamics) if dynamics else pilot
@@ -236,11 +248,11 @@ def judge(
             pilot,
             certificate,
             flights=settings.certificate_flights,
-            seed=settings.seed,
+            seed=seed.value,
             device=settings.device,
             renderer=settings.renderer,
         )
-        worlds = _flying(pilot, settings)
+        worlds = _flying(pilot, settings, seed)
     draws, rule = settings.sampled and pilot is not None, Rule(good_share=settings.good_share)
     with worlds as (env, actor):
         verdict = judge_policy(
@@ -251,6 +263,7 @@ def judge(
             sampled=draws,
             claim=claim,
             unlike=None if pilot is None else pilot.unlike,
+            seed=seed,
         )
     progress("judged", 1, 1)
     done = Judgement(name, settings, verdict, claim and claim.path, measured)
@@ -275,12 +288,12 @@ def _refuse_files(name: str, **given: str | Path | None) -> None:
 
 
 def _flying(
-    policy: Pilot, settings: FlightSettings
+    policy: Pilot, settings: FlightSettings, seed: RootSeed
 ) -> AbstractContextManager[tuple[Any, TensorDictModuleBase]]:
     """Unseen worlds and the policy in them."""
     return policy.flying(
         settings.num_worlds,
-        seed=settings.seed,
+        seed=seed.value,
         device=settings.device,
         renderer=settings.renderer,
     )
@@ -288,19 +301,23 @@ def _flying(
 
 @contextmanager
 def _baseline(
-    name: str, task: TaskSettings, dynamics: DynamicsSettings, settings: FlightSettings
+    name: str,
+    task: TaskSettings,
+    dynamics: DynamicsSettings,
+    settings: FlightSettings,
+    seed: RootSeed,
 ) -> Iterator[tuple[EnvBase, TensorDictModuleBase]]:
     """The same worlds and one that sees no picture."""
     env = DroneEnv(
         settings.num_worlds,
         task,
-        seed=settings.seed,
+        seed=seed.value,
         stream=Stream.REPORT,
         pixels=False,
         device=settings.device,
         dynamics=dynamics,
     )
-    generator = torch_generator(settings.seed, Stream.ACTIONS, device=env.device)
+    generator = torch_generator(seed.value, Stream.ACTIONS, device=env.device)
     try:
         yield env, make_baseline(name, task, generator, env.worlds.dynamics.actions)
     finally:

@@ -26,6 +26,9 @@ from drone_rl.policies.foreign import Logits
 from drone_rl.sim.dynamics import BodyState
 from drone_rl.sim.tasks import as_task
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.seeding import RootSeed, root_seed
+from drone_rl.words.licence import say
+from drone_rl.words.seeds import LOOPED, seed_line
 
 STARTS = 3
 """Of a firmware, for one flight."""
@@ -60,14 +63,16 @@ class LoopedFlights:
     """How a policy did with a firmware on board."""
 
     policy: str
-    seed: int
+    seed: RootSeed
+    """Root of the environments' random streams."""
     flights: tuple[LoopedFlight, ...]
     figures: dict[str, Any] = dataclasses.field(repr=False)
     """As of an evaluation, see `drone_rl.evaluation.summarise`."""
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values: the figures and each flight."""
-        return {**self.figures, "flights": [dataclasses.asdict(f) for f in self.flights]}
+        flights = [dataclasses.asdict(f) for f in self.flights]
+        return {**self.figures, **self.seed.as_dict(), "flights": flights}
 
     def __str__(self) -> str:
         """A line a flight, and one of them all."""
@@ -79,18 +84,21 @@ class LoopedFlights:
         success = self.figures["success"]
         ends = (f"{100 * success[bound]:.0f}%" for bound in ("lower95", "upper95"))
         share = f"{success['successes']} of {success['trials']} succeeded"
-        return "\n".join([*lines, f"{share} ({' to '.join(ends)})"])
+        seed = self.seed.as_dict()
+        notes = [f"{share} ({' to '.join(ends)})", say(LOOPED, seed), seed_line(seed)]
+        return "\n".join([*lines, *filter(None, notes)])
 
 
 def fly_in_the_loop(
     policy: str | Path | Pilot | Logits,
     flights: int = 5,
-    seed: int = 0,
+    seed: int | None = None,
     *,
     firmware: str | Path | None = None,
     isolated: bool = True,
     outputs: str | Path = "outputs",
     progress: Progress | None = None,
+    drawn_seed: RootSeed | None = None,
 ) -> LoopedFlights:
     """Flies a policy, greedily, with Betaflight between its actions and the rotors.
 
@@ -101,11 +109,12 @@ def fly_in_the_loop(
     Args:
         policy: What `judge` takes. In computer-vision mode it flies AirSim's drone.
         flights: How many, each at about the pace of real time at best.
-        seed: Root of the worlds' random streams.
+        seed: Root of the environments' random streams; a fresh one by default.
         firmware: See `drone_rl.loops.firmware.find_firmware`.
         isolated: See `drone_rl.loops.trial.betaflight_drone`.
         outputs: See `load_policy`.
         progress: Told of what is being flown; a bar by default.
+        drawn_seed: The seed of a larger analysis of which this is a part; takes precedence.
 
     Raises:
         InputError: The policy or a number is unusable, or no firmware was built.
@@ -114,18 +123,19 @@ def fly_in_the_loop(
     if not (isinstance(flights, int) and flights >= 1):
         raise InputError(f"flights={flights} is out of range; give a whole number from 1")
     progress, pilot = progress or Bar(), as_pilot(policy, outputs)
+    root = drawn_seed or root_seed(seed)
     program = find_firmware(firmware)
     flown: list[_Flown] = []
     with tempfile.TemporaryDirectory(prefix="betaflight-") as folder:
         for world in range(flights):
             progress(f"{pilot.name}: software in the loop", world, flights)
-            flown.append(_fly_or_restart(pilot, world, seed, program, Path(folder), isolated))
+            flown.append(_fly_or_restart(pilot, world, root.value, program, Path(folder), isolated))
     progress("flown", flights, flights)
     info = {name: torch.cat([one.info[name] for one in flown]) for name in flown[0].info}
     lengths = torch.tensor([len(one.path) - 1 for one in flown])
     episodes = Episodes.ended(as_task(pilot.task), info, lengths)
     told = tuple(_told(one, world, episodes) for world, one in enumerate(flown))
-    return LoopedFlights(pilot.name, seed, told, summarise(episodes))
+    return LoopedFlights(pilot.name, root, told, summarise(episodes))
 
 
 class _Flown(NamedTuple):

@@ -37,7 +37,9 @@ from drone_rl.sim.settings import MINIMAL, BaseTaskSettings
 from drone_rl.sim.tasks import as_task
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.provenance import provenance
+from drone_rl.utils.seeding import RootSeed, with_seed
 from drone_rl.words.licence import say
+from drone_rl.words.seeds import seed_line
 from drone_rl.words.shifts import SHIFTS, rows
 from drone_rl.words.verdict import unlike as say_unlike
 
@@ -86,12 +88,14 @@ class Shifts:
 
     def __str__(self) -> str:
         """The table and what it comes to."""
-        return f"{aligned(rows(self.numbers))}\n{self.sentence}{self._unlike}"
+        said = f"{self.sentence}{self._unlike}"
+        return "\n".join([aligned(rows(self.numbers)), said, seed_line(self.numbers)])
 
     def _repr_html_(self) -> str:
         head, *lines = rows(self.numbers)
         said = paragraph(self.sentence + self._unlike)
-        return table(head, lines) + said + picture(chart(self.numbers))
+        seed = paragraph(seed_line(self.numbers))
+        return table(head, lines) + said + seed + picture(chart(self.numbers))
 
     @property
     def _unlike(self) -> str:
@@ -124,7 +128,8 @@ def shifts(
     Raises:
         InputError: The policy or a setting is unusable, or there is no such axis or strength.
     """
-    settings, progress = (settings or ShiftSettings()).replace(**changes), progress or Bar()
+    settings, seed = with_seed((settings or ShiftSettings()).replace(**changes))
+    progress = progress or Bar()
     check_axes(settings.axes or ())
     pilot = as_pilot(policy, outputs).in_task(**(task or {}))
     pilot = pilot.in_dynamics(**dynamics) if dynamics else pilot
@@ -133,8 +138,8 @@ def shifts(
     axes = find_axes(settings.axes, subject)
     total = len(axes) * (len(settings.strengths) + settings.domain) + 1
     done = itertools.count()
-    found = _fly(subject, axes, settings, lambda text: progress(text, next(done), total))
-    with closing(Airfield(subject, 1, settings.seed)) as filmed:
+    found = _fly(subject, axes, settings, seed, lambda text: progress(text, next(done), total))
+    with closing(Airfield(subject, 1, seed.value)) as filmed:
         pictures = {axis.name: make_strip(filmed, axis) for axis in axes}
     progress("flown", total, total)
     numbers = {
@@ -143,6 +148,7 @@ def shifts(
         "policy": pilot.name,
         "network": _identity(pilot),
         "settings": settings.values(),
+        **seed.as_dict(),
         "terms": as_task(subject.task).terms.as_dict(),
         **found,
         "seconds": time.perf_counter() - begin,
@@ -151,19 +157,23 @@ def shifts(
 
 
 def _fly(
-    subject: Subject, axes: Sequence[Axis], settings: ShiftSettings, tell: Callable[[str], None]
+    subject: Subject,
+    axes: Sequence[Axis],
+    settings: ShiftSettings,
+    seed: RootSeed,
+    tell: Callable[[str], None],
 ) -> dict[str, Any]:
     """What the suite finds, and "domain", see `_domain`; none if nobody wants it.
 
     Raises:
         InputError: See `_domain`.
     """
-    with closing(Airfield(subject, settings.episodes, settings.seed)) as bed:
+    with closing(Airfield(subject, settings.episodes, seed.value)) as bed:
         suite = Suite(bed, [Mode(mode) for mode in settings.modes], settings.possible_share)
         found = suite.run(axes, settings.strengths, tell)
     if not settings.domain:
         return {**found, "domain": None}
-    with closing(Airfield(subject, settings.domain_episodes, settings.seed)) as wide:
+    with closing(Airfield(subject, settings.domain_episodes, seed.value)) as wide:
         return {**found, "domain": _domain(wide, axes, settings, tell)}
 
 

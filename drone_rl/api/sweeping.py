@@ -9,6 +9,7 @@ from drone_rl.sweeps import Sweep, read_result, read_sweep
 from drone_rl.sweeps.page import write_sweep_report
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import newest
+from drone_rl.words.seeds import seed_line
 
 _log = logging.getLogger(__name__)
 
@@ -43,11 +44,14 @@ def judge_sweep(sweep: Sweep, episodes: int, device: str) -> None:
         device: Where they are flown.
     """
     from drone_rl.api.choosing import judge_run  # imports torch, which no other report needs
+    from drone_rl.utils.seeding import root_seed
 
+    seed = root_seed(None)  # the same environments for all runs
+    _log.info("%s", seed_line(seed.as_dict()))
     finished = [run for run in sweep.runs if read_result(run.folder) is not None]
     for done, run in enumerate(finished, start=1):
         try:
-            verdict = judge_run(run.folder, episodes, device)
+            verdict = judge_run(run.folder, episodes, device, seed=seed)
             _log.info("[%d/%d] %s: %s", done, len(finished), run.folder.name, verdict["kind"])
         except InputError as error:
             _log.warning("[%d/%d] %s not judged: %s", done, len(finished), run.folder.name, error)

@@ -54,8 +54,12 @@ def _row(by: str, value: str, failed: int, episodes: int) -> Plain:
     return {"by": by, "value": value, **of, "lower95": share - 0.02, "upper95": share + 0.02}
 
 
+FIXED_SEED: Plain = {"seed": 0, "seed_is_fixed": True}
+"""What a result says of a seed that the user gave."""
+
 VERDICT: Plain = {
     "kind": "none of these",
+    **FIXED_SEED,
     "certain": True,
     "exit_code": 12,
     "error_rate": 0.05,
@@ -136,6 +140,7 @@ EXPLANATION: Plain = {
     "date": "2026-01-31T12:00:00+00:00",
     "provenance": {"git_revision": "0123abc"},
     "verdict": VERDICT,
+    **FIXED_SEED,
     "dataset": {
         "frames": 600,
         "episodes": 30,
@@ -306,6 +311,7 @@ _DARK = {
 }  # fmt: skip
 SHIFTS: Plain = {
     "terms": CUBES.as_dict(),
+    **FIXED_SEED,
     "settings": {"domain_episodes": 400, "episodes": 200, "seed": 0, "good_share": 0.9},
     "plain": {"success": _share(200, 200, 0.98, 1.0), "oracle": _share(200, 200, 0.98, 1.0)},
     "axes": {

@@ -19,7 +19,7 @@ def bench_explain(folder: Path, quick: bool) -> dict[str, Any]:
     run = folder / "explain"
     frames = 100 if quick else 600
     small = ["frames=100", "episodes=20", "perplexity=10"] if quick else []
-    seconds, peak = watch("explain", "policy=good", f"hydra.run.dir={run}", *small)
+    seconds, peak = watch("explain", "policy=good", "seed=0", f"hydra.run.dir={run}", *small)
     numbers = json.loads((run / "0_good" / "explanation.json").read_text())
     reached = numbers["class_model"]["logit"]["probabilities"]
     return {

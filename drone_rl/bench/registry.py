@@ -11,6 +11,7 @@ from drone_rl.bench.flight_parity import bench_flight_parity
 from drone_rl.bench.flight_paths import bench_flight_paths
 from drone_rl.bench.flight_speed import bench_flight_speed
 from drone_rl.bench.flight_training import bench_flight_training
+from drone_rl.bench.gamed import bench_gamed
 from drone_rl.bench.gymnasium import bench_gymnasium
 from drone_rl.bench.hostile import bench_hostile
 from drone_rl.bench.injections import bench_injections
@@ -104,6 +105,11 @@ BENCHMARKS: dict[str, Benchmark] = {
         "truth",
         ("words", "report", "sweeps", "api/showing", "utils/pages", "bench/injections",
          "bench/injected_pages", "bench/injection_payloads"),
+    ),
+    "gamed": Benchmark(
+        lambda s: bench_gamed(s.runs / "gamed"),
+        "truth",
+        (*_JUDGING, "api", "conditions", "bench/gamed", "bench/gamed_memory"),
     ),
     "maps": Benchmark(
         lambda s: bench_maps(s.runs, s.quick),

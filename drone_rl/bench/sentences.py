@@ -7,6 +7,7 @@ from typing import Any
 from drone_rl.bench.evidence import (
     CARD,
     EXPLANATION,
+    FIXED_SEED,
     GROUP,
     HIGHER,
     PROOF,
@@ -15,7 +16,18 @@ from drone_rl.bench.evidence import (
     VERDICT,
     changed,
 )
-from drone_rl.words import advice, card, domain, report, shifts, source, sweep, truth, verdict
+from drone_rl.words import (
+    advice,
+    card,
+    domain,
+    report,
+    seeds,
+    shifts,
+    source,
+    sweep,
+    truth,
+    verdict,
+)
 from drone_rl.words.licence import Sentence, said
 
 Changes = Mapping[str, Any]
@@ -35,6 +47,11 @@ SPOKEN: dict[str, tuple[tuple[Sentence, ...], Mapping[str, Any]]] = {
     "shifts": (shifts.SHIFTS, SHIFTS),
     "sweep": (sweep.SENTENCES, SWEEP),
     "setting": (sweep.GROUP_SENTENCES, GROUP),
+    "evaluation": (seeds.EVALUATION, FIXED_SEED),
+    "bodies": (seeds.BODIES, FIXED_SEED),
+    "looped": (seeds.LOOPED, FIXED_SEED),
+    "chances": (seeds.CHANCES, FIXED_SEED),
+    "check": (seeds.CHECK, FIXED_SEED),
 }
 """All sentences of the program, by what they are said of, with evidence of that kind."""
 NO_CLAIMS = {"card.intervals", "card.use"}
@@ -73,6 +90,8 @@ def _plants(of: str, plants: Iterable[tuple[Any, ...]]) -> list[Plant]:
     return [Plant(of, *plant) for plant in plants]
 
 
+_FRESH = {"seed_is_fixed": False}
+_OTHER_SEED = {"seed": 193287468211}
 _ALL_LUCK = {"baselines.forward.success.share": 0.95}
 _SURE = {"failures.largest": None, "failures.bound.successes": 0}
 _IN_WIND = {"unlike": {"wind": {"own": [0.0, 0.0, 0.0], "flown": [5.0, 0.0, 0.0]}}}
@@ -117,6 +136,9 @@ _OF_VERDICTS = (
     ("unlike", {"unlike": {"wind": {"own": [0.0, 0.0, 0.0], "flown": [8.0, 0.0, 0.0]}}}, _IN_WIND),
     ("drawing", {"drawing.upper95": 0.05}),
     ("drawing", {"drawing": None}),
+    ("fixed_seed", _FRESH),
+    ("fixed_seed", _OTHER_SEED),
+    ("fixed_seed", {"seed": None}),
 )  # fmt: skip
 _CERTAIN_GOOD = {"verdict.kind": "good", "verdict.certain": True, "verdict.exit_code": 0}
 _NOT_CERTAIN = {"verdict.certain": False, "verdict.enough": 1600}
@@ -135,6 +157,9 @@ _OF_REPORTS = (
     ("source.file", {"source": "b/explanation.json"}),
     ("source.file", {"date": None}),
     ("source.file", {"provenance.git_revision": None}),
+    ("explanation.fixed_seed", _FRESH),
+    ("explanation.fixed_seed", _OTHER_SEED),
+    ("domain.quoted", {"shifts.seed_is_fixed": False}, _FLOWN),
     ("advice.more", {"verdict.certain": True}, _NOT_CERTAIN),
     ("advice.more", {"verdict.enough": None}, _NOT_CERTAIN),
     ("advice.use", {"verdict.certain": False}, _CERTAIN_GOOD),
@@ -339,8 +364,12 @@ _OF_SHIFTS = (
     ("shifts.together", {"together.refused": "task.cube_size=99"}),
     ("shifts.together", {"together.modes.constant.success.share": 0.5}),
     ("shifts.scope", _NOT_GOOD),
+    ("shifts.fixed_seed", _FRESH),
+    ("shifts.fixed_seed", _OTHER_SEED),
 )  # fmt: skip
+_FIXED_SEEDS = ("evaluation", "bodies", "looped", "chances", "check")
 PLANTS = (
+    *(Plant(of, f"{of}.fixed_seed", lie) for of in _FIXED_SEEDS for lie in (_FRESH, _OTHER_SEED)),
     *_plants("verdict", _OF_VERDICTS),
     *_plants("explanation", (*_OF_REPORTS, *_OF_MAPS)),
     *_plants("card", _OF_CARDS),

@@ -5,6 +5,7 @@ from typing import Any
 
 from drone_rl.api.progress import silent
 from drone_rl.api.shifting import shifts
+from drone_rl.settings.shifting import ShiftSettings
 
 
 def bench_shifts(quick: bool) -> dict[str, Any]:
@@ -20,7 +21,8 @@ def bench_shifts(quick: bool) -> dict[str, Any]:
     """
     begin = time.perf_counter()
     episodes = 20 if quick else 200
-    suite = shifts("good", episodes=episodes, modes=["constant"], domain=False, progress=silent)
+    flown = ShiftSettings(seed=0, modes=("constant",))
+    suite = shifts("good", flown, episodes=episodes, domain=False, progress=silent)
     seconds = time.perf_counter() - begin
     found = {
         "shift_suite_s": seconds,
@@ -28,6 +30,6 @@ def bench_shifts(quick: bool) -> dict[str, Any]:
         "shift_area": suite.area,
     }
     if not quick:
-        whole = shifts("good", strengths=[5], modes=["constant"], progress=silent)
+        whole = shifts("good", flown, strengths=[5], progress=silent)
         found["shift_domain"] = whole.sentence
     return found

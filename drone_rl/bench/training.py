@@ -111,6 +111,7 @@ def train_and_evaluate(
         results["reason"].append(result["reason"])
         call(
             "evaluate",
+            "seed=0",
             f"checkpoint={run}",
             f"episodes={episodes}",
             "baselines=false",

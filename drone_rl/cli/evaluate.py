@@ -54,7 +54,7 @@ def run(settings: Command, folder: Path) -> tuple[int, float]:
             folder / "videos",
             settings.videos,
             greedy=settings.greedy,
-            seed=settings.seed,
+            seed=done.seed.value,
             device=settings.device,
             renderer=settings.renderer,
         )

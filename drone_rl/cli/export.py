@@ -12,6 +12,7 @@ from drone_rl.settings.paths import PathsSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.overrides import COMMAND
 from drone_rl.utils.schema import FileName, OneOf
+from drone_rl.words.seeds import seed_line
 
 _log = logging.getLogger(__name__)
 
@@ -48,15 +49,18 @@ class Command(FlightSettings):
 def run(settings: Command, folder: Path) -> tuple[int, str]:
     """Exports one policy. Returns the exit status and the file's path."""
     from drone_rl.api.exporting import export, export_onnx
+    from drone_rl.utils.seeding import root_seed  # imports torch
 
     policy = drone_rl.load_policy(settings.policy, outputs=settings.paths.outputs)
     target = folder / f"{settings.name}.{settings.format}"
     if settings.format == "onnx":
-        found = export_onnx(policy, target, command=settings.command, seed=settings.seed)
+        seed = root_seed(settings.seed)
+        found = export_onnx(policy, target, command=settings.command, seed=seed.value)
         difference = f"{found.difference:.1e} in {found.frames:,} pictures"
         _log.info("written: %s, which differs from PyTorch by at most %s", target, difference)
+        _log.info("%s", seed_line(seed.as_dict()))
         return 0, str(target)
-    export(
+    seed = export(
         policy,
         target,
         settings,
@@ -66,4 +70,5 @@ def run(settings: Command, folder: Path) -> tuple[int, str]:
         outputs=settings.paths.outputs,
     )
     _log.info("written: %s and %s", target, target.with_suffix(".md").name)
+    _log.info("%s", seed_line(seed.as_dict()))
     return 0, str(target)

@@ -35,6 +35,7 @@ from drone_rl.utils.schema import (
     Whole,
     as_mapping,
 )
+from drone_rl.words.seeds import SEED_KEYS
 from drone_rl.words.terms import terms_of
 from drone_rl.zoo import PolicyDescription, parse
 
@@ -200,6 +201,8 @@ _WHOLE = Record(
         "policy": Text(),
         "network": Record({"weights": Text(64), "description": Plain(most=1000)}),
         "settings": Plain(most=1000),
+        "seed": Whole(0),
+        "seed_is_fixed": Flag(),
         "terms": Plain(),
         "plain": Record({"oracle": Maybe(_Counted()), **_FIGURES}),
         "axes": _Named(AXES, _AXIS),
@@ -215,7 +218,7 @@ _WHOLE = Record(
         "seconds": Real(0.0),
         **_ORIGIN,
     },
-    optional=frozenset(_ORIGIN),
+    optional=frozenset((*_ORIGIN, *SEED_KEYS)),
 )
 
 
@@ -232,7 +235,14 @@ def _refuse_another(
     for part in ("task", *_PARTS):
         if of.get(part) != mine.get(part):
             raise InputError(f"it is of another {part} than the policy's")
-    ShiftSettings.read(numbers["settings"], "settings")
+    stated = ShiftSettings.read(numbers["settings"], "settings")
+    if stated.seed is None or stated.seed != numbers.get("seed", stated.seed):
+        shown = numbers.get("seed")
+        raise InputError(
+            f"seed={shown} is not settings.seed={stated.seed}; run drone-rl shifts again"
+        )
+    if ("seed" in numbers) != ("seed_is_fixed" in numbers):
+        raise InputError("it has one of seed and seed_is_fixed; run drone-rl shifts again")
 
 
 def _own(axis: Axis, described: PolicyDescription) -> Axis:

@@ -25,7 +25,7 @@ from drone_rl.explanations.scenes import Scenes, empty_scene
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.explanations.threads import Once
 from drone_rl.policies import PictureNetwork, make_actor
-from drone_rl.utils.seeding import Stream, torch_generator
+from drone_rl.utils.seeding import RootSeed, Stream, torch_generator, with_seed
 from drone_rl.verdicts.proof import Claim
 
 FILMED = 0
@@ -47,6 +47,7 @@ class Context:
         claim: Claim | None = None,
         measured: Measured | None = None,
         unlike: Mapping[str, Any] | None = None,
+        seed: RootSeed | None = None,
     ) -> None:
         """Takes the policy and its worlds.
 
@@ -57,11 +58,13 @@ class Context:
             claim: A certificate of it in the task of these worlds, if there is one.
             measured: Its flights under other conditions, if there are any.
             unlike: See `drone_rl.verdicts.judge.judge_policy`.
+            seed: Root of all random streams; that of the settings by default.
 
         Raises:
             InputError: A setting doesn't fit the policy.
         """
-        self.env, self.network, self.settings, self.claim = env, network, settings, claim
+        self.env, self.network, self.claim = env, network, claim
+        self.settings, self.seed = with_seed(settings, seed)
         self.measured, self.unlike = measured, unlike
         self.scenes = Scenes(env)
         self.layer = settings.layer or feature_layer(network)
@@ -78,7 +81,7 @@ class Context:
     def restart(self) -> TensorDictModuleBase:
         """Puts the worlds back to their first episodes; returns an actor with a fresh stream."""
         self.env.base_env.load_state_dict(self._start)
-        generator = torch_generator(self.settings.seed, Stream.REPORT, device=self.device)
+        generator = torch_generator(self.seed.value, Stream.REPORT, device=self.device)
         return make_actor(self.network, self.env.action_spec, generator)
 
     def aside(self) -> "Context":
@@ -102,7 +105,7 @@ class Context:
             self.restart(),
             num_episodes=self.settings.data_episodes,
             num_frames=self.settings.frames,
-            meta={"layer": self.layer, "seed": self.settings.seed},
+            meta={"layer": self.layer, "seed": self.seed.value},
         )
 
     @functools.cached_property

@@ -34,8 +34,9 @@ class ExplainSettings(Settings):
     """Layer that Grad-CAM looks at; the last convolution's nonlinearity by default."""
     perplexity: Annotated[float, Real(1.0, unit="neighbours")] = 30.0
     """Of t-SNE."""
-    seed: Annotated[int, Whole(0)] = 0
-    """Of everything that is drawn."""
+    seed: Annotated[int, Whole(0)] | None = None
+    """Root of all random streams, those of the held-out environments included; null takes a fresh
+    one from the operating system, which is printed and recorded."""
     renderer: RendererName = "raytrace"
     """Who draws: raytrace, our own, or mujoco_warp, MuJoCo Warp's."""
 

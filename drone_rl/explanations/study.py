@@ -23,6 +23,7 @@ from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.explanations.threads import is_aside
 from drone_rl.policies import PictureNetwork
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.seeding import RootSeed, with_seed
 from drone_rl.verdicts.proof import Claim
 
 FORMAT_VERSION = 3
@@ -41,6 +42,7 @@ def explain_policy(
     claim: Claim | None = None,
     measured: Measured | None = None,
     unlike: Mapping[str, Any] | None = None,
+    seed: RootSeed | None = None,
 ) -> dict[str, Any]:
     """Computes everything about one policy and writes it to a folder.
 
@@ -57,6 +59,7 @@ def explain_policy(
         claim: A certificate of the policy in the task of these worlds, if there is one.
         measured: Its flights under other conditions in that task, if there are any.
         unlike: See `drone_rl.verdicts.judge.judge_policy`.
+        seed: Root of all random streams, those of `env` included; that of the settings by default.
 
     Returns:
         The numbers, as in `explanation.json`; "left_out" says of sections that can't be made of
@@ -65,7 +68,8 @@ def explain_policy(
     Raises:
         InputError: The folder can't be written or a setting doesn't fit the policy.
     """
-    context = Context(env, network, settings, claim, measured, unlike)
+    settings, seed = with_seed(settings, seed)
+    context = Context(env, network, settings, claim, measured, unlike, seed)
     said = _ask(find_sections() if sections is None else sections, context, progress)
     made = {title: one for title, one in said.items() if one.left_out is None}
     left_out = {title: one.left_out for title, one in said.items() if title not in made}
@@ -75,6 +79,7 @@ def explain_policy(
         "name": name,
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "settings": dataclasses.asdict(settings),
+        **seed.as_dict(),
         "seconds": {title: one.seconds for title, one in made.items()},
         "actions": context.scenes.actions.as_dict(),
         "terms": context.scenes.task.terms.as_dict(),

@@ -17,24 +17,18 @@ from drone_rl.utils.limits import (
     EXPLANATION_VALUES,
     Allowance,
 )
-from drone_rl.utils.schema import Text, as_mapping
+from drone_rl.utils.schema import Flag, Maybe, Text, Whole, as_mapping
 from drone_rl.verdicts.consistency import check_verdict
 from drone_rl.words.actions import ShownActions, shown_actions
+from drone_rl.words.seeds import SEED_KEYS
 from drone_rl.words.terms import Terms, terms_of
 
 FORMAT = "drone_rl explanation"
 FORMAT_VERSION = 3
 FRAME = frozenset(
     {
-        "format",
-        "format_version",
-        "name",
-        "date",
-        "settings",
-        "seconds",
-        "actions",
-        "terms",
-        "provenance",
+        *("format", "format_version", "name", "date", "settings", "seconds", "actions", "terms"),
+        *("provenance", *SEED_KEYS),
     }
 )
 """Entries of explanation.json that are no section's."""
@@ -99,6 +93,7 @@ class Explanation:
             check_intervals(numbers, "explanation")
             if numbers.get("verdict") is not None:
                 check_verdict(numbers["verdict"])
+            _check_seed(numbers)
         except (InputError, OSError) as error:
             raise InputError(
                 f"explanation {folder} can't be read ({error}); run drone-rl explain again"
@@ -109,3 +104,10 @@ class Explanation:
                 "run drone-rl explain again"
             )
         return cls(numbers, arrays, data, f"{folder.name}/explanation.json")
+
+
+def _check_seed(numbers: dict[str, Any]) -> None:
+    """Refuses a seed that is none; files of version 0.1 have it among their settings alone."""
+    older = as_mapping(numbers.get("settings", {}), "settings").get("seed")
+    Maybe(Whole(0)).read(numbers.get("seed", older), "seed")
+    Flag().read(numbers.get("seed_is_fixed", True), "seed_is_fixed")

@@ -14,8 +14,9 @@ class ChanceSettings(Settings):
 
     placements: Annotated[int, Whole(1, unit="placements")] = 100
     """Held-out placements: those of the first episodes of as many worlds of a verdict."""
-    seed: Annotated[int, Whole(0)] = 0
-    """Root of the held-out worlds' random streams; training never draws from these."""
+    seed: Annotated[int, Whole(0)] | None = None
+    """Root of the held-out placements' random streams; null takes a fresh one from the operating
+    system, which is printed and recorded."""
     within: Annotated[float, Real(0.0, 10_000.0, unit="m")] = 0.0
     """Metres to either side of each cube; if given, success is bounded wherever they stand."""
     parts: Annotated[int, Whole(1, 1_000_000, "parts")] = 20

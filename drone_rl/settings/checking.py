@@ -14,8 +14,9 @@ class CheckSettings(Settings):
 
     flights: Annotated[int, Whole(1, 10_000_000, "flights")] = 2000
     """Flights from corners, centres and random points of the boxes, and beside their borders."""
-    seed: Annotated[int, Whole(0)] = 0
-    """Root of the random stream that draws where they start."""
+    seed: Annotated[int, Whole(0)] | None = None
+    """Root of the random stream from which the flights' placements are drawn; null takes a fresh
+    one from the operating system, which is printed and recorded."""
     device: str = "cpu"
     """Where worlds are drawn and the policy runs: cpu, cuda or cuda:N."""
     renderer: RendererName = "raytrace"

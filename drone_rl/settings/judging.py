@@ -14,8 +14,9 @@ class FlightSettings(Settings):
 
     episodes: Annotated[int, Whole(1, unit="episodes")] = 1000
     """Held-out episodes, each in a world of its own; the same worlds for all that is flown."""
-    seed: Annotated[int, Whole(0)] = 0
-    """Root of the held-out worlds' random streams; training never draws from these."""
+    seed: Annotated[int, Whole(0)] | None = None
+    """Root of the held-out environments' random streams; null takes a fresh one from the operating
+    system, which is printed and recorded."""
     num_envs: Annotated[int, Whole(1, unit="worlds")] = 250
     """Worlds in one batch; bounds memory."""
     device: str = "cpu"

@@ -31,8 +31,9 @@ class ShiftSettings(Settings):
     """Flights under each condition, each in a world of its own; the same worlds for all."""
     domain_episodes: Annotated[int, Whole(1, 100_000, "episodes")] = 400
     """The same of each strength at which the range's ends are looked for: more make it wider."""
-    seed: Annotated[int, Whole(0)] = 0
-    """Root of the worlds' random streams, which nothing else draws from."""
+    seed: Annotated[int, Whole(0)] | None = None
+    """Root of the held-out environments' random streams; null takes a fresh one from the operating
+    system, which is printed and recorded."""
     good_share: Annotated[float, Real(0.0, 1.0, is_above=True, is_below=True)] = 0.9
     """A good policy succeeds in more than this share of the oracle's episodes."""
     possible_share: Annotated[float, Real(0.0, 1.0, is_above=True, is_below=True)] = 0.9

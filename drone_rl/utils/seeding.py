@@ -4,7 +4,10 @@ Every stream is a child of `numpy.random.SeedSequence(seed)` with a key of its o
 of two worlds, of two purposes, or of seed and seed + 1 share nothing.
 """
 
+import dataclasses
 import enum
+import secrets
+from typing import Any, Protocol, Self, TypeVar
 
 import numpy as np
 import torch
@@ -35,6 +38,71 @@ class Stream(enum.IntEnum):
     """How these conditions differ from world to world and from step to step."""
     SENSORS = 11
     """Noise of what drones sense beside pictures."""
+
+
+FRESH_BITS = 48
+"""Of a fresh seed: short enough to copy by hand, and exact in JSON and JavaScript."""
+_LEGACY_BITS = 32
+"""Of the largest seed that `numpy.random.RandomState` and its users take."""
+
+
+class _Seeded(Protocol):
+    """Settings with a seed that may be left open."""
+
+    @property
+    def seed(self) -> int | None: ...
+
+    def replace(self, **changes: Any) -> Self: ...
+
+
+T = TypeVar("T", bound=_Seeded)
+
+
+@dataclasses.dataclass(frozen=True)
+class RootSeed:
+    """The root of all random streams of one analysis, and where it comes from."""
+
+    value: int
+    """The seed."""
+    is_fixed: bool
+    """Whether it was chosen beforehand, so that a policy could have been fitted to it."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values, as in every result that states a claim."""
+        return {"seed": self.value, "seed_is_fixed": self.is_fixed}
+
+
+def fresh_seed() -> int:
+    """A seed from the operating system's entropy, which nobody can know beforehand."""
+    return secrets.randbits(FRESH_BITS)
+
+
+def root_seed(given: int | None) -> RootSeed:
+    """The seed that a user gives, or a fresh one."""
+    return RootSeed(fresh_seed(), False) if given is None else RootSeed(given, True)
+
+
+def with_seed(settings: T, drawn: RootSeed | None = None) -> tuple[T, RootSeed]:
+    """Make the seed of settings concrete.
+
+    Call it once, where an analysis begins; what it calls gets the returned settings.
+
+    Args:
+        settings: Of an analysis; a seed of None takes a fresh one.
+        drawn: The root seed of a larger analysis of which this one is a part; takes precedence.
+
+    Returns:
+        The settings with a seed that is a number, and that seed.
+    """
+    drawn = drawn or root_seed(settings.seed)
+    return settings.replace(seed=drawn.value), drawn
+
+
+def legacy_seed(seed: int) -> int:
+    """A seed for generators that take 32 bits only; the seed itself if it is that short."""
+    if seed < 2**_LEGACY_BITS:
+        return seed
+    return int(seed_sequence(seed).generate_state(1, np.uint32)[0])
 
 
 def seed_sequence(seed: int, *key: int) -> np.random.SeedSequence:

@@ -14,6 +14,7 @@ from torchrl.envs import EnvBase
 from drone_rl.envs import worlds_of
 from drone_rl.evaluation import Episodes, run_episodes, summarise
 from drone_rl.utils.intervals import mean_bounds, proportion
+from drone_rl.utils.seeding import RootSeed
 from drone_rl.verdicts.failures import failure_table
 from drone_rl.verdicts.kinds import NOT_CERTAIN, Kind
 from drone_rl.verdicts.luck import fly_baselines
@@ -65,6 +66,7 @@ def judge_policy(
     sampled: bool = True,
     claim: Claim | None = None,
     unlike: Mapping[str, Any] | None = None,
+    seed: RootSeed | None = None,
 ) -> Verdict:
     """Flies a policy, greedily and sampled, and the baselines, all in the same worlds, and judges.
 
@@ -78,6 +80,8 @@ def judge_policy(
         claim: A certificate of the policy in the task of the worlds, if there is one.
         unlike: By what the drones' dynamics differ from those that the policy was made for: setting
             to "own" and "flown", plain values.
+        seed: Root of the environments' random streams; without it the verdict says that a policy
+            could have been fitted to these environments.
     """
     base: Any = getattr(env, "base_env", env)
     state, worlds = base.state_dict(), worlds_of(env)
@@ -89,7 +93,7 @@ def judge_policy(
     baselines = fly_baselines(
         env.batch_size[0], worlds.task, state, episodes, str(worlds.device), worlds.dynamics
     )
-    return judge(greedy, baselines, rule=rule, sampled=drawn, claim=claim, unlike=unlike)
+    return judge(greedy, baselines, rule=rule, sampled=drawn, claim=claim, unlike=unlike, seed=seed)
 
 
 def judge(
@@ -100,6 +104,7 @@ def judge(
     sampled: Episodes | None = None,
     claim: Claim | None = None,
     unlike: Mapping[str, Any] | None = None,
+    seed: RootSeed | None = None,
 ) -> Verdict:
     """Applies the rule.
 
@@ -111,6 +116,7 @@ def judge(
         sampled: The policy's episodes with drawn actions, in the same worlds.
         claim: A certificate of the policy in the same task, if there is one.
         unlike: See `judge_policy`.
+        seed: See `judge_policy`.
 
     Raises:
         ValueError: They were flown in different worlds.
@@ -125,6 +131,7 @@ def judge(
         "kind": kind.value,
         "certain": certain,
         "exit_code": kind.exit_code if certain else NOT_CERTAIN,
+        **({"seed": None, "seed_is_fixed": True} if seed is None else seed.as_dict()),
         "rule": rule.text,
         "error_rate": rule.error_rate,
         "good_share": rule.good_share,

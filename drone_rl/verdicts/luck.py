@@ -11,12 +11,12 @@ from drone_rl.sim.actions import Actions
 from drone_rl.sim.dynamics import Dynamics
 from drone_rl.sim.settings import BaseTaskSettings
 from drone_rl.sim.tasks import Task, as_task
-from drone_rl.utils.seeding import Stream, torch_generator
 from drone_rl.verdicts.rule import LUCK
 
 BASELINES = (*LUCK, "oracle")
 """Policies that see no picture, of cube collection."""
-_LUCK_SEED = 0
+_RANDOM_ACTIONS = 5
+"""Key of the stream of random actions, derived from the first environment's."""
 
 
 def make_baseline(
@@ -69,7 +69,9 @@ def fly_baselines(
     task = as_task(task)
     env = DroneEnv(num_worlds, task, pixels=False, device=device, dynamics=dynamics)
     actions = env.worlds.dynamics.actions
-    generator = torch_generator(_LUCK_SEED, Stream.ACTIONS, number=1, device=env.device)
+    env.load_state_dict(worlds)
+    source = env.side_streams(torch.tensor([0]), _RANDOM_ACTIONS)[0]
+    generator = torch.Generator(env.device).manual_seed(int(source.integers(2**63)))
     flown = {}
     for name in (*task.luck, "oracle"):
         env.load_state_dict(worlds)

@@ -3,6 +3,7 @@
 from drone_rl.words.domain import is_quoted, untested
 from drone_rl.words.licence import Evidence, Sentence
 from drone_rl.words.numbers import listed
+from drone_rl.words.seeds import is_fixed, seed_of
 
 
 def _more(evidence: Evidence) -> str:
@@ -55,6 +56,18 @@ SCOPE = (
     ),
 )
 
-SECTIONS = {"advice": ADVICE, "scope": SCOPE}
+SEED = (
+    Sentence(
+        "explanation.fixed_seed",
+        "the seed was known before the analysis",
+        is_fixed,
+        lambda e: (
+            f"Fixed seed {seed_of(e)}: a policy could have been fitted to the environments, frames "
+            "and placements of all sections."
+        ),
+    ),
+)
+
+SECTIONS = {"advice": ADVICE, "scope": SCOPE, "seed": SEED}
 """Sentences by the part of the page in which they stand."""
-SENTENCES = (*ADVICE, *SCOPE)
+SENTENCES = (*ADVICE, *SCOPE, *SEED)

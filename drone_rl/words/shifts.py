@@ -6,6 +6,7 @@ from typing import Any
 
 from drone_rl.words.licence import Evidence, Sentence, percent
 from drone_rl.words.numbers import listed
+from drone_rl.words.seeds import fixed_seed
 from drone_rl.words.terms import terms_of
 
 NAMES: Mapping[str, str] = {
@@ -294,4 +295,5 @@ SHIFTS = (
             "several axes at once but as said here."
         ),
     ),
+    fixed_seed("shifts.fixed_seed"),
 )

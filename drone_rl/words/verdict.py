@@ -5,6 +5,7 @@ from typing import Any
 
 from drone_rl.words.certificate import PROOF
 from drone_rl.words.licence import Evidence, Sentence, percent
+from drone_rl.words.seeds import fixed_seed
 from drone_rl.words.terms import terms_of
 
 FREQUENT = 0.02
@@ -214,6 +215,7 @@ SENTENCES = (
         lambda e: bool(e.get("unlike")),
         unlike,
     ),
+    fixed_seed("fixed_seed"),
     *PROOF,
     Sentence("shares", "a goal was missed, or a side not offered", _misses_or_lacks, _shares),
     Sentence("baselines", "luck is not enough", lambda e: not _luck_suffices(e), _baselines),

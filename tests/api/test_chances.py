@@ -65,7 +65,9 @@ def test_bounds_are_of_places_where_cubes_may_stand(good, monkeypatch):
 
 def test_held_out_placements_are_those_of_a_verdict(good):
     done = drone_rl.chances(good, placements=3, task=ONE, progress=silent)
-    with good.in_task(**ONE).flying(3) as (env, _):
+    assert str(done).endswith(f"placements: seed {done.seed.value} (fresh)")
+    assert done.as_dict()["seed_is_fixed"] is False
+    with good.in_task(**ONE).flying(3, seed=done.seed.value) as (env, _):
         env.reset()
         assert torch.equal(done.cubes, env.base_env.worlds.state.cubes)
     other = drone_rl.chances(good, placements=1, seed=1, task=ONE, progress=silent)
@@ -115,3 +117,12 @@ def test_mistakes_are_told_in_a_line(good, cubes, change, message):
 def test_flights_have_no_places_that_could_be_counted(good):
     with pytest.raises(InputError, match="chance of each placement is known of computer-vision"):
         drone_rl.chances(good.in_dynamics(mode="simple_flight"), progress=silent)
+
+
+def test_placements_that_are_given_have_no_seed(good):
+    given = drone_rl.chances(good, [1.0], task=ONE, progress=silent)
+    assert "seed" not in given.as_dict()
+    assert "seed" not in str(given)
+    fixed = drone_rl.chances(good, placements=1, seed=0, task=ONE, progress=silent)
+    assert fixed.as_dict()["seed"] == 0
+    assert "Fixed seed 0: a policy could have been fitted to these placements." in str(fixed)

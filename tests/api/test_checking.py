@@ -71,7 +71,13 @@ def test_a_lie_is_refused(path, truth):
     assert (done.accepted, done.exit_code) == (False, 14)
     lines = done.lines()
     assert lines[0].startswith("refused: ") and "30 of them ended otherwise" in lines[0]
-    assert lines[-1] == "refused: and 10 flights more ended otherwise than stated"
+    assert lines[-2] == "refused: and 10 flights more ended otherwise than stated"
+    assert lines[-1] == f"placements: seed {done.seed.value} (fresh)"
+    again = drone_rl.check(path, flights=30, seed=done.seed.value, progress=silent)
+    assert again.findings == done.findings
+    assert (again.as_dict()["seed_is_fixed"], done.as_dict()["seed_is_fixed"]) == (True, False)
+    assert "note: Fixed seed" in str(again)
+    assert "Fixed seed" not in str(done)
 
 
 def test_the_policy_must_be_known(path, truth):

@@ -9,7 +9,7 @@ from drone_rl.api.choosing import judge_run, judge_to_choose
 from drone_rl.api.policy import Policy
 from drone_rl.api.progress import silent
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.seeding import Stream
+from drone_rl.utils.seeding import RootSeed, Stream
 from tests.api.test_training import TINY
 
 
@@ -30,17 +30,23 @@ def test_the_worlds_are_those_to_choose_by(trained, monkeypatch):
     with pytest.raises(InputError, match="enough"):
         judge_to_choose(trained / "checkpoints" / "last.pt", 5, "cpu", "mujoco_warp")
     where = {"device": "cpu", "renderer": "mujoco_warp"}
-    assert asked == {"stream": Stream.CHOICE, "seed": 0, "num_envs": 5, **where}
+    seed = asked.pop("seed")
+    assert asked == {"stream": Stream.CHOICE, "num_envs": 5, **where}
+    with pytest.raises(InputError, match="enough"):
+        judge_to_choose(trained / "checkpoints" / "last.pt", 5, "cpu")
+    assert asked["seed"] != seed, "both are fresh"
 
 
 def test_a_run_keeps_its_verdict_beside_its_result(trained):
     before = json.loads((trained / "result.json").read_text())
     assert "verdict" not in before
-    verdict = judge_run(trained, 12, "cpu")
+    seed = RootSeed(4, is_fixed=False)
+    verdict = judge_run(trained, 12, "cpu", seed=seed)
+    assert (verdict["seed"], verdict["seed_is_fixed"]) == (4, False)
     after = json.loads((trained / "result.json").read_text())
     assert after == {**before, "verdict": json.loads(json.dumps(verdict))}
     assert verdict["greedy"]["episodes"] == verdict["sampled"]["episodes"] == 12
-    assert judge_run(trained, 12, "cpu") == verdict  # once more, to the last bit
+    assert judge_run(trained, 12, "cpu", seed=seed) == verdict  # once more, to the last bit
 
 
 def test_a_checkpoint_that_is_not_that_of_the_result_is_refused(trained):

@@ -85,7 +85,7 @@ def test_a_verdict_tells_the_domain_and_may_speak_against_it(good, tmp_path):
     told = {"shifts": path, "require_domain": tmp_path / "needs.yaml", "progress": silent}
     done = drone_rl.judge(good, episodes=5, sampled=False, **told)
     assert done.coverage.is_covered and "blur of up to 1 pixels" in done.domain
-    assert len(str(done).splitlines()) == 3 and done.domain in done._repr_html_()
+    assert len(str(done).splitlines()) == 4 and done.domain in done._repr_html_()
     assert done.as_dict()["required_domain"]["lacking"] == {}
     strict = drone_rl.judge(good, episodes=5, sampled=False, good_share=0.99, **told)
     assert not strict.coverage.is_covered and "not quoted" in strict.domain

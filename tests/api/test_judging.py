@@ -10,6 +10,7 @@ from drone_rl.api.judging import Evaluation
 from drone_rl.api.progress import silent
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import mean_bounds, proportion
+from drone_rl.utils.seeding import RootSeed
 from tests.checks.making import of_every_place
 from tests.fake_flight import floating
 
@@ -112,7 +113,10 @@ def test_the_table_of_an_evaluation(good):
         }
 
     figures = {"greedy": flown((1, 4), [0.5] * 100), "oracle": flown((4, 4), [])}
-    rows = str(Evaluation(good, drone_rl.EvaluateSettings(), figures)).splitlines()
+    seed = RootSeed(8, is_fixed=False)
+    told = str(Evaluation(good, drone_rl.EvaluateSettings(), figures, seed)).splitlines()
+    assert told[-1] == "environments: seed 8 (fresh)"
+    rows = told[:-1]
     assert rows[0].split() == ["greedy", "oracle"]
     assert rows[1].split("  ")[0] == "all cubes"
     assert "25% [0.631, 80.6]" in rows[1]
@@ -144,3 +148,32 @@ def test_in_another_body_it_is_said_so(good, monkeypatch):
             "mean_length"
         ]
     )
+
+
+def test_two_verdicts_differ_in_seed_and_a_printed_seed_reproduces_one(good):
+    how = {"episodes": 12, "sampled": True, "progress": silent}
+    one, other = (drone_rl.judge(good, **how) for _ in range(2))
+    first, second = one.verdict.evidence, other.verdict.evidence
+    assert first["seed"] != second["seed"]
+    assert not first["seed_is_fixed"]
+    printed = re.search(r"environments: seed (\d+) \(fresh\)", str(one))
+    assert printed is not None
+    again = drone_rl.judge(good, seed=int(printed[1]), **how).verdict.evidence
+    assert again == {**first, "seed_is_fixed": True}
+    assert one.settings.seed == first["seed"]
+
+
+def test_an_evaluation_says_what_its_seed_is(good):
+    how = {"episodes": 2, "baselines": False, "progress": silent}
+    fresh, fixed = drone_rl.evaluate(good, **how), drone_rl.evaluate(good, seed=3, **how)
+    assert (fixed.as_dict()["seed"], fixed.as_dict()["seed_is_fixed"]) == (3, True)
+    assert not fresh.as_dict()["seed_is_fixed"]
+    assert "Fixed seed 3: a policy could" in str(fixed)
+    assert "Fixed seed" not in str(fresh)
+    assert f"environments: seed {fresh.seed.value} (fresh)" in fresh._repr_html_()
+
+
+def test_a_baseline_is_judged_from_a_fresh_seed_too():
+    how = {"episodes": 2, "progress": silent}
+    seeds = {drone_rl.judge("oracle", **how).verdict.evidence["seed"] for _ in range(2)}
+    assert len(seeds) == 2

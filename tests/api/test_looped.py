@@ -48,7 +48,12 @@ def test_it_flies_the_first_worlds_of_evaluations(program):
     success = done.as_dict()["success"]
     assert (success["successes"], success["trials"]) == (2, 2)
     assert success["lower95"] == pytest.approx(0.025**0.5)  # both of two, exactly
-    assert str(done).endswith("2 of 2 succeeded (16% to 100%)")
+    assert str(done).splitlines()[-3:] == [
+        "2 of 2 succeeded (16% to 100%)",
+        "Fixed seed 3: a policy could have been fitted to these environments.",
+        "environments: seed 3 (fixed)",
+    ]
+    assert (done.as_dict()["seed"], done.as_dict()["seed_is_fixed"]) == (3, True)
     first = done.flights[0]
     assert len(first.path) == first.steps + 1
     assert first.simulated_s == pytest.approx(first.steps * 0.099)
@@ -104,7 +109,9 @@ def test_a_column_of_bodies(program, monkeypatch):
 
     monkeypatch.setattr(looped, "find_firmware", none)
     done = drone_rl.bodies([near()], **asked, progress=silent)
-    assert str(done).splitlines()[-1] == "good, software in the loop: firmware=x isn't there"
+    lines = str(done).splitlines()
+    assert lines[-2] == "good, software in the loop: firmware=x isn't there"
+    assert lines[-1] == f"environments: seed {done.numbers['seed']} (fresh)"
     assert "isn't there" in done._repr_html_() or "isn&#" in done._repr_html_()
     without = drone_rl.bodies([near()], **(asked | {"loop_flights": 0}), progress=silent)
-    assert without.numbers.keys() == {"bodies", "policies"}
+    assert without.numbers.keys() == {"bodies", "seed", "seed_is_fixed", "policies"}

@@ -6,6 +6,8 @@ import drone_rl
 from drone_rl.bench.evidence import changed
 from drone_rl.conditions.measured import read_measured
 from drone_rl.utils.errors import InputError
+from drone_rl.words.licence import said
+from drone_rl.words.shifts import SHIFTS
 from tests.conditions.making import shifts_of
 
 
@@ -71,6 +73,10 @@ _ALL_GOOD = {f"{_BLUR}.flown.3.good": True, **_WIDE}
         ({f"{_BLUR}.high_open": True}, "domain.ranges.blur contradicts"),
         ({"domain.plain.good": False}, "contradicts"),
         ({"settings.good_share": 2.0}, "good_share=2.0 is out of range"),
+        ({"seed": 1}, "seed=1 is not settings.seed=0"),
+        ({"settings.seed": None}, "seed=0 is not settings.seed=None"),
+        ({"seed": -1}, "seed=-1 is out of range"),
+        ({"seed_is_fixed": "no"}, "seed_is_fixed='no' is neither true nor false"),
         ({"pictures.blur.0": None}, "does not show the world as it is"),
         ({"pictures.blur.1": "AAAA"}, "is no picture of 25 rows"),
     ],
@@ -95,3 +101,16 @@ def test_a_damaged_file_is_refused(good, tmp_path):
         path.write_text(content)
         with pytest.raises(InputError, match="can't be used"):
             read_measured(path, good.description, good.state["policy"])
+
+
+def test_a_file_of_version_0_1_has_a_fixed_seed(good, tmp_path):
+    made = shifts_of(good)
+    path = tmp_path / "shifts.json"
+    del made["seed"]
+    path.write_text(json.dumps(made))
+    with pytest.raises(InputError, match="one of seed and seed_is_fixed"):
+        read_measured(path, good.description, good.state["policy"])
+    del made["seed_is_fixed"]
+    path.write_text(json.dumps(made))
+    measured = read_measured(path, good.description, good.state["policy"])
+    assert said(SHIFTS, measured.evidence)["shifts.fixed_seed"].startswith("Fixed seed 0: ")

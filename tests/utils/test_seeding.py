@@ -4,14 +4,21 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from drone_rl.settings.judging import JudgeSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import (
+    FRESH_BITS,
+    RootSeed,
     Stream,
+    fresh_seed,
     get_state,
+    legacy_seed,
+    root_seed,
     seed_sequence,
     set_state,
     side_stream,
     torch_generator,
+    with_seed,
     world_random_state,
 )
 
@@ -126,3 +133,33 @@ def test_a_stream_beside_a_worlds_own_leaves_it_where_it_stands():
     assert not any(np.isin(stream.random(4), drawn).any() for stream in others)
     child = np.random.SeedSequence([before["state"], before["inc"]], spawn_key=(5,))
     assert np.array_equal(np.random.Generator(np.random.PCG64(child)).random(4), drawn)
+
+
+def test_fresh_seeds_differ_and_are_exact_in_json():
+    found = {fresh_seed() for _ in range(100)}
+    assert len(found) == 100
+    assert all(0 <= seed < 2**FRESH_BITS <= 2**53 for seed in found)
+    assert max(found) > 2**40  # by chance less once in 2**800
+
+
+def test_a_seed_is_fixed_if_and_only_if_the_user_gave_it():
+    assert root_seed(0) == RootSeed(0, is_fixed=True)
+    assert not root_seed(None).is_fixed
+    given, seed = with_seed(JudgeSettings(seed=7, episodes=3))
+    assert (given.seed, given.episodes, seed) == (7, 3, RootSeed(7, is_fixed=True))
+    open_, fresh = with_seed(JudgeSettings())
+    assert open_.seed == fresh.value != with_seed(JudgeSettings())[1].value
+    assert fresh.as_dict() == {"seed": fresh.value, "seed_is_fixed": False}
+
+
+def test_a_part_of_an_analysis_has_the_seed_of_the_whole():
+    whole = RootSeed(2**47, is_fixed=False)
+    part, seed = with_seed(JudgeSettings(seed=3), whole)
+    assert (part.seed, seed) == (2**47, whole)
+
+
+def test_a_long_seed_is_shortened_for_generators_of_32_bits():
+    assert [legacy_seed(s) for s in (0, 5, 2**32 - 1)] == [0, 5, 2**32 - 1]
+    long = [legacy_seed(2**32 + i) for i in range(100)]
+    assert len(set(long)) == 100
+    assert max(long) < 2**32

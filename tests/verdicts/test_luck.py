@@ -9,7 +9,7 @@ from drone_rl.sim.actions import MOVES, Move
 from drone_rl.sim.settings import TaskSettings
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.seeding import Stream, torch_generator
+from drone_rl.utils.seeding import side_stream, world_random_state
 from drone_rl.verdicts.luck import BASELINES, fly_baselines
 from tests.continuous import make_worlds
 from tests.second_task import Posts
@@ -19,8 +19,9 @@ TASK = TaskSettings(num_cubes=1)
 
 @pytest.fixture
 def policies():
-    """What each baseline is; luck has a random stream of its own, which no policy's actions use."""
-    generator = torch_generator(0, Stream.ACTIONS, number=1)
+    """What each baseline is; random actions follow from the first environment's stream alone."""
+    stream = side_stream(world_random_state(5, 0), 5)
+    generator = torch.Generator().manual_seed(int(stream.integers(2**63)))
     fixed = {action.name.lower(): ConstantPolicy(action) for action in Move}
     return {"oracle": Oracle(TASK), "random": RandomPolicy(MOVES, generator), **fixed}
 
@@ -39,6 +40,19 @@ def test_baselines_are_flown_in_the_same_worlds_one_by_one(policies, monkeypatch
             found = getattr(episodes.goals, field)
             assert torch.equal(found.nan_to_num(), values.nan_to_num()), (name, field)
     assert len(flown["oracle"]) == 6 and flown["oracle"].success.all()
+
+
+def test_random_actions_differ_with_the_seed():
+    lengths = []
+    for seed in (5, 6):
+        env = DroneEnv(4, TASK, pixels=False, seed=seed)
+        source = env.side_streams(torch.tensor([0]), 5)[0]
+        lengths.append(int(source.integers(2**63)))
+        flown = fly_baselines(4, TASK, env.state_dict(), 4)
+        assert torch.equal(
+            flown["random"].length, fly_baselines(4, TASK, env.state_dict(), 4)["random"].length
+        )
+    assert lengths[0] != lengths[1]
 
 
 def test_another_task_has_luck_of_its_own():

@@ -15,7 +15,9 @@ def test_the_whole():
     assert text["shifts.not"] == "Not with brightness at 0.8 times: cubes on its right 47%."
     assert text["shifts.impossible"].endswith("height of the sun at 0 degrees, 45%.")
     assert "succeeds in 2% of flights" in text["shifts.together"]
-    assert set(text) == {f"shifts.{n}" for n in ("good", "not", "impossible", "together", "scope")}
+    assert text["shifts.fixed_seed"].startswith("Fixed seed 0: ")
+    said_too = ("good", "not", "impossible", "together", "scope", "fixed_seed")
+    assert set(text) == {f"shifts.{name}" for name in said_too}
 
 
 @pytest.mark.parametrize(
@@ -35,7 +37,7 @@ def test_limits_are_rounded_to_where_it_is_surely_good(value, low, high):
 
 def test_no_range_without_a_search_and_none_of_who_is_not_good():
     names = set(said(SHIFTS, changed(EVIDENCE, {"domain": None})))
-    assert names == {"shifts.impossible", "shifts.together"}
+    assert names == {"shifts.impossible", "shifts.together", "shifts.fixed_seed"}
     bad = {"low": None, "high": None, "positions": None, "failed": [], "low_open": None,
            "high_open": None}  # fmt: skip
     changes = {f"domain.ranges.{name}": bad for name in ("sun", "blur", "brightness")}

@@ -77,7 +77,7 @@ def success_lower95(policy: Any, episodes: int) -> float:
     from drone_rl.api.judging import evaluate
     from drone_rl.api.progress import silent
 
-    flown = evaluate(policy, episodes=episodes, baselines=False, progress=silent).flown
+    flown = evaluate(policy, episodes=episodes, seed=0, baselines=False, progress=silent).flown
     return flown["greedy"]["success"]["lower95"]
 
 

@@ -33,7 +33,7 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
 
     def seek(objective: Objective) -> class_model.ClassModel:
         network = copy.deepcopy(context.network)  # gradients are gathered in it
-        return class_model.search(network, statistics, objective, seed=context.settings.seed)
+        return class_model.search(network, statistics, objective, seed=context.seed.value)
 
     with ThreadPoolExecutor(len(OBJECTIVES)) as pool:  # steps of small pictures take one core
         found = dict(zip(OBJECTIVES, pool.map(seek, OBJECTIVES), strict=True))

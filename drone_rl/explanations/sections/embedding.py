@@ -24,7 +24,7 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
         ("features", data.features[context.layer]),
         ("pixels", data.observations),
     ):
-        embedding = tsne.embed(originals, perplexity=settings.perplexity, seed=settings.seed)
+        embedding = tsne.embed(originals, perplexity=settings.perplexity, seed=context.seed.value)
         arrays[f"tsne_{name}"] = embedding.points
         numbers[name] = {
             "layer": context.layer if name == "features" else None,

@@ -14,6 +14,12 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
     episodes, rule = context.settings.episodes, Rule(good_share=context.settings.good_share)
     actor, claim = context.restart(), context.claim
     verdict = judge_policy(
-        context.env, actor, episodes, rule=rule, claim=claim, unlike=context.unlike
+        context.env,
+        actor,
+        episodes,
+        rule=rule,
+        claim=claim,
+        unlike=context.unlike,
+        seed=context.seed,
     )
     return {"verdict": verdict.as_dict()}, {}

@@ -18,6 +18,7 @@ from drone_rl.sim.actions import MOVES
 from drone_rl.sim.settings import TaskSettings
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.seeding import legacy_seed
 
 _COMPARED = 1000
 """Pictures of the renderer that must be the closed form's."""
@@ -52,7 +53,7 @@ def _map(context: Context, settings: PlacesSettings) -> PlaceMap:
         raise InputError("it is no torch module, so that nothing is known of its sums")
     eye, lattice = Eye.of(task, scenes.worlds.camera), Lattice(task)
     seeing = Seeing(scenes.worlds, lattice, eye)
-    seeing.check(_COMPARED, np.random.RandomState(context.settings.seed))
+    seeing.check(_COMPARED, np.random.RandomState(legacy_seed(context.seed.value)))
     window = Window(max(settings.nearest, task.cube_size), settings.farthest, settings.sideways)
     return map_places(
         eye,

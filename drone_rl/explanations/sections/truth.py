@@ -27,7 +27,7 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
     Arrays: "interventions" (K, H, W, 3): one frame after each change; "patch_effects" (rows,
     columns): how far each patch moves the policy, on average.
     """
-    data, network, seed = context.dataset, context.network, context.settings.seed
+    data, network, seed = context.dataset, context.network, context.seed.value
     worlds = context.scenes.worlds
     state = data.state(worlds.task, worlds.dynamics).to(context.device)
     episode = context.episode

@@ -1,7 +1,8 @@
 """The verdict, the flights it rests on, and how the policy fails."""
 
 from drone_rl.report.part import Part
-from drone_rl.words.advice import ADVICE, SCOPE
+from drone_rl.words.advice import ADVICE, SCOPE, SEED
+from drone_rl.words.seeds import seed_line
 from drone_rl.words.truth import NAMES
 
 PART = Part(
@@ -9,8 +10,11 @@ PART = Part(
     label="Verdict",
     place=10,
     needs=("verdict",),
-    words={"advice": ADVICE, "scope": SCOPE},
-    extras=lambda explanation: {"trusted": _trusted(explanation.numbers.get("truth"))},
+    words={"advice": ADVICE, "scope": SCOPE, "seed": SEED},
+    extras=lambda explanation: {
+        "trusted": _trusted(explanation.numbers.get("truth")),
+        "seed": seed_line(explanation.numbers),
+    },
 )
 
 

@@ -12,5 +12,8 @@ from drone_rl.report.sections.evaluation import PART
     ],
 )
 def test_the_map_to_trust_is_named_as_people_call_it(make_explanation, truth, name):
-    numbers = {} if truth is None else {"truth": truth}
-    assert PART.extras(make_explanation(numbers)) == {"trusted": name}
+    numbers = {"seed": 5, "seed_is_fixed": False} | ({} if truth is None else {"truth": truth})
+    assert PART.extras(make_explanation(numbers)) == {
+        "trusted": name,
+        "seed": "environments: seed 5 (fresh)",
+    }

@@ -1,0 +1,45 @@
+"""`drone-rl bench truth`, adversarial policies: none may be called good and certain, or proved."""
+
+import importlib
+import importlib.util
+import logging
+from collections.abc import Iterator
+from pathlib import Path
+
+from drone_rl.bench import gamed_memory
+from drone_rl.bench.gamed_case import GamedCase
+
+_LATER = ("gamed_rounding", "gamed_certificates")
+"""Modules of this package with `cases`, used where they exist."""
+
+_log = logging.getLogger(__name__)
+
+
+def bench_gamed(folder: Path) -> dict[str, int]:
+    """Judge every adversarial policy as a user would, with default settings.
+
+    Args:
+        folder: For the policies' files; made if need be.
+
+    Returns:
+        "gamed_verdicts": how many deceived the program; "gamed_total": how many tried.
+    """
+    found = [(case.name, case.called_good()) for case in all_cases(folder)]
+    for name, is_deceived in found:
+        if is_deceived:
+            _log.warning("%s: called good", name)
+    deceived = sum(is_deceived for _, is_deceived in found)
+    return {"gamed_verdicts": deceived, "gamed_total": len(found)}
+
+
+def all_cases(folder: Path) -> Iterator[GamedCase]:
+    """The cases of all modules.
+
+    Args:
+        folder: Each module gets a folder of its own below it.
+    """
+    yield from gamed_memory.cases(folder / "memory")
+    for name in _LATER:
+        module = f"{__package__}.{name}"
+        if importlib.util.find_spec(module) is not None:
+            yield from importlib.import_module(module).cases(folder / name)

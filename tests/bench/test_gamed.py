@@ -1,0 +1,11 @@
+from drone_rl.bench import gamed, gamed_memory
+from drone_rl.bench.gamed_case import GamedCase
+from drone_rl.bench.registry import BENCHMARKS
+
+
+def test_deceived_judgements_are_counted(monkeypatch, tmp_path):
+    made = [GamedCase("a", lambda: True), GamedCase("b", lambda: False)]
+    monkeypatch.setattr(gamed_memory, "cases", lambda folder: made)
+    monkeypatch.setattr(gamed, "_LATER", ("no_such_module",))
+    assert gamed.bench_gamed(tmp_path) == {"gamed_verdicts": 1, "gamed_total": 2}
+    assert BENCHMARKS["gamed"].group == "truth"
