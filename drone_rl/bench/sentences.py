@@ -100,6 +100,8 @@ _OF_VERDICTS = (
     ("baselines", _ALL_LUCK),
     ("baselines", {"baselines.oracle.shares.all.mean": 0.7}),
     ("pointless", {"baselines.forward.success.share": 0.3}, _ALL_LUCK),
+    ("pointless", {"kind": "good, but trivial"}, _ALL_LUCK),
+    ("kind", {"baselines.forward.success.share": 0.92}, {**_ALL_LUCK, "kind": "good, but trivial"}),
     ("hopeless", {"baselines.oracle.success.upper95": 0.6},
      {"baselines.oracle.success.upper95": 0.4}),
     ("failures.largest", {"failures.largest": None}),

@@ -62,8 +62,11 @@ def _lost_side(evidence: Evidence) -> str:
 def _looks(evidence: Evidence) -> str:
     if lost := _lost_side(evidence):
         return f"blind to {lost}"
-    neither = "neither good nor poor nor one-sided"
-    return neither if evidence["kind"] == "none of these" else evidence["kind"]
+    others = {
+        "none of these": "neither good nor poor nor one-sided",
+        "good, but trivial": "good in a trivial task",
+    }
+    return others.get(evidence["kind"], evidence["kind"])
 
 
 def _list(parts: Sequence[str], last: str = "and") -> str:
@@ -76,9 +79,24 @@ def _kind(evidence: Evidence) -> str:
         return f"This policy can't be trusted with {lost}: {every}."
     return {
         "good": f"This policy does its task: {every}.",
+        "good, but trivial": _trivial(evidence),
         "poor": f"This policy does not do its task: it is {_beside_luck(evidence)} luck.",
         "none of these": f"This policy is {_looks(evidence)}: {every}.",
     }[evidence["kind"]]
+
+
+def _trivial(evidence: Evidence) -> str:
+    baseline, flown = _most_successful(evidence), evidence["baselines"]
+    return (
+        f"{_acting(baseline).capitalize()} does as well: it {_every(evidence)} in "
+        f"{_success(flown[baseline])} of episodes, this policy in {_success(evidence['greedy'])}."
+    )
+
+
+def _most_successful(evidence: Evidence) -> str:
+    """The baseline that ignores the observations and succeeds most often."""
+    flown = evidence["baselines"]
+    return max(_luck(evidence), key=lambda name: flown[name]["success"]["share"])
 
 
 def _beside_luck(evidence: Evidence) -> str:
@@ -122,8 +140,7 @@ def _luck_suffices(evidence: Evidence) -> bool:
 
 
 def _pointless(evidence: Evidence) -> str:
-    flown = evidence["baselines"]
-    luck = max(_luck(evidence), key=lambda name: flown[name]["success"]["share"])
+    flown, luck = evidence["baselines"], _most_successful(evidence)
     return (
         f"This task tells little, for luck is enough: {_acting(luck)} {_every(evidence)} in "
         f"{_success(flown[luck])} of episodes."
@@ -217,7 +234,12 @@ SENTENCES = (
     *PROOF,
     Sentence("shares", "a goal was missed, or a side not offered", _misses_or_lacks, _shares),
     Sentence("baselines", "luck is not enough", lambda e: not _luck_suffices(e), _baselines),
-    Sentence("pointless", "luck succeeds as a good policy does", _luck_suffices, _pointless),
+    Sentence(
+        "pointless",
+        "luck succeeds as a good policy does, and the first sentence does not say so",
+        lambda e: _luck_suffices(e) and not (e["certain"] and e["kind"] == "good, but trivial"),
+        _pointless,
+    ),
     Sentence(
         "hopeless",
         "the oracle surely fails in more than half of the episodes",

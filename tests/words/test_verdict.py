@@ -75,6 +75,7 @@ def test_what_is_said_of_a_good_policy(evidence):
         ("one-sided (right)", "can't be trusted with cubes on its left: it collects every cube"),
         ("one-sided (left)", "can't be trusted with cubes on its right"),
         ("none of these", "is neither good nor poor nor one-sided: it collects"),
+        ("good, but trivial", " does as well: it collects every cube in "),
     ],
 )
 def test_kinds(evidence, kind, part):
@@ -120,6 +121,13 @@ def test_luck_that_is_enough(evidence):
         "90% of episodes."
     )
     assert "baselines" not in found
+    evidence["kind"] = "good, but trivial"
+    found = speak(evidence)
+    assert found["kind"] == (
+        "Flying straight on does as well: it collects every cube in 90% of episodes, this policy "
+        "in 94%."
+    )
+    assert "pointless" not in found
     evidence["baselines"]["forward"] = flights(0.89, None, 1.0, None, 1.0)
     found = speak(evidence)
     assert "pointless" not in found
