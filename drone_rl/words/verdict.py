@@ -66,7 +66,7 @@ def _looks(evidence: Evidence) -> str:
         "none of these": "neither good nor poor nor one-sided",
         "good, but trivial": "good in a trivial task",
     }
-    return others.get(evidence["kind"], evidence["kind"])
+    return others.get(str(evidence["kind"]), str(evidence["kind"]))
 
 
 def _list(parts: Sequence[str], last: str = "and") -> str:
