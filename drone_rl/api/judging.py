@@ -236,7 +236,7 @@ def judge(
             pilot,
             certificate,
             flights=settings.certificate_flights,
-            seed=settings.seed,
+            seed=settings.certificate_seed,
             device=settings.device,
             renderer=settings.renderer,
         )

@@ -1,22 +1,27 @@
 """Which certificate a verdict, a card or a report may quote of a policy."""
 
+import secrets
 from pathlib import Path
 from typing import Any
 
 from drone_rl.api.pilot import Pilot
 from drone_rl.api.policy import Policy
 from drone_rl.checks import check_certificate, read_tried
+from drone_rl.checks.drawing import ANYWHERE
+from drone_rl.settings.judging import JudgeSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.verdicts.proof import Claim
 from drone_rl.zoo import certificate_path
+
+_SEED_BITS = 48
 
 
 def find_claim(
     policy: Pilot,
     given: str | Path | None = None,
     *,
-    flights: int = 0,
-    seed: int = 0,
+    flights: int = JudgeSettings.certificate_flights,
+    seed: int | None = None,
     device: str = "cpu",
     renderer: str = "raytrace",
 ) -> Claim | None:
@@ -26,8 +31,9 @@ def find_claim(
         policy: Which, in the task that counts.
         given: The certificate's file, or a folder that holds a certificate.json; by default the one
             that lies with the policy, see `drone_rl.zoo.certificate_path`.
-        flights: How many to fly anew; 0 for none.
-        seed: Of where these start.
+        flights: Rollouts that re-check it from other placements; 0 for none.
+        seed: Of these placements; by default a fresh one from the operating system's entropy, so
+            that no certificate can be fitted to them.
         device: Where they are flown.
         renderer: Who draws, see `drone_rl.sim.rendering.find_renderer`.
 
@@ -61,12 +67,20 @@ def _file(path: Path) -> Path:
     return path / "certificate.json" if path.is_dir() else path
 
 
-def _try(policy: Policy, path: Path, flights: int, **flying: Any) -> Claim:
+def _try(policy: Policy, path: Path, flights: int, *, seed: int | None, **flying: Any) -> Claim:
     weights = policy.state["policy"]
     certificate = read_tried(path, policy.description, weights)
-    if flights:
-        found = check_certificate(certificate, weights, flights=flights, **flying)
-        if not found.accepted:
-            raise InputError(f"certificate {path} does not hold: {found.lines()[0]}; prove again")
-        flights = sum(found.flights.values())
-    return Claim(path, certificate, flights=flights)
+    if not flights:
+        return Claim(path, certificate)
+    drawn = secrets.randbits(_SEED_BITS) if seed is None else seed
+    found = check_certificate(certificate, weights, flights=flights, seed=drawn, **flying)
+    if not found.accepted:
+        raise InputError(f"certificate {path} does not hold: {found.lines()[0]}; prove again")
+    return Claim(
+        path,
+        certificate,
+        flights=sum(found.flights.values()),
+        uniform=found.flights.get(ANYWHERE, 0),
+        seed=drawn,
+        seed_is_fixed=seed is not None,
+    )

@@ -89,7 +89,10 @@ PROOF: Plain = {
     "lost": 0.0,
     "undecided": 0.0,
     "finished": True,
-    "checked": 0,
+    "checked": 1000,
+    "wrong_at_most": 0.0031,
+    "seed": 17,
+    "seed_is_fixed": False,
     "agreeing": 400,
 }
 """What a verdict quotes of a certificate that says: from every placement."""

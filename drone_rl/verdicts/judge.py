@@ -43,7 +43,7 @@ class Verdict:
 
     @property
     def is_proved(self) -> bool:
-        """Whether a certificate says that it succeeds from every placement, and is quoted."""
+        """Whether a certificate says so of every placement, and rollouts re-checked it."""
         return is_proved(self.evidence)
 
     @property

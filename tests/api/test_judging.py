@@ -52,10 +52,17 @@ def test_a_verdict_with_proof(good, tmp_path):
     path = tmp_path / "certificate.json"
     path.write_text(json.dumps(of_every_place(good.in_task(num_cubes=1))))
     how = {"certificate": path, "episodes": 8, "sampled": False, "progress": silent}
-    done = drone_rl.judge(good, task={"num_cubes": 1}, **how)
+    done = drone_rl.judge(good, task={"num_cubes": 1}, certificate_flights=400, **how)
     assert done.verdict.is_proved
-    assert "Proved for every placement" in str(done)
+    assert "A certificate states for every placement" in str(done)
+    assert "re-checked by 400 rollouts from fresh placements" in str(done)
     assert (done.as_dict()["certificate"], done.as_dict()["proof"]["agreeing"]) == (str(path), 8)
+    again = drone_rl.judge(good, task={"num_cubes": 1}, certificate_flights=400, **how)
+    seeds = [one.as_dict()["proof"]["seed"] for one in (done, again)]
+    assert seeds[0] != seeds[1]
+    unchecked = drone_rl.judge(good, task={"num_cubes": 1}, certificate_flights=0, **how)
+    assert not unchecked.verdict.is_proved
+    assert "not re-checked, so it proves nothing here" in str(unchecked)
     with pytest.raises(InputError, match="another task: num_cubes=1, not 3"):
         drone_rl.judge(good, **how)
     with pytest.raises(InputError, match="policy=oracle has no network; give certificate= with"):
@@ -66,10 +73,13 @@ def test_a_certificate_that_flights_refute_proves_nothing(tmp_path):
     poor = drone_rl.load_policy("poor").in_task(num_cubes=1)
     path = tmp_path / "certificate.json"
     path.write_text(json.dumps(of_every_place(poor)))
-    done = drone_rl.judge(poor, certificate=path, episodes=8, sampled=False, progress=silent)
+    few = {"episodes": 8, "sampled": False, "progress": silent}
+    done = drone_rl.judge(poor, certificate=path, certificate_flights=0, **few)
     assert not done.verdict.is_proved
     assert "8 of 8 greedy flights of this verdict ended otherwise than it states." in str(done)
-    assert "Proved" not in str(done)
+    assert "A certificate states" not in str(done)
+    with pytest.raises(InputError, match=r"does not hold: .* ended otherwise than stated"):
+        drone_rl.judge(poor, certificate=path, **few)
 
 
 def test_without_a_certificate_nothing_is_proved(good):

@@ -38,7 +38,10 @@ def good():
 
 @pytest.mark.parametrize(
     ("undecided", "status", "words"),
-    [(False, 0, "Proved for every placement"), (True, 16, "from a share of 0.75 of all placem")],
+    [
+        (False, 0, "A certificate states for every"),
+        (True, 16, "from a share of 0.75 of all placem"),
+    ],
 )
 def test_a_proof_can_be_required(in_process, tmp_path, good, undecided, status, words):
     made = of_every_place(good, undecided=undecided)
@@ -49,6 +52,13 @@ def test_a_proof_can_be_required(in_process, tmp_path, good, undecided, status, 
     kept = json.loads((tmp_path / "v" / "verdict.json").read_text())
     assert kept["proof"]["every"] == (status == 0)
     assert kept["certificate"] == "c.json"
+    if status == 0:
+        unchecked = in_process(
+            *ONE, "certificate=c.json", "require=proved", "certificate_flights=0"
+        )
+        assert unchecked.returncode == 16 and "not re-checked" in unchecked.stdout
+        few = in_process(*ONE, "certificate=c.json", "require=proved", "certificate_flights=100")
+        assert few.returncode == 16 and "too much for a proof" in few.stdout
     by_kind = in_process(*ONE, "certificate=c.json")
     assert by_kind.returncode == 13  # ten flights are too few to be certain of a kind
 
