@@ -15,6 +15,7 @@ from drone_rl.api.foreign import as_pilot
 from drone_rl.api.pilot import Pilot
 from drone_rl.api.progress import Bar, Progress
 from drone_rl.api.quoting import find_claim
+from drone_rl.api.reflying import refly
 from drone_rl.api.showing import aligned, paragraph, table
 from drone_rl.conditions.measured import Measured
 from drone_rl.envs import DroneEnv, worlds_of
@@ -232,6 +233,7 @@ def judge(
         pilot = pilot.in_dynamics(**dynamics) if dynamics else pilot
         measured = find_domain(pilot, shifts, outputs)
         coverage = require(pilot, require_domain, measured) if require_domain is not None else None
+        coverage = _reflown(pilot, coverage, measured, settings)
         claim = find_claim(
             pilot,
             certificate,
@@ -257,6 +259,16 @@ def judge(
     if coverage is None or measured is None:
         return done
     return dataclasses.replace(done, coverage=beside(coverage, _told(measured, verdict)))
+
+
+def _reflown(
+    pilot: Pilot, coverage: Coverage | None, measured: Measured | None, settings: JudgeSettings
+) -> Coverage | None:
+    """The same with new episodes, if there is a claim for them to check."""
+    numbers = None if measured is None else measured.numbers
+    if coverage is None or numbers is None or not coverage.is_stated or not settings.domain_flights:
+        return coverage
+    return dataclasses.replace(coverage, reflown=refly(pilot, coverage.needs, numbers, settings))
 
 
 def _told(measured: Measured, verdict: Verdict) -> dict[str, Any]:

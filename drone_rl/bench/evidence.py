@@ -307,6 +307,7 @@ _DARK = {
 SHIFTS: Plain = {
     "terms": CUBES.as_dict(),
     "settings": {"domain_episodes": 400, "episodes": 200, "seed": 0, "good_share": 0.9},
+    "file": {"path": "shifts.json", "dated": "2026-01-31 12:00"},
     "plain": {"success": _share(200, 200, 0.98, 1.0), "oracle": _share(200, 200, 0.98, 1.0)},
     "axes": {
         "sun": _along(

@@ -176,7 +176,7 @@ def _is_sound(axis: Axis, found: Mapping[str, Any], of: Any, numbers: Mapping[st
     if found["positions"] is None or not is_good:
         return found["positions"] is None and not is_good and not found["flown"]
     values = all(_is_at(axis, at["position"], at["value"], of) for at in found["flown"])
-    limits = dict(zip((-1, 1), found["positions"], strict=True))
+    limits: dict[int, float] = dict(zip((-1, 1), found["positions"], strict=True))
     ends = [
         _is_end(axis, found, end, sign, of, numbers["settings"]["seed"])
         and _is_at(axis, limits[sign], found[end], of)
@@ -200,13 +200,13 @@ def _is_end(axis: Axis, found: Mapping[str, Any], end: str, sign: int, of: Any, 
         walked = walk(axis, sign, seed, is_good)
     except InputError:
         return False
-    limit = dict(zip((-1, 1), found["positions"], strict=True))[sign]
+    limits: dict[int, float] = dict(zip((-1, 1), found["positions"], strict=True))
     failed = [at["value"] for at in found["failed"] if at["end"] == end]
     values = [] if walked.failed is None else [finite(axis.value(walked.failed, of))]
     is_open = walked.failed is None if walked.flown else None
     return (
         not left
-        and _is_same(limit, axis.position(walked.limit))
+        and _is_same(limits[sign], axis.position(walked.limit))
         and found[f"{end}_open"] == is_open
         and len(failed) == len(values)
         and all(_is_same(one, other) for one, other in zip(failed, values, strict=True))

@@ -90,7 +90,12 @@ class Prober:
     """Says at which strengths a policy is surely good."""
 
     def __init__(
-        self, bed: Airfield, oracle: Episodes, good_share: float, possible_share: float = 0.9
+        self,
+        bed: Airfield,
+        oracle: Episodes,
+        good_share: float,
+        possible_share: float = 0.9,
+        plain_part: float = WALKING,
     ) -> None:
         """Takes what good is measured by.
 
@@ -100,12 +105,17 @@ class Prober:
                 excuse.
             good_share: See `Rule`.
             possible_share: See `Suite`.
+            plain_part: Of the axis's error, that the episodes without a difference may take.
         """
         task = oracle.task
         self._bed, self._oracle, self._possible = bed, oracle, possible_share
         self._rule = Rule(good_share=good_share, strata=task.strata, luck=task.luck)
         self._luck: dict[Any, dict[str, Episodes]] = {}
-        self.plain = self.probe(Condition(), WALKING)
+        self.plain = self.probe(Condition(), plain_part)
+
+    def rule_at(self, part: float) -> Rule:
+        """The rule with so much of an axis's error."""
+        return dataclasses.replace(self._rule, error_rate=part * self._rule.error_rate)
 
     def probe(self, condition: Condition, part: float) -> dict[str, Any]:
         """Whether it is surely good under a condition.
@@ -129,7 +139,7 @@ class Prober:
         flown = self._bed.fly(condition).episodes
         if key not in self._luck:  # who sees nothing minds neither look nor camera
             self._luck[key] = self._bed.fly_blindly(condition)
-        rule = dataclasses.replace(self._rule, error_rate=part * self._rule.error_rate)
+        rule = self.rule_at(part)
         baselines = {**self._luck[key], "oracle": self._oracle}
         found = dict(zip(rule.quantities, measure(flown, baselines, rule), strict=True))
         return {

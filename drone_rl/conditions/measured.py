@@ -5,6 +5,7 @@ axes, units, strengths and their values, sums, and limits against what was flown
 """
 
 import dataclasses
+import datetime
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -54,7 +55,8 @@ class Measured:
     path: Path
     """Their file."""
     numbers: dict[str, Any] | None
-    """As in `shifts.json`, without pictures; None if they are refused."""
+    """As in `shifts.json`, without pictures but with the "file" that they were read from, its
+    "path" and when it was written ("dated"); None if they are refused."""
     pictures: Mapping[str, list[NDArray | None]] = dataclasses.field(default_factory=dict)
     """See `Shifts.pictures`."""
     refused: str | None = None
@@ -101,7 +103,8 @@ def read_measured(
         shown = {name: _read_strip(pictures.get(name), shape, name) for name in numbers["axes"]}
     except InputError as error:
         raise InputError(f"shifts {path} can't be used: {error}") from None
-    return Measured(path, numbers, shown)
+    when = datetime.datetime.fromtimestamp(path.stat().st_mtime).strftime("%Y-%m-%d %H:%M")
+    return Measured(path, {**numbers, "file": {"path": str(path), "dated": when}}, shown)
 
 
 class _Named:

@@ -54,3 +54,9 @@ class JudgeSettings(FlightSettings):
     certificate_seed: Annotated[int, Whole(0)] | None = None
     """Root of the random stream from which their placements are drawn; none takes a fresh one from
     the operating system's entropy."""
+    domain_flights: Annotated[int, Whole(0, 100_000, "episodes")] = 200
+    """New episodes at each strength of a sample of those of a required domain; with 0 it is not
+    covered."""
+    domain_seed: Annotated[int, Whole(0)] | None = None
+    """Root of their random streams and of the sample; none takes a fresh one from the operating
+    system's entropy."""
