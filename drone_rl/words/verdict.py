@@ -205,6 +205,31 @@ def _misses_or_lacks(evidence: Evidence) -> bool:
     return any(evidence["greedy"]["shares"][side]["mean"] != 1.0 for side in _sides(evidence))
 
 
+def quantity_label(name: str, evidence: Evidence) -> str:
+    """What people call a quantity of the rule.
+
+    Args:
+        name: One of `quantities`.
+        evidence: The verdict.
+    """
+    terms, share = terms_of(evidence), f"{100 * evidence['good_share']:g}%"
+    kind, _, of = name.partition(" ")
+    baseline = of.removeprefix("by ")
+    return {
+        "success": f"success rate above {share} of the oracle's (margin, good if above 0)",
+        "offered": f"episodes that offer {terms.goals} {of} (fraction)",
+        "collected": f"{terms.goals} {terms.reached} {of} (fraction)",
+        "above": (
+            f"{terms.goals} {terms.reached} beyond a sixth of the way from {of} to the oracle "
+            "(margin)"
+        ),
+        "unsolved": (
+            f"{share} of the oracle's success rate above that of {baseline} (margin, trivial if "
+            "not above 0)"
+        ),
+    }.get(kind, name)
+
+
 def unlike(evidence: Evidence) -> str:
     """By what drones moved otherwise than those that a policy was made for."""
     changed = evidence["unlike"].items()

@@ -45,7 +45,26 @@ def test_a_verdict_in_python(good):
     assert (few.verdict.kind, few.verdict.certain) == ("good", False)
     assert str(few).startswith("good (not certain): ")
     assert few.as_dict()["policy"] == "good"
-    assert "<td>success</td>" in few._repr_html_()
+    shown = few._repr_html_()
+    assert "<td>success rate above 90% of the oracle&#x27;s (margin, good if above 0)</td>" in shown
+    success = few.verdict.evidence["greedy"]["success"]
+    rate = f"<td>success rate (95% interval)</td><td>{success['share']:.3f}</td>"
+    assert rate in shown.replace("\n", "")
+    assert "<td>success</td>" not in shown  # a margin is no success rate
+
+
+def test_several_at_once(good):
+    done = drone_rl.judge(["oracle", "left"], episodes=150, progress=silent)
+    assert [one.name for one in done] == ["oracle", "left"] and len(done) == 2
+    assert done[1].verdict.kind == "poor" and done[:1][0] is done[0]
+    assert str(done).splitlines()[1].split()[:3] == ["oracle", "good", "yes"]
+    assert "<td>poor</td>" in done._repr_html_()
+    alone = drone_rl.judge("left", episodes=150, progress=silent)
+    assert alone.verdict.evidence == done[1].verdict.evidence
+    both = drone_rl.judge((good, "oracle"), episodes=2, sampled=False, progress=silent)
+    assert [one.name for one in both] == ["good", "oracle"]
+    with pytest.raises(InputError, match=r"policy=\[\] names nobody"):
+        drone_rl.judge([])
 
 
 def test_a_verdict_with_proof(good, tmp_path):

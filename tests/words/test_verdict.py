@@ -5,7 +5,7 @@ import copy
 import pytest
 
 from drone_rl.words.licence import said
-from drone_rl.words.verdict import SENTENCES
+from drone_rl.words.verdict import SENTENCES, quantity_label
 
 
 def share(value, **more):
@@ -187,6 +187,27 @@ def test_drawn_actions_that_differ_beyond_doubt(evidence):
         assert "every cube in 50% of episodes, not in 94%" in speak(evidence)["drawing"]
     evidence["drawing"] = None
     assert "drawing" not in speak(evidence)
+
+
+@pytest.mark.parametrize(
+    ("name", "label"),
+    [
+        ("success", "success rate above 90% of the oracle's (margin, good if above 0)"),
+        ("offered left", "episodes that offer cubes left (fraction)"),
+        ("collected ahead", "cubes collected ahead (fraction)"),
+        (
+            "above forward",
+            "cubes collected beyond a sixth of the way from forward to the oracle (margin)",
+        ),
+        (
+            "unsolved by random",
+            "90% of the oracle's success rate above that of random (margin, trivial if not above "
+            "0)",
+        ),
+    ],
+)
+def test_quantities_have_labels_for_people(evidence, name, label):
+    assert quantity_label(name, {**evidence, "good_share": 0.9}) == label
 
 
 def test_every_sentence_has_its_condition_in_words():
