@@ -30,6 +30,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import Stream, torch_generator
 from drone_rl.verdicts.judge import Verdict, judge_policy
+from drone_rl.verdicts.kinds import NOT_COVERED, NOT_PROVED
 from drone_rl.verdicts.luck import BASELINES, fly_baselines, make_baseline
 from drone_rl.verdicts.rule import Rule
 from drone_rl.words.verdict import quantity_label
@@ -123,6 +124,20 @@ class Judgement:
     def domain(self) -> str:
         """Under which conditions it is good, for a person; nothing if that was not measured."""
         return "" if self.measured is None else sentence(_told(self.measured, self.verdict))
+
+    def status(self, require: str | None = None) -> int:
+        """The exit status of `drone-rl verdict`: the verdict's own, or that of what is required.
+
+        Args:
+            require: "proved" for a re-checked proof of every placement, "good" or None for the
+                verdict's own; a domain that was required has to be covered, too.
+        """
+        if require == "proved" and not self.verdict.is_proved:
+            return NOT_PROVED
+        if self.coverage is not None and not self.coverage.is_covered:
+            return NOT_COVERED
+        is_proof_enough = require == "proved" and self.coverage is None
+        return 0 if is_proof_enough else self.verdict.exit_code
 
     def save(self, path: Path) -> None:
         """Writes `verdict.json`."""

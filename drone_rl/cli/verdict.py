@@ -11,7 +11,6 @@ from drone_rl.settings.changes import DynamicsChanges, TaskChanges, no_changes
 from drone_rl.settings.judging import JudgeSettings
 from drone_rl.settings.paths import PathsSettings
 from drone_rl.utils.schema import OneOf
-from drone_rl.verdicts.kinds import NOT_COVERED, NOT_PROVED
 
 _log = logging.getLogger(__name__)
 
@@ -60,14 +59,4 @@ def run(settings: Command, folder: Path) -> tuple[int, str]:
     _log.info("written: %s", folder / "verdict.json")
     if settings.require == "proved" and done.verdict.evidence["proof"] is None:
         _log.info("no certificate lies with it; make one by drone-rl prove, give certificate=")
-    return _status(done, settings), done.verdict.kind.value
-
-
-def _status(done: "drone_rl.Judgement", settings: Command) -> int:
-    """The verdict's own exit status, or that of what is required."""
-    if settings.require == "proved" and not done.verdict.is_proved:
-        return NOT_PROVED
-    if done.coverage is not None and not done.coverage.is_covered:
-        return NOT_COVERED
-    is_proof_enough = settings.require == "proved" and done.coverage is None
-    return 0 if is_proof_enough else done.verdict.exit_code
+    return done.status(settings.require), done.verdict.kind.value

@@ -1,6 +1,7 @@
 """Flights under other conditions as `shifts.json` has them, made up and not flown."""
 
 import base64
+import dataclasses
 import zlib
 
 import torch
@@ -86,6 +87,12 @@ def found_to(axis, of, last, impossible=False):
     }
 
 
+def owned(name, of):
+    """An axis with the policy's own neutral strength."""
+    axis = AXES[name]
+    return axis if axis.own is None else dataclasses.replace(axis, neutral=axis.own(of))
+
+
 def shifts_of(policy, *, axes=("blur", "dead_rows"), weights=None):
     """Of a policy that is good up to the third strength of each axis."""
     of = policy.description
@@ -102,11 +109,11 @@ def shifts_of(policy, *, axes=("blur", "dead_rows"), weights=None):
         "settings": {**ShiftSettings().values(), "seed": 0},
         "terms": as_task(of.task).terms.as_dict(),
         "plain": {"oracle": share(200), **figures()},
-        "axes": {name: along(AXES[name], of, AXES[name].strengths[2]) for name in axes},
+        "axes": {name: along(owned(name, of), of, AXES[name].strengths[2]) for name in axes},
         "together": flown(),
         "domain": {
             "plain": {"good": True, "bad": False, "refused": None, "success": 1.0, "worst": None},
-            "ranges": {n: found_to(AXES[n], of, AXES[n].strengths[2]) for n in axes},
+            "ranges": {n: found_to(owned(n, of), of, AXES[n].strengths[2]) for n in axes},
         },
         "seconds": 1.0,
         "pictures": {name: [base64.b64encode(black).decode()] * 6 for name in axes},
