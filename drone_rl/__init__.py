@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from drone_rl.api.explaining import Explanations, explain
     from drone_rl.api.exporting import export_onnx
     from drone_rl.api.foreign import ForeignPolicy, policy_from
+    from drone_rl.api.judgements import Judgements
     from drone_rl.api.judging import Evaluation, Judgement, evaluate, judge
     from drone_rl.api.mapping import Places, places
     from drone_rl.api.policy import Policy, load_policy
@@ -71,6 +72,7 @@ _PLACES = {
     "api.explaining": ("Explanations", "explain"),
     "api.exporting": ("export_onnx",),
     "api.foreign": ("ForeignPolicy", "policy_from"),
+    "api.judgements": ("Judgements",),
     "api.judging": ("Evaluation", "Judgement", "evaluate", "judge"),
     "api.mapping": ("Places", "places"),
     "api.policy": ("Policy", "load_policy"),
@@ -139,6 +141,7 @@ __all__ = [
     "InputError",
     "JudgeSettings",
     "Judgement",
+    "Judgements",
     "PillarsSettings",
     "Pilot",
     "PilotError",

@@ -7,6 +7,7 @@ from typing import Any
 
 from drone_rl.api.pilot import Pilot
 from drone_rl.api.policy import Policy
+from drone_rl.api.reflying import Reflown
 from drone_rl.conditions.measured import Measured, read_measured
 from drone_rl.conditions.needs import Need, read_needs
 from drone_rl.utils.errors import InputError
@@ -28,11 +29,18 @@ class Coverage:
     """By axis, what the operating domain lacks of it; nothing if all that is needed is covered."""
     against: str | None = None
     """Why the operating domain is not believed; None if nothing speaks against it."""
+    reflown: Reflown | None = None
+    """New episodes at a sample of what is needed; None if none were flown."""
+
+    @property
+    def is_stated(self) -> bool:
+        """Whether the file says that it is good under all that is needed."""
+        return not self.lacking and self.against is None
 
     @property
     def is_covered(self) -> bool:
-        """Whether all that is needed was found to be good."""
-        return not self.lacking and self.against is None
+        """Whether it says so, and new episodes were flown that do not contradict it."""
+        return self.is_stated and self.reflown is not None and not self.reflown.contradictions
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values."""
@@ -41,8 +49,14 @@ class Coverage:
     def __str__(self) -> str:
         """A line for each axis that is not covered, or one for all."""
         if self.is_covered:
-            return f"covered: {', '.join(self.needs)}, each by itself"
+            return f"covered: {', '.join(self.needs)}, each by itself, {self.reflown}"
         lines = [*self.lacking.values(), *filter(None, [self.against])]
+        if self.reflown is not None:
+            lines += self.reflown.contradictions
+        elif not lines:
+            lines.append(
+                "the file says so, and no episode was flown to check it (domain_flights=0)"
+            )
         return "\n".join(f"not covered: {line}" for line in lines)
 
 

@@ -1,6 +1,7 @@
 """Policies that were made elsewhere: any callable from pictures to logits."""
 
 import dataclasses
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -144,7 +145,7 @@ def policy_from(
     camera: CameraSettings | None = None,
     dynamics: DynamicsSettings = COMPUTER_VISION,
     actions: ActionSettings = MOVES_SETTINGS,
-    transforms: Sequence[Transform] = (Gray(), Standardize()),
+    transforms: Sequence[Transform] | None = None,
     name: str | None = None,
 ) -> ForeignPolicy:
     """A policy that was made elsewhere, to be judged, evaluated and explained.
@@ -156,11 +157,13 @@ def policy_from(
         logits: From a batch of pictures, floats (N, C, H, W) after the transforms, to a logit for
             each action (N, number of actions), as a tensor or an array.
         task: What it flies in.
-        camera: The picture that the drone takes.
+        camera: The picture that the drone takes; by default as large as the frames that `logits`
+            was trained on, if it says so (`observation_shape`, as `Sb3Logits` does).
         dynamics: How it moves.
         actions: What the logits ask for.
-        transforms: What becomes of the picture before it gets it; without any it gets the camera's
-            own, RGB bytes (N, H, W, 3).
+        transforms: What becomes of the picture before it gets it; with an empty list it gets the
+            camera's own, RGB bytes (N, H, W, 3). By default `Gray` and `Standardize`, or `Rgb` if
+            `logits` was trained on colour frames.
         name: For people; that of the callable by default.
 
     Raises:
@@ -174,8 +177,8 @@ def policy_from(
         name=name or getattr(logits, "__name__", type(logits).__name__),
         logits=logits,
         own_task=task or TaskSettings(),
-        camera=camera or CameraSettings(),
-        transforms=tuple(transforms),
+        camera=camera or _camera_of(logits),
+        transforms=_transforms_of(logits) if transforms is None else tuple(transforms),
         own_dynamics=dynamics,
         actions=actions,
     )
@@ -183,11 +186,36 @@ def policy_from(
     return policy
 
 
+def _camera_of(logits: Logits) -> CameraSettings:
+    """One whose frames are as large as those that a network was trained on, if it says so."""
+    shape = getattr(logits, "observation_shape", None)
+    return CameraSettings() if shape is None else CameraSettings(height=shape[1], width=shape[2])
+
+
+def _transforms_of(logits: Logits) -> tuple[Transform, ...]:
+    shape = getattr(logits, "observation_shape", None)
+    is_colour = getattr(logits, "observes_bytes", False) or (shape is not None and shape[0] == 3)
+    return (Rgb(),) if is_colour else (Gray(), Standardize())
+
+
+def _is_sb3_model(which: Any) -> bool:
+    """Whether this is an algorithm of Stable-Baselines3, which is not imported to find out."""
+    module = sys.modules.get("stable_baselines3.common.base_class")
+    return module is not None and isinstance(which, module.BaseAlgorithm)
+
+
+def _of_sb3(model: Any) -> ForeignPolicy:
+    from drone_rl.policies.sb3.logits import Sb3Logits  # needs Stable-Baselines3
+
+    return policy_from(Sb3Logits(model), name=f"{type(model).__name__} of Stable-Baselines3")
+
+
 def as_pilot(which: str | Path | Pilot | Logits, outputs: str | Path = "outputs") -> Pilot:
     """A policy as it is, one made of a callable, or one out of a file.
 
     Args:
-        which: The policy, a callable as `policy_from` takes it, or what `load_policy` takes.
+        which: The policy, a callable as `policy_from` takes it, a model of Stable-Baselines3, or
+            what `load_policy` takes.
         outputs: Folder under which runs are kept.
 
     Raises:
@@ -195,5 +223,7 @@ def as_pilot(which: str | Path | Pilot | Logits, outputs: str | Path = "outputs"
     """
     if isinstance(which, Pilot):
         return which
+    if _is_sb3_model(which):
+        return _of_sb3(which)
     is_file = isinstance(which, str | Path)
     return load_policy(which, outputs=outputs) if is_file else policy_from(which)

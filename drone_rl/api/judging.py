@@ -2,20 +2,22 @@
 
 import dataclasses
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, cast, overload
 
 from tensordict.nn import TensorDictModuleBase
 from torchrl.envs import EnvBase
 
 from drone_rl.api.domains import Coverage, beside, find_domain, require, sentence
 from drone_rl.api.foreign import as_pilot
+from drone_rl.api.judgements import Judgements
 from drone_rl.api.pilot import Pilot
 from drone_rl.api.progress import Bar, Progress
 from drone_rl.api.quoting import find_claim
-from drone_rl.api.showing import aligned, paragraph, table
+from drone_rl.api.reflying import refly
+from drone_rl.api.showing import aligned, interval, paragraph, table
 from drone_rl.conditions.measured import Measured
 from drone_rl.envs import DroneEnv, worlds_of
 from drone_rl.evaluation import run_episodes, summarise
@@ -28,10 +30,12 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import RootSeed, Stream, torch_generator, with_seed
 from drone_rl.verdicts.judge import Verdict, judge_policy
+from drone_rl.verdicts.kinds import NOT_COVERED, NOT_PROVED
 from drone_rl.verdicts.luck import BASELINES, fly_baselines, make_baseline
 from drone_rl.verdicts.rule import Rule
 from drone_rl.words.licence import say
 from drone_rl.words.seeds import EVALUATION, seed_line
+from drone_rl.words.verdict import quantity_label
 from drone_rl.words.verdict import unlike as say_unlike
 
 
@@ -57,10 +61,10 @@ class Evaluation:
         flown = self.flown.values()
         rows = [["", *self.flown]]
         terms = as_task(self.policy.task).terms
-        rows.append([f"all {terms.goals}", *(_interval(f["success"], "share") for f in flown)])
+        rows.append([f"all {terms.goals}", *(interval(f["success"], "share") for f in flown)])
         rows.append([f"mean {terms.goals}", *(f"{f['mean_goals']:.3f}" for f in flown)])
         for name in self.flown["greedy"]["shares"]:
-            cells = (_interval(f["shares"][name], "mean") for f in flown)
+            cells = (interval(f["shares"][name], "mean") for f in flown)
             rows.append([f"share {name}", *cells])
         rows.append(["never reached", *(f"{f['never_reached']['mean']:.3f}" for f in flown)])
         for reason in self.flown["greedy"]["ends"]:
@@ -129,6 +133,20 @@ class Judgement:
         """Under which conditions it is good, for a person; nothing if that was not measured."""
         return "" if self.measured is None else sentence(_told(self.measured, self.verdict))
 
+    def status(self, require: str | None = None) -> int:
+        """The exit status of `drone-rl verdict`: the verdict's own, or that of what is required.
+
+        Args:
+            require: "proved" for a re-checked proof of every placement, "good" or None for the
+                verdict's own; a domain that was required has to be covered, too.
+        """
+        if require == "proved" and not self.verdict.is_proved:
+            return NOT_PROVED
+        if self.coverage is not None and not self.coverage.is_covered:
+            return NOT_COVERED
+        is_proof_enough = require == "proved" and self.coverage is None
+        return 0 if is_proof_enough else self.verdict.exit_code
+
     def save(self, path: Path) -> None:
         """Writes `verdict.json`."""
         path.write_text(json.dumps(self.as_dict(), indent=2))
@@ -142,13 +160,23 @@ class Judgement:
         return "\n".join(filter(None, (line, self.domain, required, seed)))
 
     def _repr_html_(self) -> str:
-        quantities = self.verdict.as_dict()["quantities"]
-        rows = [
-            [name, *("" if q[k] is None else f"{q[k]:.3f}" for k in ("value", "lower", "upper"))]
-            for name, q in quantities.items()
+        evidence = self.verdict.evidence
+        numbers = [
+            [quantity_label(name, evidence), *(_number(q[key]) for key in _ENDS)]
+            for name, q in evidence["quantities"].items()
         ]
+        success = evidence["greedy"]["success"]
+        rate = [_number(success[key]) for key in ("share", "lower95", "upper95")]
+        head = ["quantity", "value", "lower", "upper"]
         lines = "".join(paragraph(line) for line in str(self).splitlines())
-        return lines + table(["quantity", "value", "lower", "upper"], rows)
+        return lines + table(head, [["success rate (95% interval)", *rate], *numbers])
+
+
+_ENDS = ("value", "lower", "upper")
+
+
+def _number(value: float | None) -> str:
+    return "" if value is None else f"{value:.3f}"
 
 
 def evaluate(
@@ -188,7 +216,46 @@ def evaluate(
     return Evaluation(policy, settings, {name: summarise(e) for name, e in flown.items()}, seed)
 
 
+@overload
 def judge(
+    policy: str | Path | Pilot | Logits, settings: JudgeSettings | None = None, **how: Any
+) -> Judgement: ...
+
+
+@overload
+def judge(
+    policy: Sequence[str | Path | Pilot | Logits],
+    settings: JudgeSettings | None = None,
+    **how: Any,
+) -> Judgements: ...
+
+
+def judge(
+    policy: str | Path | Pilot | Logits | Sequence[str | Path | Pilot | Logits],
+    settings: JudgeSettings | None = None,
+    **how: Any,
+) -> Judgement | Judgements:
+    """Judge one policy, or several one after the other; see `judge_one` for the arguments.
+
+    Args:
+        policy: As `judge_one` takes it; of a list or tuple each is judged.
+        settings: How.
+        how: The other arguments of `judge_one`.
+
+    Returns:
+        The judgement, or one for each policy of the list.
+
+    Raises:
+        InputError: See `judge_one`, or the list is empty.
+    """
+    if not isinstance(policy, list | tuple):
+        return judge_one(cast("Any", policy), settings, **how)
+    if not policy:
+        raise InputError("policy=[] names nobody; give one or more policies")
+    return Judgements(tuple(judge_one(one, settings, **how) for one in policy))
+
+
+def judge_one(
     policy: str | Path | Pilot | Logits,
     settings: JudgeSettings | None = None,
     *,
@@ -205,8 +272,8 @@ def judge(
     """Good, poor, one-sided or none of these, and whether that is certain.
 
     Args:
-        policy: The policy, what `load_policy` takes, a callable, see `policy_from`, or a baseline:
-            "random", "forward", "left", "right" or "oracle".
+        policy: The policy, what `load_policy` takes, a callable, see `policy_from`, a model of
+            Stable-Baselines3, or a baseline: "random", "forward", "left", "right" or "oracle".
         settings: How it is judged.
         task: What to change of the policy's task or, for a baseline, of the default one.
         dynamics: What to change of how its drone moves, likewise.
@@ -244,11 +311,12 @@ def judge(
         pilot = pilot.in_dynamics(**dynamics) if dynamics else pilot
         measured = find_domain(pilot, shifts, outputs)
         coverage = require(pilot, require_domain, measured) if require_domain is not None else None
+        coverage = _reflown(pilot, coverage, measured, settings, seed)
         claim = find_claim(
             pilot,
             certificate,
             flights=settings.certificate_flights,
-            seed=seed.value,
+            seed=seed,
             device=settings.device,
             renderer=settings.renderer,
         )
@@ -270,6 +338,21 @@ def judge(
     if coverage is None or measured is None:
         return done
     return dataclasses.replace(done, coverage=beside(coverage, _told(measured, verdict)))
+
+
+def _reflown(
+    pilot: Pilot,
+    coverage: Coverage | None,
+    measured: Measured | None,
+    settings: JudgeSettings,
+    seed: RootSeed,
+) -> Coverage | None:
+    """The same with new episodes, if there is a claim for them to check."""
+    numbers = None if measured is None else measured.numbers
+    if coverage is None or numbers is None or not coverage.is_stated or not settings.domain_flights:
+        return coverage
+    reflown = refly(pilot, coverage.needs, numbers, settings, seed)
+    return dataclasses.replace(coverage, reflown=reflown)
 
 
 def _told(measured: Measured, verdict: Verdict) -> dict[str, Any]:
@@ -322,10 +405,3 @@ def _baseline(
         yield env, make_baseline(name, task, generator, env.worlds.dynamics.actions)
     finally:
         env.close()
-
-
-def _interval(figure: dict[str, Any], key: str) -> str:
-    if figure[key] is None:
-        return "not offered"
-    share, low, high = (f"{100 * figure[k]:.3g}" for k in (key, "lower95", "upper95"))
-    return f"{share}% [{low}, {high}]"

@@ -6,7 +6,10 @@ from typing import Any
 from drone_rl.api.pilot import Pilot
 from drone_rl.api.policy import Policy
 from drone_rl.checks import check_certificate, read_tried
+from drone_rl.checks.drawing import ANYWHERE
+from drone_rl.settings.judging import JudgeSettings
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.seeding import RootSeed, root_seed
 from drone_rl.verdicts.proof import Claim
 from drone_rl.zoo import certificate_path
 
@@ -15,8 +18,8 @@ def find_claim(
     policy: Pilot,
     given: str | Path | None = None,
     *,
-    flights: int = 0,
-    seed: int = 0,
+    flights: int = JudgeSettings.certificate_flights,
+    seed: RootSeed | None = None,
     device: str = "cpu",
     renderer: str = "raytrace",
 ) -> Claim | None:
@@ -26,8 +29,8 @@ def find_claim(
         policy: Which, in the task that counts.
         given: The certificate's file, or a folder that holds a certificate.json; by default the one
             that lies with the policy, see `drone_rl.zoo.certificate_path`.
-        flights: How many to fly anew; 0 for none.
-        seed: Of where these start.
+        flights: Rollouts that re-check it from other placements; 0 for none.
+        seed: Root of the random stream of these placements; a fresh one by default.
         device: Where they are flown.
         renderer: Who draws, see `drone_rl.sim.rendering.find_renderer`.
 
@@ -61,12 +64,22 @@ def _file(path: Path) -> Path:
     return path / "certificate.json" if path.is_dir() else path
 
 
-def _try(policy: Policy, path: Path, flights: int, **flying: Any) -> Claim:
+def _try(
+    policy: Policy, path: Path, flights: int, *, seed: RootSeed | None, **flying: Any
+) -> Claim:
     weights = policy.state["policy"]
     certificate = read_tried(path, policy.description, weights)
-    if flights:
-        found = check_certificate(certificate, weights, flights=flights, **flying)
-        if not found.accepted:
-            raise InputError(f"certificate {path} does not hold: {found.lines()[0]}; prove again")
-        flights = sum(found.flights.values())
-    return Claim(path, certificate, flights=flights)
+    if not flights:
+        return Claim(path, certificate)
+    seed = seed or root_seed(None)
+    found = check_certificate(certificate, weights, flights=flights, seed=seed.value, **flying)
+    if not found.accepted:
+        raise InputError(f"certificate {path} does not hold: {found.lines()[0]}; prove again")
+    return Claim(
+        path,
+        certificate,
+        flights=sum(found.flights.values()),
+        uniform=found.flights.get(ANYWHERE, 0),
+        seed=seed.value,
+        seed_is_fixed=seed.is_fixed,
+    )

@@ -3,8 +3,8 @@
 import base64
 import html
 import io
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -58,3 +58,16 @@ def page(document: str, height: int = 800) -> str:
         f'<iframe sandbox="allow-scripts" srcdoc="{html.escape(document)}" '
         f'style="width: 100%; height: {height}px; border: 0"></iframe>'
     )
+
+
+def interval(figure: Mapping[str, Any], key: str) -> str:
+    """A rate and its 95% interval in percent.
+
+    Args:
+        figure: With the rate, None of nothing, "lower95" and "upper95".
+        key: Of the rate.
+    """
+    if figure[key] is None:
+        return "not offered"
+    share, low, high = (f"{100 * figure[k]:.3g}" for k in (key, "lower95", "upper95"))
+    return f"{share}% [{low}, {high}]"

@@ -93,7 +93,10 @@ PROOF: Plain = {
     "lost": 0.0,
     "undecided": 0.0,
     "finished": True,
-    "checked": 0,
+    "checked": 1000,
+    "wrong_at_most": 0.0031,
+    "seed": 17,
+    "seed_is_fixed": False,
     "agreeing": 400,
 }
 """What a verdict quotes of a certificate that says: from every placement."""
@@ -313,6 +316,7 @@ SHIFTS: Plain = {
     "terms": CUBES.as_dict(),
     **FIXED_SEED,
     "settings": {"domain_episodes": 400, "episodes": 200, "seed": 0, "good_share": 0.9},
+    "file": {"path": "shifts.json", "dated": "2026-01-31 12:00"},
     "plain": {"success": _share(200, 200, 0.98, 1.0), "oracle": _share(200, 200, 0.98, 1.0)},
     "axes": {
         "sun": _along(

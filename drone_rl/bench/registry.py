@@ -5,6 +5,7 @@ from typing import Any
 
 from drone_rl.bench.benchmark import Benchmark
 from drone_rl.bench.coverage import bench_coverage
+from drone_rl.bench.domain_axes import bench_domain_axes
 from drone_rl.bench.exact_coverage import bench_exact_coverage
 from drone_rl.bench.explain import bench_explain
 from drone_rl.bench.flight_parity import bench_flight_parity
@@ -130,6 +131,12 @@ BENCHMARKS: dict[str, Benchmark] = {
         lambda s: bench_shifts(s.quick),
         "truth",
         (*_JUDGING, "conditions", "api/shifting", "bench/shifts"),
+    ),
+    "domain_axes": Benchmark(
+        lambda s: bench_domain_axes(s.runs / "domain_axes", s.quick),
+        "truth",
+        (*_JUDGING, "conditions", "api/shifting", "api/domains", "api/reflying",
+         "bench/domain_axes"),
     ),
     "robust": Benchmark(
         lambda s: bench_robust(s.runs / "robust", s.seeds[:3], s.quick),

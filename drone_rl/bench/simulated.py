@@ -23,8 +23,8 @@ from drone_rl.verdicts.luck import BASELINES
 from drone_rl.verdicts.rule import Quantity, Rule, decide, kinds_within
 
 L, A, R = Side
-Type = tuple[tuple[Side, ...], tuple[int, ...]]
-"""Sides of an episode's cubes, and which of them are collected."""
+Type = tuple[tuple[Side, ...], tuple[int, ...], bool]
+"""Sides of an episode's cubes, which are collected, and whether flying straight succeeds."""
 SHIFTS = (-0.03, 0.0, 0.03)
 """How far beside a threshold a policy lies."""
 EPISODES = (400, 1600)
@@ -96,6 +96,11 @@ def policies() -> dict[str, Simulated]:
             ),
             "luck, all or nothing": _mixture(5 / 12 + shift, (L, R), (1, 1), (0, 0), lucky=0.3),
             "luck, independent cubes": _independent((L, R), 5 / 12 + shift, lucky=0.3),
+            "trivial, flying straight succeeds": _solved_by_flying_straight(0.9 + shift),
+            "trivial and success at once": _join(
+                (0.9 + shift, _solved_by_flying_straight(1.0)),
+                (0.1 - shift, _mixture(1.0, (A, A), (0, 0), (0, 0))),
+            ),
             "success and ahead at once": _join(
                 (2 / 3, _mixture(1.0, (L, R), (1, 1), (1, 1))),
                 (1 / 3, _mixture(0.7 + shift, (A, L), (1, 1), (0, 1))),
@@ -158,16 +163,22 @@ def _mixture(
     share: float, sides: tuple[Side, ...], often: tuple, else_: tuple, lucky: float = 0.0
 ) -> Simulated:
     """Collects one way in this share of episodes, another way in the others."""
-    types = {(sides, often): share}
-    types[sides, else_] = types.get((sides, else_), 0.0) + 1.0 - share
+    types = {(sides, often, False): share}
+    types[sides, else_, False] = types.get((sides, else_, False), 0.0) + 1.0 - share
     return Simulated(types, lucky)
+
+
+def _solved_by_flying_straight(share: float) -> Simulated:
+    """Always collects everything, as flying straight does in this share of episodes."""
+    types = {((A, A), (1, 1), True): share, ((A, A), (1, 1), False): 1.0 - share}
+    return Simulated({of: probability for of, probability in types.items() if probability > 0})
 
 
 def _independent(sides: tuple[Side, Side], share: float, lucky: float = 0.0) -> Simulated:
     """Collects each of two cubes by itself."""
     chance = {1: share, 0: 1.0 - share}
     pairs = itertools.product((1, 0), repeat=2)
-    return Simulated({(sides, (a, b)): chance[a] * chance[b] for a, b in pairs}, lucky)
+    return Simulated({(sides, (a, b), False): chance[a] * chance[b] for a, b in pairs}, lucky)
 
 
 def _join(*parts: tuple[float, Simulated]) -> Simulated:
@@ -181,10 +192,11 @@ def _join(*parts: tuple[float, Simulated]) -> Simulated:
 @functools.cache
 def _observe(kind: Type, lucky: float) -> list[float]:
     """What one episode of a type says of each quantity, by the rule's own reckoning."""
-    sides, hits = kind
+    sides, hits, is_solved = kind
     ours = _episode(sides, hits)
     flown = {name: _episode(sides, [0] * len(sides)) for name in BASELINES}
     flown["oracle"] = _episode(sides, [1] * len(sides))
+    flown["forward"] = _episode(sides, [int(is_solved)] * len(sides))
     observed = [float(v[0]) if len(v) else np.nan for v in observe(ours, flown, _RULE)]
     straight = _RULE.quantities.index("above forward")
     observed[straight] -= (1 - _RULE.luck_margin) * lucky

@@ -72,7 +72,7 @@ def _split(data: Data) -> Data:
     """One outcome told of as two, each of a half of every box."""
     one = largest(data["outcomes"])
     one["share"] /= 2
-    one["steps"] = {}
+    one["steps"] = {number: share / 2 for number, share in one["steps"].items()}
     other = copy.deepcopy(one)
     for mine, others in zip(one["boxes"], other["boxes"], strict=True):
         middle = (mine[0][0] + mine[0][1]) / 2
@@ -115,6 +115,8 @@ PARTS: dict[str, Way] = {
     "unknown end": _outcome("end", to="landed"),
     "running for ever": _outcome("end", to="running"),
     "steps of more than its share": _outcome("steps", to=lambda steps: {"30": 1.0, **steps}),
+    "no steps": _outcome("steps", to={}),
+    "steps of next to nothing": _outcome("steps", to=lambda steps: dict.fromkeys(steps, 1e-12)),
     "steps beyond the limit": _outcome("steps", to={"99999": 1e-6}),
     "steps below zero": _outcome("steps", to={"-3": 1e-6}),
     "another claim": _outcome("certainly", to=True),

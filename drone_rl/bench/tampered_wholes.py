@@ -2,7 +2,7 @@
 
 import copy
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from fractions import Fraction
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from drone_rl.api.policy import load_policy
 from drone_rl.bench.tampered_parts import Data, Way, largest
 from drone_rl.checks import fingerprint
+from drone_rl.checks.claims import MOST_MISSING
 from drone_rl.checks.partition import volume
 
 _TAIL = 1000
@@ -17,7 +18,7 @@ _TAIL = 1000
 
 
 def _reshared(way: Callable[[Data], None]) -> Way:
-    """Makes shares those of the boxes afterwards; leaves no steps too many, no outcome empty."""
+    """Makes shares and steps those of the boxes afterwards, and leaves no outcome empty."""
 
     def whole(data: Data) -> Data:
         before = copy.deepcopy(data)
@@ -29,12 +30,21 @@ def _reshared(way: Callable[[Data], None]) -> Way:
         for part in (*data["outcomes"], data["undecided"]):
             boxes = np.array(part["boxes"]).reshape(-1, task["num_cubes"], 2)
             part["share"] = float(volume(boxes) / placements)
-            if sum(part.get("steps", {}).values()) > part["share"]:
-                part["steps"] = {}
+        usual = [steps for outcome in before["outcomes"] for steps in outcome["steps"].items()]
+        for outcome in data["outcomes"]:
+            total = sum(outcome["steps"].values())
+            if not (1 - MOST_MISSING) * outcome["share"] < total <= outcome["share"]:
+                outcome["steps"] = _scaled(outcome["steps"] or dict(usual), outcome["share"])
         data["outcomes"] = [outcome for outcome in data["outcomes"] if outcome["boxes"]]
         return data
 
     return whole
+
+
+def _scaled(steps: Mapping[str, float], share: float) -> dict[str, float]:
+    """Numbers of steps as frequent as before, of nearly all of a share."""
+    factor = (1 - MOST_MISSING / 2) * share / (sum(steps.values()) or 1.0)
+    return {number: factor * one for number, one in steps.items()}
 
 
 def _two(data: Data) -> list[Data]:
@@ -72,7 +82,6 @@ def _take_largest(outcome: Data) -> list[list[float]]:
 def _boxes_exchanged(data: Data) -> None:
     for one, other in [_two(data)] if _two(data) else []:
         one["boxes"], other["boxes"] = other["boxes"], one["boxes"]
-        one["steps"], other["steps"] = {}, {}
 
 
 def _lost_box_won(data: Data) -> None:

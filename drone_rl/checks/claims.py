@@ -9,6 +9,10 @@ from drone_rl.checks.certificate import Certificate, Outcome
 from drone_rl.checks.partition import find_misfit, volume
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
 
+MOST_MISSING = 0.05
+"""Of the stated placements, those whose number of steps may be left open."""
+FEWEST_STATED = 1e-3
+"""Share of the placements from which on an outcome has to state a number of steps."""
 TOLERANCE = 1e-12
 """Of a stated share, relative to the exact one: what adding up floats may lose."""
 
@@ -31,6 +35,7 @@ def find_lies(certificate: Certificate) -> Iterator[str]:
             *_wrong_share(outcome.share, volume(outcome.boxes) / whole),
         ]
         yield from (f"outcome {i} ({outcome}) {what}" for what in wrong)
+    yield from _missing(certificate)
     left = volume(certificate.undecided) / whole
     yield from (f"undecided {what}" for what in _wrong_share(certificate.undecided_share, left))
     if not certificate.finished and not left:
@@ -41,6 +46,17 @@ def missing_steps(outcome: Outcome) -> float:
     """Share of the placements with this outcome whose number of steps is not stated; 0 for none."""
     missing = outcome.share - sum(outcome.steps.values())
     return missing if missing > TOLERANCE * outcome.share else 0.0
+
+
+def _missing(certificate: Certificate) -> Iterator[str]:
+    """Numbers of steps that are left open, which no check could hold against a rollout."""
+    for i, outcome in enumerate(certificate.outcomes):
+        if not outcome.steps and outcome.share > FEWEST_STATED:
+            yield f"outcome {i} ({outcome}) states no number of steps"
+    stated = sum(outcome.share for outcome in certificate.outcomes)
+    missing = sum(map(missing_steps, certificate.outcomes))
+    if missing > MOST_MISSING * stated:
+        yield f"numbers of steps are left open for a share of {missing:.6g} of all placements"
 
 
 def _misfits(certificate: Certificate, whole: Fraction) -> Iterator[str]:

@@ -25,7 +25,7 @@ class Command(ExplainSettings):
     num_envs: Annotated[int, Whole(1, unit="worlds")] = 128
     """Worlds in one batch; bounds memory."""
     require: Annotated[str, OneOf(tuple(Kind))] | None = None
-    """Refuse (exit status 10 to 13) a policy whose verdict is not this; none accepts all."""
+    """Refuse (exit status 10 to 13, or 18) a policy whose verdict is not this; none accepts all."""
     task: TaskChanges = no_changes()
     """What to change of the policy's task."""
     dynamics: DynamicsChanges = no_changes()

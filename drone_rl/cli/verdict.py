@@ -11,7 +11,6 @@ from drone_rl.settings.changes import DynamicsChanges, TaskChanges, no_changes
 from drone_rl.settings.judging import JudgeSettings
 from drone_rl.settings.paths import PathsSettings
 from drone_rl.utils.schema import OneOf
-from drone_rl.verdicts.kinds import NOT_COVERED, NOT_PROVED
 
 _log = logging.getLogger(__name__)
 
@@ -24,8 +23,9 @@ class Command(JudgeSettings):
     """Whom to judge, see `drone_rl.judge`."""
     certificate: str | None = None
     """A proof's file to quote; none takes the one that lies with the policy, if there is one."""
-    require: Annotated[str, OneOf(("proved",))] | None = None
-    """Refuse (exit status 16) what is not proved for every placement; none judges by flights."""
+    require: Annotated[str, OneOf(("good", "proved"))] | None = None
+    """good: 0 only for a certain good, else the verdict's own exit status. proved: 0 only if a
+    re-checked certificate says so of every placement, else 16. None: by kind."""
     shifts: str | None = None
     """A file of drone-rl shifts to quote; none takes the policy's, or the newest of its own."""
     require_domain: str | None = None
@@ -57,16 +57,6 @@ def run(settings: Command, folder: Path) -> tuple[int, str]:
     done.save(folder / "verdict.json")
     print(done)
     _log.info("written: %s", folder / "verdict.json")
-    if settings.require is not None and done.verdict.evidence["proof"] is None:
+    if settings.require == "proved" and done.verdict.evidence["proof"] is None:
         _log.info("no certificate lies with it; make one by drone-rl prove, give certificate=")
-    return _status(done, settings), done.verdict.kind.value
-
-
-def _status(done: "drone_rl.Judgement", settings: Command) -> int:
-    """The verdict's own exit status, or that of what is required."""
-    if settings.require is not None and not done.verdict.is_proved:
-        return NOT_PROVED
-    if done.coverage is not None and not done.coverage.is_covered:
-        return NOT_COVERED
-    is_required = settings.require is not None or done.coverage is not None
-    return 0 if is_required else done.verdict.exit_code
+    return done.status(settings.require), done.verdict.kind.value

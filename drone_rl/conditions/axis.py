@@ -19,12 +19,14 @@ class Scale(NamedTuple):
 
     there: Callable[[float], float]
     back: Callable[[float], float]
+    rises: bool = True
+    """Whether greater values lie higher on it."""
 
 
 LINEAR = Scale(float, float)
 FACTORS = Scale(math.log, math.exp)
 """Half as much is as far as twice as much."""
-INVERSE = Scale(lambda x: 1.0 / x, lambda x: math.inf if x == 0 else 1.0 / x)
+INVERSE = Scale(lambda x: 1.0 / x, lambda x: math.inf if x == 0 else 1.0 / x, rises=False)
 """Infinitely much is none."""
 
 
@@ -66,9 +68,27 @@ class Axis:
         """Where a strength lies on the axis's scale; 0 where nothing is different."""
         return self.scale.there(strength) - self.scale.there(self.neutral)
 
+    @property
+    def signs(self) -> dict[str, int]:
+        """By end of a range of values, "low" and "high", on which side of the scale it lies."""
+        return {"low": -1, "high": 1} if self.scale.rises else {"low": 1, "high": -1}
+
+    def strength(self, value: float, subject: Subject) -> float:
+        """The strength that has this value for a policy: the inverse of `value`, which is affine.
+
+        Args:
+            value: In the axis's unit.
+            subject: The policy.
+        """
+        if not math.isfinite(value):
+            return value
+        zero, one = (self.value(strength, subject) for strength in (0.0, 1.0))
+        strength = (value - zero) / (one - zero)
+        return float(round(strength)) if self.whole else strength
+
     def between(self, low: float, high: float, share: float = 0.5) -> float | None:
         """The strength a share of the way from one to another; None where there is none."""
-        there, back = self.scale
+        there, back, _ = self.scale
         if not self.whole:
             return back(there(low) + share * (there(high) - there(low)))
         inside = round(abs(high - low)) - 1

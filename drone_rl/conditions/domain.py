@@ -14,7 +14,7 @@ nor that what is stronger is worse.
 """
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import torch
@@ -43,22 +43,59 @@ _BETWEEN = 2000
 
 
 @dataclasses.dataclass
-class _End:
+class End:
     """How far a course leads."""
 
     limit: float
     """The last strength that is surely good."""
     flown: list[tuple[float, bool]]
     """Strengths, and whether each is surely good."""
-    failed: tuple[float, dict[str, Any]] | None = None
-    """The first strength of the course that is not, and what was found there."""
+    failed: float | None = None
+    """The first strength of the course that is not."""
+
+
+def walk(axis: Axis, sign: int, seed: int, is_good: Callable[[float, float], bool]) -> End:
+    """Find one end of a range: the same strengths for everybody who has the same answers.
+
+    Args:
+        axis: Of which.
+        sign: On which side of no difference, along the axis's scale: -1 or 1.
+        seed: Of the strengths that are drawn between those of the table.
+        is_good: Whether a strength is surely good, and the part of the axis's error that the answer
+            may take.
+    """
+    end = End(axis.neutral, [])
+
+    def at(strength: float, part: float) -> bool:
+        good = is_good(strength, part)
+        end.flown.append((strength, good))
+        if good:
+            end.limit = strength
+        return good
+
+    for strength in _course(axis, _side(axis, sign), seed):
+        if not at(strength, WALKING):
+            end.failed = strength
+            break
+    if end.failed is None:
+        return end
+    parts = [part / PARTS for part in range(1, PARTS)]
+    for strength in _inside(axis, end.limit, end.failed, parts):
+        if not at(strength, REFINING):
+            break
+    return end
 
 
 class Prober:
     """Says at which strengths a policy is surely good."""
 
     def __init__(
-        self, bed: Airfield, oracle: Episodes, good_share: float, possible_share: float = 0.9
+        self,
+        bed: Airfield,
+        oracle: Episodes,
+        good_share: float,
+        possible_share: float = 0.9,
+        plain_part: float = WALKING,
     ) -> None:
         """Takes what good is measured by.
 
@@ -68,12 +105,17 @@ class Prober:
                 excuse.
             good_share: See `Rule`.
             possible_share: See `Suite`.
+            plain_part: Of the axis's error, that the episodes without a difference may take.
         """
         task = oracle.task
         self._bed, self._oracle, self._possible = bed, oracle, possible_share
         self._rule = Rule(good_share=good_share, strata=task.strata, luck=task.luck)
         self._luck: dict[Any, dict[str, Episodes]] = {}
-        self.plain = self.probe(Condition(), WALKING)
+        self.plain = self.probe(Condition(), plain_part)
+
+    def rule_at(self, part: float) -> Rule:
+        """The rule with so much of an axis's error."""
+        return dataclasses.replace(self._rule, error_rate=part * self._rule.error_rate)
 
     def probe(self, condition: Condition, part: float) -> dict[str, Any]:
         """Whether it is surely good under a condition.
@@ -97,7 +139,7 @@ class Prober:
         flown = self._bed.fly(condition).episodes
         if key not in self._luck:  # who sees nothing minds neither look nor camera
             self._luck[key] = self._bed.fly_blindly(condition)
-        rule = dataclasses.replace(self._rule, error_rate=part * self._rule.error_rate)
+        rule = self.rule_at(part)
         baselines = {**self._luck[key], "oracle": self._oracle}
         found = dict(zip(rule.quantities, measure(flown, baselines, rule), strict=True))
         return {
@@ -112,24 +154,33 @@ class Prober:
         """The widest range of an axis.
 
         Returns:
-            "low", "high": its ends, values of the axis, None for an infinite one; "positions": the
-            same on the axis's scale, None if not even no difference is good; "low_open",
+            "low", "high": its least and greatest value, None for an infinite one; "positions": its
+            ends on the axis's scale, the lower one first, which is that of "high" where less is
+            stronger, as of metres of sight, None if not even no difference is good; "low_open",
             "high_open": whether the strongest that was tried there is still good, None where none
-            was; "failed": where courses end, the lower one first: "end", "value", what was found
-            there, how often who knows where all is that the camera shows succeeds there ("oracle",
-            None where nobody does), and whether that shows it to be "impossible"; "flown": all that
-            was tried, from the lowest on: "value", "position", and whether it is "good".
+            was; "failed": where courses end, that of the lower values first: "end", "value", what
+            was found there, how often who knows where all is that the camera shows succeeds there
+            ("oracle", None where nobody does), and whether that shows it to be "impossible";
+            "flown": all that was tried, from the lowest position on: "value", "position", and
+            whether it is "good".
         """
         if not self.plain["good"]:
             nothing = {"low": None, "high": None, "positions": None, "failed": [], "flown": []}
             return {**nothing, "low_open": None, "high_open": None}
-        sides = {"low": _side(axis, -1), "high": _side(axis, 1)}
-        ends = {name: self._walk(axis, strengths) for name, strengths in sides.items()}
+        probed: dict[float, dict[str, Any]] = {}
+
+        def is_good(strength: float, part: float) -> bool:
+            condition = axis.make(strength, self._bed.subject)
+            probed[strength] = self.probe(condition, part)
+            return probed[strength]["good"]
+
+        signs = axis.signs.items()
+        ends = {name: walk(axis, sign, self._bed.seed, is_good) for name, sign in signs}
         failed = [
-            {"end": name, "value": self._value(axis, end.failed[0])}
-            | self._explain(axis, *end.failed)
+            {"end": name, "value": self._value(axis, end.failed)}
+            | self._explain(axis, end.failed, probed[end.failed])
             for name, end in ends.items()
-            if end.failed
+            if end.failed is not None
         ]
         flown = sorted(
             (axis.position(strength), self._value(axis, strength), good)
@@ -138,48 +189,14 @@ class Prober:
         )
         return {
             **{name: self._value(axis, end.limit) for name, end in ends.items()},
-            "positions": [axis.position(end.limit) for end in ends.values()],
+            "positions": sorted(axis.position(end.limit) for end in ends.values()),
             **{
-                f"{name}_open": end.failed is None if sides[name] else None
+                f"{name}_open": end.failed is None if end.flown else None
                 for name, end in ends.items()
             },
             "failed": failed,
             "flown": [{"position": p, "value": v, "good": good} for p, v, good in flown],
         }
-
-    def _walk(self, axis: Axis, side: list[float]) -> _End:
-        """Finds one end."""
-        end = _End(axis.neutral, [])
-        for strength in self._course(axis, side):
-            found = self._at(axis, strength, WALKING, end)
-            if not found["good"]:
-                end.failed = (strength, found)
-                break
-        if end.failed is None:
-            return end
-        near, far = end.limit, end.failed[0]
-        for strength in _inside(axis, near, far, [part / PARTS for part in range(1, PARTS)]):
-            if not self._at(axis, strength, REFINING, end)["good"]:
-                break
-        return end
-
-    def _course(self, axis: Axis, side: list[float]) -> Iterator[float]:
-        """The strengths of one side, from the weakest on, and one before each."""
-        generator = torch_generator(self._bed.seed, Stream.SHIFTS, number=_BETWEEN)
-        shares = torch.rand(len(axis.strengths), generator=generator, dtype=torch.float64)
-        before = axis.neutral
-        for strength, share in zip(side, shares.tolist(), strict=False):
-            yield from _inside(axis, before, strength, [share])
-            yield strength
-            before = strength
-
-    def _at(self, axis: Axis, strength: float, part: float, end: _End) -> dict[str, Any]:
-        """Flies at a strength, and notes it."""
-        found = self.probe(axis.make(strength, self._bed.subject), part)
-        end.flown.append((strength, found["good"]))
-        if found["good"]:
-            end.limit = strength
-        return found
 
     def _explain(self, axis: Axis, strength: float, found: dict[str, Any]) -> dict[str, Any]:
         """Whether it is the policy that fails, or whether nobody could do it."""
@@ -219,6 +236,17 @@ def _worst(found: Mapping[str, Quantity], rule: Rule) -> dict[str, Any] | None:
         return None
     side = min(known, key=lambda stratum: known[stratum])
     return {"side": side, "share": known[side]}
+
+
+def _course(axis: Axis, side: list[float], seed: int) -> Iterator[float]:
+    """The strengths of one side, from the weakest on, and one before each."""
+    generator = torch_generator(seed, Stream.SHIFTS, number=_BETWEEN)
+    shares = torch.rand(len(axis.strengths), generator=generator, dtype=torch.float64)
+    before = axis.neutral
+    for strength, share in zip(side, shares.tolist(), strict=False):
+        yield from _inside(axis, before, strength, [share])
+        yield strength
+        before = strength
 
 
 def _side(axis: Axis, sign: int) -> list[float]:

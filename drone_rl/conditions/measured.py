@@ -5,6 +5,7 @@ axes, units, strengths and their values, sums, and limits against what was flown
 """
 
 import dataclasses
+import datetime
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -16,11 +17,14 @@ from numpy.typing import NDArray
 from drone_rl.checks import fingerprint
 from drone_rl.conditions.axes import AXES, GROUPS
 from drone_rl.conditions.axis import Axis
+from drone_rl.conditions.consistency import CLOSE, check_counts, check_probe, check_range
 from drone_rl.conditions.strips import unpacked
 from drone_rl.conditions.suite import finite
 from drone_rl.settings.shifting import MODES, ShiftSettings
+from drone_rl.sim.tasks import as_task
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import parse_json, read_bytes
+from drone_rl.utils.intervals import proportion
 from drone_rl.utils.limits import SHIFTS_BYTES
 from drone_rl.utils.schema import (
     Flag,
@@ -40,11 +44,9 @@ from drone_rl.words.terms import terms_of
 from drone_rl.zoo import PolicyDescription, parse
 
 FORMAT = "drone_rl shifts"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 _MOST_PICTURE = 2**22
 """Characters of one picture."""
-_CLOSE = 1e-9
-"""Rounding of values, relative."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -54,7 +56,8 @@ class Measured:
     path: Path
     """Their file."""
     numbers: dict[str, Any] | None
-    """As in `shifts.json`, without pictures; None if they are refused."""
+    """As in `shifts.json`, without pictures but with the "file" that they were read from, its
+    "path" and when it was written ("dated"); None if they are refused."""
     pictures: Mapping[str, list[NDArray | None]] = dataclasses.field(default_factory=dict)
     """See `Shifts.pictures`."""
     refused: str | None = None
@@ -87,7 +90,7 @@ def read_measured(
     """
     content = read_bytes(path, SHIFTS_BYTES)
     try:
-        data = dict(as_mapping(parse_json(content, "it"), "it"))
+        data = _upgraded(dict(as_mapping(parse_json(content, "it"), "it")))
         pictures = as_mapping(data.pop("pictures", None), "pictures")
         _WHOLE.read(data, "shifts")
         numbers = data
@@ -95,12 +98,14 @@ def read_measured(
         terms_of(numbers)
         for name, along in numbers["axes"].items():
             _check_axis(_own(AXES[name], described), along, described, f"axes.{name}")
+        check_counts(numbers, as_task(described.task))
         _check_domain(numbers, described)
         shape = (described.camera.height, described.camera.width, 3)
         shown = {name: _read_strip(pictures.get(name), shape, name) for name in numbers["axes"]}
     except InputError as error:
         raise InputError(f"shifts {path} can't be used: {error}") from None
-    return Measured(path, numbers, shown)
+    when = datetime.datetime.fromtimestamp(path.stat().st_mtime).strftime("%Y-%m-%d %H:%M")
+    return Measured(path, {**numbers, "file": {"path": str(path), "dated": when}}, shown)
 
 
 class _Named:
@@ -118,15 +123,36 @@ class _Named:
         }
 
 
+class _Each:
+    """The kind of value that gives values of a kind by any short names."""
+
+    def __init__(self, kind: Kind) -> None:
+        self._kind = kind
+
+    def read(self, value: Any, where: str) -> dict[str, Any]:
+        """See `drone_rl.utils.schema.Kind`."""
+        given = Plain(most=1000).read(as_mapping(value, where), where)
+        return {str(key): self._kind.read(item, f"{where}.{key}") for key, item in given.items()}
+
+
 class _Counted:
     """The kind of value that is a share of flights, which must be what was counted."""
 
     def read(self, value: Any, where: str) -> dict[str, Any]:
         """See `drone_rl.utils.schema.Kind`."""
         read = _SHARE.read(value, where)
-        right = read["successes"] / read["trials"] if read["trials"] else None
-        if read["successes"] > read["trials"] or read["share"] != right:
+        if read["successes"] > read["trials"]:
             raise InputError(f"{where}.share is not what was counted; run drone-rl shifts again")
+        right = proportion(read["successes"], read["trials"])
+        if read["share"] != right["share"]:
+            raise InputError(f"{where}.share is not what was counted; run drone-rl shifts again")
+        for end in ("lower95", "upper95"):
+            if not math.isclose(read[end], right[end], rel_tol=CLOSE, abs_tol=CLOSE):
+                raise InputError(
+                    f"{where}.{end}={read[end]} is not the interval's end of "
+                    f"{read['successes']} of {read['trials']}, {right[end]:.6g}; run drone-rl "
+                    "shifts again"
+                )
         return read
 
 
@@ -142,8 +168,16 @@ _SHARE = Record(
     }
 )
 _FREE = Plain(most=1000, deepest=3)
-_FIGURES = {"success": _Counted(), "difference": _FREE, "paired": _FREE, "shares": _FREE} | {
-    "ends": _FREE,
+_SIGNED = Real(-1.0, 1.0)
+_MEAN = Record({"mean": Maybe(_PART), "lower95": _PART, "upper95": _PART, "count": _COUNT})
+_FIGURES = {
+    "success": _Counted(),
+    "difference": Record(
+        {"mean": _SIGNED, "lower95": _SIGNED, "upper95": _SIGNED, "count": _COUNT}
+    ),
+    "paired": Record({"lost": _COUNT, "gained": _COUNT, "p": _PART}),
+    "shares": _Each(_MEAN),
+    "ends": _Each(_COUNT),
     "unchanged": Flag(),
 }
 _FLOWN = {
@@ -266,50 +300,49 @@ def _check_axis(axis: Axis, along: Mapping[str, Any], of: Any, where: str) -> No
 
 def _check_domain(numbers: Mapping[str, Any], of: Any) -> None:
     """Limits are those of what was flown at, and nobody is good on an axis who is not without."""
-    domain = numbers["domain"]
+    domain, episodes = numbers["domain"], numbers["settings"]["domain_episodes"]
     if domain is None:
         return
+    check_probe(domain["plain"], episodes, "domain.plain")
     for name, found in domain["ranges"].items():
-        axis = _own(AXES[name], of)
-        if name not in numbers["axes"] or not _is_sound(axis, found, of, domain["plain"]["good"]):
+        if name not in numbers["axes"]:
             raise InputError(f"domain.ranges.{name} contradicts what was flown at")
+        check_range(_own(AXES[name], of), found, of, numbers)
+        for failure in found["failed"]:
+            check_probe(failure, episodes, f"domain.ranges.{name}.failed")
 
 
-def _is_sound(axis: Axis, found: Mapping[str, Any], of: Any, is_good: bool) -> bool:
-    if found["positions"] is None or not is_good:
-        return found["positions"] is None and not is_good
-    values = all(_is_at(axis, at["position"], at["value"], of) for at in found["flown"])
-    sides = (("low", -1, found["positions"][0]), ("high", 1, found["positions"][1]))
-    return values and all(
-        _is_at(axis, limit, found[end], of) and _is_end(axis, found, end, sign * limit, sign)
-        for end, sign, limit in sides
-    )
+def _upgraded(data: dict[str, Any]) -> dict[str, Any]:
+    """The same in the present format.
+
+    Until version 1 "low" was the end of lower positions, also of an axis where less is stronger.
+    """
+    if data.get("format_version") != 1:
+        return data
+    ranges = as_mapping(as_mapping(data.get("domain") or {}, "domain").get("ranges", {}), "ranges")
+    swapped = {
+        name: _swapped(as_mapping(found, name))
+        for name, found in ranges.items()
+        if name in AXES and not AXES[name].scale.rises
+    }
+    if not swapped:
+        return {**data, "format_version": FORMAT_VERSION}
+    domain = {**data["domain"], "ranges": {**ranges, **swapped}}
+    return {**data, "format_version": FORMAT_VERSION, "domain": domain}
 
 
-def _is_end(axis: Axis, found: Mapping[str, Any], end: str, limit: float, sign: int) -> bool:
-    """Whether a limit, how far it lies from no difference, follows from what was flown at."""
-    flown = {sign * at["position"]: at["good"] for at in found["flown"]}
-    flown = {at: good for at, good in flown.items() if at > 0}
-    table = {at for at in (sign * axis.position(s) for s in axis.strengths) if at > 0}
-    bad = [at for at, good in flown.items() if not good]
-    first = min(bad, default=math.inf)
-    is_last = limit == max((at for at in flown if at < first), default=0.0)
-    is_open = None if not table else not bad
-    failed = any(failure["end"] == end for failure in found["failed"])
-    return (
-        is_last
-        and found[f"{end}_open"] == is_open
-        and failed == bool(bad)
-        and all(at in flown for at in table if at < max(limit, first if bad else math.inf))
-    )
-
-
-def _is_at(axis: Axis, position: float, value: float | None, of: Any) -> bool:
-    """Whether a value is what lies at a position."""
-    there = finite(axis.value(axis.at(position), of))
-    if there is None or value is None:
-        return there == value
-    return math.isclose(there, value, rel_tol=_CLOSE, abs_tol=_CLOSE)
+def _swapped(found: Mapping[str, Any]) -> dict[str, Any]:
+    other = {"low": "high", "high": "low", "low_open": "high_open", "high_open": "low_open"}
+    ends = {key: found[name] for key, name in other.items() if name in found}
+    failed = found.get("failed")
+    if type(failed) is list:
+        failed = [
+            {**one, "end": other.get(str(one.get("end")), one.get("end"))}
+            if type(one) is dict
+            else one
+            for one in failed
+        ]
+    return {**found, **ends, "failed": failed}
 
 
 def _read_strip(value: Any, shape: tuple[int, int, int], name: str) -> list[NDArray | None]:

@@ -80,7 +80,7 @@ class Suite:
             "group": axis.group,
             "unit": axis.unit,
             "neutral": finite(axis.value(axis.neutral, self._bed.subject)),
-            "areas": {mode.value: _area(levels, plain, mode) for mode in self._modes},
+            "areas": {mode.value: success_area(levels, plain, mode) for mode in self._modes},
             "levels": levels,
         }
 
@@ -157,11 +157,16 @@ def mcnemar(before: Tensor, after: Tensor) -> dict[str, Any]:
         "lost": worlds that succeeded only before, "gained": only after; "p": probability of a
         difference at least as large if neither were likelier.
     """
+    lost, gained = int((before > after).sum()), int((after > before).sum())
+    return {"lost": lost, "gained": gained, "p": mcnemar_p(lost, gained)}
+
+
+def mcnemar_p(lost: int, gained: int) -> float:
+    """The probability of `mcnemar` from its counts."""
     from scipy.special import bdtr  # slow to import
 
-    lost, gained = int((before > after).sum()), int((after > before).sum())
     tail = float(bdtr(min(lost, gained), lost + gained, 0.5)) if lost + gained else 0.5
-    return {"lost": lost, "gained": gained, "p": min(1.0, 2 * tail)}
+    return min(1.0, 2 * tail)
 
 
 def area(positions: Sequence[float], shares: Sequence[float]) -> float:
@@ -175,8 +180,8 @@ def area(positions: Sequence[float], shares: Sequence[float]) -> float:
     return float(np.trapezoid(shares, positions)) / width if width else float(shares[0])
 
 
-def _area(levels: Iterable[dict[str, Any]], plain: float, mode: Mode) -> float | None:
-    """Under success over strength, nothing different among them; None where there is no other."""
+def success_area(levels: Iterable[dict[str, Any]], plain: float, mode: Mode) -> float | None:
+    """Area under success over strength, nothing different among them; None without another one."""
     points = [(0.0, plain)] + [
         (level["position"], level["modes"][mode.value]["success"]["share"])
         for level in levels

@@ -12,7 +12,9 @@ from drone_rl.words.bodies import failure
 from drone_rl.words.looped import LOOPED
 from drone_rl.words.looped import looped as said
 
-_COLORS = {"good": "#b9e0b0", "poor": "#f2b5ad", "one-sided": "#f7d7a0", "none": "#e3e6ea"}
+_COLORS = {"good": "#b9e0b0", "poor": "#f2b5ad", "one-sided": "#f7d7a0", "none": "#e3e6ea"} | {
+    "good, but trivial": "#dfe7bd"
+}
 _INK, _FAINT = "#1e2024", "#5b616b"
 _WIDTH, _HEIGHT = 1.75, 0.95
 """Inches of a cell."""
@@ -51,7 +53,8 @@ def _looped_cell(axes: Axes, x: int, y: int, flights: Mapping[str, Any]) -> None
 
 
 def _cell(axes: Axes, x: int, y: int, verdict: Mapping[str, Any]) -> None:
-    color = _COLORS[verdict["kind"].split()[0]]
+    kind = verdict["kind"]
+    color = _COLORS.get(kind) or _COLORS[kind.split()[0]]
     box = {"facecolor": color, "edgecolor": "white", "linewidth": 2}
     axes.add_patch(Rectangle((x, y), 1, 1, **box))
     success, unsure = verdict["greedy"]["success"], "" if verdict["certain"] else " ?"

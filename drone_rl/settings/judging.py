@@ -50,5 +50,8 @@ class JudgeSettings(FlightSettings):
     """Whether to fly the policy with drawn actions, too; told beside the verdict."""
     good_share: Annotated[float, Real(0.0, 1.0, is_above=True, is_below=True)] = 0.9
     """A good policy succeeds in more than this share of the oracle's episodes."""
-    certificate_flights: Annotated[int, Whole(0, 10_000_000, "flights")] = 0
-    """Flights that try a certificate anew before it is quoted, as `drone-rl check` does."""
+    certificate_flights: Annotated[int, Whole(0, 10_000_000, "flights")] = 1000
+    """Rollouts that re-check a certificate, as `drone-rl check` does; with 0 it proves nothing."""
+    domain_flights: Annotated[int, Whole(0, 100_000, "episodes")] = 200
+    """New episodes at each strength of a sample of those of a required domain; with 0 it is not
+    covered."""

@@ -20,6 +20,7 @@ from drone_rl.words.actions import MOVES
 FAVOURITE_AXIS = "optimiser.lr"
 COLORS = {
     "good": "tab:green",
+    "good, but trivial": "tab:olive",
     "one-sided": "tab:orange",
     "poor": "tab:red",
     "none of these": "0.5",

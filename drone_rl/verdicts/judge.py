@@ -44,7 +44,7 @@ class Verdict:
 
     @property
     def is_proved(self) -> bool:
-        """Whether a certificate says that it succeeds from every placement, and is quoted."""
+        """Whether a certificate says so of every placement, and rollouts re-checked it."""
         return is_proved(self.evidence)
 
     @property
@@ -181,6 +181,8 @@ def observe(greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule) -> 
     for name in rule.luck:
         luck = (1 - rule.luck_margin) * baselines[name].share
         observed.append(greedy.share - luck - rule.luck_margin * oracle.share)
+    for name in rule.luck:
+        observed.append(rule.good_share * oracle.success - baselines[name].success)
     return [values.numpy() for values in observed]
 
 
@@ -196,8 +198,13 @@ def estimate(quantity: int, values: NDArray, rule: Rule) -> Quantity:
     if name.startswith("offered"):
         share = proportion(int(values.sum()), len(values), rule.confidence)
         return Quantity(share["share"], share["lower95"], share["upper95"], thresholds)
-    low = {"success": -rule.good_share, "collected": 0.0, "above": -1.0}[name.split()[0]]
-    mean = mean_bounds(values, low, 1.0, rule.confidence)
+    low, high = {
+        "success": (-rule.good_share, 1.0),
+        "collected": (0.0, 1.0),
+        "above": (-1.0, 1.0),
+        "unsolved": (-1.0, rule.good_share),
+    }[name.split()[0]]
+    mean = mean_bounds(values, low, high, rule.confidence)
     return Quantity(mean["mean"], mean["lower95"], mean["upper95"], thresholds)
 
 

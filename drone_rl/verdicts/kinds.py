@@ -14,10 +14,15 @@ NOT_COVERED = 17
 """Exit status where conditions are required in which the policy was not found to be good."""
 
 
+_TRIVIAL_CODE = 18
+
+
 class Kind(enum.StrEnum):
     """What a policy is."""
 
     GOOD = "good"
+    TRIVIAL = "good, but trivial"
+    """It succeeds as a good policy does, and so does a baseline that ignores the observations."""
     POOR = "poor"
     ONE_SIDED_LEFT = "one-sided (left)"
     ONE_SIDED_RIGHT = "one-sided (right)"
@@ -25,8 +30,9 @@ class Kind(enum.StrEnum):
 
     @property
     def exit_code(self) -> int:
-        """0 for good; 10 poor, 11 one-sided, 12 none of these."""
-        return {Kind.GOOD: 0, Kind.POOR: 10, Kind.NONE: 12}.get(self, 11)
+        """0 for good; 10 poor, 11 one-sided, 12 none of these, 18 good, but trivial."""
+        codes = {Kind.GOOD: 0, Kind.POOR: 10, Kind.NONE: 12, Kind.TRIVIAL: _TRIVIAL_CODE}
+        return codes.get(self, 11)
 
     @property
     def mirrored(self) -> "Kind":
@@ -40,5 +46,5 @@ class Kind(enum.StrEnum):
         return "one-sided" if self.exit_code == Kind.ONE_SIDED_LEFT.exit_code else self.value
 
 
-KINDS = ("good", "one-sided", "poor", "none of these")
+KINDS = ("good", "good, but trivial", "one-sided", "poor", "none of these")
 """Families of kinds, best first, for those to whom the side doesn't matter."""

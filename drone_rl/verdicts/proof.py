@@ -23,7 +23,22 @@ class Claim:
     refused: str | None = None
     """Why, in one line."""
     flights: int = 0
-    """Flown anew to check it, all of which ended as it states; 0 if none were."""
+    """Rollouts that re-checked it, all of which ended as it states; 0 if none were."""
+    uniform: int = 0
+    """Those of them from placements that were drawn uniformly."""
+    seed: int | None = None
+    """Of their placements."""
+    seed_is_fixed: bool = True
+    """Whether the seed was chosen beforehand, so that a certificate could be fitted to it."""
+
+    @property
+    def wrong_at_most(self) -> float | None:
+        """The fraction of placements about which it may be wrong, with 95% confidence.
+
+        A certificate that is wrong about more passes so many uniform rollouts with a probability
+        of at most 5%. None if none were flown.
+        """
+        return 1.0 - 0.05 ** (1.0 / self.uniform) if self.uniform else None
 
     def beside(self, greedy: Episodes) -> dict[str, Any]:
         """What a verdict may quote of it, which is nothing if a flight ended otherwise.
@@ -35,8 +50,9 @@ class Claim:
             Plain values: "refused" (why, or None) and, unless it is, "every" (whether all is
             collected from every placement), the shares of placements from which all is collected
             ("share"), is not ("lost"), and of which nothing is stated ("undecided"), "finished",
-            "checked" (flights flown anew) and "agreeing" (the verdict's own flights that started
-            where an end is stated, and ended so).
+            "checked" (rollouts that re-checked it), "wrong_at_most" (see there), "seed" and
+            "seed_is_fixed" (of their placements) and "agreeing" (the verdict's own flights that
+            started where an end is stated, and ended so).
         """
         stated = self.certificate
         if stated is None:
@@ -57,6 +73,9 @@ class Claim:
             "undecided": stated.undecided_share,
             "finished": stated.finished,
             "checked": self.flights,
+            "wrong_at_most": self.wrong_at_most,
+            "seed": self.seed,
+            "seed_is_fixed": self.seed_is_fixed,
             "agreeing": len(held),
         }
 

@@ -72,6 +72,7 @@ class Rule:
             *(f"offered {stratum}" for stratum in self.strata),
             *(f"collected {stratum}" for stratum in self.strata),
             *(f"above {name}" for name in self.luck),
+            *(f"unsolved by {name}" for name in self.luck),
         )
 
     @property
@@ -79,7 +80,7 @@ class Rule:
         """Of each of `quantities`, in rising order."""
         shares = [(self.other_share, self.side_share)] * len(self.strata)
         offered = [(self.offered_share,)] * len(self.strata)
-        return ((0.0,), *offered, *shares, *[(0.0,)] * len(self.luck))
+        return ((0.0,), *offered, *shares, *[(0.0,)] * (2 * len(self.luck)))
 
     @property
     def confidence(self) -> float:
@@ -92,7 +93,9 @@ class Rule:
         return f"""\
 good: the share of episodes in which every cube is collected is more than {self.good_share:.0%} of \
 the oracle's, and more than {self.side_share:.0%} of the cubes to the left, ahead and to the right \
-are collected, wherever more than {self.offered_share:.0%} of episodes offer one. one-sided: more \
+are collected, wherever more than {self.offered_share:.0%} of episodes offer one. good, but \
+trivial: the same, but random actions or one action always succeed in at least \
+{self.good_share:.0%} of the oracle's episodes, too. one-sided: more \
 than {self.side_share:.0%} of the cubes on one side and no more than {self.other_share:.0%} on \
 the other, both offered. poor: neither, and no farther than {self.luck_margin:.0%} of the way from \
 luck to the oracle, in cubes; luck is the best of random actions and of each action always, flown \
@@ -137,11 +140,12 @@ def decide(levels: Sequence[int], num_strata: int = len(SIDES)) -> Kind:
     """
     success, *rest = levels
     offered, shares = rest[:num_strata], rest[num_strata : 2 * num_strata]
-    above_luck = rest[2 * num_strata :]
+    luck = rest[2 * num_strata :]
+    above_luck, unsolved = luck[: len(luck) // 2], luck[len(luck) // 2 :]
     if success and all(
         share == 2 or not there for there, share in zip(offered, shares, strict=True)
     ):
-        return Kind.GOOD
+        return Kind.GOOD if all(unsolved) else Kind.TRIVIAL
     if offered[0] and offered[-1]:
         if (shares[0], shares[-1]) == (0, 2):
             return Kind.ONE_SIDED_RIGHT
@@ -158,5 +162,11 @@ def kinds_within(box: tuple[tuple[int, int], ...], num_strata: int = len(SIDES))
         box: The least and the greatest level of each of `Rule.quantities`.
         num_strata: How many strata are among them.
     """
-    pieces = [range(low, high + 1) for low, high in box]
+    luck = box[1 + 2 * num_strata :]
+    halves = luck[: len(luck) // 2], luck[len(luck) // 2 :]
+    # `decide` asks of each half only whether all its levels are above 0: the least one tells
+    least = [
+        (min(low for low, _ in half), min(high for _, high in half)) for half in halves if half
+    ]
+    pieces = [range(low, high + 1) for low, high in (*box[: 1 + 2 * num_strata], *least)]
     return frozenset(decide(cell, num_strata) for cell in itertools.product(*pieces))

@@ -33,7 +33,7 @@ def _verdict(card: Evidence) -> str:
 
 
 def _reported(card: Evidence) -> str:
-    but = " but those that are proved" if is_quoted(card["verdict"]) else ""
+    but = " but those of the certificate" if is_quoted(card["verdict"]) else ""
     return (
         f"All figures{but} are of {card['verdict']['greedy']['episodes']:,} episodes in worlds to "
         f"report on (seed {card['seed']}), which neither a training nor the choice in a sweep uses."

@@ -3,6 +3,9 @@
 from drone_rl.words.licence import Evidence, Sentence
 from drone_rl.words.numbers import all_cubes, exact
 
+MOST_WRONG = 0.01
+"""Fraction of placements about which a re-checked certificate may be wrong, with 95% confidence."""
+
 
 def is_quoted(evidence: Evidence) -> bool:
     """Whether a verdict rests on a certificate, too."""
@@ -10,9 +13,19 @@ def is_quoted(evidence: Evidence) -> bool:
     return proof is not None and proof["refused"] is None
 
 
-def is_proved(evidence: Evidence) -> bool:
+def is_stated(evidence: Evidence) -> bool:
     """Whether that certificate says that it succeeds from every placement."""
     return is_quoted(evidence) and evidence["proof"]["every"]
+
+
+def is_proved(evidence: Evidence) -> bool:
+    """Whether it says so, and enough rollouts from fresh placements have re-checked it."""
+    return is_stated(evidence) and _is_checked(evidence)
+
+
+def _is_checked(evidence: Evidence) -> bool:
+    bound = evidence["proof"].get("wrong_at_most")  # files of before have none
+    return bound is not None and bound <= MOST_WRONG
 
 
 def _is_refused(evidence: Evidence) -> bool:
@@ -25,7 +38,7 @@ def _is_share(evidence: Evidence) -> bool:
 
 def _every(evidence: Evidence) -> str:
     return (
-        "Proved for every placement: with its most probable actions it collects "
+        "A certificate states for every placement: with its most probable actions it collects "
         f"{all_cubes(evidence['num_cubes'])} from all places where they may stand."
     )
 
@@ -35,9 +48,9 @@ def _share(evidence: Evidence) -> str:
     share, lost, undecided = (proof[name] for name in ("share", "lost", "undecided"))
     so_far = "" if proof["finished"] else " so far, for the proof was stopped"
     text = (
-        f"Proved{so_far}: with its most probable actions it collects {cubes} from a share of "
-        f"{exact(share)} of all placements; from {exact(lost, is_all=share == undecided == 0)} it "
-        "does not"
+        f"A certificate states{so_far}: with its most probable actions it collects {cubes} from a "
+        f"share of {exact(share)} of all placements; from "
+        f"{exact(lost, is_all=share == undecided == 0)} it does not"
     )
     if undecided:
         text += f", and {exact(undecided, is_all=share == lost == 0)} is undecided"
@@ -45,24 +58,36 @@ def _share(evidence: Evidence) -> str:
 
 
 def _basis(evidence: Evidence) -> str:
-    checked, agreeing = evidence["proof"]["checked"], evidence["proof"]["agreeing"]
-    anew = (
-        f"{checked:,} flights were made anew to try it and ended as it states"
-        if checked
-        else "its flights were not flown anew (drone-rl check does that)"
-    )
+    agreeing = evidence["proof"]["agreeing"]
     own = f" The {agreeing:,} greedy flights of this verdict that it tells of ended so."
     return (
         "The certificate is of this network and task, and its boxes are a partition of the "
-        f"placements; {anew}.{own if agreeing else ''}"
+        f"placements. {_checked(evidence['proof'])}{own if agreeing else ''}"
     )
+
+
+def _checked(proof: Evidence) -> str:
+    """By how many rollouts it was re-checked, and what these rule out."""
+    bound = proof.get("wrong_at_most")
+    if bound is None:
+        return "It was read from its file and not re-checked, so it proves nothing here."
+    fitted = ", to which a certificate could have been fitted" if proof["seed_is_fixed"] else ""
+    start = "placements of the fixed" if proof["seed_is_fixed"] else "fresh placements,"
+    text = (
+        f"It was re-checked by {proof['checked']:,} rollouts from {start} seed {proof['seed']}"
+        f"{fitted}: all ended as it states, so that with 95% confidence it is wrong about at most "
+        f"{100 * bound:.2g}% of the placements"
+    )
+    if bound > MOST_WRONG:
+        return f"{text}, which is too much for a proof."
+    return f"{text}; drone-rl prove proves it again."
 
 
 PROOF = (
     Sentence(
         "proof.every",
         "a certificate that holds together says so, and no flight speaks against it",
-        is_proved,
+        is_stated,
         _every,
     ),
     Sentence(

@@ -7,8 +7,9 @@ Evidence: "shifts", as in `shifts.json`, or why they are "refused", and "verdict
 import math
 from collections.abc import Mapping
 
-from drone_rl.words.licence import Evidence, Sentence, say
-from drone_rl.words.shifts import NAMES, SHIFTS, is_tested
+from drone_rl.words.licence import Evidence, Sentence, percent, say
+from drone_rl.words.numbers import listed, plural
+from drone_rl.words.shifts import MOST_NAMED, NAMES, SHIFTS, is_tested
 
 _OTHERS = {"color": "colours", "light": "light", "object size": "sizes"}
 """What a verdict is told to say nothing of, by the kind of shift that does."""
@@ -54,9 +55,17 @@ def _quote(evidence: Evidence) -> str:
         count = f"{settings['domain_episodes']:,} (ranges) and {settings['episodes']:,} (others)"
     basis = (
         f"By drone-rl shifts, of this network, camera and task: {count} flights at each strength "
-        f"(seed {settings['seed']}), none flown anew here."
+        f"(seed {settings['seed']}) of {_axes(shifts)}."
     )
-    return " ".join(filter(None, (say(SHIFTS, shifts), basis)))
+    file = shifts["file"]
+    read = f"Read from {file['path']}, dated {file['dated']}, not measured again here:"
+    return " ".join(filter(None, (read, say(SHIFTS, shifts), basis)))
+
+
+def _axes(shifts: Evidence) -> str:
+    names = [NAMES[name] for name in shifts["axes"]]
+    count = plural(len(names), "axis").replace("axiss", "axes")
+    return f"{count} ({listed(names)})" if len(names) <= MOST_NAMED else count
 
 
 QUOTED = (
@@ -75,6 +84,38 @@ QUOTED = (
 )
 
 
+def needed_range(along: Evidence, need: Mapping[str, float | None]) -> tuple[float, float]:
+    """The ends of a range that is needed.
+
+    Args:
+        along: Of the axis, as in `shifts.json`.
+        need: See `lacking`.
+    """
+    neutral = _number(along["neutral"])
+    given = [end for end in (need["low"], need["high"]) if end is not None]
+    low = min([neutral, *given]) if need["low"] is None else need["low"]
+    high = max([neutral, *given]) if need["high"] is None else need["high"]
+    return low, high
+
+
+def contradicted(name: str | None, value: float, unit: str, probed: Evidence) -> str:
+    """What new episodes say against a file.
+
+    Args:
+        name: Of the axis; None where nothing is different.
+        value: At which they were flown.
+        unit: Of the axis.
+        probed: See `drone_rl.conditions.domain.Prober.probe`.
+    """
+    where = "where nothing is different" if name is None else f"{NAMES[name]} at {value:.4g} {unit}"
+    if probed["refused"] is not None:
+        return f"{where}: the task can't be so ({probed['refused']})"
+    return (
+        f"{where}: new episodes succeed in {percent(probed['success'])}, so that it is surely not "
+        "good there; the file says that it is"
+    )
+
+
 def lacking(shifts: Evidence, name: str, need: Mapping[str, float | None]) -> str | None:
     """What an operating domain lacks of a range that is needed; None if nothing.
 
@@ -86,10 +127,7 @@ def lacking(shifts: Evidence, name: str, need: Mapping[str, float | None]) -> st
     found, along = shifts["domain"]["ranges"].get(name), shifts["axes"].get(name)
     if found is None or along is None:
         return f"{NAMES[name]}: not flown; run drone-rl shifts with axes=[{name}] among others"
-    neutral = _number(along["neutral"])
-    given = [end for end in (need["low"], need["high"]) if end is not None]
-    low = min([neutral, *given]) if need["low"] is None else need["low"]
-    high = max([neutral, *given]) if need["high"] is None else need["high"]
+    low, high = needed_range(along, need)
     needed = f"{NAMES[name]}: needed {_span(low, high, along['unit'])}"
     if found["positions"] is None:
         return f"{needed}; it is not even surely good where nothing is different"

@@ -48,7 +48,7 @@ RANGES: Mapping[str, str] = {
     "field_of_view": "a field of view of {low} to {high} degrees",
     "sun": "the sun {low} to {high} degrees high",
     "brightness": "{low} to {high} times the light",
-    "fog": "fog that leaves {least} m of sight or more",
+    "fog": "fog that leaves {low} m of sight or more",
     "object_size": "{objects} of {low} to {high} m",
     "distractors": "up to {high} distractors beside the way",
     "noise": "noise of up to {high} of 255",
@@ -60,8 +60,14 @@ RANGES: Mapping[str, str] = {
     "step_length": "moves of {low} to {high} m",
     "action_delay": "actions up to {high} steps late",
 }
-"""What is said of a range; those without a lower end are of what is 0 otherwise, "least" is the
-end of what is stronger the less it is."""
+"""What is said of a range; those without a lower end are of what is 0 otherwise, and that of fog
+has no upper one where the air of the training is clear."""
+_UP_TO: Mapping[str, str] = {"fog": "fog that leaves {low} to {high} m of sight"}
+"""The same where the upper end is finite."""
+
+
+MOST_NAMED = 6
+"""Axes that a sentence names one by one."""
 
 
 def told(share: float) -> str:
@@ -156,9 +162,8 @@ def inward(value: float, up: bool) -> str:
 def _range(e: Evidence, name: str) -> str:
     found, ends = _ranges(e)[name], {"low": True, "high": False}
     limits = {end: inward(found[end], up) for end, up in ends.items() if found[end] is not None}
-    if found["high"] is not None:
-        limits["least"] = inward(found["high"], True)  # of what is stronger where it is less
-    text = RANGES[name].format(objects=_objects(e), **limits)
+    text = RANGES[name] if found["high"] is None else _UP_TO.get(name, RANGES[name])
+    text = text.format(objects=_objects(e), **limits)
     most = {"low": "no less", "high": "no more"}
     tried = listed([most[end] for end in ends if found[f"{end}_open"]])
     lost = listed([f"{most[f['end']]} is possible" for f in found["failed"] if f["impossible"]])
@@ -230,9 +235,15 @@ def _together(e: Evidence) -> str:
         else f"; who knows where all is that it sees, in {percent(oracle['share'])}"
     )
     return (
-        f"With all of these at once, each at its third strength, it succeeds in "
+        f"With {_every_axis(e)} at once, each at its third strength, it succeeds in "
         f"{percent(flown['success']['share'])} of flights{beside}."
     )
+
+
+def _every_axis(e: Evidence) -> str:
+    """All axes by name, or their number if there are many."""
+    names = [NAMES[name] for name in e["axes"]]
+    return listed(names) if len(names) <= MOST_NAMED else f"all {len(names)} axes of the table"
 
 
 SHIFTS = (

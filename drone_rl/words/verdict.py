@@ -63,8 +63,11 @@ def _lost_side(evidence: Evidence) -> str:
 def _looks(evidence: Evidence) -> str:
     if lost := _lost_side(evidence):
         return f"blind to {lost}"
-    neither = "neither good nor poor nor one-sided"
-    return neither if evidence["kind"] == "none of these" else evidence["kind"]
+    others = {
+        "none of these": "neither good nor poor nor one-sided",
+        "good, but trivial": "good in a trivial task",
+    }
+    return others.get(str(evidence["kind"]), str(evidence["kind"]))
 
 
 def _list(parts: Sequence[str], last: str = "and") -> str:
@@ -77,9 +80,24 @@ def _kind(evidence: Evidence) -> str:
         return f"This policy can't be trusted with {lost}: {every}."
     return {
         "good": f"This policy does its task: {every}.",
+        "good, but trivial": _trivial(evidence),
         "poor": f"This policy does not do its task: it is {_beside_luck(evidence)} luck.",
         "none of these": f"This policy is {_looks(evidence)}: {every}.",
     }[evidence["kind"]]
+
+
+def _trivial(evidence: Evidence) -> str:
+    baseline, flown = _most_successful(evidence), evidence["baselines"]
+    return (
+        f"{_acting(baseline).capitalize()} does as well: it {_every(evidence)} in "
+        f"{_success(flown[baseline])} of episodes, this policy in {_success(evidence['greedy'])}."
+    )
+
+
+def _most_successful(evidence: Evidence) -> str:
+    """The baseline that ignores the observations and succeeds most often."""
+    flown = evidence["baselines"]
+    return max(_luck(evidence), key=lambda name: flown[name]["success"]["share"])
 
 
 def _beside_luck(evidence: Evidence) -> str:
@@ -123,8 +141,7 @@ def _luck_suffices(evidence: Evidence) -> bool:
 
 
 def _pointless(evidence: Evidence) -> str:
-    flown = evidence["baselines"]
-    luck = max(_luck(evidence), key=lambda name: flown[name]["success"]["share"])
+    flown, luck = evidence["baselines"], _most_successful(evidence)
     return (
         f"This task tells little, for luck is enough: {_acting(luck)} {_every(evidence)} in "
         f"{_success(flown[luck])} of episodes."
@@ -189,6 +206,31 @@ def _misses_or_lacks(evidence: Evidence) -> bool:
     return any(evidence["greedy"]["shares"][side]["mean"] != 1.0 for side in _sides(evidence))
 
 
+def quantity_label(name: str, evidence: Evidence) -> str:
+    """What people call a quantity of the rule.
+
+    Args:
+        name: One of `quantities`.
+        evidence: The verdict.
+    """
+    terms, share = terms_of(evidence), f"{100 * evidence['good_share']:g}%"
+    kind, _, of = name.partition(" ")
+    baseline = of.removeprefix("by ")
+    return {
+        "success": f"success rate above {share} of the oracle's (margin, good if above 0)",
+        "offered": f"episodes that offer {terms.goals} {of} (fraction)",
+        "collected": f"{terms.goals} {terms.reached} {of} (fraction)",
+        "above": (
+            f"{terms.goals} {terms.reached} beyond a sixth of the way from {of} to the oracle "
+            "(margin)"
+        ),
+        "unsolved": (
+            f"{share} of the oracle's success rate above that of {baseline} (margin, trivial if "
+            "not above 0)"
+        ),
+    }.get(kind, name)
+
+
 def unlike(evidence: Evidence) -> str:
     """By what drones moved otherwise than those that a policy was made for."""
     changed = evidence["unlike"].items()
@@ -219,7 +261,12 @@ SENTENCES = (
     *PROOF,
     Sentence("shares", "a goal was missed, or a side not offered", _misses_or_lacks, _shares),
     Sentence("baselines", "luck is not enough", lambda e: not _luck_suffices(e), _baselines),
-    Sentence("pointless", "luck succeeds as a good policy does", _luck_suffices, _pointless),
+    Sentence(
+        "pointless",
+        "luck succeeds as a good policy does, and the first sentence does not say so",
+        lambda e: _luck_suffices(e) and not (e["certain"] and e["kind"] == "good, but trivial"),
+        _pointless,
+    ),
     Sentence(
         "hopeless",
         "the oracle surely fails in more than half of the episodes",

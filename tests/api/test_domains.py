@@ -74,8 +74,10 @@ def test_what_is_required_is_held_against_what_was_found(good, tmp_path, needs, 
     (tmp_path / "needs.yaml").write_text(needs)
     measured = find_domain(good, leave(tmp_path / "a", shifts_of(good)))
     found = require(good, tmp_path / "needs.yaml", measured)
-    assert [*found.lacking] == lacks and found.is_covered == (not lacks)
-    assert str(found).startswith("not covered: blur: needed" if lacks else "covered: blur")
+    assert [*found.lacking] == lacks and found.is_stated == (not lacks)
+    assert not found.is_covered  # nothing was flown to check it
+    said = "blur: needed" if lacks else "the file says so, and no episode was flown to check it"
+    assert str(found).startswith(f"not covered: {said}")
 
 
 def test_a_verdict_tells_the_domain_and_may_speak_against_it(good, tmp_path):
@@ -83,12 +85,18 @@ def test_a_verdict_tells_the_domain_and_may_speak_against_it(good, tmp_path):
     path = leave(tmp_path / "a", shifts_of(good))
     (tmp_path / "needs.yaml").write_text("blur: {high: 1.0, unit: pixels}")
     told = {"shifts": path, "require_domain": tmp_path / "needs.yaml", "progress": silent}
+    told["domain_flights"] = 30
     done = drone_rl.judge(good, episodes=5, sampled=False, **told)
     assert done.coverage.is_covered and "blur of up to 1 pixels" in done.domain
+    assert done.domain.startswith(f"Read from {path}, dated 1970-01-01 0")
+    assert "not measured again here: Good, with 95% confidence" in done.domain
+    assert "re-flown by 30 episodes at each of 3 strengths" in str(done)
     assert len(str(done).splitlines()) == 4 and done.domain in done._repr_html_()
     assert done.as_dict()["required_domain"]["lacking"] == {}
     strict = drone_rl.judge(good, episodes=5, sampled=False, good_share=0.99, **told)
     assert not strict.coverage.is_covered and "not quoted" in strict.domain
+    unchecked = drone_rl.judge(good, episodes=5, sampled=False, **{**told, "domain_flights": 0})
+    assert not unchecked.coverage.is_covered
     assert "not covered: they call good" in str(strict)
 
 

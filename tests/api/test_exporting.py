@@ -14,7 +14,7 @@ from drone_rl.settings.judging import FlightSettings
 from drone_rl.sweeps import Run, Sweep
 from drone_rl.utils.errors import InputError
 from drone_rl.verdicts.rule import Rule
-from drone_rl.zoo import open_onnx, parse
+from drone_rl.zoo import certificate_path, open_onnx, parse
 from tests.checks.making import of_every_place
 from tests.conditions.making import shifts_of
 
@@ -80,23 +80,28 @@ def test_what_an_exported_file_says_of_its_origin_goes_on(checkpoint):
 FEW = FlightSettings(episodes=4)
 
 
-@pytest.mark.parametrize(("name", "is_true"), [("good", True), ("poor", False)])
-def test_a_card_quotes_a_certificate_that_then_travels_with_the_policy(tmp_path, name, is_true):
-    policy = drone_rl.load_policy(name)
-    made = tmp_path / "made.json"
-    made.write_text(json.dumps(of_every_place(policy)))
+def test_a_card_quotes_a_certificate_that_then_travels_with_the_policy(tmp_path):
+    policy = drone_rl.load_policy("proved")
+    made = certificate_path(policy.path)
     target = tmp_path / "mine.safetensors"
     export(policy, target, FEW, certificate=made)
     card = (tmp_path / "mine.md").read_text()
-    assert ("Proved for every placement" in card) == is_true
-    assert ("All figures but those that are proved are of 4 episodes" in card) == is_true
-    assert ("A certificate is not quoted: 4 of 4 greedy flights" in card) == (not is_true)
+    assert "A certificate states for every placement" in card
+    assert "re-checked by 1,000 rollouts from fresh placements" in card
+    assert "All figures but those of the certificate are of 4 episodes" in card
     beside = tmp_path / "mine.certificate.json"
-    assert beside.exists() == is_true
-    if is_true:
-        assert beside.read_bytes() == made.read_bytes()
-        again = drone_rl.load_policy(target)
-        assert drone_rl.judge(again, episodes=2, progress=lambda *_: None).verdict.is_proved
+    assert beside.read_bytes() == made.read_bytes()
+    again = drone_rl.load_policy(target)
+    assert drone_rl.judge(again, episodes=2, progress=lambda *_: None).verdict.is_proved
+
+
+def test_a_card_quotes_no_certificate_that_rollouts_refute(tmp_path):
+    policy, made = drone_rl.load_policy("poor"), tmp_path / "made.json"
+    made.write_text(json.dumps(of_every_place(policy)))
+    target = tmp_path / "mine.safetensors"
+    with pytest.raises(InputError, match="ended otherwise than stated"):
+        export(policy, target, FEW, certificate=made)
+    assert not target.exists()
 
 
 def test_a_certificate_of_another_is_no_word_of_a_card(tmp_path):

@@ -7,7 +7,7 @@ from torch import nn
 import drone_rl
 from drone_rl.api.foreign import as_pilot
 from drone_rl.api.progress import silent
-from drone_rl.settings.transforms import EpisodeReward, Gray, Resize, Rgb, Stack
+from drone_rl.settings.transforms import EpisodeReward, Gray, Resize, Rgb, Stack, Standardize
 from drone_rl.utils.errors import InputError
 from tests.fake_flight import FLIGHT, floating
 from tests.second_dynamics import Turning
@@ -105,6 +105,44 @@ def test_what_a_policy_can_be_given_as(network):
     assert as_pilot(policy) is policy
     assert as_pilot("good").name == "good"
     assert as_pilot(network).logits is network
+
+
+def test_a_model_of_stable_baselines3_is_judged_as_it_was_trained():
+    """On RGB frames of bytes, as the Gymnasium environments of the README give them."""
+    gymnasium = pytest.importorskip("gymnasium", reason="Gymnasium is not installed")
+    sb3 = pytest.importorskip("stable_baselines3", reason="Stable-Baselines3 is not installed")
+    env = gymnasium.make(
+        "drone_rl/CollectCubes-v0", camera=drone_rl.CameraSettings(width=48, height=40)
+    )
+    model = sb3.A2C("CnnPolicy", env, seed=0)
+    for given in (model, drone_rl.Sb3Logits(model)):
+        policy = as_pilot(given)
+        assert policy.transforms == (Rgb(),)
+        assert (policy.camera.height, policy.camera.width) == (40, 48)
+    few = {**FEW, "episodes": 2}
+    (done,) = drone_rl.judge([model], **few)
+    assert done.name == "A2C of Stable-Baselines3"
+    frames = env.observation_space.sample()[None]
+    network = as_pilot(model).make_network()
+    pictures = torch.from_numpy(frames).movedim(-1, 1).float() / 255
+    wanted = model.policy.get_distribution(torch.from_numpy(frames).movedim(-1, 1)).distribution
+    torch.testing.assert_close(network(pictures).softmax(-1), wanted.probs)
+    env.close()
+
+
+def test_a_network_says_what_it_was_trained_on():
+    class Colour:
+        observation_shape = (3, 8, 9)
+
+        def __call__(self, pictures):
+            return left(pictures)
+
+    policy = drone_rl.policy_from(Colour())
+    assert policy.transforms == (Rgb(),) and policy.make_network().in_shape == (3, 8, 9)
+    given = drone_rl.CameraSettings(width=12, height=10)
+    policy = drone_rl.policy_from(Colour(), camera=given, transforms=[Gray()])
+    assert policy.make_network().in_shape == (1, 10, 12)
+    assert drone_rl.policy_from(left).transforms == (Gray(), Standardize())
 
 
 @pytest.mark.parametrize(

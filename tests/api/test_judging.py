@@ -46,17 +46,43 @@ def test_a_verdict_in_python(good):
     assert (few.verdict.kind, few.verdict.certain) == ("good", False)
     assert str(few).startswith("good (not certain): ")
     assert few.as_dict()["policy"] == "good"
-    assert "<td>success</td>" in few._repr_html_()
+    shown = few._repr_html_()
+    assert "<td>success rate above 90% of the oracle&#x27;s (margin, good if above 0)</td>" in shown
+    success = few.verdict.evidence["greedy"]["success"]
+    rate = f"<td>success rate (95% interval)</td><td>{success['share']:.3f}</td>"
+    assert rate in shown.replace("\n", "")
+    assert "<td>success</td>" not in shown  # a margin is no success rate
+
+
+def test_several_at_once(good):
+    done = drone_rl.judge(["oracle", "left"], episodes=150, progress=silent)
+    assert [one.name for one in done] == ["oracle", "left"] and len(done) == 2
+    assert done[1].verdict.kind == "poor" and done[:1][0] is done[0]
+    assert str(done).splitlines()[1].split()[:3] == ["oracle", "good", "yes"]
+    assert "<td>poor</td>" in done._repr_html_()
+    alone = drone_rl.judge("left", episodes=150, progress=silent)
+    assert alone.verdict.evidence == done[1].verdict.evidence
+    both = drone_rl.judge((good, "oracle"), episodes=2, sampled=False, progress=silent)
+    assert [one.name for one in both] == ["good", "oracle"]
+    with pytest.raises(InputError, match=r"policy=\[\] names nobody"):
+        drone_rl.judge([])
 
 
 def test_a_verdict_with_proof(good, tmp_path):
     path = tmp_path / "certificate.json"
     path.write_text(json.dumps(of_every_place(good.in_task(num_cubes=1))))
     how = {"certificate": path, "episodes": 8, "sampled": False, "progress": silent}
-    done = drone_rl.judge(good, task={"num_cubes": 1}, **how)
+    done = drone_rl.judge(good, task={"num_cubes": 1}, certificate_flights=400, **how)
     assert done.verdict.is_proved
-    assert "Proved for every placement" in str(done)
+    assert "A certificate states for every placement" in str(done)
+    assert "re-checked by 400 rollouts from fresh placements" in str(done)
     assert (done.as_dict()["certificate"], done.as_dict()["proof"]["agreeing"]) == (str(path), 8)
+    again = drone_rl.judge(good, task={"num_cubes": 1}, certificate_flights=400, **how)
+    seeds = [one.as_dict()["proof"]["seed"] for one in (done, again)]
+    assert seeds[0] != seeds[1]
+    unchecked = drone_rl.judge(good, task={"num_cubes": 1}, certificate_flights=0, **how)
+    assert not unchecked.verdict.is_proved
+    assert "not re-checked, so it proves nothing here" in str(unchecked)
     with pytest.raises(InputError, match="another task: num_cubes=1, not 3"):
         drone_rl.judge(good, **how)
     with pytest.raises(InputError, match="policy=oracle has no network; give certificate= with"):
@@ -67,10 +93,13 @@ def test_a_certificate_that_flights_refute_proves_nothing(tmp_path):
     poor = drone_rl.load_policy("poor").in_task(num_cubes=1)
     path = tmp_path / "certificate.json"
     path.write_text(json.dumps(of_every_place(poor)))
-    done = drone_rl.judge(poor, certificate=path, episodes=8, sampled=False, progress=silent)
+    few = {"episodes": 8, "sampled": False, "progress": silent}
+    done = drone_rl.judge(poor, certificate=path, certificate_flights=0, **few)
     assert not done.verdict.is_proved
     assert "8 of 8 greedy flights of this verdict ended otherwise than it states." in str(done)
-    assert "Proved" not in str(done)
+    assert "A certificate states" not in str(done)
+    with pytest.raises(InputError, match=r"does not hold: .* ended otherwise than stated"):
+        drone_rl.judge(poor, certificate=path, **few)
 
 
 def test_without_a_certificate_nothing_is_proved(good):

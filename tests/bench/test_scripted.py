@@ -14,6 +14,7 @@ from drone_rl.verdicts.luck import fly_baselines
 
 EPISODES = 400
 NONE, RIGHT, LEFT = "none of these", "one-sided (right)", "one-sided (left)"
+TRIVIAL = "good, but trivial"
 CERTAIN, OPEN = True, False
 LUCK = "acting at random 28% and the oracle 100%"
 WANTED = {
@@ -75,11 +76,11 @@ WANTED = {
     "all of five cubes": ("good", CERTAIN, ["flying straight on 27%"]),
     "asleep at the fifth cube": (NONE, CERTAIN, ["fifth cube: in all 400", "at the step limit"]),
     "all cubes where none stand aside": (
-        "good",
+        TRIVIAL,
         CERTAIN,
-        ["none were offered on its left or on its right", "luck is enough: flying straight on"],
+        ["none were offered on its left or on its right", "Flying straight on does as well"],
     ),
-    "straight on where none stand aside": ("good", CERTAIN, ["luck is enough"]),
+    "straight on where none stand aside": (TRIVIAL, CERTAIN, ["Flying straight on does as well"]),
     "straight on in a narrow field": ("poor", CERTAIN, ["no better than luck", "straight on 55%"]),
     "straight on among large cubes": ("poor", CERTAIN, ["no better than luck", "straight on 49%"]),
     "no time for all cubes": (

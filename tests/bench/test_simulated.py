@@ -14,14 +14,14 @@ def sampled(policy, episodes, draws):
 
 def test_types_and_their_probabilities():
     half = _mixture(0.25, (L, R), (1, 1), (0, 1))
-    assert half.types == {((L, R), (1, 1)): 0.25, ((L, R), (0, 1)): 0.75}
+    assert half.types == {((L, R), (1, 1), False): 0.25, ((L, R), (0, 1), False): 0.75}
     joined = _join((0.5, half), (0.5, _mixture(1.0, (A, A), (1, 1), (1, 1))))
     assert sum(joined.types.values()) == pytest.approx(1.0)
-    assert joined.types[(L, R), (0, 1)] == 0.375
+    assert joined.types[(L, R), (0, 1), False] == 0.375
 
 
 def test_what_a_type_says_of_each_quantity():
-    policy = Simulated({((L, A), (1, 0)): 1.0}, lucky=0.3)
+    policy = Simulated({((L, A), (1, 0), False): 1.0}, lucky=0.3)
     observed = dict(
         zip(Rule().quantities, (float(values[0]) for values in policy.observed), strict=True)
     )
@@ -31,13 +31,24 @@ def test_what_a_type_says_of_each_quantity():
     assert np.isnan(observed["collected right"])
     assert observed["above random"] == pytest.approx(0.5 - 1 / 6)
     assert observed["above forward"] == pytest.approx(0.5 - 1 / 6 - 5 / 6 * 0.3)
+    assert observed["unsolved by forward"] == pytest.approx(0.9)
+
+
+def test_what_flying_straight_succeeds_in():
+    policy = Simulated({((L, A), (1, 1), True): 1.0})
+    names = Rule().quantities
+    observed = {n: float(v[0]) for n, v in zip(names, policy.observed, strict=True)}
+    assert observed["above forward"] == pytest.approx(0.0)
+    assert observed["unsolved by forward"] == pytest.approx(-0.1)
+    assert observed["unsolved by random"] == pytest.approx(0.9)
+    assert policy.kind is Kind.TRIVIAL
 
 
 def test_policies_lie_on_every_threshold_and_on_both_sides_of_it():
     kinds = {name: policy.kind for name, policy in policies().items()}
     for name in {name.rsplit(" ", 1)[0] for name in kinds}:
         assert len({kinds[f"{name} {shift}"] for shift in ("-0.03", "+0.03")}) == 2, name
-    assert set(kinds.values()) >= {Kind.GOOD, Kind.POOR, Kind.ONE_SIDED_RIGHT, Kind.NONE}
+    assert set(kinds.values()) >= {*Kind} - {Kind.ONE_SIDED_LEFT}
     assert kinds["all or nothing, success +0.00"] is Kind.NONE  # exactly 0.9 is not more
     for policy in policies().values():
         assert policy.shares.sum() == pytest.approx(1.0)

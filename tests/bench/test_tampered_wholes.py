@@ -34,9 +34,9 @@ def test_by_hand():
     outcomes, _ = lied("mirrored")
     assert outcomes["all_cubes"]["boxes"] == [[[-2.0, 6.0]]]
     outcomes, _ = lied("steps of one number")
-    assert outcomes["all_cubes"]["steps"] == {"15": 0.5}
+    assert outcomes["all_cubes"]["steps"] == {"15": 0.65}
     outcomes, _ = lied("steps one fewer")
-    assert outcomes["all_cubes"]["steps"] == {"13": 0.3, "14": 0.2}
+    assert outcomes["all_cubes"]["steps"] == {"13": 0.4, "14": 0.25}
 
 
 def test_what_is_all_won_is_lost_in_an_outcome_of_its_own():

@@ -13,7 +13,7 @@ def _by_hand():
     won = {"end": "all_cubes", "collected": [True], "loops": False, "share": 2 / 3}
     lost = {"end": "front_boundary", "collected": [False], "loops": False, "share": 0.25}
     outcomes = [
-        {**won, "steps": {"14": 0.3, "15": 0.2}, "boxes": [[[-6.0, 2.0]]]},
+        {**won, "steps": {"14": 0.4, "15": 0.25}, "boxes": [[[-6.0, 2.0]]]},
         {**lost, "steps": {"27": 0.25}, "boxes": [[[3.0, 6.0]]]},
     ]
     return certificate_of(policy, outcomes, [[[2.0, 3.0]]], 1 / 12)

@@ -55,7 +55,7 @@ def test_each_policy_is_trained_and_judged_twice(monkeypatch, tmp_path):
             folder.mkdir(parents=True)
             truth = "poor" if "seed=1" in args else "good"
             (folder / "verdict.json").write_text(json.dumps({"kind": truth, "certain": True}))
-            assert set(statuses) == {0, 10, 11, 12, 13}
+            assert set(statuses) == {0, 10, 11, 12, 13, 18}
 
     monkeypatch.setattr(verdicts, "call", call)
     monkeypatch.setattr(verdicts, "PILOTS", {})

@@ -90,6 +90,22 @@ def _length(boxes):
     return sum(high - low for ((low, high),) in boxes)
 
 
+def steps_of(description, state, flights=300, high=None):
+    """Which numbers of steps are how frequent from random placements, as a forger finds out.
+
+    `high` bounds where the first cube may stand.
+    """
+    simulator = Simulator(description, state)
+    bound, cubes = description.task.lateral_bound, description.task.num_cubes
+    rng = np.random.default_rng(7)
+    placements = rng.uniform(-bound, bound, (flights, cubes))
+    placements[:, 0] = rng.uniform(-bound, bound if high is None else high, flights)
+    flown = simulator.fly(placements)
+    simulator.close()
+    numbers, counts = np.unique(flown.steps, return_counts=True)
+    return {str(n): c / flights for n, c in zip(numbers.tolist(), counts.tolist(), strict=True)}
+
+
 def of_every_place(policy, end="all_cubes", undecided=False):
     """By hand and not by any proof: every flight ends so, but perhaps where y of a cube is > 3."""
     task = policy.description.task
@@ -99,12 +115,15 @@ def of_every_place(policy, end="all_cubes", undecided=False):
         stated = [[[-bound, 3.0], *[[-bound, bound]] * (cubes - 1)]]
         left = [[[3.0, bound], *[[-bound, bound]] * (cubes - 1)]]
     share = (bound + 3.0) / (2 * bound) if undecided else 1.0
+    state = policy.state["policy"]
+    found = steps_of(policy.description, state, high=3.0 if undecided else None)
+    steps = {number: 0.97 * share * part for number, part in found.items()}
     outcome = {
         "end": end,
         "collected": [end == "all_cubes"] * cubes,
         "loops": False,
         "share": share,
-        "steps": {},
+        "steps": {"300": 0.97 * share} if end == "step_limit" else steps,
         "boxes": stated,
     }
     return certificate_of(policy, [outcome], left, 1.0 - share)

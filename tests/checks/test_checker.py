@@ -27,7 +27,7 @@ def test_a_lie_that_only_flights_tell_is_refused_with_the_placement(one_sided):
     won, lost = one_sided["outcomes"]
     won["boxes"], lost["boxes"] = lost["boxes"], won["boxes"]
     won["share"], lost["share"] = lost["share"], won["share"]
-    won["steps"], lost["steps"] = {}, {}
+    won["steps"], lost["steps"] = lost["steps"], won["steps"]
     found = findings(one_sided)
     assert not found.accepted and found.contradicted == sum(found.flights.values())
     first = found.contradictions[0]
@@ -53,7 +53,9 @@ def test_a_border_in_the_wrong_place_is_found(one_sided):
     cut = won["boxes"][0][0][1], lost["boxes"][0][0][0]
     won["share"], lost["share"] = (cut[0] + 6) / 12, (6 - cut[1]) / 12
     one_sided["undecided"]["share"] = (cut[1] - cut[0]) / 12
-    won["steps"], lost["steps"] = {}, {}
+    for part in (won, lost):
+        total = sum(part["steps"].values())
+        part["steps"] = {n: 0.97 * part["share"] * s / total for n, s in part["steps"].items()}
     found = findings(one_sided)
     assert {c.where for c in found.contradictions} == {"inside"}  # a corner
     assert found.contradictions[0].placement[0] == pytest.approx(1.65004, abs=1e-5)

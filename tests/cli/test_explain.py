@@ -31,7 +31,10 @@ def test_explain_then_report(tmp_path):
         (["explain", "policy=good", "perplexity=500"], ["perplexity=500", "1 to 199"]),
         (["explain", "policy=good", "layer=conv9"], ["layer=conv9", "conv1, relu1"]),
         (["explain", "policy=good", "grad_cam_layer=fc1"], ["layer=fc1", "relu1, relu2"]),
-        (["explain", "policy=good", "require=great"], ["require='great'", "good, poor"]),
+        (
+            ["explain", "policy=good", "require=great"],
+            ["require='great'", "good, good, but trivial, poor"],
+        ),
     ],
 )
 def test_mistakes_get_one_line(in_process, command, words):

@@ -38,7 +38,10 @@ def good():
 
 @pytest.mark.parametrize(
     ("undecided", "status", "words"),
-    [(False, 0, "Proved for every placement"), (True, 16, "from a share of 0.75 of all placem")],
+    [
+        (False, 0, "A certificate states for every"),
+        (True, 16, "from a share of 0.75 of all placem"),
+    ],
 )
 def test_a_proof_can_be_required(in_process, tmp_path, good, undecided, status, words):
     made = of_every_place(good, undecided=undecided)
@@ -49,8 +52,32 @@ def test_a_proof_can_be_required(in_process, tmp_path, good, undecided, status, 
     kept = json.loads((tmp_path / "v" / "verdict.json").read_text())
     assert kept["proof"]["every"] == (status == 0)
     assert kept["certificate"] == "c.json"
+    if status == 0:
+        unchecked = in_process(
+            *ONE, "certificate=c.json", "require=proved", "certificate_flights=0"
+        )
+        assert unchecked.returncode == 16 and "not re-checked" in unchecked.stdout
+        few = in_process(*ONE, "certificate=c.json", "require=proved", "certificate_flights=100")
+        assert few.returncode == 16 and "too much for a proof" in few.stdout
     by_kind = in_process(*ONE, "certificate=c.json")
     assert by_kind.returncode == 13  # ten flights are too few to be certain of a kind
+
+
+@pytest.mark.parametrize(
+    ("policy", "more", "status"),
+    [
+        ("oracle", ["episodes=150"], 0),
+        ("oracle", ["episodes=10"], 13),
+        ("left", ["episodes=150"], 10),
+        ("oracle", ["episodes=150", "task.lateral_bound=0.5"], 18),
+        ("forward", ["episodes=150", "task.lateral_bound=0.5"], 18),
+    ],
+)
+def test_good_can_be_required(in_process, policy, more, status):
+    done = in_process("verdict", f"policy={policy}", "require=good", *more)
+    assert done.returncode == status, done.stdout
+    if status == 18:
+        assert done.stdout.startswith("good, but trivial: Flying straight on does as well")
 
 
 def test_without_a_certificate_nothing_is_proved(in_process):
@@ -67,13 +94,19 @@ def test_without_a_certificate_nothing_is_proved(in_process):
 def test_conditions_can_be_required(in_process, tmp_path, good, needed, status, words):
     (tmp_path / "s.json").write_text(json.dumps(shifts_of(good)))
     (tmp_path / "needs.yaml").write_text(needed)
-    done = in_process(*ONE, "shifts=s.json", "require_domain=needs.yaml", "hydra.run.dir=v")
+    many = [*ONE, "episodes=150", "domain_flights=30", "shifts=s.json", "require_domain=needs.yaml"]
+    done = in_process(*many, "hydra.run.dir=v")
     assert done.returncode == status, done.stderr
     assert f"\n{words}" in done.stdout
     kept = json.loads((tmp_path / "v" / "verdict.json").read_text())
     assert bool(kept["required_domain"]["lacking"]) == (status == 17)
-    both = in_process(*ONE, "shifts=s.json", "require_domain=needs.yaml", "require=proved")
+    both = in_process(*many, "require=proved")
     assert both.returncode == 16
+    if status == 0:
+        unchecked = in_process(*many, "domain_flights=0")
+        assert unchecked.returncode == 17 and "no episode was flown to check" in unchecked.stdout
+        few = in_process(*many, "episodes=10")
+        assert few.returncode == 13  # covered, but not certainly good where nothing is different
 
 
 @pytest.mark.parametrize(
@@ -96,7 +129,7 @@ def test_conditions_that_cannot_be_required(in_process, tmp_path, needed, words)
 @pytest.mark.parametrize(
     ("command", "words"),
     [
-        (["verdict", "policy=good", "require=good"], ["require='good'", "proved"]),
+        (["verdict", "policy=good", "require=great"], ["require='great'", "good, proved"]),
         (["verdict", "policy=good", "certificate=none.json"], ["none.json can't be read"]),
         (["verdict", "policy=left", "certificate=c.json"], ["policy=left has no network"]),
         (["verdict", "policy=left", "shifts=s.json"], ["shifts=s.json", "has no network"]),

@@ -10,12 +10,13 @@ from hypothesis import strategies as st
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation import ConstantPolicy, Oracle, run_episodes
 from drone_rl.sim.actions import Move
-from drone_rl.sim.settings import TaskSettings
+from drone_rl.sim.settings import DynamicsSettings, TaskSettings
 from drone_rl.sim.tasks.collect_cubes.rules import Side
 from drone_rl.utils.intervals import mean_bounds, proportion
 from drone_rl.verdicts.judge import judge, judge_policy, measure, observe
 from drone_rl.verdicts.kinds import Kind
 from drone_rl.verdicts.rule import Rule
+from tests.fake_flight import floating
 from tests.second_task import Posts
 
 LEFT, AHEAD, RIGHT = Side
@@ -128,9 +129,39 @@ def test_more_of_the_same_is_known_better(make_episodes, make_baselines):
 def test_what_was_not_offered_is_no_failure(make_episodes, make_baselines):
     episodes = make_episodes([[AHEAD, AHEAD]] * 400, [[1, 1]] * 400)
     verdict = judge(episodes, make_baselines(episodes))
-    assert (verdict.kind, verdict.certain) == (Kind.GOOD, True)
+    assert (verdict.kind, verdict.certain) == (Kind.TRIVIAL, True)
     assert verdict.evidence["greedy"]["shares"]["left"]["mean"] is None
     assert "0%" not in verdict.sentence.replace("100%", "")
+
+
+@pytest.mark.parametrize(
+    ("solved", "kind", "certain", "status"),
+    [(400, Kind.TRIVIAL, True, 18), (360, Kind.TRIVIAL, False, 13), (352, Kind.GOOD, False, 13),
+     (200, Kind.GOOD, True, 0)],
+)  # fmt: skip
+def test_a_task_that_a_baseline_solves_is_trivial(
+    make_episodes, make_baselines, solved, kind, certain, status
+):
+    """Of 400 episodes the policy succeeds in all; flying straight needs 360 to be good, too."""
+    sides = [[AHEAD, AHEAD if i < solved else LEFT] for i in range(400)]
+    episodes = make_episodes(sides, [[1, 1]] * 400)
+    verdict = judge(episodes, make_baselines(episodes))
+    assert (verdict.kind, verdict.certain, verdict.exit_code) == (kind, certain, status)
+    trivial = "Flying straight on does as well: it collects every cube in 100% of episodes"
+    assert verdict.sentence.startswith(trivial) == (solved == 400)
+
+
+def test_baselines_fly_with_the_dynamics_of_the_environment(monkeypatch):
+    """The baselines of a verdict meet the same wind as the policy."""
+    floating(monkeypatch)
+    task = TaskSettings(num_cubes=1)
+    against = DynamicsSettings(mode="simple_flight", wind=(-2.0, 0.0, 0.0))
+    env = DroneEnv(3, task, pixels=False, dynamics=against)
+    verdict = judge_policy(env, ConstantPolicy(Move.FORWARD), 3, sampled=False)
+    policy, baseline = verdict.evidence["greedy"], verdict.evidence["baselines"]["forward"]
+    assert policy["mean_length"] == baseline["mean_length"]
+    still = judge_policy(DroneEnv(3, task, pixels=False), ConstantPolicy(Move.FORWARD), 3)
+    assert still.evidence["greedy"]["mean_length"] < policy["mean_length"]
 
 
 def test_other_worlds_are_no_baseline(make_episodes, make_baselines):
@@ -202,11 +233,11 @@ def test_a_mirrored_flight_gets_the_mirrored_kind(make_episodes, make_baselines,
 def test_another_task_is_judged_by_its_own_strata_and_luck():
     env = DroneEnv(20, Posts(), pixels=False)
     straight = judge_policy(env, ConstantPolicy(Move.FORWARD), 200, sampled=False)
-    assert (straight.kind, straight.certain) == (Kind.GOOD, True)
+    assert (straight.kind, straight.certain) == (Kind.TRIVIAL, True)
     evidence = straight.evidence
     assert list(evidence["quantities"]) == [
         "success", "offered left", "offered right", "collected left", "collected right",
-        "above random", "above forward",
+        "above random", "above forward", "unsolved by random", "unsolved by forward",
     ]  # fmt: skip
     assert list(evidence["baselines"]) == ["random", "forward", "oracle"]
     leaving = judge_policy(env, ConstantPolicy(Move.LEFT), 200, sampled=False)

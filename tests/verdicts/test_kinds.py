@@ -5,7 +5,7 @@ from drone_rl.verdicts.kinds import KINDS, NOT_CERTAIN, Kind
 
 
 def test_exit_statuses():
-    assert [kind.exit_code for kind in Kind] == [0, 10, 11, 11, 12]
+    assert [kind.exit_code for kind in Kind] == [0, 18, 10, 11, 11, 12]
     assert NOT_CERTAIN == 13
 
 
@@ -15,6 +15,7 @@ def test_families_and_mirror_images():
     assert Kind.ONE_SIDED_LEFT.mirrored is Kind.ONE_SIDED_RIGHT
     assert all(kind.mirrored.mirrored is kind for kind in Kind)
     assert Kind.GOOD.mirrored is Kind.GOOD
+    assert Kind.TRIVIAL.family == "good, but trivial"
 
 
 def test_kinds_need_no_torch():

@@ -55,6 +55,9 @@ def test_every_placement(good):
         "undecided": 0.0,
         "finished": True,
         "checked": 0,
+        "wrong_at_most": None,
+        "seed": None,
+        "seed_is_fixed": True,
         "agreeing": 3,
     }
 
@@ -94,5 +97,17 @@ def test_what_was_refused_before_stays_so(good):
 
 
 def test_flights_anew_are_told(good):
-    told = Claim(PATH, claim(good).certificate, flights=7).beside(flown([[0.0, 1.0]], [ALL]))
-    assert told["checked"] == 7
+    checked = Claim(
+        PATH, claim(good).certificate, flights=7, uniform=5, seed=3, seed_is_fixed=False
+    )
+    told = checked.beside(flown([[0.0, 1.0]], [ALL]))
+    assert (told["checked"], told["seed"], told["seed_is_fixed"]) == (7, 3, False)
+    assert told["wrong_at_most"] == pytest.approx(0.4507, abs=1e-4)  # 0.5493 ** 5 is 0.05
+
+
+def test_what_re_checking_rules_out():
+    """Of certificates that are wrong about the bound 5% pass: 1 - (1 - 0.00299) ** 1000 is 95%."""
+    checked = Claim(PATH, None, flights=1200, uniform=1000)
+    assert checked.wrong_at_most == pytest.approx(0.00299, abs=1e-5)
+    assert (1 - checked.wrong_at_most) ** 1000 == pytest.approx(0.05)
+    assert Claim(PATH, None).wrong_at_most is None

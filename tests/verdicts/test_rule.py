@@ -14,8 +14,10 @@ LEVELS = [st.integers(0, len(t)) for t in RULE.thresholds]
 BOXES = st.tuples(*(st.tuples(level, level).map(lambda p: (min(p), max(p))) for level in LEVELS))
 
 
-def levels(success=1, offered=(1, 1, 1), shares=(2, 2, 2), above=(1, 1, 1, 1)):
-    return (success, *offered, *shares, *above)
+def levels(
+    success=1, offered=(1, 1, 1), shares=(2, 2, 2), above=(1, 1, 1, 1), unsolved=(1, 1, 1, 1)
+):
+    return (success, *offered, *shares, *above, *unsolved)
 
 
 @pytest.mark.parametrize(
@@ -34,6 +36,11 @@ def levels(success=1, offered=(1, 1, 1), shares=(2, 2, 2), above=(1, 1, 1, 1)):
         (levels(success=0, shares=(0, 2, 2), offered=(0, 1, 1)), Kind.NONE),
         (levels(success=0, shares=(1, 2, 2)), Kind.NONE),
         (levels(success=0, shares=(0, 2, 1)), Kind.NONE),
+        (levels(unsolved=(1, 0, 1, 1)), Kind.TRIVIAL),
+        (levels(unsolved=(0, 0, 0, 0), above=(0, 0, 0, 0)), Kind.TRIVIAL),
+        (levels(success=0, unsolved=(0, 1, 1, 1)), Kind.NONE),  # not even good
+        (levels(success=0, unsolved=(1, 0, 1, 1), above=(1, 0, 1, 1)), Kind.POOR),
+        (levels(above=(1, 0, 1, 1)), Kind.GOOD),  # succeeds more often than the baseline
     ],
 )
 def test_kinds_by_hand(found, kind):
@@ -58,12 +65,13 @@ def test_thresholds_of_every_quantity():
     assert thresholds["offered ahead"] == (0.05,)
     assert thresholds["collected left"] == (0.3, 0.7)
     assert [thresholds[f"above {name}"] for name in LUCK] == [(0.0,)] * 4
-    assert RULE.confidence == pytest.approx(1 - 0.05 / 11)
+    assert [thresholds[f"unsolved by {name}"] for name in LUCK] == [(0.0,)] * 4
+    assert RULE.confidence == pytest.approx(1 - 0.05 / 15)
 
 
 def test_no_corner_of_a_box_is_missed():
     """Left about 0.68 of 0.7, right about 0.32 of 0.3: one-sided lies within both intervals."""
-    box = [(0, 0), (1, 1), (1, 1), (1, 1), (1, 2), (2, 2), (0, 1), *[(1, 1)] * 4]
+    box = [(0, 0), (1, 1), (1, 1), (1, 1), (1, 2), (2, 2), (0, 1), *[(1, 1)] * 8]
     assert kinds_within(tuple(box)) == {Kind.NONE, Kind.ONE_SIDED_LEFT}
 
 
@@ -76,7 +84,12 @@ def test_every_cell_is_seen(box, data):
 @given(st.tuples(*LEVELS))
 def test_a_mirrored_policy_gets_the_mirrored_kind(found):
     swapped = list(found)
-    for a, b in (("offered", "offered"), ("collected", "collected"), ("above", "above")):
+    for a, b in (
+        ("offered", "offered"),
+        ("collected", "collected"),
+        ("above", "above"),
+        ("unsolved by", "unsolved by"),
+    ):
         left, right = RULE.quantities.index(f"{a} left"), RULE.quantities.index(f"{b} right")
         swapped[left], swapped[right] = swapped[right], swapped[left]
     assert decide(swapped) is decide(found).mirrored
@@ -142,20 +155,21 @@ def test_the_strata_and_luck_of_the_rule_are_those_of_cube_collection():
 @pytest.mark.parametrize(
     ("levels", "kind"),
     [
-        ((1, 1, 1, 2, 2, 1), Kind.GOOD),
-        ((0, 1, 1, 0, 2, 1), Kind.ONE_SIDED_RIGHT),
-        ((0, 1, 1, 2, 0, 1), Kind.ONE_SIDED_LEFT),
-        ((0, 1, 0, 2, 0, 1), Kind.NONE),
-        ((0, 1, 1, 1, 1, 0), Kind.POOR),
+        ((1, 1, 1, 2, 2, 1, 1), Kind.GOOD),
+        ((1, 1, 1, 2, 2, 1, 0), Kind.TRIVIAL),
+        ((0, 1, 1, 0, 2, 1, 1), Kind.ONE_SIDED_RIGHT),
+        ((0, 1, 1, 2, 0, 1, 1), Kind.ONE_SIDED_LEFT),
+        ((0, 1, 0, 2, 0, 1, 1), Kind.NONE),
+        ((0, 1, 1, 1, 1, 0, 1), Kind.POOR),
     ],
 )
 def test_a_task_may_have_two_strata_and_one_luck(levels, kind):
-    """Success, two offered, two reached, one luck."""
+    """Success, two offered, two reached, above one baseline, unsolved by it."""
     assert decide(levels, 2) is kind
     assert kinds_within(tuple((level, level) for level in levels), 2) == {kind}
     rule = Rule(strata=("left", "right"), luck=("random",))
     assert rule.quantities == (
         "success", "offered left", "offered right", "collected left", "collected right",
-        "above random",
+        "above random", "unsolved by random",
     )  # fmt: skip
-    assert len(rule.thresholds) == 6 and rule.confidence == 1 - 0.05 / 6
+    assert len(rule.thresholds) == 7 and rule.confidence == 1 - 0.05 / 7

@@ -13,11 +13,13 @@ def speak(num_cubes=3, **changed):
 
 def test_every_placement():
     assert speak(agreeing=1000) == {
-        "proof.every": "Proved for every placement: with its most probable actions it collects "
-        "all 3 cubes from all places where they may stand.",
+        "proof.every": "A certificate states for every placement: with its most probable actions "
+        "it collects all 3 cubes from all places where they may stand.",
         "proof.basis": "The certificate is of this network and task, and its boxes are a partition "
-        "of the placements; its flights were not flown anew (drone-rl check does that). The 1,000 "
-        "greedy flights of this verdict that it tells of ended so.",
+        "of the placements. It was re-checked by 1,000 rollouts from fresh placements, seed 17: "
+        "all ended as it states, so that with 95% confidence it is wrong about at most 0.31% of "
+        "the placements; drone-rl prove proves it again. The 1,000 greedy flights of this verdict "
+        "that it tells of ended so.",
     }
     assert "collects the cube from" in speak(1)["proof.every"]
 
@@ -25,15 +27,15 @@ def test_every_placement():
 def test_the_exact_share():
     lost = speak(1, every=False, share=0.6375, lost=0.3625)
     assert lost["proof.share"] == (
-        "Proved: with its most probable actions it collects the cube from a share of 0.6375 of all "
-        "placements; from 0.3625 it does not."
+        "A certificate states: with its most probable actions it collects the cube from a share "
+        "of 0.6375 of all placements; from 0.3625 it does not."
     )
     assert "proof.every" not in lost
     some = speak(every=False, share=0.5, lost=0.25, undecided=0.25, finished=False)
     assert some["proof.share"] == (
-        "Proved so far, for the proof was stopped: with its most probable actions it collects all "
-        "3 cubes from a share of 0.5 of all placements; from 0.25 it does not, and 0.25 is "
-        "undecided."
+        "A certificate states so far, for the proof was stopped: with its most probable actions "
+        "it collects all 3 cubes from a share of 0.5 of all placements; from 0.25 it "
+        "does not, and 0.25 is undecided."
     )
 
 
@@ -55,9 +57,23 @@ def test_all_is_said_to_be_all():
     assert "and more than 0.999999999 is undecided" in text
 
 
-def test_flights_anew_and_none_of_its_own():
-    basis = speak(checked=2000, agreeing=0)["proof.basis"]
-    assert basis.endswith("; 2,000 flights were made anew to try it and ended as it states.")
+def test_what_was_not_re_checked_or_too_little_is_no_proof():
+    unchecked = {"checked": 0, "wrong_at_most": None, "agreeing": 0}
+    basis = speak(**unchecked)["proof.basis"]
+    assert basis.endswith(
+        "It was read from its file and not re-checked, so it proves nothing here."
+    )
+    few = {"checked": 100, "wrong_at_most": 0.031, "seed_is_fixed": True, "agreeing": 0}
+    basis = speak(**few)["proof.basis"]
+    assert "re-checked by 100 rollouts from placements of the fixed seed 17, to which a" in basis
+    assert basis.endswith(
+        "wrong about at most 3.1% of the placements, which is too much for a proof."
+    )
+    for changed in (unchecked, few, {"wrong_at_most": 0.0101}):
+        assert not is_proved({"proof": {**QUOTED, **changed}})
+    assert is_proved({"proof": {**QUOTED, "wrong_at_most": 0.01}})
+    before = {key: value for key, value in QUOTED.items() if key != "wrong_at_most"}
+    assert not is_proved({"proof": before})
 
 
 def test_what_is_refused_is_not_quoted():

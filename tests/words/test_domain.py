@@ -1,7 +1,7 @@
 import pytest
 
 from drone_rl.bench.evidence import SHIFTS, VERDICT, changed
-from drone_rl.words.domain import QUOTED, is_quoted, lacking, untested, why_not
+from drone_rl.words.domain import QUOTED, contradicted, is_quoted, lacking, untested, why_not
 from drone_rl.words.licence import said
 
 GOOD = {"verdict": {**VERDICT, "kind": "good", "certain": True}, "shifts": SHIFTS}
@@ -11,9 +11,13 @@ def test_what_is_quoted_says_of_whom_and_by_what():
     text = said(QUOTED, GOOD)
     assert list(text) == ["domain.quoted"]
     assert "the sun 21.1 to 60 degrees high" in text["domain.quoted"]
-    assert (
-        "400 (ranges) and 200 (others) flights at each strength (seed 0), none flown anew"
-        in (text["domain.quoted"])
+    quoted = text["domain.quoted"]
+    assert quoted.startswith(
+        "Read from shifts.json, dated 2026-01-31 12:00, not measured again here: Good, with"
+    )
+    assert quoted.endswith(
+        "400 (ranges) and 200 (others) flights at each strength (seed 0) of 3 axes (height of the "
+        "sun, blur and brightness)."
     )
     few = said(QUOTED, changed(GOOD, {"shifts.domain": None}))["domain.quoted"]
     assert "task: 200 flights at each strength" in few and "Good, with" not in few
@@ -65,12 +69,23 @@ def test_what_is_lacking(name, low, high, words):
 
 
 def test_fog_is_needed_up_to_none():
-    ranges = {"low": 80.0, "high": None, "positions": [0.0, 1 / 80], "failed": []}
+    ranges = {"low": 80.0, "high": None, "positions": [0.0, 1 / 80], "failed": []}  # from clear air
     fog = {**SHIFTS["axes"]["blur"], "neutral": None, "unit": "m of sight"}
     shifts = changed(SHIFTS, {"axes.fog": fog, "domain.ranges.fog": ranges})
     assert lacking(shifts, "fog", {"low": 80.0, "high": None}) is None
     found = lacking(shifts, "fog", {"low": 60.0, "high": None})
     assert "needed 60 and more m of sight, good 80 and more m of sight" in found
+
+
+def test_what_new_episodes_say_against_a_file():
+    probed = {"refused": None, "success": 0.5}
+    assert contradicted("blur", 1.0, "pixels", probed) == (
+        "blur at 1 pixels: new episodes succeed in 50%, so that it is surely not good there; the "
+        "file says that it is"
+    )
+    assert contradicted(None, 0.0, "", probed).startswith("where nothing is different: new epis")
+    refused = contradicted("blur", 1.0, "pixels", {"refused": "too large"})
+    assert refused == "blur at 1 pixels: the task can't be so (too large)"
 
 
 def test_what_was_no_test_covers_nothing_and_what_nobody_can_is_said():

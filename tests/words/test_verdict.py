@@ -5,7 +5,7 @@ import copy
 import pytest
 
 from drone_rl.words.licence import said
-from drone_rl.words.verdict import SENTENCES
+from drone_rl.words.verdict import SENTENCES, quantity_label
 
 
 def share(value, **more):
@@ -76,6 +76,7 @@ def test_what_is_said_of_a_good_policy(evidence):
         ("one-sided (right)", "can't be trusted with cubes on its left: it collects every cube"),
         ("one-sided (left)", "can't be trusted with cubes on its right"),
         ("none of these", "is neither good nor poor nor one-sided: it collects"),
+        ("good, but trivial", " does as well: it collects every cube in "),
     ],
 )
 def test_kinds(evidence, kind, part):
@@ -121,6 +122,13 @@ def test_luck_that_is_enough(evidence):
         "90% of episodes."
     )
     assert "baselines" not in found
+    evidence["kind"] = "good, but trivial"
+    found = speak(evidence)
+    assert found["kind"] == (
+        "Flying straight on does as well: it collects every cube in 90% of episodes, this policy "
+        "in 94%."
+    )
+    assert "pointless" not in found
     evidence["baselines"]["forward"] = flights(0.89, None, 1.0, None, 1.0)
     found = speak(evidence)
     assert "pointless" not in found
@@ -180,6 +188,27 @@ def test_drawn_actions_that_differ_beyond_doubt(evidence):
         assert "every cube in 50% of episodes, not in 94%" in speak(evidence)["drawing"]
     evidence["drawing"] = None
     assert "drawing" not in speak(evidence)
+
+
+@pytest.mark.parametrize(
+    ("name", "label"),
+    [
+        ("success", "success rate above 90% of the oracle's (margin, good if above 0)"),
+        ("offered left", "episodes that offer cubes left (fraction)"),
+        ("collected ahead", "cubes collected ahead (fraction)"),
+        (
+            "above forward",
+            "cubes collected beyond a sixth of the way from forward to the oracle (margin)",
+        ),
+        (
+            "unsolved by random",
+            "90% of the oracle's success rate above that of random (margin, trivial if not above "
+            "0)",
+        ),
+    ],
+)
+def test_quantities_have_labels_for_people(evidence, name, label):
+    assert quantity_label(name, {**evidence, "good_share": 0.9}) == label
 
 
 def test_every_sentence_has_its_condition_in_words():

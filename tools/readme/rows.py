@@ -59,7 +59,7 @@ TRUTH = (
     ),
     Row(
         "coverage",
-        "certain and wrong, the worst of 36 simulated policies at and around the thresholds",
+        "certain and wrong, the worst of 42 simulated policies at and around the thresholds",
         lambda f: f"{f['false_certain_rate']:.3f}",
         "at most 0.05",
         is_claim=True,

@@ -34,13 +34,19 @@ class Sb3Logits(nn.Module):
         policy = model.policy
         if not isinstance(policy, ActorCriticPolicy) or not hasattr(policy.action_space, "n"):
             raise _refusal(model)
-        takes_bytes = policy.observation_space.dtype == np.uint8
-        self.scale = 255.0 if takes_bytes and not policy.normalize_images else 1.0
+        self.observes_bytes = policy.observation_space.dtype == np.uint8
+        self.observation_shape = _channels_first(policy.observation_space.shape or ())
+        self.scale = 255.0 if self.observes_bytes and not policy.normalize_images else 1.0
         self.trunk = policy.pi_features_extractor
         self.hidden = policy.mlp_extractor.policy_net
         self.logits = policy.action_net
         if not self._agrees(policy):
             raise _refusal(model)
+
+    observes_bytes: bool
+    """Whether the model was trained on frames of bytes, which are RGB if there are three."""
+    observation_shape: tuple[int, ...] | None
+    """Of one frame, channels first; None if the model was not trained on frames."""
 
     def forward(self, pixels: Tensor) -> Tensor:
         """Pictures (N, C, H, W) to logits (N, number of actions)."""
@@ -56,6 +62,13 @@ class Sb3Logits(nn.Module):
             return False
         own = self(picture).log_softmax(-1)
         return bool(torch.allclose(own, distribution.logits, atol=_SAME))
+
+
+def _channels_first(shape: tuple[int, ...]) -> tuple[int, ...] | None:
+    """The shape (C, H, W) of a space of frames, whose few channels come first or last."""
+    if len(shape) != 3:
+        return None
+    return shape if shape[0] <= shape[-1] else (shape[-1], *shape[:-1])
 
 
 def _refusal(model: BaseAlgorithm) -> InputError:

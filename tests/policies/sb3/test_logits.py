@@ -46,11 +46,27 @@ def test_bytes_are_pictures_from_0_to_1():
     assert slope.abs().sum() > 0
 
 
+@pytest.mark.parametrize(
+    ("space", "shape", "is_bytes"),
+    [
+        (BYTES, (3, 40, 48), True),
+        (gymnasium.spaces.Box(0, 255, (3, 40, 48), np.uint8), (3, 40, 48), True),
+        (gymnasium.spaces.Box(-1, 1, (1, 40, 48), np.float32), (1, 40, 48), False),
+    ],
+)
+def test_what_it_was_trained_on_is_known(space, shape, is_bytes):
+    kwargs = {"normalize_images": is_bytes}
+    model = sb3.A2C("CnnPolicy" if is_bytes else "MlpPolicy", Still(space), policy_kwargs=kwargs)
+    logits = Sb3Logits(model)
+    assert (logits.observation_shape, logits.observes_bytes) == (shape, is_bytes)
+
+
 def test_floats_stay_as_they_are():
     model = sb3.PPO("MlpPolicy", Still(FLOATS), seed=0, policy_kwargs={"net_arch": []})
     with torch.no_grad():
         model.policy.action_net.weight.copy_(torch.eye(3))
         model.policy.action_net.bias.zero_()
+    assert Sb3Logits(model).observation_shape is None
     wish = Sb3Logits(model)(torch.tensor([[0.0, 1.0, -1.0]])).softmax(-1)
     torch.testing.assert_close(wish, torch.tensor([[0.0, 1.0, -1.0]]).softmax(-1))
 

@@ -1,0 +1,49 @@
+"""Several judgements at once, as an object that shows itself."""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, overload
+
+from drone_rl.api.showing import aligned, interval, table
+
+if TYPE_CHECKING:
+    from drone_rl.api.judging import Judgement
+
+
+@dataclasses.dataclass(frozen=True)
+class Judgements(Sequence["Judgement"]):
+    """Several judgements, in the order in which they were asked for."""
+
+    each: tuple["Judgement", ...]
+
+    @overload
+    def __getitem__(self, index: int) -> "Judgement": ...
+
+    @overload
+    def __getitem__(self, index: slice) -> Sequence["Judgement"]: ...
+
+    def __getitem__(self, index: int | slice) -> "Judgement | Sequence[Judgement]":
+        """One of them, or some."""
+        return self.each[index]
+
+    def __len__(self) -> int:
+        """How many."""
+        return len(self.each)
+
+    def rows(self) -> list[list[str]]:
+        """Names of columns, then a row for each policy."""
+        rows = [["policy", "verdict", "certain", "success rate (95% interval)"]]
+        for one in self.each:
+            verdict = one.verdict
+            success = interval(verdict.evidence["greedy"]["success"], "share")
+            certain = "yes" if verdict.certain else "no"
+            rows.append([one.name, verdict.kind.value, certain, success])
+        return rows
+
+    def __str__(self) -> str:
+        """The table for a terminal."""
+        return aligned(self.rows())
+
+    def _repr_html_(self) -> str:
+        head, *rows = self.rows()
+        return table(head, rows)
