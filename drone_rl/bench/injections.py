@@ -39,9 +39,11 @@ document.querySelectorAll("canvas").forEach(canvas => {
 });
 const bad = "[onerror], [onload], [onclick], iframe:not([srcdoc]), object, embed, base, form, " +
   "meta[http-equiv=refresh], a[href^=javascript i], a[href^='//'], a[href^=http]";
-return [document.documentElement.dataset.ran || "", document.querySelectorAll(bad).length];
+return document.querySelectorAll(bad).length;
 """
-"""Points at everything and clicks it; returns whether something ran, and elements that may."""
+"""Points at everything and clicks it; returns how many elements there are that might run."""
+_LATER = "setTimeout(() => arguments[0](document.documentElement.dataset.ran || ''), 60)"
+"""Returns whether something has run until a little later."""
 _log = logging.getLogger(__name__)
 _NAVIGATES = ("http-equiv=refresh", "rel=preconnect", "rel=prefetch")
 """Markup that no policy of a page can stop; only escaping can."""
@@ -189,7 +191,8 @@ def what_ran(browser: Any, path: Path, *, is_markup: bool = False) -> str:
     found: list[str] = []
     try:
         browser.get(path.absolute().as_uri())
-        ran, elements = browser.execute_script(_TRY)
+        elements = browser.execute_script(_TRY)
+        ran = browser.execute_async_script(_LATER)  # errors of images come late
         found += ["a script"] if ran else []
         found += [f"{elements} elements"] if elements and not is_markup else []
     except UnexpectedAlertPresentException:
