@@ -9,7 +9,7 @@ stop it: a string that is text needs no stopping.
 import json
 import logging
 import shutil
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -212,10 +212,12 @@ def what_ran(browser: Any, path: Path, *, is_markup: bool = False) -> str:
     return "; ".join(found)[:1000]
 
 
-def _requests(messages: Iterable[dict[str, Any]], path: Path) -> list[str]:
-    """Addresses outside the page that were asked for."""
+def _requests(messages: Sequence[dict[str, Any]], path: Path) -> list[str]:
+    """Addresses outside the page that were asked for, and not stopped by the page's policy."""
+    failed = [m["params"] for m in messages if m["method"] == "Network.loadingFailed"]
+    stopped = {of["requestId"] for of in failed if of.get("blockedReason") == "csp"}
     sent = [m["params"] for m in messages if m["method"] == "Network.requestWillBeSent"]
-    urls = [params["request"]["url"] for params in sent]
+    urls = [of["request"]["url"] for of in sent if of["requestId"] not in stopped]
     page = path.absolute().as_uri()
     ours = [url for url in urls if url.startswith(("http", "file:", "ftp:")) or HOST in url]
     return [url for url in ours if url.partition("#")[0] != page]
