@@ -161,7 +161,7 @@ class _ForgedPolicy(Policy):
             "name": explanation.name,
             "numbers": explanation.numbers,
             "actions": explanation.actions,
-            "pictures": _Drawn(shown=PIXEL),
+            "pictures": _Drawn({} if extras.get("rows") == [] else {"shown": PIXEL}),
             "words": words,
             "terms": explanation.terms,
             "extras": extras,

@@ -9,7 +9,7 @@ stop it: a string that is text needs no stopping.
 import json
 import logging
 import shutil
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -39,9 +39,11 @@ document.querySelectorAll("canvas").forEach(canvas => {
 });
 const bad = "[onerror], [onload], [onclick], iframe:not([srcdoc]), object, embed, base, form, " +
   "meta[http-equiv=refresh], a[href^=javascript i], a[href^='//'], a[href^=http]";
-return [document.documentElement.dataset.ran || "", document.querySelectorAll(bad).length];
+return document.querySelectorAll(bad).length;
 """
-"""Points at everything and clicks it; returns whether something ran, and elements that may."""
+"""Points at everything and clicks it; returns how many elements there are that might run."""
+_LATER = "setTimeout(() => arguments[0](document.documentElement.dataset.ran || ''), 60)"
+"""Returns whether something has run until a little later."""
 _log = logging.getLogger(__name__)
 _NAVIGATES = ("http-equiv=refresh", "rel=preconnect", "rel=prefetch")
 """Markup that no policy of a page can stop; only escaping can."""
@@ -189,7 +191,8 @@ def what_ran(browser: Any, path: Path, *, is_markup: bool = False) -> str:
     found: list[str] = []
     try:
         browser.get(path.absolute().as_uri())
-        ran, elements = browser.execute_script(_TRY)
+        elements = browser.execute_script(_TRY)
+        ran = browser.execute_async_script(_LATER)  # errors of images come late
         found += ["a script"] if ran else []
         found += [f"{elements} elements"] if elements and not is_markup else []
     except UnexpectedAlertPresentException:
@@ -209,10 +212,12 @@ def what_ran(browser: Any, path: Path, *, is_markup: bool = False) -> str:
     return "; ".join(found)[:1000]
 
 
-def _requests(messages: Iterable[dict[str, Any]], path: Path) -> list[str]:
-    """Addresses outside the page that were asked for."""
+def _requests(messages: Sequence[dict[str, Any]], path: Path) -> list[str]:
+    """Addresses outside the page that were asked for, and not stopped by the page's policy."""
+    failed = [m["params"] for m in messages if m["method"] == "Network.loadingFailed"]
+    stopped = {of["requestId"] for of in failed if of.get("blockedReason") == "csp"}
     sent = [m["params"] for m in messages if m["method"] == "Network.requestWillBeSent"]
-    urls = [params["request"]["url"] for params in sent]
+    urls = [of["request"]["url"] for of in sent if of["requestId"] not in stopped]
     page = path.absolute().as_uri()
     ours = [url for url in urls if url.startswith(("http", "file:", "ftp:")) or HOST in url]
     return [url for url in ours if url.partition("#")[0] != page]
