@@ -18,6 +18,8 @@ import traceback
 from pathlib import Path
 from typing import Any
 
+from drone_rl.bench.hostile_runs import NOTED
+
 SECRET = "the canary's secret 4711"
 """Stands in the canary's file and in the environment; no command may tell it."""
 MOST_SECONDS = 2.0
@@ -26,8 +28,6 @@ MOST_MEMORY = 2**30
 """Bytes by which a refusal may grow the process."""
 MOST_ADDRESSES = 2**31
 """The same of its address space, so that a bomb ends the case and not the machine."""
-NOTED = "noted_"
-"""Begins the names of cases that are no reason to refuse: a report says which run is damaged."""
 PATIENCE_S = 30
 """Until a command counts as hung."""
 _PACKAGES = (

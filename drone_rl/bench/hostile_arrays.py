@@ -110,10 +110,10 @@ def _data() -> dict[str, bytes]:
 
 def _together(folder: Path) -> list[Case]:
     """Files that are small enough one by one, but not together."""
-    here = folder / "explanation_arrays_two_of_2_29"
+    here = folder / "explanation_arrays_two_of_2_28"
     here.mkdir()
     (here / "explanation.json").write_text(json.dumps(_NUMBERS))
-    half = _zip({"a.npy": _npy((2**26 - 16,), "<f8", bytes(2**29 - 128))}, deflated=True)
+    half = _zip({"a.npy": _npy((2**25,), "<f8", bytes(2**28))}, deflated=True)
     for other in ("arrays", "dataset"):
         (here / f"{other}.npz").write_bytes(half)
     several = [here.with_name(f"{here.name}_{i}") for i in range(3)]
@@ -122,8 +122,8 @@ def _together(folder: Path) -> list[Case]:
         (copy / "dataset.npz").write_bytes(_npz())
     names = ",".join(map(str, several))
     return [
-        (here.name, ["report", f"explanations={here}"], "two archives of 512 MiB"),
-        (f"{here.name}_3", ["report", f"explanations=[{names}]"], "three archives of 512 MiB"),
+        (here.name, ["report", f"explanations={here}"], "two archives of 256 MiB"),
+        (f"{here.name}_3", ["report", f"explanations=[{names}]"], "three archives of 256 MiB"),
     ]
 
 

@@ -42,7 +42,7 @@ CHECKPOINT_BYTES = 2**28
 """A checkpoint; also what it unpacks to."""
 ARCHIVE_BYTES = 2**28
 """An `.npz` file as it lies on the disk."""
-ARRAYS_BYTES = 2**29
+ARRAYS_BYTES = 5 * 2**26
 """The `.npz` files of one command together, unpacked."""
 
 # Counts.

@@ -22,6 +22,8 @@ from drone_rl.zoo.migration import describe
 
 MOST_HEADER = 2**20
 """Bytes of what an exported file says besides its weights."""
+_ENTRY = {"dtype", "shape", "data_offsets"}
+"""What a file of safetensors states of each tensor."""
 _FOLDER = Path(__file__).resolve().parent
 _COUNT = Whole(0, 2**62)
 _PROGRESS = Record(
@@ -234,8 +236,11 @@ def _exported(content: bytes) -> dict[str, Any]:
     metadata = as_mapping(header.get("__metadata__", {}), "metadata")
     if metadata.get("format") != FORMAT:
         raise InputError("it is not a drone_rl policy; use one that drone-rl export wrote")
-    for name, entry in header.items():
-        if name != "__metadata__" and as_mapping(entry, name).get("dtype") != "F32":
+    for name in header.keys() - {"__metadata__"}:
+        entry = as_mapping(header[name], name)
+        if entry.keys() != _ENTRY:
+            raise InputError(f"the weights {shown(name)} do not state {', '.join(sorted(_ENTRY))}")
+        if entry["dtype"] != "F32":
             raise InputError(f"the weights {shown(name)} are not float32")
     is_old = "description" not in metadata
     about = dict(as_mapping(_inner(metadata, "about"), "about"))
