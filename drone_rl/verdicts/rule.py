@@ -82,6 +82,13 @@ class Rule:
         return ((0.0,), *offered, *shares, *[(0.0,)] * len(self.luck))
 
     @property
+    def ranges(self) -> tuple[tuple[float, float], ...]:
+        """The least and the greatest value that an episode can have of each of `quantities`."""
+        count = len(self.strata)
+        luck = [(-1.0, 1.0)] * len(self.luck)
+        return ((-self.good_share, 1.0), *[(0.0, 1.0)] * (2 * count), *luck)
+
+    @property
     def confidence(self) -> float:
         """Of each quantity's interval, so that all of them hold at once (Bonferroni)."""
         return 1.0 - self.error_rate / len(self.quantities)
