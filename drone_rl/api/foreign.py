@@ -122,13 +122,15 @@ class ForeignPolicy(Pilot):
         for transform in self.transforms or (Rgb(),):
             part = find_part(TRANSFORMS, transform.name, "transforms")
             picture = part.change(picture, transform.values())
-        return ForeignNetwork(
+        network = ForeignNetwork(
             self.logits,
             picture.shape,
             make_dynamics(as_task(self.own_task), self.dynamics, self.actions).actions,
             takes_bytes=not self.transforms,
             device=device,
         )
+        network.owner = f"policy={self.name}"
+        return network
 
     def _repr_html_(self) -> str:
         """Shows itself in a notebook."""

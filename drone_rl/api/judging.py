@@ -18,7 +18,8 @@ from drone_rl.api.quoting import find_claim
 from drone_rl.api.showing import aligned, paragraph, table
 from drone_rl.conditions.measured import Measured
 from drone_rl.envs import DroneEnv, worlds_of
-from drone_rl.evaluation import run_episodes, summarise
+from drone_rl.evaluation import StepLog, run_episodes, summarise
+from drone_rl.evaluation.fragility import compare
 from drone_rl.policies.foreign import Logits
 from drone_rl.settings.changes import Changes
 from drone_rl.settings.judging import EvaluateSettings, FlightSettings, JudgeSettings
@@ -30,6 +31,8 @@ from drone_rl.utils.seeding import Stream, torch_generator
 from drone_rl.verdicts.judge import Verdict, judge_policy
 from drone_rl.verdicts.luck import BASELINES, fly_baselines, make_baseline
 from drone_rl.verdicts.rule import Rule
+from drone_rl.words.evaluation import EVALUATION
+from drone_rl.words.licence import say
 from drone_rl.words.verdict import unlike as say_unlike
 
 
@@ -42,6 +45,9 @@ class Evaluation:
     flown: dict[str, dict[str, Any]]
     """Figures of all that was flown, by name, see `drone_rl.evaluation.summarise`: "greedy",
     "sampled" and the baselines."""
+    rounding: dict[str, Any] | None = None
+    """What computed the actions, and whether another implementation takes the same ones in the
+    first episodes, see `drone_rl.evaluation.fragility.Rounding`."""
 
     @property
     def success(self) -> float:
@@ -74,6 +80,7 @@ class Evaluation:
             "seed": self.settings.seed,
             **({"unlike": self.policy.unlike} if self.policy.unlike else {}),
             **self.flown,
+            "rounding": self.rounding,
             **provenance(),
             "trained": origin["trained"] and origin["trained"]["progress"],
         }
@@ -81,8 +88,9 @@ class Evaluation:
     def __str__(self) -> str:
         """The table for a terminal; in other dynamics than its own also what differs."""
         figures = aligned(self.rows(), are_numbers=True)
-        unlike = self.policy.unlike
-        return f"{figures}\n{say_unlike({'unlike': unlike})}" if unlike else figures
+        unlike = say_unlike({"unlike": self.policy.unlike}) if self.policy.unlike else ""
+        computed = say(EVALUATION, {"rounding": self.rounding})
+        return "\n".join(filter(None, (figures, unlike, computed)))
 
     def _repr_html_(self) -> str:
         head, *rows = self.rows()
@@ -167,7 +175,10 @@ def evaluate(
     with _flying(policy, settings) as (env, actor):
         worlds, dynamics = env.base_env.state_dict(), worlds_of(env).dynamics
         progress("most probable actions", 0, steps)
-        flown = {"greedy": run_episodes(env, actor, episodes)}
+        log = StepLog()
+        flown = {"greedy": run_episodes(env, actor, episodes, log=log)}
+        env.base_env.load_state_dict(worlds)
+        rounding = compare(env, actor, flown=flown["greedy"], log=log)
         env.base_env.load_state_dict(worlds)
         progress("drawn actions", 1, steps)
         flown["sampled"] = run_episodes(env, actor, episodes, greedy=False)
@@ -176,7 +187,8 @@ def evaluate(
         num_worlds, device = settings.num_worlds, settings.device
         flown |= fly_baselines(num_worlds, policy.task, worlds, episodes, device, dynamics)
     progress("evaluated", steps, steps)
-    return Evaluation(policy, settings, {name: summarise(e) for name, e in flown.items()})
+    figures = {name: summarise(e) for name, e in flown.items()}
+    return Evaluation(policy, settings, figures, rounding and rounding.as_dict())
 
 
 def judge(

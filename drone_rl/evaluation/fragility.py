@@ -20,11 +20,18 @@ from drone_rl.evaluation.metrics import Episodes
 from drone_rl.policies import PictureNetwork, make_actor
 from drone_rl.policies.finite import require_finite
 from drone_rl.policies.regrouped import Regrouped
-from drone_rl.policies.rounding import Decide, decider
+from drone_rl.policies.rounding import TOLERANCE, Decide, RoundingBound, decider
 from drone_rl.sim.actions import DiscreteActions
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.provenance import num_cores
 
 COMPARED = 50
 """Episodes that are flown in batches of another composition where there is no fused kernel."""
+ALONE = 16
+"""Episodes that a network from elsewhere flies again, one frame at a time and in other batches."""
+_REMEDY = (
+    "give a callable without state, whose logits for a frame depend on no other frame of its batch"
+)
 MOST_FRAGILE = 0.02
 """Fragile frames, as a fraction of all, up to which a verdict can be certain. Honest policies have
 at most 0.002."""
@@ -136,6 +143,9 @@ def examine(
     ]
     differing = [i for i, step in enumerate(parted) if step is not None]
     unexplained = [i for i in differing if not seen.explains(i, cast(int, parted[i]))]
+    if not RoundingBound.find(network):
+        env_base(env).load_state_dict(before)
+        _require_function(env, network, log, seen)
     return Rounding(
         arithmetic=f"float32 on {worlds_of(env).device.type}, {log.implementation}",
         is_bound=is_bound and is_counted,
@@ -147,6 +157,44 @@ def examine(
         compared_episodes=count,
         differing=len(differing),
         unexplained=len(unexplained),
+    )
+
+
+def compare(
+    env: EnvBase, actor: TensorDictModuleBase, *, flown: Episodes, log: StepLog
+) -> Rounding | None:
+    """Fly the first episodes again by another implementation, the fused kernel if there is one.
+
+    Args:
+        env: As it was before `flown`.
+        actor: The policy.
+        flown: Greedy episodes, flown in PyTorch.
+        log: Their actions.
+
+    Returns:
+        None for an actor without a network.
+
+    Raises:
+        InputError: See `examine`.
+    """
+    state, count = _streams(env), min(COMPARED, len(flown))
+    found = examine(env, actor, count, flown=flown, log=log)
+    if found is None:
+        return None
+    env_base(env).load_state_dict(state)
+    again = StepLog()
+    for batch in _batches(env, actor, count, is_compiled=True, log=again):
+        again.note(batch)
+    if again.implementation == log.implementation:
+        return found
+    parted = [_parting(a, b) for a, b in zip(log.actions, again.actions, strict=False)]
+    differing = [i for i, at in enumerate(parted) if at is not None]
+    unexplained = sum(not found.is_fragile[i] for i in differing)
+    return dataclasses.replace(
+        found,
+        compared=again.implementation,
+        differing=len(differing),
+        unexplained=unexplained,
     )
 
 
@@ -231,11 +279,27 @@ def _fly(
 
 
 def _batches(
-    env: EnvBase, actor: TensorDictModuleBase, episodes: int, noted: tuple[str, ...] = ()
+    env: EnvBase,
+    actor: TensorDictModuleBase,
+    episodes: int,
+    noted: tuple[str, ...] = (),
+    *,
+    is_compiled: bool = False,
+    log: StepLog | None = None,
 ) -> Iterator[TensorDictBase]:
-    """Greedy episodes in PyTorch, no more than are asked for."""
+    """Greedy episodes, no more than are asked for; by the fused kernel if it may and can."""
     keep = tuple(("next", "info", name) for name in (*worlds_of(env).task.scored, "end_reason"))
-    collector = EpisodeCollector(env, actor, keep=keep, keep_observations=False, noted=noted)
+    collector = EpisodeCollector(
+        env,
+        actor,
+        keep=keep,
+        keep_observations=False,
+        noted=noted,
+        is_compiled=is_compiled,
+        num_cores=num_cores(),
+    )
+    if log is not None:
+        log.implementation = collector.implementation
     left = episodes
     with set_exploration_type(ExplorationType.DETERMINISTIC):
         while left > 0:
@@ -265,6 +329,59 @@ def _fly_regrouped(
         log.note(batch)
         finals.append(_final(env, batch))
     return log.actions, Episodes.joined(finals)
+
+
+def _require_function(env: EnvBase, network: PictureNetwork, log: StepLog, seen: "_Seen") -> None:
+    """Check that a network from elsewhere acts by the frame alone.
+
+    Episodes that were flown in one batch are flown again one frame at a time, and in mixed batches;
+    then frames are evaluated in batches of many sizes.
+
+    Raises:
+        InputError: It does not.
+    """
+    before, frames = _streams(env), torch.empty(0)
+    for groups, words in (("single", "one frame at a time"), ("mixed", "in other batches")):
+        env_base(env).load_state_dict(before)
+        again, actor = StepLog(), make_actor(Regrouped(network, groups), env.action_spec)
+        count = min(ALONE, len(seen.fragile))
+        for batch in _batches(env, actor, count, ("pixels",)):
+            again.note(batch)
+            frames = cast(Tensor, batch["pixels"])
+        parted = [_parting(a, b) for a, b in zip(log.actions, again.actions, strict=False)]
+        other = [i for i, at in enumerate(parted) if at is not None and not seen.explains(i, at)]
+        if isinstance(network.actions, DiscreteActions) and len(other) > MOST_UNEXPLAINED * count:
+            raise InputError(
+                f"{network.owner} acts by more than the frame: evaluated {words} it takes other "
+                f"actions in {len(other)} of {count} episodes; {_REMEDY}"
+            )
+    require_same_in_any_batch(network, frames, env.batch_size[0])
+
+
+@torch.no_grad()
+def require_same_in_any_batch(network: PictureNetwork, frames: Tensor, largest: int) -> None:
+    """Evaluate frames in batches of many sizes.
+
+    Args:
+        network: From elsewhere.
+        frames: Shape: (N, C, H, W).
+        largest: A size that must be among them.
+
+    Raises:
+        InputError: The outputs depend on the size.
+    """
+    rows = torch.linspace(0, len(frames) - 1, min(len(frames), 64)).long().to(frames.device)
+    frames = frames[rows]
+    alone = torch.cat([network(frame) for frame in frames.split(1)])
+    allowed = TOLERANCE * (1 + alone.abs().amax(-1))
+    for size in sorted({*range(1, 65), 100, 128, 200, 250, 256, 400, 500, 512, 1000, largest}):
+        which = (torch.arange(size, device=frames.device) + size) % len(frames)
+        difference = (network(frames[which]) - alone[which]).abs().amax(-1)
+        if bool((difference > allowed[which]).any()):
+            raise InputError(
+                f"{network.owner} gives other logits for the same frame in a batch of {size}: they "
+                f"differ by {float(difference.max()):.3g}; {_REMEDY}"
+            )
 
 
 def _streams(env: EnvBase) -> dict[str, Any]:

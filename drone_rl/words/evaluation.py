@@ -1,0 +1,50 @@
+"""What an evaluation says of its arithmetic. Evidence: `evaluation.json`."""
+
+from drone_rl.words.licence import Evidence, Sentence
+
+
+def _computed(evidence: Evidence) -> str:
+    return f"Computed in {evidence['rounding']['arithmetic']}."
+
+
+def _counts(evidence: Evidence) -> str:
+    found = evidence["rounding"]
+    return f"{found['differing']:,} of the first {found['compared_episodes']:,} greedy episodes"
+
+
+def _same(evidence: Evidence) -> str:
+    found = evidence["rounding"]
+    return (
+        f"The same actions in all of the first {found['compared_episodes']:,} greedy episodes "
+        f"when computed again ({found['compared']})."
+    )
+
+
+def _other(evidence: Evidence) -> str:
+    found = evidence["rounding"]
+    return (
+        f"Other actions in {_counts(evidence)} when computed again ({found['compared']}): "
+        "decisions depend on rounding."
+    )
+
+
+EVALUATION = (
+    Sentence(
+        "computed",
+        "it is known what computed the actions",
+        lambda e: e["rounding"] is not None,
+        _computed,
+    ),
+    Sentence(
+        "computed.same",
+        "another implementation took the same actions",
+        lambda e: e["rounding"] is not None and not e["rounding"]["differing"],
+        _same,
+    ),
+    Sentence(
+        "computed.other",
+        "another implementation took other actions",
+        lambda e: e["rounding"] is not None and e["rounding"]["differing"] > 0,
+        _other,
+    ),
+)
