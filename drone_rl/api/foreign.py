@@ -12,6 +12,8 @@ from drone_rl.api.environment import make_env
 from drone_rl.api.pilot import Pilot
 from drone_rl.api.policy import load_policy
 from drone_rl.api.showing import table
+from drone_rl.evaluation import StepLog, run_episodes
+from drone_rl.evaluation.fragility import compare
 from drone_rl.policies import ForeignNetwork
 from drone_rl.policies.foreign import Logits
 from drone_rl.settings.changes import Changes
@@ -31,6 +33,9 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import Stream
 from drone_rl.utils.settings import Settings, below
 from drone_rl.zoo.registry import TRANSFORMS, Picture, find_part
+
+_CHECKED = 32
+"""Episodes that are flown to check that a policy acts by the frame alone."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -183,6 +188,26 @@ def policy_from(
     )
     policy.make_network()  # refuses now what could not be asked later
     return policy
+
+
+def require_function(policy: Pilot, *, device: str = "cpu", renderer: str = "raytrace") -> None:
+    """Check that a policy from elsewhere acts by the frame alone; others do by their layers.
+
+    Args:
+        policy: Any.
+        device: Where it is flown.
+        renderer: Who renders.
+
+    Raises:
+        InputError: It acts by the batch, by a frame's place in it, or by earlier calls.
+    """
+    if not isinstance(policy, ForeignPolicy):
+        return
+    with policy.flying(_CHECKED, device=device, renderer=renderer) as (env, actor):
+        state, log = env.base_env.state_dict(), StepLog()
+        flown = run_episodes(env, actor, _CHECKED, log=log)
+        env.base_env.load_state_dict(state)
+        compare(env, actor, flown=flown, log=log)
 
 
 def as_pilot(which: str | Path | Pilot | Logits, outputs: str | Path = "outputs") -> Pilot:

@@ -68,7 +68,7 @@ def follow(sight: Sight, decide: Decide, worlds: Tensor) -> Outcomes:
 def _distinct(state: State, owner: Tensor, is_kept: Tensor) -> Tensor:
     """Rows that go on, one of those that are the same state of the same episode."""
     rows = is_kept.nonzero()[:, 0]
-    if len(rows) < 2:  # noqa: PLR2004 -- nothing to compare
+    if len(rows) < 2:
         return rows
     columns = [owner[rows, None].double(), *_columns(state[rows].tensors(), len(rows))]
     _, number = torch.cat(columns, -1).unique(dim=0, return_inverse=True)

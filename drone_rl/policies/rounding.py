@@ -16,7 +16,6 @@ from typing import Any, Self
 
 import torch
 from torch import Tensor, nn
-from torch.nn import functional
 
 from drone_rl.policies.cnn import PolicyNetwork
 from drone_rl.policies.rounded_layers import SLACK, UNIT, Layer, layer_of
@@ -169,9 +168,7 @@ class RoundingBound:
             notes.append(note)
         return value, first, notes, overflows
 
-    def _back(
-        self, pixels: Tensor, weigh: Callable[[Tensor], Tensor]
-    ) -> tuple[Tensor, Tensor]:
+    def _back(self, pixels: Tensor, weigh: Callable[[Tensor], Tensor]) -> tuple[Tensor, Tensor]:
         """Errors of weighted sums of the outputs, by a backward pass.
 
         Every rounding error moves the outputs by its slope, as long as no ReLU and no maximum

@@ -93,9 +93,7 @@ class Bounds:
         lead[:, first, second] = least  # of an action over another one, at least
         return 1 / (-lead).exp().sum(-1), 1 / lead.transpose(1, 2).exp().sum(-1)
 
-    def _least(
-        self, lower: Tensor, upper: Tensor, largest: list[Tensor] | None = None
-    ) -> Tensor:
+    def _least(self, lower: Tensor, upper: Tensor, largest: list[Tensor] | None = None) -> Tensor:
         """By how much logits are higher than others, at least, times the scale. (N, pairs).
 
         Args:

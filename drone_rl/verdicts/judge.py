@@ -229,9 +229,7 @@ def observe(greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule) -> 
     return [values[~np.isnan(values)] for values in each]
 
 
-def _observe_each(
-    greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule
-) -> list[NDArray]:
+def _observe_each(greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule) -> list[NDArray]:
     """The same of every episode, NaN where it says nothing. Shapes: (n,), float64."""
     oracle = baselines["oracle"]
     observed = [greedy.success - rule.good_share * oracle.success]
