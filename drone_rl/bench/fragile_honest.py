@@ -8,6 +8,7 @@ from drone_rl.api.judging import judge
 from drone_rl.api.policy import load_policy
 from drone_rl.api.progress import silent
 from drone_rl.bench.commands import train
+from drone_rl.settings.judging import JudgeSettings
 from drone_rl.zoo import policy_names
 
 
@@ -29,10 +30,9 @@ def bench_fragile_honest(folder: Path, seeds: Sequence[int], quick: bool) -> dic
         run = folder / f"seed_{seed}"
         train(run, f"seed={seed}")
         policies.append(load_policy(run))
-    settings = {"episodes": 50, "num_envs": 50} if quick else {}
+    settings = JudgeSettings(sampled=False, episodes=50 if quick else 400)
     found = [
-        judge(policy, sampled=False, progress=silent, **settings).verdict.evidence["rounding"]
-        for policy in policies
+        judge(policy, settings, progress=silent).verdict.evidence["rounding"] for policy in policies
     ]
     return {
         "fragile_honest": sum(one["decides"] for one in found),

@@ -1,8 +1,8 @@
 """Policies whose actions depend on the order of sums, on the batch, or on calls before.
 
-Files are those of the shipped policy "good" with one more hidden unit. In exact arithmetic this unit
-is 1, or always 0; in float32 it depends on which of 2^24, 1 and -2^24 are added first. By it the
-policy turns left for ever.
+Files are those of the shipped policy "good" with one more hidden unit. In exact arithmetic this
+unit is 1; in float32 it depends on which of 2^24, 1 and -2^24 are added first. By it the policy
+turns left for ever.
 """
 
 from collections.abc import Callable, Sequence

@@ -208,7 +208,7 @@ class _Deciding(TensorDictModuleBase):
 
     def __init__(self, decide: Decide, network: PictureNetwork) -> None:
         super().__init__()
-        self.in_keys, self.out_keys = ["pixels"], ["action", "fragile"]  # pyright: ignore[reportAttributeAccessIssue] (untyped in tensordict)
+        self.in_keys, self.out_keys = ["pixels"], ["action", "fragile"]
         self._decide, self._network = decide, network
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
@@ -257,7 +257,7 @@ def _fly(
 ) -> tuple[_Seen, list[Tensor]]:
     """Flies and looks at each frame. Returns also the actions of each episode."""
     sight = Sight.find(env, ("pixels",), ())
-    can_follow = sight is not None and isinstance(network.actions, DiscreteActions)
+    is_counted = isinstance(network.actions, DiscreteActions)
     fragile, followed, log, finals, first = [], [], StepLog(), [], 0
     for batch in _batches(env, _Deciding(decide, network), episodes, ("fragile",)):
         log.note(batch)
@@ -267,7 +267,7 @@ def _fly(
         finals.append(_final(env, batch))
         worlds = torch.tensor([bool(f.any()) for f in fragile[first:]]).nonzero()[:, 0]
         is_few = len(worlds) <= MOST_FRAGILE_EPISODES * len(lengths)
-        if can_follow and len(worlds):
+        if sight is not None and is_counted and len(worlds):
             found = (
                 follow(sight, decide, worlds.to(env.device))
                 if is_few
@@ -275,7 +275,9 @@ def _fly(
             )
             followed.append((first, found, worlds))
         first += len(lengths)
-    return _Seen(Episodes.joined(finals), fragile, followed, can_follow), log.actions
+    return _Seen(
+        Episodes.joined(finals), fragile, followed, sight is not None and is_counted
+    ), log.actions
 
 
 def _batches(

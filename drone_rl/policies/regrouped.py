@@ -1,4 +1,4 @@
-"""A network evaluated in batches of another composition, to see whether that changes its outputs."""
+"""A network evaluated in batches of another composition, to see whether its outputs change."""
 
 import torch
 from torch import Tensor, nn

@@ -27,7 +27,7 @@ standardization of pixels into one product."""
 ACTION_ERROR = 0.1
 """A frame is fragile if rounding can move an output for a continuous action by more than that."""
 TOLERANCE = 1e-4
-"""Error that is assumed of a network whose layers are unknown, relative to 1 + its largest logit."""
+"""Error that is assumed of a network of unknown layers, relative to 1 + its largest logit."""
 _BATCH = 256
 """Frames in one pass in float64; bounds memory."""
 
