@@ -8,7 +8,7 @@ from typing import Any
 import torch
 
 from drone_rl.api.domains import find_domain
-from drone_rl.api.foreign import as_pilot
+from drone_rl.api.foreign import as_pilot, require_function
 from drone_rl.api.pilot import Pilot
 from drone_rl.api.progress import Bar, Progress
 from drone_rl.api.quoting import find_claim
@@ -131,6 +131,7 @@ def _explain(
     progress: Progress,
     measured: Measured | None,
 ) -> dict[str, Any]:
+    require_function(policy, seed=seed.value, renderer=settings.renderer)
     env = policy.make_env(num_envs, seed=seed.value, renderer=settings.renderer)
     origin = {**policy.origin, **provenance()}
     try:

@@ -13,6 +13,8 @@ from drone_rl.api.environment import make_env
 from drone_rl.api.pilot import Pilot
 from drone_rl.api.policy import load_policy
 from drone_rl.api.showing import table
+from drone_rl.evaluation import StepLog, run_episodes
+from drone_rl.evaluation.fragility import compare
 from drone_rl.policies import ForeignNetwork
 from drone_rl.policies.foreign import Logits
 from drone_rl.settings.changes import Changes
@@ -32,6 +34,9 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import Stream
 from drone_rl.utils.settings import Settings, below
 from drone_rl.zoo.registry import TRANSFORMS, Picture, find_part
+
+_CHECKED = 32
+"""Episodes that are flown to check that a policy acts by the frame alone."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -123,13 +128,15 @@ class ForeignPolicy(Pilot):
         for transform in self.transforms or (Rgb(),):
             part = find_part(TRANSFORMS, transform.name, "transforms")
             picture = part.change(picture, transform.values())
-        return ForeignNetwork(
+        network = ForeignNetwork(
             self.logits,
             picture.shape,
             make_dynamics(as_task(self.own_task), self.dynamics, self.actions).actions,
             takes_bytes=not self.transforms,
             device=device,
         )
+        network.owner = f"policy={self.name}"
+        return network
 
     def _repr_html_(self) -> str:
         """Shows itself in a notebook."""
@@ -208,6 +215,27 @@ def _of_sb3(model: Any) -> ForeignPolicy:
     from drone_rl.policies.sb3.logits import Sb3Logits  # needs Stable-Baselines3
 
     return policy_from(Sb3Logits(model), name=f"{type(model).__name__} of Stable-Baselines3")
+def require_function(
+    policy: Pilot, *, seed: int, device: str = "cpu", renderer: str = "raytrace"
+) -> None:
+    """Check that a policy from elsewhere acts by the frame alone; others do by their layers.
+
+    Args:
+        policy: Any.
+        seed: Root of the random streams of the environments in which it is tried.
+        device: Where it is flown.
+        renderer: Who renders.
+
+    Raises:
+        InputError: It acts by the batch, by a frame's place in it, or by earlier calls.
+    """
+    if not isinstance(policy, ForeignPolicy):
+        return
+    with policy.flying(_CHECKED, seed=seed, device=device, renderer=renderer) as (env, actor):
+        state, log = env.base_env.state_dict(), StepLog()
+        flown = run_episodes(env, actor, _CHECKED, log=log)
+        env.base_env.load_state_dict(state)
+        compare(env, actor, flown=flown, log=log)
 
 
 def as_pilot(which: str | Path | Pilot | Logits, outputs: str | Path = "outputs") -> Pilot:

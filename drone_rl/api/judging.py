@@ -20,7 +20,8 @@ from drone_rl.api.reflying import refly
 from drone_rl.api.showing import aligned, interval, paragraph, table
 from drone_rl.conditions.measured import Measured
 from drone_rl.envs import DroneEnv, worlds_of
-from drone_rl.evaluation import run_episodes, summarise
+from drone_rl.evaluation import StepLog, run_episodes, summarise
+from drone_rl.evaluation.fragility import compare
 from drone_rl.policies.foreign import Logits
 from drone_rl.settings.changes import Changes
 from drone_rl.settings.judging import EvaluateSettings, FlightSettings, JudgeSettings
@@ -33,8 +34,9 @@ from drone_rl.verdicts.judge import Verdict, judge_policy
 from drone_rl.verdicts.kinds import NOT_COVERED, NOT_PROVED
 from drone_rl.verdicts.luck import BASELINES, fly_baselines, make_baseline
 from drone_rl.verdicts.rule import Rule
+from drone_rl.words.evaluation import EVALUATION
 from drone_rl.words.licence import say
-from drone_rl.words.seeds import EVALUATION, seed_line
+from drone_rl.words.seeds import seed_line
 from drone_rl.words.verdict import quantity_label
 from drone_rl.words.verdict import unlike as say_unlike
 
@@ -50,6 +52,9 @@ class Evaluation:
     "sampled" and the baselines."""
     seed: RootSeed
     """Root of the environments' random streams."""
+    rounding: dict[str, Any] | None = None
+    """What computed the actions, and whether another implementation takes the same ones in the
+    first episodes, see `drone_rl.evaluation.fragility.Rounding`."""
 
     @property
     def success(self) -> float:
@@ -82,6 +87,7 @@ class Evaluation:
             **self.seed.as_dict(),
             **({"unlike": self.policy.unlike} if self.policy.unlike else {}),
             **self.flown,
+            "rounding": self.rounding,
             **provenance(),
             "trained": origin["trained"] and origin["trained"]["progress"],
         }
@@ -95,9 +101,10 @@ class Evaluation:
         return table(head, rows) + "".join(map(paragraph, self._notes()))
 
     def _notes(self) -> list[str]:
-        """The seed, what follows from it and, in other dynamics than its own, what differs."""
+        """The arithmetic, the seed and, in other dynamics than its own, what differs."""
         unlike, seed = self.policy.unlike, self.seed.as_dict()
-        said = [say(EVALUATION, seed), say_unlike({"unlike": unlike}) if unlike else ""]
+        evidence = {**seed, "rounding": self.rounding}
+        said = [say(EVALUATION, evidence), say_unlike({"unlike": unlike}) if unlike else ""]
         return [*filter(None, said), seed_line(seed)]
 
 
@@ -204,7 +211,10 @@ def evaluate(
     with _flying(policy, settings, seed) as (env, actor):
         worlds, dynamics = env.base_env.state_dict(), worlds_of(env).dynamics
         progress("most probable actions", 0, steps)
-        flown = {"greedy": run_episodes(env, actor, episodes)}
+        log = StepLog()
+        flown = {"greedy": run_episodes(env, actor, episodes, log=log)}
+        env.base_env.load_state_dict(worlds)
+        rounding = compare(env, actor, flown=flown["greedy"], log=log)
         env.base_env.load_state_dict(worlds)
         progress("drawn actions", 1, steps)
         flown["sampled"] = run_episodes(env, actor, episodes, greedy=False)
@@ -213,7 +223,8 @@ def evaluate(
         num_worlds, device = settings.num_worlds, settings.device
         flown |= fly_baselines(num_worlds, policy.task, worlds, episodes, device, dynamics)
     progress("evaluated", steps, steps)
-    return Evaluation(policy, settings, {name: summarise(e) for name, e in flown.items()}, seed)
+    figures = {name: summarise(e) for name, e in flown.items()}
+    return Evaluation(policy, settings, figures, seed, rounding and rounding.as_dict())
 
 
 @overload

@@ -88,7 +88,9 @@ class Policy(Pilot):
 
     def make_network(self, device: str | torch.device = "cpu") -> PolicyNetwork:
         """Its network."""
-        return self.description.load_network(self.state["policy"]).to(device)
+        network = self.description.load_network(self.state["policy"]).to(device)
+        network.owner = f"policy={self.name}"
+        return network
 
     def _repr_html_(self) -> str:
         """Shows itself in a notebook."""

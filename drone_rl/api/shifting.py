@@ -12,7 +12,7 @@ from typing import Any
 import yaml
 from numpy.typing import NDArray
 
-from drone_rl.api.foreign import as_pilot
+from drone_rl.api.foreign import as_pilot, require_function
 from drone_rl.api.pilot import Pilot
 from drone_rl.api.policy import Policy
 from drone_rl.api.progress import Bar, Progress
@@ -134,6 +134,7 @@ def shifts(
     pilot = as_pilot(policy, outputs).in_task(**(task or {}))
     pilot = pilot.in_dynamics(**dynamics) if dynamics else pilot
     begin = time.perf_counter()
+    require_function(pilot, seed=settings.seed, device=settings.device, renderer=settings.renderer)
     subject = make_subject(pilot, settings)
     axes = find_axes(settings.axes, subject)
     total = len(axes) * (len(settings.strengths) + settings.domain) + 1

@@ -12,6 +12,7 @@ from drone_rl.bench.flight_parity import bench_flight_parity
 from drone_rl.bench.flight_paths import bench_flight_paths
 from drone_rl.bench.flight_speed import bench_flight_speed
 from drone_rl.bench.flight_training import bench_flight_training
+from drone_rl.bench.fragile_honest import bench_fragile_honest
 from drone_rl.bench.gamed import bench_gamed
 from drone_rl.bench.gymnasium import bench_gymnasium
 from drone_rl.bench.hostile import bench_hostile
@@ -126,6 +127,11 @@ BENCHMARKS: dict[str, Benchmark] = {
         lambda s: bench_verdicts(s.runs, s.device, s.quick),
         "truth",
         (*_JUDGING, "bench/verdicts", "bench/scripted"),
+    ),
+    "fragile_honest": Benchmark(
+        lambda s: bench_fragile_honest(s.runs / "fragile_honest", s.seeds, s.quick),
+        "truth",
+        (*_TRAINING, *_JUDGING, "conf", "bench/fragile_honest"),
     ),
     "shifts": Benchmark(
         lambda s: bench_shifts(s.quick),

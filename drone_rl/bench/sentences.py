@@ -99,6 +99,7 @@ _OPEN = {"certain": False, "enough": 1600}
 _PROVED = {"proof": PROOF}
 _IN_PART = {"proof": {**PROOF, "every": False, "share": 0.6, "lost": 0.3, "undecided": 0.1}}
 _REFUSED = {"proof": {"refused": "it is of another network"}}
+_ROUNDED = {"certain": False, "rounding.decides": True}
 _OF_VERDICTS = (
     ("kind", {"certain": False}),
     ("kind", {"kind": "good"}),
@@ -106,6 +107,11 @@ _OF_VERDICTS = (
     ("kind", {"greedy.shares.all.mean": 0.3}, {"kind": "poor", "greedy.shares.all.mean": 0.35}),
     ("open", {"certain": True}, _OPEN),
     ("open", {"enough": None}, _OPEN),
+    ("open", {"rounding.decides": True}, _OPEN),
+    ("rounding", {"rounding.decides": False}, _ROUNDED),
+    ("rounding", {"rounding.unexplained": 3}, _ROUNDED),
+    ("arithmetic", {"rounding": None}),
+    ("arithmetic", {"rounding.arithmetic": "float32 on cuda, PyTorch"}),
     ("proof.every", {"proof": None}, _PROVED),
     ("proof.every", {"proof.every": False}, _PROVED),
     ("proof.every", _REFUSED, _PROVED),
@@ -167,6 +173,7 @@ _OF_REPORTS = (
     ("domain.quoted", {"shifts.seed_is_fixed": False}, _FLOWN),
     ("advice.more", {"verdict.certain": True}, _NOT_CERTAIN),
     ("advice.more", {"verdict.enough": None}, _NOT_CERTAIN),
+    ("advice.more", {"verdict.rounding.decides": True}, _NOT_CERTAIN),
     ("advice.use", {"verdict.certain": False}, _CERTAIN_GOOD),
     ("advice.use", {"verdict.kind": "poor"}, _CERTAIN_GOOD),
     ("advice.refuse", _CERTAIN_GOOD),

@@ -76,6 +76,7 @@ class Simulator:
         every: Iterable[Transform] = self._env.transform  # type: ignore[assignment]
         self._transforms = [t for t in every if "pixels" in (t.in_keys or [])]
         self._network = described.load_network(weights).to(self._worlds.device)
+        self._dtype = torch.float32
 
     def fly(self, placements: NDArray[np.float64], tell: Tell = lambda done, total: None) -> Flown:
         """Flies flights to their ends, so many in a batch.
@@ -89,6 +90,10 @@ class Simulator:
             parts.append(self._fly(placements[first : first + self.at_once]))
             tell(min(first + self.at_once, len(placements)), len(placements))
         return Flown.join(parts)
+
+    def compute_in(self, dtype: torch.dtype) -> None:
+        """Evaluate the network in another precision from now on."""
+        self._network, self._dtype = self._network.to(dtype), dtype
 
     def close(self) -> None:
         """Ends the renderer."""
@@ -122,7 +127,7 @@ class Simulator:
         seen = TensorDict({"pixels": self._worlds.render(state)}, [len(state)])
         for transform in self._transforms:
             seen = transform(seen)
-        return self._network(seen["pixels"]).argmax(-1)
+        return self._network(seen["pixels"].to(self._dtype)).argmax(-1)
 
     def _is_same(self, one: WorldState, other: WorldState) -> Tensor:
         """Whether worlds are as they were: the drone at its place, the same cubes standing."""

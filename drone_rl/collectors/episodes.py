@@ -2,6 +2,7 @@
 # (TorchRL's collectors annotate states otherwise than they use them.)
 """Complete episodes, each frame once: what REINFORCE learns from."""
 
+from collections.abc import Iterable
 from typing import Any
 
 import torch
@@ -37,6 +38,7 @@ class EpisodeCollector(WorldsCollector):
         actor: TensorDictModuleBase,
         *,
         keep_observations: bool = True,
+        noted: Iterable[NestedKey] = (),
         is_compiled: bool = False,
         num_cores: int = 1,
         **kwargs: Any,
@@ -47,6 +49,7 @@ class EpisodeCollector(WorldsCollector):
             env: A batched environment that honours TorchRL's "_step" masks.
             actor: Writes the action.
             keep_observations: Whether to keep what the actor saw and made of it.
+            noted: What the actor writes and is kept besides its actions, if observations are not.
             is_compiled: Whether a kernel may fly whole episodes, see `Flight`. It draws actions in
                 another order, and sums in the network may differ in the last place.
             num_cores: That such a kernel takes; no result depends on it.
@@ -56,11 +59,16 @@ class EpisodeCollector(WorldsCollector):
             InputError: The environment is not a batch of worlds.
         """
         super().__init__(env, actor, **kwargs)
-        self._keep_observations = keep_observations
+        self._keep_observations, self._noted = keep_observations, tuple(noted)
         self._way = find_way(env, self._observed, self._kept)
         self._flight = None
         if is_compiled and isinstance(self._way, StraightWay):
             self._flight = Flight.find(self._way.sight, actor, num_cores)
+
+    @property
+    def implementation(self) -> str:
+        """What computes the actions: "fused kernel" or "PyTorch"."""
+        return "PyTorch" if self._flight is None else "fused kernel"
 
     @torch.no_grad()
     def collect(self, num_worlds: int | None = None) -> TensorDictBase:
@@ -81,7 +89,8 @@ class EpisodeCollector(WorldsCollector):
         seen = self._way.begin(indices)
         while len(indices):
             acted = self.actor(seen)
-            keys = acted.keys(True, True) if self._keep_observations else (self.env.action_key,)
+            keys = (self.env.action_key, *self._noted)
+            keys = acted.keys(True, True) if self._keep_observations else keys
             step = {key: acted.get(key) for key in keys}
             after, seen = self._way.step(indices, acted.get(self.env.action_key))
             worlds.append(indices)

@@ -23,6 +23,7 @@ from drone_rl.collectors.logbook import Logbook
 from drone_rl.collectors.sight import Entries, Sight
 from drone_rl.envs.transforms import StandardizePixels
 from drone_rl.policies.actor import CategoricalActor
+from drone_rl.policies.finite import require_finite
 from drone_rl.policies.known_outputs import KnownOutputs
 from drone_rl.policies.packing import PackedNetwork
 from drone_rl.sim.rendering.crew import Crew
@@ -73,6 +74,8 @@ class Flight:
             }
         )
         self._known: KnownOutputs | None = None
+        self._logits = torch.empty(0, num_actions)
+        self._owner = getattr(actor.network, "owner", "the policy")
         loading(flight_kernel)
 
     @classmethod
@@ -155,6 +158,7 @@ class Flight:
             before, first = taken.clone(), len(parts) * self._num_rows
             self._go_on(num_worlds, self._open_log(len(parts), names))
             worlds, rows = self._written(taken - before)
+            require_finite(self._logits[rows], self._owner)
             parts.append((worlds, rows + first))
         worlds, rows = (torch.cat(column) for column in zip(*parts, strict=True))
         order = worlds.argsort(stable=True)
@@ -168,7 +172,8 @@ class Flight:
         """Where a part is written, and what of it is kept."""
         log, pictures, room = flight_kernel.Log(), Pictures(), self._book.open(part, kept)
         pictures.gray = wp.from_torch(room["pixels"].flatten(1))
-        log.pictures, log.logits = pictures, wp.from_torch(room["logits"])
+        self._logits = room["logits"]
+        log.pictures, log.logits = pictures, wp.from_torch(self._logits)
         log.actions, log.rewards = wp.from_torch(room["action"]), wp.from_torch(room["reward"])
         log.end_reasons = wp.from_torch(room["end_reason"])
         if self._known is not None:

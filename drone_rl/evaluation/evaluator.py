@@ -1,5 +1,6 @@
 """Runs a policy on many worlds at once and gathers how the episodes ended."""
 
+import dataclasses
 from collections.abc import Mapping
 from typing import cast
 
@@ -16,6 +17,22 @@ from drone_rl.evaluation.metrics import Episodes
 from drone_rl.utils.provenance import num_cores
 
 
+@dataclasses.dataclass
+class StepLog:
+    """What was done at each step of some episodes, to compare implementations by."""
+
+    implementation: str = ""
+    """What computed the actions: "fused kernel" or "PyTorch"."""
+    actions: list[Tensor] = dataclasses.field(default_factory=list)
+    """Of each episode. Shapes: (T, *)."""
+
+    def note(self, batch: TensorDictBase) -> None:
+        """Add a batch of whole episodes, one after the other."""
+        action, episode = (cast(Tensor, batch[k]) for k in ("action", ("collector", "traj_ids")))
+        lengths = episode.unique_consecutive(return_counts=True)[1]
+        self.actions += action.cpu().split(lengths.tolist())
+
+
 def run_episodes(
     env: EnvBase,
     actor: TensorDictModuleBase,
@@ -23,6 +40,7 @@ def run_episodes(
     *,
     greedy: bool = True,
     is_compiled: bool = False,
+    log: StepLog | None = None,
 ) -> Episodes:
     """Runs complete episodes, `env.batch_size[0]` at a time.
 
@@ -35,6 +53,7 @@ def run_episodes(
         num_episodes: How many; what a last batch has more is not used.
         greedy: Whether to take the most probable action instead of drawing one.
         is_compiled: Whether a kernel may fly them, see `EpisodeCollector`.
+        log: Takes the actions, of whole batches.
 
     Returns:
         The episodes, on the CPU.
@@ -51,9 +70,13 @@ def run_episodes(
     )
     kind = ExplorationType.DETERMINISTIC if greedy else ExplorationType.RANDOM
     finals, lengths, count = [], [], 0
+    if log is not None:
+        log.implementation = collector.implementation
     with set_exploration_type(kind):
         while count < num_episodes:
             batch = collector.collect()
+            if log is not None:
+                log.note(batch)
             done = cast(Tensor, batch["next", "done"])[:, 0].nonzero()[:, 0]
             finals.append(take_rows(cast(TensorDictBase, batch["next", "info"]), done))
             lengths.append(batch["collector", "traj_ids"].unique(return_counts=True)[1])

@@ -5,9 +5,10 @@ So every interval rests on one value an episode.
 """
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+import torch
 from torch import Tensor
 
 from drone_rl.sim.tasks import Goals, Task
@@ -45,6 +46,16 @@ class Episodes:
     def __getitem__(self, rows: slice | Tensor) -> "Episodes":
         """Returns some of the episodes."""
         return Episodes(self.task, self.goals[rows], self.end_reason[rows], self.length[rows])
+
+    @classmethod
+    def joined(cls, parts: Sequence["Episodes"]) -> "Episodes":
+        """All episodes of one task, one part after the other."""
+        first = parts[0].goals
+        goals = type(first)(
+            **{name: torch.cat([vars(p.goals)[name] for p in parts]) for name in vars(first)}
+        )
+        ends, lengths = ([getattr(p, name) for p in parts] for name in ("end_reason", "length"))
+        return cls(parts[0].task, goals, torch.cat(ends), torch.cat(lengths))
 
     @property
     def success(self) -> Tensor:

@@ -14,6 +14,7 @@ import torch
 import warp as wp
 from torch import Tensor, nn
 
+from drone_rl.policies.finite import require_finite
 from drone_rl.policies.layers_kernel import Layers, decide, look
 from drone_rl.policies.packing import PackedNetwork
 from drone_rl.sim.rendering.devices import loading, start_warp
@@ -69,6 +70,7 @@ class Answers:
         given = pictures.flatten(1).contiguous()
         arrays = wp.from_torch(given), self._room(), wp.from_torch(logits)
         wp.launch(answer, 1, inputs=[self._packed.layers, *arrays], device="cpu")
+        require_finite(logits, getattr(self._network, "owner", "the policy"))
         return logits
 
     def _room(self) -> wp.array:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 import torch
 from torch import Tensor, nn
 
+from drone_rl.policies.finite import require_finite
 from drone_rl.policies.network import PictureNetwork
 from drone_rl.utils.errors import InputError
 
@@ -68,9 +69,16 @@ class PolicyNetwork(PictureNetwork):
             )
 
     def forward(self, pixels: Tensor) -> Tensor:
-        """See `PictureNetwork`."""
+        """See `PictureNetwork`.
+
+        Raises:
+            InputError: The pictures are of another shape or, unless gradients are recorded, an
+                output is not finite.
+        """
         self.check(pixels)
         logits = self.layers(pixels.reshape(-1, *self.in_shape))
+        if not (torch.is_grad_enabled() or torch.compiler.is_compiling()):
+            require_finite(logits, self.owner)
         return logits.reshape(*pixels.shape[:-3], logits.shape[-1])
 
 

@@ -15,6 +15,8 @@ class PictureNetwork(nn.Module):
     """Shape (C, H, W) of one picture."""
     actions: Actions = MOVES
     """What the outputs ask for."""
+    owner: str = "the policy"
+    """Whose it is, as error messages say."""
     is_differentiable: bool = True
     """Whether the logits have gradients by the pixels."""
 

@@ -3,15 +3,19 @@
 from collections.abc import Callable, Iterable
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 from torchrl.envs import CatFrames, Transform, TransformedEnv
 
 from drone_rl.envs import CameraFault, worlds_of
+from drone_rl.policies.rounding import RoundingBound
 from drone_rl.proofs.chain import Ask
 from drone_rl.proofs.graph import Graph
 from drone_rl.sim.tasks.collect_cubes.rules import WorldState
 from drone_rl.utils.errors import InputError
 
+MOST_ROUNDING = 0.1
+"""Largest bound on the rounding error of a logit. Honest policies have about 0.01."""
+_FEW = 256
 BATCH = 1000
 """Pictures drawn at a time; bounds memory."""
 
@@ -33,6 +37,8 @@ class Sight:
         self.pictures = 0
         """Drawn so far."""
         self._worlds, self._network = worlds_of(env), network
+        is_module = isinstance(network, nn.Module)
+        self._rounding = RoundingBound.find(network) if is_module else None
         pipeline: Iterable[Transform] = env.transform  # type: ignore[assignment]
         self._transforms = [t for t in pipeline if "pixels" in (t.in_keys or [])]
         stacks = [t.N for t in self._transforms if isinstance(t, CatFrames)]
@@ -75,4 +81,25 @@ class Sight:
         pixels = self._worlds.render(state)
         for transform in self._transforms:
             pixels = transform._apply_transform(pixels)
+        self._require_known(pixels)
         return self._network(pixels)
+
+    def _require_known(self, pixels: Tensor) -> None:
+        """Refuse probabilities that depend on the order of summation.
+
+        Raises:
+            InputError: They may differ by more than `MOST_ROUNDING`.
+        """
+        if self._rounding is None:
+            return
+        _, error = self._rounding.together(pixels)
+        if bool((error <= MOST_ROUNDING).all()):  # a probability changes by no more than its logit
+            return
+        for part in pixels.split(_FEW):
+            most = float(self._rounding.errors(part).max())
+            if not most <= MOST_ROUNDING:
+                raise InputError(
+                    f"rounding can change a logit of the policy by {most:.3g}, so that its "
+                    f"chances depend on the order of sums; give a policy with at most "
+                    f"{MOST_ROUNDING:g}"
+                )

@@ -1,7 +1,7 @@
 """From flown episodes to a verdict."""
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,9 @@ from torch import Tensor
 from torchrl.envs import EnvBase
 
 from drone_rl.envs import worlds_of
-from drone_rl.evaluation import Episodes, run_episodes, summarise
+from drone_rl.evaluation import Episodes, StepLog, run_episodes, summarise
+from drone_rl.evaluation.branches import Outcomes
+from drone_rl.evaluation.fragility import Rounding, examine
 from drone_rl.utils.intervals import mean_bounds, proportion
 from drone_rl.utils.seeding import RootSeed
 from drone_rl.verdicts.failures import failure_table
@@ -85,15 +87,26 @@ def judge_policy(
     """
     base: Any = getattr(env, "base_env", env)
     state, worlds = base.state_dict(), worlds_of(env)
-    greedy = run_episodes(env, actor, episodes, is_compiled=True)
-    drawn = None
+    log, drawn = StepLog(), None
+    greedy = run_episodes(env, actor, episodes, is_compiled=True, log=log)
     if sampled:
         base.load_state_dict(state)
         drawn = run_episodes(env, actor, episodes, greedy=False)
+    base.load_state_dict(state)
+    rounding = examine(env, actor, episodes, flown=greedy, log=log)
     baselines = fly_baselines(
         env.batch_size[0], worlds.task, state, episodes, str(worlds.device), worlds.dynamics
     )
-    return judge(greedy, baselines, rule=rule, sampled=drawn, claim=claim, unlike=unlike, seed=seed)
+    return judge(
+        greedy,
+        baselines,
+        rule=rule,
+        sampled=drawn,
+        claim=claim,
+        unlike=unlike,
+        seed=seed,
+        rounding=rounding,
+    )
 
 
 def judge(
@@ -105,6 +118,7 @@ def judge(
     claim: Claim | None = None,
     unlike: Mapping[str, Any] | None = None,
     seed: RootSeed | None = None,
+    rounding: Rounding | None = None,
 ) -> Verdict:
     """Applies the rule.
 
@@ -117,6 +131,7 @@ def judge(
         claim: A certificate of the policy in the same task, if there is one.
         unlike: See `judge_policy`.
         seed: See `judge_policy`.
+        rounding: What rounding can change in `greedy`; None if that was not examined.
 
     Raises:
         ValueError: They were flown in different worlds.
@@ -126,7 +141,11 @@ def judge(
     _check_pairs(greedy, [*baselines.values(), *([] if sampled is None else [sampled])])
     found = measure(greedy, baselines, rule)
     kind = decide([quantity.level for quantity in found], len(rule.strata))
-    certain = _is_certain(found, rule)
+    certain = is_enough = _is_certain(found, rule)
+    if rounding is not None:
+        found = widen(found, greedy, baselines, rule, rounding.outcomes)
+        certain = is_enough and not rounding.is_excessive and _is_certain(found, rule)
+    depends = is_enough and not certain
     evidence = {
         "kind": kind.value,
         "certain": certain,
@@ -137,7 +156,8 @@ def judge(
         "good_share": rule.good_share,
         "terms": task.terms.as_dict(),
         "num_cubes": greedy.goals.reached.shape[-1],
-        "proof": None if claim is None else claim.beside(greedy),
+        "rounding": None if rounding is None else {**rounding.as_dict(), "decides": depends},
+        "proof": None if claim is None else claim.beside(greedy, depends_on_rounding=depends),
         "greedy": summarise(greedy),
         "sampled": None if sampled is None else summarise(sampled),
         "baselines": {name: summarise(flown) for name, flown in baselines.items()},
@@ -145,7 +165,7 @@ def judge(
         "drawing": None if sampled is None else _gain(sampled.success, greedy.success),
         "failures": failure_table(greedy),
         "quantities": {name: q._asdict() for name, q in zip(rule.quantities, found, strict=True)},
-        "enough": len(greedy) if certain else _enough(greedy, baselines, rule),
+        "enough": len(greedy) if is_enough else _enough(greedy, baselines, rule),
         **({"unlike": dict(unlike)} if unlike else {}),
     }
     return Verdict(kind, certain, evidence)
@@ -166,6 +186,46 @@ def measure(
     return tuple(estimate(i, np.tile(values, times), rule) for i, values in enumerate(observed))
 
 
+def widen(
+    found: Sequence[Quantity],
+    greedy: Episodes,
+    baselines: Mapping[str, Episodes],
+    rule: Rule,
+    outcomes: Outcomes,
+) -> tuple[Quantity, ...]:
+    """Widen the intervals of quantities by all ends that rounding leaves possible.
+
+    The lower ends hold even if every episode takes the worst of its possible ends for a quantity,
+    the upper ends even if each takes the best one.
+
+    Args:
+        found: As `measure` returns them.
+        greedy: The policy's episodes.
+        baselines: Those of the baselines in the same worlds.
+        rule: Thresholds.
+        outcomes: Possible ends of some episodes.
+    """
+    observed = _observe_each(greedy, baselines, rule)
+    if outcomes.episodes is None:
+        others = [values[:0] for values in observed]
+    else:
+        beside = {name: flown[outcomes.owner] for name, flown in baselines.items()}
+        others = _observe_each(outcomes.episodes, beside, rule)
+    widened = []
+    for i, (quantity, values, ends) in enumerate(zip(found, observed, others, strict=True)):
+        low, high = rule.ranges[i]
+        lower, upper = values.copy(), values.copy()
+        owner = outcomes.owner.numpy()[~np.isnan(ends)]
+        np.fmin.at(lower, owner, ends[~np.isnan(ends)])
+        np.fmax.at(upper, owner, ends[~np.isnan(ends)])
+        is_open = outcomes.is_open.numpy()
+        lower[is_open], upper[is_open] = low, high
+        least, most = (estimate(i, v[~np.isnan(v)], rule) for v in (lower, upper))
+        bounds = {"lower": min(quantity.lower, least.lower)}
+        widened.append(quantity._replace(**bounds, upper=max(quantity.upper, most.upper)))
+    return tuple(widened)
+
+
 def observe(greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule) -> list[NDArray]:
     """What each episode says of each of the rule's quantities: one value, or none.
 
@@ -173,11 +233,20 @@ def observe(greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule) -> 
         One array a quantity; those of "collected" have a value for each episode that offered such a
         cube, the others one for each episode. Shape: (at most n,), float64.
     """
+    each = _observe_each(greedy, baselines, rule)
+    return [values[~np.isnan(values)] for values in each]
+
+
+def _observe_each(greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule) -> list[NDArray]:
+    """The same of every episode, NaN where it says nothing. Shapes: (n,), float64."""
     oracle = baselines["oracle"]
     observed = [greedy.success - rule.good_share * oracle.success]
-    strata = range(len(rule.strata))
-    observed += [greedy.offered(stratum).double() for stratum in strata]
-    observed += [greedy.stratum_share(stratum) for stratum in strata]
+    offered = [greedy.offered(stratum) for stratum in range(len(rule.strata))]
+    observed += [there.double() for there in offered]
+    for stratum, there in enumerate(offered):
+        share = torch.full_like(there, torch.nan, dtype=torch.float64)
+        share[there] = greedy.stratum_share(stratum)
+        observed.append(share)
     for name in rule.luck:
         luck = (1 - rule.luck_margin) * baselines[name].share
         observed.append(greedy.share - luck - rule.luck_margin * oracle.share)
@@ -198,13 +267,7 @@ def estimate(quantity: int, values: NDArray, rule: Rule) -> Quantity:
     if name.startswith("offered"):
         share = proportion(int(values.sum()), len(values), rule.confidence)
         return Quantity(share["share"], share["lower95"], share["upper95"], thresholds)
-    low, high = {
-        "success": (-rule.good_share, 1.0),
-        "collected": (0.0, 1.0),
-        "above": (-1.0, 1.0),
-        "unsolved": (-1.0, rule.good_share),
-    }[name.split()[0]]
-    mean = mean_bounds(values, low, high, rule.confidence)
+    mean = mean_bounds(values, *rule.ranges[quantity], rule.confidence)
     return Quantity(mean["mean"], mean["lower95"], mean["upper95"], thresholds)
 
 

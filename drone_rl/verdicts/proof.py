@@ -40,11 +40,12 @@ class Claim:
         """
         return 1.0 - 0.05 ** (1.0 / self.uniform) if self.uniform else None
 
-    def beside(self, greedy: Episodes) -> dict[str, Any]:
+    def beside(self, greedy: Episodes, *, depends_on_rounding: bool = False) -> dict[str, Any]:
         """What a verdict may quote of it, which is nothing if a flight ended otherwise.
 
         Args:
             greedy: The verdict's episodes with the most probable actions, in the same task.
+            depends_on_rounding: Whether rounding may change their kind; then nothing is quoted.
 
         Returns:
             Plain values: "refused" (why, or None) and, unless it is, "every" (whether all is
@@ -61,6 +62,8 @@ class Claim:
         if not all(held):
             count = f"{len(held) - sum(held)} of {len(held)} greedy flights of this verdict"
             return {"refused": f"{count} ended otherwise than it states"}
+        if depends_on_rounding:
+            return {"refused": "decisions of the policy depend on rounding"}
         won, lost = (
             [o for o in stated.outcomes if len(o.boxes) and (o.end == EndReason.ALL_CUBES) == wins]
             for wins in (True, False)

@@ -83,6 +83,14 @@ class Rule:
         return ((0.0,), *offered, *shares, *[(0.0,)] * (2 * len(self.luck)))
 
     @property
+    def ranges(self) -> tuple[tuple[float, float], ...]:
+        """The least and the greatest value that an episode can have of each of `quantities`."""
+        count = len(self.strata)
+        above = [(-1.0, 1.0)] * len(self.luck)
+        unsolved = [(-1.0, self.good_share)] * len(self.luck)
+        return ((-self.good_share, 1.0), *[(0.0, 1.0)] * (2 * count), *above, *unsolved)
+
+    @property
     def confidence(self) -> float:
         """Of each quantity's interval, so that all of them hold at once (Bonferroni)."""
         return 1.0 - self.error_rate / len(self.quantities)

@@ -4,9 +4,12 @@ from drone_rl.words.domain import is_quoted, untested
 from drone_rl.words.licence import Evidence, Sentence
 from drone_rl.words.numbers import listed
 from drone_rl.words.seeds import is_fixed, seed_of
+from drone_rl.words.verdict import depends_on_rounding
 
 
 def _more(evidence: Evidence) -> str:
+    if depends_on_rounding(evidence["verdict"]):
+        return "What to do: do not rely on it; more episodes do not change that."
     enough = evidence["verdict"]["enough"]
     if enough is None:
         return "What to do: fly many more episodes, or do not rely on it; this may stay open."

@@ -51,8 +51,6 @@ def fixed_seed(name: str, what: str = "environments") -> Sentence:
     return Sentence(name, "the seed was known before the analysis", is_fixed, text)
 
 
-EVALUATION = (fixed_seed("evaluation.fixed_seed"),)
-"""Evidence: `evaluation.json`."""
 BODIES = (fixed_seed("bodies.fixed_seed"),)
 """Evidence: `bodies.json`."""
 LOOPED = (fixed_seed("looped.fixed_seed"),)

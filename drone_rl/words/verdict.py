@@ -115,6 +115,29 @@ def _open(evidence: Evidence) -> str:
     )
 
 
+def depends_on_rounding(evidence: Evidence) -> bool:
+    """Whether the episodes suffice, but rounding can change their kind. Old files do not say."""
+    return bool((evidence.get("rounding") or {}).get("decides"))
+
+
+def _rounding(evidence: Evidence) -> str:
+    found = evidence["rounding"]
+    text = (
+        "Not certain: decisions depend on rounding. In "
+        f"{found['fragile']:,} of {found['frames']:,} frames ({percent(found['fragile_rate'])}) "
+        "the order in which float32 sums are computed can change the action, in "
+        f"{found['fragile_episodes']:,} of {found['episodes']:,} episodes"
+    )
+    if found["unexplained"]:
+        count = f"{found['unexplained']:,} of {found['compared_episodes']:,} episodes"
+        text += f"; {found['compared']} took other actions in {count} for no such reason"
+    return f"{text}."
+
+
+def _arithmetic(evidence: Evidence) -> str:
+    return f"The verdict holds for {evidence['rounding']['arithmetic']}."
+
+
 def _shares(evidence: Evidence) -> str:
     shares, sides = evidence["greedy"]["shares"], _sides(evidence)
     met = [(percent(shares[k]["mean"]), v) for k, v in sides.items() if shares[k]["count"]]
@@ -250,7 +273,18 @@ def _said(value: Any) -> str:
 
 SENTENCES = (
     Sentence("kind", "the kind is certain", lambda e: e["certain"], _kind),
-    Sentence("open", "the kind is not certain", lambda e: not e["certain"], _open),
+    Sentence(
+        "open",
+        "the episodes are too few to be certain of the kind",
+        lambda e: not e["certain"] and not depends_on_rounding(e),
+        _open,
+    ),
+    Sentence(
+        "rounding",
+        "the episodes suffice, but rounding can change the kind",
+        lambda e: not e["certain"] and depends_on_rounding(e),
+        _rounding,
+    ),
     Sentence(
         "unlike",
         "drones moved otherwise than those that the policy was made for",
@@ -290,5 +324,11 @@ SENTENCES = (
         "greedy and sampled flights surely differ in how many succeed (paired, 95%)",
         _differs,
         _drawing,
+    ),
+    Sentence(
+        "arithmetic",
+        "rounding was examined",
+        lambda e: e.get("rounding") is not None,
+        _arithmetic,
     ),
 )

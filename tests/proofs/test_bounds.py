@@ -57,6 +57,7 @@ def test_bounds_hold_for_all_that_they_are_about(make, doubt):
     network = make((1, 25, 64), 3, generator=generator).eval()
     with torch.no_grad():
         network.layers[-1].weight.mul_(100)
+        network.layers[-1].bias.copy_(torch.tensor([-1000.0, 0.0, 1000.0]))  # beyond rounding
     bounds = Bounds(network, gap=1e-4)
     lower = torch.rand(40, 1, 25, 64, generator=generator)
     upper = lower.clone()
@@ -78,6 +79,7 @@ def test_without_doubt_bounds_decide_like_the_network():
     network = SmallCNN((1, 25, 64), 3, generator=generator).eval()
     with torch.no_grad():
         network.layers[-1].weight.mul_(100)
+        network.layers[-1].bias.copy_(torch.tensor([-1000.0, 0.0, 1000.0]))  # beyond rounding
     seen = torch.rand(50, 1, 25, 64, generator=generator)
     bounds = Bounds(network, gap=1e-4)
     assert bounds.possible(seen.clone(), seen.clone()).tolist() == bounds.decide(seen)[0].tolist()
@@ -98,9 +100,24 @@ def test_probabilities_of_drawn_actions_by_hand():
     bounds = Bounds(Linear([[0.0, 0.0], [1.0, 0.0]], [0.0, 0.0]), gap=0.0)
     least, most = bounds.probabilities(pictures([1.0, 0.0]), pictures([2.0, 0.0]))
     one, two = (1 / (1 + torch.tensor([-1.0, -2.0]).double().exp())).tolist()
-    assert least[0].tolist() == pytest.approx([1 - two, one])
-    assert most[0].tolist() == pytest.approx([1 - one, two])
+    assert least[0].tolist() == pytest.approx([1 - two, one], rel=1e-5)
+    assert most[0].tolist() == pytest.approx([1 - one, two], rel=1e-5)
     wider, _ = Bounds(Linear([[0.0, 0.0], [1.0, 0.0]], [0.0, 0.0]), gap=0.5).probabilities(
         pictures([1.0, 0.0]), pictures([2.0, 0.0])
     )
     assert float(wider[0, 1]) == pytest.approx(1 / (1 + float(torch.tensor(-0.5).exp())))
+
+
+def test_an_action_that_an_order_of_summation_decides_is_left_open():
+    """The hidden unit is 2^24 + 1 - 2^24: 1 in exact arithmetic, 0 in some orders."""
+    hidden = nn.Linear(2, 2)
+    with torch.no_grad():
+        hidden.weight.copy_(torch.tensor([[2.0**24, -(2.0**24)], [0.0, 0.0]]))
+        hidden.bias.copy_(torch.tensor([1.0, 0.0]))
+    network = Linear([[1.0, 0.0], [0.0, 0.0]], [0.0, 0.5], nn.Flatten(), hidden, nn.ReLU())
+    bounds = Bounds(network, gap=0.0)
+    seen = pictures([1.0, 1.0])
+    assert bounds.decide(seen)[0].tolist() == [0b11]
+    assert bounds.possible(seen.clone(), seen.clone()).tolist() == [0b11]
+    plain = Linear([[1.0, 0.0], [0.0, 0.0]], [0.0, 0.5])
+    assert Bounds(plain, gap=0.0).decide(seen)[0].tolist() == [0b01]

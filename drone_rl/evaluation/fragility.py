@@ -1,0 +1,407 @@
+"""Whether a policy's episodes depend on rounding, and whether two implementations agree on them."""
+
+import dataclasses
+from collections.abc import Iterator
+from typing import Any, cast
+
+import torch
+from tensordict import TensorDictBase
+from tensordict.nn import TensorDictModuleBase
+from torch import Tensor
+from torchrl.envs import EnvBase
+from torchrl.envs.utils import ExplorationType, set_exploration_type
+
+from drone_rl.collectors import EpisodeCollector
+from drone_rl.collectors.sight import Sight
+from drone_rl.envs import worlds_of
+from drone_rl.evaluation.branches import Outcomes, follow
+from drone_rl.evaluation.evaluator import StepLog
+from drone_rl.evaluation.metrics import Episodes
+from drone_rl.policies import PictureNetwork, make_actor
+from drone_rl.policies.finite import require_finite
+from drone_rl.policies.regrouped import Regrouped
+from drone_rl.policies.rounding import TOLERANCE, Decide, RoundingBound, decider
+from drone_rl.sim.actions import DiscreteActions
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.provenance import num_cores
+
+COMPARED = 50
+"""Episodes that are flown in batches of another composition where there is no fused kernel."""
+ALONE = 16
+"""Episodes that a network from elsewhere flies again, one frame at a time and in other batches."""
+_REMEDY = (
+    "give a callable without state, whose logits for a frame depend on no other frame of its batch"
+)
+MOST_FRAGILE = 0.02
+"""Fragile frames, as a fraction of all, up to which a verdict can be certain. Honest policies have
+at most 0.002."""
+MOST_FRAGILE_EPISODES = 0.25
+"""The same of episodes with a fragile frame. Honest policies have at most 0.06."""
+MOST_UNEXPLAINED = 0.04
+"""Episodes that may end otherwise in another implementation where no bound on rounding is known, or
+where actions are continuous. With a bound none may, unless a frame of it was fragile."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Rounding:
+    """What rounding can change in some episodes."""
+
+    arithmetic: str
+    """What the episodes hold for, such as "float32 on cpu, fused kernel"."""
+    is_bound: bool
+    """Whether errors are bounded, and not assumed."""
+    frames: int
+    fragile: int
+    """Frames with more than one possible action."""
+    is_fragile: Tensor
+    """Episodes with such a frame. Shape: (n,), bool."""
+    outcomes: Outcomes
+    """How these can end; `owner` and `is_open` count all n episodes."""
+    compared: str
+    """With what the episodes were flown once more."""
+    compared_episodes: int
+    differing: int
+    """Episodes in which that took other actions."""
+    unexplained: int
+    """Of these those whose frame was not fragile when they parted."""
+
+    @property
+    def is_excessive(self) -> bool:
+        """Whether so much is fragile, or differs, that no outcome counts."""
+        if not self.frames:
+            return False
+        allowed = 0.0 if self.is_bound else MOST_UNEXPLAINED
+        return (
+            self.fragile > MOST_FRAGILE * self.frames
+            or int(self.is_fragile.sum()) > MOST_FRAGILE_EPISODES * len(self.is_fragile)
+            or self.unexplained > allowed * self.compared_episodes
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values, as in `verdict.json`."""
+        fragile = int(self.is_fragile.sum())
+        return {
+            "arithmetic": self.arithmetic,
+            "bound": self.is_bound,
+            "frames": self.frames,
+            "fragile": self.fragile,
+            "fragile_rate": self.fragile / max(1, self.frames),
+            "threshold": MOST_FRAGILE,
+            "episodes": len(self.is_fragile),
+            "fragile_episodes": fragile,
+            "fragile_episodes_rate": fragile / max(1, len(self.is_fragile)),
+            "threshold_episodes": MOST_FRAGILE_EPISODES,
+            "open_episodes": int(self.outcomes.is_open.sum()),
+            "compared": self.compared,
+            "compared_episodes": self.compared_episodes,
+            "differing": self.differing,
+            "unexplained": self.unexplained,
+            "excessive": self.is_excessive,
+        }
+
+
+def examine(
+    env: EnvBase,
+    actor: TensorDictModuleBase,
+    episodes: int,
+    *,
+    flown: Episodes,
+    log: StepLog,
+) -> Rounding | None:
+    """Fly the first episodes again in PyTorch, with a bound on the rounding error at every frame.
+
+    Args:
+        env: As it was before `flown`.
+        actor: The policy.
+        episodes: How many; all of `flown` at most.
+        flown: Greedy episodes, to compare with.
+        log: Their actions.
+
+    Returns:
+        None for an actor without a network.
+
+    Raises:
+        InputError: An output is not finite.
+    """
+    network = getattr(actor, "network", None)
+    if not isinstance(network, PictureNetwork):
+        return None
+    decide, is_bound = decider(network)
+    episodes, before = min(episodes, len(flown)), _streams(env)
+    seen, again = _fly(env, decide, network, episodes)
+    is_counted = isinstance(network.actions, DiscreteActions)
+    with_what, count = "PyTorch", episodes
+    if log.implementation == "PyTorch":
+        env_base(env).load_state_dict(before)
+        with_what, count = "PyTorch, in other batches", min(COMPARED, episodes)
+        again, ends = _fly_regrouped(env, network, count)
+    else:
+        ends = seen.episodes
+    parted = [
+        _parting(a, b) if is_counted else _ending(flown, ends, i)
+        for i, (a, b) in enumerate(zip(log.actions[:count], again[:count], strict=True))
+    ]
+    differing = [i for i, step in enumerate(parted) if step is not None]
+    unexplained = [i for i in differing if not seen.explains(i, cast(int, parted[i]))]
+    if not RoundingBound.find(network):
+        env_base(env).load_state_dict(before)
+        _require_function(env, network, log, seen)
+    return Rounding(
+        arithmetic=f"float32 on {worlds_of(env).device.type}, {log.implementation}",
+        is_bound=is_bound and is_counted,
+        frames=sum(map(len, seen.fragile)),
+        fragile=int(sum(f.sum() for f in seen.fragile)),
+        is_fragile=torch.tensor([bool(f.any()) for f in seen.fragile]),
+        outcomes=seen.outcomes(),
+        compared=with_what,
+        compared_episodes=count,
+        differing=len(differing),
+        unexplained=len(unexplained),
+    )
+
+
+def compare(
+    env: EnvBase, actor: TensorDictModuleBase, *, flown: Episodes, log: StepLog
+) -> Rounding | None:
+    """Fly the first episodes again by another implementation, the fused kernel if there is one.
+
+    Args:
+        env: As it was before `flown`.
+        actor: The policy.
+        flown: Greedy episodes, flown in PyTorch.
+        log: Their actions.
+
+    Returns:
+        None for an actor without a network.
+
+    Raises:
+        InputError: See `examine`.
+    """
+    state, count = _streams(env), min(COMPARED, len(flown))
+    found = examine(env, actor, count, flown=flown, log=log)
+    if found is None:
+        return None
+    env_base(env).load_state_dict(state)
+    again = StepLog()
+    for batch in _batches(env, actor, count, is_compiled=True, log=again):
+        again.note(batch)
+    if again.implementation == log.implementation:
+        return found
+    parted = [_parting(a, b) for a, b in zip(log.actions, again.actions, strict=False)]
+    differing = [i for i, at in enumerate(parted) if at is not None]
+    unexplained = sum(not found.is_fragile[i] for i in differing)
+    return dataclasses.replace(
+        found,
+        compared=again.implementation,
+        differing=len(differing),
+        unexplained=unexplained,
+    )
+
+
+def env_base(env: EnvBase) -> Any:
+    """The environment behind transforms."""
+    return getattr(env, "base_env", env)
+
+
+class _Deciding(TensorDictModuleBase):
+    """Acts greedily and notes whether another action was possible."""
+
+    def __init__(self, decide: Decide, network: PictureNetwork) -> None:
+        super().__init__()
+        self.in_keys, self.out_keys = ["pixels"], ["action", "fragile"]
+        self._decide, self._network = decide, network
+
+    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
+        """Writes "action" and "fragile"."""
+        found = self._decide(cast(Tensor, tensordict.get("pixels")))
+        require_finite(found.outputs, self._network.owner)
+        tensordict.set("fragile", found.is_fragile)
+        return tensordict.set("action", self._network.actions.greedy(found.outputs))
+
+
+@dataclasses.dataclass
+class _Seen:
+    """Examined episodes."""
+
+    episodes: Episodes
+    fragile: list[Tensor]
+    """Of each episode, which frames are. Shapes: (T,), bool."""
+    followed: list[tuple[int, Outcomes, Tensor]]
+    """Of each batch: its first episode, the ends of its fragile ones, and which these are."""
+    are_followed: bool
+    """Whether the ends can be found at all."""
+
+    def explains(self, episode: int, step: int) -> bool:
+        """Whether a frame was fragile up to that step."""
+        return bool(self.fragile[episode][: step + 1].any())
+
+    def outcomes(self) -> Outcomes:
+        """Those of all episodes."""
+        is_fragile = torch.tensor([bool(f.any()) for f in self.fragile])
+        if not self.are_followed:
+            return Outcomes(None, torch.empty(0, dtype=torch.int64), is_fragile)
+        is_open = torch.zeros_like(is_fragile)
+        ends, owners = [], []
+        for first, found, worlds in self.followed:
+            is_open[first + worlds] = found.is_open
+            if found.episodes is not None:
+                ends.append(found.episodes)
+                owners.append(first + worlds[found.owner])
+        if not ends:
+            return Outcomes(None, torch.empty(0, dtype=torch.int64), is_open)
+        return Outcomes(Episodes.joined(ends), torch.cat(owners), is_open)
+
+
+def _fly(
+    env: EnvBase, decide: Decide, network: PictureNetwork, episodes: int
+) -> tuple[_Seen, list[Tensor]]:
+    """Flies and looks at each frame. Returns also the actions of each episode."""
+    sight = Sight.find(env, ("pixels",), ())
+    is_counted = isinstance(network.actions, DiscreteActions)
+    fragile, followed, log, finals, first = [], [], StepLog(), [], 0
+    for batch in _batches(env, _Deciding(decide, network), episodes, ("fragile",)):
+        log.note(batch)
+        flags = cast(Tensor, batch["fragile"]).cpu()
+        lengths = [len(a) for a in log.actions[first:]]
+        fragile += flags.split(lengths)
+        finals.append(_final(env, batch))
+        worlds = torch.tensor([bool(f.any()) for f in fragile[first:]]).nonzero()[:, 0]
+        is_few = len(worlds) <= MOST_FRAGILE_EPISODES * len(lengths)
+        if sight is not None and is_counted and len(worlds):
+            found = (
+                follow(sight, decide, worlds.to(env.device))
+                if is_few
+                else Outcomes(None, worlds[:0], torch.ones_like(worlds, dtype=torch.bool))
+            )
+            followed.append((first, found, worlds))
+        first += len(lengths)
+    return _Seen(
+        Episodes.joined(finals), fragile, followed, sight is not None and is_counted
+    ), log.actions
+
+
+def _batches(
+    env: EnvBase,
+    actor: TensorDictModuleBase,
+    episodes: int,
+    noted: tuple[str, ...] = (),
+    *,
+    is_compiled: bool = False,
+    log: StepLog | None = None,
+) -> Iterator[TensorDictBase]:
+    """Greedy episodes, no more than are asked for; by the fused kernel if it may and can."""
+    keep = tuple(("next", "info", name) for name in (*worlds_of(env).task.scored, "end_reason"))
+    collector = EpisodeCollector(
+        env,
+        actor,
+        keep=keep,
+        keep_observations=False,
+        noted=noted,
+        is_compiled=is_compiled,
+        num_cores=num_cores(),
+    )
+    if log is not None:
+        log.implementation = collector.implementation
+    left = episodes
+    with set_exploration_type(ExplorationType.DETERMINISTIC):
+        while left > 0:
+            count = min(left, env.batch_size[0])
+            yield collector.collect(count)
+            left -= count
+
+
+def _final(env: EnvBase, batch: TensorDictBase) -> Episodes:
+    task = worlds_of(env).task
+    done = cast(Tensor, batch["next", "done"])[:, 0].nonzero()[:, 0]
+    info = {
+        name: cast(Tensor, batch["next", "info", name])[done]
+        for name in (*task.scored, "end_reason")
+    }
+    lengths = cast(Tensor, batch["collector", "traj_ids"]).unique_consecutive(return_counts=True)
+    return Episodes.ended(task, info, lengths[1])
+
+
+def _fly_regrouped(
+    env: EnvBase, network: PictureNetwork, episodes: int
+) -> tuple[list[Tensor], Episodes]:
+    """Flies with the network evaluated in other batches. Returns actions and episodes."""
+    log, finals = StepLog(), []
+    actor = make_actor(Regrouped(network, "mixed"), env.action_spec)
+    for batch in _batches(env, actor, episodes):
+        log.note(batch)
+        finals.append(_final(env, batch))
+    return log.actions, Episodes.joined(finals)
+
+
+def _require_function(env: EnvBase, network: PictureNetwork, log: StepLog, seen: "_Seen") -> None:
+    """Check that a network from elsewhere acts by the frame alone.
+
+    Episodes that were flown in one batch are flown again one frame at a time, and in mixed batches;
+    then frames are evaluated in batches of many sizes.
+
+    Raises:
+        InputError: It does not.
+    """
+    before, frames = _streams(env), torch.empty(0)
+    for groups, words in (("single", "one frame at a time"), ("mixed", "in other batches")):
+        env_base(env).load_state_dict(before)
+        again, actor = StepLog(), make_actor(Regrouped(network, groups), env.action_spec)
+        count = min(ALONE, len(seen.fragile))
+        for batch in _batches(env, actor, count, ("pixels",)):
+            again.note(batch)
+            frames = cast(Tensor, batch["pixels"])
+        parted = [_parting(a, b) for a, b in zip(log.actions, again.actions, strict=False)]
+        other = [i for i, at in enumerate(parted) if at is not None and not seen.explains(i, at)]
+        if isinstance(network.actions, DiscreteActions) and len(other) > MOST_UNEXPLAINED * count:
+            raise InputError(
+                f"{network.owner} acts by more than the frame: evaluated {words} it takes other "
+                f"actions in {len(other)} of {count} episodes; {_REMEDY}"
+            )
+    require_same_in_any_batch(network, frames, env.batch_size[0])
+
+
+@torch.no_grad()
+def require_same_in_any_batch(network: PictureNetwork, frames: Tensor, largest: int) -> None:
+    """Evaluate frames in batches of many sizes.
+
+    Args:
+        network: From elsewhere.
+        frames: Shape: (N, C, H, W).
+        largest: A size that must be among them.
+
+    Raises:
+        InputError: The outputs depend on the size.
+    """
+    rows = torch.linspace(0, len(frames) - 1, min(len(frames), 64)).long().to(frames.device)
+    frames = frames[rows]
+    alone = torch.cat([network(frame) for frame in frames.split(1)])
+    allowed = TOLERANCE * (1 + alone.abs().amax(-1))
+    for size in sorted({*range(1, 65), 100, 128, 200, 250, 256, 400, 500, 512, 1000, largest}):
+        which = (torch.arange(size, device=frames.device) + size) % len(frames)
+        difference = (network(frames[which]) - alone[which]).abs().amax(-1)
+        if bool((difference > allowed[which]).any()):
+            raise InputError(
+                f"{network.owner} gives other logits for the same frame in a batch of {size}: they "
+                f"differ by {float(difference.max()):.3g}; {_REMEDY}"
+            )
+
+
+def _streams(env: EnvBase) -> dict[str, Any]:
+    return env_base(env).state_dict()
+
+
+def _parting(one: Tensor, other: Tensor) -> int | None:
+    """The first step at which actions differ; None if none do."""
+    shared = min(len(one), len(other))
+    steps = (one[:shared] != other[:shared]).nonzero()
+    if len(steps):
+        return int(steps[0, 0])
+    return None if len(one) == len(other) else shared
+
+
+def _ending(one: Episodes, other: Episodes, i: int) -> int | None:
+    """The last step if episodes end otherwise; None if they end alike."""
+    is_same = bool(one.end_reason[i] == other.end_reason[i]) and torch.equal(
+        one.goals.reached[i], other.goals.reached[i]
+    )
+    return None if is_same else int(one.length[i])

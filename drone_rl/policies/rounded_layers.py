@@ -1,0 +1,230 @@
+"""Rounding errors of single layers, see `drone_rl.policies.rounding`.
+
+Errors are bounds, in float64, on the difference of any float32 evaluation from the exact one.
+"""
+
+import abc
+import dataclasses
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+UNIT = 2.0**-24
+"""Unit roundoff of float32: the largest relative error of one operation."""
+TINY = 2.0**-126
+"""Least normal number of float32: an operation may replace what is smaller by 0."""
+LARGEST = float(torch.finfo(torch.float32).max)
+SLACK = 1.001
+"""Factor for the rounding of the bounds' own arithmetic in float64."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Note:
+    """What a layer keeps of a forward pass."""
+
+    shape: torch.Size
+    """Of its input."""
+    local: Tensor | None = None
+    """Errors of its outputs that do not come from its inputs in proportion. Shape: its output's."""
+    mask: Tensor | None = None
+    """Where an output follows its input."""
+
+
+class Layer(abc.ABC):
+    """One layer."""
+
+    @abc.abstractmethod
+    def __call__(self, value: Tensor) -> Tensor:
+        """Evaluate the layer in float32."""
+
+    @abc.abstractmethod
+    def bound(self, largest: Tensor, error: Tensor) -> Tensor:
+        """Return a bound on the outputs' errors for all inputs up to a size.
+
+        Args:
+            largest: Size of the largest input. Shape: (1, *), float64.
+            error: Of the inputs. Shape: (1, *), float64.
+        """
+
+    @abc.abstractmethod
+    def run(self, value: Tensor, error: Tensor) -> tuple[Tensor, Tensor, Note]:
+        """Return the exact outputs, their errors and a note.
+
+        Args:
+            value: Exact inputs. Shape: (N, *), float64.
+            error: Of these. Shape: (N, *), float64.
+        """
+
+    @abc.abstractmethod
+    def back(self, slope: Tensor, note: Note) -> Tensor:
+        """Return slopes by the inputs from slopes by the outputs. Shapes: (N, P, *)."""
+
+
+class Affine(Layer):
+    """A convolution without padding or a linear layer, with a bias."""
+
+    def __init__(self, layer: nn.Conv2d | nn.Linear) -> None:
+        """Copies the weights."""
+        weight, bias = (layer.get_parameter(name).detach() for name in ("weight", "bias"))
+        self._single = weight, bias
+        self._weight, self._bias = weight.double(), bias.double()
+        self._size = self._weight.abs()
+        self._stride = layer.stride if isinstance(layer, nn.Conv2d) else None
+        self._terms = weight[0].numel() + 1
+
+    def __call__(self, value: Tensor) -> Tensor:
+        """See `Layer`."""
+        return self._apply(value, *self._single)
+
+    def bound(self, largest: Tensor, error: Tensor) -> Tensor:
+        """See `Layer`."""
+        total = self._apply(largest + error, self._size, self._bias.abs())
+        carried = self._apply(error, self._size, None)
+        return carried + self._local(total, total, largest + error)
+
+    def run(self, value: Tensor, error: Tensor) -> tuple[Tensor, Tensor, Note]:
+        """See `Layer`."""
+        size = value.abs() + error
+        total = self._apply(size, self._size, self._bias.abs())
+        carried = self._apply(error, self._size, None)
+        made = self._apply(value, self._weight, self._bias)
+        # no partial sum is larger than all positive terms, or all negative ones
+        most = torch.minimum(total, 0.5 * (total + made.abs() + carried))
+        local = self._local(total, most, size)
+        return made, SLACK * carried + local, Note(value.shape, local)
+
+    def back(self, slope: Tensor, note: Note) -> Tensor:
+        """See `Layer`."""
+        if self._stride is None:
+            return slope @ self._weight
+        flat = slope.flatten(0, 1)
+        found = functional.conv_transpose2d(flat, self._weight, stride=self._stride)
+        rows, columns = (a - b for a, b in zip(note.shape[-2:], found.shape[-2:], strict=True))
+        found = functional.pad(found, (0, columns, 0, rows))  # pixels that no patch reaches
+        return found.view(*slope.shape[:2], *note.shape[1:])
+
+    def _apply(self, value: Tensor, weight: Tensor, bias: Tensor | None) -> Tensor:
+        if self._stride is None:
+            return functional.linear(value, weight, bias)
+        return functional.conv2d(value, weight, bias, stride=self._stride)
+
+    def _local(self, total: Tensor, most: Tensor, size: Tensor) -> Tensor:
+        """Errors that arise in the sum itself.
+
+        Args:
+            total: Sum of the sizes of all terms.
+            most: Size of the largest partial sum.
+            size: Of the inputs.
+        """
+        roundings = SLACK / (1 - self._terms * UNIT)
+        rounded = roundings * UNIT * (self._terms * most + 2 * total)
+        # weights, inputs, products and sums that are too small to be normal
+        inputs = self._apply(size, torch.ones_like(self._weight), None)
+        weights = self._size.flatten(1).sum(-1).view(-1, *[1] * (total.ndim - 2))
+        lost = 2 * TINY * (inputs + weights + 4 * self._terms)
+        return (rounded + lost).masked_fill(~(SLACK * total < LARGEST), torch.inf)
+
+
+class Rectified(Layer):
+    """A ReLU."""
+
+    def __call__(self, value: Tensor) -> Tensor:
+        """See `Layer`."""
+        return value.clamp(min=0)
+
+    def bound(self, largest: Tensor, error: Tensor) -> Tensor:
+        """See `Layer`."""
+        del largest
+        return error
+
+    def run(self, value: Tensor, error: Tensor) -> tuple[Tensor, Tensor, Note]:
+        """See `Layer`."""
+        is_on, is_off = value > error, value < -error
+        error = error.masked_fill(is_off, 0.0)
+        return value.clamp(min=0), error, Note(value.shape, error.masked_fill(is_on, 0.0), is_on)
+
+    def back(self, slope: Tensor, note: Note) -> Tensor:
+        """See `Layer`."""
+        assert note.mask is not None
+        return slope.where(note.mask[:, None], 0.0)
+
+
+class Flat(Layer):
+    """All inputs in a row."""
+
+    def __call__(self, value: Tensor) -> Tensor:
+        """See `Layer`."""
+        return value.flatten(1)
+
+    def bound(self, largest: Tensor, error: Tensor) -> Tensor:
+        """See `Layer`."""
+        del largest
+        return error.flatten(1)
+
+    def run(self, value: Tensor, error: Tensor) -> tuple[Tensor, Tensor, Note]:
+        """See `Layer`."""
+        return value.flatten(1), error.flatten(1), Note(value.shape)
+
+    def back(self, slope: Tensor, note: Note) -> Tensor:
+        """See `Layer`."""
+        return slope.view(*slope.shape[:2], *note.shape[1:])
+
+
+class Maximum(Layer):
+    """Pooling by maxima of squares that do not overlap."""
+
+    def __init__(self, side: int) -> None:
+        """Takes the length of a square's side."""
+        self._side = side
+
+    def __call__(self, value: Tensor) -> Tensor:
+        """See `Layer`."""
+        return functional.max_pool2d(value, self._side)
+
+    def bound(self, largest: Tensor, error: Tensor) -> Tensor:
+        """See `Layer`."""
+        del largest
+        return functional.max_pool2d(error, self._side)
+
+    def run(self, value: Tensor, error: Tensor) -> tuple[Tensor, Tensor, Note]:
+        """See `Layer`."""
+        made, index = functional.max_pool2d(value, self._side, return_indices=True)
+        most = functional.max_pool2d(error, self._side)
+        index = index.flatten(2)
+        upper = (value + error).flatten(2).scatter(2, index, -torch.inf).view_as(value)
+        others = functional.max_pool2d(upper, self._side)
+        lower = made - error.flatten(2).gather(2, index).view_as(made)
+        is_clear = lower >= others
+        winner = torch.zeros_like(value, dtype=torch.bool).flatten(2)
+        winner = winner.scatter(2, index, is_clear.flatten(2)).view_as(value)
+        return made, most, Note(value.shape, most.masked_fill(is_clear, 0.0), winner)
+
+    def back(self, slope: Tensor, note: Note) -> Tensor:
+        """See `Layer`."""
+        assert note.mask is not None
+        rows, columns = note.shape[-2:]
+        wide = slope.repeat_interleave(self._side, -1).repeat_interleave(self._side, -2)
+        missing = (0, columns - wide.shape[-1], 0, rows - wide.shape[-2])
+        return functional.pad(wide, missing).where(note.mask[:, None], 0.0)
+
+
+def layer_of(layer: nn.Module) -> Layer | None:
+    """Return the errors of a layer, or None if nothing is known of its kind.
+
+    Args:
+        layer: Of a policy network.
+    """
+    if isinstance(layer, nn.Conv2d):
+        is_plain = (layer.padding, layer.dilation, layer.groups) == ((0, 0), (1, 1), 1)
+        return Affine(layer) if is_plain and layer.bias is not None else None
+    if isinstance(layer, nn.Linear):
+        return Affine(layer) if layer.bias is not None else None
+    if isinstance(layer, nn.MaxPool2d):
+        side = layer.kernel_size
+        is_plain = (layer.padding, layer.dilation, layer.ceil_mode) == (0, 1, False)
+        is_plain = is_plain and isinstance(side, int) and layer.stride == side
+        return Maximum(side) if is_plain and isinstance(side, int) else None
+    if isinstance(layer, nn.Flatten):
+        return Flat() if (layer.start_dim, layer.end_dim) == (1, -1) else None
+    return Rectified() if isinstance(layer, nn.ReLU) else None

@@ -1,0 +1,221 @@
+"""Bounds on how far float32 arithmetic can move a network's outputs.
+
+A kernel may sum the terms of a layer in any order, and may fuse a product with a sum. Every result
+lies within a bound of the exact one (Higham, Accuracy and Stability of Numerical Algorithms, 2002,
+chapters 2 to 4). Where two outputs are closer than their bound, the kernel, the batch and the
+machine decide which one is larger. A frame is *fragile* if that is so of its two best actions.
+
+The bound holds for float32 with a unit roundoff of 2^-24, with or without fused products and with
+or without subnormal numbers. It does not hold for TF32 or bfloat16, nor for convolutions by
+Winograd's or Fourier's transform.
+"""
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any, Self
+
+import torch
+from torch import Tensor, nn
+
+from drone_rl.policies.cnn import PolicyNetwork
+from drone_rl.policies.rounded_layers import SLACK, UNIT, Layer, layer_of
+from drone_rl.sim.actions import Actions, DiscreteActions
+
+PIXEL_UNITS = 8.0
+"""Unit roundoffs of the frame's largest pixel by which a pixel may be off: a kernel may fold the
+standardization of pixels into one product."""
+ACTION_ERROR = 0.1
+"""A frame is fragile if rounding can move an output for a continuous action by more than that."""
+TOLERANCE = 1e-4
+"""Error that is assumed of a network of unknown layers, relative to 1 + its largest logit."""
+_BATCH = 256
+"""Frames in one pass in float64; bounds memory."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Decisions:
+    """What a network decides on frames, and whether rounding can change that."""
+
+    outputs: Tensor
+    """Of the network, in float32. Shape: (N, outputs)."""
+    possible: Tensor
+    """Whether some order of summation makes an action the best one. For continuous actions, all
+    are where a frame is fragile. Shape: (N, outputs), bool."""
+
+    @property
+    def is_fragile(self) -> Tensor:
+        """Frames with more than one possible action. Shape: (N,), bool."""
+        return self.possible.sum(-1) > 1
+
+
+Decide = Callable[[Tensor], Decisions]
+"""Frames (N, C, H, W) to decisions."""
+
+
+class RoundingBound:
+    """Bounds for the present weights of one network."""
+
+    def __init__(self, layers: list[Layer], actions: Actions) -> None:
+        """Takes layers; see `find`."""
+        self._layers, self._actions = layers, actions
+
+    @classmethod
+    def find(cls, network: nn.Module) -> Self | None:
+        """Return the bounds of a network, or None if it has a layer for which none are known.
+
+        Args:
+            network: A `PolicyNetwork` of convolutions, linear layers, ReLU, MaxPool2d and Flatten.
+        """
+        if not isinstance(network, PolicyNetwork):
+            return None
+        layers = [layer_of(layer) for layer in network.layers]
+        known = [layer for layer in layers if layer is not None]
+        return cls(known, network.actions) if len(known) == len(layers) else None
+
+    @torch.no_grad()
+    def decide(self, pixels: Tensor) -> Decisions:
+        """Return which actions are possible.
+
+        One bound for all frames together sorts out those whose decision is clear. The others get a
+        bound of their own.
+
+        Args:
+            pixels: Frames as the network sees them. Shape: (N, C, H, W), float32.
+        """
+        outputs, error = self.together(pixels)
+        if not isinstance(self._actions, DiscreteActions):
+            means = outputs.shape[-1] // 2
+            is_open = ~(error[:means, None] <= ACTION_ERROR).all().expand(len(pixels))
+            rows = is_open.nonzero()[:, 0]
+            for some in rows.split(_BATCH):
+                each = self.errors(pixels[some])[:, :means]
+                is_open = is_open.index_copy(0, some, ~(each <= ACTION_ERROR).all(-1))
+            return Decisions(outputs, is_open[:, None].expand_as(outputs))
+        best = outputs.argmax(-1, keepdim=True)
+        lead = outputs.gather(1, best).double() - outputs.double()
+        # each of two evaluations is that far from the exact outputs
+        possible = ~(lead > 2 * (error + error[best]))
+        possible.scatter_(1, best, True)
+        for rows in (possible.sum(-1) > 1).nonzero()[:, 0].split(_BATCH):
+            possible[rows] = self.possible(pixels[rows])
+        return Decisions(outputs, possible)
+
+    @torch.no_grad()
+    def together(self, pixels: Tensor) -> tuple[Tensor, Tensor]:
+        """Return the outputs and one bound for all frames.
+
+        Args:
+            pixels: Shape: (N, C, H, W), float32.
+
+        Returns:
+            The outputs in float32, and the largest error of each, infinite where a sum may
+            overflow. Shapes: (N, outputs), (outputs,) float64.
+        """
+        largest = pixels.abs().amax(0, keepdim=True).double()
+        error = _pixel_error(largest.amax().clamp(min=UNIT)).expand_as(largest)
+        value = pixels
+        for layer in self._layers:
+            largest = value.abs().amax(0, keepdim=True).double()
+            error = layer.bound(largest, error)
+            value = layer(value)
+        return value, error[0].nan_to_num(nan=torch.inf)
+
+    @torch.no_grad()
+    def errors(self, pixels: Tensor) -> Tensor:
+        """Return the error of each output of each frame. Shape: (N, outputs), float64."""
+        count = self._run(pixels[:1])[0].shape[-1]
+        return self._back(pixels, lambda value: torch.eye(count).double().repeat(len(value), 1, 1))[
+            1
+        ]
+
+    @torch.no_grad()
+    def possible(self, pixels: Tensor) -> Tensor:
+        """Return which actions are possible, frame by frame.
+
+        Args:
+            pixels: Shape: (N, C, H, W), float32.
+
+        Returns:
+            Whether the exact logit is lower than the best one by no more than the error of their
+            difference. Shape: (N, outputs), bool.
+        """
+
+        def leads(value: Tensor) -> Tensor:
+            eye = torch.eye(value.shape[-1], dtype=torch.float64, device=value.device)
+            best = value.nan_to_num().argmax(-1)
+            return eye[best][:, None] - eye
+
+        value, error = self._back(pixels, leads)
+        lead = value.amax(-1, keepdim=True) - value
+        possible = ~(lead > error)
+        return possible.scatter(1, value.nan_to_num().argmax(-1, keepdim=True), True)
+
+    def _run(self, pixels: Tensor) -> tuple[Tensor, Tensor, list[Any], Tensor]:
+        """From frames to outputs in float64.
+
+        Returns:
+            Outputs; the error of each pixel; what each layer notes; frames in which a sum may
+            overflow.
+        """
+        value = pixels.double()
+        first = _pixel_error(value.abs().flatten(1).amax(-1).clamp(min=UNIT))
+        first = first[:, None, None, None].expand_as(value)
+        error, notes = first, []
+        overflows = torch.zeros(len(pixels), dtype=torch.bool, device=pixels.device)
+        for layer in self._layers:
+            value, error, note = layer.run(value, error)
+            overflows |= ~error.flatten(1).isfinite().all(-1)
+            notes.append(note)
+        return value, first, notes, overflows
+
+    def _back(self, pixels: Tensor, weigh: Callable[[Tensor], Tensor]) -> tuple[Tensor, Tensor]:
+        """Errors of weighted sums of the outputs, by a backward pass.
+
+        Every rounding error moves the outputs by its slope, as long as no ReLU and no maximum
+        changes sides. Those that may are sources of error themselves.
+
+        Args:
+            pixels: Frames.
+            weigh: Outputs (N, outputs) to the weights of P sums, (N, P, outputs).
+
+        Returns:
+            Outputs, and errors of the sums. Shapes: (N, outputs), (N, P), float64.
+        """
+        value, first, notes, overflows = self._run(pixels)
+        slope = weigh(value)
+        total = torch.zeros(slope.shape[:2], dtype=torch.float64, device=pixels.device)
+        for layer, note in zip(reversed(self._layers), reversed(notes), strict=True):
+            if note.local is not None:
+                total += (slope.abs() * note.local[:, None]).flatten(2).sum(-1)
+            slope = layer.back(slope, note)
+        total += (slope.abs() * first[:, None]).flatten(2).sum(-1)
+        total = SLACK * total.nan_to_num(nan=torch.inf)
+        return value, total.masked_fill(overflows[:, None], torch.inf)
+
+
+def decider(network: nn.Module) -> tuple[Decide, bool]:
+    """Return how to decide with a network, and whether a bound for its layers is known.
+
+    Without a bound, an error of `TOLERANCE` is assumed.
+
+    Args:
+        network: Frames to outputs, with `actions` as a `PictureNetwork` has.
+    """
+    bound = RoundingBound.find(network)
+    if bound is not None:
+        return bound.decide, True
+
+    @torch.no_grad()
+    def assume(pixels: Tensor) -> Decisions:
+        outputs: Tensor = network(pixels)
+        if not isinstance(network.actions, DiscreteActions):
+            return Decisions(outputs, torch.zeros_like(outputs, dtype=torch.bool))
+        lead = outputs.amax(-1, keepdim=True) - outputs
+        scale = 1 + outputs.abs().amax(-1, keepdim=True)
+        return Decisions(outputs, ~(lead > TOLERANCE * scale))
+
+    return assume, False
+
+
+def _pixel_error(largest: Tensor) -> Tensor:
+    return PIXEL_UNITS * UNIT * largest

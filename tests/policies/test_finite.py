@@ -1,0 +1,24 @@
+import pytest
+import torch
+
+from drone_rl.policies import MLP
+from drone_rl.policies.finite import require_finite
+from drone_rl.utils.errors import InputError
+
+
+def test_what_is_not_finite_is_named():
+    require_finite(torch.zeros(2, 3))
+    with pytest.raises(InputError, match=r"policy=a gives .* \(nan\) for an observation"):
+        require_finite(torch.tensor([[0.0, torch.nan], [1.0, 2.0]]), "policy=a")
+    with pytest.raises(InputError, match=r"\(inf\) for 2 observations"):
+        require_finite(torch.full((2, 3), torch.inf))
+
+
+def test_a_network_refuses_to_act_by_what_is_not_finite():
+    network = MLP((1, 2, 2), 2, hidden=(2,))
+    with torch.no_grad():
+        for parameter in network.parameters():
+            parameter.fill_(1e38)
+        with pytest.raises(InputError, match="non-finite action logits"):
+            network(torch.ones(1, 1, 2, 2))
+    assert not network(torch.ones(1, 1, 2, 2)).isfinite().all()  # learners have a message of theirs

@@ -1,0 +1,119 @@
+"""Rounding bounds by brute force: no order of summation in float32 goes beyond them."""
+
+import numpy as np
+import pytest
+import torch
+from torch import nn
+
+from drone_rl.policies import MLP, OriginalCNN, SmallCNN
+from drone_rl.policies.foreign import ForeignNetwork
+from drone_rl.policies.rounding import TOLERANCE, RoundingBound, decider
+from drone_rl.sim.actions import MOVES
+
+BIG = 2.0**24
+
+
+def in_some_order(weight, bias, value, random, is_fused):
+    """A linear layer whose terms are added one by one in a random order, in float32."""
+    made = np.empty(len(weight), np.float32)
+    for out, row in enumerate(weight):
+        order = random.permutation(len(row) + 1)
+        total = np.float32(0)
+        for term in order:
+            if term == len(row):
+                total = np.float32(total + bias[out])
+            elif is_fused:  # the product is not rounded
+                total = np.float32(float(total) + float(row[term]) * float(value[term]))
+            else:
+                total = np.float32(total + np.float32(row[term] * value[term]))
+        made[out] = total
+    return made
+
+
+def mlp(seed, hidden=(12, 9), spread=1.0):
+    generator = torch.Generator().manual_seed(seed)
+    network = MLP((1, 3, 4), 3, hidden=hidden, generator=generator)
+    with torch.no_grad():
+        for parameter in network.parameters():
+            parameter.copy_(torch.randn(parameter.shape, generator=generator) * spread)
+            parameter *= 10 ** torch.randn(parameter.shape, generator=generator)
+    return network
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_no_order_of_summation_exceeds_the_bounds(seed):
+    network, random = mlp(seed), np.random.default_rng(seed)
+    pixels = torch.randn(4, 1, 3, 4, generator=torch.Generator().manual_seed(seed))
+    bound = RoundingBound.find(network)
+    exact = network.double()(pixels.double())
+    network.float()
+    each, (_, together) = bound.errors(pixels), bound.together(pixels)
+    layers = [layer for layer in network.layers if isinstance(layer, nn.Linear)]
+    worst = torch.zeros_like(exact)
+    for trial in range(30):
+        for row, picture in enumerate(pixels.flatten(1).numpy()):
+            value = picture
+            for layer in layers:
+                parameters = layer.weight.detach().numpy(), layer.bias.detach().numpy()
+                value = in_some_order(*parameters, value, random, trial % 2 == 0)
+                value = value if layer is layers[-1] else value.clip(min=0)
+            off = (torch.from_numpy(value).double() - exact[row]).abs()
+            worst[row] = torch.maximum(worst[row], off)
+    assert (worst <= each).all()
+    assert (worst <= together).all()
+    assert (each <= together * 1.01).all()
+    assert (worst > each / 1000).any()  # nor is it absurdly loose
+
+
+@pytest.mark.parametrize("make", [SmallCNN, OriginalCNN])
+def test_bounds_of_convolutions_hold_for_float32_and_are_close(make):
+    network = make((1, 25, 64), 3, generator=torch.Generator().manual_seed(0))
+    pixels = torch.randn(5, 1, 25, 64, generator=torch.Generator().manual_seed(1))
+    bound = RoundingBound.find(network)
+    with torch.no_grad():
+        rounded = network(pixels).double()
+        exact = network.double()(pixels.double())
+    each = bound.errors(pixels)
+    assert ((rounded - exact).abs() <= each).all()
+    assert (each < 0.01 * exact.abs().max()).all()
+
+
+def test_orders_that_decide_are_found():
+    """The unit is 2^24 + 1 - 2^24; by it the first action wins, or the second one."""
+    network = MLP((1, 1, 2), 2, hidden=(1,))
+    with torch.no_grad():
+        network.layers.get_parameter("fc1.weight").copy_(torch.tensor([[BIG, -BIG]]))
+        network.layers.get_parameter("fc1.bias").fill_(1.0)
+        network.layers.get_parameter("logits.weight").copy_(torch.tensor([[1.0], [0.0]]))
+        network.layers.get_parameter("logits.bias").copy_(torch.tensor([0.0, 0.5]))
+    bound = RoundingBound.find(network)
+    found = bound.decide(torch.tensor([[1.0, 1.0], [1.0, 0.5]]).view(2, 1, 1, 2))
+    assert found.is_fragile.tolist() == [True, False]
+    assert found.possible.tolist() == [[True, True], [True, False]]
+
+
+def test_sums_that_may_overflow_are_fragile():
+    network = MLP((1, 1, 2), 2, hidden=(1,))
+    with torch.no_grad():
+        network.layers.get_parameter("fc1.weight").copy_(torch.tensor([[3e38, -3e38]]))
+        network.layers.get_parameter("logits.bias").copy_(torch.tensor([0.0, 9.0]))
+    pixels = torch.ones(1, 1, 1, 2)
+    assert RoundingBound.find(network).decide(1.5 * pixels).is_fragile.all()
+
+
+def test_subnormal_numbers_may_count_as_zero():
+    network = MLP((1, 1, 1), 2, hidden=(1,))
+    with torch.no_grad():
+        network.layers.get_parameter("fc1.weight").fill_(0.9 * 2.0**-126)
+        network.layers.get_parameter("logits.weight").copy_(torch.tensor([[2.0**126], [0.0]]))
+        network.layers.get_parameter("logits.bias").copy_(torch.tensor([0.0, 0.5]))
+    assert RoundingBound.find(network).decide(torch.ones(1, 1, 1, 1)).is_fragile.all()
+
+
+def test_a_network_of_unknown_layers_is_given_a_tolerance():
+    logits = torch.tensor([[3.0, 1.0, 0.0], [1.0, 1.0 - TOLERANCE, 0.0]])
+    network = ForeignNetwork(lambda pixels: logits[: len(pixels)], (1, 1, 1), MOVES)
+    decide, is_bound = decider(network)
+    assert not is_bound
+    assert decide(torch.zeros(2, 1, 1, 1)).is_fragile.tolist() == [False, True]
+    assert RoundingBound.find(network) is None
