@@ -215,6 +215,8 @@ def _of_sb3(model: Any) -> ForeignPolicy:
     from drone_rl.policies.sb3.logits import Sb3Logits  # needs Stable-Baselines3
 
     return policy_from(Sb3Logits(model), name=f"{type(model).__name__} of Stable-Baselines3")
+
+
 def require_function(
     policy: Pilot, *, seed: int, device: str = "cpu", renderer: str = "raytrace"
 ) -> None:

@@ -1,16 +1,13 @@
 """`drone-rl bench truth`, adversarial policies: none may be called good and certain, or proved."""
 
-import importlib
-import importlib.util
 import logging
 from collections.abc import Iterator
 from pathlib import Path
 
-from drone_rl.bench import gamed_memory
+from drone_rl.bench import gamed_certificates, gamed_memory, gamed_rounding
 from drone_rl.bench.gamed_case import GamedCase
 
-_LATER = ("gamed_rounding", "gamed_certificates")
-"""Modules of this package with `cases`, used where they exist."""
+_MODULES = (gamed_memory, gamed_rounding, gamed_certificates)
 
 _log = logging.getLogger(__name__)
 
@@ -38,8 +35,5 @@ def all_cases(folder: Path) -> Iterator[GamedCase]:
     Args:
         folder: Each module gets a folder of its own below it.
     """
-    yield from gamed_memory.cases(folder / "memory")
-    for name in _LATER:
-        module = f"{__package__}.{name}"
-        if importlib.util.find_spec(module) is not None:
-            yield from importlib.import_module(module).cases(folder / name)
+    for module in _MODULES:
+        yield from module.cases(folder / module.__name__.rpartition(".")[2])

@@ -35,7 +35,7 @@ from drone_rl.sim.actions import Move
 from drone_rl.sim.settings import TaskSettings
 from drone_rl.utils.seeding import Stream, root_seed
 from drone_rl.zoo import describe, read_policy
-from drone_rl.zoo.files import write_exported
+from drone_rl.zoo.files import exported_bytes
 
 KNOWN_SEED = 0
 """The default of version 0.1."""
@@ -152,7 +152,7 @@ def write_memory(path: Path, *, stream: Stream = Stream.REPORT) -> Path:
     _fit(network, frames, actions)
     origin = load_policy("good").state
     about = {name: origin[name] for name in ("progress", "provenance", "command")}
-    write_exported(path, network.state_dict(), described.as_dict(), about)
+    path.write_bytes(exported_bytes(network.state_dict(), described.as_dict(), about))
     return path
 
 

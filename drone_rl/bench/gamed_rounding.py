@@ -19,7 +19,7 @@ from drone_rl.api.proving import prove
 from drone_rl.bench.gamed_case import GamedCase
 from drone_rl.sim.actions import Move
 from drone_rl.utils.errors import InputError
-from drone_rl.zoo.files import write_exported
+from drone_rl.zoo.files import exported_bytes
 
 BIG = 2.0**24
 """Float32 has no number between it and 2^24 + 2."""
@@ -115,7 +115,8 @@ def _grown(name: str, value: Tensor, channels: int, hidden: int) -> Tensor:
 def write(folder: Path, name: str, described: dict[str, Any], weights: dict[str, Tensor]) -> Path:
     """Write a policy as `drone-rl export` does, with the other data of "good"."""
     state, path = load_policy("good").state, folder / f"{name}.safetensors"
-    write_exported(path, weights, described, {k: state[k] for k in _ABOUT if k in state})
+    about = {key: state[key] for key in _ABOUT if key in state}
+    path.write_bytes(exported_bytes(weights, described, about))
     return path
 
 

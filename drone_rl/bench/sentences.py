@@ -6,6 +6,7 @@ from typing import Any
 
 from drone_rl.bench.evidence import (
     CARD,
+    EVALUATION,
     EXPLANATION,
     FIXED_SEED,
     GROUP,
@@ -20,6 +21,7 @@ from drone_rl.words import (
     advice,
     card,
     domain,
+    evaluation,
     report,
     seeds,
     shifts,
@@ -47,7 +49,7 @@ SPOKEN: dict[str, tuple[tuple[Sentence, ...], Mapping[str, Any]]] = {
     "shifts": (shifts.SHIFTS, SHIFTS),
     "sweep": (sweep.SENTENCES, SWEEP),
     "setting": (sweep.GROUP_SENTENCES, GROUP),
-    "evaluation": (seeds.EVALUATION, FIXED_SEED),
+    "evaluation": (evaluation.EVALUATION, EVALUATION),
     "bodies": (seeds.BODIES, FIXED_SEED),
     "looped": (seeds.LOOPED, FIXED_SEED),
     "chances": (seeds.CHANCES, FIXED_SEED),
@@ -379,9 +381,19 @@ _OF_SHIFTS = (
     ("shifts.fixed_seed", _FRESH),
     ("shifts.fixed_seed", _OTHER_SEED),
 )  # fmt: skip
+_OTHERWISE = {"rounding.differing": 2}
+_OF_EVALUATIONS = (
+    ("computed", {"rounding": None}),
+    ("computed", {"rounding.arithmetic": "float32 on cuda, PyTorch"}),
+    ("computed.same", _OTHERWISE),
+    ("computed.same", {"rounding.compared_episodes": 50}),
+    ("computed.other", {"rounding.differing": 0}, _OTHERWISE),
+    ("computed.other", {"rounding.differing": 3}, _OTHERWISE),
+)
 _FIXED_SEEDS = ("evaluation", "bodies", "looped", "chances", "check")
 PLANTS = (
     *(Plant(of, f"{of}.fixed_seed", lie) for of in _FIXED_SEEDS for lie in (_FRESH, _OTHER_SEED)),
+    *_plants("evaluation", _OF_EVALUATIONS),
     *_plants("verdict", _OF_VERDICTS),
     *_plants("explanation", (*_OF_REPORTS, *_OF_MAPS)),
     *_plants("card", _OF_CARDS),

@@ -1,7 +1,7 @@
 import pytest
 
-from drone_rl.words.licence import said
 from drone_rl.words.evaluation import EVALUATION
+from drone_rl.words.licence import said
 from drone_rl.words.seeds import CHANCES, CHECK, is_fixed, seed_line, seed_of
 
 
