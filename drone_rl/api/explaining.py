@@ -142,7 +142,7 @@ def _explain(
             name=policy.name,
             provenance=origin,
             progress=lambda title: progress(f"{policy.name}: {title}"),
-            claim=find_claim(policy),
+            claim=find_claim(policy, seed=seed.value),
             measured=measured,
             unlike=policy.unlike,
             seed=seed,

@@ -57,7 +57,7 @@ def export(
     """
     settings, seed = with_seed(settings)
     device = settings.device
-    claim = find_claim(policy, certificate)
+    claim = find_claim(policy, certificate, seed=seed.value)
     claim = None if claim is None or claim.refused else claim  # a card tells of what is
     measured = find_domain(policy, shifts, outputs)
     with policy.flying(
