@@ -12,6 +12,11 @@ from drone_rl.utils.seeding import RootSeed, Stream, root_seed
 from drone_rl.verdicts.judge import judge_policy
 
 
+def draw_seed() -> RootSeed:
+    """Return a fresh seed, for all runs that are compared."""
+    return root_seed(None)
+
+
 def judge_to_choose(
     path: Path,
     episodes: int,
@@ -36,7 +41,7 @@ def judge_to_choose(
         InputError: The checkpoint is unusable.
     """
     policy = load_policy(path)
-    count, seed = min(episodes, 250), seed or root_seed(None)
+    count, seed = min(episodes, 250), seed or draw_seed()
     worlds = policy.flying(
         count, seed=seed.value, stream=Stream.CHOICE, device=device, renderer=renderer
     )

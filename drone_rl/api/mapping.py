@@ -24,6 +24,7 @@ from drone_rl.report import regions
 from drone_rl.settings.mapping import PlacesSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.provenance import provenance
+from drone_rl.utils.seeding import fresh_seed, legacy_seed
 from drone_rl.words.actions import MOVES
 from drone_rl.words.licence import say
 from drone_rl.words.places import PLACES, rows
@@ -116,7 +117,9 @@ def places(
     made = make_subject(policy.description, network, gap, settings.renderer)
     with one_thread(), closing(made) as subject:
         progress("comparing the renderer's pictures")
-        compared = subject.seeing.check(settings.compared, np.random.RandomState(0))
+        compared = subject.seeing.check(
+            settings.compared, np.random.RandomState(legacy_seed(fresh_seed()))
+        )
         progress("deciding the cells")
         found = map_places(
             subject.eye,

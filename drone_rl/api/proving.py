@@ -23,6 +23,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock, write_atomically
 from drone_rl.utils.limits import ARRAYS_BYTES
 from drone_rl.utils.provenance import provenance
+from drone_rl.utils.seeding import fresh_seed, legacy_seed
 from drone_rl.words.numbers import plural
 from drone_rl.words.proof import sentence, why_stopped
 
@@ -122,7 +123,7 @@ def prove(
     network, gap = policy.make_network(), settings.logit_gap
     made = make_subject(policy.description, network, gap, settings.renderer)
     with one_thread(), closing(made) as subject:
-        subject.seeing.check(settings.compared, np.random.RandomState(0))
+        subject.seeing.check(settings.compared, np.random.RandomState(legacy_seed(fresh_seed())))
         if folder is None:
             return _prove(policy, subject, settings, None, progress or Bar())
         folder = Path(folder)

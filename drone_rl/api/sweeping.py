@@ -43,10 +43,10 @@ def judge_sweep(sweep: Sweep, episodes: int, device: str) -> None:
         episodes: Of each verdict, in worlds to choose by.
         device: Where they are flown.
     """
-    from drone_rl.api.choosing import judge_run  # imports torch, which no other report needs
-    from drone_rl.utils.seeding import root_seed
+    # imports torch, which no other report needs
+    from drone_rl.api.choosing import draw_seed, judge_run
 
-    seed = root_seed(None)  # the same environments for all runs
+    seed = draw_seed()
     _log.info("%s", seed_line(seed.as_dict()))
     finished = [run for run in sweep.runs if read_result(run.folder) is not None]
     for done, run in enumerate(finished, start=1):

@@ -12,7 +12,6 @@ from scipy.spatial.distance import cdist
 from drone_rl.explanations.settings import check_perplexity
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.provenance import num_cores
-from drone_rl.utils.seeding import legacy_seed
 
 logging.getLogger("openTSNE").setLevel(logging.ERROR)  # its remarks are not for our users
 COMPONENTS = 50
@@ -73,7 +72,7 @@ def embed(originals: NDArray, *, perplexity: float = 30.0, seed: int = 0) -> Emb
     Args:
         originals: One row a point. Shape: (T, *).
         perplexity: Number of neighbours that each point looks to.
-        seed: Of the optimisation.
+        seed: Of the optimisation; below 2**32.
 
     Raises:
         InputError: There are too few points for the perplexity, or one is not finite.
@@ -90,7 +89,7 @@ def embed(originals: NDArray, *, perplexity: float = 30.0, seed: int = 0) -> Emb
     model = openTSNE.TSNE(
         perplexity=perplexity,  # pyright: ignore[reportArgumentType] (takes fractions, too)
         initialization="pca",
-        random_state=legacy_seed(seed),
+        random_state=seed,
         n_jobs=1 if few else num_cores(),
         neighbors="exact" if few else "annoy",
         negative_gradient_method="bh" if few else "fft",

@@ -6,8 +6,13 @@ from pathlib import Path
 import pytest
 
 import drone_rl
+from drone_rl.api import explaining
 from drone_rl.api.explaining import Explanations, _named
+from drone_rl.api.progress import silent
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.seeding import RootSeed
+
+SEED = RootSeed(6, is_fixed=False)
 
 
 def test_policies_of_the_same_name_go_by_their_files():
@@ -39,11 +44,32 @@ def test_mistakes_name_the_argument(change, message, tmp_path):
         drone_rl.explain("good", folder=tmp_path, **change)
 
 
+def test_all_policies_are_explained_from_one_fresh_seed(tmp_path, monkeypatch):
+    seen = []
+
+    def note(env, network, folder, settings, *, seed, **kwargs):
+        states = env.base_env.state_dict()["random_states"]
+        seen.append((seed, settings.seed, states[0]))
+        return {"verdict": {"kind": "good", "certain": True, "sentence": "It does."}}
+
+    monkeypatch.setattr(explaining, "explain_policy", note)
+    monkeypatch.setattr(explaining, "write_report", lambda *args: tmp_path)
+    how = {"folder": tmp_path, "num_envs": 2, "progress": silent}
+    first = drone_rl.explain(["good", "poor"], **how)
+    drone_rl.explain("good", **how)
+    drone_rl.explain("good", seed=first.seed.value, **how)
+    one, two, other, again = seen
+    assert one == two
+    assert (one[0], one[1]) == (first.seed, first.seed.value)
+    assert (one[0].is_fixed, again[0].is_fixed) == (False, True)
+    assert one[2] == again[2] != other[2]
+
+
 def test_they_show_their_report(tmp_path):
     (tmp_path / "report.html").write_text("<h1>trusted?</h1>")
     verdict = {"kind": "good", "certain": False, "sentence": "It does."}
-    shown = Explanations(tmp_path, tmp_path / "report.html", {"x": {"verdict": verdict}})
-    assert str(shown) == "x: good (not certain). It does."
+    shown = Explanations(tmp_path, tmp_path / "report.html", {"x": {"verdict": verdict}}, SEED)
+    assert str(shown) == "x: good (not certain). It does.\nenvironments: seed 6 (fresh)"
     assert shown._repr_html_().startswith(
         '<iframe sandbox="allow-scripts" srcdoc="&lt;h1&gt;trusted?'
     )

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from drone_rl.explanations import tsne
 from drone_rl.explanations.context import Context, LeftOutError
 from drone_rl.explanations.threads import aside
+from drone_rl.utils.seeding import legacy_seed
 
 
 @aside
@@ -19,12 +20,13 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
             "of this policy are known; give it as a torch module made of layers."
         )
     data, settings = context.dataset, context.settings
+    seed = legacy_seed(context.seed.value)
     numbers, arrays = {}, {}
     for name, originals in (
         ("features", data.features[context.layer]),
         ("pixels", data.observations),
     ):
-        embedding = tsne.embed(originals, perplexity=settings.perplexity, seed=context.seed.value)
+        embedding = tsne.embed(originals, perplexity=settings.perplexity, seed=seed)
         arrays[f"tsne_{name}"] = embedding.points
         numbers[name] = {
             "layer": context.layer if name == "features" else None,
