@@ -1,6 +1,7 @@
 """What a sweeper gets to see of a run; whole sweeps are in tests/cli/test_sweeps."""
 
 import json
+import logging
 import os
 import signal
 import sys
@@ -13,13 +14,14 @@ from drone_rl.hydra_app.launchers import (
     LocalLauncher,
     RayLauncher,
     SlurmLauncher,
+    SweepLauncher,
     _command,
     _job_return,
     _outcome,
     _sigterm_as_interrupt,
     register_plugins,
 )
-from drone_rl.sweeps import Run
+from drone_rl.sweeps import Run, Sweep
 
 
 @pytest.fixture
@@ -67,3 +69,20 @@ def test_sigterm_stops_a_sweep_as_ctrl_c_does():
         os.kill(os.getpid(), signal.SIGTERM)
         signal.sigtimedwait([], 1)
     assert signal.getsignal(signal.SIGTERM) is before
+
+
+def test_an_interrupted_sweep_says_how_to_go_on(run, tmp_path, monkeypatch, caplog):
+    class Interrupted:
+        def finish(self, runs):
+            raise KeyboardInterrupt
+
+    class Launcher(SweepLauncher):
+        def executor(self, folder):
+            return Interrupted()
+
+    monkeypatch.setattr("drone_rl.sweeps.page.write_sweep_report", lambda sweep: "report.html")
+    caplog.set_level(logging.INFO)
+    sweep = Sweep(tmp_path, "drone-rl train -m seed=0,1", {}, [run])
+    with pytest.raises(KeyboardInterrupt):
+        Launcher()._finish(sweep, [run])
+    assert "go on with the same command: drone-rl train -m seed=0,1" in caplog.text
