@@ -213,9 +213,9 @@ def what_ran(browser: Any, path: Path, *, is_markup: bool = False) -> str:
 
 
 def _requests(messages: Sequence[dict[str, Any]], path: Path) -> list[str]:
-    """Addresses outside the page that were asked for, and not stopped by the page's policy."""
+    """Addresses outside the page that were asked for, and not blocked before anything was sent."""
     failed = [m["params"] for m in messages if m["method"] == "Network.loadingFailed"]
-    stopped = {of["requestId"] for of in failed if of.get("blockedReason") == "csp"}
+    stopped = {of["requestId"] for of in failed if of.get("blockedReason")}
     sent = [m["params"] for m in messages if m["method"] == "Network.requestWillBeSent"]
     urls = [of["request"]["url"] for of in sent if of["requestId"] not in stopped]
     page = path.absolute().as_uri()

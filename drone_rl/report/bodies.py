@@ -54,7 +54,7 @@ def _looped_cell(axes: Axes, x: int, y: int, flights: Mapping[str, Any]) -> None
 
 def _cell(axes: Axes, x: int, y: int, verdict: Mapping[str, Any]) -> None:
     kind = verdict["kind"]
-    color = _COLORS.get(kind) or _COLORS[kind.split()[0]]
+    color = _COLORS.get(kind) or _COLORS.get(kind.split()[0], _COLORS["none"])
     box = {"facecolor": color, "edgecolor": "white", "linewidth": 2}
     axes.add_patch(Rectangle((x, y), 1, 1, **box))
     success, unsure = verdict["greedy"]["success"], "" if verdict["certain"] else " ?"

@@ -64,11 +64,6 @@ def test_nothing_runs_on_our_pages(explanations, tmp_path):  # noqa: F811
     assert [outcome for outcome in outcomes if outcome["ran"]] == []
 
 
-def test_there_are_enough_of_them():
-    assert len(set(PAYLOADS)) >= 60
-    assert all(payload.isprintable() and len(payload) <= 200 for payload in PAYLOADS)
-
-
 def test_counts(tmp_path, monkeypatch):
     outcomes = [{"page": "a", "payload": "b", "ran": ran} for ran in ("", "a script", "")]
     monkeypatch.setattr(injections, "open_all", lambda *_: outcomes)

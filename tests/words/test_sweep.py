@@ -91,7 +91,7 @@ def test_nothing_else_is_said_of_a_sweep_where_all_went_well():
         ("verdicts.not_certain", changed(certain=4), "2 of 6 verdicts are not certain"),
         ("verdicts.older_rule", changed(judged_by_older_rule=2), "not counted"),
         ("verdicts.missing", changed(never_judged=1), "`judge`"),
-        ("best.none", changed(best=None), "no run has been judged"),
+        ("best.none", changed(best=None), "No run has been judged"),
         ("best.chosen", changed(best={**SWEEP["best"], "certain": False}), "good (not certain)"),
         ("best.equals", changed(best={**SWEEP["best"], "equals": 2}), "2 runs collected the same"),
         ("curves.runs", with_group(ended=3), "fewer than 6 have ended"),
