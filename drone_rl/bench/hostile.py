@@ -26,7 +26,7 @@ MOST_SECONDS = 2.0
 """Of a refusal: processor time after the imports, which other work does not change."""
 MOST_MEMORY = 2**30
 """Bytes by which a refusal may grow the process."""
-MOST_ADDRESSES = 2**31
+MOST_ADDRESSES = 3 * 2**29
 """The same of its address space, so that a bomb ends the case and not the machine."""
 PATIENCE_S = 30
 """Until a command counts as hung."""
@@ -37,6 +37,8 @@ _PACKAGES = (
 """Imported with all their modules before any case runs."""
 _MORE = ("hydra.core.plugins", "scipy.special", "matplotlib.backends.backend_agg")
 
+_BEFORE = "resident_bytes_before"
+"""File in which a case notes its own memory before it begins."""
 _log = logging.getLogger(__name__)
 
 
@@ -130,13 +132,12 @@ def _fork(main: Any, arguments: list[str], here: Path, *, is_noted: bool = False
     Returns:
         "wrong", "mib" and "seconds", see `run_all`.
     """
-    before = _resident_bytes()
     child = os.fork()
     if child == 0:
         _become(main, arguments, here)
     _, status, used = os.wait4(child, 0)
     printed = (here / "stderr").read_text(errors="replace")
-    grown = used.ru_maxrss * 1024 - before
+    grown = used.ru_maxrss * 1024 - int((here / _BEFORE).read_text())
     seconds = used.ru_utime + used.ru_stime
     said = (here / "stdout").read_text(errors="replace")
     lines, status_code = printed.splitlines(), os.waitstatus_to_exitcode(status)
@@ -158,6 +159,7 @@ def _become(main: Any, arguments: list[str], here: Path) -> None:
     status = 1
     try:
         os.chdir(here)
+        Path(_BEFORE).write_text(str(_resident_bytes()))  # a fork has fewer pages than its parent
         for number, name in ((1, "stdout"), (2, "stderr")):
             target = os.open(name, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o644)
             os.dup2(target, number)

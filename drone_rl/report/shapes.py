@@ -56,6 +56,11 @@ _LENGTHS: Mapping[tuple[str, ...], int] = {
 """Of `explanation.json`: entries of the lists and mappings that figures show one by one."""
 _INDICES = {"actions": _ACTIONS, "film_actions": _ACTIONS, "episode": _MANY, "step": 10**7}
 """Arrays of whole numbers that are used as indices, and the first one that is too high."""
+_FINITE = {
+    *("tsne_features", "tsne_pixels", "places_points", "response_height", "outcome_height"),
+    *("response_forward", "response_lateral", "outcome_forward", "outcome_lateral"),
+}
+"""Arrays of places, which are numbers."""
 _LONGEST = 2000
 """Entries of any other list or mapping in it."""
 
@@ -78,6 +83,14 @@ def check_sizes(
     _check_arrays(arrays, _ARRAYS)
     _check_arrays(data, _DATA)
     known = {**arrays, **data}
+    for name in _FINITE & known.keys():
+        if not np.isfinite(known[name]).all():
+            raise InputError(f"{name} holds NaN or infinity")
+    if "places_ends" in arrays:
+        ends = arrays["places_ends"]
+        check_indices(ends, 1 + len(arrays.get("places_points", ())), "places_ends")
+        if (np.diff(ends) < 0).any():
+            raise InputError("places_ends go down")
     flown = len(data.get("flights/episode", ()))  # an episode has a step at least
     for name, most in {**_INDICES, "flights/episode": max(1, flown)}.items():
         if name in known:
