@@ -2,27 +2,38 @@
 
 import dataclasses
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, overload
+from typing import Protocol, TypeVar, overload
 
 from drone_rl.api.showing import aligned, interval, table
+from drone_rl.verdicts.judge import Verdict
 
-if TYPE_CHECKING:
-    from drone_rl.api.judging import Judgement
+
+class _Judged(Protocol):
+    """A judgement, as far as the table shows it."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def verdict(self) -> Verdict: ...
+
+
+T = TypeVar("T", bound=_Judged)
 
 
 @dataclasses.dataclass(frozen=True)
-class Judgements(Sequence["Judgement"]):
+class Judgements(Sequence[T]):
     """Several judgements, in the order in which they were asked for."""
 
-    each: tuple["Judgement", ...]
+    each: tuple[T, ...]
 
     @overload
-    def __getitem__(self, index: int) -> "Judgement": ...
+    def __getitem__(self, index: int) -> T: ...
 
     @overload
-    def __getitem__(self, index: slice) -> Sequence["Judgement"]: ...
+    def __getitem__(self, index: slice) -> Sequence[T]: ...
 
-    def __getitem__(self, index: int | slice) -> "Judgement | Sequence[Judgement]":
+    def __getitem__(self, index: int | slice) -> T | Sequence[T]:
         """One of them, or some."""
         return self.each[index]
 

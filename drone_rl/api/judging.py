@@ -238,14 +238,14 @@ def judge(
     policy: Sequence[str | Path | Pilot | Logits],
     settings: JudgeSettings | None = None,
     **how: Any,
-) -> Judgements: ...
+) -> Judgements[Judgement]: ...
 
 
 def judge(
     policy: str | Path | Pilot | Logits | Sequence[str | Path | Pilot | Logits],
     settings: JudgeSettings | None = None,
     **how: Any,
-) -> Judgement | Judgements:
+) -> Judgement | Judgements[Judgement]:
     """Judge one policy, or several one after the other; see `judge_one` for the arguments.
 
     Args:

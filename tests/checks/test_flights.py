@@ -73,6 +73,26 @@ def test_to_and_fro_goes_on_to_the_step_limit(make):
     assert flown.repeats.tolist() == [39, 39]
 
 
+class Hesitating(torch.nn.Module):
+    """Left and right a few times, then straight on."""
+
+    def __init__(self):
+        super().__init__()
+        self.actions = itertools.chain([1, 2, 1, 2, 1, 2], itertools.repeat(0))
+
+    def forward(self, pixels):
+        logits = torch.zeros(len(pixels), 3)
+        logits[:, next(self.actions)] = 1.0
+        return logits
+
+
+def test_repeats_begin_again_when_the_drone_moves_on(make):
+    """Only the last steps count: who goes on after going to and fro ends without any."""
+    simulator = make("good", num_cubes=1)
+    simulator._network = Hesitating()
+    assert simulator.fly(np.zeros((2, 1))).repeats.tolist() == [0, 0]
+
+
 def test_straight_flights_repeat_nothing(make):
     assert make("poor", num_cubes=1).fly(np.zeros((1, 1))).repeats.tolist() == [0]
 

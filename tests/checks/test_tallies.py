@@ -31,6 +31,21 @@ def test_what_luck_can_not_explain_is_told(steps, number):
     assert all("of 1000 random flights refute" in line for line in lines)
 
 
+def test_what_is_stated_of_all_and_of_none_is_accepted():
+    """An interval's end that equals what is stated refutes nothing: 1 of all, 0 of none."""
+    nowhere = np.zeros((0, 1, 2))
+    steps, owner = np.full(1000, 10), np.zeros(1000, int)
+    for stated in ({10: 1.0}, {10: 1.0, 12: 0.0}):
+        outcome = Outcome(EndReason.ALL_CUBES, (True,), False, 1.0, stated, nowhere)
+        assert list(find_wrong_tallies([outcome], owner, steps)) == []
+
+
+def test_what_is_open_may_be_of_any_number_and_no_more():
+    """Of a share of 0.8 the steps of 0.1 are open: 600 of 1000 may be said to be 0.52, not 0.3."""
+    assert wrong({10: 0.52, 11: 0.18}) == []
+    assert any("to take 10 steps" in line for line in wrong({10: 0.3, 11: 0.4}))
+
+
 def test_numbers_that_are_not_stated_are_counted_together():
     """Each of them is too seldom to refute anything: 40 flights of 1000, all different."""
     nowhere = np.zeros((0, 1, 2))

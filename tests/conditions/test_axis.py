@@ -2,6 +2,8 @@ import math
 
 import pytest
 
+import drone_rl
+from drone_rl.conditions.axes import AXES
 from drone_rl.conditions.axis import FACTORS, INVERSE, LINEAR, Axis
 from drone_rl.conditions.condition import Condition
 
@@ -38,3 +40,16 @@ def test_a_position_is_that_of_one_strength():
     for one in (axis(), axis(FACTORS, 1.0), axis(INVERSE, math.inf)):
         assert one.at(one.position(4.0)) == pytest.approx(4.0)
         assert one.at(0.0) == pytest.approx(one.neutral)
+
+
+@pytest.mark.parametrize("name", list(AXES))
+def test_a_value_leads_back_to_its_strength(name):
+    of, one = drone_rl.load_policy("good").description, AXES[name]
+    for strength in one.strengths:
+        assert one.strength(one.value(strength, of), of) == pytest.approx(strength)
+    assert one.strength(math.inf, of) == math.inf
+
+
+def test_less_is_more_on_an_inverse_scale():
+    assert axis(INVERSE, math.inf).signs == {"low": 1, "high": -1}
+    assert axis().signs == axis(FACTORS, 1.0).signs == {"low": -1, "high": 1}

@@ -217,6 +217,63 @@ def test_it_is_compared_with_who_knows_everything(make_prober):
     assert torch.equal(prober._oracle.success, torch.ones(1).double())
 
 
+def test_baselines_fly_under_the_condition_once_for_each_task(make_prober, monkeypatch):
+    """Blind policies meet the task as it is changed, whatever the camera shows."""
+    prober = make_prober(subject(), 4)
+    flown, blindly = [], prober._bed.fly_blindly
+    monkeypatch.setattr(
+        prober._bed, "fly_blindly", lambda condition: flown.append(condition) or blindly(condition)
+    )
+    shorter = Condition(task={"step_length": 0.5})
+    assert prober.probe(shorter, 1.0)["refused"] is None
+    prober.probe(dataclasses.replace(shorter, faults=(DeadRows(1),)), 1.0)
+    prober.probe(Condition(), 1.0)
+    assert flown == [shorter]
+    lengths = [baselines["forward"].length.double().mean() for baselines in prober._luck.values()]
+    assert lengths[1] > 1.8 * lengths[0]  # nearly twice as many steps to the boundary
+
+
+def test_impossible_is_what_the_oracle_surely_fails_at(make_prober):
+    """Of 60 episodes: neither an interval around the threshold nor one that ends at it."""
+    prober = make_prober(subject(), 60)
+    found = prober.probe(Condition(), domain.WALKING)
+    blind = dataclasses.replace(
+        AXES["dead_rows"], make=lambda s, _: Condition(faults=(DeadRows(5),))
+    )
+    seen = prober._explain(blind, 1.0, found)["oracle"]
+    assert seen["lower95"] < seen["share"] < seen["upper95"] < 0.9
+    around = (seen["share"] + seen["upper95"]) / 2
+    for possible, impossible in ((around, False), (seen["upper95"], False), (0.9, True)):
+        prober._possible = possible
+        assert prober._explain(blind, 1.0, found)["impossible"] == impossible
+
+
+def test_less_sight_is_the_lower_end(make_prober, monkeypatch):
+    """Of fog the range is from the least visibility that is good up to clear air."""
+    prober = make_prober(subject(), 1)
+    fog = dataclasses.replace(
+        AXES["fog"], make=lambda s, _: Condition(task={"strength": s}), own=None
+    )
+    good_at(prober, lambda s: s >= 30.0, monkeypatch)
+    found = prober.search(fog)
+    assert 30.0 <= found["low"] <= 40.0 and found["high"] is None
+    assert found["positions"][0] == 0.0 and found["positions"][1] == pytest.approx(1 / found["low"])
+    assert (found["low_open"], found["high_open"]) == (False, None)
+    (failed,) = found["failed"]
+    assert failed["end"] == "low" and 25.0 <= failed["value"] < 30.0
+
+
+def test_of_who_was_trained_in_fog_both_ends_are_searched(make_prober, monkeypatch):
+    prober = make_prober(subject(), 1)
+    fog = dataclasses.replace(
+        AXES["fog"], make=lambda s, _: Condition(task={"strength": s}), own=None, neutral=50.0
+    )
+    good_at(prober, lambda s: s >= 30.0, monkeypatch)
+    found = prober.search(fog)
+    assert 30.0 <= found["low"] <= 40.0 and found["high"] == 100.0
+    assert (found["low_open"], found["high_open"]) == (False, True)
+
+
 def test_what_nobody_can_do_is_called_so(make_prober):
     """With every row of the picture dead nobody sees a cube; in a little noise the oracle does."""
     prober = make_prober(subject(), 60)

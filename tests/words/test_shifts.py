@@ -3,7 +3,7 @@ import pytest
 from drone_rl.bench.evidence import SHIFTS as EVIDENCE
 from drone_rl.bench.evidence import changed
 from drone_rl.words.licence import said
-from drone_rl.words.shifts import SHIFTS, inward, rows
+from drone_rl.words.shifts import NAMES, SHIFTS, inward, rows
 
 
 def test_the_whole():
@@ -58,6 +58,27 @@ def test_what_the_task_cannot_have():
     refused |= {"end": "high", "oracle": None, "impossible": False}
     text = said(SHIFTS, changed(EVIDENCE, {"domain.ranges.brightness.failed": [refused]}))
     assert text["shifts.not"] == "Not with brightness at 9 times, which the task can't have."
+
+
+def test_fog_is_good_from_the_least_sight_up():
+    fog = {"low": 85.06, "high": None, "positions": [0.0, 1 / 85.06], "flown": []}
+    fog |= {"low_open": False, "high_open": None, "failed": []}
+    changes = {"axes.fog": EVIDENCE["axes"]["blur"], "domain.ranges.fog": fog}
+    assert (
+        "fog that leaves 85.1 m of sight or more."
+        in said(SHIFTS, changed(EVIDENCE, changes))["shifts.good"]
+    )
+    between = {**fog, "high": 100.0, "positions": [-0.01, 0.01], "high_open": True}
+    text = said(SHIFTS, changed(EVIDENCE, {**changes, "domain.ranges.fog": between}))
+    assert "fog that leaves 85.1 to 100 m of sight (no more was tried)" in text["shifts.good"]
+
+
+def test_all_at_once_names_the_axes():
+    text = said(SHIFTS, EVIDENCE)["shifts.together"]
+    assert text.startswith("With height of the sun, blur and brightness at once, each at its third")
+    many = {f"axes.{name}": EVIDENCE["axes"]["blur"] for name in list(NAMES)[:8]}
+    several = said(SHIFTS, changed(EVIDENCE, many))["shifts.together"]
+    assert several.startswith("With all 11 axes of the table at once")
 
 
 def test_the_table():
