@@ -6,6 +6,7 @@ from typing import Any
 
 from drone_rl.bench.evidence import (
     CARD,
+    EVALUATION,
     EXPLANATION,
     GROUP,
     HIGHER,
@@ -15,12 +16,13 @@ from drone_rl.bench.evidence import (
     VERDICT,
     changed,
 )
-from drone_rl.words import advice, card, domain, report, shifts, sweep, truth, verdict
+from drone_rl.words import advice, card, domain, evaluation, report, shifts, sweep, truth, verdict
 from drone_rl.words.licence import Sentence, said
 
 Changes = Mapping[str, Any]
 SPOKEN: dict[str, tuple[tuple[Sentence, ...], Mapping[str, Any]]] = {
     "verdict": (verdict.SENTENCES, VERDICT),
+    "evaluation": (evaluation.EVALUATION, EVALUATION),
     "explanation": (
         (*advice.SENTENCES, *report.SENTENCES, *truth.SENTENCES, *domain.QUOTED),
         EXPLANATION,
@@ -118,6 +120,15 @@ _OF_VERDICTS = (
     ("drawing", {"drawing.upper95": 0.05}),
     ("drawing", {"drawing": None}),
 )  # fmt: skip
+_OTHER_ACTIONS = {"rounding.differing": 5}
+_OF_EVALUATIONS = (
+    ("computed", {"rounding": None}),
+    ("computed", {"rounding.arithmetic": "float32 on cuda, PyTorch"}),
+    ("computed.same", _OTHER_ACTIONS),
+    ("computed.same", {"rounding": None}),
+    ("computed.other", {"rounding.differing": 0}, _OTHER_ACTIONS),
+    ("computed.other", {"rounding.differing": 6}, _OTHER_ACTIONS),
+)
 _CERTAIN_GOOD = {"verdict.kind": "good", "verdict.certain": True, "verdict.exit_code": 0}
 _NOT_CERTAIN = {"verdict.certain": False, "verdict.enough": 1600}
 _NO_PAIR = {"contradictions.pairs": 0}
@@ -339,6 +350,7 @@ _OF_SHIFTS = (
 )  # fmt: skip
 PLANTS = (
     *_plants("verdict", _OF_VERDICTS),
+    *_plants("evaluation", _OF_EVALUATIONS),
     *_plants("explanation", (*_OF_REPORTS, *_OF_MAPS)),
     *_plants("card", _OF_CARDS),
     *_plants("shifts", _OF_SHIFTS),

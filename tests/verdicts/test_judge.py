@@ -278,4 +278,4 @@ def test_a_tenth_of_the_episodes_makes_it_uncertain(rounded, is_open):
 
 
 def test_no_certainty_where_all_frames_are_fragile(rounded):
-    assert rounded(0, excessive=True).exit_code == 13
+    assert rounded(1, excessive=True).exit_code == 13
