@@ -29,7 +29,7 @@ from drone_rl.sim.settings import DynamicsSettings, TaskSettings
 from drone_rl.sim.tasks import as_task
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.provenance import provenance
-from drone_rl.utils.seeding import RootSeed, Stream, torch_generator, with_seed
+from drone_rl.utils.seeding import RootSeed, Stream, root_seed, torch_generator, with_seed
 from drone_rl.verdicts.judge import Verdict, judge_policy
 from drone_rl.verdicts.kinds import NOT_COVERED, NOT_PROVED
 from drone_rl.verdicts.luck import BASELINES, fly_baselines, make_baseline
@@ -263,7 +263,10 @@ def judge(
         return judge_one(cast("Any", policy), settings, **how)
     if not policy:
         raise InputError("policy=[] names nobody; give one or more policies")
-    return Judgements(tuple(judge_one(one, settings, **how) for one in policy))
+    given = how.pop("seed", (settings or JudgeSettings()).seed)
+    seed = how.pop("drawn_seed", None) or root_seed(given)  # all in the same environments
+    done = (judge_one(one, settings, drawn_seed=seed, **how) for one in policy)
+    return Judgements(tuple(done))
 
 
 def judge_one(

@@ -66,6 +66,7 @@ EVALUATION: Plain = {
         "differing": 0,
     },
 }
+"""What `evaluation.json` says of its seed and its arithmetic."""
 VERDICT: Plain = {
     "kind": "none of these",
     **FIXED_SEED,

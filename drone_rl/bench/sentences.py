@@ -35,6 +35,7 @@ from drone_rl.words.licence import Sentence, said
 Changes = Mapping[str, Any]
 SPOKEN: dict[str, tuple[tuple[Sentence, ...], Mapping[str, Any]]] = {
     "verdict": (verdict.SENTENCES, VERDICT),
+    "evaluation": (evaluation.EVALUATION, EVALUATION),
     "explanation": (
         (
             *source.SENTENCES,
@@ -49,7 +50,6 @@ SPOKEN: dict[str, tuple[tuple[Sentence, ...], Mapping[str, Any]]] = {
     "shifts": (shifts.SHIFTS, SHIFTS),
     "sweep": (sweep.SENTENCES, SWEEP),
     "setting": (sweep.GROUP_SENTENCES, GROUP),
-    "evaluation": (evaluation.EVALUATION, EVALUATION),
     "bodies": (seeds.BODIES, FIXED_SEED),
     "looped": (seeds.LOOPED, FIXED_SEED),
     "chances": (seeds.CHANCES, FIXED_SEED),
@@ -153,6 +153,15 @@ _OF_VERDICTS = (
     ("fixed_seed", _OTHER_SEED),
     ("fixed_seed", {"seed": None}),
 )  # fmt: skip
+_OTHER_ACTIONS = {"rounding.differing": 5}
+_OF_EVALUATIONS = (
+    ("computed", {"rounding": None}),
+    ("computed", {"rounding.arithmetic": "float32 on cuda, PyTorch"}),
+    ("computed.same", _OTHER_ACTIONS),
+    ("computed.same", {"rounding": None}),
+    ("computed.other", {"rounding.differing": 0}, _OTHER_ACTIONS),
+    ("computed.other", {"rounding.differing": 6}, _OTHER_ACTIONS),
+)
 _CERTAIN_GOOD = {"verdict.kind": "good", "verdict.certain": True, "verdict.exit_code": 0}
 _NOT_CERTAIN = {"verdict.certain": False, "verdict.enough": 1600}
 _NO_PAIR = {"contradictions.pairs": 0}
@@ -381,20 +390,11 @@ _OF_SHIFTS = (
     ("shifts.fixed_seed", _FRESH),
     ("shifts.fixed_seed", _OTHER_SEED),
 )  # fmt: skip
-_OTHERWISE = {"rounding.differing": 2}
-_OF_EVALUATIONS = (
-    ("computed", {"rounding": None}),
-    ("computed", {"rounding.arithmetic": "float32 on cuda, PyTorch"}),
-    ("computed.same", _OTHERWISE),
-    ("computed.same", {"rounding.compared_episodes": 50}),
-    ("computed.other", {"rounding.differing": 0}, _OTHERWISE),
-    ("computed.other", {"rounding.differing": 3}, _OTHERWISE),
-)
 _FIXED_SEEDS = ("evaluation", "bodies", "looped", "chances", "check")
 PLANTS = (
     *(Plant(of, f"{of}.fixed_seed", lie) for of in _FIXED_SEEDS for lie in (_FRESH, _OTHER_SEED)),
-    *_plants("evaluation", _OF_EVALUATIONS),
     *_plants("verdict", _OF_VERDICTS),
+    *_plants("evaluation", _OF_EVALUATIONS),
     *_plants("explanation", (*_OF_REPORTS, *_OF_MAPS)),
     *_plants("card", _OF_CARDS),
     *_plants("shifts", _OF_SHIFTS),

@@ -81,8 +81,9 @@ class Sight:
         pixels = self._worlds.render(state)
         for transform in self._transforms:
             pixels = transform._apply_transform(pixels)
+        logits = self._network(pixels)  # refuses what is not finite
         self._require_known(pixels)
-        return self._network(pixels)
+        return logits
 
     def _require_known(self, pixels: Tensor) -> None:
         """Refuse probabilities that depend on the order of summation.

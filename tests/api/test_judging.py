@@ -60,7 +60,12 @@ def test_several_at_once(good):
     assert done[1].verdict.kind == "poor" and done[:1][0] is done[0]
     assert str(done).splitlines()[1].split()[:3] == ["oracle", "good", "yes"]
     assert "<td>poor</td>" in done._repr_html_()
-    alone = drone_rl.judge("left", episodes=150, progress=silent)
+    seed = done[0].verdict.evidence["seed"]
+    assert (
+        done[1].verdict.evidence["seed"] == seed and not done[1].verdict.evidence["seed_is_fixed"]
+    )
+    fresh = RootSeed(seed, False)
+    alone = drone_rl.judge("left", episodes=150, progress=silent, drawn_seed=fresh)
     assert alone.verdict.evidence == done[1].verdict.evidence
     both = drone_rl.judge((good, "oracle"), episodes=2, sampled=False, progress=silent)
     assert [one.name for one in both] == ["good", "oracle"]

@@ -9,6 +9,8 @@ from hypothesis import strategies as st
 
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation import ConstantPolicy, Oracle, run_episodes
+from drone_rl.evaluation.branches import Outcomes
+from drone_rl.evaluation.fragility import Rounding
 from drone_rl.sim.actions import Move
 from drone_rl.sim.settings import DynamicsSettings, TaskSettings
 from drone_rl.sim.tasks.collect_cubes.rules import Side
@@ -261,3 +263,50 @@ def test_a_policy_is_flown_greedily_and_with_drawn_actions_in_the_same_worlds(mo
     flown.clear()
     judge_policy(env, Oracle(task), 3, sampled=False)
     assert [greedy for greedy, *_ in flown] == [True]
+
+
+@pytest.fixture
+def rounded(make_episodes, make_baselines):
+    """The verdict on a perfect policy of whose 400 episodes some may end otherwise."""
+
+    def rounded(number, *, is_open=False, excessive=False):
+        sides = [LAYOUTS[i % 4] for i in range(400)]
+        flown = make_episodes(sides, [[True, True]] * 400)
+        lost = make_episodes(sides[:number], [[False, False]] * number) if not is_open else None
+        opened = torch.arange(400) < (number if is_open else 0)
+        owner = torch.arange(0 if is_open else number)
+        rounding = Rounding(
+            arithmetic="float32 on cpu, PyTorch",
+            is_bound=True,
+            frames=16_000,
+            fragile=16_000 if excessive else number,
+            is_fragile=torch.arange(400) < number,
+            outcomes=Outcomes(lost, owner, opened),
+            compared="fused kernel",
+            compared_episodes=50,
+            differing=0,
+            unexplained=0,
+        )
+        return judge(flown, make_baselines(flown), rounding=rounding)
+
+    return rounded
+
+
+@pytest.mark.parametrize("is_open", [False, True])
+def test_few_episodes_that_rounding_decides_leave_a_verdict_certain(rounded, is_open):
+    verdict = rounded(4, is_open=is_open)
+    assert (verdict.kind, verdict.exit_code) == (Kind.GOOD, 0)
+    assert verdict.sentence.endswith("The verdict holds for float32 on cpu, PyTorch.")
+
+
+@pytest.mark.parametrize("is_open", [False, True])
+def test_a_tenth_of_the_episodes_makes_it_uncertain(rounded, is_open):
+    verdict = rounded(40, is_open=is_open)
+    assert (verdict.kind, verdict.certain, verdict.exit_code) == (Kind.GOOD, False, 13)
+    assert "Not certain: decisions depend on rounding. In 40 of 16,000 frames" in verdict.sentence
+    assert "too few" not in verdict.sentence
+    assert verdict.evidence["rounding"]["decides"]
+
+
+def test_no_certainty_where_all_frames_are_fragile(rounded):
+    assert rounded(1, excessive=True).exit_code == 13

@@ -31,6 +31,8 @@ def evidence():
     ends = [row("end", "front_boundary", 30), row("end", "step_limit", 0)]
     return {
         "kind": "good",
+        "seed": 0,
+        "seed_is_fixed": True,
         "certain": True,
         "good_share": 0.9,
         "enough": 400,
