@@ -67,7 +67,7 @@ def export(
         verdict=verdict,
         seed=seed,
         chosen=chosen,
-        shifts=None if measured is None else measured.numbers,
+        shifts=None if measured is None else _as_carried(measured.numbers, target),
     )
     if measured is not None and is_told({"shifts": measured.evidence, "verdict": verdict}):
         _carry(measured.path, shifts_path(target))
@@ -115,6 +115,13 @@ def export_onnx(
     except OSError as error:
         raise InputError(f"policy {target} can't be written ({error})") from error
     return found
+
+
+def _as_carried(numbers: dict[str, Any] | None, target: Path) -> dict[str, Any] | None:
+    """What a card quotes, by the name of the file that travels with the policy."""
+    if numbers is None:
+        return None
+    return {**numbers, "file": {**numbers["file"], "path": shifts_path(target).name}}
 
 
 def _carry(quoted: Path, target: Path) -> None:
