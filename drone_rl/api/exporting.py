@@ -78,7 +78,7 @@ def export(
         verdict=verdict,
         seed=seed.value,
         chosen=chosen,
-        shifts=None if measured is None else measured.numbers,
+        shifts=None if measured is None else _as_carried(measured.numbers, target),
         carried=carried,
     )
     return seed
@@ -128,6 +128,13 @@ def export_onnx(
             "another folder with hydra.run.dir=..."
         ) from error
     return found
+
+
+def _as_carried(numbers: dict[str, Any] | None, target: Path) -> dict[str, Any] | None:
+    """What a card quotes, by the name of the file that travels with the policy."""
+    if numbers is None:
+        return None
+    return {**numbers, "file": {**numbers["file"], "path": shifts_path(target).name}}
 
 
 def origin_of(path: Path, state: dict[str, Any]) -> tuple[str, dict[str, Any] | None]:

@@ -132,6 +132,7 @@ def test_a_card_quotes_conditions_that_then_travel_with_the_policy(tmp_path, nam
         assert beside.read_bytes() == made.read_bytes()
         again = drone_rl.load_policy(tmp_path / "mine.safetensors")
         assert find_domain(again).path == beside
+        assert "Read from mine.shifts.json, dated" in card  # and no path of this machine
 
 
 def test_an_onnx_model_that_agrees_is_left_with_its_command(tmp_path):
