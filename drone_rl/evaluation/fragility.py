@@ -26,8 +26,8 @@ from drone_rl.evaluation.greedy_flights import (
 from drone_rl.evaluation.metrics import Episodes
 from drone_rl.policies import PictureNetwork, make_actor
 from drone_rl.policies.finite import require_finite
-from drone_rl.policies.regrouped import Regrouped
-from drone_rl.policies.rounding import TOLERANCE, Decide, RoundingBound, decider
+from drone_rl.policies.regrouped import REMEDY, Regrouped, require_same_in_any_batch
+from drone_rl.policies.rounding import Decide, RoundingBound, decider
 from drone_rl.sim.actions import DiscreteActions
 from drone_rl.sim.dynamics import ComputerVision
 from drone_rl.utils.errors import InputError
@@ -38,9 +38,6 @@ ALONE = 16
 """Episodes that a network from elsewhere flies again, one frame at a time and in other batches."""
 _PAIR = 2
 """Possible actions of a frame of which each is tried."""
-_REMEDY = (
-    "give a callable without state, whose logits for a frame depend on no other frame of its batch"
-)
 MOST_FRAGILE = 0.02
 """Fragile frames, as a fraction of all, up to which a verdict can be certain. Honest policies have
 at most 0.002."""
@@ -373,32 +370,6 @@ def _require_function(env: EnvBase, network: PictureNetwork, log: StepLog, seen:
         if isinstance(network.actions, DiscreteActions) and len(other) > MOST_UNEXPLAINED * count:
             raise InputError(
                 f"{network.owner} acts by more than the frame: evaluated {words} it takes other "
-                f"actions in {len(other)} of {count} episodes; {_REMEDY}"
+                f"actions in {len(other)} of {count} episodes; {REMEDY}"
             )
     require_same_in_any_batch(network, frames, env.batch_size[0])
-
-
-@torch.no_grad()
-def require_same_in_any_batch(network: PictureNetwork, frames: Tensor, largest: int) -> None:
-    """Evaluate frames in batches of many sizes.
-
-    Args:
-        network: From elsewhere.
-        frames: Shape: (N, C, H, W).
-        largest: A size that must be among them.
-
-    Raises:
-        InputError: The outputs depend on the size.
-    """
-    rows = torch.linspace(0, len(frames) - 1, min(len(frames), 64)).long().to(frames.device)
-    frames = frames[rows]
-    alone = torch.cat([network(frame) for frame in frames.split(1)])
-    allowed = TOLERANCE * (1 + alone.abs().amax(-1))
-    for size in sorted({*range(1, 65), 100, 128, 200, 250, 256, 400, 500, 512, 1000, largest}):
-        which = (torch.arange(size, device=frames.device) + size) % len(frames)
-        difference = (network(frames[which]) - alone[which]).abs().amax(-1)
-        if bool((difference > allowed[which]).any()):
-            raise InputError(
-                f"{network.owner} gives other logits for the same frame in a batch of {size}: they "
-                f"differ by {float(difference.max()):.3g}; {_REMEDY}"
-            )
