@@ -1,7 +1,7 @@
 """Whether a policy's episodes depend on rounding, and whether two implementations agree on them."""
 
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Sequence
 from typing import Any, cast
 
 import torch
@@ -9,37 +9,44 @@ from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 from torchrl.envs import EnvBase
-from torchrl.envs.utils import ExplorationType, set_exploration_type
 
-from drone_rl.collectors import EpisodeCollector
 from drone_rl.collectors.sight import Sight
 from drone_rl.envs import worlds_of
 from drone_rl.evaluation.branches import Outcomes, follow
 from drone_rl.evaluation.evaluator import StepLog
+from drone_rl.evaluation.greedy_flights import (
+    batches,
+    ending,
+    env_base,
+    final,
+    only,
+    parting,
+    streams,
+)
 from drone_rl.evaluation.metrics import Episodes
 from drone_rl.policies import PictureNetwork, make_actor
 from drone_rl.policies.finite import require_finite
-from drone_rl.policies.regrouped import Regrouped
-from drone_rl.policies.rounding import TOLERANCE, Decide, RoundingBound, decider
+from drone_rl.policies.regrouped import REMEDY, Regrouped, require_same_in_any_batch
+from drone_rl.policies.rounding import Decide, RoundingBound, decider
 from drone_rl.sim.actions import DiscreteActions
+from drone_rl.sim.dynamics import ComputerVision
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.provenance import num_cores
 
 COMPARED = 50
 """Episodes that are flown in batches of another composition where there is no fused kernel."""
 ALONE = 16
 """Episodes that a network from elsewhere flies again, one frame at a time and in other batches."""
-_REMEDY = (
-    "give a callable without state, whose logits for a frame depend on no other frame of its batch"
-)
+_PAIR = 2
+"""Possible actions of a frame of which each is tried."""
 MOST_FRAGILE = 0.02
 """Fragile frames, as a fraction of all, up to which a verdict can be certain. Honest policies have
 at most 0.002."""
 MOST_FRAGILE_EPISODES = 0.25
 """The same of episodes with a fragile frame. Honest policies have at most 0.06."""
 MOST_UNEXPLAINED = 0.04
-"""Episodes that may end otherwise in another implementation where no bound on rounding is known, or
-where actions are continuous. With a bound none may, unless a frame of it was fragile."""
+"""Episodes that may end otherwise in another implementation where no bound on rounding is known,
+actions are continuous, or drones have flight dynamics. Otherwise none may take other actions,
+unless a frame of it was fragile."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -127,9 +134,12 @@ def examine(
     if not isinstance(network, PictureNetwork):
         return None
     decide, is_bound = decider(network)
-    episodes, before = min(episodes, len(flown)), _streams(env)
+    episodes, before = min(episodes, len(flown)), streams(env)
     seen, again = _fly(env, decide, network, episodes)
-    is_counted = isinstance(network.actions, DiscreteActions)
+    # implementations of flight dynamics round otherwise, so that frames are not the same
+    is_counted = isinstance(network.actions, DiscreteActions) and isinstance(
+        worlds_of(env).dynamics, ComputerVision
+    )
     with_what, count = "PyTorch", episodes
     if log.implementation == "PyTorch":
         env_base(env).load_state_dict(before)
@@ -138,7 +148,7 @@ def examine(
     else:
         ends = seen.episodes
     parted = [
-        _parting(a, b) if is_counted else _ending(flown, ends, i)
+        parting(a, b) if is_counted else ending(flown, ends, i)
         for i, (a, b) in enumerate(zip(log.actions[:count], again[:count], strict=True))
     ]
     differing = [i for i, step in enumerate(parted) if step is not None]
@@ -177,17 +187,22 @@ def compare(
     Raises:
         InputError: See `examine`.
     """
-    state, count = _streams(env), min(COMPARED, len(flown))
+    state, count = streams(env), min(COMPARED, len(flown))
     found = examine(env, actor, count, flown=flown, log=log)
     if found is None:
         return None
     env_base(env).load_state_dict(state)
-    again = StepLog()
-    for batch in _batches(env, actor, count, is_compiled=True, log=again):
+    again, finals = StepLog(), []
+    for batch in batches(env, actor, count, is_compiled=True, log=again):
         again.note(batch)
+        finals.append(final(env, batch))
     if again.implementation == log.implementation:
         return found
-    parted = [_parting(a, b) for a, b in zip(log.actions, again.actions, strict=False)]
+    if isinstance(worlds_of(env).dynamics, ComputerVision):
+        parted = [parting(a, b) for a, b in zip(log.actions, again.actions, strict=False)]
+    else:
+        ends = Episodes.joined(finals)
+        parted = [ending(flown, ends, i) for i in range(count)]
     differing = [i for i, at in enumerate(parted) if at is not None]
     unexplained = sum(not found.is_fragile[i] for i in differing)
     return dataclasses.replace(
@@ -198,25 +213,33 @@ def compare(
     )
 
 
-def env_base(env: EnvBase) -> Any:
-    """The environment behind transforms."""
-    return getattr(env, "base_env", env)
-
-
 class _Deciding(TensorDictModuleBase):
     """Acts greedily and notes whether another action was possible."""
 
-    def __init__(self, decide: Decide, network: PictureNetwork) -> None:
+    def __init__(
+        self, decide: Decide, network: PictureNetwork, *, is_contrary: bool = False
+    ) -> None:
+        """Takes a network.
+
+        Args:
+            decide: With it.
+            network: It.
+            is_contrary: Whether to take the second best action where it is possible.
+        """
         super().__init__()
         self.in_keys, self.out_keys = ["pixels"], ["action", "fragile"]
-        self._decide, self._network = decide, network
+        self._decide, self._network, self._is_contrary = decide, network, is_contrary
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Writes "action" and "fragile"."""
         found = self._decide(cast(Tensor, tensordict.get("pixels")))
         require_finite(found.outputs, self._network.owner)
         tensordict.set("fragile", found.is_fragile)
-        return tensordict.set("action", self._network.actions.greedy(found.outputs))
+        action = self._network.actions.greedy(found.outputs)
+        if self._is_contrary:
+            second = found.outputs.topk(2).indices[:, 1]
+            action = torch.where(found.possible.sum(-1) == _PAIR, second, action)
+        return tensordict.set("action", action)
 
 
 @dataclasses.dataclass
@@ -259,66 +282,58 @@ def _fly(
     sight = Sight.find(env, ("pixels",), ())
     is_counted = isinstance(network.actions, DiscreteActions)
     fragile, followed, log, finals, first = [], [], StepLog(), [], 0
-    for batch in _batches(env, _Deciding(decide, network), episodes, ("fragile",)):
+    before = streams(env)
+    for batch in batches(env, _Deciding(decide, network), episodes, ("fragile",)):
         log.note(batch)
         flags = cast(Tensor, batch["fragile"]).cpu()
         lengths = [len(a) for a in log.actions[first:]]
         fragile += flags.split(lengths)
-        finals.append(_final(env, batch))
+        finals.append(final(env, batch))
         worlds = torch.tensor([bool(f.any()) for f in fragile[first:]]).nonzero()[:, 0]
         is_few = len(worlds) <= MOST_FRAGILE_EPISODES * len(lengths)
-        if sight is not None and is_counted and len(worlds):
-            found = (
-                follow(sight, decide, worlds.to(env.device))
-                if is_few
-                else Outcomes(None, worlds[:0], torch.ones_like(worlds, dtype=torch.bool))
-            )
+        if is_counted and len(worlds):
+            if not is_few:
+                found = Outcomes(None, worlds[:0], torch.ones_like(worlds, dtype=torch.bool))
+            elif sight is not None:
+                found = follow(sight, decide, worlds.to(env.device))
+            else:
+                actor = _Deciding(decide, network, is_contrary=True)
+                found = _contrary(env, actor, before, fragile[first:], worlds)
             followed.append((first, found, worlds))
         first += len(lengths)
-    return _Seen(
-        Episodes.joined(finals), fragile, followed, sight is not None and is_counted
-    ), log.actions
+        before = streams(env)
+    return _Seen(Episodes.joined(finals), fragile, followed, is_counted), log.actions
 
 
-def _batches(
+def _contrary(
     env: EnvBase,
     actor: TensorDictModuleBase,
-    episodes: int,
-    noted: tuple[str, ...] = (),
-    *,
-    is_compiled: bool = False,
-    log: StepLog | None = None,
-) -> Iterator[TensorDictBase]:
-    """Greedy episodes, no more than are asked for; by the fused kernel if it may and can."""
-    keep = tuple(("next", "info", name) for name in (*worlds_of(env).task.scored, "end_reason"))
-    collector = EpisodeCollector(
-        env,
-        actor,
-        keep=keep,
-        keep_observations=False,
-        noted=noted,
-        is_compiled=is_compiled,
-        num_cores=num_cores(),
-    )
-    if log is not None:
-        log.implementation = collector.implementation
-    left = episodes
-    with set_exploration_type(ExplorationType.DETERMINISTIC):
-        while left > 0:
-            count = min(left, env.batch_size[0])
-            yield collector.collect(count)
-            left -= count
+    before: dict[str, Any],
+    fragile: Sequence[Tensor],
+    worlds: Tensor,
+) -> Outcomes:
+    """Fly a batch once more with the second best action in fragile frames.
 
+    That is for policies whose observations cannot be rendered from a state alone. Both flights are
+    all that there are of an episode if each has a single fragile frame, the same one.
 
-def _final(env: EnvBase, batch: TensorDictBase) -> Episodes:
-    task = worlds_of(env).task
-    done = cast(Tensor, batch["next", "done"])[:, 0].nonzero()[:, 0]
-    info = {
-        name: cast(Tensor, batch["next", "info", name])[done]
-        for name in (*task.scored, "end_reason")
-    }
-    lengths = cast(Tensor, batch["collector", "traj_ids"]).unique_consecutive(return_counts=True)
-    return Episodes.ended(task, info, lengths[1])
+    Args:
+        env: Its streams are the same after as before.
+        actor: Takes the second best action where two are possible.
+        before: Streams at the start of the batch.
+        fragile: Fragile frames of each episode of the batch.
+        worlds: Episodes that have any. Shape: (k,).
+    """
+    after, log = streams(env), StepLog()
+    env_base(env).load_state_dict(before)
+    (batch,) = batches(env, actor, len(fragile), ("fragile",))
+    env_base(env).load_state_dict(after)
+    log.note(batch)
+    again = cast(Tensor, batch["fragile"]).cpu().split([len(a) for a in log.actions])
+    is_open = [
+        only(fragile[i]) is None or only(fragile[i]) != only(again[i]) for i in worlds.tolist()
+    ]
+    return Outcomes(final(env, batch)[worlds], torch.arange(len(worlds)), torch.tensor(is_open))
 
 
 def _fly_regrouped(
@@ -327,9 +342,9 @@ def _fly_regrouped(
     """Flies with the network evaluated in other batches. Returns actions and episodes."""
     log, finals = StepLog(), []
     actor = make_actor(Regrouped(network, "mixed"), env.action_spec)
-    for batch in _batches(env, actor, episodes):
+    for batch in batches(env, actor, episodes):
         log.note(batch)
-        finals.append(_final(env, batch))
+        finals.append(final(env, batch))
     return log.actions, Episodes.joined(finals)
 
 
@@ -342,66 +357,19 @@ def _require_function(env: EnvBase, network: PictureNetwork, log: StepLog, seen:
     Raises:
         InputError: It does not.
     """
-    before, frames = _streams(env), torch.empty(0)
+    before, frames = streams(env), torch.empty(0)
     for groups, words in (("single", "one frame at a time"), ("mixed", "in other batches")):
         env_base(env).load_state_dict(before)
         again, actor = StepLog(), make_actor(Regrouped(network, groups), env.action_spec)
         count = min(ALONE, len(seen.fragile))
-        for batch in _batches(env, actor, count, ("pixels",)):
+        for batch in batches(env, actor, count, ("pixels",)):
             again.note(batch)
             frames = cast(Tensor, batch["pixels"])
-        parted = [_parting(a, b) for a, b in zip(log.actions, again.actions, strict=False)]
+        parted = [parting(a, b) for a, b in zip(log.actions, again.actions, strict=False)]
         other = [i for i, at in enumerate(parted) if at is not None and not seen.explains(i, at)]
         if isinstance(network.actions, DiscreteActions) and len(other) > MOST_UNEXPLAINED * count:
             raise InputError(
                 f"{network.owner} acts by more than the frame: evaluated {words} it takes other "
-                f"actions in {len(other)} of {count} episodes; {_REMEDY}"
+                f"actions in {len(other)} of {count} episodes; {REMEDY}"
             )
     require_same_in_any_batch(network, frames, env.batch_size[0])
-
-
-@torch.no_grad()
-def require_same_in_any_batch(network: PictureNetwork, frames: Tensor, largest: int) -> None:
-    """Evaluate frames in batches of many sizes.
-
-    Args:
-        network: From elsewhere.
-        frames: Shape: (N, C, H, W).
-        largest: A size that must be among them.
-
-    Raises:
-        InputError: The outputs depend on the size.
-    """
-    rows = torch.linspace(0, len(frames) - 1, min(len(frames), 64)).long().to(frames.device)
-    frames = frames[rows]
-    alone = torch.cat([network(frame) for frame in frames.split(1)])
-    allowed = TOLERANCE * (1 + alone.abs().amax(-1))
-    for size in sorted({*range(1, 65), 100, 128, 200, 250, 256, 400, 500, 512, 1000, largest}):
-        which = (torch.arange(size, device=frames.device) + size) % len(frames)
-        difference = (network(frames[which]) - alone[which]).abs().amax(-1)
-        if bool((difference > allowed[which]).any()):
-            raise InputError(
-                f"{network.owner} gives other logits for the same frame in a batch of {size}: they "
-                f"differ by {float(difference.max()):.3g}; {_REMEDY}"
-            )
-
-
-def _streams(env: EnvBase) -> dict[str, Any]:
-    return env_base(env).state_dict()
-
-
-def _parting(one: Tensor, other: Tensor) -> int | None:
-    """The first step at which actions differ; None if none do."""
-    shared = min(len(one), len(other))
-    steps = (one[:shared] != other[:shared]).nonzero()
-    if len(steps):
-        return int(steps[0, 0])
-    return None if len(one) == len(other) else shared
-
-
-def _ending(one: Episodes, other: Episodes, i: int) -> int | None:
-    """The last step if episodes end otherwise; None if they end alike."""
-    is_same = bool(one.end_reason[i] == other.end_reason[i]) and torch.equal(
-        one.goals.reached[i], other.goals.reached[i]
-    )
-    return None if is_same else int(one.length[i])

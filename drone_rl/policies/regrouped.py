@@ -4,6 +4,13 @@ import torch
 from torch import Tensor, nn
 
 from drone_rl.policies.network import PictureNetwork
+from drone_rl.policies.rounding import TOLERANCE
+from drone_rl.utils.errors import InputError
+
+REMEDY = (
+    "give a callable without state, whose logits for a frame depend on no other frame of its batch"
+)
+"""What to do about a callable that acts by its batch."""
 
 
 class Regrouped(PictureNetwork):
@@ -49,3 +56,29 @@ class Regrouped(PictureNetwork):
         """A number from 1 to `most`, small ones more often."""
         share = float(torch.rand((), generator=self._generator))
         return min(most, 1 + int((most + 1) ** share - 1))
+
+
+@torch.no_grad()
+def require_same_in_any_batch(network: PictureNetwork, frames: Tensor, largest: int) -> None:
+    """Evaluate frames in batches of many sizes.
+
+    Args:
+        network: From elsewhere.
+        frames: Shape: (N, C, H, W).
+        largest: A size that must be among them.
+
+    Raises:
+        InputError: The outputs depend on the size.
+    """
+    rows = torch.linspace(0, len(frames) - 1, min(len(frames), 64)).long().to(frames.device)
+    frames = frames[rows]
+    alone = torch.cat([network(frame) for frame in frames.split(1)])
+    allowed = TOLERANCE * (1 + alone.abs().amax(-1))
+    for size in sorted({*range(1, 65), 100, 128, 200, 250, 256, 400, 500, 512, 1000, largest}):
+        which = (torch.arange(size, device=frames.device) + size) % len(frames)
+        difference = (network(frames[which]) - alone[which]).abs().amax(-1)
+        if bool((difference > allowed[which]).any()):
+            raise InputError(
+                f"{network.owner} gives other logits for the same frame in a batch of {size}: they "
+                f"differ by {float(difference.max()):.3g}; {REMEDY}"
+            )
