@@ -93,3 +93,12 @@ def test_a_module_that_warp_compiles_has_more_time(root):
     chosen = reach.Reach(root, records).tests_for(mutant(6, 11, "drone_rl/sim/kernel.py"))
     assert chosen.own == (own,)
     assert chosen.limit_s == reach.START_S + reach.PATIENCE + reach.COMPILING_S
+
+
+def test_importers_by_way_of_a_package_count_too(root):
+    (root / "drone_rl" / "sim" / "__init__.py").write_text("from drone_rl.sim.small import LIMIT\n")
+    (root / "drone_rl" / "envs" / "far.py").write_text("from drone_rl.sim import LIMIT\n")
+    far = "tests/envs/test_far.py"
+    records = {far: record((f"{far}::far", 1.0, []))}
+    chosen = reach.Reach(root, records).tests_for(mutant(1, 8))
+    assert chosen.own == () and chosen.others == (far,)

@@ -82,10 +82,10 @@ class Reach:
             is_compiled = any(other.is_kernel for other in blocks(tree, module))
         else:
             tests, is_compiled = self._of_block.get(block.name, []), block.is_kernel
-        own = targets.mirror(mutant.module)
-        first = self._chosen([own], tests) if any(_file(t) == own for t in tests) else ()
-        files = sorted({_file(test) for test in tests} - {own}, key=self._nearest_to(own))
-        second = self._chosen(files, tests)
+        files, own = {_file(test) for test in tests}, targets.own_tests(mutant.module)
+        first = self._chosen([file for file in own if file in files], tests, BUDGET_S)
+        others = sorted(files - set(own), key=self._nearest_to(own[0]))
+        second = self._chosen(others, tests, WHOLE_FILE_S)
         total = sum(self._seconds[test] for test in (*first, *second))
         limit = START_S + PATIENCE * total + (COMPILING_S if is_compiled else 0.0)
         return Chosen(first, second, limit)
@@ -93,19 +93,18 @@ class Reach:
     def _of_import(self, module: str) -> list[str]:
         """Tests that may notice what runs at import: those of the module and of its importers."""
         name = module_name(module)
-        files = set(self._of_module.get(name, ())) | {targets.mirror(module)}
+        files = set(self._of_module.get(name, ())) | set(targets.own_tests(module))
         files |= {targets.mirror(other) for other in self._importers[name]}
         return [test for file in sorted(files) for test in self._of_file.get(file, [])]
 
-    def _chosen(self, files: list[str], tests: list[str]) -> tuple[str, ...]:
-        """Whole files, or of long ones the given tests, up to the budget; the first file always."""
+    def _chosen(self, files: list[str], tests: list[str], whole_s: float) -> tuple[str, ...]:
+        """Whole files, of long ones only the given tests, up to the budget; one test at least."""
         chosen, total = [], 0.0
-        for count, file in enumerate(files):
-            whole = self._seconds[file] <= (BUDGET_S if len(files) == 1 else WHOLE_FILE_S)
+        for file in files:
             of_file = [test for test in tests if _file(test) == file]
-            parts = [file] if whole else sorted(of_file, key=self._seconds.__getitem__)
-            for part in parts:
-                if total + self._seconds[part] <= BUDGET_S or (count == 0 and not chosen):
+            is_whole = self._seconds[file] <= whole_s
+            for part in [file] if is_whole else sorted(of_file, key=self._seconds.__getitem__):
+                if not chosen or total + self._seconds[part] <= BUDGET_S:
                     chosen.append(part)
                     total += self._seconds[part]
         return tuple(chosen)
@@ -128,10 +127,10 @@ def record(tree: Path, work: Path, jobs: int) -> Iterator[str]:
         A line about each file that was run.
     """
     (work / "records").mkdir(exist_ok=True)
-    missing = [file for file, path in _records(tree, work).items() if not path.exists()]
+    missing = {file: path for file, path in _records(tree, work).items() if not path.exists()}
     runs = (
-        forks.Run(f"record{count}", [file], RECORD_S, record=_records(tree, work)[file])
-        for count, file in enumerate(missing)
+        forks.Run(f"record{count}", [file], RECORD_S, record=path)
+        for count, (file, path) in enumerate(missing.items())
     )
     for count, outcome in enumerate(forks.run_all(runs, tree, work / "scratch", jobs), 1):
         file = outcome.run.tests[0]
@@ -155,14 +154,21 @@ def _records(tree: Path, work: Path) -> dict[str, Path]:
 
 
 def _importers(root: Path) -> dict[str, set[str]]:
-    """Paths of the modules that import each module, by its name."""
+    """Paths of the modules that import each module, by its name, be it by way of its package."""
     found: dict[str, set[str]] = defaultdict(set)
+    passed_on: dict[str, set[str]] = defaultdict(set)
     for path in targets.modules(root):
         for node in ast.walk(ast.parse((root / path).read_text())):
-            if isinstance(node, ast.ImportFrom) and node.module:
-                found[node.module].add(path)
-                for alias in node.names:
-                    found[f"{node.module}.{alias.name}"].add(path)
+            if not isinstance(node, ast.ImportFrom) or not node.module:
+                continue
+            names = [f"{node.module}.{alias.name}" for alias in node.names]
+            for name in (node.module, *names):
+                found[name].add(path)
+            if path.endswith("__init__.py"):
+                package = module_name(path)
+                passed_on[node.module] |= {f"{package}.{alias.name}" for alias in node.names}
+    for module, names in passed_on.items():
+        found[module] = found[module].union(*(found[name] for name in names if name in found))
     return found
 
 

@@ -7,6 +7,12 @@ NOT_MUTATED = ("bench",)
 NOT_RUN = ("bench", "docs", "examples", "tools", "test_wheel.py", "test_architecture.py")
 """Tests of other things; those of pages and examples start processes, which see no mutation."""
 
+ALSO = {
+    "drone_rl/settings/": "tests/hydra_app/test_schemas.py",
+    "drone_rl/sim/settings/": "tests/hydra_app/test_schemas.py",
+}
+"""Tests of whole packages: those that hold settings in code and in files together."""
+
 
 def modules(root: Path) -> list[str]:
     """Paths of the modules of drone_rl that are mutated, below the tree.
@@ -32,6 +38,12 @@ def test_files(root: Path) -> list[str]:
         for path in sorted((root / "tests").rglob("test_*.py"))
         if path.relative_to(root / "tests").parts[0] not in NOT_RUN
     ]
+
+
+def own_tests(module: str) -> list[str]:
+    """Files of the tests of a module: its mirror, and what its package is tested by."""
+    also = [file for package, file in ALSO.items() if module.startswith(package)]
+    return [mirror(module), *also]
 
 
 def mirror(module: str) -> str:

@@ -1,6 +1,7 @@
 """The list of mutants and a sample of it, kept in a session of Cosmic Ray."""
 
 import dataclasses
+import functools
 import hashlib
 from collections import Counter
 from collections.abc import Callable
@@ -37,8 +38,13 @@ class Mutant:
 
     def source(self, root: Path) -> str | None:
         """The mutated module; None if there is nothing to mutate."""
-        operator = cosmic_ray.plugins.get_operator(self.spec.operator_name)()
-        return mutate_code((root / self.module).read_text(), operator, self.spec.occurrence)
+        source = (root / self.module).read_text()
+        return _mutated(source, self.spec.operator_name, self.spec.occurrence)
+
+
+@functools.cache
+def _mutated(source: str, operator: str, occurrence: int) -> str | None:
+    return mutate_code(source, cosmic_ray.plugins.get_operator(operator)(), occurrence)
 
 
 def fill(
