@@ -94,7 +94,7 @@ class Reach:
         """Tests that may notice what runs at import: those of the module and of its importers."""
         name = module_name(module)
         files = set(self._of_module.get(name, ())) | set(targets.own_tests(module))
-        files |= {targets.mirror(other) for other in self._importers[name]}
+        files |= {targets.mirror(other) for other in self._importers[name]} | {targets.OF_ALL}
         return [test for file in sorted(files) for test in self._of_file.get(file, [])]
 
     def _chosen(self, files: list[str], tests: list[str], whole_s: float) -> tuple[str, ...]:
@@ -110,9 +110,13 @@ class Reach:
         return tuple(chosen)
 
     def _nearest_to(self, own: str) -> Any:
-        """Order of files of tests: of the same package first, then quick ones."""
+        """Order of files of tests: of all modules, of the same package, then quick ones."""
         folder = Path(own).parts[1]
-        return lambda file: (Path(file).parts[1] != folder, self._seconds[file])
+        return lambda file: (
+            file != targets.OF_ALL,
+            Path(file).parts[1] != folder,
+            self._seconds[file],
+        )
 
 
 def record(tree: Path, work: Path, jobs: int) -> Iterator[str]:

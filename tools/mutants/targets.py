@@ -12,6 +12,8 @@ ALSO = {
     "drone_rl/sim/settings/": "tests/hydra_app/test_schemas.py",
 }
 """Tests of whole packages: those that hold settings in code and in files together."""
+OF_ALL = "tests/test_data.py"
+"""Looks at what all modules define when they are imported."""
 
 
 def modules(root: Path) -> list[str]:
