@@ -96,3 +96,14 @@ def test_pictures_of_blocks_agree_with_ours(egl):
         timestep = env.step(action)
         worlds.step(torch.arange(1), torch.tensor([action]))
     ours.close()
+
+
+def test_fog_grows_with_the_distance_along_each_ray():
+    """Two rows of four pixels, 90 degrees high: rays through (+-1.5, +-0.5) and (+-0.5, +-0.5)."""
+    look = Appearance(colors={Meaning.SKY: (0.5, 0.5, 0.5)}, fog=10.0, exposure=2.0)
+    fogged = in_fog(np.zeros((2, 4, 3), np.uint8), np.full((2, 4), 5.0), look, 90.0, 80.0)
+    near, far = (int(255 * (1 - 0.05 ** (0.5 * d**0.5))) for d in (1.5, 3.5))
+    assert fogged[..., 0].tolist() == [[far, near, near, far]] * 2
+    narrow = in_fog(np.zeros((2, 4, 3), np.uint8), np.full((2, 4), 5.0), look, 53.13010235, 80.0)
+    near, far = (int(255 * (1 - 0.05 ** (0.5 * (1 + d / 4) ** 0.5))) for d in (0.5, 2.5))
+    assert np.abs(narrow[0, :2, 0] - np.array([far, near])).max() <= 1
