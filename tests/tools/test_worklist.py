@@ -7,6 +7,7 @@ import pytest
 
 pytest.importorskip("cosmic_ray")
 
+import cosmic_ray.plugins
 from cosmic_ray.mutating import mutate_code
 from cosmic_ray.work_db import WorkDB, use_db
 
@@ -123,3 +124,10 @@ def test_each_reason_and_each_harm_is_of_one_mutant():
         text = (kept.HERE / f"{name}.toml").read_text()
         ids = [id_ for entry in tomllib.loads(text).get("mutants", []) for id_ in entry["ids"]]
         assert len(ids) == len(set(ids)) == len(kept.listed(name))
+
+
+def test_only_operators_that_replace_like_by_like_are_tried():
+    names = cosmic_ray.plugins.operator_names()
+    assert {"drone_rl/SwapName", "core/NumberReplacer", "core/AddNot"} <= set(names)
+    assert "core/ReplaceBinaryOperator_Add_Sub" in names
+    assert "core/ReplaceBinaryOperator_Add_LShift" not in names

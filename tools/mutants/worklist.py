@@ -14,9 +14,10 @@ from cosmic_ray.work_db import WorkDB
 from cosmic_ray.work_item import MutationSpec, WorkerOutcome, WorkResult
 
 from tools.mutants.filters import changes_program, is_of_one_kind, is_within, silent_spans
-from tools.mutants.operators import Provider
+from tools.mutants.operators import OfOneKind, Provider
 
-cosmic_ray.plugins.OPERATOR_PROVIDERS["drone_rl"] = Provider()
+_PROVIDERS = cosmic_ray.plugins.OPERATOR_PROVIDERS
+_PROVIDERS |= {"drone_rl": Provider(), "core": OfOneKind(_PROVIDERS["core"])}
 FILTERED = "changes no behaviour, or only crashes"
 """Output of what the filters left out."""
 
