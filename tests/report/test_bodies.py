@@ -49,9 +49,9 @@ def test_where_words_stand_and_how_large_the_chart_is():
 
 
 def test_flights_under_a_firmware_are_the_last_column():
-    flown = {"success": {"successes": 3, "trials": 4, "lower95": 0.194, "upper95": 0.994}}
+    flown = {"success": {"successes": 3, "trials": 14, "lower95": 0.194, "upper95": 0.994}}
     figure = chart({**NUMBERS, LOOPED: {"one": flown}})
     last = figure.axes[0].texts[-1]
     assert last.get_position() == (2.5, 0.5)
-    assert last.get_text() == "no verdict: 3 of 4 (19\nto 99)"
+    assert last.get_text() == "no verdict: 3 of 14\n(19 to 99)"  # 22 letters a line
     assert cells(figure)[-1].get_xy() == (2, 0) and cells(figure)[-1].get_hatch() == ".."
