@@ -36,7 +36,11 @@ def main() -> int:
         sample, done, listed = worklist.sample_of(database, tree)
         _say(f"{len(sample)} mutants of {listed} in {len(modules)} modules, {len(done)} done")
         todo = [mutant for mutant in sample if mutant.job not in done]
-        _run(database, todo, tree, work, options.jobs)
+        tests = targets.test_files(tree)
+        if options.only:
+            own = {file for module in modules for file in targets.own_tests(module)}
+            tests = [file for file in tests if file in own]
+        _run(database, todo, tree, work, tests, options.jobs)
         done = {
             job: json.loads(result.output)
             for job, result in database.results
@@ -57,7 +61,12 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--seed", type=int, default=0, help="of the sample")
     parser.add_argument("--sample", type=int, default=1000, help="how many mutants")
     parser.add_argument("--jobs", type=int, default=2, help="processes at once")
-    parser.add_argument("--only", nargs="*", default=[], help="modules, by a part of their path")
+    parser.add_argument(
+        "--only",
+        nargs="*",
+        default=[],
+        help="modules, by a part of their path, with their own tests alone",
+    )
     parser.add_argument("--again", type=Path, help="a kept list: its survivors only, now")
     parser.add_argument("--out", type=Path, default=ROOT / "docs" / "mutants.json")
     parser.add_argument("--work", type=Path, default=ROOT / "outputs" / "mutants")
@@ -120,14 +129,21 @@ def _prepare(
     state.write_text(json.dumps(key))
 
 
-def _run(database: WorkDB, todo: list[worklist.Mutant], tree: Path, work: Path, jobs: int) -> None:
+def _run(
+    database: WorkDB,
+    todo: list[worklist.Mutant],
+    tree: Path,
+    work: Path,
+    tests: list[str],
+    jobs: int,
+) -> None:
     """Records what tests run, then runs those that can notice each mutant."""
     forks.import_libraries(work / "kernels")
     shutil.rmtree(work / "scratch", ignore_errors=True)
     (work / "scratch").mkdir()
-    for line in reach.record(tree, work, jobs):
+    for line in reach.record(tree, work, tests, jobs):
         _say(line)
-    reached = reach.read(tree, work)
+    reached = reach.read(tree, work, tests)
     if reached.failed:
         _say(f"left out, as they fail without a mutation: {', '.join(reached.failed)}")
     by_id = {mutant.id: mutant for mutant in todo}

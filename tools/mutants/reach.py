@@ -119,19 +119,21 @@ class Reach:
         )
 
 
-def record(tree: Path, work: Path, jobs: int) -> Iterator[str]:
+def record(tree: Path, work: Path, files: list[str], jobs: int) -> Iterator[str]:
     """Records the files of tests that have changed since they were recorded.
 
     Args:
         tree: The copy of the project.
         work: Folder of records and of temporary files.
+        files: Which tests.
         jobs: Processes at once.
 
     Yields:
         A line about each file that was run.
     """
     (work / "records").mkdir(exist_ok=True)
-    missing = {file: path for file, path in _records(tree, work).items() if not path.exists()}
+    paths = _records(tree, work, files)
+    missing = {file: path for file, path in paths.items() if not path.exists()}
     runs = (
         forks.Run(f"record{count}", [file], RECORD_S, record=path)
         for count, (file, path) in enumerate(missing.items())
@@ -141,19 +143,19 @@ def record(tree: Path, work: Path, jobs: int) -> Iterator[str]:
         yield f"{count}/{len(missing)} {outcome.status} {outcome.seconds:5.1f} s {file}"
 
 
-def read(tree: Path, work: Path) -> Reach:
-    """Reads all records; a file whose run left none (it was too long, or crashed) is left out."""
-    paths = _records(tree, work)
+def read(tree: Path, work: Path, files: list[str]) -> Reach:
+    """Reads records; a file whose run left none (it was too long, or crashed) is left out."""
+    paths = _records(tree, work, files)
     return Reach(tree, {f: json.loads(p.read_text()) for f, p in paths.items() if p.exists()})
 
 
-def _records(tree: Path, work: Path) -> dict[str, Path]:
+def _records(tree: Path, work: Path, files: list[str]) -> dict[str, Path]:
     """Where the record of each file of tests is, by what it depends on."""
     helpers = [p for p in (tree / "tests").rglob("*.py") if not p.name.startswith("test_")]
     shared = kept.digest(tree, ["drone_rl", *(p.relative_to(tree).as_posix() for p in helpers)])
     return {
         file: work / "records" / f"{_short(shared + kept.digest(tree, [file]) + file)}.json"
-        for file in targets.test_files(tree)
+        for file in files
     }
 
 
