@@ -4,7 +4,7 @@ from pathlib import Path
 
 NOT_MUTATED = ("bench",)
 """Packages that measure the program and are no part of what is claimed about it."""
-NOT_RUN = ("bench", "docs", "examples", "tools", "test_wheel.py", "test_architecture.py")
+NOT_RUN = ("docs", "examples", "tools", "test_wheel.py", "test_architecture.py")
 """Tests of other things; those of pages and examples start processes, which see no mutation."""
 
 ALSO = {
