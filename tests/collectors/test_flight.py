@@ -316,3 +316,13 @@ def test_a_lost_drone_ends_its_episode_in_the_kernel_too():
     lengths = batch["collector", "traj_ids"].bincount()
     assert lengths[2] == 1 and (lengths[[0, 1, 3, 4]] > 1).all()
     assert batch[REASON].flatten().tolist().count(EndReason.LOST_CONTROL) == 1
+
+
+def test_pictures_that_are_not_standardised_are_as_they_are_drawn():
+    collector = make(transforms=(GrayPixels,))
+    assert collector._flight is not None
+    batch = collector.collect()
+    first = torch.stack([batch[batch["collector", "traj_ids"] == i][0]["pixels"] for i in range(5)])
+    env = with_transforms(DroneEnv(5, SHORT), [GrayPixels()])
+    assert torch.equal(first, env.reset()["pixels"])
+    assert 0.0 <= first.min() < first.max() <= 1.0

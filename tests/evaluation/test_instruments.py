@@ -89,3 +89,92 @@ def test_words_say_where_it_goes(monkeypatch):
 
     instruments._draw_speeds(Canvas(), (-1.0, -0.02, -2.0), 6.0)
     assert said == ["speed", "backward", "1.0 m/s", "left", "0.0 m/s", "sinks", "2.0 m/s"]
+
+
+class Pen:
+    """Notes what is drawn where."""
+
+    def __init__(self):
+        self.texts, self.boxes, self.lines = [], [], []
+
+    def text(self, place, text, *_, **__):
+        self.texts.append((*place, text))
+
+    def rectangle(self, box, color):
+        self.boxes.append((*box, color))
+
+    def line(self, ends, color, width):
+        self.lines.append(ends)
+
+
+def test_bars_of_speed_by_the_pixel():
+    pen = Pen()
+    instruments._draw_speeds(pen, (3.0, 3.0, -12.0), 6.0)
+    tray = (50, 54, 63)
+    assert pen.boxes == [
+        (172, 54, 312, 66, tray),
+        (242, 54, 277, 66, instruments._BAR),  # half of 70 pixels
+        (172, 107, 312, 119, tray),
+        (207, 107, 242, 119, instruments._BAR),
+        (172, 160, 312, 172, tray),
+        (172, 160, 242, 172, instruments._BAR),  # never longer than its tray
+    ]
+    assert pen.lines == [(242, 51, 242, 69), (242, 104, 242, 122), (242, 157, 242, 175)]
+
+
+def test_bars_of_motors_by_the_pixel():
+    pen = Pen()
+    instruments._draw_motors(pen, (1.0, 0.0, 0.5, 2.0), 0.25)
+    bars = [box[:4] for box in pen.boxes if box[4] == instruments._BAR]
+    assert bars == [(342, 57, 376, 84), (414, 30, 448, 84), (342, 162, 376, 162),
+                    (414, 108, 448, 162)]  # fmt: skip
+    trays = [box[:4] for box in pen.boxes if box[4] != instruments._BAR]
+    assert trays == [(342, 30, 376, 84), (414, 30, 448, 84), (342, 108, 376, 162),
+                     (414, 108, 448, 162)]  # fmt: skip
+    assert pen.lines == [(x, y, x + 42, y) for y in (70, 148) for x in (338, 410)]
+    assert pen.texts[1:] == [
+        (359, 93, "front left"),
+        (431, 93, "front right"),
+        (359, 171, "rear left"),
+        (431, 171, "rear right"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("attitude", "text"),
+    [
+        (LEVEL, "0° left, 0° up"),
+        (Attitude(12.4, -3.0, 0.0), "12° right, 3° up"),
+        (Attitude(-2.0, 7.0, 0.0), "2° left, 7° down"),
+    ],
+)
+def test_the_needles_stand_still_and_the_attitude_is_written_below(attitude, text):
+    pen, image = Pen(), panel(Reading(LEVEL, (0.0, 0.0, 0.0), (0.0,) * 4), 6.0, 0.5)
+    instruments._draw_horizon(image, pen, attitude)
+    assert [box[:4] for box in pen.boxes] == [
+        (44, 100, 72, 103),
+        (96, 100, 124, 103),
+        (82, 100, 85, 103),
+    ]
+    assert pen.texts[-1] == (84, 178, text)
+
+
+def test_the_dial_is_round_and_has_a_line_each_ten_degrees():
+    dial = np.asarray(horizon(LEVEL)).astype(int)
+    corners = dial[[0, 0, -1, -1], [0, -1, 0, -1]]
+    assert (corners == instruments._BACKGROUND).all()
+    white = dial.min(-1) > 150
+    for degrees in (-20, -10, 10, 20):  # 40 degrees are 68 pixels
+        rows = slice(66 - round(1.7 * degrees), 70 - round(1.7 * degrees))
+        assert white[rows, 56:80].any(0).all()
+        assert not white[rows, :52].any() and not white[rows, 84:].any()
+    assert white[66:70, 2:134].any(0).all()  # across the whole dial
+    assert white.any(1).sum() == pytest.approx(5 * 2, abs=5)
+
+
+def test_of_several_drones_the_first_is_read():
+    body = FlightState.at_rest(torch.zeros(3, 3, dtype=torch.float64))
+    body.velocity[:] = torch.arange(9.0).view(3, 3)
+    body.rotors[:] = torch.arange(12.0).view(3, 4)
+    found = read(body)
+    assert found.speeds == (0.0, 1.0, 2.0) and found.rotors == (0.0, 1.0, 2.0, 3.0)

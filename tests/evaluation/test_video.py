@@ -3,7 +3,15 @@ import pytest
 import torch
 from tensordict import TensorDict
 
-from drone_rl.evaluation.video import _draw_bars, _look, film_episode, write_video
+from drone_rl.evaluation.video import (
+    _caption,
+    _compose,
+    _draw_bars,
+    _look,
+    _Seen,
+    film_episode,
+    write_video,
+)
 from drone_rl.sim.actions import MOVES
 from drone_rl.sim.continuous_actions import ContinuousActions
 from drone_rl.sim.meaning import Meaning
@@ -111,3 +119,53 @@ def test_in_flight_there_are_instruments(make_pipeline, task, actions):
     films = film_episode(*pipeline), film_episode(*make_pipeline(1, task=task))
     shown, other = (next(film)[12:202, 792:1268] for film in films)
     assert tuple(shown[0, 0]) == (24, 26, 31) != tuple(other[0, 0])
+
+
+def test_pictures_of_one_moment_by_the_pixel():
+    red, green, blue = (
+        torch.tensor(c, dtype=torch.uint8) for c in ((200, 0, 0), (0, 200, 0), (0, 0, 200))
+    )
+    seen = _Seen(
+        inside=blue.expand(10, 20, 3),
+        outside=red.expand(532, 1280, 3),
+        five=green.expand(5, 144, 252, 3),
+    )
+    shown = _compose(seen, "")
+    of = {name: (shown == color.numpy()).all(-1) for name, color in
+          (("red", red), ("green", green), ("blue", blue))}  # fmt: skip
+    assert shown.shape == (720, 1280, 3)
+    rows, columns = of["blue"].nonzero()  # 320 pixels across and half as high
+    assert (rows.min(), rows.max(), columns.min(), columns.max()) == (39, 198, 15, 334)
+    assert of["red"][0].all() and of["red"][531].all() and not of["red"][532:].any()
+    around = ~of["red"][:532]
+    assert around[12:202, 12:338].all() and around.sum() == 190 * 326
+    below = of["green"]
+    assert not below[:537].any() and not below[681:].any()
+    assert below[680].tolist() == [x % 257 < 252 for x in range(1280)]
+    label = ~below[537]  # from a camera's left edge on, behind its name
+    assert label[0] and label[257] and below[537, 251] and below[560 + 1, 0] and not below[560, 0]
+
+
+def test_a_tall_picture_of_the_policys_is_cut_to_half_the_height():
+    red, blue = (torch.tensor(c, dtype=torch.uint8) for c in ((200, 0, 0), (0, 0, 200)))
+    five = torch.zeros(5, 144, 252, 3, dtype=torch.uint8)
+    shown = _compose(_Seen(blue.expand(40, 20, 3), red.expand(532, 1280, 3), five), "")
+    rows, _ = (shown == blue.numpy()).all(-1).nonzero()
+    assert (rows.min(), rows.max()) == (39, 39 + 266 - 1)
+
+
+def test_bars_by_the_pixel():
+    canvas, acted = Canvas(), {"action": torch.tensor([0]), "logits": torch.zeros(1, 3)}
+    acted["logits"][0] = torch.tensor([0.5, 0.25, 0.25]).log()
+    _draw_bars(canvas, None, TensorDict(acted, [1]), MOVES)
+    assert [(x, width) for x, width, _ in canvas.bars] == [(420, 45), (740, 90), (1060, 45)]
+    assert [x for x, _ in canvas.texts] == [300, 620, 940]
+    assert [text for _, text in canvas.texts] == ["left 0.25", "forward 0.50", "right 0.25"]
+
+
+def test_a_caption_names_the_end_once_there_is_one(make_pipeline):
+    env, _ = make_pipeline(1, task=TaskSettings(num_cubes=1, first_distance=4.0))
+    state, task = env.reset(), env.base_env.worlds.task
+    assert _caption(task, state, 0.0).endswith(" 0")
+    state["info", "end_reason"][0] = 1
+    assert _caption(task, state, 1.0).endswith(" 1   ended: all cubes")

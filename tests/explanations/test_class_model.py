@@ -297,3 +297,18 @@ def test_bad_settings_are_refused(wrong):
 
 def test_smallest_settings_are_allowed():
     ClassModelSettings(steps=1, starts=1, lr=1e-9, blur=0.0, jitter=0, total_variation=0.0)
+
+
+def test_starts_are_anywhere_between_the_darkest_and_the_brightest():
+    statistics = PictureStatistics(mean=3.0, std=1.0, low=1.0, high=5.0, roughness=0.5)
+    still = dataclasses.replace(PLAIN, lr=1e-12, starts=8)
+    found = visualise(constant(0.0, 0.0, 0.0), statistics, still).pictures
+    assert 1.0 <= found.min() < 1.1 and 4.9 < found.max() <= 5.0
+    assert abs(float(found.mean()) - 3.0) < 0.2
+    assert torch.equal(found[0], found[1])  # the same for each action
+
+
+def test_of_pictures_without_any_difference_the_roughness_is_large_and_finite():
+    statistics = dataclasses.replace(WIDE, roughness=0.0)
+    found = visualise(constant(0.0, 0.0, 0.0), statistics, dataclasses.replace(PLAIN, starts=2))
+    assert torch.isfinite(found.roughness).all() and found.roughness.min() > 1e9

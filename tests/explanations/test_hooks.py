@@ -95,3 +95,26 @@ def test_a_function_has_no_layers():
         find_layer(network, "conv1")
     one = ForeignNetwork(nn.Sequential(nn.Flatten(), nn.Linear(80, 3)), (1, 8, 10), MOVES)
     assert feature_layer(one) == "0"
+
+
+class Last(nn.Module):
+    """A convolution whose numbers are the logits, beside a layer that sums over pictures."""
+
+    def __init__(self):
+        super().__init__()
+        self.conv = nn.Conv2d(1, 3, (8, 10))
+        self.over = Over()
+
+    def forward(self, x):
+        return self.over(x) * 0.0 + self.conv(x).flatten(1)
+
+
+class Over(nn.Module):
+    def forward(self, x):
+        return x.sum((0, 1, 2, 3)).view(1, 1)
+
+
+def test_a_convolution_may_be_the_last_and_what_is_of_no_picture_is_no_layer():
+    network = ForeignNetwork(Last(), (1, 8, 10), MOVES)
+    assert layer_names(network) == ["conv"]
+    assert spatial_layers(network) == ["conv"] and feature_layer(network) is None

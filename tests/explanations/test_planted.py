@@ -2,7 +2,17 @@ import pytest
 import torch
 
 from drone_rl.explanations.hooks import probabilities
-from drone_rl.explanations.planted import WINDOWS, linear, plant, reach, trained
+from drone_rl.explanations.planted import (
+    WINDOWS,
+    _span,
+    convolution,
+    detector,
+    linear,
+    plant,
+    reach,
+    trained,
+    two_looks,
+)
 from drone_rl.policies import MLP, SmallCNN
 
 SIZE = (25, 64)
@@ -81,3 +91,62 @@ def test_what_is_trained_learns_in_its_window_alone(pictures):
     assert (sees(x).argmax(-1) == wanted).float().mean() > 0.8
     weight = hidden.layers.fc1.weight.view(16, *SIZE)
     assert weight[:, 8:].abs().max() == 0 and weight[:, :8, :24].abs().min(0).values.max() > 0
+
+
+@pytest.mark.parametrize(
+    ("name", "rows", "columns"),
+    [
+        ("left", (8, 18), (4, 20)),
+        ("right", (8, 18), (44, 60)),
+        ("middle", (10, 16), (28, 36)),
+        ("sky, left", (0, 8), (0, 24)),
+        ("ground, right", (18, 25), (40, 64)),
+        ("ground", (20, 25), (0, 64)),
+        ("left edge", (0, 25), (0, 8)),
+        ("small", (10, 15), (12, 19)),
+    ],
+)
+def test_windows_by_the_pixel(name, rows, columns):
+    found = _span(WINDOWS[name], *SIZE)
+    assert [(part.start, part.stop) for part in found] == [rows, columns]
+
+
+def test_a_window_has_a_pixel_at_least():
+    assert _span((0.5, 0.5, 0.9, 0.9), 4, 10) == (slice(2, 3), slice(9, 10))
+
+
+@pytest.mark.parametrize("make", [linear, two_looks, convolution])
+def test_nothing_is_chosen_in_the_empty_scene_and_left_where_it_is_brighter(make):
+    absent = torch.linspace(-1.0, 1.0, 24 * 64).view(1, 24, 64)
+    network = make(absent, [WINDOWS["left"], WINDOWS["ground"]], 2.0)
+    assert network(absent[None]).abs().max() < 1e-5
+    brighter, darker = network(absent[None] + 0.5)[0], network(absent[None] - 0.5)[0]
+    assert brighter[1] > 0.1 and darker[2] > 0.1
+    torch.testing.assert_close(brighter[1], -brighter[2])
+    assert brighter[0] == darker[0] == 0
+
+
+def test_a_detector_by_hand():
+    """Darker by 1.5 than the empty scene, of which 0.2 do not count: six times 1.3."""
+    network = detector(torch.full((1, 24, 64), 0.5), WINDOWS["left"])
+    picture = torch.full((1, 1, 24, 64), 0.5)
+    assert network(picture).abs().max() == 0
+    assert network(picture - 1.5)[0].tolist() == pytest.approx([0.0, 7.8, -7.8], abs=1e-4)
+
+
+def test_what_is_planted_by_name(planted):
+    names = [p.name for p in planted]
+    assert len(names) == 2 * len(WINDOWS) + 4 + 3 + 4 + 3
+    assert names[16:20] == [
+        "left and ground, right",
+        "right and sky, left",
+        "ground and middle",
+        "left edge and right",
+    ]
+    trained_ones = [name for name in names if name.endswith("trained")]
+    assert [n.removesuffix(", trained") for n in trained_ones] == [
+        "left", "right", "left edge", "ground, right",
+    ]  # fmt: skip
+    assert [p.name for p in planted if p.is_blind] == [
+        "blind: constant", "blind: too sure", "blind: dead units",
+    ]  # fmt: skip

@@ -101,3 +101,14 @@ def test_a_drone_that_does_not_come_down():
     drone.fly(HoldPilot(ORIGIN, SETTINGS), 1.0)
     with pytest.raises(LoopError, match="landing: still"):
         land(drone, ORIGIN, within=0.1)
+
+
+def test_a_take_off_ends_near_its_height_and_not_before():
+    body = SimpleBody()
+    drone = LoopedDrone(body, body.start(), Full(), SETTINGS)
+    take_off(drone, np.array([0.0, 0.0, 2.0]))
+    assert 1.7 < drone.senses.position[2] < 1.75
+
+
+def test_corners_are_nearest_to_places_beyond_them():
+    assert distance_from(square(ORIGIN, 2.0), np.array([-1.0, -1.0, 0.0])) == pytest.approx(2**0.5)

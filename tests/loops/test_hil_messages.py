@@ -58,3 +58,14 @@ def test_rotors():
     controls = [0.1, 2.0, -1.0, math.nan, *[0.5] * 12]
     assert rotors_of(controls, 128).tolist() == [0.1, 1.0, 0.0, 0.0]
     assert rotors_of(controls, 0).tolist() == [0.0] * 4
+
+
+def test_constants_of_the_messages():
+    """Thirteen fields are new: three each of force, rates and field, and four of the air."""
+    fields = sensor_fields(SENSES)
+    assert fields["fields_updated"] == 2**13 - 1
+    assert (fields["temperature"], fields["diff_pressure"]) == (15.0, 0.0)
+    assert FIELD == (0.1795, 0.0490, 0.4903)
+    place = gps_fields(SENSES)
+    assert (place["fix_type"], place["satellites_visible"]) == (3, 12)
+    assert (place["eph"], place["epv"]) == (100, 100)

@@ -1,5 +1,6 @@
 """The keeper alone, as a program."""
 
+import io
 import json
 import socket
 import subprocess
@@ -94,3 +95,34 @@ def test_a_network_of_its_own_is_another(own_network):
         lines.close()
         ours.close()
         assert process.wait(10.0) == 0
+
+
+def test_sockets_of_each_kind():
+    with keeper.make_socket("bound", 0) as hears:
+        assert hears.type == socket.SOCK_DGRAM and hears.gettimeout() == 1.0
+        with keeper.make_socket("udp", hears.getsockname()[1]) as sends:
+            assert sends.type == socket.SOCK_DGRAM
+            sends.send(b"here")
+            assert hears.recv(16) == b"here"
+    with (
+        socket.create_server(("127.0.0.1", 0)) as server,
+        keeper.make_socket("tcp", server.getsockname()[1]) as sends,
+    ):
+        assert sends.type == socket.SOCK_STREAM
+
+
+def test_each_request_has_an_answer_of_one_line_and_its_socket():
+    requests = [{"request": "poll"}, {"request": "socket", "kind": "bound", "port": 0}]
+    lines = io.BytesIO(b"".join(json.dumps(request).encode() + b"\n" for request in requests))
+    near, far = socket.socketpair()
+    with near, far:
+        near.settimeout(5.0)
+        keeper.serve(far, lines)
+        text, given = b"", []
+        while text.count(b"\n") < 2:
+            part, more, _, _ = socket.recv_fds(near, 4096, 1)
+            text, given = text + part, [*given, *more]
+        assert [json.loads(line) for line in text.splitlines()] == [{"status": 0}, {}]
+        (number,) = given
+        with socket.socket(fileno=number) as sock:
+            assert sock.getsockname()[0] == "127.0.0.1"

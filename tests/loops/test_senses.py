@@ -84,3 +84,18 @@ def test_the_body_of_these_tests_falls_and_turns_as_it_should():
     assert fallen.velocity[0, 2] == pytest.approx(-9.81)
     turning = body.push(high, torch.tensor([[0.5, 0.5, 0.6, 0.6]], dtype=torch.float64), 1)
     assert turning.angular_velocity[0, 2] == pytest.approx(0.001 * 0.055562 * 0.2 / 0.01428)
+
+
+def test_the_heading_of_a_tilted_drone_is_where_its_nose_points():
+    """A quarter turn to the left, then the nose down by 40 degrees and a roll by 30."""
+    half = [math.radians(angle) / 2 for angle in (90.0, 40.0, 30.0)]
+    (cz, cy, cx), (sz, sy, sx) = (list(map(f, half)) for f in (math.cos, math.sin))
+    attitude = np.array([
+        cz * cy * cx + sz * sy * sx,
+        cz * cy * sx - sz * sy * cx,
+        cz * sy * cx + sz * cy * sx,
+        sz * cy * cx - cz * sy * sx,
+    ])  # fmt: skip
+    zeros = np.zeros(3)
+    senses = Senses(0.0, zeros, zeros, attitude, zeros, zeros)
+    assert senses.heading == pytest.approx(math.pi / 2)

@@ -114,3 +114,10 @@ def test_limits():
 
 def test_it_is_seen_in_a_notebook(flying):
     assert "flying, armed" in flying._repr_html_()
+
+
+def test_a_way_may_take_three_times_as_long_as_it_should_and_10_s():
+    assert limit_of(None, 12.0, 4.0) == 19.0
+    assert limit_of(0.5, 12.0, 4.0) == 0.5
+    with pytest.raises(InputError, match=r"timeout=-0\.5"):
+        limit_of(-0.5, 12.0, 4.0)

@@ -18,3 +18,20 @@ def test_a_way_from_above(quadrotor, hovering):
     assert "landed, disarmed" in text
     assert "nothing" in text
     assert len(text) < 2000
+
+
+class Long:
+    """A thousand places on a line ahead."""
+
+    positions = np.stack([np.arange(1000.0), np.zeros(1000), np.ones(1000)], -1)
+
+    def __len__(self):
+        return len(self.positions)
+
+
+def test_of_a_long_way_every_other_place_is_drawn():
+    points = re.search('points="([^"]+)"', way(Long()))[1].split()
+    assert len(points) == 500
+    assert points[0] == "10.0,150.0"
+    scale = 140 / 998
+    assert points[1] == f"10.0,{10 + scale * 996:.1f}"

@@ -3,7 +3,9 @@
 import pytest
 import torch
 
+from drone_rl.policies.known_outputs import KnownOutputs
 from drone_rl.policies.learning_network import LearningNetwork
+from drone_rl.policies.packed_layer import outputs_at, packed_layers
 from tests.policies.halves import draw_weights, halves, made, taught
 
 
@@ -52,3 +54,33 @@ def test_gradients_of_pictures_are_torchs(shape, options):
     (learning(pictures * 1.0) * weights).sum().backward()
     assert all(p.grad is None for p in network.parameters())
     torch.testing.assert_close(pictures.grad, found)
+
+
+@pytest.mark.parametrize(
+    ("first", "last"),
+    [
+        (0, 70),
+        (13, 58),  # some of the pictures, so that no row is that of its picture
+    ],
+)
+def test_gradients_from_known_outputs_in_any_order_are_torchs(first, last):
+    network = made((1, 12, 20), channels=(5, 6), hidden=(9, 7))
+    learning = LearningNetwork.find(network, 2)
+    learning.known = known = KnownOutputs(100, outputs_at(packed_layers(network))[-1])
+    pictures, weights = halves(70, 1, 12, 20), halves(last - first, 3)
+    learning(pictures)  # makes room for the weights; nothing is known yet
+    work = learning._work
+    outputs = work.answer(pictures.flatten(1)).outputs.view(-1, known.outputs.shape[1])
+    rows = torch.randperm(100)[:70]
+    known.forget()
+    known.outputs.fill_(3.0)  # wrong wherever another row is read
+    known.outputs[rows] = outputs[:70]
+    known.note(pictures, rows, work._weights.clone())
+    some = pictures[first:last]
+    assert known.find(some.flatten(1), work._weights) is not None
+    logits, expected = taught(network, network, some, weights)
+    found, gradients = taught(network, learning, some, weights)
+    torch.testing.assert_close(found, logits)
+    for gradient, other in zip(gradients, expected, strict=True):
+        assert other.any()
+        torch.testing.assert_close(gradient, other, rtol=1e-5, atol=1e-5)

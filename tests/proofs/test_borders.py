@@ -144,3 +144,15 @@ def test_the_doubtful_area_is_a_band_along_each_border():
 def test_spans_that_touch_are_one():
     spans = np.array([[3.0, 4.0], [0.0, 1.0], [1.0, 2.0], [0.5, 0.7]])
     assert joined(spans) == [[0, 2], [3, 4]]
+
+
+def test_the_band_along_a_slanting_border_grows_with_its_height():
+    """From y = 2 at x = 2 to y = 4 at x = 6, with a slope of a half."""
+    window = Window(2.0, 8.0, 5.0)
+    line = np.array([[0.5, 1.0, 2.0, 6.0]]).T
+    found = doubtful_area(eye([1.0], [0.5]), Pieces(*line, np.empty((0, 3))), window)
+    low, high = (16 * (y + 1) + 3 * 0.5 * 10 + 3 * 10 for y in (2, 4))
+    assert found == pytest.approx(4 * (low + high) * UNIT)
+    far = doubtful_area(eye([1.0], [0.5]), Pieces(*line, np.empty((0, 3))), Window(2.0, 19.0, 12.0))
+    low, high = (16 * (y + 1) + 3 * 0.5 * 20 + 3 * 12 for y in (2, 4))
+    assert far == pytest.approx(4 * (low + high) * UNIT)

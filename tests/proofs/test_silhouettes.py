@@ -1,9 +1,11 @@
 """The closed form of a cube's picture, by hand for a tiny camera and against the renderer."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
-from drone_rl.proofs.silhouettes import FRONT, LEFT_SIDE, NOTHING, RIGHT_SIDE, Eye
+from drone_rl.proofs.silhouettes import FRONT, LEFT_SIDE, NOTHING, RIGHT_SIDE, UNIT, Eye
 from drone_rl.sim.settings import CameraSettings, TaskSettings
 
 
@@ -93,3 +95,13 @@ def test_float32_moves_a_cube_by_no_more_than_is_allowed_for():
     seen = (cubes.astype(np.float32) - drone.astype(np.float32)).astype(float)
     errors = np.abs(seen - (cubes - drone)) / eye.rounding(cubes - drone)
     assert 0.5 < errors.max() < 1  # and not for much more
+
+
+def test_how_far_float32_may_move_each_border(tiny):
+    """Ways of 2, 4 and 6 m: 16 (way + 1) + 3 * 40 + 3 * 20 units of 2^-24."""
+    places, errors = tiny.borders(4.0)
+    assert places.tolist() == [-6, -4, -2, 2, 4, 6]
+    assert (errors / UNIT).tolist() == [292, 260, 228, 228, 260, 292]
+    steep = dataclasses.replace(tiny, left=np.array([2.0, -2.0]))
+    _, errors = steep.borders(4.0)  # ways of 5, 7 and 11 m
+    assert (errors[3:] / UNIT).tolist() == [16 * 6 + 300, 16 * 8 + 300, 16 * 12 + 300]

@@ -4,6 +4,7 @@ from matplotlib.colors import to_hex
 from matplotlib.patches import Rectangle
 
 from drone_rl.report.bodies import chart
+from drone_rl.words.looped import LOOPED
 from tests.words.test_bodies import BAD, GOOD, NUMBERS
 
 
@@ -34,3 +35,23 @@ def test_it_grows_with_what_there_is():
     small, large = chart(NUMBERS), chart(more)
     assert (large.get_size_inches() > small.get_size_inches()).all()
     assert len(cells(large)) == 6
+
+
+def test_where_words_stand_and_how_large_the_chart_is():
+    figure = chart({**NUMBERS, "policies": {"one": NUMBERS["policies"]["one"]} | {"two": {
+        "computer vision": BAD, "wind 8 m/s": GOOD}}})  # fmt: skip
+    assert figure.get_size_inches().tolist() == [1.75 * 3, 0.95 * 2 + 0.6]
+    places = {text.get_text(): text.get_position() for text in figure.axes[0].texts}
+    assert places["one"] == (-0.05, 0.5) and places["two"] == (-0.05, 1.5)
+    assert places["computer vision"] == (0.5, -0.25)
+    second = [text.get_position() for text in figure.axes[0].texts if text.get_text() == "good"]
+    assert second == [(0.5, 0.2), (1.5, 1.2)]
+
+
+def test_flights_under_a_firmware_are_the_last_column():
+    flown = {"success": {"successes": 3, "trials": 14, "lower95": 0.194, "upper95": 0.994}}
+    figure = chart({**NUMBERS, LOOPED: {"one": flown}})
+    last = figure.axes[0].texts[-1]
+    assert last.get_position() == (2.5, 0.5)
+    assert last.get_text() == "no verdict: 3 of 14\n(19 to 99)"  # 22 letters a line
+    assert cells(figure)[-1].get_xy() == (2, 0) and cells(figure)[-1].get_hatch() == ".."

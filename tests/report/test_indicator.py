@@ -57,3 +57,35 @@ def test_other_actions_have_a_row_each_those_to_the_left_first():
     assert np.ptp(columns) == pytest.approx(0.6 * 144, abs=1)
     others, _ = pixels(picture, MUTED).nonzero()
     assert others.min() > ROW
+
+
+def spans(picture, color):
+    """First and last row and column of a colour."""
+    rows, columns = pixels(picture, color).nonzero()
+    return rows.min(), rows.max(), columns.min(), columns.max()
+
+
+@pytest.mark.parametrize(
+    ("chosen", "expected"),
+    [
+        (1, (58, 68, 98, 142)),  # left: half of 88 pixels, from 8 beside the middle
+        (2, (58, 68, 158, 202)),
+        (0, (38, 68, 145, 155)),  # ahead: half of 60
+    ],
+)
+def test_arrows_by_the_pixel(chosen, expected):
+    assert spans(indicator([0.5, 0.5, 0.5], chosen, 300), CHOSEN) == expected
+
+
+@pytest.mark.parametrize("chosen", [0, 1, 2])
+def test_an_arrow_of_nothing_is_still_there(chosen):
+    low, high, first, last = spans(indicator([0.0, 0.0, 0.0], chosen, 300), CHOSEN)
+    assert (high - low, last - first) == {0: (1, 10), 1: (10, 1), 2: (10, 1)}[chosen]
+
+
+def test_rows_by_the_pixel():
+    picture = indicator([0.0, 0.25, 0.5, 0.25, 0.0], 2, 300, FIVE)
+    assert spans(picture, CHOSEN) == (4, 16, 150, 222)  # half of 144
+    rows, columns = pixels(picture, MUTED).nonzero()
+    widths = [np.ptp(columns[(rows >= 18 * i + 4) & (rows <= 18 * i + 16)]) for i in range(1, 5)]
+    assert widths == [1, 1, 36, 36]  # up, stay, down and right, in the order (2, 0, 4, 1, 3)

@@ -87,3 +87,25 @@ def test_a_probed_frame_has_its_own_bars():
     assert white.size == (30, 42 + 3 + bars.height)
     assert white.getpixel((1, 30)) == (255, 255, 255)
     assert list(white.crop((0, 45, 30, 45 + bars.height)).getdata()) == list(bars.getdata())
+
+
+def test_where_pictures_of_a_stack_and_of_a_grid_stand():
+    parts = [Image.new("RGB", (4, 3), (shade, 0, 0)) for shade in (50, 100, 150, 200, 250)]
+    stack = np.asarray(pictures.stacked([parts[0], parts[1].resize((2, 3))], gap=2))
+    assert stack.shape == (8, 4, 3)
+    assert (stack[:3] == (50, 0, 0)).all() and (stack[3:5] == BACKGROUND).all()
+    assert (stack[5:, :2] == (100, 0, 0)).all() and (stack[5:, 2:] == BACKGROUND).all()
+    grid = np.asarray(pictures.gridded(parts, columns=2, gap=1))
+    assert grid.shape == (3 * 3 + 2, 9, 3)
+    corners = [(0, 0), (0, 5), (4, 0), (4, 5), (8, 0)]
+    for (y, x), part in zip(corners, parts, strict=True):
+        assert (grid[y : y + 3, x : x + 4] == np.asarray(part)).all()
+    assert (grid[8:, 4:] == BACKGROUND).all() and (grid[3] == BACKGROUND).all()
+
+
+def test_heat_by_the_level():
+    heat = np.array([[0.0, 2.0]])
+    shown = pictures.heated(np.full((1, 2, 3), 100, np.uint8), heat)
+    dark, bright = (np.array(pictures.colormaps["inferno"](v)[:3]) * 255 for v in (0.0, 1.0))
+    assert shown[0, 0].tolist() == (75 * 0.85 + dark * 0.15).astype(int).tolist()
+    assert shown[0, 1].tolist() == (75 * 0.1 + bright * 0.9).astype(int).tolist()

@@ -78,3 +78,37 @@ def test_the_element_has_the_same_corners_turned_upwards():
 )
 def test_round_numbers(most, ticks):
     assert _ticks(most) == ticks
+
+
+def test_marks_and_scale_of_the_element_by_the_centimetre():
+    """A unit is a 60th of 3 + 4 metres."""
+    text = svg(NUMBERS, WAYS, MOVES)
+    root = ElementTree.fromstring(text)
+    unit = 7 / 60
+    box = (-3 - 3 * unit, -4 - unit, 6 + 4 * unit, 4 + 5.5 * unit)
+    assert [float(v) for v in root.get("viewBox").split()] == pytest.approx(box, rel=1e-4)
+    (camera,) = (p for p in root.iter("path") if p.find("title") is not None
+                 and p.find("title").text == "camera")  # fmt: skip
+    assert camera.get("d") == "M0 -0.116667L0.0816667 0.07H-0.0816667Z"
+    frame = next(p for p in root.iter("path") if p.get("stroke") == "currentColor")
+    assert frame.get("d") == "M-3 -2H3V-4H-3Z"
+    lines = [p.get("d") for p in root.iter("path") if p.get("stroke-dasharray")]
+    assert lines == ["M-1.5 -2V-4", "M1.5 -2V-4"]
+    key = [(float(r.get("x")), float(r.get("y"))) for r in root.findall("rect")]
+    assert [x for x, _ in key] == [-3, -1, 1]
+    assert [y for _, y in key] == pytest.approx([2.2 * unit] * 3, rel=1e-4)
+    aside = [t for t in root.iter("text") if t.get("text-anchor") == "middle"]
+    assert [float(t.get("x")) for t in aside] == [-1, 1, -2, 2, -3, 3]
+    assert [t.text for t in aside] == ["1 m", "1 m", "2 m", "2 m", "3 m", "3 m"]
+    assert float(aside[0].get("y")) == pytest.approx(1.2 * unit - 2, rel=1e-4)
+
+
+def test_the_charts_outlines_are_closed_and_its_size_follows_the_window():
+    figure = chart(NUMBERS, WAYS, MOVES)
+    assert figure.get_size_inches() == pytest.approx([9.0, 1.6 + 0.88 * 9.0 * 4 / 6])
+    forward = next(p for p in figure.axes[0].patches if isinstance(p, PathPatch)).get_path()
+    assert forward.codes.tolist() == [1, 2, 2, 2, 79]
+    touch = [line.get_xdata()[0] for line in figure.axes[0].lines if len(line.get_xdata()) == 2]
+    assert [x for x in touch if abs(x) == 1.5] == [-1.5, -1.5, 1.5, 1.5]
+    labels = [t.get_text() for t in figure.axes[0].get_legend().get_texts()]
+    assert labels.count("beyond: flying straight on misses it") == 1

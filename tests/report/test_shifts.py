@@ -1,6 +1,7 @@
 import numpy as np
 
 from drone_rl.bench.evidence import SHIFTS, changed
+from drone_rl.report.palette import INK
 from drone_rl.report.shifts import chart, strips
 
 PICTURES = [np.full((25, 64, 3), 40 * i, np.uint8) for i in range(6)]
@@ -36,3 +37,24 @@ def test_strips_show_what_was_flown():
     counts = {color: count for count, color in one.convert("L").getcolors()}
     shown = {color for color in range(0, 240, 40) if counts.get(color, 0) >= 25 * 64 * 9}
     assert shown == {0, 40, 200}  # strengths 1 and 5 alone were flown
+
+
+def test_ticks_stand_in_the_order_of_places_also_where_less_is_worse():
+    levels = [
+        {**level, "value": value, "position": -100 + value}
+        for level, value in zip(SHIFTS["axes"]["sun"]["levels"], (80.0, 20.0), strict=True)
+    ]
+    away = {**SHIFTS["axes"]["sun"], "neutral": None, "levels": levels}
+    axis = chart(changed(SHIFTS, {"axes.sun": away})).axes[0]
+    assert axis.get_xticks().tolist() == [-80, -20, 0]
+    assert [text.get_text() for text in axis.get_xticklabels()] == ["20", "80", "none"]
+
+
+def test_a_strip_by_the_pixel():
+    shown = np.asarray(strips(SHIFTS, {"sun": PICTURES}))
+    assert shown.shape == (22 + 3 * 25 + 6, 190 + 6 * (3 * 64 + 8), 3)
+    ink = (shown == INK).all(-1)
+    assert ink[32:50, :190].any()  # the name, in the middle of the row
+    for number, level in enumerate((0, 40, 200)):  # with nothing different, then strengths 1 and 5
+        left = 190 + number * 200
+        assert (shown[22:97, left : left + 192] == level).all()

@@ -65,3 +65,27 @@ def test_shares_of_heat_stand_beside_shares_of_pixels_and_fill_the_line(truth):
     assert widths[:5] == pytest.approx([0.5, 0.1, 0.1, 0.1, 0.2])
     assert widths[5:] == pytest.approx([0.2] * 5)
     assert [t.get_text() for t in axis.get_yticklabels()] == ["the pixels", "Grad-CAM"]
+
+
+def test_a_line_spans_the_interval_of_each_score(truth):
+    truth["placebos"]["blob"] = {"mean": 0.2, "lower95": -0.1, "upper95": 0.3}
+    lines = [list(line.get_xdata()) for line in draw(truth_chart, truth)[0].lines]
+    assert lines[:3] == [[0.4, 0.6], [-0.1, 0.3], [0.4, 0.6]]  # placebos below, Grad-CAM on top
+
+
+def test_each_test_has_a_chart_of_its_own_with_its_bar(truth):
+    axes = draw(truth_chart, truth)
+    first = [axis.get_title().split("\n")[0] for axis in axes]
+    assert first[1:] == [
+        "score above its strongest placebo",
+        "hits above chance",
+        "likeness on shuffled weights",
+    ]
+    assert [list(axis.lines[-1].get_xdata()) for axis in axes[1:]] == [[0, 0], [0, 0], [0.5, 0.5]]
+    assert list(axes[3].lines[0].get_xdata()) == [0.6, 0.8]
+
+
+def test_the_key_names_each_region_once(truth):
+    (axis,) = draw(heat_chart, truth)
+    texts = [text.get_text() for text in axis.get_legend().get_texts()]
+    assert texts == ["next cube", "other cubes", "drone", "ground", "sky"]

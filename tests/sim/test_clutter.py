@@ -72,3 +72,22 @@ def test_who_knows_where_things_stand():
     assert things_of(CUBES) == things_of(as_task(CUBES)) == CUBES.things
     assert things_of(object()) is None
     assert (most_distractors(SOME), most_distractors(MINIMAL)) == (5, 0)
+
+
+def test_middles_go_on_by_the_golden_section_and_by_halves():
+    """From half of 48 m on: left and right by half of the way, each pair by 0.618 of it."""
+    turn = 0.6180339887498949
+    shares = [(0.5 + pair * turn + side * 0.5) % 1.0 for pair in range(3) for side in (0, 1)][:5]
+    rows = drawn(SOME, None)
+    assert rows[:, 0].tolist() == pytest.approx([48 * share for share in shares], rel=1e-6)
+    assert rows[:, 1].tolist() == [sign * (6 + 4.5 + 0.75) for sign in (1, -1, 1, -1, 1)]
+
+
+def test_what_is_fixed_takes_no_number_of_the_stream():
+    fixed = AppearanceSettings(distractors=3, distractor_size=2.0, distractor_distance=4.0)
+    source, other = np.random.RandomState(0), np.random.RandomState(0)
+    begin, shift = other.uniform(0.0, 1.0), other.uniform(-0.5, 0.5, 3)
+    rows = torch.tensor(draw_distractors(fixed, CUBES.things, source)).reshape(-1, WIDTH)
+    assert source.uniform() == other.uniform()
+    shares = (begin + np.array([0.0, 0.5, 0.6180339887498949]) + shift / 3) % 1.0
+    assert rows[:, 0].tolist() == pytest.approx((48 * shares).tolist(), rel=1e-6)

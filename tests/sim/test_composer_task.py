@@ -1,11 +1,12 @@
 import numpy as np
 import pytest
+import torch
 from dm_control import composer
 
 from drone_rl.sim.actions import Move
 from drone_rl.sim.composer_task import ComposerTask, make_environment
 from drone_rl.sim.entities import cameras
-from drone_rl.sim.settings import TaskSettings
+from drone_rl.sim.settings import DynamicsSettings, TaskSettings
 from drone_rl.sim.tasks.collect_cubes.playing import VANISHED_DEPTH
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
 
@@ -102,3 +103,29 @@ def test_pixels_through_opengl(egl):
     assert pixels.shape == (25, 64, 3)
     assert pixels.dtype == np.uint8
     assert pixels.std() > 10
+
+
+@pytest.mark.parametrize("mount", ["gimbal", "body"])
+def test_cameras_on_a_gimbal_stay_level_and_those_on_the_body_tilt_with_it(mount):
+    flying = DynamicsSettings(mode="simple_flight", camera_mount=mount)
+    task = ComposerTask(pixels=False, dynamics=flying)
+    body = task.state.body
+    half = 0.3  # of a pitch, and no turn to either side
+    body.attitude[:] = torch.tensor([np.cos(half), 0.0, np.sin(half), 0.0])
+    level = torch.tensor([[1.0, 0.0, 0.0, 0.0]], dtype=torch.float64)
+    expected = level if mount == "gimbal" else body.attitude
+    torch.testing.assert_close(task._shown(body), expected, check_dtype=False)
+
+
+def test_nothing_is_earned_before_the_first_step(env):
+    env.reset()
+    assert env.task.get_reward(env.physics) == 0.0
+
+
+def test_a_drone_that_nobody_moved_is_where_the_rules_have_it(env):
+    env.reset()
+    env.step(Move.LEFT)
+    body = env.task.state.body
+    assert env.task._found(env.physics) is body
+    env.task.drone.set_pose(env.physics, body.position[0].numpy() + 0.5)
+    assert (env.task._found(env.physics).position - body.position == 0.5).all()

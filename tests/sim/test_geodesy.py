@@ -74,3 +74,13 @@ def test_longitudes_go_on_across_the_date_line():
     there = geo_from_world(np.array([0.0, -1000.0, 0.0]), home)
     assert there[1] == pytest.approx(179.9999 - 360.0 + 1000.0 / 75140.0, abs=1e-4)
     np.testing.assert_allclose(world_from_geo(there, home), [0.0, -1000.0, 0.0], atol=1e-6)
+
+
+def test_the_ellipsoid_is_that_of_wgs84():
+    """Its polar radius and the square of its eccentricity, as published."""
+    assert pytest.approx(6356752.314245, abs=1e-5) == EQUATOR_RADIUS * (1 - FLATTENING)
+    assert pytest.approx(6.69437999014e-3, abs=1e-13) == FLATTENING * (2 - FLATTENING)
+    north = world_from_geo(np.array([HOME.latitude + 1e-3, HOME.longitude, 0.0]), HOME)
+    share = 1 - 6.69437999014e-3 * np.sin(np.radians(HOME.latitude)) ** 2
+    meridian = 6378137.0 * (1 - 6.69437999014e-3) / share**1.5 + 122.0
+    assert north[0] == pytest.approx(np.radians(1e-3) * meridian, rel=1e-9)

@@ -137,3 +137,10 @@ def test_what_there_is_not_is_refused(worlds):
         image(worlds, image_type=ImageType.SEGMENTATION, ids=torch.tensor([1]))
     with pytest.raises(InputError, match="shows nothing"):
         images(worlds, None, [])
+
+
+def test_what_is_asked_for_by_default():
+    request = ImageRequest()
+    assert (request.camera, request.image_type) == ("front_center", ImageType.SCENE)
+    assert request.as_float is False
+    assert [kind.value for kind in ImageType] == list(range(7))

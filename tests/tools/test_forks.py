@@ -36,3 +36,32 @@ def test_no_tests_are_no_survival(tmp_path):
     (tmp_path / "test_nothing.py").write_text("")
     (outcome,) = run_all(iter([Run("a", ["test_nothing.py"], 60.0)]), tmp_path, tmp_path, jobs=1)
     assert outcome.status == "failed"
+
+
+def test_what_reads_its_own_source_reads_the_mutated_one(tmp_path):
+    """As Warp does, which compiles it."""
+    (tmp_path / "module.py").write_text(MODULE)
+    (tmp_path / "test_source.py").write_text(
+        "import inspect\n\nfrom module import double\n\n\n"
+        "def test_source():\n    assert '2 * x' in inspect.getsource(double)\n"
+    )
+    source = MODULE.replace("2", "3")
+    runs = [Run("same", ["test_source.py"], 60.0)]
+    runs += [Run("mutant", ["test_source.py"], 60.0, "module.py", source)]
+    found = {o.run.name: o.status for o in run_all(iter(runs), tmp_path, tmp_path, jobs=1)}
+    assert found == {"same": "passed", "mutant": "failed"}
+
+
+def test_other_tests_run_if_the_first_have_passed(tmp_path):
+    (tmp_path / "test_first.py").write_text("def test_first():\n    assert True\n")
+    (tmp_path / "test_second.py").write_text("def test_second():\n    assert 1 == 2\n")
+    first, second = ["test_first.py"], ["test_second.py"]
+    runs = [Run("both", first, 60.0, then=second), Run("others", [], 60.0, then=second)]
+    runs += [Run("left", first, 60.0, then=[*first, *second], leave_out=["test_second.py::x"])]
+    runs += [
+        Run("out", first, 60.0, then=[*first, *second], leave_out=[f"{second[0]}::test_second"])
+    ]
+    found = {o.run.name: o for o in run_all(iter(runs), tmp_path, tmp_path, jobs=1)}
+    assert found["both"].status == found["others"].status == found["left"].status == "failed"
+    assert found["both"].failing == "test_second.py::test_second"
+    assert found["out"].status == "passed" and found["out"].failing is None

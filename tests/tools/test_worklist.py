@@ -1,11 +1,13 @@
 """Listing and drawing, where Cosmic Ray is installed (`make mutants` installs it)."""
 
 import json
+import tomllib
 
 import pytest
 
 pytest.importorskip("cosmic_ray")
 
+import cosmic_ray.plugins
 from cosmic_ray.mutating import mutate_code
 from cosmic_ray.work_db import WorkDB, use_db
 
@@ -37,7 +39,7 @@ def test_the_list_has_behaviour_only(tree, database):
     worklist.fill(database, tree, ["module.py"], lambda mutants: mutants)
     sample, done, listed = worklist.sample_of(database, tree)
     assert listed == len(sample) and not done
-    rows = [kept.row(mutant, tree, "killed", {}) for mutant in sample]
+    rows = [kept.row(mutant, tree, {"outcome": "killed"}, {}, {}) for mutant in sample]
     changed = {(row["before"], " ".join(row["after"].split())) for row in rows}
     first, last = SOURCE.splitlines()[0], "return max(values) + bonus"
     assert (last, "return min(values) + bonus") in changed
@@ -82,9 +84,12 @@ def test_the_kept_list_counts_equivalent_mutants_neither_way(tree, database):
     sample, _, _ = worklist.sample_of(database, tree)
     reasons = {sample[0].id: "because", sample[1].id: "wrongly so"}
     outcomes = ("survived", "killed", "survived", "timeout")
-    rows = [kept.row(m, tree, o, reasons) for m, o in zip(sample, outcomes, strict=True)]
+    results = [{"outcome": outcome, "by": None} for outcome in outcomes]
+    harms = {sample[0].id: "none", sample[2].id: "wrong figures"}
+    rows = [kept.row(m, tree, r, reasons, harms) for m, r in zip(sample, results, strict=True)]
     assert [row["outcome"] for row in rows] == ["equivalent", "killed", "survived", "timeout"]
     assert rows[0]["reason"] == "because" and "reason" not in rows[1]
+    assert rows[2]["harm"] == "wrong figures" and "harm" not in rows[0]
     assert kept.score(rows) == pytest.approx(2 / 3)
     kept.write(tree / "kept.json", {"seed": 0}, rows)
     read = json.loads((tree / "kept.json").read_text())
@@ -112,3 +117,17 @@ def test_a_list_whose_survivors_were_run_again(tree):
     assert kept.merge(tree / "second.json", {"m": "1"}, [])[1] == pytest.approx(1 / 3)
     with pytest.raises(ValueError, match="modules have changed"):
         kept.merge(tree / "first.json", {"m": "2"}, again)
+
+
+def test_each_reason_and_each_harm_is_of_one_mutant():
+    for name in ("equivalents", "harms"):
+        text = (kept.HERE / f"{name}.toml").read_text()
+        ids = [id_ for entry in tomllib.loads(text).get("mutants", []) for id_ in entry["ids"]]
+        assert len(ids) == len(set(ids)) == len(kept.listed(name))
+
+
+def test_only_operators_that_replace_like_by_like_are_tried():
+    names = cosmic_ray.plugins.operator_names()
+    assert {"drone_rl/SwapName", "core/NumberReplacer", "core/AddNot"} <= set(names)
+    assert "core/ReplaceBinaryOperator_Add_Sub" in names
+    assert "core/ReplaceBinaryOperator_Add_LShift" not in names

@@ -1,6 +1,7 @@
 import csv
 import logging
 import subprocess
+import types
 
 import pytest
 from torchrl.record.loggers.csv import CSVLogger
@@ -10,6 +11,7 @@ from drone_rl.training import (
     CsvCallback,
     LoggerCallback,
     ProgressCallback,
+    callbacks,
     load_checkpoint,
 )
 from drone_rl.utils.errors import InputError
@@ -105,3 +107,40 @@ def test_lines_instead_of_a_bar_where_there_is_no_terminal(make_trainer, caplog)
     lines = [r.getMessage() for r in caplog.records]
     assert any("running reward" in line and "frames/s" in line for line in lines)
     assert "stopped (frames)" in lines[-1]
+
+
+class Clock:
+    """Stands still until it is set."""
+
+    def __init__(self, monkeypatch):
+        self.now = 1000.0
+        monkeypatch.setattr(callbacks.time, "monotonic", lambda: self.now)
+
+
+def test_a_line_says_how_long_it_may_take_still(monkeypatch, caplog):
+    """70 of 100 frames at 10 a second; never less than no time."""
+    caplog.set_level(logging.INFO)
+    clock, callback = Clock(monkeypatch), ProgressCallback(interval_s=5.0)
+    progress = types.SimpleNamespace(frames=30, episodes=2, running_reward=1.5)
+    training = types.SimpleNamespace(total_frames=100, progress=progress)
+    callback.on_start(training)
+    for now, frames in ((1004.9, 30), (1005.0, 30), (1009.9, 60), (1010.0, 130)):
+        clock.now, progress.frames = now, frames
+        callback.on_update(training, {"time/frames_per_second": 10.0})
+    lines = [record.getMessage() for record in caplog.records]
+    assert [line.rpartition(", ")[2] for line in lines] == [
+        "at most 7 s left",
+        "at most 0 s left",
+    ]
+    assert lines[0].startswith("frames 30, episodes 2, running reward 1.50, 10 frames/s")
+
+
+def test_checkpoints_are_an_interval_apart(make_trainer, monkeypatch, tmp_path):
+    clock, trainer = Clock(monkeypatch), make_trainer()
+    callback, saved = CheckpointCallback(tmp_path, interval_s=60.0), []
+    callback.on_start(trainer)
+    monkeypatch.setattr(callback, "_save", lambda training: saved.append(clock.now))
+    for now in (1000.0, 1059.0, 1060.0, 1100.0):
+        clock.now = now
+        callback.on_update(trainer, {})
+    assert saved == [1060.0, 1100.0]  # which is what it noted, had it been saved

@@ -13,14 +13,10 @@ from typing import Any
 from cosmic_ray.work_db import WorkDB, use_db
 from cosmic_ray.work_item import TestOutcome, WorkerOutcome, WorkResult
 
-from tools.mutants import forks, kept, worklist
-from tools.mutants.targets import find_targets
+from tools.mutants import forks, kept, reach, targets, worklist
 
 ROOT = Path(__file__).resolve().parents[2]
 COPIED = ("drone_rl", "conf", "tests", "tools", "pyproject.toml", "README.md", "docs")
-PATIENCE = 3.0
-"""A mutant may take so many times the processor time of the tests without it, and START_S."""
-START_S = 5.0
 OUTCOMES = {"passed": "survived", "failed": "killed", "timeout": "timeout"}
 
 
@@ -29,21 +25,29 @@ def main() -> int:
     options = _options()
     work = options.work.resolve()
     work.mkdir(parents=True, exist_ok=True)
-    targets = find_targets(ROOT)
+    modules = targets.modules(ROOT)
     if options.only:
-        targets = {m: t for m, t in targets.items() if any(part in m for part in options.only)}
-    head = _head(options, targets)
+        modules = [name for name in modules if any(part in name for part in options.only)]
+    head = _head(options, modules)
     tree = _copy(work)
     os.chdir(tree)
     with use_db(str(work / "session.sqlite"), WorkDB.Mode.create) as database:
-        _prepare(database, work, tree, targets, head, options.again)
+        _prepare(database, work, tree, modules, head, options.again)
         sample, done, listed = worklist.sample_of(database, tree)
-        _say(f"{len(sample)} mutants of {listed} in {len(targets)} modules, {len(done)} done")
+        _say(f"{len(sample)} mutants of {listed} in {len(modules)} modules, {len(done)} done")
         todo = [mutant for mutant in sample if mutant.job not in done]
-        _run(database, todo, tree, work, targets, options.jobs)
-        done = dict(database.results)
-    reasons = kept.equivalents()
-    rows = [kept.row(m, tree, done[m.job].output or "", reasons) for m in sample]
+        tests = targets.test_files(tree)
+        if options.only:
+            own = {file for module in modules for file in targets.own_tests(module)}
+            tests = [file for file in tests if file in own]
+        _run(database, todo, tree, work, tests, options.jobs)
+        done = {
+            job: json.loads(result.output)
+            for job, result in database.results
+            if job in {mutant.job for mutant in sample}
+        }
+    reasons, harms = kept.listed("equivalents"), kept.listed("harms")
+    rows = [kept.row(m, tree, done[m.job], reasons, harms) for m in sample]
     if options.again:
         rows, first = kept.merge(options.again, head["modules"], rows)
         head["first_score"] = first
@@ -55,9 +59,14 @@ def main() -> int:
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m tools.mutants", description=__doc__)
     parser.add_argument("--seed", type=int, default=0, help="of the sample")
-    parser.add_argument("--sample", type=int, default=600, help="how many mutants")
+    parser.add_argument("--sample", type=int, default=1000, help="how many mutants")
     parser.add_argument("--jobs", type=int, default=2, help="processes at once")
-    parser.add_argument("--only", nargs="*", default=[], help="modules, by a part of their path")
+    parser.add_argument(
+        "--only",
+        nargs="*",
+        default=[],
+        help="modules, by a part of their path, with their own tests alone",
+    )
     parser.add_argument("--again", type=Path, help="a kept list: its survivors only, now")
     parser.add_argument("--out", type=Path, default=ROOT / "docs" / "mutants.json")
     parser.add_argument("--work", type=Path, default=ROOT / "outputs" / "mutants")
@@ -66,14 +75,13 @@ def _options() -> argparse.Namespace:
     return options
 
 
-def _head(options: argparse.Namespace, targets: dict[str, list[str]]) -> dict[str, Any]:
-    tests = {test for named in targets.values() for test in named} | {"tests/conftest.py"}
+def _head(options: argparse.Namespace, modules: list[str]) -> dict[str, Any]:
     return {
         "seed": options.seed,
         "sample": options.sample,
         "revision": _revision(),
-        "modules": kept.hashes(ROOT, sorted(targets)),
-        "tests": kept.hashes(ROOT, sorted(tests)),
+        "modules": kept.hashes(ROOT, modules),
+        "tests": kept.digest(ROOT, ["tests"]),
     }
 
 
@@ -96,7 +104,7 @@ def _prepare(
     database: WorkDB,
     work: Path,
     tree: Path,
-    targets: dict[str, list[str]],
+    modules: list[str],
     head: dict[str, Any],
     again: Path | None,
 ) -> None:
@@ -117,7 +125,7 @@ def _prepare(
             return [mutant for mutant in mutants if mutant.id in set(ids)]
         return worklist.draw(mutants, tree, head["sample"], head["seed"])
 
-    worklist.fill(database, tree, list(targets), choose)
+    worklist.fill(database, tree, modules, choose)
     state.write_text(json.dumps(key))
 
 
@@ -126,47 +134,59 @@ def _run(
     todo: list[worklist.Mutant],
     tree: Path,
     work: Path,
-    targets: dict[str, list[str]],
+    tests: list[str],
     jobs: int,
 ) -> None:
-    """Runs mutants, and first the tests of their modules without any.
-
-    Raises:
-        RuntimeError: Tests fail without a mutation.
-    """
-    forks.import_libraries()
-    scratch = work / "scratch"
-    shutil.rmtree(scratch, ignore_errors=True)
-    scratch.mkdir()
-    modules = sorted({mutant.module for mutant in todo})
-    plain = (forks.Run(f"plain{i}", targets[m], 600.0) for i, m in enumerate(modules))
-    limits = {}
-    for outcome in forks.run_all(plain, tree, scratch, jobs):
-        module = modules[int(outcome.run.name.removeprefix("plain"))]
-        if outcome.status != "passed":
-            raise RuntimeError(f"tests of {module} fail without a mutation:\n{outcome.output}")
-        limits[module] = START_S + PATIENCE * outcome.seconds
-        _say(f"{outcome.seconds:5.1f} s for the tests of {module}")
+    """Records what tests run, then runs those that can notice each mutant."""
+    forks.import_libraries(work / "kernels")
+    shutil.rmtree(work / "scratch", ignore_errors=True)
+    (work / "scratch").mkdir()
+    for line in reach.record(tree, work, tests, jobs):
+        _say(line)
+    reached = reach.read(tree, work, tests)
+    if reached.failed:
+        _say(f"left out, as they fail without a mutation: {', '.join(reached.failed)}")
     by_id = {mutant.id: mutant for mutant in todo}
-    runs = (
-        forks.Run(m.id, targets[m.module], limits[m.module], m.module, m.source(tree) or "")
-        for m in todo
-    )
-    for count, outcome in enumerate(forks.run_all(runs, tree, scratch, jobs), 1):
-        mutant = by_id[outcome.run.name]
-        database.set_result(mutant.job, _result(outcome))
+    runs = (run for mutant in todo if (run := _as_run(mutant, tree, reached)))
+    for count, outcome in enumerate(forks.run_all(runs, tree, work / "scratch", jobs), 1):
+        mutant = by_id.pop(outcome.run.name)
+        result = {"outcome": OUTCOMES[outcome.status], "by": outcome.failing}
+        database.set_result(mutant.job, _result(result))
         if outcome.status == "passed" or count % 20 == 0:
-            row = kept.row(mutant, tree, OUTCOMES[outcome.status], {})
-            place = f"{row['module']}:{row['line']}"
-            _say(f"{count}/{len(todo)} {row['outcome']} {row['id']} {place} {row['after']}")
+            _say(f"{count}/{len(todo)} {_line(mutant, tree, result)}")
+    for mutant in by_id.values():
+        result = {"outcome": "survived", "by": None}
+        database.set_result(mutant.job, _result(result))
+        _say(f"no test runs it: {_line(mutant, tree, result)}")
 
 
-def _result(outcome: forks.Outcome) -> WorkResult:
-    survived = outcome.status == "passed"
+def _as_run(mutant: worklist.Mutant, tree: Path, reached: reach.Reach) -> forks.Run | None:
+    tests = reached.tests_for(mutant)
+    source = mutant.source(tree)
+    if source is None or not (tests.own or tests.others):
+        return None
+    return forks.Run(
+        mutant.id,
+        tests.own,
+        tests.limit_s,
+        mutant.module,
+        source,
+        then=tests.others,
+        leave_out=reached.failed,
+    )
+
+
+def _line(mutant: worklist.Mutant, tree: Path, result: dict[str, Any]) -> str:
+    row = kept.row(mutant, tree, result, {}, {})
+    return f"{row['outcome']} {row['id']} {row['module']}:{row['line']} {row['after']}"
+
+
+def _result(result: dict[str, Any]) -> WorkResult:
+    survived = result["outcome"] == "survived"
     return WorkResult(
         worker_outcome=WorkerOutcome.NORMAL,
         test_outcome=TestOutcome.SURVIVED if survived else TestOutcome.KILLED,
-        output=OUTCOMES[outcome.status],
+        output=json.dumps(result),
     )
 
 
@@ -190,6 +210,7 @@ def _report(rows: list[dict[str, Any]], reasons: dict[str, str]) -> None:
         if row["outcome"] == "survived":
             print(f"survived {row['id']} {row['module']}:{row['line']} {row['operator']}")
             print(f"    - {row['before']}\n    + {row['after']}")
+            print(f"    {row['harm'] or 'the harm is not yet in tools/mutants/harms.toml'}")
         if row["id"] in reasons and row["outcome"] in ("killed", "timeout"):
             print(f"listed as equivalent, but killed: {row['id']}", file=sys.stderr)
     counts = Counter(row["outcome"] for row in rows)

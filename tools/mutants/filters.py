@@ -12,6 +12,7 @@ Left out are
 """
 
 import ast
+import functools
 import re
 from collections.abc import Iterator
 
@@ -67,7 +68,12 @@ def changes_program(source: str, mutated: str | None) -> bool:
         compile(mutated, "mutant", "exec")
     except SyntaxError:
         return False
-    return changed != ast.dump(ast.parse(source))
+    return changed != _dump(source)
+
+
+@functools.cache
+def _dump(source: str) -> str:
+    return ast.dump(ast.parse(source))
 
 
 def _silent(tree: ast.AST) -> Iterator[ast.AST]:

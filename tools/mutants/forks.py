@@ -6,8 +6,10 @@ import gc
 import importlib
 import importlib.abc
 import importlib.machinery
+import linecache
 import math
 import os
+import re
 import resource
 import shutil
 import signal
@@ -17,6 +19,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import pytest
+
+from tools.mutants.recording import CountedFinder, Recorder, record_launches
 
 LIBRARIES = (
     "torch",
@@ -38,12 +42,13 @@ LIBRARIES = (
     "jinja2",
     "_hypothesis_pytestplugin",
 )
+PACKAGE = "drone_rl"
+"""Of which it is recorded which blocks run."""
 WAIT = 10.0
 """Seconds that may pass for each of processor time; more is a deadlock."""
 MEMORY_BYTES = 6 << 30
 """A mutant that wants more is killed: a size that became a power, say."""
 OPTIONS = (
-    "-x",
     "-q",
     "--no-header",
     "--tb=line",
@@ -65,6 +70,12 @@ class Run:
     module: str | None = None
     """Path of the mutated module below the tree; None for the tree as it is."""
     source: str = ""
+    then: Sequence[str] = ()
+    """Tests to run if the others have passed, in the same process."""
+    leave_out: Sequence[str] = ()
+    """Tests that fail without a mutation too."""
+    record: Path | None = None
+    """Where to write which blocks of which tests run; all tests run then, whatever fails."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -78,14 +89,24 @@ class Outcome:
     """Of processor time."""
     output: str
 
+    @property
+    def failing(self) -> str | None:
+        """The test that failed; None without one, as after a crash."""
+        found = re.search(r"^(?:FAILED|ERROR) (\S+\.py(?:::.*?)?)(?: - .*)?$", self.output, re.M)
+        return found and found[1]
 
-def import_libraries() -> None:
+
+def import_libraries(kernels: Path) -> None:
     """Imports what takes most of a test run's start; nothing of the program.
+
+    Args:
+        kernels: Folder for compiled kernels, those of mutants too.
 
     Raises:
         RuntimeError: The program was imported, so that a fork would not see a mutation.
     """
     os.environ["OMP_NUM_THREADS"] = "1"
+    os.environ["WARP_CACHE_PATH"] = str(kernels)
     for name in LIBRARIES:
         with contextlib.suppress(ImportError):
             importlib.import_module(name)
@@ -93,6 +114,8 @@ def import_libraries() -> None:
 
     hypothesis.settings.register_profile("mutants", derandomize=True, deadline=None, database=None)
     hypothesis.settings.load_profile("mutants")
+    if "warp" in sys.modules:  # at level 0 results differ by rounding, at 1 they don't
+        sys.modules["warp"].config.optimization_level = 1
     if any(name.partition(".")[0] == "drone_rl" for name in sys.modules):
         raise RuntimeError("drone_rl was imported before the fork")
     gc.freeze()  # what is imported stays for good: no child looks through it
@@ -149,6 +172,7 @@ def _start(run: Run, tree: Path, scratch: Path) -> int:
         with (scratch / f"{run.name}.txt").open("wb") as file:
             os.dup2(file.fileno(), 1)
             os.dup2(file.fileno(), 2)
+        sys.stdout, sys.stderr = sys.__stdout__, sys.__stderr__  # not a parent's captured ones
         code = _test(run, tree, scratch / run.name)
         sys.stdout.flush()
     finally:
@@ -167,7 +191,14 @@ def _test(run: Run, tree: Path, temporary: Path) -> int:
     sys.path.insert(0, str(tree))
     if run.module is not None:
         sys.meta_path.insert(0, _Replaced(run.module, run.source))
-    return int(pytest.main([*OPTIONS, f"--basetemp={temporary}", *run.tests]))
+    options = [*OPTIONS, f"--basetemp={temporary}", *(f"--deselect={t}" for t in run.leave_out)]
+    if run.record is None:
+        stages = [tests for tests in (run.tests, run.then) if tests]
+        return next(filter(None, (int(pytest.main(["-x", *options, *t])) for t in stages)), 0)
+    recorder = Recorder(run.record)
+    record_launches(recorder)
+    sys.meta_path.insert(0, CountedFinder(PACKAGE))
+    return int(pytest.main([*options, *run.tests], plugins=[recorder]))
 
 
 class _Replaced(importlib.abc.MetaPathFinder):
@@ -191,4 +222,7 @@ class _Loader(importlib.machinery.SourceFileLoader):
         self._source = source
 
     def get_code(self, fullname: str) -> object:
+        # Warp compiles what `inspect` finds in this cache; without a time it's never read again.
+        lines = self._source.splitlines(keepends=True)
+        linecache.cache[self.path] = (len(self._source), None, lines, self.path)
         return compile(self._source, self.path, "exec", dont_inherit=True)

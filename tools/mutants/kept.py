@@ -1,6 +1,5 @@
 """What is kept of a run: every mutant of the sample, and what became of it."""
 
-import difflib
 import hashlib
 import json
 import tomllib
@@ -14,14 +13,21 @@ from tools.mutants.worklist import Mutant
 HERE = Path(__file__).parent
 
 
-def row(mutant: Mutant, root: Path, outcome: str, reasons: dict[str, str]) -> dict[str, Any]:
+def row(
+    mutant: Mutant,
+    root: Path,
+    result: dict[str, Any],
+    reasons: dict[str, str],
+    harms: dict[str, str],
+) -> dict[str, Any]:
     """One line of the list.
 
     Args:
         mutant: Which one.
         root: The tree it was made of.
-        outcome: "killed", "timeout" or "survived".
+        result: Its "outcome" ("killed", "timeout" or "survived"), and "by" which test.
         reasons: Why some mutants change nothing, by id; a survivor among them is "equivalent".
+        harms: What the others would do if they were in the program, by id.
     """
     before, after = _change((root / mutant.module).read_text(), mutant.source(root) or "")
     found = {
@@ -31,17 +37,23 @@ def row(mutant: Mutant, root: Path, outcome: str, reasons: dict[str, str]) -> di
         "operator": mutant.spec.operator_name.split("/")[1],
         "before": before,
         "after": after,
-        "outcome": outcome,
+        **result,
     }
-    if outcome == "survived" and mutant.id in reasons:
+    if result["outcome"] == "survived" and mutant.id in reasons:
         found |= {"outcome": "equivalent", "reason": reasons[mutant.id]}
+    elif result["outcome"] == "survived":
+        found["harm"] = harms.get(mutant.id)
     return found
 
 
-def equivalents() -> dict[str, str]:
-    """Reasons why a mutant changes nothing, by its id, from equivalents.toml."""
-    listed = tomllib.loads((HERE / "equivalents.toml").read_text())
-    return {id_: entry["reason"] for entry in listed.get("equivalent", []) for id_ in entry["ids"]}
+def listed(name: str) -> dict[str, str]:
+    """What is listed of mutants by id, from equivalents.toml or harms.toml.
+
+    Args:
+        name: "equivalents", why they change nothing, or "harms", what they would do.
+    """
+    found = tomllib.loads((HERE / f"{name}.toml").read_text())
+    return {id_: entry["reason"] for entry in found.get("mutants", []) for id_ in entry["ids"]}
 
 
 def score(rows: list[dict[str, Any]]) -> float:
@@ -88,6 +100,11 @@ def hashes(root: Path, paths: list[str]) -> dict[str, str]:
     return {name: hashlib.sha256(files[name].read_bytes()).hexdigest() for name in sorted(files)}
 
 
+def digest(root: Path, paths: list[str]) -> str:
+    """One hash of files and folders together."""
+    return hashlib.sha256(json.dumps(hashes(root, paths)).encode()).hexdigest()
+
+
 def write(path: Path, head: dict[str, Any], rows: list[dict[str, Any]]) -> None:
     """Writes the list as JSON, a mutant a line."""
     head = {"tool": f"cosmic-ray {metadata.version('cosmic-ray')}", **head}
@@ -100,7 +117,11 @@ def write(path: Path, head: dict[str, Any], rows: list[dict[str, Any]]) -> None:
 
 def _change(source: str, mutated: str) -> tuple[str, str]:
     """The lines that differ, before and after."""
-    lines = list(difflib.ndiff(source.splitlines(), mutated.splitlines()))
-    parts = ([line[2:].strip() for line in lines if line.startswith(sign)] for sign in "-+")
-    before, after = (" ".join(part) for part in parts)
+    old, new = source.splitlines(), mutated.splitlines()
+    same = [a == b for a, b in zip(old, new, strict=False)]
+    first = same.index(False) if False in same else len(same)
+    rest = list(zip(reversed(old[first:]), reversed(new[first:]), strict=False))
+    last = next((count for count, (a, b) in enumerate(rest) if a != b), len(rest))
+    parts = (lines[first : len(lines) - last] for lines in (old, new))
+    before, after = (" ".join(line.strip() for line in part) for part in parts)
     return before, after

@@ -7,6 +7,8 @@ import parso
 from cosmic_ray.operators.operator import Example, Operator
 from parso.python.tree import Name, Number, String
 
+from tools.mutants.filters import is_of_one_kind
+
 PAIRS = (
     ("min", "max"),
     ("amin", "amax"),
@@ -76,6 +78,25 @@ class Provider:
     def __getitem__(self, name: str) -> type[Operator]:
         """One of them."""
         return self._operators[name]
+
+
+class OfOneKind:
+    """Those operators of another provider that replace like by like; the rest take a minute to try.
+
+    Args:
+        provider: What Cosmic Ray asks for its own operators.
+    """
+
+    def __init__(self, provider: Any) -> None:
+        self._provider = provider
+
+    def __iter__(self) -> Iterator[str]:
+        """Their names."""
+        return (name for name in self._provider if is_of_one_kind(f"core/{name}"))
+
+    def __getitem__(self, name: str) -> type[Operator]:
+        """One of them."""
+        return self._provider[name]
 
 
 def _counterpart(node: Any) -> str | None:

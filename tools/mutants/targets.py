@@ -1,77 +1,56 @@
-"""Which modules are mutated, and the tests that must notice: those that mirror a module first."""
+"""Which modules are mutated, and which files of tests may notice."""
 
 from pathlib import Path
 
-TARGETS: dict[str, tuple[str, ...]] = {
-    "sim/tasks/collect_cubes/rules": ("sim/tasks/collect_cubes/test_rules", "sim/test_worlds"),
-    "sim/actions": ("sim/test_actions",),
-    "sim/parts": ("sim/test_parts", "sim/test_actions"),
-    "sim/continuous_actions": ("sim/test_continuous_actions",),
-    "policies/squashed_normal": ("policies/test_squashed_normal",),
-    "sim/tasks/collect_cubes/changes": (
-        "sim/tasks/collect_cubes/test_changes",
-        "explanations/test_outcomes",
-    ),
-    "sim/tasks/collect_cubes/goals": (
-        "sim/tasks/collect_cubes/test_goals",
-        "verdicts/test_failures",
-    ),
-    "objectives/returns": ("objectives/test_returns",),
-    "objectives/return_estimator": ("objectives/test_return_estimator",),
-    "objectives/estimators": ("objectives/test_estimators",),
-    "objectives/reinforce": ("objectives/test_reinforce",),
-    "collectors/episodes": ("collectors/test_episodes",),
-    "utils/seeding": ("utils/test_seeding",),
-    "utils/intervals": ("utils/test_intervals",),
-    "evaluation/*": ("evaluation/test_{name}",),
-    "verdicts/*": ("verdicts/test_{name}", "verdicts"),
-    "sweeps/statistics": ("sweeps/test_statistics",),
-    **{
-        f"explanations/{name}": (f"explanations/test_{name}",)
-        for name in (
-            "truth",
-            "causal",
-            "trust",
-            "curves",
-            "outcomes",
-            "placebos",
-            "patches",
-            "alternatives",
-            "randomised",
-            "interventions",
-            "response",
-            "asymmetry",
-            "contradictions",
-            "loops",
-        )
-    },
+NOT_MUTATED = ("bench",)
+"""Packages that measure the program and are no part of what is claimed about it."""
+NOT_RUN = ("docs", "examples", "tools", "test_wheel.py", "test_architecture.py")
+"""Tests of other things; those of pages and examples start processes, which see no mutation."""
+
+ALSO = {
+    "drone_rl/settings/": "tests/hydra_app/test_schemas.py",
+    "drone_rl/sim/settings/": "tests/hydra_app/test_schemas.py",
 }
-"""Names below drone_rl and below tests, without suffix; * is any name, {name} the module's."""
+"""Tests of whole packages: those that hold settings in code and in files together."""
+OF_ALL = "tests/test_data.py"
+"""Looks at what all modules define when they are imported."""
 
-NOT_MUTATED = ("evaluation/oracle", "evaluation/video")
-"""Neighbours of a pattern that quote no figure: the flown baseline and the film."""
 
-
-def find_targets(root: Path) -> dict[str, list[str]]:
-    """Modules of a tree and their tests, both as paths below it.
+def modules(root: Path) -> list[str]:
+    """Paths of the modules of drone_rl that are mutated, below the tree.
 
     Raises:
-        ValueError: A pattern finds no module, or a module none of its tests.
+        ValueError: There are none.
     """
-    found = {}
-    for pattern, tests in TARGETS.items():
-        paths = sorted((root / "drone_rl").glob(f"{pattern}.py"))
-        if not paths:
-            raise ValueError(f"no module is called {pattern}; mend tools/mutants/targets.py")
-        for path in paths:
-            module = path.relative_to(root / "drone_rl").with_suffix("").as_posix()
-            if path.stem == "__init__" or module in NOT_MUTATED:
-                continue
-            named = [f"tests/{test.format(name=path.stem)}" for test in tests]
-            exist = [
-                name for test in named for name in (test, f"{test}.py") if (root / name).exists()
-            ]
-            if not exist:
-                raise ValueError(f"{module} has none of its tests: {', '.join(named)}")
-            found[path.relative_to(root).as_posix()] = exist
+    package = root / "drone_rl"
+    found = [
+        path.relative_to(root).as_posix()
+        for path in sorted(package.rglob("*.py"))
+        if path.relative_to(package).parts[0] not in NOT_MUTATED
+    ]
+    if not found:
+        raise ValueError(f"{package} has no modules")
     return found
+
+
+def test_files(root: Path) -> list[str]:
+    """Paths of the files of tests that are run, below the tree."""
+    return [
+        path.relative_to(root).as_posix()
+        for path in sorted((root / "tests").rglob("test_*.py"))
+        if path.relative_to(root / "tests").parts[0] not in NOT_RUN
+    ]
+
+
+def own_tests(module: str) -> list[str]:
+    """Files of the tests of a module: its mirror, and what its package is tested by."""
+    also = [file for package, file in ALSO.items() if module.startswith(package)]
+    return [mirror(module), *also]
+
+
+def mirror(module: str) -> str:
+    """Where the tests of a module are: tests/x/test_y.py for drone_rl/x/y.py."""
+    path = Path(module)
+    folder = Path("tests", *path.parts[1:-1])
+    name = path.parent.name if path.stem == "__init__" else path.stem
+    return (folder / f"test_{name}.py").as_posix()

@@ -1,6 +1,7 @@
 """The list of mutants and a sample of it, kept in a session of Cosmic Ray."""
 
 import dataclasses
+import functools
 import hashlib
 from collections import Counter
 from collections.abc import Callable
@@ -13,9 +14,10 @@ from cosmic_ray.work_db import WorkDB
 from cosmic_ray.work_item import MutationSpec, WorkerOutcome, WorkResult
 
 from tools.mutants.filters import changes_program, is_of_one_kind, is_within, silent_spans
-from tools.mutants.operators import Provider
+from tools.mutants.operators import OfOneKind, Provider
 
-cosmic_ray.plugins.OPERATOR_PROVIDERS["drone_rl"] = Provider()
+_PROVIDERS = cosmic_ray.plugins.OPERATOR_PROVIDERS
+_PROVIDERS |= {"drone_rl": Provider(), "core": OfOneKind(_PROVIDERS["core"])}
 FILTERED = "changes no behaviour, or only crashes"
 """Output of what the filters left out."""
 
@@ -37,8 +39,13 @@ class Mutant:
 
     def source(self, root: Path) -> str | None:
         """The mutated module; None if there is nothing to mutate."""
-        operator = cosmic_ray.plugins.get_operator(self.spec.operator_name)()
-        return mutate_code((root / self.module).read_text(), operator, self.spec.occurrence)
+        source = (root / self.module).read_text()
+        return _mutated(source, self.spec.operator_name, self.spec.occurrence)
+
+
+@functools.cache
+def _mutated(source: str, operator: str, occurrence: int) -> str | None:
+    return mutate_code(source, cosmic_ray.plugins.get_operator(operator)(), occurrence)
 
 
 def fill(

@@ -51,3 +51,28 @@ def test_maps_of_each_height_the_highest_on_top(explanation):
     assert axes[5].get_ylabel().endswith("cube +0 m")
     left = axes[0].images[0].get_array()
     assert left[2, 3] == 0.5 and left.sum() == 0.5
+
+
+def test_the_size_of_the_chart_its_key_and_what_is_needed(explanation, make_explanation):
+    figure = response_chart(explanation)
+    assert figure.get_size_inches().tolist() == [3.2 * 5, 3.9 * 2]
+    assert len(figure.axes) == 10 + 1  # and the bar of colours
+    keys = {i: a.get_legend() for i, a in enumerate(figure.axes[:10]) if a.get_legend()}
+    assert list(keys) == [8, 9]  # below the last two
+    assert [t.get_text() for t in keys[8].get_texts()] == ["forward", "left", "right"]
+    _, *rows = tables(explanation)["response"]
+    assert [row[-2] for row in rows[:4]] == ["right", "forward", "forward", "left"]
+    arrays = dict(explanation.arrays)
+    arrays["response_oracle"] = np.array([-1, 0, 0, 1])
+    _, first, *_ = tables(make_explanation(arrays=arrays))["response"]
+    assert first[-2] == ""
+
+
+def test_of_one_height_alone_it_is_not_said(explanation, make_explanation):
+    arrays = {
+        name: values[:1] if values.ndim > 1 or name.endswith("height") else values
+        for name, values in explanation.arrays.items()
+    }
+    axes = response_chart(make_explanation(arrays=arrays)).axes
+    assert axes[0].get_ylabel() == "metres ahead"
+    assert all(axis.get_xlabel() == "metres to the left (+) or right (-)" for axis in axes[:5])

@@ -1,13 +1,21 @@
 """Arrays of drones that kernels fly are the states' own, and begin anew with each batch."""
 
+import pytest
 import torch
 import warp as wp
 
 from drone_rl.sim.dynamics import Quadrotor
 from drone_rl.sim.dynamics.fleet import FlyingFleet
+from drone_rl.sim.rendering.devices import start_warp
 from drone_rl.sim.settings import ActionSettings, DynamicsSettings
 
 FLIGHT = DynamicsSettings(mode="simple_flight", camera_mount="body")
+
+
+@pytest.fixture(autouse=True)
+def warp():
+    """Started, as whoever flies or draws has it."""
+    start_warp("cpu")
 
 
 def test_takes_drones_over_and_leaves_them_alone():

@@ -37,3 +37,16 @@ def test_cameras_are_found_by_airsims_names_and_numbers():
     assert cameras.find_camera("3").name == "bottom_center"
     with pytest.raises(InputError, match=r"camera 'nose' is unknown; choose from: front_c"):
         cameras.find_camera("nose")
+
+
+def test_where_cameras_sit():
+    """Metres forward, left and up of the drone's middle."""
+    places = {spec.name: spec.pos for spec in (*cameras.DRONE_CAMERAS, cameras.CHASE)}
+    assert places == {
+        "front_center": (0.4, 0.0, 0.0),
+        "front_right": (0.4, -0.25, 0),
+        "front_left": (0.4, 0.25, 0),
+        "bottom_center": (0, 0, -0.1),
+        "back_center": (-0.4, 0, 0),
+        "chase": (-7.0, 0, 3.5),
+    }

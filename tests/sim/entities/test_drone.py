@@ -27,3 +27,19 @@ def test_observables_are_off_until_a_task_enables_them():
 def test_its_own_cameras_leave_it_out():
     groups = hide_drone().geomgroup
     assert not groups[BODY_GROUP] and groups[0]
+
+
+def test_its_shape_by_the_millimetre():
+    """Of a box of 1 m: half extents of the hull, radius and half height of the rotors."""
+    drone = Drone(size=1.0, camera=CameraSettings())
+    model = mjcf.Physics.from_mjcf_model(drone.mjcf_model).model
+    assert model.geom("hull").size.round(6).tolist() == [0.3, 0.18, 0.1]
+    places = {"front": 0.3, "rear": -0.3}, {"left": 0.3, "right": -0.3}
+    for end, x in places[0].items():
+        for side, y in places[1].items():
+            rotor = model.geom(f"rotor_{end}_{side}")
+            assert rotor.pos.round(6).tolist() == [x, y, 0.12]
+            assert rotor.size[:2].round(6).tolist() == [0.2, 0.02]
+    small = mjcf.Physics.from_mjcf_model(Drone(size=0.5, camera=CameraSettings()).mjcf_model).model
+    assert small.geom("hull").size.round(6).tolist() == [0.15, 0.09, 0.05]
+    assert small.geom("rotor_rear_left").size[:2].round(6).tolist() == [0.1, 0.01]

@@ -70,3 +70,8 @@ def test_threads_that_ask_at_once_load_once(monkeypatch):
         asked = [f.result() for f in [pool.submit(loading, kernels) for _ in range(4)]]
     assert len({id(future) for future in asked}) == 1
     assert asked[0].result() is None and len(loaded) == 1
+
+
+def test_on_a_cpu_warp_reports_errors_alone():
+    devices.start_warp("cpu")
+    assert devices.wp.config.log_level >= devices.wp.LOG_ERROR

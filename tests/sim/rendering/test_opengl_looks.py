@@ -12,6 +12,7 @@ from drone_rl.sim.composer_task import make_environment
 from drone_rl.sim.meaning import Meaning
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.rendering.opengl_looks import in_fog
+from drone_rl.sim.rendering.textures import load
 from drone_rl.sim.settings import AppearanceSettings, CameraSettings
 from drone_rl.utils.seeding import world_random_state
 
@@ -96,3 +97,28 @@ def test_pictures_of_blocks_agree_with_ours(egl):
         timestep = env.step(action)
         worlds.step(torch.arange(1), torch.tensor([action]))
     ours.close()
+
+
+def test_fog_grows_with_the_distance_along_each_ray():
+    """Two rows of four pixels, 90 degrees high: rays through (+-1.5, +-0.5) and (+-0.5, +-0.5)."""
+    look = Appearance(colors={Meaning.SKY: (0.5, 0.5, 0.5)}, fog=10.0, exposure=2.0)
+    fogged = in_fog(np.zeros((2, 4, 3), np.uint8), np.full((2, 4), 5.0), look, 90.0, 80.0)
+    near, far = (int(255 * (1 - 0.05 ** (0.5 * d**0.5))) for d in (1.5, 3.5))
+    assert fogged[..., 0].tolist() == [[far, near, near, far]] * 2
+    narrow = in_fog(np.zeros((2, 4, 3), np.uint8), np.full((2, 4), 5.0), look, 53.13010235, 80.0)
+    near, far = (int(255 * (1 - 0.05 ** (0.5 * (1 + d / 4) ** 0.5))) for d in (0.5, 2.5))
+    assert np.abs(narrow[0, :2, 0] - np.array([far, near])).max() <= 1
+
+
+@pytest.mark.parametrize(("texture", "size", "repeat"), [("grid", 4.0, 0.25), (None, None, 1.0)])
+def test_tiles_of_the_ground_are_as_large_as_asked_for(texture, size, repeat):
+    own = {} if texture is None else {"ground_texture": texture, "ground_tile": size}
+    look = AppearanceSettings(sun_elevation=40.0, **own)
+    env = make_environment(pixels=False, random_state=0, appearance=look)
+    env.reset()
+    model = env.physics.model
+    number = model.name2id("ground", "material")
+    assert model.mat_texrepeat[number].tolist() == [repeat, repeat]
+    start = model.tex_adr[model.name2id("ground", "texture")]
+    texels = model.tex_data[start : start + 3 * 256 * 256].reshape(256, 256, 3)
+    assert np.array_equal(texels, np.full_like(texels, 255) if texture is None else load(texture))

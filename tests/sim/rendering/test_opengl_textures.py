@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 
-from drone_rl.sim.rendering.opengl_textures import box_sides, flat, sky_sides
+from drone_rl.sim.rendering.opengl_textures import (
+    _fitting,
+    _points,
+    box_sides,
+    flat,
+    sky_sides,
+)
+from drone_rl.sim.rendering.textures import levels
 
 QUARTERS = np.array([[[10] * 3, [20] * 3], [[30] * 3, [40] * 3]], np.uint8)
 """Upper left, upper right, lower left, lower right."""
@@ -39,3 +46,27 @@ def test_textures_at_another_size(side):
     assert (flat(None, side) == 255).all()
     assert flat(QUARTERS, side).shape == (side, side, 3)
     assert flat(QUARTERS, 4)[0, :, 0].tolist() == [10, 10, 20, 20]
+
+
+def test_where_texels_of_each_side_are():
+    """Upper left, upper right and lower left of four texels, as OpenGL orders cube maps."""
+    expected = [
+        [(1, 1, 1), (1, 1, -1), (1, -1, 1)],
+        [(-1, 1, -1), (-1, 1, 1), (-1, -1, -1)],
+        [(-1, 1, -1), (1, 1, -1), (-1, 1, 1)],
+        [(-1, -1, 1), (1, -1, 1), (-1, -1, -1)],
+        [(-1, 1, 1), (1, 1, 1), (-1, -1, 1)],
+        [(1, 1, -1), (-1, 1, -1), (1, -1, -1)],
+    ]
+    for number, (side, points) in enumerate(zip(_points(2), expected, strict=True)):
+        half = np.where(np.arange(3) == number // 2, 1.0, 0.5)  # texels are half way to the edge
+        found = [side[0, 0], side[0, 1], side[1, 0]]
+        assert np.array_equal(found, np.array(points) * half), number
+
+
+def test_the_level_that_fits_is_as_fine_as_asked_for():
+    picture = np.arange(48, dtype=np.uint8).reshape(4, 4, 3)
+    rows = levels(picture)
+    assert np.array_equal(_fitting(picture, 0.49), picture)
+    assert np.array_equal(_fitting(picture, 0.5), rows[16:20].reshape(2, 2, 3))
+    assert np.array_equal(_fitting(picture, 1.0), rows[20:21].reshape(1, 1, 3))

@@ -1,9 +1,17 @@
 """Frames as the kernels get them."""
 
+import pytest
 import torch
 
+from drone_rl.sim.rendering.devices import start_warp
 from drone_rl.sim.rendering.raytrace_places import Places
 from drone_rl.sim.rendering.renderer import Poses
+
+
+@pytest.fixture(autouse=True)
+def warp():
+    """Started, as whoever flies or draws has it."""
+    start_warp("cpu")
 
 
 def some(count, props=2):

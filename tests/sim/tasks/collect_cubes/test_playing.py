@@ -53,3 +53,10 @@ def test_the_first_worlds_are_the_same_whatever_the_number_of_worlds():
         worlds.reset(torch.arange(number), [world_random_state(1, i) for i in range(number)])
         worlds.close()
     assert torch.equal(few.state.cubes, many.state.cubes[:2])
+
+
+def test_bounds_of_what_is_reported():
+    bounds = {name: (entry.low, entry.high) for name, entry in TASK.entries.items()}
+    assert bounds["side"] == (-1, 2)  # not known yet, or one of three
+    assert bounds["next_cube"] == bounds["cubes"] == (0, 2)
+    assert bounds["end_reason"] == (0, 5)

@@ -359,3 +359,13 @@ def test_select_and_overwrite_worlds():
     assert states.steps.tolist() == [0, 0, 0]
     states[torch.tensor([2])] = part
     assert states.steps.tolist() == [0, 0, 7]
+
+
+def test_beyond_the_step_limit_an_episode_is_over_too():
+    """A state that was saved under a longer limit."""
+    short = TaskSettings(step_limit=40)
+    state = at(5.0, 5.0, 5.0, settings=short)
+    for steps, reason in ((38, 0), (39, EndReason.STEP_LIMIT), (60, EndReason.STEP_LIMIT)):
+        state.steps[:] = steps
+        after, _ = fly(state, 1.0, 0.0, short)
+        assert after.end_reason == reason

@@ -1,3 +1,5 @@
+import math
+
 import torch
 
 from drone_rl.sim.settings import CameraSettings
@@ -44,3 +46,25 @@ def test_the_grid_reaches_over_the_field(settings):
     grid = changes.grid(settings, 3, 5)
     assert grid.forward.tolist() == [1.5, 5.25, 9.0]
     assert grid.lateral.tolist() == [8.0, 4.0, 0.0, -4.0, -8.0]
+
+
+def test_pillars_elsewhere_fill_what_is_in_view(field, settings):
+    """From 2.2 m ahead to where the second row stands, 16 m; up to 16 m to either side."""
+    state = field((5.0, -2.0), FAR)[torch.zeros(800, dtype=torch.int64)]
+    camera = CameraSettings()
+    found = changes.elsewhere(settings, state, camera, torch.Generator().manual_seed(0))
+    away = (found.pillars[..., :2] - state.drone[:, None, :2]).flatten(0, 1)
+    ahead, aside = away.unbind(-1)
+    edge = math.tan(math.radians(camera.horizontal_fov / 2))
+    assert 2.2 <= ahead.min() < 2.3 and 15.9 < ahead.max() <= 16.0
+    slope = aside / ahead
+    assert -edge <= slope.min() < -0.98 * edge and 0.98 * edge < slope.max() <= edge
+    assert 15.5 < aside.abs().max() <= 16.0 + 1e-9 and abs(slope.mean()) < 0.1 * edge
+    near = slope.abs() < 0.4 * edge  # all as far as 16 m
+    assert torch.corrcoef(torch.stack([ahead, slope])[:, near])[0, 1].abs() < 0.1
+    assert abs(ahead[near].mean() - (2.2 + 16.0) / 2) < 0.4
+
+
+def test_the_grid_begins_half_a_step_from_touching(settings):
+    short = settings.replace(step_length=0.5)
+    assert changes.grid(short, 2, 2).forward.tolist() == [1.25, 9.0]

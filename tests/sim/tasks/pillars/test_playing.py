@@ -32,3 +32,11 @@ def test_fields_are_drawn_from_the_world_s_own_stream(settings):
     task = Pillars(settings)
     one, two = (task.draw(np.random.RandomState(3)) for _ in range(2))
     assert one.shape == (2, 2) and torch.equal(one, two) and one.dtype == torch.float64
+
+
+def test_bounds_of_what_is_reported(settings):
+    entries = Pillars(settings).entries
+    bounds = {name: (entry.low, entry.high) for name, entry in entries.items()}
+    assert bounds["side"] == (-1, 2)  # not known yet, or one of three
+    assert bounds["next_row"] == (0, 2)
+    assert bounds["end_reason"] == (0, 5)

@@ -173,3 +173,10 @@ def test_worlds_are_judged_each_for_itself(settings, field):
 def _pair(x):
     at = body(x, 0.0)
     return type(at)(*(torch.cat([v, v]) for v in vars(at).values()))
+
+
+def test_a_way_is_ahead_within_half_a_step(settings):
+    for step in (1.0, 0.5):
+        short = settings.replace(step_length=step)
+        turns = step * torch.tensor([0.75, 0.51, 0.5, 0.0, -0.5, -0.51, -0.75])
+        assert rules.side_of(short, turns).tolist() == [L, L, A, A, A, R, R]
