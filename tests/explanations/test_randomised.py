@@ -88,7 +88,7 @@ def test_maps_that_are_the_same_everywhere_are_alike():
     ones, ramp = torch.ones(1, 2, 2), torch.tensor([[[1.0, 2.0], [3.0, 4.0]]])
     window = torch.tensor([[[1.0, 1.0], [0.0, 0.0]]])
     assert likeness(ones, 3 * ones) == likeness(window, 2 * window) == 1.0
-    assert likeness(ones, ramp) == 0.0
+    assert likeness(ones, ramp) == likeness(ramp, ones) == 0.0
 
 
 def test_rounding_errors_are_no_heat():

@@ -181,3 +181,13 @@ def test_every_thumbnail_has_a_cell_of_its_own(embedding):
     assert len(np.unique(cells, axis=0)) == 120
     corner = tsne.snap_to_grid(np.array([[0.0, 0.0], [1.0, 1.0]]), columns=3, rows=2)
     assert corner.tolist() == [[0, 0], [2, 1]]
+
+
+def test_cells_are_spread_over_all_rows_and_columns():
+    points = np.array([[0.0, 0.0], [0.0, 0.65], [1.0, 1.0]])
+    assert tsne.snap_to_grid(points, columns=2, rows=4).tolist() == [[0, 0], [0, 2], [1, 3]]
+    assert tsne.snap_to_grid(points[:, ::-1], columns=4, rows=2).tolist() == [
+        [0, 0],
+        [2, 0],
+        [3, 1],
+    ]

@@ -92,3 +92,15 @@ def test_it_is_done_at_the_last_point_not_at_one_on_the_way(hovering):
     command.begin(body)
     command.goals(body)
     assert command.is_complete(body).tolist() == [False]
+
+
+def test_it_climbs_slower_towards_the_end(hovering):
+    """Half a second's way from the end on: 0.4 m before it at 0.8 m/s."""
+    body = hovering((0, 0, 5))
+    command = AlongPath(rows([[0, 0, 9]]), 2.0, 60.0)
+    command.begin(body)
+    climbs = []
+    for height in (6.0, 7.0, 8.0, 8.6, 9.0):
+        body.position[0, 2] = height
+        climbs.append(command.goals(body).drift[0, 3].item())
+    assert climbs == pytest.approx([2.0, 2.0, 2.0, 0.8, 0.0], abs=1e-9)

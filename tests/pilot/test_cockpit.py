@@ -1,6 +1,8 @@
 import math
 
+import numpy as np
 import pytest
+import torch
 
 from drone_rl.pilot.cockpit import limit_of, radians
 from drone_rl.pilot.errors import PilotError
@@ -121,3 +123,12 @@ def test_a_way_may_take_three_times_as_long_as_it_should_and_10_s():
     assert limit_of(0.5, 12.0, 4.0) == 0.5
     with pytest.raises(InputError, match=r"timeout=-0\.5"):
         limit_of(-0.5, 12.0, 4.0)
+
+
+def test_in_a_world_it_is_the_drone_of_that_world_unless_another_is_given():
+    heavy = DynamicsSettings(mode="simple_flight", mass=1.25)
+    worlds = Worlds(1, dynamics=heavy)
+    worlds.reset(torch.tensor([0]), [np.random.RandomState(0)])
+    assert Pilot(worlds=worlds).settings.mass == 1.25
+    assert Pilot(heavy.replace(mass=1.1), worlds=worlds).settings.mass == 1.1
+    worlds.close()

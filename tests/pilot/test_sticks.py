@@ -43,3 +43,8 @@ def test_no_goal_is_below_the_ground(hovering):
 def test_where_no_stick_stands():
     with pytest.raises(InputError, match=r"roll=1\.1 can't be; give a finite number of -1 or more"):
         Sticks(roll=1.1)
+
+
+def test_sticks_stand_in_the_middle_by_default():
+    sticks = Sticks()
+    assert (sticks.pitch, sticks.roll, sticks.throttle, sticks.yaw) == (0.0, 0.0, 0.0, 0.0)

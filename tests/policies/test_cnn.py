@@ -70,3 +70,23 @@ def test_linear_and_convolutional_layers_are_trainable():
     net(torch.randn(4, 1, 25, 64)).sum().backward()
     assert all(p.grad is not None for p in net.parameters())
     assert sum(isinstance(m, nn.Conv2d) for m in net.layers) == 2
+
+
+def test_gains_of_the_last_layer_and_of_those_before_it():
+    """Rows of orthogonal weights are as long as the gain."""
+    network = SmallCNN((1, 25, 64), 3, generator=torch.Generator().manual_seed(0))
+    for name, gain in (("conv1", 2**0.5), ("fc1", 2**0.5), ("logits", 0.01)):
+        weight = network.layers.get_parameter(f"{name}.weight").flatten(1)
+        torch.testing.assert_close(weight.norm(dim=1), torch.full((len(weight),), gain))
+        assert not network.layers.get_parameter(f"{name}.bias").any()
+
+
+def test_widths_by_default():
+    layers = SmallCNN((1, 25, 64), 3).layers
+    shapes = {n: tuple(p.shape) for n, p in layers.named_parameters() if n.endswith("weight")}
+    assert shapes == {
+        "conv1.weight": (16, 1, 4, 4),
+        "conv2.weight": (32, 16, 3, 3),
+        "fc1.weight": (64, 32 * 4 * 14),
+        "logits.weight": (3, 64),
+    }

@@ -49,7 +49,7 @@ RECORDS = {
     OWN: record((f"{OWN}::low", 0.5, [LOW]), (f"{OWN}::high", 1.0, [HIGH])),
     SLOW: record((f"{SLOW}::quick", 2.0, [LOW]), (f"{SLOW}::none", 50.0, [])),
     OTHERS: record((f"{OTHERS}::low", 0.25, [LOW, BRANCH]), failed=[f"{OTHERS}::wrong"]),
-    WORLDS: record((f"{WORLDS}::long", 29.0, [LOW]), (f"{WORLDS}::longer", 40.0, [LOW])),
+    WORLDS: record((f"{WORLDS}::long", 19.0, [LOW]), (f"{WORLDS}::longer", 40.0, [LOW])),
 }
 
 

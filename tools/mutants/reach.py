@@ -17,7 +17,7 @@ from tools.mutants import forks, kept, targets
 from tools.mutants.blocks import block_at, blocks, module_name
 from tools.mutants.worklist import Mutant
 
-BUDGET_S = 30.0
+BUDGET_S = 20.0
 """Processor time that the tests of one stage may take without a mutation; quick ones come first."""
 WHOLE_FILE_S = 3.0
 """A file of tests that takes less is run as a whole in the second stage."""
