@@ -134,7 +134,7 @@ def shifts(
     pilot = as_pilot(policy, outputs).in_task(**(task or {}))
     pilot = pilot.in_dynamics(**dynamics) if dynamics else pilot
     begin = time.perf_counter()
-    require_function(pilot, seed=settings.seed, device=settings.device, renderer=settings.renderer)
+    require_function(pilot, seed=seed.value, device=settings.device, renderer=settings.renderer)
     subject = make_subject(pilot, settings)
     axes = find_axes(settings.axes, subject)
     total = len(axes) * (len(settings.strengths) + settings.domain) + 1

@@ -14,6 +14,7 @@ from drone_rl.api.shifting import shifts
 from drone_rl.conditions.axes import AXES
 from drone_rl.conditions.axis import Axis
 from drone_rl.settings.judging import JudgeSettings
+from drone_rl.utils.seeding import root_seed
 
 POLICY = "robust"
 """Good beyond no difference on every axis."""
@@ -49,7 +50,7 @@ def bench_domain_axes(folder: Path, quick: bool) -> dict[str, Any]:
     flights = JudgeSettings(domain_flights=20 if quick else 100)
     wrong = {name: [*_problems(policy, folder, name)] for name in found.numbers["axes"]}
     needs = _required(policy, folder, folder / "domain.yaml").needs
-    reflown = refly(policy, needs, found.numbers, flights)
+    reflown = refly(policy, needs, found.numbers, flights, root_seed(None))
     return {
         "domain_axes": len(wrong),
         "domain_axes_right": sum(not problems for problems in wrong.values()),

@@ -248,7 +248,7 @@ def _costs(axes: Axes, layout: Layout, groups: list[Group]) -> None:
 
 def _places(axes: Axes, layout: Layout, groups: list[Group]) -> list[float]:
     """Where the groups lie along the axis: at their numbers, or side by side."""
-    names = [group.choice.get(layout.axis or "", "") for group in groups]
+    names = [str(group.choice.get(layout.axis or "", "")) for group in groups]
     axes.set_xlabel(_literal(layout.axis or "all runs"))
     try:
         places = [float(name) for name in names]
