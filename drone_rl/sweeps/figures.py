@@ -268,10 +268,11 @@ def _labels(axes: Axes, places: Sequence[float], names: Sequence[str]) -> list[s
     """A label for each place, empty where it would overlap the one before it."""
     at = np.log(places) if axes.get_xscale() == "log" else np.asarray(places)
     room = np.ptp(at) / MOST_LABELS
-    labels, last = [""] * len(names), -np.inf
+    labels: list[str] = [""] * len(names)
+    last = -np.inf
     for i in np.argsort(at, kind="stable"):
         if at[i] - last >= room and at[i] > last:
-            labels[i], last = _literal(names[i]), at[i]
+            labels[int(i)], last = _literal(names[int(i)]), at[i]
     return labels
 
 

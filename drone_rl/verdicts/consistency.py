@@ -129,8 +129,8 @@ def _quantity(
     interval = {"lower95": lower, "upper95": upper}
     if value is not None:
         check_order(interval, value, where)
-    if name.startswith("offered "):  # which has a value, as every episode tells it
-        offered = proportion(round(float(value) * count), count, rule.confidence)
+    if name.startswith("offered "):
+        offered = proportion(round((value or 0.0) * count), count, rule.confidence)
         check_width(interval, offered, where)
     else:
         check_mean_width((lower, upper), value, count, bounds, rule.confidence, where)
