@@ -61,6 +61,10 @@ EVALUATION: Plain = {
     **FIXED_SEED,
     "rounding": {
         "arithmetic": "float32 on cpu, PyTorch",
+        "frames": 2000,
+        "fragile": 0,
+        "fragile_rate": 0.0,
+        "excessive": False,
         "compared": "fused kernel",
         "compared_episodes": 64,
         "differing": 0,
