@@ -123,10 +123,12 @@ class RoundingBound:
     @torch.no_grad()
     def errors(self, pixels: Tensor) -> Tensor:
         """Return the error of each output of each frame. Shape: (N, outputs), float64."""
-        count = self._run(pixels[:1])[0].shape[-1]
-        return self._back(pixels, lambda value: torch.eye(count).double().repeat(len(value), 1, 1))[
-            1
-        ]
+
+        def each(value: Tensor) -> Tensor:
+            eye = torch.eye(value.shape[-1], dtype=torch.float64, device=value.device)
+            return eye.repeat(len(value), 1, 1)
+
+        return self._back(pixels, each)[1]
 
     @torch.no_grad()
     def possible(self, pixels: Tensor) -> Tensor:

@@ -61,7 +61,7 @@ def speak(evidence):
 def test_what_is_said_of_a_good_policy(evidence):
     assert speak(evidence) == {
         "kind": "This policy does its task: it collects every cube in 94% of episodes.",
-        "fixed_seed": "Fixed environments: a policy could have been fitted to these environments.",
+        "fixed_seed": "Fixed seed 0: a policy could have been fitted to these environments.",
         "shares": "It collects 90% of the cubes on its left, 100% of those ahead and 100% of those "
         "on its right.",
         "baselines": "In the same worlds it collects 96% of all cubes, acting at random 28% and "
