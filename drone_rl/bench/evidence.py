@@ -83,6 +83,7 @@ VERDICT: Plain = {
     "proof": None,
     "rounding": {
         "arithmetic": "float32 on cpu, fused kernel",
+        "bound": True,
         "frames": 16000,
         "fragile": 8,
         "fragile_rate": 0.0005,

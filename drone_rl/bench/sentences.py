@@ -113,6 +113,7 @@ _OF_VERDICTS = (
     ("rounding", {"rounding.decides": False}, _ROUNDED),
     ("rounding", {"rounding.unexplained": 3}, _ROUNDED),
     ("arithmetic", {"rounding": None}),
+    ("arithmetic", {"rounding.bound": False}),
     ("arithmetic", {"rounding.arithmetic": "float32 on cuda, PyTorch"}),
     ("proof.every", {"proof": None}, _PROVED),
     ("proof.every", {"proof.every": False}, _PROVED),

@@ -229,3 +229,10 @@ def test_another_way_of_moving_is_told(evidence):
     )
     evidence["unlike"] = {}
     assert "unlike" not in speak(evidence)
+
+
+def test_a_verdict_says_where_effects_of_rounding_have_no_bound(evidence):
+    found = {"arithmetic": "float32 on cpu, PyTorch", "decides": False}
+    for bound, more in ((True, "."), (False, "; effects of rounding were tried out, not bounded.")):
+        text = speak({**evidence, "rounding": {**found, "bound": bound}})["arithmetic"]
+        assert text == f"The verdict holds for float32 on cpu, PyTorch{more}"
