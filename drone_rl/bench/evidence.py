@@ -61,6 +61,10 @@ EVALUATION: Plain = {
     **FIXED_SEED,
     "rounding": {
         "arithmetic": "float32 on cpu, PyTorch",
+        "frames": 2000,
+        "fragile": 0,
+        "fragile_rate": 0.0,
+        "excessive": False,
         "compared": "fused kernel",
         "compared_episodes": 64,
         "differing": 0,
@@ -79,6 +83,7 @@ VERDICT: Plain = {
     "proof": None,
     "rounding": {
         "arithmetic": "float32 on cpu, fused kernel",
+        "bound": True,
         "frames": 16000,
         "fragile": 8,
         "fragile_rate": 0.0005,

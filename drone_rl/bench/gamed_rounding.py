@@ -5,6 +5,7 @@ unit is 1; in float32 it depends on which of 2^24, 1 and -2^24 are added first. 
 turns left for ever.
 """
 
+import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -16,9 +17,12 @@ from drone_rl.api.judging import judge
 from drone_rl.api.policy import load_policy
 from drone_rl.api.progress import silent
 from drone_rl.api.proving import prove
+from drone_rl.api.shifting import shifts
 from drone_rl.bench.gamed_case import GamedCase
+from drone_rl.bench.gamed_certificates import one_box
 from drone_rl.sim.actions import Move
 from drone_rl.utils.errors import InputError
+from drone_rl.zoo import certificate_path
 from drone_rl.zoo.files import exported_bytes
 
 BIG = 2.0**24
@@ -49,6 +53,9 @@ def cases(folder: Path) -> list[GamedCase]:
     found = [GamedCase(name, lambda path=path: judged_good(path)) for name, path in files.items()]
     fused = files["good in the fused kernel only"]
     found.append(GamedCase("proved for one cube by rounding", lambda: proved(fused)))
+    batches = files["good in large batches only"]
+    found.append(GamedCase("in an operating domain by rounding", lambda: in_domain(batches)))
+    found.append(GamedCase("proved by a borrowed certificate", lambda: borrows_proof(folder)))
     made = {
         "bad one at a time": lambda: _if_alone,
         "bad in batches of 7": lambda: _if_seven,
@@ -79,12 +86,36 @@ def proved(path: Path) -> bool:
         return False
 
 
-def widened() -> tuple[dict[str, Any], dict[str, Tensor]]:
-    """Return the description and weights of "good" with a constant channel and a hidden unit more.
+def borrows_proof(folder: Path) -> bool:
+    """Whether few episodes prove a policy whose decisions all depend on rounding.
+
+    It is the shipped policy "proved" with one more unit, and comes with that policy's certificate.
+    """
+    policy = load_policy(subnormal(folder, "proved"))
+    shipped = certificate_path(load_policy("proved").path)
+    own = {"policy": one_box(policy, {})["policy"]}
+    path = folder / "borrowed.json"
+    path.write_text(json.dumps({**json.loads(shipped.read_text()), **own}))
+    done = judge(policy, certificate=path, episodes=20, sampled=False, progress=silent)
+    return done.status("proved") == 0
+
+
+def in_domain(path: Path) -> bool:
+    """Whether a policy is surely good where nothing is different."""
+    few: dict[str, Any] = {"axes": ["noise"], "strengths": [1], "modes": ["constant"]}
+    done = shifts(path, episodes=1, domain_episodes=200, progress=silent, **few)
+    return bool(done.numbers["domain"]["plain"]["good"])
+
+
+def widened(name: str = "good") -> tuple[dict[str, Any], dict[str, Tensor]]:
+    """Return a policy's description and weights with a constant channel and a hidden unit more.
 
     The channel is 1 everywhere; the unit, the last one of "fc1", has no inputs and no outputs yet.
+
+    Args:
+        name: Of a shipped policy with two convolutions and one hidden layer.
     """
-    good = load_policy("good")
+    good = load_policy(name)
     described = good.description.as_dict()
     channels, (hidden,) = described["network"]["channels"], described["network"]["hidden"]
     network = {**described["network"], "channels": [channels[0], channels[1] + 1]}
@@ -157,15 +188,15 @@ def _close(folder: Path) -> Path:
     return write(folder, "close", described, weights)
 
 
-def subnormal(folder: Path) -> Path:
+def subnormal(folder: Path, name: str = "good") -> Path:
     """The unit is a subnormal number, which some processors settings replace by 0."""
-    described, weights = widened()
+    described, weights = widened(name)
     part(weights, "fc1.bias")[-1] = 0.9 * 2.0**-126
     for name in ("logits.weight", "logits.bias"):
         part(weights, name).mul_(2.0**-8)
     part(weights, "logits.weight")[Move.LEFT, -1] = 1.9 * 2.0**127
     part(weights, "logits.bias")[Move.LEFT] -= 1.9 * 0.9 * 2.0
-    return write(folder, "subnormal", described, weights)
+    return write(folder, f"subnormal_{name}", described, weights)
 
 
 def non_finite(folder: Path) -> Path:

@@ -113,6 +113,7 @@ _OF_VERDICTS = (
     ("rounding", {"rounding.decides": False}, _ROUNDED),
     ("rounding", {"rounding.unexplained": 3}, _ROUNDED),
     ("arithmetic", {"rounding": None}),
+    ("arithmetic", {"rounding.bound": False}),
     ("arithmetic", {"rounding.arithmetic": "float32 on cuda, PyTorch"}),
     ("proof.every", {"proof": None}, _PROVED),
     ("proof.every", {"proof.every": False}, _PROVED),
@@ -154,6 +155,7 @@ _OF_VERDICTS = (
     ("fixed_seed", {"seed": None}),
 )  # fmt: skip
 _OTHER_ACTIONS = {"rounding.differing": 5}
+_EXCESSIVE = {"rounding.excessive": True, "rounding.fragile": 400, "rounding.fragile_rate": 0.2}
 _OF_EVALUATIONS = (
     ("computed", {"rounding": None}),
     ("computed", {"rounding.arithmetic": "float32 on cuda, PyTorch"}),
@@ -161,6 +163,8 @@ _OF_EVALUATIONS = (
     ("computed.same", {"rounding": None}),
     ("computed.other", {"rounding.differing": 0}, _OTHER_ACTIONS),
     ("computed.other", {"rounding.differing": 6}, _OTHER_ACTIONS),
+    ("computed.fragile", {"rounding.excessive": False}, _EXCESSIVE),
+    ("computed.fragile", {"rounding.fragile": 300, "rounding.fragile_rate": 0.15}, _EXCESSIVE),
 )
 _CERTAIN_GOOD = {"verdict.kind": "good", "verdict.certain": True, "verdict.exit_code": 0}
 _NOT_CERTAIN = {"verdict.certain": False, "verdict.enough": 1600}

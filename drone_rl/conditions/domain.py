@@ -18,17 +18,20 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import torch
+from torch import Tensor
 
 from drone_rl.conditions.axis import Axis
 from drone_rl.conditions.condition import Condition
+from drone_rl.conditions.eyes import PolicyEyes
 from drone_rl.conditions.flying import Airfield
 from drone_rl.conditions.oracle import OracleEyes, has_oracle
 from drone_rl.conditions.suite import finite
 from drone_rl.evaluation import Episodes
+from drone_rl.evaluation.branches import Outcomes
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import proportion
 from drone_rl.utils.seeding import Stream, torch_generator
-from drone_rl.verdicts.judge import measure
+from drone_rl.verdicts.judge import measure, widen
 from drone_rl.verdicts.kinds import Kind
 from drone_rl.verdicts.rule import Quantity, Rule, kinds_within
 
@@ -121,7 +124,8 @@ class Prober:
         """Whether it is surely good under a condition.
 
         That is: the verdict is good, certainly, and it is surely better than luck, so that who
-        looks at nothing is never called good, however easy a condition makes the task.
+        looks at nothing is never called good, however easy a condition makes the task. Episodes
+        that depend on rounding count as failures for "good", and as successes for "bad".
 
         Args:
             condition: Which.
@@ -136,12 +140,14 @@ class Prober:
             key = self._bed.settings(condition)
         except InputError as error:
             return {"good": False, "bad": True, "refused": str(error)}
-        flown = self._bed.fly(condition).episodes
+        flown, is_fragile = self._fly(condition)
         if key not in self._luck:  # who sees nothing minds neither look nor camera
             self._luck[key] = self._bed.fly_blindly(condition)
         rule = self.rule_at(part)
         baselines = {**self._luck[key], "oracle": self._oracle}
-        found = dict(zip(rule.quantities, measure(flown, baselines, rule), strict=True))
+        found = dict(
+            zip(rule.quantities, _measure(flown, baselines, rule, is_fragile), strict=True)
+        )
         return {
             "good": is_surely_good(found, rule),
             "bad": Kind.GOOD not in _kinds(found, rule),
@@ -149,6 +155,12 @@ class Prober:
             "success": float(flown.success.mean()),
             "worst": _worst(found, rule),
         }
+
+    def _fly(self, condition: Condition) -> tuple[Episodes, Tensor]:
+        """The policy's episodes, and which of them depend on rounding. Shape: (n,), bool."""
+        subject, count = self._bed.subject, self._bed.episodes
+        eyes = PolicyEyes(subject.network, subject.transforms, count, examines_rounding=True)
+        return self._bed.fly(condition, eyes=eyes).episodes, eyes.is_fragile
 
     def search(self, axis: Axis) -> dict[str, Any]:
         """The widest range of an axis.
@@ -209,6 +221,14 @@ class Prober:
 
     def _value(self, axis: Axis, strength: float) -> float | None:
         return finite(axis.value(strength, self._bed.subject))
+
+
+def _measure(
+    flown: Episodes, baselines: Mapping[str, Episodes], rule: Rule, is_fragile: Tensor
+) -> tuple[Quantity, ...]:
+    """The rule's quantities, whatever the ends of the fragile episodes."""
+    unknown = Outcomes(None, torch.empty(0, dtype=torch.int64), is_fragile)
+    return widen(measure(flown, baselines, rule), flown, baselines, rule, unknown)
 
 
 def is_surely_good(found: Mapping[str, Quantity], rule: Rule) -> bool:

@@ -10,6 +10,7 @@ from torchrl.envs import Transform
 from drone_rl.envs import GrayPixels
 from drone_rl.envs.pipeline import memory_of, see_film
 from drone_rl.policies import PictureNetwork
+from drone_rl.policies.rounding import decider
 from drone_rl.sim.actions import Actions
 from drone_rl.sim.rendering import Appearance, Poses
 from drone_rl.sim.rendering.view import Modality
@@ -62,7 +63,12 @@ class PolicyEyes:
     knows_truth = False
 
     def __init__(
-        self, network: PictureNetwork, transforms: Iterable[Transform], num_worlds: int
+        self,
+        network: PictureNetwork,
+        transforms: Iterable[Transform],
+        num_worlds: int,
+        *,
+        examines_rounding: bool = False,
     ) -> None:
         """Has seen nothing yet.
 
@@ -70,7 +76,12 @@ class PolicyEyes:
             network: The policy's.
             transforms: What becomes of pictures before it sees them.
             num_worlds: That fly.
+            examines_rounding: Whether to find out where rounding can change the action.
         """
+        self.is_fragile = torch.zeros(num_worlds, dtype=torch.bool)
+        """Episodes with a frame on which rounding can change the action, if that is examined.
+        Shape: (num_worlds,)."""
+        self._decide = decider(network)[0] if examines_rounding else None
         looking = [t for t in transforms if "pixels" in (t.in_keys or [])]
         self._network, self._first, self._rest = network, looking[0], looking[1:]
         self._memory, self._num_worlds = memory_of(self._rest), num_worlds
@@ -86,6 +97,8 @@ class PolicyEyes:
         film = [*(earlier[sight.flying] for earlier in self._film), pictures]
         seen = see_film(self._rest, film)
         self._keep(pictures, sight.flying)
+        if self._decide is not None:
+            self.is_fragile[sight.flying.cpu()] |= self._decide(seen).is_fragile.cpu()
         return sight.worlds.dynamics.actions.greedy(self._network(seen)), pictures
 
     def _keep(self, pictures: Tensor, flying: Tensor) -> None:

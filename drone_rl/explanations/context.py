@@ -157,4 +157,4 @@ class Context:
     @functools.cached_property
     def response(self) -> ResponseMap:
         """What it does about one cube at each place of a grid."""
-        return response_map(self.scenes, self.network)
+        return response_map(self.scenes, self.network, seed=self.seed.value)

@@ -13,9 +13,13 @@ from drone_rl.explanations.hooks import probabilities
 from drone_rl.explanations.scenes import Scenes, empty_scene, place_target
 from drone_rl.policies import PictureNetwork
 from drone_rl.sim.actions import Actions
+from drone_rl.sim.tasks.explainable import Grid
+from drone_rl.utils.seeding import Stream, torch_generator
 
 BLIND = 0.1
 """A policy is blind to a cube that changes its action probabilities by less than this."""
+_RESPONSE, _OUTCOME = 0, 1
+"""Numbers of the maps' grids."""
 
 
 @dataclasses.dataclass
@@ -54,7 +58,12 @@ class OutcomeMap:
 
 
 def response_map(
-    scenes: Scenes, network: PictureNetwork, *, num_lateral: int = 41, num_forward: int = 31
+    scenes: Scenes,
+    network: PictureNetwork,
+    *,
+    num_lateral: int = 41,
+    num_forward: int = 31,
+    seed: int | None = None,
 ) -> ResponseMap:
     """Draws one cube at every place of a grid and asks the policy about each.
 
@@ -63,8 +72,10 @@ def response_map(
         network: The policy's.
         num_lateral: Places sideways; see `Explainable.grid`.
         num_forward: Places ahead.
+        seed: Of the places, see `shrink`; without it they are always the same.
     """
-    height, forward, lateral = scenes.task.grid(num_forward, num_lateral)
+    grid = scenes.task.grid(num_forward, num_lateral)
+    height, forward, lateral = grid if seed is None else shrink(grid, seed, _RESPONSE)
     ahead, aside = torch.meshgrid(forward, lateral, indexing="ij")
     layers = []
     for up in height.tolist():
@@ -85,6 +96,37 @@ def response_map(
     )
 
 
+def shrink(grid: Grid, seed: int, number: int = 0) -> Grid:
+    """Move the outermost places inwards by random lengths, and all others in proportion.
+
+    Nobody can know these places beforehand and fit a policy to their frames. Places stay evenly
+    spaced, and symmetric sideways.
+
+    Args:
+        grid: Of the task.
+        seed: Root of the random stream.
+        number: Of one grid among several from this seed.
+
+    Returns:
+        The same number of places. Each end has moved by less than half the distance between two
+        places.
+    """
+    generator = torch_generator(seed, Stream.SCENES, number=number)
+    near, far, aside = (0.5 * torch.rand(3, dtype=torch.float64, generator=generator)).tolist()
+    lateral = _between(grid.lateral, aside, aside)
+    lateral = 0.5 * (lateral - lateral.flip(0))  # symmetric to the last bit
+    return Grid(grid.height, _between(grid.forward, near, far), lateral)
+
+
+def _between(places: Tensor, first: float, last: float) -> Tensor:
+    """Evenly spaced places from one step's fraction after the first to one before the last."""
+    if len(places) < 2:
+        return places
+    steps = torch.linspace(first, len(places) - 1 - last, len(places), dtype=torch.float64)
+    step = (places[-1] - places[0]) / (len(places) - 1)
+    return places[0] + step * steps
+
+
 def find_blind(actions: Actions, wishes: Tensor, alone: Tensor, needed: Tensor) -> Tensor:
     """Where a cube calls for a turn and the policy doesn't notice it.
 
@@ -103,7 +145,12 @@ def find_blind(actions: Actions, wishes: Tensor, alone: Tensor, needed: Tensor) 
 
 
 def outcome_map(
-    scenes: Scenes, network: PictureNetwork, *, num_lateral: int = 21, num_forward: int = 8
+    scenes: Scenes,
+    network: PictureNetwork,
+    *,
+    num_lateral: int = 21,
+    num_forward: int = 8,
+    seed: int | None = None,
 ) -> OutcomeMap:
     """Flies on from every place of a coarser grid, and sees whether the cube is collected.
 
@@ -112,8 +159,10 @@ def outcome_map(
         network: The policy's.
         num_lateral: Places sideways; see `Explainable.grid`.
         num_forward: Places ahead.
+        seed: See `response_map`.
     """
-    height, forward, lateral = scenes.task.grid(num_forward, num_lateral)
+    grid = scenes.task.grid(num_forward, num_lateral)
+    height, forward, lateral = grid if seed is None else shrink(grid, seed, _OUTCOME)
     ahead, aside = torch.meshgrid(forward, lateral, indexing="ij")
     only = torch.zeros(num_forward * num_lateral, dtype=torch.int64, device=scenes.worlds.device)
     layers = []

@@ -43,7 +43,7 @@ class Layer(abc.ABC):
         """Return a bound on the outputs' errors for all inputs up to a size.
 
         Args:
-            largest: Size of the largest input. Shape: (1, *), float64.
+            largest: Size of the largest input of one evaluation in float32. Shape: (1, *), float64.
             error: Of the inputs. Shape: (1, *), float64.
         """
 
@@ -79,9 +79,10 @@ class Affine(Layer):
 
     def bound(self, largest: Tensor, error: Tensor) -> Tensor:
         """See `Layer`."""
-        total = self._apply(largest + error, self._size, self._bias.abs())
+        size = largest + 2 * error  # the exact inputs and another evaluation's are both that near
+        total = self._apply(size, self._size, self._bias.abs())
         carried = self._apply(error, self._size, None)
-        return carried + self._local(total, total, largest + error)
+        return SLACK * carried + self._local(total, total, size)
 
     def run(self, value: Tensor, error: Tensor) -> tuple[Tensor, Tensor, Note]:
         """See `Layer`."""

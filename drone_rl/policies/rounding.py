@@ -10,6 +10,7 @@ or without subnormal numbers. It does not hold for TF32 or bfloat16, nor for con
 Winograd's or Fourier's transform.
 """
 
+import copy
 import dataclasses
 from collections.abc import Callable
 from typing import Any, Self
@@ -18,6 +19,7 @@ import torch
 from torch import Tensor, nn
 
 from drone_rl.policies.cnn import PolicyNetwork
+from drone_rl.policies.network import PictureNetwork
 from drone_rl.policies.rounded_layers import SLACK, UNIT, Layer, layer_of
 from drone_rl.sim.actions import Actions, DiscreteActions
 
@@ -123,10 +125,12 @@ class RoundingBound:
     @torch.no_grad()
     def errors(self, pixels: Tensor) -> Tensor:
         """Return the error of each output of each frame. Shape: (N, outputs), float64."""
-        count = self._run(pixels[:1])[0].shape[-1]
-        return self._back(pixels, lambda value: torch.eye(count).double().repeat(len(value), 1, 1))[
-            1
-        ]
+
+        def each(value: Tensor) -> Tensor:
+            eye = torch.eye(value.shape[-1], dtype=torch.float64, device=value.device)
+            return eye.repeat(len(value), 1, 1)
+
+        return self._back(pixels, each)[1]
 
     @torch.no_grad()
     def possible(self, pixels: Tensor) -> Tensor:
@@ -196,7 +200,8 @@ class RoundingBound:
 def decider(network: nn.Module) -> tuple[Decide, bool]:
     """Return how to decide with a network, and whether a bound for its layers is known.
 
-    Without a bound, an error of `TOLERANCE` is assumed.
+    Without a bound, an error of `TOLERANCE` is assumed or, of a torch module, twice the difference
+    between its outputs in float32 and in float64 if that is larger.
 
     Args:
         network: Frames to outputs, with `actions` as a `PictureNetwork` has.
@@ -204,6 +209,7 @@ def decider(network: nn.Module) -> tuple[Decide, bool]:
     bound = RoundingBound.find(network)
     if bound is not None:
         return bound.decide, True
+    exact = _in_float64(network)
 
     @torch.no_grad()
     def assume(pixels: Tensor) -> Decisions:
@@ -211,10 +217,30 @@ def decider(network: nn.Module) -> tuple[Decide, bool]:
         if not isinstance(network.actions, DiscreteActions):
             return Decisions(outputs, torch.zeros_like(outputs, dtype=torch.bool))
         lead = outputs.amax(-1, keepdim=True) - outputs
-        scale = 1 + outputs.abs().amax(-1, keepdim=True)
-        return Decisions(outputs, ~(lead > TOLERANCE * scale))
+        error = TOLERANCE * (1 + outputs.abs().amax(-1, keepdim=True)).double()
+        if exact is not None:
+            off = (exact(pixels.double()) - outputs).abs().amax(-1, keepdim=True)
+            error = torch.maximum(error, 2 * off)
+        return Decisions(outputs, ~(lead > error))
 
     return assume, False
+
+
+def _in_float64(network: nn.Module) -> nn.Module | None:
+    """A copy that computes in float64; None if there is no module or it fixes its precision."""
+    if not isinstance(network, PictureNetwork) or not any(True for _ in network.parameters()):
+        return None
+    exact = copy.deepcopy(network).double()
+    try:
+        with torch.no_grad():
+            exact(torch.zeros(1, *network.in_shape, dtype=torch.float64, device=_device(network)))
+    except (RuntimeError, TypeError, ValueError):
+        return None
+    return exact
+
+
+def _device(network: nn.Module) -> torch.device:
+    return next(network.parameters()).device
 
 
 def _pixel_error(largest: Tensor) -> Tensor:

@@ -38,6 +38,8 @@ class Stream(enum.IntEnum):
     """How these conditions differ from world to world and from step to step."""
     SENSORS = 11
     """Noise of what drones sense beside pictures."""
+    SCENES = 12
+    """Where explanations place a target."""
 
 
 FRESH_BITS = 48

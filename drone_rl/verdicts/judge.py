@@ -157,7 +157,7 @@ def judge(
         "terms": task.terms.as_dict(),
         "num_cubes": greedy.goals.reached.shape[-1],
         "rounding": None if rounding is None else {**rounding.as_dict(), "decides": depends},
-        "proof": None if claim is None else claim.beside(greedy, depends_on_rounding=depends),
+        "proof": None if claim is None else claim.beside(greedy, rounding=rounding),
         "greedy": summarise(greedy),
         "sampled": None if sampled is None else summarise(sampled),
         "baselines": {name: summarise(flown) for name, flown in baselines.items()},

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from drone_rl.checks import Certificate, find
 from drone_rl.evaluation import Episodes
+from drone_rl.evaluation.fragility import Rounding
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
 
 
@@ -40,12 +41,13 @@ class Claim:
         """
         return 1.0 - 0.05 ** (1.0 / self.uniform) if self.uniform else None
 
-    def beside(self, greedy: Episodes, *, depends_on_rounding: bool = False) -> dict[str, Any]:
+    def beside(self, greedy: Episodes, *, rounding: Rounding | None = None) -> dict[str, Any]:
         """What a verdict may quote of it, which is nothing if a flight ended otherwise.
 
         Args:
             greedy: The verdict's episodes with the most probable actions, in the same task.
-            depends_on_rounding: Whether rounding may change their kind; then nothing is quoted.
+            rounding: What rounding can change in these. If it can lead to an end that is not
+                stated, nothing is quoted, for a proof holds for any order of sums.
 
         Returns:
             Plain values: "refused" (why, or None) and, unless it is, "every" (whether all is
@@ -62,7 +64,7 @@ class Claim:
         if not all(held):
             count = f"{len(held) - sum(held)} of {len(held)} greedy flights of this verdict"
             return {"refused": f"{count} ended otherwise than it states"}
-        if depends_on_rounding:
+        if rounding is not None and _can_end_otherwise(stated, greedy, rounding):
             return {"refused": "decisions of the policy depend on rounding"}
         won, lost = (
             [o for o in stated.outcomes if len(o.boxes) and (o.end == EndReason.ALL_CUBES) == wins]
@@ -83,11 +85,25 @@ class Claim:
         }
 
 
-def _ends_as_stated(stated: Certificate, greedy: Episodes) -> list[bool]:
-    """Of each episode from a place of which an end is stated: whether it was that end."""
+def _can_end_otherwise(stated: Certificate, greedy: Episodes, rounding: Rounding) -> bool:
+    """Whether rounding can lead from a place of which an end is stated to another end."""
+    ends = rounding.outcomes
+    is_stated = _outcomes_of(stated, greedy) < len(stated.outcomes)
+    unknown = bool((ends.is_open.numpy() & is_stated).any())
+    is_other = ends.episodes is not None and not all(_ends_as_stated(stated, ends.episodes))
+    return rounding.is_excessive or unknown or is_other
+
+
+def _outcomes_of(stated: Certificate, episodes: Episodes) -> NDArray[np.int64]:
+    """The number of each episode's outcome; as many as there are where nothing is stated."""
     groups = stated.groups
     owner = np.repeat(np.arange(len(groups)), [len(boxes) for boxes in groups])
-    outcome = owner[find(np.concatenate(groups), _placements(greedy))]
+    return owner[find(np.concatenate(groups), _placements(episodes))]
+
+
+def _ends_as_stated(stated: Certificate, greedy: Episodes) -> list[bool]:
+    """Of each episode from a place of which an end is stated: whether it was that end."""
+    outcome = _outcomes_of(stated, greedy)
     flown = zip(outcome, greedy.end_reason.tolist(), greedy.goals.reached.tolist(), strict=True)
     return [
         (end, tuple(reached)) == (stated.outcomes[i].end, stated.outcomes[i].collected)

@@ -59,7 +59,7 @@ def _share(evidence: Evidence) -> str:
 
 def _basis(evidence: Evidence) -> str:
     agreeing = evidence["proof"]["agreeing"]
-    own = f" The {agreeing:,} greedy flights of this verdict that it tells of ended so."
+    own = f" All {agreeing:,} greedy episodes of this verdict whose end it states ended so."
     return (
         "The certificate is of this network and task, and its boxes are a partition of the "
         f"placements. {_checked(evidence['proof'])}{own if agreeing else ''}"
@@ -80,7 +80,7 @@ def _checked(proof: Evidence) -> str:
     )
     if bound > MOST_WRONG:
         return f"{text}, which is too much for a proof."
-    return f"{text}; drone-rl prove proves it again."
+    return f"{text} (to prove it again, run drone-rl prove)."
 
 
 PROOF = (

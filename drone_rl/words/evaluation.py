@@ -1,6 +1,6 @@
 """What an evaluation says of its seed and its arithmetic. Evidence: `evaluation.json`."""
 
-from drone_rl.words.licence import Evidence, Sentence
+from drone_rl.words.licence import Evidence, Sentence, percent
 from drone_rl.words.seeds import fixed_seed
 
 
@@ -29,6 +29,20 @@ def _other(evidence: Evidence) -> str:
     )
 
 
+def _is_fragile(evidence: Evidence) -> bool:
+    found = evidence.get("rounding")
+    return bool(found) and bool(found.get("excessive")) and found["fragile"] > 0
+
+
+def _fragile(evidence: Evidence) -> str:
+    found = evidence["rounding"]
+    return (
+        f"These figures hold for this arithmetic only: in {found['fragile']:,} of "
+        f"{found['frames']:,} of these episodes' frames ({percent(found['fragile_rate'])}) the "
+        "order in which float32 sums are computed can change the action."
+    )
+
+
 EVALUATION = (
     fixed_seed("evaluation.fixed_seed"),
     Sentence(
@@ -48,5 +62,11 @@ EVALUATION = (
         "another implementation took other actions",
         lambda e: bool(e.get("rounding")) and e["rounding"]["differing"] > 0,
         _other,
+    ),
+    Sentence(
+        "computed.fragile",
+        "rounding can change the action in more frames or episodes than a verdict allows",
+        _is_fragile,
+        _fragile,
     ),
 )

@@ -135,7 +135,9 @@ def _rounding(evidence: Evidence) -> str:
 
 
 def _arithmetic(evidence: Evidence) -> str:
-    return f"The verdict holds for {evidence['rounding']['arithmetic']}."
+    found = evidence["rounding"]
+    tried = "" if found.get("bound", True) else "; effects of rounding were tried out, not bounded"
+    return f"The verdict holds for {found['arithmetic']}{tried}."
 
 
 def _shares(evidence: Evidence) -> str:

@@ -17,7 +17,7 @@ from drone_rl.conditions.oracle import OracleEyes
 from drone_rl.sim.settings import TaskSettings
 from drone_rl.utils.intervals import mean_bounds
 from drone_rl.verdicts.rule import Quantity, Rule
-from tests.conditions.subjects import Blind, subject
+from tests.conditions.subjects import Blind, Steering, subject
 
 
 @pytest.fixture
@@ -184,6 +184,26 @@ def test_who_sees_nothing_is_good_nowhere(make_prober):
     assert not prober.plain["good"]
     found = prober.search(AXES["object_color"])
     assert (found["low"], found["high"], found["flown"]) == (None, None, [])
+
+
+class Undecided(Steering):
+    """Steers as well, by a lead that rounding can take away in some frames."""
+
+    def __init__(self, darkest):
+        super().__init__()
+        self.darkest = darkest
+
+    def forward(self, pixels):
+        logits = super().forward(pixels)
+        is_close = pixels.amin((-3, -2, -1), keepdim=True)[..., 0, 0] < self.darkest
+        return torch.where(is_close, 1e-6 * logits, logits)
+
+
+@pytest.mark.parametrize("darkest", [2.0, 0.0])
+def test_where_rounding_decides_nothing_is_sure(make_prober, darkest):
+    prober = make_prober(subject(Undecided(darkest)), 200)
+    assert prober.plain["success"] > 0.95 and not prober.plain["bad"]
+    assert prober.plain["good"] == (darkest == 0.0)
 
 
 def test_one_who_is_wrong_on_a_side_is_surely_bad(make_prober):

@@ -67,6 +67,27 @@ def test_a_stack_of_frames_holds_those_of_the_worlds_that_still_fly():
     assert network.shown[1][:, :, 0, 0].tolist() == [[1.25, 1.5], [2.25, 2.5]]
 
 
+class Tied(PictureNetwork):
+    """Cannot decide between two actions in bright frames."""
+
+    actions = MOVES
+
+    def forward(self, pixels):
+        lead = torch.where(pixels.amax((1, 2, 3)) > 0.5, 1e-7, 1.0)
+        return torch.stack([lead, torch.zeros_like(lead), torch.full_like(lead, -1.0)], -1)
+
+
+def test_episodes_with_a_frame_on_which_rounding_decides_are_noted():
+    worlds = make_worlds()
+    bright = torch.tensor([1.0, 0.0, 0.0])
+    for examines in (True, False):
+        eyes = PolicyEyes(Tied(), [GrayPixels()], 3, examines_rounding=examines)
+        for flying in (torch.arange(3), torch.tensor([1, 2])):
+            eyes.act(sight(worlds, flying, lambda p, f: 0 * p + bright[f, None, None, None]))
+        assert eyes.is_fragile.tolist() == [examines, False, False]
+    worlds.close()
+
+
 def test_who_looks_at_nothing_does_the_same_always_or_anything_alike():
     worlds = make_worlds()
     where = sight(worlds, torch.arange(3))

@@ -11,6 +11,7 @@ from drone_rl.explanations.response import (
     find_blind,
     outcome_map,
     response_map,
+    shrink,
     summarise,
 )
 from drone_rl.explanations.scenes import Scenes, place_target
@@ -45,6 +46,31 @@ def test_grids_are_odd_sideways_so_that_straight_ahead_is_on_them():
     ]
     fine, coarse = {"num_lateral": 41, "num_forward": 31}, {"num_lateral": 21, "num_forward": 8}
     assert defaults == [fine, coarse]
+
+
+def test_places_of_a_seed_cannot_be_known_beforehand(scenes):
+    task_grid = scenes.task.grid(4, 5)
+    one, other, again, second = (
+        shrink(task_grid, s, n) for s, n in ((1, 0), (2, 0), (1, 0), (1, 1))
+    )
+    for axis in ("forward", "lateral"):
+        own, places = getattr(task_grid, axis), getattr(one, axis)
+        assert torch.equal(places, getattr(again, axis))
+        for moved in (getattr(other, axis), getattr(second, axis)):
+            assert not set(places.tolist()) & set(moved.tolist()) - {0.0}
+        step = (own[-1] - own[0]) / (len(own) - 1)
+        inwards = torch.stack([places[0] - own[0], own[-1] - places[-1]]) / step
+        assert ((inwards > 0) & (inwards < 0.5)).all()
+        torch.testing.assert_close(places.diff(), places.diff()[:1].expand(len(own) - 1))
+    assert torch.equal(one.lateral, -one.lateral.flip(0)) and one.lateral[2] == 0.0
+
+
+def test_both_maps_use_places_of_their_seed(scenes, world):
+    for make, number in ((response_map, 0), (outcome_map, 1)):
+        found = make(scenes, Forward(), num_lateral=3, num_forward=2, seed=9)
+        expected = shrink(scenes.task.grid(2, 3), 9, number)
+        assert found.forward.tolist() == expected.forward.tolist()
+        assert found.lateral.tolist() == expected.lateral.tolist()
 
 
 def test_heights_are_those_at_which_the_task_puts_cubes(make_pipeline):

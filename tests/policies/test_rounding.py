@@ -117,3 +117,32 @@ def test_a_network_of_unknown_layers_is_given_a_tolerance():
     assert not is_bound
     assert decide(torch.zeros(2, 1, 1, 1)).is_fragile.tolist() == [False, True]
     assert RoundingBound.find(network) is None
+
+
+class Cancelling(nn.Module):
+    """The first logit is 2^24 + 1 - 2^24 in whatever precision it computes."""
+
+    def __init__(self, precision=None):
+        super().__init__()
+        self.weight, self.precision = nn.Parameter(torch.tensor([BIG, 1.0, -BIG])), precision
+
+    def forward(self, pixels):
+        big, one, minus = self.weight.to(self.precision or self.weight.dtype)
+        first = (big + one + minus).expand(len(pixels))
+        return torch.stack([first, 0 * first + 0.5, 0 * first], -1)
+
+
+def test_a_module_of_unknown_layers_is_compared_with_itself_in_float64():
+    for precision, is_fragile in ((None, True), (torch.float32, False)):
+        network = ForeignNetwork(Cancelling(precision), (1, 1, 1), MOVES)
+        found = decider(network)[0](torch.zeros(2, 1, 1, 1))
+        assert found.is_fragile.tolist() == [is_fragile] * 2
+
+
+def test_a_module_that_only_takes_float32_is_given_a_tolerance():
+    class Strict(nn.Linear):
+        def forward(self, pixels):
+            return nn.functional.linear(pixels.flatten(1).float(), self.weight, self.bias)
+
+    network = ForeignNetwork(Strict(1, 3), (1, 1, 1), MOVES)
+    assert decider(network)[0](torch.ones(1, 1, 1, 1)).outputs.shape == (1, 3)

@@ -8,6 +8,8 @@ import torch
 import drone_rl
 from drone_rl.checks.certificate import parse_certificate
 from drone_rl.evaluation import Episodes
+from drone_rl.evaluation.branches import Outcomes
+from drone_rl.evaluation.fragility import Rounding
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.sim.tasks.collect_cubes.goals import CubeGoals
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
@@ -66,6 +68,28 @@ def test_what_is_undecided_is_not_proved_and_no_flight_speaks_against_it(good):
     some = claim(good, undecided=True).beside(flown([[0.0, 1.0], [4.0, 5.0]], [ALL, BEHIND]))
     assert (some["every"], some["share"], some["undecided"]) == (False, 0.75, 0.25)
     assert some["agreeing"] == 1
+
+
+def rounded(count, fragile=(), ends=None, owner=(), is_open=()):
+    """What rounding can change: a frame of some episodes, and how they can end."""
+    flags, opened = torch.zeros(count, dtype=torch.bool), torch.zeros(count, dtype=torch.bool)
+    flags[list(fragile)], opened[list(is_open)] = True, True
+    outcomes = Outcomes(ends, torch.tensor(owner, dtype=torch.int64), opened)
+    return Rounding("float32", True, 1000, len(fragile), flags, outcomes, "PyTorch", count, 0, 0)
+
+
+def test_a_proof_holds_for_any_order_of_sums(good):
+    places = [[0.0, 1.0], [1.0, 2.0], [2.0, 2.0], [3.0, 2.0], [4.0, 5.0]]
+    greedy, refused = flown(places, [ALL] * 5), "decisions of the policy depend on rounding"
+    for end, expected in ((ALL, None), (BEHIND, refused)):
+        found = rounded(5, [1], flown(places[1:2] * 2, [ALL, end]), (1, 1))
+        assert claim(good).beside(greedy, rounding=found)["refused"] == expected
+    opened = rounded(5, [4], is_open=[4])
+    assert claim(good).beside(greedy, rounding=opened)["refused"] == refused
+    assert claim(good, undecided=True).beside(greedy, rounding=opened)["refused"] is None
+    excessive = rounded(5, [0, 1])
+    assert excessive.is_excessive
+    assert claim(good).beside(greedy, rounding=excessive)["refused"] == refused
 
 
 def test_lost_placements(good):

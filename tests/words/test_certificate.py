@@ -18,8 +18,8 @@ def test_every_placement():
         "proof.basis": "The certificate is of this network and task, and its boxes are a partition "
         "of the placements. It was re-checked by 1,000 rollouts from fresh placements, seed 17: "
         "all ended as it states, so that with 95% confidence it is wrong about at most 0.31% of "
-        "the placements; drone-rl prove proves it again. The 1,000 greedy flights of this verdict "
-        "that it tells of ended so.",
+        "the placements (to prove it again, run drone-rl prove). All 1,000 greedy episodes of "
+        "this verdict whose end it states ended so.",
     }
     assert "collects the cube from" in speak(1)["proof.every"]
 

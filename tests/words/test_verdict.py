@@ -61,7 +61,7 @@ def speak(evidence):
 def test_what_is_said_of_a_good_policy(evidence):
     assert speak(evidence) == {
         "kind": "This policy does its task: it collects every cube in 94% of episodes.",
-        "fixed_seed": "Fixed environments: a policy could have been fitted to these environments.",
+        "fixed_seed": "Fixed seed 0: a policy could have been fitted to these environments.",
         "shares": "It collects 90% of the cubes on its left, 100% of those ahead and 100% of those "
         "on its right.",
         "baselines": "In the same worlds it collects 96% of all cubes, acting at random 28% and "
@@ -229,3 +229,10 @@ def test_another_way_of_moving_is_told(evidence):
     )
     evidence["unlike"] = {}
     assert "unlike" not in speak(evidence)
+
+
+def test_a_verdict_says_where_effects_of_rounding_have_no_bound(evidence):
+    found = {"arithmetic": "float32 on cpu, PyTorch", "decides": False}
+    for bound, more in ((True, "."), (False, "; effects of rounding were tried out, not bounded.")):
+        text = speak({**evidence, "rounding": {**found, "bound": bound}})["arithmetic"]
+        assert text == f"The verdict holds for float32 on cpu, PyTorch{more}"

@@ -14,7 +14,8 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
 
     Arrays: "response_..." and "outcome_...", the fields of `ResponseMap` and `OutcomeMap`.
     """
-    response, outcome = context.response, outcome_map(context.scenes, context.network)
+    response = context.response
+    outcome = outcome_map(context.scenes, context.network, seed=context.seed.value)
     arrays = {
         f"{name}_{field.name}": getattr(one, field.name)
         for name, one in (("response", response), ("outcome", outcome))

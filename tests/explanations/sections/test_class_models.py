@@ -22,7 +22,7 @@ def test_both_objectives_are_sought_in_the_range_of_the_pictures(monkeypatch):
     context = SimpleNamespace(
         observations=observations,
         network=network,
-        settings=SimpleNamespace(seed=7),
+        seed=SimpleNamespace(value=7),
         scenes=SimpleNamespace(channels="rgb"),
     )
     numbers, arrays = section(context)

@@ -15,7 +15,11 @@ def test_features_and_pixels_are_embedded_each_by_itself():
         observations=rng.normal(size=(40, 1, 3, 4)).astype(np.float32),
     )
     settings = ExplainSettings(frames=40, perplexity=4, seed=1)
-    numbers, arrays = section(SimpleNamespace(dataset=data, settings=settings, layer="fc1"))
+    numbers, arrays = section(
+        SimpleNamespace(
+            dataset=data, settings=settings, seed=SimpleNamespace(value=settings.seed), layer="fc1"
+        )
+    )
     assert {name: points.shape for name, points in arrays.items()} == {
         "tsne_features": (40, 2),
         "tsne_pixels": (40, 2),

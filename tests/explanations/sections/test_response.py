@@ -4,6 +4,7 @@ import numpy as np
 
 from drone_rl.explanations.response import OutcomeMap, ResponseMap, summarise
 from drone_rl.explanations.sections import response
+from drone_rl.utils.seeding import RootSeed
 
 
 def test_every_field_of_both_maps_is_kept(monkeypatch):
@@ -17,10 +18,11 @@ def test_every_field_of_both_maps_is_kept(monkeypatch):
         **axes, **needs, probabilities=ahead, without_target=np.array([1.0, 0, 0]), blind=blind
     )
     comes = OutcomeMap(**axes, **needs, collected=np.array([[[False, True, False]] * 2]))
-    monkeypatch.setattr(response, "outcome_map", lambda scenes, network: comes)
+    monkeypatch.setattr(response, "outcome_map", lambda scenes, network, seed: comes)
     sides = ("left", "ahead", "right")
     scenes = SimpleNamespace(task=SimpleNamespace(strata=sides))
-    context = SimpleNamespace(response=does, scenes=scenes, network=None)
+    seed = RootSeed(5, False)
+    context = SimpleNamespace(response=does, scenes=scenes, network=None, seed=seed)
     numbers, arrays = response.section(context)
     assert numbers == {"response": summarise(does, comes, sides)}
     assert arrays["response_probabilities"] is ahead
