@@ -110,8 +110,8 @@ def one_line(error: BaseException) -> str:
             return "".join(c if c.isprintable() else "?" for c in str(cause))
         cause = cause.__cause__ or cause.__context__
     for cause in (error, error.__cause__):
-        if isinstance(cause, OSError):
-            return file_error(cause)
+        if isinstance(cause, OSError) and not isinstance(cause, HydraException):
+            return file_error(cause)  # a choice that Hydra does not find is an OSError, too
     text = without_schemas(" ".join(str(error).split())) or type(error).__name__
     if isinstance(error.__cause__, OmegaConfBaseException):
         text += f": {str(error.__cause__).splitlines()[0]}"
