@@ -36,7 +36,7 @@ METRICS_BYTES = 2**24
 """`metrics.csv` of one run."""
 LOG_BYTES = 2**16
 """The end of a log that is searched for an error."""
-JOURNAL_BYTES = 2**25
+JOURNAL_BYTES = 2**23
 """The journal of a search by Optuna."""
 CHECKPOINT_BYTES = 2**28
 """A checkpoint; also what it unpacks to."""
