@@ -41,6 +41,7 @@ def test_hydras_where_and_omegaconfs_what():
     [
         ("Could not override 'x'", "--help"),
         ("Key 'x' is not in struct", "--help"),
+        ("In 'train': Could not load 'logger/wandb'.", "--help"),
         ("BasicSweeper does not support sweep type: INTERVAL", "hydra/sweeper=optuna"),
     ],
 )
