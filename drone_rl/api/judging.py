@@ -263,6 +263,9 @@ def judge(
         return judge_one(cast("Any", policy), settings, **how)
     if not policy:
         raise InputError("policy=[] names nobody; give one or more policies")
+    for one in policy:  # a wrong one is refused before any episode
+        if one not in BASELINES:
+            as_pilot(one, how.get("outputs", "outputs"))
     given = how.pop("seed", (settings or JudgeSettings()).seed)
     seed = how.pop("drawn_seed", None) or root_seed(given)  # all in the same environments
     done = (judge_one(one, settings, drawn_seed=seed, **how) for one in policy)

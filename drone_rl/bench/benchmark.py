@@ -63,7 +63,7 @@ class Setup:
     @property
     def runs(self) -> Path:
         """Folder of what commands leave."""
-        return self.folder / "runs"
+        return self.folder / "work"  # runs/ holds the logs of drone-rl bench itself
 
 
 @dataclasses.dataclass(frozen=True)

@@ -285,6 +285,7 @@ SWEEP: Plain = {
     "finished": 6,
     "failed": 1,
     "damaged": 1,
+    "copies": 1,
     "unfinished": 1,
     "judged": 5,
     "certain": 4,

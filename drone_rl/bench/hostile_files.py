@@ -21,6 +21,7 @@ from drone_rl.bench.hostile_arrays import hostile_arrays
 from drone_rl.bench.hostile_claims import hostile_claims
 from drone_rl.bench.hostile_folders import hostile_folders, make_run
 from drone_rl.bench.hostile_json import hostile_json
+from drone_rl.bench.hostile_parts import hostile_parts
 from drone_rl.bench.hostile_policies import hostile_policies
 from drone_rl.bench.hostile_runs import hostile_runs
 from drone_rl.sim.settings import COMPUTER_VISION, MINIMAL, MOVES_SETTINGS
@@ -88,6 +89,7 @@ def hostile_files(folder: Path) -> list[tuple[str, list[str], str]]:
         *hostile_json(folder, run),
         *hostile_arrays(folder),
         *hostile_claims(folder, DESCRIPTION),
+        *hostile_parts(folder),
         *hostile_runs(folder, run),
     ]
 

@@ -39,6 +39,7 @@ def hostile_runs(folder: Path, checkpoint: Callable[[Path], Path]) -> list[Case]
         *_resumed(folder, checkpoint),
         *_proofs(folder, checkpoint),
         *_sweeps(folder),
+        *_journals(folder),
         *_targets(folder),
     ]
 
@@ -131,6 +132,34 @@ def _sweeps(folder: Path) -> list[Case]:
         (sweep / str(i)).mkdir()
         os.link(sweep / "0" / "result.json", sweep / str(i) / "result.json")
     return [*cases, (sweep.name, ["sweep-report", f"folder={sweep}"], "one result, many times")]
+
+
+def _journals(folder: Path) -> list[Case]:
+    """Searches by Optuna to go on with, whose journals are none."""
+    line = b'{"op_code": 7, "worker_id": "x", "trial_id": 0, "step": 1}\n'
+    journals: dict[str, bytes | Make] = {
+        "text": b"hello\n",
+        "list": b"[1]\n",
+        "deep": b"[" * 40_000 + b"\n",
+        "unknown_operation": b'{"op_code": 4711}\n',
+        "operation_of_nothing": b'{"op_code": 4}\n',
+        "large": line * 200_000,
+        "folder": Path.mkdir,
+        "pipe": os.mkfifo,
+        "sparse": _sparse,
+    }
+    cases = []
+    for name, content in journals.items():
+        here = folder / f"search_{name}"
+        here.mkdir()
+        if isinstance(content, bytes):
+            (here / "optuna.journal").write_bytes(content)
+        else:
+            content(here / "optuna.journal")
+        settings = ["hydra/sweeper=optuna", "hydra/launcher=local", f"hydra.sweep.dir={here}"]
+        command = ["train", "-m", *settings, "optimiser.lr=interval(1e-4,1e-1)"]
+        cases.append((here.name, command, "a journal that is none"))
+    return cases
 
 
 def _targets(folder: Path) -> list[Case]:

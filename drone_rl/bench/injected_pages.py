@@ -34,6 +34,8 @@ Place = tuple[tuple[Any, ...], bool]
 PIXEL = "data:image/gif;base64,R0lGODlhAQABAAAAACwAAAAAAQABAAA="
 _PROBE = "'\"<b x='>&"
 """Stands for all payloads where places for them are looked for."""
+_LONG_PROBE = _PROBE.ljust(200, "x")
+"""Longer than any payload: some texts, such as dates, can hold the short ones alone."""
 
 
 def places(value: Any, path: tuple[Any, ...] = ()) -> Iterator[Place]:
@@ -68,7 +70,10 @@ def put(value: Any, where: frozenset[Place], text: str, path: tuple[Any, ...] = 
 
 
 def accepted(
-    value: Any, works: Callable[[Any], object], among: frozenset[Place] | None = None
+    value: Any,
+    works: Callable[[Any], object],
+    among: frozenset[Place] | None = None,
+    probe: str = _PROBE,
 ) -> frozenset[Place]:
     """Return all places, together, in which a text is no error; entries of the whole keep names.
 
@@ -78,11 +83,12 @@ def accepted(
         value: Plain data.
         works: Raises an error where a text is refused.
         among: Places to try; all by default.
+        probe: The text that is tried.
     """
 
     def holds(where: frozenset[Place]) -> bool:
         try:
-            works(put(value, where, _PROBE))
+            works(put(value, where, probe))
         except Exception:  # whatever a reader or a template makes of nonsense
             return False
         return True
@@ -233,6 +239,7 @@ class Pages:
         among = frozenset(place for place in places(numbers) if _is_tried(place, names))
         self.of_templates = accepted(numbers, lambda n: self._report(n, ""), among)
         self.of_files = accepted(numbers, self._read, self.of_templates)
+        self.of_long = accepted(numbers, self._read, self.of_files, _LONG_PROBE)
         self.of_sweeps = accepted(self._summary, lambda s: render_sweep("x", s, []))
 
     def made(self, text: str) -> dict[str, str]:
@@ -241,7 +248,10 @@ class Pages:
         picture = {"title": text, "text": text, "light": PIXEL, "dark": PIXEL}
         other = {text: {text: text}}
         forged = self._report({**put(numbers, self.of_templates, text), **other}, text)
-        read = self._read({**put(numbers, self.of_files, text), **other})
+        try:
+            read = self._read({**put(numbers, self.of_files, text), **other})
+        except InputError:  # too long for one of the places
+            read = self._read({**put(numbers, self.of_long, text), **other})
         sweep = render_sweep(text, put(self._summary, self.of_sweeps, text), [picture])
         return {
             "report": forged,

@@ -77,7 +77,7 @@ def explained(folder: Path) -> Path:
     from drone_rl.api.explaining import explain
     from drone_rl.explanations.settings import ExplainSettings
 
-    few = ExplainSettings(frames=180, data_episodes=6, episodes=6, perplexity=5)
+    few = ExplainSettings(frames=180, episodes=6, perplexity=5)
     made = explain("good", few, folder=folder / "explained", num_envs=8, outputs=folder)
     return next(made.folder.glob("*/explanation.json")).parent
 

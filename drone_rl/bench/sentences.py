@@ -321,6 +321,7 @@ _OF_SWEEPS = (
     ("runs.read", _NOTHING_ENDED),
     ("runs.failed", {"failed": 0}),
     ("runs.damaged", {"damaged": 0}),
+    ("runs.copies", {"copies": 0}),
     ("runs.unfinished", {"unfinished": 0}),
     ("runs.solved_none", {"groups.0.solved.successes": 1}, _NOT_SOLVED),
     ("runs.few", {"groups.1.ended": 6}),

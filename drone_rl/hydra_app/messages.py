@@ -32,6 +32,8 @@ _REMEDIES = {
     ),
 }
 """What to do about an error of the file system, by its number."""
+_UNKNOWN = ("is not in struct", "Could not override", "Could not load")
+"""What Hydra says of a name that does not exist."""
 
 
 def guarded(command: Callable[[], int]) -> int:
@@ -110,12 +112,12 @@ def one_line(error: BaseException) -> str:
             return "".join(c if c.isprintable() else "?" for c in str(cause))
         cause = cause.__cause__ or cause.__context__
     for cause in (error, error.__cause__):
-        if isinstance(cause, OSError):
-            return file_error(cause)
+        if isinstance(cause, OSError) and not isinstance(cause, HydraException):
+            return file_error(cause)  # a choice that Hydra does not find is an OSError, too
     text = without_schemas(" ".join(str(error).split())) or type(error).__name__
     if isinstance(error.__cause__, OmegaConfBaseException):
         text += f": {str(error.__cause__).splitlines()[0]}"
-    if "is not in struct" in text or "Could not override" in text:
+    if any(said in text for said in _UNKNOWN):
         text += "; see drone-rl COMMAND --help for the names that exist"
     if "does not support sweep type" in text:
         text += "; to search an interval, add hydra/sweeper=optuna"

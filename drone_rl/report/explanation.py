@@ -6,6 +6,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from drone_rl.report.fitting import check_fit
 from drone_rl.report.shapes import check_sizes
 from drone_rl.utils.archives import read_arrays
 from drone_rl.utils.consistency import check_intervals
@@ -85,7 +86,7 @@ class Explanation:
             data = read_arrays(folder / "dataset.npz", allowance=allowance)
             data.pop("meta", None)
             check_sizes(numbers, arrays, data)
-            shown_actions(numbers)
+            check_fit(numbers, arrays, data, shown_actions(numbers))
             terms_of(numbers)
             if "name" in numbers:
                 Text(1000).read(numbers["name"], "name")

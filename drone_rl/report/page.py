@@ -46,6 +46,8 @@ def write_report(folders: Sequence[Path], target: Path) -> Path:
         Policy(explanation, target / "figures", f"{number}_{to_file_name(explanation.name)}")
         for number, explanation in enumerate(loaded)
     ]
+    for policy in policies:
+        policy.check()
     try:
         (target / "figures").mkdir(parents=True, exist_ok=True)
         path = target / "report.html"
@@ -66,6 +68,14 @@ class Policy:
     """Of the figures."""
     prefix: str
     """Of the names of its files."""
+
+    def check(self) -> None:
+        """Make all sentences and tables once, so that a wrong number is found before rendering."""
+        for part in find_parts().values():
+            if part.fits(self.explanation):
+                part.tables(self.explanation)
+                for may in part.words.values():
+                    say(may, self.explanation.numbers)
 
     def show(self, part: Part) -> dict[str, Any]:
         """Saves what a part makes of this policy; returns what the part's template needs."""
@@ -116,10 +126,14 @@ def _source(explanation: Explanation) -> str:
 def _parts(environment: jinja2.Environment, policies: Sequence[Policy]) -> list[dict[str, Any]]:
     """Everything that is in the explanations, in the order of the page."""
     known = find_parts()
+    htmls = {
+        name: _part(environment.get_template(f"sections/{name}.html"), part, policies)
+        for name, part in sorted(known.items(), key=lambda item: item[1].is_slow)
+    }
     parts = [
-        {"id": name, "title": part.title, "label": part.label, "html": html}
+        {"id": name, "title": part.title, "label": part.label, "html": htmls[name]}
         for name, part in known.items()
-        if (html := _part(environment.get_template(f"sections/{name}.html"), part, policies))
+        if htmls[name]
     ]
     others = [(p.explanation, _others(p.explanation, known.values())) for p in policies]
     if any(keys for _, keys in others):

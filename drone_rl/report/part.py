@@ -38,6 +38,8 @@ class Part:
     """Order on the page: low ones first. Gaps leave room for others."""
     needs: tuple[str, ...]
     """Entries of `explanation.json` that it shows; without one of them it is left out."""
+    is_slow: bool = False
+    """Whether it is rendered after the other parts, so that their errors are found first."""
     words: Mapping[str, Sequence[Sentence]] = dataclasses.field(default_factory=dict)
     """Sentences by the paragraph in which they stand."""
     draw: Callable[[Explanation], Drawn] = _nothing

@@ -13,10 +13,10 @@ from drone_rl.sweeps.manifest import Sweep
 from drone_rl.sweeps.runs import Run, read_failure, read_result
 from drone_rl.sweeps.statistics import Array
 from drone_rl.utils.consistency import read_entry
-from drone_rl.utils.csv_table import read_table
+from drone_rl.utils.csv_table import TablesAllowance, read_table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.former_names import FORMER_NAMES
-from drone_rl.utils.limits import SWEEP_METRICS_BYTES, SWEEP_RESULTS_BYTES, Allowance
+from drone_rl.utils.limits import SWEEP_RESULTS_BYTES, Allowance
 from drone_rl.utils.schema import Real, Whole
 from drone_rl.verdicts.consistency import check_verdict
 from drone_rl.verdicts.kinds import Kind
@@ -133,7 +133,7 @@ def read_rows(sweep: Sweep) -> list[Row]:
         InputError: The results of all runs together are too large.
     """
     _check_results_size(sweep)
-    metrics = Allowance(SWEEP_METRICS_BYTES)
+    metrics = TablesAllowance()
     choices = [_choice(run) for run in sweep.runs]
     keys = list(dict.fromkeys(key for choice in choices for key in choice))
     swept = [key for key in keys if len({choice.get(key) for choice in choices}) > 1]
@@ -157,7 +157,7 @@ def _check_results_size(sweep: Sweep) -> None:
                 allowance.take(path.stat().st_size, f"the results of {sweep.folder}: {path.name}")
 
 
-def _read_row(run: Run, choice: dict[str, str], metrics: Allowance) -> Row:
+def _read_row(run: Run, choice: dict[str, str], metrics: TablesAllowance) -> Row:
     result = read_result(run.folder)
     error = read_failure(run)
     if result is None:
@@ -214,7 +214,7 @@ def _check_curve(curve: tuple[Array, Array]) -> None:
 
 
 def _read_metrics(
-    folder: Path, largest_reward: float, allowance: Allowance
+    folder: Path, largest_reward: float, allowance: TablesAllowance
 ) -> tuple[tuple[Array, Array], tuple[float, float], float | None]:
     """The learning curve, frames and seconds until its end, and the entropy there."""
     rows = _metrics_columns(folder / "metrics.csv", allowance)
@@ -223,33 +223,38 @@ def _read_metrics(
     if not all(0 <= value < _MOST for value in had):
         raise InputError("metrics.csv: frames or seconds are out of range")
     last = entropies[-LAST_UPDATES:]
-    last = last[~np.isnan(last)]
-    return (frames, rewards / largest_reward), had, float(last.mean()) if len(last) else None
+    last = last[last != _EMPTY]
+    entropy = float(last.mean()) if len(last) and np.isfinite(last).all() else None
+    return (frames, rewards / largest_reward), had, entropy
 
 
+_EMPTY = math.inf
+"""Stands for an entropy that was not logged; one that is not a number makes the mean none."""
 _COLUMNS = {
     "frames": None,
     "train/running_reward": None,
     "seconds": 0.0,
-    "loss/entropy": math.nan,
+    "loss/entropy": _EMPTY,
 }
 """Columns of `metrics.csv` that a report needs, and what stands for an empty cell, if it may."""
 
 
-def _metrics_columns(path: Path, allowance: Allowance) -> Array:
+def _metrics_columns(path: Path, allowance: TablesAllowance) -> Array:
     """The numbers of `_COLUMNS` at each update. Shape: (num_updates, 4)."""
     rows = read_table(path, allowance)
     header = [FORMER_NAMES.get(name, name) for name in next(rows, [])]
-    places = [header.index(name) if name in header else None for name in _COLUMNS]
-    found = [
-        [_number(row, place, empty) for place, empty in zip(places, _COLUMNS.values(), strict=True)]
-        for row in rows
+    needed = [header.index(name) if name in header else None for name in _COLUMNS]
+    width = 1 + max((place for place in needed if place is not None), default=-1)
+    kept = [row if len(row) >= width else row + [""] * (width - len(row)) for row in rows]
+    columns = [
+        _numbers([row[place] for row in kept] if place is not None else [""] * len(kept), empty)
+        for place, empty in zip(needed, _COLUMNS.values(), strict=True)
     ]
-    return np.array(found, np.float64).reshape(len(found), len(_COLUMNS))
+    return np.stack(columns, -1)
 
 
-def _number(row: Sequence[str], place: int | None, empty: float | None) -> float:
-    text = row[place] if place is not None and place < len(row) else ""
-    if not text and empty is not None:
-        return empty
-    return float(text)
+def _numbers(texts: Sequence[str], empty: float | None) -> Array:
+    """Numbers of a column; without a value for empty cells there may be none."""
+    if empty is None:
+        return np.array([*map(float, texts)], np.float64)
+    return np.array([float(text) if text else empty for text in texts], np.float64)

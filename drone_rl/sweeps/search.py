@@ -8,9 +8,17 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from drone_rl.utils.errors import InputError
 from drone_rl.utils.extras import extra
+from drone_rl.utils.files import parse_json, read_bytes
+from drone_rl.utils.limits import JOURNAL_BYTES
+from drone_rl.utils.schema import Whole, as_mapping
 
 NAME = "sweep"
+_OPERATIONS = Whole(0, 100)
+"""Optuna's numbers of what a line of its journal does."""
+_DAMAGE = (LookupError, TypeError, ValueError, AttributeError, AssertionError)
+"""What Optuna raises where the lines of a journal do not follow from each other."""
 
 
 def import_optuna() -> Any:
@@ -33,15 +41,44 @@ def open_study(folder: Path, **settings: Any) -> Any:
         An `optuna.Study`.
 
     Raises:
-        InputError: Optuna isn't installed.
+        InputError: Optuna isn't installed, or the study's file is damaged or too large.
     """
     optuna = import_optuna()
+    path = folder / "optuna.journal"
+    _check_journal(path)
     optuna.logging.set_verbosity(optuna.logging.WARNING)
-    backend = optuna.storages.journal.JournalFileBackend(str(folder / "optuna.journal"))
-    storage = optuna.storages.JournalStorage(backend)
-    if "direction" not in settings:
-        return optuna.load_study(study_name=NAME, storage=storage, **settings)
-    return optuna.create_study(study_name=NAME, storage=storage, load_if_exists=True, **settings)
+    try:
+        backend = optuna.storages.journal.JournalFileBackend(str(path))
+        storage = optuna.storages.JournalStorage(backend)
+        named = {"study_name": NAME, "storage": storage, **settings}
+        if "direction" not in settings:
+            return optuna.load_study(**named)
+        return optuna.create_study(load_if_exists=True, **named)
+    except _DAMAGE as error:
+        raise InputError(
+            f"{path} is damaged ({type(error).__name__}: {str(error)[:100]}); move the folder away "
+            "and search again"
+        ) from error
+
+
+def _check_journal(path: Path) -> None:
+    """Refuses a journal that is too large, or whose lines are no operations.
+
+    Raises:
+        InputError: It is.
+    """
+    if not path.exists() or (path.is_file() and path.stat().st_size == 0):
+        return
+    content = read_bytes(path, JOURNAL_BYTES)
+    *lines, _ = content.split(b"\n")  # a run may be writing the last one
+    try:
+        for number, line in enumerate(lines, start=1):
+            entry = as_mapping(parse_json(line, f"line {number}", allow_nan=True), f"line {number}")
+            _OPERATIONS.read(entry.get("op_code"), f"line {number}: op_code")
+    except InputError as error:
+        raise InputError(
+            f"{path} is damaged ({error}); move the folder away and search again"
+        ) from None
 
 
 def next_trials(study: Any, space: Mapping[str, Any], count: int, seed: int) -> list[Any]:

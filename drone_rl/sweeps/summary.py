@@ -29,6 +29,7 @@ def summarise_sweep(sweep: Sweep, rows: Sequence[Row]) -> dict[str, Any]:
         "command": sweep.command,
         "judge_command": _command("sweep-report", f"folder={_literal(sweep.folder)}", "judge=true"),
         **{name: states.count(name) for name in STATES},
+        "copies": count_copies(rows),
         "judged": len(judged),
         "certain": sum(verdict["certain"] for verdict in judged),
         "judged_by_older_rule": older,
@@ -51,6 +52,16 @@ def best_rows(rows: Sequence[Row]) -> list[Row]:
     """
     judged = [row for row in rows if row.verdict is not None]
     return sorted(judged, key=lambda row: (-(row.share("all") or 0.0), row.frames))
+
+
+def count_copies(rows: Sequence[Row]) -> int:
+    """Count finished runs whose figures are those of an earlier run.
+
+    Seconds are measured to a nanosecond, so that no two trainings have the same.
+    """
+    keys = ("reason", "frames", "episodes", "seconds", "running_reward")
+    figures = [tuple(row.result[key] for key in keys) for row in rows if row.state == "finished"]
+    return len(figures) - len(set(figures))
 
 
 def to_csv(rows: Sequence[Row]) -> str:

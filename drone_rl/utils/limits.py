@@ -36,7 +36,7 @@ METRICS_BYTES = 2**24
 """`metrics.csv` of one run."""
 LOG_BYTES = 2**16
 """The end of a log that is searched for an error."""
-JOURNAL_BYTES = 2**25
+JOURNAL_BYTES = 2**23
 """The journal of a search by Optuna."""
 CHECKPOINT_BYTES = 2**28
 """A checkpoint; also what it unpacks to."""
@@ -70,8 +70,12 @@ METRICS_ROWS = 2**17
 """Updates in `metrics.csv`."""
 METRICS_CELLS = 2**21
 """Cells in `metrics.csv`."""
-SWEEP_METRICS_BYTES = 2**27
+SWEEP_METRICS_BYTES = 2**26
 """`metrics.csv` of all runs of a sweep together."""
+SWEEP_METRICS_ROWS = 2**19
+"""Updates in these."""
+SWEEP_METRICS_CELLS = 2**23
+"""Cells in these."""
 FOLDER_ENTRIES = 50_000
 """Files and folders below a folder that is searched for links."""
 

@@ -51,6 +51,15 @@ _OF_THE_RUNS = (
         ),
     ),
     Sentence(
+        "runs.copies",
+        "runs have the same figures, measured seconds included",
+        lambda e: e["copies"] > 0,
+        lambda e: (
+            f"{in_words(e['copies'])} with exactly the figures of another run, seconds included: "
+            "probably copies of one training, which count more than once."
+        ),
+    ),
+    Sentence(
         "runs.unfinished",
         "a run has not ended",
         lambda e: e["unfinished"] > 0,

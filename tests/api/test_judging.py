@@ -54,6 +54,10 @@ def test_a_verdict_in_python(good):
     assert "<td>success</td>" not in shown  # a margin is no success rate
 
 
+def refused(*_):
+    raise AssertionError("episodes were flown")
+
+
 def test_several_at_once(good):
     done = drone_rl.judge(["oracle", "left"], episodes=150, progress=silent)
     assert [one.name for one in done] == ["oracle", "left"] and len(done) == 2
@@ -71,6 +75,8 @@ def test_several_at_once(good):
     assert [one.name for one in both] == ["good", "oracle"]
     with pytest.raises(InputError, match=r"policy=\[\] names nobody"):
         drone_rl.judge([])
+    with pytest.raises(InputError, match="policy=nope does not exist"):
+        drone_rl.judge(["oracle", "nope"], progress=refused)
 
 
 def test_a_verdict_with_proof(good, tmp_path):

@@ -20,7 +20,7 @@ def test_a_gpu_draws_with_one_thread(tmp_path):
 
 
 def test_runs_are_kept_beside_the_results(tmp_path):
-    assert setup(tmp_path).runs == tmp_path / "runs"
+    assert setup(tmp_path).runs == tmp_path / "work"
 
 
 def test_a_setup_is_what_the_settings_ask_for(tmp_path):

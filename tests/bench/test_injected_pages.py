@@ -1,6 +1,14 @@
 """Where a text can be put, and what pages are made of it."""
 
-from drone_rl.bench.injected_pages import accepted, places, put, with_markup, without_policy
+from drone_rl.bench.injected_pages import (
+    _LONG_PROBE,
+    accepted,
+    places,
+    put,
+    with_markup,
+    without_policy,
+)
+from drone_rl.bench.injection_payloads import PAYLOADS
 
 PLAIN = {"a": "x", "b": [{"kind": "good", "free": 1}, {"kind": "poor", "free": 2}]}
 
@@ -28,6 +36,15 @@ def test_places_that_work_are_kept_together():
 
     kept = accepted(PLAIN, works)
     assert kept == {(("a",), False), (("b", 0, "free"), True), (("b", 1, "free"), True)}
+
+
+def test_places_for_short_texts_alone_are_known():
+    def works(value):
+        assert len(value["a"]) < 40
+
+    assert (("a",), False) in accepted(PLAIN, works)
+    assert (("a",), False) not in accepted(PLAIN, works, probe="x" * 50)
+    assert len(_LONG_PROBE) > max(map(len, PAYLOADS))
 
 
 def test_pages_are_robbed_of_one_defence_each():

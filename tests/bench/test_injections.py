@@ -64,6 +64,20 @@ def test_nothing_runs_on_our_pages(explanations, tmp_path):  # noqa: F811
     assert [outcome for outcome in outcomes if outcome["ran"]] == []
 
 
+def test_the_settings_of_the_explanation_are_valid(tmp_path, monkeypatch):
+    given = []
+
+    def explain(policy, settings, *, folder, **_):
+        given.append((policy, settings.frames))
+        (folder / "good").mkdir(parents=True)
+        (folder / "good" / "explanation.json").touch()
+        return type("Made", (), {"folder": folder})
+
+    monkeypatch.setattr("drone_rl.api.explaining.explain", explain)
+    assert injections.explained(tmp_path) == tmp_path / "explained" / "good"
+    assert given == [("good", 180)]
+
+
 def test_counts(tmp_path, monkeypatch):
     outcomes = [{"page": "a", "payload": "b", "ran": ran} for ran in ("", "a script", "")]
     monkeypatch.setattr(injections, "open_all", lambda *_: outcomes)

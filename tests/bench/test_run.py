@@ -57,6 +57,10 @@ def test_what_was_asked_for_is_measured_again(bench):
 
 
 def test_runs_of_an_earlier_command_are_gone(bench, tmp_path):
-    (tmp_path / "runs" / "train_0").mkdir(parents=True)
+    log = tmp_path / "runs" / "2026-01-01" / "bench.log"  # of the command itself
+    log.parent.mkdir(parents=True)
+    log.touch()
+    (tmp_path / "work" / "train_0").mkdir(parents=True)
     bench([])
-    assert not (tmp_path / "runs").exists()
+    assert not (tmp_path / "work").exists()
+    assert log.exists()

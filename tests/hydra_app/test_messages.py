@@ -6,7 +6,7 @@ import sys
 import threading
 
 import pytest
-from hydra.errors import HydraException
+from hydra.errors import HydraException, MissingConfigException
 from omegaconf.errors import OmegaConfBaseException
 
 from drone_rl.hydra_app.messages import file_error, guarded, is_output_closed, one_line
@@ -41,11 +41,27 @@ def test_hydras_where_and_omegaconfs_what():
     [
         ("Could not override 'x'", "--help"),
         ("Key 'x' is not in struct", "--help"),
+        ("In 'train': Could not load 'logger/wandb'.", "--help"),
         ("BasicSweeper does not support sweep type: INTERVAL", "hydra/sweeper=optuna"),
     ],
 )
 def test_what_hydra_leaves_out(text, remedy):
     assert remedy in one_line(HydraException(text))
+
+
+def test_an_unknown_choice_is_no_file(capsys):
+    text = (
+        "In 'train': Could not find 'task/pillarz'\n\nAvailable options in 'task':\n"
+        "\tbase_task\n\tpillars\nConfig search path:\n\tprovider=hydra, path=pkg://hydra.conf"
+    )
+
+    def command():
+        raise MissingConfigException(text, "task/pillarz")
+
+    assert guarded(command) == 2
+    assert capsys.readouterr().err == (
+        "error: could not find task/pillarz (task=pillarz); give one of: pillars\n"
+    )
 
 
 def test_statuses(capsys):

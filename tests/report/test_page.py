@@ -177,3 +177,23 @@ def test_a_damaged_explanation_is_refused(tmp_path):
     with pytest.raises(InputError, match="can't be read"):
         write_report([tmp_path], tmp_path)
     assert not (tmp_path / "report.html").exists()
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("places", {"window": 0}), ("truth", {"methods": 5}), ("response", {"rows": [0]})],
+)
+def test_a_wrong_number_is_refused_before_any_image_is_made(changed, tmp_path, key, value):
+    with pytest.raises((InputError, LookupError, TypeError)):
+        write_report([changed(**{key: value})], tmp_path / "report")
+    assert not list(tmp_path.glob("report/figures/*"))
+
+
+def test_slow_parts_are_rendered_last(changed, tmp_path):
+    folder = changed()
+    numbers = json.loads((folder / "explanation.json").read_text())
+    numbers["truth"]["curves"]["shares"] = None
+    (folder / "explanation.json").write_text(json.dumps(numbers))
+    with pytest.raises(TypeError):
+        write_report([folder], tmp_path / "report")
+    assert not list(tmp_path.glob("report/figures/*.mp4"))

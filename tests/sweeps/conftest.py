@@ -51,7 +51,7 @@ def _verdict(kind="good", left=1.0, ahead=1.0, right=1.0, *, whole=1.0, certain=
     greedy = _flights(shares, success=round(EPISODES * (whole or 0)))
     luck = {name: _flights(dict.fromkeys(shares, 0.0), success=0) for name in LUCK}
     if kind == "poor":  # nearly as many cubes as luck, which gets as many as the policy
-        luck["forward"] = _flights(shares, success=0)
+        luck["forward"] = _flights(shares, success=round(EPISODES * (whole or 0)))
     oracle = _flights(dict.fromkeys(shares, 1.0), success=EPISODES)
     evidence = {
         "kind": kind,

@@ -4,7 +4,9 @@ import pytest
 
 optuna = pytest.importorskip("optuna", reason="pip install 'drone-rl[optuna]'")
 
+from drone_rl.sweeps import search  # noqa: E402
 from drone_rl.sweeps.search import next_trials, note_outcome, open_study  # noqa: E402
+from drone_rl.utils.errors import InputError  # noqa: E402
 
 SPACE = {"optimiser.lr": optuna.distributions.FloatDistribution(1e-4, 1e-1, log=True)}
 
@@ -54,3 +56,39 @@ def test_what_became_of_a_run_is_told(tmp_path):
     note_outcome(study, 2, None)
     assert [t.state.name for t in study.trials] == ["COMPLETE", "PRUNED", "FAIL"]
     assert study.best_value == 2.97
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"{}\n",
+        b"hello\n",
+        b"[" * 10_000 + b"\n",
+        b'{"op_code": 10000000000}\n',
+        b'{"op_code": 4}\n',
+    ],
+)
+def test_a_damaged_journal_is_refused(tmp_path, content):
+    next_trials(begin(tmp_path), SPACE, 1, seed=0)
+    with (tmp_path / "optuna.journal").open("ab") as file:
+        file.write(content)
+    with pytest.raises(InputError, match=r"optuna\.journal is damaged"):
+        open_study(tmp_path)
+
+
+def test_a_journal_that_is_too_large_or_no_file_is_refused(tmp_path, monkeypatch):
+    next_trials(begin(tmp_path), SPACE, 1, seed=0)
+    monkeypatch.setattr(search, "JOURNAL_BYTES", 100)
+    with pytest.raises(InputError, match="too large"):
+        open_study(tmp_path)
+    (tmp_path / "optuna.journal").unlink()
+    (tmp_path / "optuna.journal").mkdir()
+    with pytest.raises(InputError, match="Is a directory"):
+        open_study(tmp_path, direction="maximize")
+
+
+def test_the_line_that_a_run_is_writing_does_not_matter(tmp_path):
+    next_trials(begin(tmp_path), SPACE, 1, seed=0)
+    with (tmp_path / "optuna.journal").open("ab") as file:
+        file.write(b'{"op_co')
+    assert len(open_study(tmp_path).trials) == 1

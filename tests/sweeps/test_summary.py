@@ -10,8 +10,9 @@ from drone_rl.sweeps.summary import best_rows, summarise_sweep, to_csv
 def test_five_cubes_are_no_merit(begin_sweep, make_verdict):
     """A share of 0.7 of five cubes is more cubes than all of three, but not better."""
     many = {"num_cubes": 5, "running_reward": 3.5, "verdict": make_verdict("poor", whole=0.7)}
-    few = {"num_cubes": 1, "running_reward": 0.9, "verdict": make_verdict(whole=0.95)}
+    few = {"num_cubes": 2, "running_reward": 1.8, "verdict": make_verdict(whole=0.95)}
     rows = read_rows(begin_sweep({"task.num_cubes=5": many, "task.num_cubes=1": few}))
+    assert [row.error for row in rows] == [None, None]
     assert [row.run.number for row in best_rows(rows)] == [1, 0]
 
 
@@ -55,3 +56,16 @@ def test_the_table_has_a_line_a_run(sweep):
     assert [row["certain"] for row in table] == ["True", "True", "False", ""]
     assert table[2]["left"] == "0.0"
     assert to_csv([]).strip() == ""
+
+
+def test_copies_of_a_run_are_counted_and_named(begin_sweep):
+    others = {"seed=0": {"seconds": 1.25}, "seed=1": {"seconds": 1.5}, "seed=2": {"seconds": 1.25}}
+    sweep = begin_sweep(others)
+    found = summarise_sweep(sweep, read_rows(sweep))
+    assert found["copies"] == 1
+    assert found["sentences"]["runs.copies"].startswith("1 run with exactly the figures of another")
+
+
+def test_different_seconds_are_no_copies(begin_sweep):
+    sweep = begin_sweep({"seed=0": {"seconds": 1.25}, "seed=1": {"seconds": 1.5}})
+    assert "runs.copies" not in summarise_sweep(sweep, read_rows(sweep))["sentences"]

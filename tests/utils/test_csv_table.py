@@ -3,9 +3,8 @@
 import pytest
 
 from drone_rl.utils import csv_table
-from drone_rl.utils.csv_table import read_table
+from drone_rl.utils.csv_table import TablesAllowance, read_table
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.limits import Allowance
 
 
 @pytest.fixture
@@ -28,7 +27,7 @@ def test_rows_without_the_empty_ones(table):
 
 
 def test_sizes_are_bounded(table, monkeypatch):
-    path, allowance = table(b"a,b\n1,2\n3,4\n"), Allowance(20)
+    path, allowance = table(b"a,b\n1,2\n3,4\n"), TablesAllowance(20)
     assert len([*read_table(path, allowance)]) == 3
     with pytest.raises(InputError, match="8 are left"):
         [*read_table(path, allowance)]
@@ -39,6 +38,27 @@ def test_sizes_are_bounded(table, monkeypatch):
     monkeypatch.setattr(csv_table, "METRICS_CELLS", 2)
     with pytest.raises(InputError, match="more than 2 cells"):
         [*read_table(path)]
+
+
+@pytest.mark.parametrize(
+    ("allowance", "message"),
+    [
+        (TablesAllowance(rows=5), "3 rows, more than 5 rows, of which 2 are left"),
+        (TablesAllowance(cells=5), "3 cells, more than 5 cells, of which 2 are left"),
+    ],
+)
+def test_rows_and_cells_of_several_tables_are_bounded(table, allowance, message):
+    path = table(b"a,b\n1,2\n3,4\n")
+    assert len([*read_table(path, allowance)]) == 3
+    with pytest.raises(InputError, match=message):
+        [*read_table(path, allowance)]
+
+
+def test_a_table_beyond_what_is_left_is_not_read(table, monkeypatch):
+    path = table(b"a,b\n1,2\n")
+    monkeypatch.setattr(csv_table, "read_bytes", None)
+    with pytest.raises(InputError, match="8 bytes, more than 7 bytes"):
+        [*read_table(path, TablesAllowance(7))]
 
 
 @pytest.mark.parametrize("content", [b"a\xff\n", b"a\n" + b"b" * 200_000])

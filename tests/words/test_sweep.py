@@ -23,6 +23,7 @@ BEST = {"run": 3, "verdict": "good", "certain": True, "share": 0.999, "episodes"
 SWEEP = {
     "finished": 6,
     "failed": 0,
+    "copies": 0,
     "damaged": 0,
     "unfinished": 0,
     "judged": 6,
@@ -82,6 +83,7 @@ def test_nothing_else_is_said_of_a_sweep_where_all_went_well():
         ("runs.counts", changed(failed=2, finished=4), "4 finished, 2 failed"),
         ("runs.failed", changed(failed=1), "1 run that failed"),
         ("runs.damaged", changed(damaged=2), "2 runs can't be read"),
+        ("runs.copies", changed(copies=2), "2 runs with exactly the figures"),
         ("runs.unfinished", changed(unfinished=1), "1 run not ended yet"),
         ("runs.solved_none", with_group(solved={"successes": 0}), "No run"),
         ("runs.few", with_group(ended=5), "1 of 1 settings with fewer than 6"),

@@ -53,6 +53,7 @@ PART = Part(
     label="Grad-CAM",
     place=60,
     needs=("attribution",),
+    is_slow=True,
     words={"attribution": ATTRIBUTION},
     draw=lambda explanation: {"sequence": key_frames(explanation), "episode": film(explanation)},
 )

@@ -114,6 +114,7 @@ PART = Part(
     label="t-SNE",
     place=30,
     needs=("tsne",),
+    is_slow=True,
     words={"tsne": TSNE},
     draw=draw,
     tables=lambda explanation: {"tsne": table(explanation)},
