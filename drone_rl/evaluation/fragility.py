@@ -20,7 +20,7 @@ from drone_rl.evaluation.metrics import Episodes
 from drone_rl.policies import PictureNetwork, make_actor
 from drone_rl.policies.finite import require_finite
 from drone_rl.policies.regrouped import Regrouped
-from drone_rl.policies.rounding import TOLERANCE, Decide, RoundingBound, decider
+from drone_rl.policies.rounding import TOLERANCE, Decide, RoundingBound, arithmetic_on, decider
 from drone_rl.sim.actions import DiscreteActions
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.provenance import num_cores
@@ -126,7 +126,10 @@ def examine(
     network = getattr(actor, "network", None)
     if not isinstance(network, PictureNetwork):
         return None
-    decide, is_bound = decider(network)
+    (decide, is_bound), (arithmetic, is_exact) = (
+        decider(network),
+        arithmetic_on(worlds_of(env).device),
+    )
     episodes, before = min(episodes, len(flown)), _streams(env)
     seen, again = _fly(env, decide, network, episodes)
     is_counted = isinstance(network.actions, DiscreteActions)
@@ -147,8 +150,8 @@ def examine(
         env_base(env).load_state_dict(before)
         _require_function(env, network, log, seen)
     return Rounding(
-        arithmetic=f"float32 on {worlds_of(env).device.type}, {log.implementation}",
-        is_bound=is_bound and is_counted,
+        arithmetic=f"{arithmetic}, {log.implementation}",
+        is_bound=is_bound and is_counted and is_exact,
         frames=sum(map(len, seen.fragile)),
         fragile=int(sum(f.sum() for f in seen.fragile)),
         is_fragile=torch.tensor([bool(f.any()) for f in seen.fragile]),
