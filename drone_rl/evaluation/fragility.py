@@ -27,7 +27,7 @@ from drone_rl.evaluation.metrics import Episodes
 from drone_rl.policies import PictureNetwork, make_actor
 from drone_rl.policies.finite import require_finite
 from drone_rl.policies.regrouped import REMEDY, Regrouped, require_same_in_any_batch
-from drone_rl.policies.rounding import Decide, RoundingBound, decider
+from drone_rl.policies.rounding import Decide, RoundingBound, arithmetic_on, decider
 from drone_rl.sim.actions import DiscreteActions
 from drone_rl.sim.dynamics import ComputerVision
 from drone_rl.utils.errors import InputError
@@ -134,6 +134,7 @@ def examine(
     if not isinstance(network, PictureNetwork):
         return None
     decide, is_bound = decider(network)
+    arithmetic, is_exact = arithmetic_on(worlds_of(env).device)
     episodes, before = min(episodes, len(flown)), streams(env)
     seen, again = _fly(env, decide, network, episodes)
     # implementations of flight dynamics round otherwise, so that frames are not the same
@@ -157,8 +158,8 @@ def examine(
         env_base(env).load_state_dict(before)
         _require_function(env, network, log, seen)
     return Rounding(
-        arithmetic=f"float32 on {worlds_of(env).device.type}, {log.implementation}",
-        is_bound=is_bound and is_counted,
+        arithmetic=f"{arithmetic}, {log.implementation}",
+        is_bound=is_bound and is_counted and is_exact,
         frames=sum(map(len, seen.fragile)),
         fragile=int(sum(f.sum() for f in seen.fragile)),
         is_fragile=torch.tensor([bool(f.any()) for f in seen.fragile]),

@@ -226,6 +226,19 @@ def decider(network: nn.Module) -> tuple[Decide, bool]:
     return assume, False
 
 
+def arithmetic_on(device: torch.device) -> tuple[str, bool]:
+    """Return the name of the arithmetic of a device, and whether the bounds hold for it.
+
+    They do not where cuDNN may round the inputs of convolutions to TF32, as it does by default.
+
+    Args:
+        device: Where networks are evaluated.
+    """
+    if device.type == "cuda" and torch.backends.cudnn.allow_tf32:
+        return f"float32 (convolutions in TF32) on {device.type}", False
+    return f"float32 on {device.type}", True
+
+
 def _in_float64(network: nn.Module) -> nn.Module | None:
     """A copy that computes in float64; None if there is no module or it fixes its precision."""
     if not isinstance(network, PictureNetwork) or not any(True for _ in network.parameters()):

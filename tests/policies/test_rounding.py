@@ -7,7 +7,7 @@ from torch import nn
 
 from drone_rl.policies import MLP, OriginalCNN, SmallCNN
 from drone_rl.policies.foreign import ForeignNetwork
-from drone_rl.policies.rounding import TOLERANCE, RoundingBound, decider
+from drone_rl.policies.rounding import TOLERANCE, RoundingBound, arithmetic_on, decider
 from drone_rl.sim.actions import MOVES
 
 BIG = 2.0**24
@@ -146,3 +146,11 @@ def test_a_module_that_only_takes_float32_is_given_a_tolerance():
 
     network = ForeignNetwork(Strict(1, 3), (1, 1, 1), MOVES)
     assert decider(network)[0](torch.ones(1, 1, 1, 1)).outputs.shape == (1, 3)
+
+
+def test_bounds_do_not_hold_where_convolutions_are_computed_in_tf32(monkeypatch):
+    for allowed in (True, False):
+        monkeypatch.setattr(torch.backends.cudnn, "allow_tf32", allowed)
+        name = "float32 (convolutions in TF32) on cuda" if allowed else "float32 on cuda"
+        assert arithmetic_on(torch.device("cuda")) == (name, not allowed)
+        assert arithmetic_on(torch.device("cpu")) == ("float32 on cpu", True)
