@@ -16,11 +16,12 @@ if TYPE_CHECKING:
     from drone_rl.api.checking import Check, check
     from drone_rl.api.domains import Coverage
     from drone_rl.api.environment import make_env
+    from drone_rl.api.evaluating import Evaluation, evaluate
     from drone_rl.api.explaining import Explanations, explain
     from drone_rl.api.exporting import export_onnx
     from drone_rl.api.foreign import ForeignPolicy, policy_from
     from drone_rl.api.judgements import Judgements
-    from drone_rl.api.judging import Evaluation, Judgement, evaluate, judge
+    from drone_rl.api.judging import Judgement, judge
     from drone_rl.api.mapping import Places, places
     from drone_rl.api.policy import Policy, load_policy
     from drone_rl.api.provable import train_until_proved
@@ -69,11 +70,12 @@ _PLACES = {
     "api.checking": ("Check", "check"),
     "api.domains": ("Coverage",),
     "api.environment": ("make_env",),
+    "api.evaluating": ("Evaluation", "evaluate"),
     "api.explaining": ("Explanations", "explain"),
     "api.exporting": ("export_onnx",),
     "api.foreign": ("ForeignPolicy", "policy_from"),
     "api.judgements": ("Judgements",),
-    "api.judging": ("Evaluation", "Judgement", "evaluate", "judge"),
+    "api.judging": ("Judgement", "judge"),
     "api.mapping": ("Places", "places"),
     "api.policy": ("Policy", "load_policy"),
     "api.provable": ("train_until_proved",),

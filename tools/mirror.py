@@ -5,6 +5,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 PURE_DATA = {
     "bench/evidence": "evidence made by hand; bench/test_sentences reads every entry",
+    "bench/plants": "changes made by hand; bench/test_sentences tries every one",
     "report/palette": "colours; report/test_indicator and test_pictures find them in pictures",
     "settings/gymnasium": "values with bounds; envs/gymnasium/test_stage gives each",
     "sim/meaning": "names; sim/test_worlds finds each on its things",

@@ -16,9 +16,10 @@ from torch import Tensor
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 from drone_rl.api.choosing import judge_to_choose
+from drone_rl.api.evaluating import evaluate
 from drone_rl.api.exporting import export
 from drone_rl.api.foreign import ForeignPolicy, policy_from
-from drone_rl.api.judging import evaluate, judge
+from drone_rl.api.judging import judge
 from drone_rl.api.pilot import Pilot
 from drone_rl.api.policy import load_policy
 from drone_rl.api.progress import silent

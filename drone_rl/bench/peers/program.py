@@ -74,7 +74,7 @@ def success_lower95(policy: Any, episodes: int) -> float:
         policy: What `drone_rl.evaluate` takes.
         episodes: To fly, greedily.
     """
-    from drone_rl.api.judging import evaluate
+    from drone_rl.api.evaluating import evaluate
     from drone_rl.api.progress import silent
 
     flown = evaluate(policy, episodes=episodes, seed=0, baselines=False, progress=silent).flown
