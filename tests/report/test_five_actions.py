@@ -41,7 +41,7 @@ def test_the_report_names_and_draws_all_five(folder, tmp_path):
     page = write_report([folder], tmp_path).read_text()
     for name in Turning.actions.names:
         assert name in page, name
-    assert page.count('style="background:#000000"') == 5  # the legend of the map of frames
+    assert page.count('rx=".2" fill="#000000"') == 5  # the legend of the map of frames
     table = next(tmp_path.rglob("*response*.csv")).read_text().splitlines()
     assert "p_turn left" in table[0] and len(table[1].split(",")) == 3 + 5 + 2
     assert all(row.split(",")[-2:] == ["", "0"] for row in table[1:])  # nobody knows what is needed
