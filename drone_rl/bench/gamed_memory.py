@@ -34,6 +34,7 @@ from drone_rl.settings.networks import Mlp
 from drone_rl.settings.training import TrainSettings
 from drone_rl.sim.actions import Move
 from drone_rl.sim.settings import TaskSettings
+from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import Stream, root_seed
 from drone_rl.zoo import describe, read_policy
 from drone_rl.zoo.files import exported_bytes
@@ -196,7 +197,10 @@ def _memorising(make: Callable[[Recording], Logits], stream: Stream) -> ForeignP
 
 
 def _verdict(make: Callable[[], Pilot | Path], seed: int | None) -> bool:
-    done = judge(make(), episodes=EPISODES, sampled=False, seed=seed, progress=silent)
+    try:
+        done = judge(make(), episodes=EPISODES, sampled=False, seed=seed, progress=silent)
+    except InputError:  # it acts by more than the frame
+        return False
     return done.verdict.exit_code == 0
 
 

@@ -145,7 +145,8 @@ def _kill_all_that_name(words: str) -> None:
 def _outcome(run: Path) -> tuple[dict[str, Any], dict[str, list]]:
     """What a run came to, but for the time it took and its verdict, whose seed is fresh."""
     result = json.loads((run / "result.json").read_text())
-    del result["seconds"], result["verdict"]
+    del result["seconds"]
+    result.pop("verdict", None)
     policy = load_checkpoint(run / "checkpoints" / "last.pt")["policy"]
     return result, {name: values.tolist() for name, values in policy.items()}
 

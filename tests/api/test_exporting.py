@@ -13,25 +13,13 @@ from drone_rl.api.exporting import export, origin_of
 from drone_rl.settings.judging import FlightSettings
 from drone_rl.sweeps import Run, Sweep
 from drone_rl.utils.errors import InputError
-from drone_rl.verdicts.rule import Rule
 from drone_rl.zoo import certificate_path, open_onnx, parse
 from tests.checks.making import of_every_place
 from tests.conditions.making import shifts_of
+from tests.sweeps.conftest import _verdict
 
 METRICS = "frames,train/running_reward\n100,1.5\n"
 FIGURES = {"frames": 100, "episodes": 9, "seconds": 1.0, "running_reward": 1.5, "num_cubes": 3}
-GREEDY = {
-    "episodes": 200,
-    "success": {"share": 0.5},
-    "shares": {name: {"mean": 0.5} for name in ("all", "left", "ahead", "right")},
-}
-VERDICT = {
-    "kind": "poor",
-    "certain": True,
-    "rule": Rule().text,
-    "error_rate": 0.05,
-    "greedy": GREEDY,
-}
 
 
 @pytest.fixture
@@ -49,7 +37,7 @@ def checkpoint(tmp_path):
 
 
 def judged(checkpoint, **verdict):
-    result = {"reason": "frames", **FIGURES, "verdict": {**VERDICT, **verdict}}
+    result = {"reason": "frames", **FIGURES, "verdict": _verdict("good", **verdict)}
     (checkpoint.parents[1] / "result.json").write_text(json.dumps(result))
 
 

@@ -5,15 +5,14 @@ import pytest
 import drone_rl
 from drone_rl.api.progress import silent
 from drone_rl.bench import gamed_memory
-from drone_rl.bench.gamed_memory import EPISODES, by_frames, cases, judgements, record
+from drone_rl.bench.gamed_memory import EPISODES, by_frames, by_steps, cases, judgements, record
+from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import Stream
 
 NAMES = (
     "verdict, callable that looks frames up",
-    "verdict, callable that counts steps",
     "evaluate, callable that looks frames up",
     "shifts, callable that looks frames up",
-    "verdict, file of an MLP",
 )
 
 
@@ -26,6 +25,21 @@ def judged(tmp_path_factory):
 def test_an_attack_works_with_the_seed_that_it_knows_and_no_other(name, judged):
     assert judged[name](0), "otherwise the test below shows nothing"
     assert not judged[name](None)
+
+
+def test_one_that_counts_steps_is_refused_even_where_it_knows_the_seed():
+    policy = gamed_memory._memorising(by_steps, Stream.REPORT)
+    with pytest.raises(InputError, match="acts by more than the frame"):
+        drone_rl.judge(policy, seed=0, episodes=EPISODES, sampled=False, progress=silent)
+
+
+def test_a_file_that_is_fitted_this_closely_depends_on_rounding_too(tmp_path):
+    path = gamed_memory.write_memory(tmp_path / "mlp.safetensors", stream=Stream.REPORT)
+    how = {"episodes": EPISODES, "sampled": False, "progress": silent}
+    known, fresh = drone_rl.judge(path, seed=0, **how), drone_rl.judge(path, **how)
+    assert (known.verdict.kind, known.verdict.exit_code) == ("good", 13)
+    assert "decisions depend on rounding" in str(known)
+    assert fresh.verdict.kind != "good"
 
 
 def test_every_judgement_is_a_case(judged, tmp_path):

@@ -10,7 +10,7 @@ def test_the_figures(monkeypatch):
         area = 0.75
         sentence = "Good."
 
-    def fly(policy, **settings):
+    def fly(policy, flown, **settings):
         told.append((policy, settings.get("episodes")))
         return Done()
 

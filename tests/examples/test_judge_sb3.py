@@ -19,7 +19,7 @@ def test_a_model_is_trained_saved_judged_and_explained(example, tmp_path, capsys
     example.train(512, num_envs=32, steps=16).save(tmp_path / "ppo.zip")
     model = sb3.PPO.load(tmp_path / "ppo.zip")
     example.trust(model, str(tmp_path), frames=40, episodes=6, perplexity=5)
-    verdict, report = capsys.readouterr().out.splitlines()
+    verdict, *_, report = capsys.readouterr().out.splitlines()
     assert "episodes are too few to be certain" in verdict
     page = Path(report).read_text()
     assert "Grad-CAM of layer trunk.cnn.5" in page  # the nonlinearity after the last convolution
