@@ -6,6 +6,6 @@ from drone_rl.bench.registry import BENCHMARKS
 def test_deceived_judgements_are_counted(monkeypatch, tmp_path):
     made = [GamedCase("a", lambda: True), GamedCase("b", lambda: False)]
     monkeypatch.setattr(gamed_memory, "cases", lambda folder: made)
-    monkeypatch.setattr(gamed, "_LATER", ("no_such_module",))
+    monkeypatch.setattr(gamed, "_MODULES", (gamed_memory,))
     assert gamed.bench_gamed(tmp_path) == {"gamed_verdicts": 1, "gamed_total": 2}
     assert BENCHMARKS["gamed"].group == "truth"

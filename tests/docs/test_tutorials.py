@@ -11,6 +11,7 @@ import torch
 
 from drone_rl.explanations import sections, study
 from drone_rl.explanations.sections import find_sections
+from drone_rl.report import page as report_page
 from drone_rl.report import sections as parts
 from drone_rl.zoo.registry import NETWORKS
 from tests.docs.commands import check_commands
@@ -75,7 +76,9 @@ def workplace(tmp_path, monkeypatch):
     theirs = jinja2.PackageLoader("drone_rl.report")
     loader = jinja2.ChoiceLoader([theirs, templates])
     monkeypatch.setattr(jinja2, "PackageLoader", lambda _: loader)
+    report_page._environment.cache_clear()  # another tutorial may have made it, with another loader
     yield tmp_path
+    report_page._environment.cache_clear()
     torch.set_num_threads(threads)
     NETWORKS.clear()
     NETWORKS.update(networks)
