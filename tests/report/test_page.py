@@ -6,6 +6,7 @@ import json
 import re
 import shutil
 
+import jinja2
 import numpy as np
 import pytest
 
@@ -197,3 +198,14 @@ def test_slow_parts_are_rendered_last(changed, tmp_path):
     with pytest.raises(TypeError):
         write_report([folder], tmp_path / "report")
     assert not list(tmp_path.glob("report/figures/*.mp4"))
+
+
+def test_a_missing_template_is_named_and_not_blamed_on_the_folder(
+    explanations, tmp_path, monkeypatch
+):
+    def render(_):
+        raise jinja2.TemplateNotFound("sections/mine.html")
+
+    monkeypatch.setattr("drone_rl.report.page.render_page", render)
+    with pytest.raises(jinja2.TemplateNotFound, match=r"sections/mine\.html"):
+        write_report(explanations, tmp_path)
