@@ -1,6 +1,7 @@
 """Every tutorial runs as it stands, block by block, but for sizes that would take minutes."""
 
 import ast
+import gc
 import re
 import sys
 from pathlib import Path
@@ -13,6 +14,7 @@ from drone_rl.explanations import sections, study
 from drone_rl.explanations.sections import find_sections
 from drone_rl.report import page as report_page
 from drone_rl.report import sections as parts
+from drone_rl.utils.settings import kinds_of, types_of
 from drone_rl.zoo.registry import NETWORKS
 from tests.docs.commands import check_commands
 
@@ -85,6 +87,9 @@ def workplace(tmp_path, monkeypatch):
     for name in set(sys.modules) - known:
         if str(tmp_path) in str(getattr(sys.modules[name], "__file__", "")):
             del sys.modules[name]
+    kinds_of.cache_clear()  # a tutorial's settings count as variants as long as a cache holds them
+    types_of.cache_clear()
+    gc.collect()
 
 
 def read_blocks(page):

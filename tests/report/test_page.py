@@ -147,7 +147,7 @@ def test_conditions_are_shown_where_they_were_flown(explanations, tmp_path):
     page = write_report([folder], tmp_path).read_text()
     part = page[page.index('<section id="shifts">') :].split("</section>")[0]
     assert "the sun 21.1 to 60 degrees high" in part and part.count("data:image/png") == 2
-    assert "none flown anew here" in part and "<td>height of the sun</td>" in part
+    assert "not measured again here" in part and "<td>height of the sun</td>" in part
     assert "nothing here tests other colours or sizes" in page
 
 
