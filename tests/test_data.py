@@ -12,7 +12,8 @@ from drone_rl.sim.batch import Batch
 
 MUTABLE = {
     "api.journal:Journal",
-    "conditions.domain:_End",
+    "conditions.domain:End",
+    "evaluation.evaluator:StepLog",
     "evaluation.metrics:Episodes",
     "explanations.attribution:Explainer",
     "explanations.class_model:Attempts",

@@ -111,7 +111,8 @@ BENCHMARKS: dict[str, Benchmark] = {
     "gamed": Benchmark(
         lambda s: bench_gamed(s.runs / "gamed"),
         "truth",
-        (*_JUDGING, "api", "conditions", "bench/gamed", "bench/gamed_memory"),
+        (*_JUDGING, "api", "conditions", "bench/gamed", "bench/gamed_memory",
+         "bench/gamed_rounding", "bench/gamed_certificates"),
     ),
     "maps": Benchmark(
         lambda s: bench_maps(s.runs, s.quick),

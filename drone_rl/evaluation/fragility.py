@@ -243,7 +243,7 @@ class _Deciding(TensorDictModuleBase):
         return tensordict.set("action", action)
 
 
-@dataclasses.dataclass
+@dataclasses.dataclass(frozen=True)
 class _Seen:
     """Examined episodes."""
 

@@ -52,6 +52,8 @@ def write_report(folders: Sequence[Path], target: Path) -> Path:
         (target / "figures").mkdir(parents=True, exist_ok=True)
         path = target / "report.html"
         path.write_text(render_page(policies), encoding="utf-8")
+    except jinja2.TemplateNotFound:
+        raise  # an OSError too, of which the folder is not the cause
     except OSError as error:
         raise InputError(
             f"report in {target} can't be written ({error.strerror}); choose another folder"

@@ -37,6 +37,10 @@ class BodiesSettings(JudgeSettings):
     """Worlds in one batch; bounds memory."""
     sampled: bool = False
     """Whether to fly with drawn actions, too."""
+    certificate_flights: Annotated[int, Whole(0, 10_000_000, "flights")] = 0
+    """Rollouts that re-check a certificate; with 0 the table's verdicts prove nothing."""
+    domain_flights: Annotated[int, Whole(0, 100_000, "episodes")] = 0
+    """New episodes that check a required operating domain; the table requires none."""
     loop_flights: Annotated[int, Whole(0, 1000, "flights")] = 0
     """Of each policy with the firmware Betaflight on board, in real time; 0 for none."""
 

@@ -32,7 +32,9 @@ def test_usage_and_help(tmp_path):
 def test_what_is_printed_without_running_anything(monkeypatch, capsys, tmp_path, args, printed):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "argv", ["drone-rl", *args])
-    main()  # returns, so that the exit status is 0
+    with pytest.raises(SystemExit) as end:
+        main()
+    assert end.value.code == 0
     assert capsys.readouterr().out.strip() == printed.strip()
     assert not list(tmp_path.iterdir())
 

@@ -1,6 +1,7 @@
 """Every tutorial runs as it stands, block by block, but for sizes that would take minutes."""
 
 import ast
+import gc
 import re
 import sys
 from pathlib import Path
@@ -11,7 +12,9 @@ import torch
 
 from drone_rl.explanations import sections, study
 from drone_rl.explanations.sections import find_sections
+from drone_rl.report import page as report_page
 from drone_rl.report import sections as parts
+from drone_rl.utils.settings import kinds_of, types_of
 from drone_rl.zoo.registry import NETWORKS
 from tests.docs.commands import check_commands
 
@@ -75,13 +78,18 @@ def workplace(tmp_path, monkeypatch):
     theirs = jinja2.PackageLoader("drone_rl.report")
     loader = jinja2.ChoiceLoader([theirs, templates])
     monkeypatch.setattr(jinja2, "PackageLoader", lambda _: loader)
+    report_page._environment.cache_clear()  # another tutorial may have made it, with another loader
     yield tmp_path
+    report_page._environment.cache_clear()
     torch.set_num_threads(threads)
     NETWORKS.clear()
     NETWORKS.update(networks)
     for name in set(sys.modules) - known:
         if str(tmp_path) in str(getattr(sys.modules[name], "__file__", "")):
             del sys.modules[name]
+    kinds_of.cache_clear()  # a tutorial's settings count as variants as long as a cache holds them
+    types_of.cache_clear()
+    gc.collect()
 
 
 def read_blocks(page):

@@ -6,6 +6,7 @@ import json
 import re
 import shutil
 
+import jinja2
 import numpy as np
 import pytest
 
@@ -146,7 +147,7 @@ def test_conditions_are_shown_where_they_were_flown(explanations, tmp_path):
     page = write_report([folder], tmp_path).read_text()
     part = page[page.index('<section id="shifts">') :].split("</section>")[0]
     assert "the sun 21.1 to 60 degrees high" in part and part.count("data:image/png") == 2
-    assert "<td>height of the sun</td>" in part
+    assert "not measured again here" in part and "<td>height of the sun</td>" in part
     assert "nothing here tests other colours or sizes" in page
 
 
@@ -197,3 +198,14 @@ def test_slow_parts_are_rendered_last(changed, tmp_path):
     with pytest.raises(TypeError):
         write_report([folder], tmp_path / "report")
     assert not list(tmp_path.glob("report/figures/*.mp4"))
+
+
+def test_a_missing_template_is_named_and_not_blamed_on_the_folder(
+    explanations, tmp_path, monkeypatch
+):
+    def render(_):
+        raise jinja2.TemplateNotFound("sections/mine.html")
+
+    monkeypatch.setattr("drone_rl.report.page.render_page", render)
+    with pytest.raises(jinja2.TemplateNotFound, match=r"sections/mine\.html"):
+        write_report(explanations, tmp_path)

@@ -103,6 +103,16 @@ def test_rows_say_what_the_figures_are():
         "onnx_max_difference": 2.56e-6,
         "onnx_frames": 40_000,
         "onnx_actions_differ": 3,
+        "gamed_verdicts": 1,
+        "gamed_total": 34,
+        "fragile_honest": 2,
+        "fragile_honest_total": 14,
+        "injections_run": 0,
+        "injections_total": 1234,
+        "domain_axes_right": 21,
+        "domain_axes": 22,
+        "hostile_peak_mib": 1000.4,
+        "hostile_max_s": 1.94,
     }
     text = "".join(make_table(rows, figures) for rows in (MAIN, FLIGHT, TRUTH, PROOF, GUESTS))
     assert "| 2.6e-06 on 40,000 pictures |" in text and "| 3 of 40,000 |" in text
@@ -110,6 +120,8 @@ def test_rows_say_what_the_figures_are():
         assert f"| {cell} |" in text
     assert "| 4.2, on a machine 1.4 times slower |" in text
     assert "| 26 of 27 |" in text
+    for cell in ("1 of 34", "2 of 14", "0 of 1,234", "21 of 22", "1,000 MiB; 1.9 s"):
+        assert f"| {cell} |" in text
 
 
 def test_layers_side_by_side_are_one_box_and_what_is_forbidden_is_told():

@@ -94,6 +94,37 @@ TRUTH = (
         is_claim=True,
     ),
     Row(
+        "hostile",
+        "the greatest memory, and processor time, of any of them after imports",
+        lambda f: f"{f['hostile_peak_mib']:,.0f} MiB; {f['hostile_max_s']:.1f} s",
+        "1,024 MiB; 2 s",
+    ),
+    Row(
+        "gamed",
+        "adversarial policies called good and certain, or proved",
+        lambda f: f"{f['gamed_verdicts']} of {f['gamed_total']}",
+        "0",
+        is_claim=True,
+    ),
+    Row(
+        "fragile_honest",
+        'honest policies, shipped or trained by default, that rounding makes "not certain"',
+        lambda f: f"{f['fragile_honest']} of {f['fragile_honest_total']}",
+        "0",
+    ),
+    Row(
+        "injections",
+        "injection payloads that run in Chromium, of one on a page each",
+        lambda f: f"{f['injections_run']} of {f['injections_total']:,}",
+        "0",
+    ),
+    Row(
+        "domain_axes",
+        "axes whose operating domain is enforced in the right direction, from file to verdict",
+        lambda f: f"{f['domain_axes_right']} of {f['domain_axes']}",
+        "all",
+    ),
+    Row(
         "render_truth",
         "pictures against OpenGL's, random scenes: pixels on no edge that show another geom; geoms "
         "of more than 30 pixels that overlap by 0.98, the least; depth, mm; colour, levels of 255",
