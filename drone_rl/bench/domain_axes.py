@@ -43,7 +43,7 @@ def bench_domain_axes(folder: Path, quick: bool) -> dict[str, Any]:
         strengths=[5],
         modes=["constant"],
         episodes=20 if quick else 50,
-        domain_episodes=200,
+        domain_episodes=200 if quick else 600,
         progress=silent,
     )
     found.save(folder)
