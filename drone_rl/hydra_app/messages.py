@@ -10,6 +10,7 @@ from collections.abc import Callable
 
 from hydra.core.hydra_config import HydraConfig
 from hydra.errors import HydraException
+from omegaconf import OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from drone_rl.hydra_app.choices import without_schemas
@@ -97,7 +98,8 @@ def file_error(error: OSError) -> str:
     reason = error.strerror or " ".join(str(error).split()) or type(error).__name__
     path = error.filename
     if path is None and HydraConfig.initialized():
-        path = HydraConfig.get().runtime.output_dir
+        runtime = HydraConfig.get().runtime
+        path = None if OmegaConf.is_missing(runtime, "output_dir") else runtime.output_dir
     remedy = _REMEDIES.get(error.errno or 0, f"check the path or {_FOLDER}")
     where = "a file" if path is None else os.fsdecode(path) if isinstance(path, bytes) else path
     text = f"{where} can't be opened or written ({reason}); {remedy}"

@@ -6,7 +6,9 @@ import sys
 import threading
 
 import pytest
+from hydra.core.hydra_config import HydraConfig
 from hydra.errors import HydraException, MissingConfigException
+from omegaconf import OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from drone_rl.hydra_app.messages import file_error, guarded, is_output_closed, one_line
@@ -97,9 +99,17 @@ def test_statuses(capsys):
         (OSError(errno.EIO, "Input/output error"), ["a file", "check the path"]),
     ],
 )
-def test_an_error_of_the_file_system_has_path_reason_and_remedy(error, words):
+def test_an_error_of_the_file_system_has_path_reason_and_remedy(error, words, monkeypatch):
+    monkeypatch.setattr(HydraConfig, "initialized", lambda: False)  # as other tests may leave it
     line = one_line(error)
     assert all(word in line for word in [*words, "hydra.run.dir="]), line
+
+
+def test_a_job_that_has_no_folder_yet_names_none(monkeypatch):
+    job = OmegaConf.create({"runtime": {"output_dir": "???"}})
+    monkeypatch.setattr(HydraConfig, "initialized", lambda: True)
+    monkeypatch.setattr(HydraConfig, "get", lambda: job)
+    assert file_error(OSError(errno.EIO, "Input/output error")).startswith("a file can't be opened")
 
 
 def test_a_path_can_not_leave_its_line():
