@@ -53,7 +53,7 @@ docs: $(STAMP)
 count: $(STAMP)
 	@$(BIN)/python -m tools.mirror
 
-# Mutation testing of the whole package but bench/: a sample of 1,000 mutants, about 45 minutes on two
+# Mutation testing of the whole package but benchmarks/: a sample of 1,000 mutants, about 45 minutes on two
 # idle cores, 15 of them for a run of all tests that records what each one runs. It goes on where it was
 # stopped. With the survivors alone, after tests for them: MUTANTS="--again docs/mutants.json".
 mutants: $(STAMP)

@@ -6,114 +6,114 @@ What is listed here is imported when it is first used, so that `import drone_rl`
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from drone_rl.api.gymnasium import register
 from drone_rl.utils.garbage import collecting_no_garbage
+from drone_rl.utils.gymnasium_registration import register
 from drone_rl.utils.when_imported import import_quietly, when_imported
 
 if TYPE_CHECKING:
-    from drone_rl.api.bodies import Bodies, bodies
-    from drone_rl.api.chances import Chances, chances
-    from drone_rl.api.checking import Check, check
-    from drone_rl.api.domains import Coverage
-    from drone_rl.api.environment import make_env
-    from drone_rl.api.evaluating import Evaluation, evaluate
-    from drone_rl.api.explaining import Explanations, explain
-    from drone_rl.api.exporting import export_onnx
-    from drone_rl.api.foreign import ForeignPolicy, policy_from
-    from drone_rl.api.judgements import Judgements
-    from drone_rl.api.judging import Judgement, judge
-    from drone_rl.api.mapping import Places, places
-    from drone_rl.api.policy import Policy, load_policy
-    from drone_rl.api.provable import train_until_proved
-    from drone_rl.api.proving import Proof, load_proof, prove
-    from drone_rl.api.shifting import Shifts, shifts
-    from drone_rl.api.training import Training, train
-    from drone_rl.envs.gymnasium.world import DroneWorld
-    from drone_rl.envs.gymnasium.worlds import DroneWorlds
-    from drone_rl.envs.sb3.worlds import Sb3Worlds
-    from drone_rl.explanations.settings import ExplainSettings
-    from drone_rl.pilot.errors import PilotError
-    from drone_rl.pilot.future import FlightFuture
-    from drone_rl.pilot.pilot import Pilot
-    from drone_rl.pilot.sensing import Sensors
-    from drone_rl.pilot.state import PilotState
-    from drone_rl.pilot.sticks import Sticks
-    from drone_rl.pilot.trajectory import Trajectory
-    from drone_rl.pilot.turning import Drivetrain, YawMode
-    from drone_rl.policies.sb3.logits import Sb3Logits
-    from drone_rl.policies.sb3.trunk import Sb3Trunk
-    from drone_rl.settings.bodies import BodiesSettings
-    from drone_rl.settings.chances import ChanceSettings
-    from drone_rl.settings.checking import CheckSettings
-    from drone_rl.settings.judging import EvaluateSettings, JudgeSettings
-    from drone_rl.settings.mapping import PlacesSettings
-    from drone_rl.settings.provable import ProvableSettings
-    from drone_rl.settings.proving import ProveSettings
-    from drone_rl.settings.shifting import ShiftSettings
-    from drone_rl.settings.training import TrainerSettings, TrainSettings
-    from drone_rl.sim.image_types import ImageRequest, ImageType
-    from drone_rl.sim.settings import (
+    from drone_rl.config import (
         ActionSettings,
         CameraSettings,
         DynamicsSettings,
         PillarsSettings,
         TaskSettings,
     )
-    from drone_rl.sim.settings.sensors import SensorSettings
+    from drone_rl.config.bodies import BodiesSettings
+    from drone_rl.config.chances import ChanceSettings
+    from drone_rl.config.checking import CheckSettings
+    from drone_rl.config.judging import EvaluateSettings, JudgeSettings
+    from drone_rl.config.mapping import PlacesSettings
+    from drone_rl.config.provable import ProvableSettings
+    from drone_rl.config.proving import ProveSettings
+    from drone_rl.config.sensors import SensorSettings
+    from drone_rl.config.shifting import ShiftSettings
+    from drone_rl.config.training import TrainerSettings, TrainSettings
+    from drone_rl.envs.gymnasium.world import DroneWorld
+    from drone_rl.envs.gymnasium.worlds import DroneWorlds
+    from drone_rl.envs.sb3.worlds import Sb3Worlds
+    from drone_rl.evaluation.evaluate import Evaluation, evaluate
+    from drone_rl.explanations.explain import Explanations, explain
+    from drone_rl.explanations.settings import ExplainSettings
+    from drone_rl.flight.commands.errors import PilotError
+    from drone_rl.flight.commands.future import FlightFuture
+    from drone_rl.flight.commands.pilot import Pilot
+    from drone_rl.flight.commands.sensing import Sensors
+    from drone_rl.flight.commands.state import PilotState
+    from drone_rl.flight.commands.sticks import Sticks
+    from drone_rl.flight.commands.trajectory import Trajectory
+    from drone_rl.flight.commands.turning import Drivetrain, YawMode
+    from drone_rl.policies.environment import make_env
+    from drone_rl.policies.external_policy import ForeignPolicy, policy_from
+    from drone_rl.policies.policy import Policy, load_policy
+    from drone_rl.policies.sb3.logits import Sb3Logits
+    from drone_rl.policies.sb3.trunk import Sb3Trunk
+    from drone_rl.robustness.shifts import Shifts, shifts
+    from drone_rl.sim.image_types import ImageRequest, ImageType
+    from drone_rl.training.train import Training, train
     from drone_rl.utils.errors import InputError
+    from drone_rl.verdicts.bodies import Bodies, bodies
+    from drone_rl.verdicts.domains import Coverage
+    from drone_rl.verdicts.export import export_onnx
+    from drone_rl.verdicts.judge import Judgement, judge
+    from drone_rl.verdicts.judgements import Judgements
+    from drone_rl.verification.chances import Chances, chances
+    from drone_rl.verification.check import Check, check
+    from drone_rl.verification.places import Places, places
+    from drone_rl.verification.provable import train_until_proved
+    from drone_rl.verification.prove import Proof, load_proof, prove
 
 __version__ = "0.1.0"
 
 _PLACES = {
-    "api.bodies": ("Bodies", "bodies"),
-    "api.chances": ("Chances", "chances"),
-    "api.checking": ("Check", "check"),
-    "api.domains": ("Coverage",),
-    "api.environment": ("make_env",),
-    "api.evaluating": ("Evaluation", "evaluate"),
-    "api.explaining": ("Explanations", "explain"),
-    "api.exporting": ("export_onnx",),
-    "api.foreign": ("ForeignPolicy", "policy_from"),
-    "api.judgements": ("Judgements",),
-    "api.judging": ("Judgement", "judge"),
-    "api.mapping": ("Places", "places"),
-    "api.policy": ("Policy", "load_policy"),
-    "api.provable": ("train_until_proved",),
-    "api.proving": ("Proof", "load_proof", "prove"),
-    "api.shifting": ("Shifts", "shifts"),
-    "api.training": ("Training", "train"),
+    "verdicts.bodies": ("Bodies", "bodies"),
+    "verification.chances": ("Chances", "chances"),
+    "verification.check": ("Check", "check"),
+    "verdicts.domains": ("Coverage",),
+    "policies.environment": ("make_env",),
+    "evaluation.evaluate": ("Evaluation", "evaluate"),
+    "explanations.explain": ("Explanations", "explain"),
+    "verdicts.export": ("export_onnx",),
+    "policies.external_policy": ("ForeignPolicy", "policy_from"),
+    "verdicts.judgements": ("Judgements",),
+    "verdicts.judge": ("Judgement", "judge"),
+    "verification.places": ("Places", "places"),
+    "policies.policy": ("Policy", "load_policy"),
+    "verification.provable": ("train_until_proved",),
+    "verification.prove": ("Proof", "load_proof", "prove"),
+    "robustness.shifts": ("Shifts", "shifts"),
+    "training.train": ("Training", "train"),
     "envs.gymnasium.world": ("DroneWorld",),
     "envs.gymnasium.worlds": ("DroneWorlds",),
     "envs.sb3.worlds": ("Sb3Worlds",),
     "explanations.settings": ("ExplainSettings",),
-    "pilot.errors": ("PilotError",),
-    "pilot.future": ("FlightFuture",),
-    "pilot.pilot": ("Pilot",),
-    "pilot.sensing": ("Sensors",),
-    "pilot.state": ("PilotState",),
-    "pilot.sticks": ("Sticks",),
-    "pilot.trajectory": ("Trajectory",),
-    "pilot.turning": ("Drivetrain", "YawMode"),
+    "flight.commands.errors": ("PilotError",),
+    "flight.commands.future": ("FlightFuture",),
+    "flight.commands.pilot": ("Pilot",),
+    "flight.commands.sensing": ("Sensors",),
+    "flight.commands.state": ("PilotState",),
+    "flight.commands.sticks": ("Sticks",),
+    "flight.commands.trajectory": ("Trajectory",),
+    "flight.commands.turning": ("Drivetrain", "YawMode"),
     "policies.sb3.logits": ("Sb3Logits",),
     "policies.sb3.trunk": ("Sb3Trunk",),
-    "settings.bodies": ("BodiesSettings",),
-    "settings.chances": ("ChanceSettings",),
-    "settings.checking": ("CheckSettings",),
-    "settings.judging": ("EvaluateSettings", "JudgeSettings"),
-    "settings.mapping": ("PlacesSettings",),
-    "settings.provable": ("ProvableSettings",),
-    "settings.proving": ("ProveSettings",),
-    "settings.shifting": ("ShiftSettings",),
-    "settings.training": ("TrainSettings", "TrainerSettings"),
+    "config.bodies": ("BodiesSettings",),
+    "config.chances": ("ChanceSettings",),
+    "config.checking": ("CheckSettings",),
+    "config.judging": ("EvaluateSettings", "JudgeSettings"),
+    "config.mapping": ("PlacesSettings",),
+    "config.provable": ("ProvableSettings",),
+    "config.proving": ("ProveSettings",),
+    "config.shifting": ("ShiftSettings",),
+    "config.training": ("TrainSettings", "TrainerSettings"),
     "sim.image_types": ("ImageRequest", "ImageType"),
-    "sim.settings": (
+    "config": (
         "ActionSettings",
         "CameraSettings",
         "DynamicsSettings",
         "PillarsSettings",
         "TaskSettings",
     ),
-    "sim.settings.sensors": ("SensorSettings",),
+    "config.sensors": ("SensorSettings",),
     "utils.errors": ("InputError",),
 }
 _HOMES = {name: f"drone_rl.{module}" for module, names in _PLACES.items() for name in names}

@@ -10,7 +10,7 @@ import gymnasium
 from stable_baselines3 import PPO
 
 import drone_rl
-from drone_rl.settings.transforms import Rgb
+from drone_rl.config.transforms import Rgb
 
 CAMERA = drone_rl.CameraSettings(width=64, height=40)
 """At least 36 pixels each way, which their CnnPolicy needs."""

@@ -8,7 +8,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecMonitor
 
 import drone_rl
-from drone_rl.settings.transforms import Gray, Standardize
+from drone_rl.config.transforms import Gray, Standardize
 
 SEES = (Gray(), Standardize())
 """What becomes of the camera's frame, RGB bytes, before the network gets it."""

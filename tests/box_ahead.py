@@ -3,9 +3,9 @@
 import numpy as np
 import warp as wp
 
-from drone_rl.sim.rendering import raytrace_structs as structs
-from drone_rl.sim.rendering.raytrace_scene import make_rays
-from drone_rl.sim.rendering.raytrace_solids import BOX
+from drone_rl.sim.rendering.raytrace import structs
+from drone_rl.sim.rendering.raytrace.scene import make_rays
+from drone_rl.sim.rendering.raytrace.solids import BOX
 
 SIZE = 40
 

@@ -2,10 +2,10 @@
 
 import torch
 
+from drone_rl.config import ActionSettings, CameraSettings, TaskSettings
 from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, with_transforms
 from drone_rl.policies import SmallCNN, make_actor
 from drone_rl.sim.dynamics import Kinematic
-from drone_rl.sim.settings import ActionSettings, CameraSettings, TaskSettings
 
 SETTINGS = ActionSettings(kind="velocity")
 TASK = TaskSettings(

@@ -4,9 +4,9 @@ import dataclasses
 
 import torch
 
+from drone_rl.config import DynamicsSettings
 from drone_rl.sim.actions import MOVES
 from drone_rl.sim.dynamics import BodyState
-from drone_rl.sim.settings import DynamicsSettings
 
 FLIGHT = DynamicsSettings(mode="simple_flight")
 """What makes one of it, where `floating` is in force."""

@@ -3,9 +3,9 @@
 import mujoco
 import torch
 
-from drone_rl.sim.meaning import Meaning
 from drone_rl.sim.rendering import Poses, Raytracer, Scene, View
-from drone_rl.sim.rendering.raytrace_painters import GpuPainter
+from drone_rl.sim.rendering.raytrace.painters import GpuPainter
+from drone_rl.sim.rendering.semantics import Meaning
 
 SIZE = 40
 XML = """<mujoco><statistic extent="1"/>

@@ -8,7 +8,7 @@ import pkgutil
 import pytest
 
 import drone_rl
-from drone_rl.sim.batch import Batch
+from drone_rl.utils.batch import Batch
 
 MUTABLE = {
     "api.journal:Journal",
@@ -33,13 +33,13 @@ MUTABLE = {
     "training.progress:Progress",
 }
 """Those that are not frozen, or not yet, below drone_rl; batches of tensors are none of them."""
-BY_NAME_ALONE = ("drone_rl.settings.", "drone_rl.sim.settings.", "drone_rl.cli.")
+BY_NAME_ALONE = ("drone_rl.config.", "drone_rl.config.", "drone_rl.cli.")
 """Where fields have no order, so that adding one changes no call."""
 
 
 def data_classes():
     for found in pkgutil.walk_packages(drone_rl.__path__, "drone_rl."):
-        if found.name.startswith("drone_rl.bench"):
+        if found.name.startswith("benchmarks"):
             continue
         try:
             module = importlib.import_module(found.name)
@@ -68,6 +68,6 @@ def test_settings_are_given_by_name(all_of_them):
         for name, kind in all_of_them.items()
         for field in dataclasses.fields(kind)
         if name.startswith(BY_NAME_ALONE) and field.init and not field.kw_only
-        if name != "drone_rl.settings.changes:Changes"  # a type, and nothing else
+        if name != "drone_rl.config.changes:Changes"  # a type, and nothing else
     }
     assert by_place == set()

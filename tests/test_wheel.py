@@ -18,12 +18,12 @@ def test_wheel_carries_the_configuration_and_runs_without_the_checkout(tmp_path)
     carried = {p.relative_to(ROOT / "conf") for p in (ROOT / "conf").rglob("*.yaml")}
     assert {f"drone_rl/conf/{path.as_posix()}" for path in carried} <= names
     assert "drone_rl/py.typed" in names
-    assert "drone_rl/report/templates/report.html" in names
+    assert "drone_rl/explanations/report/templates/report.html" in names
     policies = ("good", "poor", "right_and_forward", "proved")
-    assert {f"drone_rl/zoo/{n}.safetensors" for n in policies} <= names
-    assert "drone_rl/zoo/proved.certificate.json" in names
+    assert {f"drone_rl/policies/zoo/{n}.safetensors" for n in policies} <= names
+    assert "drone_rl/policies/zoo/proved.certificate.json" in names
     code = "import sys; sys.path.insert(0, 'site'); from drone_rl.cli.main import main; "
-    code += "from drone_rl.hydra_app.composition import conf_dir; "
+    code += "from drone_rl.cli.hydra.composition import conf_dir; "
     code += "assert str(conf_dir()).endswith('site/drone_rl/conf'), conf_dir(); main()"
     command = [sys.executable, "-c", code, "train", "--cfg", "job"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)

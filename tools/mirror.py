@@ -4,13 +4,11 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 PURE_DATA = {
-    "bench/evidence": "evidence made by hand; bench/test_sentences reads every entry",
-    "bench/plants": "changes made by hand; bench/test_sentences tries every one",
-    "report/palette": "colours; report/test_indicator and test_pictures find them in pictures",
-    "settings/gymnasium": "values with bounds; envs/gymnasium/test_stage gives each",
-    "sim/meaning": "names; sim/test_worlds finds each on its things",
+    "evaluation/plots/palette": "colours; test_indicator and test_images find them in images",
+    "config/gymnasium": "values with bounds; envs/gymnasium/test_stage gives each",
+    "sim/rendering/semantics": "names; sim/test_worlds finds each on its things",
     **{
-        f"settings/{name}": "values with bounds; hydra_app/test_schemas reads and builds each"
+        f"config/{name}": "values with bounds; cli/hydra/test_schemas reads and builds each"
         for name in (
             *("benchmarks", "chances", "checking", "collecting", "judging", "learning", "loggers"),
             *("mapping", "networks", "paths", "proving", "returns", "training", "transforms"),

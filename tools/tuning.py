@@ -15,7 +15,7 @@ from pathlib import Path
 from statistics import mean
 from typing import Any
 
-from drone_rl.bench.peers.side_by_side import train_ours, train_theirs
+from benchmarks.peers.side_by_side import train_ours, train_theirs
 
 SEEDS = (100, 101)
 MOST_FRAMES = 200_000

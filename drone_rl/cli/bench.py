@@ -1,17 +1,15 @@
 """`drone-rl bench`."""
 
 import dataclasses
+import importlib
 import json
 import logging
 from collections.abc import Sequence
 from pathlib import Path
+from types import ModuleType
 
-from drone_rl.bench.benchmark import Setup
-from drone_rl.bench.ledger import Ledger
-from drone_rl.bench.registry import BENCHMARKS, find_benchmarks
-from drone_rl.bench.run import run_benchmarks
-from drone_rl.settings.benchmarks import BenchSettings
-from drone_rl.settings.paths import PathsSettings
+from drone_rl.config.benchmarks import BenchSettings
+from drone_rl.config.paths import PathsSettings
 from drone_rl.utils.errors import InputError
 
 _log = logging.getLogger(__name__)
@@ -25,8 +23,26 @@ class Command(BenchSettings):
     """Folders."""
 
 
+def _benchmarks() -> ModuleType:
+    """Import the registry of benchmarks, which a checkout has and an installed wheel has not.
+
+    Raises:
+        InputError: It is missing.
+    """
+    try:
+        return importlib.import_module("benchmarks.registry")
+    except ModuleNotFoundError as error:
+        if (error.name or "").partition(".")[0] != "benchmarks":
+            raise
+        raise InputError(
+            "drone-rl bench needs a checkout of the project (the package benchmarks is not "
+            "installed); clone the repository and run make demo, then drone-rl bench, in it"
+        ) from error
+
+
 def prepare(overrides: Sequence[str]) -> list[str]:
     """Makes `drone-rl bench collector --quick` mean `only=[collector] quick=true`."""
+    find_benchmarks = _benchmarks().find_benchmarks
     words = [o for o in overrides if "=" not in o and not o.startswith("-")]
     names = find_benchmarks(words)
     kept = [o for o in overrides if o not in (*words, "--quick")]
@@ -45,11 +61,20 @@ def run(settings: Command, output_dir: Path) -> tuple[int, None]:
         InputError: One failed; those after it were run all the same.
     """
     del output_dir
+    registry = _benchmarks()
+    from benchmarks.benchmark import Setup
+    from benchmarks.ledger import Ledger
+    from benchmarks.run import run_benchmarks
+
     folder = Path(settings.folder) / "quick" if settings.quick else Path(settings.folder)
     folder.mkdir(parents=True, exist_ok=True)
     setup = Setup.of(settings, folder)
     ledger = Ledger(folder / "results.json")
-    names = list(BENCHMARKS) if settings.only is None else find_benchmarks(settings.only)
+    names = (
+        list(registry.BENCHMARKS)
+        if settings.only is None
+        else registry.find_benchmarks(settings.only)
+    )
     failures = run_benchmarks(names, setup, ledger, again=settings.only is not None)
     print(json.dumps({name: ledger.of(name) for name in names}, indent=2))
     _log.info("results: %s", ledger.path)

@@ -5,8 +5,8 @@ import logging
 from pathlib import Path
 
 import drone_rl
-from drone_rl.settings.bodies import BodiesSettings
-from drone_rl.settings.paths import PathsSettings
+from drone_rl.config.bodies import BodiesSettings
+from drone_rl.config.paths import PathsSettings
 
 _log = logging.getLogger(__name__)
 
@@ -21,7 +21,7 @@ class Command(BodiesSettings):
 
 def run(settings: Command, folder: Path) -> tuple[int, int]:
     """Flies policies in several bodies. Returns the exit status and how many verdicts there are."""
-    from drone_rl.api.progress import silent
+    from drone_rl.utils.progress import silent
 
     asked = settings.narrowed(BodiesSettings)
     done = drone_rl.bodies(settings=asked, outputs=settings.paths.outputs, progress=silent)

@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Annotated
 
 import drone_rl
-from drone_rl.hydra_app.names import policies as prepare  # noqa: F401 -- of what was typed
-from drone_rl.settings.chances import ChanceSettings
-from drone_rl.settings.changes import TaskChanges, no_changes
-from drone_rl.settings.paths import PathsSettings
+from drone_rl.cli.hydra.names import policies as prepare  # noqa: F401 -- of what was typed
+from drone_rl.config.chances import ChanceSettings
+from drone_rl.config.changes import TaskChanges, no_changes
+from drone_rl.config.paths import PathsSettings
 from drone_rl.utils.schema import Real, Several
 
 _log = logging.getLogger(__name__)
@@ -32,7 +32,7 @@ class Command(ChanceSettings):
 
 def run(settings: Command, folder: Path) -> tuple[int, float]:
     """Tells one policy's chances. Returns the exit status and the probability of success."""
-    from drone_rl.api.progress import silent
+    from drone_rl.utils.progress import silent
 
     done = drone_rl.chances(
         settings.policy,

@@ -5,10 +5,10 @@ import logging
 from pathlib import Path
 
 import drone_rl
-from drone_rl.hydra_app.names import policies as prepare  # noqa: F401 -- of what was typed
-from drone_rl.settings.changes import TaskChanges, no_changes
-from drone_rl.settings.checking import CheckSettings
-from drone_rl.settings.paths import PathsSettings
+from drone_rl.cli.hydra.names import policies as prepare  # noqa: F401 -- of what was typed
+from drone_rl.config.changes import TaskChanges, no_changes
+from drone_rl.config.checking import CheckSettings
+from drone_rl.config.paths import PathsSettings
 
 _log = logging.getLogger(__name__)
 
@@ -29,7 +29,7 @@ class Command(CheckSettings):
 
 def run(settings: Command, folder: Path) -> tuple[int, bool]:
     """Checks a certificate. Returns the exit status and whether it is accepted."""
-    from drone_rl.api.progress import silent
+    from drone_rl.utils.progress import silent
 
     done = drone_rl.check(
         settings.certificate,

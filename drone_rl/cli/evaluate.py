@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Annotated
 
 import drone_rl
-from drone_rl.hydra_app.names import policies as prepare  # noqa: F401 -- of what was typed
-from drone_rl.settings.changes import DynamicsChanges, TaskChanges, no_changes
-from drone_rl.settings.judging import EvaluateSettings
-from drone_rl.settings.paths import PathsSettings
+from drone_rl.cli.hydra.names import policies as prepare  # noqa: F401 -- of what was typed
+from drone_rl.config.changes import DynamicsChanges, TaskChanges, no_changes
+from drone_rl.config.judging import EvaluateSettings
+from drone_rl.config.paths import PathsSettings
 from drone_rl.utils.schema import Whole
 
 _log = logging.getLogger(__name__)
@@ -36,7 +36,7 @@ class Command(EvaluateSettings):
 
 def run(settings: Command, folder: Path) -> tuple[int, float]:
     """Evaluates one policy. Returns the exit status and the share of complete episodes."""
-    from drone_rl.api.progress import log
+    from drone_rl.utils.progress import log
 
     policy = drone_rl.load_policy(settings.policy, outputs=settings.paths.outputs)
     policy = policy.in_task(**settings.task)
@@ -47,7 +47,7 @@ def run(settings: Command, folder: Path) -> tuple[int, float]:
     _log.info("policy: %s", policy.path)
     _log.info("written: %s", folder / "evaluation.json")
     if settings.videos:
-        from drone_rl.api.filming import film
+        from drone_rl.evaluation.film import film
 
         film(
             policy,

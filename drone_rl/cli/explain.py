@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import drone_rl
+from drone_rl.cli.hydra.names import policies as prepare  # noqa: F401 -- of what was typed
+from drone_rl.config.changes import DynamicsChanges, TaskChanges, no_changes
+from drone_rl.config.paths import PathsSettings
+from drone_rl.evaluation.kinds import Kind
 from drone_rl.explanations.settings import ExplainSettings
-from drone_rl.hydra_app.names import policies as prepare  # noqa: F401 -- of what was typed
-from drone_rl.settings.changes import DynamicsChanges, TaskChanges, no_changes
-from drone_rl.settings.paths import PathsSettings
 from drone_rl.utils.schema import Listed, OneOf, Whole
-from drone_rl.verdicts.kinds import Kind
 
 _log = logging.getLogger(__name__)
 
@@ -36,7 +36,7 @@ class Command(ExplainSettings):
 
 def run(settings: Command, folder: Path) -> tuple[int, str]:
     """Explains policies and reports on them. Returns the exit status and the report's path."""
-    from drone_rl.api.progress import log
+    from drone_rl.utils.progress import log
 
     loaded = [drone_rl.load_policy(p, outputs=settings.paths.outputs) for p in settings.policy]
     done = drone_rl.explain(

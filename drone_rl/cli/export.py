@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import Annotated
 
 import drone_rl
-from drone_rl.hydra_app.names import policies as prepare  # noqa: F401 -- of what was typed
-from drone_rl.settings.judging import FlightSettings
-from drone_rl.settings.paths import PathsSettings
+from drone_rl.cli.hydra.names import policies as prepare  # noqa: F401 -- of what was typed
+from drone_rl.config.judging import FlightSettings
+from drone_rl.config.paths import PathsSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.overrides import COMMAND
 from drone_rl.utils.schema import FileName, OneOf
-from drone_rl.words.seeds import seed_line
+from drone_rl.utils.seed_text import seed_line
 
 _log = logging.getLogger(__name__)
 
@@ -48,8 +48,8 @@ class Command(FlightSettings):
 
 def run(settings: Command, folder: Path) -> tuple[int, str]:
     """Exports one policy. Returns the exit status and the file's path."""
-    from drone_rl.api.exporting import export, export_onnx
     from drone_rl.utils.seeding import root_seed  # imports torch
+    from drone_rl.verdicts.export import export, export_onnx
 
     policy = drone_rl.load_policy(settings.policy, outputs=settings.paths.outputs)
     target = folder / f"{settings.name}.{settings.format}"

@@ -49,7 +49,7 @@ def _main(args: list[str]) -> int:
         print(DEMO_USAGE)
         return 0
     look_for_garbage_rarely()
-    from drone_rl.hydra_app.messages import guarded  # usage and typing errors don't wait for Hydra
+    from drone_rl.cli.hydra.messages import guarded  # usage and typing errors don't wait for Hydra
 
     leave_compiler_unloaded()
     steps = [("train", overrides), ("evaluate", []), ("explain", [])]
@@ -60,7 +60,7 @@ def _main(args: list[str]) -> int:
 
 def _run_all(steps: list[tuple[str, list[str]]]) -> int:
     """One command after the other, until one fails."""
-    from drone_rl.hydra_app.composition import Command, run_command
+    from drone_rl.cli.hydra.composition import Command, run_command
 
     for name, overrides in steps:
         file = name.replace("-", "_")

@@ -5,10 +5,10 @@ import logging
 from pathlib import Path
 
 import drone_rl
-from drone_rl.hydra_app.names import policies as prepare  # noqa: F401 -- of what was typed
-from drone_rl.settings.changes import TaskChanges, no_changes
-from drone_rl.settings.mapping import PlacesSettings
-from drone_rl.settings.paths import PathsSettings
+from drone_rl.cli.hydra.names import policies as prepare  # noqa: F401 -- of what was typed
+from drone_rl.config.changes import TaskChanges, no_changes
+from drone_rl.config.mapping import PlacesSettings
+from drone_rl.config.paths import PathsSettings
 
 _log = logging.getLogger(__name__)
 
@@ -27,7 +27,7 @@ class Command(PlacesSettings):
 
 def run(settings: Command, folder: Path) -> tuple[int, float]:
     """Maps one policy's places. Returns the exit status and the share of blind ones."""
-    from drone_rl.api.progress import silent
+    from drone_rl.utils.progress import silent
 
     done = drone_rl.places(
         settings.policy,

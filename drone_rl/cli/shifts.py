@@ -5,10 +5,10 @@ import logging
 from pathlib import Path
 
 import drone_rl
-from drone_rl.hydra_app.names import policies as prepare  # noqa: F401 -- of what was typed
-from drone_rl.settings.changes import DynamicsChanges, TaskChanges, no_changes
-from drone_rl.settings.paths import PathsSettings
-from drone_rl.settings.shifting import ShiftSettings
+from drone_rl.cli.hydra.names import policies as prepare  # noqa: F401 -- of what was typed
+from drone_rl.config.changes import DynamicsChanges, TaskChanges, no_changes
+from drone_rl.config.paths import PathsSettings
+from drone_rl.config.shifting import ShiftSettings
 
 _log = logging.getLogger(__name__)
 
@@ -29,7 +29,7 @@ class Command(ShiftSettings):
 
 def run(settings: Command, folder: Path) -> tuple[int, float]:
     """Flies one policy. Returns the exit status and the mean area under success over strength."""
-    from drone_rl.api.progress import log
+    from drone_rl.utils.progress import log
 
     done = drone_rl.shifts(
         settings.policy,

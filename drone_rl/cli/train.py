@@ -9,22 +9,22 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import drone_rl
-from drone_rl.hydra_app import resuming
-from drone_rl.hydra_app.launchers import LocalLauncher, RayLauncher, SlurmLauncher, register_plugins
-from drone_rl.hydra_app.optuna_sweeper import OptunaSweeper
-from drone_rl.settings.loggers import Logger, Tensorboard
-from drone_rl.settings.paths import PathsSettings
-from drone_rl.settings.provable import ProvableSettings
-from drone_rl.settings.training import TrainSettings
+from drone_rl.cli.hydra import resuming
+from drone_rl.cli.hydra.launchers import LocalLauncher, RayLauncher, SlurmLauncher, register_plugins
+from drone_rl.cli.hydra.optuna_sweeper import OptunaSweeper
+from drone_rl.config.loggers import Logger, Tensorboard
+from drone_rl.config.paths import PathsSettings
+from drone_rl.config.provable import ProvableSettings
+from drone_rl.config.training import TrainSettings
 from drone_rl.utils.schema import Instance, Several, Whole
-from drone_rl.words.proof import found
+from drone_rl.verification.proof_text import found
 
 if TYPE_CHECKING:
     from drone_rl.training import Callback
 
 _log = logging.getLogger(__name__)
 prepare = resuming.complete
-"""What `drone_rl.hydra_app.composition` does with what was typed."""
+"""What `drone_rl.cli.hydra.composition` does with what was typed."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -58,7 +58,7 @@ def register() -> None:
 def run(settings: Command, folder: Path) -> tuple[int, float]:
     """Trains one policy. Returns the exit status and the running mean of rewards."""
     train = _training(settings.provable)  # slow to import; a sweep leaves it to its runs
-    from drone_rl.api.progress import silent
+    from drone_rl.utils.progress import silent
 
     try:
         done = train(

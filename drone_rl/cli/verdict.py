@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Annotated
 
 import drone_rl
-from drone_rl.hydra_app.names import policies as prepare  # noqa: F401 -- of what was typed
-from drone_rl.settings.changes import DynamicsChanges, TaskChanges, no_changes
-from drone_rl.settings.judging import JudgeSettings
-from drone_rl.settings.paths import PathsSettings
+from drone_rl.cli.hydra.names import policies as prepare  # noqa: F401 -- of what was typed
+from drone_rl.config.changes import DynamicsChanges, TaskChanges, no_changes
+from drone_rl.config.judging import JudgeSettings
+from drone_rl.config.paths import PathsSettings
 from drone_rl.utils.schema import OneOf
 
 _log = logging.getLogger(__name__)
@@ -40,7 +40,7 @@ class Command(JudgeSettings):
 
 def run(settings: Command, folder: Path) -> tuple[int, str]:
     """Judges one policy. Returns the exit status and the kind's name."""
-    from drone_rl.api.progress import silent
+    from drone_rl.utils.progress import silent
 
     outputs = settings.paths.outputs
     done = drone_rl.judge(

@@ -14,11 +14,7 @@ from torch import Tensor
 from torchrl.data import Binary, Bounded, Categorical, Composite, TensorSpec, Unbounded
 from torchrl.envs import EnvBase
 
-from drone_rl.sim.actions import Entry
-from drone_rl.sim.appearances import Appearances
-from drone_rl.sim.dynamics import Dynamics
-from drone_rl.sim.rendering import MakeRenderer, check_device
-from drone_rl.sim.settings import (
+from drone_rl.config import (
     MINIMAL,
     ActionSettings,
     AppearanceSettings,
@@ -26,6 +22,10 @@ from drone_rl.sim.settings import (
     CameraSettings,
     DynamicsSettings,
 )
+from drone_rl.sim.actions import Entry
+from drone_rl.sim.appearances import Appearances
+from drone_rl.sim.dynamics import Dynamics
+from drone_rl.sim.rendering import MakeRenderer, check_device
 from drone_rl.sim.tasks import Task, as_task
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError

@@ -3,10 +3,10 @@
 import torch
 from torch import Tensor
 
+from drone_rl.config import transforms as settings
 from drone_rl.envs import faults
 from drone_rl.envs.camera_fault import CameraFault, Streams, normal, uniform
 from drone_rl.envs.transforms import PixelTransform
-from drone_rl.settings import transforms as settings
 from drone_rl.utils.errors import InputError
 
 
@@ -18,7 +18,7 @@ class Blur(PixelTransform):
     """
 
     def __init__(self, width: float = 0.5) -> None:
-        """See `drone_rl.settings.transforms.Blur`."""
+        """See `drone_rl.config.transforms.Blur`."""
         super().__init__()
         self.width = settings.Blur(width=width).width
 
@@ -39,7 +39,7 @@ class Noise(CameraFault):
     """
 
     def __init__(self, strength: float = 0.02, correlation_time: float = 0.0) -> None:
-        """See `drone_rl.settings.transforms.Noise`."""
+        """See `drone_rl.config.transforms.Noise`."""
         super().__init__()
         told = settings.Noise(strength=strength, correlation_time=correlation_time)
         self.strength, self.correlation_time = told.strength, told.correlation_time
@@ -69,7 +69,7 @@ class DeadRows(CameraFault):
     """
 
     def __init__(self, count: int = 1, rows: tuple[int, ...] = (), level: float = 0.0) -> None:
-        """See `drone_rl.settings.transforms.DeadRows`."""
+        """See `drone_rl.config.transforms.DeadRows`."""
         super().__init__()
         told = settings.DeadRows(count=count, rows=rows, level=level)
         self.count, self.rows, self.level = told.count, told.rows, told.level
@@ -103,7 +103,7 @@ class FrozenFrames(CameraFault):
     """
 
     def __init__(self, share: float = 0.05) -> None:
-        """See `drone_rl.settings.transforms.FrozenFrames`."""
+        """See `drone_rl.config.transforms.FrozenFrames`."""
         super().__init__()
         self.share = settings.FrozenFrames(share=share).share
 
@@ -132,7 +132,7 @@ class LateFrames(CameraFault):
     """
 
     def __init__(self, frames: int = 1) -> None:
-        """See `drone_rl.settings.transforms.LateFrames`."""
+        """See `drone_rl.config.transforms.LateFrames`."""
         super().__init__()
         self.frames = settings.LateFrames(frames=frames).frames
 
@@ -160,7 +160,7 @@ class Shift(CameraFault):
     """
 
     def __init__(self, down: int = 4, across: int = 6) -> None:
-        """See `drone_rl.settings.transforms.Shift`."""
+        """See `drone_rl.config.transforms.Shift`."""
         super().__init__()
         told = settings.Shift(down=down, across=across)
         self.down, self.across = told.down, told.across

@@ -11,6 +11,13 @@ from torchrl.envs import TransformedEnv
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 from drone_rl.envs import worlds_of
+from drone_rl.evaluation.evaluator import StepLog, run_episodes
+from drone_rl.evaluation.fragility import compare
+from drone_rl.policies.base_policy import Pilot
+from drone_rl.policies.external_policy import ForeignPolicy
+
+_CHECKED_EPISODES = 32
+"""Episodes that check that a policy acts by the current frame only."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -56,3 +63,29 @@ def agreement(
         difference=float((mine - its).abs().max()),
         actions_differ=int((actions.chosen(mine) != actions.chosen(its)).sum()),
     )
+
+
+def require_function(
+    policy: Pilot, *, seed: int, device: str = "cpu", renderer: str = "raytrace"
+) -> None:
+    """Check that a policy from elsewhere acts by the frame alone; others do by their layers.
+
+    Args:
+        policy: Any.
+        seed: Root of the random streams of the environments in which it is tried.
+        device: Where it is flown.
+        renderer: Who renders.
+
+    Raises:
+        InputError: It acts by the batch, by a frame's place in it, or by earlier calls.
+    """
+    if not isinstance(policy, ForeignPolicy):
+        return
+    with policy.flying(_CHECKED_EPISODES, seed=seed, device=device, renderer=renderer) as (
+        env,
+        actor,
+    ):
+        state, log = env.base_env.state_dict(), StepLog()
+        flown = run_episodes(env, actor, _CHECKED_EPISODES, log=log)
+        env.base_env.load_state_dict(state)
+        compare(env, actor, flown=flown, log=log)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from drone_rl.pilot.state import Attitude, attitude_of
+from drone_rl.flight.commands.state import Attitude, attitude_of
 from drone_rl.sim.dynamics import FlightState
 
 WIDTH, HEIGHT = 476, 190

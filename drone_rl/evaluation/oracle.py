@@ -7,8 +7,8 @@ from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 
+from drone_rl.config import BaseTaskSettings
 from drone_rl.sim.actions import Actions
-from drone_rl.sim.settings import BaseTaskSettings
 from drone_rl.sim.tasks import Task, as_task
 from drone_rl.utils.errors import InputError
 

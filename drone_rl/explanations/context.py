@@ -15,7 +15,6 @@ from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 from torchrl.envs import TransformedEnv
 
-from drone_rl.conditions.measured import Measured
 from drone_rl.explanations.attribution import Explainer
 from drone_rl.explanations.dataset import RolloutDataset
 from drone_rl.explanations.hooks import feature_layer, features
@@ -25,6 +24,7 @@ from drone_rl.explanations.scenes import Scenes, empty_scene
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.explanations.threads import Once
 from drone_rl.policies import PictureNetwork, make_actor
+from drone_rl.robustness.measured import Measured
 from drone_rl.utils.seeding import RootSeed, Stream, torch_generator, with_seed
 from drone_rl.verdicts.proof import Claim
 
@@ -57,7 +57,7 @@ class Context:
             settings: What to compute.
             claim: A certificate of it in the task of these worlds, if there is one.
             measured: Its flights under other conditions, if there are any.
-            unlike: See `drone_rl.verdicts.judge.judge_policy`.
+            unlike: See `drone_rl.evaluation.judge.judge_policy`.
             seed: Root of all random streams; that of the settings by default.
 
         Raises:

@@ -3,7 +3,7 @@
 import dataclasses
 from typing import Annotated
 
-from drone_rl.sim.settings import RendererName
+from drone_rl.config import RendererName
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Real, Whole
 from drone_rl.utils.settings import Settings

@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 from torchrl.envs import TransformedEnv
 
-from drone_rl.conditions.measured import Measured
 from drone_rl.explanations.context import Context, LeftOutError
 from drone_rl.explanations.sections import Section, find_sections
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.explanations.threads import is_aside
 from drone_rl.policies import PictureNetwork
+from drone_rl.robustness.measured import Measured
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import RootSeed, with_seed
 from drone_rl.verdicts.proof import Claim
@@ -58,7 +58,7 @@ def explain_policy(
             of `explanations/sections` by default.
         claim: A certificate of the policy in the task of these worlds, if there is one.
         measured: Its flights under other conditions in that task, if there are any.
-        unlike: See `drone_rl.verdicts.judge.judge_policy`.
+        unlike: See `drone_rl.evaluation.judge.judge_policy`.
         seed: Root of all random streams, those of `env` included; that of the settings by default.
 
     Returns:

@@ -3,7 +3,7 @@
 from drone_rl.policies.actor import make_actor
 from drone_rl.policies.cnn import OriginalCNN, PolicyNetwork, SmallCNN
 from drone_rl.policies.critic import ActorCritic
-from drone_rl.policies.foreign import ForeignNetwork
+from drone_rl.policies.external_network import ForeignNetwork
 from drone_rl.policies.mlp import MLP
 from drone_rl.policies.network import PictureNetwork
 

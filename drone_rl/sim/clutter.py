@@ -6,8 +6,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from drone_rl.sim.settings import AppearanceSettings
-from drone_rl.sim.settings.task import BaseTaskSettings, Things
+from drone_rl.config import AppearanceSettings
+from drone_rl.config.task import BaseTaskSettings, Things
 
 HIDDEN_DEPTH = 100.0
 """Metres under the ground at which those are kept that are not there."""

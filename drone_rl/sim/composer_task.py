@@ -12,6 +12,13 @@ from dm_control import composer, mjcf
 from dm_control.composer.observation import observable
 from dm_env import specs
 
+from drone_rl.config import (
+    ActionSettings,
+    AppearanceSettings,
+    BaseTaskSettings,
+    CameraSettings,
+    DynamicsSettings,
+)
 from drone_rl.sim.appearances import Appearances
 from drone_rl.sim.clutter import things_of
 from drone_rl.sim.dynamics import BodyState, Dynamics, Quadrotor, draw_seeds, make_dynamics
@@ -19,18 +26,11 @@ from drone_rl.sim.dynamics.body import heading_only
 from drone_rl.sim.entities.arena import DRAW_DISTANCE, SKY_COLOR, Field
 from drone_rl.sim.entities.distractor import make_distractors
 from drone_rl.sim.entities.drone import Drone, hide_drone
-from drone_rl.sim.meaning import Meaning
 from drone_rl.sim.mujoco_flight import MujocoFlight
 from drone_rl.sim.rendering import Appearance, opengl_looks
 from drone_rl.sim.rendering.opengl_looks import OpenGlLooks
 from drone_rl.sim.rendering.scene import Scene
-from drone_rl.sim.settings import (
-    ActionSettings,
-    AppearanceSettings,
-    BaseTaskSettings,
-    CameraSettings,
-    DynamicsSettings,
-)
+from drone_rl.sim.rendering.semantics import Meaning
 from drone_rl.sim.tasks import State, Task, as_task
 
 _SKY = 0.69 * DRAW_DISTANCE

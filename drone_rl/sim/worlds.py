@@ -8,6 +8,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from drone_rl.config import ActionSettings, BaseTaskSettings, CameraSettings, DynamicsSettings
 from drone_rl.sim.actions import Entry
 from drone_rl.sim.clutter import HIDDEN_DEPTH
 from drone_rl.sim.composer_task import ComposerTask
@@ -24,12 +25,6 @@ from drone_rl.sim.rendering import (
     find_renderer,
 )
 from drone_rl.sim.rendering.view import Modality
-from drone_rl.sim.settings import (
-    ActionSettings,
-    BaseTaskSettings,
-    CameraSettings,
-    DynamicsSettings,
-)
 from drone_rl.sim.tasks import State, Task, as_task
 from drone_rl.utils.errors import InputError
 

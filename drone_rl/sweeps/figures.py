@@ -11,11 +11,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
+from drone_rl.evaluation.kinds import KINDS
+from drone_rl.sim.action_display import MOVES
 from drone_rl.sweeps.groups import FAILED, Group
 from drone_rl.sweeps.rows import Row
 from drone_rl.sweeps.statistics import median_band, on_grid
-from drone_rl.verdicts.kinds import KINDS
-from drone_rl.words.actions import MOVES
 
 FAVOURITE_AXIS = "optimiser.lr"
 COLORS = {

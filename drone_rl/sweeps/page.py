@@ -92,7 +92,9 @@ def render_page(name: str, summary: dict[str, Any], pictures: list[dict[str, str
         summary: From `summarise_sweep`.
         pictures: Each with "title", "text", and data URIs for a "light" and for a "dark" page.
     """
-    environment = page_environment("drone_rl.sweeps", "drone_rl.report")  # which share a style
+    environment = page_environment(
+        "drone_rl.sweeps", "drone_rl.explanations.report"
+    )  # which share a style
     environment.filters |= {"figure": _figure, "code": _code}
     style = static_text(environment, STYLES)
     parts = ("runs", "verdicts", "best", "settings")

@@ -9,6 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from drone_rl.evaluation.consistency import check_verdict
+from drone_rl.evaluation.kinds import Kind
+from drone_rl.evaluation.rule import SIDES, Rule
 from drone_rl.sweeps.manifest import Sweep
 from drone_rl.sweeps.runs import Run, read_failure, read_result
 from drone_rl.sweeps.statistics import Array
@@ -18,9 +21,6 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.former_names import FORMER_NAMES
 from drone_rl.utils.limits import SWEEP_RESULTS_BYTES, Allowance
 from drone_rl.utils.schema import Real, Whole
-from drone_rl.verdicts.consistency import check_verdict
-from drone_rl.verdicts.kinds import Kind
-from drone_rl.verdicts.rule import SIDES, Rule
 
 _MOST = 1e15
 """No figure of a run is as large."""

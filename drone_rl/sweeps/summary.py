@@ -9,12 +9,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from drone_rl.sweeps import text as words
 from drone_rl.sweeps.groups import Group, make_groups
 from drone_rl.sweeps.manifest import Sweep
 from drone_rl.sweeps.rows import Row
 from drone_rl.sweeps.runs import quoted
-from drone_rl.words import sweep as words
-from drone_rl.words.licence import said
+from drone_rl.utils.sentences import said
 
 STATES = ("finished", "failed", "damaged", "unfinished")
 

@@ -7,7 +7,6 @@ from drone_rl.training.callbacks import (
     LoggerCallback,
     ProgressCallback,
 )
-from drone_rl.training.checkpoint import load_checkpoint, save_checkpoint
 from drone_rl.training.learners import (
     ActorCriticLearner,
     Learner,
@@ -16,7 +15,8 @@ from drone_rl.training.learners import (
 )
 from drone_rl.training.progress import Progress
 from drone_rl.training.trainer import Collector, Trainer
-from drone_rl.training.weights import check_weights
+from drone_rl.utils.checkpoint import load_checkpoint, save_checkpoint
+from drone_rl.utils.weights import check_weights
 
 __all__ = [
     "ActorCriticLearner",

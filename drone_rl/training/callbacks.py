@@ -13,8 +13,8 @@ from typing import Any
 from torchrl.record.loggers import Logger
 from tqdm import tqdm
 
-from drone_rl.training.checkpoint import save_checkpoint
 from drone_rl.training.progress import OngoingTraining
+from drone_rl.utils.checkpoint import save_checkpoint
 from drone_rl.utils.csv_table import read_table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import remove_leftovers, write_atomically

@@ -1,295 +1,299 @@
-"""From flown episodes to a verdict."""
+"""Verdicts, as objects that show themselves."""
 
 import dataclasses
-from collections.abc import Mapping, Sequence
-from typing import Any
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, cast, overload
 
-import numpy as np
-import torch
-from numpy.typing import NDArray
 from tensordict.nn import TensorDictModuleBase
-from torch import Tensor
 from torchrl.envs import EnvBase
 
-from drone_rl.envs import worlds_of
-from drone_rl.evaluation import Episodes, StepLog, run_episodes, summarise
-from drone_rl.evaluation.branches import Outcomes
-from drone_rl.evaluation.fragility import Rounding, examine
-from drone_rl.utils.intervals import mean_bounds, proportion
-from drone_rl.utils.seeding import RootSeed
-from drone_rl.verdicts.failures import failure_table
-from drone_rl.verdicts.kinds import NOT_CERTAIN, Kind
-from drone_rl.verdicts.luck import fly_baselines
-from drone_rl.verdicts.proof import Claim
-from drone_rl.verdicts.rule import Quantity, Rule, decide, kinds_within
-from drone_rl.words.certificate import is_proved
-from drone_rl.words.licence import say
-from drone_rl.words.verdict import SENTENCES
-
-MANY = (2, 3, 5, 10, 20, 50, 100)
-"""How many times as many episodes are tried out, in thought, where they are not enough."""
+from drone_rl.config import DynamicsSettings, TaskSettings
+from drone_rl.config.changes import Changes
+from drone_rl.config.judging import FlightSettings, JudgeSettings
+from drone_rl.envs import DroneEnv
+from drone_rl.evaluation.baselines import BASELINES, make_baseline
+from drone_rl.evaluation.evaluate import held_out
+from drone_rl.evaluation.judge import Verdict, judge_policy
+from drone_rl.evaluation.kinds import NOT_COVERED, NOT_PROVED
+from drone_rl.evaluation.rule import Rule
+from drone_rl.evaluation.verdict_text import quantity_label
+from drone_rl.policies.base_policy import Pilot
+from drone_rl.policies.external_network import Logits
+from drone_rl.policies.external_policy import as_pilot
+from drone_rl.robustness.measured import Measured
+from drone_rl.utils.display import paragraph, table
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.progress import Bar, Progress
+from drone_rl.utils.provenance import provenance
+from drone_rl.utils.seed_text import seed_line
+from drone_rl.utils.seeding import RootSeed, Stream, root_seed, torch_generator, with_seed
+from drone_rl.verdicts.domain_check import refly
+from drone_rl.verdicts.domains import Coverage, beside, find_domain, require, sentence
+from drone_rl.verdicts.judgements import Judgements
+from drone_rl.verdicts.quoting import find_claim
 
 
 @dataclasses.dataclass(frozen=True)
-class Verdict:
-    """The kind, whether the episodes are enough to be certain of it, and all that it rests on."""
+class Judgement:
+    """A verdict, of whom, and by what."""
 
-    kind: Kind
-    certain: bool
-    evidence: dict[str, Any]
-    """Plain values; what `as_dict` returns but for the sentence."""
-
-    @property
-    def exit_code(self) -> int:
-        """The kind's if it is certain, else 13."""
-        return self.evidence["exit_code"]
-
-    @property
-    def is_proved(self) -> bool:
-        """Whether a certificate says so of every placement, and rollouts re-checked it."""
-        return is_proved(self.evidence)
-
-    @property
-    def sentence(self) -> str:
-        """For a person."""
-        return say(SENTENCES, self.evidence)
+    name: str
+    settings: JudgeSettings
+    verdict: Verdict
+    certificate: Path | None = None
+    """That lies with the policy or was given, whether it is quoted or not."""
+    measured: Measured | None = None
+    """Its flights under other conditions, if there are any."""
+    coverage: Coverage | None = None
+    """What was required beside its operating domain, if something was."""
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values, as in `verdict.json`."""
-        return {**self.evidence, "sentence": self.sentence}
+        path = None if self.certificate is None else str(self.certificate)
+        return {
+            "policy": self.name,
+            "certificate": path,
+            "shifts": None if self.measured is None else str(self.measured.path),
+            "domain": self.domain or None,
+            "required_domain": None if self.coverage is None else self.coverage.as_dict(),
+            **self.verdict.as_dict(),
+            **provenance(),
+        }
+
+    @property
+    def domain(self) -> str:
+        """Under which conditions it is good, for a person; nothing if that was not measured."""
+        return "" if self.measured is None else sentence(_told(self.measured, self.verdict))
+
+    def status(self, require: str | None = None) -> int:
+        """The exit status of `drone-rl verdict`: the verdict's own, or that of what is required.
+
+        Args:
+            require: "proved" for a re-checked proof of every placement, "good" or None for the
+                verdict's own; a domain that was required has to be covered, too.
+        """
+        if require == "proved" and not self.verdict.is_proved:
+            return NOT_PROVED
+        if self.coverage is not None and not self.coverage.is_covered:
+            return NOT_COVERED
+        is_proof_enough = require == "proved" and self.coverage is None
+        return 0 if is_proof_enough else self.verdict.exit_code
+
+    def save(self, path: Path) -> None:
+        """Writes `verdict.json`."""
+        path.write_text(json.dumps(self.as_dict(), indent=2))
+
+    def __str__(self) -> str:
+        """One line, and others of an operating domain, of what it does not cover, and the seed."""
+        certainty = "" if self.verdict.certain else " (not certain)"
+        line = f"{self.verdict.kind.value}{certainty}: {self.verdict.sentence}"
+        required = "" if self.coverage is None else str(self.coverage)
+        seed = seed_line(self.verdict.evidence)
+        return "\n".join(filter(None, (line, self.domain, required, seed)))
+
+    def _repr_html_(self) -> str:
+        evidence = self.verdict.evidence
+        numbers = [
+            [quantity_label(name, evidence), *(_number(q[key]) for key in _ENDS)]
+            for name, q in evidence["quantities"].items()
+        ]
+        success = evidence["greedy"]["success"]
+        rate = [_number(success[key]) for key in ("share", "lower95", "upper95")]
+        head = ["quantity", "value", "lower", "upper"]
+        lines = "".join(paragraph(line) for line in str(self).splitlines())
+        return lines + table(head, [["success rate (95% interval)", *rate], *numbers])
 
 
-def judge_policy(
-    env: EnvBase,
-    actor: TensorDictModuleBase,
-    episodes: int,
-    *,
-    rule: Rule | None = None,
-    sampled: bool = True,
-    claim: Claim | None = None,
-    unlike: Mapping[str, Any] | None = None,
-    seed: RootSeed | None = None,
-) -> Verdict:
-    """Flies a policy, greedily and sampled, and the baselines, all in the same worlds, and judges.
+_ENDS = ("value", "lower", "upper")
 
-    Args:
-        env: A batch of worlds.
-        actor: The policy.
-        episodes: How many of each.
-        rule: Thresholds.
-        sampled: Whether to fly the policy with drawn actions, too; one that has no probabilities
-            to draw from need not.
-        claim: A certificate of the policy in the task of the worlds, if there is one.
-        unlike: By what the drones' dynamics differ from those that the policy was made for: setting
-            to "own" and "flown", plain values.
-        seed: Root of the environments' random streams; without it the verdict says that a policy
-            could have been fitted to these environments.
-    """
-    base: Any = getattr(env, "base_env", env)
-    state, worlds = base.state_dict(), worlds_of(env)
-    log, drawn = StepLog(), None
-    greedy = run_episodes(env, actor, episodes, is_compiled=True, log=log)
-    if sampled:
-        base.load_state_dict(state)
-        drawn = run_episodes(env, actor, episodes, greedy=False)
-    base.load_state_dict(state)
-    rounding = examine(env, actor, episodes, flown=greedy, log=log)
-    baselines = fly_baselines(
-        env.batch_size[0], worlds.task, state, episodes, str(worlds.device), worlds.dynamics
-    )
-    return judge(
-        greedy,
-        baselines,
-        rule=rule,
-        sampled=drawn,
-        claim=claim,
-        unlike=unlike,
-        seed=seed,
-        rounding=rounding,
-    )
+
+def _number(value: float | None) -> str:
+    return "" if value is None else f"{value:.3f}"
+
+
+@overload
+def judge(
+    policy: str | Path | Pilot | Logits, settings: JudgeSettings | None = None, **how: Any
+) -> Judgement: ...
+
+
+@overload
+def judge(
+    policy: Sequence[str | Path | Pilot | Logits],
+    settings: JudgeSettings | None = None,
+    **how: Any,
+) -> Judgements[Judgement]: ...
 
 
 def judge(
-    greedy: Episodes,
-    baselines: Mapping[str, Episodes],
-    *,
-    rule: Rule | None = None,
-    sampled: Episodes | None = None,
-    claim: Claim | None = None,
-    unlike: Mapping[str, Any] | None = None,
-    seed: RootSeed | None = None,
-    rounding: Rounding | None = None,
-) -> Verdict:
-    """Applies the rule.
+    policy: str | Path | Pilot | Logits | Sequence[str | Path | Pilot | Logits],
+    settings: JudgeSettings | None = None,
+    **how: Any,
+) -> Judgement | Judgements[Judgement]:
+    """Judge one policy, or several one after the other; see `judge_one` for the arguments.
 
     Args:
-        greedy: The policy's episodes, each with the most probable actions.
-        baselines: Those of the task's luck and of the oracle, the k-th in the same world as the
-            policy's.
-        rule: Thresholds.
-        sampled: The policy's episodes with drawn actions, in the same worlds.
-        claim: A certificate of the policy in the same task, if there is one.
-        unlike: See `judge_policy`.
-        seed: See `judge_policy`.
-        rounding: What rounding can change in `greedy`; None if that was not examined.
-
-    Raises:
-        ValueError: They were flown in different worlds.
-    """
-    task = greedy.task
-    rule = dataclasses.replace(rule or Rule(), strata=task.strata, luck=task.luck)
-    _check_pairs(greedy, [*baselines.values(), *([] if sampled is None else [sampled])])
-    found = measure(greedy, baselines, rule)
-    kind = decide([quantity.level for quantity in found], len(rule.strata))
-    certain = is_enough = _is_certain(found, rule)
-    if rounding is not None:
-        found = widen(found, greedy, baselines, rule, rounding.outcomes)
-        certain = is_enough and not rounding.is_excessive and _is_certain(found, rule)
-    depends = is_enough and not certain
-    evidence = {
-        "kind": kind.value,
-        "certain": certain,
-        "exit_code": kind.exit_code if certain else NOT_CERTAIN,
-        **({"seed": None, "seed_is_fixed": True} if seed is None else seed.as_dict()),
-        "rule": rule.text,
-        "error_rate": rule.error_rate,
-        "good_share": rule.good_share,
-        "terms": task.terms.as_dict(),
-        "num_cubes": greedy.goals.reached.shape[-1],
-        "rounding": None if rounding is None else {**rounding.as_dict(), "decides": depends},
-        "proof": None if claim is None else claim.beside(greedy, rounding=rounding),
-        "greedy": summarise(greedy),
-        "sampled": None if sampled is None else summarise(sampled),
-        "baselines": {name: summarise(flown) for name, flown in baselines.items()},
-        "skill": {name: _gain(greedy.share, flown.share) for name, flown in baselines.items()},
-        "drawing": None if sampled is None else _gain(sampled.success, greedy.success),
-        "failures": failure_table(greedy),
-        "quantities": {name: q._asdict() for name, q in zip(rule.quantities, found, strict=True)},
-        "enough": len(greedy) if is_enough else _enough(greedy, baselines, rule),
-        **({"unlike": dict(unlike)} if unlike else {}),
-    }
-    return Verdict(kind, certain, evidence)
-
-
-def measure(
-    greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule, times: int = 1
-) -> tuple[Quantity, ...]:
-    """The rule's quantities with intervals that hold all at once.
-
-    Args:
-        greedy: The policy's episodes.
-        baselines: Those of the baselines in the same worlds.
-        rule: Thresholds.
-        times: Counts every episode so often, to see what more of the same would tell.
-    """
-    observed = observe(greedy, baselines, rule)
-    return tuple(estimate(i, np.tile(values, times), rule) for i, values in enumerate(observed))
-
-
-def widen(
-    found: Sequence[Quantity],
-    greedy: Episodes,
-    baselines: Mapping[str, Episodes],
-    rule: Rule,
-    outcomes: Outcomes,
-) -> tuple[Quantity, ...]:
-    """Widen the intervals of quantities by all ends that rounding leaves possible.
-
-    The lower ends hold even if every episode takes the worst of its possible ends for a quantity,
-    the upper ends even if each takes the best one.
-
-    Args:
-        found: As `measure` returns them.
-        greedy: The policy's episodes.
-        baselines: Those of the baselines in the same worlds.
-        rule: Thresholds.
-        outcomes: Possible ends of some episodes.
-    """
-    observed = _observe_each(greedy, baselines, rule)
-    if outcomes.episodes is None:
-        others = [values[:0] for values in observed]
-    else:
-        beside = {name: flown[outcomes.owner] for name, flown in baselines.items()}
-        others = _observe_each(outcomes.episodes, beside, rule)
-    widened = []
-    for i, (quantity, values, ends) in enumerate(zip(found, observed, others, strict=True)):
-        low, high = rule.ranges[i]
-        lower, upper = values.copy(), values.copy()
-        owner = outcomes.owner.numpy()[~np.isnan(ends)]
-        np.fmin.at(lower, owner, ends[~np.isnan(ends)])
-        np.fmax.at(upper, owner, ends[~np.isnan(ends)])
-        is_open = outcomes.is_open.numpy()
-        lower[is_open], upper[is_open] = low, high
-        least, most = (estimate(i, v[~np.isnan(v)], rule) for v in (lower, upper))
-        bounds = {"lower": min(quantity.lower, least.lower)}
-        widened.append(quantity._replace(**bounds, upper=max(quantity.upper, most.upper)))
-    return tuple(widened)
-
-
-def observe(greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule) -> list[NDArray]:
-    """What each episode says of each of the rule's quantities: one value, or none.
+        policy: As `judge_one` takes it; of a list or tuple each is judged.
+        settings: How.
+        how: The other arguments of `judge_one`.
 
     Returns:
-        One array a quantity; those of "collected" have a value for each episode that offered such a
-        cube, the others one for each episode. Shape: (at most n,), float64.
+        The judgement, or one for each policy of the list.
+
+    Raises:
+        InputError: See `judge_one`, or the list is empty.
     """
-    each = _observe_each(greedy, baselines, rule)
-    return [values[~np.isnan(values)] for values in each]
+    if not isinstance(policy, list | tuple):
+        return judge_one(cast("Any", policy), settings, **how)
+    if not policy:
+        raise InputError("policy=[] names nobody; give one or more policies")
+    for one in policy:  # a wrong one is refused before any episode
+        if one not in BASELINES:
+            as_pilot(one, how.get("outputs", "outputs"))
+    given = how.pop("seed", (settings or JudgeSettings()).seed)
+    seed = how.pop("drawn_seed", None) or root_seed(given)  # all in the same environments
+    done = (judge_one(one, settings, drawn_seed=seed, **how) for one in policy)
+    return Judgements(tuple(done))
 
 
-def _observe_each(greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule) -> list[NDArray]:
-    """The same of every episode, NaN where it says nothing. Shapes: (n,), float64."""
-    oracle = baselines["oracle"]
-    observed = [greedy.success - rule.good_share * oracle.success]
-    offered = [greedy.offered(stratum) for stratum in range(len(rule.strata))]
-    observed += [there.double() for there in offered]
-    for stratum, there in enumerate(offered):
-        share = torch.full_like(there, torch.nan, dtype=torch.float64)
-        share[there] = greedy.stratum_share(stratum)
-        observed.append(share)
-    for name in rule.luck:
-        luck = (1 - rule.luck_margin) * baselines[name].share
-        observed.append(greedy.share - luck - rule.luck_margin * oracle.share)
-    for name in rule.luck:
-        observed.append(rule.good_share * oracle.success - baselines[name].success)
-    return [values.numpy() for values in observed]
-
-
-def estimate(quantity: int, values: NDArray, rule: Rule) -> Quantity:
-    """One of the rule's quantities from what episodes say of it.
+def judge_one(
+    policy: str | Path | Pilot | Logits,
+    settings: JudgeSettings | None = None,
+    *,
+    task: Mapping[str, Any] | None = None,
+    dynamics: Mapping[str, Any] | None = None,
+    certificate: str | Path | None = None,
+    shifts: str | Path | None = None,
+    require_domain: str | Path | None = None,
+    outputs: str | Path = "outputs",
+    progress: Progress | None = None,
+    drawn_seed: RootSeed | None = None,
+    **changes: Any,
+) -> Judgement:
+    """Good, poor, one-sided or none of these, and whether that is certain.
 
     Args:
-        quantity: Its place among them.
-        values: As `observe` returns them.
-        rule: Thresholds.
+        policy: The policy, what `load_policy` takes, a callable, see `policy_from`, a model of
+            Stable-Baselines3, or a baseline: "random", "forward", "left", "right" or "oracle".
+        settings: How it is judged.
+        task: What to change of the policy's task or, for a baseline, of the default one.
+        dynamics: What to change of how its drone moves, likewise.
+        certificate: A proof's file to quote; by default the one that lies with the policy, see
+            `drone_rl.policies.zoo.certificate_path`, if it is of this task.
+        shifts: A file of its flights under other conditions to quote; by default what lies with the
+            policy or the newest under `outputs`, see `drone_rl.verdicts.domains.find_domain`.
+        require_domain: A file that says under which conditions it has to be good, see
+            `drone_rl.robustness.needs.read_needs`.
+        outputs: Folder under which runs are kept.
+        progress: Told of what is being done; a bar by default.
+        drawn_seed: The seed of a larger analysis of which this is a part; that of the settings by
+            default.
+        changes: Settings to change, as in `judge("good", episodes=1000)`.
+
+    Raises:
+        InputError: The policy, a setting or a file that is given is unusable, or a domain is
+            required of whom none was measured.
     """
-    name, thresholds = rule.quantities[quantity], rule.thresholds[quantity]
-    if name.startswith("offered"):
-        share = proportion(int(values.sum()), len(values), rule.confidence)
-        return Quantity(share["share"], share["lower95"], share["upper95"], thresholds)
-    mean = mean_bounds(values, *rule.ranges[quantity], rule.confidence)
-    return Quantity(mean["mean"], mean["lower95"], mean["upper95"], thresholds)
+    settings, seed = with_seed((settings or JudgeSettings()).replace(**changes), drawn_seed)
+    progress = progress or Bar()
+    progress("policy, luck and oracle", 0, 1)
+    pilot = None if policy in BASELINES else as_pilot(policy, outputs)
+    name = str(policy) if pilot is None or isinstance(policy, str | Path) else pilot.name
+    claim = measured = coverage = None
+    if pilot is None:
+        _refuse_files(name, certificate=certificate, shifts=shifts, require_domain=require_domain)
+    if pilot is None:
+        changed = Changes(TaskSettings).read(task or {}, "task")
+        moved = DynamicsSettings(**Changes(DynamicsSettings).read(dynamics or {}, "dynamics"))
+        moved.check_air()
+        worlds = _baseline(name, TaskSettings(**changed), moved, settings, seed)
+    else:
+        pilot = pilot.in_task(**(task or {}))
+        pilot = pilot.in_dynamics(**dynamics) if dynamics else pilot
+        measured = find_domain(pilot, shifts, outputs)
+        coverage = require(pilot, require_domain, measured) if require_domain is not None else None
+        coverage = _reflown(pilot, coverage, measured, settings, seed)
+        claim = find_claim(
+            pilot,
+            certificate,
+            flights=settings.certificate_flights,
+            seed=seed,
+            device=settings.device,
+            renderer=settings.renderer,
+        )
+        worlds = held_out(pilot, settings, seed)
+    draws, rule = settings.sampled and pilot is not None, Rule(good_share=settings.good_share)
+    with worlds as (env, actor):
+        verdict = judge_policy(
+            env,
+            actor,
+            settings.episodes,
+            rule=rule,
+            sampled=draws,
+            claim=claim,
+            unlike=None if pilot is None else pilot.unlike,
+            seed=seed,
+        )
+    progress("judged", 1, 1)
+    done = Judgement(name, settings, verdict, claim and claim.path, measured)
+    if coverage is None or measured is None:
+        return done
+    return dataclasses.replace(done, coverage=beside(coverage, _told(measured, verdict)))
 
 
-def _is_certain(found: tuple[Quantity, ...], rule: Rule) -> bool:
-    box = tuple(quantity.levels for quantity in found)
-    return len(kinds_within(box, len(rule.strata))) == 1
+def _reflown(
+    pilot: Pilot,
+    coverage: Coverage | None,
+    measured: Measured | None,
+    settings: JudgeSettings,
+    seed: RootSeed,
+) -> Coverage | None:
+    """The same with new episodes, if there is a claim for them to check."""
+    numbers = None if measured is None else measured.numbers
+    if coverage is None or numbers is None or not coverage.is_stated or not settings.domain_flights:
+        return coverage
+    reflown = refly(pilot, coverage.needs, numbers, settings, seed)
+    return dataclasses.replace(coverage, reflown=reflown)
 
 
-def _enough(greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule) -> int | None:
-    """Roughly how many episodes would do if they went on like this; None for very many."""
-    for times in MANY:
-        if _is_certain(measure(greedy, baselines, rule, times), rule):
-            return times * len(greedy)
-    return None
+def _told(measured: Measured, verdict: Verdict) -> dict[str, Any]:
+    """Evidence of what may be quoted."""
+    return {"shifts": measured.evidence, "verdict": verdict.evidence}
 
 
-def _gain(ours: Tensor, theirs: Tensor) -> dict[str, Any]:
-    """The mean paired difference of two shares, with its interval."""
-    return mean_bounds(ours - theirs, -1.0, 1.0)
+def _refuse_files(name: str, **given: str | Path | None) -> None:
+    """A baseline has no network that a file could be of."""
+    for setting, path in given.items():
+        if path is not None:
+            raise InputError(
+                f"{setting}={path}, but policy={name} has no network; give {setting}= with the "
+                "policy that it is of"
+            )
 
 
-def _check_pairs(greedy: Episodes, others: list[Episodes]) -> None:
-    for other in others:
-        if not torch.equal(other.goals.world, greedy.goals.world):
-            raise ValueError("policy and baselines were flown in different worlds; pair them")
+@contextmanager
+def _baseline(
+    name: str,
+    task: TaskSettings,
+    dynamics: DynamicsSettings,
+    settings: FlightSettings,
+    seed: RootSeed,
+) -> Iterator[tuple[EnvBase, TensorDictModuleBase]]:
+    """The same worlds and one that sees no picture."""
+    env = DroneEnv(
+        settings.num_worlds,
+        task,
+        seed=seed.value,
+        stream=Stream.REPORT,
+        pixels=False,
+        device=settings.device,
+        dynamics=dynamics,
+    )
+    generator = torch_generator(seed.value, Stream.ACTIONS, device=env.device)
+    try:
+        yield env, make_baseline(name, task, generator, env.worlds.dynamics.actions)
+    finally:
+        env.close()

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drone_rl.checks import Certificate, find
-from drone_rl.evaluation import Episodes
 from drone_rl.evaluation.fragility import Rounding
+from drone_rl.evaluation.metrics import Episodes
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.verification.checker import Certificate, find
 
 
 @dataclasses.dataclass(frozen=True)
@@ -20,7 +20,7 @@ class Claim:
     path: Path
     """Its file."""
     certificate: Certificate | None
-    """Of the policy in its task, see `drone_rl.checks.read_tried`; None if it was refused."""
+    """See `drone_rl.verification.checker.read_tried`; None if it was refused."""
     refused: str | None = None
     """Why, in one line."""
     flights: int = 0

@@ -15,7 +15,7 @@ def in_process(monkeypatch, capsys, tmp_path):
     # Hydra's logging set-up would close the streams that pytest captures
     monkeypatch.setattr("hydra.core.utils.configure_log", lambda *args: None)
     monkeypatch.setattr("hydra._internal.hydra.configure_log", lambda *args: None)
-    monkeypatch.setattr("drone_rl.hydra_app.launchers.configure_log", lambda *args: None)
+    monkeypatch.setattr("drone_rl.cli.hydra.launchers.configure_log", lambda *args: None)
 
     def call(*args, cwd=tmp_path):
         monkeypatch.chdir(cwd)

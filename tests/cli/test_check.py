@@ -4,8 +4,8 @@ import json
 
 import pytest
 
-from tests.checks.making import of_one_cube
 from tests.cli.running import error_line
+from tests.verification.checker.making import of_one_cube
 
 
 @pytest.fixture(scope="module")

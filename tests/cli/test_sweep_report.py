@@ -5,7 +5,8 @@ import shutil
 
 import pytest
 
-from drone_rl.sweeps import Run, Sweep
+from drone_rl.sweeps.manifest import Sweep
+from drone_rl.sweeps.runs import Run
 from tests.cli.running import error_line
 
 

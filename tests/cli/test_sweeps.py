@@ -10,7 +10,7 @@ import time
 import pytest
 import torch
 
-from drone_rl.training import load_checkpoint
+from drone_rl.utils.checkpoint import load_checkpoint
 
 pytestmark = pytest.mark.slow
 

@@ -14,7 +14,8 @@ import time
 import pytest
 import torch
 
-from drone_rl.training import CsvCallback, load_checkpoint
+from drone_rl.training import CsvCallback
+from drone_rl.utils.checkpoint import load_checkpoint
 from drone_rl.utils.overrides import read_overrides
 from tests.cli.running import TINY, drone_rl, error_line
 
@@ -204,7 +205,7 @@ def test_the_command_that_is_printed_goes_on_with_a_stopped_run(
     own = [*(o for o in TINY if o != "logger=csv"), *logs, "paths.outputs=my runs"]
     try:
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr("drone_rl.api.training.CsvCallback", Stop)
+            patch.setattr("drone_rl.training.train.CsvCallback", Stop)
             stopped = in_process("train", *own)
     finally:
         signal.signal(signal.SIGINT, before)

@@ -5,9 +5,9 @@ import json
 import pytest
 
 import drone_rl
-from tests.checks.making import of_every_place
 from tests.cli.running import error_line
-from tests.conditions.making import shifts_of
+from tests.robustness.making import shifts_of
+from tests.verification.checker.making import of_every_place
 
 
 @pytest.mark.parametrize(

@@ -5,10 +5,10 @@ import logging
 import pytest
 import torch
 
-from drone_rl.api.collecting import build_collector
-from drone_rl.settings.collecting import Ray, Threads
-from drone_rl.settings.training import TrainSettings
-from drone_rl.sim.settings import TaskSettings
+from drone_rl.config import TaskSettings
+from drone_rl.config.collecting import Ray, Threads
+from drone_rl.config.training import TrainSettings
+from drone_rl.training.build_collector import build_collector
 from drone_rl.training.metrics import episode_rewards
 from drone_rl.utils.errors import InputError
 

@@ -11,9 +11,9 @@ from torchrl.collectors import BaseCollector
 from torchrl.envs import CatFrames, RewardSum, StepCounter
 
 from drone_rl.collectors import RolloutCollector, ThreadedCollector
+from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv, GrayPixels, with_transforms
 from drone_rl.policies import MLP, make_actor
-from drone_rl.sim.settings import TaskSettings
 from drone_rl.training.restore import check_fits
 from drone_rl.utils.errors import InputError
 from tests.collectors.test_episodes import Scripted

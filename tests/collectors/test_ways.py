@@ -6,6 +6,7 @@ from torchrl.envs import CatFrames, RewardSum
 
 from drone_rl.collectors import EpisodeCollector
 from drone_rl.collectors.ways import StraightWay, TorchrlWay, find_way
+from drone_rl.config import AppearanceSettings, PillarsSettings, TaskSettings
 from drone_rl.envs import (
     Blur,
     CropRows,
@@ -17,7 +18,6 @@ from drone_rl.envs import (
     with_transforms,
 )
 from drone_rl.policies import SmallCNN, make_actor
-from drone_rl.sim.settings import AppearanceSettings, PillarsSettings, TaskSettings
 from tests.continuous import make_policy, make_worlds
 
 SHORT = TaskSettings(num_cubes=2, first_distance=3.0, spacing=3.0, step_limit=12, front_margin=3.0)

@@ -7,9 +7,9 @@ import shlex
 from hydra import compose, initialize_config_dir
 from hydra.core.global_hydra import GlobalHydra
 
+from drone_rl.cli.hydra.composition import conf_dir, read_settings
+from drone_rl.cli.hydra.schemas import register_schemas
 from drone_rl.cli.usage import COMMANDS
-from drone_rl.hydra_app.composition import conf_dir, read_settings
-from drone_rl.hydra_app.schemas import register_schemas
 
 COMMAND = re.compile(r"^(?:[A-Z]+=\S+ )?drone-rl ([a-z-]+)(.*)$", re.MULTILINE)
 _SWEPT = re.compile(r"=(?:range\((\d+)\)|([^\[\]{},]+),.*)$")

@@ -11,11 +11,11 @@ import pytest
 import torch
 
 from drone_rl.explanations import sections, study
+from drone_rl.explanations.report import page as report_page
+from drone_rl.explanations.report import sections as parts
 from drone_rl.explanations.sections import find_sections
-from drone_rl.report import page as report_page
-from drone_rl.report import sections as parts
+from drone_rl.policies.zoo.registry import NETWORKS
 from drone_rl.utils.settings import kinds_of, types_of
-from drone_rl.zoo.registry import NETWORKS
 from tests.docs.commands import check_commands
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -23,7 +23,7 @@ PAGES = [DOCS / "flight.md", DOCS / "pilot.md", *sorted((DOCS / "tutorials").glo
 BLOCK = re.compile(r'^```(\w+)(?: title="([^"]+)")?\n(.*?)^```$', re.DOTALL | re.MULTILINE)
 SHORT = (
     "trainer=drone_rl.TrainerSettings(total_frames=1500, checkpoint_interval_s=0.0), "
-    "collector=drone_rl.settings.collecting.Threads(num_envs=8)"
+    "collector=drone_rl.config.collecting.Threads(num_envs=8)"
 )
 SMALLER = {
     "notebook": {
@@ -75,7 +75,7 @@ def workplace(tmp_path, monkeypatch):
     monkeypatch.setattr(study, "find_sections", lambda: few)  # all of them take a minute
     known, networks, threads = set(sys.modules), dict(NETWORKS), torch.get_num_threads()
     templates = jinja2.FileSystemLoader(inside / "report" / "templates")
-    theirs = jinja2.PackageLoader("drone_rl.report")
+    theirs = jinja2.PackageLoader("drone_rl.explanations.report")
     loader = jinja2.ChoiceLoader([theirs, templates])
     monkeypatch.setattr(jinja2, "PackageLoader", lambda _: loader)
     report_page._environment.cache_clear()  # another tutorial may have made it, with another loader

@@ -11,6 +11,7 @@ from torchrl.envs.utils import check_env_specs
 from drone_rl.collectors import EpisodeCollector, RolloutCollector
 from drone_rl.collectors.streams import TorchrlStream
 from drone_rl.collectors.ways import TorchrlWay
+from drone_rl.config import CameraSettings, TaskSettings
 from drone_rl.envs import (
     Blur,
     CameraFault,
@@ -26,7 +27,6 @@ from drone_rl.envs import (
 )
 from drone_rl.envs.camera_fault import normal, uniform
 from drone_rl.policies import SmallCNN, make_actor
-from drone_rl.sim.settings import CameraSettings, TaskSettings
 from drone_rl.utils.errors import InputError
 
 SHORT = TaskSettings(num_cubes=2, first_distance=3.0, spacing=3.0, step_limit=12, front_margin=3.0)

@@ -7,8 +7,8 @@ from tensordict import TensorDict
 from torchrl.envs import Compose, ParallelEnv, RewardSum, SerialEnv, TransformedEnv
 from torchrl.envs.utils import check_env_specs
 
+from drone_rl.config import AppearanceSettings, TaskSettings
 from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels
-from drone_rl.sim.settings import AppearanceSettings, TaskSettings
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
 from drone_rl.utils.errors import InputError
 

@@ -3,6 +3,7 @@
 import pytest
 import torch
 
+from drone_rl.config import CameraSettings, TaskSettings
 from drone_rl.envs import (
     Blur,
     DeadRows,
@@ -15,7 +16,6 @@ from drone_rl.envs import (
     faults,
     with_transforms,
 )
-from drone_rl.sim.settings import CameraSettings, TaskSettings
 from drone_rl.utils.errors import InputError
 
 LONG = TaskSettings(num_cubes=30, first_distance=3.0, spacing=3.0, step_limit=90)

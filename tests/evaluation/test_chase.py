@@ -5,12 +5,12 @@ import math
 import pytest
 import torch
 
+from drone_rl.config import DynamicsSettings
 from drone_rl.evaluation.chase import film, level
 from drone_rl.sim.entities.cameras import CHASE
-from drone_rl.sim.meaning import Meaning
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.rendering.mounting import product, rotate, turned
-from drone_rl.sim.settings import DynamicsSettings
+from drone_rl.sim.rendering.semantics import Meaning
 from drone_rl.sim.worlds import Worlds
 
 SIZE = {"height": 60, "width": 90}

@@ -2,10 +2,12 @@ import pytest
 import torch
 
 from drone_rl.collectors import EpisodeCollector
+from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv
-from drone_rl.evaluation import ConstantPolicy, Oracle, RandomPolicy, run_episodes, summarise
+from drone_rl.evaluation.evaluator import run_episodes
+from drone_rl.evaluation.metrics import summarise
+from drone_rl.evaluation.oracle import ConstantPolicy, Oracle, RandomPolicy
 from drone_rl.sim.actions import MOVES, Move
-from drone_rl.sim.settings import TaskSettings
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
 from drone_rl.utils.seeding import Stream
 

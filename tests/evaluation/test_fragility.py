@@ -4,10 +4,10 @@ import pytest
 import torch
 
 import drone_rl
-from drone_rl.api.foreign import policy_from
-from drone_rl.evaluation import StepLog, run_episodes
+from drone_rl.evaluation.evaluator import StepLog, run_episodes
 from drone_rl.evaluation.fragility import compare, examine, require_same_in_any_batch
-from drone_rl.policies.foreign import ForeignNetwork
+from drone_rl.policies.external_network import ForeignNetwork
+from drone_rl.policies.external_policy import policy_from
 from drone_rl.sim.actions import MOVES, Move
 from drone_rl.utils.errors import InputError
 
@@ -26,8 +26,8 @@ def examined(policy, is_compiled=True):
 
 def with_unit(by_unit):
     """The shipped policy with the hidden unit 2^24 + 1 - 2^24 added to the logit of a left turn."""
-    from drone_rl.bench.gamed_rounding import BIG, part, widened
-    from drone_rl.zoo import parse
+    from benchmarks.gamed_rounding import BIG, part, widened
+    from drone_rl.policies.zoo import parse
 
     described, weights = widened()
     unit = part(weights, "fc1.weight")[-1]

@@ -6,7 +6,7 @@ import pytest
 import torch
 
 import drone_rl
-from drone_rl.evaluation import StepLog, run_episodes
+from drone_rl.evaluation.evaluator import StepLog, run_episodes
 from drone_rl.evaluation.greedy_flights import (
     batches,
     ending,

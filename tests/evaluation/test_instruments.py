@@ -8,7 +8,7 @@ import torch
 
 from drone_rl.evaluation import instruments
 from drone_rl.evaluation.instruments import HEIGHT, WIDTH, Reading, horizon, panel, read
-from drone_rl.pilot.state import Attitude
+from drone_rl.flight.commands.state import Attitude
 from drone_rl.sim.dynamics import FlightState
 
 LEVEL = Attitude(0.0, 0.0, 0.0)

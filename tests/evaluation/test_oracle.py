@@ -2,10 +2,10 @@ import pytest
 import torch
 from tensordict import TensorDict
 
-from drone_rl.evaluation import ConstantPolicy, Oracle, RandomPolicy
+from drone_rl.config import TaskSettings
+from drone_rl.evaluation.oracle import ConstantPolicy, Oracle, RandomPolicy
 from drone_rl.sim.actions import MOVES, Move
 from drone_rl.sim.continuous_actions import ContinuousActions
-from drone_rl.sim.settings import TaskSettings
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.utils.errors import InputError
 from tests.continuous import SETTINGS

@@ -2,11 +2,11 @@
 
 import numpy as np
 
+from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv
-from drone_rl.evaluation import ConstantPolicy
+from drone_rl.evaluation.oracle import ConstantPolicy
 from drone_rl.evaluation.searching import find_failures
 from drone_rl.sim.actions import Move
-from drone_rl.sim.settings import TaskSettings
 from drone_rl.utils.seeding import world_random_state
 
 TASK = TaskSettings(num_cubes=1, first_distance=8.0, step_limit=60)

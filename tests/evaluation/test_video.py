@@ -3,6 +3,13 @@ import pytest
 import torch
 from tensordict import TensorDict
 
+from drone_rl.config import (
+    ActionSettings,
+    AppearanceSettings,
+    DynamicsSettings,
+    PillarsSettings,
+    TaskSettings,
+)
 from drone_rl.evaluation.video import (
     _caption,
     _compose,
@@ -14,14 +21,7 @@ from drone_rl.evaluation.video import (
 )
 from drone_rl.sim.actions import MOVES
 from drone_rl.sim.continuous_actions import ContinuousActions
-from drone_rl.sim.meaning import Meaning
-from drone_rl.sim.settings import (
-    ActionSettings,
-    AppearanceSettings,
-    DynamicsSettings,
-    PillarsSettings,
-    TaskSettings,
-)
+from drone_rl.sim.rendering.semantics import Meaning
 from drone_rl.utils.errors import InputError
 from tests.continuous import SETTINGS
 from tests.five_actions import FIVE

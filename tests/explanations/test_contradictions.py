@@ -3,13 +3,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from drone_rl.explanations.contradictions import (
-    Kind,
-    Pair,
-    find_pairs,
-    one_move,
-    summarise_pairs,
-)
+from drone_rl.explanations.contradictions import Kind, Pair, find_pairs, one_move, summarise_pairs
 from drone_rl.explanations.dataset import RolloutDataset
 from drone_rl.sim.actions import MOVES
 

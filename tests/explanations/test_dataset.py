@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 import torch
 
+from drone_rl.config import DynamicsSettings
 from drone_rl.explanations.dataset import SEEN, RolloutDataset, flown_fields
 from drone_rl.explanations.recording import fly
 from drone_rl.explanations.scenes import Region
 from drone_rl.sim.actions import MOVES
 from drone_rl.sim.dynamics import BodyState, ComputerVision, FlightState, Quadrotor
-from drone_rl.sim.settings import DynamicsSettings
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.utils.errors import InputError
 

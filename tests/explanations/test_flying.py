@@ -3,11 +3,11 @@ import torch
 from torch import nn
 from torchrl.envs import CatFrames
 
+from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv, GrayPixels, with_transforms
 from drone_rl.explanations.flying import fly_on
 from drone_rl.explanations.scenes import Scenes, place_target
 from drone_rl.sim.actions import Move
-from drone_rl.sim.settings import TaskSettings
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
 
 F, L, R = Move.FORWARD, Move.LEFT, Move.RIGHT

@@ -2,18 +2,13 @@ import numpy as np
 import pytest
 import torch
 
+from drone_rl.config import TaskSettings
 from drone_rl.explanations.alternatives import DARK_GROUND
 from drone_rl.explanations.hooks import probabilities
-from drone_rl.explanations.interventions import (
-    OTHER_TARGETS,
-    _patches,
-    intervene,
-    to_the_middle,
-)
+from drone_rl.explanations.interventions import OTHER_TARGETS, _patches, intervene, to_the_middle
 from drone_rl.explanations.scenes import Region, empty_scene, place_target
 from drone_rl.sim.entities.arena import FLOOR_COLOR
-from drone_rl.sim.meaning import Meaning
-from drone_rl.sim.settings import TaskSettings
+from drone_rl.sim.rendering.semantics import Meaning
 
 
 def test_only_what_was_changed_changes(scenes, world):

@@ -4,6 +4,7 @@ import numpy as np
 import torch
 from torch import nn
 
+from drone_rl.config import TaskSettings
 from drone_rl.explanations.hooks import probabilities
 from drone_rl.explanations.response import (
     OutcomeMap,
@@ -17,7 +18,6 @@ from drone_rl.explanations.response import (
 from drone_rl.explanations.scenes import Scenes, place_target
 from drone_rl.sim.actions import MOVES
 from drone_rl.sim.continuous_actions import ContinuousActions
-from drone_rl.sim.settings import TaskSettings
 from tests.continuous import SETTINGS
 
 IDLE, LEFT = [1.0, 0.0, 0.0], [0.1, 0.9, 0.0]

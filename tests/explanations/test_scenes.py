@@ -1,5 +1,6 @@
 import torch
 
+from drone_rl.config import CameraSettings
 from drone_rl.envs import (
     ChromaticityPixels,
     CropRows,
@@ -10,7 +11,6 @@ from drone_rl.envs import (
     with_transforms,
 )
 from drone_rl.explanations.scenes import Region, Scenes, empty_scene, place_target
-from drone_rl.sim.settings import CameraSettings
 from tests.continuous import make_worlds
 from tests.second_dynamics import Turning
 

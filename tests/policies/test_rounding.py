@@ -6,7 +6,7 @@ import torch
 from torch import nn
 
 from drone_rl.policies import MLP, OriginalCNN, SmallCNN
-from drone_rl.policies.foreign import ForeignNetwork
+from drone_rl.policies.external_network import ForeignNetwork
 from drone_rl.policies.rounding import TOLERANCE, RoundingBound, arithmetic_on, decider
 from drone_rl.sim.actions import MOVES
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import torch
 
+from drone_rl.config import MINIMAL, AppearanceSettings, TaskSettings
 from drone_rl.sim.clutter import (
     HIDDEN_DEPTH,
     PALETTE,
@@ -13,7 +14,6 @@ from drone_rl.sim.clutter import (
     stand,
     things_of,
 )
-from drone_rl.sim.settings import MINIMAL, AppearanceSettings, TaskSettings
 from drone_rl.sim.tasks import as_task
 
 CUBES = TaskSettings()

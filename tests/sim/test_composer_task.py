@@ -3,10 +3,10 @@ import pytest
 import torch
 from dm_control import composer
 
+from drone_rl.config import DynamicsSettings, TaskSettings
 from drone_rl.sim.actions import Move
 from drone_rl.sim.composer_task import ComposerTask, make_environment
 from drone_rl.sim.entities import cameras
-from drone_rl.sim.settings import DynamicsSettings, TaskSettings
 from drone_rl.sim.tasks.collect_cubes.playing import VANISHED_DEPTH
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
 
@@ -88,8 +88,8 @@ def test_five_cameras_with_airsims_names():
 
 
 def test_observables_are_off_until_a_task_enables_them():
+    from drone_rl.config import CameraSettings
     from drone_rl.sim.entities.drone import Drone
-    from drone_rl.sim.settings import CameraSettings
 
     drone = Drone(size=0.8, camera=CameraSettings())
     assert not any(o.enabled for o in drone.observables.as_dict().values())

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import torch
 
+from drone_rl.config import ActionSettings
 from drone_rl.sim.actions import MOVES
 from drone_rl.sim.continuous_actions import ContinuousActions, normal_of
-from drone_rl.sim.settings import ActionSettings
 
 SETTINGS = ActionSettings(kind="velocity", forward_speed=4, sideways_speed=3, yaw_rate=45)
 ALL = ContinuousActions.of(SETTINGS)

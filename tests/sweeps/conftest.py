@@ -6,11 +6,13 @@ import sys
 import numpy as np
 import pytest
 
-from drone_rl.sweeps import Run, open_sweep, process
+from drone_rl.evaluation.consistency import _expected
+from drone_rl.evaluation.kinds import Kind
+from drone_rl.evaluation.rule import LUCK, Rule
+from drone_rl.sweeps import process
+from drone_rl.sweeps.manifest import open_sweep
+from drone_rl.sweeps.runs import Run
 from drone_rl.utils.intervals import mean_bounds, proportion
-from drone_rl.verdicts.consistency import _expected
-from drone_rl.verdicts.kinds import Kind
-from drone_rl.verdicts.rule import LUCK, Rule
 
 FAKE = """
 import json, pathlib, sys, time

@@ -5,10 +5,9 @@ import time
 
 import pytest
 
-from drone_rl.sweeps import LocalExecutor, read_result
-from drone_rl.sweeps.executors import RayExecutor, SlurmExecutor
+from drone_rl.sweeps.executors import LocalExecutor, RayExecutor, SlurmExecutor
 from drone_rl.sweeps.process import finish_run
-from drone_rl.sweeps.runs import quoted, read_failure
+from drone_rl.sweeps.runs import quoted, read_failure, read_result
 from drone_rl.utils.errors import InputError
 
 pytestmark = pytest.mark.usefixtures("fake_training")

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from drone_rl.sweeps import open_sweep, read_sweep
+from drone_rl.sweeps.manifest import open_sweep, read_sweep
 from drone_rl.utils.errors import InputError
 
 

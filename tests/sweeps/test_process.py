@@ -8,9 +8,9 @@ import time
 
 import pytest
 
-from drone_rl.sweeps import process, read_result
+from drone_rl.sweeps import process
 from drone_rl.sweeps.process import RunProcess, finish_run, note_failure
-from drone_rl.sweeps.runs import read_failure
+from drone_rl.sweeps.runs import read_failure, read_result
 from drone_rl.utils.files import folder_lock
 
 pytestmark = pytest.mark.usefixtures("fake_training")

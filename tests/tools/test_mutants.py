@@ -75,19 +75,18 @@ def test_a_mutant_is_another_program():
     assert not filters.changes_program("a = 1", None)
 
 
-def test_the_whole_package_is_mutated_but_for_benchmarks():
+def test_the_whole_package_is_mutated():
     found = targets.modules(ROOT)
     assert "drone_rl/evaluation/metrics.py" in found
     assert "drone_rl/policies/gradients_kernel.py" in found
-    assert not any(name.startswith("drone_rl/bench/") for name in found)
     packages = {path.parent.name for path in (ROOT / "drone_rl").glob("*/__init__.py")}
-    assert {name.split("/")[1] for name in found if name.count("/") > 1} == packages - {"bench"}
+    assert {name.split("/")[1] for name in found if name.count("/") > 1} == packages
 
 
 def test_tests_of_pages_and_tools_are_not_run():
     found = targets.test_files(ROOT)
     assert "tests/evaluation/test_metrics.py" in found
-    assert "tests/bench/test_sentences.py" in found  # plants in all that is said
+    assert "tests/benchmarks/test_sentences.py" in found  # plants in all that is said
     assert not any("/tools/" in name or "/docs/" in name for name in found)
 
 

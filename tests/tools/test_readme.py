@@ -6,9 +6,9 @@ import re
 
 import pytest
 
-from drone_rl.bench.benchmark import Benchmark
-from drone_rl.bench.ledger import Ledger, Origin, digest_code, make_origin
-from drone_rl.bench.registry import BENCHMARKS
+from benchmarks.benchmark import Benchmark
+from benchmarks.ledger import Ledger, Origin, digest_code, make_origin
+from benchmarks.registry import BENCHMARKS
 from tools.readme.__main__ import PAGES, ROOT, keep, main, make_blocks, make_files
 from tools.readme.blocks import marked_blocks, replace_blocks
 from tools.readme.flight_rows import FLIGHT
@@ -160,7 +160,8 @@ def test_packages_are_listed_from_the_top_each_with_those_within_it(tmp_path):
 @pytest.fixture
 def measured(tmp_path):
     """A ledger of three benchmarks, one of them of today's code."""
-    (tmp_path / "sim.py").write_text("1")
+    (tmp_path / "drone_rl").mkdir()
+    (tmp_path / "drone_rl" / "sim.py").write_text("1")
     code = digest_code(["sim"], tmp_path)
     ledger = Ledger(tmp_path / "r.json")
     for name, of in (("new", code), ("old", "abc"), ("unknown", None)):
@@ -173,11 +174,11 @@ def measured(tmp_path):
 
 
 def test_figures_older_than_their_code_are_named(measured):
-    ledger, package = measured
+    ledger, root = measured
     names = ("new", "old", "unknown", "never")
     benchmarks = {name: Benchmark(lambda _: {}, "tests", ("sim",)) for name in names}
     since = "measured 2026-11-21 at 0123456789ab, "
-    assert list(tell_ages(benchmarks, ledger, package)) == [
+    assert list(tell_ages(benchmarks, ledger, root)) == [
         f"new: {since}of today's code",
         f"old: {since}OLDER than what it measures (sim)",
         f"unknown: {since}of code that was not noted",

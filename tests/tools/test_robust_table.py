@@ -1,7 +1,7 @@
 """The table of the ablation."""
 
-from drone_rl.bench.robust import ARMS
-from drone_rl.conditions.axes import GROUPS
+from benchmarks.robust import ARMS
+from drone_rl.robustness.axes import GROUPS
 from tools.readme.robust import make_robust
 from tools.readme.tables import UNKNOWN
 

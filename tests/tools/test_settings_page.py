@@ -6,11 +6,11 @@ from typing import Annotated, ClassVar
 
 import pytest
 
+from drone_rl.cli.hydra.schemas import GROUPS, PARTS, SEVERAL
 from drone_rl.cli.usage import COMMANDS
-from drone_rl.hydra_app.schemas import GROUPS, PARTS, SEVERAL
-from drone_rl.settings.networks import SmallCnn
-from drone_rl.settings.transforms import Crop
-from drone_rl.sim.settings import DynamicsSettings
+from drone_rl.config import DynamicsSettings
+from drone_rl.config.networks import SmallCnn
+from drone_rl.config.transforms import Crop
 from drone_rl.utils.schema import OneOf, Real, Several, Whole
 from drone_rl.utils.settings import Settings, kinds_of
 from tools.readme.__main__ import ROOT

@@ -1,6 +1,6 @@
 """Everybody is tuned with the same care, and what was found is what is used."""
 
-from drone_rl.bench.peers import contenders
+from benchmarks.peers import contenders
 from tools import tuning
 
 

@@ -12,8 +12,8 @@ from drone_rl.training import (
     LoggerCallback,
     ProgressCallback,
     callbacks,
-    load_checkpoint,
 )
+from drone_rl.utils.checkpoint import load_checkpoint
 from drone_rl.utils.errors import InputError
 
 

@@ -2,11 +2,12 @@
 
 import dataclasses
 
+from drone_rl.policies.zoo.files import load_exported
 from drone_rl.training import Callback
 from drone_rl.training.progress import OngoingTraining, Progress
-from drone_rl.zoo.files import export_policy, load_exported
-from tests.words.test_card import VERDICT
-from tests.zoo.test_files import CHECKPOINT
+from drone_rl.verdicts.export import export_policy
+from tests.policies.zoo.test_files import CHECKPOINT
+from tests.verdicts.test_card_text import VERDICT
 
 
 def test_it_begins_at_nothing():

@@ -5,9 +5,10 @@ import threading
 import pytest
 import torch
 
-from drone_rl.training import Callback, CheckpointCallback, NotANumberError, load_checkpoint
+from drone_rl.training import Callback, CheckpointCallback, NotANumberError
 from drone_rl.training import trainer as trainer_module
 from drone_rl.training.metrics import episode_rewards, running_mean
+from drone_rl.utils.checkpoint import load_checkpoint
 
 
 class At(Callback):

@@ -7,12 +7,7 @@ import json
 import jinja2
 import pytest
 
-from drone_rl.utils.pages import (
-    content_security_policy,
-    folder_link,
-    page_environment,
-    static_text,
-)
+from drone_rl.utils.pages import content_security_policy, folder_link, page_environment, static_text
 
 PAYLOAD = "</script><!--<img src=x onerror=\"alert('1')\">&\u2028"
 
@@ -35,7 +30,7 @@ def test_a_page_without_a_script_allows_none():
 
 
 def test_values_are_escaped_in_text_attributes_and_data():
-    environment = page_environment("drone_rl.report")
+    environment = page_environment("drone_rl.explanations.report")
     template = environment.from_string(
         '<p title="{{ x }}">{{ x }}</p><script type="application/json">{{ [x]|tojson }}</script>'
     )
@@ -47,11 +42,11 @@ def test_values_are_escaped_in_text_attributes_and_data():
 
 def test_a_missing_value_is_an_error():
     with pytest.raises(jinja2.UndefinedError):
-        page_environment("drone_rl.report").from_string("{{ x }}").render()
+        page_environment("drone_rl.explanations.report").from_string("{{ x }}").render()
 
 
 def test_static_files_are_joined_and_may_not_end_their_element():
-    environment = page_environment("drone_rl.report")
+    environment = page_environment("drone_rl.explanations.report")
     assert "setUp" in static_text(environment, ["map.js", "zoom.js"])
     environment.loader = jinja2.DictLoader({"a.js": "1\r\n", "b.js": "'</script>'"})
     assert static_text(environment, ["a.js"]) == "1\n"

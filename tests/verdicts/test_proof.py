@@ -6,15 +6,15 @@ import pytest
 import torch
 
 import drone_rl
-from drone_rl.checks.certificate import parse_certificate
-from drone_rl.evaluation import Episodes
 from drone_rl.evaluation.branches import Outcomes
 from drone_rl.evaluation.fragility import Rounding
+from drone_rl.evaluation.metrics import Episodes
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.sim.tasks.collect_cubes.goals import CubeGoals
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
 from drone_rl.verdicts.proof import Claim
-from tests.checks.making import of_every_place
+from drone_rl.verification.checker.certificate import parse_certificate
+from tests.verification.checker.making import of_every_place
 
 PATH = Path("certificate.json")
 

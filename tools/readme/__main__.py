@@ -3,8 +3,8 @@
 import sys
 from pathlib import Path
 
-from drone_rl.bench.ledger import Ledger
-from drone_rl.bench.registry import BENCHMARKS
+from benchmarks.ledger import Ledger
+from benchmarks.registry import BENCHMARKS
 from tools.readme.blocks import replace_blocks
 from tools.readme.flight_rows import FLIGHT
 from tools.readme.guest_rows import GUESTS
@@ -81,7 +81,7 @@ def main(words: list[str]) -> int:
     """Returns the exit status."""
     if words == ["stale"]:
         ledger = Ledger(ROOT / "docs" / "results.json")
-        print(*tell_ages(BENCHMARKS, ledger, ROOT / "drone_rl"), sep="\n")
+        print(*tell_ages(BENCHMARKS, ledger, ROOT), sep="\n")
         return 0
     if words not in ([], ["keep"]):
         print(f"error: {' '.join(words)!r} is unknown; use keep, stale or nothing", file=sys.stderr)

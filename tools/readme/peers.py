@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from drone_rl.bench.peers.contenders import LABELS, OURS, THEIRS
+from benchmarks.peers.contenders import LABELS, OURS, THEIRS
 from tools.readme.tables import UNKNOWN
 
 _SHOWN = {

@@ -3,9 +3,9 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from drone_rl.bench.robust import ALL_KINDS, ARMS
-from drone_rl.conditions.axes import GROUPS
-from drone_rl.conditions.comparing import PLAIN, mean
+from benchmarks.robust import ALL_KINDS, ARMS
+from drone_rl.robustness.axes import GROUPS
+from drone_rl.robustness.comparing import PLAIN, mean
 from tools.readme.tables import UNKNOWN
 
 _UNTOUCHED = "untouched"

@@ -3,17 +3,17 @@
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from drone_rl.bench.benchmark import Benchmark
-from drone_rl.bench.ledger import Ledger, digest_code
+from benchmarks.benchmark import Benchmark
+from benchmarks.ledger import Ledger, digest_code
 
 
-def tell_ages(benchmarks: Mapping[str, Benchmark], ledger: Ledger, package: Path) -> Iterable[str]:
+def tell_ages(benchmarks: Mapping[str, Benchmark], ledger: Ledger, root: Path) -> Iterable[str]:
     """A line for each benchmark: of today's code, older, never run, or of code that nobody noted.
 
     Args:
         benchmarks: All that there are.
         ledger: What was measured.
-        package: The folder drone_rl.
+        root: Of the checkout.
     """
     for name, benchmark in benchmarks.items():
         origin = ledger.origins.get(name)
@@ -23,7 +23,7 @@ def tell_ages(benchmarks: Mapping[str, Benchmark], ledger: Ledger, package: Path
         since = f"measured {origin.date} at {(origin.revision or 'an unknown revision')[:12]}"
         if origin.code is None:
             yield f"{name}: {since}, of code that was not noted"
-        elif origin.code == digest_code(benchmark.measures, package):
+        elif origin.code == digest_code(benchmark.measures, root):
             yield f"{name}: {since}, of today's code"
         else:
             yield f"{name}: {since}, OLDER than what it measures ({', '.join(benchmark.measures)})"

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple
 
-from drone_rl.bench.ledger import Ledger, Origin
+from benchmarks.ledger import Ledger, Origin
 
 Figures = Mapping[str, Any]
 UNKNOWN = "not measured yet"

@@ -9,8 +9,8 @@ import torch
 from gymnasium import spaces
 from torch import Tensor
 
+from drone_rl.config import CameraSettings
 from drone_rl.sim.actions import Actions, Entry
-from drone_rl.sim.settings import CameraSettings
 from drone_rl.utils.errors import InputError
 
 _MOST = float(np.finfo(np.float32).max)

@@ -9,20 +9,20 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 from torch import Tensor
 
-from drone_rl.envs.gymnasium.spaces import action_space, picture_space, vector_space
-from drone_rl.settings.changes import Changes
-from drone_rl.settings.gymnasium import GymnasiumSettings
-from drone_rl.settings.variant import locate
-from drone_rl.sim.composer_task import CONTROL_TIMESTEP_S
-from drone_rl.sim.entities.cameras import CHASE
-from drone_rl.sim.rendering import check_device
-from drone_rl.sim.settings import (
+from drone_rl.config import (
     ActionSettings,
     BaseTaskSettings,
     CameraSettings,
     DynamicsSettings,
     TaskSettings,
 )
+from drone_rl.config.changes import Changes
+from drone_rl.config.gymnasium import GymnasiumSettings
+from drone_rl.config.variant import locate
+from drone_rl.envs.gymnasium.spaces import action_space, picture_space, vector_space
+from drone_rl.sim.composer_task import CONTROL_TIMESTEP_S
+from drone_rl.sim.entities.cameras import CHASE
+from drone_rl.sim.rendering import check_device
 from drone_rl.sim.tasks import State, Task, as_task
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError

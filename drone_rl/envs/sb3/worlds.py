@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvStepReturn
 
+from drone_rl.config.transforms import Fault, Stack, Transform
 from drone_rl.envs.pipeline import on_pixels
-from drone_rl.settings.transforms import Fault, Stack, Transform
 from drone_rl.utils.errors import InputError
 
 

@@ -4,9 +4,9 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from drone_rl.evaluation.judge import judge_policy
+from drone_rl.evaluation.rule import Rule
 from drone_rl.explanations.context import Context
-from drone_rl.verdicts.judge import judge_policy
-from drone_rl.verdicts.rule import Rule
 
 
 def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:

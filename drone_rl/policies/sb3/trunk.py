@@ -7,8 +7,8 @@ from gymnasium import spaces
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from torch import Tensor
 
+from drone_rl.config.networks import Network, SmallCnn
 from drone_rl.policies.cnn import PolicyNetwork
-from drone_rl.settings.networks import Network, SmallCnn
 from drone_rl.utils.errors import InputError
 
 

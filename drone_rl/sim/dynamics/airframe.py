@@ -7,8 +7,8 @@ import math
 
 import warp as wp
 
-from drone_rl.sim.settings import DynamicsSettings
-from drone_rl.sim.settings.dynamics import GRAVITY
+from drone_rl.config import DynamicsSettings
+from drone_rl.config.dynamics import GRAVITY
 
 
 @wp.struct

@@ -6,7 +6,7 @@ from typing import Self
 import torch
 from torch import Tensor
 
-from drone_rl.sim.batch import Batch
+from drone_rl.utils.batch import Batch
 
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 """The attitude of a drone that is level and looks forward, quaternion (w, x, y, z)."""

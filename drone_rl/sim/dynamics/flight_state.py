@@ -5,8 +5,8 @@ from typing import NamedTuple, Self
 
 from torch import Tensor
 
-from drone_rl.sim.batch import Batch
 from drone_rl.sim.dynamics.body import LEVEL, BodyState, heading_of
+from drone_rl.utils.batch import Batch
 
 NOTHING, GROUND = -2, -1
 """Numbers of what is touched: no thing, and the ground. Obstacles count from 0."""

@@ -5,10 +5,10 @@ import dataclasses
 import torch
 from torch import Tensor
 
+from drone_rl.config.actions import ActionSettings
 from drone_rl.sim.continuous_actions import ContinuousActions
 from drone_rl.sim.dynamics.body import BodyState, heading_of
 from drone_rl.sim.dynamics.obstacles import Obstacles
-from drone_rl.sim.settings.actions import ActionSettings
 
 
 class Kinematic:

@@ -7,15 +7,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from drone_rl.config import COMPUTER_VISION, MOVES_SETTINGS, ActionSettings, DynamicsSettings
 from drone_rl.sim.dynamics.dynamics import Dynamics
 from drone_rl.sim.dynamics.kinematic import Kinematic
 from drone_rl.sim.dynamics.quadrotor import Quadrotor
-from drone_rl.sim.settings import (
-    COMPUTER_VISION,
-    MOVES_SETTINGS,
-    ActionSettings,
-    DynamicsSettings,
-)
 from drone_rl.utils.errors import InputError
 
 _SEEDS = 2**31 - 1

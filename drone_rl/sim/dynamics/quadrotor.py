@@ -9,6 +9,7 @@ import torch
 import warp as wp
 from torch import Tensor
 
+from drone_rl.config import ActionSettings, DynamicsSettings
 from drone_rl.sim.actions import Actions
 from drone_rl.sim.dynamics import flight_kernel
 from drone_rl.sim.dynamics.airframe import make_airframe
@@ -19,7 +20,6 @@ from drone_rl.sim.dynamics.obstacles import Obstacles
 from drone_rl.sim.dynamics.steering import make_steering
 from drone_rl.sim.rendering.crew import Crew
 from drone_rl.sim.rendering.devices import on_torch_stream, start_warp
-from drone_rl.sim.settings import ActionSettings, DynamicsSettings
 
 _LEAST_WORK = 3000
 """Ticks of all drones together for which a second thread is worth its while."""

@@ -5,12 +5,12 @@ from typing import Protocol
 import torch
 from torch import Tensor
 
+from drone_rl.config import ActionSettings
 from drone_rl.sim.actions import MOVES, Actions
 from drone_rl.sim.continuous_actions import ContinuousActions
 from drone_rl.sim.dynamics.computer_vision import DIRECTIONS
 from drone_rl.sim.dynamics.flight_state import FlightState
 from drone_rl.sim.dynamics.goals import Goals, Mode
-from drone_rl.sim.settings import ActionSettings
 
 
 class Steering(Protocol):

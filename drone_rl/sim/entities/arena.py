@@ -5,7 +5,7 @@
 
 from dm_control import composer
 
-from drone_rl.sim.meaning import Meaning
+from drone_rl.sim.rendering.semantics import Meaning
 
 SKY_COLOR = (0.62, 0.74, 0.92)
 """Red, green, blue of everything that is neither floor, cube nor drone."""

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from dm_control import mjcf
 
-from drone_rl.sim.settings.camera import FRONT
+from drone_rl.config.camera import FRONT
 from drone_rl.utils.errors import InputError
 
 

@@ -5,7 +5,7 @@
 
 from dm_control import composer, mjcf
 
-from drone_rl.sim.meaning import Meaning
+from drone_rl.sim.rendering.semantics import Meaning
 
 
 class Cube(composer.Entity):

@@ -5,7 +5,7 @@
 
 from dm_control import composer, mjcf
 
-from drone_rl.sim.meaning import Meaning
+from drone_rl.sim.rendering.semantics import Meaning
 
 KINDS = ("box", "sphere", "cylinder")
 """Of all that there are in a world, in turn."""

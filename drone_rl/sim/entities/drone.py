@@ -8,9 +8,9 @@ from dm_control import composer, mjcf
 from dm_control.composer.observation import observable
 from dm_control.mujoco import engine
 
+from drone_rl.config import CameraSettings
 from drone_rl.sim.entities import cameras
-from drone_rl.sim.meaning import Meaning
-from drone_rl.sim.settings import CameraSettings
+from drone_rl.sim.rendering.semantics import Meaning
 
 BODY_GROUP = 1
 """Geom group of the drone's own body: filmed by the chase camera, unseen by its own cameras."""

@@ -4,7 +4,7 @@ from drone_rl.sim.rendering.appearance import Appearance, Beside, Texture
 from drone_rl.sim.rendering.devices import check_device
 from drone_rl.sim.rendering.mounting import Mounting
 from drone_rl.sim.rendering.named import find_renderer
-from drone_rl.sim.rendering.raytrace import Raytracer
+from drone_rl.sim.rendering.raytrace.renderer import Raytracer
 from drone_rl.sim.rendering.renderer import MakeRenderer, Poses, Renderer
 from drone_rl.sim.rendering.scene import Scene
 from drone_rl.sim.rendering.view import View

@@ -7,8 +7,8 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from drone_rl.sim.meaning import Meaning
 from drone_rl.sim.rendering.mounting import Mounting
+from drone_rl.sim.rendering.semantics import Meaning
 
 Color = tuple[float, float, float]
 """Red, green, blue, from 0 to 1."""

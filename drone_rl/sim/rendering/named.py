@@ -2,8 +2,8 @@
 
 import importlib
 
+from drone_rl.config.renderers import RENDERERS
 from drone_rl.sim.rendering.renderer import MakeRenderer
-from drone_rl.sim.settings.renderers import RENDERERS
 from drone_rl.utils.errors import InputError
 
 

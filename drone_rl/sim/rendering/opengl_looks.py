@@ -18,12 +18,12 @@ import torch
 from dm_control import mjcf
 from numpy.typing import NDArray
 
-from drone_rl.sim.meaning import Meaning
 from drone_rl.sim.rendering import opengl_textures as faces
 from drone_rl.sim.rendering import textures
 from drone_rl.sim.rendering.appearance import Appearance, Texture
 from drone_rl.sim.rendering.mounting import Mounting, product
 from drone_rl.sim.rendering.scene import Scene
+from drone_rl.sim.rendering.semantics import Meaning
 
 _SIDE = 256
 """Texels of all textures, each way."""

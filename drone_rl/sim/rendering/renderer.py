@@ -5,10 +5,10 @@ from typing import Protocol
 
 from torch import Tensor
 
-from drone_rl.sim.batch import Batch
 from drone_rl.sim.rendering.appearance import Appearance
 from drone_rl.sim.rendering.scene import Scene
 from drone_rl.sim.rendering.view import Modality, View
+from drone_rl.utils.batch import Batch
 
 
 @dataclasses.dataclass

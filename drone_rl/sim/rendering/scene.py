@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from drone_rl.sim.meaning import Meaning
+from drone_rl.sim.rendering.semantics import Meaning
 from drone_rl.utils.errors import InputError
 
 _UNSET = (0.5, 0.5, 0.5, 1.0)

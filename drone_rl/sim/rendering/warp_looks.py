@@ -5,10 +5,10 @@ import torch
 import warp as wp
 from torch import Tensor
 
-from drone_rl.sim.meaning import Meaning
 from drone_rl.sim.rendering.appearance import Appearance, Beside, each
 from drone_rl.sim.rendering.mounting import Mounting, product
 from drone_rl.sim.rendering.scene import Scene
+from drone_rl.sim.rendering.semantics import Meaning
 
 _KINDS = {
     "geom_rgba": wp.vec4,

@@ -8,11 +8,11 @@ import torch
 import warp as wp
 from torch import Tensor
 
-from drone_rl.sim.meaning import Meaning
 from drone_rl.sim.rendering.appearance import Appearance, each
 from drone_rl.sim.rendering.devices import on_torch_stream
 from drone_rl.sim.rendering.renderer import Poses
 from drone_rl.sim.rendering.scene import Scene
+from drone_rl.sim.rendering.semantics import Meaning
 from drone_rl.sim.rendering.view import View
 from drone_rl.sim.rendering.warp_looks import Looks
 

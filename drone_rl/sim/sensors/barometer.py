@@ -5,12 +5,12 @@ import dataclasses
 import torch
 from torch import Tensor
 
-from drone_rl.sim.batch import Batch
+from drone_rl.config.sensors import BarometerSettings
 from drone_rl.sim.dynamics.body import BodyState
 from drone_rl.sim.geodesy import HOME, GeoPoint
 from drone_rl.sim.sensors.noise import forgotten, normal
 from drone_rl.sim.sensors.sampling import Samples, Sampling
-from drone_rl.sim.settings.sensors import BarometerSettings
+from drone_rl.utils.batch import Batch
 
 SEA_LEVEL_TEMPERATURE = 288.15
 """Kelvin."""

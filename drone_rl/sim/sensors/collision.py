@@ -5,8 +5,8 @@ import dataclasses
 import torch
 from torch import Tensor
 
-from drone_rl.sim.batch import Batch
 from drone_rl.sim.dynamics.flight_state import GROUND, NOTHING, Contact
+from drone_rl.utils.batch import Batch
 
 
 @dataclasses.dataclass

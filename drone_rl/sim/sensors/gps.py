@@ -6,12 +6,12 @@ import enum
 import torch
 from torch import Tensor
 
-from drone_rl.sim.batch import Batch
+from drone_rl.config.sensors import GpsSettings
 from drone_rl.sim.dynamics.body import BodyState
 from drone_rl.sim.geodesy import HOME, GeoPoint, geo_from_world
 from drone_rl.sim.sensors.noise import normal
 from drone_rl.sim.sensors.sampling import Samples, Sampling
-from drone_rl.sim.settings.sensors import GpsSettings
+from drone_rl.utils.batch import Batch
 
 
 class Fix(enum.IntEnum):

@@ -6,13 +6,13 @@ import math
 import torch
 from torch import Tensor
 
-from drone_rl.sim.batch import Batch
+from drone_rl.config.dynamics import GRAVITY
+from drone_rl.config.sensors import ImuSettings
 from drone_rl.sim.dynamics.body import BodyState
 from drone_rl.sim.frames import body_from_world
 from drone_rl.sim.sensors.noise import normal, walked
 from drone_rl.sim.sensors.sampling import Samples, Sampling
-from drone_rl.sim.settings.dynamics import GRAVITY
-from drone_rl.sim.settings.sensors import ImuSettings
+from drone_rl.utils.batch import Batch
 
 STANDARD_GRAVITY = 9.80665
 """Metres a second squared, in whose parts accelerometers' errors are given."""

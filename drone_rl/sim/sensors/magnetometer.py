@@ -6,13 +6,13 @@ import math
 import torch
 from torch import Tensor
 
-from drone_rl.sim.batch import Batch
+from drone_rl.config.sensors import MagnetometerSettings
 from drone_rl.sim.dynamics.body import BodyState
 from drone_rl.sim.frames import body_from_world
 from drone_rl.sim.geodesy import HOME, GeoPoint, geo_from_world
 from drone_rl.sim.sensors.noise import normal
 from drone_rl.sim.sensors.sampling import Samples, Sampling
-from drone_rl.sim.settings.sensors import MagnetometerSettings
+from drone_rl.utils.batch import Batch
 
 CONSTANT = (0.34252, -0.09805, -0.93438)
 """AirSim's field of Seattle, gauss, world frame: north, west, up."""

@@ -6,7 +6,7 @@ import math
 import torch
 from torch import Tensor
 
-from drone_rl.sim.batch import Batch
+from drone_rl.utils.batch import Batch
 
 _ROUNDING = 1e-6
 """Share of a period by which a time that is summed up tick by tick may miss its mark."""

@@ -5,7 +5,7 @@ import dataclasses
 import torch
 from torch import Tensor
 
-from drone_rl.sim.batch import Batch
+from drone_rl.config.sensors import SensorSettings
 from drone_rl.sim.dynamics.body import BodyState
 from drone_rl.sim.dynamics.flight_state import FlightState
 from drone_rl.sim.geodesy import HOME, GeoPoint
@@ -14,12 +14,8 @@ from drone_rl.sim.sensors.barometer import Barometer, BarometerReading, Baromete
 from drone_rl.sim.sensors.collision import CollisionState
 from drone_rl.sim.sensors.gps import Gps, GpsReading, GpsState
 from drone_rl.sim.sensors.imu import Imu, ImuReading, ImuState
-from drone_rl.sim.sensors.magnetometer import (
-    Magnetometer,
-    MagnetometerReading,
-    MagnetometerState,
-)
-from drone_rl.sim.settings.sensors import SensorSettings
+from drone_rl.sim.sensors.magnetometer import Magnetometer, MagnetometerReading, MagnetometerState
+from drone_rl.utils.batch import Batch
 from drone_rl.utils.seeding import Stream, torch_generator
 
 

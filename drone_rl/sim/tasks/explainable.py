@@ -6,8 +6,8 @@ from typing import NamedTuple, Protocol
 import torch
 from torch import Tensor
 
+from drone_rl.config import CameraSettings
 from drone_rl.sim.dynamics import BodyState
-from drone_rl.sim.settings import CameraSettings
 from drone_rl.sim.tasks.playable import S
 
 

@@ -9,8 +9,8 @@ import torch
 from torch import Tensor
 
 from drone_rl.sim.actions import Actions
-from drone_rl.sim.batch import Batch
-from drone_rl.words.terms import Terms
+from drone_rl.sim.vocabulary import Terms
+from drone_rl.utils.batch import Batch
 
 
 @dataclasses.dataclass

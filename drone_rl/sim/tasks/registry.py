@@ -3,13 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
-from drone_rl.sim.settings import (
-    TASKS,
-    BaseTaskSettings,
-    PillarsSettings,
-    TaskSettings,
-    settings_of,
-)
+from drone_rl.config import TASKS, BaseTaskSettings, PillarsSettings, TaskSettings, settings_of
 from drone_rl.sim.tasks.collect_cubes import CollectCubes
 from drone_rl.sim.tasks.pillars import Pillars
 from drone_rl.sim.tasks.task import Task

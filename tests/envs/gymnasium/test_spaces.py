@@ -4,17 +4,12 @@ import numpy as np
 import pytest
 import torch
 
+from drone_rl.config import CameraSettings
 from drone_rl.sim.actions import MOVES, Entry
-from drone_rl.sim.settings import CameraSettings
 from drone_rl.utils.errors import InputError
 
 spaces = pytest.importorskip("gymnasium.spaces", reason="Gymnasium is not installed")
-from drone_rl.envs.gymnasium.spaces import (  # noqa: E402 (after the skip)
-    action_space,
-    picture_space,
-    read_action,
-    vector_space,
-)
+from drone_rl.envs.gymnasium.spaces import action_space, picture_space, read_action, vector_space  # noqa: E402 (after the skip)
 
 
 class Thrusts:

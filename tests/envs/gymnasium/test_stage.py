@@ -7,7 +7,7 @@ import pytest
 import torch
 
 import drone_rl
-from drone_rl.sim.settings import CameraSettings, TaskSettings
+from drone_rl.config import CameraSettings, TaskSettings
 from drone_rl.utils.errors import InputError
 from tests.fake_flight import FLIGHT, floating
 from tests.second_task import Posts
@@ -15,7 +15,7 @@ from tests.second_task import Posts
 pytest.importorskip("gymnasium", reason="Gymnasium is not installed")
 from drone_rl.envs.gymnasium.stage import Stage
 
-TASK = "drone_rl.sim.settings.TaskSettings"
+TASK = "drone_rl.config.TaskSettings"
 
 
 def streams(*seeds):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import drone_rl
-from drone_rl.settings.transforms import Crop, Gray, LateFrames, Stack, Standardize
+from drone_rl.config.transforms import Crop, Gray, LateFrames, Stack, Standardize
 from drone_rl.utils.errors import InputError
 
 gymnasium = pytest.importorskip("gymnasium", reason="Gymnasium is not installed")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from drone_rl.settings.networks import Mlp, SmallCnn
+from drone_rl.config.networks import Mlp, SmallCnn
 from drone_rl.utils.errors import InputError
 
 spaces = pytest.importorskip("gymnasium.spaces", reason="Gymnasium is not installed")

@@ -4,10 +4,10 @@ import pytest
 import torch
 import warp as wp
 
+from drone_rl.config import ActionSettings, DynamicsSettings
 from drone_rl.sim.dynamics import Quadrotor
 from drone_rl.sim.dynamics.fleet import FlyingFleet
 from drone_rl.sim.rendering.devices import start_warp
-from drone_rl.sim.settings import ActionSettings, DynamicsSettings
 
 FLIGHT = DynamicsSettings(mode="simple_flight", camera_mount="body")
 

@@ -9,17 +9,7 @@ import torch
 from drone_rl.sim.dynamics import Mode
 from drone_rl.sim.dynamics import flight_state as fs
 from drone_rl.sim.dynamics.forces import forces, told
-from tests.flying import (
-    ANGLES,
-    GRAVITY,
-    PLACES,
-    SPEEDS,
-    falling,
-    matrix,
-    numbers,
-    quadrotor,
-    still,
-)
+from tests.flying import ANGLES, GRAVITY, PLACES, SPEEDS, falling, matrix, numbers, quadrotor, still
 from tests.flying import told as goals_of
 
 ROTORS = (Mode.ROTOR,) * 4

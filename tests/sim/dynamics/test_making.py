@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 import torch
 
-from drone_rl.sim.continuous_actions import ContinuousActions
-from drone_rl.sim.dynamics import ComputerVision, Kinematic, Quadrotor, draw_seeds, make_dynamics
-from drone_rl.sim.settings import (
+from drone_rl.config import (
     COMPUTER_VISION,
     MOVES_SETTINGS,
     ActionSettings,
     DynamicsSettings,
     TaskSettings,
 )
+from drone_rl.sim.continuous_actions import ContinuousActions
+from drone_rl.sim.dynamics import ComputerVision, Kinematic, Quadrotor, draw_seeds, make_dynamics
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.utils.errors import InputError
 from tests.fake_flight import FLIGHT, Floating, floating

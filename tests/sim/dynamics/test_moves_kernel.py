@@ -4,12 +4,12 @@ import pytest
 import torch
 import warp as wp
 
+from drone_rl.config import DynamicsSettings
 from drone_rl.sim.dynamics import Quadrotor
 from drone_rl.sim.dynamics.body import heading_only
 from drone_rl.sim.dynamics.fleet import FlyingFleet
 from drone_rl.sim.dynamics.moves_kernel import Fleet, camera_attitude, fly_move, is_flying, is_lost
 from drone_rl.sim.rendering.devices import start_warp
-from drone_rl.sim.settings import DynamicsSettings
 
 start_warp("cpu")
 

@@ -3,9 +3,9 @@
 import numpy as np
 import torch
 
+from drone_rl.config import MOVES_SETTINGS, PillarsSettings
 from drone_rl.sim.composer_task import make_environment
 from drone_rl.sim.dynamics import BodyState, Obstacles
-from drone_rl.sim.settings import MOVES_SETTINGS, PillarsSettings
 from drone_rl.sim.tasks import CollectCubes, Pillars
 from drone_rl.sim.worlds import Worlds
 from tests.fake_flight import FLIGHT, Floating

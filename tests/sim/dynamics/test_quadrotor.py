@@ -5,9 +5,9 @@ import pytest
 import torch
 import yaml
 
+from drone_rl.config import ActionSettings, DynamicsSettings
 from drone_rl.sim.actions import Move
 from drone_rl.sim.dynamics import Quadrotor
-from drone_rl.sim.settings import ActionSettings, DynamicsSettings
 from tests.flying import PLACES, angles, history, numbers, quadrotor, settings, still, told
 
 CONF = Path(__file__).parents[3] / "conf" / "dynamics"

@@ -7,16 +7,7 @@ import pytest
 import torch
 
 from drone_rl.sim.dynamics.goals import rotor_goals
-from tests.flying import (
-    GRAVITY,
-    falling,
-    history,
-    matrix,
-    numbers,
-    quadrotor,
-    rotation,
-    still,
-)
+from tests.flying import GRAVITY, falling, history, matrix, numbers, quadrotor, rotation, still
 
 VACUUM = {"air_density": 0.0}
 AT_ONCE = {"rotor_time_constant": 0.0}

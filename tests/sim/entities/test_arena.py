@@ -2,7 +2,7 @@ import numpy as np
 from dm_control import mjcf
 
 from drone_rl.sim.entities.arena import DRAW_DISTANCE, FLOOR_COLOR, SKY_COLOR, Field
-from drone_rl.sim.meaning import Meaning
+from drone_rl.sim.rendering.semantics import Meaning
 
 
 def test_the_field_is_a_floor_and_a_sun_without_shadows():

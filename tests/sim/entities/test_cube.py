@@ -2,7 +2,7 @@ import numpy as np
 from dm_control import mjcf
 
 from drone_rl.sim.entities.cube import Cube
-from drone_rl.sim.meaning import Meaning
+from drone_rl.sim.rendering.semantics import Meaning
 
 
 def test_a_cube_is_a_box_of_that_size_and_colour_and_pushes_nothing():

@@ -1,5 +1,5 @@
 from drone_rl.sim.entities.distractor import make_distractors
-from drone_rl.sim.meaning import Meaning
+from drone_rl.sim.rendering.semantics import Meaning
 
 
 def test_all_kinds_take_turns():

@@ -1,9 +1,9 @@
 from dm_control import mjcf
 
+from drone_rl.config import CameraSettings
 from drone_rl.sim.entities.cameras import CHASE, DRONE_CAMERAS
 from drone_rl.sim.entities.drone import BODY_GROUP, Drone, hide_drone
-from drone_rl.sim.meaning import Meaning
-from drone_rl.sim.settings import CameraSettings
+from drone_rl.sim.rendering.semantics import Meaning
 
 
 def test_a_hull_four_rotors_and_six_cameras():

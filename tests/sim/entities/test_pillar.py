@@ -1,5 +1,5 @@
 from drone_rl.sim.entities.pillar import Pillar
-from drone_rl.sim.meaning import Meaning
+from drone_rl.sim.rendering.semantics import Meaning
 
 
 def test_it_is_an_upright_box_that_pushes_nothing():

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 import torch
 
-from drone_rl.bench import speed
+from benchmarks import speed
+from drone_rl.config import AppearanceSettings, CameraSettings
 from drone_rl.envs import DroneEnv
 from drone_rl.sim.composer_task import make_environment
-from drone_rl.sim.meaning import Meaning
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.rendering.opengl_looks import in_fog
+from drone_rl.sim.rendering.semantics import Meaning
 from drone_rl.sim.rendering.textures import load
-from drone_rl.sim.settings import AppearanceSettings, CameraSettings
 from drone_rl.utils.seeding import world_random_state
 
 BLOCKS = dataclasses.replace(

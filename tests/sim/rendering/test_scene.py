@@ -2,8 +2,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from drone_rl.sim.meaning import Meaning
 from drone_rl.sim.rendering import Scene
+from drone_rl.sim.rendering.semantics import Meaning
 from drone_rl.utils.errors import InputError
 
 

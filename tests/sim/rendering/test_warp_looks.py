@@ -6,8 +6,8 @@ import pytest
 import torch
 import warp as wp
 
-from drone_rl.sim.meaning import Meaning
 from drone_rl.sim.rendering import Appearance, Scene
+from drone_rl.sim.rendering.semantics import Meaning
 from drone_rl.sim.rendering.warp_looks import Looks
 
 XML = """<mujoco><worldbody><light directional="true" ambient=".1 .1 .1" diffuse=".5 .5 .5"/>

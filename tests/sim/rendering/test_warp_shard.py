@@ -5,8 +5,8 @@ import pytest
 import torch
 import warp as wp
 
-from drone_rl.sim.meaning import Meaning
 from drone_rl.sim.rendering import Appearance, Poses, View
+from drone_rl.sim.rendering.semantics import Meaning
 from drone_rl.sim.rendering.warp_shard import Shard
 from drone_rl.sim.worlds import Worlds
 

@@ -3,10 +3,10 @@ import math
 import pytest
 import torch
 
+from drone_rl.config.sensors import BarometerSettings
 from drone_rl.sim.dynamics.body import BodyState
 from drone_rl.sim.geodesy import HOME
 from drone_rl.sim.sensors.barometer import Barometer, altitude_of, pressure_share
-from drone_rl.sim.settings.sensors import BarometerSettings
 
 TICK = 0.003
 

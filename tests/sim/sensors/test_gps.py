@@ -4,10 +4,10 @@ import math
 import pytest
 import torch
 
+from drone_rl.config.sensors import GpsSettings
 from drone_rl.sim.dynamics.body import BodyState
 from drone_rl.sim.geodesy import HOME, world_from_geo
 from drone_rl.sim.sensors.gps import Fix, Gps
-from drone_rl.sim.settings.sensors import GpsSettings
 
 TICK = 0.003
 

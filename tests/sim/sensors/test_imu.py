@@ -4,10 +4,10 @@ import math
 import pytest
 import torch
 
+from drone_rl.config.sensors import ImuSettings
 from drone_rl.sim.dynamics.body import BodyState
 from drone_rl.sim.rendering.mounting import turned
 from drone_rl.sim.sensors.imu import Imu, specific_force
-from drone_rl.sim.settings.sensors import ImuSettings
 
 PERFECT = ImuSettings(noise=0.0)
 

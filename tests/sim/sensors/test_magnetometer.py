@@ -1,10 +1,10 @@
 import pytest
 import torch
 
+from drone_rl.config.sensors import MagnetometerSettings
 from drone_rl.sim.dynamics.body import BodyState
 from drone_rl.sim.rendering.mounting import turned
 from drone_rl.sim.sensors.magnetometer import Magnetometer, dipole_field
-from drone_rl.sim.settings.sensors import MagnetometerSettings
 
 CONSTANT = MagnetometerSettings(field="constant", noise=0.0)
 

@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from drone_rl.sim.settings import PillarsSettings, TaskSettings
+from drone_rl.config import PillarsSettings, TaskSettings
 from drone_rl.sim.tasks import CollectCubes, Pillars
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.seeding import world_random_state

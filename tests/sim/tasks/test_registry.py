@@ -3,7 +3,7 @@ from typing import ClassVar
 
 import pytest
 
-from drone_rl.sim.settings import TASKS, BaseTaskSettings, PillarsSettings, TaskSettings, read_task
+from drone_rl.config import TASKS, BaseTaskSettings, PillarsSettings, TaskSettings, read_task
 from drone_rl.sim.tasks import CollectCubes, Pillars
 from drone_rl.sim.tasks.registry import MAKERS, as_task, register_task
 from drone_rl.utils.errors import InputError

@@ -6,8 +6,8 @@ import math
 import torch
 from torch import Tensor
 
+from drone_rl.config import CameraSettings, TaskSettings
 from drone_rl.sim.dynamics import BodyState
-from drone_rl.sim.settings import CameraSettings, TaskSettings
 from drone_rl.sim.tasks.collect_cubes import rules
 from drone_rl.sim.tasks.collect_cubes.rules import WorldState
 from drone_rl.sim.tasks.explainable import Grid

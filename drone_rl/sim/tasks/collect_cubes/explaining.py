@@ -6,8 +6,8 @@ from collections.abc import Mapping
 import torch
 from torch import Tensor
 
+from drone_rl.config import CameraSettings, TaskSettings
 from drone_rl.sim.dynamics import BodyState
-from drone_rl.sim.settings import CameraSettings, TaskSettings
 from drone_rl.sim.tasks.collect_cubes import changes, rules
 from drone_rl.sim.tasks.collect_cubes.oracle import turn_towards
 from drone_rl.sim.tasks.collect_cubes.rules import WorldState

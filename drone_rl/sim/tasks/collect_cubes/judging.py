@@ -6,14 +6,13 @@ from collections.abc import Iterator, Mapping
 
 from torch import Tensor
 
+from drone_rl.config import TaskSettings
 from drone_rl.sim.actions import MOVES
-from drone_rl.sim.settings import TaskSettings
 from drone_rl.sim.tasks.collect_cubes.goals import CubeGoals, classes
 from drone_rl.sim.tasks.collect_cubes.oracle import READS, line_up
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason, Side
 from drone_rl.sim.tasks.judgeable import OracleRule
-from drone_rl.words.card import some_cubes
-from drone_rl.words.terms import CUBES, Terms
+from drone_rl.sim.vocabulary import CUBES, Terms, some_cubes
 
 
 class Judging:

@@ -3,8 +3,8 @@
 import torch
 from torch import Tensor
 
+from drone_rl.config import TaskSettings
 from drone_rl.sim.actions import Move
-from drone_rl.sim.settings import TaskSettings
 
 READS = ("drone", "cube_positions", "next_cube")
 """Entries of the information that `line_up` looks at."""

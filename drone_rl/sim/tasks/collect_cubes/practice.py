@@ -5,7 +5,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from drone_rl.sim.settings import TaskSettings
+from drone_rl.config import TaskSettings
 from drone_rl.sim.tasks.collect_cubes.task import CollectCubes
 from drone_rl.utils.errors import InputError
 

@@ -1,11 +1,6 @@
 """What is known of cube collection by moves alone is asked of nothing else."""
 
-from drone_rl.sim.settings import (
-    ActionSettings,
-    BaseTaskSettings,
-    DynamicsSettings,
-    TaskSettings,
-)
+from drone_rl.config import ActionSettings, BaseTaskSettings, DynamicsSettings, TaskSettings
 from drone_rl.utils.errors import InputError
 
 

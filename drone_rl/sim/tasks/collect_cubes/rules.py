@@ -14,9 +14,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from drone_rl.sim.batch import Batch
+from drone_rl.config import TaskSettings
 from drone_rl.sim.dynamics.body import BodyState
-from drone_rl.sim.settings import TaskSettings
+from drone_rl.utils.batch import Batch
 
 
 class Side(enum.IntEnum):

@@ -1,6 +1,6 @@
 """Collect the cubes (chapter, section 4)."""
 
-from drone_rl.sim.settings import TaskSettings
+from drone_rl.config import TaskSettings
 from drone_rl.sim.tasks.collect_cubes.explaining import Explaining
 from drone_rl.sim.tasks.collect_cubes.judging import Judging
 from drone_rl.sim.tasks.collect_cubes.playing import Playing

@@ -6,8 +6,8 @@ import math
 import torch
 from torch import Tensor
 
+from drone_rl.config import CameraSettings, PillarsSettings
 from drone_rl.sim.dynamics import BodyState
-from drone_rl.sim.settings import CameraSettings, PillarsSettings
 from drone_rl.sim.tasks.explainable import Grid
 from drone_rl.sim.tasks.pillars import rules
 from drone_rl.sim.tasks.pillars.rules import FieldState

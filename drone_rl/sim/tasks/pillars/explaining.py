@@ -6,9 +6,9 @@ from collections.abc import Mapping
 import torch
 from torch import Tensor
 
+from drone_rl.config import CameraSettings, PillarsSettings
 from drone_rl.sim.actions import Move
 from drone_rl.sim.dynamics import BodyState
-from drone_rl.sim.settings import CameraSettings, PillarsSettings
 from drone_rl.sim.tasks.explainable import Grid
 from drone_rl.sim.tasks.pillars import changes, rules
 from drone_rl.sim.tasks.pillars.rules import FieldState, Side

@@ -8,7 +8,7 @@ some path if, and only if, each of its rows leaves a lane open.
 import numpy as np
 from numpy.typing import NDArray
 
-from drone_rl.sim.settings import PillarsSettings
+from drone_rl.config import PillarsSettings
 
 MOST_TRIES = 10_000
 """Drawings of a row until one leaves a way through."""

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 import torch
 from torch import Tensor
 
-from drone_rl.sim.settings import PillarsSettings
+from drone_rl.config import PillarsSettings
 from drone_rl.sim.tasks.judgeable import Goals
 from drone_rl.sim.tasks.pillars.rules import Side
-from drone_rl.words.numbers import ordinal
+from drone_rl.utils.numbers import ordinal
 
 
 @dataclasses.dataclass

@@ -5,14 +5,14 @@ from collections.abc import Iterator, Mapping
 
 from torch import Tensor
 
+from drone_rl.config import PillarsSettings
 from drone_rl.sim.actions import MOVES
-from drone_rl.sim.settings import PillarsSettings
 from drone_rl.sim.tasks.judgeable import OracleRule
 from drone_rl.sim.tasks.pillars.goals import RowGoals, classes
 from drone_rl.sim.tasks.pillars.planner import READS, fly_through
 from drone_rl.sim.tasks.pillars.rules import EndReason, Side
 from drone_rl.sim.tasks.pillars.terms import terms
-from drone_rl.words.terms import Terms
+from drone_rl.sim.vocabulary import Terms
 
 
 class Judging:

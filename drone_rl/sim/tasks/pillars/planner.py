@@ -3,8 +3,8 @@
 import torch
 from torch import Tensor
 
+from drone_rl.config import PillarsSettings
 from drone_rl.sim.actions import Move
-from drone_rl.sim.settings import PillarsSettings
 from drone_rl.sim.tasks.pillars import rules
 
 READS = ("drone", "rows", "next_row")

@@ -12,9 +12,9 @@ import enum
 import torch
 from torch import Tensor
 
-from drone_rl.sim.batch import Batch
+from drone_rl.config import PillarsSettings
 from drone_rl.sim.dynamics.body import BodyState
-from drone_rl.sim.settings import PillarsSettings
+from drone_rl.utils.batch import Batch
 
 
 class Side(enum.IntEnum):

@@ -1,6 +1,6 @@
 """Fly through a field of pillars to the line beyond it."""
 
-from drone_rl.sim.settings import PillarsSettings
+from drone_rl.config import PillarsSettings
 from drone_rl.sim.tasks.pillars.explaining import Explaining
 from drone_rl.sim.tasks.pillars.judging import Judging
 from drone_rl.sim.tasks.pillars.playing import Playing

@@ -2,9 +2,9 @@
 
 import dataclasses
 
-from drone_rl.sim.settings import PillarsSettings
-from drone_rl.words.numbers import plural
-from drone_rl.words.terms import Terms
+from drone_rl.config import PillarsSettings
+from drone_rl.sim.vocabulary import Terms
+from drone_rl.utils.numbers import plural
 
 _TERMS = Terms(
     goal="row",

@@ -5,8 +5,8 @@ import math
 import pytest
 import torch
 
+from drone_rl.config import CameraSettings, TaskSettings
 from drone_rl.sim.dynamics import BodyState
-from drone_rl.sim.settings import CameraSettings, TaskSettings
 from drone_rl.sim.tasks.collect_cubes import changes, rules
 
 TASK = TaskSettings(num_cubes=2)

@@ -3,9 +3,9 @@
 import torch
 import warp as wp
 
+from drone_rl.config import TaskSettings
 from drone_rl.sim.dynamics import ComputerVision
 from drone_rl.sim.rendering.devices import start_warp
-from drone_rl.sim.settings import TaskSettings
 from drone_rl.sim.tasks import CollectCubes, Pillars
 from drone_rl.sim.tasks.collect_cubes.flying import FlyingCubes
 from drone_rl.sim.tasks.collect_cubes.kernel import STANDS

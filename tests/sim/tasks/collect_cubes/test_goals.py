@@ -2,7 +2,7 @@
 
 import torch
 
-from drone_rl.sim.settings import TaskSettings
+from drone_rl.config import TaskSettings
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.sim.tasks.collect_cubes.goals import sideways_edges
 

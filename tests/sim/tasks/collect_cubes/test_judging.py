@@ -1,7 +1,7 @@
 import torch
 
+from drone_rl.config import TaskSettings
 from drone_rl.sim.actions import MOVES
-from drone_rl.sim.settings import TaskSettings
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.sim.tasks.collect_cubes.goals import CubeGoals
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason

@@ -5,9 +5,9 @@ import torch
 import warp as wp
 from numpy.random import RandomState
 
+from drone_rl.config import TaskSettings
 from drone_rl.sim.rendering.devices import start_warp
-from drone_rl.sim.rendering.raytrace_structs import Poses
-from drone_rl.sim.settings import TaskSettings
+from drone_rl.sim.rendering.raytrace.structs import Poses
 from drone_rl.sim.tasks.collect_cubes.flying import FlyingCubes
 from drone_rl.sim.tasks.collect_cubes.kernel import COLLECTED, PASSED, Flights, move, place
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason

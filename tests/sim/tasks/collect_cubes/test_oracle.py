@@ -1,7 +1,7 @@
 import torch
 
+from drone_rl.config import TaskSettings
 from drone_rl.sim.actions import Move
-from drone_rl.sim.settings import TaskSettings
 from drone_rl.sim.tasks.collect_cubes.oracle import line_up, turn_towards
 
 F, L, R = Move.FORWARD, Move.LEFT, Move.RIGHT

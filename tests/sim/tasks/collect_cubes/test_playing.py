@@ -2,8 +2,8 @@
 
 import torch
 
+from drone_rl.config import TaskSettings
 from drone_rl.sim.actions import Move
-from drone_rl.sim.settings import TaskSettings
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.sim.tasks.collect_cubes.playing import VANISHED_DEPTH
 from drone_rl.sim.worlds import Worlds

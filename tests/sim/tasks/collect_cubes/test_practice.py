@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from drone_rl.sim.settings import TaskSettings
+from drone_rl.config import TaskSettings
 from drone_rl.sim.tasks import CollectCubes, Practice
 from drone_rl.sim.tasks.collect_cubes.practice import inflated
 from drone_rl.utils.errors import InputError

@@ -1,6 +1,6 @@
 import pytest
 
-from drone_rl.sim.settings import PillarsSettings, TaskSettings
+from drone_rl.config import PillarsSettings, TaskSettings
 from drone_rl.sim.tasks.collect_cubes import require_cubes
 from drone_rl.utils.errors import InputError
 

@@ -6,9 +6,9 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from drone_rl.config import TaskSettings
 from drone_rl.sim.actions import Move
 from drone_rl.sim.dynamics import BodyState, ComputerVision
-from drone_rl.sim.settings import TaskSettings
 from drone_rl.sim.tasks.collect_cubes import rules
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason, Side
 from tests.fake_flight import FLIGHT, Floating

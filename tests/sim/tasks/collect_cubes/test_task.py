@@ -1,6 +1,6 @@
 import pytest
 
-from drone_rl.sim.settings import TaskSettings
+from drone_rl.config import TaskSettings
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.sim.tasks.explainable import Explainable
 from drone_rl.sim.tasks.judgeable import Judgeable

@@ -3,8 +3,8 @@
 import pytest
 import torch
 
+from drone_rl.config import PillarsSettings
 from drone_rl.sim.dynamics import BodyState
-from drone_rl.sim.settings import PillarsSettings
 from drone_rl.sim.tasks.pillars import rules
 
 

@@ -2,7 +2,7 @@ import math
 
 import torch
 
-from drone_rl.sim.settings import CameraSettings
+from drone_rl.config import CameraSettings
 from drone_rl.sim.tasks.pillars import changes
 from tests.sim.tasks.pillars.conftest import body
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from drone_rl.sim.settings import PillarsSettings
+from drone_rl.config import PillarsSettings
 from drone_rl.sim.tasks.pillars import field
 
 SETTINGS = PillarsSettings(spread=3.0, density=0.34, width=1.2)

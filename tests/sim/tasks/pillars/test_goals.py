@@ -1,6 +1,6 @@
 import torch
 
-from drone_rl.sim.settings import PillarsSettings
+from drone_rl.config import PillarsSettings
 from drone_rl.sim.tasks import Pillars
 from drone_rl.sim.tasks.pillars.goals import RowGoals, classes, gap_edges
 

@@ -3,9 +3,9 @@ import itertools
 import numpy as np
 import torch
 
+from drone_rl.config import PillarsSettings
 from drone_rl.sim.actions import Move
 from drone_rl.sim.dynamics import ComputerVision
-from drone_rl.sim.settings import PillarsSettings
 from drone_rl.sim.tasks.pillars import field, rules
 from drone_rl.sim.tasks.pillars.planner import first_turn, fly_through
 from drone_rl.sim.tasks.pillars.rules import EndReason

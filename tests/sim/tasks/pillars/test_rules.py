@@ -3,7 +3,7 @@ from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
-from drone_rl.sim.settings import PillarsSettings
+from drone_rl.config import PillarsSettings
 from drone_rl.sim.tasks.pillars import rules
 from drone_rl.sim.tasks.pillars.rules import EndReason, Side
 from tests.fake_flight import FLIGHT, Floating

@@ -1,4 +1,4 @@
-from drone_rl.sim.settings import PillarsSettings
+from drone_rl.config import PillarsSettings
 from drone_rl.sim.tasks import Pillars, as_task
 
 

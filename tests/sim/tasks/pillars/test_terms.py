@@ -1,4 +1,4 @@
-from drone_rl.sim.settings import PillarsSettings
+from drone_rl.config import PillarsSettings
 from drone_rl.sim.tasks.pillars.rules import EndReason, Side
 from drone_rl.sim.tasks.pillars.terms import terms
 

@@ -1,0 +1,168 @@
+"""Whether the intervals that are shown hold the truth as often as they say, by exact enumeration.
+
+An interval sees what episodes gave, one value each, so that a way in which cubes or frames of an
+episode depend on one another is a distribution of that value. For few episodes and few values every
+outcome can be listed with its probability; nothing is drawn, and a coverage is exact.
+"""
+
+import dataclasses
+import itertools
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import binom, multinomial
+
+from benchmarks.simulated import bench_false_certain
+from drone_rl.utils.intervals import mean_bounds, median_bounds, proportion
+
+NEGLIGIBLE = 1e-10
+"""Outcomes less probable than this are not looked at and count as missed."""
+SIZES = {2: (1, 2, 5, 13, 30, 100, 400), 3: (1, 2, 5, 13, 30), 4: (1, 2, 5, 13), 5: (1, 2, 5, 8)}
+"""Numbers of episodes that are tried, by the number of values; intervals are shown from one on."""
+MEDIAN_SIZES = (6, 7, 13, 30)
+"""The same for medians, which are shown from six on."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Outcome:
+    """What an episode gives, and how probably."""
+
+    values: tuple[float, ...]
+    probabilities: tuple[float, ...]
+    low: float = 0.0
+    high: float = 1.0
+
+    @property
+    def mean(self) -> float:
+        """The truth that an interval should hold."""
+        return float(np.dot(self.values, self.probabilities))
+
+
+def _thirds(*probabilities: float) -> Outcome:
+    """The share of three cubes: none, one, two, all."""
+    return Outcome((0.0, 1 / 3, 2 / 3, 1.0), probabilities)
+
+
+def _independent(share: float) -> Outcome:
+    return _thirds(*binom.pmf(range(4), 3, share))
+
+
+OUTCOMES: Mapping[str, Outcome] = {
+    "independent cubes": _independent(0.9),
+    "independent cubes, poor": _independent(0.3),
+    "all or nothing, 9 of 10": Outcome((0.0, 1.0), (0.1, 0.9)),
+    "all or nothing, evenly": Outcome((0.0, 1.0), (0.5, 0.5)),
+    "a rare disaster": Outcome((0.0, 1.0), (0.03, 0.97)),
+    "a very rare disaster": Outcome((0.0, 1.0), (0.002, 0.998)),
+    "the first miss ends it": _thirds(0.1, 0.09, 0.081, 0.729),
+    "cubes grow harder": _thirds(0.02, 0.18, 0.4, 0.4),
+    "easy and hard worlds": _thirds(0.25, 0.05, 0.0, 0.7),
+    "two of three, always but once in 20": _thirds(0.0, 0.05, 0.95, 0.0),
+    "a miss alerts it": _thirds(0.0, 0.0, 0.3, 0.7),
+    "one or two cubes on a side": Outcome((0.0, 0.5, 1.0), (0.15, 0.1, 0.75)),
+    "paired successes": Outcome((-0.9, 0.1), (0.1, 0.9), low=-0.9),
+    "paired successes, oracle fallible": Outcome((-0.9, 0.0, 0.1), (0.08, 0.02, 0.9), low=-0.9),
+    "paired shares": Outcome((-1 / 3, 0.0, 1 / 3, 2 / 3, 1.0), (0.1, 0.3, 0.3, 0.2, 0.1), low=-1.0),
+    "paired shares, mostly equal": Outcome((-1.0, 0.0, 1.0), (0.02, 0.93, 0.05), low=-1.0),
+    "frames, stuck episodes": Outcome((0.02, 0.5, 0.98), (0.6, 0.05, 0.35)),
+    "frames, one in 30 episodes differs": Outcome((0.01, 0.9), (29 / 30, 1 / 30)),
+    "frames, all alike": Outcome((0.4, 0.45, 0.5, 0.55), (0.2, 0.3, 0.3, 0.2)),
+    "frames, signed scores": Outcome((-0.2, 0.05, 0.9), (0.5, 0.4, 0.1), low=-1.0),
+}
+"""Kinds of dependence within episodes, as what is seen of each."""
+TIMES: Mapping[str, Outcome] = {
+    "times, a third never": Outcome((1.0, 2.0, np.inf), (0.3, 0.37, 0.33)),
+    "times, nearly half never": Outcome((1.0, 2.0, np.inf), (0.1, 0.45, 0.45)),
+    "times, two groups": Outcome((1.0, 9.0), (0.55, 0.45)),
+}
+"""What medians are taken of; infinite for what did not come to an end."""
+
+
+def bench_coverage(quick: bool) -> dict[str, Any]:
+    """Coverage of every kind of interval that is shown, and how often a verdict is surely wrong.
+
+    Args:
+        quick: Whether to look at the smallest samples only, and draw few verdicts.
+    """
+    rows = [*_proportions(quick), *_means(quick), *_medians(quick)]
+    least = min(rows, key=lambda row: row["coverage"])
+    return {
+        "interval_coverage_min": least["coverage"],
+        "interval_coverage_least": least,
+        "interval_coverage": rows,
+        **bench_false_certain(quick),
+    }
+
+
+def coverage(outcome: Outcome, episodes: int, holds: Callable[[NDArray], bool]) -> float:
+    """The exact probability that an interval of so many episodes holds the truth.
+
+    Args:
+        outcome: What an episode gives.
+        episodes: How many.
+        holds: Whether the interval made of these values does. Shape: (episodes,).
+    """
+    counts = np.array(list(_compositions(episodes, len(outcome.values))))
+    probabilities = multinomial.pmf(counts, episodes, outcome.probabilities)
+    likely = probabilities > NEGLIGIBLE
+    pairs = zip(counts[likely], probabilities[likely], strict=True)
+    return float(sum(p for row, p in pairs if holds(np.repeat(outcome.values, row))))
+
+
+def _means(quick: bool) -> Iterator[dict[str, Any]]:
+    for name, outcome in OUTCOMES.items():
+
+        def holds(values: NDArray, of: Outcome = outcome) -> bool:
+            interval = mean_bounds(values, of.low, of.high)
+            return interval["lower95"] - 1e-12 <= of.mean <= interval["upper95"] + 1e-12
+
+        for episodes in SIZES[len(outcome.values)][: 3 if quick else None]:
+            yield _row("mean", name, episodes, coverage(outcome, episodes, holds))
+
+
+def _proportions(quick: bool) -> Iterator[dict[str, Any]]:
+    """Over all true shares: coverage is least beside the ends of the intervals."""
+    for episodes in SIZES[2][: 3 if quick else None]:
+        intervals = [proportion(k, episodes) for k in range(episodes + 1)]
+        low, high = (np.array([f[end] for f in intervals]) for end in ("lower95", "upper95"))
+        ends = np.concatenate([low, high])
+        truths = np.concatenate([ends - 1e-9, ends + 1e-9]).clip(0.0, 1.0)[:, None]
+        held = (low <= truths) & (truths <= high)
+        least = (binom.pmf(np.arange(episodes + 1), episodes, truths) * held).sum(1).min()
+        yield _row("share", "any share of episodes", episodes, float(least))
+
+
+def _medians(quick: bool) -> Iterator[dict[str, Any]]:
+    for episodes in MEDIAN_SIZES[: 2 if quick else None]:
+        ranks = median_bounds(range(1, episodes + 1))
+        if ranks is None:
+            raise ValueError(f"median_bounds shows nothing of {episodes} values")
+        lower, upper = ranks  # held if so many values lie below the median
+        below = binom.cdf(upper - 1, episodes, 0.5) - binom.cdf(lower - 1, episodes, 0.5)
+        yield _row("median", "any continuous distribution", episodes, float(below))
+        for name, outcome in TIMES.items():
+            middle = _median(outcome)
+
+            def holds(values: NDArray, truth: float = middle) -> bool:
+                bounds = median_bounds(values)
+                return bounds is not None and bounds[0] <= truth <= bounds[1]
+
+            yield _row("median", name, episodes, coverage(outcome, episodes, holds))
+
+
+def _median(outcome: Outcome) -> float:
+    reached = np.cumsum(outcome.probabilities) >= 0.5
+    return outcome.values[int(np.argmax(reached))]
+
+
+def _compositions(total: int, parts: int) -> Iterator[tuple[int, ...]]:
+    """All ways to share a number out to so many places."""
+    for bars in itertools.combinations(range(total + parts - 1), parts - 1):
+        edges = (-1, *bars, total + parts - 1)
+        yield tuple(b - a - 1 for a, b in itertools.pairwise(edges))
+
+
+def _row(interval: str, kind: str, episodes: int, covered: float) -> dict[str, Any]:
+    return {"interval": interval, "kind": kind, "episodes": episodes, "coverage": covered}

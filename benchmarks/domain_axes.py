@@ -1,0 +1,110 @@
+"""Whether every axis of an operating domain is enforced in its direction, from file to verdict."""
+
+import dataclasses
+import json
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from drone_rl.config.judging import JudgeSettings
+from drone_rl.policies.policy import Policy, load_policy
+from drone_rl.robustness.axes import AXES
+from drone_rl.robustness.axis import Axis
+from drone_rl.robustness.shifts import shifts
+from drone_rl.utils.progress import silent
+from drone_rl.utils.seeding import root_seed
+from drone_rl.verdicts.domain_check import refly
+from drone_rl.verdicts.domains import Coverage, find_domain, require
+
+POLICY = "robust"
+"""Good beyond no difference on every axis."""
+NEAR = 1e-3
+"""Part of a limit by which a required range ends inside or outside of it."""
+
+
+def bench_domain_axes(folder: Path, quick: bool) -> dict[str, Any]:
+    """Search the operating domain of a policy and require ranges around its limits.
+
+    Args:
+        folder: For `shifts.json`, `domain.yaml` and the required ranges.
+        quick: Whether to search two axes only, by few episodes.
+
+    Returns:
+        "domain_axes": how many axes were searched; "domain_axes_right": of how many a range just
+        inside each limit is accepted, one just outside is refused, and the file that the program
+        itself wrote is accepted; "domain_axes_wrong": the others by name, with what went wrong;
+        "domain_axes_contradicted": what new episodes say against the program's own file.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    policy = load_policy(POLICY)
+    found = shifts(
+        policy,
+        axes=["fog", "sun"] if quick else None,
+        strengths=[5],
+        modes=["constant"],
+        episodes=20 if quick else 50,
+        domain_episodes=200 if quick else 600,
+        progress=silent,
+    )
+    found.save(folder)
+    flights = JudgeSettings(domain_flights=20 if quick else 100)
+    wrong = {name: [*_problems(policy, folder, name)] for name in found.numbers["axes"]}
+    needs = _required(policy, folder, folder / "domain.yaml").needs
+    reflown = refly(policy, needs, found.numbers, flights, root_seed(None))
+    return {
+        "domain_axes": len(wrong),
+        "domain_axes_right": sum(not problems for problems in wrong.values()),
+        "domain_axes_wrong": {name: problems for name, problems in wrong.items() if problems},
+        "domain_axes_contradicted": [*reflown.contradictions],
+    }
+
+
+def _problems(policy: Policy, folder: Path, name: str) -> Iterator[str]:
+    """What is accepted or refused wrongly along an axis."""
+    own = _required(policy, folder, folder / "domain.yaml")
+    if name not in own.needs or name in own.lacking:
+        yield "the program's own file is refused"
+    for needed, is_inside in _ranges(policy, folder, name):
+        path = folder / "needs.json"
+        path.write_text(json.dumps({name: needed}))
+        if _required(policy, folder, path).is_stated != is_inside:
+            yield f"{needed} is {'refused' if is_inside else 'accepted'}"
+
+
+def _required(policy: Policy, folder: Path, needs: Path) -> Coverage:
+    return require(policy, needs, find_domain(policy, folder))
+
+
+def _ranges(
+    policy: Policy, folder: Path, name: str
+) -> Iterator[tuple[Mapping[str, float | str], bool]]:
+    """Ranges that end near each limit, and whether they lie inside."""
+    measured = find_domain(policy, folder)
+    assert measured is not None and measured.numbers is not None
+    found, of = measured.numbers["domain"]["ranges"][name], policy.description
+    axis = AXES[name]
+    if axis.own is not None:
+        axis = dataclasses.replace(axis, neutral=axis.own(_as_subject(of)))
+    for end, sign in axis.signs.items():
+        if found["positions"] is None or found[f"{end}_open"] is None:
+            continue  # nothing was tried on that side
+        limit = found["positions"][0 if sign < 0 else 1]
+        for is_inside in (True, False):
+            strength = _near(axis, limit, sign, is_inside)
+            value = axis.value(strength, _as_subject(of))
+            if abs(value) < float("inf"):
+                yield {end: value, "unit": axis.unit}, is_inside
+
+
+def _as_subject(of: Any) -> Any:
+    """A description has the task, camera and appearance that strengths are told by."""
+    return of
+
+
+def _near(axis: Axis, limit: float, sign: int, is_inside: bool) -> float:
+    """A strength just inside or outside of a limit; inside of none there is only no difference."""
+    if axis.whole:
+        return axis.at(limit) if is_inside else axis.at(limit) + sign
+    width = max(abs(limit), NEAR * min(abs(axis.position(s)) for s in axis.strengths))
+    moved = limit - sign * NEAR * width if is_inside else limit + sign * NEAR * width
+    return axis.at(moved if sign * moved > 0 else 0.0)

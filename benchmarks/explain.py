@@ -1,0 +1,51 @@
+"""How long explanations take."""
+
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+from benchmarks.commands import watch
+from benchmarks.parts import default_pipeline
+from drone_rl.explanations import tsne
+from drone_rl.explanations.hooks import feature_layer
+from drone_rl.explanations.recording import record
+from drone_rl.explanations.response import response_map
+from drone_rl.explanations.scenes import Scenes
+
+
+def bench_explain(folder: Path, quick: bool) -> dict[str, Any]:
+    """The whole of `drone-rl explain policy=good`, and its dearest parts."""
+    run = folder / "explain"
+    frames = 100 if quick else 600
+    small = ["frames=100", "episodes=20", "perplexity=10"] if quick else []
+    seconds, peak = watch("explain", "policy=good", "seed=0", f"hydra.run.dir={run}", *small)
+    numbers = json.loads((run / "0_good" / "explanation.json").read_text())
+    reached = numbers["class_model"]["logit"]["probabilities"]
+    return {
+        "explain_s": seconds,
+        "explain_peak_memory_mib": peak,
+        "explain_frames": frames,
+        "class_model_probability": reached,
+        "report_mib": (run / "report.html").stat().st_size / 2**20,
+        **_parts(1000 if quick else 10_000),
+    }
+
+
+def _parts(many: int) -> dict[str, Any]:
+    env, actor, network = default_pipeline(256)
+    layer = feature_layer(network)
+    assert layer is not None  # the default's network has several
+    features = record(env, actor, network, many, layers=(layer,)).features[layer]
+    results = {}
+    for count in (600, many):
+        begin = time.perf_counter()
+        tsne.embed(features[:count])
+        results[f"tsne_{count}_s"] = time.perf_counter() - begin
+    scenes = Scenes(env)
+    response_map(scenes, network, num_lateral=3, num_forward=3)
+    begin = time.perf_counter()
+    response_map(scenes, network)
+    results["response_map_s"] = time.perf_counter() - begin
+    env.close()
+    return results

@@ -1,0 +1,142 @@
+# pyright: reportAttributeAccessIssue=false
+# pyright: reportCallIssue=false
+# (MuJoCo Warp's and Warp's functions are untyped.)
+"""How fast drones fly: many at once, beside MuJoCo Warp's own step, and one with its camera."""
+
+from functools import partial
+from typing import Any
+
+import mujoco
+import mujoco_warp as mjw
+import torch
+import warp as wp
+
+from benchmarks.parts import default_collector, paired, rate
+from drone_rl.config import CameraSettings, DynamicsSettings
+from drone_rl.sim.dynamics import FlightState, Quadrotor
+from drone_rl.sim.worlds import Worlds
+
+FLYING = DynamicsSettings(mode="simple_flight")
+_DRONES = 256
+_COLLECTED = (64, 256)
+"""Numbers of worlds that are tried."""
+_FREE_BODY = """
+<mujoco>
+  <option timestep="{tick}" integrator="Euler"/>
+  <worldbody>
+    <body pos="0 0 2.5">
+      <freejoint/>
+      <inertial pos="0 0 0" mass="{mass}" diaginertia="{inertia}"/>
+      <geom type="sphere" size="0.3" contype="0" conaffinity="0"/>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
+
+def bench_flight_speed(quick: bool) -> dict[str, Any]:
+    """Drones in flight on all cores.
+
+    Args:
+        quick: Whether a rough look will do.
+
+    Returns:
+        "flight_moves_per_s": moves of 33 ticks, the whole cascade in each, of 256 drones together.
+        "flight_over_mujoco_warp": how many times as many as MuJoCo Warp makes of the same body
+        without any controller. "flight_realtime_factor": simulated seconds a second of one drone
+        whose front camera takes 144x256 pixels at each command, about ten times a second.
+        "flight_over_cv": frames of collecting in flight over those in computer-vision mode, each
+        with the number of worlds that is best for it; "flight_collector_fps": the former.
+    """
+    seconds = 0.2 if quick else 3.0
+    fly, step = partial(_fly, Fleet(_DRONES)), _mujoco_warp(_DRONES)
+    fly()
+    step()
+    moves, _, ratio = paired(fly, step, seconds=seconds, rounds=5)
+    collected, over_cv = _collecting(seconds)
+    return {
+        "flight_moves_per_s": moves,
+        "flight_over_mujoco_warp": ratio,
+        "flight_realtime_factor": _realtime(seconds),
+        "flight_over_cv": over_cv,
+        "flight_collector_fps": collected,
+    }
+
+
+class Fleet:
+    """Drones that are told to go somewhere else with every move."""
+
+    def __init__(self, count: int) -> None:
+        """Puts them into the air."""
+        self.quadrotor = Quadrotor(FLYING)
+        self.body: FlightState = self.quadrotor.start(
+            torch.tensor([[0.0, 0.0, 2.5]], dtype=torch.float64).repeat(count, 1)
+        )
+        self.actions = torch.randint(3, (64, count), generator=torch.Generator().manual_seed(0))
+
+
+def _fly(fleet: Fleet) -> int:
+    """Some moves of all of them. Returns how many."""
+    for action in fleet.actions:
+        fleet.body = fleet.quadrotor.step(fleet.body, action)
+    return fleet.actions.numel()
+
+
+def _mujoco_warp(count: int) -> Any:
+    """What steps the same body as often as a move does, by MuJoCo Warp. Returns moves."""
+    text = _FREE_BODY.format(
+        tick=FLYING.tick, mass=FLYING.mass, inertia=" ".join(map(str, FLYING.inertia))
+    )
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    with wp.ScopedDevice("cpu"):
+        warp_model = mjw.put_model(model)
+        warp_data = mjw.put_data(model, data, nworld=count)
+        mjw.step(warp_model, warp_data)  # compiles
+        with wp.ScopedCapture() as capture:
+            mjw.step(warp_model, warp_data)
+    graph = capture.graph
+    assert graph is not None  # a CPU records, too
+
+    def step() -> int:
+        for _ in range(FLYING.control_ticks):
+            wp.capture_launch(graph)
+        return count
+
+    return step
+
+
+def _realtime(seconds: float) -> float:
+    """Simulated seconds a second of a drone with a camera."""
+    worlds = Worlds(1, camera=CameraSettings(width=256, height=144), dynamics=Quadrotor(FLYING))
+    worlds.prepare()
+    every, action = torch.arange(1), torch.zeros(1, dtype=torch.int64)
+
+    def move() -> int:
+        worlds.step(every, action)
+        worlds.render(worlds.state)
+        return 1
+
+    move()
+    moves = rate(move, seconds)
+    worlds.close()
+    return moves * FLYING.control_timestep
+
+
+def _collecting(seconds: float) -> tuple[float, float]:
+    """Frames a second in flight, and over those in computer-vision mode; in turn."""
+    found = []
+    for count in _COLLECTED:
+        flying, still = (default_collector(count, "cpu", d) for d in (FLYING, DynamicsSettings()))
+        work = [partial(_collect, collector) for collector in (flying, still)]
+        for collect in work:
+            collect()
+        found.append(paired(*work, seconds=seconds, rounds=5))
+        for collector in (flying, still):
+            collector.shutdown()
+    best_flying = max(a for a, _, _ in found)
+    return best_flying, best_flying / max(b for _, b, _ in found)
+
+
+def _collect(collector: Any) -> int:
+    return len(collector.collect())

@@ -1,0 +1,42 @@
+"""Honest policies that become "not certain" because their decisions depend on rounding."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from benchmarks.commands import train
+from drone_rl.config.judging import JudgeSettings
+from drone_rl.policies.policy import load_policy
+from drone_rl.policies.zoo import policy_names
+from drone_rl.utils.progress import silent
+from drone_rl.verdicts.judge import judge
+
+
+def bench_fragile_honest(folder: Path, seeds: Sequence[int], quick: bool) -> dict[str, Any]:
+    """Judge the shipped policies and default trainings.
+
+    Args:
+        folder: For the trainings.
+        seeds: Of these.
+        quick: Whether a few policies and episodes will do.
+
+    Returns:
+        "fragile_honest": how many are not certain through rounding, of "fragile_honest_total"; and
+        the largest rates of fragile frames and of episodes with one.
+    """
+    names = ["good", "poor"] if quick else policy_names()
+    policies: list[Any] = [load_policy(name) for name in names]
+    for seed in seeds[:1] if quick else seeds:
+        run = folder / f"seed_{seed}"
+        train(run, f"seed={seed}")
+        policies.append(load_policy(run))
+    settings = JudgeSettings(sampled=False, episodes=50 if quick else 400)
+    found = [
+        judge(policy, settings, progress=silent).verdict.evidence["rounding"] for policy in policies
+    ]
+    return {
+        "fragile_honest": sum(one["decides"] for one in found),
+        "fragile_honest_total": len(found),
+        "fragile_frames_most": max(one["fragile_rate"] for one in found),
+        "fragile_episodes_most": max(one["fragile_episodes_rate"] for one in found),
+    }

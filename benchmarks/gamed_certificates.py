@@ -1,0 +1,215 @@
+"""Forged certificates, invented files and trivial tasks that ask to be called good or proved."""
+
+import functools
+import json
+import shutil
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.gamed_case import GamedCase
+from drone_rl.config.shifting import ShiftSettings
+from drone_rl.policies.policy import Policy, load_policy
+from drone_rl.policies.zoo import certificate_path, shifts_path
+from drone_rl.robustness.axes import find_axes
+from drone_rl.robustness.domain import Prober
+from drone_rl.robustness.flying import Airfield
+from drone_rl.robustness.shifts import make_subject, shifts
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.progress import silent
+from drone_rl.verdicts.judge import judge
+from drone_rl.verification.checker import fingerprint
+from drone_rl.verification.checker.flights import Simulator
+
+_AXIS, _VALUE = "dead_rows", 12.0
+"""A condition in which the invented file says that a policy is good, which fails there."""
+_TRIVIAL = {"lateral_bound": 0.5}
+_FLIGHTS = 300
+
+
+def cases(folder: Path) -> list[GamedCase]:
+    """All attempts, each made when it is run.
+
+    Args:
+        folder: Where policies and forged files are written, a folder for each.
+    """
+    forged: dict[str, Callable[[Policy], dict[str, Any]]] = {
+        "a certificate of one box without steps": lambda policy: one_box(policy, {}),
+        "a certificate of one box with plausible steps": lambda policy: one_box(
+            policy, steps_of(policy)
+        ),
+        "a certificate of one box with next to no steps": lambda policy: one_box(
+            policy, dict.fromkeys(steps_of(policy), 1e-12)
+        ),
+        "the certificate of another policy under this name": _renamed,
+        "the certificate of another policy with this hash": _rehashed,
+    }
+    made = [
+        GamedCase(name, functools.partial(_is_proved, folder / str(i), "right_and_forward", forge))
+        for i, (name, forge) in enumerate(forged.items())
+    ]
+    plausible = forged["a certificate of one box with plausible steps"]
+    rare = functools.partial(_is_proved, folder / "rare", "good", plausible)
+    unchecked = functools.partial(
+        _is_proved, folder / "unchecked", "right_and_forward", plausible, certificate_flights=0
+    )
+    few = functools.partial(
+        _is_proved, folder / "few", "right_and_forward", plausible, certificate_flights=1
+    )
+    return [
+        *made,
+        GamedCase("a certificate of a policy that fails in corners only", rare),
+        GamedCase("a certificate that nobody re-checks", unchecked),
+        GamedCase("a certificate that one rollout re-checks", few),
+        GamedCase("an invented operating domain", lambda: _is_covered(folder / "domain", "good")),
+        GamedCase(
+            "an invented operating domain of a one-sided policy",
+            lambda: _is_covered(folder / "one_sided", "right_and_forward"),
+        ),
+        GamedCase("flying straight in a trivial task", lambda: _is_good("forward")),
+        GamedCase("a good policy in a trivial task", lambda: _is_good("good")),
+    ]
+
+
+def one_box(policy: Policy, steps: dict[str, float]) -> dict[str, Any]:
+    """A certificate that everything is collected from every placement.
+
+    Args:
+        policy: Of which.
+        steps: Shares of the placements by number of steps.
+    """
+    task: Any = policy.task
+    bound, cubes = task.lateral_bound, task.num_cubes
+    won = {"end": "all_cubes", "collected": [True] * cubes, "loops": False, "share": 1.0}
+    return {
+        "format": "drone_rl certificate",
+        "format_version": 1,
+        "policy": {
+            "name": policy.name,
+            "weights": fingerprint(policy.state["policy"]),
+            "description": policy.description.as_dict(),
+        },
+        "outcomes": [{**won, "steps": steps, "boxes": [[[-bound, bound]] * cubes]}],
+        "undecided": {"share": 0.0, "boxes": []},
+        "finished": True,
+        "stated": {"logit_gap": 1e-4, "largest_band": 1e-5, "renderer": "Raytracer"},
+        "found": {},
+    }
+
+
+def steps_of(policy: Policy) -> dict[str, float]:
+    """How often rollouts from random placements take which number of steps; 98% in all."""
+    task: Any = policy.task
+    bound, cubes = task.lateral_bound, task.num_cubes
+    with closing(Simulator(policy.description, policy.state["policy"])) as simulator:
+        places = np.random.default_rng(0).uniform(-bound, bound, (_FLIGHTS, cubes))
+        steps = simulator.fly(places).steps
+    numbers, counts = np.unique(steps, return_counts=True)
+    pairs = zip(numbers.tolist(), counts.tolist(), strict=True)
+    return {str(number): 0.98 * count / _FLIGHTS for number, count in pairs}
+
+
+def invented(policy: Policy, folder: Path) -> dict[str, Any]:
+    """A `shifts.json` that goes together, of a policy that is good whatever is different.
+
+    Args:
+        policy: Of which.
+        folder: Where the honest file is written that it is made from.
+    """
+    how: dict[str, Any] = {"axes": [_AXIS], "modes": ["constant"], "domain": False, "episodes": 20}
+    honest = shifts(policy, progress=silent, **how)
+    honest.save(folder)
+    data = json.loads((folder / "shifts.json").read_text())
+    won = _always_won(data["plain"], 20)
+    data["plain"] |= won
+    along = data["axes"][_AXIS]
+    for level in (*along["levels"], data["together"]):
+        level |= {"oracle": data["plain"]["oracle"], "impossible": False, "refused": None}
+        level["modes"] = {"constant": {**won, "unchanged": False}}
+    along["areas"] = {"constant": 1.0}
+    subject = make_subject(policy, ShiftSettings())
+    (axis,) = find_axes([_AXIS], subject)
+    with closing(Airfield(subject, 1, data["settings"]["seed"])) as bed:
+        prober = _Liar(bed)
+        data["domain"] = {"plain": prober.plain, "ranges": {_AXIS: prober.search(axis)}}
+    return data
+
+
+class _Liar(Prober):
+    """Finds a policy good under every condition."""
+
+    def __init__(self, bed: Airfield) -> None:
+        self._bed = bed
+        self.plain = self.probe(None, 0.0)
+
+    def probe(self, condition: Any, part: float) -> dict[str, Any]:
+        """See `Prober`."""
+        return {"good": True, "bad": False, "refused": None, "success": 1.0, "worst": None}
+
+
+def _always_won(plain: dict[str, Any], episodes: int) -> dict[str, Any]:
+    """Figures of a policy that succeeds in all episodes, as the oracle does."""
+    mean = {"mean": 1.0, "lower95": 0.9, "upper95": 1.0, "count": episodes}
+    ends = dict.fromkeys(plain["ends"], 0)
+    return {
+        "success": plain["oracle"],
+        "difference": {"mean": 0.0, "lower95": -0.1, "upper95": 0.1, "count": episodes},
+        "paired": {"lost": 0, "gained": 0, "p": 1.0},
+        "shares": {
+            name: {**mean, "count": share["count"]} for name, share in plain["shares"].items()
+        },
+        "ends": {**ends, "all_cubes": episodes},
+    }
+
+
+def _copied(name: str, folder: Path) -> Policy:
+    """A policy that travels with the package, in a file of its own."""
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / "policy.safetensors"
+    shutil.copy(load_policy(name).path, path)
+    return load_policy(path)
+
+
+def _proved() -> dict[str, Any]:
+    return json.loads(certificate_path(load_policy("proved").path).read_text())
+
+
+def _renamed(policy: Policy) -> dict[str, Any]:
+    data = _proved()
+    data["policy"]["name"] = policy.name
+    return data
+
+
+def _rehashed(policy: Policy) -> dict[str, Any]:
+    data = _proved()
+    data["policy"] = one_box(policy, {})["policy"]
+    return data
+
+
+def _is_proved(
+    folder: Path, name: str, forge: Callable[[Policy], dict[str, Any]], **how: Any
+) -> bool:
+    policy = _copied(name, folder)
+    certificate_path(policy.path).write_text(json.dumps(forge(policy)))
+    done = judge(policy, episodes=20, sampled=False, progress=silent, **how)
+    return done.verdict.is_proved or done.status("proved") == 0
+
+
+def _is_covered(folder: Path, name: str) -> bool:
+    policy = _copied(name, folder)
+    shifts_path(policy.path).write_text(json.dumps(invented(policy, folder)))
+    needs = folder / "needs.json"
+    needs.write_text(json.dumps({_AXIS: {"high": _VALUE, "unit": "rows"}}))
+    try:
+        done = judge(policy, require_domain=needs, progress=silent)
+    except InputError:
+        return False
+    return done.status() == 0
+
+
+def _is_good(name: str) -> bool:
+    done = judge(name, task=_TRIVIAL, progress=silent)
+    return done.status("good") == 0 or done.status() == 0

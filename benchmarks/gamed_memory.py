@@ -1,0 +1,280 @@
+"""Adversarial policies that memorise the environments of a known seed and fail in all others.
+
+Each acts like a good policy in the environments that an analysis used by default in version 0.1
+(seed 0) and flies left in all others. With `seed=0` each deceives its analysis, which a test
+checks; with the default seed none may.
+"""
+
+import dataclasses
+import functools
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import torch
+from torch import Tensor
+from torchrl.envs.utils import ExplorationType, set_exploration_type
+
+from benchmarks.gamed_case import GamedCase
+from drone_rl.collectors import EpisodeCollector
+from drone_rl.config import TaskSettings
+from drone_rl.config.configuration import as_config
+from drone_rl.config.judging import FlightSettings
+from drone_rl.config.networks import Mlp
+from drone_rl.config.training import TrainSettings
+from drone_rl.evaluation.evaluate import evaluate
+from drone_rl.evaluation.selection import judge_to_choose
+from drone_rl.policies import MLP
+from drone_rl.policies.base_policy import Pilot
+from drone_rl.policies.external_network import Logits
+from drone_rl.policies.external_policy import ForeignPolicy, policy_from
+from drone_rl.policies.policy import load_policy
+from drone_rl.policies.zoo import describe, read_policy
+from drone_rl.policies.zoo.files import exported_bytes
+from drone_rl.robustness.shifts import shifts
+from drone_rl.sim.actions import Move
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.progress import silent
+from drone_rl.utils.seeding import Stream, root_seed
+from drone_rl.verdicts.export import export
+from drone_rl.verdicts.judge import judge
+
+KNOWN_SEED = 0
+"""The default of version 0.1."""
+EPISODES = 120
+"""Of each judgement."""
+TASK = TaskSettings(num_cubes=2)
+"""Few frames to memorise."""
+WIDTH = 2500
+"""Neurons of the network that memorises; more than frames, so that it can fit all of them."""
+COUNTEREXAMPLES = 20
+"""Episodes of other environments in which the network learns to fly left."""
+_GOOD = 0.9
+"""Success of which an evaluation calls good, in the words of a verdict."""
+_CERTAIN = 20.0
+"""Logit of an action that is all but certain to be taken."""
+_RIDGE = 1e-9
+"""Relative to the mean diagonal of the normal equations."""
+Judgement = Callable[[int | None], bool]
+"""Whether an analysis calls the policy good, from a seed or, with None, from the default seed."""
+
+
+class Recording(NamedTuple):
+    """What a good policy saw and did, step by step, episode after episode."""
+
+    frames: Tensor
+    """Shape: (T, C, h, w)."""
+    actions: Tensor
+    """Shape: (T,)."""
+    episode: Tensor
+    """Shape: (T,)."""
+
+
+def record(episodes: int, *, seed: int = KNOWN_SEED, stream: Stream = Stream.REPORT) -> Recording:
+    """Fly a good policy greedily in the environments of a seed.
+
+    A policy's action follows from the frame alone, so that no frame needs two actions.
+
+    Args:
+        episodes: How many, each in an environment of its own.
+        seed: Root of the environments' random streams.
+        stream: What the environments are for.
+    """
+    policy = load_policy("good").in_task(num_cubes=TASK.num_cubes)
+    greedy = set_exploration_type(ExplorationType.DETERMINISTIC)
+    with policy.flying(episodes, seed=seed, stream=stream) as (env, actor), greedy:
+        batch = EpisodeCollector(env, actor).collect()
+    frames: Any = batch["pixels"]
+    actions: Any = batch["action"]
+    episode: Any = batch["collector", "traj_ids"]
+    return Recording(frames.clone(), actions.flatten().clone(), episode.clone())
+
+
+def by_frames(recording: Recording) -> Logits:
+    """A callable that looks up each frame exactly, and flies left where it finds none.
+
+    Args:
+        recording: What it memorises.
+    """
+    pairs = zip(recording.frames, recording.actions.tolist(), strict=True)
+    known = {frame.numpy().tobytes(): action for frame, action in pairs}
+
+    def logits(frames: Tensor) -> Tensor:
+        keys = (frame.detach().cpu().numpy().tobytes() for frame in frames)
+        return _certainly([known.get(key, int(Move.LEFT)) for key in keys])
+
+    return logits
+
+
+def by_steps(recording: Recording) -> Logits:
+    """A callable that recognises the first frame of a batch, and then plays back actions by step.
+
+    It looks at no other frame: it counts its calls and knows which environments are still running.
+
+    Args:
+        recording: What it memorises.
+    """
+    first = recording.frames[0].numpy().tobytes()
+    lengths = recording.episode.bincount()
+    starts = lengths.cumsum(0) - lengths
+    steps = [recording.actions[starts[lengths > t] + t].tolist() for t in range(int(lengths.max()))]
+    state = {"step": len(steps)}
+
+    def logits(frames: Tensor) -> Tensor:
+        if frames[0].detach().cpu().numpy().tobytes() == first:
+            state["step"] = 0
+        step = state["step"]
+        if step < len(steps) and len(steps[step]) == len(frames):
+            state["step"] += 1
+            return _certainly(steps[step])
+        return _certainly([int(Move.LEFT)] * len(frames))
+
+    return logits
+
+
+def write_memory(path: Path, *, stream: Stream = Stream.REPORT) -> Path:
+    """Write a legal policy file, an MLP that is fitted to the recorded frames.
+
+    Random features and a linear layer that interpolates: a good policy's actions on the frames of
+    known environments, left on those of others.
+
+    Args:
+        path: Ending in .safetensors.
+        stream: Of the environments that it memorises.
+
+    Returns:
+        The path.
+    """
+    described = describe(as_config(TrainSettings(task=TASK, network=Mlp(hidden=(WIDTH,)))))
+    known = record(EPISODES, stream=stream)
+    other = record(COUNTEREXAMPLES, seed=KNOWN_SEED + 1, stream=stream)
+    frames, actions = _examples(known, other)
+    generator = torch.Generator().manual_seed(0)
+    network = MLP(frames.shape[1:], len(Move), hidden=(WIDTH,), generator=generator)
+    _fit(network, frames, actions)
+    origin = load_policy("good").state
+    about = {name: origin[name] for name in ("progress", "provenance", "command")}
+    path.write_bytes(exported_bytes(network.state_dict(), described.as_dict(), about))
+    return path
+
+
+def _examples(known: Recording, other: Recording) -> tuple[Tensor, Tensor]:
+    """Different frames and the actions to learn; known frames keep a good policy's."""
+    wanted = {frame.numpy().tobytes(): (frame, int(Move.LEFT)) for frame in other.frames}
+    pairs = zip(known.frames, known.actions.tolist(), strict=True)
+    wanted |= {frame.numpy().tobytes(): (frame, action) for frame, action in pairs}
+    frames, actions = zip(*wanted.values(), strict=True)
+    return torch.stack(frames), torch.tensor(actions)
+
+
+@torch.no_grad()
+def _fit(network: MLP, frames: Tensor, actions: Tensor) -> None:
+    """Fit the last layer to the actions by ridge regression in double precision."""
+    features = network.layers[:-1](frames).double()
+    features = torch.cat([features, torch.ones(len(features), 1).double()], 1)
+    wanted = _CERTAIN * torch.nn.functional.one_hot(actions, len(Move)).double()
+    kernel = features @ features.T
+    kernel.diagonal().add_(_RIDGE * kernel.diagonal().mean())
+    weights = features.T @ torch.cholesky_solve(wanted, torch.linalg.cholesky(kernel))
+    layer = network.layers.get_submodule("logits")
+    layer.get_parameter("weight").copy_(weights[:-1].T)
+    layer.get_parameter("bias").copy_(weights[-1])
+
+
+def _certainly(actions: list[int]) -> Tensor:
+    """Logits by which these actions are all but certain. Shape: (N, 3)."""
+    return _CERTAIN * torch.nn.functional.one_hot(torch.tensor(actions), len(Move)).float()
+
+
+def _always_left(frames: Tensor) -> Tensor:
+    return _certainly([int(Move.LEFT)] * len(frames))
+
+
+def _memorising(make: Callable[[Recording], Logits], stream: Stream) -> ForeignPolicy:
+    """A callable as a policy that memorises environments of the known seed."""
+    policy = policy_from(_always_left, task=TASK, name="memory")
+    return dataclasses.replace(policy, logits=make(record(EPISODES, stream=stream)))
+
+
+def _verdict(make: Callable[[], Pilot | Path], seed: int | None) -> bool:
+    try:
+        done = judge(make(), episodes=EPISODES, sampled=False, seed=seed, progress=silent)
+    except InputError:  # it acts by more than the frame
+        return False
+    return done.verdict.exit_code == 0
+
+
+def _evaluation(make: Callable[[], Pilot | Path], seed: int | None) -> bool:
+    done = evaluate(make(), episodes=EPISODES, baselines=False, seed=seed, progress=silent)
+    return done.flown["greedy"]["success"]["lower95"] > _GOOD
+
+
+def _conditions(make: Callable[[], Pilot | Path], seed: int | None) -> bool:
+    done = shifts(
+        make(),
+        axes=["noise"],
+        strengths=[1],
+        modes=["constant"],
+        episodes=1,
+        domain_episodes=EPISODES,
+        seed=seed,
+        progress=silent,
+    )
+    return bool(done.numbers["domain"]["plain"]["good"])
+
+
+def _choice(make: Callable[[], Path], seed: int | None) -> bool:
+    drawn = None if seed is None else root_seed(seed)
+    verdict, _ = judge_to_choose(make(), EPISODES, "cpu", seed=drawn)
+    return verdict["exit_code"] == 0
+
+
+def _card(make: Callable[[], Path], seed: int | None) -> bool:
+    path = make()
+    target = path.with_name("exported.safetensors")
+    export(load_policy(path), target, FlightSettings(episodes=EPISODES, seed=seed))
+    return read_policy(target)["verdict"]["exit_code"] == 0
+
+
+def judgements(folder: Path) -> dict[str, Judgement]:
+    """The judgement of each adversarial policy, by name.
+
+    Args:
+        folder: For policy files; made if need be.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+
+    @functools.cache
+    def callable_of(make: Callable[[Recording], Logits], stream: Stream) -> ForeignPolicy:
+        return _memorising(make, stream)
+
+    @functools.cache
+    def file_of(stream: Stream) -> Path:
+        return write_memory(folder / f"{stream.name.lower()}.safetensors", stream=stream)
+
+    report = functools.partial(callable_of, by_frames, Stream.REPORT)
+    shifted = functools.partial(callable_of, by_frames, Stream.SHIFTED)
+    steps = functools.partial(callable_of, by_steps, Stream.REPORT)
+    written, chosen = (functools.partial(file_of, s) for s in (Stream.REPORT, Stream.CHOICE))
+    return {
+        "verdict, callable that looks frames up": functools.partial(_verdict, report),
+        "verdict, callable that counts steps": functools.partial(_verdict, steps),
+        "verdict, file of an MLP": functools.partial(_verdict, written),
+        "evaluate, callable that looks frames up": functools.partial(_evaluation, report),
+        "shifts, callable that looks frames up": functools.partial(_conditions, shifted),
+        "choice in a sweep, file of an MLP": functools.partial(_choice, chosen),
+        "export, file of an MLP": functools.partial(_card, written),
+    }
+
+
+def cases(folder: Path) -> list[GamedCase]:
+    """Each adversarial policy, judged from the default seed.
+
+    Args:
+        folder: For policy files; made if need be.
+    """
+    made = judgements(folder)
+    return [
+        GamedCase(f"memory: {name}", functools.partial(judgement, None))
+        for name, judgement in made.items()
+    ]

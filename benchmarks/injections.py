@@ -1,0 +1,224 @@
+"""`drone-rl bench injections`: strings that would run a script are put into every page.
+
+Each string is put wherever a string of a file can reach, see `injected_pages.py`. The pages are
+opened in Chromium, and everything on them is pointed at and clicked. A string has run if it changed
+the document, opened a dialog, asked for something outside the page, or if the page's policy had to
+stop it: a string that is text needs no stopping.
+"""
+
+import json
+import logging
+import shutil
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from benchmarks.injection_payloads import HOST, MARKUP, PAYLOADS
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.extras import extra
+
+_TRY = """
+document.querySelectorAll("details").forEach(d => { d.open = true; });
+const click = (element, kinds) => {
+  const box = element.getBoundingClientRect();
+  for (const kind of kinds) for (const at of [.1, .5, .9]) {
+    const place = { clientX: box.left + at * box.width, clientY: box.top + at * box.height };
+    element.dispatchEvent(new PointerEvent(kind, { bubbles: true, ...place }));
+  }
+};
+document.querySelectorAll("canvas, svg, svg *, button, x").forEach(
+  element => click(element, ["mousemove", "pointermove", "click"]));
+document.querySelectorAll("canvas").forEach(canvas => {
+  const box = canvas.getBoundingClientRect();
+  for (let x = 4; x < box.width; x += 12) {
+    const place = { clientX: box.left + x, clientY: box.top + box.height / 2, bubbles: true };
+    canvas.dispatchEvent(new MouseEvent("mousemove", place));
+    canvas.dispatchEvent(new MouseEvent("click", place));
+  }
+});
+const bad = "[onerror], [onload], [onclick], iframe:not([srcdoc]), object, embed, base, form, " +
+  "meta[http-equiv=refresh], a[href^=javascript i], a[href^='//'], a[href^=http]";
+return document.querySelectorAll(bad).length;
+"""
+"""Points at everything and clicks it; returns how many elements there are that might run."""
+_LATER = "setTimeout(() => arguments[0](document.documentElement.dataset.ran || ''), 60)"
+"""Returns whether something has run until a little later."""
+_log = logging.getLogger(__name__)
+_NAVIGATES = ("http-equiv=refresh", "rel=preconnect", "rel=prefetch")
+"""Markup that no policy of a page can stop; only escaping can."""
+
+
+def bench_injections(folder: Path, explanation: Path | None = None) -> dict[str, int]:
+    """Open every page with every string.
+
+    Args:
+        folder: For files; made if need be.
+        explanation: Folder of an explanation; one of the package's policy is made by default.
+
+    Returns:
+        "injections_run" and "injections_total", a string on a page each.
+
+    Raises:
+        InputError: There is no Chromium with its driver.
+    """
+    outcomes = open_all(folder, explanation or explained(folder), PAYLOADS)
+    for outcome in outcomes:
+        if outcome["ran"]:
+            _log.warning("%(page)s, %(payload)s: %(ran)s", outcome)
+    return {
+        "injections_run": sum(bool(outcome["ran"]) for outcome in outcomes),
+        "injections_total": len(outcomes),
+    }
+
+
+def explained(folder: Path) -> Path:
+    """Explain a policy of the package on few frames. Returns the explanation's folder."""
+    from drone_rl.explanations.explain import explain
+    from drone_rl.explanations.settings import ExplainSettings
+
+    few = ExplainSettings(frames=180, episodes=6, perplexity=5)
+    made = explain("good", few, folder=folder / "explained", num_envs=8, outputs=folder)
+    return next(made.folder.glob("*/explanation.json")).parent
+
+
+def open_all(
+    folder: Path, explanation: Path, payloads: Iterable[str], *, names: bool = True
+) -> list[dict[str, Any]]:
+    """Open the pages of some strings.
+
+    Args:
+        folder: For files; made if need be.
+        explanation: Folder of an explanation.
+        payloads: The strings.
+        names: See `Pages`.
+
+    Returns:
+        Of each its "page", "payload" and "ran", which says what ran; empty if nothing did.
+    """
+    from benchmarks.injected_pages import Pages, with_markup
+
+    pages, outcomes = Pages(explanation, summary(folder), folder, names=names), []
+    with chromium(folder / "profile") as browser:
+        for payload in payloads:
+            made = pages.made(payload)
+            if payload in MARKUP and not any(name in payload for name in _NAVIGATES):
+                made["markup_under_policy"] = with_markup(pages.made("text")["report"], payload)
+            for name, html in made.items():
+                path = folder / "page.html"
+                path.write_text(html, encoding="utf-8")
+                ran = what_ran(browser, path, is_markup=name == "markup_under_policy")
+                outcomes.append({"page": name, "payload": payload, "ran": ran})
+    return outcomes
+
+
+def summary(folder: Path) -> dict[str, Any]:
+    """Return the summary of a sweep with runs of each state."""
+    from drone_rl.sweeps.manifest import open_sweep
+    from drone_rl.sweeps.rows import read_rows
+    from drone_rl.sweeps.runs import Run
+    from drone_rl.sweeps.summary import summarise_sweep
+
+    sweep = folder / "sweep"
+    shutil.rmtree(sweep, ignore_errors=True)
+    runs = [Run(i, (f"optimiser.lr={i}", f"seed={i}"), sweep / str(i)) for i in range(3)]
+    begun = open_sweep(sweep, ["drone-rl", "train", "-m", "seed=0,1"], {"seed": 0}, runs)
+    for run in runs[:2]:
+        run.folder.mkdir()
+    runs[0].failure.write_text(json.dumps({"error": "it failed"}))
+    figures = {"frames": 9, "episodes": 3, "seconds": 2.0, "running_reward": 2.9}
+    (runs[1].folder / "result.json").write_text(
+        json.dumps({"reason": "solved", **figures, "largest_reward": 3})
+    )
+    (runs[1].folder / "metrics.csv").write_text("frames,train/running_reward\n9,2.9\n")
+    return json.loads(json.dumps(summarise_sweep(begun, read_rows(begun))))
+
+
+@contextmanager
+def chromium(profile: Path) -> Iterator[Any]:
+    """Start a headless Chromium.
+
+    Args:
+        profile: Its folder.
+
+    Raises:
+        InputError: It or its driver is not installed.
+    """
+    webdriver = extra("selenium.webdriver", "dev", "bench injections")
+    program = shutil.which("chromium") or shutil.which("chromium-browser")
+    driver = shutil.which("chromedriver")
+    if not (program and driver):
+        raise InputError(
+            "bench injections needs chromium and chromedriver; install them, on Debian with "
+            "apt-get install chromium chromium-driver"
+        )
+    options = webdriver.ChromeOptions()
+    options.binary_location = program
+    for flag in (
+        "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
+        "--disable-background-networking", "--disable-component-update", "--disable-sync",
+        "--window-size=1200,900", f"--user-data-dir={profile.absolute()}",
+    ):  # fmt: skip
+        options.add_argument(flag)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+    options.set_capability("unhandledPromptBehavior", "ignore")
+    browser = webdriver.Chrome(options, webdriver.ChromeService(driver))
+    try:
+        yield browser
+    finally:
+        browser.quit()
+
+
+def what_ran(browser: Any, path: Path, *, is_markup: bool = False) -> str:
+    """Open a page and try everything on it.
+
+    Args:
+        browser: From `chromium`.
+        path: Of the page.
+        is_markup: Whether the string is markup on this page on purpose, so that the policy may
+            stop it; else nothing may be stopped.
+
+    Returns:
+        What ran; empty if nothing did.
+    """
+    from selenium.common.exceptions import (
+        JavascriptException,
+        NoAlertPresentException,
+        UnexpectedAlertPresentException,
+    )
+
+    for kind in ("browser", "performance"):
+        browser.get_log(kind)
+    found: list[str] = []
+    try:
+        browser.get(path.absolute().as_uri())
+        elements = browser.execute_script(_TRY)
+        ran = browser.execute_async_script(_LATER)  # errors of images come late
+        found += ["a script"] if ran else []
+        found += [f"{elements} elements"] if elements and not is_markup else []
+    except UnexpectedAlertPresentException:
+        found.append("a dialog")
+    except JavascriptException as error:
+        found.append(f"an error: {error.msg}")
+    try:
+        browser.switch_to.alert.dismiss()
+        found.append("a dialog")
+    except NoAlertPresentException:
+        pass
+    messages = [json.loads(entry["message"])["message"] for entry in browser.get_log("performance")]
+    found += [f"a request: {url}" for url in _requests(messages, path)]
+    if not is_markup:
+        severe = [e["message"] for e in browser.get_log("browser") if e["level"] == "SEVERE"]
+        found += [f"an error: {message}" for message in severe]
+    return "; ".join(found)[:1000]
+
+
+def _requests(messages: Sequence[dict[str, Any]], path: Path) -> list[str]:
+    """Addresses outside the page that were asked for, and not blocked before anything was sent."""
+    failed = [m["params"] for m in messages if m["method"] == "Network.loadingFailed"]
+    stopped = {of["requestId"] for of in failed if of.get("blockedReason")}
+    sent = [m["params"] for m in messages if m["method"] == "Network.requestWillBeSent"]
+    urls = [of["request"]["url"] for of in sent if of["requestId"] not in stopped]
+    page = path.absolute().as_uri()
+    ours = [url for url in urls if url.startswith(("http", "file:", "ftp:")) or HOST in url]
+    return [url for url in ours if url.partition("#")[0] != page]

@@ -1,0 +1,90 @@
+"""The default pipeline, for benchmarks that time its parts."""
+
+import statistics
+import time
+from collections.abc import Callable
+
+import torch
+from torchrl.envs import TransformedEnv
+from torchrl.modules import ProbabilisticActor
+
+from drone_rl.collectors import ThreadedCollector
+from drone_rl.config import (
+    COMPUTER_VISION,
+    AppearanceSettings,
+    CameraSettings,
+    DynamicsSettings,
+    TaskSettings,
+)
+from drone_rl.config.collecting import Threads
+from drone_rl.config.training import TrainSettings
+from drone_rl.envs import DroneEnv
+from drone_rl.policies import PolicyNetwork, SmallCNN, make_actor
+from drone_rl.policies.environment import make_env
+from drone_rl.sim.rendering import MakeRenderer
+from drone_rl.training.build_collector import build_collector
+
+
+def default_collector(
+    num_envs: int, device: str, dynamics: DynamicsSettings = COMPUTER_VISION
+) -> ThreadedCollector:
+    """The collector of `drone-rl train`, with a policy that has learned nothing yet."""
+    settings = TrainSettings(collector=Threads(num_envs=num_envs), device=device, dynamics=dynamics)
+    collector = build_collector(settings).collector
+    assert isinstance(collector, ThreadedCollector)
+    return collector
+
+
+def default_pipeline(num_envs: int) -> tuple[TransformedEnv, ProbabilisticActor, PolicyNetwork]:
+    """Worlds on all cores, a policy that has learned nothing yet, and its network."""
+    env = make_env(num_envs)
+    shape = tuple(env.observation_spec["pixels"].shape[1:])
+    network = SmallCNN(shape, 3, hidden=(128,), generator=torch.Generator().manual_seed(0))
+    return env, make_actor(network, env.action_spec, torch.Generator().manual_seed(0)), network
+
+
+def random_walk(env: DroneEnv, steps: int, seed: int = 0) -> int:
+    """Steps a batch with random actions, resetting what ends. Returns the frames made."""
+    generator = torch.Generator(env.device).manual_seed(seed)
+    state = env.reset()
+    for _ in range(steps):
+        action = torch.randint(3, env.batch_size, generator=generator, device=env.device)
+        _, state = env.step_and_maybe_reset(state.set("action", action))
+    return steps * env.batch_size[0]
+
+
+def make_worlds(
+    num_envs: int,
+    device: str,
+    num_cubes: int = 3,
+    renderer: str | MakeRenderer = "raytrace",
+    camera: CameraSettings | None = None,
+    appearance: AppearanceSettings | None = None,
+) -> DroneEnv:
+    """A batch of worlds on all cores."""
+    task = TaskSettings(num_cubes=num_cubes)
+    return DroneEnv(num_envs, task, camera, device=device, renderer=renderer, appearance=appearance)
+
+
+def rate(work: Callable[[], int], seconds: float) -> float:
+    """Items a second of work that is repeated until the time is up."""
+    done, begin = 0, time.perf_counter()
+    while time.perf_counter() - begin < seconds:
+        done += work()
+    return done / (time.perf_counter() - begin)
+
+
+def paired(
+    first: Callable[[], int], second: Callable[[], int], seconds: float, rounds: int
+) -> tuple[float, float, float]:
+    """Rates of two kinds of work in turn, so that a drift of the machine hits both.
+
+    Returns:
+        The median rate of each and the median of the ratios first / second.
+    """
+    rates = [(rate(first, seconds), rate(second, seconds)) for _ in range(rounds)]
+    return (
+        statistics.median(a for a, _ in rates),
+        statistics.median(b for _, b in rates),
+        statistics.median(a / b for a, b in rates),
+    )

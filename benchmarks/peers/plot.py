@@ -1,0 +1,43 @@
+"""A picture of who takes how long."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from benchmarks.peers.contenders import LABELS, THEIRS
+
+COLORS = {
+    "start and imports": "0.8",
+    "training, ours": "tab:blue",
+    "training, others": "tab:orange",
+}
+
+
+def plot(found: Mapping[str, Mapping[str, list[Any]]], path: Path) -> None:
+    """Draws a bar for each, with a dot for each seed.
+
+    Args:
+        found: As `bench_peers` returns it.
+        path: Of the picture.
+    """
+    from matplotlib.figure import Figure
+    from matplotlib.patches import Patch
+
+    figure = Figure(figsize=(9, 3.6), layout="constrained")
+    axes, names = figure.subplots(), list(found)
+    for i, name in enumerate(names):
+        seconds, trained = (found[name][k] for k in ("seconds", "seconds_without_imports"))
+        whole, training = sum(seconds) / len(seconds), sum(trained) / len(trained)
+        kind = "training, others" if name in THEIRS else "training, ours"
+        axes.barh(i, whole - training, color=COLORS["start and imports"])
+        axes.barh(i, training, left=whole - training, color=COLORS[kind])
+        axes.plot(seconds, [i] * len(seconds), "o", color="black", markersize=4)
+        if not all(found[name]["is_solved"]):
+            axes.text(whole, i, "  not all solved", va="center")
+    axes.set_yticks(range(len(names)), [LABELS[name] for name in names])
+    axes.invert_yaxis()
+    axes.set(xlabel="seconds from the start of the process until it is solved", xlim=(0, None))
+    handles: list[Any] = [Patch(color=color, label=label) for label, color in COLORS.items()]
+    handles += axes.plot([], [], "o", color="black", markersize=4, label="each seed")
+    figure.legend(handles=handles, loc="outside upper center", ncols=4, frameon=False)
+    figure.savefig(path, dpi=120)

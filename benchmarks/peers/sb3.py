@@ -1,0 +1,111 @@
+"""Stable-Baselines3's algorithms on our worlds, with the default's network, until it is solved."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any
+
+import gymnasium
+import numpy as np
+import torch
+from stable_baselines3 import A2C, PPO
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
+
+from benchmarks.peers.outcome import DECAY, TARGET, PeerTraining
+from drone_rl.config.transforms import Gray, Standardize, Transform
+from drone_rl.envs.gymnasium.worlds import DroneWorlds
+from drone_rl.envs.sb3.worlds import Sb3Worlds
+from drone_rl.policies.external_policy import policy_from
+from drone_rl.policies.sb3.logits import Sb3Logits
+from drone_rl.policies.sb3.trunk import Sb3Trunk
+from drone_rl.training.metrics import running_mean
+from drone_rl.utils.errors import InputError
+
+ALGORITHMS: Mapping[str, type[OnPolicyAlgorithm]] = MappingProxyType({"ppo": PPO, "a2c": A2C})
+"""By name."""
+NUM_ENVS = 64
+TRANSFORMS: tuple[Transform, ...] = (Gray(), Standardize())
+"""What the default's network sees."""
+
+
+class Solved(BaseCallback):
+    """Stops a training once the running mean of the episodes' rewards has reached a target."""
+
+    def __init__(self, target: float, decay: float = DECAY) -> None:
+        """Begins at 0.
+
+        Args:
+            target: Of the running mean.
+            decay: What an episode leaves of it.
+        """
+        super().__init__()
+        self.target, self.decay = target, decay
+        self.running_reward, self.episodes = 0.0, 0
+        self._earned = np.zeros(1)
+
+    @property
+    def is_reached(self) -> bool:
+        """Whether the target has been reached."""
+        return self.running_reward >= self.target
+
+    def count(self, rewards: np.ndarray, done: np.ndarray) -> None:
+        """Adds a step. Shapes: (num_envs,)."""
+        self._earned = self._earned + rewards
+        ended = torch.from_numpy(self._earned[done])
+        self.running_reward = running_mean(self.running_reward, ended, self.decay)
+        self.episodes += len(ended)
+        self._earned = np.where(done, 0.0, self._earned)
+
+    def _on_step(self) -> bool:
+        self.count(self.locals["rewards"], self.locals["dones"])
+        return not self.is_reached
+
+
+def train_sb3(
+    algorithm: str,
+    seed: int,
+    *,
+    environment: str = "drone_rl/CollectCubes-v0",
+    num_envs: int = NUM_ENVS,
+    target: float = TARGET,
+    max_frames: int = 1_000_000,
+    **settings: Any,
+) -> PeerTraining:
+    """Trains until the running mean of the episodes' rewards has reached a target.
+
+    Args:
+        algorithm: "ppo" or "a2c".
+        seed: Of worlds, weights and actions.
+        environment: Gymnasium's name of the worlds.
+        num_envs: Worlds in a batch.
+        target: Of the running mean.
+        max_frames: It stops after so many in any case.
+        settings: Of the algorithm.
+
+    Raises:
+        InputError: There is no such algorithm.
+    """
+    if algorithm not in ALGORITHMS:
+        raise InputError(f"algorithm={algorithm!r} is unknown; give {', '.join(ALGORITHMS)}")
+    worlds = gymnasium.make_vec(environment, num_envs=num_envs, autoreset_mode="SameStep")
+    assert isinstance(worlds, DroneWorlds)
+    env, solved = Sb3Worlds(worlds, TRANSFORMS), Solved(target)
+    model = ALGORITHMS[algorithm](
+        "MlpPolicy",  # of which the trunk and the heads are all that is left
+        env,
+        seed=seed,
+        policy_kwargs={"features_extractor_class": Sb3Trunk, "net_arch": []},
+        device="cpu",
+        **settings,
+    )
+    model.learn(max_frames, callback=solved)
+    stage = worlds.stage
+    env.close()
+    policy = policy_from(
+        Sb3Logits(model),
+        task=stage.worlds.task,
+        camera=stage.worlds.camera,
+        transforms=TRANSFORMS,
+        name=f"sb3 {algorithm}",
+    )
+    return PeerTraining(solved.is_reached, model.num_timesteps, solved.running_reward, policy)

@@ -1,0 +1,314 @@
+"""All benchmarks, by name."""
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from benchmarks.benchmark import Benchmark
+from benchmarks.coverage import bench_coverage
+from benchmarks.domain_axes import bench_domain_axes
+from benchmarks.exact_coverage import bench_exact_coverage
+from benchmarks.explain import bench_explain
+from benchmarks.flight_parity import bench_flight_parity
+from benchmarks.flight_paths import bench_flight_paths
+from benchmarks.flight_speed import bench_flight_speed
+from benchmarks.flight_training import bench_flight_training
+from benchmarks.fragile_honest import bench_fragile_honest
+from benchmarks.gamed import bench_gamed
+from benchmarks.gymnasium import bench_gymnasium
+from benchmarks.hostile import bench_hostile
+from benchmarks.injections import bench_injections
+from benchmarks.maps import bench_maps
+from benchmarks.memory import bench_memory
+from benchmarks.mutants import bench_mutants
+from benchmarks.onnx_export import bench_onnx
+from benchmarks.peers.side_by_side import bench_peers
+from benchmarks.places import bench_places
+from benchmarks.provable import bench_provable
+from benchmarks.proving import bench_many_cubes, bench_prove, bench_tampering
+from benchmarks.render_truth import bench_render_truth
+from benchmarks.robust import bench_robust
+from benchmarks.scaling import bench_scaling
+from benchmarks.sentences import bench_sentences
+from benchmarks.shifts import bench_shifts
+from benchmarks.speed import bench_collector, bench_dm_control, bench_render
+from benchmarks.startup import bench_startup
+from benchmarks.sweeps import bench_kills, bench_ray, bench_sweeps
+from benchmarks.training import bench_large, bench_pillars, bench_seeds, bench_solve
+from benchmarks.verdicts import bench_verdicts
+from drone_rl.utils.errors import InputError
+
+_DRAWING = ("sim", "envs")
+_COLLECTING = (*_DRAWING, "policies", "collectors")
+_TRAINING = (*_COLLECTING, "objectives", "training")
+_JUDGING = (*_DRAWING, "policies", "evaluation", "verdicts")
+_PROVING = (*_DRAWING, "policies", "verification/prover", "verification/checker")
+_EXPLAINING = (*_JUDGING, "explanations")
+_CLAIMS = ("evaluation", "robustness", "verification", "verdicts", "explanations", "sweeps")
+
+
+def _trained_in_flight(asked: Any, experiment: str, seeds: Sequence[int]) -> dict[str, Any]:
+    runs = asked.runs / experiment
+    return bench_flight_training(experiment, runs, seeds, asked.episodes, asked.device, asked.quick)
+
+
+BENCHMARKS: dict[str, Benchmark] = {
+    "render": Benchmark(
+        lambda s: bench_render(s.worlds, s.device, s.quick), "main", (*_DRAWING, "benchmarks/speed")
+    ),
+    "collector": Benchmark(
+        lambda s: bench_collector(s.worlds, s.device, s.quick),
+        "main",
+        (*_COLLECTING, "benchmarks/speed"),
+    ),
+    "dm_control": Benchmark(
+        lambda s: bench_dm_control(s.worlds, s.device, s.quick),
+        "main",
+        (*_DRAWING, "benchmarks/speed", "benchmarks/dm_control"),
+    ),
+    "scaling": Benchmark(
+        lambda s: bench_scaling(s.folder, s.device, s.quick),
+        "main",
+        (*_DRAWING, "benchmarks/scaling"),
+    ),
+    "memory": Benchmark(
+        lambda s: bench_memory(s.runs, s.memory_frames, s.device, s.quick),
+        "main",
+        (*_TRAINING, "benchmarks/memory"),
+    ),
+    "solve": Benchmark(
+        lambda s: bench_solve(s.runs, s.seeds, s.episodes, s.device, s.quick),
+        "main",
+        (*_TRAINING, "evaluation", "conf", "benchmarks/training"),
+    ),
+    "seeds": Benchmark(
+        lambda s: bench_seeds(s.runs / "seeds", s.device, s.quick),
+        "main",
+        (*_TRAINING, "evaluation", "conf", "benchmarks/training"),
+    ),
+    "large": Benchmark(
+        lambda s: bench_large(s.runs, s.device, s.quick),
+        "main",
+        (*_TRAINING, "conf", "benchmarks/training"),
+    ),
+    "coverage": Benchmark(
+        lambda s: bench_coverage(s.quick),
+        "truth",
+        ("utils/intervals", "evaluation", "benchmarks/coverage", "benchmarks/simulated"),
+    ),
+    "sentences": Benchmark(
+        lambda s: bench_sentences(),
+        "truth",
+        (*_CLAIMS, "benchmarks/sentences", "benchmarks/evidence"),
+    ),
+    "hostile": Benchmark(
+        lambda s: bench_hostile(s.runs / "hostile"),
+        "truth",
+        (
+            "utils",
+            "policies/zoo",
+            "training",
+            "sweeps",
+            "explanations/report",
+            "verification/checker",
+            "robustness",
+            "cli/hydra",
+            *(
+                f"benchmarks/hostile{part}"
+                for part in (
+                    "",
+                    "_files",
+                    "_folders",
+                    "_json",
+                    "_arrays",
+                    "_policies",
+                    "_claims",
+                    "_runs",
+                )
+            ),
+        ),
+    ),
+    "injections": Benchmark(
+        lambda s: bench_injections(s.runs / "injections"),
+        "truth",
+        (
+            *_CLAIMS,
+            "utils/display",
+            "utils/pages",
+            "benchmarks/injections",
+            "benchmarks/injected_pages",
+            "benchmarks/injection_payloads",
+        ),
+    ),
+    "gamed": Benchmark(
+        lambda s: bench_gamed(s.runs / "gamed"),
+        "truth",
+        (
+            *_JUDGING,
+            "robustness",
+            "benchmarks/gamed",
+            "benchmarks/gamed_memory",
+            "benchmarks/gamed_rounding",
+            "benchmarks/gamed_certificates",
+        ),
+    ),
+    "maps": Benchmark(
+        lambda s: bench_maps(s.runs, s.quick),
+        "truth",
+        (*_EXPLAINING, "benchmarks/maps", "benchmarks/liars"),
+    ),
+    "explain": Benchmark(
+        lambda s: bench_explain(s.runs, s.quick),
+        "truth",
+        (*_EXPLAINING, "explanations/report", "conf", "benchmarks/explain"),
+    ),
+    "verdicts": Benchmark(
+        lambda s: bench_verdicts(s.runs, s.device, s.quick),
+        "truth",
+        (*_JUDGING, "benchmarks/verdicts", "benchmarks/scripted"),
+    ),
+    "fragile_honest": Benchmark(
+        lambda s: bench_fragile_honest(s.runs / "fragile_honest", s.seeds, s.quick),
+        "truth",
+        (*_TRAINING, *_JUDGING, "conf", "benchmarks/fragile_honest"),
+    ),
+    "shifts": Benchmark(
+        lambda s: bench_shifts(s.quick),
+        "truth",
+        (*_JUDGING, "robustness", "benchmarks/shifts"),
+    ),
+    "domain_axes": Benchmark(
+        lambda s: bench_domain_axes(s.runs / "domain_axes", s.quick),
+        "truth",
+        (*_JUDGING, "robustness", "benchmarks/domain_axes"),
+    ),
+    "robust": Benchmark(
+        lambda s: bench_robust(s.runs / "robust", s.seeds[:3], s.quick),
+        "truth",
+        (*_TRAINING, "evaluation", "robustness", "conf", "benchmarks/robust"),
+    ),
+    "render_truth": Benchmark(
+        lambda s: bench_render_truth(s.quick),
+        "truth",
+        ("sim/rendering", "benchmarks/render_truth", "benchmarks/random_scenes"),
+    ),
+    "mutants": Benchmark(lambda s: bench_mutants(), "truth", ("benchmarks/mutants",)),
+    "sweeps": Benchmark(
+        lambda s: bench_sweeps(s.runs, s.device, s.quick),
+        "many",
+        (*_TRAINING, "sweeps", "conf", "benchmarks/sweeps"),
+    ),
+    "kills": Benchmark(
+        lambda s: bench_kills(s.runs, s.device, s.quick),
+        "many",
+        (*_TRAINING, "sweeps", "conf", "benchmarks/sweeps"),
+    ),
+    "ray": Benchmark(
+        lambda s: bench_ray(s.runs, s.device, s.quick),
+        "many",
+        (*_COLLECTING, "conf", "benchmarks/sweeps"),
+    ),
+    "prove": Benchmark(
+        lambda s: bench_prove(s.runs / "prove", s.seeds, s.quick),
+        "proof",
+        (*_PROVING, "benchmarks/proving"),
+    ),
+    "tampering": Benchmark(
+        lambda s: bench_tampering(s.runs / "tampering", s.quick),
+        "proof",
+        (
+            *_PROVING,
+            "benchmarks/tampering",
+            "benchmarks/tampered_parts",
+            "benchmarks/tampered_wholes",
+        ),
+    ),
+    "places": Benchmark(lambda s: bench_places(s.quick), "proof", (*_PROVING, "benchmarks/places")),
+    "exact_coverage": Benchmark(
+        lambda s: bench_exact_coverage(s.runs / "exact_coverage", s.quick),
+        "proof",
+        (*_TRAINING, *_PROVING, "verdicts", "benchmarks/exact_coverage"),
+    ),
+    "provable": Benchmark(
+        lambda s: bench_provable(s.runs / "provable", s.seeds[:3], s.quick),
+        "proof",
+        (*_TRAINING, *_PROVING, "conf", "benchmarks/provable"),
+    ),
+    "many_cubes": Benchmark(
+        lambda s: bench_many_cubes(s.runs / "many_cubes", 1.0, s.quick),
+        "hours",
+        (*_PROVING, "benchmarks/proving"),
+    ),
+    "pillars": Benchmark(
+        lambda s: bench_pillars(s.runs / "pillars", s.seeds[:3], s.episodes, s.device, s.quick),
+        "guests",
+        (*_TRAINING, "evaluation", "conf", "benchmarks/training"),
+    ),
+    "startup": Benchmark(
+        lambda s: bench_startup(s.runs / "startup", s.device, s.quick),
+        "room",
+        (*_TRAINING, "verdicts", "config", "cli", "conf", "benchmarks/startup"),
+    ),
+    "onnx": Benchmark(
+        lambda s: bench_onnx(s.runs / "onnx", s.quick),
+        "guests",
+        (*_DRAWING, "policies", "evaluation", "verdicts/export", "benchmarks/onnx_export"),
+    ),
+    "peers": Benchmark(
+        lambda s: bench_peers(s.runs / "peers", s.seeds[:3], s.episodes, s.quick),
+        "guests",
+        (*_TRAINING, "config", "cli", "conf", "benchmarks/peers"),
+    ),
+    "gymnasium": Benchmark(
+        lambda s: bench_gymnasium(s.worlds, s.device, s.quick),
+        "guests",
+        (*_DRAWING, "benchmarks/gymnasium"),
+    ),
+    "flight_speed": Benchmark(
+        lambda s: bench_flight_speed(s.quick), "flight", (*_COLLECTING, "benchmarks/flight_speed")
+    ),
+    "flight_parity": Benchmark(
+        lambda s: bench_flight_parity(s.quick), "flight", ("sim", "benchmarks/flight_parity")
+    ),
+    "flight_paths": Benchmark(
+        lambda s: bench_flight_paths(s.quick),
+        "flight",
+        ("sim", "flight/commands", "benchmarks/flight_paths"),
+    ),
+    "flight_moves": Benchmark(
+        lambda s: _trained_in_flight(s, "flight", s.seeds),
+        "flight",
+        (*_TRAINING, "evaluation", "conf", "benchmarks/flight_training"),
+    ),
+    "flight_velocity": Benchmark(
+        lambda s: _trained_in_flight(s, "flight_velocity", s.seeds[:3]),
+        "flight",
+        (*_TRAINING, "evaluation", "conf", "benchmarks/flight_training"),
+    ),
+    "flight_pillars": Benchmark(
+        lambda s: _trained_in_flight(s, "flight_pillars", s.seeds[:3]),
+        "flight",
+        (*_TRAINING, "evaluation", "conf", "benchmarks/flight_training"),
+    ),
+}
+GROUPS = tuple(dict.fromkeys(benchmark.group for benchmark in BENCHMARKS.values()))
+"""Names of several at once: the main job, whether what is said is true, proofs, many trainings,
+what works with programs of others, drones in flight."""
+
+
+def find_benchmarks(words: Iterable[str]) -> list[str]:
+    """The benchmarks that words name, each once, in the order of the words.
+
+    Args:
+        words: Names of benchmarks and of groups.
+
+    Raises:
+        InputError: A word names neither.
+    """
+    names: dict[str, None] = {}
+    for word in words:
+        named = [n for n, b in BENCHMARKS.items() if word in (n, b.group)]
+        if not named:
+            known = ", ".join((*GROUPS, *BENCHMARKS))
+            raise InputError(f"benchmark {word!r} is unknown; use some of: {known}")
+        names |= dict.fromkeys(named)
+    return list(names)

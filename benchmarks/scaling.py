@@ -1,0 +1,75 @@
+"""Cost must grow linearly with worlds, frames, cubes and pixels."""
+
+import statistics
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.parts import make_worlds, random_walk
+from drone_rl.config import CameraSettings
+
+
+def bench_scaling(folder: Path, device: str, quick: bool) -> dict[str, Any]:
+    """Times random flight against the number of worlds, frames, cubes and pixels, and draws it.
+
+    Returns:
+        For each, the sizes, the seconds and the share of the variance that a line explains.
+    """
+    worlds = (32, 64, 128) if quick else (32, 64, 128, 256, 512)
+    cubes = (1, 4, 8) if quick else (1, 2, 4, 8, 16)
+    larger = range(1, 4 if quick else 6)
+    cameras = [CameraSettings(width=64 * k, height=25 * k) for k in larger]
+    steps = 5 if quick else 20
+    series = {
+        "worlds": {n: _seconds(make_worlds(n, device), steps, quick) for n in worlds},
+        "frames": {
+            64 * k * steps: _seconds(make_worlds(64, device), k * steps, quick)
+            for k in ((1, 2, 3) if quick else (1, 2, 4, 8))
+        },
+        "cubes": {n: _seconds(make_worlds(128, device, n), steps, quick) for n in cubes},
+        "pixels": {
+            c.width * c.height: _seconds(make_worlds(128, device, camera=c), steps, quick)
+            for c in cameras
+        },
+    }
+    _plot(series, folder / "scaling.png")
+    results = {}
+    for name, points in series.items():
+        sizes, seconds = list(points), list(points.values())
+        results[name] = {"sizes": sizes, "seconds": seconds, "r_squared": _r_squared(points)}
+    return {"scaling": results}
+
+
+def _seconds(env: Any, steps: int, quick: bool) -> float:
+    """Median time of a few random flights."""
+    random_walk(env, 2)
+    times = []
+    for _ in range(1 if quick else 5):
+        begin = time.perf_counter()
+        random_walk(env, steps)
+        times.append(time.perf_counter() - begin)
+    env.close()
+    return statistics.median(times)
+
+
+def _r_squared(points: dict[int, float]) -> float:
+    x, y = np.array(list(points)), np.array(list(points.values()))
+    fitted = np.polyval(np.polyfit(x, y, 1), x)
+    return float(1 - ((y - fitted) ** 2).sum() / ((y - y.mean()) ** 2).sum())
+
+
+def _plot(series: dict[str, dict[int, float]], path: Path) -> None:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(14, 3.4), layout="constrained")
+    for axes, (name, points) in zip(figure.subplots(1, len(series)), series.items(), strict=True):
+        x, y = np.array(list(points)), np.array(list(points.values()))
+        line = np.polyfit(x, y, 1)
+        grid = np.linspace(0, x.max(), 50)
+        axes.plot(grid, np.polyval(line, grid), color="0.7", label="straight line")
+        axes.plot(x, y, "o", color="tab:red", label="measured")
+        axes.set(title=f"time against {name}", xlabel=name, ylabel="seconds", ylim=(0, None))
+        axes.legend()
+    figure.savefig(path, dpi=120)

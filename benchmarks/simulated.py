@@ -1,0 +1,217 @@
+"""How often a verdict is certain and wrong, for simulated policies at and around every threshold.
+
+A simulated policy draws each episode from a few types, each with what it offers, what is collected
+and what luck gets there. So its true quantities are known, and with them its kind by the rule.
+"""
+
+import dataclasses
+import functools
+import itertools
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from drone_rl.evaluation.baselines import BASELINES
+from drone_rl.evaluation.judge import estimate, observe
+from drone_rl.evaluation.kinds import Kind
+from drone_rl.evaluation.metrics import Episodes
+from drone_rl.evaluation.rule import Quantity, Rule, decide, kinds_within
+from drone_rl.sim.tasks import CollectCubes, Goals
+from drone_rl.sim.tasks.collect_cubes.rules import Side
+
+L, A, R = Side
+Type = tuple[tuple[Side, ...], tuple[int, ...], bool]
+"""Sides of an episode's cubes, which are collected, and whether flying straight succeeds."""
+SHIFTS = (-0.03, 0.0, 0.03)
+"""How far beside a threshold a policy lies."""
+EPISODES = (400, 1600)
+_RULE, _TASK = Rule(), CollectCubes()
+
+
+@dataclasses.dataclass(frozen=True)
+class Simulated:
+    """A policy as a mixture of types of episodes."""
+
+    types: Mapping[Type, float]
+    """The types and their probabilities, which sum to 1."""
+    lucky: float = 0.0
+    """Share of the cubes that flying straight on collects in every episode."""
+
+    @functools.cached_property
+    def observed(self) -> list[NDArray]:
+        """What each type of episode says of each quantity; NaN if nothing. Shape: (types,)."""
+        each = [_observe(kind, self.lucky) for kind in self.types]
+        return [np.array(values) for values in zip(*each, strict=True)]
+
+    @property
+    def shares(self) -> NDArray:
+        """Probabilities of the types."""
+        return np.array(list(self.types.values()))
+
+    @property
+    def kind(self) -> Kind:
+        """What it is in truth."""
+        return decide([self._truth(i).level for i in range(len(_RULE.quantities))])
+
+    def _truth(self, quantity: int) -> Quantity:
+        values, thresholds = self.observed[quantity], _RULE.thresholds[quantity]
+        speaks = ~np.isnan(values)
+        if not self.shares[speaks].sum():
+            return Quantity(None, 0.0, 1.0, thresholds)
+        mean = float(np.average(values[speaks], weights=self.shares[speaks]))
+        return Quantity(mean, mean, mean, thresholds)
+
+
+def policies() -> dict[str, Simulated]:
+    """Policies at and around each threshold of the rule, and at two at once."""
+    policies: dict[str, Simulated] = {}
+    for shift in SHIFTS:
+        made = {
+            "all or nothing, success": _mixture(0.9 + shift, (L, R), (1, 1), (0, 0)),
+            "last cube, success": _mixture(0.9 + shift, (L, A, R), (1, 1, 1), (1, 1, 0)),
+            "ahead, seldom offered": _join(
+                (0.85, _mixture(1.0, (L, R), (1, 1), (1, 1))),
+                (0.15, _mixture(0.7 + shift, (A, A), (1, 1), (0, 0))),
+            ),
+            "ahead, seldom offered, independent cubes": _join(
+                (0.85, _mixture(1.0, (L, R), (1, 1), (1, 1))),
+                (0.15, _independent((A, A), 0.7 + shift)),
+            ),
+            "left just short of none": _mixture(0.3 + shift, (L, R), (1, 1), (0, 1)),
+            "right just enough, left lost": _mixture(0.7 + shift, (L, R), (0, 1), (0, 0)),
+            "both sides at once": _join(
+                (0.5, _mixture(0.3 - shift, (L, L), (1, 1), (0, 0))),
+                (0.5, _mixture(0.7 + shift, (R, R), (1, 1), (0, 0))),
+            ),
+            "left lost and seldom offered": _join(
+                (0.05 + shift, _mixture(1.0, (L, R), (0, 1), (0, 1))),
+                (0.95 - shift, _mixture(1.0, (A, R), (1, 1), (1, 1))),
+            ),
+            "ahead lost and seldom offered": _join(
+                (0.05 + shift, _mixture(1.0, (A, R), (0, 1), (0, 1))),
+                (0.95 - shift, _mixture(1.0, (L, R), (1, 1), (1, 1))),
+            ),
+            "luck, all or nothing": _mixture(5 / 12 + shift, (L, R), (1, 1), (0, 0), lucky=0.3),
+            "luck, independent cubes": _independent((L, R), 5 / 12 + shift, lucky=0.3),
+            "trivial, flying straight succeeds": _solved_by_flying_straight(0.9 + shift),
+            "trivial and success at once": _join(
+                (0.9 + shift, _solved_by_flying_straight(1.0)),
+                (0.1 - shift, _mixture(1.0, (A, A), (0, 0), (0, 0))),
+            ),
+            "success and ahead at once": _join(
+                (2 / 3, _mixture(1.0, (L, R), (1, 1), (1, 1))),
+                (1 / 3, _mixture(0.7 + shift, (A, L), (1, 1), (0, 1))),
+            ),
+        }
+        policies |= {f"{name} {shift:+.2f}": policy for name, policy in made.items()}
+    return policies
+
+
+def bench_false_certain(quick: bool) -> dict[str, Any]:
+    """The largest probability of a verdict that is certain and wrong, over all `policies`.
+
+    Args:
+        quick: Whether to draw few samples of the smaller size only.
+    """
+    draws, sizes = (20, EPISODES[:1]) if quick else (400, EPISODES)
+    rng, rows = np.random.default_rng(0), []
+    for name, policy in policies().items():
+        for episodes in sizes:
+            kinds = judge_samples(policy, rng.multinomial(episodes, policy.shares, draws))
+            wrong = sum(kind not in (None, policy.kind) for kind in kinds)
+            row = {"policy": name, "kind": policy.kind.value, "episodes": episodes, "draws": draws}
+            row |= {"certain": sum(k is not None for k in kinds) / draws, "wrong": wrong / draws}
+            rows.append(row)
+    worst = max(rows, key=lambda row: row["wrong"])
+    return {"false_certain_rate": worst["wrong"], "false_certain_worst": worst, "certain": rows}
+
+
+def judge_samples(policy: Simulated, counts: NDArray) -> list[Kind | None]:
+    """The kind by each sample where it is certain, else None.
+
+    Args:
+        policy: Whose.
+        counts: How many episodes of each type every sample has. Shape: (samples, types).
+    """
+
+    @functools.cache
+    def levels(quantity: int, *row: int) -> tuple[int, int]:
+        return estimate(quantity, np.repeat(merged[quantity][0], row), _RULE).levels
+
+    merged = [_merge(values) for values in policy.observed]
+    kinds = []
+    for sample in counts:
+        box = tuple(
+            levels(i, *(int(sample[of].sum()) for of in which))
+            for i, (_, which) in enumerate(merged)
+        )
+        possible = kinds_within(box)
+        kinds.append(next(iter(possible)) if len(possible) == 1 else None)
+    return kinds
+
+
+def _merge(values: NDArray) -> tuple[NDArray, list[NDArray]]:
+    """The different values, and which types have each."""
+    distinct = np.unique(values[~np.isnan(values)])
+    return distinct, [np.flatnonzero(values == value) for value in distinct]
+
+
+def _mixture(
+    share: float, sides: tuple[Side, ...], often: tuple, else_: tuple, lucky: float = 0.0
+) -> Simulated:
+    """Collects one way in this share of episodes, another way in the others."""
+    types = {(sides, often, False): share}
+    types[sides, else_, False] = types.get((sides, else_, False), 0.0) + 1.0 - share
+    return Simulated(types, lucky)
+
+
+def _solved_by_flying_straight(share: float) -> Simulated:
+    """Always collects everything, as flying straight does in this share of episodes."""
+    types = {((A, A), (1, 1), True): share, ((A, A), (1, 1), False): 1.0 - share}
+    return Simulated({of: probability for of, probability in types.items() if probability > 0})
+
+
+def _independent(sides: tuple[Side, Side], share: float, lucky: float = 0.0) -> Simulated:
+    """Collects each of two cubes by itself."""
+    chance = {1: share, 0: 1.0 - share}
+    pairs = itertools.product((1, 0), repeat=2)
+    return Simulated({(sides, (a, b), False): chance[a] * chance[b] for a, b in pairs}, lucky)
+
+
+def _join(*parts: tuple[float, Simulated]) -> Simulated:
+    types: dict[Type, float] = {}
+    for weight, part in parts:
+        for kind, share in part.types.items():
+            types[kind] = types.get(kind, 0.0) + weight * share
+    return Simulated(types, parts[0][1].lucky)
+
+
+@functools.cache
+def _observe(kind: Type, lucky: float) -> list[float]:
+    """What one episode of a type says of each quantity, by the rule's own reckoning."""
+    sides, hits, is_solved = kind
+    ours = _episode(sides, hits)
+    flown = {name: _episode(sides, [0] * len(sides)) for name in BASELINES}
+    flown["oracle"] = _episode(sides, [1] * len(sides))
+    flown["forward"] = _episode(sides, [int(is_solved)] * len(sides))
+    observed = [float(v[0]) if len(v) else np.nan for v in observe(ours, flown, _RULE)]
+    straight = _RULE.quantities.index("above forward")
+    observed[straight] -= (1 - _RULE.luck_margin) * lucky
+    return observed
+
+
+def _episode(sides: tuple[Side, ...], hits: Any) -> Episodes:
+    side = torch.tensor([[int(s) for s in sides]])
+    return Episodes(
+        task=_TASK,
+        goals=Goals(
+            reached=torch.tensor([list(hits)], dtype=torch.bool),
+            stratum=side,
+            world=torch.zeros(1, 1),
+        ),
+        end_reason=torch.ones(1, dtype=torch.int64),
+        length=torch.ones(1, dtype=torch.int64),
+    )

@@ -1,1 +1,0 @@
-"""For programs and notebooks: make_env, train, load_policy, evaluate, judge, explain."""

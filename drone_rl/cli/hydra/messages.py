@@ -1,0 +1,126 @@
+"""A user's mistake as one line, whoever noticed it."""
+
+import errno
+import logging
+import os
+import select
+import sys
+import threading
+from collections.abc import Callable
+
+from hydra.core.hydra_config import HydraConfig
+from hydra.errors import HydraException
+from omegaconf import OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+
+from drone_rl.cli.hydra.choices import without_schemas
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.quiet import ignore_noise
+
+MISTAKES = (InputError, HydraException, OmegaConfBaseException, OSError)
+"""What a user can be blamed for; all else is a bug of ours and keeps its traceback."""
+
+
+_FOLDER = "choose another folder with hydra.run.dir=..."
+_REMEDIES = {
+    **dict.fromkeys((errno.ENOSPC, errno.EDQUOT, errno.EFBIG), f"free some space or {_FOLDER}"),
+    **dict.fromkeys(
+        (errno.EACCES, errno.EPERM, errno.EROFS), f"check who may write there, or {_FOLDER}"
+    ),
+    **dict.fromkeys(
+        (errno.EISDIR, errno.ENOTDIR, errno.EEXIST, errno.ELOOP, errno.ENOTEMPTY),
+        f"move it away or {_FOLDER}",
+    ),
+}
+"""What to do about an error of the file system, by its number."""
+_UNKNOWN = ("is not in struct", "Could not override", "Could not load")
+"""What Hydra says of a name that does not exist."""
+
+
+def guarded(command: Callable[[], int]) -> int:
+    """Runs a command; a mistake becomes one line and an exit status of 2, Ctrl-C one of 130."""
+    os.environ["HYDRA_FULL_ERROR"] = "1"  # let Hydra's own errors through to be shortened here
+    logging.raiseExceptions = False  # a log that can't be written is no reason for a traceback
+    ignore_noise()
+    lost = _errors_in_threads()
+    try:
+        status = command()
+        if lost and not status:
+            print(f"warning: {file_error(lost[0])}", file=sys.stderr)
+        return status
+    except KeyboardInterrupt:
+        print("error: interrupted", file=sys.stderr)
+        return 130
+    except Exception as error:
+        is_closed = isinstance(error, BrokenPipeError) and is_output_closed()
+        if is_closed or not is_mistake(error):
+            raise
+        print(f"error: {one_line(error)}", file=sys.stderr)
+        return 2
+
+
+def _errors_in_threads() -> list[OSError]:
+    """Collects errors of the file system in threads, such as TensorBoard's, in place of tracebacks.
+
+    What a thread can't write the command can't write either, most often, and then says so.
+    """
+    lost: list[OSError] = []
+    show = threading.excepthook
+
+    def note(args: threading.ExceptHookArgs) -> None:
+        if isinstance(args.exc_value, OSError):
+            lost.append(args.exc_value)
+        else:
+            show(args)
+
+    threading.excepthook = note
+    return lost
+
+
+def is_mistake(error: Exception) -> bool:
+    """Whether a user can be blamed for an error; logging wraps those of its files."""
+    is_wrapped = isinstance(error, ValueError) and isinstance(error.__cause__, OSError)
+    return isinstance(error, MISTAKES) or is_wrapped
+
+
+def is_output_closed() -> bool:
+    """Whether nobody reads standard output any more, as after `| head`."""
+    look = select.poll()
+    try:
+        look.register(sys.stdout.fileno(), select.POLLOUT)
+    except (OSError, ValueError):  # it is no file of the system's, as in tests
+        return False
+    return any(events & select.POLLERR for _, events in look.poll(0))
+
+
+def file_error(error: OSError) -> str:
+    """An error of the file system as one line: the path, the reason and a remedy."""
+    reason = error.strerror or " ".join(str(error).split()) or type(error).__name__
+    path = error.filename
+    if path is None and HydraConfig.initialized():
+        runtime = HydraConfig.get().runtime
+        path = None if OmegaConf.is_missing(runtime, "output_dir") else runtime.output_dir
+    remedy = _REMEDIES.get(error.errno or 0, f"check the path or {_FOLDER}")
+    where = "a file" if path is None else os.fsdecode(path) if isinstance(path, bytes) else path
+    text = f"{where} can't be opened or written ({reason}); {remedy}"
+    return "".join(c if c.isprintable() else "?" for c in text)
+
+
+def one_line(error: BaseException) -> str:
+    """The most telling message of an error and its causes, on one line."""
+    cause: BaseException | None = error
+    while cause is not None:
+        if isinstance(cause, InputError):
+            return "".join(c if c.isprintable() else "?" for c in str(cause))
+        cause = cause.__cause__ or cause.__context__
+    for cause in (error, error.__cause__):
+        if isinstance(cause, OSError) and not isinstance(cause, HydraException):
+            return file_error(cause)  # a choice that Hydra does not find is an OSError, too
+    text = without_schemas(" ".join(str(error).split())) or type(error).__name__
+    if isinstance(error.__cause__, OmegaConfBaseException):
+        text += f": {str(error.__cause__).splitlines()[0]}"
+    if any(said in text for said in _UNKNOWN):
+        text += "; see drone-rl COMMAND --help for the names that exist"
+    if "does not support sweep type" in text:
+        text += "; to search an interval, add hydra/sweeper=optuna"
+    return text

@@ -1,0 +1,105 @@
+"""What a training's command line leaves out: a sweep's folder, the settings of a run."""
+
+import re
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+
+import yaml
+from hydra.core.hydra_config import HydraConfig
+from omegaconf import OmegaConf
+
+from drone_rl.cli.hydra.names import former, networks
+from drone_rl.sweeps.naming import is_sweep, sweep_name
+from drone_rl.sweeps.runs import quoted
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.files import refuse_links, write_atomically
+from drone_rl.utils.overrides import must_be_typed, taken_over
+
+_FOLDER = "hydra.sweep.dir=${paths.outputs}/${hydra.job.config_name}/multiruns/"
+_WRITE_NOTHING = ("hydra.output_subdir=null", "++hydra.job_logging.handlers.file.delay=true")
+"""Hydra would note the settings before anybody has checked them (`note_settings` does it after),
+and open a log."""
+_PLAIN = re.compile(r"[\w./+-]*")
+"""Values that mean the same to Hydra's grammar with and without quotes."""
+
+
+def complete(overrides: Sequence[str]) -> list[str]:
+    """Makes `resume=FOLDER` mean the settings of that run and its folder; names a sweep's.
+
+    Raises:
+        InputError: There is no such run, or it is not plain what its settings were.
+    """
+    typed = networks(overrides)
+    if is_sweep(typed):
+        is_named = any(o.startswith("hydra.sweep.dir=") for o in typed)
+        return typed if is_named else [*typed, _FOLDER + sweep_name(typed)]
+    folders = [o.split("=", 1)[1] for o in typed if o.startswith("resume=")]
+    if not folders or folders[-1] in ("", "null"):
+        return typed
+    if any(o.startswith("hydra.run.dir=") for o in typed):
+        return [*typed, *_WRITE_NOTHING]  # a sweep gives all settings itself
+    folder = Path(_unquoted(folders[-1]))
+    if not (folder / "checkpoints" / "last.pt").is_file():
+        raise InputError(f"resume={folder} has no checkpoints/last.pt; give the folder of a run")
+    refuse_links(folder)
+    kept = networks(taken_over(folder, [*typed, *former(typed)]))
+    plain = [_resume(folder) if o.startswith("resume=") else o for o in typed]
+    own = ["hydra.mode=RUN", f"hydra.run.dir={quoted(str(folder))}", *_WRITE_NOTHING]
+    return [*kept, *plain, *own]
+
+
+def check_folder(resume: str, folder: Path) -> None:
+    """Makes sure that a run goes on in its own folder.
+
+    Args:
+        resume: What was given.
+        folder: Where this command writes.
+
+    Raises:
+        InputError: Another folder was given as hydra.run.dir.
+    """
+    if Path(resume).resolve() != folder.resolve():
+        raise InputError(
+            f"resume={resume} goes on in that folder, but hydra.run.dir={folder} is another; "
+            "leave hydra.run.dir out"
+        )
+
+
+def note_settings(folder: Path) -> None:
+    """Writes the settings of this command into a run's folder, for whoever goes on with it.
+
+    Args:
+        folder: Of the run, which has accepted them.
+    """
+    path = folder / ".hydra" / "overrides.yaml"
+    path.parent.mkdir(exist_ok=True)
+    write_atomically(path, yaml.safe_dump(_overrides(), allow_unicode=True, width=10_000))
+
+
+def resume_command(folder: Path) -> str:
+    """The shell command that goes on with the run of this command, from any working directory.
+
+    Args:
+        folder: Of the run.
+    """
+    settings = [_resume(folder.absolute()), *must_be_typed(_overrides())]
+    return shlex.join(["drone-rl", "train", *settings])
+
+
+def _overrides() -> list[str]:
+    """The settings of the command that runs, as Hydra knows them."""
+    found = OmegaConf.to_container(HydraConfig.get().overrides.task)
+    assert isinstance(found, list)
+    return [str(override) for override in found]
+
+
+def _resume(folder: Path) -> str:
+    text = str(folder)
+    return f"resume={text if _PLAIN.fullmatch(text) else quoted(text)}"
+
+
+def _unquoted(value: str) -> str:
+    """A value whose quotes were meant for Hydra, without them."""
+    is_quoted = len(value) > 1 and value[0] == value[-1] and value[0] in "'\""
+    return re.sub(r"\\(.)", r"\1", value[1:-1]) if is_quoted else value

@@ -1,0 +1,32 @@
+"""What can be chosen about tasks and the camera; known without what they are made of."""
+
+from drone_rl.config.actions import MOVES_SETTINGS, ActionSettings
+from drone_rl.config.appearance import MINIMAL, AppearanceSettings
+from drone_rl.config.camera import CameraSettings
+from drone_rl.config.cubes import TaskSettings
+from drone_rl.config.dynamics import COMPUTER_VISION, DynamicsSettings
+from drone_rl.config.pillars import PillarsSettings
+from drone_rl.config.registry import TASKS, named_settings, read_task, settings_of
+from drone_rl.config.renderers import RENDERERS, RendererName
+from drone_rl.config.sensors import SensorSettings
+from drone_rl.config.task import BaseTaskSettings
+
+__all__ = [
+    "COMPUTER_VISION",
+    "MINIMAL",
+    "MOVES_SETTINGS",
+    "RENDERERS",
+    "TASKS",
+    "ActionSettings",
+    "AppearanceSettings",
+    "BaseTaskSettings",
+    "CameraSettings",
+    "DynamicsSettings",
+    "PillarsSettings",
+    "RendererName",
+    "SensorSettings",
+    "TaskSettings",
+    "named_settings",
+    "read_task",
+    "settings_of",
+]

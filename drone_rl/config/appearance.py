@@ -1,0 +1,99 @@
+"""What can be chosen about how worlds look; each value is fixed, or drawn anew at every reset."""
+
+import dataclasses
+from typing import Annotated
+
+from drone_rl.config.task import Color
+from drone_rl.utils.schema import Listed, Real, Several, Span, Whole
+from drone_rl.utils.settings import Settings
+
+Number = float | tuple[float, float]
+"""A number, or a range in which every one is as likely."""
+Tint = Color | tuple[Color, Color]
+"""Red, green, blue from 0 to 1, or a range of each."""
+Triple = tuple[float, float, float]
+Triples = Triple | tuple[Triple, Triple]
+"""Three numbers, or a range of each."""
+Names = str | tuple[str, ...]
+"""A name or several; kept as several."""
+NO_TEXTURE = "none"
+"""The name that stands for no texture, among others from which one is drawn."""
+
+_Tint = Span(Several(Real(0.0, 1.0), 3, 3))
+_Light = Span(Real(0.0, 10.0))
+_Tile = Span(Real(0.05, 1000.0, unit="m"))
+_Textures = Listed("texture", most=32)
+_Place = Span(Several(Real(-10.0, 10.0, unit="m"), 3, 3))
+_Turn = Span(Several(Real(-90.0, 90.0, unit="degrees"), 3, 3))
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class AppearanceSettings(Settings):
+    """Sun, sky, air, colours, textures, things beside the way, and the policy's camera.
+
+    The defaults are the look of the tasks themselves.
+
+    Raises:
+        InputError: A value is out of range, or a range begins above its end.
+    """
+
+    sun_elevation: Annotated[Number, Span(Real(1.0, 90.0, unit="degrees"))] = 55.2
+    """Height of the sun above the horizon, in degrees."""
+    sun_azimuth: Annotated[Number, Span(Real(-360.0, 360.0, unit="degrees"))] = 127.9
+    """Where the sun stands: 0 is straight ahead, 90 to the left, in degrees."""
+    sun_strength: Annotated[Number, _Light] = 0.75
+    """Light of the sun on what faces it; with the ambient light's it should be about 1."""
+    sun_color: Annotated[Tint, _Tint] = (1.0, 1.0, 1.0)
+    """Red, green, blue of the sun's light."""
+    ambient_strength: Annotated[Number, _Light] = 0.35
+    """Light from everywhere."""
+    shadows: Annotated[float, Real(0.0, 1.0)] = 0.0
+    """Share of episodes in which the sun casts shadows: 0 for none, 1 for all."""
+    sky_horizon: Annotated[Tint, _Tint] = (0.62, 0.74, 0.92)
+    """Colour of the sky at the horizon, and of fog."""
+    sky_zenith: Annotated[Tint, _Tint] | None = None
+    """Colour of the sky overhead; none for that of the horizon."""
+    fog_visibility: (
+        Annotated[Number, Span(Real(0.0, 100_000.0, is_above=True, unit="m"))] | None
+    ) = None
+    """Distance at which fog leaves 5% of a contrast, in metres; none for clear air."""
+    ground_color: Annotated[Tint, _Tint] = (0.5, 0.54, 0.48)
+    """Colour of the ground."""
+    object_color: Annotated[Tint, _Tint] | None = None
+    """Colour of targets and obstacles; none for the task's own."""
+    ground_texture: Annotated[Names, _Textures] | None = None
+    """Texture of the ground: checker, grid, bricks, noise, a picture's file, or a list of these and
+    none, of which each is as likely."""
+    ground_tile: Annotated[Number, _Tile] = 4.0
+    """Edge of a tile of it, in metres."""
+    object_texture: Annotated[Names, _Textures] | None = None
+    """The same of targets and obstacles."""
+    object_tile: Annotated[Number, _Tile] = 2.0
+    """Edge of a tile of it, in metres."""
+    distractors: Annotated[int | tuple[int, int], Span(Whole(0, 64, "distractors"))] = 0
+    """Boxes, balls and cylinders beside the way, which mean nothing."""
+    distractor_size: Annotated[Number, Span(Real(0.1, 50.0, unit="m"))] = (1.0, 4.0)
+    """Edge or diameter of each, in metres."""
+    distractor_color: Annotated[Tint, _Tint] | None = None
+    """Colour of each; none for one of six, in turn."""
+    distractor_distance: Annotated[Number, Span(Real(0.1, 200.0, unit="m"))] = (2.0, 14.0)
+    """How far each is from where targets and obstacles may stand, to the side, in metres."""
+    camera_offset: Annotated[Triples, _Place] = (0.0, 0.0, 0.0)
+    """Where the policy's camera sits beside its place on the drone: forward, to the left and up, in
+    metres."""
+    camera_turn: Annotated[Triples, _Turn] = (0.0, 0.0, 0.0)
+    """How it is turned there: roll (to the right), pitch (down) and yaw (to the left), degrees."""
+    camera_widening: Annotated[Number, Span(Real(-160.0, 160.0, unit="degrees"))] = 0.0
+    """By how much its horizontal field of view is wider than that of the camera's settings, in
+    degrees."""
+    exposure: Annotated[Number, Span(Real(0.01, 100.0))] = 1.0
+    """Factor of the camera on all colours."""
+
+    @property
+    def is_minimal(self) -> bool:
+        """Whether worlds look as the tasks themselves have it."""
+        return self == MINIMAL
+
+
+MINIMAL = AppearanceSettings()
+"""The look of the tasks themselves."""

@@ -1,0 +1,184 @@
+"""Steps from the camera's frame to what a network sees."""
+
+import dataclasses
+from typing import Annotated, Any, ClassVar
+
+from drone_rl.config.variant import Variant
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.schema import Real, Several, Whole
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Transform(Variant):
+    """Which step, and with which values."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Gray(Transform):
+    """RGB bytes to gray from 0 to 1."""
+
+    target: ClassVar[str] = "drone_rl.envs.transforms.GrayPixels"
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Rgb(Transform):
+    """RGB bytes to colours from 0 to 1."""
+
+    target: ClassVar[str] = "drone_rl.envs.transforms.RgbPixels"
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Chromaticity(Transform):
+    """Shares of red and blue in each color, less a third: 0 for every gray, however bright."""
+
+    target: ClassVar[str] = "drone_rl.envs.transforms.ChromaticityPixels"
+    floor: Annotated[float, Real(0.0, 3.0, is_above=True)] = 0.15
+    """Added to the sum of red, green and blue, so that the dark is gray."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Standardize(Transform):
+    """Shifted and scaled: (x - mean) / std."""
+
+    target: ClassVar[str] = "drone_rl.envs.transforms.StandardizePixels"
+    mean: Annotated[float, Real(-1000.0, 1000.0)] = 0.53
+    """Gray level that becomes 0."""
+    std: Annotated[float, Real(1e-6, 1000.0)] = 0.21
+    """Deviation that becomes 1."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Crop(Transform):
+    """The rows that are kept, from top (included) to bottom (excluded)."""
+
+    target: ClassVar[str] = "drone_rl.envs.transforms.CropRows"
+    top: Annotated[int, Whole(0, 1023, "pixels")] = 5
+    """First row."""
+    bottom: Annotated[int, Whole(1, 1024, "pixels")] = 30
+    """First row that is not kept."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Resize(Transform):
+    """Averaging over areas."""
+
+    target: ClassVar[str] = "drone_rl.envs.transforms.Resize"
+    height: Annotated[int, Whole(1, 1024, "pixels")] = 25
+    """Pixels down."""
+    width: Annotated[int, Whole(1, 1024, "pixels")] = 64
+    """Pixels across."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Stack(Transform):
+    """The newest frames as channels, oldest first."""
+
+    target: ClassVar[str] = "torchrl.envs.CatFrames"
+    N: Annotated[int, Whole(1, 16, "frames")] = 2
+    """Frames."""
+
+    def make(self, *args: Any, **kwargs: Any) -> Any:
+        """See `Variant`; the dimension is that of channels."""
+        return super().make(*args, dim=-3, in_keys=["pixels"], **kwargs)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class EpisodeReward(Transform):
+    """Sum of the episode's rewards so far, as "episode_reward"."""
+
+    target: ClassVar[str] = "torchrl.envs.RewardSum"
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class StepCount(Transform):
+    """Steps of the episode so far, as "step_count"."""
+
+    target: ClassVar[str] = "torchrl.envs.StepCounter"
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Blur(Transform):
+    """Blurred by a Gaussian, as out of focus."""
+
+    target: ClassVar[str] = "drone_rl.envs.fault_transforms.Blur"
+    width: Annotated[float, Real(0.0, 16.0, unit="pixels")] = 0.5
+    """Standard deviation of the Gaussian."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Fault(Transform):
+    """Something that goes wrong in a camera by chance or with memory: no map of pictures."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Noise(Fault):
+    """Noise of the sensor, which cuts off at black and white."""
+
+    target: ClassVar[str] = "drone_rl.envs.fault_transforms.Noise"
+    strength: Annotated[float, Real(0.0, 1.0)] = 0.02
+    """Standard deviation; from black to white is 1."""
+    correlation_time: Annotated[float, Real(0.0, 10_000.0, unit="frames")] = 0.0
+    """Time after which the correlation of a pixel's noise has fallen to 1/e; white noise at 0."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class DeadRows(Fault):
+    """Rows of the sensor that show nothing."""
+
+    target: ClassVar[str] = "drone_rl.envs.fault_transforms.DeadRows"
+    count: Annotated[int, Whole(0, 1024, "rows")] = 1
+    """Rows drawn anew for each episode, besides those that are always dead."""
+    rows: Annotated[tuple[int, ...], Several(Whole(0, 1023, "rows"), 0, 1024)] = ()
+    """Rows that are always dead, from 0 at the top."""
+    level: Annotated[float, Real(0.0, 1.0)] = 0.0
+    """What they show instead; 0 is black, 1 white."""
+
+    def check(self) -> None:
+        """Refuses rows that are named twice."""
+        if len(set(self.rows)) < len(self.rows):
+            raise InputError(f"rows={list(self.rows)} names a row twice; name each once")
+
+    def check_height(self, height: int) -> None:
+        """Refuses more rows than pictures have.
+
+        Raises:
+            InputError: There are not as many.
+        """
+        if max(self.rows, default=0) >= height:
+            raise InputError(
+                f"rows={list(self.rows)} of a picture of {height} rows; give at most {height - 1}"
+            )
+        if self.count + len(self.rows) > height:
+            raise InputError(
+                f"count={self.count} of a picture of {height} rows, of which {len(self.rows)} are "
+                f"always dead; give at most {height - len(self.rows)}"
+            )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class FrozenFrames(Fault):
+    """Frames that are, by chance, the one before."""
+
+    target: ClassVar[str] = "drone_rl.envs.fault_transforms.FrozenFrames"
+    share: Annotated[float, Real(0.0, 1.0)] = 0.05
+    """Probability of each."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class LateFrames(Fault):
+    """Frames that are shown late; until then the episode's first."""
+
+    target: ClassVar[str] = "drone_rl.envs.fault_transforms.LateFrames"
+    frames: Annotated[int, Whole(0, 16, "frames")] = 1
+    """How late."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Shift(Fault):
+    """A picture that stands a little aside all through an episode, as of a camera fixed askew."""
+
+    target: ClassVar[str] = "drone_rl.envs.fault_transforms.Shift"
+    down: Annotated[int, Whole(0, 1023, "pixels")] = 4
+    """How far up or down at most; every shift is as likely."""
+    across: Annotated[int, Whole(0, 1023, "pixels")] = 6
+    """How far to the left or right at most."""

@@ -1,0 +1,215 @@
+"""Verdicts read from files: refused unless their parts agree with one another.
+
+The kind, the exit status, shares, intervals and the rule's quantities follow from one another; what
+can be computed again is computed again. See also `utils/consistency.py`.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+from drone_rl.evaluation import kinds
+from drone_rl.evaluation.rule import SIDES, Quantity, Rule, decide, kinds_within
+from drone_rl.utils.consistency import (
+    MOST_VALUES,
+    check_mean,
+    check_mean_width,
+    check_order,
+    check_proportion,
+    check_same,
+    check_width,
+    read_entry,
+)
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.intervals import proportion
+from drone_rl.utils.schema import Flag, OneOf, Plain, Real, Several, Whole, as_mapping, shown
+
+_KIND = OneOf(tuple(kind.value for kind in kinds.Kind))
+_ROUNDING = 1e-6
+
+
+def check_verdict(given: Any) -> None:
+    """Check a verdict that was read from a file.
+
+    Args:
+        given: As in `verdict.json`.
+
+    Raises:
+        InputError: A number is out of range, or its parts contradict one another.
+    """
+    verdict = as_mapping(Plain().read(given, "verdict"), "verdict")
+    rule = _rule(verdict)
+    evaluations = {"greedy": verdict.get("greedy"), **verdict["baselines"]}
+    if verdict.get("sampled") is not None:
+        evaluations["sampled"] = verdict["sampled"]
+    for name, flights in evaluations.items():
+        _check_flights(verdict, flights, name[:40], rule)
+        check_same(flights["episodes"], verdict["greedy"]["episodes"], f"{name[:40]}.episodes")
+    found = [
+        _quantity(verdict, name, thresholds, rule)
+        for name, thresholds in zip(rule.quantities, rule.thresholds, strict=True)
+    ]
+    _check_kind(verdict, found, rule)
+    _check_differences(verdict)
+    if "failures" in verdict:
+        _check_failures(verdict)
+
+
+def _rule(verdict: Mapping[str, Any]) -> Rule:
+    """The rule that the verdict is by, for its strata and baselines."""
+    error_rate, good_share = (verdict.get(key) for key in ("error_rate", "good_share"))
+    strata = [name for name in _shares(verdict.get("greedy"), "greedy") if name != "all"]
+    if set(strata) == set(SIDES):
+        strata = list(SIDES)
+    flown = as_mapping(verdict.get("baselines"), "baselines")
+    luck = [name for name in flown if name != "oracle"]
+    if not 0 < len(strata) <= 8 or not 0 < len(luck) <= 32 or len(luck) == len(flown):
+        raise InputError(f"verdict has {len(strata)} strata and {len(luck)} baselines; judge again")
+    rule = Rule(
+        error_rate=Real(0.0, 1.0).read(error_rate, "verdict.error_rate"),
+        good_share=Real(0.0, 1.0).read(good_share, "verdict.good_share"),
+        strata=tuple(strata),
+        luck=tuple(luck),
+    )
+    if verdict.get("rule") != rule.text:
+        raise InputError("verdict.rule is not the rule of this version; judge the policy again")
+    return rule
+
+
+def _shares(flights: Any, of: str) -> Mapping[str, Any]:
+    return as_mapping(as_mapping(flights, of).get("shares"), f"{of}.shares")
+
+
+def _check_flights(verdict: Mapping[str, Any], flights: Any, of: str, rule: Rule) -> None:
+    """The summary of one evaluation."""
+    episodes = read_entry(flights, "episodes", Whole(1, MOST_VALUES), of)
+    successes = check_proportion(flights.get("success"), f"{of}.success", episodes)
+    shares = _shares(flights, of)
+    if {*shares} != {"all", *rule.strata}:
+        raise InputError(f"{of}.shares are of {shown(', '.join(shares))}; judge again")
+    for name, share in shares.items():
+        check_mean(share, f"{of}.shares.{name}", count=episodes if name == "all" else None)
+        if share["count"] > episodes:
+            raise InputError(f"{of}.shares.{name} counts more than {episodes} episodes")
+    _check_goals(verdict, flights, successes / episodes, of)
+    ended = [
+        check_proportion(end, f"{of}.ends", episodes)
+        for end in as_mapping(flights.get("ends", {}), f"{of}.ends").values()
+    ]
+    if sum(ended) > episodes:
+        raise InputError(f"{of}.ends are of {sum(ended)} episodes, not of {episodes}")
+    if "never_reached" in flights:
+        check_mean(flights["never_reached"], f"{of}.never_reached", count=episodes)
+
+
+def _check_goals(
+    verdict: Mapping[str, Any], flights: Mapping[str, Any], success: float, of: str
+) -> None:
+    """An episode with success reaches all goals, another one at least one less."""
+    goals = read_entry(verdict, "num_cubes", Whole(1, 10_000), "verdict")
+    every = float(flights["shares"]["all"]["mean"])
+    if not success - _ROUNDING <= every <= 1 - (1 - success) / goals + _ROUNDING:
+        raise InputError(f"{of}: {success:.3f} succeed, but {every:.3f} of all goals are reached")
+    if "mean_goals" in flights:
+        check_same(flights["mean_goals"], goals * every, f"{of}.mean_goals")
+    if "mean_length" in flights and "max_length" in flights:
+        longest = read_entry(flights, "max_length", Whole(0, 10**9), of)
+        read_entry(flights, "mean_length", Real(0.0, longest), of)
+
+
+def _quantity(
+    verdict: Mapping[str, Any], name: str, thresholds: tuple[float, ...], rule: Rule
+) -> Quantity:
+    """One quantity of the rule, checked against the evaluations that it comes from."""
+    where = f"verdict.quantities.{name}"
+    quantities = as_mapping(verdict.get("quantities"), "verdict.quantities")
+    given = as_mapping(quantities.get(name), where)
+    value, bounds, count = _expected(verdict, name, rule)
+    check_same(given.get("value"), value, f"{where}.value")
+    lower, upper = (read_entry(given, key, Real(*bounds), where) for key in ("lower", "upper"))
+    interval = {"lower95": lower, "upper95": upper}
+    if value is not None:
+        check_order(interval, value, where)
+    if name.startswith("offered "):
+        offered = proportion(round((value or 0.0) * count), count, rule.confidence)
+        check_width(interval, offered, where)
+    else:
+        check_mean_width((lower, upper), value, count, bounds, rule.confidence, where)
+    Several(Real(-1.0, 1.0), 1, 8).read(given.get("thresholds"), f"{where}.thresholds")
+    for one, other in zip(given["thresholds"], thresholds, strict=False):
+        check_same(one, other, f"{where}.thresholds")
+    return Quantity(value, lower, upper, thresholds)
+
+
+def _expected(
+    verdict: Mapping[str, Any], name: str, rule: Rule
+) -> tuple[Any, tuple[float, float], int]:
+    """What a quantity must be: its value, its least and greatest value, and of how many values."""
+    greedy, flown, good = verdict["greedy"], verdict["baselines"], rule.good_share
+    ours, best = (of["success"]["share"] for of in (greedy, flown["oracle"]))
+    every, most = (of["shares"]["all"]["mean"] for of in (greedy, flown["oracle"]))
+    episodes, what = greedy["episodes"], name.rpartition(" ")[2]
+    if name == "success":
+        return ours - good * best, (-good, 1.0), episodes
+    if name.startswith("offered "):
+        return greedy["shares"][what]["count"] / episodes, (0.0, 1.0), episodes
+    if name.startswith("collected "):
+        stratum = greedy["shares"][what]
+        return stratum["mean"], (0.0, 1.0), stratum["count"]
+    if name.startswith("above "):
+        luck = flown[what]["shares"]["all"]["mean"]
+        share = every - (1 - rule.luck_margin) * luck - rule.luck_margin * most
+        return share, (-1.0, 1.0), episodes
+    return good * best - flown[what]["success"]["share"], (-1.0, good), episodes
+
+
+def _check_kind(verdict: Mapping[str, Any], found: list[Quantity], rule: Rule) -> None:
+    """The kind is what the rule makes of the quantities, and certain only where they are."""
+    kind = kinds.Kind(read_entry(verdict, "kind", _KIND, "verdict"))
+    is_certain = read_entry(verdict, "certain", Flag(), "verdict")
+    expected = decide([quantity.level for quantity in found], len(rule.strata))
+    if kind != expected:
+        raise InputError(f"verdict.kind={kind} is not what its figures give ({expected})")
+    box = tuple(quantity.levels for quantity in found)
+    if is_certain and len(kinds_within(box, len(rule.strata))) > 1:
+        raise InputError(f"verdict.certain=true, but its intervals allow for more than {kind}")
+    status = read_entry(verdict, "exit_code", Whole(0, 255), "verdict")
+    if status != kind.exit_code if is_certain else status == 0:
+        raise InputError(f"verdict.exit_code={status} is not that of its kind; judge again")
+
+
+def _check_differences(verdict: Mapping[str, Any]) -> None:
+    """Paired differences between the policy and others."""
+    greedy = verdict["greedy"]
+    for name, gain in as_mapping(verdict.get("skill", {}), "verdict.skill").items():
+        mean = check_mean(gain, f"skill.{name[:40]}", (-1.0, 1.0), greedy["episodes"])
+        other = as_mapping(verdict["baselines"].get(name), f"baselines.{name[:40]}")
+        check_same(
+            mean,
+            greedy["shares"]["all"]["mean"] - other["shares"]["all"]["mean"],
+            f"skill.{name[:40]}",
+        )
+    if verdict.get("drawing") is not None:
+        mean = check_mean(verdict["drawing"], "drawing", (-1.0, 1.0), greedy["episodes"])
+        sampled = as_mapping(verdict.get("sampled"), "sampled")
+        check_same(mean, sampled["success"]["share"] - greedy["success"]["share"], "drawing.mean")
+
+
+def _check_failures(verdict: Mapping[str, Any]) -> None:
+    """The table of failures."""
+    failures = as_mapping(verdict["failures"], "failures")
+    episodes = verdict["greedy"]["episodes"]
+    failed = check_proportion(failures.get("bound"), "failures.bound", episodes)
+    check_same(
+        failed, episodes - verdict["greedy"]["success"]["successes"], "failures.bound.successes"
+    )
+    rows = failures.get("rows")
+    if not isinstance(rows, list) or not 0 < len(rows) <= 1000:
+        raise InputError("failures.rows is no list of up to 1000 rows; judge again")
+    for row in rows:
+        row = as_mapping(row, "a row of failures")
+        share = {**row, "successes": row.get("failed"), "trials": row.get("episodes")}
+        check_proportion(share, "a row of failures")
+        if row["episodes"] > episodes or row["failed"] > failed:
+            raise InputError(f"a row of failures counts more than {failed} of {episodes} episodes")
+    if failures.get("largest") is not None and failures["largest"] not in rows:
+        raise InputError("failures.largest is none of its rows; judge again")

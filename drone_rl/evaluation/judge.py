@@ -1,0 +1,303 @@
+"""From flown episodes to a verdict."""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from tensordict.nn import TensorDictModuleBase
+from torch import Tensor
+from torchrl.envs import EnvBase
+
+from drone_rl.envs import worlds_of
+from drone_rl.evaluation.baselines import fly_baselines
+from drone_rl.evaluation.branches import Outcomes
+from drone_rl.evaluation.certificate_text import is_proved
+from drone_rl.evaluation.evaluator import StepLog, run_episodes
+from drone_rl.evaluation.failures import failure_table
+from drone_rl.evaluation.fragility import Rounding, examine
+from drone_rl.evaluation.kinds import NOT_CERTAIN, Kind
+from drone_rl.evaluation.metrics import Episodes, summarise
+from drone_rl.evaluation.rule import Quantity, Rule, decide, kinds_within
+from drone_rl.evaluation.verdict_text import SENTENCES
+from drone_rl.utils.intervals import mean_bounds, proportion
+from drone_rl.utils.seeding import RootSeed
+from drone_rl.utils.sentences import say
+
+MANY = (2, 3, 5, 10, 20, 50, 100)
+"""How many times as many episodes are tried out, in thought, where they are not enough."""
+
+
+class Claim(Protocol):
+    """A certificate of the policy; `drone_rl.verdicts.proof` has the implementation."""
+
+    def beside(self, greedy: Episodes, *, rounding: Rounding | None = None) -> dict[str, Any]:
+        """Return what a verdict on these greedy episodes may quote of it."""
+        ...
+
+
+@dataclasses.dataclass(frozen=True)
+class Verdict:
+    """The kind, whether the episodes are enough to be certain of it, and all that it rests on."""
+
+    kind: Kind
+    certain: bool
+    evidence: dict[str, Any]
+    """Plain values; what `as_dict` returns but for the sentence."""
+
+    @property
+    def exit_code(self) -> int:
+        """The kind's if it is certain, else 13."""
+        return self.evidence["exit_code"]
+
+    @property
+    def is_proved(self) -> bool:
+        """Whether a certificate says so of every placement, and rollouts re-checked it."""
+        return is_proved(self.evidence)
+
+    @property
+    def sentence(self) -> str:
+        """For a person."""
+        return say(SENTENCES, self.evidence)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values, as in `verdict.json`."""
+        return {**self.evidence, "sentence": self.sentence}
+
+
+def judge_policy(
+    env: EnvBase,
+    actor: TensorDictModuleBase,
+    episodes: int,
+    *,
+    rule: Rule | None = None,
+    sampled: bool = True,
+    claim: Claim | None = None,
+    unlike: Mapping[str, Any] | None = None,
+    seed: RootSeed | None = None,
+) -> Verdict:
+    """Flies a policy, greedily and sampled, and the baselines, all in the same worlds, and judges.
+
+    Args:
+        env: A batch of worlds.
+        actor: The policy.
+        episodes: How many of each.
+        rule: Thresholds.
+        sampled: Whether to fly the policy with drawn actions, too; one that has no probabilities
+            to draw from need not.
+        claim: A certificate of the policy in the task of the worlds, if there is one.
+        unlike: By what the drones' dynamics differ from those that the policy was made for: setting
+            to "own" and "flown", plain values.
+        seed: Root of the environments' random streams; without it the verdict says that a policy
+            could have been fitted to these environments.
+    """
+    base: Any = getattr(env, "base_env", env)
+    state, worlds = base.state_dict(), worlds_of(env)
+    log, drawn = StepLog(), None
+    greedy = run_episodes(env, actor, episodes, is_compiled=True, log=log)
+    if sampled:
+        base.load_state_dict(state)
+        drawn = run_episodes(env, actor, episodes, greedy=False)
+    base.load_state_dict(state)
+    rounding = examine(env, actor, episodes, flown=greedy, log=log)
+    baselines = fly_baselines(
+        env.batch_size[0], worlds.task, state, episodes, str(worlds.device), worlds.dynamics
+    )
+    return judge(
+        greedy,
+        baselines,
+        rule=rule,
+        sampled=drawn,
+        claim=claim,
+        unlike=unlike,
+        seed=seed,
+        rounding=rounding,
+    )
+
+
+def judge(
+    greedy: Episodes,
+    baselines: Mapping[str, Episodes],
+    *,
+    rule: Rule | None = None,
+    sampled: Episodes | None = None,
+    claim: Claim | None = None,
+    unlike: Mapping[str, Any] | None = None,
+    seed: RootSeed | None = None,
+    rounding: Rounding | None = None,
+) -> Verdict:
+    """Applies the rule.
+
+    Args:
+        greedy: The policy's episodes, each with the most probable actions.
+        baselines: Those of the task's luck and of the oracle, the k-th in the same world as the
+            policy's.
+        rule: Thresholds.
+        sampled: The policy's episodes with drawn actions, in the same worlds.
+        claim: A certificate of the policy in the same task, if there is one.
+        unlike: See `judge_policy`.
+        seed: See `judge_policy`.
+        rounding: What rounding can change in `greedy`; None if that was not examined.
+
+    Raises:
+        ValueError: They were flown in different worlds.
+    """
+    task = greedy.task
+    rule = dataclasses.replace(rule or Rule(), strata=task.strata, luck=task.luck)
+    _check_pairs(greedy, [*baselines.values(), *([] if sampled is None else [sampled])])
+    found = measure(greedy, baselines, rule)
+    kind = decide([quantity.level for quantity in found], len(rule.strata))
+    certain = is_enough = _is_certain(found, rule)
+    if rounding is not None:
+        found = widen(found, greedy, baselines, rule, rounding.outcomes)
+        certain = is_enough and not rounding.is_excessive and _is_certain(found, rule)
+    depends = is_enough and not certain
+    evidence = {
+        "kind": kind.value,
+        "certain": certain,
+        "exit_code": kind.exit_code if certain else NOT_CERTAIN,
+        **({"seed": None, "seed_is_fixed": True} if seed is None else seed.as_dict()),
+        "rule": rule.text,
+        "error_rate": rule.error_rate,
+        "good_share": rule.good_share,
+        "terms": task.terms.as_dict(),
+        "num_cubes": greedy.goals.reached.shape[-1],
+        "rounding": None if rounding is None else {**rounding.as_dict(), "decides": depends},
+        "proof": None if claim is None else claim.beside(greedy, rounding=rounding),
+        "greedy": summarise(greedy),
+        "sampled": None if sampled is None else summarise(sampled),
+        "baselines": {name: summarise(flown) for name, flown in baselines.items()},
+        "skill": {name: _gain(greedy.share, flown.share) for name, flown in baselines.items()},
+        "drawing": None if sampled is None else _gain(sampled.success, greedy.success),
+        "failures": failure_table(greedy),
+        "quantities": {name: q._asdict() for name, q in zip(rule.quantities, found, strict=True)},
+        "enough": len(greedy) if is_enough else _enough(greedy, baselines, rule),
+        **({"unlike": dict(unlike)} if unlike else {}),
+    }
+    return Verdict(kind, certain, evidence)
+
+
+def measure(
+    greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule, times: int = 1
+) -> tuple[Quantity, ...]:
+    """The rule's quantities with intervals that hold all at once.
+
+    Args:
+        greedy: The policy's episodes.
+        baselines: Those of the baselines in the same worlds.
+        rule: Thresholds.
+        times: Counts every episode so often, to see what more of the same would tell.
+    """
+    observed = observe(greedy, baselines, rule)
+    return tuple(estimate(i, np.tile(values, times), rule) for i, values in enumerate(observed))
+
+
+def widen(
+    found: Sequence[Quantity],
+    greedy: Episodes,
+    baselines: Mapping[str, Episodes],
+    rule: Rule,
+    outcomes: Outcomes,
+) -> tuple[Quantity, ...]:
+    """Widen the intervals of quantities by all ends that rounding leaves possible.
+
+    The lower ends hold even if every episode takes the worst of its possible ends for a quantity,
+    the upper ends even if each takes the best one.
+
+    Args:
+        found: As `measure` returns them.
+        greedy: The policy's episodes.
+        baselines: Those of the baselines in the same worlds.
+        rule: Thresholds.
+        outcomes: Possible ends of some episodes.
+    """
+    observed = _observe_each(greedy, baselines, rule)
+    if outcomes.episodes is None:
+        others = [values[:0] for values in observed]
+    else:
+        beside = {name: flown[outcomes.owner] for name, flown in baselines.items()}
+        others = _observe_each(outcomes.episodes, beside, rule)
+    widened = []
+    for i, (quantity, values, ends) in enumerate(zip(found, observed, others, strict=True)):
+        low, high = rule.ranges[i]
+        lower, upper = values.copy(), values.copy()
+        owner = outcomes.owner.numpy()[~np.isnan(ends)]
+        np.fmin.at(lower, owner, ends[~np.isnan(ends)])
+        np.fmax.at(upper, owner, ends[~np.isnan(ends)])
+        is_open = outcomes.is_open.numpy()
+        lower[is_open], upper[is_open] = low, high
+        least, most = (estimate(i, v[~np.isnan(v)], rule) for v in (lower, upper))
+        bounds = {"lower": min(quantity.lower, least.lower)}
+        widened.append(quantity._replace(**bounds, upper=max(quantity.upper, most.upper)))
+    return tuple(widened)
+
+
+def observe(greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule) -> list[NDArray]:
+    """What each episode says of each of the rule's quantities: one value, or none.
+
+    Returns:
+        One array a quantity; those of "collected" have a value for each episode that offered such a
+        cube, the others one for each episode. Shape: (at most n,), float64.
+    """
+    each = _observe_each(greedy, baselines, rule)
+    return [values[~np.isnan(values)] for values in each]
+
+
+def _observe_each(greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule) -> list[NDArray]:
+    """The same of every episode, NaN where it says nothing. Shapes: (n,), float64."""
+    oracle = baselines["oracle"]
+    observed = [greedy.success - rule.good_share * oracle.success]
+    offered = [greedy.offered(stratum) for stratum in range(len(rule.strata))]
+    observed += [there.double() for there in offered]
+    for stratum, there in enumerate(offered):
+        share = torch.full_like(there, torch.nan, dtype=torch.float64)
+        share[there] = greedy.stratum_share(stratum)
+        observed.append(share)
+    for name in rule.luck:
+        luck = (1 - rule.luck_margin) * baselines[name].share
+        observed.append(greedy.share - luck - rule.luck_margin * oracle.share)
+    for name in rule.luck:
+        observed.append(rule.good_share * oracle.success - baselines[name].success)
+    return [values.numpy() for values in observed]
+
+
+def estimate(quantity: int, values: NDArray, rule: Rule) -> Quantity:
+    """One of the rule's quantities from what episodes say of it.
+
+    Args:
+        quantity: Its place among them.
+        values: As `observe` returns them.
+        rule: Thresholds.
+    """
+    name, thresholds = rule.quantities[quantity], rule.thresholds[quantity]
+    if name.startswith("offered"):
+        share = proportion(int(values.sum()), len(values), rule.confidence)
+        return Quantity(share["share"], share["lower95"], share["upper95"], thresholds)
+    mean = mean_bounds(values, *rule.ranges[quantity], rule.confidence)
+    return Quantity(mean["mean"], mean["lower95"], mean["upper95"], thresholds)
+
+
+def _is_certain(found: tuple[Quantity, ...], rule: Rule) -> bool:
+    box = tuple(quantity.levels for quantity in found)
+    return len(kinds_within(box, len(rule.strata))) == 1
+
+
+def _enough(greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule) -> int | None:
+    """Roughly how many episodes would do if they went on like this; None for very many."""
+    for times in MANY:
+        if _is_certain(measure(greedy, baselines, rule, times), rule):
+            return times * len(greedy)
+    return None
+
+
+def _gain(ours: Tensor, theirs: Tensor) -> dict[str, Any]:
+    """The mean paired difference of two shares, with its interval."""
+    return mean_bounds(ours - theirs, -1.0, 1.0)
+
+
+def _check_pairs(greedy: Episodes, others: list[Episodes]) -> None:
+    for other in others:
+        if not torch.equal(other.goals.world, greedy.goals.world):
+            raise ValueError("policy and baselines were flown in different worlds; pair them")

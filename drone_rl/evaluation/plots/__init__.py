@@ -1,0 +1,1 @@
+"""Image and chart building blocks that reports, maps and films share."""

@@ -1,0 +1,140 @@
+"""Pictures made of the policy's own frames: tinted, heated, in rows, with the indicator."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib import colormaps
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+
+from drone_rl.evaluation.plots.indicator import indicator
+from drone_rl.evaluation.plots.palette import BACKGROUND, INK, Color
+from drone_rl.sim.action_display import MOVES, ShownActions
+
+SCALE = 5
+"""Screen pixels to one of the policy's in a single picture."""
+_CHANNELS = {"gray": 1, "rgb": 3, "chromaticity": 2}
+"""Of each frame that a policy gets."""
+
+
+def tint(frame: NDArray, color: Color, strength: float = 0.4) -> NDArray:
+    """A frame washed with its action's colour. Shape: (H, W, 3), uint8."""
+    wash = np.array(color, dtype=np.float64)
+    return (frame * (1 - strength) + wash * strength).astype(np.uint8)
+
+
+def heated(frame: NDArray, heat: NDArray) -> NDArray:
+    """A frame in gray with a heat map over it, hot where it is bright. Shape: (H, W, 3), uint8."""
+    gray = np.repeat(frame.mean(-1, keepdims=True), 3, -1) * 0.75
+    top = float(heat.max())
+    share = heat.astype(np.float64) / top if top > 0 else np.zeros(heat.shape)
+    color = colormaps["inferno"](share)[..., :3] * 255
+    weight = (0.15 + 0.75 * share)[..., None] * (top > 0)
+    return (gray * (1 - weight) + color * weight).astype(np.uint8)
+
+
+def thumbnails(frames: NDArray, colors: Sequence[Color], cells: NDArray) -> Image.Image:
+    """Tinted frames on cells of a grid, none over another.
+
+    Args:
+        frames: Shape (N, H, W, 3).
+        colors: Of each frame's action.
+        cells: Column and row of each. Shape: (N, 2).
+    """
+    height, width = frames.shape[1:3]
+    columns, rows = cells.max(0) + 1
+    canvas = Image.new("RGB", (int(columns) * width, int(rows) * height), BACKGROUND)
+    for frame, color, (column, row) in zip(frames, colors, cells, strict=True):
+        picture = Image.fromarray(tint(frame, color))
+        canvas.paste(picture, (int(column) * width, int(row) * height))
+    return canvas
+
+
+def explained_frame(
+    frame: NDArray,
+    heat: NDArray,
+    probabilities: Sequence[float],
+    chosen: int,
+    captions: tuple[str, str],
+    actions: ShownActions = MOVES,
+) -> Image.Image:
+    """A frame, its heat map, each under a caption, and the indicator, from top to bottom."""
+    plain, hot = enlarge(frame), enlarge(heated(frame, heat))
+    bars = indicator(probabilities, chosen, plain.width, actions)
+    return stacked([titled(plain, captions[0]), titled(hot, captions[1]), bars])
+
+
+def probed_frame(
+    data: Mapping[str, NDArray], frame: int, caption: str, actions: ShownActions = MOVES
+) -> Image.Image:
+    """A frame of the data set under a caption, with what the policy made of it.
+
+    Args:
+        data: With "frames" (T, H, W, 3), "actions" (T,) and "probabilities" (T, num_actions).
+        frame: Which of the T.
+        caption: Over the picture.
+        actions: What they are.
+    """
+    plain = titled(enlarge(data["frames"][frame]), caption)
+    chosen = int(data["actions"][frame])
+    bars = indicator(data["probabilities"][frame], chosen, plain.width, actions)
+    return stacked([plain, bars])
+
+
+def enlarge(frame: NDArray, scale: int = SCALE) -> Image.Image:
+    """A frame with each pixel as a square."""
+    picture = Image.fromarray(frame)
+    return picture.resize((picture.width * scale, picture.height * scale), Image.Resampling.NEAREST)
+
+
+def titled(picture: Image.Image, caption: str) -> Image.Image:
+    """A picture under a line of text."""
+    canvas = Image.new("RGB", (picture.width, picture.height + 22), BACKGROUND)
+    ImageDraw.Draw(canvas).text((2, 2), caption, INK, ImageFont.load_default(14))
+    canvas.paste(picture, (0, 22))
+    return canvas
+
+
+def stacked(pictures: Sequence[Image.Image], gap: int = 3) -> Image.Image:
+    """Pictures one under another."""
+    width = max(p.width for p in pictures)
+    height = sum(p.height for p in pictures) + gap * (len(pictures) - 1)
+    canvas, y = Image.new("RGB", (width, height), BACKGROUND), 0
+    for picture in pictures:
+        canvas.paste(picture, (0, y))
+        y += picture.height + gap
+    return canvas
+
+
+def gridded(pictures: Sequence[Image.Image], columns: int, gap: int = 12) -> Image.Image:
+    """Pictures of one size in rows."""
+    width, height = pictures[0].width, pictures[0].height
+    rows = -(-len(pictures) // columns)
+    size = (columns * (width + gap) - gap, rows * (height + gap) - gap)
+    canvas = Image.new("RGB", size, BACKGROUND)
+    for i, picture in enumerate(pictures):
+        canvas.paste(picture, ((i % columns) * (width + gap), (i // columns) * (height + gap)))
+    return canvas
+
+
+def shown_picture(observation: NDArray, low: float, high: float, channels: str) -> NDArray:
+    """What a policy gets, as bytes: the newest frame's colors, or its gray.
+
+    Args:
+        observation: Shape (C, H, W), of one frame or several.
+        low: Becomes black.
+        high: Becomes white.
+        channels: What they are: "gray", "rgb", or "chromaticity" of red and blue, to which green
+            is shown as what they leave.
+
+    Returns:
+        Shape: (H, W, 3).
+    """
+    newest = observation[-_CHANNELS.get(channels, 1) :].astype(np.float64)
+    share = ((newest - low) / max(high - low, 1e-12)).clip(0, 1)
+    if channels == "chromaticity":
+        red, blue = share
+        share = np.stack([red, 1 - (red + blue) / 2, blue])
+    elif channels != "rgb":
+        share = share.repeat(3, 0)
+    return (np.moveaxis(share, 0, -1) * 255).astype(np.uint8)

@@ -1,0 +1,184 @@
+"""Regions of a plane as pictures: metres ahead upwards, metres to the left leftwards."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from markupsafe import escape
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch, PathPatch
+from matplotlib.path import Path
+from numpy.typing import NDArray
+
+from drone_rl.sim.action_display import ShownActions
+
+_LINE = 'fill="none" class="line"'
+
+
+def chart(numbers: Mapping[str, Any], arrays: Mapping[str, NDArray], names: ShownActions) -> Figure:
+    """The exact map as a chart.
+
+    Args:
+        numbers: "places" of an explanation.
+        arrays: "points", "ends" and "labels" of its outlines.
+        names: The actions.
+    """
+    window = numbers["window"]
+    side, near, far = window["sideways"], window["nearest"], window["farthest"]
+    width = 9.0
+    figure = Figure(figsize=(width, 1.6 + 0.88 * width * far / (2 * side)), layout="constrained")
+    axis = figure.subplots()
+    for label, ways in _ways(arrays).items():
+        shut = [np.concatenate([way, way[:1]])[:, ::-1] for way in ways]
+        path = Path.make_compound_path(*(Path(way, closed=True) for way in shut))
+        is_action = label < len(names.names)
+        style: dict[str, Any] = (
+            {"facecolor": names.css(label), "alpha": 0.85}
+            if is_action
+            else {"fill": False, "hatch": "////", "edgecolor": "#ffffff"}
+        )
+        axis.add_patch(PathPatch(path, linewidth=0, **style))
+    _mark(axis, numbers)
+    axis.set(xlim=(side, -side), ylim=(-0.04 * far, far), aspect="equal")
+    axis.set_xlabel("metres to the left (+) or right (-)")
+    axis.set_ylabel("metres ahead of the camera")
+    axis.axhline(near, color="#1d2026", lw=0.5)
+    axis.set_title("what it does about one cube that stands there")
+    handles = [Patch(color=names.css(a), label=f"goes {names.names[a]}") for a in names.order]
+    if numbers["unseen"]:
+        style = {"facecolor": "#b4b8c0", "edgecolor": "white", "hatch": "////"}
+        handles.append(Patch(**style, label="cube not seen"))
+    handles += axis.get_legend_handles_labels()[0]
+    axis.legend(
+        handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.07), ncols=3, frameon=False
+    )
+    return figure
+
+
+def _mark(axis: Axes, numbers: Mapping[str, Any]) -> None:
+    """The camera, the lines beyond which a turn is called for, and where the logits are closest."""
+    touch = numbers["touch_distance"]
+    for y in (-touch, touch):
+        label = "beyond: flying straight on misses it" if y < 0 else None
+        axis.axvline(y, color="white", ls=(0, (5, 4)), lw=1.6)
+        axis.axvline(y, color="#1d2026", ls=(0, (5, 4)), lw=0.8, label=label)
+    axis.plot(0, 0, "^", color="#1d2026", ms=11, clip_on=False, ls="", label="camera, looking up")
+    axis.plot(
+        numbers["least_gap_left"], numbers["least_gap_ahead"], "o", ms=11, mfc="none", mew=2,
+        color="white", ls="",
+    )  # fmt: skip
+    axis.plot(
+        numbers["least_gap_left"], numbers["least_gap_ahead"], "o", ms=11, mfc="none", mew=1,
+        color="#1d2026", ls="", label="logits closest",
+    )  # fmt: skip
+
+
+def svg(numbers: Mapping[str, Any], arrays: Mapping[str, NDArray], names: ShownActions) -> str:
+    """The exact map as an SVG element, which can be zoomed into without end.
+
+    Args:
+        numbers: "places" of an explanation.
+        arrays: "points", "ends" and "labels" of its outlines.
+        names: The actions.
+    """
+    window, touch = numbers["window"], numbers["touch_distance"]
+    side, near, far = window["sideways"], window["nearest"], window["farthest"]
+    unit = (side + far) / 60
+    left, below = side + 3 * unit, 4.5 * unit
+    box = (-left, -far - unit, left + side + unit, far + unit + below)
+    parts = [
+        f'<svg class="places" viewBox="{" ".join(f"{v:g}" for v in box)}" role="img" '
+        'aria-label="What it does about one cube at each place" font-family="sans-serif" '
+        f'font-size="{unit:g}">',
+        '<defs><pattern id="unseen" width=".3" height=".3" patternUnits="userSpaceOnUse" '
+        'patternTransform="rotate(45)"><rect width=".1" height=".3" fill="#fff" '
+        'fill-opacity=".7"/></pattern></defs>',
+    ]
+    for label, ways in _ways(arrays).items():
+        is_action = label < len(names.names)
+        fill = names.css(label) if is_action else "url(#unseen)"
+        title = escape(f"goes {names.names[label]}") if is_action else ""
+        inner = f"<title>{title}</title>" if title else ""
+        style = "" if is_action else ' pointer-events="none"'
+        parts.append(
+            f'<path fill="{fill}" fill-opacity=".85" fill-rule="evenodd"{style} '
+            f'd="{"".join(map(_way, ways))}">{inner}</path>'
+        )
+    parts += [
+        f'<path {_LINE} stroke="#fff" stroke-width=".05" stroke-dasharray=".3 .2" '
+        f'd="M{x:g} {-near:g}V{-far:g}"/>'
+        for x in (-touch, touch)
+    ]
+    parts += [*_scale(side, near, far, unit), *_marks(numbers, unit), *_key(names, side, unit)]
+    return "\n".join([*parts, "</svg>"])
+
+
+def _scale(side: float, near: float, far: float, unit: float) -> list[str]:
+    """A frame and the numbers beside it."""
+    frame = f"M{-side:g} {-near:g}H{side:g}V{-far:g}H{-side:g}Z"
+    ahead = [y for y in _ticks(far) if y >= near]
+    aside = [x for x in _ticks(side) if x]
+    text, low = 'fill="currentColor" text-anchor', 1.2 * unit - near
+    return [
+        f'<path {_LINE} stroke="currentColor" stroke-width=".03" d="{frame}"/>',
+        *(f'<text {text}="end" x="{-side - unit / 3:g}" y="{unit / 3 - y:g}">{y:g} m</text>'
+          for y in ahead),
+        *(f'<text {text}="middle" x="{sign * x:g}" y="{low:g}">{x:g} m</text>'
+          for x in aside for sign in (-1, 1)),
+    ]  # fmt: skip
+
+
+def _marks(numbers: Mapping[str, Any], unit: float) -> list[str]:
+    """The camera and where the logits are closest."""
+    x, y = -numbers["least_gap_left"], -numbers["least_gap_ahead"]
+    circle = f'<circle cx="{x:.6g}" cy="{y:.6g}" r="{unit / 2:g}" {_LINE}'
+    camera = f"M0 {-unit:g}L{0.7 * unit:g} {0.6 * unit:g}H{-0.7 * unit:g}Z"
+    return [
+        f'<path fill="currentColor" d="{camera}"><title>camera</title></path>',
+        f'{circle} stroke="#fff" stroke-width=".12"/>',
+        f'{circle} stroke="#000" stroke-width=".05"><title>logits closest</title></circle>',
+    ]
+
+
+def _key(names: ShownActions, side: float, unit: float) -> list[str]:
+    """What the colours are."""
+    parts, step = [], 2 * side / len(names.names)
+    for place, action in enumerate(names.order):
+        x, y = place * step - side, 2.2 * unit
+        parts += [
+            f'<rect x="{x:g}" y="{y:g}" width="{unit:g}" height="{unit:g}" '
+            f'fill="{names.css(action)}"/>',
+            f'<text fill="currentColor" x="{x + 1.4 * unit:g}" y="{y + 0.9 * unit:g}">goes '
+            f"{escape(names.names[action])}</text>",
+        ]
+    return parts
+
+
+def _ticks(most: float) -> list[float]:
+    """Round numbers from 0 up, four or so."""
+    size = 10.0 ** np.floor(np.log10(most / 5))
+    step = next((size * k for k in (1, 2, 5) if most / (size * k) <= 5), size * 10)
+    return (step * np.arange(int(most / step + 1e-9) + 1)).tolist()
+
+
+def _ways(arrays: Mapping[str, NDArray]) -> dict[int, list[NDArray]]:
+    """Closed ways by their labels."""
+    ways: dict[int, list[NDArray]] = {}
+    parts = np.split(arrays["points"], arrays["ends"][:-1])
+    for label, way in zip(arrays["labels"].tolist(), parts, strict=True):
+        ways.setdefault(label, []).append(way)
+    return dict(sorted(ways.items()))
+
+
+def _way(way: NDArray) -> str:
+    """A closed way in a path's words, to a tenth of a millimetre."""
+    whole = np.round(-1e4 * way[:, ::-1]).astype(int)
+    steps: Sequence[Any] = np.diff(whole, axis=0).tolist()
+    begin = f"M{_short(whole[0, 0])} {_short(whole[0, 1])}"
+    return begin + "l" + " ".join(f"{_short(x)} {_short(y)}" for x, y in steps) + "z"
+
+
+def _short(value: int) -> str:
+    """Ten-thousandths as a decimal number."""
+    return f"{value / 1e4:.4f}".rstrip("0").rstrip(".")

@@ -1,0 +1,71 @@
+"""Pictures, films, tables and numbers as files, and as data URIs for a page of one file."""
+
+import base64
+import csv
+import io
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import imageio.v3 as iio
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+from PIL import Image
+
+Rows = Sequence[Sequence[Any]]
+"""A table, its heading first."""
+_DPI = 90
+"""Pixels to the inch of a chart."""
+_MOST_PIXELS = 2**25
+"""Of a chart."""
+FRAMES_PER_SECOND = 8
+"""Of films."""
+
+
+def save_drawn(drawn: Image.Image | Figure | NDArray, path: Path) -> str:
+    """Saves a picture or chart as PNG, a film as MP4.
+
+    Args:
+        drawn: See `report.part.Drawn`.
+        path: Without suffix.
+
+    Returns:
+        The same as a data URI.
+    """
+    if isinstance(drawn, (Image.Image, Figure)):
+        content = to_png(drawn)
+        path.with_name(path.name + ".png").write_bytes(content)
+        return to_uri(content, "image/png")
+    film = path.with_name(path.name + ".mp4")
+    iio.imwrite(film, drawn, fps=FRAMES_PER_SECOND, codec="libx264")
+    return to_uri(film.read_bytes(), "video/mp4")
+
+
+def save_rows(rows: Rows, path: Path) -> None:
+    """Saves a table as CSV. The path is without suffix."""
+    with open(path.with_name(path.name + ".csv"), "w", newline="", encoding="utf-8") as file:
+        csv.writer(file).writerows(rows)
+
+
+def save_numbers(numbers: Any, path: Path) -> None:
+    """Saves plain values as JSON. The path is without suffix."""
+    path.with_name(path.name + ".json").write_text(json.dumps(numbers, indent=1))
+
+
+def to_png(picture: Image.Image | Figure) -> bytes:
+    """A picture or chart as the bytes of a PNG file."""
+    buffer = io.BytesIO()
+    if isinstance(picture, Figure):
+        width, height = (_DPI * picture.get_size_inches()).tolist()
+        if not width * height <= _MOST_PIXELS:
+            raise ValueError(f"a chart has {width:.0f} x {height:.0f} pixels")
+        picture.savefig(buffer, format="png", dpi=_DPI, metadata={"Software": None})
+    else:
+        picture.save(buffer, "png", optimize=True)
+    return buffer.getvalue()
+
+
+def to_uri(content: bytes, kind: str) -> str:
+    """Bytes of a media type, such as image/png, as a data URI."""
+    return f"data:{kind};base64,{base64.b64encode(content).decode()}"

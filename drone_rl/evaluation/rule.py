@@ -1,0 +1,180 @@
+"""The rule of the verdict: quantities, thresholds, and the kind in every corner of a box.
+
+The rule asks of each quantity only how many of its thresholds it exceeds: its level. The truth
+lies, with the probability that is asked for, within all quantities' intervals at once, a box. The
+thresholds cut the box into cells; the verdict is certain if every cell gets the same kind.
+"""
+
+import dataclasses
+import functools
+import itertools
+import math
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+from drone_rl.evaluation.kinds import Kind
+from drone_rl.utils.errors import InputError
+
+SIDES = ("left", "ahead", "right")
+"""Strata of cube collection."""
+LUCK = ("random", "forward", "left", "right")
+"""Its policies that see nothing: any action alike, and each action always."""
+TOLERANCE = 1e-9
+"""Rounding of a mean; who exceeds a threshold by no more stands on it."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Rule:
+    """Thresholds.
+
+    Raises:
+        InputError: A value is out of range.
+    """
+
+    good_share: float = 0.9
+    """A good policy succeeds in more than this share of the oracle's episodes."""
+    side_share: float = 0.7
+    """A good policy collects more than this share on each side, a one-sided one on its side."""
+    other_share: float = 0.3
+    """A one-sided policy collects no more than this share on the other side."""
+    offered_share: float = 0.05
+    """A side counts if more than this share of episodes offer a cube there."""
+    luck_margin: float = 1 / 6
+    """A poor policy is no farther than this part of the way from luck to the oracle."""
+    error_rate: float = 0.05
+    """Largest probability of being certain and wrong."""
+    strata: tuple[str, ...] = SIDES
+    """The task's, from left to right; one-sided policies differ between first and last."""
+    luck: tuple[str, ...] = LUCK
+    """The task's."""
+
+    def __post_init__(self) -> None:
+        """Refuses what no policy could meet or miss."""
+        for field in dataclasses.fields(self):
+            if field.type is not float:
+                continue
+            value = getattr(self, field.name)
+            is_number = isinstance(value, int | float) and not isinstance(value, bool)
+            if not is_number or not math.isfinite(value) or not 0 < value < 1:
+                raise InputError(
+                    f"{field.name}={value} is out of range; give a share above 0 and below 1"
+                )
+        if self.other_share > self.side_share:
+            raise InputError(
+                f"other_share={self.other_share} must not exceed side_share={self.side_share}"
+            )
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """Names of all that the rule looks at, in order."""
+        return (
+            "success",
+            *(f"offered {stratum}" for stratum in self.strata),
+            *(f"collected {stratum}" for stratum in self.strata),
+            *(f"above {name}" for name in self.luck),
+            *(f"unsolved by {name}" for name in self.luck),
+        )
+
+    @property
+    def thresholds(self) -> tuple[tuple[float, ...], ...]:
+        """Of each of `quantities`, in rising order."""
+        shares = [(self.other_share, self.side_share)] * len(self.strata)
+        offered = [(self.offered_share,)] * len(self.strata)
+        return ((0.0,), *offered, *shares, *[(0.0,)] * (2 * len(self.luck)))
+
+    @property
+    def ranges(self) -> tuple[tuple[float, float], ...]:
+        """The least and the greatest value that an episode can have of each of `quantities`."""
+        count = len(self.strata)
+        above = [(-1.0, 1.0)] * len(self.luck)
+        unsolved = [(-1.0, self.good_share)] * len(self.luck)
+        return ((-self.good_share, 1.0), *[(0.0, 1.0)] * (2 * count), *above, *unsolved)
+
+    @property
+    def confidence(self) -> float:
+        """Of each quantity's interval, so that all of them hold at once (Bonferroni)."""
+        return 1.0 - self.error_rate / len(self.quantities)
+
+    @property
+    def text(self) -> str:
+        """The rule in words."""
+        return f"""\
+good: the share of episodes in which every cube is collected is more than {self.good_share:.0%} of \
+the oracle's, and more than {self.side_share:.0%} of the cubes to the left, ahead and to the right \
+are collected, wherever more than {self.offered_share:.0%} of episodes offer one. good, but \
+trivial: the same, but random actions or one action always succeed in at least \
+{self.good_share:.0%} of the oracle's episodes, too. one-sided: more \
+than {self.side_share:.0%} of the cubes on one side and no more than {self.other_share:.0%} on \
+the other, both offered. poor: neither, and no farther than {self.luck_margin:.0%} of the way from \
+luck to the oracle, in cubes; luck is the best of random actions and of each action always, flown \
+in the same worlds. none of these: anything else. Every episode counts once: a share is a mean \
+over episodes. The verdict is certain if the kind is the same wherever the quantities lie within \
+intervals that hold all at once with {1 - self.error_rate:.0%} probability, whatever depends on \
+what within an episode."""
+
+
+class Quantity(NamedTuple):
+    """One number of the rule, as far as it is known."""
+
+    value: float | None
+    """None if nothing tells it, as a share of cubes that were never offered."""
+    lower: float
+    upper: float
+    thresholds: tuple[float, ...]
+
+    @property
+    def level(self) -> int:
+        """How many thresholds the value exceeds."""
+        return 0 if self.value is None else level(self.value - TOLERANCE, self.thresholds)
+
+    @property
+    def levels(self) -> tuple[int, int]:
+        """The least and the greatest level within the interval."""
+        lower = level(self.lower - TOLERANCE, self.thresholds)
+        return lower, level(self.upper + TOLERANCE, self.thresholds)
+
+
+def level(value: float, thresholds: Iterable[float]) -> int:
+    """How many thresholds a value exceeds; one that equals a threshold doesn't exceed it."""
+    return sum(value > threshold for threshold in thresholds)
+
+
+def decide(levels: Sequence[int], num_strata: int = len(SIDES)) -> Kind:
+    """The kind.
+
+    Args:
+        levels: Of each of `Rule.quantities`.
+        num_strata: How many strata are among them.
+    """
+    success, *rest = levels
+    offered, shares = rest[:num_strata], rest[num_strata : 2 * num_strata]
+    luck = rest[2 * num_strata :]
+    above_luck, unsolved = luck[: len(luck) // 2], luck[len(luck) // 2 :]
+    if success and all(
+        share == 2 or not there for there, share in zip(offered, shares, strict=True)
+    ):
+        return Kind.GOOD if all(unsolved) else Kind.TRIVIAL
+    if offered[0] and offered[-1]:
+        if (shares[0], shares[-1]) == (0, 2):
+            return Kind.ONE_SIDED_RIGHT
+        if (shares[0], shares[-1]) == (2, 0):
+            return Kind.ONE_SIDED_LEFT
+    return Kind.NONE if all(above_luck) else Kind.POOR
+
+
+@functools.lru_cache(maxsize=4096)
+def kinds_within(box: tuple[tuple[int, int], ...], num_strata: int = len(SIDES)) -> frozenset[Kind]:
+    """The kinds of all cells of a box.
+
+    Args:
+        box: The least and the greatest level of each of `Rule.quantities`.
+        num_strata: How many strata are among them.
+    """
+    luck = box[1 + 2 * num_strata :]
+    halves = luck[: len(luck) // 2], luck[len(luck) // 2 :]
+    # `decide` asks of each half only whether all its levels are above 0: the least one tells
+    least = [
+        (min(low for low, _ in half), min(high for _, high in half)) for half in halves if half
+    ]
+    pieces = [range(low, high + 1) for low, high in (*box[: 1 + 2 * num_strata], *least)]
+    return frozenset(decide(cell, num_strata) for cell in itertools.product(*pieces))

@@ -1,0 +1,109 @@
+"""An explanation's files, read back: plain numbers and arrays."""
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
+
+from drone_rl.evaluation.consistency import check_verdict
+from drone_rl.explanations.report.fitting import check_fit
+from drone_rl.explanations.report.shapes import check_sizes
+from drone_rl.sim.action_display import ShownActions, shown_actions
+from drone_rl.sim.vocabulary import Terms, terms_of
+from drone_rl.utils.archives import read_arrays
+from drone_rl.utils.consistency import check_intervals
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.files import parse_json, read_bytes, refuse_links
+from drone_rl.utils.limits import ARRAYS_BYTES, EXPLANATION_BYTES, EXPLANATION_VALUES, Allowance
+from drone_rl.utils.schema import Flag, Maybe, Text, Whole, as_mapping
+from drone_rl.utils.seed_text import SEED_KEYS
+
+FORMAT = "drone_rl explanation"
+FORMAT_VERSION = 3
+FRAME = frozenset(
+    {
+        *("format", "format_version", "name", "date", "settings", "seconds", "actions", "terms"),
+        *("provenance", *SEED_KEYS),
+    }
+)
+"""Entries of explanation.json that are no section's."""
+
+
+@dataclasses.dataclass
+class Explanation:
+    """What `drone-rl explain` wrote about one policy."""
+
+    numbers: dict[str, Any]
+    """explanation.json"""
+    arrays: dict[str, NDArray]
+    """arrays.npz"""
+    data: dict[str, NDArray]
+    """The arrays of dataset.npz."""
+    source: str = "explanation.json"
+    """What the file of the numbers is called, for people."""
+
+    @property
+    def name(self) -> str:
+        """Of the policy."""
+        return str(self.numbers["name"])
+
+    @property
+    def actions(self) -> ShownActions:
+        """What the policy could do."""
+        return shown_actions(self.numbers)
+
+    @property
+    def terms(self) -> Terms:
+        """What its task calls things."""
+        return terms_of(self.numbers)
+
+    @classmethod
+    def load(cls, folder: Path, allowance: Allowance | None = None) -> "Explanation":
+        """Reads a folder.
+
+        Args:
+            folder: Its own.
+            allowance: Bytes that the arrays of this explanation and others may have together.
+
+        Raises:
+            InputError: A file is missing, damaged, too large, or of another version.
+        """
+        allowance = allowance or Allowance(ARRAYS_BYTES)
+        try:
+            refuse_links(folder, depth=1)
+            content = read_bytes(folder / "explanation.json", EXPLANATION_BYTES)
+            parsed = parse_json(
+                content, "explanation.json", allow_nan=True, most_values=EXPLANATION_VALUES
+            )
+            numbers = dict(as_mapping(parsed, "explanation.json"))
+            arrays = read_arrays(folder / "arrays.npz", allowance=allowance)
+            data = read_arrays(folder / "dataset.npz", allowance=allowance)
+            data.pop("meta", None)
+            check_sizes(numbers, arrays, data)
+            check_fit(numbers, arrays, data, shown_actions(numbers))
+            terms_of(numbers)
+            if "name" in numbers:
+                Text(1000).read(numbers["name"], "name")
+            Text(40).read(numbers.get("date", ""), "date")
+            check_intervals(numbers, "explanation")
+            if numbers.get("verdict") is not None:
+                check_verdict(numbers["verdict"])
+            _check_seed(numbers)
+        except (InputError, OSError) as error:
+            raise InputError(
+                f"explanation {folder} can't be read ({error}); run drone-rl explain again"
+            ) from None
+        if numbers.get("format") != FORMAT or numbers.get("format_version") != FORMAT_VERSION:
+            raise InputError(
+                f"{folder} holds no explanation of format version {FORMAT_VERSION}; "
+                "run drone-rl explain again"
+            )
+        return cls(numbers, arrays, data, f"{folder.name}/explanation.json")
+
+
+def _check_seed(numbers: dict[str, Any]) -> None:
+    """Refuses a seed that is none; files of version 0.1 have it among their settings alone."""
+    older = as_mapping(numbers.get("settings", {}), "settings").get("seed")
+    Maybe(Whole(0)).read(numbers.get("seed", older), "seed")
+    Flag().read(numbers.get("seed_is_fixed", True), "seed_is_fixed")

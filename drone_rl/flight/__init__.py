@@ -1,0 +1,1 @@
+"""Flight interfaces: AirSim's commands, Betaflight and MAVLink."""

@@ -1,0 +1,159 @@
+"""A trained policy, wherever it comes from, and the worlds to fly it in."""
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import torch
+from torchrl.envs import TransformedEnv
+
+from drone_rl.config import ActionSettings, BaseTaskSettings, DynamicsSettings
+from drone_rl.config.changes import Changes
+from drone_rl.policies import PolicyNetwork
+from drone_rl.policies.base_policy import Pilot
+from drone_rl.policies.zoo import PolicyDescription, parse, policy_names, policy_path, read_policy
+from drone_rl.utils.display import table
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.files import newest
+from drone_rl.utils.seeding import Stream
+
+
+@dataclasses.dataclass(frozen=True)
+class Policy(Pilot):
+    """A trained policy: what it flies in, what it sees, its network, and where it comes from."""
+
+    name: str
+    """For people: a name in the zoo, or that of the run's folder."""
+    path: Path
+    """Its file."""
+    description: PolicyDescription = dataclasses.field(repr=False)
+    """Task, camera, transforms and network."""
+    state: dict[str, Any] = dataclasses.field(repr=False)
+    """All that its file says, see `drone_rl.policies.zoo.read_policy`."""
+
+    @property
+    def task(self) -> BaseTaskSettings:
+        """What it flies in."""
+        return self.description.task
+
+    @property
+    def dynamics(self) -> DynamicsSettings:
+        """See `Pilot`."""
+        return self.description.dynamics
+
+    @property
+    def actions(self) -> ActionSettings:
+        """See `Pilot`."""
+        return self.description.actions
+
+    @property
+    def own_dynamics(self) -> DynamicsSettings:
+        """See `Pilot`."""
+        return parse(self.state["description"]).dynamics
+
+    @property
+    def origin(self) -> dict[str, Any]:
+        """See `Pilot`; of the training "description", "progress", "provenance" and "command"."""
+        told = ("description", "progress", "provenance")
+        trained = {**{key: self.state[key] for key in told}, "command": self.state.get("command")}
+        return {"policy": str(self.path), "trained": trained}
+
+    def in_task(self, **changes: Any) -> "Policy":
+        """See `Pilot`."""
+        changed = Changes(type(self.task)).read(changes, "task")
+        described = self.description.as_dict()
+        described["task"] |= changed
+        return dataclasses.replace(self, description=parse(described))
+
+    def in_dynamics(self, **changes: Any) -> "Policy":
+        """See `Pilot`."""
+        changed = Changes(DynamicsSettings).read(changes, "dynamics")
+        described = self.description.as_dict()
+        described["dynamics"] = {**self.dynamics.values(), **changed}
+        return dataclasses.replace(self, description=parse(described))
+
+    def make_env(
+        self,
+        num_envs: int,
+        *,
+        seed: int = 0,
+        stream: Stream = Stream.REPORT,
+        device: str = "cpu",
+        **kwargs: Any,
+    ) -> TransformedEnv:
+        """See `Pilot`."""
+        return self.description.build_env(
+            num_envs, seed=seed, stream=stream, device=device, **kwargs
+        )
+
+    def make_network(self, device: str | torch.device = "cpu") -> PolicyNetwork:
+        """Its network."""
+        network = self.description.load_network(self.state["policy"]).to(device)
+        network.owner = f"policy={self.name}"
+        return network
+
+    def _repr_html_(self) -> str:
+        """Shows itself in a notebook."""
+        progress, described = self.state["progress"], self.description.as_dict()
+        rows = {
+            "network": ", ".join(f"{k}={v}" for k, v in described["network"].items()),
+            "sees": " > ".join(step["name"] for step in described["transforms"]),
+            "task": ", ".join(f"{k}={v}" for k, v in described["task"].items()),
+            **{
+                part: ", ".join(f"{k}={v}" for k, v in described[part].items())
+                for part in ("dynamics", "actions")
+                if part in described
+            },
+            "trained": f"{progress['frames']:,} frames, {progress['episodes']:,} episodes",
+            "file": str(self.path),
+        }
+        return table(["policy", self.name], [[name, text] for name, text in rows.items()])
+
+
+def load_policy(which: str | Path, *, outputs: str | Path = "outputs") -> Policy:
+    """A trained policy.
+
+    Args:
+        which: A policy that travels with the package ("good", "poor", "right_and_forward"), a .pt
+            or .safetensors file, the folder of a run (its `last.pt`), or "latest" for the newest.
+        outputs: Folder under which runs are kept.
+
+    Raises:
+        InputError: There is none, or it is unusable.
+    """
+    if not isinstance(which, str | Path):
+        name = getattr(which, "name", type(which).__name__)
+        raise InputError(
+            f"policy={name} is in no file of drone-rl's, and a network from elsewhere can only be "
+            "judged, evaluated and explained; give a policy that drone-rl trained"
+        )
+    path = find_policy(which, outputs)
+    state = read_policy(path)
+    is_run = path.suffix == ".pt" and len(path.parents) > 1
+    name = path.absolute().parents[1].name if is_run else path.stem
+    return Policy(name, path, parse(state["description"]), state)
+
+
+def find_policy(which: str | Path, outputs: str | Path = "outputs") -> Path:
+    """The file of a policy, see `load_policy`.
+
+    Raises:
+        InputError: There is none.
+    """
+    if which == "latest":
+        last = newest(Path(outputs).glob("train/**/checkpoints/last.pt"))
+        if last is None:
+            raise InputError(
+                f"policy=latest, but there is no run under {outputs}/train; "
+                "run drone-rl train first or give the path of a checkpoint"
+            )
+        return last
+    if which in policy_names():
+        return policy_path(str(which))
+    path = Path(which)
+    if not path.exists():
+        raise InputError(
+            f"policy={which} does not exist; give a file, the folder of a run, latest, or one of "
+            f"{', '.join(policy_names())}"
+        )
+    return path / "checkpoints" / "last.pt" if path.is_dir() else path

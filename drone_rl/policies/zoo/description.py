@@ -1,0 +1,288 @@
+"""A policy as plain data: its worlds, camera, transforms and network, by names and values.
+
+The same description stands in checkpoints, exported files and run folders. It is all that is needed
+to build a policy, and all that a file can ask for.
+"""
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import torch
+from torchrl.envs import Transform, TransformedEnv
+
+from drone_rl.config import (
+    COMPUTER_VISION,
+    MINIMAL,
+    MOVES_SETTINGS,
+    ActionSettings,
+    AppearanceSettings,
+    BaseTaskSettings,
+    CameraSettings,
+    DynamicsSettings,
+    read_task,
+)
+from drone_rl.envs import DroneEnv, with_transforms
+from drone_rl.policies import PolicyNetwork
+from drone_rl.policies.zoo.registry import NETWORKS, TRANSFORMS, Part, Picture, find_part
+from drone_rl.sim.actions import Actions
+from drone_rl.sim.dynamics import Dynamics, make_dynamics
+from drone_rl.sim.tasks import Task, as_task
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.schema import Record, Several, as_mapping, shown
+from drone_rl.utils.settings import Settings, plain
+
+FORMAT = "drone_rl policy"
+FORMAT_VERSION = 2
+MOST_PARAMETERS = 2**24
+"""Of a network: 64 MiB."""
+MOST_PIXELS = 2**18
+"""Of a camera's frame."""
+MOST_NUMBERS = 2**20
+"""Of one picture after any transform."""
+MOST_TRANSFORMS = 16
+_KEYS = ("format", "format_version", "task", "camera", "transforms", "network")
+_OPTIONAL: dict[str, tuple[type[Settings], Settings]] = {
+    "appearance": (AppearanceSettings, MINIMAL),
+    "dynamics": (DynamicsSettings, COMPUTER_VISION),
+    "actions": (ActionSettings, MOVES_SETTINGS),
+}
+"""The keys that may be missing, with what they then mean."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Choice:
+    """A registered part and the values of its parameters."""
+
+    name: str
+    values: Mapping[str, Any]
+
+    def as_dict(self) -> dict[str, Any]:
+        """As in files."""
+        return {"name": self.name, **{k: plain(v) for k, v in self.values.items()}}
+
+    def make_transform(self) -> Transform:
+        """The transform that it stands for."""
+        part = TRANSFORMS[self.name]
+        return part.make(**self.values, **part.fixed)
+
+
+@dataclasses.dataclass(frozen=True)
+class PolicyDescription:
+    """What a policy flies in, sees and consists of; in bounds, and its parts fit together.
+
+    Raises:
+        InputError: They don't fit, or together exceed a bound.
+    """
+
+    task: BaseTaskSettings
+    camera: CameraSettings
+    transforms: tuple[Choice, ...]
+    """In the order in which they are applied."""
+    network: Choice
+    appearance: AppearanceSettings = MINIMAL
+    """How the worlds look; files without it mean the minimal one."""
+    dynamics: DynamicsSettings = COMPUTER_VISION
+    """How the drone moves; files without it mean computer-vision mode."""
+    actions: ActionSettings = MOVES_SETTINGS
+    """What the network can ask for; files without it mean moves."""
+
+    def __post_init__(self) -> None:
+        """Refuses what could not be built, or only with much memory."""
+        self.dynamics.check_air()
+        pixels = self.camera.width * self.camera.height
+        if pixels > MOST_PIXELS:
+            raise InputError(f"camera has {pixels} pixels; give at most {MOST_PIXELS}")
+        if not self.picture.is_float:
+            raise InputError("the network needs floats; add a transform such as gray")
+        expected = self.expected_weights()
+        count = sum(value.numel() for value in expected.values())
+        if count > MOST_PARAMETERS:
+            raise InputError(
+                f"the network has {count} parameters; give sizes that make at most "
+                f"{MOST_PARAMETERS}"
+            )
+
+    @property
+    def picture(self) -> Picture:
+        """What the network sees."""
+        picture = Picture((self.camera.height, self.camera.width, 3))
+        for choice in self.transforms:
+            picture = TRANSFORMS[choice.name].change(picture, choice.values)
+            if math.prod(picture.shape) > MOST_NUMBERS:
+                raise InputError(
+                    f"the transform {choice.name} makes pictures of shape {picture.shape}; give "
+                    f"sizes that make at most {MOST_NUMBERS} numbers"
+                )
+        return picture
+
+    @property
+    def frames(self) -> int:
+        """How many frames the network sees at once."""
+        return math.prod(c.values["N"] for c in self.transforms if c.name == "stack")
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """Names of the transforms by which the camera goes wrong, by chance or with memory."""
+        return tuple(c.name for c in self.transforms if TRANSFORMS[c.name].is_fault)
+
+    def without_faults(self) -> "PolicyDescription":
+        """The same behind a camera of which none is known."""
+        sound = tuple(c for c in self.transforms if not TRANSFORMS[c.name].is_fault)
+        return dataclasses.replace(self, transforms=sound)
+
+    def as_dict(self) -> dict[str, Any]:
+        """As in files; `parse` undoes it."""
+        chosen = {name: getattr(self, name) for name in _OPTIONAL}
+        special = {n: s.values() for n, s in chosen.items() if s != _OPTIONAL[n][1]}
+        return {
+            "format": FORMAT,
+            "format_version": FORMAT_VERSION,
+            "task": self.task.values(),
+            "camera": self.camera.values(),
+            "transforms": [choice.as_dict() for choice in self.transforms],
+            "network": self.network.as_dict(),
+            **special,
+        }
+
+    def build_env(
+        self,
+        num_envs: int,
+        *,
+        seed: int,
+        device: str,
+        pixels: bool = True,
+        task: Task[Any] | None = None,
+        **kwargs: Any,
+    ) -> TransformedEnv:
+        """The described worlds, seen through the described camera and transforms.
+
+        Args:
+            num_envs: How many.
+            seed: Root of their random streams.
+            device: Where they are drawn.
+            pixels: Whether they are drawn at all.
+            task: One that looks like the described one, but begins its episodes otherwise.
+            kwargs: See `DroneEnv`.
+        """
+        env = DroneEnv(
+            num_envs,
+            task or self.task,
+            self.camera,
+            seed=seed,
+            device=device,
+            pixels=pixels,
+            **{"appearance": self.appearance, **self._moved(kwargs), **kwargs},
+        )
+        return with_transforms(env, self.make_transforms() if pixels else ())
+
+    def _moved(self, given: Mapping[str, Any]) -> dict[str, Any]:
+        """Dynamics and actions, unless the dynamics that are given bring actions of their own."""
+        dynamics = given.get("dynamics")
+        if dynamics is None or isinstance(dynamics, DynamicsSettings):
+            return {"dynamics": self.dynamics, "actions": self.actions}
+        return {}
+
+    def make_dynamics(self) -> Dynamics:
+        """How the drone moves."""
+        return make_dynamics(as_task(self.task), self.dynamics, self.actions)
+
+    def make_transforms(self) -> list[Transform]:
+        """The described transforms, in their order."""
+        return [choice.make_transform() for choice in self.transforms]
+
+    def build_network(self, generator: torch.Generator | None = None) -> PolicyNetwork:
+        """The described network with fresh weights.
+
+        Args:
+            generator: Source of the initial weights; torch's global one by default.
+        """
+        return self._network(self.make_dynamics().actions, generator)
+
+    def load_network(self, weights: Mapping[str, torch.Tensor]) -> PolicyNetwork:
+        """The described network with given weights; none are drawn before, which takes longer.
+
+        Args:
+            weights: Names, shapes and types as in `expected_weights`.
+        """
+        network = self._without_weights().to_empty(device="cpu")
+        network.load_state_dict(weights)
+        return network
+
+    def build_critic(self, generator: torch.Generator | None = None) -> PolicyNetwork:
+        """A network like the described one, from a picture to one number.
+
+        Args:
+            generator: See `build_network`.
+        """
+        return self._layers(1, generator)
+
+    def expected_weights(self) -> dict[str, torch.Tensor]:
+        """Names, shapes and types of the network's weights, without the weights themselves."""
+        return dict(self._without_weights().state_dict())
+
+    def _without_weights(self) -> PolicyNetwork:
+        actions = self.make_dynamics().actions
+        with torch.device("meta"):  # nothing is computed here: that would load a compiler's algebra
+            return self._network(actions)
+
+    def _network(self, actions: Actions, generator: torch.Generator | None = None) -> PolicyNetwork:
+        network = self._layers(actions.num_outputs, generator)
+        network.actions = actions
+        return network
+
+    def _layers(self, outputs: int, generator: torch.Generator | None) -> PolicyNetwork:
+        make = NETWORKS[self.network.name].make
+        return make(self.picture.shape, outputs, generator=generator, **self.network.values)
+
+
+def parse(data: Any) -> PolicyDescription:
+    """Reads a description, strictly.
+
+    Args:
+        data: Plain data.
+
+    Raises:
+        InputError: A key is missing or unknown, a value is of another type or out of bounds.
+    """
+    data = as_mapping(data, "the policy's description")
+    if data.get("format") != FORMAT or type(data.get("format_version")) is not int:
+        raise InputError(f"format={shown(data.get('format'))} is not that of a policy: {FORMAT}")
+    if data["format_version"] != FORMAT_VERSION:
+        raise InputError(
+            f"format_version={shown(data['format_version'])}: this program reads "
+            f"{FORMAT_VERSION}; use the version of drone_rl that wrote it"
+        )
+    if (keys := set(data) - set(_OPTIONAL)) != set(_KEYS):
+        names = ", ".join(shown(key) for key in sorted(keys ^ set(_KEYS)))
+        raise InputError(
+            f"the policy's description has exactly {', '.join(_KEYS)}; not so: {names}"
+        )
+    chosen = Several(_ChoiceOf(TRANSFORMS), 0, MOST_TRANSFORMS).read(
+        data["transforms"], "transforms"
+    )
+    special: dict[str, Any] = {
+        name: of.read(data[name], name) for name, (of, _) in _OPTIONAL.items() if name in data
+    }
+    return PolicyDescription(
+        read_task(data["task"], "task"),
+        CameraSettings.read(data["camera"], "camera"),
+        chosen,
+        _ChoiceOf(NETWORKS).read(data["network"], "network"),
+        **special,
+    )
+
+
+@dataclasses.dataclass(frozen=True)
+class _ChoiceOf:
+    """The kind of value that names a part and gives its parameters."""
+
+    parts: Mapping[str, Part]
+
+    def read(self, value: Any, where: str) -> Choice:
+        """See `drone_rl.utils.schema.Kind`."""
+        given = dict(as_mapping(value, where))
+        name = given.pop("name", None)
+        parameters: Record = find_part(self.parts, name, f"{where}.name").parameters
+        return Choice(str(name), parameters.read(given, where))

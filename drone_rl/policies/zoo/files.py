@@ -1,0 +1,208 @@
+"""Policies in files: what they consist of, their weights, and where they come from."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import torch
+from safetensors import SafetensorError
+from safetensors.torch import load, save
+
+from drone_rl.policies.zoo.description import FORMAT, MOST_PARAMETERS, parse
+from drone_rl.policies.zoo.migration import describe
+from drone_rl.utils.checkpoint import load_checkpoint
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.files import parse_json, read_bytes
+from drone_rl.utils.former_names import with_present_names
+from drone_rl.utils.overrides import COMMAND
+from drone_rl.utils.schema import Kind, Maybe, Plain, Real, Record, Text, Whole, as_mapping, shown
+from drone_rl.utils.weights import check_weights
+
+MOST_HEADER = 2**20
+"""Bytes of what an exported file says besides its weights."""
+_ENTRY = {"dtype", "shape", "data_offsets"}
+"""What a file of safetensors states of each tensor."""
+_FOLDER = Path(__file__).resolve().parent
+_COUNT = Whole(0, 2**62)
+_PROGRESS = Record(
+    {
+        "frames": _COUNT,
+        "episodes": _COUNT,
+        "updates": _COUNT,
+        "seconds": Real(0.0, 1e12),
+        "running_reward": Real(-1e6, 1e6),
+    }
+)
+
+
+class _Versions:
+    """Names of packages with their versions."""
+
+    def read(self, value: Any, where: str) -> dict[str, str]:
+        """See `drone_rl.utils.schema.Kind`."""
+        versions = Plain(most=100, deepest=1).read(as_mapping(value, where), where)
+        return {key: Text(200).read(item, f"{where}.{key}") for key, item in versions.items()}
+
+
+_PROVENANCE = Record(
+    {
+        "versions": _Versions(),
+        "git_revision": Maybe(Text(200)),
+        "machine": Plain(most=100, deepest=2),
+    },
+    optional=frozenset({"machine"}),
+)
+_ABOUT: dict[str, Kind] = {
+    "progress": _PROGRESS,
+    "provenance": _PROVENANCE,
+    "command": COMMAND,
+    "verdict": Plain(),
+    "worlds": Text(20),
+    "seed": _COUNT,
+    "chosen": Maybe(Record({"runs": _COUNT, "episodes": Maybe(_COUNT)})),
+    "evaluation": Plain(),
+}
+_NOT_IN_ALL = frozenset({"verdict", "worlds", "seed", "chosen", "evaluation"})
+"""Older files have an evaluation, newer ones a verdict and what it rests on."""
+
+
+def policy_names() -> list[str]:
+    """Names of the policies that travel with the package."""
+    return sorted(path.stem for path in _FOLDER.glob("*.safetensors"))
+
+
+def policy_path(name: str) -> Path:
+    """File of a policy that travels with the package."""
+    return _FOLDER / f"{name}.safetensors"
+
+
+def card_path(name: str) -> Path:
+    """Model card of such a policy."""
+    return _FOLDER / f"{name}.md"
+
+
+def certificate_path(policy: Path) -> Path:
+    """Where the certificate of a policy lies, if it has one.
+
+    Args:
+        policy: Its file: an exported one has it beside itself, as those that travel with the
+            package do, the checkpoint of a run in the run's folder.
+    """
+    if policy.suffix == ".safetensors":
+        return policy.with_suffix(".certificate.json")
+    return policy.absolute().parent.parent / "certificate.json"
+
+
+def shifts_path(policy: Path) -> Path:
+    """Where the flights of a policy under other conditions lie, if it has any.
+
+    Args:
+        policy: See `certificate_path`.
+    """
+    if policy.suffix == ".safetensors":
+        return policy.with_suffix(".shifts.json")
+    return policy.absolute().parent.parent / "shifts.json"
+
+
+def read_policy(path: Path) -> dict[str, Any]:
+    """A policy out of a file: its description, weights that fit it, and where it comes from.
+
+    Args:
+        path: Of a checkpoint, or of an exported file (.safetensors).
+
+    Returns:
+        "description" (see `drone_rl.policies.zoo.parse`), "policy" (the weights), "progress" and
+        "provenance"; of an exported file also "command" and what `export_policy` was given,
+        unless it is old; of a checkpoint all of its state.
+
+    Raises:
+        InputError: The file is missing, damaged or something else.
+    """
+    return load_exported(path) if path.suffix == ".safetensors" else read_checkpoint(path)
+
+
+def read_checkpoint(path: Path) -> dict[str, Any]:
+    """A checkpoint of `drone-rl train`, see `read_policy`; its "config" is plain data alone.
+
+    Raises:
+        InputError: The file is missing, damaged or something else.
+    """
+    state = load_checkpoint(path)
+    try:
+        for key in ("policy", "progress", "provenance", "config"):
+            if key not in state:
+                raise InputError(f"it has no {key}")
+        state["config"] = Plain().read(as_mapping(state["config"], "config"), "config")
+        is_old = state["format_version"] == 1
+        description = describe(state["config"]) if is_old else parse(state.get("description"))
+        checked = {
+            "description": description.as_dict(),
+            "policy": check_weights(state["policy"], description.expected_weights()),
+            "progress": _PROGRESS.read(state["progress"], "progress"),
+            "provenance": _PROVENANCE.read(state["provenance"], "provenance"),
+        }
+    except InputError as error:
+        raise InputError(f"checkpoint {path} can't be used: {error}") from None
+    return {**state, **checked}
+
+
+def exported_bytes(
+    weights: Mapping[str, torch.Tensor], description: Mapping[str, Any], about: Mapping[str, Any]
+) -> bytes:
+    """Weights with their description and where they come from, as the content of a file."""
+    contiguous = {name: value.contiguous() for name, value in weights.items()}
+    metadata = {"description": json.dumps(description), "about": json.dumps(about)}
+    return save(contiguous, {"format": FORMAT, **metadata})
+
+
+def load_exported(path: Path) -> dict[str, Any]:
+    """An exported policy, see `read_policy`.
+
+    Raises:
+        InputError: The file is missing, damaged or something else.
+    """
+    content = read_bytes(path, 8 + MOST_HEADER + 4 * MOST_PARAMETERS)
+    try:
+        return _exported(content)
+    except InputError as error:
+        raise InputError(f"policy {path} can't be read: {error}; export it again") from None
+
+
+def _exported(content: bytes) -> dict[str, Any]:
+    size = int.from_bytes(content[:8], "little")
+    if not 2 <= size <= min(MOST_HEADER, len(content) - 8):
+        raise InputError("it is not in the safetensors format, or damaged")
+    header = as_mapping(parse_json(content[8 : 8 + size], "its header"), "header")
+    metadata = as_mapping(header.get("__metadata__", {}), "metadata")
+    if metadata.get("format") != FORMAT:
+        raise InputError("it is not a drone_rl policy; use one that drone-rl export wrote")
+    for name in header.keys() - {"__metadata__"}:
+        entry = as_mapping(header[name], name)
+        if entry.keys() != _ENTRY:
+            raise InputError(f"the weights {shown(name)} do not state {', '.join(sorted(_ENTRY))}")
+        if entry["dtype"] != "F32":
+            raise InputError(f"the weights {shown(name)} are not float32")
+    is_old = "description" not in metadata
+    about = dict(as_mapping(_inner(metadata, "about"), "about"))
+    if "progress" in about:
+        about["progress"] = with_present_names(as_mapping(about["progress"], "progress"))
+    description = (
+        describe(about.pop("config", None)) if is_old else parse(_inner(metadata, "description"))
+    )
+    try:
+        weights = load(content)
+    except (SafetensorError, ValueError, KeyError, TypeError, RuntimeError) as error:
+        raise InputError(f"its weights are damaged ({str(error)[:100]})") from None
+    return {
+        "description": description.as_dict(),
+        "policy": check_weights(weights, description.expected_weights()),
+        **Record(_ABOUT, _NOT_IN_ALL).read(about, "about"),
+    }
+
+
+def _inner(metadata: Mapping[str, Any], key: str) -> Any:
+    text = metadata.get(key)
+    if not isinstance(text, str):
+        raise InputError(f"its {key} is missing")
+    return parse_json(text, f"its {key}")

@@ -1,0 +1,135 @@
+"""Policies as ONNX models: from a camera's picture to probabilities, for programs without torch."""
+
+import contextlib
+import json
+import logging
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+
+from drone_rl.envs import on_pixels
+from drone_rl.policies import PolicyNetwork
+from drone_rl.policies.zoo.description import PolicyDescription
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.extras import extra
+
+FRAMES, PROBABILITIES, ACTION = "frames", "probabilities", "action"
+"""Names of the model's input and outputs."""
+_ASKED_BY = "format=onnx"
+
+
+class SeeingPolicy(nn.Module):
+    """All that a policy does about one picture of its camera: transforms, network, probabilities.
+
+    Raises:
+        InputError: It needs more than one picture.
+    """
+
+    def __init__(self, description: PolicyDescription, network: PolicyNetwork) -> None:
+        super().__init__()
+        if description.frames > 1:
+            raise InputError(
+                "the policy sees a stack of frames, but an ONNX model is given one at a time; "
+                "export it with format=safetensors"
+            )
+        self._network = network
+        self._transform = on_pixels(description.make_transforms())
+
+    @property
+    def tells_action(self) -> bool:
+        """Whether the action is told, too: it is more than the most probable part's number."""
+        return bool(self._network.actions.entry.shape)
+
+    def forward(self, frames: Tensor) -> Tensor | tuple[Tensor, Tensor]:
+        """RGB (N, H, W, 3), uint8, to the probability of each part (N, A), float32.
+
+        And to the greedy action, (N, 3), float32, where probabilities don't tell it.
+        """
+        actions, outputs = self._network.actions, self._network(self._transform(frames))
+        wish = actions.wish(outputs)
+        return (wish, actions.greedy(outputs)) if self.tells_action else wish
+
+
+def make_onnx(
+    description: PolicyDescription, network: PolicyNetwork, about: Mapping[str, Any]
+) -> bytes:
+    """A policy as an ONNX model.
+
+    The model's input is "frames", RGB of the policy's camera, uint8 (N, H, W, 3) for any N from 1;
+    its output "probabilities", of each action, float32 (N, A). Where actions are continuous these
+    are of their parts, see `Actions.wish`, and a second output, "action", float32 (N, 3), is what
+    to do. Its metadata are JSON texts: all that the description says, by its keys, and "actions",
+    names in the order of the first output.
+
+    Args:
+        description: Of the policy.
+        network: With the policy's weights, on the CPU.
+        about: What else the metadata should say.
+
+    Raises:
+        InputError: It needs more than one picture, or does what ONNX can't say, or a package is
+            missing.
+    """
+    extra("onnxscript", "onnx", _ASKED_BY)  # which torch's exporter needs
+    passes = extra("onnx_ir.passes.common", "onnx", _ASKED_BY)
+    policy, camera = SeeingPolicy(description, network).eval(), description.camera
+    sample = torch.zeros(2, camera.height, camera.width, 3, dtype=torch.uint8)
+    try:
+        with _silence():
+            program = torch.onnx.export(
+                policy,
+                (sample,),
+                dynamo=True,
+                input_names=[FRAMES],
+                output_names=[PROBABILITIES, ACTION][: 1 + policy.tells_action],
+                dynamic_shapes=({0: torch.export.Dim("N")},),
+                verbose=False,
+            )
+    except torch.onnx.OnnxExporterError as error:
+        reason = str(error).strip().splitlines()[-1][:200]
+        raise InputError(
+            f"the policy can't be written as an ONNX model ({reason}); export it with "
+            "format=safetensors"
+        ) from error
+    assert program is not None  # torch returns none only where it compiles by halves
+    passes.ClearMetadataAndDocStringPass()(program.model)  # the exporter's own notes
+    told = {**description.as_dict(), "actions": list(network.actions.names), **about}
+    program.model.metadata_props.update({key: json.dumps(value) for key, value in told.items()})
+    return program.model_proto.SerializeToString()
+
+
+def open_onnx(content: bytes) -> Callable[[Tensor], Tensor]:
+    """An ONNX model as a function of frames, computed by onnxruntime.
+
+    Args:
+        content: From `make_onnx`.
+
+    Raises:
+        InputError: The package is missing.
+    """
+    runtime = extra("onnxruntime", "onnx", _ASKED_BY)
+    options = runtime.SessionOptions()
+    options.intra_op_num_threads = 1  # more would only wait for torch's, and sums depend on them
+    session = runtime.InferenceSession(content, options)
+
+    def probabilities(frames: Tensor) -> Tensor:
+        (found,) = session.run([PROBABILITIES], {FRAMES: frames.numpy()})
+        return torch.from_numpy(found)
+
+    return probabilities
+
+
+@contextlib.contextmanager
+def _silence() -> Iterator[None]:
+    """Holds back what torch's exporter and what it calls tell of themselves: all but errors."""
+    before = logging.root.manager.disable
+    logging.disable(logging.WARNING)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    finally:
+        logging.disable(before)

@@ -1,5 +1,0 @@
-"""Explanations as something that a person opens and understands; reads files, runs no policy."""
-
-from drone_rl.report.page import write_report
-
-__all__ = ["write_report"]

@@ -1,0 +1,224 @@
+"""Whether the figures of `shifts.json` go together: counts, intervals, areas, and courses.
+
+These checks do not prove that a file is genuine; `drone_rl.verdicts.domain_check` re-runs a sample.
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from drone_rl.robustness.axis import Axis
+from drone_rl.robustness.domain import walk
+from drone_rl.robustness.modes import Mode
+from drone_rl.robustness.suite import finite, mcnemar_p, success_area
+from drone_rl.sim.tasks import Task
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.intervals import proportion
+
+CLOSE = 1e-9
+"""Rounding of values, relative."""
+UNLIKELY = 1e-6
+"""Probability of a chance difference between two samples that counts as a contradiction."""
+_REMEDY = "run drone-rl shifts again"
+
+
+def check_counts(numbers: Mapping[str, Any], task: Task[Any]) -> None:
+    """Refuse figures that no rollouts give.
+
+    Args:
+        numbers: As in `shifts.json`, of the right types.
+        task: In which the episodes were flown.
+
+    Raises:
+        InputError: A count, a share, an interval or an area contradicts another one.
+    """
+    settings, plain = numbers["settings"], numbers["plain"]
+    _refuse(_wrong_oracle(plain["oracle"], settings["episodes"]), "plain")
+    _refuse(_wrong_figures(plain, plain, settings["episodes"], task), "plain")
+    for name, along in numbers["axes"].items():
+        where = f"axes.{name}"
+        if [level["number"] for level in along["levels"]] != [*settings["strengths"]]:
+            raise InputError(f"{where} has other strengths than settings.strengths; {_REMEDY}")
+        for i, level in enumerate(along["levels"]):
+            _refuse(_wrong_level(level, numbers, task), f"{where}.levels.{i}")
+        share = plain["success"]["share"]
+        areas = {mode: success_area(along["levels"], share, Mode(mode)) for mode in along["areas"]}
+        if not all(_is_same(areas[mode], along["areas"][mode]) for mode in areas):
+            raise InputError(f"{where}.areas is not that of its shares; {_REMEDY}")
+    _refuse(_wrong_level(numbers["together"], numbers, task), "together")
+
+
+def check_range(axis: Axis, found: Mapping[str, Any], of: Any, numbers: Mapping[str, Any]) -> None:
+    """Refuse a range that does not follow from the strengths that the search tries.
+
+    Args:
+        axis: Of which, with the policy's own neutral strength.
+        found: Of `domain.ranges`.
+        of: The policy's description.
+        numbers: As in `shifts.json`.
+
+    Raises:
+        InputError: A limit, or what was flown, is not what the search gives.
+    """
+    if not _is_sound(axis, found, of, numbers):
+        raise InputError(f"domain.ranges.{axis.name} contradicts what was flown at; {_REMEDY}")
+    levels = numbers["axes"][axis.name]["levels"]
+    for level, at in ((v, at) for v in levels for at in found["flown"]):
+        is_there = _is_same(at["position"], level["position"]) and level["refused"] is None
+        if is_there and at["good"] and _is_surely_bad(level, numbers):
+            raise InputError(
+                f"domain.ranges.{axis.name} says good at {level['value']:g}, and axes.{axis.name} "
+                f"counts {level['modes']['constant']['success']['share']:.0%} there; {_REMEDY}"
+            )
+
+
+def check_probe(found: Mapping[str, Any], episodes: int, where: str) -> None:
+    """Refuse what no search finds at a strength.
+
+    Args:
+        found: "good", "bad", "success", and "oracle" with "impossible" where courses end.
+        episodes: Of the search.
+        where: Of the file, for the message.
+
+    Raises:
+        InputError: It contradicts itself.
+    """
+    success = found.get("success")
+    if success is not None and abs(success * episodes - round(success * episodes)) > 1e-6:
+        raise InputError(f"{where}.success is no share of {episodes} episodes; {_REMEDY}")
+    if found["good"] and (found["bad"] or found["refused"] is not None):
+        raise InputError(f"{where} is both good and bad; {_REMEDY}")
+    _refuse(_wrong_oracle(found.get("oracle"), episodes), where)
+
+
+def _refuse(problem: str | None, where: str) -> None:
+    if problem is not None:
+        raise InputError(f"{where}{problem}; {_REMEDY}")
+
+
+def _wrong_oracle(oracle: Mapping[str, Any] | None, episodes: int) -> str | None:
+    if oracle is not None and oracle["trials"] != episodes:
+        return f".oracle is of {oracle['trials']} episodes, not of {episodes}"
+    return None
+
+
+def _wrong_level(
+    level: Mapping[str, Any], numbers: Mapping[str, Any], task: Task[Any]
+) -> str | None:
+    settings, oracle = numbers["settings"], level["oracle"]
+    if level["refused"] is not None:
+        is_empty = oracle is None and level["impossible"] is None and not level["modes"]
+        return None if is_empty else " is refused, and has figures"
+    if not {*level["modes"]} <= {*settings["modes"]} or "constant" not in level["modes"]:
+        return ".modes are not those of settings.modes"
+    possible = None if oracle is None else oracle["upper95"] < settings["possible_share"]
+    if level["impossible"] != possible:
+        return ".impossible does not follow from its oracle"
+    episodes = settings["episodes"]
+    problems = (
+        _wrong_figures(figures, numbers["plain"], episodes, task)
+        for figures in level["modes"].values()
+    )
+    return _wrong_oracle(oracle, episodes) or next(filter(None, problems), None)
+
+
+def _wrong_figures(
+    figures: Mapping[str, Any], plain: Mapping[str, Any], episodes: int, task: Task[Any]
+) -> str | None:
+    return next(_problems(figures, plain, episodes, task), None)
+
+
+def _problems(
+    figures: Mapping[str, Any], plain: Mapping[str, Any], episodes: int, task: Task[Any]
+) -> Iterator[str]:
+    success, ends, every = figures["success"], figures["ends"], figures["shares"].get("all")
+    count, before = success["successes"], plain["success"]["successes"]
+    if success["trials"] != episodes:
+        yield f".success is of {success['trials']} episodes, not of {episodes}"
+    success_end = task.ends(task.success_end).name.lower()
+    if sum(ends.values()) != episodes or ends.get(success_end) != count:
+        yield ".ends do not add up to its episodes and successes"
+    if every is None or any(not _is_mean(share, episodes) for share in figures["shares"].values()):
+        yield ".shares holds something else than means of its episodes"
+    elif every["count"] != episodes or every["mean"] < count / episodes - CLOSE:
+        yield ".shares.all is less than its share of successes"
+    lost, gained = figures["paired"]["lost"], figures["paired"]["gained"]
+    if gained - lost != count - before or lost > before or gained > episodes - before:
+        yield ".paired does not lead from the successes without a change to its own"
+    elif not _is_same(figures["paired"]["p"], mcnemar_p(lost, gained)):
+        yield ".paired.p is not that of its counts"
+    difference = figures["difference"]
+    low, mean, high = (difference[key] for key in ("lower95", "mean", "upper95"))
+    if not low - CLOSE <= mean <= high + CLOSE or not _is_same(mean, (gained - lost) / episodes):
+        yield ".difference is not that of its pairs"
+
+
+def _is_mean(share: Mapping[str, Any], episodes: int) -> bool:
+    """Whether this is a mean of at most one share from 0 to 1 an episode."""
+    if share["count"] > episodes:
+        return False
+    if share["mean"] is None:
+        return share["count"] == 0
+    low, mean, high = (share[key] for key in ("lower95", "mean", "upper95"))
+    return share["count"] > 0 and low - CLOSE <= mean <= high + CLOSE
+
+
+def _is_surely_bad(level: Mapping[str, Any], numbers: Mapping[str, Any]) -> bool:
+    """Whether the counts at a strength leave no doubt that the policy is not good there."""
+    success, oracle = level["modes"]["constant"]["success"], numbers["plain"]["oracle"]
+    least = 0.0 if oracle is None else oracle["lower95"]
+    found = proportion(success["successes"], success["trials"], 1 - UNLIKELY)
+    return found["upper95"] < numbers["settings"]["good_share"] * least
+
+
+def _is_sound(axis: Axis, found: Mapping[str, Any], of: Any, numbers: Mapping[str, Any]) -> bool:
+    is_good = numbers["domain"]["plain"]["good"]
+    if found["positions"] is None or not is_good:
+        return found["positions"] is None and not is_good and not found["flown"]
+    values = all(_is_at(axis, at["position"], at["value"], of) for at in found["flown"])
+    limits: dict[int, float] = dict(zip((-1, 1), found["positions"], strict=True))
+    ends = [
+        _is_end(axis, found, end, sign, of, numbers["settings"]["seed"])
+        and _is_at(axis, limits[sign], found[end], of)
+        for end, sign in axis.signs.items()
+    ]
+    return values and all(ends)
+
+
+def _is_end(axis: Axis, found: Mapping[str, Any], end: str, sign: int, of: Any, seed: int) -> bool:
+    """Whether the search, given these answers, tries these strengths and ends at this limit."""
+    left = {at["position"]: at["good"] for at in found["flown"] if sign * at["position"] > 0}
+
+    def is_good(strength: float, _: float) -> bool:
+        where = [at for at in left if _is_same(at, axis.position(strength))]
+        return left.pop(where[0]) if where else missing()
+
+    def missing() -> bool:
+        raise InputError("a strength is missing")
+
+    try:
+        walked = walk(axis, sign, seed, is_good)
+    except InputError:
+        return False
+    limits: dict[int, float] = dict(zip((-1, 1), found["positions"], strict=True))
+    failed = [at["value"] for at in found["failed"] if at["end"] == end]
+    values = [] if walked.failed is None else [finite(axis.value(walked.failed, of))]
+    is_open = walked.failed is None if walked.flown else None
+    return (
+        not left
+        and _is_same(limits[sign], axis.position(walked.limit))
+        and found[f"{end}_open"] == is_open
+        and len(failed) == len(values)
+        and all(_is_same(one, other) for one, other in zip(failed, values, strict=True))
+    )
+
+
+def _is_at(axis: Axis, position: float, value: float | None, of: Any) -> bool:
+    """Whether a value is what lies at a position."""
+    return _is_same(finite(axis.value(axis.at(position), of)), value)
+
+
+def _is_same(one: float | None, other: float | None) -> bool:
+    if one is None or other is None:
+        return one == other
+    return math.isclose(one, other, rel_tol=CLOSE, abs_tol=CLOSE)

@@ -1,0 +1,240 @@
+"""Flights of a policy under other conditions than its own, as an object that shows itself."""
+
+import dataclasses
+import itertools
+import json
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import yaml
+from numpy.typing import NDArray
+
+from drone_rl.config import MINIMAL, BaseTaskSettings
+from drone_rl.config.shifting import ShiftSettings
+from drone_rl.envs import worlds_of
+from drone_rl.evaluation.agreement import require_function
+from drone_rl.evaluation.verdict_text import unlike as say_unlike
+from drone_rl.policies.base_policy import Pilot
+from drone_rl.policies.external_network import Logits
+from drone_rl.policies.external_policy import as_pilot
+from drone_rl.policies.policy import Policy
+from drone_rl.robustness.axes import check_axes, find_axes
+from drone_rl.robustness.axis import Axis
+from drone_rl.robustness.charts import chart, strips
+from drone_rl.robustness.condition import Condition
+from drone_rl.robustness.domain import Prober
+from drone_rl.robustness.flying import Airfield, Subject
+from drone_rl.robustness.measured import FORMAT, FORMAT_VERSION
+from drone_rl.robustness.modes import Mode
+from drone_rl.robustness.needs import ranges_of
+from drone_rl.robustness.oracle import OracleEyes
+from drone_rl.robustness.shifts_text import SHIFTS, rows
+from drone_rl.robustness.strips import make_strip, packed
+from drone_rl.robustness.suite import Suite
+from drone_rl.sim.tasks import as_task
+from drone_rl.utils.display import aligned, paragraph, picture, table
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.progress import Bar, Progress
+from drone_rl.utils.provenance import provenance
+from drone_rl.utils.seed_text import seed_line
+from drone_rl.utils.seeding import RootSeed, with_seed
+from drone_rl.utils.sentences import say
+from drone_rl.verification.checker import fingerprint
+
+
+@dataclasses.dataclass(frozen=True)
+class Shifts:
+    """How often a policy succeeds under other conditions, and under which it stays good."""
+
+    policy: Pilot
+    settings: ShiftSettings
+    numbers: dict[str, Any] = dataclasses.field(repr=False)
+    """As in `shifts.json`."""
+    pictures: Mapping[str, Sequence[NDArray | None]] = dataclasses.field(repr=False)
+    """By axis, what the camera shows with nothing different and at each of the five strengths; none
+    where the task can't be so. Shapes: (H, W, 3), uint8."""
+
+    @property
+    def area(self) -> float:
+        """Mean over axes of the area under success over strength."""
+        areas = [along["areas"]["constant"] for along in self.numbers["axes"].values()]
+        known = [area for area in areas if area is not None]
+        return sum(known) / max(len(known), 1)
+
+    @property
+    def sentence(self) -> str:
+        """Under which conditions it is good, for a person."""
+        return say(SHIFTS, self.numbers)
+
+    def save(self, folder: Path) -> None:
+        """Writes what was found.
+
+        `shifts.json` is what verdicts, cards and reports quote; `domain.yaml`, if ranges were
+        looked for, has them as `drone-rl verdict require_domain=FILE` reads what is needed;
+        `shifts.png` are curves, `strips.png` pictures.
+        """
+        shown = {
+            name: [None if one is None else packed(one) for one in strip]
+            for name, strip in self.pictures.items()
+        }
+        written = {**self.numbers, "pictures": shown, **provenance()}
+        (folder / "shifts.json").write_text(json.dumps(written, indent=2))
+        if self.numbers["domain"] is not None:
+            (folder / "domain.yaml").write_text(yaml.safe_dump(ranges_of(self.numbers)))
+        chart(self.numbers).savefig(folder / "shifts.png", dpi=110)
+        strips(self.numbers, self.pictures).save(folder / "strips.png")
+
+    def __str__(self) -> str:
+        """The table and what it comes to."""
+        said = f"{self.sentence}{self._unlike}"
+        return "\n".join([aligned(rows(self.numbers)), said, seed_line(self.numbers)])
+
+    def _repr_html_(self) -> str:
+        head, *lines = rows(self.numbers)
+        said = paragraph(self.sentence + self._unlike)
+        seed = paragraph(seed_line(self.numbers))
+        return table(head, lines) + said + seed + picture(chart(self.numbers))
+
+    @property
+    def _unlike(self) -> str:
+        """By what its own way of moving was another one; nothing where it was not."""
+        unlike = self.policy.unlike
+        return f" {say_unlike({'unlike': unlike})}" if unlike else ""
+
+
+def shifts(
+    policy: str | Path | Pilot | Logits,
+    settings: ShiftSettings | None = None,
+    *,
+    task: Mapping[str, Any] | None = None,
+    dynamics: Mapping[str, Any] | None = None,
+    outputs: str | Path = "outputs",
+    progress: Progress | None = None,
+    **changes: Any,
+) -> Shifts:
+    """Flies a policy under other conditions than its own, one axis at a time and all together.
+
+    Args:
+        policy: The policy, what `load_policy` takes, or a callable, see `policy_from`.
+        settings: Which conditions, and how often.
+        task: What to change of the policy's task.
+        dynamics: What to change of how its drone moves.
+        outputs: See `load_policy`.
+        progress: Told of what is being flown; a bar by default.
+        changes: Settings to change, as in `shifts("good", axes=["light"])`.
+
+    Raises:
+        InputError: The policy or a setting is unusable, or there is no such axis or strength.
+    """
+    settings, seed = with_seed((settings or ShiftSettings()).replace(**changes))
+    progress = progress or Bar()
+    check_axes(settings.axes or ())
+    pilot = as_pilot(policy, outputs).in_task(**(task or {}))
+    pilot = pilot.in_dynamics(**dynamics) if dynamics else pilot
+    begin = time.perf_counter()
+    require_function(pilot, seed=seed.value, device=settings.device, renderer=settings.renderer)
+    subject = make_subject(pilot, settings)
+    axes = find_axes(settings.axes, subject)
+    total = len(axes) * (len(settings.strengths) + settings.domain) + 1
+    done = itertools.count()
+    found = _fly(subject, axes, settings, seed, lambda text: progress(text, next(done), total))
+    with closing(Airfield(subject, 1, seed.value)) as filmed:
+        pictures = {axis.name: make_strip(filmed, axis) for axis in axes}
+    progress("flown", total, total)
+    numbers = {
+        "format": FORMAT,
+        "format_version": FORMAT_VERSION,
+        "policy": pilot.name,
+        "network": _identity(pilot),
+        "settings": settings.values(),
+        **seed.as_dict(),
+        "terms": as_task(subject.task).terms.as_dict(),
+        **found,
+        "seconds": time.perf_counter() - begin,
+    }
+    return Shifts(pilot, settings, numbers, pictures)
+
+
+def _fly(
+    subject: Subject,
+    axes: Sequence[Axis],
+    settings: ShiftSettings,
+    seed: RootSeed,
+    tell: Callable[[str], None],
+) -> dict[str, Any]:
+    """What the suite finds, and "domain", see `_domain`; none if nobody wants it.
+
+    Raises:
+        InputError: See `_domain`.
+    """
+    with closing(Airfield(subject, settings.episodes, seed.value)) as bed:
+        suite = Suite(bed, [Mode(mode) for mode in settings.modes], settings.possible_share)
+        found = suite.run(axes, settings.strengths, tell)
+    if not settings.domain:
+        return {**found, "domain": None}
+    with closing(Airfield(subject, settings.domain_episodes, seed.value)) as wide:
+        return {**found, "domain": _domain(wide, axes, settings, tell)}
+
+
+def _domain(
+    bed: Airfield, axes: Sequence[Axis], settings: ShiftSettings, tell: Callable[[str], None]
+) -> dict[str, Any]:
+    """Where it is surely good: "plain", and "ranges" by axis.
+
+    Raises:
+        InputError: Nobody knows how to do the task, to be compared with.
+    """
+    task = as_task(bed.subject.task)
+    if task.oracle is None:
+        raise InputError(f"task={task.name} has no oracle to compare with; give domain=false")
+    oracle = bed.fly(Condition(), eyes=OracleEyes(looks=False)).episodes
+    prober = Prober(bed, oracle, settings.good_share, settings.possible_share)
+    ranges: dict[str, Any] = {}
+    for axis in axes:
+        tell(f"range of {axis.name}")
+        ranges[axis.name] = prober.search(axis)
+    return {"plain": prober.plain, "ranges": ranges}
+
+
+def _identity(pilot: Pilot) -> dict[str, Any] | None:
+    """By what it is known whose flights these are; None of who was made elsewhere."""
+    if not isinstance(pilot, Policy):
+        return None
+    described = pilot.description.as_dict()
+    return {"weights": fingerprint(pilot.state["policy"]), "description": described}
+
+
+def make_subject(pilot: Pilot, settings: ShiftSettings) -> Subject:
+    """What is flown: the policy's network, and the task and the camera that it has.
+
+    Raises:
+        InputError: The task has no settings that could be changed.
+    """
+    task: Any = pilot.task
+    task = task if isinstance(task, BaseTaskSettings) else getattr(task, "settings", None)
+    if not isinstance(task, BaseTaskSettings):
+        raise InputError(
+            f"policy={pilot.name} flies in a task without settings; give one with some"
+        )
+    env: Any = pilot.make_env(1, device=settings.device, renderer=settings.renderer)
+    try:
+        camera, transforms = worlds_of(env).camera, [*env.transform]
+    finally:
+        env.close()
+    network = pilot.make_network(settings.device).eval()
+    described = getattr(pilot, "description", None)  # of who comes from a file
+    look = MINIMAL if described is None else described.appearance
+    return Subject(
+        network,
+        task,
+        camera,
+        transforms,
+        look,
+        settings.device,
+        settings.renderer,
+        pilot.dynamics,
+        pilot.actions,
+    )

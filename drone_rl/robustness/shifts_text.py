@@ -1,0 +1,310 @@
+"""What is said of flights under other conditions, and of the conditions under which all is well."""
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from drone_rl.sim.vocabulary import terms_of
+from drone_rl.utils.numbers import listed
+from drone_rl.utils.seed_text import fixed_seed
+from drone_rl.utils.sentences import Evidence, Sentence, percent
+
+NAMES: Mapping[str, str] = {
+    "object_color": "color of the objects",
+    "object_white": "objects whitened",
+    "floor_color": "color of the floor",
+    "camera_yaw": "camera turned sideways",
+    "camera_pitch": "camera tilted",
+    "camera_roll": "camera rolled",
+    "camera_height": "camera higher or lower",
+    "camera_sideways": "camera to one side",
+    "field_of_view": "field of view",
+    "sun": "height of the sun",
+    "brightness": "brightness",
+    "fog": "fog",
+    "object_size": "size of the objects",
+    "distractors": "distractors beside the way",
+    "noise": "noise",
+    "slow_noise": "noise that changes slowly",
+    "blur": "blur",
+    "dead_rows": "dead rows",
+    "frozen_frames": "frozen pictures",
+    "late_frames": "late pictures",
+    "step_length": "length of a move",
+    "action_delay": "late actions",
+}
+"""Axes as people call them."""
+
+
+RANGES: Mapping[str, str] = {
+    "object_color": "{objects} whose red, green and blue differ by up to {high}",
+    "object_white": "{objects} with a share of white of up to {high}",
+    "floor_color": "a floor whose red, green and blue differ by up to {high}",
+    "camera_yaw": "the camera turned sideways by up to {high} degrees",
+    "camera_pitch": "the camera tilted by up to {high} degrees",
+    "camera_roll": "the camera rolled by up to {high} degrees",
+    "camera_height": "the camera up to {high} m higher or lower",
+    "camera_sideways": "the camera up to {high} m to one side",
+    "field_of_view": "a field of view of {low} to {high} degrees",
+    "sun": "the sun {low} to {high} degrees high",
+    "brightness": "{low} to {high} times the light",
+    "fog": "fog that leaves {low} m of sight or more",
+    "object_size": "{objects} of {low} to {high} m",
+    "distractors": "up to {high} distractors beside the way",
+    "noise": "noise of up to {high} of 255",
+    "slow_noise": "slow noise of up to {high} of 255",
+    "blur": "blur of up to {high} pixels",
+    "dead_rows": "up to {high} dead rows",
+    "frozen_frames": "a share of frozen pictures of up to {high}",
+    "late_frames": "pictures up to {high} frames late",
+    "step_length": "moves of {low} to {high} m",
+    "action_delay": "actions up to {high} steps late",
+}
+"""What is said of a range; those without a lower end are of what is 0 otherwise, and that of fog
+has no upper one where the air of the training is clear."""
+_UP_TO: Mapping[str, str] = {"fog": "fog that leaves {low} to {high} m of sight"}
+"""The same where the upper end is finite."""
+
+
+MOST_NAMED = 6
+"""Axes that a sentence names one by one."""
+
+
+def told(share: float) -> str:
+    """A share of flights, for people."""
+    return percent(share)
+
+
+def rows(numbers: Evidence) -> list[list[str]]:
+    """Success at every strength as texts: names, then a row for each axis.
+
+    Args:
+        numbers: As in `shifts.json`.
+    """
+    head = ["success, constant", "1", "2", "3", "4", "5", "area", ""]
+    return [
+        head,
+        *(_row(name, along) for name, along in numbers["axes"].items()),
+    ]
+
+
+def _row(name: str, along: Mapping[str, Any]) -> list[str]:
+    cells = {level["number"]: _cell(level) for level in along["levels"]}
+    area = along["areas"]["constant"]
+    return [
+        NAMES[name],
+        *(cells.get(number, "") for number in range(1, 6)),
+        "" if area is None else f"{area:.2f}",
+        along["unit"],
+    ]
+
+
+def _cell(level: Mapping[str, Any]) -> str:
+    if level["refused"] is not None:
+        return f"{level['value']:.3g}: -"
+    success = told(level["modes"]["constant"]["success"]["share"])
+    return f"{level['value']:.3g}: {success}{'*' if level['impossible'] else ''}"
+
+
+def _ranges(e: Evidence) -> Mapping[str, Any]:
+    return (e["domain"] or {}).get("ranges", {})
+
+
+def is_tested(e: Evidence, name: str) -> bool:
+    """Whether its strongest change was seen, or made flights go otherwise."""
+    flown = [v["modes"]["constant"] for v in e["axes"][name]["levels"] if v["refused"] is None]
+    return bool(flown) and not flown[-1]["unchanged"]
+
+
+def _wide(e: Evidence) -> Iterator[str]:
+    """Axes with a range in which it is good."""
+    for name, found in _ranges(e).items():
+        has_width = found["positions"] is not None and found["positions"][0] < found["positions"][1]
+        if has_width and is_tested(e, name):
+            yield name
+
+
+def _shut(e: Evidence, is_sure: bool) -> list[str]:
+    """Axes without any, of a policy that is good where nothing differs.
+
+    Args:
+        e: As in `shifts.json`.
+        is_sure: Those on which it surely is not good, or those on which too few flights were made.
+    """
+    return [
+        name
+        for name, found in _ranges(e).items()
+        if found["positions"] == [0.0, 0.0]
+        and (failed := _own_failures(found))
+        and any(failure["bad"] for failure in failed) == is_sure
+    ]
+
+
+def _own_failures(found: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """Those of the policy, where it could have done better."""
+    return [failure for failure in found["failed"] if not failure["impossible"]]
+
+
+def inward(value: float, up: bool) -> str:
+    """A limit in three digits, rounded to where it is surely good.
+
+    Args:
+        value: The limit.
+        up: Whether it is a lower one.
+    """
+    if value == 0:
+        return "0"
+    unit = 10.0 ** (math.floor(math.log10(abs(value))) - 2)
+    count = value / unit
+    return f"{(math.ceil(count - 1e-6) if up else math.floor(count + 1e-6)) * unit:.3g}"
+
+
+def _range(e: Evidence, name: str) -> str:
+    found, ends = _ranges(e)[name], {"low": True, "high": False}
+    limits = {end: inward(found[end], up) for end, up in ends.items() if found[end] is not None}
+    text = RANGES[name] if found["high"] is None else _UP_TO.get(name, RANGES[name])
+    text = text.format(objects=_objects(e), **limits)
+    most = {"low": "no less", "high": "no more"}
+    tried = listed([most[end] for end in ends if found[f"{end}_open"]])
+    lost = listed([f"{most[f['end']]} is possible" for f in found["failed"] if f["impossible"]])
+    aside = listed([*([f"{tried} was tried"] if tried else []), *([lost] if lost else [])])
+    return f"{text} ({aside})" if aside else text
+
+
+def _good(e: Evidence) -> str:
+    ranges = listed([_range(e, name) for name in _wide(e)])
+    return f"Good, with 95% confidence for each range by itself, with {ranges}."
+
+
+def _not(e: Evidence) -> str:
+    parts = []
+    for name in _shut(e, True):
+        found = next(f for f in _own_failures(_ranges(e)[name]) if f["bad"])
+        parts.append(f"{_at(e, name, found['value'])}{_why(e, found)}")
+    return f"Not with {listed(parts)}."
+
+
+def _too_few(e: Evidence) -> str:
+    parts = [
+        _at(e, name, found["value"])
+        for name in _shut(e, False)
+        for found in _own_failures(_ranges(e)[name])[:1]
+    ]
+    count = e["settings"]["domain_episodes"]
+    return f"Whether it is good with {listed(parts, 'or')} {count} flights do not tell."
+
+
+def _at(e: Evidence, name: str, value: float) -> str:
+    return f"{NAMES[name]} at {value:.3g} {e['axes'][name]['unit']}"
+
+
+def _why(e: Evidence, found: Mapping[str, Any]) -> str:
+    """Where it fails."""
+    if found["refused"] is not None:
+        return ", which the task can't have"
+    worst = found["worst"]
+    if worst is None:
+        return f": all {terms_of(e).goals} in {percent(found['success'])} of flights"
+    return f": {terms_of(e).goals} {terms_of(e).side(worst['side'])} {percent(worst['share'])}"
+
+
+def _objects(e: Evidence) -> str:
+    return f"{terms_of(e).target}s"
+
+
+def _impossible(e: Evidence) -> list[str]:
+    """Strengths of the table and ends of ranges, the flights of the former where both were made."""
+    found = {
+        _at(e, name, at["value"]): percent(at["oracle"]["share"])
+        for name, along in e["axes"].items()
+        for at in (*_ranges(e).get(name, {"failed": []})["failed"], *along["levels"])
+        if at["impossible"]
+    }
+    return [f"{at}, {share}" for at, share in found.items()]
+
+
+def _untested(e: Evidence) -> list[str]:
+    return [NAMES[name] for name in e["axes"] if not is_tested(e, name)]
+
+
+def _together(e: Evidence) -> str:
+    flown, oracle = e["together"]["modes"]["constant"], e["together"]["oracle"]
+    beside = (
+        ""
+        if oracle is None
+        else f"; who knows where all is that it sees, in {percent(oracle['share'])}"
+    )
+    return (
+        f"With {_every_axis(e)} at once, each at its third strength, it succeeds in "
+        f"{percent(flown['success']['share'])} of flights{beside}."
+    )
+
+
+def _every_axis(e: Evidence) -> str:
+    """All axes by name, or their number if there are many."""
+    names = [NAMES[name] for name in e["axes"]]
+    return listed(names) if len(names) <= MOST_NAMED else f"all {len(names)} axes of the table"
+
+
+SHIFTS = (
+    Sentence(
+        "shifts.good",
+        "surely good where nothing differs and up to both ends of a range that was seen to differ",
+        lambda e: any(True for _ in _wide(e)),
+        _good,
+    ),
+    Sentence(
+        "shifts.not",
+        "surely good where nothing differs, surely not at the next strength of an axis",
+        lambda e: bool(_shut(e, True)),
+        _not,
+    ),
+    Sentence(
+        "shifts.too_few",
+        "surely good where nothing differs, and nowhere else on an axis, but not surely bad",
+        lambda e: bool(_shut(e, False)),
+        _too_few,
+    ),
+    Sentence(
+        "shifts.none",
+        "ranges were looked for, and it is not even surely good where nothing differs",
+        lambda e: e["domain"] is not None and not e["domain"]["plain"]["good"],
+        lambda e: (
+            "It is not surely good where nothing is different from its training, so there is no "
+            "range in which it is."
+        ),
+    ),
+    Sentence(
+        "shifts.untested",
+        "an axis changed neither what it saw nor how it flew",
+        lambda e: bool(_untested(e)),
+        lambda e: f"Of {listed(_untested(e))} it notices nothing: that was no test.",
+    ),
+    Sentence(
+        "shifts.impossible",
+        "who knows where all is that the camera shows surely fails too often, at a strength of the "
+        "table or where a range ends",
+        lambda e: bool(_impossible(e)),
+        lambda e: (
+            "Impossible even for who knows where all is that the camera shows: "
+            f"{listed(_impossible(e))}."
+        ),
+    ),
+    Sentence(
+        "shifts.together",
+        "several axes were flown at once",
+        lambda e: e["together"]["refused"] is None and len(e["axes"]) > 1,
+        _together,
+    ),
+    Sentence(
+        "shifts.scope",
+        "a range was found",
+        lambda e: any(True for _ in _wide(e)),
+        lambda e: (
+            "Within each range its limits, the strengths of the table and one drawn at random "
+            "between each two were flown at, always constantly different; nothing else was, nor "
+            "several axes at once but as said here."
+        ),
+    ),
+    fixed_seed("shifts.fixed_seed"),
+)

@@ -1,0 +1,211 @@
+"""A policy that flies another's firmware, in the worlds in which it is evaluated."""
+
+import contextlib
+import dataclasses
+import tempfile
+import time
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import torch
+from torch import Tensor
+from torchrl.envs.utils import ExplorationType, set_exploration_type, step_mdp
+
+from drone_rl.envs import worlds_of
+from drone_rl.evaluation.metrics import Episodes, summarise
+from drone_rl.flight.firmware.errors import NotBegunError
+from drone_rl.flight.firmware.firmware import find_firmware
+from drone_rl.flight.firmware.looped_dynamics import LoopedDynamics
+from drone_rl.flight.firmware.sitl import Betaflight
+from drone_rl.flight.firmware.trial import betaflight_drone
+from drone_rl.policies.base_policy import Pilot
+from drone_rl.policies.external_network import Logits
+from drone_rl.policies.external_policy import as_pilot
+from drone_rl.sim.dynamics import BodyState
+from drone_rl.sim.tasks import as_task
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.progress import Bar, Progress
+from drone_rl.utils.seed_text import LOOPED, seed_line
+from drone_rl.utils.seeding import RootSeed, root_seed
+from drone_rl.utils.sentences import say
+
+STARTS = 3
+"""Of a firmware, for one flight."""
+
+
+@dataclasses.dataclass(frozen=True)
+class LoopedFlight:
+    """One episode with a firmware on board."""
+
+    world: int
+    """Number of the world, as in evaluations."""
+    goals: int
+    """That were reached."""
+    success: bool
+    """Whether all were."""
+    end: str
+    """Why it ended, a name of the task's ends."""
+    steps: int
+    """Actions."""
+    simulated_s: float
+    """From the first action to the end."""
+    wall_s: float
+    """On the clock on the wall, arming and take-off included."""
+    missed: int
+    """Ticks that the firmware did not answer in time."""
+    path: tuple[tuple[float, float, float], ...]
+    """Places before the first action and after each, metres, world frame."""
+
+
+@dataclasses.dataclass(frozen=True)
+class LoopedFlights:
+    """How a policy did with a firmware on board."""
+
+    policy: str
+    seed: RootSeed
+    """Root of the environments' random streams."""
+    flights: tuple[LoopedFlight, ...]
+    figures: dict[str, Any] = dataclasses.field(repr=False)
+    """As of an evaluation, see `drone_rl.evaluation.metrics.summarise`."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values: the figures and each flight."""
+        flights = [dataclasses.asdict(f) for f in self.flights]
+        return {**self.figures, **self.seed.as_dict(), "flights": flights}
+
+    def __str__(self) -> str:
+        """A line a flight, and one of them all."""
+        lines = [
+            f"world {f.world}: {f.goals} reached, {f.end.replace('_', ' ')}, {f.steps} steps, "
+            f"{f.simulated_s:.1f} s"
+            for f in self.flights
+        ]
+        success = self.figures["success"]
+        ends = (f"{100 * success[bound]:.0f}%" for bound in ("lower95", "upper95"))
+        share = f"{success['successes']} of {success['trials']} succeeded"
+        seed = self.seed.as_dict()
+        notes = [f"{share} ({' to '.join(ends)})", say(LOOPED, seed), seed_line(seed)]
+        return "\n".join([*lines, *filter(None, notes)])
+
+
+def fly_in_the_loop(
+    policy: str | Path | Pilot | Logits,
+    flights: int = 5,
+    seed: int | None = None,
+    *,
+    firmware: str | Path | None = None,
+    isolated: bool = True,
+    outputs: str | Path = "outputs",
+    progress: Progress | None = None,
+    drawn_seed: RootSeed | None = None,
+) -> LoopedFlights:
+    """Flies a policy, greedily, with Betaflight between its actions and the rotors.
+
+    The worlds are the first in which evaluations and verdicts of the same seed fly. Each flight has
+    a firmware that has just been started, so that none inherits anything of another: it arms, takes
+    off, hovers where the episode begins, and goes on until the task says that it is over.
+
+    Args:
+        policy: What `judge` takes. In computer-vision mode it flies AirSim's drone.
+        flights: How many, each at about the pace of real time at best.
+        seed: Root of the environments' random streams; a fresh one by default.
+        firmware: See `drone_rl.flight.firmware.firmware.find_firmware`.
+        isolated: See `drone_rl.flight.firmware.trial.betaflight_drone`.
+        outputs: See `load_policy`.
+        progress: Told of what is being flown; a bar by default.
+        drawn_seed: The seed of a larger analysis of which this is a part; takes precedence.
+
+    Raises:
+        InputError: The policy or a number is unusable, or no firmware was built.
+        LoopError: The firmware failed, or the machine was too busy for it.
+    """
+    if not (isinstance(flights, int) and flights >= 1):
+        raise InputError(f"flights={flights} is out of range; give a whole number from 1")
+    progress, pilot = progress or Bar(), as_pilot(policy, outputs)
+    root = drawn_seed or root_seed(seed)
+    program = find_firmware(firmware)
+    flown: list[_Flown] = []
+    with tempfile.TemporaryDirectory(prefix="betaflight-") as folder:
+        for world in range(flights):
+            progress(f"{pilot.name}: software in the loop", world, flights)
+            flown.append(_fly_or_restart(pilot, world, root.value, program, Path(folder), isolated))
+    progress("flown", flights, flights)
+    info = {name: torch.cat([one.info[name] for one in flown]) for name in flown[0].info}
+    lengths = torch.tensor([len(one.path) - 1 for one in flown])
+    episodes = Episodes.ended(as_task(pilot.task), info, lengths)
+    told = tuple(_told(one, world, episodes) for world, one in enumerate(flown))
+    return LoopedFlights(pilot.name, root, told, summarise(episodes))
+
+
+class _Flown(NamedTuple):
+    """One flight, before its task says what it was worth."""
+
+    info: dict[str, Tensor]
+    """What was true at the end. Shapes: (1, *)."""
+    path: list[tuple[float, float, float]]
+    simulated_s: float
+    wall_s: float
+    missed: int
+
+
+def _fly_or_restart(pilot: Pilot, world: int, *given: Any) -> _Flown:
+    """One episode; a firmware that doesn't get the drone to its beginning is started again.
+
+    That has nothing to do with the policy, which was not asked for anything yet.
+    """
+    for _ in range(STARTS - 1):
+        with contextlib.suppress(NotBegunError):
+            return _fly(pilot, world, *given)
+    return _fly(pilot, world, *given)
+
+
+@torch.no_grad()
+def _fly(
+    pilot: Pilot, world: int, seed: int, program: Path, folder: Path, isolated: bool
+) -> _Flown:
+    """One episode, with a firmware of its own."""
+    began = time.monotonic()
+    settings = pilot.dynamics.replace(mode="simple_flight")
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(set_exploration_type(ExplorationType.DETERMINISTIC))
+        drone = stack.enter_context(
+            betaflight_drone(settings, firmware=program, folder=folder, isolated=isolated)
+        )
+        dynamics = LoopedDynamics(drone, settings, pilot.actions)
+        env, actor = stack.enter_context(
+            pilot.flying(1, seed=seed, first_world=world, dynamics=dynamics)
+        )
+        seen, worlds = env.reset(), worlds_of(env)
+        actor(seen.clone())  # once before the firmware waits for it
+        dynamics.begin(worlds.state.body)
+        left, path = drone.time, [_place(drone.body)]
+        while True:
+            after = env.step(actor(seen))
+            path.append(_place(drone.body))
+            if bool(after["next", "done"]):
+                break
+            seen = step_mdp(after)
+        told = (*worlds.task.scored, "end_reason")
+        info = {name: after["next", "info", name].cpu() for name in told}
+        missed = drone.controller.missed if isinstance(drone.controller, Betaflight) else 0
+        return _Flown(info, path, drone.time - left, time.monotonic() - began, missed)
+
+
+def _told(flown: _Flown, world: int, episodes: Episodes) -> LoopedFlight:
+    reached = episodes.goals.reached[world]
+    return LoopedFlight(
+        world=world,
+        goals=int(reached.sum()),
+        success=bool(reached.all()),
+        end=episodes.task.ends(int(episodes.end_reason[world])).name.lower(),
+        steps=len(flown.path) - 1,
+        simulated_s=flown.simulated_s,
+        wall_s=flown.wall_s,
+        missed=flown.missed,
+        path=tuple(flown.path),
+    )
+
+
+def _place(body: BodyState) -> tuple[float, float, float]:
+    x, y, z = body.position[0].tolist()
+    return x, y, z

@@ -1,0 +1,1 @@
+"""The ray tracer: kernels, shared structures and the renderer that launches them."""

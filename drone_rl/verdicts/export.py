@@ -1,0 +1,214 @@
+"""Policies as files for others: with a card that tells all about them, or as ONNX models."""
+
+import dataclasses
+import hashlib
+import shlex
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from safetensors import SafetensorError
+
+from drone_rl.config.judging import FlightSettings
+from drone_rl.evaluation.agreement import Agreement, agreement
+from drone_rl.evaluation.certificate_text import is_quoted
+from drone_rl.evaluation.judge import judge_policy
+from drone_rl.policies.policy import Policy, load_policy
+from drone_rl.policies.zoo import certificate_path, make_onnx, open_onnx, shifts_path
+from drone_rl.policies.zoo.files import exported_bytes
+from drone_rl.robustness.domain_text import is_quoted as is_told
+from drone_rl.sweeps.manifest import read_sweep
+from drone_rl.sweeps.rows import read_rows
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.files import read_bytes, write_all_atomically, write_atomically
+from drone_rl.utils.limits import CERTIFICATE_BYTES, SHIFTS_BYTES
+from drone_rl.utils.overrides import COMMAND, read_overrides
+from drone_rl.utils.seeding import RootSeed, root_seed, with_seed
+from drone_rl.verdicts.card import write_card
+from drone_rl.verdicts.domains import find_domain
+from drone_rl.verdicts.quoting import find_claim
+
+MOST_DIFFERENCE = 1e-5
+"""Of a probability that an ONNX model gives, from PyTorch's."""
+_WORLDS, _STEPS = 100, 100
+"""Of the flights on which it is compared: 10,000 pictures."""
+
+
+def export(
+    policy: Policy,
+    target: Path,
+    settings: FlightSettings,
+    *,
+    command: str | None = None,
+    certificate: str | Path | None = None,
+    shifts: str | Path | None = None,
+    outputs: str | Path = "outputs",
+) -> RootSeed:
+    """Judges a policy and writes it as safetensors, with a model card beside it.
+
+    Args:
+        policy: Which.
+        target: Of the file, ending in .safetensors.
+        settings: Of the flights for the card's verdict.
+        command: That trained it; None names what its file or folder says.
+        certificate: A proof's file for the card to quote and for the policy to have beside it; by
+            default the one that lies with the policy already.
+        shifts: The same of a file of flights under other conditions, see `find_domain`.
+        outputs: See `find_domain`.
+
+    Returns:
+        Root of the random streams of the verdict's environments.
+
+    Raises:
+        InputError: It can't be written, or a file that is given is unusable.
+    """
+    settings, seed = with_seed(settings)
+    device = settings.device
+    claim = find_claim(policy, certificate, seed=seed)
+    claim = None if claim is None or claim.refused else claim  # a card tells of what is
+    measured = find_domain(policy, shifts, outputs)
+    with policy.flying(
+        settings.num_worlds, seed=seed.value, device=device, renderer=settings.renderer
+    ) as (env, actor):
+        verdict = judge_policy(env, actor, settings.episodes, claim=claim, seed=seed).as_dict()
+    noted, chosen = origin_of(policy.path, policy.state)
+    carried = {}
+    if measured is not None and is_told({"shifts": measured.evidence, "verdict": verdict}):
+        carried[shifts_path(target)] = read_bytes(measured.path, SHIFTS_BYTES)
+    if claim is not None and is_quoted(verdict):
+        carried[certificate_path(target)] = read_bytes(claim.path, CERTIFICATE_BYTES)
+    export_policy(
+        target,
+        policy.state,
+        command=command or noted,
+        verdict=verdict,
+        seed=seed.value,
+        chosen=chosen,
+        shifts=None if measured is None else _as_carried(measured.numbers, target),
+        carried=carried,
+    )
+    return seed
+
+
+def export_onnx(
+    policy: str | Path | Policy,
+    target: str | Path,
+    *,
+    command: str | None = None,
+    seed: int | None = None,
+) -> Agreement:
+    """Writes a policy as an ONNX model, if that does what the policy does: all of it on the CPU.
+
+    Args:
+        policy: The policy, or what `load_policy` takes.
+        target: Of the file, ending in .onnx; what is in it, see `drone_rl.policies.zoo.make_onnx`.
+        command: That trained it, for the model's metadata; None names what its file or folder says.
+        seed: Root of the random streams of the environments in which the two are compared; a fresh
+            one by default.
+
+    Returns:
+        How far the model and PyTorch agree, on 10,000 pictures that the policy met.
+
+    Raises:
+        InputError: It can't be an ONNX model, or not be written, or the model is another function
+            than the policy; then nothing is written.
+    """
+    policy = policy if isinstance(policy, Policy) else load_policy(policy)
+    told = {"command": command or origin_of(policy.path, policy.state)[0]}
+    content = make_onnx(policy.description, policy.make_network(), told)
+    model = open_onnx(content)
+    sound = dataclasses.replace(policy, description=policy.description.without_faults())
+    with sound.flying(_WORLDS, seed=root_seed(seed).value) as (env, actor):
+        found = agreement(env, actor, model, _STEPS)
+    if not found.difference <= MOST_DIFFERENCE:
+        raise InputError(
+            f"policy {policy.name} as an ONNX model gives probabilities that differ by up to "
+            f"{found.difference:.2g} from its own, and {MOST_DIFFERENCE:g} is allowed; export it "
+            "with format=safetensors"
+        )
+    try:
+        write_atomically(Path(target), content)
+    except OSError as error:
+        raise InputError(
+            f"policy {target} can't be written ({error.strerror}); free some space or choose "
+            "another folder with hydra.run.dir=..."
+        ) from error
+    return found
+
+
+def _as_carried(numbers: dict[str, Any] | None, target: Path) -> dict[str, Any] | None:
+    """What a card quotes, by the name of the file that travels with the policy."""
+    if numbers is None:
+        return None
+    return {**numbers, "file": {**numbers["file"], "path": shifts_path(target).name}}
+
+
+def origin_of(path: Path, state: dict[str, Any]) -> tuple[str, dict[str, Any] | None]:
+    """The command that trains the same once more, and the choice in a sweep, if it is of one."""
+    folder = path.absolute().parent.parent
+    if path.suffix == ".pt" and (folder.parent / "sweep.json").is_file():
+        rows = read_rows(read_sweep(folder.parent))
+        row = next((row for row in rows if row.run.folder == folder), None)
+        if row is not None:
+            episodes = None if row.verdict is None else row.verdict["greedy"]["episodes"]
+            return row.run.repeat_command(), {"runs": len(rows), "episodes": episodes}
+    noted = state.get("command") or shlex.join(["drone-rl", "train", *read_overrides(folder)])
+    return noted, state.get("chosen")
+
+
+def export_policy(
+    path: Path,
+    checkpoint: Mapping[str, Any],
+    *,
+    command: str,
+    verdict: Mapping[str, Any],
+    seed: int,
+    chosen: Mapping[str, Any] | None,
+    shifts: Mapping[str, Any] | None = None,
+    carried: Mapping[Path, bytes] | None = None,
+) -> None:
+    """Writes a checkpoint's policy and its model card beside it, all of it or nothing.
+
+    Args:
+        path: Where to, ending in .safetensors; the card ends in .md.
+        checkpoint: From `read_policy`.
+        command: The training command.
+        verdict: As in verdict.json, from worlds to report on.
+        seed: Root of these worlds' random streams.
+        chosen: "runs" of the sweep in which it was made, and "episodes" by which it was judged
+            there, if it was; None if it was made in no sweep.
+        shifts: As in shifts.json, for the card; None if there are none.
+        carried: Further files that the card quotes, by their paths.
+
+    Raises:
+        InputError: It can't be written.
+    """
+    origin = checkpoint["provenance"]
+    about = {
+        "progress": checkpoint["progress"],
+        "provenance": {k: origin[k] for k in ("versions", "git_revision")},
+        "command": COMMAND.read(command, "command"),
+        "verdict": verdict,
+        "worlds": "report",
+        "seed": seed,
+        "chosen": chosen,
+    }
+    described = checkpoint["description"]
+    try:
+        content = exported_bytes(checkpoint["policy"], described, about)
+    except SafetensorError as error:
+        raise InputError(f"policy {path} can't be written ({error})") from error
+    told = {
+        **about,
+        "task": described["task"],
+        "dynamics": described.get("dynamics"),
+        "shifts": shifts,
+    }
+    card = write_card(path.stem, hashlib.sha256(content).hexdigest(), told)
+    try:
+        write_all_atomically({path: content, path.with_suffix(".md"): card, **(carried or {})})
+    except OSError as error:
+        raise InputError(
+            f"policy {path} can't be written ({error.filename}: {error.strerror}); free some "
+            "space or choose another folder with hydra.run.dir=..."
+        ) from error

@@ -1,0 +1,1 @@
+"""Exhaustive verification: the prover, the independent checker and exact maps."""

@@ -1,0 +1,170 @@
+"""Checks of certificates, as objects that show themselves."""
+
+import dataclasses
+import functools
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from drone_rl.config.checking import CheckSettings
+from drone_rl.policies.policy import Policy, load_policy
+from drone_rl.policies.zoo import policy_names
+from drone_rl.utils.display import table
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.files import newest
+from drone_rl.utils.progress import Bar, Progress
+from drone_rl.utils.provenance import provenance
+from drone_rl.utils.seed_text import CHECK, seed_line
+from drone_rl.utils.seeding import RootSeed, with_seed
+from drone_rl.utils.sentences import say
+from drone_rl.verification.checker import (
+    Certificate,
+    Findings,
+    check_certificate,
+    read_certificate,
+    refuse_another,
+)
+
+REFUSED = 14
+"""Exit status for a certificate that doesn't hold."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Check:
+    """Whether a certificate holds, whose it is, and what speaks against it."""
+
+    path: Path
+    """Of the certificate."""
+    policy: Policy
+    """Whom it is of, in the task that it is of."""
+    settings: CheckSettings
+    certificate: Certificate = dataclasses.field(repr=False)
+    """What it states."""
+    findings: Findings
+    seed: RootSeed
+    """Of the placements flown."""
+
+    @property
+    def accepted(self) -> bool:
+        """Whether nothing speaks against it."""
+        return self.findings.accepted
+
+    @property
+    def exit_code(self) -> int:
+        """Of a process that reports it."""
+        return 0 if self.accepted else REFUSED
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values, as in `check.json`."""
+        return {
+            "certificate": str(self.path),
+            "policy": str(self.policy.path),
+            "task": self.policy.task.values(),
+            **self.seed.as_dict(),
+            **self.findings.as_dict(),
+            **provenance(),
+        }
+
+    def save(self, path: Path) -> None:
+        """Writes `check.json`."""
+        path.write_text(json.dumps(self.as_dict(), indent=2))
+
+    def lines(self) -> list[str]:
+        """What it comes to, what was stated, then each finding in one line."""
+        stated, flown = self.certificate, sum(self.findings.flights.values())
+        kind = "accepted" if self.accepted else "refused"
+        count = sum(map(len, stated.groups))
+        shares = [f"{outcome.share:.9g} {outcome}" for outcome in stated.outcomes]
+        return [
+            f"{kind}: {self.path}, of policy {self.policy.name}{self._changes()}, {count} boxes, "
+            f"{flown} flights, {self.findings.contradicted} of them ended otherwise than stated",
+            *(f"stated: {share}" for share in (*shares, f"{stated.undecided_share:.3g} undecided")),
+            *(f"refused: {line}" for line in self.findings.lines()),
+            *(f"note: {line}" for line in filter(None, [say(CHECK, self.seed.as_dict())])),
+            seed_line(self.seed.as_dict(), "placements"),
+        ]
+
+    def __str__(self) -> str:
+        """The lines."""
+        return "\n".join(self.lines())
+
+    def _repr_html_(self) -> str:
+        head, *rows = (line.split(": ", 1) for line in self.lines())
+        return table(head, rows)
+
+    def _changes(self) -> str:
+        """What is other in the certificate's task than in the policy's own."""
+        own = self.policy.state["description"]["task"]
+        changed = [f"{n}={v}" for n, v in self.policy.task.values().items() if own.get(n) != v]
+        return f" with {', '.join(changed)}" if changed else ""
+
+
+def check(
+    certificate: str | Path,
+    policy: str | Path | Policy | None = None,
+    settings: CheckSettings | None = None,
+    *,
+    task: Mapping[str, Any] | None = None,
+    outputs: str | Path = "outputs",
+    progress: Progress | None = None,
+    **changes: Any,
+) -> Check:
+    """Checks a certificate with nothing of the prover: exact sums, and flights in the simulator.
+
+    Args:
+        certificate: The file, or "latest" for the newest one.
+        policy: Whom it is of, or what `load_policy` takes; by default the policy that the
+            certificate names, if that travels with the package.
+        settings: How it is checked.
+        task: Settings of the policy's task that the certificate must be of; any by default.
+        outputs: Folder under which runs are kept.
+        progress: Told of what is being done; a bar by default.
+        changes: Settings to change, as in `check("certificate.json", flights=10_000)`.
+
+    Raises:
+        InputError: The certificate can't be read or is of another network or task, the policy or a
+            setting is unusable.
+    """
+    settings, seed = with_seed((settings or CheckSettings()).replace(**changes))
+    path = _find(certificate, outputs)
+    stated = read_certificate(path)
+    if policy is None:
+        policy = _named(stated.name)
+    loaded = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
+    weights, asked = loaded.state["policy"], loaded.in_task(**task).task if task else None
+    refuse_another(stated, loaded.description, weights, asked)
+    flown = dataclasses.replace(loaded, description=stated.description)
+    findings = check_certificate(
+        stated,
+        weights,
+        flights=settings.flights,
+        seed=seed.value,
+        device=settings.device,
+        renderer=settings.renderer,
+        tell=functools.partial(progress or Bar(), "flown"),
+    )
+    return Check(path, flown, settings, stated, findings, seed)
+
+
+def _find(certificate: str | Path, outputs: str | Path) -> Path:
+    """The file."""
+    if certificate != "latest":
+        return Path(certificate)
+    path = newest(Path(outputs).glob("prove/**/certificate.json"))
+    if path is None:
+        raise InputError(
+            f"certificate=latest, but there is none under {outputs}/prove; run drone-rl prove "
+            "first or give the path of a certificate"
+        )
+    return path
+
+
+def _named(name: str) -> str:
+    """The policy that a certificate names, which must be one that travels with the package."""
+    if name not in policy_names():
+        raise InputError(
+            f"the certificate is of policy {name!r}, which is none of "
+            f"{', '.join(policy_names())}; give policy= its file"
+        )
+    return name

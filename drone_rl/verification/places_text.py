@@ -1,0 +1,143 @@
+"""What is said of the exact map of one cube's places."""
+
+from collections.abc import Sequence
+
+from drone_rl.sim.action_display import shown_actions
+from drone_rl.utils.numbers import listed
+from drone_rl.utils.sentences import Evidence, Sentence
+
+WHERE = {"left": "on its left", "ahead": "straight ahead", "right": "on its right"}
+"""Sides, and how people say them."""
+
+
+def exact(share: float) -> str:
+    """A share that is known; never 0% or 100% of what is only nearly none or nearly all."""
+    if share in (0, 1):
+        return f"{share:.0%}"
+    text = f"{100 * share:.2f}%"
+    return {"0.00%": "less than 0.01%", "100.00%": "more than 99.99%"}.get(text, text)
+
+
+def rows(places: Evidence, names: Sequence[str]) -> list[list[str]]:
+    """The figures as texts: names, then a row for each side and one for all.
+
+    Args:
+        places: "places" of `explanation.json`, or `places.json`.
+        names: Of the actions.
+    """
+    head = ["one cube", "share of places", *names, "not seen", "blind"]
+    every = {**{n: places[n] for n in ("actions", "unseen", "blind")}, "share": 1.0}
+    told = {WHERE[s]: of for s, of in places["sides"].items()} | {"anywhere": every}
+    return [
+        head,
+        *(
+            [where, *map(exact, (of["share"], *of["actions"], of["unseen"], of["blind"]))]
+            for where, of in told.items()
+        ),
+    ]
+
+
+def _made(evidence: Evidence) -> bool:
+    return "refused" not in evidence["places"]
+
+
+def _does(evidence: Evidence) -> str:
+    places, names = evidence["places"], shown_actions(evidence).names
+    window, parts = places["window"], []
+    for side, of in places["sides"].items():
+        needed = "forward" if side == "ahead" else side
+        share = of["actions"][names.index(needed)]
+        parts.append(f"{needed} for {exact(share)} of those {WHERE[side]}")
+    return (
+        f"With one cube {window['nearest']:g} to {window['farthest']:g} m ahead of its camera and "
+        f"up to {window['sideways']:g} m to either side, exactly and over all places, it goes "
+        f"{listed(parts)}."
+    )
+
+
+def _unseen(evidence: Evidence) -> str:
+    share = exact(evidence["places"]["unseen"])
+    return f"At {share} of the places not one pixel shows the cube."
+
+
+def _blind(evidence: Evidence) -> str:
+    places, names = evidence["places"], shown_actions(evidence).names
+    shares = [
+        f"{exact(of['blind'])} of those {WHERE[side]}"
+        for side, of in places["sides"].items()
+        if of["blind"]
+    ]
+    return (
+        f"It is blind to {listed(shares)}: a turn is called for, and it goes "
+        f"{names[places['alone']]}, as with no cube in sight. Farther on it may see the cube yet."
+    )
+
+
+def _gap(evidence: Evidence) -> str:
+    places = evidence["places"]
+    left = places["least_gap_left"]
+    return (
+        f"Its two highest logits come closest, to {places['least_gap']:.2g}, with the cube "
+        f"{places['least_gap_ahead']:.2f} m ahead and {abs(left):.2f} m to the "
+        f"{'left' if left > 0 else 'right'}."
+    )
+
+
+def _close(evidence: Evidence) -> str:
+    places = evidence["places"]
+    return (
+        f"At {exact(places['close'])} of the places they are no farther apart than "
+        f"{places['logit_gap']:g}, where rounding may decide between the two actions."
+    )
+
+
+def _doubt(evidence: Evidence) -> str:
+    return (
+        f"At most {exact(evidence['places']['in_doubt'])} of the places lie so near to a border "
+        "between two pictures that the renderer, by rounding, may show the other one."
+    )
+
+
+PLACES = (
+    Sentence("places.does", "every cell of places was decided", _made, _does),
+    Sentence(
+        "places.unseen",
+        "there are places where no pixel shows the cube",
+        lambda e: _made(e) and e["places"]["unseen"] > 0,
+        _unseen,
+    ),
+    Sentence(
+        "places.blind",
+        "there are places where a turn is called for and only what is done anyway is done",
+        lambda e: _made(e) and e["places"]["blind"] > 0,
+        _blind,
+    ),
+    Sentence(
+        "places.sees",
+        "there are none",
+        lambda e: _made(e) and e["places"]["blind"] == 0,
+        lambda e: (
+            "Nowhere a turn is called for does it do just what it does with no cube in sight, "
+            "unless that is the turn."
+        ),
+    ),
+    Sentence("places.gap", "all logits were compared", _made, _gap),
+    Sentence(
+        "places.close",
+        "somewhere the two highest logits are closer than sums are sure to be",
+        lambda e: _made(e) and e["places"]["close"] > 0,
+        _close,
+    ),
+    Sentence(
+        "places.doubt",
+        "pictures have borders",
+        lambda e: _made(e) and e["places"]["in_doubt"] > 0,
+        _doubt,
+    ),
+    Sentence(
+        "places.refused",
+        "no closed form is known of what it sees, or it chooses among other actions",
+        lambda e: not _made(e),
+        lambda e: f"Of this policy there is no exact map: {e['places']['refused']}.",
+    ),
+)

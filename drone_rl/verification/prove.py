@@ -1,0 +1,212 @@
+"""A proof of what a policy does, from its settings to its certificate."""
+
+import dataclasses
+import json
+import time
+from collections.abc import Mapping
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from drone_rl.config.proving import ProveSettings
+from drone_rl.policies.policy import Policy, load_policy
+from drone_rl.utils.display import aligned, paragraph, table
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.files import folder_lock, write_atomically
+from drone_rl.utils.limits import ARRAYS_BYTES
+from drone_rl.utils.numbers import plural
+from drone_rl.utils.progress import Bar, Progress
+from drone_rl.utils.provenance import provenance
+from drone_rl.utils.seeding import fresh_seed, legacy_seed
+from drone_rl.verification.proof_text import sentence, why_stopped
+from drone_rl.verification.prover.certificate import certify, weights_hash
+from drone_rl.verification.prover.prover import Prover
+from drone_rl.verification.prover.saving import load, save
+from drone_rl.verification.prover.subject import Subject, make_subject
+from drone_rl.verification.prover.threads import one_thread
+
+_BYTES_PER_SIDE = 64
+"""Of a state, for each cube of each box under way: two borders, kept up to four times."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Proof:
+    """How all placements of the cubes end, exactly, as far as it is decided."""
+
+    certificate: dict[str, Any]
+    """Plain data, see `drone_rl.verification.prover.certificate`."""
+    folder: Path | None = None
+    """Where it lies, as `certificate.json`."""
+
+    @property
+    def success(self) -> float:
+        """Share of all placements from which everything is collected, for certain."""
+        done = (o["share"] for o in self.certificate["outcomes"] if o["end"] == "all_cubes")
+        return sum(done)
+
+    @property
+    def lost(self) -> float:
+        """Share of all placements from which it is not, for certain."""
+        return sum(o["share"] for o in self.certificate["outcomes"] if o["end"] != "all_cubes")
+
+    @property
+    def undecided(self) -> float:
+        """Share of the placements of which nothing is claimed."""
+        return self.certificate["undecided"]["share"]
+
+    @property
+    def is_proved(self) -> bool:
+        """Whether it succeeds from every placement."""
+        ends = {o["end"] for o in self.certificate["outcomes"]}
+        return ends == {"all_cubes"} and not self.certificate["undecided"]["boxes"]
+
+    def losing(self) -> np.ndarray:
+        """The boxes from which it does not succeed. Shape: (N, num_cubes, 2), metres."""
+        lost = [o["boxes"] for o in self.certificate["outcomes"] if o["end"] != "all_cubes"]
+        n = self.certificate["policy"]["description"]["task"]["num_cubes"]
+        return np.concatenate([np.empty((0, n, 2)), *map(np.array, lost)])
+
+    def open(self) -> np.ndarray:
+        """The boxes of which nothing is claimed. Shape: (N, num_cubes, 2), metres."""
+        n = self.certificate["policy"]["description"]["task"]["num_cubes"]
+        return np.array(self.certificate["undecided"]["boxes"], float).reshape(-1, n, 2)
+
+    def rows(self) -> list[list[str]]:
+        """The outcomes as texts: names, then a row for each."""
+        rows = [["ends", "collects", "share of placements", "boxes"]]
+        for outcome in self.certificate["outcomes"]:
+            end = "to and fro" if outcome["loops"] else outcome["end"].replace("_", " ")
+            cubes = "".join(str(k + 1) if c else "-" for k, c in enumerate(outcome["collected"]))
+            rows.append([end, cubes, f"{outcome['share']:.9g}", str(len(outcome["boxes"]))])
+        left = self.certificate["undecided"]
+        return [*rows, ["undecided", "", f"{left['share']:.9g}", str(len(left["boxes"]))]]
+
+    def __str__(self) -> str:
+        """The table and what it comes to."""
+        return f"{aligned(self.rows())}\n{sentence(self.certificate)}"
+
+    def _repr_html_(self) -> str:
+        head, *rows = self.rows()
+        return table(head, rows) + paragraph(sentence(self.certificate))
+
+
+def prove(
+    policy: str | Path | Policy,
+    settings: ProveSettings | None = None,
+    *,
+    folder: str | Path | None = None,
+    task: Mapping[str, Any] | None = None,
+    outputs: str | Path = "outputs",
+    progress: Progress | None = None,
+    **changes: Any,
+) -> Proof:
+    """Follows all placements of the cubes at once through a policy's whole greedy flight.
+
+    Args:
+        policy: The policy, or what `load_policy` takes.
+        settings: How.
+        folder: Where the certificate is left, and the state to go on from if it is stopped: a
+            proof that is found half done there is gone on with. Nowhere by default.
+        task: What to change of the policy's task.
+        outputs: See `load_policy`.
+        progress: Told how far it is; a bar by default.
+        changes: Settings to change, as in `prove("good", limit_s=60)`.
+
+    Raises:
+        InputError: The policy, its task or a setting is not for a proof; the message says why.
+    """
+    settings = (settings or ProveSettings()).replace(**changes)
+    policy = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
+    policy = policy.in_task(**(task or {}))
+    network, gap = policy.make_network(), settings.logit_gap
+    made = make_subject(policy.description, network, gap, settings.renderer)
+    with one_thread(), closing(made) as subject:
+        subject.seeing.check(settings.compared, np.random.RandomState(legacy_seed(fresh_seed())))
+        if folder is None:
+            return _prove(policy, subject, settings, None, progress or Bar())
+        folder = Path(folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        with folder_lock(folder):
+            return _prove(policy, subject, settings, folder, progress or Bar())
+
+
+def _prove(
+    policy: Policy,
+    subject: Subject,
+    settings: ProveSettings,
+    folder: Path | None,
+    progress: Progress,
+) -> Proof:
+    prover, weights = (
+        Prover(subject, settings.most_combinations),
+        weights_hash(policy.state["policy"]),
+    )
+    known = json.dumps([weights, policy.description.as_dict(), settings.logit_gap])
+    state = None if folder is None else folder / "state.npz"
+    if state is not None and state.exists():
+        boxes = settings.most_boxes * policy.description.task.values()["num_cubes"]
+        load(prover, state, known, most=max(ARRAYS_BYTES, _BYTES_PER_SIDE * boxes))
+    begin = time.monotonic()
+    stopped = _go_on(prover, settings, progress, state, known)
+    seconds = time.monotonic() - begin
+    found = certify(policy.name, policy.description, weights, prover, seconds, stopped)
+    found |= provenance()
+    if folder is not None:
+        write_atomically(folder / "certificate.json", json.dumps(found))
+    if state is not None and prover.is_finished:
+        state.unlink(missing_ok=True)
+    return Proof(found, folder)
+
+
+def _go_on(
+    prover: Prover, settings: ProveSettings, progress: Progress, state: Path | None, known: str
+) -> str | None:
+    """Advances a proof until it is finished or must stop, and saves it now and then.
+
+    Returns:
+        The setting that stopped it; None if it is finished.
+    """
+    task, last = prover.lattice.task, prover.lattice.last
+    total = (2 * task.lateral_bound) ** task.num_cubes
+    begin, stopped = time.monotonic(), None
+    saved = begin
+    while not prover.is_finished and not (stopped := _reached(prover, settings, begin)):
+        place = prover.advance()
+        done = prover.decided / total
+        text = f"step {place.ahead} of {last}, {done:.1%} decided, {prover.pictures:,} pictures"
+        at = min(place.ahead, last - 1)
+        if count := len(prover.parts):
+            text, at = f"{text}, {plural(count, 'part')} to come", int(done * last)
+        progress(text, at, last)
+        if state is not None and time.monotonic() - saved > settings.save_interval_s:
+            save(prover, state, known)
+            saved = time.monotonic()
+    if state is not None and stopped:
+        save(prover, state, known)
+    progress(why_stopped(stopped) if stopped else "proved", last, last)
+    return stopped
+
+
+def _reached(prover: Prover, settings: ProveSettings, begin: float) -> str | None:
+    """The setting because of which a proof stops, if there is one."""
+    if settings.limit_s is not None and time.monotonic() - begin > settings.limit_s:
+        return "limit_s"
+    return "most_boxes" if prover.boxes_under_way > settings.most_boxes else None
+
+
+def load_proof(path: str | Path) -> Proof:
+    """A proof out of its certificate.
+
+    Raises:
+        InputError: There is none.
+    """
+    path = Path(path)
+    path = path / "certificate.json" if path.is_dir() else path
+    try:
+        return Proof(json.loads(path.read_text()), path.parent)
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"certificate={path} can't be read ({error}); give a certificate"
+        ) from None

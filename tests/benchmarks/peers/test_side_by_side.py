@@ -1,0 +1,58 @@
+"""All of them, in short form."""
+
+import pytest
+
+from benchmarks.peers import side_by_side
+from benchmarks.peers.contenders import LABELS, OURS, THEIRS
+from benchmarks.peers.side_by_side import bench_peers, train_ours, train_theirs
+
+KEYS = {"seconds", "seconds_without_imports", "frames", "is_solved", "success_lower95"}
+
+
+def test_lists_by_seed_in_the_order_of_seeds_by_turns(tmp_path, monkeypatch):
+    told = []
+
+    def measured(name, seed, episodes):
+        told.append((name, seed, episodes))
+        seconds = (10.0 if name in OURS else 20.0 if name == "sb3_a2c" else 12.0) + seed
+        return {"seconds": seconds, "seconds_without_imports": 5.0, "is_solved": True}
+
+    def ours(arguments, *, seed, episodes, folder):
+        short = () if episodes else ("trainer.total_frames=1",)
+        assert tuple(arguments) == (*OURS[folder.name], *short)
+        return measured(folder.name, seed, episodes)
+
+    def theirs(name, settings, *, seed, episodes, max_frames):
+        assert (settings, max_frames) == (THEIRS[name], 1_000_000 if episodes else 1)
+        return measured(name, seed, episodes)
+
+    monkeypatch.setattr(side_by_side, "train_ours", ours)
+    monkeypatch.setattr(side_by_side, "train_theirs", theirs)
+    told_all = bench_peers(tmp_path / "runs" / "peers", [5, 4], 3, quick=False)
+    found = told_all["peers"]
+    assert told_all["solve_over_best_peer"] == pytest.approx(14.5 / 16.5)
+    measured_first = [(name, seed, 3) for seed in (5, 4) for name in LABELS]
+    assert told == [*((name, 5, 0) for name in LABELS), *measured_first]
+    assert [*found] == [*LABELS]
+    assert found["reinforce"]["seconds"] == [15.0, 14.0]
+    assert (tmp_path / "peers.png").stat().st_size > 10_000
+
+
+def test_the_command_that_a_user_gives(tmp_path):
+    short = ["trainer.total_frames=1", "collector.num_envs=2", "task.num_cubes=1"]
+    found = train_ours(short, seed=1, episodes=2, folder=tmp_path)
+    assert found.keys() == KEYS and not found["is_solved"]
+    assert 0 < found["seconds_without_imports"] < found["seconds"]
+    assert found["frames"] > 0 and 0 <= found["success_lower95"] < 1
+    assert (tmp_path / "1" / "result.json").is_file()
+
+
+def test_a_peer():
+    how = {"num_envs": 2, "steps": 160}
+    found = train_theirs("torchrl", how, seed=1, episodes=2, max_frames=1)
+    assert found.keys() == KEYS and found["frames"] == 320 and not found["is_solved"]
+
+
+def test_a_peer_that_fails_says_why():
+    with pytest.raises(RuntimeError, match="no_such failed"):
+        train_theirs("no_such", {}, seed=0, episodes=1, max_frames=1)

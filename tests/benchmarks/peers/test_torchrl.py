@@ -1,0 +1,22 @@
+"""TorchRL's collector, by the example that stands in the repository."""
+
+import pytest
+
+from benchmarks.peers import torchrl
+from benchmarks.peers.torchrl import train_torchrl
+from drone_rl.utils.errors import InputError
+
+
+def test_it_stops_at_frames_or_target_and_leaves_a_policy_to_judge():
+    done = train_torchrl(3, max_frames=640, num_envs=4, steps=160)
+    assert (done.is_solved, done.frames) == (False, 640)
+    assert done.running_reward > 0
+    network = done.policy.make_network()
+    assert network.in_shape == (1, 25, 64) and done.policy.name == "torchrl's Collector"
+    assert train_torchrl(3, target=0.0, num_envs=2, steps=160).is_solved
+
+
+def test_without_the_repository(monkeypatch, tmp_path):
+    monkeypatch.setattr(torchrl, "EXAMPLE", tmp_path / "none.py")
+    with pytest.raises(InputError, match=r"none\.py is not there; measure in a clone"):
+        train_torchrl(0)

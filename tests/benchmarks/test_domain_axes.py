@@ -1,0 +1,72 @@
+"""Every axis from the search to a required range, by a policy whose limits are known."""
+
+import json
+
+import pytest
+
+import drone_rl
+from benchmarks import domain_axes
+from benchmarks.domain_axes import bench_domain_axes
+from drone_rl.robustness.axes import AXES
+from drone_rl.robustness.needs import ranges_of
+from tests.robustness.making import shifts_of
+
+robust = drone_rl.load_policy(domain_axes.POLICY)
+
+
+class Made:
+    """The result of `drone_rl.shifts` of a policy that is good up to the third strength."""
+
+    def __init__(self, names, change=lambda numbers: numbers):
+        made = change(shifts_of(robust, axes=names))
+        self.pictures, self.numbers = made["pictures"], made
+
+    def save(self, folder):
+        (folder / "shifts.json").write_text(json.dumps(self.numbers))
+        (folder / "domain.yaml").write_text(json.dumps(ranges_of(self.numbers)))
+
+
+@pytest.fixture
+def count(tmp_path, monkeypatch):
+    def run(made):
+        monkeypatch.setattr(domain_axes, "shifts", lambda *a, **k: made)
+        monkeypatch.setattr(domain_axes, "refly", lambda *a: type("R", (), {"contradictions": ()}))
+        return bench_domain_axes(tmp_path / "bench", quick=True)
+
+    return run
+
+
+def test_every_axis_is_enforced_in_its_direction(count):
+    found = count(Made(tuple(AXES)))
+    assert found["domain_axes_wrong"] == {}
+    assert found["domain_axes_right"] == found["domain_axes"] == len(AXES) == 22
+    assert found["domain_axes_contradicted"] == []
+
+
+def test_two_sided_axes_are_tried_at_both_ends(tmp_path, count):
+    count(Made(("sun", "fog", "blur")))
+    folder = tmp_path / "bench"
+    tried = {
+        name: {
+            (end, is_inside)
+            for needed, is_inside in domain_axes._ranges(robust, folder, name)
+            for end in ("low", "high")
+            if end in needed
+        }
+        for name in ("sun", "fog", "blur")
+    }
+    both = {(end, inside) for end in ("low", "high") for inside in (True, False)}
+    assert tried["sun"] == both
+    assert tried["fog"] == {("low", True), ("low", False)}
+    assert tried["blur"] == {("high", True), ("high", False)}
+
+
+def test_an_axis_that_is_enforced_the_other_way_round_is_found(count, monkeypatch):
+    """As limits of fog were: the greatest visibility in place of the least."""
+    monkeypatch.setattr(
+        "drone_rl.verdicts.domains.lacking",
+        lambda numbers, name, need: None if need["low"] is None else "reversed",
+    )
+    found = count(Made(("fog", "blur")))
+    assert "the program's own file is refused" in found["domain_axes_wrong"]["fog"]
+    assert found["domain_axes_right"] == 0

@@ -1,0 +1,13 @@
+import math
+
+from benchmarks.flight_paths import bench_flight_paths
+
+
+def test_it_meets_what_is_asked_for():
+    figures = bench_flight_paths(quick=True)
+    assert figures["path_error_m"] <= 0.5
+    assert figures["hover_error_m"] <= figures["hover_greatest_m"] <= 0.3
+    square = figures["path_errors"]["square"]
+    assert (square["length"], square["speed"]) == (40.0, 2.0)
+    assert square["mean"] == figures["path_error_m"] < square["greatest"]
+    assert math.isfinite(square["seconds"])

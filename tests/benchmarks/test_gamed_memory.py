@@ -1,0 +1,66 @@
+"""Policies that memorise the environments of a known seed deceive no analysis by default."""
+
+import pytest
+
+import drone_rl
+from benchmarks import gamed_memory
+from benchmarks.gamed_memory import EPISODES, by_frames, by_steps, cases, judgements, record
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.progress import silent
+from drone_rl.utils.seeding import Stream
+
+NAMES = (
+    "verdict, callable that looks frames up",
+    "evaluate, callable that looks frames up",
+    "shifts, callable that looks frames up",
+)
+
+
+@pytest.fixture(scope="module")
+def judged(tmp_path_factory):
+    return judgements(tmp_path_factory.mktemp("memory"))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_an_attack_works_with_the_seed_that_it_knows_and_no_other(name, judged):
+    assert judged[name](0), "otherwise the test below shows nothing"
+    assert not judged[name](None)
+
+
+def test_one_that_counts_steps_is_refused_even_where_it_knows_the_seed():
+    policy = gamed_memory._memorising(by_steps, Stream.REPORT)
+    with pytest.raises(InputError, match="acts by more than the frame"):
+        drone_rl.judge(policy, seed=0, episodes=EPISODES, sampled=False, progress=silent)
+
+
+def test_a_file_that_is_fitted_this_closely_depends_on_rounding_too(tmp_path):
+    path = gamed_memory.write_memory(tmp_path / "mlp.safetensors", stream=Stream.REPORT)
+    how = {"episodes": EPISODES, "sampled": False, "progress": silent}
+    known, fresh = drone_rl.judge(path, seed=0, **how), drone_rl.judge(path, **how)
+    assert (known.verdict.kind, known.verdict.exit_code) == ("good", 13)
+    assert "decisions depend on rounding" in str(known)
+    assert fresh.verdict.kind != "good"
+
+
+def test_every_judgement_is_a_case(judged, tmp_path):
+    assert {case.name for case in cases(tmp_path)} == {f"memory: {name}" for name in judged}
+    assert set(NAMES) < set(judged)
+
+
+def test_a_verdict_from_a_fixed_seed_says_so_and_a_fresh_one_is_not_deceived():
+    policy = gamed_memory._memorising(by_frames, Stream.REPORT)
+    how = {"episodes": EPISODES, "sampled": False, "progress": silent}
+    known, fresh = drone_rl.judge(policy, seed=0, **how), drone_rl.judge(policy, **how)
+    assert (known.verdict.kind, known.verdict.exit_code) == ("good", 0)
+    assert "Fixed seed 0: a policy could have been fitted to these environments." in str(known)
+    assert "environments: seed 0 (fixed)" in str(known)
+    assert fresh.verdict.exit_code != 0
+    assert fresh.verdict.kind != "good"
+    assert "Fixed seed" not in str(fresh)
+
+
+def test_a_recording_holds_each_step_of_each_episode():
+    recorded = record(3)
+    lengths = recorded.episode.bincount()
+    assert len(lengths) == 3
+    assert len(recorded.frames) == len(recorded.actions) == lengths.sum()

@@ -1,0 +1,27 @@
+import stat
+
+import pytest
+
+from benchmarks.hostile_files import checkpoint_state
+from benchmarks.hostile_folders import hostile_folders
+
+
+@pytest.fixture
+def cases(tmp_path):
+    (tmp_path / "canary").mkdir()
+    return tmp_path, hostile_folders(tmp_path, checkpoint_state())
+
+
+def test_runs_sweeps_and_explanations_are_opened_by_their_commands(cases):
+    _, found = cases
+    commands = {command[0] for _, command, _ in found}
+    assert {"train", "sweep-report", "report"} <= commands
+    assert len({name for name, *_ in found}) == len(found)
+
+
+def test_a_pipe_and_an_endless_device_stand_in_for_arrays(cases):
+    folder, _ = cases
+    pipe = folder / "explanation_pipe" / "arrays.npz"
+    assert stat.S_ISFIFO(pipe.stat().st_mode)
+    endless = folder / "explanation_zeros" / "arrays.npz"
+    assert endless.is_symlink() and str(endless.readlink()) == "/dev/zero"

@@ -1,0 +1,31 @@
+"""Each case has one part that is refused, and is valid without it."""
+
+import pytest
+
+from benchmarks import hostile_parts as made
+from benchmarks.evidence import changed
+from drone_rl.explanations.report.fitting import check_fit
+from drone_rl.explanations.report.shapes import check_sizes
+from drone_rl.sim.action_display import MOVES
+from drone_rl.utils.errors import InputError
+
+
+def check(numbers, arrays):
+    check_sizes(numbers, arrays, made.data())
+    check_fit(numbers, arrays, made.data(), MOVES)
+
+
+def test_the_rest_is_valid():
+    check(made.numbers(), made.arrays())
+
+
+@pytest.mark.parametrize("name", made.NUMBERS)
+def test_a_number_is_refused(name):
+    with pytest.raises(InputError):
+        check(changed(made.numbers(), dict([made.NUMBERS[name]])), made.arrays())
+
+
+@pytest.mark.parametrize("name", made.ARRAYS)
+def test_an_array_is_refused(name):
+    with pytest.raises(InputError):
+        check(made.numbers(), {**made.arrays(), **dict([made.ARRAYS[name]])})

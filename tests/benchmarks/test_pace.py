@@ -1,0 +1,18 @@
+"""A machine's pace, counted on a network that takes a known time."""
+
+import time
+
+import pytest
+from torch import nn
+
+from benchmarks.pace import network_pictures_per_s
+
+
+class Slow(nn.Module):
+    def forward(self, pictures):
+        assert pictures.shape == (1024, 1, 5, 8)
+        time.sleep(0.02)
+
+
+def test_pictures_a_second():
+    assert network_pictures_per_s(Slow(), (1, 5, 8)) == pytest.approx(51_200, rel=0.5)

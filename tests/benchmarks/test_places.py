@@ -1,0 +1,32 @@
+import numpy as np
+import pytest
+
+from benchmarks import places
+from benchmarks.places import bench_places, compare
+
+
+@pytest.fixture
+def subject():
+    import drone_rl
+    from drone_rl.verification.prover.subject import make_subject
+
+    policy = drone_rl.load_policy("good").in_task(num_cubes=2)
+    made = make_subject(policy.description, policy.make_network(), 0.0)
+    yield made
+    made.close()
+
+
+def test_the_figures(monkeypatch):
+    numbers = {"seconds": 2.0, "cells": 7}
+    monkeypatch.setattr(places, "places", lambda *_, **__: type("P", (), {"numbers": numbers}))
+    found = bench_places(quick=True)
+    assert (found["places_s"], found["places_cells"], found["places_wrong"]) == (2.0, 7, 0)
+    assert 380 <= found["places_compared"] <= found["places_drawn"] == 400
+
+
+def test_a_closed_form_that_is_wrong_is_noticed(subject, monkeypatch):
+    random_state = np.random.RandomState(0)
+    assert compare(subject.seeing, 35.0, 2, 20, random_state)[0] == 0
+    monkeypatch.setattr("drone_rl.verification.prover.seeing.camera_ahead", lambda: 0.9)
+    wrong, compared = compare(subject.seeing, 35.0, 2, 20, random_state)
+    assert 0 < wrong <= compared <= 20

@@ -1,0 +1,24 @@
+"""Benchmarks of proofs, in their short form: real proofs of one cube."""
+
+import pytest
+
+from benchmarks.proving import bench_many_cubes, bench_prove, bench_tampering
+
+
+def test_proofs_and_their_checks(tmp_path):
+    found = bench_prove(tmp_path, [0, 1], quick=True)
+    assert len(found["proof_three_s"]) == len(found["proof_success"]) == 1
+    assert found["proof_checked"] == found["proof_checked_total"] == 4
+    assert found["proof_contradicted"] == 0 and found["proof_flights"] >= 600
+    assert 0 <= found["proof_undecided"] < 1e-3
+
+
+def test_tampered_certificates_are_refused(tmp_path):
+    found = bench_tampering(tmp_path, quick=True)
+    assert found["tampered_refused"] == found["tampered_total"] >= 20
+
+
+def test_more_cubes_than_there_is_time_for(tmp_path):
+    found = bench_many_cubes(tmp_path, 1.0, quick=True)
+    assert found["proof_four"] == pytest.approx(found["proof_five"]) == pytest.approx(0.0)
+    assert found["proof_four_s"] > 1.0

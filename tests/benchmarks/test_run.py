@@ -1,0 +1,66 @@
+import json
+
+import pytest
+
+from benchmarks.benchmark import Benchmark, Setup
+from benchmarks.ledger import Ledger
+from benchmarks.run import run_benchmarks
+from drone_rl.utils.errors import InputError
+
+
+@pytest.fixture
+def bench(tmp_path):
+    """Runs benchmarks `one`, `broken` and `two`; tells what ran and what failed."""
+
+    def command(names=("one", "broken", "two"), again=False, broken=InputError, **changes):
+        ran = []
+
+        def of(name):
+            def measure(setup):
+                ran.append(name)
+                if name == "broken":
+                    raise broken("out of order")
+                return {f"{name}_s": len(ran)}
+
+            return Benchmark(measure, "tests", ("bench/run",))
+
+        given = {"folder": tmp_path, "quick": False, "device": "cpu", "num_envs": 2, "seeds": (0,)}
+        setup = Setup(**given | {"episodes": 1, "memory_frames": 1} | changes)
+        all_of_them = {name: of(name) for name in ("one", "broken", "two")}
+        ledger = Ledger(tmp_path / "results.json")
+        failures = run_benchmarks(names, setup, ledger, again=again, benchmarks=all_of_them)
+        return ran, failures
+
+    return command
+
+
+def test_one_that_fails_stops_no_other(bench, tmp_path):
+    assert bench() == (["one", "broken", "two"], {"broken": "out of order"})
+    content = json.loads((tmp_path / "results.json").read_text())
+    assert (content["one_s"], content["two_s"]) == (1, 3)
+    assert content["benchmarks"].keys() == {"one", "two"}
+
+
+def test_it_goes_on_where_it_was_stopped(bench, tmp_path):
+    with pytest.raises(KeyboardInterrupt):
+        bench(broken=KeyboardInterrupt)
+    assert "one_s" in json.loads((tmp_path / "results.json").read_text())
+    assert bench()[0] == ["broken", "two"]
+    assert bench()[0] == ["broken"]
+
+
+def test_what_was_asked_for_is_measured_again(bench):
+    bench()
+    assert bench(["one"], again=True)[0] == ["one"]
+    assert bench(["one"], seeds=(1,))[0] == ["one"]
+    assert bench(["one"], seeds=(1,))[0] == []
+
+
+def test_runs_of_an_earlier_command_are_gone(bench, tmp_path):
+    log = tmp_path / "runs" / "2026-01-01" / "bench.log"  # of the command itself
+    log.parent.mkdir(parents=True)
+    log.touch()
+    (tmp_path / "work" / "train_0").mkdir(parents=True)
+    bench([])
+    assert not (tmp_path / "work").exists()
+    assert log.exists()

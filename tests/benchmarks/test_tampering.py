@@ -1,0 +1,51 @@
+"""How many lies the checker refuses: all."""
+
+import json
+
+import drone_rl
+from benchmarks.tampering import TEXTS, count_refused, is_refused, tampered
+from tests.verification.checker.making import certificate_of, of_one_cube
+
+
+def _by_hand():
+    """One cube, won up to y = 2, lost from y = 3; no flight was made for it."""
+    policy = drone_rl.load_policy("right_and_forward").in_task(num_cubes=1)
+    won = {"end": "all_cubes", "collected": [True], "loops": False, "share": 2 / 3}
+    lost = {"end": "front_boundary", "collected": [False], "loops": False, "share": 0.25}
+    outcomes = [
+        {**won, "steps": {"14": 0.4, "15": 0.25}, "boxes": [[[-6.0, 2.0]]]},
+        {**lost, "steps": {"27": 0.25}, "boxes": [[[3.0, 6.0]]]},
+    ]
+    return certificate_of(policy, outcomes, [[[2.0, 3.0]]], 1 / 12)
+
+
+CERTIFICATE = _by_hand()
+
+
+def test_there_are_enough_ways_and_names():
+    made = list(tampered(CERTIFICATE))
+    assert len({content for _, content in made}) == len(made) >= 60
+    assert {"cut in half", "a border moved", "hash changed"} <= {name for name, _ in made}
+
+
+def test_texts_by_hand():
+    assert TEXTS["cut in half"](b"{12345}") == b"{12"
+    assert TEXTS["infinite share"](b'{"share": 0.5, "share": 1}') == b'{"share": 1e999, "share": 1}'
+
+
+def test_every_lie_about_a_true_certificate_is_refused(tmp_path):
+    true = tmp_path / "true.json"
+    true.write_text(json.dumps(of_one_cube("right_and_forward")))
+    assert not is_refused(true, flights=100)
+    found = count_refused({true: None}, few=200)
+    assert found["tampered_accepted"] == []
+    assert found["tampered_refused"] == found["tampered_total"] >= 60
+
+
+def test_a_lie_that_passes_is_named(tmp_path, monkeypatch):
+    true = tmp_path / "true.json"
+    true.write_text(json.dumps(CERTIFICATE))
+    monkeypatch.setattr("benchmarks.tampering.is_refused", lambda *a: "hash" not in str(a))
+    monkeypatch.setattr("benchmarks.tampering.tampered", lambda data: [("x", b"{}")])
+    found = count_refused({true: "good"})
+    assert found == {"tampered_refused": 1, "tampered_total": 1, "tampered_accepted": []}

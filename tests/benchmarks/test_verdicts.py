@@ -1,0 +1,69 @@
+import json
+from pathlib import Path
+
+from benchmarks import verdicts
+from benchmarks.scripted import PILOTS
+
+
+def entry(kind, certain, truth):
+    return {"kind": kind, "certain": certain, "is": truth}
+
+
+def test_only_certain_verdicts_must_be_right():
+    found = verdicts.count(
+        {
+            "right": entry("good", True, "good"),
+            "wrong": entry("good", True, "poor"),
+            "open": entry("good", False, "poor"),
+        }
+    )
+    figures = [found[f"verdicts_{name}"] for name in ("right", "certain", "total")]
+    assert figures == [1, 2, 3]
+
+
+def test_enough_policies_are_judged():
+    trained = len(verdicts.RATES) * len(verdicts.SEEDS)
+    assert len(PILOTS) + len(verdicts.SHIPPED) + len(verdicts.BASELINES) + trained >= 50
+
+
+def test_the_truth_comes_from_other_worlds(monkeypatch):
+    flown = []
+    fly = verdicts.fly_baselines
+
+    def watch(num_worlds, task, worlds, episodes):
+        flown.append(worlds["random_states"][0])
+        return fly(20, task, {"random_states": worlds["random_states"][:20]}, episodes)
+
+    monkeypatch.setattr(verdicts, "fly_baselines", watch)
+    monkeypatch.setattr(verdicts, "_NUM_WORLDS", 20)
+    monkeypatch.setattr(verdicts, "_sizes", lambda quick: (20, 40))
+    verdicts._baselines.cache_clear()
+    found = verdicts._judge_pilot(PILOTS["turns the wrong way"], quick=True)
+    verdicts._baselines.cache_clear()
+    assert found == {"kind": "poor", "certain": False, "is": "poor"}
+    assert len(flown) == 2
+    assert flown[0] != flown[1]
+
+
+def test_each_policy_is_trained_and_judged_twice(monkeypatch, tmp_path):
+    called = []
+
+    def call(*args, statuses=(0,)):
+        called.append(args)
+        folder = Path(args[-1].removeprefix("hydra.run.dir="))
+        if args[0] == "verdict":
+            folder.mkdir(parents=True)
+            truth = "poor" if "seed=1" in args else "good"
+            (folder / "verdict.json").write_text(json.dumps({"kind": truth, "certain": True}))
+            assert set(statuses) == {0, 10, 11, 12, 13, 18}
+
+    monkeypatch.setattr(verdicts, "call", call)
+    monkeypatch.setattr(verdicts, "PILOTS", {})
+    found = verdicts.bench_verdicts(tmp_path, "cpu", quick=False)
+    assert found["verdicts"]["lr=0.007 seed=2"] == entry("good", True, "poor")
+    assert (found["verdicts_right"], found["verdicts_certain"]) == (0, 20)
+    judged = [args for args in called if args[0] == "verdict"]
+    assert [args[2] for args in judged[:2]] == ["episodes=400", "episodes=5000"]
+    assert judged[0][1] == judged[1][1] == "policy=good"
+    assert sum(args[0] == "train" for args in called) == 12
+    assert judged[-1][1] == f"policy={tmp_path / 'verdict_0.01_3' / 'checkpoints' / 'last.pt'}"

@@ -1,0 +1,37 @@
+"""Composes as the command line does."""
+
+import importlib
+
+import pytest
+from hydra import compose, initialize_config_dir
+
+from drone_rl.cli.hydra.composition import conf_dir, read_settings
+from drone_rl.cli.hydra.schemas import register_schemas
+from drone_rl.cli.usage import COMMANDS
+
+MODULES = {c.replace("-", "_"): None for c in COMMANDS}
+
+
+def commands():
+    """The settings of each command, by the name of its file."""
+    return {name: importlib.import_module(f"drone_rl.cli.{name}").Command for name in MODULES}
+
+
+@pytest.fixture
+def config():
+    """What Hydra makes of a command and overrides."""
+    register_schemas(**commands())
+    with initialize_config_dir(str(conf_dir()), version_base="1.3"):
+        yield compose
+
+
+@pytest.fixture
+def settings(config):
+    """The settings of a command, without loggers, whose folder only a run knows."""
+    known = commands()
+
+    def read(name, *told):
+        without = ["logger=csv"] if name == "train" else []
+        return read_settings(known[name], config(name, [*without, *told]))
+
+    return read

@@ -1,0 +1,89 @@
+"""What a sweeper gets to see of a run; whole sweeps are in tests/cli/test_sweeps."""
+
+import json
+import logging
+import os
+import signal
+import sys
+
+import pytest
+from hydra.core.plugins import Plugins
+
+from drone_rl.cli.hydra.launchers import (
+    NAMESPACE,
+    LocalLauncher,
+    RayLauncher,
+    SlurmLauncher,
+    SweepLauncher,
+    _command,
+    _job_return,
+    _outcome,
+    _sigterm_as_interrupt,
+    register_plugins,
+)
+from drone_rl.sweeps.manifest import Sweep
+from drone_rl.sweeps.runs import Run
+
+
+@pytest.fixture
+def run(tmp_path):
+    return Run(0, ("seed=1",), tmp_path)
+
+
+def test_a_finished_run_returns_its_running_mean(run):
+    result = {"reason": "frames", "running_reward": 1.5}
+    (run.folder / "result.json").write_text(json.dumps(result))
+    job = _job_return(run)
+    assert (job.return_value, job.overrides) == (1.5, ["seed=1"])
+    assert _outcome(run) == "frames, running reward 1.5"
+
+
+def test_an_unfinished_run_returns_nothing_and_says_why(run):
+    assert _job_return(run).return_value is None
+    assert _outcome(run) == "failed: for a reason unknown"
+    (run.folder / "failure.json").write_text(json.dumps({"error": "no memory"}))
+    assert _outcome(run) == "failed: no memory"
+
+
+def test_rubbish_in_a_result_is_no_number(run):
+    result = {"reason": "frames", "running_reward": "high"}
+    (run.folder / "result.json").write_text(json.dumps(result))
+    assert _job_return(run).return_value is None
+
+
+def test_the_command_is_what_was_typed(monkeypatch):
+    argv = ["drone-rl train", "-m", "seed=0,1", "hydra.sweep.dir=${paths.outputs}/x"]
+    monkeypatch.setattr(sys, "argv", argv)
+    assert _command() == ["drone-rl", "train", "-m", "seed=0,1"]
+
+
+def test_hydra_finds_the_launchers():
+    register_plugins(LocalLauncher, SlurmLauncher, RayLauncher)
+    known = Plugins.instance().class_name_to_class
+    for launcher in (LocalLauncher, SlurmLauncher, RayLauncher):
+        assert known[f"{NAMESPACE}.{launcher.__name__}"] is launcher
+
+
+def test_sigterm_stops_a_sweep_as_ctrl_c_does():
+    before = signal.getsignal(signal.SIGTERM)
+    with pytest.raises(KeyboardInterrupt), _sigterm_as_interrupt():
+        os.kill(os.getpid(), signal.SIGTERM)
+        signal.sigtimedwait([], 1)
+    assert signal.getsignal(signal.SIGTERM) is before
+
+
+def test_an_interrupted_sweep_says_how_to_go_on(run, tmp_path, monkeypatch, caplog):
+    class Interrupted:
+        def finish(self, runs):
+            raise KeyboardInterrupt
+
+    class Launcher(SweepLauncher):
+        def executor(self, folder):
+            return Interrupted()
+
+    monkeypatch.setattr("drone_rl.sweeps.page.write_sweep_report", lambda sweep: "report.html")
+    caplog.set_level(logging.INFO)
+    sweep = Sweep(tmp_path, "drone-rl train -m seed=0,1", {}, [run])
+    with pytest.raises(KeyboardInterrupt):
+        Launcher()._finish(sweep, [run])
+    assert "go on with the same command: drone-rl train -m seed=0,1" in caplog.text

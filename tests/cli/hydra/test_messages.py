@@ -1,0 +1,152 @@
+"""One line, whoever noticed the mistake."""
+
+import errno
+import os
+import sys
+import threading
+
+import pytest
+from hydra.core.hydra_config import HydraConfig
+from hydra.errors import HydraException, MissingConfigException
+from omegaconf import OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+
+from drone_rl.cli.hydra.messages import file_error, guarded, is_output_closed, one_line
+from drone_rl.utils.errors import InputError
+
+
+def raised(error, cause=None):
+    try:
+        raise error from cause
+    except type(error) as caught:
+        return caught
+
+
+def test_our_own_word_counts_wherever_it_was_said():
+    ours = InputError("seed=-1 is out of range; give 0 or more")
+    assert one_line(raised(HydraException("Error in\ncall"), ours)) == str(ours)
+
+
+def test_what_a_file_says_can_not_leave_its_line():
+    assert one_line(InputError("a\nb\x1b[0m")) == "a?b?[0m"
+
+
+def test_hydras_where_and_omegaconfs_what():
+    what = OmegaConfBaseException("Value 'x' is no Integer\n  full_key: a")
+    assert one_line(raised(HydraException("Error merging a=x"), what)) == (
+        "Error merging a=x: Value 'x' is no Integer"
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "remedy"),
+    [
+        ("Could not override 'x'", "--help"),
+        ("Key 'x' is not in struct", "--help"),
+        ("In 'train': Could not load 'logger/wandb'.", "--help"),
+        ("BasicSweeper does not support sweep type: INTERVAL", "hydra/sweeper=optuna"),
+    ],
+)
+def test_what_hydra_leaves_out(text, remedy):
+    assert remedy in one_line(HydraException(text))
+
+
+def test_an_unknown_choice_is_no_file(capsys):
+    text = (
+        "In 'train': Could not find 'task/pillarz'\n\nAvailable options in 'task':\n"
+        "\tbase_task\n\tpillars\nConfig search path:\n\tprovider=hydra, path=pkg://hydra.conf"
+    )
+
+    def command():
+        raise MissingConfigException(text, "task/pillarz")
+
+    assert guarded(command) == 2
+    assert capsys.readouterr().err == (
+        "error: could not find task/pillarz (task=pillarz); give one of: pillars\n"
+    )
+
+
+def test_statuses(capsys):
+    def fail(error):
+        def command():
+            raise error
+
+        return command
+
+    assert guarded(lambda: 11) == 11
+    assert guarded(fail(KeyboardInterrupt())) == 130
+    assert guarded(fail(InputError("no"))) == 2
+    assert guarded(fail(FileNotFoundError(2, "No such file", "x"))) == 2
+    assert capsys.readouterr().err.splitlines() == [
+        *("error: interrupted", "error: no"),
+        "error: x can't be opened or written (No such file); check the path or choose another "
+        "folder with hydra.run.dir=...",
+    ]
+    with pytest.raises(ZeroDivisionError):
+        guarded(lambda: 1 // 0)
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (
+            OSError(errno.ENOSPC, "No space left", "a/b"),
+            ["a/b", "No space left", "free some space"],
+        ),
+        (OSError(errno.EFBIG, "File too large", "a"), ["a ", "free some space"]),
+        (OSError(errno.EROFS, "Read-only file system", b"a"), ["a ", "who may write"]),
+        (OSError(errno.EISDIR, "Is a directory", "a"), ["a ", "move it away"]),
+        (OSError(errno.EIO, "Input/output error"), ["a file", "check the path"]),
+    ],
+)
+def test_an_error_of_the_file_system_has_path_reason_and_remedy(error, words, monkeypatch):
+    monkeypatch.setattr(HydraConfig, "initialized", lambda: False)  # as other tests may leave it
+    line = one_line(error)
+    assert all(word in line for word in [*words, "hydra.run.dir="]), line
+
+
+def test_a_job_that_has_no_folder_yet_names_none(monkeypatch):
+    job = OmegaConf.create({"runtime": {"output_dir": "???"}})
+    monkeypatch.setattr(HydraConfig, "initialized", lambda: True)
+    monkeypatch.setattr(HydraConfig, "get", lambda: job)
+    assert file_error(OSError(errno.EIO, "Input/output error")).startswith("a file can't be opened")
+
+
+def test_a_path_can_not_leave_its_line():
+    assert "\n" not in file_error(OSError(errno.EISDIR, "Is a directory", "a\nb"))
+
+
+def test_a_log_that_can_not_be_opened_is_no_bug(capsys):
+    def command():
+        try:
+            raise IsADirectoryError(errno.EISDIR, "Is a directory", "train.log")
+        except OSError as error:
+            raise ValueError("Unable to configure handler 'file'") from error
+
+    assert guarded(command) == 2
+    assert capsys.readouterr().err.startswith("error: train.log can't be opened")
+
+
+def test_a_thread_that_can_not_write_is_told_of_in_one_line(capsys, monkeypatch):
+    monkeypatch.setattr(threading, "excepthook", threading.excepthook)
+
+    def full():
+        raise OSError(errno.ENOSPC, "No space left", "events")
+
+    def command():
+        thread = threading.Thread(target=full)
+        thread.start()
+        thread.join()
+        return 0
+
+    assert guarded(command) == 0
+    assert capsys.readouterr().err.startswith("warning: events can't be opened")
+
+
+def test_an_output_that_nobody_reads(monkeypatch):
+    reader, writer = os.pipe()
+    with os.fdopen(writer, "w") as out:
+        monkeypatch.setattr(sys, "stdout", out)
+        assert not is_output_closed()
+        os.close(reader)
+        assert is_output_closed()

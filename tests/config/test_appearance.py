@@ -1,0 +1,54 @@
+"""How worlds look is checked before anything is drawn."""
+
+import pytest
+
+from drone_rl.config import MINIMAL, AppearanceSettings
+from drone_rl.utils.errors import InputError
+
+
+def test_each_value_is_fixed_or_a_range():
+    settings = AppearanceSettings(
+        sun_elevation=[10, 20], sky_zenith=[[0, 0, 0], [1, 1, 1]], ground_texture="grid"
+    )
+    assert settings.sun_elevation == (10.0, 20.0)
+    assert settings.sky_zenith == ((0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
+    assert settings.ground_texture == ("grid",)
+    assert AppearanceSettings.read(settings.values(), "appearance") == settings
+
+
+def test_only_the_defaults_are_minimal():
+    assert MINIMAL.is_minimal and AppearanceSettings(exposure=1).is_minimal
+    assert not AppearanceSettings(fog_visibility=50.0).is_minimal
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"fog_visibility": 0.0}, "fog_visibility=0.0 is out of range; give a number above 0"),
+        ({"fog_visibility": [200, 50]}, "fog_visibility goes from 200 to 50, which is less"),
+        ({"fog_visibility": [0, 50]}, r"fog_visibility\[0\]=0 is out of range"),
+        ({"sun_elevation": [1, 2, 3]}, "sun_elevation=.* is out of range"),
+        ({"sun_elevation": "high"}, "sun_elevation='high' is out of range"),
+        ({"sun_elevation": float("nan")}, "sun_elevation=nan is out of range"),
+        ({"sun_color": [0.1, 0.2]}, r"sun_color=.* is out of range; give a list of 3"),
+        ({"sun_color": [[0, 0.5, 0], [1, 0.4, 1]]}, "sun_color goes from 0.5 to 0.4"),
+        ({"sun_color": [[0, 0.5, 0], 1]}, r"sun_color\[1\]=1 is out of range"),
+        ({"sky_horizon": [0, 0, 1.5]}, r"sky_horizon\[2\]=1.5 is out of range"),
+        ({"shadows": 2}, "shadows=2 is out of range; give a number from 0 to 1"),
+        ({"ground_texture": []}, "ground_texture=.* must name a texture"),
+        ({"ground_texture": ["grid", "grid"]}, "each once"),
+        ({"ground_tile": 0}, "ground_tile=0 is out of range"),
+        ({"exposure": 0}, "exposure=0 is out of range"),
+        ({"distractors": 1.5}, "distractors=1.5 is out of range; give a whole number from 0 to 64"),
+        ({"distractors": [5, 2]}, "distractors goes from 5 to 2"),
+        ({"distractor_size": 0}, "distractor_size=0 is out of range"),
+        ({"camera_offset": [0, 0]}, "camera_offset=.* is out of range"),
+        ({"camera_offset": [[0, 0, 1], [0, 0, 0]]}, "camera_offset goes from 1 to 0"),
+        ({"camera_turn": [0, 100, 0]}, r"camera_turn\[1\]=100 is out of range"),
+        ({"camera_widening": [3, -3]}, "camera_widening goes from 3 to -3"),
+    ],
+)
+def test_what_can_not_be_is_refused_in_one_line(given, words):
+    with pytest.raises(InputError, match=words) as refused:
+        AppearanceSettings(**given)
+    assert "\n" not in str(refused.value)

@@ -1,0 +1,93 @@
+"""Settings become plain data and come back; what can't is named by its place."""
+
+import subprocess
+import sys
+
+import pytest
+
+from drone_rl.cli.play import Command
+from drone_rl.config import AppearanceSettings, TaskSettings
+from drone_rl.config.configuration import as_config, from_config, variant_of
+from drone_rl.config.learning import Adam, Optimiser
+from drone_rl.config.networks import Mlp
+from drone_rl.config.training import TrainerSettings, TrainSettings
+from drone_rl.config.transforms import Crop, Gray
+from drone_rl.utils.errors import InputError
+
+
+def test_a_training_comes_back_as_it_was():
+    told = TrainSettings(
+        task=TaskSettings(num_cubes=2),
+        transforms=(Gray(), Crop(top=1, bottom=9), Crop(top=0, bottom=4)),
+        network=Mlp(hidden=()),
+        trainer=TrainerSettings(total_episodes=7),
+        seed=4,
+    )
+    config = as_config(told)
+    assert list(config["transforms"]) == ["gray", "crop", "crop_2"]
+    assert config["network"] == {"_target_": "drone_rl.policies.MLP", "hidden": []}
+    assert from_config(TrainSettings, config) == told
+    assert from_config(TrainSettings, as_config(told.replace(transforms=()))).transforms == ()
+
+
+@pytest.mark.parametrize(
+    ("config", "message"),
+    [
+        ({"task": {"num_cubes": 0}}, "task.num_cubes=0 is out of range"),
+        ({"task": {"num_cubs": 1}}, "num_cubs is unknown"),
+        ({"task": {"vertical_bound": 3.0}}, "task.vertical_bound=3.0 puts cubes"),
+        ({"trainer": 3}, "trainer=3 must be a mapping"),
+        ({"unheard": 3}, "unheard is unknown"),
+        ({"optimiser": {"lr": 1.0}}, "optimiser._target_=None names nothing"),
+        ({"optimiser": {"_target_": Adam.target, "lr": 0}}, "optimiser.lr=0 is out of range"),
+        ({"transforms": {"a": {"_target_": Crop.target, "top": -1}}}, r"transforms\.a\.top=-1"),
+        ({"collector": {"_target_": "theirs", "num_envs": 0}}, "collector.num_envs=0"),
+        ([], "settings="),
+    ],
+)
+def test_mistakes_are_named_by_their_place(config, message):
+    with pytest.raises(InputError, match=f"{message}"):
+        from_config(TrainSettings, config)
+
+
+def test_what_only_the_user_knows_is_kept_and_checked_where_it_is_known():
+    sgd = {"_target_": "mine.Optimiser", "momentum": 0.9}
+    found = variant_of(Optimiser, sgd, "optimiser")
+    assert not found.is_known
+    assert as_config(found) == sgd
+    more = {"_target_": Adam.target, "lr": 0.1, "amsgrad": True}
+    assert as_config(variant_of(Optimiser, more, "optimiser")) == more
+    with pytest.raises(InputError, match=r"optimiser\.lr=-1 "):
+        variant_of(Optimiser, {**more, "lr": -1}, "optimiser")
+    assert variant_of(Optimiser, {"_target_": Adam.target, "lr": 0.1}, "x") == Adam(lr=0.1)
+    with pytest.raises(InputError, match=r"_target_=mine\.Optimiser can't be imported"):
+        found.make()
+
+
+def test_settings_import_nothing_heavy():
+    code = "import sys, drone_rl.config.training, drone_rl.config.judging\n"
+    code += "assert not {'torch', 'hydra', 'mujoco', 'scipy', 'numpy'} & set(sys.modules)"
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_the_other_renderer_draws_the_minimal_look_alone():
+    look = AppearanceSettings(fog_visibility=50.0)
+    with pytest.raises(InputError, match=r"^renderer=mujoco_warp draws the minimal appearance"):
+        TrainSettings(renderer="mujoco_warp", appearance=look)
+    assert TrainSettings(appearance=look).replace(seed=1).appearance is look
+    given = from_config(TrainSettings, {"appearance": {"fog_visibility": 50.0}})
+    assert given.appearance == look
+    assert from_config(TrainSettings, as_config(given)) == given
+
+
+def test_settings_that_may_be_none_are_made_of_mappings_too():
+    given = {"appearance": {"exposure": 2.0}}
+    assert from_config(Command, given).appearance == AppearanceSettings(exposure=2.0)
+    assert from_config(Command, {"appearance": None}).appearance is None
+    with pytest.raises(InputError, match=r"^appearance\.exposure=0 is out of range"):
+        from_config(Command, {"appearance": {"exposure": 0}})
+
+
+def test_an_appearance_without_room_is_refused_with_the_training():
+    with pytest.raises(InputError, match="puts the camera into the ground"):
+        TrainSettings(appearance=AppearanceSettings(camera_offset=(0.0, 0.0, -3.0)))

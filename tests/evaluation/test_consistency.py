@@ -1,0 +1,138 @@
+"""Verdicts as files hold them: those that were judged are accepted, changed ones are refused."""
+
+import json
+import math
+
+import pytest
+
+from benchmarks.evidence import changed
+from drone_rl.evaluation.consistency import check_verdict
+from drone_rl.evaluation.judge import judge
+from drone_rl.sim.tasks.collect_cubes.rules import Side
+from drone_rl.utils.errors import InputError
+
+LEFT, AHEAD, RIGHT = Side
+LAYOUTS = [[LEFT, RIGHT], [RIGHT, LEFT], [AHEAD, LEFT], [RIGHT, AHEAD]]
+
+
+@pytest.fixture
+def judged(make_episodes, make_baselines):
+    """`verdict.json` of a policy that collects what `hits` says of the sides of its episodes."""
+
+    def judged(hits, number=400, **kwargs):
+        sides = [LAYOUTS[i % 4] for i in range(number)]
+        episodes = make_episodes(sides, [[hits(i, s) for s in row] for i, row in enumerate(sides)])
+        verdict = judge(episodes, make_baselines(episodes), sampled=episodes, **kwargs)
+        return json.loads(json.dumps(verdict.as_dict()))
+
+    return judged
+
+
+@pytest.mark.parametrize("number", [3, 40, 400])
+@pytest.mark.parametrize(
+    "hits",
+    [
+        lambda i, side: True,
+        lambda i, side: False,
+        lambda i, side: side != LEFT,
+        lambda i, side: side != AHEAD,
+        lambda i, side: i % 8 < 4,
+        lambda i, side: i % 40 != 0,
+    ],
+)
+def test_verdicts_that_were_judged_are_accepted(judged, hits, number):
+    check_verdict(judged(hits, number))
+
+
+ONE = {"share": 1.0, "successes": 400}
+LIES = [
+    {"kind": "good"},
+    {"kind": "splendid"},
+    {"kind": "one-sided (left)"},
+    {"certain": "yes"},
+    {"exit_code": 0},
+    {"exit_code": None},
+    {"rule": "good: this one"},
+    {"error_rate": 0.5},
+    {"good_share": 0.0},
+    {"num_cubes": -1},
+    {"num_cubes": 40},
+    {"greedy": None},
+    {"greedy.episodes": -5},
+    {"greedy.episodes": 4000},
+    {"greedy.episodes": 10**30},
+    {"greedy.success.share": 7},
+    {"greedy.success": {**ONE, "trials": 400, "lower95": 0.99, "upper95": 1.0}},
+    {"greedy.shares.all.mean": 1e308},
+    {"greedy.shares.all.mean": 1.0},
+    {"greedy.shares.left.mean": 1.0},
+    {"greedy.shares.left.count": 0},
+    {"greedy.shares.left.lower95": 0.2},
+    {"greedy.shares": {}},
+    {"greedy.mean_goals": 3},
+    {"greedy.mean_length": 1e9},
+    {"greedy.ends.front_boundary.successes": 100},
+    {"greedy.never_reached.mean": -1},
+    {"sampled.success.share": 1.0},
+    {"sampled.episodes": 10},
+    {"baselines": {}},
+    {"baselines.oracle": None},
+    {"baselines.oracle.success.share": 0.1},
+    {"baselines.forward.shares.all.mean": 0.0},
+    {"quantities": {}},
+    {"quantities.success.value": 0.1},
+    {"quantities.success.lower": 0.1},
+    {"quantities.success.upper": math.inf},
+    {"quantities.success.thresholds": [-1.0]},
+    {"quantities.offered left.value": 0.0},
+    {"quantities.offered left.lower": 0.75},
+    {"quantities.collected left.value": 1.0},
+    {"quantities.above forward.upper": 0.0},
+    {"skill.oracle.mean": 1.0},
+    {"drawing.mean": 0.5},
+    {"failures.bound.successes": 0},
+    {"failures.rows.0.failed": 1000},
+    {"failures.rows.0.share": 0.0},
+    {"failures.rows": []},
+    {"failures.largest.failed": 1},
+]
+
+
+@pytest.mark.parametrize(
+    "lie", LIES, ids=lambda lie: ",".join(f"{k}={v}" for k, v in lie.items())[:60]
+)
+def test_a_verdict_that_contradicts_itself_is_refused(judged, lie):
+    """Of a policy that has lost its left: certainly one-sided."""
+    verdict = judged(lambda i, side: side != LEFT)
+    assert (verdict["kind"], verdict["certain"]) == ("one-sided (right)", True)
+    with pytest.raises(InputError):
+        check_verdict(changed(verdict, lie))
+
+
+def test_few_episodes_can_not_be_made_certain(judged):
+    verdict = judged(lambda i, side: True, number=5)
+    assert not verdict["certain"]
+    with pytest.raises(InputError, match="certain"):
+        check_verdict({**verdict, "certain": True, "exit_code": 0})
+    narrow = {
+        f"quantities.{name}.{end}": quantity["value"]
+        for name, quantity in verdict["quantities"].items()
+        if quantity["value"] is not None
+        for end in ("lower", "upper")
+    }
+    with pytest.raises(InputError, match="narrower"):
+        check_verdict(changed(verdict, {**narrow, "certain": True, "exit_code": 0}))
+
+
+def test_a_second_evaluation_of_a_name_does_not_divert_the_check(judged):
+    verdict = judged(lambda i, side: side != LEFT)
+    lie = changed(verdict, {"baselines.oracle.success.share": 0.1})
+    with pytest.raises(InputError):
+        check_verdict({**lie, "oracle": verdict["baselines"]["oracle"]})
+
+
+def test_sides_in_another_order_are_the_same_sides(judged):
+    verdict = judged(lambda i, side: side != LEFT)
+    shares = verdict["greedy"]["shares"]
+    verdict["greedy"]["shares"] = dict(reversed(shares.items()))
+    check_verdict(verdict)

@@ -1,0 +1,32 @@
+import numpy as np
+
+from benchmarks.evidence import SHIFTS, VERDICT
+from drone_rl.explanations.report.sections.shifts import PART, draw, extras, tables
+
+GOOD = {**VERDICT, "kind": "good", "certain": True}
+ARRAYS = {f"shifts_{name}": np.zeros((6, 5, 16, 3), np.uint8) for name in SHIFTS["axes"]}
+
+
+def test_curves_strips_and_a_table(make_explanation):
+    explanation = make_explanation({"shifts": SHIFTS, "verdict": GOOD}, ARRAYS)
+    assert PART.fits(explanation)
+    drawn = draw(explanation)
+    assert [*drawn] == ["shifts", "conditions"]
+    assert len(drawn["shifts"].axes) == 4 and drawn["conditions"].height >= 3 * 15
+    head, *rows = tables(explanation)["shifts"]
+    assert head[0] == "success, constant" and len(rows) == 3
+    assert extras(explanation) == {"rows": [head, *rows]}
+
+
+def test_nothing_is_shown_of_what_is_not_believed(make_explanation):
+    for numbers in (
+        {"shifts": {"refused": "it is of another task"}, "verdict": GOOD},
+        {"shifts": SHIFTS, "verdict": {**GOOD, "kind": "poor"}},
+    ):
+        explanation = make_explanation(numbers)
+        assert PART.fits(explanation)
+        assert draw(explanation) == {} and extras(explanation) == {"rows": []}
+
+
+def test_without_such_flights_there_is_no_part(make_explanation):
+    assert not PART.fits(make_explanation({"verdict": GOOD}))

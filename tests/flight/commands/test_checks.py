@@ -1,0 +1,58 @@
+import math
+
+import numpy as np
+import pytest
+import torch
+
+from drone_rl.flight.commands import checks
+from drone_rl.utils.errors import InputError
+
+
+def test_numbers_of_any_kind_are_taken():
+    assert checks.real(np.float32(1.5), "x") == 1.5
+    assert checks.real(torch.tensor(2), "x") == 2.0
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, "far", None, [1.0, 2.0]])
+def test_what_is_no_finite_number_is_refused(value):
+    with pytest.raises(InputError, match=r"^x=.* can't be; give a finite number$"):
+        checks.real(value, "x")
+
+
+def test_bounds_are_told():
+    with pytest.raises(InputError, match="duration=-1 can't be; give a finite number of 0 or more"):
+        checks.duration(-1)
+    with pytest.raises(InputError, match="speed=0 can't be; give a finite number above 0"):
+        checks.speed(0)
+    with pytest.raises(InputError, match="speed=-2 "):
+        checks.speed(-2)
+    with pytest.raises(InputError, match="z=-5 is below the ground; z points up"):
+        checks.height(-5)
+
+
+def test_so_many_numbers():
+    assert checks.numbers(np.array([1, 2]), "start", 2, 0, 5) == [1.0, 2.0]
+    with pytest.raises(InputError, match=r"start\[1\]=9 can't be"):
+        checks.numbers((1, 9), "start", 2, 0, 5)
+
+
+def test_a_path():
+    assert checks.path([(1, 2, 3), (4, 5, 6)]).tolist() == [[[1, 2, 3], [4, 5, 6]]]
+
+
+@pytest.mark.parametrize(
+    ("path", "told"),
+    [
+        ([], "path has no points"),
+        ([(1, 2)], r"shape \(1, 2\)"),
+        ([1, 2, 3], r"shape \(3,\)"),
+        ([(1, 2, 3), (0, math.nan, 1)], r"path\[1\].y=nan can't be"),
+        ([(0, 0, -1)], r"path\[0\].z=-1 is below the ground"),
+        ("home", "path='home' has no places"),
+        ([(1, 2, 3), (1, 2)], "has no places"),
+    ],
+)
+def test_what_is_no_path(path, told):
+    with pytest.raises(InputError, match=told) as error:
+        checks.path(path)
+    assert "\n" not in str(error.value)

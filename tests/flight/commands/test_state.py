@@ -1,0 +1,50 @@
+import math
+
+import pytest
+import torch
+
+from drone_rl.flight.commands.state import (
+    Attitude,
+    LandedState,
+    PilotState,
+    attitude_of,
+    collision_of,
+    triple,
+)
+from drone_rl.sim.dynamics.flight_state import DEPTH, GROUND, NORMAL, THING
+
+HALF = math.sqrt(0.5)
+
+
+@pytest.mark.parametrize(
+    ("quaternion", "angles"),
+    [
+        ((1, 0, 0, 0), (0, 0, 0)),
+        ((HALF, HALF, 0, 0), (90, 0, 0)),
+        ((math.cos(0.25), 0, math.sin(0.25), 0), (0, math.degrees(0.5), 0)),
+        ((HALF, 0, 0, HALF), (0, 0, 90)),
+    ],
+)
+def test_angles(quaternion, angles):
+    found = attitude_of(quaternion)
+    assert (found.roll, found.pitch, found.yaw) == pytest.approx(angles, abs=1e-6)
+
+
+def test_contacts_have_names(hovering):
+    body = hovering((0, 0, 1))
+    assert collision_of(body) is None
+    body.numbers[0, THING.first] = GROUND
+    body.numbers[0, NORMAL.first : NORMAL.last] = torch.tensor([0.0, 0.0, 1.0]).double()
+    body.numbers[0, DEPTH.first] = 0.25
+    touched = collision_of(body)
+    assert (touched.thing, touched.normal, touched.depth) == ("ground", (0, 0, 1), 0.25)
+    body.numbers[0, THING.first] = 3
+    assert collision_of(body).thing == "obstacle 3"
+
+
+def test_speed():
+    state = PilotState(
+        0.0, (0, 0, 0), (2, 3, 6), Attitude(0, 0, 0), LandedState.FLYING, True, False, None
+    )
+    assert state.speed == 7.0
+    assert triple(torch.tensor([[1.0, 2.0, 3.0]])) == (1, 2, 3)

@@ -1,0 +1,131 @@
+import pytest
+import torch
+from torchrl.envs.utils import check_env_specs
+
+import drone_rl
+from drone_rl.config.transforms import Gray, Resize
+from drone_rl.evaluation.film import film
+from drone_rl.policies.zoo import certificate_path, policy_path
+from drone_rl.sim import worlds as worlds_module
+from drone_rl.sim.rendering import Raytracer
+from drone_rl.sim.tasks import Pillars
+from drone_rl.training.build_collector import build_collector
+from drone_rl.utils.errors import InputError
+from tests.fake_flight import floating
+from tests.second_dynamics import Turning
+
+
+def test_worlds_as_policies_see_them():
+    env = drone_rl.make_env(2, task=drone_rl.TaskSettings(num_cubes=2), seed=3)
+    assert env.reset()["pixels"].shape == (2, 1, 25, 64)
+    assert env.reset()["info", "cube_positions"].shape == (2, 2, 3)
+    check_env_specs(env)
+    env.close()
+
+
+def test_other_pictures():
+    camera = drone_rl.CameraSettings(width=20, height=10)
+    env = drone_rl.make_env(1, camera=camera, transforms=[Gray(), Resize(height=5, width=8)])
+    assert env.reset()["pixels"].shape == (1, 1, 5, 8)
+    env.close()
+
+
+def test_a_task_by_its_name():
+    env = drone_rl.make_env(1, task="pillars")
+    assert isinstance(env.base_env.worlds.task, Pillars)
+    env.close()
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"task": "pillar"}, "task='pillar' is unknown; there are: collect_cubes, pillars"),
+        ({"task": 3}, "task=3 is no task; give one of collect_cubes, pillars"),
+        ({"camera": "tiny"}, "camera='tiny' is no CameraSettings; give a CameraSettings"),
+        ({"dynamics": "simple_flight"}, "dynamics='simple_flight' is no DynamicsSettings"),
+        ({"actions": "velocity"}, "actions='velocity' is no ActionSettings"),
+        ({"appearance": "fog"}, "appearance='fog' is no AppearanceSettings"),
+        ({"transforms": "gray"}, "transforms='gray' is no Transform"),
+        ({"transforms": [Gray(), 3]}, "transforms=3 is no Transform"),
+    ],
+)
+def test_values_of_another_type_are_refused_by_name(given, message):
+    with pytest.raises(InputError, match=f"^{message}"):
+        drone_rl.make_env(1, **given)
+
+
+def test_a_seed_means_the_same_worlds():
+    found = []
+    for _ in range(2):
+        env = drone_rl.make_env(2, seed=7)
+        found.append(env.reset()["info", "cube_positions"])
+        env.close()
+    assert torch.equal(*found)
+
+
+@pytest.fixture
+def asked(monkeypatch):
+    """Names of the renderers that worlds were asked to be drawn by; our own draws them all."""
+    names = []
+
+    def find(which):
+        names.append(which)
+        return Raytracer
+
+    monkeypatch.setattr(worlds_module, "find_renderer", find)
+    return names
+
+
+def test_whoever_is_asked_for_draws(asked, tmp_path):
+    """In worlds to train in, to be judged in, to be looked at, and of others."""
+    chosen = {"renderer": "mujoco_warp"}
+    drone_rl.make_env(1, **chosen).close()
+    assert asked == ["mujoco_warp"]
+    build_collector(drone_rl.TrainSettings(**chosen)).collector.shutdown()
+    assert set(asked) == {"mujoco_warp"}
+    asked.clear()
+    drone_rl.evaluate("good", episodes=1, baselines=False, **chosen)
+    assert asked == ["mujoco_warp"]
+    asked.clear()
+    film(drone_rl.load_policy("right_and_forward"), tmp_path, 1, **chosen)
+    drone_rl.DroneWorld(**chosen).close()
+    assert asked == ["mujoco_warp"] * 2
+    asked.clear()
+    drone_rl.judge("right_and_forward", episodes=1, **chosen)
+    assert asked[0] == "mujoco_warp"  # luck and the oracle see nothing
+
+
+@pytest.mark.parametrize(
+    ("command", "given"),
+    [
+        *[(command, "good") for command in ("prove", "places", "chances", "explain", "judge")],
+        ("check", certificate_path(policy_path("proved"))),
+    ],
+)
+def test_every_command_that_draws_asks_for_it(command, given, monkeypatch, tmp_path):
+    def refuse(which):
+        raise InputError(f"asked for {which}")
+
+    monkeypatch.setattr(worlds_module, "find_renderer", refuse)
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match="asked for mujoco_warp"):
+        getattr(drone_rl, command)(given, renderer="mujoco_warp", progress=lambda *_: None)
+
+
+def test_a_renderer_that_there_is_not():
+    with pytest.raises(InputError, match="renderer='opengl' is unknown; give one of: raytrace"):
+        drone_rl.make_env(1, renderer="opengl")
+    with pytest.raises(InputError, match="renderer='opengl' is unknown; give raytrace, mujoco"):
+        drone_rl.TrainSettings(renderer="opengl")
+
+
+def test_settings_of_dynamics_and_actions(monkeypatch):
+    floating(monkeypatch)
+    slow = drone_rl.ActionSettings(move_speed=1.0)
+    windy = drone_rl.DynamicsSettings(mode="simple_flight", wind=(1.0, 0.0, 0.0))
+    env = drone_rl.make_env(2, dynamics=windy, actions=slow)
+    made = env.base_env.worlds.dynamics
+    assert (made.settings, made.asked) == (windy, slow)
+    env.close()
+    with pytest.raises(InputError, match=r"^actions=moves, but dynamics=Turning brings its own"):
+        drone_rl.make_env(1, dynamics=Turning(), actions=slow)

@@ -1,0 +1,216 @@
+"""Policies that were made elsewhere are flown, judged and explained as ours are."""
+
+import pytest
+import torch
+from torch import nn
+
+import drone_rl
+from drone_rl.config.transforms import EpisodeReward, Gray, Resize, Rgb, Stack, Standardize
+from drone_rl.policies.external_policy import as_pilot
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.progress import silent
+from tests.fake_flight import FLIGHT, floating
+from tests.second_dynamics import Turning
+from tests.second_task import Posts
+
+FEW = {"episodes": 8, "sampled": False, "seed": 0, "progress": silent}
+
+
+@pytest.fixture(scope="module")
+def network():
+    return drone_rl.load_policy("good").make_network()
+
+
+def on_bytes(network):
+    """The same network, behind what becomes of a frame before it, outside of torch's sight."""
+
+    def logits(frames):
+        assert frames.dtype == torch.uint8 and frames.shape[1:] == (25, 64, 3)
+        gray = frames.float() @ torch.tensor([0.299, 0.587, 0.114]) / 255
+        with torch.no_grad():
+            return network(((gray - 0.53) / 0.21)[:, None]).numpy()
+
+    return logits
+
+
+def left(pictures):
+    return torch.tensor([0.0, 99.0, 0.0]).expand(len(pictures), 3)
+
+
+def test_the_same_network_gets_the_same_verdict_wherever_it_comes_from(network):
+    own = drone_rl.judge("good", **FEW).as_dict()
+    ways = {
+        "module": network,
+        "function": lambda x: network(x),
+        "bytes": drone_rl.policy_from(on_bytes(network), transforms=()),
+    }
+    for name, way in ways.items():
+        found = drone_rl.judge(way, **FEW).as_dict()
+        for key in ("kind", "greedy", "skill", "quantities"):
+            assert found[key] == own[key], (name, key)
+
+
+def test_drawn_actions_are_those_of_the_same_network(network):
+    few = {"episodes": 6, "num_envs": 6, "seed": 0, "progress": silent}
+    own, found = drone_rl.evaluate("good", **few), drone_rl.evaluate(network, **few)
+    assert found.flown == own.flown
+    told = found.as_dict()
+    assert (told["policy"], told["trained"]) == ("SmallCNN", None)
+
+
+def test_a_changed_task_and_a_task_of_another_kind():
+    done = drone_rl.judge(left, task={"num_cubes": 1}, **FEW)
+    assert (done.name, done.as_dict()["num_cubes"]) == ("left", 1)
+    assert done.verdict.kind == "poor"
+    posts = drone_rl.policy_from(left, task=Posts(), name="aside")
+    with posts.flying(2) as (env, actor):
+        assert actor(env.reset())["action"].tolist() == [1, 1]
+    assert posts.in_task() is posts
+    with pytest.raises(InputError, match=r"^task\.num_cubes is unknown; the task has no settings"):
+        posts.in_task(num_cubes=2)
+
+
+@pytest.mark.parametrize(
+    ("transforms", "shape"),
+    [
+        ([Gray()], (1, 25, 64)),
+        ([Rgb(), Resize(height=8, width=9)], (3, 8, 9)),
+        ([Gray(), Stack(N=3)], (3, 25, 64)),
+        ([Gray(), EpisodeReward()], (1, 25, 64)),
+    ],
+)
+def test_it_sees_what_the_transforms_make(transforms, shape):
+    seen = []
+
+    def note(pictures):
+        seen.append(tuple(pictures.shape[1:]))
+        return left(pictures)
+
+    policy = drone_rl.policy_from(note, transforms=transforms)
+    assert policy.make_network().in_shape == shape
+    with policy.flying(2) as (env, actor):
+        actor(env.reset())
+    assert set(seen) == {shape}
+
+
+def test_it_shows_itself():
+    policy = drone_rl.policy_from(left, camera=drone_rl.CameraSettings(width=32), transforms=())
+    assert repr(policy).startswith("ForeignPolicy(name='left', own_task=TaskSettings(")
+    assert "<td>RGB bytes</td>" in policy._repr_html_()
+    assert policy.make_network().in_shape == (3, 25, 32)
+
+
+def test_what_a_policy_can_be_given_as(network):
+    policy = drone_rl.policy_from(left)
+    assert as_pilot(policy) is policy
+    assert as_pilot("good").name == "good"
+    assert as_pilot(network).logits is network
+
+
+def test_a_model_of_stable_baselines3_is_judged_as_it_was_trained():
+    """On RGB frames of bytes, as the Gymnasium environments of the README give them."""
+    gymnasium = pytest.importorskip("gymnasium", reason="Gymnasium is not installed")
+    sb3 = pytest.importorskip("stable_baselines3", reason="Stable-Baselines3 is not installed")
+    env = gymnasium.make(
+        "drone_rl/CollectCubes-v0", camera=drone_rl.CameraSettings(width=48, height=40)
+    )
+    model = sb3.A2C("CnnPolicy", env, seed=0)
+    for given in (model, drone_rl.Sb3Logits(model)):
+        policy = as_pilot(given)
+        assert policy.transforms == (Rgb(),)
+        assert (policy.camera.height, policy.camera.width) == (40, 48)
+    few = {**FEW, "episodes": 2}
+    (done,) = drone_rl.judge([model], **few)
+    assert done.name == "A2C of Stable-Baselines3"
+    frames = env.observation_space.sample()[None]
+    network = as_pilot(model).make_network()
+    pictures = torch.from_numpy(frames).movedim(-1, 1).float() / 255
+    wanted = model.policy.get_distribution(torch.from_numpy(frames).movedim(-1, 1)).distribution
+    torch.testing.assert_close(network(pictures).softmax(-1), wanted.probs)
+    env.close()
+
+
+def test_a_network_says_what_it_was_trained_on():
+    class Colour:
+        observation_shape = (3, 8, 9)
+
+        def __call__(self, pictures):
+            return left(pictures)
+
+    policy = drone_rl.policy_from(Colour())
+    assert policy.transforms == (Rgb(),) and policy.make_network().in_shape == (3, 8, 9)
+    given = drone_rl.CameraSettings(width=12, height=10)
+    policy = drone_rl.policy_from(Colour(), camera=given, transforms=[Gray()])
+    assert policy.make_network().in_shape == (1, 10, 12)
+    assert drone_rl.policy_from(left).transforms == (Gray(), Standardize())
+
+
+@pytest.mark.parametrize(
+    ("given", "options", "message"),
+    [
+        (3, {}, "policy_from got a int; give a callable from pictures to logits"),
+        (nn.Linear(9, 3), {}, r"the network can't take pictures of shape \(1, 1, 25, 64\)"),
+        (lambda x: left(x)[:, :2], {}, r"the network gives logits of shape \(1, 2\); give one"),
+        (left, {"transforms": [Resize()]}, "the transform resize needs floats; let gray come f"),
+        (left, {"transforms": [Gray(), Gray()]}, "the transform gray needs the camera's own RGB"),
+    ],
+)
+def test_what_does_not_fit_is_told_when_it_is_given(given, options, message):
+    with pytest.raises(InputError, match=f"^{message}"):
+        drone_rl.policy_from(given, **options)
+
+
+def test_a_camera_that_does_not_fit_a_network_of_ours(network):
+    with pytest.raises(InputError, match=r"built for pictures of shape \(1, 25, 64\), not \(1, 2"):
+        drone_rl.policy_from(network, camera=drone_rl.CameraSettings(width=32))
+
+
+def test_nothing_is_proved_of_it(tmp_path):
+    policy = drone_rl.policy_from(left)
+    for ask in (drone_rl.prove, drone_rl.chances, drone_rl.places, drone_rl.load_policy):
+        with pytest.raises(InputError, match=r"^policy=left is in no file of drone-rl's") as caught:
+            ask(policy)
+        assert "\n" not in str(caught.value)
+    with pytest.raises(InputError, match=r"policy=left was made elsewhere, and nothing is proved"):
+        drone_rl.judge(policy, certificate=tmp_path / "certificate.json", **FEW)
+
+
+@pytest.mark.slow
+def test_of_a_mere_callable_all_is_explained_that_can_be(network, tmp_path):
+    policy = drone_rl.policy_from(on_bytes(network), transforms=(), name="a function")
+    small = {"frames": 40, "episodes": 6, "perplexity": 5}
+    done = drone_rl.explain(policy, folder=tmp_path, progress=silent, **small)
+    numbers = done.numbers["a function"]
+    assert set(numbers["left_out"]) == {"class_models", "embedding"}
+    assert not {"class_model", "tsne"} & set(numbers)
+    assert (numbers["attribution"]["methods"], numbers["attribution"]["layer"]) == (
+        ["occlusion"],
+        None,
+    )
+    truth = numbers["truth"]
+    assert (truth["trusted"], truth["methods"], truth["integration_error"]) == (None, {}, None)
+    assert truth["outcomes"]["flights"] > 0
+    assert "it is no torch module" in numbers["places"]["refused"]
+    assert numbers["provenance"]["trained"] is None
+    page = done.report.read_text()
+    assert "What is left out, and why" in page
+    assert "None could be tested" in page
+    assert "Grad-CAM; occlusion is shown" in page
+
+
+def test_dynamics_are_those_it_was_made_for_or_others(monkeypatch):
+    floating(monkeypatch)
+    policy = drone_rl.policy_from(left)
+    assert policy.dynamics.is_computer_vision and policy.unlike == {}
+    moved = policy.in_dynamics(mode="simple_flight", gusts=1.0)
+    assert moved.unlike["gusts"] == {"own": 0.0, "flown": 1.0}
+    with moved.flying(1) as (env, _):
+        assert env.base_env.worlds.dynamics.settings == FLIGHT.replace(gusts=1.0)
+    made = drone_rl.policy_from(left, dynamics=FLIGHT)
+    assert made.unlike == {} and made.in_dynamics(mode="computer_vision").unlike == {
+        "mode": {"own": "simple_flight", "flown": "computer_vision"}
+    }
+    with made.flying(1, dynamics=Turning(), pixels=False) as (env, _):
+        assert isinstance(env.base_env.worlds.dynamics, Turning)
+    with pytest.raises(InputError, match=r"^dynamics\.mass=-1\.0"):
+        policy.in_dynamics(mass=-1.0)

@@ -1,0 +1,126 @@
+"""Policies by name, by file, by run; in a changed task."""
+
+import os
+import shutil
+
+import pytest
+import torch
+
+import drone_rl
+from drone_rl.policies.policy import find_policy
+from drone_rl.policies.zoo import policy_path
+from drone_rl.utils.errors import InputError
+from tests.fake_flight import FLIGHT, Floating, floating
+
+
+def test_a_policy_that_travels_with_the_package():
+    policy = drone_rl.load_policy("good")
+    assert (policy.name, policy.task.num_cubes) == ("good", 3)
+    assert policy.path == policy_path("good")
+    shown = policy._repr_html_()
+    assert "<td>network</td>" in shown
+    assert "small_cnn" in shown
+    assert repr(policy) == f"Policy(name='good', path={policy.path!r})"  # not all its weights
+
+
+def test_worlds_are_closed_when_the_flights_end_or_fail():
+    policy = drone_rl.load_policy("good")
+    with pytest.raises(KeyError), policy.flying(2) as (env, actor):
+        assert actor(env.reset())["action"].shape == (2,)
+        assert not env.is_closed
+        raise KeyError
+    assert env.is_closed
+
+
+def test_a_changed_task_changes_the_worlds_alone():
+    policy = drone_rl.load_policy("good")
+    other = policy.in_task(num_cubes=5, spacing=None)
+    assert (other.task.num_cubes, other.task.spacing) == (5, policy.task.spacing)
+    assert policy.task.num_cubes == 3
+    env = other.make_env(2)
+    assert env.reset()["info", "cube_positions"].shape == (2, 5, 3)
+    actor = other.make_actor(env)
+    assert actor(env.reset())["action"].shape == (2,)
+    env.close()
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"num_cubes": 0}, "task.num_cubes=0 is out of range"),
+        ({"wind": 1}, "task.wind is unknown"),
+        ({"step_limit": 5}, "task.step_limit=5 ends every episode"),
+    ],
+)
+def test_a_task_that_can_not_be(changes, message):
+    with pytest.raises(InputError, match=f"^{message}"):
+        drone_rl.load_policy("good").in_task(**changes)
+
+
+def test_its_network_has_its_weights():
+    policy = drone_rl.load_policy("poor")
+    weights = policy.make_network().state_dict()
+    assert all(torch.equal(weights[k], v) for k, v in policy.state["policy"].items())
+
+
+def test_an_actor_needs_no_environment():
+    policy = drone_rl.load_policy("good")
+    env = policy.make_env(2, seed=3)
+    flown = []
+    for actor in (policy.make_actor(), policy.make_actor(env)):
+        env.set_seed(3)
+        flown.append(env.rollout(4, actor)["action"])
+    env.close()
+    assert torch.equal(*flown)
+    with pytest.raises(drone_rl.InputError, match=r"env=2 is no TorchRL environment; give policy"):
+        policy.make_actor(2)
+
+
+def test_what_latest_and_a_folder_mean(tmp_path):
+    runs = tmp_path / "train" / "runs"
+    for number, name in enumerate(("b", "a")):
+        (runs / name / "checkpoints").mkdir(parents=True)
+        shutil.copy(policy_path("good"), runs / name / "checkpoints" / "last.pt")
+        os.utime(runs / name / "checkpoints" / "last.pt", (number, number))
+    assert find_policy("latest", tmp_path) == runs / "a" / "checkpoints" / "last.pt"
+    assert find_policy(runs / "b") == runs / "b" / "checkpoints" / "last.pt"
+
+
+def test_what_is_not_there(tmp_path):
+    with pytest.raises(InputError, match="policy=latest, but there is no run"):
+        drone_rl.load_policy("latest", outputs=tmp_path)
+    with pytest.raises(InputError, match=r"policy=nobody does not exist.*good, .*poor"):
+        drone_rl.load_policy("nobody")
+
+
+def test_changed_dynamics_change_the_worlds_alone(monkeypatch):
+    floating(monkeypatch)
+    policy = drone_rl.load_policy("good")
+    other = policy.in_dynamics(mode="simple_flight", wind=[5.0, 0.0, 0.0], gusts=None)
+    assert other.dynamics == FLIGHT.replace(wind=(5.0, 0.0, 0.0))
+    assert policy.dynamics.is_computer_vision and other.own_dynamics == policy.dynamics
+    assert policy.unlike == {} and other.unlike == {
+        "mode": {"own": "computer_vision", "flown": "simple_flight"},
+        "wind": {"own": [0.0, 0.0, 0.0], "flown": [5.0, 0.0, 0.0]},
+    }
+    with other.flying(2) as (env, actor):
+        assert isinstance(env.base_env.worlds.dynamics, Floating)
+        assert actor(env.reset())["action"].shape == (2,)
+    back = other.in_dynamics(mode="computer_vision", wind=[0, 0, 0])
+    assert back.unlike == {} and back.description == policy.description
+    with policy.flying(1, dynamics=FLIGHT) as (env, _):
+        assert env.base_env.worlds.dynamics.settings == FLIGHT
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"mass": -1.0}, r"dynamics\.mass=-1\.0 is out of range"),
+        ({"masss": 1}, r"dynamics\.masss is unknown"),
+        ({"wind": [1, 0, 0]}, r"dynamics\.wind=\[1\.0, 0\.0, 0\.0\] moves nothing"),
+        ({"mass": 50.0}, r"dynamics\.rotor_thrust=4\.17945 can't hover"),
+    ],
+)
+def test_dynamics_that_can_not_be(changes, message):
+    with pytest.raises(InputError, match=f"^{message}"):
+        drone_rl.load_policy("good").in_dynamics(**changes)

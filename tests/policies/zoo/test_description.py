@@ -1,0 +1,294 @@
+"""A description is strict, says everything, and builds what it says."""
+
+import copy
+import subprocess
+import sys
+
+import pytest
+import torch
+
+from drone_rl.config import COMPUTER_VISION, MOVES_SETTINGS, ActionSettings, AppearanceSettings
+from drone_rl.policies.zoo import parse
+from drone_rl.sim.dynamics import ComputerVision
+from drone_rl.utils.errors import InputError
+from tests.fake_flight import FLIGHT, floating
+from tests.second_dynamics import Turning
+
+DEFAULT = {
+    "format": "drone_rl policy",
+    "format_version": 2,
+    "task": {
+        "num_cubes": 3,
+        "first_distance": 15.0,
+        "spacing": 9.0,
+        "lateral_bound": 6.0,
+        "vertical_bound": 0.0,
+        "cube_size": 2.5,
+        "cube_color": [0.75, 0.12, 0.08],
+        "drone_size": 0.8,
+        "altitude": 2.5,
+        "step_length": 1.0,
+        "step_limit": 300,
+        "front_margin": 11.0,
+        "side_margin": 20.0,
+    },
+    "camera": {"width": 64, "height": 25, "horizontal_fov": 135.0},
+    "transforms": [{"name": "gray"}, {"name": "standardize", "mean": 0.53, "std": 0.21}],
+    "network": {"name": "small_cnn", "patch": 4, "channels": [16, 32], "hidden": [128]},
+}
+GRAY, STACK = {"name": "gray"}, {"name": "stack", "N": 2}
+DEAD = {"name": "dead_rows", "count": 0, "rows": [], "level": 0.0}
+
+
+def changed(where, value):
+    """The default with one value changed; a missing one is `...`."""
+    data, *keys = copy.deepcopy(DEFAULT), *where.split(".")
+    part = data
+    for key in keys[:-1]:
+        part = part[int(key) if key.isdigit() else key]
+    if value is ...:
+        del part[keys[-1]]
+    else:
+        part[int(keys[-1]) if keys[-1].isdigit() else keys[-1]] = value
+    return data
+
+
+def test_a_critic_is_the_described_network_with_one_output():
+    described = parse(DEFAULT)
+    critic = described.build_critic(torch.Generator().manual_seed(0))
+    wanted = dict(described.expected_weights())
+    shapes = {name: tuple(value.shape) for name, value in critic.state_dict().items()}
+    last = {"layers.logits.weight": (1, 128), "layers.logits.bias": (1,)}
+    assert shapes == {name: tuple(value.shape) for name, value in wanted.items()} | last
+    assert critic(torch.zeros(5, 1, 25, 64)).shape == (5, 1)
+
+
+def test_it_comes_back_as_it_was():
+    assert parse(DEFAULT).as_dict() == DEFAULT
+    assert parse(parse(DEFAULT).as_dict()) == parse(DEFAULT)
+
+
+def test_the_weights_are_known_before_there_are_any():
+    expected = parse(DEFAULT).expected_weights()
+    built = parse(DEFAULT).build_network(torch.Generator().manual_seed(0)).state_dict()
+    assert all(value.is_meta for value in expected.values())
+    assert {k: (v.shape, v.dtype) for k, v in expected.items()} == {
+        k: (v.shape, v.dtype) for k, v in built.items()
+    }
+
+
+@pytest.mark.parametrize(
+    ("camera", "transforms", "shape"),
+    [
+        ((25, 64), [GRAY], (1, 25, 64)),
+        ((36, 64), [GRAY, {"name": "crop", "top": 5, "bottom": 30}], (1, 25, 64)),
+        ((50, 100), [GRAY, {"name": "resize", "height": 13, "width": 20}], (1, 13, 20)),
+        (
+            (25, 64),
+            [GRAY, STACK, {"name": "episode_reward"}, {"name": "step_count"}],
+            (2, 25, 64),
+        ),
+    ],
+)
+def test_pictures_are_of_the_foretold_shape(camera, transforms, shape):
+    data = {**DEFAULT, "transforms": transforms}
+    data["camera"] = {"height": camera[0], "width": camera[1], "horizontal_fov": 90.0}
+    described = parse(data)
+    assert described.picture.shape == shape
+    env = described.build_env(1, seed=0, device="cpu")
+    assert tuple(env.reset()["pixels"].shape[1:]) == shape
+    env.close()
+
+
+@pytest.mark.parametrize(
+    ("where", "value", "message"),
+    [
+        ("format", "drone_rl checkpoint", "format='drone_rl checkpoint'"),
+        ("format_version", 3, "format_version=3"),
+        ("format_version", True, "format="),
+        ("format_version", ..., "format="),
+        ("more", 1, "not so: 'more'"),
+        ("task", ..., "not so: 'task'"),
+        ("task.num_cubes", 10**9, r"task\.num_cubes=1000000000"),
+        ("task.num_cubes", 3.0, r"num_cubes=3\.0"),
+        ("task.num_cubes", True, "num_cubes=True"),
+        ("task.num_cubes", 101, "from 1 to 100"),
+        ("task.step_limit", 0, "step_limit=0"),
+        ("task.step_limit", 100_001, "step_limit=100001"),
+        ("task.spacing", float("nan"), "spacing=nan"),
+        ("task.spacing", "${oc.env:HOME}", "spacing='"),
+        ("task.spacing", ..., r"task\.spacing is missing"),
+        ("task.wind", 1.0, "'wind' is unknown"),
+        ("task.cube_color", [0.1, 0.2], "cube_color"),
+        ("task.vertical_bound", 3.0, "never touches"),
+        ("camera.width", 4096, "width=4096"),
+        ("camera.width", 1024, None),
+        ("camera.horizontal_fov", 171, "horizontal_fov=171"),
+        ("transforms", [], "needs floats"),
+        ("transforms", {}, "transforms="),
+        ("transforms", [GRAY] * 17, "0 to 16 values"),
+        ("transforms", [GRAY, GRAY], "let it come first"),
+        ("transforms", [{"name": "crop", "top": 0, "bottom": 9}], "keeps rows 0 to 9 of 64|floats"),
+        ("transforms", [GRAY, {"name": "crop", "top": 9, "bottom": 9}], "9 to 9 of 25"),
+        ("transforms", [GRAY, {"name": "crop", "top": 0, "bottom": 26}], "0 to 26 of 25"),
+        ("transforms", [{"name": "resize", "height": 9, "width": 9}], "resize needs floats"),
+        ("transforms", [{"name": "blur", "width": 1.0}, GRAY], "blur needs floats"),
+        ("transforms", [GRAY, {"name": "blur", "width": 17.0}], r"width=17\.0"),
+        (
+            "transforms",
+            [GRAY, {**DEAD, "count": 26}],
+            r"^transforms\.dead_rows\.count=26 of a picture of 25 rows",
+        ),
+        (
+            "transforms",
+            [GRAY, {**DEAD, "rows": [25]}],
+            r"^transforms\.dead_rows\.rows=\[25\] of a picture of 25 rows",
+        ),
+        (
+            "transforms",
+            [GRAY, {**DEAD, "rows": [3, 3]}],
+            r"^transforms\.dead_rows\.rows=\[3, 3\] names a row twice",
+        ),
+        ("transforms", [GRAY, {**STACK, "N": 17}], "N=17"),
+        ("transforms", [GRAY, {**STACK, "N": 16}, {**STACK, "N": 16}, {**STACK, "N": 16}], "shape"),
+        ("transforms.1.std", 0.0, r"transforms\[1\]\.std=0\.0"),
+        ("transforms.0.name", "exec", r"transforms\[0\]\.name='exec' is unknown"),
+        ("transforms.0._target_", "os.system", "'_target_' is unknown"),
+        ("network.name", "os.system", "network.name='os.system' is unknown"),
+        ("network.name", ["mlp"], r"network.name=\(list\) is unknown"),
+        ("network.name", ..., "network.name=None is unknown"),
+        ("network.hidden", [128] * 9, "0 to 8 values"),
+        ("network.hidden", [4097], r"hidden\[0\]=4097"),
+        ("network.hidden", [4096] * 3, "parameters"),
+        ("network.channels", [], "1 to 8 values"),
+        ("network.channels", [513], "513"),
+        ("network.patch", 26, "too small"),
+        ("network.bias", True, "'bias' is unknown"),
+    ],
+)
+def test_what_is_out_of_bounds_is_named(where, value, message):
+    if message is None:
+        parse(changed(where, value))  # at the bound
+        return
+    with pytest.raises(InputError, match=message) as error:
+        parse(changed(where, value))
+    assert "\n" not in str(error.value)
+
+
+def test_frames_are_bounded_as_a_whole():
+    camera = {"width": 1024, "height": 256, "horizontal_fov": 90.0}
+    network = {"name": "small_cnn", "patch": 64, "channels": [4], "hidden": []}
+    parse({**DEFAULT, "camera": camera, "network": network})
+    with pytest.raises(InputError, match="263168 pixels"):
+        parse({**DEFAULT, "camera": {**camera, "height": 257}, "network": network})
+
+
+@pytest.mark.parametrize("data", [None, [], "text", {}, {1: 2}])
+def test_what_is_no_description(data):
+    with pytest.raises(InputError):
+        parse(data)
+
+
+def test_reading_a_description_computes_nothing():
+    """What is computed on no device loads torch's symbolic algebra: half a second a start."""
+    code = """import sys
+from drone_rl.utils.compiler import leave_compiler_unloaded
+leave_compiler_unloaded()
+from drone_rl.config.configuration import as_config
+from drone_rl.config.training import TrainSettings
+from drone_rl.policies.zoo import describe
+describe(as_config(TrainSettings())).expected_weights()
+print("sympy" in sys.modules)"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "False\n"
+
+
+def test_frames_seen_at_once_are_those_of_all_stacks():
+    assert parse(DEFAULT).frames == 1
+    stacks = [{"name": "gray"}, {"name": "stack", "N": 2}, {"name": "stack", "N": 3}]
+    assert parse({**DEFAULT, "transforms": stacks}).frames == 6
+
+
+def test_given_weights_are_taken_as_they_are_laid_out():
+    description = parse(DEFAULT)
+    built = description.build_network(torch.Generator().manual_seed(0))
+    loaded = description.load_network(built.state_dict())
+    pairs = zip(built.parameters(), loaded.parameters(), strict=True)
+    for one, other in pairs:
+        assert torch.equal(one, other) and one.stride() == other.stride()
+        assert one.data_ptr() != other.data_ptr() and other.requires_grad
+    assert loaded.actions is built.actions and loaded.training
+
+
+def test_what_a_policy_sees_through_a_camera_of_which_no_fault_is_known():
+    blur, late = {"name": "blur", "width": 1.0}, {"name": "late_frames", "frames": 2}
+    described = parse({**DEFAULT, "transforms": [GRAY, blur, DEAD, late]})
+    assert described.faults == ("dead_rows", "late_frames")
+    assert described.without_faults() == parse({**DEFAULT, "transforms": [GRAY, blur]})
+    assert parse(DEFAULT).without_faults() == parse(DEFAULT)
+
+
+def test_a_look_is_told_where_it_is_not_minimal():
+    assert "appearance" not in parse(DEFAULT).as_dict() and parse(DEFAULT).appearance.is_minimal
+    look = AppearanceSettings(fog_visibility=(20.0, 50.0), ground_texture="grid").values()
+    described = parse({**DEFAULT, "appearance": look})
+    assert described.as_dict()["appearance"] == look
+    assert parse(described.as_dict()) == described
+    env = described.build_env(1, seed=0, device="cpu")
+    assert 20.0 <= env.base_env.looks.values[0, 14] <= 50.0
+    env.close()
+    for wrong in ({**look, "fog_visibility": 0.0}, {"fog_visibility": 5.0}, 3):
+        with pytest.raises(InputError, match="appearance"):
+            parse({**DEFAULT, "appearance": wrong})
+
+
+def test_dynamics_and_actions_are_told_where_they_are_not_the_first_ones():
+    plain = parse(DEFAULT)
+    assert plain.dynamics.is_computer_vision and plain.actions == MOVES_SETTINGS
+    windy, fast = FLIGHT.replace(wind=(2.0, 0.0, 0.0)).values(), ActionSettings(move_speed=5.0)
+    described = parse({**DEFAULT, "dynamics": windy, "actions": fast.values()})
+    assert described.as_dict() == {**DEFAULT, "dynamics": windy, "actions": fast.values()}
+    assert parse(described.as_dict()) == described
+    assert [*described.expected_weights()] == [*plain.expected_weights()]
+    still = {"dynamics": plain.dynamics.values(), "actions": plain.actions.values()}
+    assert parse({**DEFAULT, **still}).as_dict() == DEFAULT
+
+
+@pytest.mark.parametrize(
+    ("part", "value", "message"),
+    [
+        ("dynamics", {"mode": "simple_flight"}, r"dynamics\.camera_mount is missing"),
+        ("dynamics", {**FLIGHT.values(), "mass": -1.0}, r"dynamics\.mass=-1\.0"),
+        ("dynamics", {**FLIGHT.values(), "mass": 50.0}, r"dynamics\.rotor_thrust=.*can't hover"),
+        ("dynamics", {**FLIGHT.values(), "inertia": [1.0, 1.0, 3.0]}, r"dynamics\.inertia="),
+        ("dynamics", {**COMPUTER_VISION.values(), "gusts": 1.0}, r"dynamics\.gusts=1\.0 moves"),
+        ("dynamics", {**FLIGHT.values(), "_target_": "os.system"}, "'_target_' is unknown"),
+        ("dynamics", None, "dynamics="),
+        ("actions", {**MOVES_SETTINGS.values(), "kind": "eval"}, r"actions\.kind='eval'"),
+        ("actions", {**MOVES_SETTINGS.values(), "move_speed": True}, r"actions\.move_speed=True"),
+        ("actions", [], "actions="),
+    ],
+)
+def test_dynamics_and_actions_out_of_bounds_are_named(part, value, message):
+    with pytest.raises(InputError, match=message) as error:
+        parse({**DEFAULT, part: value})
+    assert "\n" not in str(error.value)
+
+
+def test_worlds_move_as_described_or_as_told(monkeypatch):
+    floating(monkeypatch)
+    fast = ActionSettings(move_speed=5.0)
+    flight = {"dynamics": FLIGHT.values(), "actions": fast.values()}
+    described = parse({**DEFAULT, **flight})
+
+    def flown(**told):
+        env = described.build_env(1, seed=0, device="cpu", pixels=False, **told)
+        return env.base_env.worlds.dynamics
+
+    own = flown()
+    assert (own.settings, own.asked) == (FLIGHT, fast)
+    windy = FLIGHT.replace(wind=(1.0, 0.0, 0.0))
+    assert (flown(dynamics=windy).settings, flown(dynamics=windy).asked) == (windy, fast)
+    turning = Turning()
+    assert flown(dynamics=turning) is turning
+    assert type(flown(dynamics=COMPUTER_VISION)) is ComputerVision

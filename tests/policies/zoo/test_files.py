@@ -1,0 +1,227 @@
+"""Policies in files: what is written comes back, old files are read, anything else is refused."""
+
+import hashlib
+import json
+from pathlib import Path
+
+import pytest
+import torch
+from safetensors.torch import save
+
+from drone_rl.policies.zoo import (
+    card_path,
+    certificate_path,
+    load_exported,
+    parse,
+    policy_names,
+    policy_path,
+    read_policy,
+    shifts_path,
+)
+from drone_rl.utils.checkpoint import save_checkpoint
+from drone_rl.utils.errors import InputError
+from drone_rl.verdicts.export import export_policy
+from tests.policies.zoo.test_description import DEFAULT
+from tests.verdicts.test_card_text import VERDICT
+
+DATA = Path(__file__).parents[2] / "data"
+DESCRIPTION = {
+    **DEFAULT,
+    "network": {"name": "small_cnn", "patch": 4, "channels": [2], "hidden": []},
+}
+WEIGHTS = {
+    name: torch.arange(float(value.numel())).reshape(value.shape)
+    for name, value in parse(DESCRIPTION).expected_weights().items()
+}
+PROGRESS = {"frames": 1234, "episodes": 9, "updates": 3, "seconds": 0.5, "running_reward": 1.0}
+CHECKPOINT = {
+    "policy": WEIGHTS,
+    "config": {"paths": {"outputs": "/home/somebody"}},
+    "description": DESCRIPTION,
+    "progress": PROGRESS,
+    "provenance": {
+        "versions": {"torch": "1", "torchrl": "2", "mujoco-warp": "3"},
+        "git_revision": "abc",
+        "machine": {"system": "here"},
+    },
+}
+ABOUT = {
+    "progress": PROGRESS,
+    "provenance": {"versions": {"torch": "1"}, "git_revision": None},
+    "command": "drone-rl train",
+    "verdict": VERDICT,
+    "worlds": "report",
+    "seed": 5,
+    "chosen": {"runs": 3, "episodes": None},
+}
+
+
+def exported(weights=None, about=None, description=DESCRIPTION, **metadata):
+    """An exported file's content."""
+    texts = {
+        "format": "drone_rl policy",
+        "about": json.dumps({**ABOUT, **(about or {})}),
+        "description": json.dumps(description),
+        **metadata,
+    }
+    return save(WEIGHTS if weights is None else weights, texts)
+
+
+DAMAGED_DESCRIPTION = save(
+    WEIGHTS, {"format": "drone_rl policy", "about": "{}", "description": "{"}
+)
+
+
+def test_what_is_exported_comes_back_without_traces_of_the_machine(tmp_path):
+    path = tmp_path / "mine.safetensors"
+    origin = {"command": "drone-rl train", "seed": 5, "chosen": None}
+    export_policy(path, CHECKPOINT, verdict=VERDICT, **origin)
+    found = load_exported(path)
+    torch.testing.assert_close(found["policy"], WEIGHTS)
+    assert found["description"] == DESCRIPTION
+    assert found["progress"] == PROGRESS
+    assert {key: found[key] for key in origin} == origin
+    assert (found["verdict"], found["worlds"]) == (VERDICT, "report")
+    assert b"somebody" not in path.read_bytes()
+    card = path.with_suffix(".md").read_text()
+    assert hashlib.sha256(path.read_bytes()).hexdigest() in card
+    assert "1,234 frames" in card and "**poor**" in card and "(seed 5)" in card
+    assert "three cubes of 2.5 m, up to 6 m" in card
+
+
+def test_a_checkpoint_is_read_by_its_description_alone(tmp_path):
+    save_checkpoint(tmp_path / "a.pt", {**CHECKPOINT, "best": 0.5})
+    found = read_policy(tmp_path / "a.pt")
+    assert found["description"] == DESCRIPTION
+    assert found["best"] == 0.5
+    torch.testing.assert_close(found["policy"], WEIGHTS)
+
+
+@pytest.mark.parametrize("name", ["old_policy.safetensors", "old_checkpoint.pt"])
+def test_files_from_before_descriptions_are_translated(name):
+    found = read_policy(DATA / name)
+    assert "running_reward" in found["progress"]
+    assert found["description"]["task"]["num_cubes"] == 1
+    assert found["description"]["camera"]["width"] == 32
+    assert [t["name"] for t in found["description"]["transforms"]] == ["gray", "standardize"]
+    assert found["description"]["network"] == {
+        "name": "small_cnn",
+        "patch": 4,
+        "channels": [2, 3],
+        "hidden": [4],
+    }
+    assert found["policy"]["layers.fc1.weight"].shape == (4, 18)
+    network = parse(found["description"]).build_network()
+    network.load_state_dict(found["policy"])
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"\x02", "safetensors format"),
+        (b"not a policy at all", "safetensors format"),
+        ((2**40).to_bytes(8, "little") + b"{}", "safetensors format"),
+        (exported()[:-1], "weights are damaged"),
+        (exported() + b"1", "weights are damaged"),
+        (exported().replace(b'"layers.conv1.bias":{"dtype"', b'"layers.conv1.bias":{"dtypo"'), "f"),
+        (exported(format="drone_rl checkpoint"), "not a drone_rl policy"),
+        (exported(description=[]), "description"),
+        (exported(about={"extra": 1}), "'extra' is unknown"),
+        (exported(about={"command": "rm -rf /"}), "no training command"),
+        (exported(about={"command": "drone-rl train; rm -rf /"}), "no training command"),
+        (exported(about={"command": "drone-rl train `id`"}), "no training command"),
+        (exported(about={"command": "drone-rl train '"}), "no training command"),
+        (exported(about={"progress": {**PROGRESS, "frames": -1}}), "frames=-1"),
+        (exported(about={"provenance": {"versions": [], "git_revision": None}}), "versions"),
+        (exported(about={"evaluation": {"a": "b\nc"}}), "a text in"),
+        (exported(about={"verdict": {"a": "b\nc"}}), "a text in"),
+        (exported(about={"worlds": "r" * 30}), "worlds"),
+        (exported(about={"seed": 0.5}), r"seed=0\.5"),
+        (exported(about={"chosen": {"runs": 3}}), r"chosen\.episodes is missing"),
+        (exported({**WEIGHTS, "x": torch.zeros(1)}), "x' is .* absent by"),
+        (exported({k: v.double() for k, v in WEIGHTS.items()}), "not float32"),
+        (exported({k: v * float("nan") for k, v in WEIGHTS.items()}), "NaN"),
+        (exported({}), "absent in the file"),
+        (DAMAGED_DESCRIPTION, "its description is damaged"),
+    ],
+)
+def test_a_damaged_or_hostile_file_is_refused_in_one_line(tmp_path, content, message):
+    (tmp_path / "x.safetensors").write_bytes(content)
+    with pytest.raises(InputError, match=message) as error:
+        load_exported(tmp_path / "x.safetensors")
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"description": None}, "description=None"),
+        ({"policy": {}}, "absent in the file"),
+        ({"policy": 5}, "weights=5"),
+        ({"policy": {**WEIGHTS, "layers.conv1.bias": torch.tensor([0.0, float("inf")])}}, "NaN"),
+        ({"progress": {}}, r"progress\.frames is missing"),
+        ({"provenance": {"versions": {"torch": 5}, "git_revision": ""}}, r"versions\.torch=5"),
+        ({"config": {"a": torch.zeros(3)}}, "type Tensor"),
+        ({"config": [1]}, r"config=\(list\)"),
+    ],
+)
+def test_a_checkpoint_that_lies(tmp_path, change, message):
+    save_checkpoint(tmp_path / "a.pt", {**CHECKPOINT, **change})
+    with pytest.raises(InputError, match=message):
+        read_policy(tmp_path / "a.pt")
+
+
+def test_the_policies_travel_with_their_cards():
+    assert {"good", "poor", "right_and_forward", "proved"} <= set(policy_names())
+    for name in policy_names():
+        path, card = policy_path(name), card_path(name).read_text()
+        assert path.stat().st_size < 1_000_000
+        assert hashlib.sha256(path.read_bytes()).hexdigest() in card
+        assert load_exported(path)["command"] in card
+        assert b"_target_" not in path.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [
+        ("good", "good"),
+        ("poor", "poor"),
+        ("right_and_forward", "one-sided (right)"),
+        ("proved", "good"),
+        ("pillars_good", "good"),
+        ("pillars_reckless", "poor"),
+        ("pillars_timid", "poor"),
+        ("flight", "good"),
+        ("flight_wind", "good"),
+        ("flight_velocity", "good"),
+        ("flight_pillars", "good"),
+        ("robust", "good"),
+    ],
+)
+def test_each_is_what_its_name_says(name, kind):
+    found = load_exported(policy_path(name))
+    assert (found["verdict"]["kind"], found["verdict"]["certain"]) == (kind, True)
+    assert (found["worlds"], found["verdict"]["greedy"]["episodes"]) == ("report", 1000)
+
+
+def test_where_certificates_lie(tmp_path, monkeypatch):
+    assert shifts_path(policy_path("good")).name == "good.shifts.json"
+    assert certificate_path(policy_path("good")).name == "good.certificate.json"
+    assert certificate_path(policy_path("good")).parent == policy_path("good").parent
+    run = tmp_path / "run"
+    assert certificate_path(run / "checkpoints" / "best.pt") == run / "certificate.json"
+    monkeypatch.chdir(tmp_path)
+    assert certificate_path(Path("last.pt")) == tmp_path.parent / "certificate.json"
+    assert certificate_path(Path("/last.pt")) == Path("/certificate.json")
+
+
+@pytest.mark.parametrize("where", ["mine.md", "mine.shifts.json"])
+def test_an_export_that_fails_writes_nothing(tmp_path, where):
+    (tmp_path / where).mkdir()
+    path, carried = tmp_path / "mine.safetensors", {tmp_path / "mine.shifts.json": b"{}"}
+    origin = {"command": "drone-rl train", "seed": 5, "chosen": None, "carried": carried}
+    with pytest.raises(InputError, match=rf"{where}.*free some space"):
+        export_policy(path, CHECKPOINT, verdict=VERDICT, **origin)
+    with pytest.raises(KeyError):
+        export_policy(path, CHECKPOINT, verdict={**VERDICT, "failures": {}}, **origin)
+    assert [found.name for found in tmp_path.iterdir()] == [where]

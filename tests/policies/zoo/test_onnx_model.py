@@ -1,0 +1,183 @@
+"""An ONNX model computes what the pipeline does, and says all that is needed to fly it."""
+
+import json
+import logging
+import sys
+import warnings
+
+import onnx
+import onnxruntime
+import pytest
+import torch
+
+from drone_rl.envs import on_pixels
+from drone_rl.evaluation import agreement
+from drone_rl.policies import MLP, make_actor
+from drone_rl.policies.zoo import make_onnx, open_onnx, parse, register_network
+from drone_rl.policies.zoo.registry import NETWORKS
+from drone_rl.sim.continuous_actions import ContinuousActions
+from drone_rl.utils.errors import InputError
+from tests.continuous import SETTINGS
+from tests.policies.zoo.test_description import DEFAULT
+
+GRAY, STANDARD = {"name": "gray"}, {"name": "standardize", "mean": 0.53, "std": 0.21}
+BLIND = [{"name": "episode_reward"}, {"name": "step_count"}]
+LINEAR = {"name": "mlp", "hidden": []}
+
+
+def described(height, width, transforms, network):
+    camera = {**DEFAULT["camera"], "height": height, "width": width}
+    parts = {"camera": camera, "transforms": transforms, "network": network}
+    return parse({**DEFAULT, **parts})
+
+
+def built(description, scale=1.0):
+    network = description.build_network(torch.Generator().manual_seed(0))
+    network.layers.get_parameter("logits.weight").data.mul_(scale)
+    return network
+
+
+@pytest.fixture(scope="module")
+def linear():
+    """A picture of 1x2 pixels, of which the logits are gray levels and nothing else."""
+    description = described(1, 2, [GRAY], LINEAR)
+    network = built(description)
+    with torch.no_grad():
+        network.layers.get_parameter("logits.bias").copy_(torch.tensor([0.0, 0.0, 1.0]))
+        weights = torch.tensor([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]])
+        network.layers.get_parameter("logits.weight").copy_(weights)
+    return make_onnx(description, network, {"command": "drone-rl train seed=7"})
+
+
+def test_probabilities_of_a_picture_by_hand(linear):
+    red_and_white = [[[255, 0, 0], [255, 255, 255]]]
+    black_and_blue = [[[0, 0, 0], [0, 0, 255]]]
+    green_twice = [[[0, 255, 0], [0, 255, 0]]]
+    frames = torch.tensor([red_and_white, black_and_blue, green_twice], dtype=torch.uint8)
+    logits = torch.tensor([[0.299, 1.0, 1.0], [0.0, 0.114, 1.0], [0.587, 0.587, 1.0]])
+    torch.testing.assert_close(open_onnx(linear)(frames), logits.softmax(-1))
+    torch.testing.assert_close(open_onnx(linear)(frames[:1]), logits[:1].softmax(-1))
+
+
+def test_inputs_outputs_and_what_they_mean_are_told(linear):
+    session = onnxruntime.InferenceSession(linear)
+    ((given,), (got,)) = (session.get_inputs(), session.get_outputs())
+    assert (given.name, given.type, given.shape[1:]) == ("frames", "tensor(uint8)", [1, 2, 3])
+    assert (got.name, got.type, got.shape[1:]) == ("probabilities", "tensor(float)", [3])
+    assert isinstance(given.shape[0], str) and given.shape[0] == got.shape[0]  # any number
+    told = session.get_modelmeta().custom_metadata_map
+    told = {key: json.loads(text) for key, text in told.items()}
+    assert told.pop("actions") == ["forward", "left", "right"]
+    assert told.pop("command") == "drone-rl train seed=7"
+    assert parse(told) == described(1, 2, [GRAY], LINEAR)
+
+
+def test_speeds_are_told_beside_the_probabilities_of_their_parts():
+    description = described(1, 2, [GRAY], LINEAR)
+    network = MLP((1, 1, 2), 6, hidden=(), generator=torch.Generator().manual_seed(0))
+    network.actions = ContinuousActions.of(SETTINGS)
+    content = make_onnx(description, network, {})
+    session = onnxruntime.InferenceSession(content)
+    told = json.loads(session.get_modelmeta().custom_metadata_map["actions"])
+    assert told == ["forward", "left", "right", "turn left", "turn right"]
+    frames = torch.tensor([[[[255, 0, 0], [9, 99, 255]]]], dtype=torch.uint8)
+    found = dict(
+        zip(
+            (o.name for o in session.get_outputs()),
+            session.run(None, {"frames": frames.numpy()}),
+            strict=True,
+        )
+    )
+    with torch.no_grad():
+        outputs = network(on_pixels(description.make_transforms())(frames))
+    assert set(found) == {"probabilities", "action"}
+    expected = {
+        "probabilities": network.actions.wish(outputs),
+        "action": outputs[:, :3].div(3).tanh().mul(3).tanh(),
+    }
+    for name, values in expected.items():
+        torch.testing.assert_close(torch.from_numpy(found[name]), values, atol=1e-6, rtol=0)
+    torch.testing.assert_close(open_onnx(content)(frames), torch.from_numpy(found["probabilities"]))
+
+
+def test_it_is_a_valid_model_that_tells_nothing_of_the_machine(linear):
+    onnx.checker.check_model(onnx.load_from_string(linear), full_check=True)
+    for word in (b"stack_trace", b"onnx_model.py", sys.prefix.encode()):
+        assert word not in linear
+
+
+def test_frames_of_another_camera_are_refused_by_the_runtime(linear):
+    with pytest.raises(Exception, match="Got: 3 Expected: 2"):
+        open_onnx(linear)(torch.zeros(1, 1, 3, 3, dtype=torch.uint8))
+
+
+@pytest.mark.parametrize(
+    ("height", "width", "transforms", "network"),
+    [
+        (25, 64, [GRAY, STANDARD, *BLIND], DEFAULT["network"]),
+        (
+            *(36, 64, [GRAY, STANDARD, {"name": "crop", "top": 5, "bottom": 30}]),
+            {"name": "original_cnn", "channels": [6, 16], "hidden": [120, 84]},
+        ),
+        (31, 77, [GRAY, {"name": "resize", "height": 13, "width": 40}, STANDARD], LINEAR),
+        (7, 9, [GRAY, {"name": "resize", "height": 10, "width": 20}], LINEAR),
+        (5, 6, [STANDARD], {"name": "mlp", "hidden": [4]}),
+        (9, 11, [GRAY, {"name": "blur", "width": 0.8}, STANDARD], LINEAR),
+    ],
+    ids=["default", "original", "averaged unevenly", "enlarged", "in colour", "blurred"],
+)
+def test_it_agrees_with_the_pipeline_in_flight(height, width, transforms, network):
+    description = described(height, width, transforms, network)
+    policy = built(description, scale=20.0)
+    env = description.build_env(8, seed=0, device="cpu")
+    actor = make_actor(policy, env.action_spec, torch.Generator().manual_seed(0))
+    found = agreement(env, actor, open_onnx(make_onnx(description, policy, {})), 40)
+    env.close()
+    assert found.difference <= 1e-5 and found.actions_differ == 0 and found.frames == 320
+
+
+def test_the_same_policy_makes_the_same_file():
+    description = described(5, 6, [GRAY], LINEAR)
+    assert make_onnx(description, built(description), {}) == make_onnx(
+        description, built(description), {}
+    )
+
+
+def test_stacks_of_frames_are_refused():
+    description = described(25, 64, [GRAY, {"name": "stack", "N": 2}], LINEAR)
+    with pytest.raises(InputError, match=r"stack of frames.*format=safetensors"):
+        make_onnx(description, built(description), {})
+
+
+class Torn(MLP):
+    """A network that takes different ways with different pictures, which no graph can."""
+
+    def forward(self, pixels):
+        return super().forward(pixels if pixels.sum() > 0 else -pixels)
+
+
+def test_what_onnx_cant_say_is_one_line(monkeypatch):
+    monkeypatch.setitem(NETWORKS, "torn", None)  # and gone again afterwards
+    register_network("torn", Torn, {})
+    description = described(5, 6, [GRAY], {"name": "torn"})
+    with pytest.raises(InputError, match=r"can't be written as an ONNX model \(.*safeten") as told:
+        make_onnx(description, built(description), {})
+    assert "\n" not in str(told.value)
+
+
+@pytest.mark.parametrize("missing", ["onnxscript", "onnxruntime"])
+def test_a_missing_package_is_named_with_its_remedy(missing, monkeypatch, linear):
+    monkeypatch.setitem(sys.modules, missing, None)
+    description = described(5, 6, [GRAY], LINEAR)
+    with pytest.raises(InputError, match=rf"format=onnx needs {missing}.*'drone-rl\[onnx\]'"):
+        open_onnx(make_onnx(description, built(description), {}))
+
+
+def test_nothing_is_said_and_nothing_is_left_changed(caplog, capfd):
+    description = described(5, 6, [GRAY], LINEAR)
+    caplog.set_level(logging.INFO)
+    with warnings.catch_warnings(record=True) as warned:
+        make_onnx(description, built(description), {})
+    printed = capfd.readouterr()
+    assert (caplog.text, printed.out, printed.err, warned) == ("", "", "", [])
+    assert logging.root.manager.disable == 0

@@ -1,0 +1,60 @@
+import numpy as np
+
+from benchmarks.evidence import SHIFTS, changed
+from drone_rl.evaluation.plots.palette import INK
+from drone_rl.robustness.charts import chart, strips
+
+PICTURES = [np.full((25, 64, 3), 40 * i, np.uint8) for i in range(6)]
+
+
+def test_curves_go_through_what_was_measured():
+    figure = chart(SHIFTS)
+    sun = figure.axes[0]
+    assert sun.get_title() == "height of the sun" and sun.get_xlabel() == "degrees"
+    policy = next(line for line in sun.lines if line.get_label() == "success of the policy")
+    np.testing.assert_allclose(policy.get_xdata(), [-55, 0, 5])
+    np.testing.assert_allclose(policy.get_ydata(), [0.1, 1.0, 0.995])
+    oracle = next(line for line in sun.lines if str(line.get_label()).startswith("oracle"))
+    np.testing.assert_allclose(oracle.get_ydata(), [0.45, 1.0, 1.0])
+    assert [text.get_text() for text in sun.get_xticklabels()] == ["0", "55", "60"]
+    crosses = [line for line in sun.lines if line.get_label() == "impossible"]
+    assert [line.get_xdata()[0] for line in crosses] == [-55]
+    legend = figure.axes[3].get_legend()
+    assert "surely good in this range" in [text.get_text() for text in legend.get_texts()]
+
+
+def test_nothing_is_called_good_without_a_search():
+    figure = chart(changed(SHIFTS, {"domain": None}))
+    labels = [label for axis in figure.axes for label in axis.get_legend_handles_labels()[1]]
+    assert "surely good in this range" not in labels
+
+
+def test_strips_show_what_was_flown():
+    one = strips(SHIFTS, {"sun": PICTURES})
+    assert one.height >= 25 * 3 and one.width > 6 * 64 * 3
+    two = strips(SHIFTS, {"sun": PICTURES, "blur": [*PICTURES[:3], None, *PICTURES[4:]]})
+    assert two.height == 2 * one.height
+    counts = {color: count for count, color in one.convert("L").getcolors()}
+    shown = {color for color in range(0, 240, 40) if counts.get(color, 0) >= 25 * 64 * 9}
+    assert shown == {0, 40, 200}  # strengths 1 and 5 alone were flown
+
+
+def test_ticks_stand_in_the_order_of_places_also_where_less_is_worse():
+    levels = [
+        {**level, "value": value, "position": -100 + value}
+        for level, value in zip(SHIFTS["axes"]["sun"]["levels"], (80.0, 20.0), strict=True)
+    ]
+    away = {**SHIFTS["axes"]["sun"], "neutral": None, "levels": levels}
+    axis = chart(changed(SHIFTS, {"axes.sun": away})).axes[0]
+    assert axis.get_xticks().tolist() == [-80, -20, 0]
+    assert [text.get_text() for text in axis.get_xticklabels()] == ["20", "80", "none"]
+
+
+def test_a_strip_by_the_pixel():
+    shown = np.asarray(strips(SHIFTS, {"sun": PICTURES}))
+    assert shown.shape == (22 + 3 * 25 + 6, 190 + 6 * (3 * 64 + 8), 3)
+    ink = (shown == INK).all(-1)
+    assert ink[32:50, :190].any()  # the name, in the middle of the row
+    for number, level in enumerate((0, 40, 200)):  # with nothing different, then strengths 1 and 5
+        left = 190 + number * 200
+        assert (shown[22:97, left : left + 192] == level).all()

@@ -1,0 +1,105 @@
+import pytest
+
+from benchmarks.evidence import SHIFTS, VERDICT, changed
+from drone_rl.robustness.domain_text import (
+    QUOTED,
+    contradicted,
+    is_quoted,
+    lacking,
+    untested,
+    why_not,
+)
+from drone_rl.utils.sentences import said
+
+GOOD = {"verdict": {**VERDICT, "kind": "good", "certain": True}, "shifts": SHIFTS}
+
+
+def test_what_is_quoted_says_of_whom_and_by_what():
+    text = said(QUOTED, GOOD)
+    assert list(text) == ["domain.quoted"]
+    assert "the sun 21.1 to 60 degrees high" in text["domain.quoted"]
+    quoted = text["domain.quoted"]
+    assert quoted.startswith(
+        "Read from shifts.json, dated 2026-01-31 12:00, not measured again here: Good, with"
+    )
+    assert quoted.endswith(
+        "400 (ranges) and 200 (others) flights at each strength (seed 0) of 3 axes (height of the "
+        "sun, blur and brightness)."
+    )
+    few = said(QUOTED, changed(GOOD, {"shifts.domain": None}))["domain.quoted"]
+    assert "task: 200 flights at each strength" in few and "Good, with" not in few
+
+
+@pytest.mark.parametrize(
+    ("changes", "why"),
+    [
+        ({"shifts": {"refused": "it is of another task"}}, "of another task"),
+        ({"verdict.good_share": 0.99}, "a share of 0.9 of the oracle's success, this verdict one"),
+        ({"verdict.kind": "poor"}, "this verdict's do not"),
+    ],
+)
+def test_what_speaks_against_them_is_said_instead(changes, why):
+    evidence = changed(GOOD, changes)
+    assert not is_quoted(evidence) and why in why_not(evidence)
+    assert list(said(QUOTED, evidence)) == ["domain.refused"]
+    assert untested(evidence) == ["colours", "light", "sizes"]
+
+
+def test_an_open_verdict_and_a_policy_that_is_good_nowhere_go_together():
+    assert is_quoted(changed(GOOD, {"verdict.kind": "poor", "verdict.certain": False}))
+    nowhere = {"shifts.domain.plain.good": False, "verdict.kind": "poor"}
+    assert is_quoted(changed(GOOD, nowhere))
+
+
+def test_what_was_not_flown_stays_untested():
+    assert untested(GOOD) == ["colours", "sizes"]
+    assert untested({"verdict": VERDICT}) == ["colours", "light", "sizes"]
+
+
+@pytest.mark.parametrize(
+    ("name", "low", "high", "words"),
+    [
+        ("sun", 21.07, 60.0, None),
+        ("sun", 30.0, None, None),
+        ("sun", None, 30.0, None),
+        ("sun", 21.0, None, "needed 21 to 55 degrees, good 21.07 to 60 degrees"),
+        ("sun", 30.0, 61.0, "needed 30 to 61 degrees"),
+        ("blur", None, 1.5, None),
+        ("blur", None, 1.6, "needed 0 to 1.6 pixels, good 0 to 1.5 pixels"),
+        ("brightness", 0.9, 1.0, "good 1 to 1 times"),
+        ("fog", 60.0, None, "fog: not flown; run drone-rl shifts with axes=[fog]"),
+    ],
+)
+def test_what_is_lacking(name, low, high, words):
+    found = lacking(SHIFTS, name, {"low": low, "high": high})
+    assert found == words if words is None else words in found
+
+
+def test_fog_is_needed_up_to_none():
+    ranges = {"low": 80.0, "high": None, "positions": [0.0, 1 / 80], "failed": []}  # from clear air
+    fog = {**SHIFTS["axes"]["blur"], "neutral": None, "unit": "m of sight"}
+    shifts = changed(SHIFTS, {"axes.fog": fog, "domain.ranges.fog": ranges})
+    assert lacking(shifts, "fog", {"low": 80.0, "high": None}) is None
+    found = lacking(shifts, "fog", {"low": 60.0, "high": None})
+    assert "needed 60 and more m of sight, good 80 and more m of sight" in found
+
+
+def test_what_new_episodes_say_against_a_file():
+    probed = {"refused": None, "success": 0.5}
+    assert contradicted("blur", 1.0, "pixels", probed) == (
+        "blur at 1 pixels: new episodes succeed in 50%, so that it is surely not good there; the "
+        "file says that it is"
+    )
+    assert contradicted(None, 0.0, "", probed).startswith("where nothing is different: new epis")
+    refused = contradicted("blur", 1.0, "pixels", {"refused": "too large"})
+    assert refused == "blur at 1 pixels: the task can't be so (too large)"
+
+
+def test_what_was_no_test_covers_nothing_and_what_nobody_can_is_said():
+    need = {"low": None, "high": 1.0}
+    same = {"axes.blur.levels.1.modes.constant.unchanged": True}
+    assert "notices nothing" in lacking(changed(SHIFTS, same), "blur", need)
+    nowhere = {"domain.ranges.blur.positions": None}
+    assert "where nothing is different" in lacking(changed(SHIFTS, nowhere), "blur", need)
+    lost = {"domain.ranges.blur.failed": [{"end": "high", "impossible": True}]}
+    assert "nobody can" in lacking(changed(SHIFTS, lost), "blur", {"low": None, "high": 2.0})

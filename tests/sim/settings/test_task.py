@@ -1,7 +1,0 @@
-from drone_rl.sim.settings import PillarsSettings, TaskSettings
-from drone_rl.sim.settings.task import FIRST
-
-
-def test_settings_name_their_task_but_the_first():
-    assert PillarsSettings(num_rows=2).values()["name"] == "pillars"
-    assert "name" not in TaskSettings().values() and TaskSettings.name == FIRST

@@ -1,0 +1,48 @@
+import dataclasses
+
+import pytest
+
+from drone_rl.sim.vocabulary import CUBES, MOST, terms_of
+from drone_rl.utils.errors import InputError
+
+
+def test_words_go_through_files_and_older_files_are_about_cubes():
+    assert terms_of({}) == CUBES
+    other = dataclasses.replace(CUBES, goal="post", sides={"near": "close by"})
+    assert terms_of({"terms": other.as_dict()}) == other
+
+
+def test_phrases():
+    assert (CUBES.goals, CUBES.targets, CUBES.reaches, CUBES.handles) == (
+        "cubes", "cubes", "collects", "collects the cube",
+    )  # fmt: skip
+    assert dataclasses.replace(CUBES, reach="reach").reaches == "reaches"
+    assert CUBES.side("left") == "on its left" and CUBES.side("above") == "above"
+    assert CUBES.place("right") == "on its right" and CUBES.label("row") == "row"
+    assert CUBES.ending("step_limit") == "at the step limit"
+    assert CUBES.ending("wall_touched") == "by wall touched"
+
+
+@pytest.mark.parametrize(
+    ("by", "value", "said"),
+    [
+        ("cube", "second", "at the second cube"),
+        ("side", "left", "with cubes on its left"),
+        ("sideways", "4 to 6 m", "with cubes 4 to 6 m to its side"),
+        ("height", "lower", "with cubes lower than itself"),
+        ("end", "side_boundary", "by ending outside the field, left or right"),
+        ("wind", "strong", "where wind is strong"),
+    ],
+)
+def test_failures_have_a_place(by, value, said):
+    assert CUBES.failing(by, value) == said
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"goal": 3}, {"goal": "c" * 201}, {"sides": ["left"]}, {"follows": 1}, {"extra": ""},
+     {"ends": {str(i): "" for i in range(MOST + 1)}}, {"goal": "a\nb"}],
+)  # fmt: skip
+def test_words_out_of_a_file_are_texts_in_bounds(change):
+    with pytest.raises(InputError, match="terms"):
+        terms_of({"terms": {**CUBES.as_dict(), **change}})

@@ -1,0 +1,83 @@
+"""A policy that is lucky while it draws its actions has not solved its task."""
+
+import pytest
+import torch
+
+import drone_rl
+from drone_rl.config import TaskSettings
+from drone_rl.config.training import TrainerSettings, TrainSettings
+from drone_rl.policies import MLP
+from drone_rl.training import confirmation as confirming
+from drone_rl.training.confirmation import Confirmation
+from drone_rl.utils.progress import silent
+from drone_rl.utils.seeding import Stream
+
+SETTINGS = TrainSettings(
+    task=TaskSettings(num_cubes=1, first_distance=5.0, lateral_bound=3.0, step_limit=20),
+    trainer=TrainerSettings(confirm_episodes=40),
+    seed=3,
+)
+
+
+def always(*logits):
+    network = MLP((1, 25, 64), 3, hidden=(4,))
+    with torch.no_grad():
+        network.layers.logits.weight.zero_()
+        network.layers.logits.bias.copy_(torch.tensor(logits))
+    return network
+
+
+def test_the_most_probable_action_counts_however_close_the_others_are():
+    ahead = SETTINGS.replace(task=SETTINGS.task.replace(lateral_bound=0.5))
+    straight = Confirmation(ahead, always(0.02, 0.01, 0.0))
+    assert straight(1)
+    assert straight.told == {"confirming_flights": 40, "confirming_flights_succeeded": 40}
+    lucky = Confirmation(ahead, always(0.01, 0.02, 0.0))  # drawn actions come by it now and then
+    assert not lucky(1) and not lucky(2)
+    assert lucky.told == {"confirming_flights": 80, "confirming_flights_succeeded": 0}
+
+
+def test_the_share_is_that_of_flights_that_reach_everything():
+    straight = Confirmation(SETTINGS, always(1.0, 0.0, 0.0))
+    assert not straight(1)
+    reached = straight.succeeded
+    assert 0 < reached < 40  # a drone that flies straight on touches what is 1.65 m aside or less
+    for share, is_enough in ((reached / 40, True), (reached / 40 + 0.01, False)):
+        trainer = SETTINGS.trainer.replace(confirm_share=share)
+        again = Confirmation(SETTINGS.replace(trainer=trainer), always(1.0, 0.0, 0.0))
+        assert again(1) is is_enough and again.succeeded == reached
+
+
+def test_worlds_are_of_their_own_after_each_update(monkeypatch):
+    asked, fly = [], confirming.run_episodes
+
+    def note(env, actor, episodes, **how):
+        base = env.base_env
+        base.reset()
+        asked.append(
+            (base.stream, base.first_world, len(base.worlds.state), base.worlds.state.cubes.clone())
+        )
+        base.set_seed(SETTINGS.seed)
+        return fly(env, actor, episodes, **how)
+
+    monkeypatch.setattr(confirming, "run_episodes", note)
+    confirmation = Confirmation(SETTINGS, always(1.0, 0.0, 0.0))
+    shares = [(confirmation(update), confirmation.succeeded)[1] for update in (1, 1, 2)]
+    assert shares[0] == shares[1]
+    assert [a[:3] for a in asked] == [(Stream.CONFIRMATION, n, 40) for n in (250, 250, 500)]
+    assert torch.equal(asked[0][3], asked[1][3]) and not torch.equal(asked[0][3], asked[2][3])
+
+
+@pytest.mark.parametrize(("episodes", "reason"), [(0, "solved"), (8, "frames")])
+def test_a_training_goes_on_until_it_is_confirmed(tmp_path, episodes, reason):
+    """The first reward passes for success, which only flights can gainsay."""
+    trainer = SETTINGS.trainer.replace(
+        total_frames=400, target_share=1e-3, confirm_episodes=episodes
+    )
+    collector = SETTINGS.collector.replace(num_envs=4)
+    optimiser = SETTINGS.optimiser.replace(lr=1e-9)
+    settings = SETTINGS.replace(trainer=trainer, collector=collector, optimiser=optimiser)
+    done = drone_rl.train(settings, folder=tmp_path / "run", progress=silent)
+    assert done.reason == reason
+    assert done.result.get("confirming_flights", 0) % 8 == 0
+    assert ("confirming_flights" in done.result) is (episodes > 0)

@@ -1,0 +1,298 @@
+"""A training in Python is that of the command line, and goes on bit for bit."""
+
+import json
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import torch
+import yaml
+
+import drone_rl
+from drone_rl.config import DynamicsSettings, TaskSettings
+from drone_rl.config.collecting import Threads
+from drone_rl.config.training import TrainerSettings, TrainSettings
+from drone_rl.training import Callback
+from drone_rl.training.train import _read_best
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.progress import silent
+
+OLD = Path(__file__).parents[1] / "data" / "old_checkpoint.pt"
+TINY = TrainSettings(
+    task=TaskSettings(num_cubes=1, first_distance=8.0, step_limit=60),
+    collector=Threads(num_envs=4),
+    trainer=TrainerSettings(total_frames=300),
+)
+
+
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory):
+    said = []
+    folder = tmp_path_factory.mktemp("run") / "mine"
+
+    def note(text, done=0, total=0):
+        said.append((text, done, total))
+
+    return drone_rl.train(TINY, folder=folder, progress=note), said
+
+
+def weights(folder):
+    return drone_rl.load_policy(folder).state["policy"]
+
+
+def test_it_leaves_what_the_command_line_leaves(trained):
+    done, said = trained
+    assert done.reason == "frames"
+    assert {p.name for p in done.folder.iterdir() if p.suffix} == {
+        *("metrics.csv", "result.json", "run.yaml"),
+    }
+    assert json.loads((done.folder / "result.json").read_text()) == done.result
+    noted = yaml.safe_load((done.folder / "run.yaml").read_text())
+    assert noted["config"]["task"]["num_cubes"] == 1
+    assert noted["description"]["network"]["name"] == "small_cnn"
+    assert said[-1][0] == "stopped: frames"
+    assert done.policy.name == "mine"
+
+
+def test_it_shows_itself(trained):
+    done, _ = trained
+    assert done.metrics()["frames"][-1] == done.result["frames"]
+    assert done.running_reward == done.result["running_reward"]
+    shown = done._repr_html_()
+    assert "<td>reason</td><td>frames</td>" in shown
+    assert "data:image/png;base64," in shown
+
+
+def test_stopped_and_resumed_is_the_uninterrupted(trained, tmp_path):
+    longer = TINY.trainer.replace(total_frames=900)
+    whole = drone_rl.train(TINY, folder=tmp_path / "whole", trainer=longer, progress=silent)
+    half = drone_rl.train(TINY, folder=tmp_path / "half", progress=silent)
+    assert half.result["frames"] < 900
+    again = drone_rl.train(folder=half.folder, resume=True, trainer=longer, progress=silent)
+    assert again.result["frames"] == whole.result["frames"]
+    one, two = weights(whole.folder), weights(again.folder)
+    assert all(torch.equal(one[name], two[name]) for name in one)
+
+
+def test_a_run_of_version_0_1_goes_on(tmp_path):
+    (tmp_path / "checkpoints").mkdir()
+    shutil.copy(OLD, tmp_path / "checkpoints" / "last.pt")
+    before = drone_rl.load_policy(tmp_path).state["progress"]
+    was = {"num_threads": 1, "compiled": False, "minibatch_frames": 512}
+    more = TrainerSettings(total_frames=before["frames"] + 50, **was)
+    done = drone_rl.train(folder=tmp_path, resume=True, trainer=more, progress=silent)
+    assert done.result["updates"] > before["updates"]
+    assert done.result["frames"] >= before["frames"] + 50
+
+
+def test_a_run_goes_on_that_was_killed_before_its_first_update(trained, tmp_path):
+    class Killed(BaseException):
+        pass
+
+    class Kill(Callback):
+        def on_start(self, training):
+            raise Killed
+
+    with pytest.raises(Killed):
+        drone_rl.train(TINY, folder=tmp_path, callbacks=[Kill()], progress=silent)
+    done = drone_rl.train(folder=tmp_path, resume=True, progress=silent)
+    there, whole = weights(done.folder), weights(trained[0].folder)
+    assert all(torch.equal(there[name], whole[name]) for name in whole)
+
+
+@pytest.mark.parametrize("best", [float("nan"), float("inf"), 1e9, "high", None])
+def test_the_best_mean_of_a_checkpoint_is_a_number(best):
+    with pytest.raises(InputError, match=r"^the checkpoint's best="):
+        _read_best(best)
+
+
+def test_a_resumed_run_learns_as_it_did(trained):
+    done, _ = trained
+    with pytest.raises(InputError, match=r"can't resume with seed=5: .* seed=0"):
+        drone_rl.train(TINY, folder=done.folder, resume=True, seed=5)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"seed": -1}, "seed=-1 is out of range; give a whole number of 0 or more"),
+        ({"task": {"num_cubes": 1}}, r"task=\(dict\) is no BaseTaskSettings"),
+        ({"returns": 3}, "returns=3 is no Returns"),
+        ({"transforms": (3,)}, r"transforms\[0\]=3 is no Transform"),
+        ({"wind": 3}, "wind is unknown; there are: task, appearance, dynamics, actions, camera"),
+    ],
+)
+def test_mistakes_name_the_argument(change, message, tmp_path):
+    with pytest.raises(InputError, match=f"^{message}"):
+        drone_rl.train(folder=tmp_path, **change)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_training_in_flight_is_described_and_goes_on_as_it_was(tmp_path, trained):
+    flight = DynamicsSettings(mode="simple_flight", gusts=1.0)
+    task = TaskSettings(num_cubes=1, first_distance=3.0, step_limit=20, front_margin=2.0)
+    short = TrainerSettings(total_frames=100, confirm_episodes=0)
+    told = TINY.replace(task=task, dynamics=flight, trainer=short)
+    whole = told.replace(trainer=short.replace(total_frames=200))
+    drone_rl.train(told, folder=tmp_path / "parts", progress=silent)
+    parts = drone_rl.train(whole, folder=tmp_path / "parts", resume=True, progress=silent)
+    once = drone_rl.train(whole, folder=tmp_path / "once", progress=silent)
+    own, other = weights(parts.folder), weights(once.folder)
+    assert all(torch.equal(own[name], other[name]) for name in own)
+    assert parts.policy.dynamics == flight and parts.policy.unlike == {}
+    assert "end/lost_control" in parts.metrics()
+    assert "end/lost_control" not in trained[0].metrics()  # where nothing can be lost
+    with pytest.raises(InputError, match=r"^can't resume with dynamics\.gusts=2\.0: "):
+        windy = whole.replace(dynamics=flight.replace(gusts=2.0))
+        drone_rl.train(windy, folder=parts.folder, resume=True, progress=silent)
+
+
+class Stop(Callback):
+    """Sends signals to this process after an update, or before the first."""
+
+    def __init__(self, *numbers, update=1):
+        self.numbers, self.update = numbers, update
+
+    def send(self):
+        for number in self.numbers:
+            signal.raise_signal(number)
+
+    def on_start(self, training):
+        if self.update == 0:
+            self.send()
+
+    def on_update(self, training, metrics):
+        if training.progress.updates == self.update:
+            self.send()
+
+
+@pytest.fixture
+def handlers():
+    """Python's own handlers, whatever this process was started with; returns what sets others."""
+    defaults = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
+    before = {number: signal.signal(number, handler) for number, handler in defaults.items()}
+    yield signal.signal
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+def assert_goes_on(folder, trained):
+    """What is learned is that of the training which nobody stopped."""
+    drone_rl.train(folder=folder, resume=True, progress=silent)
+    there, whole = weights(folder), weights(trained[0].folder)
+    assert all(torch.equal(there[name], whole[name]) for name in whole)
+
+
+@pytest.mark.parametrize("update", [0, 1])
+@pytest.mark.parametrize(
+    ("number", "raised", "args"),
+    [
+        (signal.SIGINT, KeyboardInterrupt, "resume=True"),
+        (signal.SIGTERM, SystemExit, "143"),
+    ],
+)
+def test_a_signal_acts_once_the_state_is_saved(
+    trained, tmp_path, handlers, number, raised, args, update
+):
+    with pytest.raises(raised, match=args) as stopped:
+        drone_rl.train(TINY, folder=tmp_path, callbacks=[Stop(number, update=update)])
+    done = stopped.value.training
+    assert done.reason == number.name
+    assert json.loads((tmp_path / "result.json").read_text()) == done.result
+    assert done.result["updates"] == update
+    assert_goes_on(tmp_path, trained)
+
+
+def test_a_second_ctrl_c_does_not_wait_for_the_state(trained, tmp_path, handlers):
+    with pytest.raises(KeyboardInterrupt) as stopped:
+        drone_rl.train(TINY, folder=tmp_path, callbacks=[Stop(signal.SIGINT, signal.SIGINT)])
+    assert not hasattr(stopped.value, "training")
+    assert not (tmp_path / "result.json").exists()
+    assert_goes_on(tmp_path, trained)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_handler_of_the_callers_own_decides(tmp_path, handlers, number):
+    got = []
+    handlers(number, lambda n, frame: got.append(n))
+    done = drone_rl.train(TINY, folder=tmp_path, callbacks=[Stop(number)], progress=silent)
+    assert got == [number] and done.reason == number.name
+
+
+def test_a_signal_that_is_ignored_stops_training_too(tmp_path, handlers):
+    """As in a process started in the background of a script, which ignores Ctrl-C."""
+    handlers(signal.SIGINT, signal.SIG_IGN)
+    with pytest.raises(KeyboardInterrupt):
+        drone_rl.train(TINY, folder=tmp_path, callbacks=[Stop(signal.SIGINT)], progress=silent)
+    assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+
+
+def test_a_stopped_confirmation_is_repeated(tmp_path, handlers, monkeypatch):
+    flown = []
+
+    def confirm(self, update):
+        flown.append(update)
+        if len(flown) == 1:
+            signal.raise_signal(signal.SIGINT)
+        return True
+
+    monkeypatch.setattr("drone_rl.training.confirmation.Confirmation.__call__", confirm)
+    easy = TINY.replace(trainer=TINY.trainer.replace(target_share=1e-9))
+    with pytest.raises(KeyboardInterrupt):
+        drone_rl.train(easy, folder=tmp_path, progress=silent)
+    done = drone_rl.train(folder=tmp_path, resume=True, progress=silent)
+    assert done.reason == "solved" and len(flown) == 2 and flown[0] == flown[1]
+
+
+@pytest.mark.parametrize(
+    ("number", "statuses"),
+    [
+        (signal.SIGINT, (-signal.SIGINT, 1)),  # 1 where Ray is installed: what it does at exit
+        (signal.SIGTERM, (143,)),
+    ],
+)
+def test_a_signal_ends_a_loop_of_trainings(tmp_path, number, statuses):
+    code = (
+        "import signal, drone_rl\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "short = drone_rl.TrainerSettings(total_frames=10_000_000)\n"
+        "for seed in range(3):\n"
+        "    drone_rl.train(folder=f'run{seed}', seed=seed, trainer=short)\n"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", code], cwd=tmp_path, stderr=subprocess.PIPE, text=True
+    )
+    while not (tmp_path / "run0" / "metrics.csv").exists():
+        assert process.poll() is None
+        time.sleep(0.02)
+    process.send_signal(number)
+    _, printed = process.communicate(timeout=60)
+    assert process.returncode in statuses, printed
+    assert ("KeyboardInterrupt: training stopped" in printed) == (number == signal.SIGINT)
+    assert [path.name for path in tmp_path.iterdir()] == ["run0"]
+    state = drone_rl.load_policy(tmp_path / "run0").state["progress"]
+    rows = (tmp_path / "run0" / "metrics.csv").read_text().splitlines()
+    assert state["updates"] == len(rows) - 1
+
+
+def contents(folder):
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_a_refused_resume_changes_nothing(trained, tmp_path):
+    folder = shutil.copytree(trained[0].folder, tmp_path / "run")
+    before = contents(folder)
+    with pytest.raises(InputError, match="can't resume with seed=9"):
+        drone_rl.train(folder=folder, resume=True, seed=9)
+    assert contents(folder) == before
+    state = torch.load(folder / "checkpoints" / "last.pt", weights_only=False)
+    torch.save({**state, "optimiser": {}}, folder / "checkpoints" / "last.pt")
+    before = contents(folder)
+    longer = TINY.trainer.replace(total_frames=900)
+    with pytest.raises(InputError):
+        drone_rl.train(folder=folder, resume=True, trainer=longer)
+    assert contents(folder) == before

@@ -1,0 +1,48 @@
+"""True certificates of the policies that travel with the package, made once."""
+
+import copy
+import json
+
+import pytest
+
+from drone_rl.verification.checker.certificate import parse_certificate
+from tests.verification.checker.making import certificate_of, of_one_cube, steps_of
+
+
+@pytest.fixture(scope="session")
+def one_sided_truth():
+    return of_one_cube("right_and_forward")
+
+
+@pytest.fixture
+def one_sided(one_sided_truth):
+    """Of the policy right_and_forward, one cube: won up to y = 1.65, lost to the left of it."""
+    return copy.deepcopy(one_sided_truth)
+
+
+@pytest.fixture
+def two_halves():
+    """Of the policy good, two cubes: all collected, in two boxes, steps of most stated."""
+    import drone_rl
+
+    policy = drone_rl.load_policy("good").in_task(num_cubes=2)
+    boxes = [[[-6.0, 1.0], [-6.0, 6.0]], [[1.0, 6.0], [-6.0, 6.0]]]
+    won = {"end": "all_cubes", "collected": [True, True], "loops": False, "share": 1.0}
+    found = steps_of(policy.description, policy.state["policy"])
+    steps = {number: 0.97 * share for number, share in found.items()}
+    return certificate_of(policy, [{**won, "steps": steps, "boxes": boxes}], [], 0.0)
+
+
+@pytest.fixture
+def parsed(one_sided):
+    return parse_certificate(one_sided)
+
+
+@pytest.fixture
+def write(tmp_path):
+    def to_file(data, name="certificate.json"):
+        path = tmp_path / name
+        path.write_bytes(data if isinstance(data, bytes) else json.dumps(data).encode())
+        return path
+
+    return to_file

@@ -1,0 +1,101 @@
+"""Cells and bands of a tiny camera, and of the real renderer."""
+
+import numpy as np
+import pytest
+
+from drone_rl.utils.errors import InputError
+from drone_rl.verification.prover.cells import Cells
+from drone_rl.verification.prover.silhouettes import Eye
+
+TINY = Eye(
+    left=np.array([1.0, -1.0]), up=np.array([0.0]), half=1.0, farthest=40.0, widest=20.0, bound=6.0
+)
+
+
+class Drawn:
+    """A renderer with an error in each pixel: colours are faces."""
+
+    def __init__(self, error=(0.0, 0.0), ahead=4.0):
+        self.error, self.ahead, self.looks = error, ahead, 0
+
+    def look(self, left):
+        self.looks += len(left)
+        faces = [
+            TINY.faces(self.ahead, left.astype(float) + e)[..., k] for k, e in enumerate(self.error)
+        ]
+        return np.stack(faces, -1)[..., None].repeat(3, -1)
+
+    def read(self, pictures):
+        return pictures[..., 0]
+
+
+def test_cells_by_hand():
+    """4 m ahead, pictures change 2, 4 and 6 m to either side."""
+    cells = Cells(TINY, 4.0, -5.0, 5.0)
+    middles = (cells.limits[1:] + cells.limits[:-1]) / 2
+    assert middles[1::2].round(6).tolist() == [-4.0, -2.0, 2.0, 4.0]
+    assert len(cells) == 9
+    assert np.diff(cells.limits)[1::2].max() < 2e-5
+    assert cells.pictures[:, 0].tolist() == [[0, 3], [0, 1], [0, 0], [1, 0], [2, 0]]
+
+
+def test_a_band_shows_what_is_on_either_side():
+    cells = Cells(TINY, 4.0, -5.0, 5.0)
+    assert cells.first.tolist() == [0, 0, 1, 1, 2, 2, 3, 3, 4]
+    assert cells.last.tolist() == [0, 1, 1, 2, 2, 3, 3, 4, 4]
+
+
+def test_spans():
+    cells = Cells(TINY, 4.0, -5.0, 5.0)
+    first, last = cells.span(np.array([-5.0, -1.0, 2.0]), np.array([-4.5, 3.0, 5.0]))
+    assert (first.tolist(), last.tolist()) == ([0, 4, 5], [0, 6, 8])
+
+
+def test_an_outermost_band_is_whole():
+    cells = Cells(TINY, 4.0, 2.0, 5.0)
+    assert cells.limits[0] < 2.0 - 1e-6
+    assert cells.pictures[:, 0].tolist() == [[0, 0], [1, 0], [2, 0]]
+
+
+def test_pictures_within_a_band_are_found():
+    """The pixel on the right changes late: at its borders there is a picture of neither side."""
+    both = Eye(**{**vars(TINY), "left": np.array([1.0, 1.0])})
+
+    class Late(Drawn):
+        def look(self, left):
+            faces = [both.faces(4.0, left.astype(float) - e)[..., :1] for e in (0.0, 1e-6)]
+            return np.concatenate(faces, -1)[..., None].repeat(3, -1)
+
+    cells = Cells(both, 4.0, 1.0, 3.0, Late())
+    assert cells.pictures[:, 0].tolist() == [[0, 0], [1, 0], [1, 1]]
+    assert (cells.first.tolist(), cells.last.tolist()) == ([0, 0, 2], [0, 2, 2])
+
+
+def test_a_renderer_that_is_a_little_off_gets_wider_bands():
+    narrow = np.diff(Cells(TINY, 4.0, 1.0, 3.0, Drawn()).limits)[1]
+    wide = np.diff(Cells(TINY, 4.0, 1.0, 3.0, Drawn((4e-6, 4e-6))).limits)[1]
+    assert wide > 2 * narrow
+
+
+def test_a_renderer_that_is_far_off_is_refused():
+    with pytest.raises(InputError, match="another picture than the closed form"):
+        Cells(TINY, 4.0, 1.0, 3.0, Drawn((1e-3, 1e-3)))
+
+
+def test_grazing_rows_are_refused():
+    eye = Eye(**{**vars(TINY), "up": np.array([0.5])})
+    with pytest.raises(InputError, match=r"3.0 m ahead a row of pixels just grazes"):
+        Cells(eye, 3.0, -5.0, 5.0)
+
+
+def test_a_part_of_a_row_shows_what_the_row_does_there():
+    whole = Cells(TINY, 4.0, -5.0, 5.0)
+    some = whole.between(-0.7, 2.5)
+    assert some.limits[0] <= -0.7 and some.limits[-1] >= 1.3
+    assert 1 < len(some) < len(whole) and len(some) % 2 == 1
+    (at,) = np.flatnonzero(whole.limits == some.limits[0])
+    for k in range(len(some)):
+        mine = some.pictures[some.first[k] : some.last[k] + 1]
+        theirs = whole.pictures[whole.first[at + k] : whole.last[at + k] + 1]
+        assert np.array_equal(mine, theirs)
+    assert len(some.pictures) == some.last[-1] + 1

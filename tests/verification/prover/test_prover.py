@@ -1,0 +1,173 @@
+"""Whole proofs of one cube: what is known of it by hand, and against flights."""
+
+import numpy as np
+import pytest
+
+import drone_rl
+from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.verification.prover.boxes import volumes
+from drone_rl.verification.prover.prover import Prover
+from drone_rl.verification.prover.subject import make_subject
+
+
+def prove(name, gap=1e-4, most=500_000_000, **task):
+    policy = drone_rl.load_policy(name).in_task(num_cubes=1, **task)
+    subject = make_subject(policy.description, policy.make_network(), gap)
+    prover = Prover(subject, most)
+    while not prover.is_finished:
+        prover.advance()
+    subject.close()
+    return prover
+
+
+@pytest.fixture(scope="module")
+def one_sided():
+    return prove("right_and_forward")
+
+
+def shares(findings, bound=6.0):
+    parts = {
+        (ending.reason.name, ending.collected): float(volumes(boxes).sum()) / (2 * bound)
+        for ending, boxes in findings.endings.items()
+    }
+    return parts, float(volumes(findings.undecided).sum()) / (2 * bound)
+
+
+def test_the_share_that_a_policy_collects(one_sided):
+    """It never goes to the left: it collects what stands up to 1.65 m to its left."""
+    parts, undecided = shares(one_sided.findings())
+    assert parts[("ALL_CUBES", 1)] == pytest.approx((6 + 1.65) / 12, abs=1e-9)
+    assert parts[("FRONT_BOUNDARY", 0)] == pytest.approx((6 - 1.65) / 12, abs=1e-9)
+    assert undecided < 1e-6
+
+
+def test_part_by_part_it_comes_to_the_same(one_sided):
+    in_parts = prove("right_and_forward", most=200)
+    assert in_parts.num_places > one_sided.num_places
+    (parts, undecided), (whole, left) = shares(in_parts.findings()), shares(one_sided.findings())
+    assert parts == pytest.approx(whole, abs=1e-12) and undecided == pytest.approx(left, abs=1e-12)
+    assert in_parts.findings().steps.keys() == one_sided.findings().steps.keys()
+
+
+def test_steps_are_counted(one_sided):
+    """At y=0 it takes 14 steps ahead and none to the side."""
+    steps = one_sided.findings().steps
+    (won,) = [e for e in steps if e.reason is EndReason.ALL_CUBES]
+    assert min(steps[won]) == 14
+    assert sum(steps[won].values()) <= (6 + 1.65) + 1e-9
+
+
+def test_it_says_what_flights_show(one_sided):
+    findings = one_sided.findings()
+    won = np.concatenate([b for e, b in findings.endings.items() if e.collected])
+    share = float(volumes(won).sum()) / 12
+    policy = drone_rl.load_policy("right_and_forward").in_task(num_cubes=1)
+    flown = drone_rl.evaluate(policy, episodes=200, baselines=False).success
+    assert abs(flown - share) < 5 * (share * (1 - share) / 200) ** 0.5
+
+
+def test_half_way_the_rest_is_undecided():
+    policy = drone_rl.load_policy("right_and_forward").in_task(num_cubes=1)
+    subject = make_subject(policy.description, policy.make_network(), 1e-4)
+    prover = Prover(subject)
+    for _ in range(5):
+        prover.advance()
+    parts, undecided = shares(prover.findings())
+    subject.close()
+    assert not prover.is_finished and prover.boxes_under_way > 0
+    assert parts == {} and undecided == 1.0
+
+
+def test_a_part_that_is_done_is_settled_and_how_it_came_is_forgotten():
+    policy = drone_rl.load_policy("right_and_forward").in_task(num_cubes=1, lateral_bound=2.0)
+    subject = make_subject(policy.description, policy.make_network(), 1e-4)
+    prover, most = Prover(subject, 200), 0
+    while not prover.is_finished:
+        prover.advance()
+        most = max(most, len(prover.forked), len(prover.ended))
+        findings = prover.findings()
+        parts, undecided = shares(findings, bound=2.0)
+        assert sum(parts.values()) + undecided == pytest.approx(1.0, abs=1e-12)
+        assert sum(parts.values()) * 4.0 == pytest.approx(findings.decided, abs=1e-12)
+        assert sum(parts.values()) * 4.0 <= prover.decided + 1e-9
+        counted = sum(sum(steps.values()) for steps in findings.steps.values())
+        assert counted <= findings.decided + 1e-12
+    subject.close()
+    assert most and not prover.ended and not prover.forked and not prover.fork_ends
+    assert not len(prover.part) and prover.decided == pytest.approx(findings.decided)
+
+
+def test_parts_that_are_not_begun_with_are_undecided():
+    policy = drone_rl.load_policy("right_and_forward").in_task(num_cubes=1, lateral_bound=2.0)
+    subject = make_subject(policy.description, policy.make_network(), 1e-4)
+    prover = Prover(subject, 200)
+    count = len(prover.parts)
+    assert count > 2 and shares(prover.findings(), bound=2.0) == ({}, pytest.approx(1.0))
+    prover.advance()
+    while prover.waiting:
+        waiting = [len(part) for parts in prover.waiting.values() for part in parts]
+        assert prover.boxes_under_way == sum(waiting)
+        prover.advance()
+    assert prover.boxes_under_way == 0
+    subject.close()
+    parts, undecided = shares(prover.findings(), bound=2.0)
+    assert len(prover.parts) == count - 1 and not prover.is_finished
+    assert parts == {("ALL_CUBES", 1): pytest.approx(1 / count, abs=1e-6)}
+    assert undecided == pytest.approx(1 - 1 / count, abs=1e-6)
+
+
+def test_where_logits_are_close_nothing_is_claimed(one_sided, monkeypatch):
+    """The larger the gap that is asked for, the more ways are followed, and nothing is wrong."""
+    forked = []
+    settle = Prover._settle
+
+    def noted(prover):
+        forked.append(sum(volumes(b).sum() for b in prover.forked))
+        settle(prover)
+
+    monkeypatch.setattr(Prover, "_settle", noted)
+    prove("right_and_forward")
+    careful = prove("right_and_forward", gap=3.0)
+    assert forked[0] < 1e-3 < forked[1]
+    parts, _ = shares(careful.findings())
+    assert parts.get(("ALL_CUBES", 1), 0) <= (6 + 1.65) / 12 + 1e-9
+    assert parts.get(("FRONT_BOUNDARY", 0), 0) <= (6 - 1.65) / 12 + 1e-9
+
+
+def test_to_and_fro_ends_at_the_step_limit(monkeypatch):
+    """Whoever turns left where it came from the right, and back, goes on until the step limit."""
+    policy = drone_rl.load_policy("good").in_task(num_cubes=1)
+    subject = make_subject(policy.description, policy.make_network(), 1e-4)
+    prover = Prover(subject)
+    monkeypatch.setattr(
+        prover, "_cut", lambda place, boxes: [(2 if place.left % 2 == 0 else 4, boxes)]
+    )
+    while not prover.is_finished:
+        prover.advance()
+    subject.close()
+    (ending,) = prover.findings().endings
+    assert ending.loops and ending.reason is EndReason.STEP_LIMIT and ending.collected == 0
+
+
+def test_a_fork_is_decided_only_if_all_its_ways_end_alike(monkeypatch):
+    """Straight on is won near the middle; to the left for ever is lost everywhere."""
+    policy = drone_rl.load_policy("good").in_task(num_cubes=1)
+    subject = make_subject(policy.description, policy.make_network(), 1e-4)
+    prover = Prover(subject)
+
+    def both_at_first(place, boxes):
+        is_start = place.ahead == place.left == 0
+        return [(3 if is_start else 2 if place.left else 1, boxes)]
+
+    monkeypatch.setattr(prover, "_cut", both_at_first)
+    while not prover.is_finished:
+        prover.advance()
+    subject.close()
+    parts, undecided = shares(prover.findings())
+    assert parts == {} and undecided == 1.0
+
+
+def test_bigger_steps_and_other_cubes_can_be_proved():
+    prover = prove("good", step_length=1.25, cube_size=2.0, lateral_bound=2.0)
+    parts, undecided = shares(prover.findings(), bound=2.0)
+    assert sum(parts.values()) + undecided == pytest.approx(1.0, abs=1e-9)

@@ -1,0 +1,106 @@
+"""The exact map of a small policy against the simulator's own pictures."""
+
+import json
+import xml.etree.ElementTree as ElementTree
+
+import numpy as np
+import pytest
+import torch
+
+import drone_rl
+from drone_rl.explanations.scenes import Scenes, place_target
+from drone_rl.policies.policy import Policy
+from drone_rl.policies.zoo import parse
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.progress import silent
+from drone_rl.verification.prover.silhouettes import camera_ahead
+
+
+@pytest.fixture(scope="module")
+def small():
+    """A policy of 12x5 pixels with random weights and opinions."""
+    good = drone_rl.load_policy("good")
+    described = good.description.as_dict()
+    described["camera"] |= {"width": 12, "height": 5}
+    described["network"] = {"name": "mlp", "hidden": [8]}
+    description = parse(described)
+    network = description.build_network(torch.Generator().manual_seed(3))
+    weights = {name: 20 * value for name, value in network.state_dict().items()}
+    return Policy("small", good.path, description, {**good.state, "policy": weights})
+
+
+@pytest.fixture(scope="module")
+def done(small):
+    return drone_rl.places(small, progress=silent, compared=200)
+
+
+def test_everywhere_it_does_what_it_does_about_the_simulators_picture(small, done):
+    random_state = np.random.RandomState(0)
+    places = random_state.uniform((2.5, -8.0), (20.0, 8.0), (2000, 2))
+    env = small.make_env(8)
+    scenes = Scenes(env)
+    ahead, left = torch.from_numpy(places).T
+    pictures = scenes.observe(place_target(scenes, ahead + camera_ahead(), left))
+    with torch.no_grad():
+        taken = small.make_network()(pictures).argmax(-1).numpy()
+    env.close()
+    assert len(set(taken)) == 3
+    assert (done.places.at(places) != taken).sum() == 0
+    shares = np.bincount(taken, minlength=3) / 2000
+    assert done.numbers["actions"] == pytest.approx(shares, abs=0.05)
+
+
+def test_areas_fill_the_window(done):
+    numbers = done.numbers
+    assert numbers["area"] == pytest.approx(17.5 * 16, rel=1e-12)
+    assert sum(numbers["actions"]) == pytest.approx(1)
+    assert sum(side["share"] for side in numbers["sides"].values()) == pytest.approx(1)
+    assert numbers["sides"]["ahead"]["share"] == pytest.approx(2 * 1.65 / 16)
+    assert 190 <= numbers["compared"] <= 200
+
+
+def test_what_is_done_about_one_place(done):
+    assert done.at(10.0, 0.1) in ("forward", "left", "right")
+    for place in ((1.0, 0.0), (10.0, 8.1), (21.0, 0.0)):
+        with pytest.raises(InputError, match=r"outside .* give 2.5 to 20 metres"):
+            done.at(*place)
+
+
+def test_it_is_saved_and_shows_itself(done, tmp_path):
+    done.save(tmp_path)
+    kept = json.loads((tmp_path / "places.json").read_text())
+    assert kept["cells"] == len(done.places.action) and kept["policy"] == "small"
+    assert (tmp_path / "places.png").read_bytes().startswith(b"\x89PNG")
+    root = ElementTree.parse(tmp_path / "places.svg").getroot()
+    assert root.tag == "{http://www.w3.org/2000/svg}svg"
+    text = str(done)
+    assert text.splitlines()[0].split()[:2] == ["one", "cube"]
+    assert "With one cube 2.5 to 20 m ahead" in text
+    shown = done._repr_html_()
+    assert "<table>" in shown and "data:image/png" in shown
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"nearest": 30.0}, r"nearest=30.0 leaves no place before farthest=20.0"),
+        ({"nearest": 1.0}, r"nearest=1.0 puts the camera into a cube"),
+        ({"sideways": 0.0}, r"sideways=0.0 is out of range"),
+        ({"most_cells": 5}, r"more than 5 cells"),
+        ({"task": {"vertical_bound": 1.0}}, r"task.vertical_bound=1.0"),
+        ({"wind": 1}, "wind is unknown"),
+    ],
+)
+def test_mistakes_are_told_in_a_line(small, change, message):
+    with pytest.raises(InputError, match=message):
+        drone_rl.places(small, progress=silent, **{"compared": 10} | change)
+
+
+def test_a_policy_with_a_memory_is_refused(small):
+    described = small.description.as_dict()
+    described["transforms"].append({"name": "stack", "N": 2})
+    description = parse(described)
+    weights = description.build_network(torch.Generator()).state_dict()
+    remembering = Policy("stack", small.path, description, {**small.state, "policy": weights})
+    with pytest.raises(InputError, match="stack of frames"):
+        drone_rl.places(remembering, progress=silent)

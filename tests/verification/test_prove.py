@@ -1,0 +1,131 @@
+"""Proofs by the API: folders, limits, what is shown and what is refused."""
+
+import json
+
+import numpy as np
+import pytest
+import torch
+
+import drone_rl
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.progress import silent
+
+ONE = {"num_cubes": 1}
+
+
+def prove(name="right_and_forward", **kwargs):
+    return drone_rl.prove(name, task=ONE, compared=100, progress=silent, **kwargs)
+
+
+@pytest.fixture(scope="module")
+def proof(tmp_path_factory):
+    return prove(folder=tmp_path_factory.mktemp("proof"))
+
+
+def test_what_is_known(proof):
+    assert proof.success == pytest.approx(0.6375, abs=1e-9)
+    assert proof.undecided < 1e-6
+    assert not proof.is_proved
+    losing = proof.losing()
+    assert losing.shape[1:] == (1, 2)
+    assert losing.min() == pytest.approx(1.65) and losing.max() == 6.0
+
+
+def test_a_policy_that_collects_from_everywhere(tmp_path):
+    proof = prove("good")
+    assert proof.is_proved and proof.success == 1.0
+    assert proof.losing().shape == (0, 1, 2)
+    assert proof.folder is None
+
+
+def test_it_shows_itself(proof):
+    text = str(proof)
+    assert "front boundary" in text and "0.6375" in text and "Proved: greedy" in text
+    assert "<table" in proof._repr_html_()
+
+
+def test_it_is_loaded_again(proof):
+    assert drone_rl.load_proof(proof.folder).certificate == proof.certificate
+    assert not (proof.folder / "state.npz").exists()
+    with pytest.raises(InputError, match="can't be read"):
+        drone_rl.load_proof(proof.folder / "nothing.json")
+
+
+def test_stopped_and_gone_on_with(proof, tmp_path):
+    stopped = prove(folder=tmp_path, limit_s=0.0)
+    assert not stopped.certificate["finished"]
+    assert stopped.undecided == pytest.approx(1.0)
+    assert "the proof was stopped" in str(stopped)
+    assert (tmp_path / "state.npz").exists()
+    done = prove(folder=tmp_path)
+    same = ("outcomes", "undecided", "finished")
+    assert [done.certificate[k] for k in same] == [proof.certificate[k] for k in same]
+
+
+def test_memory_is_bounded(tmp_path):
+    stopped = prove(folder=tmp_path, most_boxes=1)
+    assert not stopped.certificate["finished"]
+
+
+def test_a_state_of_another_policy_is_refused(tmp_path):
+    prove(folder=tmp_path, limit_s=0.0)
+    with pytest.raises(InputError, match="is of another proof"):
+        prove("good", folder=tmp_path)
+
+
+def test_progress_is_told():
+    told = []
+    drone_rl.prove("good", task=ONE, compared=100, progress=lambda *args: told.append(args))
+    texts = [text for text, *_ in told]
+    assert "step 0 of 27" in texts[0] and texts[-1] == "proved"
+    assert np.diff([done for _, done, _ in told]).min() >= 0
+
+
+def test_parts_to_come_are_told():
+    told, narrow = [], {**ONE, "lateral_bound": 2.0}
+    stopped = drone_rl.prove(
+        "good", task=narrow, compared=1, most_combinations=400, most_boxes=1,
+        progress=lambda text, *_: told.append(text),
+    )  # fmt: skip
+    assert told[0].endswith(" pictures, 1 part to come")
+    assert "with a smaller most_combinations" in told[-1] and told[-1] in str(stopped)
+    assert stopped.undecided == pytest.approx(1.0)
+
+
+def test_the_certificate_is_of_the_task_that_was_asked_for(proof):
+    written = json.loads((proof.folder / "certificate.json").read_text())
+    assert written["policy"]["description"]["task"]["num_cubes"] == 1
+
+
+def test_torch_has_its_threads_again():
+    before = torch.get_num_threads()
+    torch.set_num_threads(2)
+    try:
+        told = []
+        drone_rl.prove(
+            "good", task=ONE, compared=1, limit_s=0.0,
+            progress=lambda *_: told.append(torch.get_num_threads()),
+        )  # fmt: skip
+        assert {*told} == {1} and torch.get_num_threads() == 2
+        with pytest.raises(InputError, match=r"vertical_bound=1\.0"):
+            drone_rl.prove("good", task={"vertical_bound": 1.0}, progress=silent)
+        assert torch.get_num_threads() == 2
+    finally:
+        torch.set_num_threads(before)
+
+
+def test_a_policy_with_memory_is_refused(tmp_path):
+    drone_rl.train(
+        folder=tmp_path,
+        transforms=drone_rl.TrainSettings().transforms + _stack(),
+        trainer=drone_rl.TrainerSettings(total_frames=1),
+        progress=silent,
+    )
+    with pytest.raises(InputError, match="sees a stack of frames"):
+        drone_rl.prove(tmp_path, task=ONE, progress=silent)
+
+
+def _stack():
+    from drone_rl.config.transforms import Stack
+
+    return (Stack(),)
