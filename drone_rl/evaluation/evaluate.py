@@ -51,7 +51,7 @@ class Evaluation:
         """The figures side by side, as texts: names, then a row for each figure."""
         flown = self.flown.values()
         rows = [["", *self.flown]]
-        terms = as_task(self.policy.task).terms
+        terms = as_task(self.policy.task).vocabulary
         rows.append([f"all {terms.goals}", *(interval(f["success"], "share") for f in flown)])
         rows.append([f"mean {terms.goals}", *(f"{f['mean_goals']:.3f}" for f in flown)])
         for name in self.flown["greedy"]["shares"]:

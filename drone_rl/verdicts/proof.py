@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from drone_rl.evaluation.fragility import Rounding
 from drone_rl.evaluation.metrics import Episodes
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.verification.checker import Certificate, find
 
 

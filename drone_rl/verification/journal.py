@@ -16,13 +16,13 @@ from drone_rl.config.comparison import check_same_config
 from drone_rl.config.configuration import as_config
 from drone_rl.config.provable import ProvableSettings
 from drone_rl.config.training import TrainSettings
-from drone_rl.sim.tasks.collect_cubes import require_cubes, require_moves
 from drone_rl.training.train import MAY_CHANGE, settings_of
 from drone_rl.utils.archives import read_array
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import read_json, write_atomically
 from drone_rl.utils.schema import Plain, Real, Record, Several, Whole
 from drone_rl.utils.settings import Settings
+from drone_rl.verification.requirements import require_cubes, require_moves
 
 HOW_MAY_CHANGE = ("rounds", "limit_s")
 """What a resumed run may change of its rounds."""

@@ -17,7 +17,7 @@ from drone_rl.evaluation.searching import find_failures
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import read_checkpoint
 from drone_rl.sim.tasks import Practice
-from drone_rl.sim.tasks.collect_cubes.practice import inflated
+from drone_rl.sim.tasks.practice import inflated
 from drone_rl.training import Callback
 from drone_rl.training.progress import OngoingTraining
 from drone_rl.training.train import (

@@ -17,7 +17,7 @@ from drone_rl.evaluation.kinds import Kind
 from drone_rl.evaluation.oracle import ConstantPolicy, Oracle
 from drone_rl.evaluation.rule import Rule
 from drone_rl.sim.actions import Move
-from drone_rl.sim.tasks.collect_cubes.rules import Side
+from drone_rl.sim.tasks.collect_cubes import Side
 from drone_rl.utils.intervals import mean_bounds, proportion
 from tests.fake_flight import floating
 from tests.second_task import Posts

@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.verification.checker.certificate import Certificate, Outcome
 from drone_rl.verification.checker.claims import find_lies, missing_steps
 from drone_rl.verification.checker.drawing import ANYWHERE, BORDER, INSIDE, draw_places

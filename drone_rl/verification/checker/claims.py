@@ -5,7 +5,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.verification.checker.certificate import Certificate, Outcome
 from drone_rl.verification.checker.partition import find_misfit, volume
 

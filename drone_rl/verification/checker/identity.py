@@ -7,9 +7,9 @@ import torch
 
 from drone_rl.config import BaseTaskSettings
 from drone_rl.policies.zoo import PolicyDescription
-from drone_rl.sim.tasks.collect_cubes import require_moves
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.checker.certificate import Certificate
+from drone_rl.verification.requirements import require_moves
 
 
 def fingerprint(weights: Mapping[str, torch.Tensor]) -> str:

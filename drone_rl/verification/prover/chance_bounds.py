@@ -13,7 +13,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.verification.prover.boxes import Boxes
 from drone_rl.verification.prover.cells import Cells
 from drone_rl.verification.prover.lattice import AHEAD, LEFT, RIGHT, Place

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from drone_rl.config import TaskSettings
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.prover.boxes import Boxes, cut
 

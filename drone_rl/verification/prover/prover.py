@@ -14,7 +14,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.verification.prover.boxes import Boxes, merge, unite, volumes, whole
 from drone_rl.verification.prover.cells import Cells
 from drone_rl.verification.prover.findings import (

@@ -12,7 +12,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from drone_rl.sim.tasks.collect_cubes.rules import WorldState
+from drone_rl.sim.tasks.collect_cubes import WorldState
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.prover.lattice import Lattice

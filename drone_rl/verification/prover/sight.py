@@ -8,7 +8,7 @@ from torchrl.envs import CatFrames, Transform, TransformedEnv
 
 from drone_rl.envs import CameraFault, worlds_of
 from drone_rl.policies.rounding import RoundingBound
-from drone_rl.sim.tasks.collect_cubes.rules import WorldState
+from drone_rl.sim.tasks.collect_cubes import WorldState
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.prover.chain import Ask
 from drone_rl.verification.prover.graph import Graph

@@ -7,7 +7,6 @@ from drone_rl.envs import on_pixels
 from drone_rl.policies import PolicyNetwork
 from drone_rl.policies.zoo import PolicyDescription
 from drone_rl.sim.actions import MOVES
-from drone_rl.sim.tasks.collect_cubes import require_cubes, require_moves
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.prover.bounds import Bounds
@@ -16,6 +15,7 @@ from drone_rl.verification.prover.lattice import Lattice
 from drone_rl.verification.prover.painting import Painter
 from drone_rl.verification.prover.seeing import Seeing
 from drone_rl.verification.prover.silhouettes import FRONT, Eye, camera_ahead
+from drone_rl.verification.requirements import require_cubes, require_moves
 
 _SHADES = ("gray", "standardize")
 """Transforms of each pixel alone, by which a brighter pixel stays brighter."""

@@ -14,7 +14,7 @@ from drone_rl.evaluation.evaluator import run_episodes
 from drone_rl.evaluation.metrics import summarise
 from drone_rl.policies import make_actor
 from drone_rl.policies.zoo import parse, policy_path, read_policy
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.verification.prover import chain
 from drone_rl.verification.prover.chain import NEGLIGIBLE, Outcomes, follow_chances
 from drone_rl.verification.prover.graph import explore
