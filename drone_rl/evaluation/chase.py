@@ -7,9 +7,9 @@ from torch import Tensor
 
 from drone_rl.sim.dynamics import FlightState
 from drone_rl.sim.dynamics.body import heading_only
-from drone_rl.sim.entities.cameras import CHASE
+from drone_rl.sim.entities import CHASE
 from drone_rl.sim.rendering import Appearance
-from drone_rl.sim.rendering.mounting import Mounting, product, rotate
+from drone_rl.sim.rendering.appearance import Mounting, product, rotate
 from drone_rl.sim.worlds import Worlds
 
 _BACK = (1.0, -1.0, -1.0, -1.0)

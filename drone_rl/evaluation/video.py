@@ -18,7 +18,7 @@ from drone_rl.envs import DroneEnv
 from drone_rl.evaluation import chase, instruments
 from drone_rl.sim.actions import MOVES, Actions
 from drone_rl.sim.dynamics import FlightState, Quadrotor
-from drone_rl.sim.entities.cameras import (
+from drone_rl.sim.entities import (
     BACK_CENTER,
     BOTTOM_CENTER,
     FRONT_CENTER,

@@ -16,7 +16,7 @@ from drone_rl.robustness.faults import Blur, DeadRows, Frozen, Late, Noise
 from drone_rl.robustness.flying import Subject
 from drone_rl.robustness.looks import Exposed, Fogged, SunAt, Tinted, Whitened
 from drone_rl.robustness.mounting import Mount
-from drone_rl.sim.rendering.semantics import Meaning
+from drone_rl.sim.rendering.scene import Meaning
 from drone_rl.utils.errors import InputError
 
 CORRELATION_TIME = -1.0 / math.log(0.95)

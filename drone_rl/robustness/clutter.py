@@ -10,7 +10,7 @@ from drone_rl.config import BaseTaskSettings
 from drone_rl.config.task import Things
 from drone_rl.sim.clutter import stand
 from drone_rl.sim.rendering import Appearance, Beside
-from drone_rl.sim.rendering.gray import LUMA
+from drone_rl.sim.rendering.view import LUMA
 from drone_rl.utils.errors import InputError
 
 MOST = 16

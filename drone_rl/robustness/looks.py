@@ -9,7 +9,7 @@ from torch import Tensor
 
 from drone_rl.sim.rendering import Appearance, Scene
 from drone_rl.sim.rendering.appearance import Several
-from drone_rl.sim.rendering.semantics import Meaning
+from drone_rl.sim.rendering.scene import Meaning
 
 
 def look_of(scene: Scene) -> Appearance:

@@ -5,7 +5,7 @@ import dataclasses
 from torch import Tensor
 
 from drone_rl.sim.rendering import Appearance
-from drone_rl.sim.rendering.mounting import moved, turned
+from drone_rl.sim.rendering.appearance import moved, turned
 
 
 @dataclasses.dataclass(frozen=True)
@@ -15,7 +15,7 @@ class Mount:
     offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Metres, drone frame: forward, to the left, up."""
     turn: str = "yaw"
-    """Around which axis of the drone, see `drone_rl.sim.rendering.mounting.AXES`."""
+    """Around which axis of the drone, see `drone_rl.sim.rendering.appearance.AXES`."""
     degrees: float = 0.0
     dimensions: int = 1
     """One number: 1 as stated, -1 the opposite way."""

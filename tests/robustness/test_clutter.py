@@ -6,7 +6,7 @@ from drone_rl.robustness.clutter import MOST, as_bright, clutter, draw_places, t
 from drone_rl.robustness.condition import Condition
 from drone_rl.robustness.flying import Airfield
 from drone_rl.robustness.oracle import OracleEyes
-from drone_rl.sim.rendering.semantics import Meaning
+from drone_rl.sim.rendering.scene import Meaning
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 from tests.robustness.subjects import subject

@@ -2,7 +2,7 @@ from drone_rl.robustness.condition import Condition
 from drone_rl.robustness.faults import Blur, Late
 from drone_rl.robustness.looks import SunAt, Tinted
 from drone_rl.robustness.mounting import Mount
-from drone_rl.sim.rendering.semantics import Meaning
+from drone_rl.sim.rendering.scene import Meaning
 
 
 def test_nothing_is_different_by_default():

@@ -12,7 +12,7 @@ from drone_rl.robustness.faults import Late
 from drone_rl.robustness.flying import Airfield, Subject
 from drone_rl.robustness.looks import Whitened
 from drone_rl.robustness.modes import ONSET_STEP, Mode
-from drone_rl.sim.rendering.semantics import Meaning
+from drone_rl.sim.rendering.scene import Meaning
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import Stream

@@ -6,7 +6,7 @@ import torch
 from drone_rl.config import MINIMAL
 from drone_rl.robustness.looks import Exposed, Fogged, SunAt, Tinted, Whitened, elevation, look_of
 from drone_rl.sim.rendering import Appearance
-from drone_rl.sim.rendering.semantics import Meaning
+from drone_rl.sim.rendering.scene import Meaning
 from drone_rl.sim.worlds import Worlds
 
 PLAIN = Appearance(

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drone_rl.config import CameraSettings, TaskSettings
-from drone_rl.sim.entities.cameras import FRONT_CENTER
+from drone_rl.sim.entities import FRONT_CENTER
 
 NOTHING, FRONT, LEFT_SIDE, RIGHT_SIDE = range(4)
 """What a pixel shows of a cube: its side is seen where the cube stands to that side."""
