@@ -11,7 +11,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import RootSeed, root_seed
 from drone_rl.verdicts.proof import Claim
 from drone_rl.verification.checker import check_certificate, read_tried
-from drone_rl.verification.checker.drawing import ANYWHERE
+from drone_rl.verification.checker.sampling import ANYWHERE
 
 
 def find_claim(
