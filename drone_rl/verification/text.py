@@ -1,4 +1,4 @@
-"""What is said of the exact_percent map of one cube's places."""
+"""Report text about exact maps and proofs; imports nothing heavy."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -139,7 +139,7 @@ PLACES = (
         "places.refused",
         "no closed form is known of what it sees, or it chooses among other actions",
         lambda e: not _made(e),
-        lambda e: f"Of this policy there is no exact_percent map: {e['places']['refused']}.",
+        lambda e: f"Of this policy there is no exact map: {e['places']['refused']}.",
     ),
 )
 

@@ -91,7 +91,7 @@ def missed(eye, found, count=2000):
     low, high = (WINDOW.nearest, -WINDOW.sideways), (WINDOW.farthest, WINDOW.sideways)
     places = random_state.uniform(low, high, (count, 2))
     pictures = eye.faces(*cells.inner_points().T)[cells.locate(places)]
-    return int((pictures != eye.faces(*action_map.T)).any((1, 2)).sum())
+    return int((pictures != eye.faces(*places.T)).any((1, 2)).sum())
 
 
 @pytest.mark.parametrize("camera", CAMERAS)
