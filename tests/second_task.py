@@ -12,8 +12,8 @@ import torch
 from torch import Tensor
 
 from drone_rl.sim.actions import MOVES, Entry
-from drone_rl.sim.entities.cube import Cube
-from drone_rl.sim.rendering.semantics import Meaning
+from drone_rl.sim.entities import Cube
+from drone_rl.sim.rendering.scene import Meaning
 from drone_rl.sim.tasks import Goals, Grid, OracleRule, State, Task
 from drone_rl.sim.vocabulary import TaskVocabulary
 

@@ -11,7 +11,7 @@ from torch import Tensor
 from drone_rl.config import CameraSettings, TaskSettings
 from drone_rl.sim.actions import MOVES, Entry, Move
 from drone_rl.sim.dynamics import BodyState, ComputerVision, Dynamics
-from drone_rl.sim.entities.cube import Cube
+from drone_rl.sim.entities import Cube
 from drone_rl.sim.tasks.collect_cubes_kernel import EndReason, FlyingCubes
 from drone_rl.sim.tasks.common import (
     SIDES,

@@ -26,7 +26,7 @@ from drone_rl.sim.dynamics import ComputerVision, Dynamics, FlightState, Quadrot
 from drone_rl.sim.dynamics.body import LEVEL
 from drone_rl.sim.dynamics.fleet import FlyingFleet
 from drone_rl.sim.dynamics.moves_kernel import Fleet, camera_attitude, fly_move, is_flying, is_lost
-from drone_rl.sim.rendering.raytrace.structs import DRONE_FRAME, Poses
+from drone_rl.sim.rendering.raytrace.structs_kernel import DRONE_FRAME, Poses
 
 
 class EndReason(enum.IntEnum):
@@ -96,7 +96,7 @@ def place(flights: Flights, world: int, poses: Poses) -> None:
 
 @wp.func
 def move(flights: Flights, world: int, action: int) -> float:
-    """Moves a drone, as its dynamics do, and applies the rules, as `rules.judge` does.
+    """Moves a drone, as its dynamics do, and applies the rules, as `CollectCubes.judge` does.
 
     Args:
         flights: The worlds.

@@ -15,7 +15,7 @@ from torch import Tensor
 from drone_rl.config import CameraSettings, PillarsSettings
 from drone_rl.sim.actions import MOVES, Entry, Move
 from drone_rl.sim.dynamics import BodyState, ComputerVision, Obstacles
-from drone_rl.sim.entities.pillar import Pillar
+from drone_rl.sim.entities import Pillar
 from drone_rl.sim.tasks.common import (
     SIDES,
     Side,

@@ -18,7 +18,7 @@ from torch import Tensor
 from drone_rl.config import CameraSettings
 from drone_rl.sim.actions import Actions, Entry
 from drone_rl.sim.dynamics import BodyState, ComputerVision, Dynamics, Obstacles
-from drone_rl.sim.rendering.semantics import Meaning
+from drone_rl.sim.rendering.scene import Meaning
 from drone_rl.sim.vocabulary import TaskVocabulary
 from drone_rl.utils.batch import Batch
 from drone_rl.utils.errors import InputError

@@ -8,7 +8,7 @@ from numpy.random import RandomState
 from drone_rl.config import TaskSettings
 from drone_rl.sim.dynamics import ComputerVision
 from drone_rl.sim.rendering.devices import start_warp
-from drone_rl.sim.rendering.raytrace.structs import Poses
+from drone_rl.sim.rendering.raytrace.structs_kernel import Poses
 from drone_rl.sim.tasks import CollectCubes, Pillars
 from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.sim.tasks.collect_cubes_kernel import (

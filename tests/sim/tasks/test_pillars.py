@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from drone_rl.config import CameraSettings, PillarsSettings
 from drone_rl.sim.actions import Move
 from drone_rl.sim.dynamics import BodyState
-from drone_rl.sim.rendering.semantics import Meaning
+from drone_rl.sim.rendering.scene import Meaning
 from drone_rl.sim.tasks import Pillars, as_task
 from drone_rl.sim.tasks.common import Side, side_of
 from drone_rl.sim.tasks.pillars import EndReason, RowGoals
