@@ -18,7 +18,7 @@ from torch import Tensor
 
 from drone_rl.sim.parts import Parts, Rgb, Wish
 
-__all__ = ["MOVES", "Actions", "DiscreteActions", "Entry", "Move", "Rgb", "Wish"]
+__all__ = ["DIRECTIONS", "MOVES", "Actions", "DiscreteActions", "Entry", "Move", "Rgb", "Wish"]
 
 
 class Entry(NamedTuple):
@@ -216,3 +216,5 @@ MOVES = DiscreteActions(
     colors=((214, 39, 40), (44, 160, 44), (31, 96, 200)),
 )
 """As a set of actions; nothing undoes a move forward."""
+DIRECTIONS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0))
+"""Unit vector of each of `MOVES`, world frame."""

@@ -22,7 +22,7 @@ from drone_rl.config import (
 from drone_rl.sim.appearances import Appearances
 from drone_rl.sim.clutter import things_of
 from drone_rl.sim.dynamics import BodyState, Dynamics, Quadrotor, draw_seeds, make_dynamics
-from drone_rl.sim.dynamics.body import heading_only
+from drone_rl.sim.dynamics.state import heading_only
 from drone_rl.sim.entities import (
     DRAW_DISTANCE,
     SKY_COLOR,

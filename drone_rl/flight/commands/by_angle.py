@@ -7,7 +7,7 @@ from torch import Tensor
 
 from drone_rl.flight.commands.command import Command, goals_of
 from drone_rl.sim.dynamics import FlightState, Goals, Mode
-from drone_rl.sim.dynamics.goals import Modes, rotor_goals
+from drone_rl.sim.dynamics.control import Modes, rotor_goals
 
 
 @dataclasses.dataclass(frozen=True)

@@ -7,7 +7,7 @@ import torch
 from drone_rl.flight.commands.command import ACCURACY, Command, goals_of
 from drone_rl.flight.commands.turning import Turning
 from drone_rl.sim.dynamics import FlightState, Goals, Mode
-from drone_rl.sim.dynamics.goals import Modes
+from drone_rl.sim.dynamics.control import Modes
 from drone_rl.utils.errors import InputError
 
 

@@ -7,7 +7,7 @@ import torch
 from torch import Tensor
 
 from drone_rl.sim.dynamics import FlightState, Goals, Mode
-from drone_rl.sim.dynamics.goals import Modes
+from drone_rl.sim.dynamics.control import Modes
 
 PERIOD = 0.02
 """Seconds from one decision of a command to the next, at least."""

@@ -17,8 +17,8 @@ from drone_rl.flight.commands.state import (
 )
 from drone_rl.flight.commands.trajectory import Trajectory
 from drone_rl.sim.dynamics import FlightState, Goals, Obstacles, Quadrotor
-from drone_rl.sim.dynamics.flight_state import CLIMB, NOTHING, TICKS
-from drone_rl.sim.dynamics.goals import rotor_goals
+from drone_rl.sim.dynamics.control import rotor_goals
+from drone_rl.sim.dynamics.state import CLIMB, NOTHING, TICKS
 
 _IDLE = 0.1
 """Share of the thrust that carries the drone which rotors give while it stands, armed."""

@@ -8,7 +8,7 @@ from torch import Tensor
 from drone_rl.flight.commands.auto_flight import AutoFlight
 from drone_rl.flight.commands.errors import PilotError
 from drone_rl.flight.commands.navigation import Navigation
-from drone_rl.sim.dynamics.body import heading_only
+from drone_rl.sim.dynamics.state import heading_only
 from drone_rl.sim.entities import FRONT_CENTER
 from drone_rl.sim.image_types import ImageRequest, images
 from drone_rl.sim.rendering.view import Modality

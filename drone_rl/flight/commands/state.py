@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from drone_rl.sim.dynamics import FlightState
-from drone_rl.sim.dynamics.flight_state import GROUND, NOTHING
+from drone_rl.sim.dynamics.state import GROUND, NOTHING
 
 Triple = tuple[float, float, float]
 

@@ -10,7 +10,7 @@ from drone_rl.flight.commands.checks import real
 from drone_rl.flight.commands.command import ACCURACY, Command, goals_of
 from drone_rl.flight.commands.turning import Turning
 from drone_rl.sim.dynamics import FlightState, Goals, Mode
-from drone_rl.sim.dynamics.goals import Modes
+from drone_rl.sim.dynamics.control import Modes
 
 YAW_AT_FULL_STICK = 100.0
 """Degrees (a second) that the stick adds to the yaw mode's."""

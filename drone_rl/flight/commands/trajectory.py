@@ -3,7 +3,7 @@
 import numpy as np
 
 from drone_rl.sim.dynamics import FlightState
-from drone_rl.sim.dynamics.flight_state import ATTITUDE, POSITION, ROTORS, VELOCITY, Slot
+from drone_rl.sim.dynamics.state import ATTITUDE, POSITION, ROTORS, VELOCITY, Slot
 
 
 class Trajectory:

@@ -14,8 +14,8 @@ from drone_rl.flight.firmware.steered import told_after, wish_of
 from drone_rl.flight.firmware.sticks import Wish
 from drone_rl.sim.actions import Actions
 from drone_rl.sim.dynamics import BodyState, Dynamics, FlightState, Goals, Obstacles, Quadrotor
-from drone_rl.sim.dynamics.flight_state import SEED
-from drone_rl.sim.dynamics.goals import rotor_goals
+from drone_rl.sim.dynamics.control import rotor_goals
+from drone_rl.sim.dynamics.state import SEED
 
 NEAR, SLOW = 0.1, 0.1
 """Metres from its place, and metres a second, within which a drone hovers."""

@@ -34,7 +34,7 @@ from drone_rl.flight.firmware.errors import LoopError
 from drone_rl.flight.firmware.keeping import Keeping
 from drone_rl.flight.firmware.senses import Senses, Vector
 from drone_rl.flight.firmware.sticks import FULL_ANGLE, FULL_YAW_RATE, Sticks
-from drone_rl.sim.dynamics.body import LEVEL
+from drone_rl.sim.dynamics.state import LEVEL
 
 MEMORY = "eeprom.bin"
 """The file in its folder in which the firmware keeps how it was set up."""

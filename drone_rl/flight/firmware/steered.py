@@ -13,7 +13,7 @@ from drone_rl.config import DynamicsSettings
 from drone_rl.flight.firmware.senses import Senses, Vector
 from drone_rl.flight.firmware.sticks import Wish, velocity_to
 from drone_rl.sim.dynamics import FlightState, Goals, Mode
-from drone_rl.sim.dynamics.goals import HEADING, Y, Z
+from drone_rl.sim.dynamics.control import HEADING, Y, Z
 from drone_rl.utils.errors import InputError
 
 _SIDEWAYS = (Mode.POSITION, Mode.VELOCITY, Mode.HEADING_VELOCITY)

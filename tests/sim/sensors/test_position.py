@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from drone_rl.config.sensors import GpsSettings
-from drone_rl.sim.dynamics.body import BodyState
+from drone_rl.sim.dynamics.state import BodyState
 from drone_rl.sim.geodesy import HOME, world_from_geo
 from drone_rl.sim.sensors.position import Fix, Gps
 

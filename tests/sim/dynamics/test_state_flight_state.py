@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from drone_rl.sim.dynamics import FlightState
-from drone_rl.sim.dynamics import flight_state as fs
+from drone_rl.sim.dynamics import state as fs
 from tests.flying import numbers
 
 

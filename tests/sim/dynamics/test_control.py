@@ -2,7 +2,7 @@ import pytest
 import torch
 
 from drone_rl.sim.dynamics import Goals, Mode
-from drone_rl.sim.dynamics.goals import rotor_goals
+from drone_rl.sim.dynamics.control import rotor_goals
 from drone_rl.utils.errors import InputError
 from tests.flying import PLACES, numbers
 

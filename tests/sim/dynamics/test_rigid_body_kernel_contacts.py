@@ -7,8 +7,8 @@ import pytest
 import torch
 
 from drone_rl.sim.dynamics import Obstacles
-from drone_rl.sim.dynamics.flight_state import GROUND, NOTHING
-from drone_rl.sim.dynamics.goals import rotor_goals
+from drone_rl.sim.dynamics.control import rotor_goals
+from drone_rl.sim.dynamics.state import GROUND, NOTHING
 from tests.flying import falling, numbers, quadrotor
 
 NONE = numbers((0.0, 0.0, 0.0, 0.0))

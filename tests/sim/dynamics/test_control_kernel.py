@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import warp as wp
 
-from drone_rl.sim.dynamics import controllers
-from drone_rl.sim.dynamics.airframe import Airframe
-from drone_rl.sim.dynamics.controllers import mix, turned
+from drone_rl.sim.dynamics import control_kernel
+from drone_rl.sim.dynamics.control_kernel import mix, turned
+from drone_rl.sim.dynamics.rigid_body_kernel import Airframe
 from tests.flying import frame
 
 PARTS = {"position": 3, "velocity": 2, "climb": 1, "memory": 1, "attitude": 3, "rate": 3, "mix": 4}
@@ -19,10 +19,10 @@ ENDS = np.cumsum([0, *PARTS.values()])
 def control(drone: Airframe, given: wp.array[wp.vec4], found: wp.array2d[float]):
     i = wp.tid()
     three = wp.vec3(given[i][0], given[i][1], given[i][2])
-    position = controllers.position_control(drone, three)
-    velocity = controllers.velocity_control(drone, wp.vec2(three[0], three[1]))
-    attitude = controllers.attitude_control(drone, three)
-    rate = controllers.rate_control(drone, three)
+    position = control_kernel.position_control(drone, three)
+    velocity = control_kernel.velocity_control(drone, wp.vec2(three[0], three[1]))
+    attitude = control_kernel.attitude_control(drone, three)
+    rate = control_kernel.rate_control(drone, three)
     mixed = mix(given[i][3], three)
     for k in range(3):
         found[i, k] = position[k]
@@ -30,8 +30,8 @@ def control(drone: Airframe, given: wp.array[wp.vec4], found: wp.array2d[float])
         found[i, 10 + k] = rate[k]
     found[i, 3] = velocity[0]
     found[i, 4] = velocity[1]
-    found[i, 5] = controllers.climb_control(drone, three[0], three[1])
-    found[i, 6] = controllers.climb_memory(drone, three[0], three[1])
+    found[i, 5] = control_kernel.climb_control(drone, three[0], three[1])
+    found[i, 6] = control_kernel.climb_memory(drone, three[0], three[1])
     for k in range(4):
         found[i, 13 + k] = mixed[k]
     found[i, 17] = turned(three[0])

@@ -8,7 +8,7 @@ import torch
 from drone_rl.config import ActionSettings
 from drone_rl.sim.actions import Move
 from drone_rl.sim.dynamics import FlightState, Mode
-from drone_rl.sim.dynamics.steering import Moves, Velocities, make_steering
+from drone_rl.sim.dynamics.control import Moves, Velocities, make_steering
 
 MOVES = ActionSettings(move_speed=4.0, move_lead=0.5)
 VELOCITY = ActionSettings(kind="velocity", forward_speed=4, sideways_speed=3, yaw_rate=90)

@@ -1,32 +1,28 @@
-# pyright: reportIndexIssue=false
-# pyright: reportGeneralTypeIssues=false
-# pyright: reportOperatorIssue=false
-# pyright: reportAttributeAccessIssue=false
-# pyright: reportArgumentType=false
-# pyright: reportCallIssue=false
-# (Warp compiles this file; Python's types say nothing about it.)
+# pyright: reportIndexIssue=false, reportGeneralTypeIssues=false, reportOperatorIssue=false
+# pyright: reportAttributeAccessIssue=false, reportReturnType=false, reportArgumentType=false
+# pyright: reportCallIssue=false, reportAssignmentType=false
+# (Warp compiles this file: its types are not those of Python.)
 """What controllers, rotors and air do to drones in one tick, for whoever integrates it himself."""
 
 import torch
 import warp as wp
 from torch import Tensor
 
-from drone_rl.sim.dynamics import flight_state as fs
-from drone_rl.sim.dynamics.airframe import Airframe
+from drone_rl.sim.dynamics import state as fs
+from drone_rl.sim.dynamics.control import Goals, Mode
 from drone_rl.sim.dynamics.flight_kernel import goal_of, is_sound, is_told, loaded, write
-from drone_rl.sim.dynamics.flight_state import FlightState
-from drone_rl.sim.dynamics.flight_tick import driven, force_on
-from drone_rl.sim.dynamics.goals import Goals, Mode
-from drone_rl.sim.dynamics.rigid_body import axes_of, torque_of
+from drone_rl.sim.dynamics.rigid_body_kernel import Airframe, axes_of, torque_of
+from drone_rl.sim.dynamics.state import FlightState
+from drone_rl.sim.dynamics.tick_kernel import driven, force_on
 from drone_rl.sim.rendering.devices import start_warp
+
+wp.set_module_options({"enable_backward": False})
 
 _PLACE = wp.constant(fs.POSITION.first)
 _SEED = wp.constant(fs.SEED.first)
 _TICKS = wp.constant(fs.TICKS.first)
 _LOST = wp.constant(fs.LOST.first)
 _NUMBERS = wp.constant(fs.NUMBERS)
-
-wp.set_module_options({"enable_backward": False})
 
 
 @wp.kernel

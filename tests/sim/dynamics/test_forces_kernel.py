@@ -7,8 +7,8 @@ import pytest
 import torch
 
 from drone_rl.sim.dynamics import Mode
-from drone_rl.sim.dynamics import flight_state as fs
-from drone_rl.sim.dynamics.forces import forces, told
+from drone_rl.sim.dynamics import state as fs
+from drone_rl.sim.dynamics.forces_kernel import forces, told
 from tests.flying import ANGLES, GRAVITY, PLACES, SPEEDS, falling, matrix, numbers, quadrotor, still
 from tests.flying import told as goals_of
 

@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from drone_rl.sim.dynamics import BodyState
-from drone_rl.sim.dynamics.body import heading_only
+from drone_rl.sim.dynamics.state import heading_only
 
 
 def test_a_body_at_rest_is_level_unless_it_is_turned():

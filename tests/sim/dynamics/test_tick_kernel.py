@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from drone_rl.sim.dynamics import Mode, Obstacles
-from drone_rl.sim.dynamics.goals import rotor_goals
+from drone_rl.sim.dynamics.control import rotor_goals
 from tests.flying import (
     ANGLES,
     PLACES,

@@ -1,40 +1,36 @@
 # ruff: noqa: RUF046, UP018
-# pyright: reportIndexIssue=false
-# pyright: reportGeneralTypeIssues=false
-# pyright: reportOperatorIssue=false
-# pyright: reportAttributeAccessIssue=false
-# pyright: reportReturnType=false
-# pyright: reportArgumentType=false
-# pyright: reportCallIssue=false
-# pyright: reportAssignmentType=false
-# (Warp compiles this file; Python's types say nothing about it, and what a loop changes is declared
-# by its type.)
+# pyright: reportIndexIssue=false, reportGeneralTypeIssues=false, reportOperatorIssue=false
+# pyright: reportAttributeAccessIssue=false, reportReturnType=false, reportArgumentType=false
+# pyright: reportCallIssue=false, reportAssignmentType=false
+# (Warp compiles this file: its types are not those of Python.)
 """One tick of a flight: controllers, rotors, air, motion, contacts."""
 
 import warp as wp
 
-from drone_rl.sim.dynamics import cascade, flight_state
-from drone_rl.sim.dynamics.air import gust_after
-from drone_rl.sim.dynamics.airframe import Airframe
-from drone_rl.sim.dynamics.contacts import Overlap, box_overlap, pushed_out
-from drone_rl.sim.dynamics.controllers import climb_memory
-from drone_rl.sim.dynamics.rigid_body import (
+from drone_rl.sim.dynamics import control_kernel, state
+from drone_rl.sim.dynamics.control_kernel import climb_memory
+from drone_rl.sim.dynamics.rigid_body_kernel import (
+    Airframe,
     Axes,
     Motion,
+    Overlap,
     advanced,
     answered,
     axes_of,
+    box_overlap,
     drag_of,
+    gust_after,
+    pushed_out,
     thrust_of,
     torque_of,
 )
 
-NO_THING = wp.constant(flight_state.NOTHING)
-GROUND = wp.constant(flight_state.GROUND)
+wp.set_module_options({"enable_backward": False})
+
+NO_THING = wp.constant(state.NOTHING)
+GROUND = wp.constant(state.GROUND)
 _WILDEST = wp.constant(10.0)
 """Standard deviations that no gust is beyond."""
-
-wp.set_module_options({"enable_backward": False})
 
 
 @wp.struct
@@ -63,7 +59,7 @@ class Flight:
 def driven(
     frame: Airframe,
     modes: wp.vec4i,
-    goal: cascade.Goal,
+    goal: control_kernel.Goal,
     before: Flight,
     axes: Axes,
     seed: wp.int64,
@@ -85,9 +81,9 @@ def driven(
     flight = before
     motion = before.motion
     seconds = frame.tick * float(tick)
-    asked = cascade.rotors_wanted(frame, modes, goal, seconds, motion, axes, before.climb)
-    if modes[3] == cascade.VELOCITY or modes[3] == cascade.POSITION:
-        missing = cascade.climb_missing(frame, modes, goal, seconds, motion)
+    asked = control_kernel.rotors_wanted(frame, modes, goal, seconds, motion, axes, before.climb)
+    if modes[3] == control_kernel.VELOCITY or modes[3] == control_kernel.POSITION:
+        missing = control_kernel.climb_missing(frame, modes, goal, seconds, motion)
         flight.climb = climb_memory(frame, missing, before.climb)
     flight.rotors = answered(frame, before.rotors, asked)
     if frame.gusts > 0.0:
@@ -107,7 +103,7 @@ def force_on(frame: Airframe, flight: Flight, axes: Axes) -> wp.vec3:
 def ticked(
     frame: Airframe,
     modes: wp.vec4i,
-    goal: cascade.Goal,
+    goal: control_kernel.Goal,
     before: Flight,
     height: float,
     seed: wp.int64,

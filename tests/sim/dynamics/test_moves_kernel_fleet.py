@@ -6,7 +6,7 @@ import warp as wp
 
 from drone_rl.config import ActionSettings, DynamicsSettings
 from drone_rl.sim.dynamics import Quadrotor
-from drone_rl.sim.dynamics.fleet import FlyingFleet
+from drone_rl.sim.dynamics.moves_kernel import FlyingFleet
 from drone_rl.sim.rendering.devices import start_warp
 
 FLIGHT = DynamicsSettings(mode="simple_flight", camera_mount="body")

@@ -5,7 +5,7 @@ import torch
 
 from drone_rl.config import ActionSettings
 from drone_rl.sim.dynamics import Kinematic
-from drone_rl.sim.dynamics.body import heading_of
+from drone_rl.sim.dynamics.state import heading_of
 
 SETTINGS = ActionSettings(kind="velocity", forward_speed=4, sideways_speed=3, yaw_rate=90)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from drone_rl.sim.dynamics.goals import rotor_goals
+from drone_rl.sim.dynamics.control import rotor_goals
 from tests.flying import GRAVITY, falling, history, matrix, numbers, quadrotor, rotation, still
 
 VACUUM = {"air_density": 0.0}
