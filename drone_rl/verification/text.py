@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from drone_rl.sim.action_display import shown_actions
+from drone_rl.sim.vocabulary import shown_actions
 from drone_rl.utils.numbers import all_cubes, exact, listed
 from drone_rl.utils.sentences import Evidence, Sentence
 

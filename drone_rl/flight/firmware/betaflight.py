@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from drone_rl.flight.firmware.senses import Senses, Vector
-from drone_rl.sim.frames import enu_from_world, frd_from_body, ned_attitude_from_world
+from drone_rl.sim.coordinates import enu_from_world, frd_from_body, ned_attitude_from_world
 
 STATE_PORT, RC_PORT, ROTOR_PORT, CLI_PORT = 9003, 9004, 9002, 5761
 """UDP into the firmware: the drone's state; UDP into it: sticks; UDP out of it: rotors; TCP: its

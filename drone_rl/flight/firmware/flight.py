@@ -13,8 +13,8 @@ from drone_rl.config import DynamicsSettings
 from drone_rl.flight.firmware.errors import LoopError
 from drone_rl.flight.firmware.senses import Senses, Vector, sense
 from drone_rl.flight.firmware.sticks import AT_REST, Climb, Sticks, Wish, sticks_for
+from drone_rl.sim.coordinates import HOME, GeoPoint
 from drone_rl.sim.dynamics import BodyState
-from drone_rl.sim.geodesy import HOME, GeoPoint
 
 TICK = 0.001
 """Seconds of physics between two answers of a firmware: it steps a thousand times a second."""

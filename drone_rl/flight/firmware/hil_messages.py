@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from drone_rl.flight.firmware.senses import Senses, Vector, into_body
-from drone_rl.sim.frames import frd_from_body, ned_from_world, world_from_ned
+from drone_rl.sim.coordinates import frd_from_body, ned_from_world, world_from_ned
 
 ROTORS = 4
 ARMED = 128

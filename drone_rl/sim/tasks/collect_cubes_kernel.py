@@ -15,7 +15,6 @@ import torch
 import warp as wp
 
 from drone_rl.config import TaskSettings
-from drone_rl.sim.clutter import HIDDEN_DEPTH
 from drone_rl.sim.dynamics import ComputerVision, Dynamics, FlightState, Quadrotor
 from drone_rl.sim.dynamics.moves_kernel import (
     Fleet,
@@ -27,6 +26,7 @@ from drone_rl.sim.dynamics.moves_kernel import (
 )
 from drone_rl.sim.dynamics.state import LEVEL
 from drone_rl.sim.rendering.raytrace.structs_kernel import DRONE_FRAME, Poses
+from drone_rl.sim.tasks.common import HIDDEN_DEPTH
 
 
 class EndReason(enum.IntEnum):

@@ -6,7 +6,7 @@ import pytest
 from drone_rl.flight.firmware import betaflight
 from drone_rl.flight.firmware.betaflight import pack_state, pack_sticks, setup_lines, unpack_rotors
 from drone_rl.flight.firmware.senses import Senses
-from drone_rl.sim.geodesy import GeoPoint
+from drone_rl.sim.coordinates import GeoPoint
 
 SENSES = Senses(
     time=7.0,

@@ -5,7 +5,7 @@ import pytest
 
 from drone_rl.flight.firmware.hil_messages import FIELD, gps_fields, rotors_of, sensor_fields
 from drone_rl.flight.firmware.senses import Senses
-from drone_rl.sim.geodesy import GeoPoint
+from drone_rl.sim.coordinates import GeoPoint
 
 HALF = math.sqrt(0.5)
 SENSES = Senses(

@@ -5,8 +5,8 @@ import pytest
 import torch
 
 from drone_rl.flight.firmware.senses import Senses, into_body, pressure_at, sense, turn_between
+from drone_rl.sim.coordinates import GeoPoint
 from drone_rl.sim.dynamics import BodyState
-from drone_rl.sim.geodesy import GeoPoint
 from tests.flight.firmware.simple_body import SimpleBody
 
 HALF = math.sqrt(0.5)

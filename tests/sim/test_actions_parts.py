@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import torch
 
-from drone_rl.sim.parts import Parts
+from drone_rl.sim.actions import Parts
 
 FOUR = Parts(
     names=("left", "right", "far left", "far right"),

@@ -5,8 +5,8 @@ import pytest
 import torch
 
 from drone_rl.config import TaskSettings
-from drone_rl.sim.tasks import CollectCubes, Practice
-from drone_rl.sim.tasks.practice import inflated
+from drone_rl.sim.tasks import CollectCubes, FailureReplayTask
+from drone_rl.sim.tasks.failure_replay import inflated
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import get_state, set_state, world_random_state
 
@@ -30,7 +30,7 @@ ANYWHERE = (0.5, 0.5, 0.75, 0.5)
 
 
 def test_places_by_hand():
-    task = Practice(TASK, BOXES, 0.5)
+    task = FailureReplayTask(TASK, BOXES, 0.5)
     left = [
         task.draw(Given(*ANYWHERE, chance, which, 0.25, 0.5)).tolist()
         for chance, which in ((0.6, 0.0), (0.4, 0.49), (0.4, 0.5))
@@ -44,8 +44,10 @@ def test_places_by_hand():
 
 def test_a_share_of_none_and_of_all():
     usual, world = CollectCubes(TASK), world_random_state(3, 0)
-    assert torch.equal(Practice(TASK, BOXES, 0.0).draw(world_random_state(3, 0)), usual.draw(world))
-    always = Practice(TASK, BOXES, 1.0)
+    assert torch.equal(
+        FailureReplayTask(TASK, BOXES, 0.0).draw(world_random_state(3, 0)), usual.draw(world)
+    )
+    always = FailureReplayTask(TASK, BOXES, 1.0)
     y = np.stack([always.draw(world)[:, 1].numpy() for _ in range(200)])
     is_inside = ((y[:, None] >= BOXES[..., 0]) & (y[:, None] <= BOXES[..., 1])).all(-1)
     assert is_inside.any(-1).all()
@@ -54,7 +56,7 @@ def test_a_share_of_none_and_of_all():
 
 def test_a_world_goes_on_alike_from_its_saved_stream():
     task, world, other = (
-        Practice(TASK, BOXES, 0.5),
+        FailureReplayTask(TASK, BOXES, 0.5),
         world_random_state(1, 2),
         world_random_state(9, 9),
     )
@@ -80,4 +82,4 @@ def test_boxes_reach_farther_but_not_beyond_the_placements():
 )
 def test_boxes_that_are_none(boxes, message):
     with pytest.raises(InputError, match=message):
-        Practice(TASK, boxes, 0.5)
+        FailureReplayTask(TASK, boxes, 0.5)

@@ -10,7 +10,7 @@ from drone_rl.sim.tasks.collect_cubes import CollectCubes
 from drone_rl.utils.errors import InputError
 
 
-class Practice(CollectCubes):
+class FailureReplayTask(CollectCubes):
     """The same task, but a share of its episodes have their cubes in given boxes.
 
     Which ones, which box, and where in it, is drawn from the world's own stream, and the same

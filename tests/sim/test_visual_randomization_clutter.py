@@ -5,7 +5,8 @@ import pytest
 import torch
 
 from drone_rl.config import MINIMAL, AppearanceSettings, TaskSettings
-from drone_rl.sim.clutter import (
+from drone_rl.sim.tasks import as_task
+from drone_rl.sim.visual_randomization import (
     HIDDEN_DEPTH,
     PALETTE,
     WIDTH,
@@ -14,7 +15,6 @@ from drone_rl.sim.clutter import (
     stand,
     things_of,
 )
-from drone_rl.sim.tasks import as_task
 
 CUBES = TaskSettings()
 SOME = AppearanceSettings(

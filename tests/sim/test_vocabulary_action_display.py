@@ -1,16 +1,16 @@
 import pytest
 
 from drone_rl.sim import actions
-from drone_rl.sim.action_display import MOVES, shown_actions
 from drone_rl.sim.continuous_actions import ContinuousActions
+from drone_rl.sim.vocabulary import SHOWN_MOVES, shown_actions
 from drone_rl.utils.errors import InputError
 from tests.continuous import SETTINGS
 
 
 def test_the_moves_are_those_of_the_simulator_also_in_files_that_say_nothing():
     told = shown_actions({"actions": actions.MOVES.as_dict()})
-    assert told == MOVES == shown_actions({"name": "an older one"})
-    assert [MOVES.css(i) for i in range(3)] == ["#d62728", "#2ca02c", "#1f60c8"]
+    assert told == SHOWN_MOVES == shown_actions({"name": "an older one"})
+    assert [SHOWN_MOVES.css(i) for i in range(3)] == ["#d62728", "#2ca02c", "#1f60c8"]
 
 
 def test_speeds_are_told_in_metres_and_degrees_a_second():
