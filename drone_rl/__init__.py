@@ -6,9 +6,8 @@ What is listed here is imported when it is first used, so that `import drone_rl`
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from drone_rl.utils.garbage import collecting_no_garbage
-from drone_rl.utils.gymnasium_registration import register
-from drone_rl.utils.when_imported import import_quietly, when_imported
+from drone_rl.utils.imports import import_quietly, register, when_imported
+from drone_rl.utils.memory import collecting_no_garbage
 
 if TYPE_CHECKING:
     from drone_rl.config import (
@@ -196,7 +195,7 @@ def __getattr__(name: str) -> Any:
     """Imports a public name when it is first asked for."""
     if name not in _HOMES:
         raise AttributeError(f"module 'drone_rl' has no attribute {name!r}")
-    from drone_rl.utils.quiet import noise_held_back
+    from drone_rl.utils.imports import noise_held_back
 
     with collecting_no_garbage(), noise_held_back():
         value = getattr(importlib.import_module(_HOMES[name]), name)

@@ -12,7 +12,7 @@ from drone_rl.config.paths import PathsSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.overrides import COMMAND
 from drone_rl.utils.schema import FileName, OneOf
-from drone_rl.utils.seed_text import seed_line
+from drone_rl.utils.text import seed_line
 
 _log = logging.getLogger(__name__)
 

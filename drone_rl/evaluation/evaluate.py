@@ -22,9 +22,8 @@ from drone_rl.sim.tasks import as_task
 from drone_rl.utils.display import aligned, interval, paragraph, table
 from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
-from drone_rl.utils.seed_text import seed_line
 from drone_rl.utils.seeding import RootSeed, with_seed
-from drone_rl.utils.sentences import say
+from drone_rl.utils.text import say, seed_line
 
 
 @dataclasses.dataclass(frozen=True)

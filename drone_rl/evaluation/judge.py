@@ -24,7 +24,7 @@ from drone_rl.evaluation.rule import Quantity, Rule, decide, kinds_within
 from drone_rl.evaluation.verdict_text import SENTENCES
 from drone_rl.utils.intervals import mean_bounds, proportion
 from drone_rl.utils.seeding import RootSeed
-from drone_rl.utils.sentences import say
+from drone_rl.utils.text import say
 
 MANY = (2, 3, 5, 10, 20, 50, 100)
 """How many times as many episodes are tried out, in thought, where they are not enough."""

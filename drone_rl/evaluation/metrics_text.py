@@ -1,7 +1,6 @@
 """What an evaluation says of its seed and its arithmetic. Evidence: `evaluation.json`."""
 
-from drone_rl.utils.seed_text import fixed_seed
-from drone_rl.utils.sentences import Evidence, Sentence, percent
+from drone_rl.utils.text import Evidence, Sentence, fixed_seed, percent
 
 
 def _computed(evidence: Evidence) -> str:

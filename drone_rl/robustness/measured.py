@@ -40,7 +40,7 @@ from drone_rl.utils.schema import (
     Whole,
     as_mapping,
 )
-from drone_rl.utils.seed_text import SEED_KEYS
+from drone_rl.utils.text import SEED_KEYS
 from drone_rl.verification.checker import fingerprint
 
 FORMAT = "drone_rl shifts"

@@ -39,9 +39,8 @@ from drone_rl.utils.display import aligned, paragraph, picture, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
-from drone_rl.utils.seed_text import seed_line
 from drone_rl.utils.seeding import RootSeed, with_seed
-from drone_rl.utils.sentences import say
+from drone_rl.utils.text import say, seed_line
 from drone_rl.verification.checker import fingerprint
 
 

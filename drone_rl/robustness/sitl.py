@@ -25,9 +25,8 @@ from drone_rl.sim.dynamics import BodyState
 from drone_rl.sim.tasks import as_task
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Bar, Progress
-from drone_rl.utils.seed_text import LOOPED, seed_line
 from drone_rl.utils.seeding import RootSeed, root_seed
-from drone_rl.utils.sentences import say
+from drone_rl.utils.text import LOOPED, say, seed_line
 
 STARTS = 3
 """Of a firmware, for one flight."""

@@ -3,7 +3,7 @@
 Evidence: `bodies.json`, which has them by policy where there are any.
 """
 
-from drone_rl.utils.sentences import Evidence
+from drone_rl.utils.text import Evidence
 
 LOOPED = "software in the loop"
 """Their column, and their key in the evidence."""

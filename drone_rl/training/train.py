@@ -23,13 +23,13 @@ from drone_rl.training.build_collector import build_collector
 from drone_rl.training.build_learner import build_learner
 from drone_rl.training.confirmation import Confirmation
 from drone_rl.training.progress import OngoingTraining
-from drone_rl.utils.csv_table import read_table
 from drone_rl.utils.display import picture, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock, remove_leftovers, write_atomically
 from drone_rl.utils.memory import bound_kernels
 from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
+from drone_rl.utils.readers import read_table
 from drone_rl.utils.schema import Real
 from drone_rl.utils.settings import kinds_of
 

@@ -17,9 +17,8 @@ from drone_rl.utils.display import aligned, paragraph, picture, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Bar, Progress, silent
 from drone_rl.utils.provenance import provenance
-from drone_rl.utils.seed_text import BODIES, seed_line
 from drone_rl.utils.seeding import RootSeed, with_seed
-from drone_rl.utils.sentences import say
+from drone_rl.utils.text import BODIES, say, seed_line
 from drone_rl.verdicts.bodies_chart import chart
 from drone_rl.verdicts.bodies_text import rows
 from drone_rl.verdicts.judge import judge

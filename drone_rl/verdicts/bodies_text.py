@@ -4,7 +4,7 @@ from typing import Any
 
 from drone_rl.robustness.sitl_text import with_loops
 from drone_rl.sim.vocabulary import terms_of
-from drone_rl.utils.sentences import Evidence, percent
+from drone_rl.utils.text import Evidence, percent
 
 
 def rows(numbers: Evidence) -> list[list[str]]:

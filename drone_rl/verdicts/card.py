@@ -5,7 +5,7 @@ from typing import Any
 
 from drone_rl.evaluation.verdict_text import best_luck
 from drone_rl.sim.vocabulary import terms_of
-from drone_rl.utils.sentences import said
+from drone_rl.utils.text import said
 from drone_rl.verdicts.card_text import SENTENCES
 
 Evidence = Mapping[str, Any]

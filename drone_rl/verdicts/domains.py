@@ -12,7 +12,7 @@ from drone_rl.robustness.domain_text import QUOTED, lacking, why_not
 from drone_rl.robustness.measured import Measured, read_measured
 from drone_rl.robustness.needs import Need, read_needs
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.sentences import say
+from drone_rl.utils.text import say
 from drone_rl.verdicts.domain_check import Reflown
 
 MOST_LOOKED_AT = 100

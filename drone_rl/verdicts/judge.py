@@ -28,8 +28,8 @@ from drone_rl.utils.display import paragraph, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
-from drone_rl.utils.seed_text import seed_line
 from drone_rl.utils.seeding import RootSeed, Stream, root_seed, torch_generator, with_seed
+from drone_rl.utils.text import seed_line
 from drone_rl.verdicts.domain_check import refly
 from drone_rl.verdicts.domains import Coverage, beside, find_domain, require, sentence
 from drone_rl.verdicts.judgements import Judgements

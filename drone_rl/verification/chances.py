@@ -21,9 +21,8 @@ from drone_rl.utils.display import aligned, paragraph, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
-from drone_rl.utils.seed_text import CHANCES, seed_line
 from drone_rl.utils.seeding import RootSeed, Stream, with_seed, world_random_state
-from drone_rl.utils.sentences import say
+from drone_rl.utils.text import CHANCES, say, seed_line
 from drone_rl.verification.prover.chain import Outcomes, follow_chances
 from drone_rl.verification.prover.chance_bounds import Bounded, bound_success
 from drone_rl.verification.prover.graph import explore, shape_of

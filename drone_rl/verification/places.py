@@ -21,7 +21,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import fresh_seed, legacy_seed
-from drone_rl.utils.sentences import say
+from drone_rl.utils.text import say
 from drone_rl.verification.places_text import PLACES, rows
 from drone_rl.verification.prover.arrangement import Window
 from drone_rl.verification.prover.painting import Painter

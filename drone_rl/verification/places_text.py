@@ -3,8 +3,7 @@
 from collections.abc import Sequence
 
 from drone_rl.sim.action_display import shown_actions
-from drone_rl.utils.numbers import listed
-from drone_rl.utils.sentences import Evidence, Sentence
+from drone_rl.utils.text import Evidence, Sentence, listed
 
 WHERE = {"left": "on its left", "ahead": "straight ahead", "right": "on its right"}
 """Sides, and how people say them."""

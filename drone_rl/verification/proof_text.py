@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from drone_rl.utils.numbers import all_cubes, exact
+from drone_rl.utils.text import all_cubes, exact
 
 
 def sentence(certificate: Mapping[str, Any]) -> str:

@@ -16,7 +16,7 @@ from drone_rl.flight.firmware.hil_messages import ARMED, gps_fields, rotors_of, 
 from drone_rl.flight.firmware.senses import Senses, Vector
 from drone_rl.flight.firmware.sticks import Sticks
 from drone_rl.flight.firmware.wires import TcpWire, Wire
-from drone_rl.utils.extras import extra
+from drone_rl.utils.errors import extra
 
 _DIALECT = "pymavlink.dialects.v20.common"
 HEARTBEAT_EVERY = 1.0

@@ -9,7 +9,7 @@ from torch import Tensor
 from drone_rl.config import TaskSettings
 from drone_rl.sim.tasks.collect_cubes.rules import Side
 from drone_rl.sim.tasks.judgeable import Goals
-from drone_rl.utils.numbers import ordinal
+from drone_rl.utils.text import ordinal
 
 
 @dataclasses.dataclass

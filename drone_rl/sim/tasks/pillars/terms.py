@@ -4,7 +4,7 @@ import dataclasses
 
 from drone_rl.config import PillarsSettings
 from drone_rl.sim.vocabulary import Terms
-from drone_rl.utils.numbers import plural
+from drone_rl.utils.text import plural
 
 _TERMS = Terms(
     goal="row",

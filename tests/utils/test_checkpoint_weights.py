@@ -2,8 +2,8 @@ import pytest
 import torch
 from torch import nn
 
+from drone_rl.utils.checkpoint import check_weights
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.weights import check_weights
 
 EXPECTED = nn.Linear(4, 2, device="meta").state_dict()
 

@@ -1,6 +1,6 @@
 import pytest
 
-from drone_rl.utils.sentences import Sentence, percent, said, say
+from drone_rl.utils.text import Sentence, percent, said, say
 
 MANY = Sentence("loops.many", "a loop", lambda e: e["loops"] > 0, lambda e: f"{e['loops']} loops.")
 NONE = Sentence("loops.never", "none", lambda e: e["loops"] == 0, lambda e: "No loop.")

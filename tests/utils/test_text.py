@@ -1,5 +1,4 @@
-from drone_rl.utils.numbers import all_cubes, among, bounds, exact, listed, ordinal, plural
-from drone_rl.utils.sentences import percent
+from drone_rl.utils.text import all_cubes, among, bounds, exact, listed, ordinal, percent, plural
 
 
 def test_numbers_as_people_write_them():

@@ -7,7 +7,12 @@ import json
 import jinja2
 import pytest
 
-from drone_rl.utils.pages import content_security_policy, folder_link, page_environment, static_text
+from drone_rl.utils.display import (
+    content_security_policy,
+    folder_link,
+    page_environment,
+    static_text,
+)
 
 PAYLOAD = "</script><!--<img src=x onerror=\"alert('1')\">&\u2028"
 

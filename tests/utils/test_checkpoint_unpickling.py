@@ -11,8 +11,8 @@ import pytest
 import torch
 from torch import nn
 
+from drone_rl.utils.checkpoint import DamagedError, ForeignError, unpickle
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.unpickling import DamagedError, ForeignError, unpickle
 
 
 def saved(value):

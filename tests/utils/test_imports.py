@@ -7,10 +7,10 @@ import warnings
 
 import pytest
 
-from drone_rl.utils.when_imported import import_quietly
+from drone_rl.utils.imports import import_quietly
 
 WAITING = (
-    "import importlib.util, sys; from drone_rl.utils.when_imported import when_imported\n"
+    "import importlib.util, sys; from drone_rl.utils.imports import when_imported\n"
     "done = []\n"
     "def do(): done.append(sys.modules['colorsys'].rgb_to_hsv)\n"
     "{}\n"

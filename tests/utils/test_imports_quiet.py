@@ -3,7 +3,7 @@ import subprocess
 import sys
 import warnings
 
-from drone_rl.utils.quiet import ignore_noise, noise_held_back, standard_error_closed
+from drone_rl.utils.imports import ignore_noise, noise_held_back, standard_error_closed
 
 
 def test_nothing_gets_through_to_standard_error_until_it_is_open_again(capfd):
@@ -15,7 +15,7 @@ def test_nothing_gets_through_to_standard_error_until_it_is_open_again(capfd):
 
 def test_what_no_user_can_do_anything_about():
     code = (
-        "import logging, warnings; from drone_rl.utils.quiet import ignore_noise\n"
+        "import logging, warnings; from drone_rl.utils.imports import ignore_noise\n"
         "logging.basicConfig(level='INFO', format='%(message)s'); ignore_noise()\n"
         "from absl import logging as absl\n"
         "warnings.simplefilter('always')  # as dm_control does\n"

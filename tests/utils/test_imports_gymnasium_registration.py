@@ -11,7 +11,7 @@ import pytest
 
 from drone_rl.config.variant import locate
 from drone_rl.sim.tasks import as_task
-from drone_rl.utils.gymnasium_registration import ENVIRONMENTS, register
+from drone_rl.utils.imports import ENVIRONMENTS, register
 
 ROOT = Path(__file__).parents[2]
 gymnasium = pytest.importorskip("gymnasium", reason="Gymnasium is not installed")

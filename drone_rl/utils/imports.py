@@ -1,11 +1,15 @@
 """What is to be done as soon as another package is imported, and not before: imports are slow."""
 
+import contextlib
+import os
 import sys
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from importlib.machinery import ModuleSpec, PathFinder
 from types import ModuleType
 from typing import Any
+
+from absl import logging
 
 
 def when_imported(name: str, do: Callable[[], None]) -> None:
@@ -89,3 +93,66 @@ class _Waiting:
 
         spec.loader.exec_module = execute_and_do
         return spec
+
+
+ENVIRONMENTS = {
+    "drone_rl/CollectCubes-v0": "drone_rl.config.TaskSettings",
+    "drone_rl/Pillars-v0": "drone_rl.config.PillarsSettings",
+}
+"""By name, the class of the task's settings, which `gymnasium.make` takes as options."""
+
+
+def register() -> None:
+    """Makes them known to Gymnasium; those that are known already stay as they are."""
+    import gymnasium  # slow to import, and not everybody has it
+
+    for name, task in ENVIRONMENTS.items():
+        if name not in gymnasium.registry:
+            gymnasium.register(
+                name,
+                entry_point="drone_rl:DroneWorld",
+                vector_entry_point="drone_rl:DroneWorlds",
+                kwargs={"task": task},
+            )
+
+
+NOISE = ("DISPLAY", "GLFW", "WeightUpdaterBase")
+"""Words in warnings of dm_control, which looks for a screen, and of TorchRL, of its own classes."""
+
+
+def ignore_noise() -> None:
+    """Keeps warnings and log lines back that no user can do anything about.
+
+    Filters would not do: dm_control puts one of its own, that lets all through, before them.
+    """
+    show = warnings.showwarning
+
+    def show_the_rest(message: Warning | str, *args: Any, **kwargs: Any) -> None:
+        if not any(word in str(message) for word in NOISE):
+            show(message, *args, **kwargs)
+
+    warnings.showwarning = show_the_rest
+    logging.set_verbosity(logging.WARNING)  # dm_control tells which OpenGL it found
+
+
+@contextlib.contextmanager
+def noise_held_back() -> Iterator[None]:
+    """The same for a while, such as an import: warnings are shown as before afterwards."""
+    with warnings.catch_warnings():
+        ignore_noise()
+        yield
+
+
+@contextlib.contextmanager
+def standard_error_closed() -> Iterator[None]:
+    """Lets nothing through to standard error, not even from below Python."""
+    sys.stderr.flush()
+    kept = os.dup(2)
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 2)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nowhere)

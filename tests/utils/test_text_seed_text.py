@@ -1,8 +1,7 @@
 import pytest
 
 from drone_rl.evaluation.metrics_text import EVALUATION
-from drone_rl.utils.seed_text import CHANCES, CHECK, is_fixed, seed_line, seed_of
-from drone_rl.utils.sentences import said
+from drone_rl.utils.text import CHANCES, CHECK, is_fixed, said, seed_line, seed_of
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 import pytest
 
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.plain_yaml import parse_yaml, read_yaml
+from drone_rl.utils.readers import parse_yaml, read_yaml
 
 
 def test_plain_data_comes_back(tmp_path):

@@ -2,9 +2,9 @@
 
 import pytest
 
-from drone_rl.utils import csv_table
-from drone_rl.utils.csv_table import TablesAllowance, read_table
+from drone_rl.utils import readers
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.readers import TablesAllowance, read_table
 
 
 @pytest.fixture
@@ -31,11 +31,11 @@ def test_sizes_are_bounded(table, monkeypatch):
     assert len([*read_table(path, allowance)]) == 3
     with pytest.raises(InputError, match="8 are left"):
         [*read_table(path, allowance)]
-    monkeypatch.setattr(csv_table, "METRICS_ROWS", 1)
+    monkeypatch.setattr(readers, "METRICS_ROWS", 1)
     with pytest.raises(InputError, match="more than 1 rows"):
         [*read_table(path)]
-    monkeypatch.setattr(csv_table, "METRICS_ROWS", 9)
-    monkeypatch.setattr(csv_table, "METRICS_CELLS", 2)
+    monkeypatch.setattr(readers, "METRICS_ROWS", 9)
+    monkeypatch.setattr(readers, "METRICS_CELLS", 2)
     with pytest.raises(InputError, match="more than 2 cells"):
         [*read_table(path)]
 
@@ -56,7 +56,7 @@ def test_rows_and_cells_of_several_tables_are_bounded(table, allowance, message)
 
 def test_a_table_beyond_what_is_left_is_not_read(table, monkeypatch):
     path = table(b"a,b\n1,2\n")
-    monkeypatch.setattr(csv_table, "read_bytes", None)
+    monkeypatch.setattr(readers, "read_bytes", None)
     with pytest.raises(InputError, match="8 bytes, more than 7 bytes"):
         [*read_table(path, TablesAllowance(7))]
 

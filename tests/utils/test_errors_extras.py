@@ -5,8 +5,7 @@ import sys
 
 import pytest
 
-from drone_rl.utils.errors import InputError
-from drone_rl.utils.extras import extra
+from drone_rl.utils.errors import InputError, extra
 
 
 def test_a_package_that_is_there():

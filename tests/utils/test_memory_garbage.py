@@ -4,7 +4,7 @@ import sys
 
 import pytest
 
-from drone_rl.utils.garbage import collecting_no_garbage
+from drone_rl.utils.memory import collecting_no_garbage
 
 
 def test_the_collector_rests_and_goes_on():
@@ -32,7 +32,7 @@ def test_it_keeps_nothing_from_being_collected_later():
 
 def test_at_the_end_nothing_is_looked_through():
     code = """import gc
-from drone_rl.utils.garbage import leave_garbage_to_the_system
+from drone_rl.utils.memory import leave_garbage_to_the_system
 kept = [[] for _ in range(1000)]
 leave_garbage_to_the_system()
 print(gc.get_freeze_count() >= 1000, len(gc.get_objects()) < 1000)"""
@@ -42,7 +42,7 @@ print(gc.get_freeze_count() >= 1000, len(gc.get_objects()) < 1000)"""
 
 def test_a_program_looks_rarely_and_finds_what_there_is():
     code = """import gc, weakref
-from drone_rl.utils.garbage import look_for_garbage_rarely
+from drone_rl.utils.memory import look_for_garbage_rarely
 class Loop: pass
 looks = []
 gc.callbacks.append(lambda phase, info: looks.append(phase))
@@ -59,7 +59,7 @@ print(len(looks) > 0, gone() is None)"""
 
 def test_after_the_first_look_it_looks_more_often():
     code = """import gc
-from drone_rl.utils.garbage import look_for_garbage_rarely
+from drone_rl.utils.memory import look_for_garbage_rarely
 look_for_garbage_rarely()
 print(gc.get_threshold()[0])
 gc.collect()
@@ -70,7 +70,7 @@ print(gc.get_threshold()[0], len(gc.callbacks))"""
 
 def test_what_came_with_the_imports_is_never_looked_through():
     code = """import gc, weakref
-from drone_rl.utils.garbage import look_for_garbage_rarely
+from drone_rl.utils.memory import look_for_garbage_rarely
 class Loop: pass
 look_for_garbage_rarely()
 early = Loop(); early.itself = early; gone = weakref.ref(early); del early
