@@ -17,16 +17,21 @@ if TYPE_CHECKING:
         PillarsSettings,
         TaskSettings,
     )
-    from drone_rl.config.bodies import BodiesSettings
-    from drone_rl.config.chances import ChanceSettings
-    from drone_rl.config.checking import CheckSettings
-    from drone_rl.config.judging import EvaluateSettings, JudgeSettings
-    from drone_rl.config.mapping import PlacesSettings
-    from drone_rl.config.provable import ProvableSettings
-    from drone_rl.config.proving import ProveSettings
+    from drone_rl.config.commands import (
+        BodiesSettings,
+        EvaluateSettings,
+        JudgeSettings,
+        ShiftSettings,
+    )
     from drone_rl.config.sensors import SensorSettings
-    from drone_rl.config.shifting import ShiftSettings
     from drone_rl.config.training import TrainerSettings, TrainSettings
+    from drone_rl.config.verification import (
+        ChanceSettings,
+        CheckSettings,
+        PlacesSettings,
+        ProvableSettings,
+        ProveSettings,
+    )
     from drone_rl.envs.gymnasium.world import DroneWorld
     from drone_rl.envs.gymnasium.worlds import DroneWorlds
     from drone_rl.envs.sb3.worlds import Sb3Worlds

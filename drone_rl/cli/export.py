@@ -7,8 +7,7 @@ from typing import Annotated
 
 import drone_rl
 from drone_rl.cli.hydra.names import policies as prepare  # noqa: F401 -- of what was typed
-from drone_rl.config.judging import FlightSettings
-from drone_rl.config.paths import PathsSettings
+from drone_rl.config.commands import FlightSettings, PathsSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.overrides import COMMAND
 from drone_rl.utils.schema import FileName, OneOf

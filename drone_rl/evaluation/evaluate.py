@@ -7,7 +7,7 @@ from typing import Any
 
 from tensordict.nn import TensorDictModuleBase
 
-from drone_rl.config.judging import EvaluateSettings, FlightSettings
+from drone_rl.config.commands import EvaluateSettings, FlightSettings
 from drone_rl.envs import worlds_of
 from drone_rl.evaluation.baselines import fly_baselines
 from drone_rl.evaluation.evaluator import StepLog, run_episodes

@@ -14,7 +14,7 @@ from typing import Any
 import torch
 from numpy.typing import NDArray
 
-from drone_rl.config.shifting import MODES, ShiftSettings
+from drone_rl.config.commands import MODES, ShiftSettings
 from drone_rl.policies.zoo import PolicyDescription, parse
 from drone_rl.robustness.axes import AXES, GROUPS
 from drone_rl.robustness.axis import Axis

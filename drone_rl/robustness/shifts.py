@@ -13,7 +13,7 @@ import yaml
 from numpy.typing import NDArray
 
 from drone_rl.config import MINIMAL, BaseTaskSettings
-from drone_rl.config.shifting import ShiftSettings
+from drone_rl.config.commands import ShiftSettings
 from drone_rl.envs import worlds_of
 from drone_rl.evaluation.agreement import require_function
 from drone_rl.evaluation.verdict_text import unlike as say_unlike

@@ -10,8 +10,7 @@ import torch
 from torch import Tensor
 
 from drone_rl.config import AppearanceSettings, BaseTaskSettings, CameraSettings
-from drone_rl.config.appearance import NO_TEXTURE, Names
-from drone_rl.config.placing import check_appearance
+from drone_rl.config.appearance import NO_TEXTURE, Names, check_appearance
 from drone_rl.sim.clutter import WIDTH, draw_distractors, most_distractors, things_of
 from drone_rl.sim.rendering import Appearance, Beside, Mounting, Texture, textures
 from drone_rl.sim.rendering.mounting import product, turned, zoom_of

@@ -12,8 +12,7 @@ from typing import Any
 import torch
 import yaml
 
-from drone_rl.config.comparison import check_same_config, modern
-from drone_rl.config.configuration import as_config, from_config
+from drone_rl.config.configuration import as_config, check_same_config, from_config, modern
 from drone_rl.config.training import TrainSettings
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import describe, read_checkpoint

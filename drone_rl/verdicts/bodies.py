@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from drone_rl.config import DynamicsSettings
-from drone_rl.config.bodies import BodiesSettings
-from drone_rl.config.judging import JudgeSettings
+from drone_rl.config.commands import BodiesSettings, JudgeSettings
 from drone_rl.flight.firmware.errors import LoopError
 from drone_rl.policies.base_policy import Pilot
 from drone_rl.policies.external_policy import as_pilot

@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from drone_rl.config.judging import JudgeSettings
-from drone_rl.config.shifting import ShiftSettings
+from drone_rl.config.commands import JudgeSettings, ShiftSettings
 from drone_rl.evaluation.rule import Rule
 from drone_rl.policies.base_policy import Pilot
 from drone_rl.robustness.axes import find_axes

@@ -11,8 +11,8 @@ from tensordict.nn import TensorDictModuleBase
 from torchrl.envs import EnvBase
 
 from drone_rl.config import DynamicsSettings, TaskSettings
-from drone_rl.config.changes import Changes
-from drone_rl.config.judging import FlightSettings, JudgeSettings
+from drone_rl.config.commands import FlightSettings, JudgeSettings
+from drone_rl.config.configuration import Changes
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation.baselines import BASELINES, make_baseline
 from drone_rl.evaluation.evaluate import held_out

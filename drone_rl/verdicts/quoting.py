@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from drone_rl.config.judging import JudgeSettings
+from drone_rl.config.commands import JudgeSettings
 from drone_rl.policies.base_policy import Pilot
 from drone_rl.policies.policy import Policy
 from drone_rl.policies.zoo import certificate_path

@@ -12,8 +12,7 @@ import torch
 from torch import Tensor
 
 from drone_rl.config import TaskSettings
-from drone_rl.config.chances import ChanceSettings
-from drone_rl.config.proving import ProveSettings
+from drone_rl.config.verification import ChanceSettings, ProveSettings
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.sim.tasks.collect_cubes import require_cubes, require_moves, rules
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason

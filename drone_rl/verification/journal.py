@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drone_rl.config import TaskSettings
-from drone_rl.config.comparison import check_same_config
-from drone_rl.config.configuration import as_config
-from drone_rl.config.provable import ProvableSettings
+from drone_rl.config.configuration import as_config, check_same_config
 from drone_rl.config.training import TrainSettings
+from drone_rl.config.verification import ProvableSettings
 from drone_rl.sim.tasks.collect_cubes import require_cubes, require_moves
 from drone_rl.training.train import MAY_CHANGE, settings_of
 from drone_rl.utils.archives import read_array

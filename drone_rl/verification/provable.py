@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drone_rl.config.provable import ProvableSettings
 from drone_rl.config.training import TrainSettings
+from drone_rl.config.verification import ProvableSettings
 from drone_rl.evaluation.searching import find_failures
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import read_checkpoint

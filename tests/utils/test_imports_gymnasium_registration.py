@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from drone_rl.config.variant import locate
+from drone_rl.config.configuration import locate
 from drone_rl.sim.tasks import as_task
 from drone_rl.utils.imports import ENVIRONMENTS, register
 

@@ -7,7 +7,7 @@ import pytest
 import torch
 
 import drone_rl
-from drone_rl.config.judging import FlightSettings
+from drone_rl.config.commands import FlightSettings
 from drone_rl.policies.zoo import certificate_path, open_onnx, parse
 from drone_rl.sweeps.manifest import Sweep
 from drone_rl.sweeps.runs import Run

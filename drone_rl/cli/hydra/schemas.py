@@ -18,18 +18,13 @@ from drone_rl.config import (
     DynamicsSettings,
     TaskSettings,
 )
-from drone_rl.config.changes import Changes, ChangesOfTask
-from drone_rl.config.collecting import Collector
-from drone_rl.config.learning import Optimiser, Scheduler
-from drone_rl.config.loggers import Logger
+from drone_rl.config.commands import PathsSettings
+from drone_rl.config.configuration import Changes, ChangesOfTask, Variant
+from drone_rl.config.learning import Collector, Objective, Optimiser, Returns, Scheduler
 from drone_rl.config.networks import Network
-from drone_rl.config.objectives import Objective
-from drone_rl.config.paths import PathsSettings
-from drone_rl.config.provable import ProvableSettings
-from drone_rl.config.returns import Returns
-from drone_rl.config.training import TrainerSettings
+from drone_rl.config.training import Logger, TrainerSettings
 from drone_rl.config.transforms import Transform
-from drone_rl.config.variant import Variant
+from drone_rl.config.verification import ProvableSettings
 from drone_rl.utils.settings import Settings, kinds_of, snake_case, types_of
 
 GROUPS: dict[str, type[Settings]] = {

@@ -2,7 +2,7 @@
 
 import importlib
 
-from drone_rl.config.renderers import RENDERERS
+from drone_rl.config.camera import RENDERERS
 from drone_rl.sim.rendering.renderer import MakeRenderer
 from drone_rl.utils.errors import InputError
 

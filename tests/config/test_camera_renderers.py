@@ -2,7 +2,7 @@ import dataclasses
 
 import pytest
 
-from drone_rl.config.renderers import RENDERERS, RendererName
+from drone_rl.config.camera import RENDERERS, RendererName
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.settings import Settings
 

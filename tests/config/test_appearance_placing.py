@@ -3,7 +3,7 @@
 import pytest
 
 from drone_rl.config import AppearanceSettings, CameraSettings, PillarsSettings, TaskSettings
-from drone_rl.config.placing import check_appearance
+from drone_rl.config.appearance import check_appearance
 from drone_rl.utils.errors import InputError
 
 

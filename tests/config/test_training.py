@@ -4,7 +4,7 @@ from typing import ClassVar
 
 import pytest
 
-from drone_rl.config.loggers import Logger
+from drone_rl.config.training import Logger
 from drone_rl.utils.errors import InputError
 
 

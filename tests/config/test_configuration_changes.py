@@ -1,7 +1,7 @@
 import pytest
 
 from drone_rl.config import DynamicsSettings, TaskSettings
-from drone_rl.config.changes import Changes
+from drone_rl.config.configuration import Changes
 from drone_rl.utils.errors import InputError
 
 

@@ -6,9 +6,9 @@ from typing import Annotated, ClassVar
 
 import pytest
 
+from drone_rl.config.configuration import Variant, locate
+from drone_rl.config.learning import Returns
 from drone_rl.config.networks import Mlp, Network, OriginalCnn, SmallCnn
-from drone_rl.config.returns import Returns
-from drone_rl.config.variant import Variant, locate
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Whole
 

@@ -1,6 +1,6 @@
 import pytest
 
-from drone_rl.config.bodies import BODIES, BodiesSettings
+from drone_rl.config.commands import BODIES, BodiesSettings
 from drone_rl.utils.errors import InputError
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from drone_rl.config import COMPUTER_VISION, MINIMAL, MOVES_SETTINGS
-from drone_rl.config.comparison import check_same_config, modern
+from drone_rl.config.configuration import check_same_config, modern
 from drone_rl.utils.errors import InputError
 
 OLD = {

@@ -1,6 +1,6 @@
 import pytest
 
-from drone_rl.config.shifting import MODES, ShiftSettings
+from drone_rl.config.commands import MODES, ShiftSettings
 from drone_rl.robustness.modes import Mode
 from drone_rl.utils.errors import InputError
 

@@ -2,10 +2,18 @@
 
 import pytest
 
-from drone_rl.config.collecting import Ray, Rollouts, Threads
 from drone_rl.config.configuration import as_config, from_config
-from drone_rl.config.objectives import A2c, Objective, Ppo, Reinforce
-from drone_rl.config.returns import Gae, LeaveOneOut
+from drone_rl.config.learning import (
+    A2c,
+    Gae,
+    LeaveOneOut,
+    Objective,
+    Ppo,
+    Ray,
+    Reinforce,
+    Rollouts,
+    Threads,
+)
 from drone_rl.config.training import TrainSettings
 from drone_rl.utils.errors import InputError
 
