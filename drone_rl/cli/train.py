@@ -10,8 +10,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import drone_rl
 from drone_rl.cli.hydra import resuming
-from drone_rl.cli.hydra.launchers import LocalLauncher, RayLauncher, SlurmLauncher, register_plugins
-from drone_rl.cli.hydra.optuna_sweeper import OptunaSweeper
+from drone_rl.cli.hydra.launchers import (
+    LocalLauncher,
+    OptunaSweeper,
+    RayLauncher,
+    SlurmLauncher,
+    register_plugins,
+)
 from drone_rl.config.commands import PathsSettings
 from drone_rl.config.training import Logger, Tensorboard, TrainSettings
 from drone_rl.config.verification import ProvableSettings

@@ -1,4 +1,4 @@
-"""What can be chosen about the policy's camera."""
+"""Settings of the policy's camera and the names of renderers."""
 
 import dataclasses
 import math

@@ -1,4 +1,4 @@
-"""What an evaluation and a verdict can be told."""
+"""Settings of commands: evaluation, verdict, robustness, dynamics sweep, benchmarks, Gymnasium."""
 
 import dataclasses
 from typing import Annotated, Any

@@ -1,4 +1,4 @@
-"""Settings as nested plain data and back: what stands in checkpoints and what Hydra composes."""
+"""Settings as nested plain data and back, as in checkpoints and in what Hydra composes."""
 
 import dataclasses
 import importlib

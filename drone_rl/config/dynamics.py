@@ -1,6 +1,6 @@
-"""What can be chosen about how drones move: the body, its controller, and the air.
+"""Settings of how drones move: vehicle, controller, wind, and the actions of a policy.
 
-A drone is data: another one is another file of these values.
+A drone is data: another drone is another file of these values.
 """
 
 import dataclasses

@@ -1,4 +1,4 @@
-"""How parameters are changed: the optimiser and the schedule of its rate."""
+"""Settings of what learns: returns, loss, optimizer, scheduler and collector."""
 
 import dataclasses
 from collections.abc import Mapping

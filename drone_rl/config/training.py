@@ -1,4 +1,4 @@
-"""Everything that a training can be told."""
+"""Settings of a training."""
 
 import dataclasses
 import re

@@ -1,4 +1,4 @@
-"""What the check of a certificate can be told."""
+"""Settings of verification: proof, certificate check, success probabilities, decision map."""
 
 import dataclasses
 from typing import Annotated

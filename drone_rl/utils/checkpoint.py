@@ -1,4 +1,9 @@
-"""Checkpoints that are whole or not there, and that can't run code when loaded."""
+"""Checkpoints: written atomically, read without executing code or trusting sizes.
+
+`torch.load(weights_only=True)` runs no code, but it allocates what a file requests, trusts the
+sizes of storages and supports types that a checkpoint never contains. The reader here supports a
+dozen pickle instructions, builds tensors from the bytes that are present, and calls nothing.
+"""
 
 import collections
 import contextlib

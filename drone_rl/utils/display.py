@@ -1,4 +1,10 @@
-"""Tables and figures of results: as text for a terminal, as HTML for a notebook."""
+"""Tables, figures and HTML pages of results.
+
+Pages show strings from files of unknown origin. Two independent defences keep these strings from
+being executed. Templates escape every value, so that a string reaches the page as text. And the
+page's Content-Security-Policy allows exactly the page's own script and style, by their hashes:
+no inline script, event handler, style attribute or request to another host.
+"""
 
 import base64
 import hashlib
@@ -8,10 +14,9 @@ import urllib.parse
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-import jinja2
-from markupsafe import Markup
-
 if TYPE_CHECKING:
+    import jinja2
+    from markupsafe import Markup
     from matplotlib.figure import Figure
 
 
@@ -91,7 +96,7 @@ _TYPES = ("require-trusted-types-for 'script'", "trusted-types 'none'")
 """Makes it an error of the page's own script to turn text into markup or into code."""
 
 
-def page_environment(*packages: str) -> jinja2.Environment:
+def page_environment(*packages: str) -> "jinja2.Environment":
     """Return an environment for the templates of a page; every value is escaped.
 
     It has the filters `folder_link`, a relative link to a folder by its name, and jinja's `tojson`,
@@ -100,6 +105,8 @@ def page_environment(*packages: str) -> jinja2.Environment:
     Args:
         packages: Each has a folder `templates`; earlier ones come first.
     """
+    import jinja2  # most users of this module need no template
+
     loaders = [jinja2.PackageLoader(package) for package in packages]
     environment = jinja2.Environment(
         loader=jinja2.ChoiceLoader(loaders),
@@ -111,7 +118,7 @@ def page_environment(*packages: str) -> jinja2.Environment:
     return environment
 
 
-def static_text(environment: jinja2.Environment, names: Sequence[str]) -> Markup:
+def static_text(environment: "jinja2.Environment", names: Sequence[str]) -> "Markup":
     """Return files of a page's style or script, joined, without any value put into them.
 
     Args:
@@ -126,6 +133,8 @@ def static_text(environment: jinja2.Environment, names: Sequence[str]) -> Markup
     text = "\n".join(files).replace("\r\n", "\n")  # as browsers read it before they hash it
     if "</" in text or "<!--" in text:
         raise ValueError(f"{', '.join(names)} would end the element that holds them")
+    from markupsafe import Markup
+
     return Markup(text)
 
 

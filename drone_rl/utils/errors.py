@@ -1,4 +1,4 @@
-"""The one exception that means "the user asked for something impossible"."""
+"""Errors that a user can correct."""
 
 import importlib
 from typing import Any

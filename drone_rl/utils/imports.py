@@ -1,4 +1,4 @@
-"""What is to be done as soon as another package is imported, and not before: imports are slow."""
+"""Actions when other packages are imported, and filters of what those packages print."""
 
 import contextlib
 import os
@@ -8,8 +8,6 @@ from collections.abc import Callable, Iterator, Sequence
 from importlib.machinery import ModuleSpec, PathFinder
 from types import ModuleType
 from typing import Any
-
-from absl import logging
 
 
 def when_imported(name: str, do: Callable[[], None]) -> None:
@@ -132,6 +130,8 @@ def ignore_noise() -> None:
             show(message, *args, **kwargs)
 
     warnings.showwarning = show_the_rest
+    from absl import logging  # slow to import
+
     logging.set_verbosity(logging.WARNING)  # dm_control tells which OpenGL it found
 
 

@@ -1,8 +1,8 @@
-"""Memory that a long training would hold without using it: what fills it, and its return.
+"""Bounds on memory and on the time that Python's garbage collector takes.
 
-Batches differ in length, and two things grow with every length that comes up. The C library keeps
-freed blocks for later, ever less of them fit, and the gaps stay resident. And PyTorch's library of
-CPU kernels, oneDNN, compiles each for the shape of its input and keeps a thousand of them.
+Batches differ in length, and two caches grow with every new length: the C library keeps freed
+blocks, of which ever fewer fit, and oneDNN compiles a kernel for each input shape and keeps a
+thousand of them.
 """
 
 import contextlib

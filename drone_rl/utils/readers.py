@@ -1,4 +1,4 @@
-"""Plain data out of YAML: no anchors, no tags, no merging, each name once, bounded in size."""
+"""Readers of YAML and CSV files that accept plain data only, bounded in size."""
 
 import csv
 import io

@@ -1,4 +1,9 @@
-"""Numbers and lists as people write them."""
+"""Text for reports: numbers, lists, and sentences with the condition that permits each.
+
+The program states claims only through `Sentence`: a claim whose evidence is missing or contradicts
+it is not written. Evidence is plain data, as in the JSON files, so that a test can change the
+evidence and see the sentence change or disappear.
+"""
 
 import dataclasses
 from collections.abc import Callable, Iterable, Mapping, Sequence

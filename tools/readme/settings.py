@@ -12,7 +12,7 @@ from typing import Any
 
 import yaml
 
-from drone_rl.cli.hydra.schemas import GROUPS, PARTS, SEVERAL
+from drone_rl.cli.hydra.composition import GROUPS, PARTS, SEVERAL
 from drone_rl.cli.usage import COMMANDS
 from drone_rl.config import TASKS, BaseTaskSettings
 from drone_rl.config.configuration import Changes, ChangesOfTask, Variant

@@ -13,7 +13,7 @@ from hydra.errors import HydraException
 from omegaconf import OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from drone_rl.cli.hydra.choices import without_schemas
+from drone_rl.cli.hydra.help import without_schemas
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.imports import ignore_noise
 

@@ -10,7 +10,7 @@ import torch
 import yaml
 from hydra.errors import HydraException
 
-from drone_rl.cli.hydra import schemas
+from drone_rl.cli.hydra import composition
 from drone_rl.cli.hydra.composition import conf_dir
 from drone_rl.cli.usage import COMMANDS
 from drone_rl.config import CameraSettings, DynamicsSettings, PillarsSettings, TaskSettings
@@ -57,10 +57,10 @@ def test_every_setting_of_a_command_is_typed(command, config):
             config(command, [f"{name}=many"])
 
 
-PARTS = {**schemas.PARTS, **schemas.SEVERAL}
+PARTS = {**composition.PARTS, **composition.SEVERAL}
 
 
-@pytest.mark.parametrize(("group", "name"), files(*schemas.PARTS))
+@pytest.mark.parametrize(("group", "name"), files(*composition.PARTS))
 def test_every_choice_is_told_the_same_by_its_file_and_in_code(group, name, settings):
     choice = f"{group}={name}"
     chosen = getattr(settings("train", choice, *NEEDS.get(choice, ())), group)
@@ -76,10 +76,10 @@ def test_every_variant_has_a_file(part):
         assert re.search(rf"\bbase_{name}\b", text) or f": {name}" in text, name
 
 
-@pytest.mark.parametrize(("group", "name"), files(*schemas.PARTS, *schemas.SEVERAL))
+@pytest.mark.parametrize(("group", "name"), files(*composition.PARTS, *composition.SEVERAL))
 def test_every_setting_of_every_choice_is_typed(group, name, config):
     chosen = config("train", [f"{group}={name}"])[group]
-    steps = chosen.values() if group in schemas.SEVERAL else [chosen]
+    steps = chosen.values() if group in composition.SEVERAL else [chosen]
     for step in steps:
         assert dataclasses.is_dataclass(typing.cast(typing.Any, step)._metadata.object_type)
 
@@ -198,7 +198,7 @@ def test_what_only_the_user_knows_is_passed_on(settings):
 
 
 def test_the_cameras_schema_has_the_types_of_the_settings():
-    made = {f.name: f.type for f in dataclasses.fields(schemas.schema_of(CameraSettings))}
+    made = {f.name: f.type for f in dataclasses.fields(composition.schema_of(CameraSettings))}
     assert made == {"width": int, "height": int, "horizontal_fov": float}
 
 

@@ -1,4 +1,4 @@
-from drone_rl.cli.hydra.names import networks, policies
+from drone_rl.cli.hydra.resuming import networks, policies
 
 
 def test_a_trained_policy_was_once_called_checkpoint():

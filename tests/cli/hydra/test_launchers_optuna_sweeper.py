@@ -11,7 +11,7 @@ from optuna.distributions import (  # noqa: E402
     IntDistribution,
 )
 
-from drone_rl.cli.hydra.optuna_sweeper import OptunaSweeper, check_params, distribution  # noqa: E402
+from drone_rl.cli.hydra.launchers import OptunaSweeper, check_params, distribution  # noqa: E402
 from drone_rl.utils.errors import InputError  # noqa: E402
 
 

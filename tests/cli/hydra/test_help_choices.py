@@ -2,8 +2,8 @@
 
 import pytest
 
-from drone_rl.cli.hydra.choices import check_choices, without_schemas
 from drone_rl.cli.hydra.composition import conf_dir
+from drone_rl.cli.hydra.help import check_choices, without_schemas
 from drone_rl.utils.errors import InputError
 
 
