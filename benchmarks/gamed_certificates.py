@@ -16,13 +16,13 @@ from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import certificate_path, shifts_path
 from drone_rl.robustness.axes import find_axes
 from drone_rl.robustness.domain import Prober
-from drone_rl.robustness.flying import Airfield
+from drone_rl.robustness.paired_evaluation import Airfield
 from drone_rl.robustness.shifts import make_subject, shifts
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 from drone_rl.verdicts.judge import judge
 from drone_rl.verification.checker import fingerprint
-from drone_rl.verification.checker.flights import Simulator
+from drone_rl.verification.checker.rollouts import Simulator
 
 _AXIS, _VALUE = "dead_rows", 12.0
 """A condition in which the invented file says that a policy is good, which fails there."""

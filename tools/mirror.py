@@ -4,11 +4,9 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 PURE_DATA = {
-    "evaluation/plots/palette": "colours; test_indicator and test_images find them in images",
-    "sim/rendering/semantics": "names; sim/test_worlds finds each on its things",
     **{
         f"config/{name}": "values with bounds; cli/hydra/test_schemas reads and builds each"
-        for name in (*("networks", "transforms"),)
+        for name in ("networks", "transforms")
     },
 }
 """Modules that need no test of their own, and why: what they hold is tried by others' tests."""

@@ -7,7 +7,7 @@ from drone_rl.explanations.report.truth_text import NAMES
 from drone_rl.sim.action_display import shown_actions
 from drone_rl.sim.vocabulary import terms_of
 from drone_rl.utils.text import Evidence, Sentence, among, bounds, listed, percent, plural
-from drone_rl.verification.places_text import PLACES
+from drone_rl.verification.text import PLACES
 
 
 def _size(evidence: Evidence) -> str:
