@@ -15,7 +15,7 @@ from benchmarks.peers.contenders import OURS, THEIRS
 from benchmarks.peers.plot import plot
 from benchmarks.peers.program import success_lower95
 
-Measured = dict[str, Any]
+SavedShifts = dict[str, Any]
 
 
 def bench_peers(folder: Path, seeds: Sequence[int], episodes: int, quick: bool) -> dict[str, Any]:
@@ -52,9 +52,9 @@ def bench_peers(folder: Path, seeds: Sequence[int], episodes: int, quick: bool) 
     return {"peers": found, "solve_over_best_peer": means["reinforce"] / best}
 
 
-def _contenders(folder: Path, episodes: int, quick: bool) -> dict[str, Callable[..., Measured]]:
+def _contenders(folder: Path, episodes: int, quick: bool) -> dict[str, Callable[..., SavedShifts]]:
     """A training by each, of a seed."""
-    contenders: dict[str, Callable[..., Measured]] = {}
+    contenders: dict[str, Callable[..., SavedShifts]] = {}
     for name, arguments in OURS.items():
         short = ("trainer.total_frames=1",) if quick else ()
         contenders[name] = functools.partial(
@@ -68,7 +68,7 @@ def _contenders(folder: Path, episodes: int, quick: bool) -> dict[str, Callable[
     return contenders
 
 
-def train_ours(arguments: Sequence[str], *, seed: int, episodes: int, folder: Path) -> Measured:
+def train_ours(arguments: Sequence[str], *, seed: int, episodes: int, folder: Path) -> SavedShifts:
     """One training by `drone-rl train`.
 
     Args:
@@ -90,7 +90,7 @@ def train_ours(arguments: Sequence[str], *, seed: int, episodes: int, folder: Pa
 
 def train_theirs(
     name: str, settings: Mapping[str, Any], *, seed: int, episodes: int, max_frames: int
-) -> Measured:
+) -> SavedShifts:
     """One training by others.
 
     Args:

@@ -128,7 +128,7 @@ def make_baseline(
     return ConstantPolicy(actions.always(name))
 
 
-def fly_baselines(
+def run_baselines(
     num_worlds: int,
     task: BaseTaskSettings | Task[Any],
     worlds: dict[str, Any],

@@ -9,7 +9,7 @@ from tensordict.nn import TensorDictModuleBase
 
 from drone_rl.config.judging import EvaluateSettings, FlightSettings
 from drone_rl.envs import worlds_of
-from drone_rl.evaluation.baselines import fly_baselines
+from drone_rl.evaluation.baselines import run_baselines
 from drone_rl.evaluation.metrics import summarise
 from drone_rl.evaluation.rollouts import StepLog, run_episodes
 from drone_rl.evaluation.rounding_sensitivity import compare
@@ -183,7 +183,7 @@ def evaluate(
     progress = progress or Bar()
     policy = as_pilot(policy)
     episodes, steps = settings.episodes, 3 if settings.baselines else 2
-    with held_out(policy, settings, seed) as (env, actor):
+    with held_out_environments(policy, settings, seed) as (env, actor):
         worlds, dynamics = env.base_env.state_dict(), worlds_of(env).dynamics
         progress("most probable actions", 0, steps)
         log = StepLog()
@@ -196,13 +196,13 @@ def evaluate(
     if settings.baselines:
         progress("luck and the oracle", 2, steps)
         num_worlds, device = settings.num_worlds, settings.device
-        flown |= fly_baselines(num_worlds, policy.task, worlds, episodes, device, dynamics)
+        flown |= run_baselines(num_worlds, policy.task, worlds, episodes, device, dynamics)
     progress("evaluated", steps, steps)
     figures = {name: summarise(e) for name, e in flown.items()}
     return Evaluation(policy, settings, figures, seed, rounding and rounding.as_dict())
 
 
-def held_out(
+def held_out_environments(
     policy: Pilot, settings: FlightSettings, seed: RootSeed
 ) -> AbstractContextManager[tuple[Any, TensorDictModuleBase]]:
     """Unseen worlds and the policy in them."""

@@ -13,7 +13,7 @@ from torch import Tensor
 from torchrl.envs import EnvBase
 
 from drone_rl.envs import worlds_of
-from drone_rl.evaluation.baselines import fly_baselines
+from drone_rl.evaluation.baselines import run_baselines
 from drone_rl.evaluation.certificate_text import is_proved
 from drone_rl.evaluation.metrics import Episodes, failure_table, summarise
 from drone_rl.evaluation.outcomes import Outcomes
@@ -102,7 +102,7 @@ def judge_policy(
         drawn = run_episodes(env, actor, episodes, greedy=False)
     base.load_state_dict(state)
     rounding = examine(env, actor, episodes, flown=greedy, log=log)
-    baselines = fly_baselines(
+    baselines = run_baselines(
         env.batch_size[0], worlds.task, state, episodes, str(worlds.device), worlds.dynamics
     )
     return judge(
@@ -303,7 +303,7 @@ def _check_pairs(greedy: Episodes, others: list[Episodes]) -> None:
             raise ValueError("policy and baselines were flown in different worlds; pair them")
 
 
-def judge_to_choose(
+def judge_for_selection(
     path: Path,
     episodes: int,
     device: str,
