@@ -21,15 +21,15 @@ from drone_rl.config import (
 )
 from drone_rl.evaluation.metrics import Episodes
 from drone_rl.policies import PictureNetwork
-from drone_rl.robustness.agents import BaselineAgent, Agent, PolicyAgent, StepContext
+from drone_rl.robustness.agents import Agent, BaselineAgent, PolicyAgent, StepContext
 from drone_rl.robustness.faults import FaultPipeline
 from drone_rl.robustness.perturbations import (
     ONSET_STEP,
     Condition,
     Mode,
     clutter,
-    sample_distractors,
     look_of,
+    sample_distractors,
     sways,
     task_things,
 )

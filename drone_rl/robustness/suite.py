@@ -17,7 +17,7 @@ from torch import Tensor
 
 from drone_rl.robustness.agents import OracleAgent, StepContext, has_oracle
 from drone_rl.robustness.axes import TOGETHER, Axis
-from drone_rl.robustness.paired_evaluation import PairedEvaluator, ConditionResult
+from drone_rl.robustness.paired_evaluation import ConditionResult, PairedEvaluator
 from drone_rl.robustness.perturbations import Condition, Mode
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import mean_bounds, proportion

@@ -30,7 +30,14 @@ from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seed_text import seed_line
 from drone_rl.utils.seeding import RootSeed, Stream, root_seed, torch_generator, with_seed
 from drone_rl.verdicts.certificate import find_claim
-from drone_rl.verdicts.coverage import Coverage, beside, find_domain, recheck_domain, require, sentence
+from drone_rl.verdicts.coverage import (
+    Coverage,
+    beside,
+    find_domain,
+    recheck_domain,
+    require,
+    sentence,
+)
 
 
 class _Judged(Protocol):
