@@ -1,4 +1,4 @@
-"""SavedShifts figures in a file: each benchmark's with the code, the day and the machine they are of.
+"""Measured figures in a file: each benchmark's with the code, the day and the machine they are of.
 
 The file holds the figures by their keys and, under "benchmarks", where each benchmark's come from.
 """

@@ -11,7 +11,7 @@ from drone_rl.policies.policy import load_policy
 from drone_rl.utils.progress import silent
 from drone_rl.verification.places import places
 from drone_rl.verification.prover.seeing import Seeing
-from drone_rl.verification.prover.subject import make_policy_spec
+from drone_rl.verification.prover.subject import make_subject
 
 _BATCH = 2000
 
@@ -33,7 +33,7 @@ def bench_places(quick: bool) -> dict[str, Any]:
     wrong = compared = 0
     for cubes in (2, 3):
         policy = load_policy("good").in_task(num_cubes=cubes)
-        made = make_policy_spec(policy.description, policy.make_network(), 0.0)
+        made = make_subject(policy.description, policy.make_network(), 0.0)
         with closing(made) as subject:
             for begin in range(0, count // 2, _BATCH):
                 size = min(_BATCH, count // 2 - begin)

@@ -15,7 +15,7 @@ from benchmarks.peers.contenders import OURS, THEIRS
 from benchmarks.peers.plot import plot
 from benchmarks.peers.program import success_lower95
 
-SavedShifts = dict[str, Any]
+Measured = dict[str, Any]
 
 
 def bench_peers(folder: Path, seeds: Sequence[int], episodes: int, quick: bool) -> dict[str, Any]:
@@ -52,9 +52,9 @@ def bench_peers(folder: Path, seeds: Sequence[int], episodes: int, quick: bool) 
     return {"peers": found, "solve_over_best_peer": means["reinforce"] / best}
 
 
-def _contenders(folder: Path, episodes: int, quick: bool) -> dict[str, Callable[..., SavedShifts]]:
+def _contenders(folder: Path, episodes: int, quick: bool) -> dict[str, Callable[..., Measured]]:
     """A training by each, of a seed."""
-    contenders: dict[str, Callable[..., SavedShifts]] = {}
+    contenders: dict[str, Callable[..., Measured]] = {}
     for name, arguments in OURS.items():
         short = ("trainer.total_frames=1",) if quick else ()
         contenders[name] = functools.partial(
@@ -68,7 +68,7 @@ def _contenders(folder: Path, episodes: int, quick: bool) -> dict[str, Callable[
     return contenders
 
 
-def train_ours(arguments: Sequence[str], *, seed: int, episodes: int, folder: Path) -> SavedShifts:
+def train_ours(arguments: Sequence[str], *, seed: int, episodes: int, folder: Path) -> Measured:
     """One training by `drone-rl train`.
 
     Args:
@@ -90,7 +90,7 @@ def train_ours(arguments: Sequence[str], *, seed: int, episodes: int, folder: Pa
 
 def train_theirs(
     name: str, settings: Mapping[str, Any], *, seed: int, episodes: int, max_frames: int
-) -> SavedShifts:
+) -> Measured:
     """One training by others.
 
     Args:

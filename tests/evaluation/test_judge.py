@@ -11,9 +11,8 @@ from drone_rl.config import DynamicsSettings, TaskSettings
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation.baselines import ConstantPolicy, Oracle
 from drone_rl.evaluation.judge import judge, judge_policy, measure, observe
-from drone_rl.evaluation.outcomes import Outcomes
+from drone_rl.evaluation.outcomes import Outcomes, Rounding
 from drone_rl.evaluation.rollouts import run_episodes
-from drone_rl.evaluation.rounding_sensitivity import Rounding
 from drone_rl.evaluation.rule import Kind, Rule
 from drone_rl.sim.actions import Move
 from drone_rl.sim.tasks.collect_cubes.rules import Side

@@ -1,7 +1,7 @@
 import pytest
 import torch
 
-from drone_rl.robustness.faults import Blur, DeadRows, Fault, Frozen, Late, Noise, FaultPipeline
+from drone_rl.robustness.faults import Blur, DeadRows, Fault, FaultPipeline, Frozen, Late, Noise
 
 
 def picture(*values):
@@ -77,4 +77,6 @@ def test_who_knows_the_truth_minds_only_what_hides_it():
 
 
 def test_nothing_goes_wrong_by_itself():
-    assert torch.equal(FaultPipeline([Fault()], 2, seed=0)(picture(0.3, 0.6), ALL), picture(0.3, 0.6))
+    assert torch.equal(
+        FaultPipeline([Fault()], 2, seed=0)(picture(0.3, 0.6), ALL), picture(0.3, 0.6)
+    )

@@ -33,7 +33,9 @@ def make_bed():
 def test_with_nothing_different_flights_are_those_of_the_environment(make_bed):
     policy = drone_rl.load_policy("poor")
     network, described = policy.make_network().eval(), policy.description
-    bed = make_bed(PolicySpec(network, policy.task, described.camera, described.make_transforms()), 6)
+    bed = make_bed(
+        PolicySpec(network, policy.task, described.camera, described.make_transforms()), 6
+    )
     flown = bed.fly(Condition()).episodes
     with policy.flying(6, stream=Stream.SHIFTED) as (env, actor):
         expected = run_episodes(env, actor, 6)
