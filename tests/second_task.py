@@ -13,8 +13,8 @@ from torch import Tensor
 
 from drone_rl.sim.actions import MOVES, Entry
 from drone_rl.sim.dynamics import BodyState, ComputerVision
-from drone_rl.sim.entities.cube import Cube
-from drone_rl.sim.rendering.semantics import Meaning
+from drone_rl.sim.entities import Cube
+from drone_rl.sim.rendering.scene import Meaning
 from drone_rl.sim.tasks import Goals, Grid, OracleRule
 from drone_rl.sim.vocabulary import Terms
 from drone_rl.utils.batch import Batch

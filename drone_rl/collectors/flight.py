@@ -26,10 +26,9 @@ from drone_rl.policies.actor import CategoricalActor
 from drone_rl.policies.finite import require_finite
 from drone_rl.policies.known_outputs import KnownOutputs
 from drone_rl.policies.packing import PackedNetwork
-from drone_rl.sim.rendering.crew import Crew
-from drone_rl.sim.rendering.devices import loading
+from drone_rl.sim.rendering.devices import Crew, loading
 from drone_rl.sim.rendering.raytrace.renderer import Raytracer
-from drone_rl.sim.rendering.raytrace.structs import Pictures
+from drone_rl.sim.rendering.raytrace.structs_kernel import Pictures
 from drone_rl.sim.tasks.collect_cubes.flying import FlyingCubes
 
 _LONGEST = 64

@@ -25,7 +25,7 @@ from drone_rl.sim.actions import MOVES, Actions
 from drone_rl.sim.composer_task import make_environment
 from drone_rl.sim.dynamics import FlightState, Quadrotor
 from drone_rl.sim.dynamics.body import heading_only
-from drone_rl.sim.entities.cameras import (
+from drone_rl.sim.entities import (
     BACK_CENTER,
     BOTTOM_CENTER,
     CHASE,
@@ -34,7 +34,7 @@ from drone_rl.sim.entities.cameras import (
     FRONT_RIGHT,
 )
 from drone_rl.sim.rendering import Appearance
-from drone_rl.sim.rendering.mounting import Mounting, product, rotate
+from drone_rl.sim.rendering.appearance import Mounting, product, rotate
 from drone_rl.sim.tasks import Task
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError

@@ -22,7 +22,7 @@ from drone_rl.robustness.perturbations import (
     Whitened,
     task_things,
 )
-from drone_rl.sim.rendering.semantics import Meaning
+from drone_rl.sim.rendering.scene import Meaning
 from drone_rl.utils.errors import InputError
 
 NUMBERS = (1, 2, 3, 4, 5)

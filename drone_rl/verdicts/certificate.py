@@ -17,7 +17,7 @@ from drone_rl.sim.tasks.collect_cubes.rules import EndReason
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import RootSeed, root_seed
 from drone_rl.verification.checker import Certificate, check_certificate, find, read_tried
-from drone_rl.verification.checker.drawing import ANYWHERE
+from drone_rl.verification.checker.sampling import ANYWHERE
 
 
 @dataclasses.dataclass(frozen=True)

@@ -24,11 +24,15 @@ from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seed_text import CHANCES, seed_line
 from drone_rl.utils.seeding import RootSeed, Stream, with_seed, world_random_state
 from drone_rl.utils.sentences import say
-from drone_rl.verification.prover.chain import Outcomes, follow_chances
-from drone_rl.verification.prover.chance_bounds import Bounded, bound_success
-from drone_rl.verification.prover.graph import explore, shape_of
-from drone_rl.verification.prover.sight import Sight
-from drone_rl.verification.prover.subject import make_subject
+from drone_rl.verification.prover.lattice import explore, shape_of
+from drone_rl.verification.prover.markov_chain import (
+    Bounded,
+    Outcomes,
+    Sight,
+    bound_success,
+    follow_chances,
+)
+from drone_rl.verification.prover.policy_spec import make_subject
 
 _BOUNDS = {
     "least": "everywhere at least",

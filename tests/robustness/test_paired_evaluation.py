@@ -10,7 +10,7 @@ from drone_rl.robustness.axes import AXES
 from drone_rl.robustness.faults import Late
 from drone_rl.robustness.paired_evaluation import PairedEvaluator, PolicySpec
 from drone_rl.robustness.perturbations import ONSET_STEP, Condition, Mode, Whitened
-from drone_rl.sim.rendering.semantics import Meaning
+from drone_rl.sim.rendering.scene import Meaning
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import Stream

@@ -12,7 +12,7 @@ from drone_rl.robustness.perturbations import (
     sample_distractors,
     task_things,
 )
-from drone_rl.sim.rendering.semantics import Meaning
+from drone_rl.sim.rendering.scene import Meaning
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 from tests.robustness.subjects import subject

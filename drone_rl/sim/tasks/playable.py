@@ -11,7 +11,7 @@ from torch import Tensor
 
 from drone_rl.sim.actions import Entry
 from drone_rl.sim.dynamics import BodyState, Dynamics, Obstacles
-from drone_rl.sim.rendering.semantics import Meaning
+from drone_rl.sim.rendering.scene import Meaning
 
 
 class State(Protocol):

@@ -7,7 +7,7 @@ from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv
 from drone_rl.envs.composer_env import ComposerEnv
 from drone_rl.sim.composer_task import make_environment
-from drone_rl.sim.rendering.semantics import Meaning
+from drone_rl.sim.rendering.scene import Meaning
 from drone_rl.sim.tasks import CollectCubes, as_task
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.seeding import world_random_state

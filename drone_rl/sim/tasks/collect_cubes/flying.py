@@ -11,7 +11,7 @@ import warp as wp
 from drone_rl.sim.dynamics import ComputerVision, Dynamics, FlightState, Quadrotor
 from drone_rl.sim.dynamics.body import LEVEL
 from drone_rl.sim.dynamics.fleet import FlyingFleet
-from drone_rl.sim.rendering.raytrace.structs import DRONE_FRAME, Poses
+from drone_rl.sim.rendering.raytrace.structs_kernel import DRONE_FRAME, Poses
 from drone_rl.sim.tasks.collect_cubes.kernel import Flights
 from drone_rl.sim.tasks.collect_cubes.practice import Practice
 from drone_rl.sim.tasks.collect_cubes.rules import WorldState

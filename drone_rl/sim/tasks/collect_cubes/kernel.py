@@ -17,7 +17,7 @@ The same numbers, bit for bit: places are of double precision here, too.
 import warp as wp
 
 from drone_rl.sim.dynamics.moves_kernel import Fleet, camera_attitude, fly_move, is_flying, is_lost
-from drone_rl.sim.rendering.raytrace.structs import DRONE_FRAME, Poses
+from drone_rl.sim.rendering.raytrace.structs_kernel import DRONE_FRAME, Poses
 from drone_rl.sim.tasks.collect_cubes.playing import VANISHED_DEPTH
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
 

@@ -10,7 +10,7 @@ from torch import Tensor
 from drone_rl.config import TaskSettings
 from drone_rl.sim.actions import Entry
 from drone_rl.sim.dynamics import BodyState, ComputerVision
-from drone_rl.sim.entities.cube import Cube
+from drone_rl.sim.entities import Cube
 from drone_rl.sim.tasks.collect_cubes import rules
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason, Side, WorldState
 

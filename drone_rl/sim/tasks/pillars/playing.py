@@ -10,7 +10,7 @@ from torch import Tensor
 from drone_rl.config import PillarsSettings
 from drone_rl.sim.actions import Entry
 from drone_rl.sim.dynamics import BodyState, ComputerVision, Obstacles
-from drone_rl.sim.entities.pillar import Pillar
+from drone_rl.sim.entities import Pillar
 from drone_rl.sim.tasks.pillars import field, rules
 from drone_rl.sim.tasks.pillars.rules import EndReason, FieldState, Side
 

@@ -7,7 +7,7 @@ from numpy.random import RandomState
 
 from drone_rl.config import TaskSettings
 from drone_rl.sim.rendering.devices import start_warp
-from drone_rl.sim.rendering.raytrace.structs import Poses
+from drone_rl.sim.rendering.raytrace.structs_kernel import Poses
 from drone_rl.sim.tasks.collect_cubes.flying import FlyingCubes
 from drone_rl.sim.tasks.collect_cubes.kernel import COLLECTED, PASSED, Flights, move, place
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason

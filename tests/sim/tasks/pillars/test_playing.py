@@ -1,7 +1,7 @@
 import numpy as np
 import torch
 
-from drone_rl.sim.rendering.semantics import Meaning
+from drone_rl.sim.rendering.scene import Meaning
 from drone_rl.sim.tasks import Pillars
 
 
