@@ -168,16 +168,16 @@ def test_baselines_fly_with_the_dynamics_of_the_environment(monkeypatch):
 def test_other_worlds_are_no_baseline(make_episodes, make_baselines):
     ours = make_episodes([[LEFT, LEFT]] * 2, [[1, 1]] * 2)
     theirs = make_episodes([[RIGHT, LEFT]] * 2, [[1, 1]] * 2)
-    with pytest.raises(ValueError, match="different worlds"):
+    with pytest.raises(ValueError, match="different initial states"):
         judge(ours, make_baselines(theirs))
-    with pytest.raises(ValueError, match="different worlds"):
+    with pytest.raises(ValueError, match="different initial states"):
         judge(ours, make_baselines(ours), sampled=ours[:1])
 
 
 def test_one_other_world_is_enough_to_be_no_baseline(make_episodes, make_baselines):
     ours = make_episodes([[LEFT, LEFT]] * 3, [[1, 1]] * 3)
     theirs = make_episodes([[LEFT, LEFT]] * 2 + [[RIGHT, LEFT]], [[1, 1]] * 3)
-    with pytest.raises(ValueError, match="different worlds"):
+    with pytest.raises(ValueError, match="different initial states"):
         judge(ours, make_baselines(theirs))
 
 
