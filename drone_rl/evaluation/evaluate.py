@@ -49,7 +49,7 @@ class Evaluation:
     def rows(self) -> list[list[str]]:
         """Return the figures as a table of texts: a heading, then a row for each figure."""
         flown = self.flown.values()
-        terms = as_task(self.policy.task).terms
+        terms = as_task(self.policy.task).vocabulary
         rows = [
             ["", *self.flown],
             [f"all {terms.goals}", *(interval(f["success"], "share") for f in flown)],

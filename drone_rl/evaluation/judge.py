@@ -160,7 +160,7 @@ def judge(
         "rule": rule.text,
         "error_rate": rule.error_rate,
         "good_share": rule.good_share,
-        "terms": task.terms.as_dict(),
+        "terms": task.vocabulary.as_dict(),
         "num_cubes": greedy.goals.reached.shape[-1],
         "rounding": None if rounding is None else {**rounding.as_dict(), "decides": depends},
         "proof": None if claim is None else claim.beside(greedy, rounding=rounding),

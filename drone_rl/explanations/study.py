@@ -82,7 +82,7 @@ def explain_policy(
         **seed.as_dict(),
         "seconds": {title: one.seconds for title, one in made.items()},
         "actions": context.scenes.actions.as_dict(),
-        "terms": context.scenes.task.terms.as_dict(),
+        "terms": context.scenes.task.vocabulary.as_dict(),
         **{key: value for one in made.values() for key, value in one.numbers.items()},
         **({"left_out": left_out} if left_out else {}),
         "provenance": provenance,

@@ -148,7 +148,7 @@ def shifts(
         "network": _identity(pilot),
         "settings": settings.values(),
         **seed.as_dict(),
-        "terms": as_task(subject.task).terms.as_dict(),
+        "terms": as_task(subject.task).vocabulary.as_dict(),
         **found,
         "seconds": time.perf_counter() - begin,
     }

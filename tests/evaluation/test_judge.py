@@ -15,7 +15,7 @@ from drone_rl.evaluation.outcomes import Outcomes, Rounding
 from drone_rl.evaluation.rollouts import run_episodes
 from drone_rl.evaluation.rule import Kind, Rule
 from drone_rl.sim.actions import Move
-from drone_rl.sim.tasks.collect_cubes.rules import Side
+from drone_rl.sim.tasks.collect_cubes import Side
 from drone_rl.utils.intervals import mean_bounds, proportion
 from tests.fake_flight import floating
 from tests.second_task import Posts

@@ -5,7 +5,7 @@ from drone_rl.collectors.sight import Sight
 from drone_rl.evaluation.outcomes import MOST, enumerate_outcomes
 from drone_rl.policies.rounding import Decisions
 from drone_rl.sim.actions import Move
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.sim.tasks.collect_cubes import EndReason
 
 
 def ends(possible):

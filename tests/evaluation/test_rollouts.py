@@ -8,7 +8,7 @@ from drone_rl.evaluation.baselines import ConstantPolicy, Oracle, RandomPolicy
 from drone_rl.evaluation.metrics import summarise
 from drone_rl.evaluation.rollouts import run_episodes
 from drone_rl.sim.actions import MOVES, Move
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.utils.seeding import Stream
 
 

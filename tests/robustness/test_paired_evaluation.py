@@ -11,7 +11,7 @@ from drone_rl.robustness.faults import Late
 from drone_rl.robustness.paired_evaluation import PairedEvaluator, PolicySpec
 from drone_rl.robustness.perturbations import ONSET_STEP, Condition, Mode, Whitened
 from drone_rl.sim.rendering.scene import Meaning
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import Stream
 from tests.robustness.subjects import TASK, Blind, subject
