@@ -172,7 +172,7 @@ def write_video(frames: list[np.ndarray], path: Path) -> list[Path]:
 def _caption(task: Task[Any], state: TensorDictBase, earned: float) -> str:
     end = task.ends(int(state["info", "end_reason"][0]))
     ended = "" if end == 0 else f"   ended: {end.name.lower()}"
-    return f"{task.terms.goals} {earned:.3g}" + ended.replace("_", " ")
+    return f"{task.vocabulary.goals} {earned:.3g}" + ended.replace("_", " ")
 
 
 def _look(base: DroneEnv) -> _Seen:

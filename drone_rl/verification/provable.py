@@ -23,8 +23,7 @@ from drone_rl.evaluation.rollouts import find_failures
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import read_checkpoint
 from drone_rl.sim.tasks import Practice
-from drone_rl.sim.tasks.collect_cubes import require_cubes, require_moves
-from drone_rl.sim.tasks.collect_cubes.practice import inflated
+from drone_rl.sim.tasks.practice import inflated
 from drone_rl.training import Callback
 from drone_rl.training.progress import OngoingTraining
 from drone_rl.training.train import (
@@ -47,6 +46,7 @@ from drone_rl.utils.seeding import Stream
 from drone_rl.utils.settings import Settings
 from drone_rl.verification.prove import Proof, prove
 from drone_rl.verification.prover.boxes import volumes
+from drone_rl.verification.requirements import require_cubes, require_moves
 
 HOW_MAY_CHANGE = ("rounds", "limit_s")
 """What a resumed run may change of its rounds."""

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from drone_rl.config import TaskSettings
-from drone_rl.sim.tasks.collect_cubes.task import CollectCubes
+from drone_rl.sim.tasks.collect_cubes import CollectCubes
 from drone_rl.utils.errors import InputError
 
 

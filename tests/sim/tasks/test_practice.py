@@ -6,7 +6,7 @@ import torch
 
 from drone_rl.config import TaskSettings
 from drone_rl.sim.tasks import CollectCubes, Practice
-from drone_rl.sim.tasks.collect_cubes.practice import inflated
+from drone_rl.sim.tasks.practice import inflated
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import get_state, set_state, world_random_state
 

@@ -1,4 +1,4 @@
-"""The kernel's rules are the rules, bit for bit."""
+"""The kernel's rules are the rules, bit for bit; its arrays start from the environments' state."""
 
 import pytest
 import torch
@@ -6,11 +6,20 @@ import warp as wp
 from numpy.random import RandomState
 
 from drone_rl.config import TaskSettings
+from drone_rl.sim.dynamics import ComputerVision
 from drone_rl.sim.rendering.devices import start_warp
 from drone_rl.sim.rendering.raytrace.structs_kernel import Poses
-from drone_rl.sim.tasks.collect_cubes.flying import FlyingCubes
-from drone_rl.sim.tasks.collect_cubes.kernel import COLLECTED, PASSED, Flights, move, place
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.sim.tasks import CollectCubes, Pillars
+from drone_rl.sim.tasks.collect_cubes import EndReason
+from drone_rl.sim.tasks.collect_cubes_kernel import (
+    COLLECTED,
+    PASSED,
+    STANDS,
+    Flights,
+    FlyingCubes,
+    move,
+    place,
+)
 from drone_rl.sim.worlds import Worlds
 
 start_warp("cpu")
@@ -40,7 +49,7 @@ def test_random_flights_go_as_the_rules_say(settings, ends):
     task = TaskSettings(**settings)
     worlds, draws = Worlds(WORLDS, task), torch.Generator().manual_seed(0)
     worlds.reset(torch.arange(WORLDS), [RandomState(i) for i in range(WORLDS)])
-    flying = FlyingCubes.find(worlds.task, worlds.dynamics, WORLDS)
+    flying = worlds.task.fused_rules(worlds.dynamics, WORLDS)
     flying.begin(worlds.state)
     places = wp.to_torch(flying.poses.places)
     state, going, seen = worlds.state, torch.arange(WORLDS), set()
@@ -65,3 +74,35 @@ def test_random_flights_go_as_the_rules_say(settings, ends):
         seen |= {*state.end_reason.tolist()}
         state, going = state[is_on], going[is_on]
     assert ends <= seen
+
+
+def test_begins_where_worlds_are_and_leaves_them_alone():
+    settings = TaskSettings(num_cubes=2, altitude=3.0, vertical_bound=0.5)
+    worlds = Worlds(2, settings)
+    cubes = torch.tensor([[[15.0, 1.0, 3.0], [24.0, -2.0, 3.5]], [[15.0, 0.0, 3.0]] * 2])
+    worlds.state = worlds.start(cubes.double())
+    flying = FlyingCubes(settings, worlds.dynamics, 3)
+    for values in (flying.steps, flying.end_reasons, wp.to_torch(flying.flights.fates)):
+        values.fill_(1)  # of a batch before
+    flying.begin(worlds.state)
+    assert wp.to_torch(flying.flights.drones)[:2].tolist() == [[0.0, 0.0, 3.0]] * 2
+    assert torch.equal(wp.to_torch(flying.flights.cubes)[:2], cubes.double())
+    assert (wp.to_torch(flying.flights.fates)[:2] == STANDS).all()
+    assert flying.steps.tolist() == flying.end_reasons.tolist() == [0, 0, 1]
+    wp.to_torch(flying.flights.drones).fill_(7.0)
+    assert worlds.state.drone[0].tolist() == [0.0, 0.0, 3.0]
+    assert wp.to_torch(flying.poses.attitudes)[0].tolist() == [1.0, 0.0, 0.0, 0.0]
+
+
+def test_other_rules_and_other_moves_are_not_known():
+    class Windy(ComputerVision):
+        pass
+
+    class Strict(CollectCubes):
+        def judge(self, state, body):
+            return super().judge(state, body)
+
+    assert CollectCubes().fused_rules(ComputerVision(), 1) is not None
+    assert CollectCubes().fused_rules(Windy(), 1) is None
+    assert Strict().fused_rules(ComputerVision(), 1) is None
+    assert Pillars().fused_rules(ComputerVision(), 1) is None

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from drone_rl.config import TaskSettings
 from drone_rl.sim.actions import Move
 from drone_rl.sim.dynamics import BodyState, ComputerVision
-from drone_rl.sim.tasks.collect_cubes import rules
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason, Side
+from drone_rl.sim.tasks.collect_cubes import CollectCubes, EndReason, Side
 from tests.fake_flight import FLIGHT, Floating
 
 SETTINGS = TaskSettings()  # drone and cubes touch up to 1.65 m on each axis
@@ -20,7 +19,7 @@ def at(*ys, settings=SETTINGS):
     """One world whose cubes stand at these y."""
     x = settings.first_distance + settings.spacing * torch.arange(len(ys))
     y, z = torch.tensor(ys).double(), torch.full((len(ys),), settings.altitude).double()
-    return rules.start(settings, torch.stack([x, y, z], -1)[None])
+    return CollectCubes(settings).start(torch.stack([x, y, z], -1)[None])
 
 
 def body(*place):
@@ -29,18 +28,20 @@ def body(*place):
 
 
 def fly(state, x, y, settings=SETTINGS):
-    return rules.judge(settings, state, body(x, y, settings.altitude))
+    return CollectCubes(settings).judge(state, body(x, y, settings.altitude))
 
 
 def move(task, state, action):
     """Flies all worlds in computer-vision mode."""
     moves = torch.tensor([action] * len(state))
-    return rules.judge(task, state, ComputerVision(task.step_length).step(state.body, moves))
+    return CollectCubes(task).judge(state, ComputerVision(task.step_length).step(state.body, moves))
 
 
 def test_cubes_are_drawn_within_their_bounds_and_uniformly():
     settings = TaskSettings(vertical_bound=1.0, altitude=5.0)
-    draws = torch.stack([rules.draw_cubes(settings, np.random.RandomState(i)) for i in range(2000)])
+    draws = torch.stack(
+        [CollectCubes(settings).draw(np.random.RandomState(i)) for i in range(2000)]
+    )
     assert draws[..., 0].unique().tolist() == [15.0, 24.0, 33.0]
     assert draws[..., 1].abs().max() <= 6.0
     assert (draws[..., 2] - 5.0).abs().max() <= 1.0
@@ -60,7 +61,7 @@ def test_codes_are_those_of_recorded_files():
 
 def test_a_cube_stands_until_it_is_collected_or_passed_and_the_next_is_the_first_that_stands():
     flags = torch.tensor(list(itertools.product([False, True], repeat=6)))
-    state = rules.start(SETTINGS, torch.zeros(64, 3, 3).double())
+    state = CollectCubes(SETTINGS).start(torch.zeros(64, 3, 3).double())
     state.collected, state.passed = flags[:, :3], flags[:, 3:]
     for collected, passed, present, following in zip(
         state.collected.tolist(),
@@ -76,8 +77,8 @@ def test_a_cube_stands_until_it_is_collected_or_passed_and_the_next_is_the_first
 
 def test_a_start_is_at_the_origin_with_everything_to_come():
     settings = TaskSettings(altitude=4.0)
-    cubes = rules.draw_cubes(settings, np.random.RandomState(0))
-    state = rules.start(settings, [cubes, cubes + 1.0])
+    cubes = CollectCubes(settings).draw(np.random.RandomState(0))
+    state = CollectCubes(settings).start(torch.stack([cubes, cubes + 1.0]))
     assert state.drone.tolist() == [[0.0, 0.0, 4.0]] * 2
     assert torch.equal(state.cubes[1], cubes + 1.0)
     assert not state.collected.any() and not state.passed.any()
@@ -109,25 +110,25 @@ def test_touch_distance_is_exact(axis, sign):
     for distance, touches in ((1.65, True), (beyond(1.65), False)):
         cube = torch.zeros(1, 1, 3).double()
         cube[..., axis] = sign * distance
-        state = rules.start(SETTINGS, cube)
-        state, reward = rules.judge(SETTINGS, state, body(0, 0, 0))
+        state = CollectCubes(SETTINGS).start(cube)
+        state, reward = CollectCubes(SETTINGS).judge(state, body(0, 0, 0))
         assert state.collected.item() == touches
         assert reward.item() == float(touches)
 
 
 def test_touch_needs_all_three_axes():
     corner = torch.tensor([[[1.6, -1.6, 1.6]]]).double()
-    assert rules.judge(SETTINGS, rules.start(SETTINGS, corner), body(0, 0, 0))[1] == 1
+    assert CollectCubes(SETTINGS).judge(CollectCubes(SETTINGS).start(corner), body(0, 0, 0))[1] == 1
     for axis in range(3):
         aside = corner.clone()
         aside[..., axis] *= 1.1
-        state = rules.start(SETTINGS, aside)
-        assert rules.judge(SETTINGS, state, body(0, 0, 0))[1] == 0
+        state = CollectCubes(SETTINGS).start(aside)
+        assert CollectCubes(SETTINGS).judge(state, body(0, 0, 0))[1] == 0
 
 
 def test_two_cubes_touched_at_once_are_worth_two():
     cubes = torch.tensor([[[1.0, 0.0, 0.0], [1.5, 0.0, 0.0], [1.7, 0.0, 0.0]]]).double()
-    state, reward = rules.judge(SETTINGS, rules.start(SETTINGS, cubes), body(0, 0, 0))
+    state, reward = CollectCubes(SETTINGS).judge(CollectCubes(SETTINGS).start(cubes), body(0, 0, 0))
     assert reward.tolist() == [2.0] and reward.dtype == torch.float64
     assert state.collected.tolist() == [[True, True, False]]
 
@@ -170,7 +171,7 @@ def test_side_is_ahead_up_to_exactly_the_touch_distance():
         for sign in (1, -1):
             cubes = torch.tensor([[[15.0, sign * y, 0.0]]], dtype=torch.float64)
             mirrored = {Side.LEFT: Side.RIGHT, Side.AHEAD: Side.AHEAD}[side] if sign < 0 else side
-            assert rules.start(SETTINGS, cubes).side.tolist() == [[mirrored]]
+            assert CollectCubes(SETTINGS).start(cubes).side.tolist() == [[mirrored]]
 
 
 def test_ends_in_the_order_of_algorithm_3():
@@ -201,15 +202,15 @@ def test_of_coinciding_ends_the_first_in_the_order_counts(coinciding):
 def test_a_lost_drone_ends_its_own_episode_and_for_that_reason():
     cubes = torch.zeros(2, 3, 3).double()
     cubes[..., 0] = 50.0
-    state = rules.start(SETTINGS, cubes)
+    state = CollectCubes(SETTINGS).start(cubes)
     state.collected[:] = True
     body = Floating(FLIGHT, None).start(torch.zeros(2, 3).double())
     body.lost[1] = True
-    ended, _ = rules.judge(SETTINGS, state, body)
+    ended, _ = CollectCubes(SETTINGS).judge(state, body)
     assert ended.end_reason.tolist() == [EndReason.ALL_CUBES, EndReason.LOST_CONTROL]
     state.collected[:] = False
     body.position[:, 1] = 1000.0
-    ended, _ = rules.judge(SETTINGS, state, body)
+    ended, _ = CollectCubes(SETTINGS).judge(state, body)
     assert ended.end_reason.tolist() == [EndReason.SIDE_BOUNDARY, EndReason.LOST_CONTROL]
 
 
@@ -247,8 +248,8 @@ def test_next_cube_is_the_first_that_stands_and_their_number_if_none_does():
 
 
 def test_a_start_is_at_the_altitude_with_nothing_done():
-    cubes = [torch.zeros(2, 3).double() + i for i in range(3)]
-    state = rules.start(TaskSettings(altitude=4.0), cubes)
+    cubes = torch.arange(3.0).double()[:, None, None].expand(3, 2, 3)
+    state = CollectCubes(TaskSettings(altitude=4.0)).start(cubes)
     assert state.drone.tolist() == [[0.0, 0.0, 4.0]] * 3 and state.drone.dtype == torch.float64
     assert state.cubes[2].unique().tolist() == [2.0]
     assert state.collected.shape == state.passed.shape == (3, 2)
@@ -263,7 +264,7 @@ def test_draws_are_those_of_the_stream_in_order():
     task = TaskSettings(vertical_bound=1.0, num_cubes=2)
     raw = np.random.RandomState(5).uniform(-1, 1, size=(2, 2))
     expected = [[15.0, 6 * raw[0, 0], 2.5 + raw[0, 1]], [24.0, 6 * raw[1, 0], 2.5 + raw[1, 1]]]
-    assert rules.draw_cubes(task, np.random.RandomState(5)).tolist() == expected
+    assert CollectCubes(task).draw(np.random.RandomState(5)).tolist() == expected
 
 
 MOVES = st.lists(st.sampled_from(list(Move)), min_size=1, max_size=60)
@@ -325,7 +326,7 @@ def test_mirrored_worlds_under_mirrored_moves_are_mirrored(places, moves):
 def test_worlds_know_nothing_of_each_other(worlds, moves):
     alone = [flight(places, moves)[0][-1] for places in worlds]
     cubes = torch.cat([at(*places, settings=NEAR).cubes for places in worlds])
-    state = rules.start(NEAR, cubes)
+    state = CollectCubes(NEAR).start(cubes)
     for action in moves:
         state, _ = move(NEAR, state, action)
     for i, one in enumerate(alone):
@@ -353,7 +354,7 @@ def test_judge_leaves_its_input_alone():
 
 
 def test_select_and_overwrite_worlds():
-    states = rules.start(SETTINGS, torch.zeros(3, 3, 3).double())
+    states = CollectCubes(SETTINGS).start(torch.zeros(3, 3, 3).double())
     part = states[torch.tensor([2])]
     part.steps += 7
     assert states.steps.tolist() == [0, 0, 0]

@@ -1,8 +1,8 @@
 import pytest
 
 from drone_rl.config import PillarsSettings, TaskSettings
-from drone_rl.sim.tasks.collect_cubes import require_cubes
 from drone_rl.utils.errors import InputError
+from drone_rl.verification.requirements import require_cubes
 
 
 def test_only_cube_collection_passes():

@@ -9,17 +9,37 @@
 # pyright: reportAttributeAccessIssue=false
 # (Warp compiles this file; Python's types say nothing about it, and what a loop changes is
 # declared by its type.)
-"""`rules` for kernels that fly whole episodes, a world at a time.
+"""The rules of `collect_cubes` as Warp functions, for the fused episode kernel.
 
-The same numbers, bit for bit: places are of double precision here, too.
+They compute the same numbers as the rules in torch, bit for bit, in double precision.
 """
 
+import enum
+from typing import Any
+
+import torch
 import warp as wp
 
+from drone_rl.config import TaskSettings
+from drone_rl.sim.clutter import HIDDEN_DEPTH
+from drone_rl.sim.dynamics import ComputerVision, Dynamics, FlightState, Quadrotor
+from drone_rl.sim.dynamics.body import LEVEL
+from drone_rl.sim.dynamics.fleet import FlyingFleet
 from drone_rl.sim.dynamics.moves_kernel import Fleet, camera_attitude, fly_move, is_flying, is_lost
 from drone_rl.sim.rendering.raytrace.structs_kernel import DRONE_FRAME, Poses
-from drone_rl.sim.tasks.collect_cubes.playing import VANISHED_DEPTH
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+
+
+class EndReason(enum.IntEnum):
+    """Why an episode ended."""
+
+    RUNNING = 0
+    ALL_CUBES = 1
+    FRONT_BOUNDARY = 2
+    SIDE_BOUNDARY = 3
+    STEP_LIMIT = 4
+    LOST_CONTROL = 5
+    """The drone's motion diverged, see `BodyState.is_lost`: precedes all other reasons."""
+
 
 _RUNNING = wp.constant(int(EndReason.RUNNING))
 _ALL_CUBES = wp.constant(int(EndReason.ALL_CUBES))
@@ -27,7 +47,7 @@ _FRONT_BOUNDARY = wp.constant(int(EndReason.FRONT_BOUNDARY))
 _SIDE_BOUNDARY = wp.constant(int(EndReason.SIDE_BOUNDARY))
 _STEP_LIMIT = wp.constant(int(EndReason.STEP_LIMIT))
 _LOST_CONTROL = wp.constant(int(EndReason.LOST_CONTROL))
-_DEPTH = wp.constant(wp.float64(VANISHED_DEPTH))
+_DEPTH = wp.constant(wp.float64(HIDDEN_DEPTH))
 
 STANDS = wp.constant(0)
 COLLECTED = wp.constant(1)
@@ -76,7 +96,7 @@ def place(flights: Flights, world: int, poses: Poses) -> None:
 
 @wp.func
 def move(flights: Flights, world: int, action: int) -> float:
-    """Moves a drone, as its dynamics do, and applies the rules, as `rules.judge` does.
+    """Moves a drone, as its dynamics do, and applies the rules, as `CollectCubes.judge` does.
 
     Args:
         flights: The worlds.
@@ -133,3 +153,53 @@ def _end_reason(flights: Flights, world: int, drone: wp.vec3d, collected: int) -
     if flights.steps[world] >= flights.step_limit:
         return _STEP_LIMIT
     return _RUNNING
+
+
+class FlyingCubes:
+    """Arrays of environments, rewritten for each batch of episodes."""
+
+    def __init__(self, settings: TaskSettings, dynamics: Dynamics, num_envs: int) -> None:
+        """Allocate the arrays of at most `num_envs` environments; see `supports`."""
+        cubes = settings.num_cubes
+        self._drones = torch.zeros(num_envs, 3, dtype=torch.float64)
+        self._cubes = torch.zeros(num_envs, cubes, 3, dtype=torch.float64)
+        self._fates = torch.zeros(num_envs, cubes, dtype=torch.int32)
+        self.steps = torch.zeros(num_envs, dtype=torch.int32)
+        """Taken so far. Shape: (num_envs,)."""
+        self.end_reasons = torch.zeros(num_envs, dtype=torch.int32)
+        """Shape: (num_envs,)."""
+        places = torch.zeros(num_envs, 1 + DRONE_FRAME + cubes, 3)
+        attitudes = torch.tensor(LEVEL).repeat(num_envs, 1)
+        self.flights, self.poses = Flights(), Poses()
+        self.flights.drones = wp.from_torch(self._drones, dtype=wp.vec3d)
+        self.flights.cubes = wp.from_torch(self._cubes, dtype=wp.vec3d)
+        self.flights.fates = wp.from_torch(self._fates)
+        self.flights.steps = wp.from_torch(self.steps)
+        self.flights.end_reasons = wp.from_torch(self.end_reasons)
+        if isinstance(dynamics, ComputerVision):
+            self.flights.moves = wp.from_torch(dynamics.moves.contiguous(), dtype=wp.vec3d)
+        self._fleet = FlyingFleet(num_envs, dynamics if isinstance(dynamics, Quadrotor) else None)
+        self.flights.fleet = self._fleet.fleet
+        self.flights.touch_distance = settings.touch_distance
+        self.flights.front_bound = settings.front_bound
+        self.flights.side_bound = settings.side_bound
+        self.flights.step_limit = settings.step_limit
+        self.poses.places = wp.from_torch(places, dtype=wp.vec3)
+        self.poses.attitudes = wp.from_torch(attitudes, dtype=wp.vec4)
+
+    @staticmethod
+    def supports(dynamics: Dynamics) -> bool:
+        """Return whether the kernel implements these dynamics."""
+        return type(dynamics) is ComputerVision or (
+            type(dynamics) is Quadrotor and FlyingFleet.knows(dynamics)
+        )
+
+    def begin(self, state: Any) -> None:
+        """Copy states at the start of episodes."""
+        count = len(state)
+        self._drones[:count] = state.drone
+        self._cubes[:count] = state.cubes
+        if isinstance(state.body, FlightState):
+            self._fleet.begin(state.body)
+        for values in (self._fates, self.steps, self.end_reasons):
+            values[:count] = 0
