@@ -8,13 +8,11 @@ from typing import Any
 
 from drone_rl.config.judging import JudgeSettings
 from drone_rl.policies.policy import Policy, load_policy
-from drone_rl.robustness.axes import AXES
-from drone_rl.robustness.axis import Axis
+from drone_rl.robustness.axes import AXES, Axis
 from drone_rl.robustness.shifts import shifts
 from drone_rl.utils.progress import silent
 from drone_rl.utils.seeding import root_seed
-from drone_rl.verdicts.domain_check import refly
-from drone_rl.verdicts.domains import Coverage, find_domain, require
+from drone_rl.verdicts.coverage import Coverage, find_domain, refly, require
 
 POLICY = "robust"
 """Good beyond no difference on every axis."""

@@ -16,7 +16,7 @@ from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import certificate_path, shifts_path
 from drone_rl.robustness.axes import find_axes
 from drone_rl.robustness.domain import Prober
-from drone_rl.robustness.flying import Airfield
+from drone_rl.robustness.paired_evaluation import Airfield
 from drone_rl.robustness.shifts import make_subject, shifts
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent

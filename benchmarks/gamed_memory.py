@@ -23,7 +23,7 @@ from drone_rl.config.judging import FlightSettings
 from drone_rl.config.networks import Mlp
 from drone_rl.config.training import TrainSettings
 from drone_rl.evaluation.evaluate import evaluate
-from drone_rl.evaluation.selection import judge_to_choose
+from drone_rl.evaluation.judge import judge_to_choose
 from drone_rl.policies import MLP
 from drone_rl.policies.base_policy import Pilot
 from drone_rl.policies.external_network import Logits

@@ -12,15 +12,14 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.commands import train
+from benchmarks.robust_comparison import PLAIN, by_kind, compare, mean, untouched_kinds
 from drone_rl.config import MINIMAL
 from drone_rl.config.shifting import ShiftSettings
 from drone_rl.policies.policy import load_policy
 from drone_rl.policies.zoo import read_checkpoint
 from drone_rl.robustness.axes import AXES, GROUPS, find_axes
-from drone_rl.robustness.comparing import PLAIN, by_kind, compare, mean
-from drone_rl.robustness.flying import Airfield, Subject
+from drone_rl.robustness.paired_evaluation import Airfield, Subject
 from drone_rl.robustness.shifts import make_subject
-from drone_rl.robustness.touched import untouched_kinds
 from drone_rl.training.train import last_of, settings_of
 
 DEFAULT, ALL = "default", "all"

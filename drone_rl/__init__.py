@@ -51,11 +51,10 @@ if TYPE_CHECKING:
     from drone_rl.sim.image_types import ImageRequest, ImageType
     from drone_rl.training.train import Training, train
     from drone_rl.utils.errors import InputError
-    from drone_rl.verdicts.bodies import Bodies, bodies
-    from drone_rl.verdicts.domains import Coverage
-    from drone_rl.verdicts.export import export_onnx
-    from drone_rl.verdicts.judge import Judgement, judge
-    from drone_rl.verdicts.judgements import Judgements
+    from drone_rl.verdicts.coverage import Coverage
+    from drone_rl.verdicts.dynamics_sweep import Bodies, bodies
+    from drone_rl.verdicts.judge import Judgement, Judgements, judge
+    from drone_rl.verdicts.onnx_export import export_onnx
     from drone_rl.verification.chances import Chances, chances
     from drone_rl.verification.check import Check, check
     from drone_rl.verification.places import Places, places

@@ -4,7 +4,6 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 PURE_DATA = {
-    "evaluation/plots/palette": "colours; test_indicator and test_images find them in images",
     "config/gymnasium": "values with bounds; envs/gymnasium/test_stage gives each",
     "sim/rendering/semantics": "names; sim/test_worlds finds each on its things",
     **{

@@ -10,10 +10,9 @@ from tensordict.nn import TensorDictModuleBase
 from drone_rl.config.judging import EvaluateSettings, FlightSettings
 from drone_rl.envs import worlds_of
 from drone_rl.evaluation.baselines import fly_baselines
-from drone_rl.evaluation.evaluator import StepLog, run_episodes
-from drone_rl.evaluation.fragility import compare
 from drone_rl.evaluation.metrics import summarise
-from drone_rl.evaluation.metrics_text import EVALUATION
+from drone_rl.evaluation.rollouts import StepLog, run_episodes
+from drone_rl.evaluation.rounding_sensitivity import compare
 from drone_rl.evaluation.verdict_text import unlike as say_unlike
 from drone_rl.policies.base_policy import Pilot
 from drone_rl.policies.external_network import Logits
@@ -22,9 +21,77 @@ from drone_rl.sim.tasks import as_task
 from drone_rl.utils.display import aligned, interval, paragraph, table
 from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
-from drone_rl.utils.seed_text import seed_line
+from drone_rl.utils.seed_text import fixed_seed, seed_line
 from drone_rl.utils.seeding import RootSeed, with_seed
-from drone_rl.utils.sentences import say
+from drone_rl.utils.sentences import Evidence, Sentence, percent, say
+
+
+def _computed(evidence: Evidence) -> str:
+    return f"Computed in {evidence['rounding']['arithmetic']}."
+
+
+def _counts(evidence: Evidence) -> str:
+    found = evidence["rounding"]
+    return f"{found['differing']:,} of the first {found['compared_episodes']:,} greedy episodes"
+
+
+def _same(evidence: Evidence) -> str:
+    found = evidence["rounding"]
+    return (
+        f"The same actions in all of the first {found['compared_episodes']:,} greedy episodes "
+        f"when computed again ({found['compared']})."
+    )
+
+
+def _other(evidence: Evidence) -> str:
+    found = evidence["rounding"]
+    return (
+        f"Other actions in {_counts(evidence)} when computed again ({found['compared']}): "
+        "decisions depend on rounding."
+    )
+
+
+def _is_fragile(evidence: Evidence) -> bool:
+    found = evidence.get("rounding")
+    return bool(found) and bool(found.get("excessive")) and found["fragile"] > 0
+
+
+def _fragile(evidence: Evidence) -> str:
+    found = evidence["rounding"]
+    return (
+        f"These figures hold for this arithmetic only: in {found['fragile']:,} of "
+        f"{found['frames']:,} of these episodes' frames ({percent(found['fragile_rate'])}) the "
+        "order in which float32 sums are computed can change the action."
+    )
+
+
+EVALUATION = (
+    fixed_seed("evaluation.fixed_seed"),
+    Sentence(
+        "computed",
+        "it is known what computed the actions",
+        lambda e: bool(e.get("rounding")),
+        _computed,
+    ),
+    Sentence(
+        "computed.same",
+        "another implementation took the same actions",
+        lambda e: bool(e.get("rounding")) and not e["rounding"]["differing"],
+        _same,
+    ),
+    Sentence(
+        "computed.other",
+        "another implementation took other actions",
+        lambda e: bool(e.get("rounding")) and e["rounding"]["differing"] > 0,
+        _other,
+    ),
+    Sentence(
+        "computed.fragile",
+        "rounding can change the action in more frames or episodes than a verdict allows",
+        _is_fragile,
+        _fragile,
+    ),
+)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -40,7 +107,7 @@ class Evaluation:
     """Root of the environments' random streams."""
     rounding: dict[str, Any] | None = None
     """What computed the actions, and whether another implementation takes the same ones in the
-    first episodes, see `drone_rl.evaluation.fragility.Rounding`."""
+    first episodes, see `drone_rl.evaluation.rounding_sensitivity.Rounding`."""
 
     @property
     def success(self) -> float:

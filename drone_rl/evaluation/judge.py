@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
@@ -13,17 +14,16 @@ from torchrl.envs import EnvBase
 
 from drone_rl.envs import worlds_of
 from drone_rl.evaluation.baselines import fly_baselines
-from drone_rl.evaluation.branches import Outcomes
 from drone_rl.evaluation.certificate_text import is_proved
-from drone_rl.evaluation.evaluator import StepLog, run_episodes
-from drone_rl.evaluation.failures import failure_table
-from drone_rl.evaluation.fragility import Rounding, examine
-from drone_rl.evaluation.kinds import NOT_CERTAIN, Kind
-from drone_rl.evaluation.metrics import Episodes, summarise
-from drone_rl.evaluation.rule import Quantity, Rule, decide, kinds_within
+from drone_rl.evaluation.metrics import Episodes, failure_table, summarise
+from drone_rl.evaluation.outcomes import Outcomes
+from drone_rl.evaluation.rollouts import StepLog, run_episodes
+from drone_rl.evaluation.rounding_sensitivity import Rounding, examine
+from drone_rl.evaluation.rule import NOT_CERTAIN, Kind, Quantity, Rule, decide, kinds_within
 from drone_rl.evaluation.verdict_text import SENTENCES
+from drone_rl.policies.policy import load_policy
 from drone_rl.utils.intervals import mean_bounds, proportion
-from drone_rl.utils.seeding import RootSeed
+from drone_rl.utils.seeding import RootSeed, Stream, root_seed
 from drone_rl.utils.sentences import say
 
 MANY = (2, 3, 5, 10, 20, 50, 100)
@@ -31,7 +31,7 @@ MANY = (2, 3, 5, 10, 20, 50, 100)
 
 
 class Claim(Protocol):
-    """A certificate of the policy; `drone_rl.verdicts.proof` has the implementation."""
+    """A certificate of the policy; `drone_rl.verdicts.certificate` has the implementation."""
 
     def beside(self, greedy: Episodes, *, rounding: Rounding | None = None) -> dict[str, Any]:
         """Return what a verdict on these greedy episodes may quote of it."""
@@ -301,3 +301,36 @@ def _check_pairs(greedy: Episodes, others: list[Episodes]) -> None:
     for other in others:
         if not torch.equal(other.goals.world, greedy.goals.world):
             raise ValueError("policy and baselines were flown in different worlds; pair them")
+
+
+def judge_to_choose(
+    path: Path,
+    episodes: int,
+    device: str,
+    renderer: str = "raytrace",
+    *,
+    seed: RootSeed | None = None,
+) -> tuple[dict[str, Any], dict]:
+    """What a checkpoint's policy is, in environments of which no report shows figures.
+
+    Args:
+        path: The checkpoint.
+        episodes: To fly.
+        device: Where to fly them.
+        renderer: Who draws them.
+        seed: Root of their random streams; a fresh one by default.
+
+    Returns:
+        The verdict, as in verdict.json, and the checkpoint's progress.
+
+    Raises:
+        InputError: The checkpoint is unusable.
+    """
+    policy = load_policy(path)
+    count, seed = min(episodes, 250), seed or root_seed(None)
+    worlds = policy.flying(
+        count, seed=seed.value, stream=Stream.CHOICE, device=device, renderer=renderer
+    )
+    with worlds as (env, actor):
+        verdict = judge_policy(env, actor, episodes, seed=seed)
+        return verdict.as_dict(), policy.state["progress"]

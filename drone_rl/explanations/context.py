@@ -24,9 +24,9 @@ from drone_rl.explanations.scenes import Scenes, empty_scene
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.explanations.threads import Once
 from drone_rl.policies import PictureNetwork, make_actor
-from drone_rl.robustness.measured import Measured
+from drone_rl.robustness.shifts_file import Measured
 from drone_rl.utils.seeding import RootSeed, Stream, torch_generator, with_seed
-from drone_rl.verdicts.proof import Claim
+from drone_rl.verdicts.certificate import Claim
 
 FILMED = 0
 """The flight that is shown: the first, whatever it is like."""

@@ -21,10 +21,10 @@ from drone_rl.explanations.sections import Section, find_sections
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.explanations.threads import is_aside
 from drone_rl.policies import PictureNetwork
-from drone_rl.robustness.measured import Measured
+from drone_rl.robustness.shifts_file import Measured
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import RootSeed, with_seed
-from drone_rl.verdicts.proof import Claim
+from drone_rl.verdicts.certificate import Claim
 
 FORMAT_VERSION = 3
 

@@ -20,16 +20,14 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from drone_rl.evaluation.branches import Outcomes
 from drone_rl.evaluation.judge import measure, widen
-from drone_rl.evaluation.kinds import Kind
 from drone_rl.evaluation.metrics import Episodes
-from drone_rl.evaluation.rule import Quantity, Rule, kinds_within
-from drone_rl.robustness.axis import Axis
-from drone_rl.robustness.condition import Condition
-from drone_rl.robustness.eyes import PolicyEyes
-from drone_rl.robustness.flying import Airfield
-from drone_rl.robustness.oracle import OracleEyes, has_oracle
+from drone_rl.evaluation.outcomes import Outcomes
+from drone_rl.evaluation.rule import Kind, Quantity, Rule, kinds_within
+from drone_rl.robustness.agents import OracleEyes, PolicyEyes, has_oracle
+from drone_rl.robustness.axes import Axis
+from drone_rl.robustness.paired_evaluation import Airfield
+from drone_rl.robustness.perturbations import Condition
 from drone_rl.robustness.suite import finite
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import proportion

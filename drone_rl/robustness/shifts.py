@@ -15,25 +15,22 @@ from numpy.typing import NDArray
 from drone_rl.config import MINIMAL, BaseTaskSettings
 from drone_rl.config.shifting import ShiftSettings
 from drone_rl.envs import worlds_of
-from drone_rl.evaluation.agreement import require_function
+from drone_rl.evaluation.rounding_sensitivity import require_function
 from drone_rl.evaluation.verdict_text import unlike as say_unlike
 from drone_rl.policies.base_policy import Pilot
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_pilot
 from drone_rl.policies.policy import Policy
-from drone_rl.robustness.axes import check_axes, find_axes
-from drone_rl.robustness.axis import Axis
+from drone_rl.robustness.agents import OracleEyes
+from drone_rl.robustness.axes import Axis, check_axes, find_axes
 from drone_rl.robustness.charts import chart, strips
-from drone_rl.robustness.condition import Condition
 from drone_rl.robustness.domain import Prober
-from drone_rl.robustness.flying import Airfield, Subject
-from drone_rl.robustness.measured import FORMAT, FORMAT_VERSION
-from drone_rl.robustness.modes import Mode
-from drone_rl.robustness.needs import ranges_of
-from drone_rl.robustness.oracle import OracleEyes
+from drone_rl.robustness.paired_evaluation import Airfield, Subject
+from drone_rl.robustness.perturbations import Condition, Mode
+from drone_rl.robustness.requirements import ranges_of
+from drone_rl.robustness.shifts_file import FORMAT, FORMAT_VERSION
 from drone_rl.robustness.shifts_text import SHIFTS, rows
-from drone_rl.robustness.strips import make_strip, packed
-from drone_rl.robustness.suite import Suite
+from drone_rl.robustness.suite import Suite, make_strip, packed
 from drone_rl.sim.tasks import as_task
 from drone_rl.utils.display import aligned, paragraph, picture, table
 from drone_rl.utils.errors import InputError

@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from drone_rl.evaluation.selection import judge_to_choose
+from drone_rl.evaluation.judge import judge_to_choose
 from drone_rl.sweeps.runs import read_result
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock, write_atomically

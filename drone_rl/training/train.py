@@ -210,7 +210,7 @@ def finish(settings: TrainSettings, folder: Path, result: dict[str, Any]) -> Tra
         result: Goes into `result.json`.
     """
     if settings.evaluate_after and not result["reason"].startswith("SIG"):
-        from drone_rl.evaluation.selection import judge_to_choose  # slow to import, and few need it
+        from drone_rl.evaluation.judge import judge_to_choose  # slow to import, and few need it
 
         last, episodes = last_of(folder), settings.evaluate_after
         given = (settings.device, settings.renderer)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from drone_rl.config.provable import ProvableSettings
 from drone_rl.config.training import TrainSettings
-from drone_rl.evaluation.searching import find_failures
+from drone_rl.evaluation.rollouts import find_failures
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import read_checkpoint
 from drone_rl.sim.tasks import Practice

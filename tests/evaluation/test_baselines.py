@@ -5,9 +5,14 @@ import torch
 
 from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv
-from drone_rl.evaluation.baselines import BASELINES, fly_baselines
-from drone_rl.evaluation.evaluator import run_episodes
-from drone_rl.evaluation.oracle import ConstantPolicy, Oracle, RandomPolicy
+from drone_rl.evaluation.baselines import (
+    BASELINES,
+    ConstantPolicy,
+    Oracle,
+    RandomPolicy,
+    fly_baselines,
+)
+from drone_rl.evaluation.rollouts import run_episodes
 from drone_rl.sim.actions import MOVES, Move
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError

@@ -9,13 +9,12 @@ from hypothesis import strategies as st
 
 from drone_rl.config import DynamicsSettings, TaskSettings
 from drone_rl.envs import DroneEnv
-from drone_rl.evaluation.branches import Outcomes
-from drone_rl.evaluation.evaluator import run_episodes
-from drone_rl.evaluation.fragility import Rounding
+from drone_rl.evaluation.baselines import ConstantPolicy, Oracle
 from drone_rl.evaluation.judge import judge, judge_policy, measure, observe
-from drone_rl.evaluation.kinds import Kind
-from drone_rl.evaluation.oracle import ConstantPolicy, Oracle
-from drone_rl.evaluation.rule import Rule
+from drone_rl.evaluation.outcomes import Outcomes
+from drone_rl.evaluation.rollouts import run_episodes
+from drone_rl.evaluation.rounding_sensitivity import Rounding
+from drone_rl.evaluation.rule import Kind, Rule
 from drone_rl.sim.actions import Move
 from drone_rl.sim.tasks.collect_cubes.rules import Side
 from drone_rl.utils.intervals import mean_bounds, proportion

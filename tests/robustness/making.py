@@ -9,7 +9,7 @@ import torch
 from drone_rl.config.shifting import ShiftSettings
 from drone_rl.robustness.axes import AXES
 from drone_rl.robustness.domain import walk
-from drone_rl.robustness.modes import Mode
+from drone_rl.robustness.perturbations import Mode
 from drone_rl.robustness.suite import finite, mcnemar, success_area
 from drone_rl.sim.tasks import as_task
 from drone_rl.utils.intervals import mean_bounds, proportion

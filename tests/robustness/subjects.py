@@ -5,7 +5,7 @@ import torch
 from drone_rl.config import CameraSettings, TaskSettings
 from drone_rl.envs import GrayPixels
 from drone_rl.policies import PictureNetwork
-from drone_rl.robustness.flying import Subject
+from drone_rl.robustness.paired_evaluation import Subject
 
 TASK = TaskSettings(num_cubes=1, first_distance=8.0, front_margin=4.0)
 

@@ -4,10 +4,9 @@ import pytest
 import torch
 
 from drone_rl.robustness.axes import AXES
-from drone_rl.robustness.condition import Condition
 from drone_rl.robustness.faults import DeadRows
-from drone_rl.robustness.flying import Airfield
-from drone_rl.robustness.modes import Mode
+from drone_rl.robustness.paired_evaluation import Airfield
+from drone_rl.robustness.perturbations import Condition, Mode
 from drone_rl.robustness.suite import Suite, area, mcnemar
 from tests.robustness.subjects import Blind, subject
 

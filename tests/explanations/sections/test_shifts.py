@@ -4,7 +4,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from drone_rl.explanations.sections.shifts import section
-from drone_rl.robustness.measured import Measured
+from drone_rl.robustness.shifts_file import Measured
 
 
 def test_what_was_measured_is_taken_over():

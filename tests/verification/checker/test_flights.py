@@ -5,7 +5,7 @@ import pytest
 import torch
 
 import drone_rl
-from drone_rl.evaluation.evaluator import run_episodes
+from drone_rl.evaluation.rollouts import run_episodes
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
 from drone_rl.verification.checker.flights import Flown, Simulator
 

@@ -10,8 +10,8 @@ from tensordict.nn import TensorDictModule
 from torch import nn
 
 from drone_rl.config import TaskSettings
-from drone_rl.evaluation.evaluator import run_episodes
 from drone_rl.evaluation.metrics import summarise
+from drone_rl.evaluation.rollouts import run_episodes
 from drone_rl.policies import make_actor
 from drone_rl.policies.zoo import parse, policy_path, read_policy
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
