@@ -64,17 +64,16 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _PLACES = {
-    "verdicts.bodies": ("Bodies", "bodies"),
+    "verdicts.dynamics_sweep": ("Bodies", "bodies"),
     "verification.chances": ("Chances", "chances"),
     "verification.check": ("Check", "check"),
-    "verdicts.domains": ("Coverage",),
+    "verdicts.coverage": ("Coverage",),
     "policies.environment": ("make_env",),
     "evaluation.evaluate": ("Evaluation", "evaluate"),
     "explanations.explain": ("Explanations", "explain"),
-    "verdicts.export": ("export_onnx",),
+    "verdicts.onnx_export": ("export_onnx",),
     "policies.external_policy": ("ForeignPolicy", "policy_from"),
-    "verdicts.judgements": ("Judgements",),
-    "verdicts.judge": ("Judgement", "judge"),
+    "verdicts.judge": ("Judgement", "Judgements", "judge"),
     "verification.places": ("Places", "places"),
     "policies.policy": ("Policy", "load_policy"),
     "verification.provable": ("train_until_proved",),

@@ -5,7 +5,6 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 PURE_DATA = {
     "config/gymnasium": "values with bounds; envs/gymnasium/test_stage gives each",
-    "sim/rendering/semantics": "names; sim/test_worlds finds each on its things",
     **{
         f"config/{name}": "values with bounds; cli/hydra/test_schemas reads and builds each"
         for name in (

@@ -22,7 +22,7 @@ Need = Mapping[str, float | None]
 """Of an axis, "low" and "high"; None for as far as no difference is."""
 
 
-def read_needs(path: Path) -> dict[str, Need]:
+def read_requirements(path: Path) -> dict[str, Need]:
     """What is needed, out of a YAML or JSON file.
 
     Of each axis by name, `{low: 40, high: 100, unit: m of sight}`; one of the ends may be missing.

@@ -9,7 +9,7 @@ from drone_rl.flight.commands.auto_flight import AutoFlight
 from drone_rl.flight.commands.errors import PilotError
 from drone_rl.flight.commands.navigation import Navigation
 from drone_rl.sim.dynamics.body import heading_only
-from drone_rl.sim.entities.cameras import FRONT_CENTER
+from drone_rl.sim.entities import FRONT_CENTER
 from drone_rl.sim.image_types import ImageRequest, images
 from drone_rl.sim.rendering.view import Modality
 from drone_rl.sim.tasks import State
