@@ -9,7 +9,7 @@ from typing import Any
 from drone_rl.config import DynamicsSettings
 from drone_rl.config.bodies import BodiesSettings
 from drone_rl.config.judging import JudgeSettings
-from drone_rl.flight.firmware.errors import LoopError
+from drone_rl.flight.in_the_loop.drone import FlightControllerError
 from drone_rl.policies.base_policy import Pilot
 from drone_rl.policies.external_policy import as_pilot
 from drone_rl.robustness.sitl_text import LOOPED, reasons
@@ -125,7 +125,7 @@ def _looped(pilot: Pilot, settings: BodiesSettings, seed: RootSeed) -> dict[str,
     count = settings.loop_flights
     try:
         return fly_in_the_loop(still, count, drawn_seed=seed, progress=silent).as_dict()
-    except (InputError, LoopError) as error:
+    except (InputError, FlightControllerError) as error:
         return {"left_out": str(error)}
 
 
