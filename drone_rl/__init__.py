@@ -49,11 +49,10 @@ if TYPE_CHECKING:
     from drone_rl.sim.image_types import ImageRequest, ImageType
     from drone_rl.training.train import Training, train
     from drone_rl.utils.errors import InputError
-    from drone_rl.verdicts.bodies import Bodies, bodies
-    from drone_rl.verdicts.domains import Coverage
-    from drone_rl.verdicts.export import export_onnx
-    from drone_rl.verdicts.judge import Judgement, judge
-    from drone_rl.verdicts.judgements import Judgements
+    from drone_rl.verdicts.coverage import Coverage
+    from drone_rl.verdicts.dynamics_sweep import Bodies, bodies
+    from drone_rl.verdicts.judge import Judgement, Judgements, judge
+    from drone_rl.verdicts.onnx_export import export_onnx
     from drone_rl.verification.chances import Chances, chances
     from drone_rl.verification.check import Check, check
     from drone_rl.verification.places import Places, places
@@ -63,17 +62,16 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _PLACES = {
-    "verdicts.bodies": ("Bodies", "bodies"),
+    "verdicts.dynamics_sweep": ("Bodies", "bodies"),
     "verification.chances": ("Chances", "chances"),
     "verification.check": ("Check", "check"),
-    "verdicts.domains": ("Coverage",),
+    "verdicts.coverage": ("Coverage",),
     "policies.environment": ("make_env",),
     "evaluation.evaluate": ("Evaluation", "evaluate"),
     "explanations.explain": ("Explanations", "explain"),
-    "verdicts.export": ("export_onnx",),
+    "verdicts.onnx_export": ("export_onnx",),
     "policies.external_policy": ("ForeignPolicy", "policy_from"),
-    "verdicts.judgements": ("Judgements",),
-    "verdicts.judge": ("Judgement", "judge"),
+    "verdicts.judge": ("Judgement", "Judgements", "judge"),
     "verification.places": ("Places", "places"),
     "policies.policy": ("Policy", "load_policy"),
     "verification.provable": ("train_until_proved",),

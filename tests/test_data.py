@@ -12,8 +12,8 @@ from drone_rl.utils.batch import Batch
 
 MUTABLE = {
     "api.journal:Journal",
-    "conditions.domain:End",
-    "evaluation.evaluator:StepLog",
+    "robustness.domain:End",
+    "evaluation.rollouts:StepLog",
     "evaluation.metrics:Episodes",
     "explanations.attribution:Explainer",
     "explanations.class_model:Attempts",

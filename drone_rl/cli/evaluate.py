@@ -47,7 +47,7 @@ def run(settings: Command, folder: Path) -> tuple[int, float]:
     _log.info("policy: %s", policy.path)
     _log.info("written: %s", folder / "evaluation.json")
     if settings.videos:
-        from drone_rl.evaluation.film import film
+        from drone_rl.evaluation.video import film
 
         film(
             policy,

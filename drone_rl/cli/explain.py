@@ -9,7 +9,7 @@ import drone_rl
 from drone_rl.cli.hydra.names import policies as prepare  # noqa: F401 -- of what was typed
 from drone_rl.config.changes import DynamicsChanges, TaskChanges, no_changes
 from drone_rl.config.paths import PathsSettings
-from drone_rl.evaluation.kinds import Kind
+from drone_rl.evaluation.rule import Kind
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.utils.schema import Listed, OneOf, Whole
 

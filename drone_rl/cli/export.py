@@ -49,7 +49,8 @@ class Command(FlightSettings):
 def run(settings: Command, folder: Path) -> tuple[int, str]:
     """Exports one policy. Returns the exit status and the file's path."""
     from drone_rl.utils.seeding import root_seed  # imports torch
-    from drone_rl.verdicts.export import export, export_onnx
+    from drone_rl.verdicts.export import export
+    from drone_rl.verdicts.onnx_export import export_onnx
 
     policy = drone_rl.load_policy(settings.policy, outputs=settings.paths.outputs)
     target = folder / f"{settings.name}.{settings.format}"

@@ -44,7 +44,7 @@ class Command(Settings):
 def run(settings: Command, folder: Path) -> tuple[int, None]:
     """Films a policy. Returns the exit status."""
     policy = drone_rl.load_policy(settings.policy, outputs=settings.paths.outputs)
-    from drone_rl.evaluation.film import film, view  # after what is slow to import
+    from drone_rl.evaluation.video import film, view  # after what is slow to import
 
     policy = policy.in_task(**settings.task)
     policy = policy.in_dynamics(**settings.dynamics) if settings.dynamics else policy

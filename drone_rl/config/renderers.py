@@ -6,7 +6,7 @@ from drone_rl.utils.schema import OneOf
 
 RENDERERS = {
     "raytrace": "drone_rl.sim.rendering.raytrace.renderer.Raytracer",
-    "mujoco_warp": "drone_rl.sim.rendering.warp.WarpRenderer",
+    "mujoco_warp": "drone_rl.sim.rendering.mujoco_warp.WarpRenderer",
 }
 """Where each is to be imported from: our own of simple solids, and MuJoCo Warp's of anything."""
 

@@ -36,7 +36,7 @@ def _is_share(evidence: Evidence) -> bool:
     return is_quoted(evidence) and not evidence["proof"]["every"]
 
 
-def _every(evidence: Evidence) -> str:
+def _every_placement(evidence: Evidence) -> str:
     return (
         "A certificate states for every placement: with its most probable actions it collects "
         f"{all_cubes(evidence['num_cubes'])} from all places where they may stand."
@@ -88,7 +88,7 @@ PROOF = (
         "proof.every",
         "a certificate that holds together says so, and no flight speaks against it",
         is_stated,
-        _every,
+        _every_placement,
     ),
     Sentence(
         "proof.share",

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from drone_rl.evaluation.consistency import check_verdict
-from drone_rl.evaluation.kinds import Kind
-from drone_rl.evaluation.rule import SIDES, Rule
+from drone_rl.evaluation.rule import SIDES, Kind, Rule
 from drone_rl.sweeps.manifest import Sweep
 from drone_rl.sweeps.runs import Run, read_failure, read_result
 from drone_rl.sweeps.statistics import Array

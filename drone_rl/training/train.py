@@ -210,11 +210,11 @@ def finish(settings: TrainSettings, folder: Path, result: dict[str, Any]) -> Tra
         result: Goes into `result.json`.
     """
     if settings.evaluate_after and not result["reason"].startswith("SIG"):
-        from drone_rl.evaluation.selection import judge_to_choose  # slow to import, and few need it
+        from drone_rl.evaluation.judge import judge_for_selection  # slow to import, and few need it
 
         last, episodes = last_of(folder), settings.evaluate_after
         given = (settings.device, settings.renderer)
-        result["verdict"], _ = judge_to_choose(last, episodes, *given)
+        result["verdict"], _ = judge_for_selection(last, episodes, *given)
     write_atomically(folder / "result.json", json.dumps(result, indent=2))
     return Training(folder, result["reason"], result)
 

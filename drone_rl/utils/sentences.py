@@ -19,12 +19,12 @@ class Sentence:
 
     name: str
     """Section and claim, such as "loops.never"."""
-    licence: str
-    """The condition in words, for people who read the code or the page."""
+    condition: str
+    """The condition in English, for readers of the code or the page."""
     may: Callable[[Evidence], bool]
-    """The condition."""
+    """Whether the condition holds."""
     text: Callable[[Evidence], str]
-    """The claim; asked for only where the condition holds."""
+    """The claim; called only if the condition holds."""
 
 
 def say(sentences: Iterable[Sentence], evidence: Evidence) -> str:

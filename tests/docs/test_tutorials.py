@@ -125,3 +125,9 @@ def test_it_runs(page, workplace):
             run(code, f"{page.stem}, block {number}", names)
         elif language == "sh":
             check_commands(code)
+
+
+def test_a_minimal_task_takes_at_most_80_lines():
+    blocks = BLOCK.findall((DOCS / "tutorials" / "task.md").read_text())
+    (post,) = [text for _, title, text in blocks if title == "post.py"]
+    assert len(post.splitlines()) <= 80

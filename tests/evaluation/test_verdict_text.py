@@ -214,7 +214,7 @@ def test_quantities_have_labels_for_people(evidence, name, label):
 
 
 def test_every_sentence_has_its_condition_in_words():
-    assert all(sentence.licence and sentence.name for sentence in SENTENCES)
+    assert all(sentence.condition and sentence.name for sentence in SENTENCES)
     assert len({sentence.name for sentence in SENTENCES}) == len(SENTENCES)
 
 

@@ -156,4 +156,4 @@ def test_a_group_in_a_line():
 def test_names_are_unique_and_licences_are_told():
     names = [sentence.name for sentence in (*SENTENCES, *GROUP_SENTENCES)]
     assert len(set(names)) == len(names)
-    assert all(sentence.licence for sentence in SENTENCES)
+    assert all(sentence.condition for sentence in SENTENCES)

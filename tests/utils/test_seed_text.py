@@ -1,6 +1,6 @@
 import pytest
 
-from drone_rl.evaluation.metrics_text import EVALUATION
+from drone_rl.evaluation.evaluate import EVALUATION
 from drone_rl.utils.seed_text import CHANCES, CHECK, is_fixed, seed_line, seed_of
 from drone_rl.utils.sentences import said
 

@@ -10,7 +10,7 @@ from drone_rl.evaluation.consistency import check_verdict
 from drone_rl.explanations.report.fitting import check_fit
 from drone_rl.explanations.report.shapes import check_sizes
 from drone_rl.sim.action_display import ShownActions, shown_actions
-from drone_rl.sim.vocabulary import Terms, terms_of
+from drone_rl.sim.vocabulary import TaskVocabulary, terms_of
 from drone_rl.utils.archives import read_arrays
 from drone_rl.utils.consistency import check_intervals
 from drone_rl.utils.errors import InputError
@@ -54,7 +54,7 @@ class Explanation:
         return shown_actions(self.numbers)
 
     @property
-    def terms(self) -> Terms:
+    def terms(self) -> TaskVocabulary:
         """What its task calls things."""
         return terms_of(self.numbers)
 

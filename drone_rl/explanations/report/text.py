@@ -8,7 +8,7 @@ from drone_rl.sim.action_display import shown_actions
 from drone_rl.sim.vocabulary import terms_of
 from drone_rl.utils.numbers import among, bounds, listed, plural
 from drone_rl.utils.sentences import Evidence, Sentence, percent
-from drone_rl.verification.places_text import PLACES
+from drone_rl.verification.text import PLACES
 
 
 def _size(evidence: Evidence) -> str:
