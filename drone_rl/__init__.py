@@ -38,14 +38,12 @@ if TYPE_CHECKING:
     from drone_rl.evaluation.evaluate import Evaluation, evaluate
     from drone_rl.explanations.explain import Explanations, explain
     from drone_rl.explanations.settings import ExplainSettings
-    from drone_rl.flight.commands.errors import PilotError
-    from drone_rl.flight.commands.future import FlightFuture
+    from drone_rl.flight.commands.command import FlightFuture, PilotError
+    from drone_rl.flight.commands.drone import Sensors
+    from drone_rl.flight.commands.movement import Sticks
     from drone_rl.flight.commands.pilot import Pilot
-    from drone_rl.flight.commands.sensing import Sensors
-    from drone_rl.flight.commands.state import PilotState
-    from drone_rl.flight.commands.sticks import Sticks
-    from drone_rl.flight.commands.trajectory import Trajectory
-    from drone_rl.flight.commands.turning import Drivetrain, YawMode
+    from drone_rl.flight.commands.state import PilotState, Trajectory
+    from drone_rl.flight.commands.yaw import Drivetrain, YawMode
     from drone_rl.policies.environment import make_env
     from drone_rl.policies.external_policy import ForeignPolicy, policy_from
     from drone_rl.policies.policy import Policy, load_policy
@@ -88,14 +86,12 @@ _PLACES = {
     "envs.gymnasium.worlds": ("DroneWorlds",),
     "envs.sb3.worlds": ("Sb3Worlds",),
     "explanations.settings": ("ExplainSettings",),
-    "flight.commands.errors": ("PilotError",),
-    "flight.commands.future": ("FlightFuture",),
+    "flight.commands.command": ("FlightFuture", "PilotError"),
+    "flight.commands.drone": ("Sensors",),
+    "flight.commands.movement": ("Sticks",),
     "flight.commands.pilot": ("Pilot",),
-    "flight.commands.sensing": ("Sensors",),
-    "flight.commands.state": ("PilotState",),
-    "flight.commands.sticks": ("Sticks",),
-    "flight.commands.trajectory": ("Trajectory",),
-    "flight.commands.turning": ("Drivetrain", "YawMode"),
+    "flight.commands.state": ("PilotState", "Trajectory"),
+    "flight.commands.yaw": ("Drivetrain", "YawMode"),
     "policies.sb3.logits": ("Sb3Logits",),
     "policies.sb3.trunk": ("Sb3Trunk",),
     "config.bodies": ("BodiesSettings",),
