@@ -26,7 +26,7 @@ from drone_rl.sim.vocabulary import ShownActions, TaskVocabulary
 from drone_rl.sweeps.page import render_page as render_sweep
 from drone_rl.utils.display import page, paragraph, table
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.sentences import say
+from drone_rl.utils.text import say
 
 Place = tuple[tuple[Any, ...], bool]
 """Keys that lead to an entry, and whether its name is meant and not its value."""

@@ -209,7 +209,7 @@ _AWAY = (2.0, 10.0)
 """Metres, from and to, by which they stand outside of where anything matters."""
 
 
-def told_by(settings: BaseTaskSettings) -> Things:
+def task_things(settings: BaseTaskSettings) -> Things:
     """Where a task's things stand, how large and of which colour.
 
     Raises:
@@ -226,7 +226,7 @@ def as_bright(color: Sequence[float]) -> tuple[float, ...]:
     return tuple(min(1.0, wanted / has * c) for c in _BLUE)
 
 
-def draw_places(things: Things, num_worlds: int, generator: torch.Generator) -> Tensor:
+def sample_distractors(things: Things, num_worlds: int, generator: torch.Generator) -> Tensor:
     """Where distractors stand; fewer of them are the first of these.
 
     Args:

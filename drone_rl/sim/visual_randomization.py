@@ -14,8 +14,7 @@ import torch
 from torch import Tensor
 
 from drone_rl.config import AppearanceSettings, BaseTaskSettings, CameraSettings
-from drone_rl.config.appearance import NO_TEXTURE, Names
-from drone_rl.config.placing import check_appearance
+from drone_rl.config.appearance import NO_TEXTURE, Names, check_appearance
 from drone_rl.config.task import Things
 from drone_rl.sim.rendering import Appearance, Beside, Mounting, Texture, textures
 from drone_rl.sim.rendering.appearance import product, turned, zoom_of

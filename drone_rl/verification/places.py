@@ -12,7 +12,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from drone_rl.config.mapping import PlacesSettings
+from drone_rl.config.verification import PlacesSettings
 from drone_rl.evaluation.plots import regions
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.sim.vocabulary import SHOWN_MOVES
@@ -21,7 +21,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import fresh_seed, legacy_seed
-from drone_rl.utils.sentences import say
+from drone_rl.utils.text import say
 from drone_rl.verification.prover.action_map import Look, PlaceMap, map_places
 from drone_rl.verification.prover.arrangement import Window
 from drone_rl.verification.prover.bounds import Painter

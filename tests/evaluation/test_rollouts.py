@@ -74,7 +74,7 @@ def test_greedy_flies_by_the_mode_and_sampling_by_the_odds(make_pipeline):
 def test_no_batch_is_flown_in_vain_and_no_picture_kept(make_pipeline, monkeypatch, number, batches):
     collected, collect = [], EpisodeCollector.collect
     monkeypatch.setattr(
-        EpisodeCollector, "collect", lambda self: collected.append(collect(self)) or collected[-1]
+        EpisodeCollector, "collect", lambda *how: collected.append(collect(*how)) or collected[-1]
     )
     task = TaskSettings(num_cubes=1, first_distance=4.0, step_limit=4)
     env, actor = make_pipeline(8, task=task)

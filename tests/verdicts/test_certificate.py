@@ -7,8 +7,7 @@ import torch
 
 import drone_rl
 from drone_rl.evaluation.metrics import Episodes
-from drone_rl.evaluation.outcomes import Outcomes
-from drone_rl.evaluation.rounding_sensitivity import Rounding
+from drone_rl.evaluation.outcomes import Outcomes, Rounding
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.sim.tasks.collect_cubes import CubeGoals, EndReason
 from drone_rl.verdicts.certificate import Claim

@@ -16,7 +16,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import parse_json, read_bytes, refuse_links
 from drone_rl.utils.limits import ARRAYS_BYTES, EXPLANATION_BYTES, EXPLANATION_VALUES, Allowance
 from drone_rl.utils.schema import Flag, Maybe, Text, Whole, as_mapping
-from drone_rl.utils.seed_text import SEED_KEYS
+from drone_rl.utils.text import SEED_KEYS
 
 FORMAT = "drone_rl explanation"
 FORMAT_VERSION = 3

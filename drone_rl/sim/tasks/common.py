@@ -10,7 +10,7 @@ from torch import Tensor
 from drone_rl.config import CameraSettings
 from drone_rl.sim.dynamics import BodyState
 from drone_rl.sim.tasks.task import Goals
-from drone_rl.utils.numbers import ordinal
+from drone_rl.utils.text import ordinal
 
 HIDDEN_DEPTH = 100.0
 """Metres below its place at which an absent prop is kept, out of sight under the floor."""
