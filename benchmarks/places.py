@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from drone_rl.policies.policy import load_policy
 from drone_rl.utils.progress import silent
 from drone_rl.verification.places import places
-from drone_rl.verification.prover.cube_images import Seeing
-from drone_rl.verification.prover.policy_spec import make_subject
+from drone_rl.verification.prover.cube_images import CubeImages
+from drone_rl.verification.prover.policy_spec import make_policy_spec
 
 _BATCH = 2000
 
@@ -33,7 +33,7 @@ def bench_places(quick: bool) -> dict[str, Any]:
     wrong = compared = 0
     for cubes in (2, 3):
         policy = load_policy("good").in_task(num_cubes=cubes)
-        made = make_subject(policy.description, policy.make_network(), 0.0)
+        made = make_policy_spec(policy.description, policy.make_network(), 0.0)
         with closing(made) as subject:
             for begin in range(0, count // 2, _BATCH):
                 size = min(_BATCH, count // 2 - begin)
@@ -51,7 +51,7 @@ def bench_places(quick: bool) -> dict[str, Any]:
 
 
 def compare(
-    seeing: Seeing,
+    seeing: CubeImages,
     farthest: float,
     num_cubes: int,
     count: int,

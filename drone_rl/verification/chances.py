@@ -26,13 +26,13 @@ from drone_rl.utils.seeding import RootSeed, Stream, with_seed, world_random_sta
 from drone_rl.utils.sentences import say
 from drone_rl.verification.prover.lattice import explore, shape_of
 from drone_rl.verification.prover.markov_chain import (
-    Bounded,
+    NodeEvaluator,
     Outcomes,
-    Sight,
+    SuccessBounds,
     bound_success,
-    follow_chances,
+    propagate,
 )
-from drone_rl.verification.prover.policy_spec import make_subject
+from drone_rl.verification.prover.policy_spec import make_policy_spec
 
 _BOUNDS = {
     "least": "everywhere at least",
@@ -62,7 +62,7 @@ class Chances:
     """How many were drawn."""
     within: float = 0.0
     """Metres to either side of each cube for which the bounds are."""
-    bounded: tuple[Bounded, ...] = ()
+    bounded: tuple[SuccessBounds, ...] = ()
     """Bounds on the success of each placement, wherever within these metres the cubes stand."""
     seed: RootSeed | None = None
     """Of held-out placements; None of given ones."""
@@ -201,11 +201,11 @@ def chances(
     parts = placed.split(min(at_a_time, PLACEMENTS_AT_A_TIME))
     env = policy.make_env(1, device=settings.device, renderer=settings.renderer)
     try:
-        sight, told = Sight(env, policy.make_network(settings.device)), []
+        sight, told = NodeEvaluator(env, policy.make_network(settings.device)), []
         for part in parts:
             progress("placements", sum(map(len, told)), len(placed))
             graph = explore(flown, part)
-            told.append(follow_chances(graph, sight.on(graph)))
+            told.append(propagate(graph, sight.on(graph)))
     finally:
         env.close()
     progress("placements", len(placed), len(placed))
@@ -217,11 +217,11 @@ def chances(
 
 def _bounded(
     policy: Policy, placed: Tensor, settings: ChanceSettings, progress: Progress
-) -> tuple[Bounded, ...]:
+) -> tuple[SuccessBounds, ...]:
     """Bounds around each placement, as far as cubes are placed at all."""
     network, gap = policy.make_network(), ProveSettings().logit_gap
-    made = make_subject(policy.description, network, gap, settings.renderer)
-    found: list[Bounded] = []
+    made = make_policy_spec(policy.description, network, gap, settings.renderer)
+    found: list[SuccessBounds] = []
     with closing(made) as subject:
         bound = subject.lattice.task.lateral_bound
         for i, aside in enumerate(placed[..., 1].numpy()):

@@ -22,8 +22,8 @@ from drone_rl.verification.checker import (
     Certificate,
     Findings,
     check_certificate,
+    check_same_policy,
     read_certificate,
-    refuse_another,
 )
 
 REFUSED = 14
@@ -133,7 +133,7 @@ def check(
         policy = _named(stated.name)
     loaded = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
     weights, asked = loaded.state["policy"], loaded.in_task(**task).task if task else None
-    refuse_another(stated, loaded.description, weights, asked)
+    check_same_policy(stated, loaded.description, weights, asked)
     flown = dataclasses.replace(loaded, description=stated.description)
     findings = check_certificate(
         stated,

@@ -22,10 +22,10 @@ from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import fresh_seed, legacy_seed
 from drone_rl.utils.sentences import say
-from drone_rl.verification.prover.action_map import Look, PlaceMap, map_places
+from drone_rl.verification.prover.action_map import ActionMap, RenderFaces, map_actions
 from drone_rl.verification.prover.arrangement import Window
-from drone_rl.verification.prover.bounds import Painter
-from drone_rl.verification.prover.policy_spec import make_subject, one_thread
+from drone_rl.verification.prover.bounds import Compositor
+from drone_rl.verification.prover.policy_spec import make_policy_spec, one_thread
 from drone_rl.verification.text import PLACES, rows
 
 
@@ -35,7 +35,7 @@ class Places:
 
     policy: Policy
     settings: PlacesSettings
-    places: PlaceMap = dataclasses.field(repr=False)
+    places: ActionMap = dataclasses.field(repr=False)
     """The cells."""
     numbers: dict[str, Any] = dataclasses.field(repr=False)
     """What they come to, as in `places.json`."""
@@ -113,14 +113,14 @@ def places(
     policy = policy.in_task(**(task or {}))
     begin = time.perf_counter()
     network, gap = policy.make_network(), settings.logit_gap
-    made = make_subject(policy.description, network, gap, settings.renderer)
+    made = make_policy_spec(policy.description, network, gap, settings.renderer)
     with one_thread(), closing(made) as subject:
         progress("comparing the renderer's pictures")
         compared = subject.seeing.check(
             settings.compared, np.random.RandomState(legacy_seed(fresh_seed()))
         )
         progress("deciding the cells")
-        found = map_places(
+        found = map_actions(
             subject.eye,
             Window(settings.nearest, settings.farthest, settings.sideways),
             _look(subject.painter),
@@ -141,7 +141,7 @@ def places(
     return Places(policy, settings, found, numbers)
 
 
-def _look(painter: Painter) -> Look:
+def _look(painter: Compositor) -> RenderFaces:
     """From what pixels show of a cube to what the network sees."""
     whole = (slice(None), slice(None))
 

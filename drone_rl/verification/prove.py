@@ -20,10 +20,10 @@ from drone_rl.utils.numbers import plural
 from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import fresh_seed, legacy_seed
-from drone_rl.verification.prover.policy_spec import Subject, make_subject, one_thread
+from drone_rl.verification.prover.policy_spec import PolicySpec, make_policy_spec, one_thread
 from drone_rl.verification.prover.proof_files import certify, load, save, weights_hash
 from drone_rl.verification.prover.prover import Prover
-from drone_rl.verification.text import sentence, why_stopped
+from drone_rl.verification.text import describe_proof, why_stopped
 
 _BYTES_PER_SIDE = 64
 """Of a state, for each cube of each box under way: two borders, kept up to four times."""
@@ -83,11 +83,11 @@ class Proof:
 
     def __str__(self) -> str:
         """The table and what it comes to."""
-        return f"{aligned(self.rows())}\n{sentence(self.certificate)}"
+        return f"{aligned(self.rows())}\n{describe_proof(self.certificate)}"
 
     def _repr_html_(self) -> str:
         head, *rows = self.rows()
-        return table(head, rows) + paragraph(sentence(self.certificate))
+        return table(head, rows) + paragraph(describe_proof(self.certificate))
 
 
 def prove(
@@ -119,7 +119,7 @@ def prove(
     policy = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
     policy = policy.in_task(**(task or {}))
     network, gap = policy.make_network(), settings.logit_gap
-    made = make_subject(policy.description, network, gap, settings.renderer)
+    made = make_policy_spec(policy.description, network, gap, settings.renderer)
     with one_thread(), closing(made) as subject:
         subject.seeing.check(settings.compared, np.random.RandomState(legacy_seed(fresh_seed())))
         if folder is None:
@@ -132,7 +132,7 @@ def prove(
 
 def _prove(
     policy: Policy,
-    subject: Subject,
+    subject: PolicySpec,
     settings: ProveSettings,
     folder: Path | None,
     progress: Progress,

@@ -144,7 +144,7 @@ PLACES = (
 )
 
 
-def sentence(certificate: Mapping[str, Any]) -> str:
+def describe_proof(certificate: Mapping[str, Any]) -> str:
     """Says no more than the certificate does.
 
     Args:

@@ -8,10 +8,10 @@ from benchmarks.places import bench_places, compare
 @pytest.fixture
 def subject():
     import drone_rl
-    from drone_rl.verification.prover.policy_spec import make_subject
+    from drone_rl.verification.prover.policy_spec import make_policy_spec
 
     policy = drone_rl.load_policy("good").in_task(num_cubes=2)
-    made = make_subject(policy.description, policy.make_network(), 0.0)
+    made = make_policy_spec(policy.description, policy.make_network(), 0.0)
     yield made
     made.close()
 

@@ -275,7 +275,7 @@ def fingerprint(weights: Mapping[str, torch.Tensor]) -> str:
     return digest.hexdigest()
 
 
-def refuse_another(
+def check_same_policy(
     certificate: Certificate,
     described: PolicyDescription,
     weights: Mapping[str, torch.Tensor],

@@ -16,12 +16,16 @@ from drone_rl.utils.errors import InputError
 from drone_rl.verification.checker.certificate import (
     Certificate,
     Outcome,
+    check_same_policy,
     read_certificate,
-    refuse_another,
 )
-from drone_rl.verification.checker.consistency import find_lies, find_wrong_tallies, missing_steps
-from drone_rl.verification.checker.rollouts import Flown, Simulator, Tell
-from drone_rl.verification.checker.sampling import ANYWHERE, BORDER, INSIDE, draw_places
+from drone_rl.verification.checker.consistency import (
+    find_inconsistencies,
+    find_wrong_step_counts,
+    missing_steps,
+)
+from drone_rl.verification.checker.rollouts import ProgressCallback, Rollouts, Simulator
+from drone_rl.verification.checker.sampling import ANYWHERE, BORDER, INSIDE, sample_placements
 
 MOST_TOLD = 20
 """Lines about flights that ended otherwise."""
@@ -63,7 +67,7 @@ class Findings:
     contradicted: int
     """How many there were."""
     flights: Mapping[str, int]
-    """Flown, by why."""
+    """Rollouts, by why."""
 
     @property
     def accepted(self) -> bool:
@@ -95,11 +99,11 @@ def check_certificate(
     seed: int = 0,
     device: str = "cpu",
     renderer: str = "raytrace",
-    tell: Tell = lambda done, total: None,
+    tell: ProgressCallback = lambda done, total: None,
 ) -> Findings:
-    """Checks a certificate that is of a policy with these weights, see `refuse_another`.
+    """Checks a certificate that is of a policy with these weights, see `check_same_policy`.
 
-    What doesn't go together is refused without flights. For where these start see `draw_places`;
+    What doesn't go together is refused without flights. For where these start see `sample_placements`;
     places of which nothing is stated are left out.
 
     Args:
@@ -114,10 +118,10 @@ def check_certificate(
     Raises:
         InputError: There is no such device.
     """
-    lies = tuple(find_lies(certificate))
+    lies = tuple(find_inconsistencies(certificate))
     if lies:
         return Findings(lies, (), 0, {})
-    drawn = draw_places(certificate, flights, np.random.default_rng(seed))
+    drawn = sample_placements(certificate, flights, np.random.default_rng(seed))
     stated = drawn.outcome < len(certificate.outcomes)
     simulator = Simulator(certificate.description, weights, device, renderer)
     with closing(simulator):
@@ -132,7 +136,7 @@ def check_certificate(
     steps = np.zeros_like(drawn.outcome)
     steps[stated] = flown.steps
     anywhere = drawn.why == ANYWHERE
-    tallies = find_wrong_tallies(certificate.outcomes, drawn.outcome[anywhere], steps[anywhere])
+    tallies = find_wrong_step_counts(certificate.outcomes, drawn.outcome[anywhere], steps[anywhere])
     kept = [
         Contradiction(
             where=str(why[i]),
@@ -147,7 +151,7 @@ def check_certificate(
 
 
 def _depending_on_rounding(
-    stated: Sequence[Outcome], exact: Flown, is_wrong: NDArray[np.bool_]
+    stated: Sequence[Outcome], exact: Rollouts, is_wrong: NDArray[np.bool_]
 ) -> list[str]:
     """What float64 refutes: a proof holds for any order of sums, so for exact ones, too.
 
@@ -166,7 +170,7 @@ def _depending_on_rounding(
     ]
 
 
-def ends_as_stated(outcome: Outcome, flown: Flown, i: int) -> bool:
+def ends_as_stated(outcome: Outcome, flown: Rollouts, i: int) -> bool:
     """Whether a flight ended as stated, and its number of steps is one of those stated.
 
     Args:
@@ -188,14 +192,14 @@ def _stated(outcome: Outcome) -> str:
     return f"{outcome}" if missing_steps(outcome) else f"{outcome}, steps: {steps}"
 
 
-def _found(flown: Flown, i: int) -> str:
+def _found(flown: Rollouts, i: int) -> str:
     end, collected = EndReason(flown.end[i]), tuple(map(bool, flown.collected[i]))
     loops = end == EndReason.STEP_LIMIT and bool(flown.repeats[i])
     as_outcome = Outcome(end, collected, loops, 0.0, {}, np.zeros((0, len(collected), 2)))
     return f"{as_outcome}, steps: {flown.steps[i]}"
 
 
-def read_tried(
+def read_validated(
     path: Path, described: PolicyDescription, weights: Mapping[str, torch.Tensor]
 ) -> Certificate:
     """A certificate of this very policy and task, whose boxes and shares go together exactly.
@@ -211,8 +215,8 @@ def read_tried(
         InputError: It can't be read, is of another network, camera or task, or contradicts itself.
     """
     certificate = read_certificate(path)
-    refuse_another(certificate, described, weights, described.task)
-    lie = next(find_lies(certificate), None)
+    check_same_policy(certificate, described, weights, described.task)
+    lie = next(find_inconsistencies(certificate), None)
     if lie is not None:
         raise InputError(f"certificate {path} contradicts itself: {lie}; prove the policy again")
     return certificate

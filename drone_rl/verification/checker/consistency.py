@@ -24,7 +24,9 @@ def volume(boxes: NDArray[np.float64]) -> Fraction:
     return Fraction(int(sizes.prod(1).sum()), unit ** boxes.shape[1])
 
 
-def find_misfit(boxes: NDArray[np.float64], bound: float) -> tuple[list[float], int] | None:
+def find_partition_error(
+    boxes: NDArray[np.float64], bound: float
+) -> tuple[list[float], int] | None:
     """A place at which boxes are no partition of the cube [-bound, bound]^n.
 
     Args:
@@ -89,7 +91,7 @@ TOLERANCE = 1e-12
 """Of a stated share, relative to the exact one: what adding up floats may lose."""
 
 
-def find_lies(certificate: Certificate) -> Iterator[str]:
+def find_inconsistencies(certificate: Certificate) -> Iterator[str]:
     """What can't be, one line each.
 
     Args:
@@ -134,7 +136,7 @@ def _missing(certificate: Certificate) -> Iterator[str]:
 def _misfits(certificate: Certificate, whole: Fraction) -> Iterator[str]:
     """Whether the boxes are a partition of the placements; told twice, by corners and volumes."""
     boxes = np.concatenate(certificate.groups)
-    misfit = find_misfit(boxes, certificate.bound)
+    misfit = find_partition_error(boxes, certificate.bound)
     if misfit is not None:
         place, count = misfit
         yield (
@@ -168,7 +170,7 @@ DOUBT = 1e-9
 """Probability at which luck may refuse what is true, for each number of steps, and all others."""
 
 
-def find_wrong_tallies(
+def find_wrong_step_counts(
     outcomes: Sequence[Outcome], owner: NDArray[np.int64], steps: NDArray[np.int64]
 ) -> Iterator[str]:
     """Shares of numbers of steps that random flights refute, one line each.

@@ -21,12 +21,12 @@ MOST_AT_ONCE = 1024
 """Flights in one batch."""
 MOST_PIXELS = 2**22
 """Of the pictures of a batch."""
-Tell = Callable[[int, int], None]
+ProgressCallback = Callable[[int, int], None]
 """Told how much is done, and of how much."""
 
 
 @dataclasses.dataclass(frozen=True)
-class Flown:
+class Rollouts:
     """How flights ended; the first dimension counts flights."""
 
     end: NDArray[np.int64]  # (k,)
@@ -39,7 +39,7 @@ class Flown:
     """At how many of the last steps, one after the other, the world was as two steps before."""
 
     @classmethod
-    def join(cls, parts: Iterable["Flown"]) -> Self:
+    def join(cls, parts: Iterable["Rollouts"]) -> Self:
         """All of them, one after the other."""
         every = list(parts)
         names = [field.name for field in dataclasses.fields(cls)]
@@ -78,7 +78,9 @@ class Simulator:
         self._network = described.load_network(weights).to(self._worlds.device)
         self._dtype = torch.float32
 
-    def fly(self, placements: NDArray[np.float64], tell: Tell = lambda done, total: None) -> Flown:
+    def fly(
+        self, placements: NDArray[np.float64], tell: ProgressCallback = lambda done, total: None
+    ) -> Rollouts:
         """Flies flights to their ends, so many in a batch.
 
         Args:
@@ -89,7 +91,7 @@ class Simulator:
         for first in range(0, len(placements), self.at_once):
             parts.append(self._fly(placements[first : first + self.at_once]))
             tell(min(first + self.at_once, len(placements)), len(placements))
-        return Flown.join(parts)
+        return Rollouts.join(parts)
 
     def compute_in(self, dtype: torch.dtype) -> None:
         """Evaluate the network in another precision from now on."""
@@ -100,7 +102,7 @@ class Simulator:
         self._env.close()
 
     @torch.no_grad()
-    def _fly(self, placements: NDArray[np.float64]) -> Flown:
+    def _fly(self, placements: NDArray[np.float64]) -> Rollouts:
         now: Any = self._start(torch.from_numpy(placements))  # worlds are of any task's state
         flying = torch.arange(len(now), device=self._worlds.device)
         done, before = now[flying], now
@@ -113,7 +115,7 @@ class Simulator:
             on = now.end_reason == 0
             flying, now, before = flying[on], now[on], before[on]
         ended = (done.end_reason, done.collected, done.steps, repeats)
-        return Flown(*(value.cpu().numpy() for value in ended))
+        return Rollouts(*(value.cpu().numpy() for value in ended))
 
     def _start(self, lateral: Tensor) -> State:
         """The worlds at the start, with cubes at these places."""

@@ -16,15 +16,15 @@ Points = NDArray[np.float64]
 Indices = NDArray[np.intp]
 """Shape: (points,) or (boxes,)."""
 
-HAIR = 1e-9
+CORNER_INSET = 1e-9
 """Metres by which corners are moved inwards."""
-ASIDE = 1e-4
+BORDER_OFFSET = 1e-4
 """Metres from a border to the places on both its sides."""
 _MOST_WORK = 2**31
 """Numbers that are compared, at most, to look for borders."""
 
 
-def draw_inside(boxes: Boxes, count: int, rng: np.random.Generator) -> Points:
+def sample_inside(boxes: Boxes, count: int, rng: np.random.Generator) -> Points:
     """Centres, corners and random points of boxes, so many in all.
 
     As many centres as there are boxes, but at most half; where there are more, of large boxes, of
@@ -39,14 +39,14 @@ def draw_inside(boxes: Boxes, count: int, rng: np.random.Generator) -> Points:
     return np.concatenate([centres, corners, _random(chosen[rest], rng)])
 
 
-def draw_anywhere(boxes: Boxes, count: int, rng: np.random.Generator) -> tuple[Points, Indices]:
+def sample_anywhere(boxes: Boxes, count: int, rng: np.random.Generator) -> tuple[Points, Indices]:
     """Points that are uniform in the volume of all boxes together, and the box of each."""
     sizes = np.diff(boxes)[..., 0].prod(1)
     chosen = rng.choice(len(boxes), count, p=sizes / sizes.sum())
     return _random(boxes[chosen], rng), chosen
 
 
-def draw_borders(
+def sample_borders(
     groups: Sequence[Boxes], bound: float, count: int, rng: np.random.Generator
 ) -> Points:
     """Points on both sides of faces where boxes of different groups meet, or nearly so.
@@ -66,7 +66,7 @@ def draw_borders(
     on = _random(chosen, rng)
     on[row, axis] = chosen[row, axis, side]
     off = np.zeros_like(on)
-    off[row, axis] = ASIDE
+    off[row, axis] = BORDER_OFFSET
     pairs = np.stack([on - off, on + off], 1)  # (tries, 2, cubes)
     pairs = pairs[(abs(pairs) < bound).all((1, 2))]
     owner = np.repeat(np.arange(len(groups)), sizes)[find(boxes, pairs.reshape(-1, boxes.shape[1]))]
@@ -105,7 +105,7 @@ def _mixed(boxes: Boxes, rng: np.random.Generator) -> Indices:
 def _corners(boxes: Boxes) -> Points:
     """All corners, a hair inside. Shape: (boxes * 2^cubes, cubes)."""
     low, high = boxes[..., 0], boxes[..., 1]
-    hair = np.minimum(HAIR, (high - low) / 4)
+    hair = np.minimum(CORNER_INSET, (high - low) / 4)
     ends = np.array(list(product((False, True), repeat=boxes.shape[1])))
     corners = np.where(ends, (high - hair)[:, None], (low + hair)[:, None])
     return corners.reshape(-1, boxes.shape[1])
@@ -123,7 +123,7 @@ _ROUNDS = 4
 
 
 @dataclasses.dataclass(frozen=True)
-class Places:
+class Placements:
     """Placements; the first dimension counts them."""
 
     points: Points
@@ -134,23 +134,23 @@ class Places:
     """INSIDE a box, near a BORDER of an outcome, or ANYWHERE."""
 
 
-def draw_places(certificate: Certificate, count: int, rng: np.random.Generator) -> Places:
+def sample_placements(certificate: Certificate, count: int, rng: np.random.Generator) -> Placements:
     """Draws places: up to a half in boxes of every outcome, a quarter at borders, others anywhere.
 
     Args:
         certificate: Whose boxes are a partition.
-        count: Places.
+        count: Placements.
         rng: Draws them.
     """
     groups = certificate.groups
     boxes = np.concatenate(groups)
     group = np.repeat(np.arange(len(groups)), [len(boxes) for boxes in groups])
     parts = [(p, np.full(len(p), i), INSIDE) for i, p in _inside(groups[:-1], count // 2, rng)]
-    border = draw_borders(groups, certificate.bound, count // 4, rng)
+    border = sample_borders(groups, certificate.bound, count // 4, rng)
     parts.append((border, group[find(boxes, border)], BORDER))
-    points, chosen = draw_anywhere(boxes, count - sum(len(p) for p, *_ in parts), rng)
+    points, chosen = sample_anywhere(boxes, count - sum(len(p) for p, *_ in parts), rng)
     parts.append((points, group[chosen], ANYWHERE))
-    return Places(
+    return Placements(
         np.concatenate([points for points, *_ in parts]),
         np.concatenate([outcome for _, outcome, _ in parts]),
         np.repeat([why for *_, why in parts], [len(points) for points, *_ in parts]),
@@ -166,4 +166,4 @@ def _inside(
         enough = _ROUNDS * num_boxes * (2 ** groups[i].shape[1] + 2)
         share = min(enough, count // (len(order) - done))
         count -= share
-        yield i, draw_inside(groups[i], share, rng)
+        yield i, sample_inside(groups[i], share, rng)

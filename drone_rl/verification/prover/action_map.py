@@ -14,13 +14,13 @@ from drone_rl.sim.actions import MOVES, Move
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.provenance import num_cores
 from drone_rl.verification.prover.arrangement import SAME, Arrangement, Pieces, Window, arrange
-from drone_rl.verification.prover.cube_images import NOTHING, UNIT, Eye
+from drone_rl.verification.prover.cube_images import NOTHING, UNIT, CameraModel
 
 _DIGITS = 14
 """Of slopes: those of a row above and one below are rounded otherwise."""
 
 
-def find_borders(eye: Eye, window: Window) -> Pieces:
+def find_borders(eye: CameraModel, window: Window) -> Pieces:
     """All of them within a rectangle; no two on one line overlap.
 
     Args:
@@ -48,10 +48,10 @@ def find_borders(eye: Eye, window: Window) -> Pieces:
     return Pieces(slope, offset, begin, end, np.reshape(upright, (-1, 3))).clipped(window)
 
 
-def doubtful_area(eye: Eye, pieces: Pieces, window: Window) -> float:
+def doubtful_area(eye: CameraModel, pieces: Pieces, window: Window) -> float:
     """Square metres, at most, so near to a border that it may lie on its other side in float32.
 
-    See `Eye.borders` and `Eye.grazed` for how near that is.
+    See `CameraModel.borders` and `CameraModel.grazed` for how near that is.
     """
     farthest = max(eye.farthest, window.farthest + 1.0)
     widest = max(eye.widest, window.sideways)
@@ -97,8 +97,8 @@ def _levels(aside: NDArray, outer: NDArray, leaves: NDArray, half: float) -> lis
     ]
 
 
-Look = Callable[[NDArray[np.uint8]], Tensor]
-"""From what pixels show, see `Eye.faces`, to pictures as the network sees them: (N, C, H, W)."""
+RenderFaces = Callable[[NDArray[np.uint8]], Tensor]
+"""From what pixels show, see `CameraModel.faces`, to pictures as the network sees them: (N, C, H, W)."""
 
 SIDES = ("left", "ahead", "right")
 """Of a place: to its left or right, flying straight on misses the cube."""
@@ -110,7 +110,7 @@ _BATCH = 256
 
 
 @dataclasses.dataclass(frozen=True)
-class PlaceMap:
+class ActionMap:
     """Cells of places. In each, the cube's picture is the same everywhere."""
 
     window: Window
@@ -208,15 +208,15 @@ class PlaceMap:
         }
 
 
-def map_places(
-    eye: Eye,
+def map_actions(
+    eye: CameraModel,
     window: Window,
-    look: Look,
+    look: RenderFaces,
     network: nn.Module,
     *,
     touch_distance: float,
     most_cells: int,
-) -> PlaceMap:
+) -> ActionMap:
     """Decides a policy's action at every place of one cube.
 
     Args:
@@ -249,7 +249,7 @@ def map_places(
         num_cores(), "places", initializer=torch.set_num_threads, initargs=(1,)
     ) as pool:
         action, gap, is_unseen = map(np.concatenate, zip(*pool.map(decide, parts), strict=True))
-    return PlaceMap(
+    return ActionMap(
         window=window,
         arrangement=cells,
         places=places,
@@ -263,13 +263,15 @@ def map_places(
     )
 
 
-def _no_faces(eye: Eye) -> NDArray[np.uint8]:
+def _no_faces(eye: CameraModel) -> NDArray[np.uint8]:
     """What pixels show with no cube in sight. Shape: (1, H, W)."""
     return np.full((1, len(eye.up), len(eye.left)), NOTHING, np.uint8)
 
 
 @torch.no_grad()
-def _decide(look: Look, network: nn.Module, faces: NDArray[np.uint8]) -> tuple[NDArray, NDArray]:
+def _decide(
+    look: RenderFaces, network: nn.Module, faces: NDArray[np.uint8]
+) -> tuple[NDArray, NDArray]:
     """Actions, and the gaps to the next best. Shapes: (N,)."""
     highest = network(look(faces)).topk(2)
     gap = highest.values[:, 0] - highest.values[:, 1]

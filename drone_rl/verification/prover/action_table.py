@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from drone_rl.utils.provenance import num_cores
-from drone_rl.verification.prover.bounds import Bounds, Painter, Part, Ranges
+from drone_rl.verification.prover.bounds import Bounds, Compositor, Crop, ImageRanges
 from drone_rl.verification.prover.boxes import Boxes, blocks, merge, ragged
 from drone_rl.verification.prover.cells import Cells
 from drone_rl.verification.prover.cube_images import NOTHING
@@ -29,11 +29,11 @@ FEW, PRICE = 8, 6.0
 """Pictures of a block that are simply looked at; and what bounds on a block cost, in pictures."""
 
 
-class Outlook:
+class ActionTable:
     """The possible actions over all combinations of the places of the cubes in sight."""
 
     def __init__(
-        self, bounds: Bounds, painter: Painter, cells: Sequence[Cells], record: NDArray[np.int64]
+        self, bounds: Bounds, painter: Compositor, cells: Sequence[Cells], record: NDArray[np.int64]
     ) -> None:
         """Starts with nothing known.
 
@@ -52,7 +52,7 @@ class Outlook:
         """How many passes through the network there were."""
         self._gaps = [np.inf]
         self._bounds, self._painter = bounds, painter
-        self._ranges = [Ranges(torch.from_numpy(c.pictures)) for c in self.cells]
+        self._ranges = [ImageRanges(torch.from_numpy(c.pictures)) for c in self.cells]
         self._known = np.zeros([len(c.pictures) for c in reversed(self.cells)], np.uint8)
         """The same of each combination of pictures."""
         self._record = record
@@ -259,7 +259,7 @@ def _workers() -> ThreadPoolExecutor:
     )
 
 
-def _alike(near: Cells, far: Cells, part: Part) -> NDArray[np.int64]:
+def _alike(near: Cells, far: Cells, part: Crop) -> NDArray[np.int64]:
     """Which picture of a cube looks the same behind each picture of a nearer one.
 
     Args:
@@ -284,7 +284,9 @@ def _slices(span: NDArray) -> tuple[slice, ...]:
     return tuple(slice(a, b + 1) for a, b in span[::-1])
 
 
-def runs(outlook: Outlook, spans: NDArray[np.int64], most: int) -> Iterator[tuple[NDArray, ...]]:
+def runs(
+    outlook: ActionTable, spans: NDArray[np.int64], most: int
+) -> Iterator[tuple[NDArray, ...]]:
     """Cuts blocks of the table into rows of one set of possible actions, along the nearest cube.
 
     Args:

@@ -246,12 +246,12 @@ def _linear(layer: nn.Linear, scale: int) -> Step:
 
 Transform = Callable[[Tensor], Tensor]
 
-Part = tuple[slice, slice]
+Crop = tuple[slice, slice]
 """Rows and columns of a picture."""
 _FACES = 4
 
 
-class Painter:
+class Compositor:
     """Paints cubes over each other, the nearer one in front, before an even background."""
 
     def __init__(self, background: Tensor, faces: Tensor, rest: Transform | None = None) -> None:
@@ -275,7 +275,7 @@ class Painter:
         """Added to what stands behind: it counts where the cube may leave it open."""
 
     def paint(
-        self, cubes: Sequence[tuple[Part, Tensor, Tensor]], num_pictures: int
+        self, cubes: Sequence[tuple[Crop, Tensor, Tensor]], num_pictures: int
     ) -> tuple[Tensor, Tensor]:
         """Bounds on pictures.
 
@@ -298,7 +298,7 @@ class Painter:
             high.sub_(shut).clamp_min_(self._highest[index].index_select(0, case))
         return lower, upper
 
-    def paint_one(self, cubes: Sequence[tuple[Part, Tensor]], num_pictures: int) -> Tensor:
+    def paint_one(self, cubes: Sequence[tuple[Crop, Tensor]], num_pictures: int) -> Tensor:
         """Pictures of which everything is known.
 
         Args:
@@ -321,7 +321,7 @@ class Painter:
         return pictures[:, None] if self._rest is None else self._rest(pictures[:, None])
 
 
-class Ranges:
+class ImageRanges:
     """The pictures of one cube, one after the other, each range of them looked up in two steps."""
 
     def __init__(self, pictures: Tensor) -> None:

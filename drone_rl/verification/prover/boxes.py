@@ -22,7 +22,7 @@ MOST_GRIDS = 1_000
 """That are gone through, so that it takes half a minute at most."""
 
 
-def whole(bound: float, num_cubes: int) -> Boxes:
+def all_placements(bound: float, num_cubes: int) -> Boxes:
     """All placements: every cube anywhere from -bound to bound."""
     return np.broadcast_to([-bound, bound], (1, num_cubes, 2)).astype(np.float64)
 
@@ -51,7 +51,7 @@ def merge(boxes: NDArray[_Number]) -> NDArray[_Number]:
     return boxes
 
 
-def unite(boxes: Boxes, most: int = MOST_GRIDS) -> Boxes:
+def union(boxes: Boxes, most: int = MOST_GRIDS) -> Boxes:
     """The same set in disjoint boxes, where they overlap.
 
     Args:
@@ -68,13 +68,13 @@ def unite(boxes: Boxes, most: int = MOST_GRIDS) -> Boxes:
     return merge(np.concatenate([_of_grid(_covered(*grid), grid[1]) for grid in grids]))
 
 
-def beyond(boxes: Boxes, space: Boxes, most: int = MOST_GRIDS) -> Boxes | None:
+def complement(boxes: Boxes, space: Boxes, most: int = MOST_GRIDS) -> Boxes | None:
     """What some boxes leave of another one, in disjoint boxes.
 
     Args:
         boxes: Any within the other one.
         space: That one. Shape: (1, n, 2).
-        most: See `unite`.
+        most: See `union`.
 
     Returns:
         None if it would take more.
@@ -93,9 +93,9 @@ def blocks(mask: NDArray[np.bool_]) -> NDArray[np.int64]:
     """
     edges = np.diff(mask.view(np.int8), prepend=0, append=0, axis=-1)
     first, last = np.argwhere(edges > 0), np.argwhere(edges < 0)
-    beyond = first + 1
-    beyond[:, -1] = last[:, -1]
-    return np.stack([first, beyond], -1)
+    complement = first + 1
+    complement[:, -1] = last[:, -1]
+    return np.stack([first, complement], -1)
 
 
 def intersect(boxes: Boxes, others: Boxes) -> Boxes:
@@ -198,7 +198,7 @@ _AT_ONCE = 10_000_000
 """Pairs of boxes that are compared at a time; bounds memory."""
 
 
-def settle(
+def resolve_forks(
     forks: Sequence[Boxes], ways: Mapping[E, Boxes], unknown: Sequence[Boxes], num_cubes: int
 ) -> tuple[dict[E, Boxes], Boxes]:
     """Parts forks by how they end.
@@ -218,7 +218,7 @@ def settle(
     usual = max(ways, key=lambda e: volumes(ways[e]).sum())
     different = list(ways.values())
     both = [intersect(a, b) for i, a in enumerate(different) for b in different[i + 1 :]]
-    holes = unite(np.concatenate([left[:0], *unknown, *both]))
+    holes = union(np.concatenate([left[:0], *unknown, *both]))
     is_special = _meets(left, np.concatenate([holes, *(b for e, b in ways.items() if e != usual)]))
     settled: dict[E, list[Boxes]] = {usual: [left[~is_special]]}
     left = left[is_special]

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drone_rl.utils.errors import InputError
-from drone_rl.verification.prover.cube_images import Eye
+from drone_rl.verification.prover.cube_images import CameraModel
 
 NARROWER = 8
 """A renderer that is asked shows its bands: by so much they are narrower than rounding allows."""
@@ -29,7 +29,7 @@ class Renderer(Protocol):
         ...
 
     def read(self, pictures: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """What each pixel shows of it, see `Eye.faces`. Shape: (N, height, width)."""
+        """What each pixel shows of it, see `CameraModel.faces`. Shape: (N, height, width)."""
         ...
 
 
@@ -38,7 +38,7 @@ class Cells:
 
     def __init__(
         self,
-        eye: Eye,
+        eye: CameraModel,
         ahead: float,
         lowest: float,
         highest: float,
@@ -118,7 +118,9 @@ class Cells:
         return first.clip(0, len(self) - 1), last.clip(0, len(self) - 1)
 
 
-def _bands(eye: Eye, ahead: float, lowest: float, highest: float, narrower: float) -> NDArray:
+def _bands(
+    eye: CameraModel, ahead: float, lowest: float, highest: float, narrower: float
+) -> NDArray:
     """Where pictures change, from the first band that reaches into a range to the last."""
     places, errors = eye.borders(ahead)
     errors = errors / narrower + eye.rounding(places)
@@ -138,7 +140,7 @@ def _middles(limits: NDArray) -> NDArray[np.float64]:
 
 
 def _within(
-    bands: NDArray, eye: Eye, ahead: float, renderer: Renderer
+    bands: NDArray, eye: CameraModel, ahead: float, renderer: Renderer
 ) -> list[NDArray[np.uint8]] | None:
     """The pictures inside each band but its neighbours', in order.
 

@@ -34,7 +34,7 @@ UNIT = 2.0**-24
 
 
 @dataclasses.dataclass(frozen=True)
-class Eye:
+class CameraModel:
     """The policy's camera among cubes of one size."""
 
     left: NDArray[np.float64]
@@ -51,7 +51,7 @@ class Eye:
     """No cube's |y| is larger, metres."""
 
     @classmethod
-    def of(cls, task: TaskSettings, camera: CameraSettings) -> "Eye":
+    def of(cls, task: TaskSettings, camera: CameraSettings) -> "CameraModel":
         """The eye of a policy."""
         wide = np.tan(np.radians(camera.horizontal_fov) / 2)
         high = wide * camera.height / camera.width
@@ -159,10 +159,10 @@ ANYTHING = 255
 """No face."""
 
 
-class Seeing:
+class CubeImages:
     """The pictures of cubes that stand in given places, drawn and worked out."""
 
-    def __init__(self, worlds: Worlds, lattice: Lattice, eye: Eye) -> None:
+    def __init__(self, worlds: Worlds, lattice: Lattice, eye: CameraModel) -> None:
         """Takes the colours from the renderer.
 
         Args:
@@ -203,12 +203,12 @@ class Seeing:
                 "or the sky, so that none can be told from the other; give another colour"
             )
 
-    def of(self, cube: int, steps: int) -> "OneCube":
+    def of(self, cube: int, steps: int) -> "CubeView":
         """What is seen of one cube by a drone that has gone so many steps ahead."""
-        return OneCube(self, cube, steps)
+        return CubeView(self, cube, steps)
 
     def read(self, pictures: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """From a renderer's pictures of one cube to what each pixel shows, as `Eye.faces` says it.
+        """From a renderer's pictures of one cube to what each pixel shows, as `CameraModel.faces` says it.
 
         Raises:
             InputError: A pixel shows something else.
@@ -226,7 +226,7 @@ class Seeing:
         return faces
 
     def look(self, cube: int, steps: int, left: NDArray[np.float32]) -> NDArray[np.uint8]:
-        """Pictures of one cube alone, by the renderer; see `OneCube.look`."""
+        """Pictures of one cube alone, by the renderer; see `CubeView.look`."""
         count, num_cubes = len(left), self._lattice.task.num_cubes
         cubes = np.zeros((count, num_cubes))
         cubes[:, cube] = left
@@ -338,10 +338,10 @@ def _packed(colors: NDArray[np.uint8]) -> NDArray[np.uint32]:
 
 
 @dataclasses.dataclass(frozen=True)
-class OneCube:
+class CubeView:
     """One cube at one distance, by the renderer."""
 
-    seeing: Seeing
+    seeing: CubeImages
     cube: int
     steps: int
 
@@ -357,5 +357,5 @@ class OneCube:
         return self.seeing.look(self.cube, self.steps, left)
 
     def read(self, pictures: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """What each pixel shows of it, see `Seeing.read`."""
+        """What each pixel shows of it, see `CubeImages.read`."""
         return self.seeing.read(pictures)

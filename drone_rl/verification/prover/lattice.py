@@ -28,7 +28,7 @@ AHEAD, LEFT, RIGHT = range(3)
 
 
 @dataclasses.dataclass(frozen=True)
-class Place:
+class LatticeState:
     """Where a drone is, what it has, and how it came there."""
 
     ahead: int
@@ -88,21 +88,23 @@ class Lattice:
         """Steps ahead after which every episode has ended."""
         return int(self.task.front_bound / self.task.step_length) + 1
 
-    def x(self, place: Place) -> float:
+    def x(self, place: LatticeState) -> float:
         """Metres from the start."""
         return place.ahead * self.task.step_length
 
-    def y(self, place: Place) -> float:
+    def y(self, place: LatticeState) -> float:
         """Metres to the left of the start."""
         return place.left * self.task.step_length
 
-    def standing(self, place: Place) -> list[int]:
+    def standing(self, place: LatticeState) -> list[int]:
         """Cubes that are neither collected nor left behind, the nearest first."""
         x = self.x(place)
         cubes = range(len(self.cubes))
         return [k for k in cubes if not place.collected >> k & 1 and x <= self.cubes[k]]
 
-    def move(self, place: Place, action: int, boxes: Boxes) -> Iterator[tuple[Place, Boxes]]:
+    def move(
+        self, place: LatticeState, action: int, boxes: Boxes
+    ) -> Iterator[tuple[LatticeState, Boxes]]:
         """Where an action leads.
 
         Args:
@@ -126,7 +128,7 @@ class Lattice:
             came = AHEAD if is_new else action
             yield dataclasses.replace(moved, collected=collected, came=came), part
 
-    def ending(self, place: Place) -> Ending | None:
+    def ending(self, place: LatticeState) -> Ending | None:
         """How the episode has ended there, in the order of Algorithm 3; None if it goes on."""
         reason = None
         if place.steps >= self.task.step_limit:
@@ -139,7 +141,9 @@ class Lattice:
             reason = EndReason.ALL_CUBES
         return None if reason is None else Ending(reason, place.collected)
 
-    def _touched(self, place: Place, stood: list[int], boxes: Boxes) -> Iterator[tuple[int, Boxes]]:
+    def _touched(
+        self, place: LatticeState, stood: list[int], boxes: Boxes
+    ) -> Iterator[tuple[int, Boxes]]:
         """Boxes by the cubes that the drone has at a place, of those that stood before."""
         parts = [(place.collected, boxes)]
         reach, y = self.task.touch_distance, self.y(place)

@@ -19,19 +19,19 @@ from drone_rl.policies.rounding import RoundingBound
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason, WorldState
 from drone_rl.utils.batch import Batch
 from drone_rl.utils.errors import InputError
-from drone_rl.verification.prover.bounds import Part, Ranges
+from drone_rl.verification.prover.bounds import Crop, ImageRanges
 from drone_rl.verification.prover.boxes import Boxes
 from drone_rl.verification.prover.cells import Cells
-from drone_rl.verification.prover.lattice import AHEAD, LEFT, RIGHT, Graph, Place
-from drone_rl.verification.prover.policy_spec import Subject
+from drone_rl.verification.prover.lattice import AHEAD, LEFT, RIGHT, Graph, LatticeState
+from drone_rl.verification.prover.policy_spec import PolicySpec
 
-FAINT = 1e-18
+MIN_PROBABILITY = 1e-18
 """Probability of being in a node at a step up to which the policy isn't asked what it does there;
 most nodes are all but out of reach. Once it has been asked, all that comes there is followed."""
 NEGLIGIBLE = 1e-15
 """Probability that any episode still goes on, of all placements together, below which none is
 followed farther."""
-Ask = Callable[[Tensor], Tensor]
+Evaluate = Callable[[Tensor], Tensor]
 """Nodes by number (N,) to the probabilities of the moves there (N, A), float64."""
 
 
@@ -83,7 +83,7 @@ class Outcomes(Batch):
         return self.collected.sum(-1)
 
 
-def follow_chances(graph: Graph, ask: Ask) -> Outcomes:
+def propagate(graph: Graph, ask: Evaluate) -> Outcomes:
     """Carries the probability of every node on, step by step, until all episodes have ended.
 
     Args:
@@ -106,7 +106,7 @@ def follow_chances(graph: Graph, ask: Ask) -> Outcomes:
     return Outcomes(*map(torch.from_numpy, (ends.clip(max=1.0), steps, undecided)))
 
 
-def _carry(graph: Graph, ask: Ask) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+def _carry(graph: Graph, ask: Evaluate) -> tuple[NDArray, NDArray, NDArray, NDArray]:
     """Steps as long as anything goes on.
 
     Returns:
@@ -121,7 +121,7 @@ def _carry(graph: Graph, ask: Ask) -> tuple[NDArray, NDArray, NDArray, NDArray]:
     is_known = np.zeros(nodes, dtype=bool)
     now = (np.arange(nodes) < len(graph.cubes)).astype(float)
     for _ in range(graph.settings.step_limit):
-        new = (now > FAINT) & ~is_known
+        new = (now > MIN_PROBABILITY) & ~is_known
         if new.any():
             wish[new] = ask(torch.from_numpy(new.nonzero()[0])).numpy()
             is_known |= new
@@ -143,7 +143,7 @@ BATCH = 1000
 """Pictures drawn at a time; bounds memory."""
 
 
-class Sight:
+class NodeEvaluator:
     """Draws nodes of lattices as the policy's camera does, and asks its network."""
 
     def __init__(self, env: TransformedEnv, network: Callable[[Tensor], Tensor]) -> None:
@@ -176,7 +176,7 @@ class Sight:
                 "or the past; give a policy without"
             )
 
-    def on(self, graph: Graph) -> Ask:
+    def on(self, graph: Graph) -> Evaluate:
         """How to ask what the policy does in nodes of a graph; no picture is drawn twice."""
         node, picture = graph.pictures()
         every = graph.states()
@@ -237,7 +237,7 @@ ROUNDING = 1e-9
 
 
 @dataclasses.dataclass(frozen=True)
-class Bounded:
+class SuccessBounds:
     """Bounds on the probability that all cubes are collected, over a box of placements."""
 
     least: float
@@ -250,7 +250,7 @@ class Bounded:
     """or more than this."""
 
 
-def bound_success(subject: Subject, box: Boxes, most: int = 1) -> Bounded:
+def bound_success(subject: PolicySpec, box: Boxes, most: int = 1) -> SuccessBounds:
     """How probable it is that all cubes are collected, wherever in a box they stand.
 
     Args:
@@ -271,7 +271,7 @@ def bound_success(subject: Subject, box: Boxes, most: int = 1) -> Bounded:
             break
         parts[worst : worst + 1] = [(half, *_bound(looks, half)) for half in _halves(part)]
     shares = [float(np.prod(np.diff(part)) / np.prod(np.diff(box))) for part, _, _ in parts]
-    return Bounded(
+    return SuccessBounds(
         least=min(low for _, low, _ in parts),
         most=max(high for _, _, high in parts),
         mean_least=sum(share * low for share, (_, low, _) in zip(shares, parts, strict=True)),
@@ -302,15 +302,15 @@ def _bound(looks: "_Looks", box: Boxes) -> tuple[float, float]:
     return max(0.0, float(least[2]) - ROUNDING), min(1.0, float(most[2]) + ROUNDING)
 
 
-def _reachable(subject: Subject, box: Boxes) -> tuple[list[Place], NDArray[np.int64]]:
+def _reachable(subject: PolicySpec, box: Boxes) -> tuple[list[LatticeState], NDArray[np.int64]]:
     """All places, the start first, and where each move may lead.
 
     Returns:
         The places; and of each move the numbers of what may come of it, which are 0 for a loss, 1
         for a win, and two more than the place's own otherwise. Shape: (places, moves, ways).
     """
-    lattice, number = subject.lattice, {Place(0, 0): 0}
-    places, found = [Place(0, 0)], []
+    lattice, number = subject.lattice, {LatticeState(0, 0): 0}
+    places, found = [LatticeState(0, 0)], []
     for place in places:  # which grows
         for move in _MOVES:
             ways = []
@@ -332,12 +332,12 @@ def _reachable(subject: Subject, box: Boxes) -> tuple[list[Place], NDArray[np.in
 class _Looks:
     """What may be seen, and wished for, of cubes in a box and in its parts."""
 
-    def __init__(self, subject: Subject, box: Boxes) -> None:
+    def __init__(self, subject: PolicySpec, box: Boxes) -> None:
         self.subject, self._box = subject, box
-        self._known: dict[tuple[int, int], tuple[Cells, Ranges]] = {}
+        self._known: dict[tuple[int, int], tuple[Cells, ImageRanges]] = {}
 
     def probabilities(
-        self, box: Boxes, places: list[Place]
+        self, box: Boxes, places: list[LatticeState]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """How probable each move is, at least and at most. Shapes: (places, moves)."""
         lattice, painter = self.subject.lattice, self.subject.painter
@@ -357,18 +357,18 @@ class _Looks:
 
     def _case(
         self, cube: int, ahead: int, interval: NDArray, y: NDArray
-    ) -> tuple[Part, Tensor, Tensor]:
-        """What `Painter.paint` takes of one cube, for drones at y."""
+    ) -> tuple[Crop, Tensor, Tensor]:
+        """What `Compositor.paint` takes of one cube, for drones at y."""
         cells, ranges = self._look(cube, ahead)
         first, last = cells.span(interval[0] - y, interval[1] - y)
         return ranges.part, *ranges.of(np.stack([cells.first[first], cells.last[last]], -1))
 
-    def _look(self, cube: int, ahead: int) -> tuple[Cells, Ranges]:
+    def _look(self, cube: int, ahead: int) -> tuple[Cells, ImageRanges]:
         if (cube, ahead) not in self._known:
             task, (low, high) = self.subject.lattice.task, self._box[cube]
             aside = task.side_bound + task.step_length
             cells = self.subject.cells(cube, ahead, low - aside, high + aside)
-            self._known[cube, ahead] = cells, Ranges(torch.from_numpy(cells.pictures))
+            self._known[cube, ahead] = cells, ImageRanges(torch.from_numpy(cells.pictures))
         return self._known[cube, ahead]
 
 

@@ -16,10 +16,10 @@ from drone_rl.sim.actions import MOVES
 from drone_rl.sim.tasks.collect_cubes import require_cubes, require_moves
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
-from drone_rl.verification.prover.bounds import Bounds, Painter
-from drone_rl.verification.prover.boxes import Boxes, whole
+from drone_rl.verification.prover.bounds import Bounds, Compositor
+from drone_rl.verification.prover.boxes import Boxes
 from drone_rl.verification.prover.cells import Cells
-from drone_rl.verification.prover.cube_images import FRONT, Eye, Seeing, camera_ahead
+from drone_rl.verification.prover.cube_images import FRONT, CameraModel, CubeImages, camera_ahead
 from drone_rl.verification.prover.lattice import Lattice
 
 _SHADES = ("gray", "standardize")
@@ -31,14 +31,14 @@ _BLIND = ("step_count", "episode_reward")
 
 
 @dataclasses.dataclass(frozen=True)
-class Subject:
+class PolicySpec:
     """A policy in a task, in the parts that proofs are made of."""
 
     lattice: Lattice
-    eye: Eye
+    eye: CameraModel
     bounds: Bounds
-    painter: Painter
-    seeing: Seeing
+    painter: Compositor
+    seeing: CubeImages
     worlds: Worlds
 
     def cells(self, cube: int, steps: int, lowest: float, highest: float) -> Cells:
@@ -61,12 +61,12 @@ class Subject:
         self.worlds.close()
 
 
-def make_subject(
+def make_policy_spec(
     description: PolicyDescription,
     network: PolicyNetwork,
     gap: float,
     renderer: str = "raytrace",
-) -> Subject:
+) -> PolicySpec:
     """Takes a policy apart.
 
     Args:
@@ -88,11 +88,11 @@ def make_subject(
         )
     if network.actions is not MOVES:
         raise InputError(f"the policy does not choose among {', '.join(MOVES.names)}; prove one")
-    lattice, eye = Lattice(task), Eye.of(task, description.camera)
+    lattice, eye = Lattice(task), CameraModel.of(task, description.camera)
     bounds = Bounds(network.eval(), gap)
     worlds = Worlds(64, task, description.camera, renderer=renderer)
-    seeing = Seeing(worlds, lattice, eye)
-    return Subject(lattice, eye, bounds, make_painter(description, seeing), seeing, worlds)
+    seeing = CubeImages(worlds, lattice, eye)
+    return PolicySpec(lattice, eye, bounds, make_compositor(description, seeing), seeing, worlds)
 
 
 def check_task(task: TaskSettings) -> None:
@@ -115,7 +115,7 @@ def check_task(task: TaskSettings) -> None:
         raise InputError("task.lateral_bound=0 leaves a single placement; simply fly it")
 
 
-def make_painter(description: PolicyDescription, seeing: Seeing) -> Painter:
+def make_compositor(description: PolicyDescription, seeing: CubeImages) -> Compositor:
     """What the policy's transforms make of what its camera shows.
 
     Raises:
@@ -145,7 +145,7 @@ def make_painter(description: PolicyDescription, seeing: Seeing) -> Painter:
     shade, rest = on_pixels(made[:count]), on_pixels(made[count:])
     background = shade(seeing.background[None])[0, 0]
     faces = shade(seeing.colors[None, None, FRONT:])[0, 0, 0]
-    return Painter(background, faces, rest if made[count:] else None)
+    return Compositor(background, faces, rest if made[count:] else None)
 
 
 @contextlib.contextmanager
@@ -165,7 +165,7 @@ MOST_PARTS = 1_000
 """A task of more would take days."""
 
 
-def pictures_of_each(subject: Subject) -> list[int]:
+def pictures_of_each(subject: PolicySpec) -> list[int]:
     """About how many pictures each cube has alone where together they have the most."""
     lattice, found = subject.lattice, []
     for steps in range(lattice.last):
@@ -174,13 +174,13 @@ def pictures_of_each(subject: Subject) -> list[int]:
     return max(found, key=math.prod)
 
 
-def _count(subject: Subject, away: float) -> int:
+def _count(subject: PolicySpec, away: float) -> int:
     """About how many pictures a cube has within the placements, metres ahead of the drone."""
     places, _ = subject.eye.borders(away - camera_ahead())
     return 1 + PICTURES * int((np.abs(places) <= subject.lattice.task.lateral_bound).sum())
 
 
-def in_parts(subject: Subject, most: int) -> Boxes:
+def partition_placements(subject: PolicySpec, most: int) -> Boxes:
     """Cuts all placements.
 
     Args:
@@ -204,7 +204,7 @@ def in_parts(subject: Subject, most: int) -> Boxes:
             f"{math.prod(strips):,} parts, which would take days; give fewer cubes, a smaller "
             "task.lateral_bound, or a policy whose camera has fewer pixels"
         )
-    boxes = whole(subject.lattice.task.lateral_bound, len(counts))
+    boxes = all_placements(subject.lattice.task.lateral_bound, len(counts))
     for cube, count in enumerate(strips):
         low, high = boxes[0, cube, 0], boxes[-1, cube, 1]
         ends = np.linspace(low, high, count + 1)

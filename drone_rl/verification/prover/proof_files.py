@@ -19,8 +19,8 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import write_atomically
 from drone_rl.utils.limits import ARRAYS_BYTES, check_indices
 from drone_rl.verification.prover.boxes import Boxes, volumes
-from drone_rl.verification.prover.lattice import Ending, Place
-from drone_rl.verification.prover.prover import Findings, Prover, together
+from drone_rl.verification.prover.lattice import Ending, LatticeState
+from drone_rl.verification.prover.prover import Findings, Prover, combine
 
 _COUNTS = ("num_places", "pictures", "most_boxes", "least_gap", "largest_band", "decided")
 _SETS = ("waiting", "ended", "ways", "forked", "parts", "part", "done", "undecided")
@@ -95,7 +95,7 @@ def load(prover: Prover, path: Path, subject: str, most: int = ARRAYS_BYTES) -> 
         parts, part, left = (_only(sets[name]) for name in ("parts", "part", "undecided"))
         _check(part, waiting, [*ended, *ways, *forked])
         done = [Findings({_ending(row): b}, left[:0], {}) for row, b in sets["done"]]
-        done = together([Findings({}, left, _steps(state)), *done])
+        done = combine([Findings({}, left, _steps(state)), *done])
     except _DAMAGE as error:
         raise InputError(f"{path} is no state of a proof ({error}); delete it to begin") from None
     if saved != subject:
@@ -115,9 +115,9 @@ def load(prover: Prover, path: Path, subject: str, most: int = ARRAYS_BYTES) -> 
         setattr(prover, name, count)
 
 
-def _place(row: tuple[int, ...]) -> Place:
+def _place(row: tuple[int, ...]) -> LatticeState:
     ahead, left, collected, steps, came, is_fork = row
-    return Place(ahead, left, collected, steps, came, bool(is_fork))
+    return LatticeState(ahead, left, collected, steps, came, bool(is_fork))
 
 
 def _row(ending: Ending | None) -> tuple[int, int, int]:

@@ -15,20 +15,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
-from drone_rl.verification.prover.action_table import Outlook, runs
+from drone_rl.verification.prover.action_table import ActionTable, runs
 from drone_rl.verification.prover.boxes import (
     Boxes,
-    beyond,
+    all_placements,
+    complement,
     merge,
     ragged,
-    settle,
-    unite,
+    resolve_forks,
+    union,
     volumes,
-    whole,
 )
 from drone_rl.verification.prover.cells import Cells
-from drone_rl.verification.prover.lattice import AHEAD, LEFT, RIGHT, Ending, Place
-from drone_rl.verification.prover.policy_spec import Subject, in_parts
+from drone_rl.verification.prover.lattice import AHEAD, LEFT, RIGHT, Ending, LatticeState
+from drone_rl.verification.prover.policy_spec import PolicySpec, partition_placements
 
 MOST_STATED = 20_000
 """Boxes that are stated of a part under way; what they leave takes a few times as many."""
@@ -72,7 +72,7 @@ def ended(known: Ended, none: Boxes) -> Findings:
         found.append(
             Findings({ending: boxes}, none, {ending: {steps: float(volumes(boxes).sum())}})
         )
-    return together(found)
+    return combine(found)
 
 
 def so_far(known: Ended, part: Boxes) -> Findings:
@@ -93,13 +93,13 @@ def so_far(known: Ended, part: Boxes) -> Findings:
     order = np.lexsort((-volumes(boxes), kind))
     rank = ragged(np.bincount(kind))[1]
     largest = order[np.argsort(rank, kind="stable")][:MOST_STATED]
-    while (left := beyond(boxes[largest], part)) is None:
+    while (left := complement(boxes[largest], part)) is None:
         largest = largest[: len(largest) // 2]
     stated = {key: [boxes[largest[owner[largest] == i]]] for i, key in enumerate(known)}
-    return together([ended(stated, part[:0]), undecided(left)])
+    return combine([ended(stated, part[:0]), undecided(left)])
 
 
-def together(some: Sequence[Findings]) -> Findings:
+def combine(some: Sequence[Findings]) -> Findings:
     """Findings of disjoint placements, of as many cubes, as one."""
     endings: dict[Ending, list[Boxes]] = defaultdict(list)
     steps: dict[Ending, dict[int, float]] = defaultdict(dict)
@@ -129,7 +129,7 @@ def simplified(found: Findings, space: Boxes) -> Findings:
     if endings:
         usual = max(endings, key=lambda e: volumes(endings[e]).sum())
         holes = np.concatenate([left, *(b for e, b in endings.items() if e != usual)])
-        if (rest := beyond(holes, space)) is not None:
+        if (rest := complement(holes, space)) is not None:
             endings[usual] = min(endings[usual], rest, key=len)
     return Findings(endings, left, found.steps)
 
@@ -146,7 +146,7 @@ COARSE = 0.5
 class Prover:
     """A proof on its way: advance it place by place, and ask for its findings at any time."""
 
-    def __init__(self, subject: Subject, most_combinations: int = 500_000_000) -> None:
+    def __init__(self, subject: PolicySpec, most_combinations: int = 500_000_000) -> None:
         """Begins with every placement at the start.
 
         Args:
@@ -158,18 +158,18 @@ class Prover:
             InputError: There would be too many parts.
         """
         self.lattice = subject.lattice
-        self.parts = in_parts(subject, most_combinations)
+        self.parts = partition_placements(subject, most_combinations)
         """Placements that are not yet begun with."""
         self.part = self.parts[:0]
         """Those under way; none between two parts."""
         self.done = undecided(self.parts[:0])
         """What is known of the parts before."""
-        self.waiting: dict[Place, list[Boxes]] = defaultdict(list)
+        self.waiting: dict[LatticeState, list[Boxes]] = defaultdict(list)
         self.ended: dict[tuple[Ending, int], list[Boxes]] = defaultdict(list)
         """Of the part under way, by number of steps."""
         self.forked: list[Boxes] = []
         """Where more than one action was possible for the first time, disjoint."""
-        self.longest: dict[Place, int] = {}
+        self.longest: dict[LatticeState, int] = {}
         """The most steps that forks took to where they are; their places count none."""
         self.fork_ends: dict[Ending | None, list[Boxes]] = defaultdict(list)
         """What became of that; None for what is not followed to its end."""
@@ -183,7 +183,7 @@ class Prover:
         self._seen_from = -1
         self._foreseen: set[int] = set()
         self._cells: dict[int, Cells] = {}
-        self._outlooks: dict[tuple[int, ...], Outlook] = {}
+        self._outlooks: dict[tuple[int, ...], ActionTable] = {}
         self._record = np.zeros((32, 2), np.int64)
 
     @property
@@ -201,17 +201,17 @@ class Prover:
         """Whether every placement has been followed to its end."""
         return not self.waiting and not len(self.parts)
 
-    def advance(self) -> Place:
+    def advance(self) -> LatticeState:
         """Visits the next place; returns it."""
         if not self.waiting:
             self.part, self.parts = self.parts[:1], self.parts[1:]
-            self.wait(Place(0, 0), self.part)
+            self.wait(LatticeState(0, 0), self.part)
         place = min(self.waiting, key=lambda p: p.turn)
         self._arrive(place.ahead)
         self._foresee(place)
         boxes = np.concatenate(self.waiting.pop(place))
         self.boxes_under_way -= len(boxes)
-        boxes = unite(boxes) if place.is_fork else merge(boxes)
+        boxes = union(boxes) if place.is_fork else merge(boxes)
         if place.is_fork:
             place = dataclasses.replace(place, steps=self.longest.pop(place))
         self.num_places += 1
@@ -228,24 +228,24 @@ class Prover:
             self._settle()
         return place
 
-    def wait(self, place: Place, boxes: Boxes) -> None:
+    def wait(self, place: LatticeState, boxes: Boxes) -> None:
         """Notes placements that must be followed from a place on."""
         self.waiting[place].append(boxes)
         self.boxes_under_way += len(boxes)
 
     def _settle(self) -> None:
         """Settles the forks of a part that is done, and forgets how it came to that."""
-        ways = {e: unite(np.concatenate(b)) for e, b in self.fork_ends.items() if e}
+        ways = {e: union(np.concatenate(b)) for e, b in self.fork_ends.items() if e}
         unknown, num_cubes = self.fork_ends.get(None, []), self.lattice.task.num_cubes
-        forks = Findings(*settle(self.forked, ways, unknown, num_cubes), {})
-        found = together([ended(self.ended, self.part[:0]), forks])
-        self.done = together([self.done, simplified(found, self.part)])
+        forks = Findings(*resolve_forks(self.forked, ways, unknown, num_cubes), {})
+        found = combine([ended(self.ended, self.part[:0]), forks])
+        self.done = combine([self.done, simplified(found, self.part)])
         self.decided = self.done.decided
         self.part = self.part[:0]
         for forgotten in (self.ended, self.forked, self.fork_ends):
             forgotten.clear()
 
-    def _follow(self, place: Place, action: int, boxes: Boxes) -> None:
+    def _follow(self, place: LatticeState, action: int, boxes: Boxes) -> None:
         """Moves on, unless that would be back to where the drone has just come from."""
         if {place.came, action} == {LEFT, RIGHT}:
             self._end(place, Ending(EndReason.STEP_LIMIT, place.collected, loops=True), boxes)
@@ -258,8 +258,8 @@ class Prover:
             else:
                 self._gather(moved, part)
 
-    def _gather(self, place: Place, boxes: Boxes) -> None:
-        """Puts forks together however they came: what follows does not depend on it.
+    def _gather(self, place: LatticeState, boxes: Boxes) -> None:
+        """Puts forks combine however they came: what follows does not depend on it.
 
         Of steps, the most that any took are noted. Where cubes stood that are gone is rounded, so
         that it includes where they stood: that can only leave more undecided, within forks.
@@ -273,7 +273,7 @@ class Prover:
         self.longest[there] = steps
         self.wait(there, boxes)
 
-    def _end(self, place: Place, ending: Ending, boxes: Boxes) -> None:
+    def _end(self, place: LatticeState, ending: Ending, boxes: Boxes) -> None:
         if place.is_fork:
             # who may go to and fro may also leave off at any time
             is_known = not ending.loops and ending.reason is not EndReason.STEP_LIMIT
@@ -283,7 +283,7 @@ class Prover:
             self.ended[ending, steps].append(boxes)
             self.decided += float(volumes(boxes).sum())
 
-    def _cut(self, place: Place, boxes: Boxes) -> Iterator[tuple[int, Boxes]]:
+    def _cut(self, place: LatticeState, boxes: Boxes) -> Iterator[tuple[int, Boxes]]:
         """Boxes by the bits of the actions that are possible."""
         cubes, y = self.lattice.standing(place), self.lattice.y(place)
         seen = boxes[:, cubes] - y
@@ -307,7 +307,7 @@ class Prover:
         for kind, parts in found.items():
             yield kind, merge(np.concatenate(parts))
 
-    def _fill(self, outlook: Outlook, boxes: Boxes) -> NDArray[np.int64]:
+    def _fill(self, outlook: ActionTable, boxes: Boxes) -> NDArray[np.int64]:
         """Makes an outlook known there; returns the spans."""
         spans, pictures = outlook.spans(boxes), outlook.pictures
         outlook.fill(spans)
@@ -323,7 +323,7 @@ class Prover:
             self._outlooks.clear()
             self._cells.clear()
 
-    def _foresee(self, place: Place) -> None:
+    def _foresee(self, place: LatticeState) -> None:
         """Fills the outlook of all places beside one that were come to from behind.
 
         None of them leads to another one; many small batches would cost more than a large one.
@@ -341,7 +341,7 @@ class Prover:
             if self._is_within(self._looks(place, cubes, boxes)):
                 self._fill(self._outlook(place, cubes, boxes), boxes)
 
-    def _outlook(self, place: Place, cubes: list[int], boxes: Boxes) -> Outlook:
+    def _outlook(self, place: LatticeState, cubes: list[int], boxes: Boxes) -> ActionTable:
         """What is seen from the place's x, as far to the sides as boxes of cubes in sight reach."""
         cells = self._looks(place, cubes, boxes)
         if not self._is_within(cells):  # what is seen from elsewhere is of little use here
@@ -349,7 +349,7 @@ class Prover:
             cells = [c.between(*end) for c, end in zip(cells, ends, strict=True)]
         known = self._outlooks.get(tuple(cubes))
         if known is None or known.cells != cells:
-            known = Outlook(self._subject.bounds, self._subject.painter, cells, self._record)
+            known = ActionTable(self._subject.bounds, self._subject.painter, cells, self._record)
             self._outlooks[tuple(cubes)] = known
         return known
 
@@ -357,12 +357,12 @@ class Prover:
         """Whether the combinations of pictures are few enough to be remembered."""
         return math.prod(len(c.pictures) for c in cells) <= self._most
 
-    def _looks(self, place: Place, cubes: list[int], boxes: Boxes) -> list[Cells]:
+    def _looks(self, place: LatticeState, cubes: list[int], boxes: Boxes) -> list[Cells]:
         """The cells of each cube in sight."""
         ends = zip(boxes[..., 0].min(0), boxes[..., 1].max(0), strict=True)
         return [self._look(place, k, *end) for k, end in zip(cubes, ends, strict=True)]
 
-    def _look(self, place: Place, cube: int, lowest: float, highest: float) -> Cells:
+    def _look(self, place: LatticeState, cube: int, lowest: float, highest: float) -> Cells:
         """The cells of one cube, at least from the lowest to the highest place."""
         known = self._cells.get(cube)
         if known is not None and known.limits[0] <= lowest and highest <= known.limits[-1]:
@@ -379,4 +379,4 @@ class Prover:
         """What is known by now of all placements; nothing yet of forks of the part under way."""
         task = self.lattice.task
         found = [self.done, so_far(self.ended, self.part), undecided(self.parts)]
-        return simplified(together(found), whole(task.lateral_bound, task.num_cubes))
+        return simplified(combine(found), all_placements(task.lateral_bound, task.num_cubes))

@@ -10,12 +10,12 @@ from drone_rl.config import CameraSettings, TaskSettings
 from drone_rl.verification.prover import action_map
 from drone_rl.verification.prover.action_map import doubtful_area, find_borders, joined
 from drone_rl.verification.prover.arrangement import Pieces, Window, arrange
-from drone_rl.verification.prover.cube_images import FRONT, LEFT_SIDE, NOTHING, UNIT, Eye
+from drone_rl.verification.prover.cube_images import FRONT, LEFT_SIDE, NOTHING, UNIT, CameraModel
 
 
 def eye(left, up):
     """Cubes with an edge of 2 m."""
-    return Eye(
+    return CameraModel(
         np.array(left, float), np.array(up, float), half=1.0, farthest=10.0, widest=10.0, bound=6.0
     )
 
@@ -51,7 +51,7 @@ def test_a_ray_that_leaves_by_the_upper_edge_sees_less_of_the_side():
 
 def test_twelve_pixels():
     """3 columns 2/3 apart; 4 rows that rise 1/3 and 1, which see cubes as far as 5 and 2.5 m."""
-    seen = Eye.of(TaskSettings(), CameraSettings(width=3, height=4, horizontal_fov=90))
+    seen = CameraModel.of(TaskSettings(), CameraSettings(width=3, height=4, horizontal_fov=90))
     np.testing.assert_allclose(seen.left, [2 / 3, 0, -2 / 3], atol=1e-15)
     np.testing.assert_allclose(np.abs(seen.up), [1, 1 / 3, 1 / 3, 1])
     window = Window(2.0, 20.0, 30.0)
@@ -97,7 +97,9 @@ def missed(eye, found, count=2000):
 @pytest.mark.parametrize("camera", CAMERAS)
 def test_every_place_has_the_picture_of_its_cell(camera):
     width, height, fov = camera
-    seen = Eye.of(TaskSettings(), CameraSettings(width=width, height=height, horizontal_fov=fov))
+    seen = CameraModel.of(
+        TaskSettings(), CameraSettings(width=width, height=height, horizontal_fov=fov)
+    )
     found = find_borders(seen, WINDOW)
     assert missed(seen, found) == 0
     cells = arrange(found, WINDOW, 100_000)
@@ -112,7 +114,7 @@ def test_every_place_has_the_picture_of_its_cell(camera):
 
 @pytest.mark.parametrize("family", ["near", "far", "side", "levels", "upright"])
 def test_no_family_of_borders_can_be_left_out(family, monkeypatch):
-    seen = Eye.of(TaskSettings(), CameraSettings(width=9, height=6, horizontal_fov=90))
+    seen = CameraModel.of(TaskSettings(), CameraSettings(width=9, height=6, horizontal_fov=90))
     calls = []
 
     def without(*args):
@@ -133,7 +135,7 @@ def test_no_family_of_borders_can_be_left_out(family, monkeypatch):
 
 
 def test_the_doubtful_area_is_a_band_along_each_border():
-    """A level border 3 m long at y = 2, an upright one of 4 m: see `Eye.borders`, `Eye.grazed`."""
+    """A level border 3 m long at y = 2, an upright one of 4 m: see `CameraModel.borders`, `CameraModel.grazed`."""
     window = Window(2.0, 8.0, 5.0)
     level, upright = np.array([[0.0, 2.0, 3.0, 6.0]]).T, np.array([[4.0, -2.0, 2.0]])
     found = doubtful_area(eye([1.0], [0.5]), Pieces(*level, upright), window)

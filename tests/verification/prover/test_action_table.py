@@ -5,12 +5,12 @@ import pytest
 import torch
 from torch import nn
 
-from drone_rl.verification.prover.action_table import Outlook, runs
-from drone_rl.verification.prover.bounds import Bounds, Painter
+from drone_rl.verification.prover.action_table import ActionTable, runs
+from drone_rl.verification.prover.bounds import Bounds, Compositor
 from drone_rl.verification.prover.cells import Cells
-from drone_rl.verification.prover.cube_images import Eye
+from drone_rl.verification.prover.cube_images import CameraModel
 
-EYE = Eye(
+EYE = CameraModel(
     left=np.linspace(2, -2, 8), up=np.linspace(0.6, -0.6, 5), half=1.0, farthest=40.0, widest=20.0,
     bound=6.0,
 )  # fmt: skip
@@ -33,8 +33,8 @@ class Network(nn.Module):
 
 
 def make(cells):
-    painter = Painter(torch.full((5, 8), 0.2), torch.tensor([1.0, -1.0, 0.6]))
-    return Outlook(Bounds(Network().eval(), 1e-4), painter, cells, np.zeros((32, 2), int))
+    painter = Compositor(torch.full((5, 8), 0.2), torch.tensor([1.0, -1.0, 0.6]))
+    return ActionTable(Bounds(Network().eval(), 1e-4), painter, cells, np.zeros((32, 2), int))
 
 
 @pytest.fixture

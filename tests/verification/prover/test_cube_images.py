@@ -12,14 +12,14 @@ from drone_rl.verification.prover.cube_images import (
     NOTHING,
     RIGHT_SIDE,
     UNIT,
-    Eye,
+    CameraModel,
 )
 
 
 @pytest.fixture
 def tiny():
     """Two columns with slopes 1 and -1, three rows with slopes 0.5, 0 and -0.5; cubes of 2 m."""
-    return Eye(
+    return CameraModel(
         left=np.array([1.0, -1.0]),
         up=np.array([0.5, 0.0, -0.5]),
         half=1.0,
@@ -30,7 +30,7 @@ def tiny():
 
 
 def test_slopes_of_the_default_camera():
-    eye = Eye.of(TaskSettings(), CameraSettings())
+    eye = CameraModel.of(TaskSettings(), CameraSettings())
     wide = np.tan(np.radians(67.5))
     assert eye.left[0] == pytest.approx(63 / 64 * wide)
     assert eye.left[-1] == -eye.left[0]
@@ -79,7 +79,7 @@ def test_borders_are_where_faces_change(tiny):
 
 @pytest.mark.parametrize("ahead", [0.6, 1.6, 2.6, 5.6, 14.6, 32.6])
 def test_between_borders_nothing_changes(ahead):
-    eye = Eye.of(TaskSettings(), CameraSettings())
+    eye = CameraModel.of(TaskSettings(), CameraSettings())
     places, _ = eye.borders(ahead)
     places = np.unique(places.round(12))
     low, high = places[:-1] + 1e-9, places[1:] - 1e-9
@@ -96,7 +96,7 @@ def test_grazing_rows_are_told(tiny):
 
 
 def test_float32_moves_a_cube_by_no_more_than_is_allowed_for():
-    eye, random = Eye.of(TaskSettings(), CameraSettings()), np.random.RandomState(0)
+    eye, random = CameraModel.of(TaskSettings(), CameraSettings()), np.random.RandomState(0)
     cubes = random.uniform(-eye.bound, eye.bound, 200_000)
     drone = random.randint(-int(eye.widest), int(eye.widest) + 1, len(cubes)).astype(float)
     seen = (cubes.astype(np.float32) - drone.astype(np.float32)).astype(float)

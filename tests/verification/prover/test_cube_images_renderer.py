@@ -7,13 +7,13 @@ import torch
 from drone_rl.config import CameraSettings, TaskSettings
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
-from drone_rl.verification.prover.cube_images import FRONT, NOTHING, Eye, Seeing
+from drone_rl.verification.prover.cube_images import FRONT, NOTHING, CameraModel, CubeImages
 from drone_rl.verification.prover.lattice import Lattice
 
 
 def make(task=None, camera=None):
     task, camera = task or TaskSettings(), camera or CameraSettings()
-    return Seeing(Worlds(64, task, camera), Lattice(task), Eye.of(task, camera))
+    return CubeImages(Worlds(64, task, camera), Lattice(task), CameraModel.of(task, camera))
 
 
 @pytest.fixture(scope="module")

@@ -12,13 +12,13 @@ from drone_rl.config import ActionSettings, AppearanceSettings, DynamicsSettings
 from drone_rl.policies.zoo import parse
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.prover.cells import Cells
-from drone_rl.verification.prover.policy_spec import check_task, make_painter, make_subject
+from drone_rl.verification.prover.policy_spec import check_task, make_compositor, make_policy_spec
 
 
 @pytest.fixture(scope="module")
 def subject():
     policy = drone_rl.load_policy("good")
-    subject = make_subject(policy.description, policy.make_network(), 1e-4)
+    subject = make_policy_spec(policy.description, policy.make_network(), 1e-4)
     yield subject
     subject.close()
 
@@ -47,7 +47,7 @@ def test_pictures_are_what_the_network_sees(subject):
 def test_transforms_after_the_shades_are_applied(subject):
     crop = {"name": "crop", "top": 2, "bottom": 22}
     description = with_transforms("gray", crop, {"name": "standardize", "mean": 0.5, "std": 0.25})
-    painter = make_painter(description, subject.seeing)
+    painter = make_compositor(description, subject.seeing)
     picture = painter.see(painter.paint([], 1)[0])
     assert picture.shape == (1, 1, 20, 64)
     sky = (0.299 * 158 + 0.587 * 188 + 0.114 * 234) / 255
@@ -56,7 +56,7 @@ def test_transforms_after_the_shades_are_applied(subject):
 
 def test_a_blurred_picture_is_bounded_by_its_blurred_bounds(subject):
     blur = {"name": "blur", "width": 1.0}
-    painter = make_painter(with_transforms("gray", blur), subject.seeing)
+    painter = make_compositor(with_transforms("gray", blur), subject.seeing)
     nothing = painter.paint([], 1)[0]
     brighter = nothing.clone()
     brighter[0, 12, 32] += 0.1
@@ -76,7 +76,7 @@ def test_cells_are_those_of_a_cubes_distance(subject):
 def test_memory_is_refused(subject):
     stack = {"name": "stack", "N": 2}
     with pytest.raises(InputError, match="sees a stack of frames"):
-        make_painter(with_transforms("gray", stack), subject.seeing)
+        make_compositor(with_transforms("gray", stack), subject.seeing)
 
 
 @pytest.mark.parametrize(
@@ -84,7 +84,7 @@ def test_memory_is_refused(subject):
 )
 def test_a_camera_that_goes_wrong_is_refused(subject, fault):
     with pytest.raises(InputError, match=rf"goes wrong \(transform {fault['name']}\).*prove one"):
-        make_painter(with_transforms("gray", fault), subject.seeing)
+        make_compositor(with_transforms("gray", fault), subject.seeing)
 
 
 @pytest.mark.parametrize(
@@ -111,7 +111,7 @@ def test_worlds_without_a_closed_form_are_refused(change, message):
 def test_what_the_parts_refuse_is_refused(change, message):
     policy = drone_rl.load_policy("good").in_task(**change)
     with pytest.raises(InputError, match=message):
-        make_subject(policy.description, policy.make_network(), 1e-4)
+        make_policy_spec(policy.description, policy.make_network(), 1e-4)
 
 
 def test_worlds_of_another_look_are_refused():
@@ -120,7 +120,7 @@ def test_worlds_of_another_look_are_refused():
         policy.description, appearance=AppearanceSettings(fog_visibility=50.0)
     )
     with pytest.raises(InputError, match="appearance=minimal"):
-        make_subject(foggy, policy.make_network(), 1e-4)
+        make_policy_spec(foggy, policy.make_network(), 1e-4)
 
 
 def test_the_networks_actions_must_be_moves():
@@ -128,7 +128,7 @@ def test_the_networks_actions_must_be_moves():
     network = policy.make_network()
     network.actions = dataclasses.replace(network.actions)
     with pytest.raises(InputError, match="does not choose among"):
-        make_subject(policy.description, network, 1e-4)
+        make_policy_spec(policy.description, network, 1e-4)
 
 
 @pytest.mark.parametrize(
@@ -144,4 +144,4 @@ def test_what_is_proved_flies_by_moves_in_computer_vision_mode(part, settings, m
     other = copy.copy(policy.description)
     object.__setattr__(other, part, settings)  # whatever its network is
     with pytest.raises(InputError, match=message):
-        make_subject(other, network, 1e-4)
+        make_policy_spec(other, network, 1e-4)

@@ -5,7 +5,7 @@ import pytest
 
 import drone_rl
 from drone_rl.utils.errors import InputError
-from drone_rl.verification.prover.policy_spec import make_subject
+from drone_rl.verification.prover.policy_spec import make_policy_spec
 from drone_rl.verification.prover.proof_files import load, save
 from drone_rl.verification.prover.prover import Prover
 
@@ -13,7 +13,7 @@ from drone_rl.verification.prover.prover import Prover
 @pytest.fixture(scope="module")
 def subject():
     policy = drone_rl.load_policy("right_and_forward").in_task(num_cubes=1)
-    subject = make_subject(policy.description, policy.make_network(), 1e-4)
+    subject = make_policy_spec(policy.description, policy.make_network(), 1e-4)
     yield subject
     subject.close()
 
@@ -42,7 +42,7 @@ def test_stopped_and_gone_on_with(subject, tmp_path, places):
 @pytest.mark.parametrize("places", [5, None])
 def test_stopped_within_a_part_or_between_two(tmp_path, places):
     policy = drone_rl.load_policy("right_and_forward").in_task(num_cubes=1, lateral_bound=1.0)
-    subject = make_subject(policy.description, policy.make_network(), 1e-4)
+    subject = make_policy_spec(policy.description, policy.make_network(), 1e-4)
     path, stopped, later = tmp_path / "state.npz", *(Prover(subject, 100) for _ in range(2))
     assert len(stopped.parts) == 2
     stopped.advance()

@@ -6,13 +6,13 @@ import pytest
 import drone_rl
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
 from drone_rl.verification.prover.boxes import volumes
-from drone_rl.verification.prover.policy_spec import make_subject
+from drone_rl.verification.prover.policy_spec import make_policy_spec
 from drone_rl.verification.prover.prover import Prover
 
 
 def prove(name, gap=1e-4, most=500_000_000, **task):
     policy = drone_rl.load_policy(name).in_task(num_cubes=1, **task)
-    subject = make_subject(policy.description, policy.make_network(), gap)
+    subject = make_policy_spec(policy.description, policy.make_network(), gap)
     prover = Prover(subject, most)
     while not prover.is_finished:
         prover.advance()
@@ -42,11 +42,14 @@ def test_the_share_that_a_policy_collects(one_sided):
 
 
 def test_part_by_part_it_comes_to_the_same(one_sided):
-    in_parts = prove("right_and_forward", most=200)
-    assert in_parts.num_places > one_sided.num_places
-    (parts, undecided), (whole, left) = shares(in_parts.findings()), shares(one_sided.findings())
+    partition_placements = prove("right_and_forward", most=200)
+    assert partition_placements.num_places > one_sided.num_places
+    (parts, undecided), (whole, left) = (
+        shares(partition_placements.findings()),
+        shares(one_sided.findings()),
+    )
     assert parts == pytest.approx(whole, abs=1e-12) and undecided == pytest.approx(left, abs=1e-12)
-    assert in_parts.findings().steps.keys() == one_sided.findings().steps.keys()
+    assert partition_placements.findings().steps.keys() == one_sided.findings().steps.keys()
 
 
 def test_steps_are_counted(one_sided):
@@ -68,7 +71,7 @@ def test_it_says_what_flights_show(one_sided):
 
 def test_half_way_the_rest_is_undecided():
     policy = drone_rl.load_policy("right_and_forward").in_task(num_cubes=1)
-    subject = make_subject(policy.description, policy.make_network(), 1e-4)
+    subject = make_policy_spec(policy.description, policy.make_network(), 1e-4)
     prover = Prover(subject)
     for _ in range(5):
         prover.advance()
@@ -80,7 +83,7 @@ def test_half_way_the_rest_is_undecided():
 
 def test_a_part_that_is_done_is_settled_and_how_it_came_is_forgotten():
     policy = drone_rl.load_policy("right_and_forward").in_task(num_cubes=1, lateral_bound=2.0)
-    subject = make_subject(policy.description, policy.make_network(), 1e-4)
+    subject = make_policy_spec(policy.description, policy.make_network(), 1e-4)
     prover, most = Prover(subject, 200), 0
     while not prover.is_finished:
         prover.advance()
@@ -99,7 +102,7 @@ def test_a_part_that_is_done_is_settled_and_how_it_came_is_forgotten():
 
 def test_parts_that_are_not_begun_with_are_undecided():
     policy = drone_rl.load_policy("right_and_forward").in_task(num_cubes=1, lateral_bound=2.0)
-    subject = make_subject(policy.description, policy.make_network(), 1e-4)
+    subject = make_policy_spec(policy.description, policy.make_network(), 1e-4)
     prover = Prover(subject, 200)
     count = len(prover.parts)
     assert count > 2 and shares(prover.findings(), bound=2.0) == ({}, pytest.approx(1.0))
@@ -119,11 +122,11 @@ def test_parts_that_are_not_begun_with_are_undecided():
 def test_where_logits_are_close_nothing_is_claimed(one_sided, monkeypatch):
     """The larger the gap that is asked for, the more ways are followed, and nothing is wrong."""
     forked = []
-    settle = Prover._settle
+    resolve_forks = Prover._settle
 
     def noted(prover):
         forked.append(sum(volumes(b).sum() for b in prover.forked))
-        settle(prover)
+        resolve_forks(prover)
 
     monkeypatch.setattr(Prover, "_settle", noted)
     prove("right_and_forward")
@@ -137,7 +140,7 @@ def test_where_logits_are_close_nothing_is_claimed(one_sided, monkeypatch):
 def test_to_and_fro_ends_at_the_step_limit(monkeypatch):
     """Whoever turns left where it came from the right, and back, goes on until the step limit."""
     policy = drone_rl.load_policy("good").in_task(num_cubes=1)
-    subject = make_subject(policy.description, policy.make_network(), 1e-4)
+    subject = make_policy_spec(policy.description, policy.make_network(), 1e-4)
     prover = Prover(subject)
     monkeypatch.setattr(
         prover, "_cut", lambda place, boxes: [(2 if place.left % 2 == 0 else 4, boxes)]
@@ -152,7 +155,7 @@ def test_to_and_fro_ends_at_the_step_limit(monkeypatch):
 def test_a_fork_is_decided_only_if_all_its_ways_end_alike(monkeypatch):
     """Straight on is won near the middle; to the left for ever is lost everywhere."""
     policy = drone_rl.load_policy("good").in_task(num_cubes=1)
-    subject = make_subject(policy.description, policy.make_network(), 1e-4)
+    subject = make_policy_spec(policy.description, policy.make_network(), 1e-4)
     prover = Prover(subject)
 
     def both_at_first(place, boxes):
