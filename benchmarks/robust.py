@@ -19,7 +19,7 @@ from drone_rl.policies.policy import load_policy
 from drone_rl.policies.zoo import read_checkpoint
 from drone_rl.robustness.axes import AXES, GROUPS, find_axes
 from drone_rl.robustness.paired_evaluation import Airfield, Subject
-from drone_rl.robustness.shifts import make_policy_spec
+from drone_rl.robustness.shifts import make_subject
 from drone_rl.training.train import last_of, settings_of
 
 DEFAULT, ALL = "default", "all"
@@ -108,7 +108,7 @@ def fly(
 
 def _in_plain_worlds(run: Path, asked: ShiftSettings) -> Subject:
     """A policy, wherever it was trained; faults of its camera are none of the flights'."""
-    return dataclasses.replace(make_policy_spec(load_policy(run), asked), appearance=MINIMAL)
+    return dataclasses.replace(make_subject(load_policy(run), asked), appearance=MINIMAL)
 
 
 def _told(shares: Mapping[str, float], untouched: Sequence[str]) -> dict[str, float]:

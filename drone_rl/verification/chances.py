@@ -222,12 +222,12 @@ def _bounded(
     network, gap = policy.make_network(), ProveSettings().logit_gap
     made = make_policy_spec(policy.description, network, gap, settings.renderer)
     found: list[SuccessBounds] = []
-    with closing(made) as subject:
-        bound = subject.lattice.task.lateral_bound
+    with closing(made) as spec:
+        bound = spec.lattice.task.lateral_bound
         for i, aside in enumerate(placed[..., 1].numpy()):
             progress("bounds", i, len(placed))
             box = np.stack([aside - settings.within, aside + settings.within], -1)
-            found.append(bound_success(subject, box.clip(-bound, bound), settings.parts))
+            found.append(bound_success(spec, box.clip(-bound, bound), settings.parts))
     progress("bounds", len(placed), len(placed))
     return tuple(found)
 

@@ -114,18 +114,18 @@ def places(
     begin = time.perf_counter()
     network, gap = policy.make_network(), settings.logit_gap
     made = make_policy_spec(policy.description, network, gap, settings.renderer)
-    with one_thread(), closing(made) as subject:
+    with one_thread(), closing(made) as spec:
         progress("comparing the renderer's pictures")
-        compared = subject.seeing.check(
+        compared = spec.images.check(
             settings.compared, np.random.RandomState(legacy_seed(fresh_seed()))
         )
         progress("deciding the cells")
         found = map_actions(
-            subject.eye,
+            spec.camera,
             Window(settings.nearest, settings.farthest, settings.sideways),
-            _look(subject.painter),
+            _look(spec.compositor),
             network.eval(),
-            touch_distance=subject.lattice.task.touch_distance,
+            touch_distance=spec.lattice.task.touch_distance,
             most_cells=settings.most_cells,
         )
     progress("mapped", 1, 1)
@@ -141,11 +141,11 @@ def places(
     return Places(policy, settings, found, numbers)
 
 
-def _look(painter: Compositor) -> RenderFaces:
+def _look(compositor: Compositor) -> RenderFaces:
     """From what pixels show of a cube to what the network sees."""
     whole = (slice(None), slice(None))
 
     def look(faces: NDArray[np.uint8]) -> torch.Tensor:
-        return painter.see(painter.paint_one([(whole, torch.from_numpy(faces))], len(faces)))
+        return compositor.see(compositor.paint_one([(whole, torch.from_numpy(faces))], len(faces)))
 
     return look

@@ -120,25 +120,25 @@ def prove(
     policy = policy.in_task(**(task or {}))
     network, gap = policy.make_network(), settings.logit_gap
     made = make_policy_spec(policy.description, network, gap, settings.renderer)
-    with one_thread(), closing(made) as subject:
-        subject.seeing.check(settings.compared, np.random.RandomState(legacy_seed(fresh_seed())))
+    with one_thread(), closing(made) as spec:
+        spec.images.check(settings.compared, np.random.RandomState(legacy_seed(fresh_seed())))
         if folder is None:
-            return _prove(policy, subject, settings, None, progress or Bar())
+            return _prove(policy, spec, settings, None, progress or Bar())
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
         with folder_lock(folder):
-            return _prove(policy, subject, settings, folder, progress or Bar())
+            return _prove(policy, spec, settings, folder, progress or Bar())
 
 
 def _prove(
     policy: Policy,
-    subject: PolicySpec,
+    spec: PolicySpec,
     settings: ProveSettings,
     folder: Path | None,
     progress: Progress,
 ) -> Proof:
     prover, weights = (
-        Prover(subject, settings.most_combinations),
+        Prover(spec, settings.most_combinations),
         weights_hash(policy.state["policy"]),
     )
     known = json.dumps([weights, policy.description.as_dict(), settings.logit_gap])

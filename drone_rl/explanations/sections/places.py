@@ -50,28 +50,28 @@ def _map(context: Context, settings: PlacesSettings) -> ActionMap:
     check_task(task)
     if not network.has_weights:
         raise InputError("it is no torch module, so that nothing is known of its sums")
-    eye, lattice = CameraModel.of(task, scenes.worlds.camera), Lattice(task)
-    seeing = CubeImages(scenes.worlds, lattice, eye)
-    seeing.check(_COMPARED, np.random.RandomState(legacy_seed(context.seed.value)))
+    camera, lattice = CameraModel.of(task, scenes.worlds.camera), Lattice(task)
+    images = CubeImages(scenes.worlds, lattice, camera)
+    images.check(_COMPARED, np.random.RandomState(legacy_seed(context.seed.value)))
     window = Window(max(settings.nearest, task.cube_size), settings.farthest, settings.sideways)
     return map_actions(
-        eye,
+        camera,
         window,
-        _look(context, seeing),
+        _look(context, images),
         network.eval(),
         touch_distance=task.touch_distance,
         most_cells=settings.most_cells,
     )
 
 
-def _look(context: Context, seeing: CubeImages) -> RenderFaces:
+def _look(context: Context, images: CubeImages) -> RenderFaces:
     """From what pixels show of a cube, by way of colours, to what the network sees."""
 
     def look(faces: NDArray[np.uint8]) -> torch.Tensor:
         shown = torch.from_numpy(faces).long()
         is_open = (shown == NOTHING)[..., None]
         return context.scenes.transform(
-            torch.where(is_open, seeing.background, seeing.colors[shown])
+            torch.where(is_open, images.background, images.colors[shown])
         )
 
     return look

@@ -71,5 +71,5 @@ def test_a_cube_is_seen_in_its_part_alone():
 
 
 def test_what_follows_is_applied():
-    painter = Compositor(torch.tensor([[0.5, 0.9]]), torch.zeros(3), lambda p: p[..., :1] * 2)
-    assert painter.see(torch.tensor([[[0.5, 0.9]]])).tolist() == [[[[1.0]]]]
+    compositor = Compositor(torch.tensor([[0.5, 0.9]]), torch.zeros(3), lambda p: p[..., :1] * 2)
+    assert compositor.see(torch.tensor([[[0.5, 0.9]]])).tolist() == [[[[1.0]]]]

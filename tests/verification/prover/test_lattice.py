@@ -11,7 +11,7 @@ from drone_rl.sim.dynamics import ComputerVision
 from drone_rl.sim.tasks.collect_cubes import rules
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason
 from drone_rl.utils.errors import InputError
-from drone_rl.verification.prover.boxes import volumes
+from drone_rl.verification.prover.boxes import all_placements, volumes
 from drone_rl.verification.prover.lattice import AHEAD, LEFT, RIGHT, Ending, Lattice, LatticeState
 
 TASK = TaskSettings(num_cubes=2, step_limit=60)
@@ -123,6 +123,6 @@ def test_no_place_comes_before_one_that_leads_to_it():
 
 
 def test_steps_that_round_are_refused():
-    with pytest.raises(InputError, match=r"step_length=0.1 can't be added up without rounding"):
+    with pytest.raises(InputError, match=r"step_length=0.1 are rounded"):
         Lattice(dataclasses.replace(TASK, step_length=0.1, step_limit=900))
     Lattice(dataclasses.replace(TASK, step_length=0.75))

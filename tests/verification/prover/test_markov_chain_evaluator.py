@@ -40,7 +40,7 @@ def test_a_policy_with_a_memory_is_refused():
         DroneEnv(1, TaskSettings(num_cubes=1)),
         [GrayPixels(), CatFrames(N=2, dim=-3, in_keys=["pixels"])],
     )
-    with pytest.raises(InputError, match=r"stacks 2 frames.*give a policy that sees one picture"):
+    with pytest.raises(InputError, match=r"stacks 2 frames.*give a policy that observes one frame"):
         NodeEvaluator(env, lambda pixels: pixels)
     env.close()
 
@@ -48,7 +48,7 @@ def test_a_policy_with_a_memory_is_refused():
 def test_a_camera_that_goes_wrong_is_refused():
     env = with_transforms(DroneEnv(1, TaskSettings(num_cubes=1)), [GrayPixels(), LateFrames(1)])
     with pytest.raises(
-        InputError, match=r"goes wrong \(LateFrames\(frames=1\)\).*a policy without"
+        InputError, match=r"simulates faults \(LateFrames\(frames=1\)\).*a policy without"
     ):
         NodeEvaluator(env, lambda pixels: pixels)
     env.close()
