@@ -1,4 +1,4 @@
-"""The second checker of certificates: slow, plain, and with nothing of the prover in it."""
+"""The independent checker of certificates: slow, plain, and without any code of the prover."""
 
 from drone_rl.verification.checker.certificate import (
     Certificate,

@@ -1,4 +1,11 @@
-"""What a certificate says must go together, before any flight: shares, outcomes, the partition."""
+"""Consistency of a certificate: an exact partition, exact fractions, possible outcomes.
+
+Whether boxes partition a cube is decided without tolerance. The mixed derivative of a box's
+indicator function is a sum of deltas at its corners, with sign plus where an even number of edges
+are low ones. Functions that vanish far away are equal if and only if their derivatives are; so
+boxes cover each point of the cube exactly once, and none outside, if and only if their signed
+corners cancel except for those of the cube.
+"""
 
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
@@ -13,7 +20,7 @@ from drone_rl.verification.checker.certificate import Certificate, Outcome
 
 
 def volume(boxes: NDArray[np.float64]) -> Fraction:
-    """The exact sum of the boxes' volumes, metres to the power of n. Boxes: (boxes, n, 2)."""
+    """Return the exact total volume of boxes, metres^n. Shape: (boxes, n, 2)."""
     if not len(boxes):
         return Fraction(0)
     borders, rank = np.unique(boxes, return_inverse=True)
@@ -27,15 +34,14 @@ def volume(boxes: NDArray[np.float64]) -> Fraction:
 def find_partition_error(
     boxes: NDArray[np.float64], bound: float
 ) -> tuple[list[float], int] | None:
-    """A place at which boxes are no partition of the cube [-bound, bound]^n.
+    """Return a point at which boxes do not partition the cube [-bound, bound]^n.
 
     Args:
-        boxes: None of them empty. Shape: (boxes, n, 2).
+        boxes: Not empty ones. Shape: (boxes, n, 2).
         bound: Half the edge of the cube, metres.
 
     Returns:
-        The place, and how many boxes hold it: once is right in the cube, never outside; None if
-        the boxes are a partition.
+        The point, and how many boxes hold it; None if the boxes are a partition.
     """
     n = boxes.shape[1]
     cube = np.full((1, n, 2), (-bound, bound))
@@ -49,7 +55,7 @@ def find_partition_error(
 
 
 def _uncancelled(ranks: NDArray[np.intp]) -> NDArray[np.intp] | None:
-    """A corner that is left over; the first box counts as taken away. Ranks: (boxes, n, 2)."""
+    """Return a corner that does not cancel; the first box counts as negative."""
     n = ranks.shape[1]
     ends = np.array(list(product((0, 1), repeat=n)))  # (2^n, n)
     sign = 1 - 2 * (ends.sum(1) % 2)
@@ -69,7 +75,7 @@ def _uncancelled(ranks: NDArray[np.intp]) -> NDArray[np.intp] | None:
 def _around(
     corner: NDArray[np.intp], ranks: NDArray[np.intp], axes: Sequence[NDArray[np.float64]]
 ) -> Iterator[tuple[list[float], int]]:
-    """The places around a corner of which boxes tell wrongly; there is one at least."""
+    """Yield the points around a corner with a wrong number of boxes; there is at least one."""
     sides = [
         [c for c in (r - 1, r) if 0 <= c < len(axis) - 1]
         for r, axis in zip(corner, axes, strict=True)
@@ -83,20 +89,14 @@ def _around(
             yield place, count
 
 
-MOST_MISSING = 0.05
-"""Of the stated placements, those whose number of steps may be left open."""
+MOST_MISSING = 0.05  # largest fraction of the stated placements without a stated number of steps
 FEWEST_STATED = 1e-3
-"""Share of the placements from which on an outcome has to state a number of steps."""
-TOLERANCE = 1e-12
-"""Of a stated share, relative to the exact one: what adding up floats may lose."""
+"""Fraction of placements from which on an outcome must state a number of steps."""
+TOLERANCE = 1e-12  # relative error of a stated fraction from summing floats
 
 
 def find_inconsistencies(certificate: Certificate) -> Iterator[str]:
-    """What can't be, one line each.
-
-    Args:
-        certificate: Which.
-    """
+    """Yield what is impossible, one line each."""
     whole = Fraction(2 * certificate.bound) ** certificate.task.num_cubes
     yield from _misfits(certificate, whole)
     seen: dict[tuple, int] = {}
@@ -117,13 +117,13 @@ def find_inconsistencies(certificate: Certificate) -> Iterator[str]:
 
 
 def missing_steps(outcome: Outcome) -> float:
-    """Share of the placements with this outcome whose number of steps is not stated; 0 for none."""
+    """Return the fraction of placements with this outcome but no stated number of steps."""
     missing = outcome.share - sum(outcome.steps.values())
     return missing if missing > TOLERANCE * outcome.share else 0.0
 
 
 def _missing(certificate: Certificate) -> Iterator[str]:
-    """Numbers of steps that are left open, which no check could hold against a rollout."""
+    """Yield missing numbers of steps, which no simulation could refute."""
     for i, outcome in enumerate(certificate.outcomes):
         if not outcome.steps and outcome.share > FEWEST_STATED:
             yield f"outcome {i} ({outcome}) states no number of steps"
@@ -134,7 +134,7 @@ def _missing(certificate: Certificate) -> Iterator[str]:
 
 
 def _misfits(certificate: Certificate, whole: Fraction) -> Iterator[str]:
-    """Whether the boxes are a partition of the placements; told twice, by corners and volumes."""
+    """Check twice that the boxes partition the placements: by corners and by volume."""
     boxes = np.concatenate(certificate.groups)
     misfit = find_partition_error(boxes, certificate.bound)
     if misfit is not None:
@@ -148,7 +148,7 @@ def _misfits(certificate: Certificate, whole: Fraction) -> Iterator[str]:
 
 
 def _impossible(outcome: Outcome, step_limit: int) -> Iterator[str]:
-    """What the rules of the task don't allow."""
+    """Yield what the rules of the task exclude."""
     if (outcome.end == EndReason.ALL_CUBES) != all(outcome.collected):
         yield "can't be: a flight ends with all_cubes if and only if all are collected"
     if outcome.loops and outcome.end != EndReason.STEP_LIMIT:
@@ -167,19 +167,19 @@ def _wrong_share(stated: float, exact: Fraction) -> Iterator[str]:
 
 
 DOUBT = 1e-9
-"""Probability at which luck may refuse what is true, for each number of steps, and all others."""
+"""Probability of refusing a true statement by chance, per number of steps."""
 
 
 def find_wrong_step_counts(
     outcomes: Sequence[Outcome], owner: NDArray[np.int64], steps: NDArray[np.int64]
 ) -> Iterator[str]:
-    """Shares of numbers of steps that random flights refute, one line each.
+    """Yield the fractions of step counts that random episodes refute, one line each.
 
     Args:
         outcomes: As stated.
-        owner: Outcome of each flight's placement, uniform over all placements; as many as there
-            are outcomes where nothing is stated. Shape: (flights,).
-        steps: How many each flight had. Shape: (flights,).
+        owner: Outcome of each episode's placement, uniform over all placements; the number of
+            outcomes where nothing is stated. Shape: (flights,).
+        steps: Steps of each episode. Shape: (flights,).
     """
     for i, outcome in enumerate(outcomes):
         here, missing = steps[owner == i], missing_steps(outcome)

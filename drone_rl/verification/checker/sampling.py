@@ -1,4 +1,4 @@
-"""Where to fly: corners, centres and random points of boxes, both sides of borders, anywhere."""
+"""Sample placements inside boxes, on both sides of their borders, and anywhere."""
 
 import dataclasses
 from collections.abc import Iterator, Sequence
@@ -11,24 +11,19 @@ from drone_rl.verification.checker.certificate import Certificate
 
 Boxes = NDArray[np.float64]
 """Metres to the left of each cube, lowest and highest. Shape: (boxes, cubes, 2)."""
-Points = NDArray[np.float64]
-"""Metres to the left of each cube. Shape: (points, cubes)."""
-Indices = NDArray[np.intp]
-"""Shape: (points,) or (boxes,)."""
+Points = NDArray[np.float64]  # metres to the left of each cube. Shape: (points, cubes)
+Indices = NDArray[np.intp]  # shape: (points,) or (boxes,)
 
-CORNER_INSET = 1e-9
-"""Metres by which corners are moved inwards."""
-BORDER_OFFSET = 1e-4
-"""Metres from a border to the places on both its sides."""
-_MOST_WORK = 2**31
-"""Numbers that are compared, at most, to look for borders."""
+CORNER_INSET = 1e-9  # metres by which corners are moved inwards
+BORDER_OFFSET = 1e-4  # metres from a border to the points on both sides
+_MOST_WORK = 2**31  # comparisons in the search for borders
 
 
 def sample_inside(boxes: Boxes, count: int, rng: np.random.Generator) -> Points:
-    """Centres, corners and random points of boxes, so many in all.
+    """Return `count` centres, corners and random points of boxes.
 
-    As many centres as there are boxes, but at most half; where there are more, of large boxes, of
-    thin ones and of any in turn. Then all corners of as many boxes as a half of the rest allows.
+    As many centres as there are boxes, at most half; if there are more, large, thin and random
+    boxes in turn. Then all corners of as many boxes as half of the rest allows.
     """
     chosen = boxes[_mixed(boxes, rng)]
     centres = chosen[: -(-count // 2)].mean(-1)
@@ -40,7 +35,7 @@ def sample_inside(boxes: Boxes, count: int, rng: np.random.Generator) -> Points:
 
 
 def sample_anywhere(boxes: Boxes, count: int, rng: np.random.Generator) -> tuple[Points, Indices]:
-    """Points that are uniform in the volume of all boxes together, and the box of each."""
+    """Return points uniform in the union of disjoint boxes, and the box of each."""
     sizes = np.diff(boxes)[..., 0].prod(1)
     chosen = rng.choice(len(boxes), count, p=sizes / sizes.sum())
     return _random(boxes[chosen], rng), chosen
@@ -49,13 +44,13 @@ def sample_anywhere(boxes: Boxes, count: int, rng: np.random.Generator) -> tuple
 def sample_borders(
     groups: Sequence[Boxes], bound: float, count: int, rng: np.random.Generator
 ) -> Points:
-    """Points on both sides of faces where boxes of different groups meet, or nearly so.
+    """Return pairs of points on both sides of faces between boxes of different groups.
 
     Args:
-        groups: Boxes, a partition all together.
-        bound: Metres to either side at which cubes are placed at most.
-        count: Points, at most; fewer where few borders are found.
-        rng: Draws them.
+        groups: Boxes that together are a partition.
+        bound: Largest |y| of cubes, metres.
+        count: Largest number of points.
+        rng: Random generator.
     """
     boxes, sizes = np.concatenate(groups), np.array([len(group) for group in groups])
     tries = max(1, min(4 * count, _MOST_WORK // (4 * boxes.size)))
@@ -76,7 +71,7 @@ def sample_borders(
 
 
 def find(boxes: Boxes, points: Points) -> Indices:
-    """A box for each point that holds it, inside or on its border. Shape: (points,).
+    """Return a box that holds each point, inside or on its border. Shape: (points,).
 
     Raises:
         ValueError: There is none.
@@ -95,7 +90,7 @@ def find(boxes: Boxes, points: Points) -> Indices:
 
 
 def _mixed(boxes: Boxes, rng: np.random.Generator) -> Indices:
-    """All boxes, each once: the largest, the thinnest, any one, the next largest, and so on."""
+    """Return all boxes once: in turn the next largest, thinnest and random one."""
     sizes = np.diff(boxes)[..., 0]
     orders = (-sizes.prod(1)).argsort(), sizes.min(1).argsort(), rng.permutation(len(boxes))
     mixed = np.stack(orders, 1).ravel()
@@ -103,7 +98,7 @@ def _mixed(boxes: Boxes, rng: np.random.Generator) -> Indices:
 
 
 def _corners(boxes: Boxes) -> Points:
-    """All corners, a hair inside. Shape: (boxes * 2^cubes, cubes)."""
+    """Return all corners, slightly inside. Shape: (boxes * 2^cubes, cubes)."""
     low, high = boxes[..., 0], boxes[..., 1]
     hair = np.minimum(CORNER_INSET, (high - low) / 4)
     ends = np.array(list(product((False, True), repeat=boxes.shape[1])))
@@ -112,35 +107,32 @@ def _corners(boxes: Boxes) -> Points:
 
 
 def _random(boxes: Boxes, rng: np.random.Generator) -> Points:
-    """A point in each box. Shape: (boxes, cubes)."""
+    """Return a random point in each box. Shape: (boxes, cubes)."""
     low, high = boxes[..., 0], boxes[..., 1]
     return low + rng.random(low.shape) * (high - low)
 
 
 INSIDE, BORDER, ANYWHERE = "inside", "border", "anywhere"
-_ROUNDS = 4
-"""How often as many flights as a box has corners, and two more, go to each box at most."""
+_ROUNDS = 4  # at most this many times 2^cubes + 2 episodes go to each box
 
 
 @dataclasses.dataclass(frozen=True)
 class Placements:
     """Placements; the first dimension counts them."""
 
-    points: Points
-    """Metres to the left of each cube. Shape: (k, cubes)."""
+    points: Points  # metres to the left of each cube. Shape: (k, cubes)
     outcome: NDArray[np.int64]  # (k,)
-    """Number of the one that is stated; as many as there are where nothing is."""
-    why: NDArray[np.str_]  # (k,)
-    """INSIDE a box, near a BORDER of an outcome, or ANYWHERE."""
+    """Index of the stated outcome; the number of outcomes where nothing is stated."""
+    why: NDArray[np.str_]  # (k,); INSIDE a box, near a BORDER of an outcome, or ANYWHERE
 
 
 def sample_placements(certificate: Certificate, count: int, rng: np.random.Generator) -> Placements:
-    """Draws places: up to a half in boxes of every outcome, a quarter at borders, others anywhere.
+    """Sample placements: half in boxes of each outcome, a quarter at borders, the rest anywhere.
 
     Args:
-        certificate: Whose boxes are a partition.
-        count: Placements.
-        rng: Draws them.
+        certificate: Its boxes are a partition.
+        count: Number of placements.
+        rng: Random generator.
     """
     groups = certificate.groups
     boxes = np.concatenate(groups)
@@ -160,7 +152,7 @@ def sample_placements(certificate: Certificate, count: int, rng: np.random.Gener
 def _inside(
     groups: list[Boxes], count: int, rng: np.random.Generator
 ) -> Iterator[tuple[int, Points]]:
-    """As many points for each outcome, but that those of few boxes leave some to others."""
+    """Yield as many points for each outcome; outcomes of few boxes leave some to others."""
     order = sorted((len(boxes), i) for i, boxes in enumerate(groups) if len(boxes))
     for done, (num_boxes, i) in enumerate(order):
         enough = _ROUNDS * num_boxes * (2 ** groups[i].shape[1] + 2)

@@ -7,7 +7,8 @@ image changes only along these lines:
 - fronts begin and end at Y = a (D - h) - h and Y = a (D - h) + h;
 - a side ends at Y = a (D + h) +- h, where a row sees its far edge;
 - or at Y = a h / |b| +- h, where the row leaves it by its upper or lower edge before;
-- a row sees nothing of a cube beyond D = h / |b| + h: a vertical border as long as the front is wide.
+- a row sees nothing of a cube beyond D = h / |b| + h: a vertical border as long as the front is
+  wide.
 """
 
 import dataclasses
@@ -29,15 +30,11 @@ from drone_rl.verification.prover.cube_images import NOTHING, UNIT, CameraModel
 RenderFaces = Callable[[NDArray[np.uint8]], Tensor]
 """Maps faces, see `CameraModel.faces`, to the network's input images (N, C, H, W)."""
 
-SIDES = ("left", "ahead", "right")
-"""Flying straight on misses a cube to the left or right."""
-NEEDED = (Move.LEFT, Move.FORWARD, Move.RIGHT)
-"""The action that a cube on each side requires."""
+SIDES = ("left", "ahead", "right")  # flying straight on misses a cube to the left or right
+NEEDED = (Move.LEFT, Move.FORWARD, Move.RIGHT)  # the action that a cube on each side requires
 UNSEEN, BLIND = "unseen", "blind"
-_DIGITS = 14
-"""Slopes of mirrored rows are rounded differently."""
-_BATCH = 256
-"""Images per batch; constant, so that sums are reproducible."""
+_DIGITS = 14  # slopes of mirrored rows are rounded differently
+_BATCH = 256  # images per batch; constant, so that sums are reproducible
 
 
 @dataclasses.dataclass(frozen=True)
@@ -48,24 +45,18 @@ class ActionMap:
     arrangement: Arrangement
     places: NDArray[np.float64]
     """A point of each cell: metres ahead of the camera and to its left. Shape: (cells, 2)."""
-    areas: NDArray[np.float64]
-    """Area of each cell, m^2, by `SIDES`. Shape: (cells, 3)."""
-    action: NDArray[np.int64]
-    """Argmax action. Shape: (cells,)."""
-    gap: NDArray[np.float64]
-    """Gap of the two highest logits. Shape: (cells,)."""
-    is_unseen: NDArray[np.bool_]
-    """Whether no pixel shows the cube. Shape: (cells,)."""
-    alone: int
-    """The action without a visible cube."""
-    touch_distance: float
-    """Metres; a cube further to the side requires a turn."""
+    areas: NDArray[np.float64]  # area of each cell, m^2, by `SIDES`. Shape: (cells, 3)
+    action: NDArray[np.int64]  # argmax action. Shape: (cells,)
+    gap: NDArray[np.float64]  # gap of the two highest logits. Shape: (cells,)
+    is_unseen: NDArray[np.bool_]  # whether no pixel shows the cube. Shape: (cells,)
+    alone: int  # the action without a visible cube
+    touch_distance: float  # metres; a cube further to the side requires a turn
     doubtful: float
-    """Bound on the area, m^2, near borders, where a float32 renderer may show a neighbour's image."""
+    """Bound on the area, m^2, near borders where float32 may show a neighbour's image."""
 
     @property
     def is_blind(self) -> NDArray[np.bool_]:
-        """Cells, by side, that require a turn but get the action without a cube. Shape: (cells, 3)."""
+        """Cells, by side, that require a turn but get no reaction. Shape: (cells, 3)."""
         needed = np.array(NEEDED)
         turns = needed != Move.FORWARD
         return (self.action == self.alone)[:, None] & (self.action[:, None] != needed) & turns
@@ -122,8 +113,8 @@ class ActionMap:
         """Return closed polygons around regions of equal action, for plots.
 
         Returns:
-            "points", the corners of all polygons, shape (P, 2); "ends", the end of each polygon among
-            them; "labels", the action of each, or one more than the last action if unseen.
+            "points", the corners of all polygons, shape (P, 2); "ends", the end of each polygon
+            among them; "labels", the action of each, or one more than the last action if unseen.
         """
         ways = self.arrangement.outlines(self.action)
         unseen = self.arrangement.outlines(self.is_unseen.astype(np.int64))

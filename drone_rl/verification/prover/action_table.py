@@ -22,8 +22,7 @@ from drone_rl.verification.prover.cube_images import NOTHING
 
 BATCH, CHUNK, ALONE = 4096, 256, 64
 """Blocks tried at a time, by one thread at a time, and without threads."""
-SMALL = 1000
-"""Combinations of a span that are enumerated."""
+SMALL = 1000  # combinations of a span that are enumerated
 FEW, PRICE = 8, 6.0
 """Images of a block that are evaluated singly; cost of bounds on a block, in images."""
 
@@ -50,8 +49,7 @@ class ActionTable:
         self.cells = list(cells)
         self.table = np.zeros([len(c) for c in reversed(self.cells)], np.uint8)
         """Bits of the possible actions, 0 if unknown. The nearest cube is last."""
-        self.pictures = 0
-        """Number of network evaluations."""
+        self.pictures = 0  # number of network evaluations
         self._gaps = [np.inf]
         self._bounds, self._painter = bounds, compositor
         self._ranges = [ImageRanges(torch.from_numpy(c.pictures)) for c in self.cells]
@@ -261,8 +259,8 @@ def _workers() -> ThreadPoolExecutor:
 def _alike(near: Cells, far: Cells, part: Crop) -> NDArray[np.int64]:
     """Return which image of a cube is indistinguishable behind each image of a nearer one.
 
-    `part` is the crop of the further cube. Returns the first of the neighbours that differ only where
-    the nearer cube is visible. Shape: (images of the nearer cube, images of the further one).
+    `part` is the crop of the further cube. Returns the first of the neighbours that differ only
+    where the nearer cube is visible. Shape: (images of the nearer cube, images of the further one).
     """
     behind = far.pictures[:, *part].reshape(len(far.pictures), -1)
     changes = (behind[1:] != behind[:-1]).astype(np.float32)

@@ -14,20 +14,16 @@ from scipy.sparse.csgraph import connected_components
 
 from drone_rl.utils.errors import InputError
 
-SAME = 1e-11
-"""Metres. Points closer than this in x and y are one point, to allow for rounding."""
+SAME = 1e-11  # metres. Points closer than this in x and y are one point, to allow for rounding
 
 
 @dataclasses.dataclass(frozen=True)
 class Window:
     """A rectangle of cube positions relative to the camera."""
 
-    nearest: float
-    """Smallest x, metres."""
-    farthest: float
-    """Largest x."""
-    sideways: float
-    """Largest |y|."""
+    nearest: float  # smallest x, metres
+    farthest: float  # largest x
+    sideways: float  # largest |y|
 
     @property
     def area(self) -> float:
@@ -42,10 +38,8 @@ class Pieces:
     slope: NDArray[np.float64]
     offset: NDArray[np.float64]
     begin: NDArray[np.float64]
-    end: NDArray[np.float64]
-    """Shapes: (N,)."""
-    upright: NDArray[np.float64]
-    """x, lowest and highest y of each vertical segment. Shape: (M, 3)."""
+    end: NDArray[np.float64]  # shapes: (N,)
+    upright: NDArray[np.float64]  # x, lowest and highest y of each vertical segment. Shape: (M, 3)
 
     def clipped(self, window: Window) -> "Pieces":
         """Return the parts inside the window."""
@@ -86,16 +80,12 @@ class Pieces:
 class Arrangement:
     """Cells as half-edges. The second half of the half-edges are the twins of the first half."""
 
-    points: NDArray[np.float64]
-    """Points where segments meet or end. Shape: (P, 2)."""
-    origin: NDArray[np.int64]
-    """Index of the start point of each half-edge. Shape: (E,)."""
-    angle: NDArray[np.float64]
-    """Direction of each half-edge, radians. Shape: (E,)."""
+    points: NDArray[np.float64]  # points where segments meet or end. Shape: (P, 2)
+    origin: NDArray[np.int64]  # index of the start point of each half-edge. Shape: (E,)
+    angle: NDArray[np.float64]  # direction of each half-edge, radians. Shape: (E,)
     following: NDArray[np.int64]
     """Next half-edge around the cell to the left of each half-edge. Shape: (E,)."""
-    cell: NDArray[np.int64]
-    """Cell of each half-edge; -1 outside the window. Shape: (E,)."""
+    cell: NDArray[np.int64]  # cell of each half-edge; -1 outside the window. Shape: (E,)
     num_cells: int
 
     @property
@@ -104,7 +94,7 @@ class Arrangement:
         return np.roll(np.arange(len(self.origin)), len(self.origin) // 2)
 
     def areas(self, above: float | None = None) -> NDArray[np.float64]:
-        """Return the area of each cell, or of its part with y above a value, m^2. Shape: (num_cells,)."""
+        """Return the area, m^2, of each cell or its part above a y. Shape: (num_cells,)."""
         of = self.cell >= 0
         cell, after = self.cell[of], self.following[of]
         corner = np.empty(self.num_cells, np.int64)
@@ -192,8 +182,8 @@ def arrange(pieces: Pieces, window: Window, most_cells: int) -> Arrangement:
     """Compute all cells into which segments cut a window.
 
     Args:
-        pieces: Segments inside the window, see `Pieces.clipped`. Collinear segments must not overlap,
-            and each must connect to the sides of the window, directly or through others.
+        pieces: Segments inside the window, see `Pieces.clipped`. Collinear segments must not
+            overlap, and each must connect to the sides of the window, directly or through others.
         window: The rectangle.
         most_cells: Bounds memory.
 
@@ -224,7 +214,7 @@ def arrange(pieces: Pieces, window: Window, most_cells: int) -> Arrangement:
 
 
 def _meetings(pieces: Pieces, most: int) -> tuple[NDArray, NDArray]:
-    """Return the points where segments meet and end, and the segment of each; vertical ones last."""
+    """Return where segments meet and end, and the segment of each; vertical ones last."""
     slope, offset, begin, end = pieces.slope, pieces.offset, pieces.begin, pieces.end
     count = len(slope)
     index = np.arange(count)

@@ -31,9 +31,10 @@ class NetworkBounds:
         """Prepare the layers.
 
         Args:
-            network: Convolutions, linear layers, ReLU, max pooling and flattening; the last is linear.
-            gap: An action is certain only if its logit leads by more than this and by more than the bound
-                on rounding errors, see `drone_rl.policies.rounding`.
+            network: Convolutions, linear layers, ReLU, max pooling and flattening; the last is
+                linear.
+            gap: An action is certain only if its logit leads by more than this and by more than the
+                bound on rounding errors, see `drone_rl.policies.rounding`.
 
         Raises:
             InputError: A layer has another type.
@@ -112,7 +113,7 @@ class NetworkBounds:
 
     @torch.no_grad()
     def decide(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
-        """Return the possible actions of known images, as bits, and the gap of the two highest logits.
+        """Return the bits of the possible actions of images, and the gap of the top two logits.
 
         Args:
             pictures: Shape (N, C, H, W).
@@ -173,8 +174,8 @@ def _errors_of(layer: nn.Module) -> Layer:
     found = layer_of(layer)
     if found is None:
         raise InputError(
-            f"rounding errors of the network's layer {layer} have no known bound; prove a policy of "
-            "convolutions without padding, linear layers, ReLU, MaxPool2d and Flatten"
+            f"rounding errors of the network's layer {layer} have no known bound; prove a policy "
+            "of convolutions without padding, linear layers, ReLU, MaxPool2d and Flatten"
         )
     return found
 
@@ -233,8 +234,7 @@ def _linear(layer: nn.Linear, scale: int) -> Step:
 
 Transform = Callable[[Tensor], Tensor]
 
-Crop = tuple[slice, slice]
-"""Rows and columns of an image."""
+Crop = tuple[slice, slice]  # rows and columns of an image
 _FACES = 4
 
 
@@ -247,8 +247,8 @@ class Compositor:
         Args:
             background: Image without cubes. Shape: (height, width), float32.
             faces: Brightness of a cube's front, left and right side. Shape: (3,), float32.
-            rest: Maps an image (N, 1, height, width) to the network's input; must be monotone. Identity
-                by default.
+            rest: Maps an image (N, 1, height, width) to the network's input; must be monotone.
+                Identity by default.
         """
         self._background = background
         self._rest = rest
@@ -267,9 +267,9 @@ class Compositor:
         """Return lower and upper bounds of images. Shapes: (N, height, width).
 
         Args:
-            cubes: For each cube, nearest first: the crop outside which it is never visible; bit masks of
-                the possible faces of each pixel in each case, shape (cases, rows, columns), uint8; the
-                case of each image, shape (N,).
+            cubes: For each cube, nearest first: the crop outside which it is never visible; bit
+                masks of the possible faces of each pixel in each case, shape (cases, rows,
+                columns), uint8; the case of each image, shape (N,).
             num_pictures: N.
         """
         lower = self._background.repeat(num_pictures, 1, 1)
@@ -286,8 +286,8 @@ class Compositor:
         """Return known images. Shape: (N, height, width).
 
         Args:
-            cubes: For each cube, nearest first: the crop outside which it is never visible; its faces
-                there, shape (N, rows, columns), uint8.
+            cubes: For each cube, nearest first: the crop outside which it is never visible; its
+                faces there, shape (N, rows, columns), uint8.
             num_pictures: N.
         """
         pictures = self._background.repeat(num_pictures, 1, 1)
@@ -328,7 +328,7 @@ class ImageRanges:
         """By first and last image; -1 where not yet counted."""
 
     def of(self, ranges: NDArray) -> tuple[Tensor, Tensor]:
-        """Return the masks of the distinct ranges, within the crop, and the index of each range's."""
+        """Return the masks of the distinct ranges, and the index of each range among them."""
         code, case = np.unique(self._code(ranges), return_inverse=True)
         return self._masks(code), torch.from_numpy(case)
 

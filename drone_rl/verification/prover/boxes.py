@@ -14,15 +14,11 @@ from numpy.typing import NDArray
 Boxes = NDArray[np.float64]
 _Number = TypeVar("_Number", np.float64, np.int64)
 E = TypeVar("E")
-Sides = Sequence[NDArray[np.float64]]
-"""Borders of a grid's cells along each axis."""
+Sides = Sequence[NDArray[np.float64]]  # borders of a grid's cells along each axis
 
-AT_ONCE = 1_000_000
-"""Cells of a grid; bounds memory."""
-MOST_GRIDS = 1_000
-"""Bounds the time to about half a minute."""
-_MOST_PAIRS = 10_000_000
-"""Pairs of boxes compared at a time; bounds memory."""
+AT_ONCE = 1_000_000  # cells of a grid; bounds memory
+MOST_GRIDS = 1_000  # bounds the time to about half a minute
+_MOST_PAIRS = 10_000_000  # pairs of boxes compared at a time; bounds memory
 
 
 def all_placements(bound: float, num_cubes: int) -> Boxes:

@@ -14,10 +14,8 @@ from numpy.typing import NDArray
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.prover.cube_images import CameraModel, CubeView
 
-NARROWER = 8
-"""Factor by which bands are narrower where the renderer's images are available."""
-SLIVER = 1e-9
-"""Metres. Smallest part of a cell next to a band; bands are further apart."""
+NARROWER = 8  # factor by which bands are narrower where the renderer's images are available
+SLIVER = 1e-9  # metres. Smallest part of a cell next to a band; bands are further apart
 
 
 class Cells:
@@ -45,8 +43,8 @@ class Cells:
         """
         if camera.grazed(ahead).any():
             raise InputError(
-                f"at {ahead} m a row of pixels grazes the edge of a cube, so rounding decides what it "
-                "shows; change task.first_distance a little"
+                f"at {ahead} m a row of pixels grazes the edge of a cube, so rounding decides what "
+                "it shows; change task.first_distance a little"
             )
         bands, between = _bands(camera, ahead, lowest, highest, NARROWER), None
         if renderer is not None:
@@ -56,11 +54,11 @@ class Cells:
                 between = _within(bands, camera, ahead, renderer)
             if between is None:
                 raise InputError(
-                    "the renderer's image next to a border differs from the closed form, so nothing "
-                    "can be proved; prove the policy in the default environment"
+                    "the renderer's image next to a border differs from the closed form, so "
+                    "nothing can be proved; prove the policy in the default environment"
                 )
         self.limits = _limits(bands, lowest, highest)
-        """Start of each cell and band, then the end of the last, metres to the left of the camera."""
+        """Start of each cell and band, then the end of the last, metres left of the camera."""
         pure = camera.faces(ahead, _middles(self.limits))
         between = [pure[:0]] * len(bands) if between is None else between
         parts, begins = [pure[:1]], [0]
@@ -69,8 +67,7 @@ class Cells:
             parts += [inner, after[None]]
         self.pictures = np.concatenate(parts)
         """Faces shown in the distinct images. Shape: (images, height, width)."""
-        self.first = np.array(begins)
-        """Index of the first possible image of each cell or band."""
+        self.first = np.array(begins)  # index of the first possible image of each cell or band
         self.last = np.array([begins[min(i + i % 2, len(begins) - 1)] for i in range(len(begins))])
         """Index of the last one."""
 

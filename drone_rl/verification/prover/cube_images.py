@@ -1,7 +1,7 @@
 """Images of cubes: in closed form, and by the renderer.
 
-The camera is level and at the height of the cubes' centres. Let a cube's centre be D metres ahead of
-the camera and Y metres to the left, h half its edge, and T = D - h the distance of its front. A
+The camera is level and at the height of the cubes' centres. Let a cube's centre be D metres ahead
+of the camera and Y metres to the left, h half its edge, and T = D - h the distance of its front. A
 pixel whose ray goes a metres left and b metres up per metre ahead shows
 
 - the front, where |Y - a T| <= h, if the front is ahead and |b| T <= h;
@@ -30,8 +30,7 @@ from drone_rl.verification.prover.lattice import Lattice
 
 NOTHING, FRONT, LEFT_SIDE, RIGHT_SIDE = range(4)
 """What a pixel shows of a cube; a side is visible where the cube stands on that side."""
-UNIT = 2.0**-24
-"""Largest relative error of a float32 operation."""
+UNIT = 2.0**-24  # largest relative error of a float32 operation
 
 
 @dataclasses.dataclass(frozen=True)
@@ -42,14 +41,10 @@ class CameraModel:
     """Slope of each column's rays, metres left per metre ahead. Shape: (width,)."""
     up: NDArray[np.float64]
     """Slope of each row's rays, metres up per metre ahead. Shape: (height,)."""
-    half: float
-    """Half the edge of a cube, metres."""
-    farthest: float
-    """Bound on every x, metres."""
-    widest: float
-    """Bound on every |y|, metres."""
-    bound: float
-    """Bound on the cubes' |y|, metres."""
+    half: float  # half the edge of a cube, metres
+    farthest: float  # bound on every x, metres
+    widest: float  # bound on every |y|, metres
+    bound: float  # bound on the cubes' |y|, metres
 
     @classmethod
     def of(cls, task: TaskSettings, camera: CameraSettings) -> "CameraModel":
@@ -72,11 +67,11 @@ class CameraModel:
             ahead: Metres from the camera to the cube's centre.
 
         Returns:
-            Metres to the left of the camera, ascending; and how far to either side of each a float32
-            renderer may show the other image. Its error, in units of 2^-24, is at most 16 per metre of
-            a ray's lateral offset (slopes are good to 10; a division, a product and a sum add 4), 3 times
-            the slope per metre of x (rounding of both positions and their difference), and 3 per metre of
-            y.
+            Metres to the left of the camera, ascending; and how far to either side of each a
+            float32 renderer may show the other image. Its error, in units of 2^-24, is at most 16
+            per metre of a ray's lateral offset (slopes are good to 10; a division, a product and a
+            sum add 4), 3 times the slope per metre of x (rounding of both positions and their
+            difference), and 3 per metre of y.
         """
         front, back = self._depths(ahead)
         shown = back >= front
@@ -121,13 +116,13 @@ class CameraModel:
     def rounding(self, left: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return how far float32 may move a cube that stands so far to the left of the camera.
 
-        Its y, at most `bound`, and its difference from the camera's are rounded; one metre more covers
-        the error of this sum. The drone's own position is exact.
+        Its y, at most `bound`, and its difference from the camera's are rounded; one metre more
+        covers the error of this sum. The drone's own position is exact.
         """
         return UNIT * (self.bound + np.abs(left) + 1)
 
     def grazed(self, ahead: float) -> NDArray[np.bool_]:
-        """Return which rows end within rounding error of a cube's horizontal front edge. Shape: (height,)."""
+        """Return which rows end within rounding error of a front edge. Shape: (height,)."""
         front, back = self._depths(ahead)
         return np.abs(back - front) <= 32 * UNIT * self.farthest
 
@@ -149,8 +144,7 @@ def _middles(count: int) -> NDArray[np.float64]:
     return (np.arange(count) + 0.5) / count * 2 - 1
 
 
-ANYTHING = 255
-"""No face."""
+ANYTHING = 255  # no face
 
 
 class CubeImages:
@@ -215,8 +209,8 @@ class CubeImages:
             faces[packed == _packed(shown.numpy())] = face
         if (faces == ANYTHING).any():
             raise InputError(
-                "a pixel has none of the colours of floor, sky and the cubes' faces, so nothing can "
-                "be proved; prove the policy in the default environment"
+                "a pixel has none of the colours of floor, sky and the cubes' faces, so nothing "
+                "can be proved; prove the policy in the default environment"
             )
         return faces
 

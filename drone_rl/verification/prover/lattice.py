@@ -1,8 +1,8 @@
 """The task's rules on the lattice of drone positions.
 
 In computer-vision mode every move is one step forward, left or right, so the drone is always a
-whole number of steps from its start. `Lattice` moves boxes of placements; `explore` builds the graph
-of everything reachable past cubes at given positions, by the simulator's own rules.
+whole number of steps from its start. `Lattice` moves boxes of placements; `explore` builds the
+graph of everything reachable past cubes at given positions, by the simulator's own rules.
 """
 
 import dataclasses
@@ -24,26 +24,19 @@ from drone_rl.utils.batch import Batch
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.prover.boxes import Boxes, cut
 
-AHEAD, LEFT, RIGHT = range(3)
-"""The actions."""
+AHEAD, LEFT, RIGHT = range(3)  # the actions
 
 
 @dataclasses.dataclass(frozen=True)
 class LatticeState:
     """The drone's position, the cubes it has, and how it arrived."""
 
-    ahead: int
-    """Steps."""
-    left: int
-    """Steps."""
-    collected: int = 0
-    """Bit k is set for cube k."""
-    steps: int = 0
-    """Steps taken so far."""
-    came: int = AHEAD
-    """The last action if it was sideways and collected nothing; else `AHEAD`."""
-    is_fork: bool = False
-    """Whether some earlier action was not certain."""
+    ahead: int  # steps
+    left: int  # steps
+    collected: int = 0  # bit k is set for cube k
+    steps: int = 0  # steps taken so far
+    came: int = AHEAD  # the last action if it was sideways and collected nothing; else `AHEAD`
+    is_fork: bool = False  # whether some earlier action was not certain
 
     @functools.cached_property
     def turn(self) -> tuple:
@@ -57,10 +50,8 @@ class Ending:
     """How an episode ends."""
 
     reason: EndReason
-    collected: int
-    """Bit k is set for cube k."""
-    loops: bool = False
-    """Whether the drone oscillates until the step limit."""
+    collected: int  # bit k is set for cube k
+    loops: bool = False  # whether the drone oscillates until the step limit
 
 
 class Lattice:
@@ -77,8 +68,8 @@ class Lattice:
         multiples = np.arange(-count, count + 1) * step
         if not np.array_equal(multiples[1:], multiples[:-1] + step):
             raise InputError(
-                f"multiples of task.step_length={step} are rounded, so positions depend on the path; "
-                "give a multiple of a power of two, such as 0.5 or 1.25"
+                f"multiples of task.step_length={step} are rounded, so positions depend on the "
+                "path; give a multiple of a power of two, such as 0.5 or 1.25"
             )
         self.cubes = task.first_distance + task.spacing * np.arange(task.num_cubes)
         """x of each cube, metres."""
@@ -168,8 +159,7 @@ def _least(y: float, reach: float) -> float:
     return least
 
 
-MOST_NODES = 2**24
-"""Reachable or not, per placement; bounds memory."""
+MOST_NODES = 2**24  # reachable or not, per placement; bounds memory
 
 
 @dataclasses.dataclass
@@ -179,14 +169,10 @@ class Nodes(Batch):
     A node determines the image and the effect of each move, but not the number of steps.
     """
 
-    placement: Tensor  # (K,) int64
-    """Index of the placement of the cubes."""
-    ahead: Tensor  # (K,) int64
-    """Steps forward from the origin."""
-    aside: Tensor  # (K,) int64
-    """Steps to the left of it; negative to the right."""
-    collected: Tensor  # (K,) int64
-    """Bit k is set if cube k is collected."""
+    placement: Tensor  # (K,) int64; index of the placement of the cubes
+    ahead: Tensor  # (K,) int64; steps forward from the origin
+    aside: Tensor  # (K,) int64; steps to the left of it; negative to the right
+    collected: Tensor  # (K,) int64; bit k is set if cube k is collected
 
 
 class Shape(NamedTuple):
@@ -210,16 +196,11 @@ class Graph:
     """
 
     settings: TaskSettings
-    cubes: Tensor  # (P, C, 3) float64
-    """Placements, metres."""
-    nodes: Nodes
-    """The first P are the start nodes, in the order of the placements."""
-    target: Tensor  # (K, A) int64
-    """Node that a move leads to; -1 where the episode ends."""
-    reason: Tensor  # (K, A) int64
-    """`EndReason`; never the step limit."""
-    collected: Tensor  # (K, A) int64
-    """Cubes collected after the move, as in `Nodes`."""
+    cubes: Tensor  # (P, C, 3) float64; placements, metres
+    nodes: Nodes  # the first P are the start nodes, in the order of the placements
+    target: Tensor  # (K, A) int64; node that a move leads to; -1 where the episode ends
+    reason: Tensor  # (K, A) int64; `EndReason`; never the step limit
+    collected: Tensor  # (K, A) int64; cubes collected after the move, as in `Nodes`
 
     def states(self) -> WorldState:
         """Return the nodes as states that can be rendered."""
@@ -279,8 +260,8 @@ def follow(settings: TaskSettings, cubes: Tensor, nodes: Nodes) -> tuple[Nodes, 
     """Apply every move to some nodes, by `rules.judge`.
 
     Returns:
-        The nodes after each move, those of the first node first (K * A); and the `EndReason` of each,
-        never the step limit. Shape: (K, A).
+        The nodes after each move, those of the first node first (K * A); and the `EndReason` of
+        each, never the step limit. Shape: (K, A).
     """
     moves = torch.tensor(DIRECTIONS).long()
     each = torch.arange(len(nodes)).repeat_interleave(len(moves))

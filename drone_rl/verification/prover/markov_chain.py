@@ -33,10 +33,8 @@ NEGLIGIBLE = 1e-15
 """Total probability of running episodes, over all placements, at which propagation stops."""
 MOST_ROUNDING = 0.1
 """Largest bound on the rounding error of a logit; usual policies have about 0.01."""
-ROUNDING = 1e-9
-"""More than the float64 error of some hundred steps."""
-BATCH = 1000
-"""Images rendered at a time; bounds memory."""
+ROUNDING = 1e-9  # more than the float64 error of some hundred steps
+BATCH = 1000  # images rendered at a time; bounds memory
 _FEW = 256
 _BATCH = 512
 _LOST, _WON = 0, 1
@@ -52,8 +50,7 @@ class Outcomes(Batch):
     ends: Tensor  # (P, len(EndReason), 2**C) float64
     """Probability of each end with exactly these cubes collected; bit k of the last index stands
     for cube k."""
-    steps: Tensor  # (P,) float64
-    """Expected length of an episode."""
+    steps: Tensor  # (P,) float64; expected length of an episode
     undecided: Tensor  # (P,) float64
     """Probability not followed to its end. Every other probability is too low by at most this, and
     never too high, up to float64 rounding."""
@@ -229,14 +226,10 @@ class NodeEvaluator:
 class SuccessBounds:
     """Bounds on the success probability over a box of placements."""
 
-    least: float
-    """Lower bound everywhere in the box."""
-    most: float
-    """Upper bound everywhere in the box."""
-    mean_least: float
-    """Lower bound of the mean over the box."""
-    mean_most: float
-    """Upper bound of the mean over the box."""
+    least: float  # lower bound everywhere in the box
+    most: float  # upper bound everywhere in the box
+    mean_least: float  # lower bound of the mean over the box
+    mean_most: float  # upper bound of the mean over the box
 
 
 def bound_success(spec: PolicySpec, box: Boxes, most: int = 1) -> SuccessBounds:

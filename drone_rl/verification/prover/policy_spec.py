@@ -1,4 +1,4 @@
-"""A policy and a task in the form that proofs need; everything that cannot be proved is refused here.
+"""A policy and a task in the form that proofs need; refuses what cannot be proved.
 
 Also cuts large tasks into parts: each cube multiplies the number of images by a few hundred, so the
 placements of the furthest cubes are cut into strips whose images fit into memory.
@@ -26,12 +26,9 @@ from drone_rl.verification.prover.cells import Cells
 from drone_rl.verification.prover.cube_images import FRONT, CameraModel, CubeImages, camera_ahead
 from drone_rl.verification.prover.lattice import Lattice
 
-_SHADES = ("gray", "standardize")
-"""Monotone transforms of each pixel alone."""
-_MONOTONE = (*_SHADES, "crop", "resize", "blur")
-"""Monotone transforms."""
-_BLIND = ("step_count", "episode_reward")
-"""Transforms that do not change images."""
+_SHADES = ("gray", "standardize")  # monotone transforms of each pixel alone
+_MONOTONE = (*_SHADES, "crop", "resize", "blur")  # monotone transforms
+_BLIND = ("step_count", "episode_reward")  # transforms that do not change images
 
 
 @dataclasses.dataclass(frozen=True)
@@ -87,8 +84,8 @@ def make_policy_spec(
     require_moves(description.dynamics, description.actions, "what is proved")
     if not description.appearance.is_minimal:
         raise InputError(
-            "proofs support only appearance=minimal, whose images have a closed form; prove a policy "
-            "trained with it"
+            "proofs support only appearance=minimal, whose images have a closed form; prove a "
+            "policy trained with it"
         )
     if network.actions is not MOVES:
         raise InputError(
@@ -111,8 +108,8 @@ def check_task(task: TaskSettings) -> None:
         raise InputError(f"proofs support only task.vertical_bound=0, got {task.vertical_bound}")
     if task.spacing <= task.cube_size:
         raise InputError(
-            f"task.spacing={task.spacing} puts cubes next to each other, so neither always occludes "
-            f"the other; give more than {task.cube_size} (cube_size)"
+            f"task.spacing={task.spacing} puts cubes next to each other, so neither always "
+            f"occludes the other; give more than {task.cube_size} (cube_size)"
         )
     if task.lateral_bound <= 0:
         raise InputError(
@@ -164,10 +161,8 @@ def one_thread() -> Iterator[None]:
         torch.set_num_threads(threads)
 
 
-PICTURES = 3
-"""Approximate number of images per border: beside it, and within its band."""
-MOST_PARTS = 1_000
-"""A task with more would take days."""
+PICTURES = 3  # approximate number of images per border: beside it, and within its band
+MOST_PARTS = 1_000  # a task with more would take days
 
 
 def pictures_of_each(spec: PolicySpec) -> list[int]:

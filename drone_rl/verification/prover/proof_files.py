@@ -32,10 +32,8 @@ _COUNTS = ("num_places", "pictures", "most_boxes", "least_gap", "largest_band", 
 _SETS = ("waiting", "ended", "ways", "forked", "parts", "part", "done", "undecided")
 _DAMAGE = (*(ValueError, TypeError, LookupError, ArithmeticError, AttributeError),)
 """Errors from reading a damaged file."""
-_MOST = 2**40
-"""Bound on every integer in a row."""
-_NOWHERE = (-1, 0, 0)
-"""Stands for an unknown ending."""
+_MOST = 2**40  # bound on every integer in a row
+_NOWHERE = (-1, 0, 0)  # stands for an unknown ending
 
 
 def weights_hash(weights: Mapping[str, Tensor]) -> str:

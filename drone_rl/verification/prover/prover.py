@@ -32,12 +32,9 @@ from drone_rl.verification.prover.policy_spec import PolicySpec, partition_place
 
 MOST_STATED = 20_000
 """Boxes stated for a part in progress; their complement takes a few times as many."""
-MOST_ROWS = 20_000
-"""Rows of the action table cut at a time."""
-MARGIN = 2.0
-"""Metres by which a table extends beyond what is needed: drones move sideways."""
-COARSE = 0.5
-"""Metres to which forks record the positions of cubes that are gone."""
+MOST_ROWS = 20_000  # rows of the action table cut at a time
+MARGIN = 2.0  # metres by which a table extends beyond what is needed: drones move sideways
+COARSE = 0.5  # metres to which forks record the positions of cubes that are gone
 
 Ended = Mapping[tuple[Ending, int], Sequence[Boxes]]
 """Disjoint placements by ending and number of steps."""
@@ -49,8 +46,7 @@ class Findings:
 
     endings: dict[Ending, Boxes]
     undecided: Boxes
-    steps: dict[Ending, dict[int, float]]
-    """Volume of each ending by number of steps, where certain."""
+    steps: dict[Ending, dict[int, float]]  # volume of each ending by number of steps, where certain
 
     @property
     def decided(self) -> float:
@@ -85,11 +81,9 @@ class Prover:
         """Most steps of forks to each state; the states themselves count none."""
         self.fork_ends: dict[Ending | None, list[Boxes]] = defaultdict(list)
         """Endings of branches; None if unknown."""
-        self.boxes_under_way = 0
-        """Boxes in all waiting states."""
+        self.boxes_under_way = 0  # boxes in all waiting states
         self.num_places = self.pictures = self.most_boxes = 0
-        self.decided = 0.0
-        """Volume known; of the part in progress, without forks."""
+        self.decided = 0.0  # volume known; of the part in progress, without forks
         self.least_gap, self.largest_band = np.inf, 0.0
         self._spec, self._most = spec, most_combinations
         self._seen_from = -1

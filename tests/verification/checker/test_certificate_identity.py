@@ -63,7 +63,7 @@ def test_a_policy_that_remembers_is_refused(one_sided, policy):
     steps = [{"name": "gray"}, {"name": "stack", "N": 2}]
     certificate = changed(one_sided, "transforms", steps)
     described = parse({**policy.description.as_dict(), "transforms": steps})
-    with pytest.raises(InputError, match="remembers pictures"):
+    with pytest.raises(InputError, match="stacks frames"):
         check_same_policy(certificate, described, policy.state["policy"])
 
 
@@ -71,7 +71,7 @@ def test_a_policy_whose_camera_goes_wrong_is_refused(one_sided, policy):
     steps = [{"name": "gray"}, {"name": "late_frames", "frames": 1}]
     certificate = changed(one_sided, "transforms", steps)
     described = parse({**policy.description.as_dict(), "transforms": steps})
-    with pytest.raises(InputError, match=r"camera goes wrong \(transform late_frames\)"):
+    with pytest.raises(InputError, match=r"simulates faults \(transform late_frames\)"):
         check_same_policy(certificate, described, policy.state["policy"])
 
 

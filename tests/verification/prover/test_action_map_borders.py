@@ -135,7 +135,7 @@ def test_no_family_of_borders_can_be_left_out(family, monkeypatch):
 
 
 def test_the_doubtful_area_is_a_band_along_each_border():
-    """A level border 3 m long at y = 2, an upright one of 4 m: see `CameraModel.borders`, `CameraModel.grazed`."""
+    """A level border 3 m long at y = 2, an upright one of 4 m."""
     window = Window(2.0, 8.0, 5.0)
     level, upright = np.array([[0.0, 2.0, 3.0, 6.0]]).T, np.array([[4.0, -2.0, 2.0]])
     found = doubtful_area(camera([1.0], [0.5]), Pieces(*level, upright), window)

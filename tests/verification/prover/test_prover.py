@@ -122,13 +122,13 @@ def test_parts_that_are_not_begun_with_are_undecided():
 def test_where_logits_are_close_nothing_is_claimed(one_sided, monkeypatch):
     """The larger the gap that is asked for, the more ways are followed, and nothing is wrong."""
     forked = []
-    resolve_forks = Prover._settle
+    resolve_forks = Prover._finish_part
 
     def noted(prover):
         forked.append(sum(volumes(b).sum() for b in prover.forked))
         resolve_forks(prover)
 
-    monkeypatch.setattr(Prover, "_settle", noted)
+    monkeypatch.setattr(Prover, "_finish_part", noted)
     prove("right_and_forward")
     careful = prove("right_and_forward", gap=3.0)
     assert forked[0] < 1e-3 < forked[1]
