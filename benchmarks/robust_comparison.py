@@ -9,9 +9,9 @@ from typing import Any
 
 from drone_rl.config.configuration import as_config
 from drone_rl.config.training import TrainSettings
-from drone_rl.robustness.agents import Eyes, OracleEyes, PolicyEyes
+from drone_rl.robustness.agents import Agent, OracleAgent, PolicyAgent
 from drone_rl.robustness.axes import AXES, GROUPS, Axis
-from drone_rl.robustness.paired_evaluation import Airfield, Subject
+from drone_rl.robustness.paired_evaluation import PairedEvaluator, PolicySpec
 from drone_rl.robustness.perturbations import Condition
 from drone_rl.utils.intervals import proportion
 
@@ -58,8 +58,8 @@ PLAIN = "plain"
 
 
 def compare(
-    bed: Airfield,
-    subjects: Mapping[str, Subject],
+    bed: PairedEvaluator,
+    subjects: Mapping[str, PolicySpec],
     axes: Iterable[Axis],
     *,
     possible_share: float = 0.9,
@@ -80,7 +80,7 @@ def compare(
         strengths; an axis without any is left out.
     """
     makers = {
-        name: lambda s=s: PolicyEyes(s.network, s.transforms, bed.episodes)
+        name: lambda s=s: PolicyAgent(s.network, s.transforms, bed.episodes)
         for name, s in subjects.items()
     }
     found = {name: {PLAIN: _share(bed, Condition(), make())} for name, make in makers.items()}
@@ -114,10 +114,10 @@ def _kind(name: str) -> str | None:
     return AXES[name].group if name in AXES else None
 
 
-def _share(bed: Airfield, condition: Condition, eyes: Eyes) -> float:
+def _share(bed: PairedEvaluator, condition: Condition, eyes: Agent) -> float:
     return float(bed.fly(condition, eyes=eyes).episodes.success.mean())
 
 
-def _is_possible(bed: Airfield, condition: Condition, possible_share: float) -> bool:
-    success = bed.fly(condition, eyes=OracleEyes()).episodes.success
+def _is_possible(bed: PairedEvaluator, condition: Condition, possible_share: float) -> bool:
+    success = bed.fly(condition, eyes=OracleAgent()).episodes.success
     return proportion(int(success.sum()), len(success))["upper95"] >= possible_share

@@ -24,8 +24,8 @@ from drone_rl.policies.policy import Policy
 from drone_rl.sim.actions import MOVES, Actions
 from drone_rl.sim.composer_task import make_environment
 from drone_rl.sim.dynamics import FlightState, Quadrotor
-from drone_rl.sim.dynamics.body import heading_only
-from drone_rl.sim.entities.cameras import (
+from drone_rl.sim.dynamics.state import heading_only
+from drone_rl.sim.entities import (
     BACK_CENTER,
     BOTTOM_CENTER,
     CHASE,
@@ -34,7 +34,7 @@ from drone_rl.sim.entities.cameras import (
     FRONT_RIGHT,
 )
 from drone_rl.sim.rendering import Appearance
-from drone_rl.sim.rendering.mounting import Mounting, product, rotate
+from drone_rl.sim.rendering.appearance import Mounting, product, rotate
 from drone_rl.sim.tasks import Task
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
@@ -172,7 +172,7 @@ def write_video(frames: list[np.ndarray], path: Path) -> list[Path]:
 def _caption(task: Task[Any], state: TensorDictBase, earned: float) -> str:
     end = task.ends(int(state["info", "end_reason"][0]))
     ended = "" if end == 0 else f"   ended: {end.name.lower()}"
-    return f"{task.terms.goals} {earned:.3g}" + ended.replace("_", " ")
+    return f"{task.vocabulary.goals} {earned:.3g}" + ended.replace("_", " ")
 
 
 def _look(base: DroneEnv) -> _Seen:

@@ -24,7 +24,7 @@ from drone_rl.explanations.scenes import Scenes, empty_scene
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.explanations.threads import Once
 from drone_rl.policies import PictureNetwork, make_actor
-from drone_rl.robustness.shifts_file import Measured
+from drone_rl.robustness.shifts_file import SavedShifts
 from drone_rl.utils.seeding import RootSeed, Stream, torch_generator, with_seed
 from drone_rl.verdicts.certificate import Claim
 
@@ -45,7 +45,7 @@ class Context:
         network: PictureNetwork,
         settings: ExplainSettings,
         claim: Claim | None = None,
-        measured: Measured | None = None,
+        measured: SavedShifts | None = None,
         unlike: Mapping[str, Any] | None = None,
         seed: RootSeed | None = None,
     ) -> None:

@@ -19,7 +19,7 @@ from drone_rl.sim.tasks import State, Task
 from drone_rl.sim.worlds import Worlds
 
 
-class Sight(NamedTuple):
+class StepContext(NamedTuple):
     """What there is to see at one step of the worlds that still fly, n of num_worlds."""
 
     worlds: Worlds
@@ -30,7 +30,7 @@ class Sight(NamedTuple):
     """Where the camera has everything."""
     appearance: Appearance | None
     spoil: Callable[..., Tensor]
-    """What becomes of pictures, see `faults.Spoiling`."""
+    """What becomes of pictures, see `faults.FaultPipeline`."""
     pending: list[Tensor]
     """Actions decided but not yet taken, oldest first. Shapes: (n, *)."""
 
@@ -40,7 +40,7 @@ class Sight(NamedTuple):
         return self.worlds.renderer.render(view, self.poses, self.appearance)[modality][:, 0]
 
 
-class Eyes(Protocol):
+class Agent(Protocol):
     """Who acts, from the start of a flight on."""
 
     @property
@@ -48,7 +48,7 @@ class Eyes(Protocol):
         """Whether only faults that hide things matter to it."""
         ...
 
-    def act(self, sight: Sight) -> tuple[Tensor, Tensor | None]:
+    def act(self, sight: StepContext) -> tuple[Tensor, Tensor | None]:
         """What to do.
 
         Returns:
@@ -58,7 +58,7 @@ class Eyes(Protocol):
         ...
 
 
-class PolicyEyes:
+class PolicyAgent:
     """A policy that takes the most probable action."""
 
     knows_truth = False
@@ -88,8 +88,8 @@ class PolicyEyes:
         self._memory, self._num_worlds = memory_of(self._rest), num_worlds
         self._film: list[Tensor] = []
 
-    def act(self, sight: Sight) -> tuple[Tensor, Tensor | None]:
-        """See `Eyes`."""
+    def act(self, sight: StepContext) -> tuple[Tensor, Tensor | None]:
+        """See `Agent`."""
         if type(self._first) is GrayPixels:
             pictures = sight.draw("gray")[:, None]
         else:
@@ -109,7 +109,7 @@ class PolicyEyes:
             self._film = [*self._film, newest][-self._memory :]
 
 
-class BlindEyes:
+class BaselineAgent:
     """One action always, or any action alike."""
 
     knows_truth = True
@@ -125,8 +125,8 @@ class BlindEyes:
         self._actions, self._generator = actions, generator
         self._action = None if name == "random" else actions.always(name)
 
-    def act(self, sight: Sight) -> tuple[Tensor, Tensor | None]:
-        """See `Eyes`."""
+    def act(self, sight: StepContext) -> tuple[Tensor, Tensor | None]:
+        """See `Agent`."""
         if self._action is not None:
             same = self._action.expand(len(sight.flying), *self._action.shape)
             return same.to(sight.flying.device), None
@@ -137,7 +137,7 @@ class BlindEyes:
 _NOTHING = -1.0
 
 
-class OracleEyes:
+class OracleAgent:
     """Does what the task's oracle does about the first cube that it sees."""
 
     knows_truth = True
@@ -150,8 +150,8 @@ class OracleEyes:
         """
         self._looks = looks
 
-    def act(self, sight: Sight) -> tuple[Tensor, Tensor | None]:
-        """See `Eyes`."""
+    def act(self, sight: StepContext) -> tuple[Tensor, Tensor | None]:
+        """See `Agent`."""
         worlds, rule = sight.worlds, sight.worlds.task.oracle
         assert rule is not None
         body = sight.state.body
@@ -162,7 +162,7 @@ class OracleEyes:
             info["next_cube"] = self._first_seen(sight, info["next_cube"])
         return rule.decide([info[name] for name in rule.reads], worlds.dynamics.actions), None
 
-    def _first_seen(self, sight: Sight, next_cube: Tensor) -> Tensor:
+    def _first_seen(self, sight: StepContext, next_cube: Tensor) -> Tensor:
         """The nearest standing cube that shows; their number if none does. Shape: (n, 1)."""
         props = torch.tensor([*sight.worlds.scene.props, -1], device=next_cube.device)
         shown = props[sight.draw("segmentation").long()].float()[:, None]

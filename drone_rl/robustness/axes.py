@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 from drone_rl.robustness.faults import Blur, DeadRows, Frozen, Late, Noise
-from drone_rl.robustness.paired_evaluation import Subject
+from drone_rl.robustness.paired_evaluation import PolicySpec
 from drone_rl.robustness.perturbations import (
     Condition,
     Exposed,
@@ -20,9 +20,9 @@ from drone_rl.robustness.perturbations import (
     SunAt,
     Tinted,
     Whitened,
-    told_by,
+    task_things,
 )
-from drone_rl.sim.rendering.semantics import Meaning
+from drone_rl.sim.rendering.scene import Meaning
 from drone_rl.utils.errors import InputError
 
 NUMBERS = (1, 2, 3, 4, 5)
@@ -47,7 +47,7 @@ INVERSE = Scale(lambda x: 1.0 / x, lambda x: math.inf if x == 0 else 1.0 / x, ri
 """Infinitely much is none."""
 
 
-def _as_it_is(strength: float, subject: Subject) -> float:
+def _as_it_is(strength: float, subject: PolicySpec) -> float:
     return strength
 
 
@@ -64,15 +64,15 @@ class Axis:
     """The strength of no difference."""
     strengths: tuple[float, float, float, float, float]
     """From the weakest on; those of an axis with two ends lie on both sides of the neutral one."""
-    make: Callable[[float, Subject], Condition]
+    make: Callable[[float, PolicySpec], Condition]
     """What a strength makes different for a policy.
 
     Raises:
         InputError: This task has no such thing.
     """
-    value: Callable[[float, Subject], float] = _as_it_is
+    value: Callable[[float, PolicySpec], float] = _as_it_is
     """A strength in the axis's unit, where strengths are told by what the policy has itself."""
-    own: Callable[[Subject], float] | None = None
+    own: Callable[[PolicySpec], float] | None = None
     """What the neutral strength is for a policy, where that is not the same for all."""
     scale: Scale = LINEAR
     whole: bool = False
@@ -90,7 +90,7 @@ class Axis:
         """By end of a range of values, "low" and "high", on which side of the scale it lies."""
         return {"low": -1, "high": 1} if self.scale.rises else {"low": 1, "high": -1}
 
-    def strength(self, value: float, subject: Subject) -> float:
+    def strength(self, value: float, subject: PolicySpec) -> float:
         """The strength that has this value for a policy: the inverse of `value`, which is affine.
 
         Args:
@@ -143,14 +143,14 @@ _DISTRACTORS = _below(
 )
 
 
-def _size(subject: Subject) -> str:
+def _size(subject: PolicySpec) -> str:
     name = subject.task.name
     if name not in _SIZES:
         raise InputError(f"axis=object_size is not for task={name}; leave it out of axes")
     return _SIZES[name]
 
 
-def _drawn(subject: Subject, condition: Condition) -> Condition:
+def _drawn(subject: PolicySpec, condition: Condition) -> Condition:
     """A condition that our own ray tracer alone can draw."""
     if subject.renderer != "raytrace":
         raise InputError(
@@ -160,8 +160,8 @@ def _drawn(subject: Subject, condition: Condition) -> Condition:
     return condition
 
 
-def _cluttered(subject: Subject, count: int) -> Condition:
-    told_by(subject.task)
+def _cluttered(subject: PolicySpec, count: int) -> Condition:
+    task_things(subject.task)
     return Condition(clutter=count)
 
 
@@ -170,7 +170,7 @@ def _middle(value: float | tuple[float, float]) -> float:
     return sum(value) / 2 if isinstance(value, tuple) else value
 
 
-def _times(setting: str, factor: float, subject: Subject) -> float:
+def _times(setting: str, factor: float, subject: PolicySpec) -> float:
     return factor * getattr(subject.task, setting)
 
 
@@ -318,7 +318,7 @@ def check_axes(names: Iterable[str]) -> None:
             raise InputError(f"axes={name} is unknown; give some of: {known}")
 
 
-def find_axes(names: Iterable[str] | None, subject: Subject) -> list[Axis]:
+def find_axes(names: Iterable[str] | None, subject: PolicySpec) -> list[Axis]:
     """Axes by name or by group, in the order of `AXES`.
 
     Args:
@@ -338,12 +338,12 @@ def find_axes(names: Iterable[str] | None, subject: Subject) -> list[Axis]:
     return [_owned(axis, subject) for axis in found]
 
 
-def _owned(axis: Axis, subject: Subject) -> Axis:
+def _owned(axis: Axis, subject: PolicySpec) -> Axis:
     """With the policy's own neutral strength."""
     return axis if axis.own is None else dataclasses.replace(axis, neutral=axis.own(subject))
 
 
-def _is_for(axis: Axis, subject: Subject) -> bool:
+def _is_for(axis: Axis, subject: PolicySpec) -> bool:
     try:
         axis.make(axis.strengths[0], subject)
     except InputError:

@@ -21,22 +21,22 @@ from drone_rl.config import (
 )
 from drone_rl.evaluation.metrics import Episodes
 from drone_rl.policies import PictureNetwork
-from drone_rl.robustness.agents import BlindEyes, Eyes, PolicyEyes, Sight
-from drone_rl.robustness.faults import Spoiling
+from drone_rl.robustness.agents import Agent, BaselineAgent, PolicyAgent, StepContext
+from drone_rl.robustness.faults import FaultPipeline
 from drone_rl.robustness.perturbations import (
     ONSET_STEP,
     Condition,
     Mode,
     clutter,
-    draw_places,
     look_of,
+    sample_distractors,
     sways,
-    told_by,
+    task_things,
 )
-from drone_rl.sim.appearances import Appearances
 from drone_rl.sim.dynamics import draw_seeds, make_dynamics
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.tasks import State, as_task
+from drone_rl.sim.visual_randomization import Appearances
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.seeding import Stream, torch_generator, world_random_state
 from drone_rl.utils.settings import below
@@ -46,7 +46,7 @@ _CLUTTER = 1000
 
 
 @dataclasses.dataclass(frozen=True)
-class Subject:
+class PolicySpec:
     """A policy, what it flies in and what it sees."""
 
     network: PictureNetwork
@@ -61,7 +61,7 @@ class Subject:
 
 
 @dataclasses.dataclass(frozen=True)
-class Flown:
+class ConditionResult:
     """How flights went."""
 
     episodes: Episodes
@@ -70,10 +70,10 @@ class Flown:
     """One number a world that sums up all that was seen: equal if nothing differed. (n,)."""
 
 
-class Airfield:
+class PairedEvaluator:
     """Worlds to fly a policy and others in, each condition in the same ones."""
 
-    def __init__(self, subject: Subject, episodes: int, seed: int = 0) -> None:
+    def __init__(self, subject: PolicySpec, episodes: int, seed: int = 0) -> None:
         """Draws the worlds; they are built when they are flown in.
 
         Args:
@@ -127,8 +127,8 @@ class Airfield:
         return self._built[key]
 
     def fly(
-        self, condition: Condition, mode: Mode = Mode.CONSTANT, eyes: Eyes | None = None
-    ) -> Flown:
+        self, condition: Condition, mode: Mode = Mode.CONSTANT, eyes: Agent | None = None
+    ) -> ConditionResult:
         """Flies to the end in every world.
 
         Args:
@@ -138,7 +138,7 @@ class Airfield:
         """
         if eyes is None:
             subject = self.subject
-            eyes = PolicyEyes(subject.network, subject.transforms, self.episodes)
+            eyes = PolicyAgent(subject.network, subject.transforms, self.episodes)
         stages = [(0, condition)]
         if mode is Mode.ONSET:
             stages = [(0, Condition()), (ONSET_STEP, condition)]
@@ -150,14 +150,14 @@ class Airfield:
         flown = {}
         for name in worlds.task.luck:
             generator = torch_generator(self.seed, Stream.ACTIONS)
-            eyes = BlindEyes(name, worlds.dynamics.actions, generator)
+            eyes = BaselineAgent(name, worlds.dynamics.actions, generator)
             flown[name] = self.fly(condition, eyes=eyes).episodes
         return flown
 
     def beside(self) -> Tensor:
-        """Where the distractors of a condition stand, see `clutter.draw_places`."""
+        """Where the distractors of a condition stand, see `clutter.sample_distractors`."""
         generator = torch_generator(self.seed, Stream.SHIFTS, number=_CLUTTER)
-        places = draw_places(told_by(self.subject.task), self.episodes, generator)
+        places = sample_distractors(task_things(self.subject.task), self.episodes, generator)
         return places.to(self.subject.device)
 
     def close(self) -> None:
@@ -169,19 +169,19 @@ class Airfield:
 class _Flight:
     """One flight of all worlds."""
 
-    def __init__(self, bed: Airfield, mode: Mode, eyes: Eyes) -> None:
+    def __init__(self, bed: PairedEvaluator, mode: Mode, eyes: Agent) -> None:
         self._bed, self._mode, self._eyes = bed, mode, eyes
 
     @torch.no_grad()
     def fly(
         self, stages: Sequence[tuple[int, Condition]], drawn: Tensor, seeds: Tensor | None
-    ) -> Flown:
+    ) -> ConditionResult:
         worlds = self._bed.worlds(stages[0][1])
         now = worlds.start(drawn, seeds)
         flying = torch.arange(len(now), device=worlds.device)
         done, trace = now[flying], torch.zeros(len(now), dtype=torch.float64, device=worlds.device)
         decided: list[Tensor] = []
-        see: Callable[[State, Tensor, list[Tensor]], Sight] | None = None
+        see: Callable[[State, Tensor, list[Tensor]], StepContext] | None = None
         delay, begins = 0, dict(stages)
         for step in itertools.count():
             if step in begins:
@@ -204,31 +204,31 @@ class _Flight:
             if not len(flying):
                 break
         episodes = Episodes.ended(worlds.task, worlds.info(done), done.steps)
-        return Flown(episodes, trace.cpu())
+        return ConditionResult(episodes, trace.cpu())
 
     def _stage(
         self, worlds: Worlds, condition: Condition
-    ) -> Callable[[State, Tensor, list[Tensor]], Sight]:
+    ) -> Callable[[State, Tensor, list[Tensor]], StepContext]:
         """What there is to see from now on."""
         bed = self._bed
         generator = torch_generator(bed.seed, Stream.SHIFTS)
         ways = sways(self._mode, condition.dimensions, bed.episodes, generator)
         hiding_only = self._eyes.knows_truth
-        spoil = Spoiling(condition.faults, bed.episodes, bed.seed, hiding_only=hiding_only)
+        spoil = FaultPipeline(condition.faults, bed.episodes, bed.seed, hiding_only=hiding_only)
         plain = look_of(worlds.scene) if condition.looks else None
         beside = bed.beside() if condition.clutter else None
         same = None if bed.looks.varies else bed.looks.middle
 
-        def see(now: State, flying: Tensor, pending: list[Tensor]) -> Sight:
+        def see(now: State, flying: Tensor, pending: list[Tensor]) -> StepContext:
             way = [part.to(worlds.device)[flying] for part in next(ways)]
             own = bed.looks.drawn(flying) if bed.looks.varies else same
             look = own if plain is None or own is None else own.over(plain)
             appearance = _dress(condition, look or plain, way)
             if beside is not None:
-                things, places = told_by(bed.subject.task), beside[flying, : condition.clutter]
+                things, places = task_things(bed.subject.task), beside[flying, : condition.clutter]
                 appearance = clutter(appearance, things, places)
             poses = worlds.poses(now, appearance)
-            return Sight(worlds, now, flying, poses, appearance, spoil, pending)
+            return StepContext(worlds, now, flying, poses, appearance, spoil, pending)
 
         return see
 

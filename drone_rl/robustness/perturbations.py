@@ -12,12 +12,11 @@ from torch import Tensor
 from drone_rl.config import BaseTaskSettings
 from drone_rl.config.task import Things
 from drone_rl.robustness.faults import Fault
-from drone_rl.sim.clutter import stand
 from drone_rl.sim.rendering import Appearance, Beside, Scene
-from drone_rl.sim.rendering.appearance import Several
-from drone_rl.sim.rendering.gray import LUMA
-from drone_rl.sim.rendering.mounting import moved, turned
-from drone_rl.sim.rendering.semantics import Meaning
+from drone_rl.sim.rendering.appearance import Several, moved, turned
+from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.view import LUMA
+from drone_rl.sim.visual_randomization import stand
 from drone_rl.utils.errors import InputError
 
 
@@ -28,7 +27,7 @@ class Mount:
     offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Metres, drone frame: forward, to the left, up."""
     turn: str = "yaw"
-    """Around which axis of the drone, see `drone_rl.sim.rendering.mounting.AXES`."""
+    """Around which axis of the drone, see `drone_rl.sim.rendering.appearance.AXES`."""
     degrees: float = 0.0
     dimensions: int = 1
     """One number: 1 as stated, -1 the opposite way."""
@@ -210,7 +209,7 @@ _AWAY = (2.0, 10.0)
 """Metres, from and to, by which they stand outside of where anything matters."""
 
 
-def told_by(settings: BaseTaskSettings) -> Things:
+def task_things(settings: BaseTaskSettings) -> Things:
     """Where a task's things stand, how large and of which colour.
 
     Raises:
@@ -227,7 +226,7 @@ def as_bright(color: Sequence[float]) -> tuple[float, ...]:
     return tuple(min(1.0, wanted / has * c) for c in _BLUE)
 
 
-def draw_places(things: Things, num_worlds: int, generator: torch.Generator) -> Tensor:
+def sample_distractors(things: Things, num_worlds: int, generator: torch.Generator) -> Tensor:
     """Where distractors stand; fewer of them are the first of these.
 
     Args:

@@ -9,7 +9,7 @@ from drone_rl.robustness.shifts_text import is_tested
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import parse_json, read_bytes
 from drone_rl.utils.limits import YAML_BYTES
-from drone_rl.utils.plain_yaml import parse_yaml
+from drone_rl.utils.readers import parse_yaml
 from drone_rl.utils.schema import Maybe, Real, as_mapping, shown
 
 _KEYS = ("low", "high", "unit")
@@ -22,7 +22,7 @@ Need = Mapping[str, float | None]
 """Of an axis, "low" and "high"; None for as far as no difference is."""
 
 
-def read_needs(path: Path) -> dict[str, Need]:
+def read_requirements(path: Path) -> dict[str, Need]:
     """What is needed, out of a YAML or JSON file.
 
     Of each axis by name, `{low: 40, high: 100, unit: m of sight}`; one of the ends may be missing.

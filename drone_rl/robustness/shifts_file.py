@@ -14,7 +14,7 @@ from typing import Any
 import torch
 from numpy.typing import NDArray
 
-from drone_rl.config.shifting import MODES, ShiftSettings
+from drone_rl.config.commands import MODES, ShiftSettings
 from drone_rl.policies.zoo import PolicyDescription, parse
 from drone_rl.robustness.axes import AXES, GROUPS, Axis
 from drone_rl.robustness.consistency import CLOSE, check_counts, check_probe, check_range
@@ -38,7 +38,7 @@ from drone_rl.utils.schema import (
     Whole,
     as_mapping,
 )
-from drone_rl.utils.seed_text import SEED_KEYS
+from drone_rl.utils.text import SEED_KEYS
 from drone_rl.verification.checker import fingerprint
 
 FORMAT = "drone_rl shifts"
@@ -48,7 +48,7 @@ _MOST_PICTURE = 2**22
 
 
 @dataclasses.dataclass(frozen=True)
-class Measured:
+class SavedShifts:
     """Flights under other conditions that were found, or why they are not quoted."""
 
     path: Path
@@ -72,9 +72,9 @@ class Measured:
         return self.numbers is not None and self.numbers["domain"] is not None
 
 
-def read_measured(
+def read_shifts(
     path: Path, described: PolicyDescription, weights: Mapping[str, torch.Tensor]
-) -> Measured:
+) -> SavedShifts:
     """Flights under other conditions out of a file.
 
     Args:
@@ -103,7 +103,7 @@ def read_measured(
     except InputError as error:
         raise InputError(f"shifts {path} can't be used: {error}") from None
     when = datetime.datetime.fromtimestamp(path.stat().st_mtime).strftime("%Y-%m-%d %H:%M")
-    return Measured(path, {**numbers, "file": {"path": str(path), "dated": when}}, shown)
+    return SavedShifts(path, {**numbers, "file": {"path": str(path), "dated": when}}, shown)
 
 
 class _Named:

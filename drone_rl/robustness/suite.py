@@ -15,9 +15,9 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from drone_rl.robustness.agents import OracleEyes, Sight, has_oracle
+from drone_rl.robustness.agents import OracleAgent, StepContext, has_oracle
 from drone_rl.robustness.axes import TOGETHER, Axis
-from drone_rl.robustness.paired_evaluation import Airfield, Flown
+from drone_rl.robustness.paired_evaluation import ConditionResult, PairedEvaluator
 from drone_rl.robustness.perturbations import Condition, Mode
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import mean_bounds, proportion
@@ -28,7 +28,7 @@ Told = Callable[[str], None]
 class Suite:
     """A policy's flights under all conditions."""
 
-    def __init__(self, bed: Airfield, modes: Sequence[Mode], possible_share: float) -> None:
+    def __init__(self, bed: PairedEvaluator, modes: Sequence[Mode], possible_share: float) -> None:
         """Flies where nothing is different.
 
         Args:
@@ -111,7 +111,7 @@ class Suite:
             },
         }
 
-    def _fly_oracle(self, condition: Condition) -> Flown:
+    def _fly_oracle(self, condition: Condition) -> ConditionResult:
         """Who knows where all is that shows: light, colours and noise are all the same to it."""
         faults = tuple(fault for fault in condition.faults if fault.hides)
         differs = (
@@ -123,9 +123,9 @@ class Suite:
         )
         if not (differs or faults) and hasattr(self, "oracle") and self.oracle is not None:
             return self.oracle
-        return self._bed.fly(condition, eyes=OracleEyes())
+        return self._bed.fly(condition, eyes=OracleAgent())
 
-    def _figures(self, flown: Flown) -> dict[str, Any]:
+    def _figures(self, flown: ConditionResult) -> dict[str, Any]:
         episodes, plain = flown.episodes, self.plain.episodes
         task = episodes.task
         shares = {"all": mean_bounds(episodes.share)}
@@ -195,7 +195,7 @@ def success_area(levels: Iterable[dict[str, Any]], plain: float, mode: Mode) -> 
     return area(positions, shares)
 
 
-def _success(flown: Flown | None) -> dict[str, Any] | None:
+def _success(flown: ConditionResult | None) -> dict[str, Any] | None:
     if flown is None:
         return None
     success = flown.episodes.success
@@ -206,7 +206,7 @@ STEP = 8
 """The step whose picture is shown: the first cube is near, and late pictures show it late."""
 
 
-class FilmEyes:
+class FrameRecorder:
     """Flies straight on and keeps one picture, in colour, as the camera gave it."""
 
     knows_truth = False
@@ -216,8 +216,8 @@ class FilmEyes:
         self._step = 0
         self.picture: Tensor | None = None
 
-    def act(self, sight: Sight) -> tuple[Tensor, Tensor | None]:
-        """See `Eyes`."""
+    def act(self, sight: StepContext) -> tuple[Tensor, Tensor | None]:
+        """See `Agent`."""
         pictures = sight.draw("rgb").movedim(-1, 1).float() / 255.0
         pictures = sight.spoil(pictures, sight.flying)
         if self._step <= STEP:  # some flights end before
@@ -226,7 +226,7 @@ class FilmEyes:
         return torch.zeros_like(sight.flying), None
 
 
-def make_strip(bed: Airfield, axis: Axis) -> list[NDArray | None]:
+def make_strip(bed: PairedEvaluator, axis: Axis) -> list[NDArray | None]:
     """The policy's camera with nothing different, then at each strength; None where it can't be.
 
     Args:
@@ -240,8 +240,8 @@ def make_strip(bed: Airfield, axis: Axis) -> list[NDArray | None]:
     return [_picture(bed, condition) for condition in (Condition(), *made)]
 
 
-def _picture(bed: Airfield, condition: Condition) -> NDArray | None:
-    eyes = FilmEyes()
+def _picture(bed: PairedEvaluator, condition: Condition) -> NDArray | None:
+    eyes = FrameRecorder()
     try:
         bed.fly(condition, eyes=eyes)
     except InputError:

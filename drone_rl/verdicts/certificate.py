@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drone_rl.config.judging import JudgeSettings
+from drone_rl.config.commands import JudgeSettings
 from drone_rl.evaluation.metrics import Episodes
-from drone_rl.evaluation.rounding_sensitivity import Rounding
+from drone_rl.evaluation.outcomes import Rounding
 from drone_rl.policies.base_policy import Pilot
 from drone_rl.policies.policy import Policy
 from drone_rl.policies.zoo import certificate_path
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import RootSeed, root_seed
 from drone_rl.verification.checker import Certificate, check_certificate, find, read_validated

@@ -8,31 +8,30 @@ from typing import Any
 
 import numpy as np
 
-from drone_rl.config.judging import JudgeSettings
-from drone_rl.config.shifting import ShiftSettings
+from drone_rl.config.commands import JudgeSettings, ShiftSettings
 from drone_rl.evaluation.rule import Rule
 from drone_rl.policies.base_policy import Pilot
 from drone_rl.policies.policy import Policy
 from drone_rl.policies.zoo import shifts_path
-from drone_rl.robustness.agents import OracleEyes
+from drone_rl.robustness.agents import OracleAgent
 from drone_rl.robustness.axes import Axis, find_axes
 from drone_rl.robustness.domain import Prober
 from drone_rl.robustness.domain_text import QUOTED, contradicted, lacking, needed_range, why_not
-from drone_rl.robustness.paired_evaluation import Airfield, Subject
+from drone_rl.robustness.paired_evaluation import PairedEvaluator, PolicySpec
 from drone_rl.robustness.perturbations import Condition
-from drone_rl.robustness.requirements import Need, read_needs
-from drone_rl.robustness.shifts_file import Measured, read_measured
+from drone_rl.robustness.requirements import Need, read_requirements
+from drone_rl.robustness.shifts_file import SavedShifts, read_shifts
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import mean_bounds
 from drone_rl.utils.seeding import RootSeed
-from drone_rl.utils.sentences import say
+from drone_rl.utils.text import say
 
 RANDOM = 2
 """Strengths that are drawn at random within each range, besides its ends."""
 
 
 @dataclasses.dataclass(frozen=True)
-class Reflown:
+class DomainRecheck:
     """New rollouts under required conditions, held against what a file says of these."""
 
     episodes: int
@@ -64,33 +63,33 @@ class Reflown:
         )
 
 
-def refly(
+def recheck_domain(
     policy: Pilot,
     needs: Mapping[str, Need],
     numbers: Mapping[str, Any],
     settings: JudgeSettings,
     seed: RootSeed,
-) -> Reflown:
+) -> DomainRecheck:
     """Fly new episodes at the ends of the required ranges and at random strengths within them.
 
     Args:
         policy: Which, in the task that counts.
-        needs: By axis, see `drone_rl.robustness.requirements.read_needs`.
+        needs: By axis, see `drone_rl.robustness.requirements.read_requirements`.
         numbers: As in `shifts.json`, with the axes.
         settings: `domain_flights`, `good_share`, device and renderer count.
         seed: Root of the random streams of the sample and of its environments.
     """
-    from drone_rl.robustness.shifts import make_subject  # slow to import: it draws charts
+    from drone_rl.robustness.shifts import make_policy_spec  # slow to import: it draws charts
 
     how = ShiftSettings(device=settings.device, renderer=settings.renderer)
-    subject, rng = make_subject(policy, how), np.random.default_rng(seed.value)
+    subject, rng = make_policy_spec(policy, how), np.random.default_rng(seed.value)
     tried = {
         axis: [*_strengths(axis, subject, needs[axis.name], numbers, rng)]
         for axis in find_axes(needs, subject)
     }
     count = sum(map(len, tried.values())) + 1
-    with closing(Airfield(subject, settings.domain_flights, seed.value)) as bed:
-        oracle = bed.fly(Condition(), eyes=OracleEyes(looks=False)).episodes
+    with closing(PairedEvaluator(subject, settings.domain_flights, seed.value)) as bed:
+        oracle = bed.fly(Condition(), eyes=OracleAgent(looks=False)).episodes
         prober = Prober(bed, oracle, settings.good_share, plain_part=1 / count)
         found = [_contradiction(None, prober.plain, 0.0, "")]
         for axis, strengths in tried.items():
@@ -98,7 +97,7 @@ def refly(
                 probed = prober.probe(axis.make(strength, subject), 1 / count)
                 value = axis.value(strength, subject)
                 found.append(_contradiction(axis.name, probed, value, axis.unit))
-    return Reflown(
+    return DomainRecheck(
         episodes=settings.domain_flights,
         seed=seed.value,
         seed_is_fixed=seed.is_fixed,
@@ -113,7 +112,7 @@ def refly(
 
 def _strengths(
     axis: Axis,
-    subject: Subject,
+    subject: PolicySpec,
     need: Need,
     numbers: Mapping[str, Any],
     rng: np.random.Generator,
@@ -162,7 +161,7 @@ class Coverage:
     """By axis, what the operating domain lacks of it; nothing if all that is needed is covered."""
     against: str | None = None
     """Why the operating domain is not believed; None if nothing speaks against it."""
-    reflown: Reflown | None = None
+    reflown: DomainRecheck | None = None
     """New episodes at a sample of what is needed; None if none were flown."""
 
     @property
@@ -195,7 +194,7 @@ class Coverage:
 
 def find_domain(
     policy: Pilot, given: str | Path | None = None, outputs: str | Path = "outputs"
-) -> Measured | None:
+) -> SavedShifts | None:
     """A policy's flights under other conditions, in its task.
 
     Args:
@@ -227,7 +226,7 @@ def find_domain(
         try:
             return _read(beside, policy)
         except InputError as error:
-            return Measured(beside, None, refused=str(error))
+            return SavedShifts(beside, None, refused=str(error))
     found = None
     for measured in _made(policy, Path(outputs)):
         if measured.has_ranges:
@@ -236,18 +235,18 @@ def find_domain(
     return found
 
 
-def require(policy: Pilot, needed: str | Path, measured: Measured | None) -> Coverage:
+def require(policy: Pilot, needed: str | Path, measured: SavedShifts | None) -> Coverage:
     """Compares what is needed with a policy's operating domain.
 
     Args:
         policy: Which.
-        needed: A file, see `drone_rl.robustness.requirements.read_needs`.
+        needed: A file, see `drone_rl.robustness.requirements.read_requirements`.
         measured: From `find_domain`.
 
     Raises:
         InputError: The file is unusable, or no operating domain was measured, or it is refused.
     """
-    needs = read_needs(Path(needed))
+    needs = read_requirements(Path(needed))
     remedy = f"run drone-rl shifts policy={_given(policy)} first, in the same task"
     if measured is None:
         raise InputError(f"require_domain={needed}, but no domain of it was measured; {remedy}")
@@ -280,11 +279,11 @@ def _given(policy: Pilot) -> str:
     return str(policy.path) if isinstance(policy, Policy) else policy.name
 
 
-def _read(path: Path, policy: Policy) -> Measured:
-    return read_measured(path, policy.description, policy.state["policy"])
+def _read(path: Path, policy: Policy) -> SavedShifts:
+    return read_shifts(path, policy.description, policy.state["policy"])
 
 
-def _made(policy: Policy, outputs: Path) -> Iterator[Measured]:
+def _made(policy: Policy, outputs: Path) -> Iterator[SavedShifts]:
     """What `drone-rl shifts` left of this network and task, the newest first."""
     there = [
         *outputs.glob("shifts/runs/*/shifts.json"),

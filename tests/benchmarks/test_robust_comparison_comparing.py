@@ -7,7 +7,7 @@ import pytest
 from benchmarks.robust_comparison import PLAIN, by_kind, compare, mean
 from drone_rl.config import TaskSettings
 from drone_rl.robustness.axes import AXES
-from drone_rl.robustness.paired_evaluation import Airfield
+from drone_rl.robustness.paired_evaluation import PairedEvaluator
 from tests.robustness.subjects import Blind, Steering, subject
 
 AHEAD = TaskSettings(num_cubes=1, first_distance=8.0, front_margin=4.0, lateral_bound=0.0)
@@ -15,7 +15,7 @@ AHEAD = TaskSettings(num_cubes=1, first_distance=8.0, front_margin=4.0, lateral_
 
 @pytest.fixture
 def bed():
-    made = Airfield(subject(Blind(0), task=AHEAD), 3)
+    made = PairedEvaluator(subject(Blind(0), task=AHEAD), 3)
     yield made
     made.close()
 
@@ -33,7 +33,7 @@ def test_impossible_strengths_are_left_out_for_all(bed):
     """No picture shows anything: not even who sees what the picture shows finds a cube."""
     dark = dataclasses.replace(AXES["dead_rows"], strengths=(5.0,) * 5)
     aside = AHEAD.replace(lateral_bound=6.0)
-    field = Airfield(subject(Steering(), task=aside), 12)
+    field = PairedEvaluator(subject(Steering(), task=aside), 12)
     try:
         found = compare(field, {"one": field.subject}, [dark])
     finally:

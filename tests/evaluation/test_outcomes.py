@@ -2,10 +2,10 @@ import torch
 
 import drone_rl
 from drone_rl.collectors.sight import Sight
-from drone_rl.evaluation.outcomes import MOST, follow
+from drone_rl.evaluation.outcomes import MOST, enumerate_outcomes
 from drone_rl.policies.rounding import Decisions
 from drone_rl.sim.actions import Move
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.sim.tasks.collect_cubes import EndReason
 
 
 def ends(possible):
@@ -16,7 +16,7 @@ def ends(possible):
         def decide(pixels):
             return Decisions(torch.zeros(len(pixels), 3), possible(pixels))
 
-        return follow(sight, decide, torch.tensor([0, 2]))
+        return enumerate_outcomes(sight, decide, torch.tensor([0, 2]))
 
 
 def test_one_possible_action_gives_one_end():

@@ -7,10 +7,10 @@ import torch
 
 from drone_rl.config import DynamicsSettings
 from drone_rl.evaluation.video import level, render_chase
-from drone_rl.sim.entities.cameras import CHASE
+from drone_rl.sim.entities import CHASE
 from drone_rl.sim.rendering import Appearance
-from drone_rl.sim.rendering.mounting import product, rotate, turned
-from drone_rl.sim.rendering.semantics import Meaning
+from drone_rl.sim.rendering.appearance import product, rotate, turned
+from drone_rl.sim.rendering.scene import Meaning
 from drone_rl.sim.worlds import Worlds
 
 SIZE = {"height": 60, "width": 90}

@@ -4,9 +4,9 @@ import pytest
 import torch
 
 from drone_rl.config import CameraSettings, PillarsSettings, TaskSettings
-from drone_rl.robustness.agents import OracleEyes, has_oracle
+from drone_rl.robustness.agents import OracleAgent, has_oracle
 from drone_rl.robustness.faults import DeadRows, Noise
-from drone_rl.robustness.paired_evaluation import Airfield
+from drone_rl.robustness.paired_evaluation import PairedEvaluator
 from drone_rl.robustness.perturbations import Condition
 from drone_rl.sim.tasks import as_task
 from tests.robustness.subjects import subject
@@ -14,13 +14,13 @@ from tests.robustness.subjects import subject
 
 @pytest.fixture
 def bed():
-    made = Airfield(subject(task=TaskSettings(num_cubes=2), camera=CameraSettings()), 30)
+    made = PairedEvaluator(subject(task=TaskSettings(num_cubes=2), camera=CameraSettings()), 30)
     yield made
     made.close()
 
 
 def success(bed, condition, **kwargs):
-    return float(bed.fly(condition, eyes=OracleEyes(**kwargs)).episodes.success.mean())
+    return float(bed.fly(condition, eyes=OracleAgent(**kwargs)).episodes.success.mean())
 
 
 def test_it_collects_what_it_sees_and_knows_its_own_delay(bed):
@@ -47,4 +47,4 @@ def test_of_pillars_it_knows_nothing_to_hide():
 
 
 def test_it_has_seen_nothing_that_can_be_compared(bed):
-    assert torch.equal(bed.fly(Condition(), eyes=OracleEyes()).trace, torch.zeros(30).double())
+    assert torch.equal(bed.fly(Condition(), eyes=OracleAgent()).trace, torch.zeros(30).double())

@@ -8,10 +8,10 @@ from drone_rl.config import DynamicsSettings, TaskSettings
 from drone_rl.evaluation.rollouts import run_episodes
 from drone_rl.robustness.axes import AXES
 from drone_rl.robustness.faults import Late
-from drone_rl.robustness.paired_evaluation import Airfield, Subject
+from drone_rl.robustness.paired_evaluation import PairedEvaluator, PolicySpec
 from drone_rl.robustness.perturbations import ONSET_STEP, Condition, Mode, Whitened
-from drone_rl.sim.rendering.semantics import Meaning
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import Stream
 from tests.robustness.subjects import TASK, Blind, subject
@@ -22,7 +22,7 @@ def make_bed():
     beds = []
 
     def make(*args, **kwargs):
-        beds.append(Airfield(*args, **kwargs))
+        beds.append(PairedEvaluator(*args, **kwargs))
         return beds[-1]
 
     yield make
@@ -33,7 +33,9 @@ def make_bed():
 def test_with_nothing_different_flights_are_those_of_the_environment(make_bed):
     policy = drone_rl.load_policy("poor")
     network, described = policy.make_network().eval(), policy.description
-    bed = make_bed(Subject(network, policy.task, described.camera, described.make_transforms()), 6)
+    bed = make_bed(
+        PolicySpec(network, policy.task, described.camera, described.make_transforms()), 6
+    )
     flown = bed.fly(Condition()).episodes
     with policy.flying(6, stream=Stream.SHIFTED) as (env, actor):
         expected = run_episodes(env, actor, 6)
@@ -128,7 +130,7 @@ def test_flights_in_another_body_are_those_of_the_environment(make_bed):
     policy = drone_rl.load_policy("good").in_dynamics(mode="simple_flight", wind=[1, 0, 0], gusts=1)
     network, described = policy.make_network().eval(), policy.description
     pipeline = described.make_transforms()
-    told = Subject(network, policy.task, described.camera, pipeline, dynamics=gusty)
+    told = PolicySpec(network, policy.task, described.camera, pipeline, dynamics=gusty)
     flown = make_bed(told, 3).fly(Condition()).episodes
     with policy.flying(3, stream=Stream.SHIFTED) as (env, actor):
         expected = run_episodes(env, actor, 3)

@@ -5,7 +5,7 @@ import torch
 
 from drone_rl.robustness.perturbations import Mount
 from drone_rl.sim.rendering import Appearance
-from drone_rl.sim.rendering.semantics import Meaning
+from drone_rl.sim.rendering.scene import Meaning
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.seeding import world_random_state
 

@@ -1,6 +1,6 @@
 from drone_rl.robustness.faults import Blur, Late
 from drone_rl.robustness.perturbations import Condition, Mount, SunAt, Tinted
-from drone_rl.sim.rendering.semantics import Meaning
+from drone_rl.sim.rendering.scene import Meaning
 
 
 def test_nothing_is_different_by_default():

@@ -14,7 +14,7 @@ from drone_rl.robustness.perturbations import (
     look_of,
 )
 from drone_rl.sim.rendering import Appearance
-from drone_rl.sim.rendering.semantics import Meaning
+from drone_rl.sim.rendering.scene import Meaning
 from drone_rl.sim.worlds import Worlds
 
 PLAIN = Appearance(

@@ -2,15 +2,15 @@ import numpy as np
 import torch
 
 from drone_rl.config import CameraSettings, TaskSettings
-from drone_rl.robustness.agents import Sight
+from drone_rl.robustness.agents import StepContext
 from drone_rl.robustness.axes import AXES
-from drone_rl.robustness.paired_evaluation import Airfield
-from drone_rl.robustness.suite import STEP, FilmEyes, make_strip
+from drone_rl.robustness.paired_evaluation import PairedEvaluator
+from drone_rl.robustness.suite import STEP, FrameRecorder, make_strip
 from tests.robustness.subjects import Blind, subject
 
 
 def test_the_picture_is_the_one_of_that_step():
-    eyes, shown = FilmEyes(), iter(torch.arange(0, 200, 10, dtype=torch.uint8))
+    eyes, shown = FrameRecorder(), iter(torch.arange(0, 200, 10, dtype=torch.uint8))
 
     class Marked:
         flying = torch.arange(1)
@@ -22,7 +22,7 @@ def test_the_picture_is_the_one_of_that_step():
         def spoil(self, pictures, flying):
             return pictures
 
-    sight: Sight = Marked()  # pyright: ignore[reportAssignmentType]
+    sight: StepContext = Marked()  # pyright: ignore[reportAssignmentType]
     for _ in range(STEP + 4):
         action, _ = eyes.act(sight)
         assert action.tolist() == [0]
@@ -30,7 +30,7 @@ def test_the_picture_is_the_one_of_that_step():
 
 
 def test_a_strip_shows_every_strength():
-    bed = Airfield(subject(Blind(0), TaskSettings(), camera=CameraSettings()), 1)
+    bed = PairedEvaluator(subject(Blind(0), TaskSettings(), camera=CameraSettings()), 1)
     for name in ("brightness", "late_frames", "object_size"):
         pictures = make_strip(bed, AXES[name])
         assert [p.shape for p in pictures] == [(25, 64, 3)] * 6
@@ -45,7 +45,7 @@ def test_what_cannot_be_has_no_picture():
     wide = type(wide)(
         wide.network, wide.task, wide.camera.replace(horizontal_fov=165.0), wide.transforms
     )
-    bed = Airfield(wide, 1)
+    bed = PairedEvaluator(wide, 1)
     shown = [picture is not None for picture in make_strip(bed, AXES["field_of_view"])]
     bed.close()
     assert shown == [True, True, False, True, False, True]  # 175 and 185 degrees are too wide

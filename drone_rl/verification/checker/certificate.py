@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from drone_rl.config import BaseTaskSettings, TaskSettings
 from drone_rl.policies.zoo import PolicyDescription, parse
-from drone_rl.sim.tasks.collect_cubes import require_cubes, require_moves
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import parse_json, read_bytes
 from drone_rl.utils.limits import CERTIFICATE_BYTES, CERTIFICATE_VALUES
@@ -30,6 +29,7 @@ from drone_rl.utils.schema import (
     as_mapping,
     shown,
 )
+from drone_rl.verification.requirements import require_cubes, require_moves
 
 FORMAT = "drone_rl certificate"
 FORMAT_VERSION = 1
@@ -81,7 +81,7 @@ class Certificate:
     @property
     def task(self) -> TaskSettings:
         """The task of the certificate."""
-        return require_cubes(self.description.task, "what a certificate states")
+        return require_cubes(self.description.task, "certificates")
 
     @property
     def bound(self) -> float:
@@ -281,7 +281,7 @@ def check_same_policy(
             faults.
     """
     for of in (certificate.description, described):
-        require_moves(of.dynamics, of.actions, "what a certificate states")
+        require_moves(of.dynamics, of.actions, "certificates")
     if certificate.weights != (own := fingerprint(weights)):
         raise InputError(
             f"the certificate is of a network with the hash {certificate.weights[:12]}..., the "

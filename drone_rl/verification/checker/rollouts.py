@@ -14,8 +14,8 @@ from torchrl.envs import Transform
 from drone_rl.envs import worlds_of
 from drone_rl.policies.zoo import PolicyDescription
 from drone_rl.sim.tasks import State
-from drone_rl.sim.tasks.collect_cubes import require_cubes
-from drone_rl.sim.tasks.collect_cubes.rules import WorldState
+from drone_rl.sim.tasks.collect_cubes import WorldState
+from drone_rl.verification.requirements import require_cubes
 
 MOST_AT_ONCE = 1024  # episodes per batch
 MOST_PIXELS = 2**22  # pixels per batch of images
@@ -66,7 +66,7 @@ class Simulator:
         count = min(self.at_once, 64)
         self._env = described.build_env(count, seed=0, device=device, renderer=renderer)
         self._worlds = worlds_of(self._env)
-        self._task = require_cubes(described.task, "what a certificate states")
+        self._task = require_cubes(described.task, "certificates")
         every: Iterable[Transform] = self._env.transform  # type: ignore[assignment]
         self._transforms = [t for t in every if "pixels" in (t.in_keys or [])]
         self._network = described.load_network(weights).to(self._worlds.device)

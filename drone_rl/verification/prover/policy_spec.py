@@ -17,7 +17,6 @@ from drone_rl.envs import on_pixels
 from drone_rl.policies import PolicyNetwork
 from drone_rl.policies.zoo import PolicyDescription
 from drone_rl.sim.actions import MOVES
-from drone_rl.sim.tasks.collect_cubes import require_cubes, require_moves
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.prover.bounds import Compositor, NetworkBounds
@@ -25,6 +24,7 @@ from drone_rl.verification.prover.boxes import Boxes, all_placements
 from drone_rl.verification.prover.cells import Cells
 from drone_rl.verification.prover.cube_images import FRONT, CameraModel, CubeImages, camera_ahead
 from drone_rl.verification.prover.lattice import Lattice
+from drone_rl.verification.requirements import require_cubes, require_moves
 
 _SHADES = ("gray", "standardize")  # monotone transforms of each pixel alone
 _MONOTONE = (*_SHADES, "crop", "resize", "blur")  # monotone transforms
@@ -79,9 +79,9 @@ def make_policy_spec(
     Raises:
         InputError: The policy or task is not supported; the message says why.
     """
-    task = require_cubes(description.task, "what is proved")
+    task = require_cubes(description.task, "proofs")
     check_task(task)
-    require_moves(description.dynamics, description.actions, "what is proved")
+    require_moves(description.dynamics, description.actions, "proofs")
     if not description.appearance.is_minimal:
         raise InputError(
             "proofs support only appearance=minimal, whose images have a closed form; prove a "

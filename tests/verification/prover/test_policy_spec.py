@@ -136,8 +136,8 @@ def test_the_networks_actions_must_be_moves():
 @pytest.mark.parametrize(
     ("part", "settings", "message"),
     [
-        ("dynamics", DynamicsSettings(mode="simple_flight"), "known of computer-vision mode alone"),
-        ("actions", ActionSettings(kind="velocity"), "known of moves alone"),
+        ("dynamics", DynamicsSettings(mode="simple_flight"), "only dynamics=computer_vision"),
+        ("actions", ActionSettings(kind="velocity"), "only actions=moves"),
     ],
 )
 def test_what_is_proved_flies_by_moves_in_computer_vision_mode(part, settings, message):
