@@ -26,11 +26,10 @@ from drone_rl.policies.actor import CategoricalActor
 from drone_rl.policies.finite import require_finite
 from drone_rl.policies.known_outputs import KnownOutputs
 from drone_rl.policies.packing import PackedNetwork
-from drone_rl.sim.rendering.crew import Crew
-from drone_rl.sim.rendering.devices import loading
+from drone_rl.sim.rendering.devices import Crew, loading
 from drone_rl.sim.rendering.raytrace.renderer import Raytracer
-from drone_rl.sim.rendering.raytrace.structs import Pictures
-from drone_rl.sim.tasks.collect_cubes.flying import FlyingCubes
+from drone_rl.sim.rendering.raytrace.structs_kernel import Pictures
+from drone_rl.sim.tasks.task import FusedRules
 
 _LONGEST = 64
 """Steps that are flown at a time; most episodes end within them."""
@@ -48,7 +47,7 @@ class Flight:
         sight: Sight,
         actor: CategoricalActor,
         network: PackedNetwork,
-        worlds: FlyingCubes,
+        worlds: FusedRules,
         num_cores: int,
     ) -> None:
         """Makes what the kernel needs; see `find`."""
@@ -96,7 +95,7 @@ class Flight:
         if worlds.appearance is not None:
             return None
         network = PackedNetwork.find(actor.network, flight_kernel.TOGETHER)
-        flown = FlyingCubes.find(worlds.task, worlds.dynamics, worlds.num_worlds)
+        flown = worlds.task.fused_rules(worlds.dynamics, worlds.num_worlds)
         if network is None or flown is None:
             return None
         return cls(sight, actor, network, flown, num_cores)

@@ -22,9 +22,9 @@ from drone_rl.explanations.rollouts import RolloutDataset, collect, render_frame
 from drone_rl.explanations.scenes import Scenes, empty_scene
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.policies import PictureNetwork, make_actor
-from drone_rl.robustness.measured import Measured
+from drone_rl.robustness.shifts_file import SavedShifts
 from drone_rl.utils.seeding import RootSeed, Stream, torch_generator, with_seed
-from drone_rl.verdicts.proof import Claim
+from drone_rl.verdicts.certificate import Claim
 
 T = TypeVar("T")
 FILMED = 0
@@ -44,7 +44,7 @@ class Context:
         network: PictureNetwork,
         settings: ExplainSettings,
         claim: Claim | None = None,
-        measured: Measured | None = None,
+        measured: SavedShifts | None = None,
         unlike: Mapping[str, Any] | None = None,
         seed: RootSeed | None = None,
     ) -> None:

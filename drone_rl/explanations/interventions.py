@@ -13,7 +13,7 @@ from drone_rl.explanations.patches import sample_frames
 from drone_rl.explanations.scenes import DARK_GROUND, Region, Scenes
 from drone_rl.policies import PictureNetwork
 from drone_rl.sim.rendering import Appearance
-from drone_rl.sim.rendering.semantics import Meaning
+from drone_rl.sim.rendering.scene import Meaning
 from drone_rl.sim.tasks import State
 from drone_rl.utils.intervals import episode_means, mean_bounds
 

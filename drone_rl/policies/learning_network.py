@@ -19,8 +19,7 @@ from drone_rl.policies.gradients_kernel import BLOCK, Lesson
 from drone_rl.policies.known_outputs import KnownOutputs
 from drone_rl.policies.network import PictureNetwork
 from drone_rl.policies.packed_layer import Order, PackedLayer, odd_lines, outputs_at, packed_layers
-from drone_rl.sim.rendering.crew import Crew
-from drone_rl.sim.rendering.devices import loading
+from drone_rl.sim.rendering.devices import Crew, loading
 
 MOST_WEIGHTS = 2**20
 """Of a network; more of them don't stay near a core, and torch is as fast."""

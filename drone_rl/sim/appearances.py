@@ -10,12 +10,11 @@ import torch
 from torch import Tensor
 
 from drone_rl.config import AppearanceSettings, BaseTaskSettings, CameraSettings
-from drone_rl.config.appearance import NO_TEXTURE, Names
-from drone_rl.config.placing import check_appearance
+from drone_rl.config.appearance import NO_TEXTURE, Names, check_appearance
 from drone_rl.sim.clutter import WIDTH, draw_distractors, most_distractors, things_of
 from drone_rl.sim.rendering import Appearance, Beside, Mounting, Texture, textures
-from drone_rl.sim.rendering.mounting import product, turned, zoom_of
-from drone_rl.sim.rendering.semantics import Meaning
+from drone_rl.sim.rendering.appearance import product, turned, zoom_of
+from drone_rl.sim.rendering.scene import Meaning
 from drone_rl.sim.tasks import Task, as_task
 
 _OBJECTS = (Meaning.TARGET, Meaning.OBSTACLE)

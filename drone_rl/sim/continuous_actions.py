@@ -25,7 +25,7 @@ from typing import Any, Self
 import torch
 from torch import Tensor
 
-from drone_rl.config.actions import ActionSettings
+from drone_rl.config.dynamics import ActionSettings
 from drone_rl.sim.actions import Entry, listed
 from drone_rl.sim.parts import Parts
 

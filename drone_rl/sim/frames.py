@@ -15,7 +15,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from drone_rl.sim.rendering.mounting import rotate
+from drone_rl.sim.rendering.appearance import rotate
 
 Values = TypeVar("Values", Tensor, NDArray[Any])
 """A tensor or an array; what comes out is of the kind that went in."""

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor
 
-from drone_rl.sim.entities.cameras import find_camera
+from drone_rl.sim.entities import find_camera
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.rendering.view import Modality
 from drone_rl.sim.segmentation import check_ids, default_ids, palette

@@ -14,22 +14,22 @@ MOST = 64
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Terms:
-    """The words of a task, as `verdict.json` and `explanation.json` have them under "terms"."""
+class TaskVocabulary:
+    """What reports call the goals and targets of a task, as files have them under "terms"."""
 
-    goal: str
+    goal: str = "goal"
     """What has to be reached, one by one: "cube"."""
-    reach: str
+    reach: str = "reach"
     """What is done to a goal: "collect"."""
-    reached: str
+    reached: str = "reached"
     """And has been done: "collected"."""
-    target: str
+    target: str = "target"
     """What stands in the picture and calls for action: "cube"."""
-    handle: str
+    handle: str = "reach the target"
     """What is done about a single target: "collect the cube"."""
-    handled: str
+    handled: str = "reached"
     """And has been done: "collected"."""
-    unhandled: str
+    unhandled: str = "missed"
     """And has not been done: "missed"."""
     tested: str = ""
     """In what it is flown, for its card: "three cubes of 2.5 m"."""
@@ -105,7 +105,7 @@ def _third(verb: str) -> str:
     return f"{verb}es" if verb.endswith(("s", "sh", "ch", "x")) else f"{verb}s"
 
 
-CUBES = Terms(
+CUBES = TaskVocabulary(
     goal="cube",
     reach="collect",
     reached="collected",
@@ -141,7 +141,43 @@ CUBES = Terms(
 """Of cube collection, and of files that say nothing of their words."""
 
 
-def terms_of(evidence: Mapping[str, Any]) -> Terms:
+PILLARS = TaskVocabulary(
+    goal="row",
+    reach="pass",
+    reached="passed",
+    target="pillar",
+    handle="get past the pillar",
+    handled="flown around",
+    unhandled="touched, or never passed",
+    follows=False,
+    sides={
+        "left": "that call for a turn left",
+        "ahead": "that are open straight ahead",
+        "right": "that call for a turn right",
+    },
+    places={
+        "left": "that call for a turn left",
+        "ahead": "that leave the way free",
+        "right": "that call for a turn right",
+    },
+    classes={"row": "at the {value} row", "gap": "at gaps of {value}"},
+    labels={
+        "row": "number of the row",
+        "side": "nearest way through",
+        "gap": "width of the gap",
+        "end": "how it ended",
+    },
+    ends={
+        "finish_line": "at the line",
+        "pillar_touched": "by touching a pillar",
+        "side_boundary": "outside the field, left or right",
+        "step_limit": "at the step limit",
+        "lost_control": "with the drone out of control",
+    },
+)
+
+
+def terms_of(evidence: Mapping[str, Any]) -> TaskVocabulary:
     """The words of whatever the evidence is about.
 
     Args:
@@ -150,7 +186,9 @@ def terms_of(evidence: Mapping[str, Any]) -> Terms:
     Raises:
         InputError: They are none.
     """
-    return Terms(**_FIELDS.read(evidence["terms"], "terms")) if "terms" in evidence else CUBES
+    return (
+        TaskVocabulary(**_FIELDS.read(evidence["terms"], "terms")) if "terms" in evidence else CUBES
+    )
 
 
 class _Phrases:
@@ -171,7 +209,7 @@ def _kind(field: dataclasses.Field) -> Kind:
     return Text(LONGEST) if field.type in (str, "str") else _Phrases()
 
 
-_FIELDS = Record({field.name: _kind(field) for field in dataclasses.fields(Terms)})
+_FIELDS = Record({field.name: _kind(field) for field in dataclasses.fields(TaskVocabulary)})
 
 
 _NUMBERS = {1: "one cube", 2: "two cubes", 3: "three cubes", 4: "four cubes", 5: "five cubes"}

@@ -14,7 +14,7 @@ from drone_rl.sim.clutter import HIDDEN_DEPTH
 from drone_rl.sim.composer_task import ComposerTask
 from drone_rl.sim.dynamics import BodyState, Dynamics, draw_seeds, make_dynamics
 from drone_rl.sim.dynamics.body import heading_only
-from drone_rl.sim.entities.cameras import FRONT_CENTER
+from drone_rl.sim.entities import FRONT_CENTER
 from drone_rl.sim.rendering import (
     Appearance,
     MakeRenderer,

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from drone_rl.evaluation.kinds import KINDS
+from drone_rl.evaluation.rule import KINDS
 from drone_rl.sim.action_display import MOVES
 from drone_rl.sweeps.groups import FAILED, Group
 from drone_rl.sweeps.rows import Row

@@ -12,11 +12,9 @@ from drone_rl.collectors import (
     ThreadedCollector,
     WorldsCollector,
 )
-from drone_rl.config.collecting import Episodes, Ray
-from drone_rl.config.configuration import as_config, from_config
-from drone_rl.config.objectives import WithCritic
+from drone_rl.config.configuration import as_config, from_config, locate
+from drone_rl.config.learning import Episodes, Ray, WithCritic
 from drone_rl.config.training import TrainSettings
-from drone_rl.config.variant import locate
 from drone_rl.policies import PolicyNetwork, make_actor
 from drone_rl.policies.zoo import describe
 from drone_rl.sim.tasks import Practice

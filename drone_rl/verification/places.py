@@ -12,7 +12,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from drone_rl.config.mapping import PlacesSettings
+from drone_rl.config.verification import PlacesSettings
 from drone_rl.evaluation.plots import regions
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.sim.action_display import MOVES
@@ -21,13 +21,12 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import fresh_seed, legacy_seed
-from drone_rl.utils.sentences import say
-from drone_rl.verification.places_text import PLACES, rows
+from drone_rl.utils.text import say
+from drone_rl.verification.prover.action_map import Look, PlaceMap, map_places
 from drone_rl.verification.prover.arrangement import Window
-from drone_rl.verification.prover.painting import Painter
-from drone_rl.verification.prover.places import Look, PlaceMap, map_places
-from drone_rl.verification.prover.subject import make_subject
-from drone_rl.verification.prover.threads import one_thread
+from drone_rl.verification.prover.bounds import Painter
+from drone_rl.verification.prover.policy_spec import make_subject, one_thread
+from drone_rl.verification.text import PLACES, rows
 
 
 @dataclasses.dataclass(frozen=True)

@@ -9,7 +9,7 @@ from PIL import Image
 
 from drone_rl.config import MINIMAL, AppearanceSettings, PillarsSettings, TaskSettings
 from drone_rl.sim.appearances import Appearances
-from drone_rl.sim.rendering.semantics import Meaning
+from drone_rl.sim.rendering.scene import Meaning
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import world_random_state

@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from drone_rl.sim import frames
-from drone_rl.sim.rendering.mounting import rotate, turned
+from drone_rl.sim.rendering.appearance import rotate, turned
 
 HALF = math.sqrt(0.5)
 KINDS = [np.array, lambda rows: torch.tensor(rows, dtype=torch.float64)]

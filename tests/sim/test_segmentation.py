@@ -3,7 +3,7 @@ import hashlib
 import pytest
 import torch
 
-from drone_rl.sim.rendering.semantics import Meaning
+from drone_rl.sim.rendering.scene import Meaning
 from drone_rl.sim.segmentation import check_ids, default_id, default_ids, object_names, palette
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError

@@ -11,7 +11,7 @@ from drone_rl.sim.action_display import ShownActions
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.limits import check_indices
 from drone_rl.utils.schema import Kind, Maybe, OneOf, Real, Several, Whole, as_mapping
-from drone_rl.verification.places_text import WHERE
+from drone_rl.verification.text import WHERE
 
 METHOD_NAMES = {
     "grad_cam": "Grad-CAM",

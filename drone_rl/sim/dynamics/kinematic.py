@@ -5,7 +5,7 @@ import dataclasses
 import torch
 from torch import Tensor
 
-from drone_rl.config.actions import ActionSettings
+from drone_rl.config.dynamics import ActionSettings
 from drone_rl.sim.continuous_actions import ContinuousActions
 from drone_rl.sim.dynamics.body import BodyState, heading_of
 from drone_rl.sim.dynamics.obstacles import Obstacles

@@ -18,8 +18,7 @@ from drone_rl.sim.dynamics.flight_state import CLIMB, FlightState
 from drone_rl.sim.dynamics.goals import Goals, rotor_goals
 from drone_rl.sim.dynamics.obstacles import Obstacles
 from drone_rl.sim.dynamics.steering import make_steering
-from drone_rl.sim.rendering.crew import Crew
-from drone_rl.sim.rendering.devices import on_torch_stream, start_warp
+from drone_rl.sim.rendering.devices import Crew, on_torch_stream, start_warp
 
 _LEAST_WORK = 3000
 """Ticks of all drones together for which a second thread is worth its while."""
