@@ -18,7 +18,7 @@ import torch
 from numpy.typing import NDArray
 from torchrl.envs import TransformedEnv
 
-from drone_rl.evaluation.agreement import require_function
+from drone_rl.evaluation.rounding_sensitivity import require_function
 from drone_rl.explanations import (
     attribution,
     behavior,
@@ -36,17 +36,16 @@ from drone_rl.policies import PictureNetwork
 from drone_rl.policies.base_policy import Pilot
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_pilot
-from drone_rl.robustness.measured import Measured
+from drone_rl.robustness.shifts_file import SavedShifts
 from drone_rl.utils.display import page
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import to_file_name
 from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
-from drone_rl.utils.seed_text import seed_line
 from drone_rl.utils.seeding import RootSeed, with_seed
-from drone_rl.verdicts.domains import find_domain
-from drone_rl.verdicts.proof import Claim
-from drone_rl.verdicts.quoting import find_claim
+from drone_rl.utils.text import seed_line
+from drone_rl.verdicts.certificate import Claim, find_claim
+from drone_rl.verdicts.coverage import find_domain
 
 FORMAT_VERSION = 3
 Given = str | Path | Pilot | Logits
@@ -171,7 +170,7 @@ def _explain(
     folder: Path,
     num_envs: int,
     progress: Progress,
-    measured: Measured | None,
+    measured: SavedShifts | None,
 ) -> dict[str, Any]:
     require_function(policy, seed=seed.value, renderer=settings.renderer)
     env = policy.make_env(num_envs, seed=seed.value, renderer=settings.renderer)
@@ -205,7 +204,7 @@ def explain_policy(
     progress: Callable[[str], None] = lambda _: None,
     sections: Mapping[str, Section] | None = None,
     claim: Claim | None = None,
-    measured: Measured | None = None,
+    measured: SavedShifts | None = None,
     unlike: Mapping[str, Any] | None = None,
     seed: RootSeed | None = None,
 ) -> dict[str, Any]:
@@ -247,7 +246,7 @@ def explain_policy(
         **seed.as_dict(),
         "seconds": {title: one.seconds for title, one in made.items()},
         "actions": context.scenes.actions.as_dict(),
-        "terms": context.scenes.task.terms.as_dict(),
+        "terms": context.scenes.task.vocabulary.as_dict(),
         **{key: value for one in made.values() for key, value in one.numbers.items()},
         **({"left_out": left_out} if left_out else {}),
         "provenance": provenance,

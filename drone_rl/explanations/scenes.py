@@ -11,7 +11,7 @@ from torchrl.envs import CatFrames, Transform, TransformedEnv
 from drone_rl.envs import ChromaticityPixels, CropRows, RgbPixels, worlds_of
 from drone_rl.envs.pipeline import memory_of, see_film
 from drone_rl.sim.rendering import Appearance
-from drone_rl.sim.rendering.semantics import Meaning
+from drone_rl.sim.rendering.scene import Meaning
 from drone_rl.sim.tasks import State
 
 

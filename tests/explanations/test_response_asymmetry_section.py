@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from drone_rl.explanations.response import asymmetry_section, grid_asymmetry
+from drone_rl.explanations.response import asymmetry_section, grid_asymmetry, policy_response
 
 
 def test_frames_and_grid_are_compared_with_their_mirror_images(context):

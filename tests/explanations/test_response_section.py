@@ -22,9 +22,7 @@ def test_every_field_of_both_maps_is_kept(monkeypatch):
     sides = ("left", "ahead", "right")
     scenes = SimpleNamespace(task=SimpleNamespace(strata=sides))
     seed = RootSeed(5, False)
-    context = SimpleNamespace(
-        shared=lambda *_: does, scenes=scenes, network=None, seed=seed
-    )
+    context = SimpleNamespace(shared=lambda *_: does, scenes=scenes, network=None, seed=seed)
     numbers, arrays = response.response_section(context)
     assert numbers == {"response": summarise(does, comes, sides)}
     assert arrays["response_probabilities"] is ahead

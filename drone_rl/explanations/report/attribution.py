@@ -10,7 +10,7 @@ from drone_rl.evaluation.plots import images
 from drone_rl.explanations.report.explanation import Explanation
 from drone_rl.explanations.report.part import Part
 from drone_rl.explanations.report.validation import METHOD_NAMES
-from drone_rl.utils.sentences import Evidence, Sentence
+from drone_rl.utils.text import Evidence, Sentence
 
 BLOCK = 16
 """Sides of a film are multiples of this many pixels, as its encoder requires."""

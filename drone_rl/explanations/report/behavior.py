@@ -7,8 +7,7 @@ from drone_rl.explanations.report.explanation import Explanation
 from drone_rl.explanations.report.part import Part
 from drone_rl.sim.action_display import shown_actions
 from drone_rl.sim.vocabulary import terms_of
-from drone_rl.utils.numbers import among, bounds, listed, plural
-from drone_rl.utils.sentences import Evidence, Sentence, percent
+from drone_rl.utils.text import Evidence, Sentence, among, bounds, listed, percent, plural
 
 KINDS = ("contradiction", "justified", "unknown")
 MOST_PAIRS = 4

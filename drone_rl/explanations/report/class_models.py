@@ -8,8 +8,7 @@ from drone_rl.evaluation.plots import images
 from drone_rl.explanations.report.explanation import Explanation
 from drone_rl.explanations.report.part import Part
 from drone_rl.sim.action_display import shown_actions
-from drone_rl.utils.numbers import listed
-from drone_rl.utils.sentences import Evidence, Sentence
+from drone_rl.utils.text import Evidence, Sentence, listed
 
 _OBJECTIVES = ("probability", "logit")
 

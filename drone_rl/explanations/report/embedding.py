@@ -12,8 +12,7 @@ from drone_rl.evaluation.plots import images
 from drone_rl.evaluation.plots.saving import Rows, to_png, to_uri
 from drone_rl.explanations.report.explanation import Explanation
 from drone_rl.explanations.report.part import Part
-from drone_rl.utils.numbers import listed
-from drone_rl.utils.sentences import Evidence, Sentence, percent
+from drone_rl.utils.text import Evidence, Sentence, listed, percent
 
 MOST_THUMBNAILS = 900
 """If there are more frames, an evenly spaced selection is shown."""

@@ -17,8 +17,7 @@ from drone_rl.explanations.report.explanation import Explanation
 from drone_rl.explanations.report.part import Part
 from drone_rl.sim.action_display import ShownActions
 from drone_rl.sim.vocabulary import terms_of
-from drone_rl.utils.numbers import bounds, listed
-from drone_rl.utils.sentences import Evidence, Sentence, percent
+from drone_rl.utils.text import Evidence, Sentence, bounds, listed, percent
 
 _OUTCOMES = ("#d9d9de", "#4269d0")
 """Colours of targets that are not handled, and of those that are."""

@@ -11,8 +11,7 @@ from drone_rl.explanations.report.part import Drawn, Part
 from drone_rl.explanations.report.truth_charts import curves_chart, heat_chart, truth_chart
 from drone_rl.explanations.report.validation import METHOD_NAMES
 from drone_rl.sim.vocabulary import terms_of
-from drone_rl.utils.numbers import bounds, listed, plural
-from drone_rl.utils.sentences import Evidence, Sentence, percent
+from drone_rl.utils.text import Evidence, Sentence, bounds, listed, percent, plural
 
 _FAILED = {
     "pointing": "its hottest patch does not reliably affect the policy more often than chance",

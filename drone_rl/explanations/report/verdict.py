@@ -14,10 +14,8 @@ from drone_rl.explanations.report.validation import METHOD_NAMES
 from drone_rl.robustness import charts
 from drone_rl.robustness.domain_text import QUOTED, is_quoted, untested
 from drone_rl.robustness.shifts_text import rows
-from drone_rl.utils.numbers import listed
 from drone_rl.utils.schema import as_mapping
-from drone_rl.utils.seed_text import is_fixed, seed_line, seed_of
-from drone_rl.utils.sentences import Evidence, Sentence
+from drone_rl.utils.text import Evidence, Sentence, is_fixed, listed, seed_line, seed_of
 
 
 def _source_file(evidence: Evidence) -> str:

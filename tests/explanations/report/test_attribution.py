@@ -9,7 +9,7 @@ from drone_rl.explanations.report.attribution import (
     film,
     key_frames,
 )
-from drone_rl.utils.sentences import said
+from drone_rl.utils.text import said
 
 STEPS = 5
 

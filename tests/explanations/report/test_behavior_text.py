@@ -2,7 +2,7 @@
 
 from benchmarks.evidence import EXPLANATION, changed
 from drone_rl.explanations.report.behavior import CONTRADICTIONS, DATASET, LOOPS
-from drone_rl.utils.sentences import said
+from drone_rl.utils.text import said
 
 
 def speak(**changes):

@@ -3,7 +3,7 @@ import pytest
 
 from benchmarks.evidence import EXPLANATION, changed
 from drone_rl.explanations.report.class_models import CLASS_MODEL, PART, grid
-from drone_rl.utils.sentences import said
+from drone_rl.utils.text import said
 
 
 @pytest.fixture

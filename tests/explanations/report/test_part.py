@@ -9,7 +9,7 @@ from drone_rl.explanations.explain import SECTIONS
 from drone_rl.explanations.report.explanation import Explanation
 from drone_rl.explanations.report.page import PARTS
 from drone_rl.explanations.report.part import Part
-from drone_rl.utils.sentences import said
+from drone_rl.utils.text import said
 
 
 def part(**kwargs):

@@ -1,5 +1,5 @@
 from drone_rl.explanations.report.verdict import LEFT_OUT_PART
-from drone_rl.utils.sentences import say
+from drone_rl.utils.text import say
 
 
 def test_it_says_why_where_something_is_left_out(make_explanation):
