@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.gamed_case import GamedCase
-from drone_rl.config.shifting import ShiftSettings
+from drone_rl.config.commands import ShiftSettings
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import certificate_path, shifts_path
 from drone_rl.robustness.axes import find_axes

@@ -14,7 +14,7 @@ from typing import Any
 from benchmarks.commands import train
 from benchmarks.robust_comparison import PLAIN, by_kind, compare, mean, untouched_kinds
 from drone_rl.config import MINIMAL
-from drone_rl.config.shifting import ShiftSettings
+from drone_rl.config.commands import ShiftSettings
 from drone_rl.policies.policy import load_policy
 from drone_rl.policies.zoo import read_checkpoint
 from drone_rl.robustness.axes import AXES, GROUPS, find_axes

@@ -24,7 +24,7 @@ from drone_rl.policies.policy import Policy
 from drone_rl.sim.actions import MOVES, Actions
 from drone_rl.sim.composer_task import make_environment
 from drone_rl.sim.dynamics import FlightState, Quadrotor
-from drone_rl.sim.dynamics.body import heading_only
+from drone_rl.sim.dynamics.state import heading_only
 from drone_rl.sim.entities import (
     BACK_CENTER,
     BOTTOM_CENTER,

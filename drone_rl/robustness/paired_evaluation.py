@@ -33,10 +33,10 @@ from drone_rl.robustness.perturbations import (
     task_things,
     variations,
 )
-from drone_rl.sim.appearances import Appearances
 from drone_rl.sim.dynamics import draw_seeds, make_dynamics
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.tasks import State, as_task
+from drone_rl.sim.visual_randomization import Appearances
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.seeding import Stream, torch_generator, world_random_state
 from drone_rl.utils.settings import below

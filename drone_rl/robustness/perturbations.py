@@ -12,11 +12,11 @@ from torch import Tensor
 from drone_rl.config import BaseTaskSettings
 from drone_rl.config.task import Things
 from drone_rl.robustness.faults import Fault
-from drone_rl.sim.clutter import stand
 from drone_rl.sim.rendering import Appearance, Beside, Scene
 from drone_rl.sim.rendering.appearance import Several, moved, turned
 from drone_rl.sim.rendering.scene import Meaning
 from drone_rl.sim.rendering.view import LUMA
+from drone_rl.sim.visual_randomization import stand
 from drone_rl.utils.errors import InputError
 
 DRIFT = 0.1

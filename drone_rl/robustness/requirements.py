@@ -9,7 +9,7 @@ from drone_rl.robustness.shifts_text import is_tested
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import parse_json, read_bytes
 from drone_rl.utils.limits import YAML_BYTES
-from drone_rl.utils.plain_yaml import parse_yaml
+from drone_rl.utils.readers import parse_yaml
 from drone_rl.utils.schema import Maybe, Real, as_mapping, shown
 
 _KEYS = ("low", "high", "unit")

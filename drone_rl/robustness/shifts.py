@@ -13,7 +13,7 @@ import yaml
 from numpy.typing import NDArray
 
 from drone_rl.config import MINIMAL, BaseTaskSettings
-from drone_rl.config.shifting import ShiftSettings
+from drone_rl.config.commands import ShiftSettings
 from drone_rl.envs import worlds_of
 from drone_rl.evaluation.rounding_sensitivity import require_function
 from drone_rl.evaluation.verdict_text import unlike as say_unlike
@@ -36,9 +36,8 @@ from drone_rl.utils.display import aligned, paragraph, picture, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
-from drone_rl.utils.seed_text import seed_line
 from drone_rl.utils.seeding import RootSeed, with_seed
-from drone_rl.utils.sentences import say
+from drone_rl.utils.text import say, seed_line
 from drone_rl.verification.checker import fingerprint
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import torch
 from numpy.typing import NDArray
 
-from drone_rl.config.shifting import MODES, ShiftSettings
+from drone_rl.config.commands import MODES, ShiftSettings
 from drone_rl.policies.zoo import PolicyDescription, parse
 from drone_rl.robustness.axes import AXES, GROUPS, Axis
 from drone_rl.robustness.consistency import CLOSE, check_counts, check_probe, check_range
@@ -37,7 +37,7 @@ from drone_rl.utils.schema import (
     Whole,
     as_mapping,
 )
-from drone_rl.utils.seed_text import SEED_KEYS
+from drone_rl.utils.text import SEED_KEYS
 from drone_rl.verification.checker import fingerprint
 
 FORMAT = "drone_rl shifts"

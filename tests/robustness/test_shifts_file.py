@@ -10,7 +10,7 @@ from drone_rl.robustness.shifts_file import read_shifts
 from drone_rl.robustness.shifts_text import SHIFTS
 from drone_rl.robustness.suite import success_area
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.sentences import said
+from drone_rl.utils.text import said
 from tests.robustness.making import figures, share, shifts_of
 
 

@@ -7,7 +7,7 @@ from matplotlib import colormaps
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from drone_rl.sim.action_display import MOVES, ShownActions
+from drone_rl.sim.vocabulary import SHOWN_MOVES, ShownActions
 
 Color = tuple[int, int, int]
 """Red, green, blue, 0 to 255."""
@@ -26,7 +26,7 @@ ROW = 18
 
 
 def indicator(
-    probabilities: Sequence[float], chosen: int, width: int, actions: ShownActions = MOVES
+    probabilities: Sequence[float], chosen: int, width: int, actions: ShownActions = SHOWN_MOVES
 ) -> Image.Image:
     """Draw one bar per action, as long as it is probable.
 
@@ -131,7 +131,7 @@ def explained_frame(
     probabilities: Sequence[float],
     chosen: int,
     captions: tuple[str, str],
-    actions: ShownActions = MOVES,
+    actions: ShownActions = SHOWN_MOVES,
 ) -> Image.Image:
     """Stack a frame, its heat map, each under a caption, and the action probabilities."""
     plain, hot = enlarge(frame), enlarge(heated(frame, heat))
@@ -140,7 +140,7 @@ def explained_frame(
 
 
 def probed_frame(
-    data: Mapping[str, NDArray], frame: int, caption: str, actions: ShownActions = MOVES
+    data: Mapping[str, NDArray], frame: int, caption: str, actions: ShownActions = SHOWN_MOVES
 ) -> Image.Image:
     """Stack a frame of the data set under a caption, and its action probabilities.
 
