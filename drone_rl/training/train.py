@@ -16,7 +16,7 @@ from drone_rl.config.configuration import as_config, check_same_config, from_con
 from drone_rl.config.training import TrainSettings
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import describe, read_checkpoint
-from drone_rl.sim.tasks import Practice, as_task
+from drone_rl.sim.tasks import FailureReplayTask, as_task
 from drone_rl.training import Callback, CheckpointCallback, CsvCallback, NotANumberError, Trainer
 from drone_rl.training.build_collector import build_collector
 from drone_rl.training.build_learner import build_learner
@@ -161,7 +161,7 @@ def learn(
     folder: Path,
     state: Mapping[str, Any] | None,
     callbacks: Sequence[Callback],
-    practice: Practice | None = None,
+    practice: FailureReplayTask | None = None,
 ) -> dict[str, Any]:
     """Trains until solved, out of budget or told to stop, and leaves checkpoints and metrics.
 
@@ -219,7 +219,10 @@ def finish(settings: TrainSettings, folder: Path, result: dict[str, Any]) -> Tra
 
 
 def _build(
-    settings: TrainSettings, folder: Path, callbacks: Sequence[Callback], practice: Practice | None
+    settings: TrainSettings,
+    folder: Path,
+    callbacks: Sequence[Callback],
+    practice: FailureReplayTask | None,
 ) -> tuple[Trainer, CheckpointCallback, Confirmation | None]:
     config, origin = as_config(settings), provenance()
     description = describe(config).as_dict()

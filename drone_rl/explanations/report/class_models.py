@@ -7,7 +7,7 @@ from PIL import Image
 from drone_rl.evaluation.plots import images
 from drone_rl.explanations.report.explanation import Explanation
 from drone_rl.explanations.report.part import Part
-from drone_rl.sim.action_display import shown_actions
+from drone_rl.sim.vocabulary import shown_actions
 from drone_rl.utils.text import Evidence, Sentence, listed
 
 _OBJECTIVES = ("probability", "logit")

@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 
 from drone_rl.evaluation.consistency import check_verdict
 from drone_rl.explanations.report.validation import check_fit, check_sizes
-from drone_rl.sim.action_display import ShownActions, shown_actions
-from drone_rl.sim.vocabulary import TaskVocabulary, terms_of
+from drone_rl.sim.vocabulary import ShownActions, TaskVocabulary, shown_actions, terms_of
 from drone_rl.utils.archives import read_arrays
 from drone_rl.utils.consistency import check_intervals
 from drone_rl.utils.errors import InputError

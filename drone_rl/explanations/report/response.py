@@ -15,8 +15,7 @@ from drone_rl.evaluation.plots import images
 from drone_rl.evaluation.plots.saving import Rows
 from drone_rl.explanations.report.explanation import Explanation
 from drone_rl.explanations.report.part import Part
-from drone_rl.sim.action_display import ShownActions
-from drone_rl.sim.vocabulary import terms_of
+from drone_rl.sim.vocabulary import ShownActions, terms_of
 from drone_rl.utils.text import Evidence, Sentence, bounds, listed, percent
 
 _OUTCOMES = ("#d9d9de", "#4269d0")
