@@ -12,10 +12,10 @@ from tensordict.utils import NestedKey
 from torch import Tensor
 from torchrl.envs import EnvBase
 
-from drone_rl.collectors.flight import Flight
+from drone_rl.acceleration.fused_collector import Flight
+from drone_rl.acceleration.fused_network import KnownOutputs
 from drone_rl.collectors.ways import StraightWay, find_way
 from drone_rl.collectors.worlds_collector import WorldsCollector
-from drone_rl.policies.known_outputs import KnownOutputs
 
 
 class EpisodeCollector(WorldsCollector):

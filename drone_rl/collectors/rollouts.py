@@ -9,9 +9,9 @@ from tensordict import TensorDict, TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torchrl.envs import EnvBase
 
-from drone_rl.collectors.sight import Entries
 from drone_rl.collectors.streams import find_stream
 from drone_rl.collectors.worlds_collector import WorldsCollector
+from drone_rl.envs.direct_renderer import Entries
 from drone_rl.utils.errors import InputError
 
 

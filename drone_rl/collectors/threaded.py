@@ -12,8 +12,8 @@ from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torchrl.collectors import BaseCollector
 
+from drone_rl.acceleration.fused_network import KnownOutputs
 from drone_rl.collectors.worlds_collector import WorldsCollector
-from drone_rl.policies.known_outputs import KnownOutputs
 
 
 class ThreadedCollector(BaseCollector):

@@ -12,8 +12,8 @@ from tensordict.utils import NestedKey
 from torch import Tensor
 from torchrl.envs import EnvBase
 
-from drone_rl.collectors.sight import Entries, Sight
 from drone_rl.collectors.worlds_collector import ballast, take_rows
+from drone_rl.envs.direct_renderer import Entries, Sight
 from drone_rl.sim.tasks import State
 
 

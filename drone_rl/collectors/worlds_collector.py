@@ -15,7 +15,7 @@ from torch import Tensor, nn
 from torchrl.collectors import BaseCollector
 from torchrl.envs import EnvBase
 
-from drone_rl.policies.known_outputs import KnownOutputs
+from drone_rl.acceleration.fused_network import KnownOutputs
 from drone_rl.utils.errors import InputError
 
 

@@ -6,7 +6,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from drone_rl.collectors.sight import Sight
+from drone_rl.envs.direct_renderer import Sight
 from drone_rl.evaluation.metrics import Episodes
 from drone_rl.policies.rounding import Decide
 from drone_rl.sim.tasks import State

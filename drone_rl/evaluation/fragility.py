@@ -10,8 +10,8 @@ from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 from torchrl.envs import EnvBase
 
-from drone_rl.collectors.sight import Sight
 from drone_rl.envs import worlds_of
+from drone_rl.envs.direct_renderer import Sight
 from drone_rl.evaluation.branches import Outcomes, follow
 from drone_rl.evaluation.evaluator import StepLog
 from drone_rl.evaluation.greedy_flights import (

@@ -9,10 +9,10 @@ from captum.attr import IntegratedGradients, LayerGradCam, Saliency
 from torch import Tensor, nn
 from torch.nn import functional
 
+from drone_rl.acceleration.fused_network import LearningNetwork
 from drone_rl.explanations.hooks import actions_of, find_layer, probabilities, spatial_layers
 from drone_rl.explanations.patches import replaced
 from drone_rl.policies import PictureNetwork
-from drone_rl.policies.learning_network import LearningNetwork
 from drone_rl.utils.errors import InputError
 
 Objective = Literal["probability", "logit"]

@@ -8,9 +8,9 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
+from drone_rl.acceleration.fused_network import LearningNetwork
 from drone_rl.explanations.hooks import actions_of
 from drone_rl.policies import PictureNetwork
-from drone_rl.policies.learning_network import LearningNetwork
 from drone_rl.utils.errors import InputError
 
 AS_PROBABLE = 0.01

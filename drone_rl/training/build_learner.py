@@ -5,13 +5,13 @@ from typing import Any
 import torch
 from torch import nn
 
+from drone_rl.acceleration.fused_network import LearningNetwork
 from drone_rl.collectors import ThreadedCollector
 from drone_rl.config.configuration import as_config
 from drone_rl.config.objectives import WithCritic
 from drone_rl.config.training import TrainSettings
 from drone_rl.config.variant import locate
 from drone_rl.policies import ActorCritic, make_actor
-from drone_rl.policies.learning_network import LearningNetwork
 from drone_rl.policies.zoo import describe
 from drone_rl.training.build_collector import Collecting
 from drone_rl.training.learners import ActorCriticLearner, Learner, ReinforceLearner

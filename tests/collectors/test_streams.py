@@ -7,10 +7,10 @@ import torch
 from torchrl.envs import CatFrames
 
 from drone_rl.collectors import RolloutCollector
-from drone_rl.collectors.sight import FLAGS
 from drone_rl.collectors.streams import StraightStream, TorchrlStream, find_stream
 from drone_rl.config import AppearanceSettings, PillarsSettings, TaskSettings
 from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, with_transforms
+from drone_rl.envs.direct_renderer import FLAGS
 from drone_rl.policies import SmallCNN, make_actor
 
 SHORT = TaskSettings(num_cubes=2, first_distance=3.0, spacing=3.0, step_limit=12, front_margin=3.0)

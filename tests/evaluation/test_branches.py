@@ -1,7 +1,7 @@
 import torch
 
 import drone_rl
-from drone_rl.collectors.sight import Sight
+from drone_rl.envs.direct_renderer import Sight
 from drone_rl.evaluation.branches import MOST, follow
 from drone_rl.policies.rounding import Decisions
 from drone_rl.sim.actions import Move

@@ -10,6 +10,7 @@ from torchrl.collectors import Collector
 from torchrl.objectives.value import GAE
 
 import drone_rl
+from drone_rl.acceleration.fused_network import KnownOutputs, LearningNetwork
 from drone_rl.config import TaskSettings
 from drone_rl.config.collecting import Rollouts, Threads
 from drone_rl.config.judging import FlightSettings
@@ -19,8 +20,6 @@ from drone_rl.config.objectives import A2c, Ppo
 from drone_rl.config.returns import Gae
 from drone_rl.config.training import TrainerSettings, TrainSettings
 from drone_rl.config.transforms import EpisodeReward, Gray, Stack
-from drone_rl.policies.known_outputs import KnownOutputs
-from drone_rl.policies.learning_network import LearningNetwork
 from drone_rl.training import ActorCriticLearner, ReinforceLearner
 from drone_rl.training.build_collector import build_collector
 from drone_rl.training.build_learner import build_learner

@@ -13,8 +13,8 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from drone_rl.acceleration.inference_kernel import Answers
 from drone_rl.policies import PolicyNetwork
-from drone_rl.policies.answering import Answers
 from drone_rl.policies.rounded_layers import SLACK, UNIT, Layer, layer_of
 from drone_rl.policies.rounding import PIXEL_UNITS, RoundingBound
 from drone_rl.sim.actions import MOVES

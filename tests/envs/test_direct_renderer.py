@@ -3,9 +3,9 @@
 import pytest
 import torch
 
-from drone_rl.collectors.sight import FLAGS, Sight
 from drone_rl.config import TaskSettings
 from drone_rl.envs import CropRows, DroneEnv, GrayPixels, RgbPixels, with_transforms
+from drone_rl.envs.direct_renderer import FLAGS, Sight
 
 SHORT = TaskSettings(num_cubes=2, first_distance=3.0, spacing=3.0, step_limit=5)
 KEPT = [("next", name) for name in FLAGS]

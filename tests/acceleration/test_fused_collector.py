@@ -7,12 +7,12 @@ import torch
 from torchrl.envs import RewardSum
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
+from drone_rl.acceleration import fused_collector as flight_module
+from drone_rl.acceleration.fused_network import LearningNetwork
 from drone_rl.collectors import EpisodeCollector
-from drone_rl.collectors import flight as flight_module
 from drone_rl.config import AppearanceSettings, DynamicsSettings, PillarsSettings, TaskSettings
 from drone_rl.envs import CropRows, DroneEnv, GrayPixels, StandardizePixels, with_transforms
 from drone_rl.policies import MLP, SmallCNN, make_actor
-from drone_rl.policies.learning_network import LearningNetwork
 from drone_rl.sim.dynamics import Quadrotor
 from drone_rl.sim.dynamics.flight_state import LOST
 from drone_rl.sim.tasks.collect_cubes.rules import EndReason

@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from drone_rl.policies.known_outputs import KnownOutputs
+from drone_rl.acceleration.fused_network import KnownOutputs
 
 WEIGHTS = torch.tensor([1.0, -2.0])
 

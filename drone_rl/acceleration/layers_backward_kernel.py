@@ -11,7 +11,7 @@ the beginning of the second.
 
 import warp as wp
 
-from drone_rl.policies.layers_kernel import NUMBERS
+from drone_rl.acceleration.layers_kernel import NUMBERS
 
 _TILES = (
     NUMBERS

@@ -2,9 +2,8 @@
 
 import torch
 
-from drone_rl.policies import SmallCNN
-from drone_rl.policies.layers_kernel import WIDTH
-from drone_rl.policies.packed_layer import (
+from drone_rl.acceleration.layers_kernel import WIDTH
+from drone_rl.acceleration.packed_layers import (
     Order,
     PackedLayer,
     in_panels,
@@ -12,6 +11,7 @@ from drone_rl.policies.packed_layer import (
     outputs_at,
     packed_layers,
 )
+from drone_rl.policies import SmallCNN
 
 
 def small():

@@ -6,7 +6,7 @@ import pytest
 import torch
 import warp as wp
 
-from drone_rl.collectors.flight_kernel import choose, standardise
+from drone_rl.acceleration.rollout_kernel import choose, standardise
 from drone_rl.envs import StandardizePixels
 from drone_rl.sim.rendering.devices import start_warp
 

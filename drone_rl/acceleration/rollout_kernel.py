@@ -16,7 +16,7 @@ once for all of them.
 
 import warp as wp
 
-from drone_rl.policies.layers_kernel import Layers, decide, keep, look
+from drone_rl.acceleration.layers_kernel import Layers, decide, keep, look
 from drone_rl.sim.rendering.raytrace.kernel import Desk, draw_picture
 from drone_rl.sim.rendering.raytrace.structs import Geoms, Pictures, Poses, View
 from drone_rl.sim.rendering.raytrace.structs import Looks as SceneLooks

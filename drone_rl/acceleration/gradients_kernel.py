@@ -14,8 +14,8 @@ is still near.
 
 import warp as wp
 
-from drone_rl.policies.layers_back_kernel import accumulate, fold, rectify
-from drone_rl.policies.layers_kernel import copy, multiply
+from drone_rl.acceleration.layers_backward_kernel import accumulate, fold, rectify
+from drone_rl.acceleration.layers_kernel import copy, multiply
 
 BLOCK = wp.constant(64)
 """Pictures at a time."""

@@ -5,8 +5,8 @@ import copy
 import pytest
 import torch
 
+from drone_rl.acceleration.fused_network import LearningNetwork
 from drone_rl.policies import MLP, OriginalCNN, SmallCNN
-from drone_rl.policies.learning_network import LearningNetwork
 from drone_rl.utils.errors import InputError
 from tests.policies.halves import draw_weights, halves, made, taught
 

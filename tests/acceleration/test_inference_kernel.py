@@ -5,8 +5,8 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 import torch
 
+from drone_rl.acceleration.inference_kernel import Answers
 from drone_rl.policies import OriginalCNN, SmallCNN
-from drone_rl.policies.answering import Answers
 
 
 @pytest.fixture

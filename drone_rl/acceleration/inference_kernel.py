@@ -14,9 +14,9 @@ import torch
 import warp as wp
 from torch import Tensor, nn
 
+from drone_rl.acceleration.layers_kernel import Layers, decide, look
+from drone_rl.acceleration.packed_layers import PackedNetwork
 from drone_rl.policies.finite import require_finite
-from drone_rl.policies.layers_kernel import Layers, decide, look
-from drone_rl.policies.packing import PackedNetwork
 from drone_rl.sim.rendering.devices import loading, start_warp
 
 _TOGETHER = wp.constant(16)

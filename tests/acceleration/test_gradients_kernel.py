@@ -3,9 +3,8 @@
 import pytest
 import torch
 
-from drone_rl.policies.known_outputs import KnownOutputs
-from drone_rl.policies.learning_network import LearningNetwork
-from drone_rl.policies.packed_layer import outputs_at, packed_layers
+from drone_rl.acceleration.fused_network import KnownOutputs, LearningNetwork
+from drone_rl.acceleration.packed_layers import outputs_at, packed_layers
 from tests.policies.halves import draw_weights, halves, made, taught
 
 

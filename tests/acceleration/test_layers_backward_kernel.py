@@ -5,8 +5,8 @@ import torch
 import warp as wp
 from torch.nn import functional
 
-from drone_rl.policies.layers_back_kernel import accumulate, fold, rectify
-from drone_rl.policies.packed_layer import in_panels
+from drone_rl.acceleration.layers_backward_kernel import accumulate, fold, rectify
+from drone_rl.acceleration.packed_layers import in_panels
 from drone_rl.sim.rendering.devices import start_warp
 
 start_warp("cpu")

@@ -18,14 +18,14 @@ from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 from torchrl.envs.utils import ExplorationType
 
-from drone_rl.collectors import flight_kernel
-from drone_rl.collectors.logbook import Logbook
-from drone_rl.collectors.sight import Entries, Sight
+from drone_rl.acceleration import rollout_kernel
+from drone_rl.acceleration.fused_network import KnownOutputs
+from drone_rl.acceleration.packed_layers import PackedNetwork
+from drone_rl.acceleration.rollout_buffer import Logbook
+from drone_rl.envs.direct_renderer import Entries, Sight
 from drone_rl.envs.transforms import StandardizePixels
 from drone_rl.policies.actor import CategoricalActor
 from drone_rl.policies.finite import require_finite
-from drone_rl.policies.known_outputs import KnownOutputs
-from drone_rl.policies.packing import PackedNetwork
 from drone_rl.sim.rendering.crew import Crew
 from drone_rl.sim.rendering.devices import loading
 from drone_rl.sim.rendering.raytrace.renderer import Raytracer
@@ -56,7 +56,7 @@ class Flight:
         count, view = sight.worlds.num_worlds, sight.view
         self._crew = Crew(count, num_cores)
         tools = sight.worlds.renderer.tools(view, self._crew.size)
-        self._eye = flight_kernel.Eye()
+        self._eye = rollout_kernel.Eye()
         self._eye.view, self._eye.geoms, self._eye.looks, self._eye.desk = tools
         self._eye.mean, self._eye.deviation = _standard(sight)
         self._rooms = wp.empty((self._crew.size, network.room), dtype=float, device="cpu")
@@ -95,7 +95,7 @@ class Flight:
             return None
         if worlds.appearance is not None:
             return None
-        network = PackedNetwork.find(actor.network, flight_kernel.TOGETHER)
+        network = PackedNetwork.find(actor.network, rollout_kernel.TOGETHER)
         flown = FlyingCubes.find(worlds.task, worlds.dynamics, worlds.num_worlds)
         if network is None or flown is None:
             return None
@@ -168,9 +168,9 @@ class Flight:
             self._known.note(logged["pixels"], rows, self._network.weights)
         return worlds, logged
 
-    def _open_log(self, part: int, kept: tuple[str, ...]) -> flight_kernel.Log:
+    def _open_log(self, part: int, kept: tuple[str, ...]) -> rollout_kernel.Log:
         """Where a part is written, and what of it is kept."""
-        log, pictures, room = flight_kernel.Log(), Pictures(), self._book.open(part, kept)
+        log, pictures, room = rollout_kernel.Log(), Pictures(), self._book.open(part, kept)
         pictures.gray = wp.from_torch(room["pixels"].flatten(1))
         self._logits = room["logits"]
         log.pictures, log.logits = pictures, wp.from_torch(self._logits)
@@ -183,7 +183,7 @@ class Flight:
             )  # none, if there is no room
         return log
 
-    def _go_on(self, num_worlds: int, log: flight_kernel.Log) -> None:
+    def _go_on(self, num_worlds: int, log: rollout_kernel.Log) -> None:
         draws = torch.full((num_worlds, self._length), -1.0)
         if self._actor.exploration == ExplorationType.RANDOM:
             draws.uniform_(generator=self._actor.generator)
@@ -199,7 +199,7 @@ class Flight:
 
         def work(member: int, first: int, last: int) -> None:
             inputs = [first, last, member, *given]
-            wp.launch(flight_kernel.fly, 1, inputs=inputs, device="cpu")
+            wp.launch(rollout_kernel.fly, 1, inputs=inputs, device="cpu")
 
         self._crew.share_out(0, num_worlds, work)
 
