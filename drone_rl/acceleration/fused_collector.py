@@ -19,10 +19,10 @@ from torch import Tensor
 from torchrl.envs.utils import ExplorationType
 
 from drone_rl.acceleration import rollout_kernel
-from drone_rl.acceleration.fused_network import KnownOutputs
+from drone_rl.acceleration.fused_network import ActivationCache
 from drone_rl.acceleration.packed_layers import PackedNetwork
-from drone_rl.acceleration.rollout_buffer import Logbook
-from drone_rl.envs.direct_renderer import Entries, Sight
+from drone_rl.acceleration.rollout_buffer import RolloutBuffer
+from drone_rl.envs.direct_renderer import DirectRenderer, Entries
 from drone_rl.envs.transforms import StandardizePixels
 from drone_rl.policies.actor import CategoricalActor
 from drone_rl.policies.finite import require_finite
@@ -40,12 +40,12 @@ _MOST_OUTPUTS = 2**24
 """Numbers that layers make of pictures and that are kept: 64 MiB."""
 
 
-class Flight:
+class FusedCollector:
     """Flies the policy of an actor in the worlds of an environment."""
 
     def __init__(
         self,
-        sight: Sight,
+        sight: DirectRenderer,
         actor: CategoricalActor,
         network: PackedNetwork,
         worlds: FlyingCubes,
@@ -56,7 +56,7 @@ class Flight:
         count, view = sight.worlds.num_worlds, sight.view
         self._crew = Crew(count, num_cores)
         tools = sight.worlds.renderer.tools(view, self._crew.size)
-        self._eye = rollout_kernel.Eye()
+        self._eye = rollout_kernel.CameraView()
         self._eye.view, self._eye.geoms, self._eye.looks, self._eye.desk = tools
         self._eye.mean, self._eye.deviation = _standard(sight)
         self._rooms = wp.empty((self._crew.size, network.room), dtype=float, device="cpu")
@@ -64,7 +64,7 @@ class Flight:
         self._length = max(1, min(_LONGEST, _MOST_NUMBERS // (count * pixels)))
         self._num_rows = rows = count * self._length
         num_actions = sight.worlds.dynamics.actions.num_outputs
-        self._book = Logbook(
+        self._book = RolloutBuffer(
             {
                 "pixels": torch.empty(rows, 1, view.height, view.width),
                 "logits": torch.empty(rows, num_actions),
@@ -73,13 +73,15 @@ class Flight:
                 "end_reason": torch.empty(rows, dtype=torch.int32),
             }
         )
-        self._known: KnownOutputs | None = None
+        self._known: ActivationCache | None = None
         self._logits = torch.empty(0, num_actions)
         self._owner = getattr(actor.network, "owner", "the policy")
         loading(flight_kernel)
 
     @classmethod
-    def find(cls, sight: Sight, actor: TensorDictModuleBase, num_cores: int) -> Self | None:
+    def find(
+        cls, sight: DirectRenderer, actor: TensorDictModuleBase, num_cores: int
+    ) -> Self | None:
         """The same, where task, pictures, network and renderer are such as the kernel knows.
 
         Args:
@@ -105,11 +107,11 @@ class Flight:
         """Whether actions shall be drawn, or the most probable be taken."""
         return self._actor.exploration in (ExplorationType.RANDOM, ExplorationType.DETERMINISTIC)
 
-    def keep_outputs(self) -> KnownOutputs | None:
+    def cache_activations(self) -> ActivationCache | None:
         """Keeps what all layers make of pictures from now on, where it is not too much."""
         parts = _MOST_OUTPUTS // (self._num_rows * self._network.num_outputs)
         if self._known is None and parts:
-            self._known = KnownOutputs(parts * self._num_rows, self._network.num_outputs)
+            self._known = ActivationCache(parts * self._num_rows, self._network.num_outputs)
         return self._known
 
     def fly(self, num_worlds: int, keep_observations: bool = True) -> TensorDictBase:
@@ -120,7 +122,7 @@ class Flight:
             keep_observations: Whether to return "pixels" and "logits".
 
         Returns:
-            Episode after episode: what was seen, "action", what `Sight.tell` tells, and
+            Episode after episode: what was seen, "action", what `DirectRenderer.tell` tells, and
             ("collector", "traj_ids"), from 0. Shape: (T_total,).
         """
         loading(flight_kernel).result()
@@ -168,9 +170,9 @@ class Flight:
             self._known.note(logged["pixels"], rows, self._network.weights)
         return worlds, logged
 
-    def _open_log(self, part: int, kept: tuple[str, ...]) -> rollout_kernel.Log:
+    def _open_log(self, part: int, kept: tuple[str, ...]) -> rollout_kernel.RolloutLog:
         """Where a part is written, and what of it is kept."""
-        log, pictures, room = rollout_kernel.Log(), Pictures(), self._book.open(part, kept)
+        log, pictures, room = rollout_kernel.RolloutLog(), Pictures(), self._book.open(part, kept)
         pictures.gray = wp.from_torch(room["pixels"].flatten(1))
         self._logits = room["logits"]
         log.pictures, log.logits = pictures, wp.from_torch(self._logits)
@@ -183,7 +185,7 @@ class Flight:
             )  # none, if there is no room
         return log
 
-    def _go_on(self, num_worlds: int, log: rollout_kernel.Log) -> None:
+    def _go_on(self, num_worlds: int, log: rollout_kernel.RolloutLog) -> None:
         draws = torch.full((num_worlds, self._length), -1.0)
         if self._actor.exploration == ExplorationType.RANDOM:
             draws.uniform_(generator=self._actor.generator)
@@ -233,7 +235,7 @@ class Flight:
         return entries
 
 
-def _standard(sight: Sight) -> tuple[float, float] | None:
+def _standard(sight: DirectRenderer) -> tuple[float, float] | None:
     """Mean and deviation by which gray pictures are standardised, if nothing else is done."""
     after = sight.after
     if not after:

@@ -14,7 +14,7 @@ from torch import Tensor, nn
 from torch.autograd.function import once_differentiable
 
 from drone_rl.acceleration import gradients_kernel
-from drone_rl.acceleration.gradients_kernel import BLOCK, Lesson
+from drone_rl.acceleration.gradients_kernel import BLOCK, PackedParams
 from drone_rl.acceleration.packed_layers import (
     Order,
     PackedLayer,
@@ -28,7 +28,7 @@ from drone_rl.sim.rendering.crew import Crew
 from drone_rl.sim.rendering.devices import loading
 
 
-class KnownOutputs:
+class ActivationCache:
     """Outputs of all layers, for as long as pictures and weights are those that they came from."""
 
     def __init__(self, num_rows: int, num_outputs: int) -> None:
@@ -89,7 +89,7 @@ Of = Literal["weights", "pictures"]
 """What has gradients."""
 
 
-class LearningNetwork(PictureNetwork):
+class FusedNetwork(PictureNetwork):
     """Gives what a network gives, and its weights the gradients, in less time than torch does.
 
     On a small network torch spends a third of its time between products; here each layer's product
@@ -108,7 +108,7 @@ class LearningNetwork(PictureNetwork):
         super().__init__()
         self.network, self.in_shape, self.actions = network, network.in_shape, network.actions
         self._num_threads, self._of = num_threads, of
-        self.known: KnownOutputs | None = None
+        self.known: ActivationCache | None = None
         """Outputs that somebody else makes by the same network; looked for at each call."""
         self._work: _Work | None = None
         loading(gradients_kernel)
@@ -149,7 +149,7 @@ class _Made(NamedTuple):
     rows: Tensor
     """Which of them each picture has."""
     times: int | None
-    """Of `KnownOutputs`, if they are such."""
+    """Of `ActivationCache`, if they are such."""
 
 
 class _Logits(torch.autograd.Function):
@@ -164,13 +164,13 @@ class _Logits(torch.autograd.Function):
 
     @staticmethod
     @once_differentiable
-    def backward(ctx: Any, slopes: Tensor) -> tuple[Tensor | None, ...]:
+    def backward(ctx: Any, grad_output: Tensor) -> tuple[Tensor | None, ...]:
         if ctx.made is None:
             raise RuntimeError("the way back was gone once; its numbers were given away")
         made, ctx.made = ctx.made, None
         if ctx.of == "pictures":
-            return None, ctx.work.look_back(ctx.pictures, made, slopes)
-        return None, None, *ctx.work.learn(ctx.pictures, made, slopes)
+            return None, ctx.work.look_back(ctx.pictures, made, grad_output)
+        return None, None, *ctx.work.learn(ctx.pictures, made, grad_output)
 
 
 class _Work:
@@ -180,7 +180,7 @@ class _Work:
         self,
         layers: Sequence[PackedLayer],
         num_threads: int,
-        known: KnownOutputs | None,
+        known: ActivationCache | None,
         *,
         is_fixed: bool,
     ) -> None:
@@ -192,16 +192,16 @@ class _Work:
         self._back = torch.zeros(order.back_at[-1])
         made_at = outputs_at(layers)
         self._logits_at, self._size = made_at[-2:]
-        lesson = Lesson()
-        lesson.geometry = _ints([layer.geometry for layer in layers])
-        lesson.weights_at, lesson.back_at = _ints(order.weights_at), _ints(order.back_at)
-        lesson.weights, lesson.back = wp.from_torch(self._weights), wp.from_torch(self._back)
-        lesson.made_at = _ints(made_at)
-        lesson.num_convolutions = sum(layer.is_convolution for layer in layers)
-        lesson.near = odd_lines(self._logits_at - made_at[lesson.num_convolutions - 1])
-        self._lesson = lesson
+        params = PackedParams()
+        params.geometry = _ints([layer.geometry for layer in layers])
+        params.weights_at, params.back_at = _ints(order.weights_at), _ints(order.back_at)
+        params.weights, params.back = wp.from_torch(self._weights), wp.from_torch(self._back)
+        params.made_at = _ints(made_at)
+        params.num_convolutions = sum(layer.is_convolution for layer in layers)
+        params.near = odd_lines(self._logits_at - made_at[params.num_convolutions - 1])
+        self._lesson = params
         self._rooms = torch.empty(self._crew.size, int(BLOCK) * self._size)
-        self._sides = torch.empty(self._crew.size, int(BLOCK) * lesson.near)
+        self._sides = torch.empty(self._crew.size, int(BLOCK) * params.near)
         most = max(v.num_inputs * v.geometry[0] for v in layers if v.is_convolution)
         self._patches = torch.empty(self._crew.size, most)
         self._spare: Tensor | None = None
@@ -240,25 +240,33 @@ class _Work:
         last = self._logits_at + torch.arange(len(self._layers[-1].layer.weight))
         return made.outputs.take(made.rows[:, None].long() * self._size + last)
 
-    def learn(self, pictures: Tensor, made: _Made, slopes: Tensor) -> list[Tensor]:
+    def learn(self, pictures: Tensor, made: _Made, grad_output: Tensor) -> list[Tensor]:
         """Gradients of the parameters by those of the logits; takes `made` for the next answer."""
         self._gradients.zero_()
-        self._go_back(pictures, made, slopes, self._gradients, torch.empty(0, 0))
+        self._go_back(pictures, made, grad_output, self._gradients, torch.empty(0, 0))
         return self._order.unpack(self._gradients.sum(0))
 
-    def look_back(self, pictures: Tensor, made: _Made, slopes: Tensor) -> Tensor:
+    def look_back(self, pictures: Tensor, made: _Made, grad_output: Tensor) -> Tensor:
         """Gradient of the pictures by those of the logits; takes `made` for the next answer."""
         seen = torch.empty_like(pictures)
-        self._go_back(pictures, made, slopes, torch.empty(0, 0), seen)
+        self._go_back(pictures, made, grad_output, torch.empty(0, 0), seen)
         return seen
 
     def _go_back(
-        self, pictures: Tensor, made: _Made, slopes: Tensor, gradients: Tensor, seen: Tensor
+        self, pictures: Tensor, made: _Made, grad_output: Tensor, gradients: Tensor, seen: Tensor
     ) -> None:
         if self._known is not None and made.times not in (None, self._known.times):
             raise RuntimeError("pictures were flown through between the way there and the way back")
         rooms = (self._rooms, self._sides, self._patches)
-        arrays = (pictures, made.outputs, made.rows, slopes.contiguous(), *rooms, gradients, seen)
+        arrays = (
+            pictures,
+            made.outputs,
+            made.rows,
+            grad_output.contiguous(),
+            *rooms,
+            gradients,
+            seen,
+        )
         given = [self._lesson, *(wp.from_torch(array) for array in arrays)]
 
         def work(member: int, first: int, last: int) -> None:

@@ -22,7 +22,7 @@ BLOCK = wp.constant(64)
 
 
 @wp.struct
-class Lesson:
+class PackedParams:
     """A network that learns."""
 
     geometry: wp.array2d[int]
@@ -44,7 +44,7 @@ class Lesson:
 def answer(
     first: int,
     last: int,
-    lesson: Lesson,
+    params: PackedParams,
     pictures: wp.array2d[float],
     made: wp.array[float],
 ) -> None:
@@ -53,46 +53,46 @@ def answer(
     Args:
         first: The first picture.
         last: The one after the last: launch it with a dimension of 1.
-        lesson: The network.
+        params: The network.
         pictures: Gray. Shape: (pictures, pixels).
         made: Takes the outputs: of each picture those of all layers.
     """
-    size = _size(lesson)
-    num_layers = lesson.geometry.shape[0]
+    size = _size(params)
+    num_layers = params.geometry.shape[0]
     for block in range(first, last, BLOCK):
         end = wp.min(block + BLOCK, last)
         for picture in range(block, end):
-            for layer in range(lesson.num_convolutions):
-                to = picture * size + lesson.made_at[layer]
-                rows = lesson.geometry[layer, 0]
-                down = lesson.geometry[layer, 2]
-                outs = lesson.geometry[layer, 7]
+            for layer in range(params.num_convolutions):
+                to = picture * size + params.made_at[layer]
+                rows = params.geometry[layer, 0]
+                down = params.geometry[layer, 2]
+                outs = params.geometry[layer, 7]
                 if layer == 0:
-                    _forward(lesson, layer, pictures[picture], 0, made, to, rows, down, outs)
+                    _forward(params, layer, pictures[picture], 0, made, to, rows, down, outs)
                 else:
-                    at = picture * size + lesson.made_at[layer - 1]
-                    _forward(lesson, layer, made, at, made, to, rows, down, outs)
-        for layer in range(lesson.num_convolutions, num_layers):
-            at = block * size + lesson.made_at[layer - 1]
-            to = block * size + lesson.made_at[layer]
-            _forward(lesson, layer, made, at, made, to, end - block, size, size)
+                    at = picture * size + params.made_at[layer - 1]
+                    _forward(params, layer, made, at, made, to, rows, down, outs)
+        for layer in range(params.num_convolutions, num_layers):
+            at = block * size + params.made_at[layer - 1]
+            to = block * size + params.made_at[layer]
+            _forward(params, layer, made, at, made, to, end - block, size, size)
 
 
 @wp.func
-def _size(lesson: Lesson) -> int:
+def _size(params: PackedParams) -> int:
     """Room that the outputs of a picture take."""
-    return lesson.made_at[lesson.geometry.shape[0]]
+    return params.made_at[params.geometry.shape[0]]
 
 
 @wp.func
-def _stride(lesson: Lesson, layer: int) -> int:
+def _stride(params: PackedParams, layer: int) -> int:
     """Room that those of a layer take."""
-    return lesson.made_at[layer + 1] - lesson.made_at[layer]
+    return params.made_at[layer + 1] - params.made_at[layer]
 
 
 @wp.func
 def _forward(
-    lesson: Lesson,
+    params: PackedParams,
     layer: int,
     given: wp.array[float],
     given_at: int,
@@ -105,20 +105,20 @@ def _forward(
     multiply(
         given,
         given_at,
-        lesson.weights,
-        lesson.weights_at[layer],
+        params.weights,
+        params.weights_at[layer],
         made,
         made_at,
         rows,
-        lesson.geometry[layer, 1],
+        params.geometry[layer, 1],
         down,
-        lesson.geometry[layer, 3],
-        lesson.geometry[layer, 4],
-        lesson.geometry[layer, 5],
-        lesson.geometry[layer, 6],
-        lesson.geometry[layer, 7],
+        params.geometry[layer, 3],
+        params.geometry[layer, 4],
+        params.geometry[layer, 5],
+        params.geometry[layer, 6],
+        params.geometry[layer, 7],
         made_down,
-        wp.where(layer < lesson.geometry.shape[0] - 1, 1, 0),
+        wp.where(layer < params.geometry.shape[0] - 1, 1, 0),
     )
 
 
@@ -127,11 +127,11 @@ def learn(
     first: int,
     last: int,
     member: int,
-    lesson: Lesson,
+    params: PackedParams,
     pictures: wp.array2d[float],
     made: wp.array[float],
     rows: wp.array[int],
-    slopes: wp.array2d[float],
+    grad_output: wp.array2d[float],
     rooms: wp.array2d[float],
     sides: wp.array2d[float],
     patches: wp.array2d[float],
@@ -144,11 +144,11 @@ def learn(
         first: The first picture.
         last: The one after the last: launch it with a dimension of 1.
         member: Which of the rooms to work in, and which gradients to add to.
-        lesson: The network.
+        params: The network.
         pictures: Gray. Shape: (pictures, pixels).
         made: Outputs, as `answer` writes them.
         rows: Which of them each picture has.
-        slopes: Gradient of the logits. Shape: (pictures, actions).
+        grad_output: Gradient of the logits. Shape: (pictures, actions).
         rooms: For gradients of outputs, one a member.
         sides: For inputs of linear layers, of a block's pictures side by side, one a member.
         patches: For those of inputs of one convolution, one a member.
@@ -160,51 +160,51 @@ def learn(
     if gradients.shape[0] > 0:
         total = gradients[member]
     side = sides[member]
-    top = lesson.geometry.shape[0] - 1
+    top = params.geometry.shape[0] - 1
     for block in range(first, last, BLOCK):
         end = wp.min(block + BLOCK, last)
         for picture in range(block, end):
-            _begin(lesson, picture, picture - block, made, rows, slopes[picture], room, side)
+            _begin(params, picture, picture - block, made, rows, grad_output[picture], room, side)
         for down in range(top + 1):
             layer = top - down
             if gradients.shape[0] > 0:
-                _notice(lesson, layer, block, end, pictures, made, rows, side, room, total)
-            if layer >= lesson.num_convolutions:
-                _linear(lesson, layer, end - block, side, room)
+                _notice(params, layer, block, end, pictures, made, rows, side, room, total)
+            if layer >= params.num_convolutions:
+                _linear(params, layer, end - block, side, room)
             else:
                 for picture in range(block, end):
                     _convolution(
-                        lesson, layer, picture, block, made, rows, room, patches[member], seen
+                        params, layer, picture, block, made, rows, room, patches[member], seen
                     )
 
 
 @wp.func
 def _begin(
-    lesson: Lesson,
+    params: PackedParams,
     picture: int,
     number: int,
     made: wp.array[float],
     rows: wp.array[int],
-    slopes: wp.array[float],
+    grad_output: wp.array[float],
     room: wp.array[float],
     side: wp.array[float],
 ) -> None:
     """Writes the gradient of a picture's logits, of those that fill up 0, and its linear inputs."""
-    inputs_at = lesson.made_at[lesson.num_convolutions - 1]
-    top = lesson.geometry.shape[0] - 1
-    given_at = rows[picture] * _size(lesson) + inputs_at
-    copy(made, given_at, side, number * lesson.near, lesson.made_at[top] - inputs_at)
-    at = BLOCK * lesson.made_at[top] + number * _stride(lesson, top)
-    for action in range(lesson.geometry[top, 7]):
+    inputs_at = params.made_at[params.num_convolutions - 1]
+    top = params.geometry.shape[0] - 1
+    given_at = rows[picture] * _size(params) + inputs_at
+    copy(made, given_at, side, number * params.near, params.made_at[top] - inputs_at)
+    at = BLOCK * params.made_at[top] + number * _stride(params, top)
+    for action in range(params.geometry[top, 7]):
         slope = float(0.0)
-        if action < slopes.shape[0]:
-            slope = slopes[action]
+        if action < grad_output.shape[0]:
+            slope = grad_output[action]
         room[at + action] = slope
 
 
 @wp.func
 def _notice(
-    lesson: Lesson,
+    params: PackedParams,
     layer: int,
     block: int,
     end: int,
@@ -216,31 +216,31 @@ def _notice(
     gradients: wp.array[float],
 ) -> None:
     """Adds to the gradient of a layer's weights."""
-    deltas_at = BLOCK * lesson.made_at[layer]
-    stride = _stride(lesson, layer)
+    deltas_at = BLOCK * params.made_at[layer]
+    stride = _stride(params, layer)
     count = end - block
-    if layer >= lesson.num_convolutions:
-        at = lesson.made_at[layer - 1] - lesson.made_at[lesson.num_convolutions - 1]
-        near = lesson.near
-        _add(lesson, layer, side, at, room, deltas_at, gradients, count, count, 0, near)
+    if layer >= params.num_convolutions:
+        at = params.made_at[layer - 1] - params.made_at[params.num_convolutions - 1]
+        near = params.near
+        _add(params, layer, side, at, room, deltas_at, gradients, count, count, 0, near)
         return
-    places = lesson.geometry[layer, 0]
-    columns = lesson.geometry[layer, 1]
-    down = lesson.geometry[layer, 2]
-    across = lesson.geometry[layer, 3]
+    places = params.geometry[layer, 0]
+    columns = params.geometry[layer, 1]
+    down = params.geometry[layer, 2]
+    across = params.geometry[layer, 3]
     for picture in range(block, end):
         by = deltas_at + (picture - block) * stride
         if layer == 0:
             given = pictures[picture]
-            _add(lesson, layer, given, 0, room, by, gradients, places, columns, down, across)
+            _add(params, layer, given, 0, room, by, gradients, places, columns, down, across)
         else:
-            at = rows[picture] * _size(lesson) + lesson.made_at[layer - 1]
-            _add(lesson, layer, made, at, room, by, gradients, places, columns, down, across)
+            at = rows[picture] * _size(params) + params.made_at[layer - 1]
+            _add(params, layer, made, at, room, by, gradients, places, columns, down, across)
 
 
 @wp.func
 def _add(
-    lesson: Lesson,
+    params: PackedParams,
     layer: int,
     given: wp.array[float],
     given_at: int,
@@ -252,54 +252,54 @@ def _add(
     down: int,
     across: int,
 ) -> None:
-    outs = lesson.geometry[layer, 7]
+    outs = params.geometry[layer, 7]
     accumulate(
         given,
         given_at,
         room,
         deltas_at,
         gradients,
-        lesson.weights_at[layer],
+        params.weights_at[layer],
         rows,
         columns,
         down,
         across,
-        lesson.geometry[layer, 4],
-        lesson.geometry[layer, 5],
-        lesson.geometry[layer, 6],
+        params.geometry[layer, 4],
+        params.geometry[layer, 5],
+        params.geometry[layer, 6],
         outs,
-        wp.where(layer < lesson.num_convolutions, outs, _stride(lesson, layer)),
+        wp.where(layer < params.num_convolutions, outs, _stride(params, layer)),
     )
 
 
 @wp.func
 def _linear(
-    lesson: Lesson, layer: int, count: int, side: wp.array[float], room: wp.array[float]
+    params: PackedParams, layer: int, count: int, side: wp.array[float], room: wp.array[float]
 ) -> None:
     """From the gradient of a linear layer's outputs to that of its inputs."""
-    size = lesson.geometry[layer, 5]
-    stride = _stride(lesson, layer - 1)
-    before_at = BLOCK * lesson.made_at[layer - 1]
+    size = params.geometry[layer, 5]
+    stride = _stride(params, layer - 1)
+    before_at = BLOCK * params.made_at[layer - 1]
     _back(
-        lesson,
+        params,
         layer,
         room,
-        BLOCK * lesson.made_at[layer],
+        BLOCK * params.made_at[layer],
         room,
         before_at,
         count,
-        _stride(lesson, layer),
+        _stride(params, layer),
         size,
         stride,
     )
-    given_at = lesson.made_at[layer - 1] - lesson.made_at[lesson.num_convolutions - 1]
+    given_at = params.made_at[layer - 1] - params.made_at[params.num_convolutions - 1]
     for row in range(count):
-        rectify(room, before_at + row * stride, side, given_at + row * lesson.near, size)
+        rectify(room, before_at + row * stride, side, given_at + row * params.near, size)
 
 
 @wp.func
 def _convolution(
-    lesson: Lesson,
+    params: PackedParams,
     layer: int,
     picture: int,
     block: int,
@@ -312,25 +312,25 @@ def _convolution(
     """The same of a convolution and one picture; the first is asked only if that is wanted."""
     if layer == 0 and seen.shape[0] == 0:
         return
-    outs = lesson.geometry[layer, 7]
-    size = lesson.geometry[layer, 4] * lesson.geometry[layer, 5]
-    deltas_at = BLOCK * lesson.made_at[layer] + (picture - block) * _stride(lesson, layer)
-    places = lesson.geometry[layer, 0]
-    _back(lesson, layer, room, deltas_at, patches, 0, places, outs, size, size)
+    outs = params.geometry[layer, 7]
+    size = params.geometry[layer, 4] * params.geometry[layer, 5]
+    deltas_at = BLOCK * params.made_at[layer] + (picture - block) * _stride(params, layer)
+    places = params.geometry[layer, 0]
+    _back(params, layer, room, deltas_at, patches, 0, places, outs, size, size)
     if layer == 0:
-        _fold(lesson, layer, patches, seen[picture], 0, seen.shape[1])
+        _fold(params, layer, patches, seen[picture], 0, seen.shape[1])
         return
     before = layer - 1
-    before_at = BLOCK * lesson.made_at[before] + (picture - block) * _stride(lesson, before)
-    num_made = lesson.geometry[before, 0] * lesson.geometry[before, 7]
-    _fold(lesson, layer, patches, room, before_at, num_made)
-    given_at = rows[picture] * _size(lesson) + lesson.made_at[before]
+    before_at = BLOCK * params.made_at[before] + (picture - block) * _stride(params, before)
+    num_made = params.geometry[before, 0] * params.geometry[before, 7]
+    _fold(params, layer, patches, room, before_at, num_made)
+    given_at = rows[picture] * _size(params) + params.made_at[before]
     rectify(room, before_at, made, given_at, num_made)
 
 
 @wp.func
 def _back(
-    lesson: Lesson,
+    params: PackedParams,
     layer: int,
     deltas: wp.array[float],
     deltas_at: int,
@@ -341,12 +341,12 @@ def _back(
     num_outs: int,
     made_down: int,
 ) -> None:
-    outs = lesson.geometry[layer, 7]
+    outs = params.geometry[layer, 7]
     multiply(
         deltas,
         deltas_at,
-        lesson.back,
-        lesson.back_at[layer],
+        params.back,
+        params.back_at[layer],
         made,
         made_at,
         rows,
@@ -364,7 +364,7 @@ def _back(
 
 @wp.func
 def _fold(
-    lesson: Lesson,
+    params: PackedParams,
     layer: int,
     patches: wp.array[float],
     made: wp.array[float],
@@ -376,11 +376,11 @@ def _fold(
         made,
         made_at,
         size,
-        lesson.geometry[layer, 0],
-        lesson.geometry[layer, 1],
-        lesson.geometry[layer, 2],
-        lesson.geometry[layer, 3],
-        lesson.geometry[layer, 4],
-        lesson.geometry[layer, 5],
-        lesson.geometry[layer, 6],
+        params.geometry[layer, 0],
+        params.geometry[layer, 1],
+        params.geometry[layer, 2],
+        params.geometry[layer, 3],
+        params.geometry[layer, 4],
+        params.geometry[layer, 5],
+        params.geometry[layer, 6],
     )

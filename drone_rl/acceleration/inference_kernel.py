@@ -48,7 +48,7 @@ def answer(
                 logits[first + row, action] = room[at + action]
 
 
-class Answers:
+class BatchedInference:
     """Logits of a network that learns no more; any number of threads may ask at a time."""
 
     def __init__(self, network: nn.Module) -> None:

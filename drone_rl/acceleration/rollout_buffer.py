@@ -7,7 +7,7 @@ import torch
 from torch import Tensor
 
 
-class Logbook:
+class RolloutBuffer:
     """A row a step, part after part, as long as any flight goes on.
 
     Its memory is used again, and so is that of what was read once nobody holds any of it: new

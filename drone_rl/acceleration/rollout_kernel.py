@@ -29,7 +29,7 @@ wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 
 @wp.struct
-class Eye:
+class CameraView:
     """What draws, and what becomes of a picture before the network sees it."""
 
     view: View
@@ -43,7 +43,7 @@ class Eye:
 
 
 @wp.struct
-class Log:
+class RolloutLog:
     """What is written down, a row a step; each world has as many rows as there may be steps."""
 
     pictures: Pictures
@@ -99,13 +99,13 @@ def _see(
     last: int,
     step: int,
     member: int,
-    eye: Eye,
+    eye: CameraView,
     layers: Layers,
     room: wp.array[float],
     flights: Flights,
     poses: Poses,
     steps: int,
-    log: Log,
+    log: RolloutLog,
 ) -> int:
     """Draws what is seen in worlds that go on, and begins to look. Returns how many these are."""
     going = int(0)
@@ -134,7 +134,7 @@ def _act(
     room: wp.array[float],
     flights: Flights,
     draws: wp.array2d[float],
-    log: Log,
+    log: RolloutLog,
 ) -> None:
     """Acts in the same worlds, once it is decided."""
     at = int(layers.logits_at)
@@ -160,13 +160,13 @@ def fly(
     first: int,
     last: int,
     member: int,
-    eye: Eye,
+    eye: CameraView,
     layers: Layers,
     rooms: wp.array2d[float],
     flights: Flights,
     poses: Poses,
     draws: wp.array2d[float],
-    log: Log,
+    log: RolloutLog,
 ) -> None:
     """Flies worlds that have not ended, to their ends or for as many steps as the log has room.
 

@@ -13,7 +13,7 @@ from torch import Tensor
 from torchrl.envs import EnvBase
 
 from drone_rl.acceleration.fused_collector import Flight
-from drone_rl.acceleration.fused_network import KnownOutputs
+from drone_rl.acceleration.fused_network import ActivationCache
 from drone_rl.collectors.ways import StraightWay, find_way
 from drone_rl.collectors.worlds_collector import WorldsCollector
 
@@ -98,9 +98,9 @@ class EpisodeCollector(WorldsCollector):
             indices = indices[~after["next", "done"].flatten()]
         return _join(steps, worlds, flying)
 
-    def keep_outputs(self) -> KnownOutputs | None:
+    def cache_activations(self) -> ActivationCache | None:
         """See `WorldsCollector`."""
-        return None if self._flight is None else self._flight.keep_outputs()
+        return None if self._flight is None else self._flight.cache_activations()
 
     def shutdown(
         self, timeout: float | None = None, close_env: bool = True, raise_on_error: bool = True

@@ -1,6 +1,6 @@
 """Ways through episodes one after the other: worlds that go on, each beginning anew where one ends.
 
-There is TorchRL's way, and a straight one (`Sight`); both give the same, bit for bit.
+There is TorchRL's way, and a straight one (`DirectRenderer`); both give the same, bit for bit.
 """
 
 from collections.abc import Iterable, Mapping
@@ -13,7 +13,7 @@ from torch import Tensor
 from torchrl.envs import EnvBase
 
 from drone_rl.collectors.worlds_collector import ballast
-from drone_rl.envs.direct_renderer import Entries, Sight
+from drone_rl.envs.direct_renderer import DirectRenderer, Entries
 
 
 class WorldStream(Protocol):
@@ -133,7 +133,7 @@ class TorchrlStream:
 class StraightStream:
     """By the worlds themselves."""
 
-    def __init__(self, sight: Sight) -> None:
+    def __init__(self, sight: DirectRenderer) -> None:
         """Takes an environment's worlds over."""
         self._sight = sight
         self._pixels: Tensor | None = None
@@ -193,5 +193,5 @@ def find_stream(
         kept: ("next", ...) entries that are kept of each step.
     """
     observed, kept = tuple(observed), tuple(kept)
-    sight = Sight.find(env, observed, kept)
+    sight = DirectRenderer.find(env, observed, kept)
     return TorchrlStream(env, observed, kept) if sight is None else StraightStream(sight)

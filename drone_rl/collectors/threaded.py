@@ -12,7 +12,7 @@ from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torchrl.collectors import BaseCollector
 
-from drone_rl.acceleration.fused_network import KnownOutputs
+from drone_rl.acceleration.fused_network import ActivationCache
 from drone_rl.collectors.worlds_collector import WorldsCollector
 
 
@@ -50,9 +50,9 @@ class ThreadedCollector(BaseCollector):
         """The policy that learns."""
         return self.collectors[0].actor
 
-    def keep_outputs(self) -> KnownOutputs | None:
+    def cache_activations(self) -> ActivationCache | None:
         """See `WorldsCollector`; None where batches are joined, whose pictures are copies."""
-        return self.collectors[0].keep_outputs() if len(self.collectors) == 1 else None
+        return self.collectors[0].cache_activations() if len(self.collectors) == 1 else None
 
     def iterator(self) -> Iterator[TensorDictBase]:
         """Yields batches without end; what a `for` over the collector goes through."""

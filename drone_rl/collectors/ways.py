@@ -1,6 +1,6 @@
 """Ways through episodes: from the actions of some worlds to what is seen in those that go on.
 
-There is TorchRL's way, and a straight one (`Sight`); both give the same, bit for bit.
+There is TorchRL's way, and a straight one (`DirectRenderer`); both give the same, bit for bit.
 """
 
 from collections.abc import Iterable
@@ -13,7 +13,7 @@ from torch import Tensor
 from torchrl.envs import EnvBase
 
 from drone_rl.collectors.worlds_collector import ballast, take_rows
-from drone_rl.envs.direct_renderer import Entries, Sight
+from drone_rl.envs.direct_renderer import DirectRenderer, Entries
 from drone_rl.sim.tasks import State
 
 
@@ -77,7 +77,7 @@ class StraightWay:
     The worlds of the environment stay as they were at the start.
     """
 
-    def __init__(self, sight: Sight) -> None:
+    def __init__(self, sight: DirectRenderer) -> None:
         """Takes an environment's worlds over."""
         self.sight = sight
         self._going: Any = None
@@ -110,5 +110,5 @@ def find_way(env: EnvBase, observed: Iterable[NestedKey], kept: Iterable[NestedK
         kept: ("next", ...) entries that are kept of each step.
     """
     observed, kept = tuple(observed), tuple(kept)
-    sight = Sight.find(env, observed, kept)
+    sight = DirectRenderer.find(env, observed, kept)
     return TorchrlWay(env, observed, kept) if sight is None else StraightWay(sight)

@@ -15,7 +15,7 @@ from torch import Tensor, nn
 from torchrl.collectors import BaseCollector
 from torchrl.envs import EnvBase
 
-from drone_rl.acceleration.fused_network import KnownOutputs
+from drone_rl.acceleration.fused_network import ActivationCache
 from drone_rl.utils.errors import InputError
 
 
@@ -63,7 +63,7 @@ class WorldsCollector(BaseCollector):
         """The environment itself, without the transforms before it."""
         return getattr(self.env, "base_env", self.env)
 
-    def keep_outputs(self) -> KnownOutputs | None:
+    def cache_activations(self) -> ActivationCache | None:
         """Keeps what the network makes of pictures from the next batch on, for who learns from it.
 
         No result depends on it.

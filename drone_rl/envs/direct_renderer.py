@@ -23,7 +23,7 @@ FLAGS = ("reward", "done", "terminated", "truncated")
 _REASON = ("next", "info", "end_reason")
 
 
-class Sight:
+class DirectRenderer:
     """What an actor sees of worlds, and what is told of a step, without steps of TorchRL.
 
     Where the first of the transforms makes pictures gray, they are drawn so.

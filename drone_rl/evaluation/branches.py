@@ -6,7 +6,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from drone_rl.envs.direct_renderer import Sight
+from drone_rl.envs.direct_renderer import DirectRenderer
 from drone_rl.evaluation.metrics import Episodes
 from drone_rl.policies.rounding import Decide
 from drone_rl.sim.tasks import State
@@ -28,7 +28,7 @@ class Outcomes:
 
 
 @torch.no_grad()
-def follow(sight: Sight, decide: Decide, worlds: Tensor) -> Outcomes:
+def follow(sight: DirectRenderer, decide: Decide, worlds: Tensor) -> Outcomes:
     """Fly episodes from their starts, with every possible action wherever there are several.
 
     Args:

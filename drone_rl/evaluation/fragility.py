@@ -11,7 +11,7 @@ from torch import Tensor
 from torchrl.envs import EnvBase
 
 from drone_rl.envs import worlds_of
-from drone_rl.envs.direct_renderer import Sight
+from drone_rl.envs.direct_renderer import DirectRenderer
 from drone_rl.evaluation.branches import Outcomes, follow
 from drone_rl.evaluation.evaluator import StepLog
 from drone_rl.evaluation.greedy_flights import (
@@ -280,7 +280,7 @@ def _fly(
     env: EnvBase, decide: Decide, network: PictureNetwork, episodes: int
 ) -> tuple[_Seen, list[Tensor]]:
     """Flies and looks at each frame. Returns also the actions of each episode."""
-    sight = Sight.find(env, ("pixels",), ())
+    sight = DirectRenderer.find(env, ("pixels",), ())
     is_counted = isinstance(network.actions, DiscreteActions)
     fragile, followed, log, finals, first = [], [], StepLog(), [], 0
     before = streams(env)

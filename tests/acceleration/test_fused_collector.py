@@ -8,7 +8,7 @@ from torchrl.envs import RewardSum
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
 from drone_rl.acceleration import fused_collector as flight_module
-from drone_rl.acceleration.fused_network import LearningNetwork
+from drone_rl.acceleration.fused_network import FusedNetwork
 from drone_rl.collectors import EpisodeCollector
 from drone_rl.config import AppearanceSettings, DynamicsSettings, PillarsSettings, TaskSettings
 from drone_rl.envs import CropRows, DroneEnv, GrayPixels, StandardizePixels, with_transforms
@@ -168,8 +168,8 @@ def test_what_the_layers_made_is_what_they_would_make_again(longest, is_greedy, 
     monkeypatch.setattr(flight_module, "_LONGEST", longest)
     collector = make(num_envs=35, num_cores=2)
     network = collector.actor.module[0].module
-    quick, plain = LearningNetwork(network, 2), LearningNetwork(network, 2)
-    quick.known = known = collector.keep_outputs()
+    quick, plain = FusedNetwork(network, 2), FusedNetwork(network, 2)
+    quick.known = known = collector.cache_activations()
     weights = collector._flight._network.weights
     for _ in range(2):
         kind = DETERMINISTIC if is_greedy else ExplorationType.RANDOM
@@ -190,8 +190,8 @@ def test_what_the_layers_made_is_what_they_would_make_again(longest, is_greedy, 
 
 def test_another_flight_writes_over_what_was_made():
     collector = make()
-    network = LearningNetwork(collector.actor.module[0].module)
-    network.known = collector.keep_outputs()
+    network = FusedNetwork(collector.actor.module[0].module)
+    network.known = collector.cache_activations()
     batch = collector.collect()
     logits = network(batch["pixels"])
     other = collector.collect()
@@ -205,28 +205,28 @@ def test_another_flight_writes_over_what_was_made():
 
 @pytest.mark.parametrize(("parts", "is_known"), [(0, False), (2, False), (6, True)])
 def test_what_the_layers_made_is_kept_as_far_as_there_is_room(parts, is_known, monkeypatch):
-    size = make().keep_outputs().outputs.shape[1]
+    size = make().cache_activations().outputs.shape[1]
     monkeypatch.setattr(flight_module, "_LONGEST", 2)
     monkeypatch.setattr(flight_module, "_MOST_OUTPUTS", parts * 5 * 2 * size)
     collector = make()
-    known = collector.keep_outputs()
+    known = collector.cache_activations()
     batch = collector.collect()
     assert 4 < batch["collector", "traj_ids"].bincount().max() <= 12
     assert (known is None) is (parts == 0)
     if known is not None:
         rows = known.find(batch["pixels"].flatten(1), collector._flight._network.weights)
         assert (rows is not None) is is_known
-    network = LearningNetwork(collector.actor.module[0].module)
+    network = FusedNetwork(collector.actor.module[0].module)
     network.known = known
     assert torch.equal(network(batch["pixels"]), batch["logits"])
 
 
 def test_nothing_is_kept_that_nobody_asked_for_or_that_has_no_pictures():
     assert make()._flight._known is None
-    assert make(is_compiled=False).keep_outputs() is None
+    assert make(is_compiled=False).cache_activations() is None
     collector = make(keep_observations=False)
-    known = collector.keep_outputs()
-    assert known is not None and collector.keep_outputs() is known
+    known = collector.cache_activations()
+    assert known is not None and collector.cache_activations() is known
     assert "pixels" not in collector.collect()
 
 

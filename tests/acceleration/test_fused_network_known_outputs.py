@@ -3,13 +3,13 @@
 import pytest
 import torch
 
-from drone_rl.acceleration.fused_network import KnownOutputs
+from drone_rl.acceleration.fused_network import ActivationCache
 
 WEIGHTS = torch.tensor([1.0, -2.0])
 
 
 def noted(pictures):
-    known = KnownOutputs(8, 3)
+    known = ActivationCache(8, 3)
     known.forget()
     known.note(pictures, torch.tensor([6, 0, 1, 7]), WEIGHTS)
     return known
@@ -75,14 +75,14 @@ def test_not_once_they_are_forgotten():
 def test_nothing_is_known_where_there_was_no_room_for_all():
     pictures = torch.rand(2, 10)
     for last, is_known in ((7, True), (8, False)):
-        known = KnownOutputs(8, 3)
+        known = ActivationCache(8, 3)
         known.note(pictures, torch.tensor([0, last]), WEIGHTS)
         assert (known.find(pictures, WEIGHTS) is not None) is is_known
 
 
 def test_nothing_is_known_at_first_and_of_what_has_no_history():
     pictures = torch.rand(4, 10)
-    assert KnownOutputs(8, 3).find(pictures, WEIGHTS) is None
-    assert KnownOutputs(8, 3).find(torch.empty(0, 10), torch.empty(0)) is None
+    assert ActivationCache(8, 3).find(pictures, WEIGHTS) is None
+    assert ActivationCache(8, 3).find(torch.empty(0, 10), torch.empty(0)) is None
     with torch.inference_mode():
         assert noted(pictures).find(torch.rand(4, 10), WEIGHTS) is None

@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from drone_rl.acceleration.fused_network import KnownOutputs, LearningNetwork
+from drone_rl.acceleration.fused_network import ActivationCache, FusedNetwork
 from drone_rl.acceleration.packed_layers import outputs_at, packed_layers
 from tests.policies.halves import draw_weights, halves, made, taught
 
@@ -21,7 +21,7 @@ from tests.policies.halves import draw_weights, halves, made, taught
 )
 def test_gradients_are_torchs(shape, options, num_threads):
     network = made(shape, **options)
-    learning = LearningNetwork.find(network, num_threads)
+    learning = FusedNetwork.find(network, num_threads)
     for count in (150, 1, 2, 65):  # more than a block a thread; fewer than threads; smaller ones
         pictures, weights = halves(count, *shape), halves(count, 3)
         logits, expected = taught(network, network, pictures, weights)
@@ -41,7 +41,7 @@ def test_gradients_are_torchs(shape, options, num_threads):
 )
 def test_gradients_of_pictures_are_torchs(shape, options):
     network = made(shape, **options)
-    learning = LearningNetwork.find(network, of="pictures")
+    learning = FusedNetwork.find(network, of="pictures")
     pictures, weights = halves(70, *shape).requires_grad_(), halves(70, 3)
     expected, found = (
         torch.autograd.grad((by(pictures) * weights).sum(), pictures)[0]
@@ -64,8 +64,8 @@ def test_gradients_of_pictures_are_torchs(shape, options):
 )
 def test_gradients_from_known_outputs_in_any_order_are_torchs(first, last):
     network = made((1, 12, 20), channels=(5, 6), hidden=(9, 7))
-    learning = LearningNetwork.find(network, 2)
-    learning.known = known = KnownOutputs(100, outputs_at(packed_layers(network))[-1])
+    learning = FusedNetwork.find(network, 2)
+    learning.known = known = ActivationCache(100, outputs_at(packed_layers(network))[-1])
     pictures, weights = halves(70, 1, 12, 20), halves(last - first, 3)
     learning(pictures)  # makes room for the weights; nothing is known yet
     work = learning._work

@@ -7,14 +7,16 @@ import torch
 import warp as wp
 from tensordict import TensorDict
 
-from drone_rl.acceleration.rollout_buffer import Logbook, is_free
+from drone_rl.acceleration.rollout_buffer import RolloutBuffer, is_free
 from drone_rl.sim.rendering.devices import start_warp
 
 start_warp("cpu")
 
 
 def make(num_rows=4):
-    return Logbook({"action": torch.zeros(num_rows, dtype=int), "pixels": torch.zeros(num_rows, 2)})
+    return RolloutBuffer(
+        {"action": torch.zeros(num_rows, dtype=int), "pixels": torch.zeros(num_rows, 2)}
+    )
 
 
 def write(room, *numbers):

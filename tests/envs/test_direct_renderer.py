@@ -5,7 +5,7 @@ import torch
 
 from drone_rl.config import TaskSettings
 from drone_rl.envs import CropRows, DroneEnv, GrayPixels, RgbPixels, with_transforms
-from drone_rl.envs.direct_renderer import FLAGS, Sight
+from drone_rl.envs.direct_renderer import FLAGS, DirectRenderer
 
 SHORT = TaskSettings(num_cubes=2, first_distance=3.0, spacing=3.0, step_limit=5)
 KEPT = [("next", name) for name in FLAGS]
@@ -20,7 +20,7 @@ class Dark(GrayPixels):
 )
 def test_gray_is_drawn_gray_and_the_same(first, modality):
     env = with_transforms(DroneEnv(3, SHORT), [first, CropRows(5, 25)])
-    sight = Sight.find(env, ["pixels"], KEPT)
+    sight = DirectRenderer.find(env, ["pixels"], KEPT)
     assert sight.view.modalities == (modality,)
     seen = env.reset()["pixels"]
     assert torch.equal(sight.look(env.base_env.worlds.state)["pixels"], seen)
@@ -30,7 +30,7 @@ def test_gray_is_drawn_gray_and_the_same(first, modality):
 def test_a_step_is_told_as_torchrl_tells_it():
     reason = ("next", "info", "end_reason")
     env = with_transforms(DroneEnv(3, SHORT), [GrayPixels()])
-    sight = Sight.find(env, ["pixels"], [*KEPT, reason])
+    sight = DirectRenderer.find(env, ["pixels"], [*KEPT, reason])
     state = env.reset()
     action = torch.tensor([0, 1, 2])
     for step in range(5):

@@ -1,7 +1,7 @@
 import torch
 
 import drone_rl
-from drone_rl.envs.direct_renderer import Sight
+from drone_rl.envs.direct_renderer import DirectRenderer
 from drone_rl.evaluation.branches import MOST, follow
 from drone_rl.policies.rounding import Decisions
 from drone_rl.sim.actions import Move
@@ -11,7 +11,7 @@ from drone_rl.sim.tasks.collect_cubes.rules import EndReason
 def ends(possible):
     with drone_rl.load_policy("good").flying(3, seed=0) as (env, _):
         env.reset()
-        sight = Sight.find(env, ("pixels",), ())
+        sight = DirectRenderer.find(env, ("pixels",), ())
 
         def decide(pixels):
             return Decisions(torch.zeros(len(pixels), 3), possible(pixels))

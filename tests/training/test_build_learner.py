@@ -10,7 +10,7 @@ from torchrl.collectors import Collector
 from torchrl.objectives.value import GAE
 
 import drone_rl
-from drone_rl.acceleration.fused_network import KnownOutputs, LearningNetwork
+from drone_rl.acceleration.fused_network import ActivationCache, FusedNetwork
 from drone_rl.config import TaskSettings
 from drone_rl.config.collecting import Rollouts, Threads
 from drone_rl.config.judging import FlightSettings
@@ -68,7 +68,7 @@ def test_gradients_by_the_kernel_teach_what_those_of_torch_do():
         made = build_collector(settings)
         learner = build_learner(settings, made)
         network = learner.loss.actor_network.module[0].module
-        assert isinstance(network, LearningNetwork) is is_compiled
+        assert isinstance(network, FusedNetwork) is is_compiled
         before = [p.detach().clone() for p in made.network.parameters()]
         batch = next(iter(made.collector))
         assert len(batch) > 2 * limits.minibatch_frames
@@ -108,13 +108,13 @@ def test_what_the_network_made_is_kept_where_it_is_learned_from(settings, is_kep
 def test_what_was_made_in_flight_is_taken_and_teaches_the_same(monkeypatch):
     learned, taken = [], []
     for is_known in (True, False):
-        find = KnownOutputs.find
+        find = ActivationCache.find
 
         def note(self, *given, find=find, is_known=is_known):
             taken.append(find(self, *given))
             return taken[-1] if is_known else None
 
-        monkeypatch.setattr(KnownOutputs, "find", note)
+        monkeypatch.setattr(ActivationCache, "find", note)
         settings = TrainSettings(task=TASK, trainer=TrainerSettings(minibatch_frames=40))
         made = build_collector(settings)
         learner, batches = build_learner(settings, made), iter(made.collector)
