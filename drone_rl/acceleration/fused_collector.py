@@ -1,11 +1,7 @@
-# pyright: reportAttributeAccessIssue=false
-# pyright: reportGeneralTypeIssues=false
-# pyright: reportCallIssue=false
-# (Warp's structures are untyped, and torch's modules hold anything.)
-"""Complete episodes flown by one kernel, with no Python between their steps.
+"""Collects complete episodes in one fused kernel, without Python between their steps.
 
-Where Python takes each step, it takes most of the time: a small network is asked about a picture in
-ten microseconds, and a picture drawn in as many.
+Stepping in Python takes most of the time: a small network is evaluated on a frame in ten
+microseconds, and a frame is rendered in as many.
 """
 
 from collections.abc import Mapping
@@ -14,15 +10,15 @@ from typing import Any, Self
 import torch
 import warp as wp
 from tensordict import TensorDict, TensorDictBase
-from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 from torchrl.envs.utils import ExplorationType
 
 from drone_rl.acceleration import rollout_kernel
-from drone_rl.acceleration.fused_network import ActivationCache
-from drone_rl.acceleration.packed_layers import PackedNetwork
+from drone_rl.acceleration.direct_collector import DirectCollector
+from drone_rl.acceleration.fused_network import ACTIVATIONS, ActivationCache
+from drone_rl.acceleration.packed_layers import PackedNetwork, unsupported
 from drone_rl.acceleration.rollout_buffer import RolloutBuffer
-from drone_rl.envs.direct_renderer import DirectRenderer, Entries
+from drone_rl.envs.direct_renderer import DirectRenderer, Entries, Reasons
 from drone_rl.envs.transforms import StandardizePixels
 from drone_rl.policies.actor import CategoricalActor
 from drone_rl.policies.finite import require_finite
@@ -32,39 +28,50 @@ from drone_rl.sim.rendering.raytrace.renderer import Raytracer
 from drone_rl.sim.rendering.raytrace.structs import Pictures
 from drone_rl.sim.tasks.collect_cubes.flying import FlyingCubes
 
-_LONGEST = 64
-"""Steps that are flown at a time; most episodes end within them."""
-_MOST_NUMBERS = 2**23
-"""Of the pictures that are flown through at a time."""
-_MOST_OUTPUTS = 2**24
-"""Numbers that layers make of pictures and that are kept: 64 MiB."""
+_MAX_STEPS = 64
+"""Steps of one launch of the kernel; most episodes end within them."""
+_MAX_PIXELS = 2**23
+"""Of the frames of one launch."""
+_MAX_ACTIVATIONS = 2**24
+"""Numbers that are cached: 64 MiB."""
 
 
 class FusedCollector:
-    """Flies the policy of an actor in the worlds of an environment."""
+    """Collects complete episodes; renderer, network and task run in one kernel.
+
+    The state that the environment itself holds stays as it is at the start of the episodes.
+    """
+
+    implementation = "fused kernel"
+    name = "fused collector"
+    reasons = Reasons()
 
     def __init__(
         self,
-        sight: DirectRenderer,
-        actor: CategoricalActor,
+        direct: DirectCollector,
         network: PackedNetwork,
         worlds: FlyingCubes,
-        num_cores: int,
+        num_threads: int,
     ) -> None:
-        """Makes what the kernel needs; see `find`."""
-        self._sight, self._actor, self._network, self._worlds = sight, actor, network, worlds
-        count, view = sight.worlds.num_worlds, sight.view
-        self._crew = Crew(count, num_cores)
-        tools = sight.worlds.renderer.tools(view, self._crew.size)
-        self._eye = rollout_kernel.CameraView()
-        self._eye.view, self._eye.geoms, self._eye.looks, self._eye.desk = tools
-        self._eye.mean, self._eye.deviation = _standard(sight)
+        """Allocates what the kernel needs; see `try_create`."""
+        self._direct, actor = direct, direct.actor
+        assert isinstance(actor, CategoricalActor)
+        self._actor = actor
+        renderer = self._renderer = direct.renderer
+        self._network, self._worlds = network, worlds
+        count, view = renderer.worlds.num_worlds, renderer.view
+        self._crew = Crew(count, num_threads)
+        raytracer: Any = renderer.worlds.renderer
+        tools = raytracer.tools(view, self._crew.size)
+        eye = self._eye = rollout_kernel.CameraView()
+        eye.view, eye.geoms, eye.looks, eye.desk = tools
+        eye.mean, eye.deviation = _mean_and_deviation(renderer)
         self._rooms = wp.empty((self._crew.size, network.room), dtype=float, device="cpu")
         pixels = view.height * view.width
-        self._length = max(1, min(_LONGEST, _MOST_NUMBERS // (count * pixels)))
+        self._length = max(1, min(_MAX_STEPS, _MAX_PIXELS // (count * pixels)))
         self._num_rows = rows = count * self._length
-        num_actions = sight.worlds.dynamics.actions.num_outputs
-        self._book = RolloutBuffer(
+        num_actions = renderer.worlds.dynamics.actions.num_outputs
+        self._buffer = RolloutBuffer(
             {
                 "pixels": torch.empty(rows, 1, view.height, view.width),
                 "logits": torch.empty(rows, num_actions),
@@ -73,122 +80,113 @@ class FusedCollector:
                 "end_reason": torch.empty(rows, dtype=torch.int32),
             }
         )
-        self._known: ActivationCache | None = None
+        self._cache: ActivationCache | None = None
         self._logits = torch.empty(0, num_actions)
-        self._owner = getattr(actor.network, "owner", "the policy")
-        loading(flight_kernel)
+        self._owner = getattr(self._actor.network, "owner", "the policy")
+        loading(rollout_kernel)
 
     @classmethod
-    def find(
-        cls, sight: DirectRenderer, actor: TensorDictModuleBase, num_cores: int
-    ) -> Self | None:
-        """The same, where task, pictures, network and renderer are such as the kernel knows.
+    def try_create(cls, direct: DirectCollector, num_threads: int) -> Self | Reasons:
+        """Return the fused collector, or the reasons why the kernel does not support it.
 
         Args:
-            sight: Of the environment.
-            actor: The policy.
-            num_cores: Shares of the worlds, each on a thread; no result depends on it.
+            direct: The same collector, stepping in Python.
+            num_threads: Groups of environments; no result depends on it.
         """
-        if type(actor) is not CategoricalActor:
-            return None
-        worlds, renderer = sight.worlds, sight.worlds.renderer
-        is_drawn = type(renderer) is Raytracer and renderer.device.type == "cpu"
-        if not is_drawn or sight.view.modalities != ("gray",) or _standard(sight) is None:
-            return None
-        if worlds.appearance is not None:
-            return None
-        network = PackedNetwork.find(actor.network, rollout_kernel.TOGETHER)
+        reasons = [*_not_fused(direct.renderer), *_not_fused_policy(direct)]
+        worlds = direct.renderer.worlds
         flown = FlyingCubes.find(worlds.task, worlds.dynamics, worlds.num_worlds)
-        if network is None or flown is None:
-            return None
-        return cls(sight, actor, network, flown, num_cores)
-
-    def can_act(self) -> bool:
-        """Whether actions shall be drawn, or the most probable be taken."""
-        return self._actor.exploration in (ExplorationType.RANDOM, ExplorationType.DETERMINISTIC)
+        if flown is None:
+            names = f"{type(worlds.task).__name__} with {type(worlds.dynamics).__name__}"
+            reasons.append(f"task {names} is not fused")
+        if reasons or flown is None:
+            return Reasons(reasons)
+        actor: Any = direct.actor
+        network = PackedNetwork(actor.network, int(rollout_kernel.TOGETHER))
+        return cls(direct, network, flown, num_threads)
 
     def cache_activations(self) -> ActivationCache | None:
-        """Keeps what all layers make of pictures from now on, where it is not too much."""
-        parts = _MOST_OUTPUTS // (self._num_rows * self._network.num_outputs)
-        if self._known is None and parts:
-            self._known = ActivationCache(parts * self._num_rows, self._network.num_outputs)
-        return self._known
+        """Keep the activations of all layers from now on, unless they are too many.
 
-    def fly(self, num_worlds: int, keep_observations: bool = True) -> TensorDictBase:
-        """Runs an episode in the first worlds; the environment's stay as they were at the start.
-
-        Args:
-            num_worlds: How many.
-            keep_observations: Whether to return "pixels" and "logits".
-
-        Returns:
-            Episode after episode: what was seen, "action", what `DirectRenderer.tell` tells, and
-            ("collector", "traj_ids"), from 0. Shape: (T_total,).
+        Batches get an entry "activations", which a `FusedNetwork` with this cache reads.
         """
-        loading(flight_kernel).result()
-        self._sight.env.start()
-        state: Any = self._sight.worlds.state
+        parts = _MAX_ACTIVATIONS // (self._num_rows * self._network.num_outputs)
+        if self._cache is None and parts:
+            self._cache = ActivationCache(parts * self._num_rows, self._network.num_outputs)
+        return self._cache
+
+    def collect(self, num_envs: int) -> TensorDictBase:
+        """Run an episode in each of the first environments; trajectories count from 0.
+
+        Shape: (T_total,), episode after episode.
+        """
+        if self._actor.exploration not in (ExplorationType.RANDOM, ExplorationType.DETERMINISTIC):
+            return self._direct.collect(num_envs)
+        loading(rollout_kernel).result()
+        self._renderer.env.start()
+        state: Any = self._renderer.worlds.state
         self._worlds.begin(state)
-        if self._known is not None:
-            self._known.forget()
+        if self._cache is not None:
+            self._cache.clear()
         self._network.update()
-        world, logged = self._flown(num_worlds, keep_observations)
+        env_of_step, logged = self._run(num_envs)
         for name in ("action", "end_reason"):
             logged[name] = logged[name].long()
-        if self._sight.is_brief:
-            told = self._sight.flags(logged["reward"], logged["end_reason"])
+        if self._renderer.needs_info:
+            entries = self._replay(env_of_step, logged)
         else:
-            told = self._replayed(world, logged)
-        batch = TensorDict({}, [len(world)])
-        for key in ("pixels", "logits", "action"):
+            entries = self._renderer.flags(logged["reward"], logged["end_reason"])
+        batch = TensorDict({}, [len(env_of_step)])
+        for key in ("pixels", "logits", "action", ACTIVATIONS):
             if key in logged:
                 batch.set(key, logged[key])
-        for key, value in told.items():
+        for key, value in entries.items():
             batch.set(key, value)
-        return batch.set(("collector", "traj_ids"), world)
+        return batch.set(("collector", "traj_ids"), env_of_step)
 
     def close(self) -> None:
         """Ends the threads."""
         self._crew.close()
 
-    def _flown(self, num_worlds: int, keep_observations: bool) -> tuple[Tensor, dict[str, Tensor]]:
-        """Worlds of steps, episode after episode, and what was written down of these."""
-        taken, reasons = self._worlds.steps[:num_worlds], self._worlds.end_reasons[:num_worlds]
-        seen = ("pixels", "logits") if keep_observations else ()
+    def _run(self, num_envs: int) -> tuple[Tensor, dict[str, Tensor]]:
+        """Environments of the steps, episode after episode, and what the kernel wrote of each."""
+        taken, reasons = self._worlds.steps[:num_envs], self._worlds.end_reasons[:num_envs]
+        is_observed = self._direct.keep_observations
+        seen = ("pixels", "logits") if is_observed else ()
         names, parts = ("action", "reward", "end_reason", *seen), []
         while not (parts and bool(reasons.all())):
             before, first = taken.clone(), len(parts) * self._num_rows
-            self._go_on(num_worlds, self._open_log(len(parts), names))
-            worlds, rows = self._written(taken - before)
+            self._launch(num_envs, self._open_log(len(parts), names))
+            envs, rows = self._written(taken - before)
             require_finite(self._logits[rows], self._owner)
-            parts.append((worlds, rows + first))
-        worlds, rows = (torch.cat(column) for column in zip(*parts, strict=True))
-        order = worlds.argsort(stable=True)
-        worlds, rows = worlds[order], rows[order]
-        logged = self._book.read(rows, names)
-        if self._known is not None and keep_observations:
-            self._known.note(logged["pixels"], rows, self._network.weights)
-        return worlds, logged
+            parts.append((envs, rows + first))
+        envs, rows = (torch.cat(column) for column in zip(*parts, strict=True))
+        order = envs.argsort(stable=True)
+        envs, rows = envs[order], rows[order]
+        logged = self._buffer.read(rows, names)
+        if self._cache is not None and is_observed:
+            logged[ACTIVATIONS] = self._cache.add(rows, self._network.weights)
+        return envs, logged
 
-    def _open_log(self, part: int, kept: tuple[str, ...]) -> rollout_kernel.RolloutLog:
-        """Where a part is written, and what of it is kept."""
-        log, pictures, room = rollout_kernel.RolloutLog(), Pictures(), self._book.open(part, kept)
+    def _open_log(self, part: int, kept: tuple[str, ...]) -> Any:
+        """Return arrays that one launch writes, and of which the named ones are kept."""
+        log, pictures, room = rollout_kernel.RolloutLog(), Pictures(), self._buffer.open(part, kept)
         pictures.gray = wp.from_torch(room["pixels"].flatten(1))
         self._logits = room["logits"]
         log.pictures, log.logits = pictures, wp.from_torch(self._logits)
         log.actions, log.rewards = wp.from_torch(room["action"]), wp.from_torch(room["reward"])
         log.end_reasons = wp.from_torch(room["end_reason"])
-        if self._known is not None:
+        if self._cache is not None:
             first, last = part * self._num_rows, (part + 1) * self._num_rows
-            log.outputs = wp.from_torch(
-                self._known.outputs[first:last]
-            )  # none, if there is no room
+            # of no rows if there is no room
+            log.outputs = wp.from_torch(self._cache.outputs[first:last])
         return log
 
-    def _go_on(self, num_worlds: int, log: rollout_kernel.RolloutLog) -> None:
-        draws = torch.full((num_worlds, self._length), -1.0)
+    def _launch(self, num_envs: int, log: Any) -> None:
+        draws = torch.full((num_envs, self._length), -1.0)
         if self._actor.exploration == ExplorationType.RANDOM:
-            draws.uniform_(generator=self._actor.generator)
+            source: Any = self._actor.generator
+            draws.uniform_(generator=source)
         given = [
             self._eye,
             self._network.layers,
@@ -203,42 +201,65 @@ class FusedCollector:
             inputs = [first, last, member, *given]
             wp.launch(rollout_kernel.fly, 1, inputs=inputs, device="cpu")
 
-        self._crew.share_out(0, num_worlds, work)
+        self._crew.share_out(0, num_envs, work)
 
     def _written(self, lengths: Tensor) -> tuple[Tensor, Tensor]:
-        """Worlds and rows of the log, world after world.
+        """Return environment and row in the log of each step, environment after environment.
 
         Args:
-            lengths: Steps of each world. Shape: (num_worlds,).
+            lengths: Steps of each environment. Shape: (num_envs,).
         """
         is_step = torch.arange(self._length) < lengths[:, None]
         rows = is_step.flatten().nonzero()[:, 0]
         return rows // self._length, rows
 
-    def _replayed(self, world: Tensor, logged: Mapping[str, Tensor]) -> Entries:
-        """What is told of steps, by the rules that know everything: nothing is drawn again."""
-        worlds = self._sight.worlds
-        lengths = world.bincount()
+    def _replay(self, env_of_step: Tensor, logged: Mapping[str, Tensor]) -> Entries:
+        """Compute the kept entries by the task's batched step; nothing is rendered again."""
+        worlds = self._renderer.worlds
+        lengths = env_of_step.bincount()
         first = lengths.cumsum(0) - lengths
         state, going, entries = worlds.state, torch.arange(len(lengths)), Entries()
         state = state if len(state) == len(going) else state[going]
         for step in range(int(lengths.max())):
-            is_on = lengths[going] > step
-            if not bool(is_on.all()):
-                state, going = state[is_on], going[is_on]
+            is_running = lengths[going] > step
+            if not bool(is_running.all()):
+                state, going = state[is_running], going[is_running]
             rows = first[going] + step
             state, reward = worlds.advance(state, logged["action"][rows])
-            for key, value in self._sight.tell(state, reward)[0].items():
+            for key, value in self._renderer.entries(state, reward)[0].items():
                 if step == 0:
-                    entries[key] = value.new_empty(len(world), *value.shape[1:])
+                    entries[key] = value.new_empty(len(env_of_step), *value.shape[1:])
                 entries[key].index_copy_(0, rows, value)
         return entries
 
 
-def _standard(sight: DirectRenderer) -> tuple[float, float] | None:
-    """Mean and deviation by which gray pictures are standardised, if nothing else is done."""
-    after = sight.after
-    if not after:
-        return 0.0, 1.0
-    is_known = len(after) == 1 and type(after[0]) is StandardizePixels
-    return (after[0].mean, after[0].std) if is_known else None
+def _mean_and_deviation(renderer: DirectRenderer) -> tuple[float, float]:
+    """Return what the kernel subtracts from gray pixels, and then divides them by."""
+    for transform in renderer.after:
+        if type(transform) is StandardizePixels:
+            return transform.mean, transform.std
+    return 0.0, 1.0
+
+
+def _not_fused(renderer: DirectRenderer) -> list[str]:
+    """Reasons against fusing the renderer, the appearance or the transforms."""
+    worlds, reasons = renderer.worlds, []
+    if type(worlds.renderer) is not Raytracer or worlds.renderer.device.type != "cpu":
+        device = worlds.state.end_reason.device.type
+        reasons.append(f"renderer {type(worlds.renderer).__name__} on {device} is not fused")
+    if renderer.view.modalities != ("gray",):
+        reasons.append("frames that are not gray are not fused")
+    first, *others = [*renderer.after, None]
+    if first is not None and type(first) is not StandardizePixels:
+        others.insert(0, first)
+    reasons += [f"transform {type(t).__name__} is not fused" for t in others if t is not None]
+    if worlds.appearance is not None:
+        reasons.append("visual randomization is not fused")
+    return reasons
+
+
+def _not_fused_policy(direct: DirectCollector) -> list[str]:
+    """Reasons against fusing the actor."""
+    if type(direct.actor) is not CategoricalActor:
+        return [f"policy {type(direct.actor).__name__} is not fused"]
+    return unsupported(direct.actor.network)

@@ -1,11 +1,7 @@
-# pyright: reportAttributeAccessIssue=false
-# pyright: reportGeneralTypeIssues=false
-# pyright: reportIncompatibleMethodOverride=false
-# (Warp's structures are untyped, and so is what autograd calls.)
-"""A network whose gradients a kernel works out, where it knows the layers."""
+"""Fused forward and backward pass of a small network, and the activations that it reuses."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Literal, NamedTuple, Self
 
 import torch
@@ -15,177 +11,199 @@ from torch.autograd.function import once_differentiable
 
 from drone_rl.acceleration import gradients_kernel
 from drone_rl.acceleration.gradients_kernel import BLOCK, PackedParams
+from drone_rl.acceleration.layers_kernel import WIDTH
 from drone_rl.acceleration.packed_layers import (
     Order,
     PackedLayer,
     odd_lines,
     outputs_at,
     packed_layers,
+    unsupported,
 )
+from drone_rl.envs.direct_renderer import Reasons
 from drone_rl.policies.cnn import PolicyNetwork
 from drone_rl.policies.network import PictureNetwork
 from drone_rl.sim.rendering.crew import Crew
 from drone_rl.sim.rendering.devices import loading
 
+MAX_WEIGHTS = 2**20
+"""Larger networks do not fit into a core's cache, and torch is as fast."""
+ACTIVATIONS = "activations"
+"""Entry of a batch: the handle of each step's activations in an `ActivationCache`."""
+GradientsOf = Literal["weights", "pixels"]
+
 
 class ActivationCache:
-    """Outputs of all layers, for as long as pictures and weights are those that they came from."""
+    """Activations of all layers, kept by a fused collector for the learner's forward pass.
+
+    A handle names the activations of one observation: an entry of the batch carries it from the
+    collector to the network. Handles are valid until the collector's next batch. Whoever changes
+    the observations of a batch must remove the entry.
+    """
 
     def __init__(self, num_rows: int, num_outputs: int) -> None:
-        """Nothing is known yet.
+        """Allocates memory.
 
         Args:
-            num_rows: Of pictures at a time.
-            num_outputs: Numbers that all layers make of a picture, see `outputs_at`.
+            num_rows: Observations of one batch.
+            num_outputs: Numbers of an observation, see `outputs_at`.
         """
         self.outputs = torch.empty(num_rows, num_outputs)
-        """To write into, between `forget` and `note`."""
-        self.times = 0
-        """How often they were forgotten."""
-        self._pictures = self._rows = self._weights = torch.empty(0)
-        self._version = 0
+        """Written by the collector between `clear` and `add`."""
+        self.generation = 0
+        """Counts the calls of `clear`."""
+        self._weights = torch.empty(0)
 
-    def forget(self) -> None:
-        """Says that outputs are about to be written over."""
-        self.times += 1
-        self._pictures = torch.empty(0)
+    def clear(self) -> None:
+        """Invalidate all handles, before the activations are overwritten."""
+        self.generation += 1
 
-    def note(self, pictures: Tensor, rows: Tensor, weights: Tensor) -> None:
-        """Says what the outputs are of, if there was room for those of all.
+    def add(self, rows: Tensor, weights: Tensor) -> Tensor:
+        """Return handles of activations: -1 for each if there was not room for all.
 
         Args:
-            pictures: As the network saw them. Shape: (num_pictures, *).
-            rows: Of `outputs`, where each one's are, or would be. Shape: (num_pictures,).
-            weights: By which they were made, as they are packed; they must stay until `forget`.
+            rows: Of `outputs`. Shape: (k,), int64.
+            weights: Packed weights that the activations were computed with.
         """
-        if int(rows.max()) < len(self.outputs):
-            self._pictures, self._version = pictures.flatten(1), pictures._version
-            self._rows, self._weights = rows.int(), weights
+        self._weights = weights
+        if int(rows.max()) >= len(self.outputs):
+            return torch.full_like(rows, -1)
+        return rows + self.generation * len(self.outputs)
 
-    def find(self, pictures: Tensor, weights: Tensor) -> Tensor | None:
-        """Rows of the outputs, if they are of these very pictures, unchanged, by equal weights.
+    def find(self, handles: Tensor, weights: Tensor) -> Tensor | None:
+        """Return the rows of activations, or None unless all are there for these weights.
 
         Args:
-            pictures: Some of those noted, one after the other, in the memory where they were; not
-                seen are changes behind torch's back. Shape: (k, num_pixels).
-            weights: As they are packed.
+            handles: As returned by `add`. Shape: (k,).
+            weights: Packed weights.
         """
-        known = self._pictures
-        if not len(known) or pictures.is_inference() or pictures._version != self._version:
+        rows = handles - self.generation * len(self.outputs)
+        is_valid = (rows >= 0) & (rows < len(self.outputs))
+        if not (bool(is_valid.all()) and torch.equal(weights, self._weights)):
             return None
-        here, there = (array.untyped_storage().data_ptr() for array in (pictures, known))
-        is_alike = pictures.stride() == known.stride() and pictures.shape[1] == known.shape[1]
-        if here != there or not is_alike:
-            return None
-        numbers = int(pictures.storage_offset()) - int(known.storage_offset())
-        first, beside = divmod(numbers, known.shape[1])
-        is_known = not beside and torch.equal(weights, self._weights)
-        return self._rows[first : first + len(pictures)] if is_known else None
-
-
-MOST_WEIGHTS = 2**20
-"""Of a network; more of them don't stay near a core, and torch is as fast."""
-Of = Literal["weights", "pictures"]
-"""What has gradients."""
+        return rows.int()
 
 
 class FusedNetwork(PictureNetwork):
-    """Gives what a network gives, and its weights the gradients, in less time than torch does.
+    """Computes the same logits and gradients as a network, faster than torch.
 
-    On a small network torch spends a third of its time between products; here each layer's product
-    is made where its numbers lie, in blocks of pictures that stay near.
+    On a small network torch spends a third of its time between matrix products. The fused kernel
+    passes blocks of observations through all layers, so that their numbers stay in cache.
     """
 
-    def __init__(self, network: PolicyNetwork, num_threads: int = 1, *, of: Of = "weights") -> None:
-        """Wraps a network; `find` tells whether that can be done.
-
-        Args:
-            network: From pictures to logits.
-            num_threads: That share the pictures; sums over these depend on how many there are.
-            of: What has gradients: the weights, or the pictures. For those of pictures the weights
-                stay what they are at first.
-        """
+    def __init__(
+        self,
+        network: PolicyNetwork,
+        num_threads: int = 1,
+        *,
+        of: GradientsOf = "weights",
+        cache: ActivationCache | None = None,
+    ) -> None:
+        """Wraps a network; see `try_create`."""
         super().__init__()
         self.network, self.in_shape, self.actions = network, network.in_shape, network.actions
-        self._num_threads, self._of = num_threads, of
-        self.known: ActivationCache | None = None
-        """Outputs that somebody else makes by the same network; looked for at each call."""
+        self._num_threads, self._of, self._cache = num_threads, of, cache
+        self.in_keys = ("pixels",) if cache is None else ("pixels", ACTIVATIONS)
         self._work: _Work | None = None
         loading(gradients_kernel)
 
     @classmethod
-    def find(cls, network: nn.Module, num_threads: int = 1, *, of: Of = "weights") -> Self | None:
-        """The same, if the network is of such layers, small, and on the CPU."""
-        layers = packed_layers(network)
-        if layers is None or (of == "pictures" and not layers[0].has_way_back):
-            return None
-        if sum(p.numel() for p in network.parameters()) > MOST_WEIGHTS:
-            return None
-        assert isinstance(network, PolicyNetwork)
-        return cls(network, num_threads, of=of)
+    def try_create(
+        cls,
+        network: nn.Module,
+        num_threads: int = 1,
+        *,
+        of: GradientsOf = "weights",
+        cache: Callable[[], ActivationCache | None] = lambda: None,
+    ) -> Self | Reasons:
+        """Return the fused network, or the reasons why the kernel does not support the network.
 
-    def forward(self, pixels: Tensor) -> Tensor:
+        Args:
+            network: From pixels to logits.
+            num_threads: Threads that share the observations; sums over these depend on it.
+            of: What has gradients: the weights, or the pixels. For those of the pixels the weights
+                stay what they are at first.
+            cache: Called if the network is supported; returns the activations that a collector
+                keeps, such as `FusedCollector.cache_activations`.
+        """
+        reasons = unsupported(network)
+        if not reasons and of == "pixels" and not packed_layers(network)[0].has_way_back:
+            reasons.append(f"the first layer's inputs are not a multiple of {WIDTH}")
+        num_weights = sum(p.numel() for p in network.parameters())
+        if num_weights > MAX_WEIGHTS:
+            reasons.append(f"{num_weights} weights are more than {MAX_WEIGHTS}")
+        if reasons or not isinstance(network, PolicyNetwork):
+            return Reasons(reasons)
+        return cls(network, num_threads, of=of, cache=cache())
+
+    def forward(self, pixels: Tensor, activations: Tensor | None = None) -> Tensor:
         """See `PictureNetwork`.
 
+        Args:
+            pixels: Shape: (*, C, H, W).
+            activations: Handle of each observation's activations in the cache. Shape: (*,).
+
         Raises:
-            InputError: The pictures are of another shape than the network was built for.
+            InputError: The observations have another shape than the network was built for.
         """
         if self._work is None:
-            layers = packed_layers(self.network) or []
-            is_fixed = self._of == "pictures"
-            self._work = _Work(layers, self._num_threads, self.known, is_fixed=is_fixed)
+            layers, is_fixed = packed_layers(self.network), self._of == "pixels"
+            self._work = _Work(layers, self._num_threads, self._cache, is_fixed=is_fixed)
         self.network.check(pixels)
         flat = pixels.reshape(-1, math.prod(self.in_shape))
+        handles = None if activations is None else activations.reshape(-1)
         learning = self._work.parameters if self._of == "weights" else ()
-        logits = _Logits.apply(self._work, flat, *learning)
+        logits = _Logits.apply(self._work, flat, handles, *learning)
         return logits.reshape(*pixels.shape[:-3], -1)
 
 
-class _Made(NamedTuple):
+class _Activations(NamedTuple):
     """Outputs of all layers."""
 
     outputs: Tensor
-    """A row a picture, one after the other; there may be room behind. Flat."""
+    """One observation after the other; there may be room behind. Flat."""
     rows: Tensor
-    """Which of them each picture has."""
-    times: int | None
-    """Of `ActivationCache`, if they are such."""
+    """Row of each observation."""
+    generation: int | None
+    """Of the `ActivationCache`, if they are from there."""
 
 
 class _Logits(torch.autograd.Function):
-    """The way there and back."""
+    """Forward and backward pass."""
 
     @staticmethod
-    def forward(ctx: Any, work: "_Work", pictures: Tensor, *parameters: Tensor) -> Tensor:
-        ctx.work, ctx.of = work, "weights" if parameters else "pictures"
-        ctx.pictures = pictures.detach()  # Warp asks arrays for gradients, which torch warns of
-        ctx.made = work.answer(ctx.pictures)
+    def forward(
+        ctx: Any, work: "_Work", pixels: Tensor, handles: Tensor | None, *parameters: Tensor
+    ) -> Tensor:
+        ctx.work, ctx.of = work, "weights" if parameters else "pixels"
+        ctx.pixels = pixels.detach()  # Warp asks arrays for gradients, which torch warns of
+        ctx.made = work.compute(ctx.pixels, handles)
         return work.logits(ctx.made)
 
     @staticmethod
     @once_differentiable
-    def backward(ctx: Any, grad_output: Tensor) -> tuple[Tensor | None, ...]:
+    def backward(ctx: Any, grad_output: Tensor) -> tuple[Tensor | None, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
         if ctx.made is None:
-            raise RuntimeError("the way back was gone once; its numbers were given away")
+            raise RuntimeError("a second backward pass is impossible: activations were released")
         made, ctx.made = ctx.made, None
-        if ctx.of == "pictures":
-            return None, ctx.work.look_back(ctx.pictures, made, grad_output)
-        return None, None, *ctx.work.learn(ctx.pictures, made, grad_output)
+        if ctx.of == "pixels":
+            return None, ctx.work.pixel_gradient(ctx.pixels, made, grad_output), None
+        return None, None, None, *ctx.work.weight_gradients(ctx.pixels, made, grad_output)
 
 
 class _Work:
-    """Packed layers, and room to work in."""
+    """Packed layers and the buffers of both passes."""
 
     def __init__(
         self,
         layers: Sequence[PackedLayer],
         num_threads: int,
-        known: ActivationCache | None,
+        cache: ActivationCache | None,
         *,
         is_fixed: bool,
     ) -> None:
         loading(gradients_kernel).result()
-        self._layers, self._known = layers, known
+        self._layers, self._cache = layers, cache
         self._crew = Crew(num_threads, num_threads)
         self._order = order = Order(layers)
         self._weights = torch.zeros(order.weights_at[-1])
@@ -199,13 +217,13 @@ class _Work:
         params.made_at = _ints(made_at)
         params.num_convolutions = sum(layer.is_convolution for layer in layers)
         params.near = odd_lines(self._logits_at - made_at[params.num_convolutions - 1])
-        self._lesson = params
+        self._params = params
         self._rooms = torch.empty(self._crew.size, int(BLOCK) * self._size)
         self._sides = torch.empty(self._crew.size, int(BLOCK) * params.near)
         most = max(v.num_inputs * v.geometry[0] for v in layers if v.is_convolution)
         self._patches = torch.empty(self._crew.size, most)
         self._spare: Tensor | None = None
-        """Of outputs that nobody needs any more; new memory takes longer than a layer."""
+        """Outputs to overwrite; new memory takes longer than a layer."""
         self._gradients = torch.empty(self._crew.size, *self._weights.shape)
         self._is_fixed = is_fixed
         order.pack(self._weights, self._back)
@@ -215,51 +233,59 @@ class _Work:
         """Weight and bias of each layer."""
         return [parameter for layer in self._layers for parameter in layer.parameters]
 
-    def answer(self, pictures: Tensor) -> _Made:
-        """Outputs of all layers."""
+    def compute(self, pixels: Tensor, handles: Tensor | None) -> _Activations:
+        """Return the outputs of all layers, from the cache if they are there."""
         if not self._is_fixed:
             self._order.pack(self._weights, self._back)
-        if self._known is not None:
-            rows = self._known.find(pictures, self._weights)
+        if self._cache is not None and handles is not None:
+            rows = self._cache.find(handles, self._weights)
             if rows is not None:
-                return _Made(self._known.outputs.view(-1), rows, self._known.times)
-        size, spare, self._spare = len(pictures) * self._size, self._spare, None
+                outputs = self._cache.outputs.view(-1)
+                return _Activations(outputs, rows, self._cache.generation)
+        size, spare, self._spare = len(pixels) * self._size, self._spare, None
         made = torch.empty(size) if spare is None or len(spare) < size else spare
-        given = [self._lesson, wp.from_torch(pictures), wp.from_torch(made)]
+        given = [self._params, wp.from_torch(pixels), wp.from_torch(made)]
 
         def work(member: int, first: int, last: int) -> None:
             del member
             inputs = [first, last, *given]
             wp.launch(gradients_kernel.answer, 1, inputs=inputs, device="cpu")
 
-        self._crew.share_out(0, len(pictures), work)
-        return _Made(made, torch.arange(len(pictures), dtype=torch.int32), None)
+        self._crew.share_out(0, len(pixels), work)
+        return _Activations(made, torch.arange(len(pixels), dtype=torch.int32), None)
 
-    def logits(self, made: _Made) -> Tensor:
-        """Those of the last layer. Shape: (num_pictures, num_actions)."""
+    def logits(self, made: _Activations) -> Tensor:
+        """Return the outputs of the last layer. Shape: (num_observations, num_actions)."""
         last = self._logits_at + torch.arange(len(self._layers[-1].layer.weight))
         return made.outputs.take(made.rows[:, None].long() * self._size + last)
 
-    def learn(self, pictures: Tensor, made: _Made, grad_output: Tensor) -> list[Tensor]:
-        """Gradients of the parameters by those of the logits; takes `made` for the next answer."""
+    def weight_gradients(
+        self, pixels: Tensor, made: _Activations, grad_output: Tensor
+    ) -> list[Tensor]:
+        """Return the gradients of the parameters; `made` may be overwritten afterwards."""
         self._gradients.zero_()
-        self._go_back(pictures, made, grad_output, self._gradients, torch.empty(0, 0))
+        self._backward(pixels, made, grad_output, self._gradients, torch.empty(0, 0))
         return self._order.unpack(self._gradients.sum(0))
 
-    def look_back(self, pictures: Tensor, made: _Made, grad_output: Tensor) -> Tensor:
-        """Gradient of the pictures by those of the logits; takes `made` for the next answer."""
-        seen = torch.empty_like(pictures)
-        self._go_back(pictures, made, grad_output, torch.empty(0, 0), seen)
+    def pixel_gradient(self, pixels: Tensor, made: _Activations, grad_output: Tensor) -> Tensor:
+        """Return the gradient of the pixels; `made` may be overwritten afterwards."""
+        seen = torch.empty_like(pixels)
+        self._backward(pixels, made, grad_output, torch.empty(0, 0), seen)
         return seen
 
-    def _go_back(
-        self, pictures: Tensor, made: _Made, grad_output: Tensor, gradients: Tensor, seen: Tensor
+    def _backward(
+        self,
+        pixels: Tensor,
+        made: _Activations,
+        grad_output: Tensor,
+        gradients: Tensor,
+        seen: Tensor,
     ) -> None:
-        if self._known is not None and made.times not in (None, self._known.times):
-            raise RuntimeError("pictures were flown through between the way there and the way back")
+        if self._cache is not None and made.generation not in (None, self._cache.generation):
+            raise RuntimeError("a batch was collected between the forward and the backward pass")
         rooms = (self._rooms, self._sides, self._patches)
         arrays = (
-            pictures,
+            pixels,
             made.outputs,
             made.rows,
             grad_output.contiguous(),
@@ -267,14 +293,14 @@ class _Work:
             gradients,
             seen,
         )
-        given = [self._lesson, *(wp.from_torch(array) for array in arrays)]
+        given = [self._params, *(wp.from_torch(array) for array in arrays)]
 
         def work(member: int, first: int, last: int) -> None:
             inputs = [first, last, member, *given]
             wp.launch(gradients_kernel.learn, 1, inputs=inputs, device="cpu")
 
-        self._crew.share_out(0, len(pictures), work)
-        if made.times is None:
+        self._crew.share_out(0, len(pixels), work)
+        if made.generation is None:
             self._spare = made.outputs
 
 

@@ -5,17 +5,19 @@
 # pyright: reportOperatorIssue=false
 # pyright: reportAttributeAccessIssue=false
 # (Warp compiles the kernel; Python's types say nothing about it.)
-"""A small network asked about many pictures on one core, in half of torch's time."""
+"""Forward pass of a small network on one core, in half of torch's time."""
 
 import sys
 import threading
+from typing import Self
 
 import torch
 import warp as wp
 from torch import Tensor, nn
 
 from drone_rl.acceleration.layers_kernel import Layers, decide, look
-from drone_rl.acceleration.packed_layers import PackedNetwork
+from drone_rl.acceleration.packed_layers import PackedNetwork, unsupported
+from drone_rl.envs.direct_renderer import Reasons
 from drone_rl.policies.finite import require_finite
 from drone_rl.sim.rendering.devices import loading, start_warp
 
@@ -49,33 +51,35 @@ def answer(
 
 
 class BatchedInference:
-    """Logits of a network that learns no more; any number of threads may ask at a time."""
+    """Logits of a network that no longer learns; any number of threads may call it at a time."""
 
     def __init__(self, network: nn.Module) -> None:
-        """Packs the network, if it is of layers that kernels know; else torch is asked."""
+        """Packs the network; see `try_create`."""
         start_warp("cpu")
-        self._network = network
-        self._packed = PackedNetwork.find(network, int(_TOGETHER))
+        self._owner = getattr(network, "owner", "the policy")
+        self._packed = PackedNetwork(network, int(_TOGETHER))
+        self._packed.update()
         self._own = threading.local()
-        if self._packed is not None:
-            self._packed.update()
-            loading(sys.modules[__name__]).result()
+        loading(sys.modules[__name__]).result()
+
+    @classmethod
+    def try_create(cls, network: nn.Module) -> Self | Reasons:
+        """Return the faster forward pass, or the reasons why the kernel does not support it."""
+        reasons = unsupported(network)
+        return Reasons(reasons) if reasons else cls(network)
 
     @torch.no_grad()
-    def __call__(self, pictures: Tensor) -> Tensor:
-        """Pictures (N, C, H, W) to logits (N, num_actions)."""
-        if self._packed is None:
-            return self._network(pictures)
-        logits = torch.empty(len(pictures), self._packed.num_actions)
-        given = pictures.flatten(1).contiguous()
-        arrays = wp.from_torch(given), self._room(), wp.from_torch(logits)
+    def __call__(self, pixels: Tensor) -> Tensor:
+        """Observations (N, C, H, W) to logits (N, num_actions)."""
+        logits = torch.empty(len(pixels), self._packed.num_actions)
+        flat = pixels.flatten(1).contiguous()
+        arrays = wp.from_torch(flat), self._workspace(), wp.from_torch(logits)
         wp.launch(answer, 1, inputs=[self._packed.layers, *arrays], device="cpu")
-        require_finite(logits, getattr(self._network, "owner", "the policy"))
+        require_finite(logits, self._owner)
         return logits
 
-    def _room(self) -> wp.array:
-        """A thread's own."""
-        if not hasattr(self._own, "room"):
-            assert self._packed is not None
-            self._own.room = wp.empty(self._packed.room, dtype=float, device="cpu")
-        return self._own.room
+    def _workspace(self) -> wp.array:
+        """Each thread has one."""
+        if not hasattr(self._own, "workspace"):
+            self._own.workspace = wp.empty(self._packed.room, dtype=float, device="cpu")
+        return self._own.workspace

@@ -5,7 +5,7 @@
 
 from collections.abc import Sequence
 from itertools import accumulate
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import torch
 import warp as wp
@@ -159,24 +159,33 @@ def in_panels(by_row: Tensor) -> Tensor:
     return by_row.view(len(by_row), -1, WIDTH).transpose(0, 1).flatten()
 
 
-def packed_layers(network: nn.Module) -> list[PackedLayer] | None:
-    """The layers of convolutions of gray pictures, then linear ones, rectified in between.
+def unsupported(network: nn.Module) -> list[str]:
+    """Return why kernels do not support a network; empty if they do.
 
-    None for other networks, and for such as are not of plain numbers on the CPU.
+    They support convolutions of gray frames and then linear layers, with ReLU in between, of
+    32-bit numbers on the CPU.
     """
-    if not (isinstance(network, PolicyNetwork) and network.in_shape[0] == 1):
-        return None
+    name = type(network).__name__
+    if not isinstance(network, PolicyNetwork):
+        return [f"network {name} is not fused"]
+    if network.in_shape[0] != 1:
+        return [f"a network of {network.in_shape[0]} channels is not fused"]
     kinds = "".join(_letter(layer) for layer in network.layers)
     convolutions, _, rest = kinds.partition("f")
     is_known = convolutions == "cr" * (len(convolutions) // 2) != "" and (
         rest == "lr" * (len(rest) // 2) + "l"
     )
+    if not is_known:
+        return [f"network {name} is not fused"]
     tensors = list(network.parameters())
-    is_plain = all(p.dtype == torch.float32 and p.device.type == "cpu" for p in tensors)
-    return _layers(network) if is_known and is_plain else None
+    if not all(p.dtype == torch.float32 and p.device.type == "cpu" for p in tensors):
+        return ["a network that is not float32 on the CPU is not fused"]
+    return []
 
 
-def _layers(network: PolicyNetwork) -> list[PackedLayer]:
+def packed_layers(network: nn.Module) -> list[PackedLayer]:
+    """Return the layers of a network that is supported."""
+    assert isinstance(network, PolicyNetwork)
     channels, height, width = network.in_shape
     padded, packed = channels, []
     for layer in network.layers:
@@ -193,7 +202,7 @@ def _layers(network: PolicyNetwork) -> list[PackedLayer]:
 
 
 def _letter(layer: nn.Module) -> str:
-    """What stands for a kind of layer."""
+    """Return the letter of a kind of layer."""
     if isinstance(layer, nn.Conv2d):
         is_square = layer.stride[0] == layer.stride[1]
         plain = (layer.padding, layer.dilation, layer.groups) == ((0, 0), (1, 1), 1)
@@ -208,13 +217,14 @@ def _letter(layer: nn.Module) -> str:
 class PackedNetwork:
     """Convolutions of gray pictures, then linear layers, rectified in between."""
 
-    def __init__(self, packed: Sequence[PackedLayer], num_pictures: int) -> None:
-        """Lays it out; `find` tells whether that can be done.
+    def __init__(self, network: nn.Module, num_pictures: int) -> None:
+        """Packs a network that is supported, see `unsupported`.
 
         Args:
-            packed: The layers.
-            num_pictures: That are decided on together.
+            network: From frames to logits.
+            num_pictures: Frames whose linear layers are computed together.
         """
+        packed = packed_layers(network)
         self._order = Order(packed)
         self.weights = torch.zeros(self._order.weights_at[-1])
         """As they are laid out."""
@@ -231,12 +241,6 @@ class PackedNetwork:
         self.layers = made
         """For kernels."""
         self.num_actions = len(packed[-1].layer.weight)
-
-    @classmethod
-    def find(cls, network: nn.Module, num_pictures: int) -> Self | None:
-        """The network, if it is of such layers and on the CPU."""
-        packed = packed_layers(network)
-        return None if packed is None else cls(packed, num_pictures)
 
     def update(self) -> None:
         """Takes over what the network has learned."""

@@ -1,8 +1,8 @@
-"""Pictures as an actor sees them, straight from the worlds.
+"""Renders observations of given simulation states, without steps of TorchRL.
 
-A step of TorchRL's copies every entry of every world, whether or not it still flies, through each
-transform. With few worlds that takes longer than simulating, drawing and acting together. So where
-nothing but maps from picture to picture stands between worlds and actor, collectors go without it.
+A step of TorchRL copies every entry of every environment through each transform, whether or not its
+episode still runs. With few environments that takes longer than simulating, rendering and acting
+together. Where only maps from frame to frame lie between renderer and actor, it is not needed.
 """
 
 from collections.abc import Iterable, Sequence
@@ -13,107 +13,119 @@ from tensordict.utils import NestedKey
 from torch import Tensor
 from torchrl.envs import Compose, EnvBase, TransformedEnv
 
-from drone_rl.envs import DroneEnv
+from drone_rl.envs.drone_env import DroneEnv
 from drone_rl.envs.pipeline import on_pixels
 from drone_rl.envs.transforms import GrayPixels, PixelTransform
 from drone_rl.sim.tasks import State
 
 Entries = dict[NestedKey, Tensor]
 FLAGS = ("reward", "done", "terminated", "truncated")
-_REASON = ("next", "info", "end_reason")
+_END_REASON = ("next", "info", "end_reason")
+
+
+class Reasons(tuple[str, ...]):
+    """Why an implementation does not support a configuration: plain sentences, at least one."""
+
+    def __str__(self) -> str:
+        return "; ".join(self)
 
 
 class DirectRenderer:
-    """What an actor sees of worlds, and what is told of a step, without steps of TorchRL.
+    """Renders what an actor observes of states, and computes the entries of a step.
 
-    Where the first of the transforms makes pictures gray, they are drawn so.
+    If the first transform is `GrayPixels`, the renderer renders gray frames.
     """
 
     def __init__(
         self, env: DroneEnv, transforms: Sequence[PixelTransform], kept: Iterable[NestedKey]
     ) -> None:
-        """Takes an environment's worlds over.
-
-        Args:
-            env: Whose worlds they are.
-            transforms: What becomes of their pictures.
-            kept: Which ("next", ...) entries of a step are told.
-        """
+        """Takes over the environment's states; see `try_create`."""
         self.env, self.worlds = env, env.worlds
         is_gray = type(next(iter(transforms), None)) is GrayPixels
         self.view = self.worlds.view(modality="gray") if is_gray else self.worlds.policy_view
         self.after: Sequence[Any] = transforms[1:] if is_gray else transforms
-        """What becomes of pictures once they are drawn."""
-        self._see = on_pixels(self.after)
+        """Transforms that are applied to rendered frames."""
+        self._transform = on_pixels(self.after)
         self._kept = tuple(kept)
-        self._asked = [(key, str(key[2])) for key in self._kept if len(key) == 3 and key != _REASON]
+        self._info = [
+            (key, str(key[2])) for key in self._kept if len(key) == 3 and key != _END_REASON
+        ]
 
     @property
-    def is_brief(self) -> bool:
-        """Whether nothing is told of a step but reward, flags and why an episode ended."""
-        return not self._asked
+    def needs_info(self) -> bool:
+        """Whether a step has other entries than reward, flags and end reason."""
+        return bool(self._info)
 
     @classmethod
-    def find(
+    def try_create(
         cls, env: EnvBase, observed: Iterable[NestedKey], kept: Iterable[NestedKey]
-    ) -> Self | None:
-        """That of an environment, if it has one.
+    ) -> Self | Reasons:
+        """Return the renderer of an environment, or the reasons why there is none.
 
         Args:
-            env: Any batch of worlds.
-            observed: What the actor looks at.
-            kept: ("next", ...) entries that are kept of each step.
+            env: Any batch of environments.
+            observed: Entries that the actor reads.
+            kept: ("next", ...) entries to keep of each step.
         """
-        if type(env) is not TransformedEnv or type(env.base_env) is not DroneEnv:
-            return None
+        base: Any = getattr(env, "base_env", None)
+        if type(env) is not TransformedEnv or type(base) is not DroneEnv:
+            return Reasons([f"environment {type(env).__name__} is no TransformedEnv of DroneEnv"])
         one: Any = env.transform
         transforms: list[Any] = list(one) if isinstance(one, Compose) else [one]
-        are_maps = all(isinstance(t, PixelTransform) and t.is_in_place for t in transforms)
-        told = {("next", name) for name in FLAGS}
-        told |= {("next", "info", name) for name in env.base_env.worlds.entries}
-        is_straight = env.base_env.pixels and are_maps and tuple(observed) == ("pixels",)
-        return cls(env.base_env, transforms, kept) if is_straight and set(kept) <= told else None
+        known = {("next", name) for name in FLAGS}
+        known |= {("next", "info", name) for name in base.worlds.entries}
+        reasons = [
+            f"transform {type(t).__name__} is not fused"
+            for t in transforms
+            if not (isinstance(t, PixelTransform) and t.is_in_place)
+        ]
+        if not base.pixels:
+            reasons.append("the environment renders no pixels")
+        elif tuple(observed) != ("pixels",):
+            reasons.append(f"the policy reads {', '.join(map(str, observed))} instead of pixels")
+        reasons += [f"entry {key} is not fused" for key in kept if key not in known]
+        return Reasons(reasons) if reasons else cls(base, transforms, kept)
 
-    def look(self, state: State, worlds: Tensor | None = None) -> TensorDictBase:
-        """What is seen of worlds. First dimension: the state's.
+    def look(self, state: State, rows: Tensor | None = None) -> TensorDictBase:
+        """Render the observations of states. First dimension: the state's.
 
         Args:
-            state: Theirs.
-            worlds: Which of the environment's they are; all by default. Shape: (k,).
+            state: Of some environments.
+            rows: Indices of these environments; all by default. Shape: (k,).
         """
-        picture = self.worlds.render(state, self.view, self.env.looks.drawn(worlds))
+        frames = self.worlds.render(state, self.view, self.env.looks.drawn(rows))
         if self.view.modalities == ("gray",):
-            picture = picture[:, None]
-        pixels = self._see(picture)
+            frames = frames[:, None]
+        pixels = self._transform(frames)
         return TensorDict({"pixels": pixels}, [len(pixels)], device=pixels.device)
 
-    def tell(self, state: State, reward: Tensor) -> tuple[Entries, Tensor]:
-        """What is kept of a step.
+    def entries(self, state: State, reward: Tensor) -> tuple[Entries, Tensor]:
+        """Return the kept entries of a step, and whether it ended an episode.
 
         Args:
-            state: After it.
-            reward: For it. Shape: (num_worlds,), float64.
+            state: After the step.
+            reward: Of the step. Shape: (num_envs,), float64.
 
         Returns:
-            Each entry, and which worlds' episodes have ended. Shapes: (num_worlds, *).
+            Each kept entry, and the done flag. Shapes: (num_envs, *).
         """
-        told = self.flags(reward, state.end_reason)
-        if self._asked:
+        entries = self.flags(reward, state.end_reason)
+        if self._info:
             info = self.worlds.info(state)
-            told.update((key, info[name]) for key, name in self._asked)
-        return {key: told[key] for key in self._kept}, told["next", "done"]
+            entries.update((key, info[name]) for key, name in self._info)
+        return {key: entries[key] for key in self._kept}, entries["next", "done"]
 
     def flags(self, reward: Tensor, end_reason: Tensor) -> Entries:
-        """What is told of every step.
+        """Return the entries that every step has.
 
         Args:
-            reward: For it. Shape: (num_worlds,).
-            end_reason: After it, 0 where the episode goes on. Shape: (num_worlds,).
+            reward: Of the step. Shape: (num_envs,).
+            end_reason: After the step, 0 while the episode runs. Shape: (num_envs,).
 
         Returns:
-            ("next", ...) "reward", float32, the flags, and why it ended. Shapes: (num_worlds, 1).
+            ("next", ...) "reward", float32, the flags and the end reason. Shapes: (num_envs, 1).
         """
         terminated, truncated = self.worlds.ends(end_reason)
         values = (reward.float(), terminated | truncated, terminated, truncated, end_reason)
-        keys = (*(("next", name) for name in FLAGS), _REASON)
+        keys = (*(("next", name) for name in FLAGS), _END_REASON)
         return {key: value[:, None] for key, value in zip(keys, values, strict=True)}

@@ -28,24 +28,24 @@ class Outcomes:
 
 
 @torch.no_grad()
-def follow(sight: DirectRenderer, decide: Decide, worlds: Tensor) -> Outcomes:
+def follow(renderer: DirectRenderer, decide: Decide, worlds: Tensor) -> Outcomes:
     """Fly episodes from their starts, with every possible action wherever there are several.
 
     Args:
-        sight: Of an environment whose worlds are as they were at the start.
+        renderer: Of an environment whose worlds are as they were at the start.
         decide: The policy, of counted actions and without memory.
         worlds: Indices of the environment's. Shape: (k,).
 
     Returns:
         The k episodes' ends.
     """
-    simulated, count = sight.worlds, len(worlds)
+    simulated, count = renderer.worlds, len(worlds)
     state: Any = simulated.state[worlds]
     owner = torch.arange(count, device=worlds.device)
     is_open = torch.zeros_like(owner, dtype=torch.bool)
     ends, owners = [], []
     while len(owner):
-        possible = decide(sight.look(state, worlds[owner]).get("pixels")).possible
+        possible = decide(renderer.look(state, worlds[owner]).get("pixels")).possible
         row, action = possible.nonzero().unbind(-1)
         state, owner = state[row], owner[row]
         state, _ = simulated.advance(state, action)

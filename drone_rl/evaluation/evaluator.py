@@ -52,7 +52,7 @@ def run_episodes(
         actor: The policy.
         num_episodes: How many; what a last batch has more is not used.
         greedy: Whether to take the most probable action instead of drawing one.
-        is_compiled: Whether a kernel may fly them, see `EpisodeCollector`.
+        is_compiled: Whether the fused kernel may run them, see `EpisodeCollector`.
         log: Takes the actions, of whole batches.
 
     Returns:
@@ -65,13 +65,13 @@ def run_episodes(
         actor,
         keep=keep,
         keep_observations=False,
-        is_compiled=is_compiled,
-        num_cores=num_cores(),
+        acceleration="fused" if is_compiled else "direct",
+        num_threads=num_cores(),
     )
     kind = ExplorationType.DETERMINISTIC if greedy else ExplorationType.RANDOM
     finals, lengths, count = [], [], 0
     if log is not None:
-        log.implementation = collector.implementation
+        log.implementation = collector.source.implementation
     with set_exploration_type(kind):
         while count < num_episodes:
             batch = collector.collect()

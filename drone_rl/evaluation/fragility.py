@@ -11,7 +11,7 @@ from torch import Tensor
 from torchrl.envs import EnvBase
 
 from drone_rl.envs import worlds_of
-from drone_rl.envs.direct_renderer import DirectRenderer
+from drone_rl.envs.direct_renderer import DirectRenderer, Reasons
 from drone_rl.evaluation.branches import Outcomes, follow
 from drone_rl.evaluation.evaluator import StepLog
 from drone_rl.evaluation.greedy_flights import (
@@ -280,7 +280,7 @@ def _fly(
     env: EnvBase, decide: Decide, network: PictureNetwork, episodes: int
 ) -> tuple[_Seen, list[Tensor]]:
     """Flies and looks at each frame. Returns also the actions of each episode."""
-    sight = DirectRenderer.find(env, ("pixels",), ())
+    renderer = DirectRenderer.try_create(env, ("pixels",), ())
     is_counted = isinstance(network.actions, DiscreteActions)
     fragile, followed, log, finals, first = [], [], StepLog(), [], 0
     before = streams(env)
@@ -295,8 +295,8 @@ def _fly(
         if is_counted and len(worlds):
             if not is_few:
                 found = Outcomes(None, worlds[:0], torch.ones_like(worlds, dtype=torch.bool))
-            elif sight is not None:
-                found = follow(sight, decide, worlds.to(env.device))
+            elif not isinstance(renderer, Reasons):
+                found = follow(renderer, decide, worlds.to(env.device))
             else:
                 actor = _Deciding(decide, network, is_contrary=True)
                 found = _contrary(env, actor, before, fragile[first:], worlds)

@@ -43,11 +43,11 @@ def batches(
         keep=keep,
         keep_observations=False,
         noted=noted,
-        is_compiled=is_compiled,
-        num_cores=num_cores(),
+        acceleration="fused" if is_compiled else "direct",
+        num_threads=num_cores(),
     )
     if log is not None:
-        log.implementation = collector.implementation
+        log.implementation = collector.source.implementation
     left = episodes
     with set_exploration_type(ExplorationType.DETERMINISTIC):
         while left > 0:

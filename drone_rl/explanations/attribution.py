@@ -9,7 +9,7 @@ from captum.attr import IntegratedGradients, LayerGradCam, Saliency
 from torch import Tensor, nn
 from torch.nn import functional
 
-from drone_rl.acceleration.fused_network import FusedNetwork
+from drone_rl.collectors.speedups import accelerated_gradients
 from drone_rl.explanations.hooks import actions_of, find_layer, probabilities, spatial_layers
 from drone_rl.explanations.patches import replaced
 from drone_rl.policies import PictureNetwork
@@ -156,7 +156,7 @@ class Explainer:
 
     def _integrated(self, observations: Tensor, actions: Tensor) -> Tensor:
         """The path integral of each channel of each pixel. Shape: (T, C, H, W)."""
-        quick = FusedNetwork.find(self.network, of="pictures")
+        quick = accelerated_gradients(self.network, of="pixels")
         method = IntegratedGradients(self._forward("probability", quick))
 
         def attribute(x: Tensor, a: Tensor) -> Tensor:

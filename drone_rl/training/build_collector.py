@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import torch
 
 from drone_rl.collectors import (
+    BatchedCollector,
     EpisodeCollector,
     RolloutCollector,
     ThreadedCollector,
-    WorldsCollector,
 )
 from drone_rl.config.collecting import Episodes, Ray
 from drone_rl.config.configuration import as_config, from_config
@@ -26,7 +26,7 @@ from drone_rl.utils.seeding import Stream, torch_generator
 if TYPE_CHECKING:
     from drone_rl.collectors.ray import RayEpisodeCollector
 
-C = TypeVar("C", bound=WorldsCollector)
+C = TypeVar("C", bound=BatchedCollector)
 
 
 class Collecting(NamedTuple):
@@ -67,7 +67,7 @@ def rollout_collector(settings: TrainSettings, practice: Practice | None = None)
 
 
 def _threaded(
-    settings: TrainSettings, practice: Practice | None, collect: Callable[..., WorldsCollector]
+    settings: TrainSettings, practice: Practice | None, collect: Callable[..., BatchedCollector]
 ) -> Collecting:
     """The worlds shared out to threads, each with a collector made of worlds and an actor."""
     shares = _shares(settings)
@@ -155,8 +155,8 @@ def _remote_share(
 def _episodes(settings: TrainSettings, cores: int) -> Callable[..., EpisodeCollector]:
     """Makes collectors of complete episodes, each on so many cores."""
     asked = settings.collector
-    is_compiled = isinstance(asked, Episodes) and asked.compiled
-    return functools.partial(EpisodeCollector, is_compiled=is_compiled, num_cores=cores)
+    acceleration = "fused" if isinstance(asked, Episodes) and asked.compiled else "none"
+    return functools.partial(EpisodeCollector, acceleration=acceleration, num_threads=cores)
 
 
 def _num_workers(settings: TrainSettings) -> int:

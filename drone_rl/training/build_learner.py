@@ -5,8 +5,7 @@ from typing import Any
 import torch
 from torch import nn
 
-from drone_rl.acceleration.fused_network import FusedNetwork
-from drone_rl.collectors import ThreadedCollector
+from drone_rl.collectors.speedups import accelerated_gradients
 from drone_rl.config.configuration import as_config
 from drone_rl.config.objectives import WithCritic
 from drone_rl.config.training import TrainSettings
@@ -68,13 +67,15 @@ def actor_critic_learner(settings: TrainSettings, made: Collecting) -> ActorCrit
 
 
 def _learning_actor(settings: TrainSettings, made: Collecting) -> nn.Module:
-    """The actor; its network by a kernel, if that is asked for and there is one that knows it."""
+    """The actor; with a fused network, if that is asked for and the kernel supports it."""
     actor, trainer = made.collector.actor, settings.trainer
-    network = FusedNetwork.find(made.network, trainer.num_threads) if trainer.compiled else None
-    if network is None:
+    if not trainer.compiled:
         return actor
-    if isinstance(made.collector, ThreadedCollector):  # in this process
-        network.known = made.collector.cache_activations()
+    network = accelerated_gradients(
+        made.network, trainer.num_threads, cache=made.collector.cache_activations
+    )
+    if network is made.network:
+        return actor
     torch.set_num_threads(1)  # what is left to torch is small, and its threads wait in loops
     spec: Any = actor.spec  # torch's modules are annotated to hold anything
     return make_actor(network, spec["action"])

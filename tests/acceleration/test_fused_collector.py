@@ -7,11 +7,21 @@ import torch
 from torchrl.envs import RewardSum
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
-from drone_rl.acceleration import fused_collector as flight_module
+from drone_rl.acceleration import fused_collector
+from drone_rl.acceleration.direct_collector import DirectCollector
+from drone_rl.acceleration.fused_collector import FusedCollector
 from drone_rl.acceleration.fused_network import FusedNetwork
 from drone_rl.collectors import EpisodeCollector
+from drone_rl.collectors.stepping import SteppingCollector
 from drone_rl.config import AppearanceSettings, DynamicsSettings, PillarsSettings, TaskSettings
-from drone_rl.envs import CropRows, DroneEnv, GrayPixels, StandardizePixels, with_transforms
+from drone_rl.envs import (
+    CropRows,
+    DroneEnv,
+    GrayPixels,
+    RgbPixels,
+    StandardizePixels,
+    with_transforms,
+)
 from drone_rl.policies import MLP, SmallCNN, make_actor
 from drone_rl.sim.dynamics import Quadrotor
 from drone_rl.sim.dynamics.flight_state import LOST
@@ -42,7 +52,7 @@ def make(
         with torch.no_grad():
             network.layers.logits.weight.mul_(100)
     actor = make_actor(network, env.action_spec, generator)
-    return EpisodeCollector(env, actor, **{"is_compiled": True, **how})
+    return EpisodeCollector(env, actor, **{"acceleration": "fused", **how})
 
 
 GIMBAL = FLYING.replace(camera_mount="gimbal")
@@ -52,7 +62,7 @@ GIMBAL = FLYING.replace(camera_mount="gimbal")
 def test_replayed_by_torchrls_steps_they_are_the_same_bit_for_bit(dynamics):
     kept = [REASON, ("next", "info", "collected"), ("next", "info", "drone")]
     collector = make(keep=kept, dynamics=dynamics)
-    assert collector._flight is not None
+    assert isinstance(collector.source, FusedCollector)
     env = DroneEnv(5, SHORT, dynamics=dynamics)
     env = with_transforms(env, [GrayPixels(), StandardizePixels()])
     for _ in range(3):
@@ -89,13 +99,13 @@ def test_what_is_told_by_the_kernel_is_what_a_replay_tells():
 
 
 def test_the_step_by_step_way_gives_entries_of_the_same_kinds():
-    one, other = make().collect(), make(is_compiled=False).collect()
+    one, other = make().collect(), make(acceleration="direct").collect()
     assert {*one.keys(True, True)} == {*other.keys(True, True)}
     for key in one.keys(True, True):
         assert one[key].dtype == other[key].dtype and one[key].shape[1:] == other[key].shape[1:]
 
 
-@pytest.mark.parametrize("how", [{"num_cores": 2}, {"num_cores": 3}])
+@pytest.mark.parametrize("how", [{"num_threads": 2}, {"num_threads": 3}])
 def test_nothing_depends_on_how_many_cores_fly(how):
     one, other = make(num_envs=35), make(num_envs=35, **how)
     for _ in range(2):
@@ -106,9 +116,9 @@ def test_nothing_depends_on_how_many_cores_fly(how):
 def test_in_parts_greedy_flights_are_the_same(monkeypatch):
     with set_exploration_type(DETERMINISTIC):
         whole = make()
-        monkeypatch.setattr(flight_module, "_LONGEST", 2)
+        monkeypatch.setattr(fused_collector, "_MAX_STEPS", 2)
         parts = make()
-        assert parts._flight._length == 2
+        assert parts.source._length == 2
         for _ in range(2):
             expected, found = whole.collect(), parts.collect()
             assert torch.bincount(found["collector", "traj_ids"]).max() > 4
@@ -154,80 +164,105 @@ def test_observations_may_be_left_out():
     assert "pixels" not in batch and "logits" not in batch and "action" in batch
 
 
-def learned(network, by, batch):
+def learned(network, by, batch, *handles):
     """Logits of a batch, and the gradients of a sum of them."""
     network.zero_grad()
-    logits = by(batch["pixels"])
+    logits = by(batch["pixels"], *handles)
     (logits * torch.linspace(-1, 1, logits.numel()).view(logits.shape)).sum().backward()
     return [logits.detach(), *(p.grad.clone() for p in network.parameters())]
 
 
-@pytest.mark.parametrize("longest", [64, 2])
+def cached(collector, num_threads=1):
+    """The collector's network, fused, and with the activations that the collector keeps."""
+    cache = collector.source.cache_activations()
+    return FusedNetwork(collector.actor.module[0].module, num_threads, cache=cache)
+
+
+@pytest.mark.parametrize("max_steps", [64, 2])
 @pytest.mark.parametrize("is_greedy", [True, False])
-def test_what_the_layers_made_is_what_they_would_make_again(longest, is_greedy, monkeypatch):
-    monkeypatch.setattr(flight_module, "_LONGEST", longest)
-    collector = make(num_envs=35, num_cores=2)
+def test_cached_activations_equal_computed_ones(max_steps, is_greedy, monkeypatch):
+    monkeypatch.setattr(fused_collector, "_MAX_STEPS", max_steps)
+    collector = make(num_envs=35, num_threads=2)
     network = collector.actor.module[0].module
-    quick, plain = FusedNetwork(network, 2), FusedNetwork(network, 2)
-    quick.known = known = collector.cache_activations()
-    weights = collector._flight._network.weights
+    reusing, plain = cached(collector, 2), FusedNetwork(network, 2)
+    cache, weights = collector.source.cache_activations(), collector.source._network.weights
     for _ in range(2):
         kind = DETERMINISTIC if is_greedy else ExplorationType.RANDOM
         with set_exploration_type(kind):
             batch = collector.collect()
-        assert known.find(batch["pixels"].flatten(1), weights) is not None
+        assert cache.find(batch["activations"], weights) is not None
         half = batch[len(batch) // 2 :]
         for part in (batch, half):
-            found, expected = learned(network, quick, part), learned(network, plain, part)
+            found = learned(network, reusing, part, part["activations"])
+            expected = learned(network, plain, part)
             assert all(torch.equal(*pair) for pair in zip(found, expected, strict=True))
             assert torch.equal(found[0], part["logits"])
-            quick(torch.zeros_like(batch["pixels"]))  # makes its own, in memory of its own
+            reusing(torch.zeros_like(batch["pixels"]))  # computed in memory of its own
         with torch.no_grad():
-            network.layers.fc1.weight.add_(0.1)  # no longer what made them
-        quick_logits, logits = quick(batch["pixels"]), plain(batch["pixels"])
-        assert torch.equal(quick_logits, logits) and not torch.equal(logits, batch["logits"])
+            network.layers.fc1.weight.add_(0.1)  # other weights than the cached activations'
+        logits = plain(batch["pixels"])
+        assert torch.equal(reusing(batch["pixels"], batch["activations"]), logits)
+        assert not torch.equal(logits, batch["logits"])
 
 
-def test_another_flight_writes_over_what_was_made():
+def test_the_next_batch_overwrites_cached_activations():
     collector = make()
-    network = FusedNetwork(collector.actor.module[0].module)
-    network.known = collector.cache_activations()
+    network = cached(collector)
     batch = collector.collect()
-    logits = network(batch["pixels"])
+    logits = network(batch["pixels"], batch["activations"])
     other = collector.collect()
-    with pytest.raises(RuntimeError, match="flown through"):
+    with pytest.raises(RuntimeError, match="collected between the forward and the backward pass"):
         logits.sum().backward()
-    again = network(batch["pixels"])
+    again = network(batch["pixels"], batch["activations"])  # stale handles: computed
     assert torch.allclose(again, batch["logits"], atol=1e-5)
     again.sum().backward()
-    assert torch.equal(network(other["pixels"]), other["logits"])
+    assert torch.equal(network(other["pixels"], other["activations"]), other["logits"])
 
 
-@pytest.mark.parametrize(("parts", "is_known"), [(0, False), (2, False), (6, True)])
-def test_what_the_layers_made_is_kept_as_far_as_there_is_room(parts, is_known, monkeypatch):
-    size = make().cache_activations().outputs.shape[1]
-    monkeypatch.setattr(flight_module, "_LONGEST", 2)
-    monkeypatch.setattr(flight_module, "_MOST_OUTPUTS", parts * 5 * 2 * size)
+@pytest.mark.parametrize(("parts", "fits"), [(0, False), (2, False), (6, True)])
+def test_activations_are_cached_if_they_fit(parts, fits, monkeypatch):
+    size = make().source.cache_activations().outputs.shape[1]
+    monkeypatch.setattr(fused_collector, "_MAX_STEPS", 2)
+    monkeypatch.setattr(fused_collector, "_MAX_ACTIVATIONS", parts * 5 * 2 * size)
     collector = make()
-    known = collector.cache_activations()
+    cache = collector.source.cache_activations()
     batch = collector.collect()
     assert 4 < batch["collector", "traj_ids"].bincount().max() <= 12
-    assert (known is None) is (parts == 0)
-    if known is not None:
-        rows = known.find(batch["pixels"].flatten(1), collector._flight._network.weights)
-        assert (rows is not None) is is_known
-    network = FusedNetwork(collector.actor.module[0].module)
-    network.known = known
-    assert torch.equal(network(batch["pixels"]), batch["logits"])
+    assert (cache is None) is (parts == 0)
+    if cache is not None:
+        rows = cache.find(batch["activations"], collector.source._network.weights)
+        assert (rows is not None) is fits
+        network = cached(collector)
+        assert torch.equal(network(batch["pixels"], batch["activations"]), batch["logits"])
 
 
-def test_nothing_is_kept_that_nobody_asked_for_or_that_has_no_pictures():
-    assert make()._flight._known is None
-    assert make(is_compiled=False).cache_activations() is None
+def test_no_activations_without_a_request_or_without_observations():
+    assert "activations" not in make().collect()
+    assert make(acceleration="direct").source.cache_activations() is None
     collector = make(keep_observations=False)
-    known = collector.cache_activations()
-    assert known is not None and collector.cache_activations() is known
-    assert "pixels" not in collector.collect()
+    cache = collector.source.cache_activations()
+    assert cache is not None and collector.source.cache_activations() is cache
+    assert not {"pixels", "activations"} & set(collector.collect().keys())
+
+
+@pytest.mark.parametrize(
+    ("how", "reason"),
+    [
+        ({"transforms": (GrayPixels, lambda: CropRows(2, 20))}, "transform CropRows is not fused"),
+        ({"transforms": (RgbPixels,)}, "frames that are not gray are not fused"),
+        ({"task": PillarsSettings(num_rows=1)}, "task Pillars with ComputerVision is not fused"),
+        ({"network": MLP((1, 25, 64), 3)}, "network MLP is not fused"),
+    ],
+)
+def test_the_log_says_why_a_collector_is_not_fused(how, reason):
+    collector = make(**how) if "network" in how or "task" in how else None
+    if collector is None:
+        channels = 3 if how["transforms"] == (RgbPixels,) else 1
+        collector = make(network=SmallCNN((channels, 18 if channels == 1 else 25, 64), 3), **how)
+    assert reason in collector.source.name and collector.source.name.startswith("direct collector")
+    stepping = make(transforms=(GrayPixels, StandardizePixels, RewardSum))
+    assert stepping.source.name == "stepping collector: transform RewardSum is not fused"
+    assert make().source.name == "fused collector"
 
 
 def test_goes_on_from_a_state_as_if_it_had_never_stopped():
@@ -246,7 +281,7 @@ def test_goes_on_from_a_state_as_if_it_had_never_stopped():
 @pytest.mark.parametrize(
     "what",
     [
-        {"is_compiled": False},
+        {"acceleration": "direct"},
         {"transforms": (GrayPixels, StandardizePixels, RewardSum)},
         {"transforms": (GrayPixels, lambda: CropRows(2, 20))},
         {"transforms": (GrayPixels, StandardizePixels, StandardizePixels)},
@@ -256,27 +291,27 @@ def test_goes_on_from_a_state_as_if_it_had_never_stopped():
 )
 def test_whatever_it_does_not_know_is_flown_step_by_step(what):
     collector = make(**what)
-    assert collector._flight is None
+    assert isinstance(collector.source, DirectCollector | SteppingCollector)
     assert len(collector.collect())
 
 
 def test_another_renderer_draws_step_by_step():
     env = with_transforms(DroneEnv(2, SHORT, renderer="mujoco_warp"), [GrayPixels()])
     actor = make_actor(SmallCNN((1, 25, 64), 3), env.action_spec)
-    assert EpisodeCollector(env, actor, is_compiled=True)._flight is None
+    source = EpisodeCollector(env, actor, acceleration="fused").source
+    assert isinstance(source, DirectCollector) and "WarpRenderer on cpu" in str(source.reasons)
     env.close()
 
 
 def test_a_way_of_exploring_that_it_does_not_know_is_taken_step_by_step():
     collector = make()
     with set_exploration_type(ExplorationType.MODE):
-        assert not collector._flight.can_act()
         assert len(collector.collect())
 
 
 def test_its_threads_end_with_the_collector():
     before = {*threading.enumerate()}
-    collector = make(num_cores=3)
+    collector = make(num_threads=3)
     collector.collect()
     begun = {*threading.enumerate()} - before
     assert begun  # no more than it needs: one that is idle again takes the next part
@@ -290,8 +325,8 @@ def test_worlds_of_another_look_are_flown_step_by_step(visibility):
     env = with_transforms(DroneEnv(3, SHORT, appearance=look), [GrayPixels(), StandardizePixels()])
     network = SmallCNN((1, 25, 64), 3, channels=(4,), hidden=(8,))
     actor = make_actor(network, env.action_spec, torch.Generator().manual_seed(0))
-    collector = EpisodeCollector(env, actor, is_compiled=True)
-    assert collector._flight is None
+    collector = EpisodeCollector(env, actor, acceleration="fused")
+    assert isinstance(collector.source, DirectCollector | SteppingCollector)
     batch, plain = collector.collect(), make(num_envs=3).collect()
     assert batch["next", "done"].sum() == 3
     assert batch["pixels"][0].mean() > plain["pixels"][0].mean()  # the fog is bright
@@ -300,13 +335,13 @@ def test_worlds_of_another_look_are_flown_step_by_step(visibility):
 def test_a_lost_drone_ends_its_episode_in_the_kernel_too():
     """Of five drones one is lost from the start."""
     collector = make(dynamics=Quadrotor(FLYING))
-    begin = collector._flight._worlds.begin
+    begin = collector.source._worlds.begin
 
     def lose(state):
         state.body.numbers[2, LOST.first] = 1.0
         begin(state)
 
-    collector._flight._worlds.begin = lose
+    collector.source._worlds.begin = lose
     batch = collector.collect()
     lengths = batch["collector", "traj_ids"].bincount()
     assert lengths[2] == 1 and (lengths[[0, 1, 3, 4]] > 1).all()
@@ -315,7 +350,7 @@ def test_a_lost_drone_ends_its_episode_in_the_kernel_too():
 
 def test_pictures_that_are_not_standardised_are_as_they_are_drawn():
     collector = make(transforms=(GrayPixels,))
-    assert collector._flight is not None
+    assert isinstance(collector.source, FusedCollector)
     batch = collector.collect()
     first = torch.stack([batch[batch["collector", "traj_ids"] == i][0]["pixels"] for i in range(5)])
     env = with_transforms(DroneEnv(5, SHORT), [GrayPixels()])

@@ -21,7 +21,7 @@ from tests.policies.halves import draw_weights, halves, made, taught
 )
 def test_gradients_are_torchs(shape, options, num_threads):
     network = made(shape, **options)
-    learning = FusedNetwork.find(network, num_threads)
+    learning = FusedNetwork.try_create(network, num_threads)
     for count in (150, 1, 2, 65):  # more than a block a thread; fewer than threads; smaller ones
         pictures, weights = halves(count, *shape), halves(count, 3)
         logits, expected = taught(network, network, pictures, weights)
@@ -41,7 +41,7 @@ def test_gradients_are_torchs(shape, options, num_threads):
 )
 def test_gradients_of_pictures_are_torchs(shape, options):
     network = made(shape, **options)
-    learning = FusedNetwork.find(network, of="pictures")
+    learning = FusedNetwork.try_create(network, of="pixels")
     pictures, weights = halves(70, *shape).requires_grad_(), halves(70, 3)
     expected, found = (
         torch.autograd.grad((by(pictures) * weights).sum(), pictures)[0]
@@ -64,21 +64,21 @@ def test_gradients_of_pictures_are_torchs(shape, options):
 )
 def test_gradients_from_known_outputs_in_any_order_are_torchs(first, last):
     network = made((1, 12, 20), channels=(5, 6), hidden=(9, 7))
-    learning = FusedNetwork.find(network, 2)
-    learning.known = known = ActivationCache(100, outputs_at(packed_layers(network))[-1])
+    known = ActivationCache(100, outputs_at(packed_layers(network))[-1])
+    learning = FusedNetwork.try_create(network, 2, cache=lambda: known)
     pictures, weights = halves(70, 1, 12, 20), halves(last - first, 3)
-    learning(pictures)  # makes room for the weights; nothing is known yet
+    learning(pictures)  # packs the weights; nothing is cached yet
     work = learning._work
-    outputs = work.answer(pictures.flatten(1)).outputs.view(-1, known.outputs.shape[1])
+    outputs = work.compute(pictures.flatten(1), None).outputs.view(-1, known.outputs.shape[1])
     rows = torch.randperm(100)[:70]
-    known.forget()
+    known.clear()
     known.outputs.fill_(3.0)  # wrong wherever another row is read
     known.outputs[rows] = outputs[:70]
-    known.note(pictures, rows, work._weights.clone())
+    handles = known.add(rows, work._weights.clone())[first:last]
     some = pictures[first:last]
-    assert known.find(some.flatten(1), work._weights) is not None
+    assert known.find(handles, work._weights) is not None
     logits, expected = taught(network, network, some, weights)
-    found, gradients = taught(network, learning, some, weights)
+    found, gradients = taught(network, lambda x: learning(x, handles), some, weights)
     torch.testing.assert_close(found, logits)
     for gradient, other in zip(gradients, expected, strict=True):
         assert other.any()

@@ -41,8 +41,6 @@ def test_threads_have_rooms_of_their_own(network):
     assert all(torch.equal(one, other) for one, other in zip(expected, found, strict=True))
 
 
-def test_other_networks_are_asked_by_torch():
-    network = OriginalCNN((1, 25, 64), 3)
-    answers, pictures = BatchedInference(network), torch.randn(3, 1, 25, 64)
-    assert answers._packed is None
-    assert torch.equal(answers(pictures), network(pictures))
+def test_other_networks_are_not_supported():
+    found = BatchedInference.try_create(OriginalCNN((1, 25, 64), 3))
+    assert found == ("network OriginalCNN is not fused",)

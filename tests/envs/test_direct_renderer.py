@@ -20,23 +20,23 @@ class Dark(GrayPixels):
 )
 def test_gray_is_drawn_gray_and_the_same(first, modality):
     env = with_transforms(DroneEnv(3, SHORT), [first, CropRows(5, 25)])
-    sight = DirectRenderer.find(env, ["pixels"], KEPT)
-    assert sight.view.modalities == (modality,)
+    renderer = DirectRenderer.try_create(env, ["pixels"], KEPT)
+    assert renderer.view.modalities == (modality,)
     seen = env.reset()["pixels"]
-    assert torch.equal(sight.look(env.base_env.worlds.state)["pixels"], seen)
+    assert torch.equal(renderer.look(env.base_env.worlds.state)["pixels"], seen)
     env.close()
 
 
 def test_a_step_is_told_as_torchrl_tells_it():
     reason = ("next", "info", "end_reason")
     env = with_transforms(DroneEnv(3, SHORT), [GrayPixels()])
-    sight = DirectRenderer.find(env, ["pixels"], [*KEPT, reason])
+    renderer = DirectRenderer.try_create(env, ["pixels"], [*KEPT, reason])
     state = env.reset()
     action = torch.tensor([0, 1, 2])
     for step in range(5):
-        moved, reward = sight.worlds.advance(sight.worlds.state, action)  # changes nothing
+        moved, reward = renderer.worlds.advance(renderer.worlds.state, action)  # changes nothing
         state = env.step(state.set("action", action))
-        told, done = sight.tell(moved, reward)
+        told, done = renderer.entries(moved, reward)
         assert set(told) == {*KEPT, reason}
         assert not (told["next", "terminated"] & told["next", "truncated"]).any()
         assert all(torch.equal(value, state[key]) for key, value in told.items())

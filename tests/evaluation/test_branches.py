@@ -11,12 +11,12 @@ from drone_rl.sim.tasks.collect_cubes.rules import EndReason
 def ends(possible):
     with drone_rl.load_policy("good").flying(3, seed=0) as (env, _):
         env.reset()
-        sight = DirectRenderer.find(env, ("pixels",), ())
+        renderer = DirectRenderer.try_create(env, ("pixels",), ())
 
         def decide(pixels):
             return Decisions(torch.zeros(len(pixels), 3), possible(pixels))
 
-        return follow(sight, decide, torch.tensor([0, 2]))
+        return follow(renderer, decide, torch.tensor([0, 2]))
 
 
 def test_one_possible_action_gives_one_end():

@@ -10,6 +10,7 @@ from torchrl.collectors import Collector
 from torchrl.objectives.value import GAE
 
 import drone_rl
+from drone_rl.acceleration.fused_collector import FusedCollector
 from drone_rl.acceleration.fused_network import ActivationCache, FusedNetwork
 from drone_rl.config import TaskSettings
 from drone_rl.config.collecting import Rollouts, Threads
@@ -97,11 +98,12 @@ def test_what_the_network_made_is_kept_where_it_is_learned_from(settings, is_kep
     settings = TrainSettings(task=TASK).replace(**settings)
     made = build_collector(settings)
     learner = build_learner(settings, made)
-    flights = [getattr(part, "_flight", None) for part in made.collector.collectors]
-    kept = [flight._known for flight in flights if flight is not None and flight._known is not None]
+    sources = [getattr(part, "source", None) for part in made.collector.collectors]
+    kept = [s._cache for s in sources if isinstance(s, FusedCollector) and s._cache is not None]
     assert (len(kept) == 1) is is_kept and bool(kept) is is_kept
+    assert ("activations" in learner.in_keys) is is_kept
     if is_kept:
-        assert kept[0] is learner.loss.actor_network.module[0].module.known
+        assert kept[0] is learner.loss.actor_network.module[0].module._cache
     made.collector.shutdown()
 
 

@@ -13,7 +13,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from drone_rl.acceleration.inference_kernel import BatchedInference
+from drone_rl.collectors.speedups import accelerated_inference
 from drone_rl.policies import PolicyNetwork
 from drone_rl.policies.rounded_layers import SLACK, UNIT, Layer, layer_of
 from drone_rl.policies.rounding import PIXEL_UNITS, RoundingBound
@@ -41,7 +41,7 @@ class Bounds:
         if not isinstance(last, nn.Linear):
             raise InputError("the network's last layer is not linear; prove a policy whose is")
         self.gap = gap
-        self._answers = BatchedInference(network)
+        self._answers = accelerated_inference(network)
         scale, self._steps = 2, []
         for layer in inner:
             self._steps.append((_step(layer, scale), scale))

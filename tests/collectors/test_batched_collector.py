@@ -103,15 +103,15 @@ def test_shutdown_may_leave_the_worlds_open(make):
 
 def test_the_worlds_are_those_behind_transforms():
     env = DroneEnv(2, TASK, pixels=False)
-    assert EpisodeCollector(TransformedEnv(env, RewardSum()), Oracle(TASK)).worlds is env
-    assert EpisodeCollector(env, Oracle(TASK)).worlds is env
+    assert EpisodeCollector(TransformedEnv(env, RewardSum()), Oracle(TASK)).base_env is env
+    assert EpisodeCollector(env, Oracle(TASK)).base_env is env
 
 
 def test_one_world_without_a_batch(make):
     env = DroneEnv(1, TASK, pixels=False)
     env.batch_size = torch.Size([])
     for kind in KINDS.values():
-        with pytest.raises(InputError, match=r"batch size \[\]; give a batch of worlds"):
+        with pytest.raises(InputError, match=r"batch size \[\]; give a batch of environments"):
             kind(env, Oracle(TASK))
 
 

@@ -1,8 +1,4 @@
-# pyright: reportAttributeAccessIssue=false
-# pyright: reportIncompatibleMethodOverride=false
-# pyright: reportReturnType=false
-# (TorchRL's collectors annotate seeds, and TensorDict keys, otherwise than they use them.)
-"""What collectors over one batch of worlds have in common."""
+"""What the collectors of one batch of environments share."""
 
 import abc
 from collections.abc import Callable, Iterable, Iterator
@@ -15,11 +11,10 @@ from torch import Tensor, nn
 from torchrl.collectors import BaseCollector
 from torchrl.envs import EnvBase
 
-from drone_rl.acceleration.fused_network import ActivationCache
 from drone_rl.utils.errors import InputError
 
 
-class WorldsCollector(BaseCollector):
+class BatchedCollector(BaseCollector):
     """Iterates over batches from a batched environment and an actor, in this process."""
 
     def __init__(
@@ -34,18 +29,20 @@ class WorldsCollector(BaseCollector):
         """Connects an environment and a policy.
 
         Args:
-            env: A batch of worlds.
+            env: A batch of environments.
             actor: Writes the action.
             total_frames: Stop before a batch once this many frames were collected; -1 for never.
-            keep: Entries kept besides what the actor saw and made of it, the reward and the end
+            keep: Entries kept in addition to observations, what the actor writes, reward and end
                 flags, as far as the environment has them.
             postproc: Applied to each batch, such as a return estimator.
 
         Raises:
-            InputError: The environment is not a batch of worlds.
+            InputError: The environment is not a batch of environments.
         """
         if len(env.batch_size) != 1:
-            raise InputError(f"env has batch size {list(env.batch_size)}; give a batch of worlds")
+            raise InputError(
+                f"env has batch size {list(env.batch_size)}; give a batch of environments"
+            )
         super().__init__()
         self.env = env
         self.actor = actor
@@ -59,58 +56,48 @@ class WorldsCollector(BaseCollector):
         self._kept = (*(("next", key) for key in flags), *(k for k in keep if k in observable))
 
     @property
-    def worlds(self) -> Any:
-        """The environment itself, without the transforms before it."""
+    def base_env(self) -> Any:
+        """The environment without its transforms."""
         return getattr(self.env, "base_env", self.env)
-
-    def cache_activations(self) -> ActivationCache | None:
-        """Keeps what the network makes of pictures from the next batch on, for who learns from it.
-
-        No result depends on it.
-
-        Returns:
-            That of the last batch, while there is no other; None where it can't be kept.
-        """
-        return None
 
     @abc.abstractmethod
     def collect(self) -> TensorDictBase:
-        """The next batch."""
+        """Return the next batch."""
 
     def iterator(self) -> Iterator[TensorDictBase]:
-        """Yields batches until `total_frames`; what a `for` over the collector goes through."""
+        """Yields batches until `total_frames`; a `for` over the collector calls it."""
         while self.total_frames < 0 or self.frames < self.total_frames:
             yield self.collect()
 
     def _finish(self, batch: TensorDictBase, episodes: int) -> TensorDictBase:
-        """Counts a batch, and what becomes of it."""
+        """Counts a batch and applies `postproc`."""
         self.frames += batch.numel()
         self.episodes += episodes
         return batch if self.postproc is None else self.postproc(batch)
 
     def set_seed(self, seed: int, static_seed: bool = False) -> int:
-        """Seeds the worlds; the actor's draws are the business of whoever made its generator.
+        """Seeds the environments; whoever made the actor's generator seeds that.
 
         Returns:
             A seed for the next collector, or the same if it is static.
         """
-        return self.env.set_seed(seed, static_seed=static_seed)
+        return cast(int, self.env.set_seed(seed, static_seed=static_seed))
 
     def shutdown(
         self, timeout: float | None = None, close_env: bool = True, raise_on_error: bool = True
     ) -> None:
-        """Closes the environment, unless it shall stay open."""
+        """Closes the environment, unless it is to stay open."""
         if close_env and not self.env.is_closed:
             self.env.close()
 
     def __len__(self) -> int:
-        """How many batches there will be is not known."""
+        """Raises TypeError: the number of batches is not known."""
         raise TypeError(f"the number of batches of {type(self).__name__} is not known beforehand")
 
     def _maybe_fallback_update(
         self, policy_or_weights: Any = None, *, model_id: str | None = None
     ) -> None:
-        """What `update_policy_weights_` does: nothing without weights, if the actor is shared."""
+        """Implements `update_policy_weights_`: nothing without weights, if the actor is shared."""
         if policy_or_weights is not None:
             copy_weights(policy_or_weights, self.actor)
 
@@ -129,26 +116,16 @@ def copy_weights(source: Any, actor: TensorDictModuleBase) -> None:
         actor.load_state_dict(source.state_dict() if isinstance(source, nn.Module) else source)
 
 
-def ballast(env: EnvBase, observed: Iterable[NestedKey]) -> set[NestedKey]:
-    """Entries of a state that no step reads, and which make each step of TorchRL's dearer.
-
-    Args:
-        env: Whose states they are.
-        observed: What the actor looks at.
-    """
-    return {env.reward_key, "info"} - {_as_tuple(key)[0] for key in observed}
-
-
 def take_rows(tensordict: TensorDictBase, rows: Tensor) -> TensorDictBase:
-    """What indexing gives, without tensordict's search for the shape of it, which takes longer.
+    """Index the first dimension, faster than tensordict's own indexing.
 
     Args:
-        tensordict: Of any entries. First dimension: rows.
+        tensordict: First dimension: rows.
         rows: Indices. Shape: (k,).
     """
     taken = {key: tensordict.get(key).index_select(0, rows) for key in tensordict.keys(True, True)}
     return TensorDict(taken, [len(rows)], device=tensordict.device)
 
 
-def _as_tuple(key: NestedKey) -> tuple[str, ...]:
+def _as_tuple(key: Any) -> tuple[str, ...]:
     return (key,) if isinstance(key, str) else key
