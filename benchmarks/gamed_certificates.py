@@ -11,18 +11,18 @@ from typing import Any
 import numpy as np
 
 from benchmarks.gamed_case import GamedCase
-from drone_rl.config.shifting import ShiftSettings
+from drone_rl.config.commands import ShiftSettings
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import certificate_path, shifts_path
 from drone_rl.robustness.axes import find_axes
 from drone_rl.robustness.domain import Prober
-from drone_rl.robustness.flying import Airfield
-from drone_rl.robustness.shifts import make_subject, shifts
+from drone_rl.robustness.paired_evaluation import PairedEvaluator
+from drone_rl.robustness.shifts import make_policy_spec, shifts
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 from drone_rl.verdicts.judge import judge
 from drone_rl.verification.checker import fingerprint
-from drone_rl.verification.checker.flights import Simulator
+from drone_rl.verification.checker.rollouts import Simulator
 
 _AXIS, _VALUE = "dead_rows", 12.0
 """A condition in which the invented file says that a policy is good, which fails there."""
@@ -130,9 +130,9 @@ def invented(policy: Policy, folder: Path) -> dict[str, Any]:
         level |= {"oracle": data["plain"]["oracle"], "impossible": False, "refused": None}
         level["modes"] = {"constant": {**won, "unchanged": False}}
     along["areas"] = {"constant": 1.0}
-    subject = make_subject(policy, ShiftSettings())
+    subject = make_policy_spec(policy, ShiftSettings())
     (axis,) = find_axes([_AXIS], subject)
-    with closing(Airfield(subject, 1, data["settings"]["seed"])) as bed:
+    with closing(PairedEvaluator(subject, 1, data["settings"]["seed"])) as bed:
         prober = _Liar(bed)
         data["domain"] = {"plain": prober.plain, "ranges": {_AXIS: prober.search(axis)}}
     return data
@@ -141,7 +141,7 @@ def invented(policy: Policy, folder: Path) -> dict[str, Any]:
 class _Liar(Prober):
     """Finds a policy good under every condition."""
 
-    def __init__(self, bed: Airfield) -> None:
+    def __init__(self, bed: PairedEvaluator) -> None:
         self._bed = bed
         self.plain = self.probe(None, 0.0)
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from drone_rl.policies.policy import load_policy
 from drone_rl.utils.progress import silent
 from drone_rl.verification.places import places
-from drone_rl.verification.prover.seeing import Seeing
-from drone_rl.verification.prover.subject import make_subject
+from drone_rl.verification.prover.cube_images import Seeing
+from drone_rl.verification.prover.policy_spec import make_subject
 
 _BATCH = 2000
 

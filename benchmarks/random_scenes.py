@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drone_rl.sim.rendering import Scene
-from drone_rl.sim.rendering.semantics import Meaning
+from drone_rl.sim.rendering.scene import Meaning
 
 CAMERA = "camera"
 NUDGED = ("left", "right", "up", "down")

@@ -16,7 +16,7 @@ from benchmarks.evidence import (
     VERDICT,
     changed,
 )
-from drone_rl.evaluation import metrics_text as evaluation
+from drone_rl.evaluation import evaluate as evaluation
 from drone_rl.evaluation import verdict_text as verdict
 from drone_rl.explanations.report import (
     advice,
@@ -33,9 +33,9 @@ from drone_rl.explanations.report import (
 from drone_rl.robustness import domain_text as domain
 from drone_rl.robustness import shifts_text as shifts
 from drone_rl.sweeps import text as sweep
-from drone_rl.utils import seed_text as seeds
-from drone_rl.utils.sentences import Sentence, said
-from drone_rl.verdicts import card_text as card
+from drone_rl.utils import text as seeds
+from drone_rl.utils.text import Sentence, said
+from drone_rl.verdicts import card as card
 
 Changes = Mapping[str, Any]
 SPOKEN: dict[str, tuple[tuple[Sentence, ...], Mapping[str, Any]]] = {

@@ -10,8 +10,7 @@ import numpy as np
 from benchmarks.tampered_parts import Data, Way, largest
 from drone_rl.policies.policy import load_policy
 from drone_rl.verification.checker import fingerprint
-from drone_rl.verification.checker.claims import MOST_MISSING
-from drone_rl.verification.checker.partition import volume
+from drone_rl.verification.checker.consistency import MOST_MISSING, volume
 
 _TAIL = 1000
 """A box's length by that of the part that is given to another outcome."""

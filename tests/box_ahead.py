@@ -3,9 +3,9 @@
 import numpy as np
 import warp as wp
 
-from drone_rl.sim.rendering.raytrace import structs
+from drone_rl.sim.rendering.raytrace import structs_kernel
+from drone_rl.sim.rendering.raytrace.intersection_kernel import BOX
 from drone_rl.sim.rendering.raytrace.scene import make_rays
-from drone_rl.sim.rendering.raytrace.solids import BOX
 
 SIZE = 40
 
@@ -16,13 +16,13 @@ def array(values, dtype):
 
 def view(what):
     """One camera at the origin that looks along -z."""
-    camera = structs.Camera()
+    camera = structs_kernel.Camera()
     camera.attitude = wp.vec4(1.0, 0.0, 0.0, 0.0)
     camera.half_width = camera.half_height = 1.0
-    made = structs.View()
+    made = structs_kernel.View()
     made.count = 1
     rays = make_rays(camera, SIZE, SIZE).reshape(1, -1, 3)
-    made.cameras = array([camera], structs.Camera)
+    made.cameras = array([camera], structs_kernel.Camera)
     made.rays, made.cosines = array(rays, wp.vec3), array(-rays[..., 2], float)
     made.width = made.height = SIZE
     made.far, made.what = 50.0, what
@@ -30,7 +30,7 @@ def view(what):
 
 
 def geoms(*depths, numbers=(3,)):
-    count, made = len(numbers), structs.Geoms()
+    count, made = len(numbers), structs_kernel.Geoms()
     made.kind, made.frame = array([int(BOX)] * count, int), array([0] * count, int)
     made.number = array(numbers, int)
     made.position = array([[0.0, 0.0, z] for z in depths or (-6.0,)], wp.vec3)
@@ -40,14 +40,14 @@ def geoms(*depths, numbers=(3,)):
 
 
 def poses():
-    made = structs.Poses()
+    made = structs_kernel.Poses()
     made.places = array([[[0.0, 0.0, 0.0]]], wp.vec3)
     made.attitudes = array([[1.0, 0.0, 0.0, 0.0]], wp.vec4)
     return made
 
 
 def looks():
-    made = structs.Looks()
+    made = structs_kernel.Looks()
     made.colors = array([[[0.0] * 3] * 3 + [[1.0, 0.5, 0.0]]], wp.vec3)
     made.ambient = array([[[0.2, 0.2, 0.2]]], wp.vec3)
     made.diffuse = array([[[0.6, 0.6, 0.6]]], wp.vec3)
@@ -58,7 +58,7 @@ def looks():
 
 def pictures(**dtypes):
     """Empty ones, by name."""
-    made = structs.Pictures()
+    made = structs_kernel.Pictures()
     for name, dtype in dtypes.items():
         setattr(made, name, wp.full((1, SIZE * SIZE), dtype(), dtype=dtype, device="cpu"))
     return made

@@ -4,8 +4,8 @@ import mujoco
 import torch
 
 from drone_rl.sim.rendering import Poses, Raytracer, Scene, View
-from drone_rl.sim.rendering.raytrace.painters import GpuPainter
-from drone_rl.sim.rendering.semantics import Meaning
+from drone_rl.sim.rendering.raytrace.renderer import GpuPainter
+from drone_rl.sim.rendering.scene import Meaning
 
 SIZE = 40
 XML = """<mujoco><statistic extent="1"/>

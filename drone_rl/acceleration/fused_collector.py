@@ -22,11 +22,10 @@ from drone_rl.envs.direct_renderer import DirectRenderer, Entries, Reasons
 from drone_rl.envs.transforms import StandardizePixels
 from drone_rl.policies.actor import CategoricalActor
 from drone_rl.policies.finite import require_finite
-from drone_rl.sim.rendering.crew import Crew
-from drone_rl.sim.rendering.devices import loading
+from drone_rl.sim.rendering.devices import Crew, loading
 from drone_rl.sim.rendering.raytrace.renderer import Raytracer
-from drone_rl.sim.rendering.raytrace.structs import Pictures
-from drone_rl.sim.tasks.collect_cubes.flying import FlyingCubes
+from drone_rl.sim.rendering.raytrace.structs_kernel import Pictures
+from drone_rl.sim.tasks.task import FusedRules
 
 _MAX_STEPS = 64
 """Steps of one launch of the kernel; most episodes end within them."""
@@ -50,7 +49,7 @@ class FusedCollector:
         self,
         direct: DirectCollector,
         network: PackedNetwork,
-        worlds: FlyingCubes,
+        worlds: FusedRules,
         num_threads: int,
     ) -> None:
         """Allocates what the kernel needs; see `try_create`."""
@@ -95,7 +94,7 @@ class FusedCollector:
         """
         reasons = [*_not_fused(direct.renderer), *_not_fused_policy(direct)]
         worlds = direct.renderer.worlds
-        flown = FlyingCubes.find(worlds.task, worlds.dynamics, worlds.num_worlds)
+        flown = worlds.task.fused_rules(worlds.dynamics, worlds.num_worlds)
         if flown is None:
             names = f"{type(worlds.task).__name__} with {type(worlds.dynamics).__name__}"
             reasons.append(f"task {names} is not fused")

@@ -23,8 +23,7 @@ from drone_rl.acceleration.packed_layers import (
 from drone_rl.envs.direct_renderer import Reasons
 from drone_rl.policies.cnn import PolicyNetwork
 from drone_rl.policies.network import PictureNetwork
-from drone_rl.sim.rendering.crew import Crew
-from drone_rl.sim.rendering.devices import loading
+from drone_rl.sim.rendering.devices import Crew, loading
 
 MAX_WEIGHTS = 2**20
 """Larger networks do not fit into a core's cache, and torch is as fast."""

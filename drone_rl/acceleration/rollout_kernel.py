@@ -17,10 +17,10 @@ once for all of them.
 import warp as wp
 
 from drone_rl.acceleration.layers_kernel import Layers, decide, keep, look
-from drone_rl.sim.rendering.raytrace.kernel import Desk, draw_picture
-from drone_rl.sim.rendering.raytrace.structs import Geoms, Pictures, Poses, View
-from drone_rl.sim.rendering.raytrace.structs import Looks as SceneLooks
-from drone_rl.sim.tasks.collect_cubes.kernel import Flights, move, place
+from drone_rl.sim.rendering.raytrace.plain_kernel import Desk, draw_picture
+from drone_rl.sim.rendering.raytrace.structs_kernel import Geoms, Pictures, Poses, View
+from drone_rl.sim.rendering.raytrace.structs_kernel import Looks as SceneLooks
+from drone_rl.sim.tasks.collect_cubes_kernel import Flights, move, place
 
 TOGETHER = wp.constant(16)
 """Worlds that take a step together."""

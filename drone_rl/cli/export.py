@@ -6,13 +6,12 @@ from pathlib import Path
 from typing import Annotated
 
 import drone_rl
-from drone_rl.cli.hydra.names import policies as prepare  # noqa: F401 -- of what was typed
-from drone_rl.config.judging import FlightSettings
-from drone_rl.config.paths import PathsSettings
+from drone_rl.cli.hydra.resuming import policies as prepare  # noqa: F401 -- of what was typed
+from drone_rl.config.commands import FlightSettings, PathsSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.overrides import COMMAND
 from drone_rl.utils.schema import FileName, OneOf
-from drone_rl.utils.seed_text import seed_line
+from drone_rl.utils.text import seed_line
 
 _log = logging.getLogger(__name__)
 
@@ -49,7 +48,8 @@ class Command(FlightSettings):
 def run(settings: Command, folder: Path) -> tuple[int, str]:
     """Exports one policy. Returns the exit status and the file's path."""
     from drone_rl.utils.seeding import root_seed  # imports torch
-    from drone_rl.verdicts.export import export, export_onnx
+    from drone_rl.verdicts.export import export
+    from drone_rl.verdicts.onnx_export import export_onnx
 
     policy = drone_rl.load_policy(settings.policy, outputs=settings.paths.outputs)
     target = folder / f"{settings.name}.{settings.format}"

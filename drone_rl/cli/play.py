@@ -5,10 +5,10 @@ from pathlib import Path
 from typing import Annotated
 
 import drone_rl
-from drone_rl.cli.hydra.names import policies as prepare  # noqa: F401 -- of what was typed
+from drone_rl.cli.hydra.resuming import policies as prepare  # noqa: F401 -- of what was typed
 from drone_rl.config import AppearanceSettings, RendererName
-from drone_rl.config.changes import DynamicsChanges, TaskChanges, no_changes
-from drone_rl.config.paths import PathsSettings
+from drone_rl.config.commands import PathsSettings
+from drone_rl.config.configuration import DynamicsChanges, TaskChanges, no_changes
 from drone_rl.utils.schema import Whole
 from drone_rl.utils.settings import Settings
 
@@ -44,7 +44,7 @@ class Command(Settings):
 def run(settings: Command, folder: Path) -> tuple[int, None]:
     """Films a policy. Returns the exit status."""
     policy = drone_rl.load_policy(settings.policy, outputs=settings.paths.outputs)
-    from drone_rl.evaluation.film import film, view  # after what is slow to import
+    from drone_rl.evaluation.video import film, view  # after what is slow to import
 
     policy = policy.in_task(**settings.task)
     policy = policy.in_dynamics(**settings.dynamics) if settings.dynamics else policy

@@ -8,7 +8,7 @@ from torch.nn import functional
 from torchrl.data import TensorSpec, Unbounded
 from torchrl.envs.transforms import ObservationTransform
 
-from drone_rl.sim.rendering.gray import to_gray
+from drone_rl.sim.rendering.view import to_gray
 from drone_rl.utils.errors import InputError
 
 

@@ -1,7 +1,6 @@
 """What a verdict quotes of a certificate. Evidence: `verdict.json`; old ones have no "proof"."""
 
-from drone_rl.utils.numbers import all_cubes, exact
-from drone_rl.utils.sentences import Evidence, Sentence
+from drone_rl.utils.text import Evidence, Sentence, all_cubes, exact
 
 MOST_WRONG = 0.01
 """Fraction of placements about which a re-checked certificate may be wrong, with 95% confidence."""
@@ -36,7 +35,7 @@ def _is_share(evidence: Evidence) -> bool:
     return is_quoted(evidence) and not evidence["proof"]["every"]
 
 
-def _every(evidence: Evidence) -> str:
+def _every_placement(evidence: Evidence) -> str:
     return (
         "A certificate states for every placement: with its most probable actions it collects "
         f"{all_cubes(evidence['num_cubes'])} from all places where they may stand."
@@ -88,7 +87,7 @@ PROOF = (
         "proof.every",
         "a certificate that holds together says so, and no flight speaks against it",
         is_stated,
-        _every,
+        _every_placement,
     ),
     Sentence(
         "proof.share",

@@ -7,8 +7,7 @@ can be computed again is computed again. See also `utils/consistency.py`.
 from collections.abc import Mapping
 from typing import Any
 
-from drone_rl.evaluation import kinds
-from drone_rl.evaluation.rule import SIDES, Quantity, Rule, decide, kinds_within
+from drone_rl.evaluation.rule import SIDES, Kind, Quantity, Rule, decide, kinds_within
 from drone_rl.utils.consistency import (
     MOST_VALUES,
     check_mean,
@@ -23,7 +22,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import proportion
 from drone_rl.utils.schema import Flag, OneOf, Plain, Real, Several, Whole, as_mapping, shown
 
-_KIND = OneOf(tuple(kind.value for kind in kinds.Kind))
+_KIND = OneOf(tuple(kind.value for kind in Kind))
 _ROUNDING = 1e-6
 
 
@@ -164,7 +163,7 @@ def _expected(
 
 def _check_kind(verdict: Mapping[str, Any], found: list[Quantity], rule: Rule) -> None:
     """The kind is what the rule makes of the quantities, and certain only where they are."""
-    kind = kinds.Kind(read_entry(verdict, "kind", _KIND, "verdict"))
+    kind = Kind(read_entry(verdict, "kind", _KIND, "verdict"))
     is_certain = read_entry(verdict, "certain", Flag(), "verdict")
     expected = decide([quantity.level for quantity in found], len(rule.strata))
     if kind != expected:

@@ -1,5 +1,8 @@
 """Films of an episode: what the drone sees beside the drone itself, and what it makes of it."""
 
+import dataclasses
+import logging
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple, cast
@@ -8,26 +11,76 @@ import imageio.v3 as iio
 import numpy as np
 import torch
 from PIL import Image, ImageDraw, ImageFont
-from tensordict import TensorDictBase
+from tensordict import TensorDict, TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 from torchrl.envs import TransformedEnv
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
+from drone_rl.config import AppearanceSettings
 from drone_rl.envs import DroneEnv
-from drone_rl.evaluation import chase, instruments
+from drone_rl.evaluation import instruments
+from drone_rl.policies.policy import Policy
 from drone_rl.sim.actions import MOVES, Actions
+from drone_rl.sim.composer_task import make_environment
 from drone_rl.sim.dynamics import FlightState, Quadrotor
-from drone_rl.sim.entities.cameras import (
+from drone_rl.sim.dynamics.state import heading_only
+from drone_rl.sim.entities import (
     BACK_CENTER,
     BOTTOM_CENTER,
+    CHASE,
     FRONT_CENTER,
     FRONT_LEFT,
     FRONT_RIGHT,
 )
+from drone_rl.sim.rendering import Appearance
+from drone_rl.sim.rendering.appearance import Mounting, product, rotate
 from drone_rl.sim.tasks import Task
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.seeding import legacy_seed
+
+_BACK = (1.0, -1.0, -1.0, -1.0)
+"""Signs that turn a quaternion into its inverse."""
+
+
+def render_chase(worlds: Worlds, look: Appearance | None, height: int, width: int) -> Tensor:
+    """The worlds' drones from behind.
+
+    In flight the chase camera follows the heading alone, whatever holds the drone's own cameras, so
+    that one sees how the body is tilted. Else the drone is level with its cameras, as it is drawn.
+
+    Args:
+        worlds: Of which all are drawn.
+        look: How they look otherwise than all of them do.
+        height: Pixels.
+        width: Pixels.
+
+    Returns:
+        Colours. Shape: (num_worlds, height, width, 3), uint8.
+    """
+    view = worlds.view(CHASE.name, height=height, width=width, show_drone=True)
+    state = worlds.state
+    if not isinstance(state.body, FlightState):
+        return worlds.render(state, view, look)
+    attitude = state.body.attitude
+    whole = (look or Appearance()).over(worlds.appearance)
+    tilted = dataclasses.replace(worlds.poses(state, whole), attitude=attitude)
+    held = dataclasses.replace(whole, camera=level(attitude, view.cameras[0]))
+    return worlds.renderer.render(view, tilted, held)["rgb"][:, 0]
+
+
+def level(attitude: Tensor, camera: str) -> Mounting:
+    """The chase camera on bodies that are tilted, held as if they were not.
+
+    Args:
+        attitude: Of the bodies, quaternions (w, x, y, z). Shape: (num_worlds, 4).
+        camera: Its full name in the model.
+    """
+    back = product(attitude * attitude.new_tensor(_BACK), heading_only(attitude))
+    place = torch.tensor(CHASE.pos, dtype=attitude.dtype, device=attitude.device)
+    return Mounting(camera=camera, offset=rotate(back, place) - place, turn=back)
+
 
 WIDTH, HEIGHT = 1280, 720
 CHASE_HEIGHT, STRIP_HEIGHT, GAP = 532, 144, 5
@@ -119,14 +172,14 @@ def write_video(frames: list[np.ndarray], path: Path) -> list[Path]:
 def _caption(task: Task[Any], state: TensorDictBase, earned: float) -> str:
     end = task.ends(int(state["info", "end_reason"][0]))
     ended = "" if end == 0 else f"   ended: {end.name.lower()}"
-    return f"{task.terms.goals} {earned:.3g}" + ended.replace("_", " ")
+    return f"{task.vocabulary.goals} {earned:.3g}" + ended.replace("_", " ")
 
 
 def _look(base: DroneEnv) -> _Seen:
     """What there is to see of the first world."""
     worlds, look = base.worlds, base.looks.drawn()
     five = worlds.view(_FIVE, height=STRIP_HEIGHT, width=(WIDTH + GAP) // len(_FIVE) - GAP)
-    outside = chase.film(worlds, look, CHASE_HEIGHT, WIDTH)[0]
+    outside = render_chase(worlds, look, CHASE_HEIGHT, WIDTH)[0]
     strip = worlds.render_all(worlds.state, five, look)["rgb"][0]
     return _Seen(base.last_pixels[0], outside, strip, _panel(worlds))
 
@@ -193,3 +246,91 @@ def _draw_bars(
         color = _CHOSEN if action == chosen else _BAR
         most = room - 140
         draw.rectangle((x + 120, y + 2, x + 120 + max(1, int(most * share)), y + 18), color)
+
+
+_log = logging.getLogger(__name__)
+
+
+def film(
+    policy: Policy,
+    folder: Path,
+    episodes: int,
+    *,
+    greedy: bool = True,
+    seed: int = 0,
+    device: str = "cpu",
+    renderer: str = "raytrace",
+    appearance: AppearanceSettings | None = None,
+) -> list[Path]:
+    """Writes videos of a policy in unseen worlds.
+
+    Args:
+        policy: Who flies.
+        folder: Where the files go.
+        episodes: Flights, one MP4 and one GIF each.
+        greedy: Whether to take the most probable action instead of drawing one.
+        seed: Root of the worlds' random streams.
+        device: Where to draw.
+        renderer: Who draws, see `drone_rl.sim.rendering.find_renderer`.
+        appearance: How worlds look; as in the policy's training by default.
+
+    Returns:
+        The files.
+    """
+    files: list[Path] = []
+    look = {} if appearance is None else {"appearance": appearance}
+    with policy.flying(1, seed=seed, device=device, renderer=renderer, **look) as (env, actor):
+        for episode in range(episodes):
+            frames = list(film_episode(env, actor, greedy=greedy))
+            files += write_video(frames, folder / f"episode_{episode}")
+    for file in files:
+        _log.info("written: %s", file)
+    return files
+
+
+def view(
+    policy: Policy,
+    *,
+    greedy: bool = True,
+    seed: int = 0,
+    device: str = "cpu",
+    renderer: str = "raytrace",
+    appearance: AppearanceSettings | None = None,
+) -> None:
+    """Opens dm_control's viewer on the composer task, flown by a policy.
+
+    The viewer shows the dm_control simulation; the policy sees the same poses drawn as in
+    training.
+
+    Raises:
+        InputError: There is no display.
+    """
+    if not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        raise InputError("viewer=true needs a display, and there is none; leave it false to film")
+    import dm_env
+    from dm_control import viewer
+
+    look = {} if appearance is None else {"appearance": appearance}
+    env = policy.make_env(1, seed=seed, device=device, renderer=renderer, **look)
+    base = cast(DroneEnv, env.base_env)
+    actor, worlds = policy.make_actor(env, seed=seed), base.worlds
+    shown = make_environment(
+        worlds.task,
+        worlds.camera,
+        dynamics=worlds.dynamics,
+        pixels=False,
+        random_state=legacy_seed(seed),
+        appearance=base.looks.settings,
+    )
+    kind = ExplorationType.DETERMINISTIC if greedy else ExplorationType.RANDOM
+
+    @torch.no_grad()
+    def act(timestep: dm_env.TimeStep) -> int:
+        del timestep
+        state = shown.task.state.to(worlds.device)
+        pixels = worlds.render(state, appearance=shown.task.look)
+        seen = env.transform(TensorDict({"pixels": pixels}, [1], device=worlds.device))
+        with set_exploration_type(kind):
+            return int(actor(seen)["action"])
+
+    viewer.launch(shown, act, title="drone-rl play")

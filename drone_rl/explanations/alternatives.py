@@ -9,7 +9,7 @@ from torch import Tensor
 
 from drone_rl.explanations.scenes import Scenes
 from drone_rl.sim.rendering import Appearance
-from drone_rl.sim.rendering.semantics import Meaning
+from drone_rl.sim.rendering.scene import Meaning
 from drone_rl.sim.tasks import State
 
 DARK_GROUND = Appearance(colors={Meaning.GROUND: (0.25, 0.25, 0.22)})

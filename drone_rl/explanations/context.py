@@ -24,9 +24,9 @@ from drone_rl.explanations.scenes import Scenes, empty_scene
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.explanations.threads import Once
 from drone_rl.policies import PictureNetwork, make_actor
-from drone_rl.robustness.measured import Measured
+from drone_rl.robustness.shifts_file import SavedShifts
 from drone_rl.utils.seeding import RootSeed, Stream, torch_generator, with_seed
-from drone_rl.verdicts.proof import Claim
+from drone_rl.verdicts.certificate import Claim
 
 FILMED = 0
 """The flight that is shown: the first, whatever it is like."""
@@ -45,7 +45,7 @@ class Context:
         network: PictureNetwork,
         settings: ExplainSettings,
         claim: Claim | None = None,
-        measured: Measured | None = None,
+        measured: SavedShifts | None = None,
         unlike: Mapping[str, Any] | None = None,
         seed: RootSeed | None = None,
     ) -> None:

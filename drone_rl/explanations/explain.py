@@ -7,23 +7,23 @@ from typing import Any
 
 import torch
 
-from drone_rl.evaluation.agreement import require_function
+from drone_rl.evaluation.rounding_sensitivity import require_function
 from drone_rl.explanations.report import write_report
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.explanations.study import explain_policy
 from drone_rl.policies.base_policy import Pilot
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_pilot
-from drone_rl.robustness.measured import Measured
+from drone_rl.robustness.shifts_file import SavedShifts
 from drone_rl.utils.display import page
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import to_file_name
 from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
-from drone_rl.utils.seed_text import seed_line
 from drone_rl.utils.seeding import RootSeed, with_seed
-from drone_rl.verdicts.domains import find_domain
-from drone_rl.verdicts.quoting import find_claim
+from drone_rl.utils.text import seed_line
+from drone_rl.verdicts.certificate import find_claim
+from drone_rl.verdicts.coverage import find_domain
 
 
 @dataclasses.dataclass(frozen=True)
@@ -130,7 +130,7 @@ def _explain(
     folder: Path,
     num_envs: int,
     progress: Progress,
-    measured: Measured | None,
+    measured: SavedShifts | None,
 ) -> dict[str, Any]:
     require_function(policy, seed=seed.value, renderer=settings.renderer)
     env = policy.make_env(num_envs, seed=seed.value, renderer=settings.renderer)

@@ -12,7 +12,7 @@ from drone_rl.explanations.hooks import probabilities
 from drone_rl.explanations.scenes import Region, Scenes
 from drone_rl.policies import PictureNetwork
 from drone_rl.sim.rendering import Appearance
-from drone_rl.sim.rendering.semantics import Meaning
+from drone_rl.sim.rendering.scene import Meaning
 from drone_rl.sim.tasks import State
 
 OTHER_TARGETS = Appearance(

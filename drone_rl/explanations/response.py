@@ -13,7 +13,7 @@ from drone_rl.explanations.hooks import probabilities
 from drone_rl.explanations.scenes import Scenes, empty_scene, place_target
 from drone_rl.policies import PictureNetwork
 from drone_rl.sim.actions import Actions
-from drone_rl.sim.tasks.explainable import Grid
+from drone_rl.sim.tasks import Grid
 from drone_rl.utils.seeding import Stream, torch_generator
 
 BLIND = 0.1
@@ -70,7 +70,7 @@ def response_map(
     Args:
         scenes: Where they are drawn.
         network: The policy's.
-        num_lateral: Places sideways; see `Explainable.grid`.
+        num_lateral: Places sideways; see `Task.grid`.
         num_forward: Places ahead.
         seed: Of the places, see `shrink`; without it they are always the same.
     """
@@ -157,7 +157,7 @@ def outcome_map(
     Args:
         scenes: Where the flights are drawn.
         network: The policy's.
-        num_lateral: Places sideways; see `Explainable.grid`.
+        num_lateral: Places sideways; see `Task.grid`.
         num_forward: Places ahead.
         seed: See `response_map`.
     """

@@ -1,15 +1,17 @@
 """Which frames tell an episode's story: the first, the approach, each goal, the failure."""
 
+from typing import Any
+
 import numpy as np
 
 from drone_rl.explanations.dataset import RolloutDataset
-from drone_rl.sim.tasks.judgeable import Judgeable
+from drone_rl.sim.tasks import Task
 
 COUNT = 6
 """Frames in a sequence, as in Figs. 13 to 15."""
 
 
-def key_frames(dataset: RolloutDataset, episode: int, task: Judgeable) -> list[tuple[int, str]]:
+def key_frames(dataset: RolloutDataset, episode: int, task: Task[Any]) -> list[tuple[int, str]]:
     """Six frames of an episode in order of time, each with why it was chosen.
 
     The rule: the first frame; half way to the first goal (or to the end); the frame before
@@ -28,7 +30,7 @@ def key_frames(dataset: RolloutDataset, episode: int, task: Judgeable) -> list[t
     chosen: dict[int, str] = {int(frames[0]): "start"}
     reached, missed = (frames[dataset.event[frames] == event] for event in (1, -1))
     half = frames[len(frames) // 2] if not len(reached) else (frames[0] + reached[0]) // 2
-    terms = task.terms
+    terms = task.vocabulary
     events = [(int(t), f"{terms.reaches} a {terms.goal}") for t in reached]
     events += [(int(t), f"misses a {terms.goal}") for t in missed]
     end = int(dataset.end_reason[frames[-1]])

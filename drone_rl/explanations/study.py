@@ -21,10 +21,10 @@ from drone_rl.explanations.sections import Section, find_sections
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.explanations.threads import is_aside
 from drone_rl.policies import PictureNetwork
-from drone_rl.robustness.measured import Measured
+from drone_rl.robustness.shifts_file import SavedShifts
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import RootSeed, with_seed
-from drone_rl.verdicts.proof import Claim
+from drone_rl.verdicts.certificate import Claim
 
 FORMAT_VERSION = 3
 
@@ -40,7 +40,7 @@ def explain_policy(
     progress: Callable[[str], None] = lambda _: None,
     sections: Mapping[str, Section] | None = None,
     claim: Claim | None = None,
-    measured: Measured | None = None,
+    measured: SavedShifts | None = None,
     unlike: Mapping[str, Any] | None = None,
     seed: RootSeed | None = None,
 ) -> dict[str, Any]:
@@ -82,7 +82,7 @@ def explain_policy(
         **seed.as_dict(),
         "seconds": {title: one.seconds for title, one in made.items()},
         "actions": context.scenes.actions.as_dict(),
-        "terms": context.scenes.task.terms.as_dict(),
+        "terms": context.scenes.task.vocabulary.as_dict(),
         **{key: value for one in made.values() for key, value in one.numbers.items()},
         **({"left_out": left_out} if left_out else {}),
         "provenance": provenance,

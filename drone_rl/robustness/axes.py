@@ -7,17 +7,115 @@ and two below, sizes The Colosseum (Pumacay et al., 2024), correlated noise Nasv
 
 import dataclasses
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from typing import NamedTuple
 
-from drone_rl.robustness.axis import FACTORS, INVERSE, Axis
-from drone_rl.robustness.clutter import told_by
-from drone_rl.robustness.condition import Condition
 from drone_rl.robustness.faults import Blur, DeadRows, Frozen, Late, Noise
-from drone_rl.robustness.flying import Subject
-from drone_rl.robustness.looks import Exposed, Fogged, SunAt, Tinted, Whitened
-from drone_rl.robustness.mounting import Mount
-from drone_rl.sim.rendering.semantics import Meaning
+from drone_rl.robustness.paired_evaluation import PolicySpec
+from drone_rl.robustness.perturbations import (
+    Condition,
+    Exposed,
+    Fogged,
+    Mount,
+    SunAt,
+    Tinted,
+    Whitened,
+    task_things,
+)
+from drone_rl.sim.rendering.scene import Meaning
 from drone_rl.utils.errors import InputError
+
+NUMBERS = (1, 2, 3, 4, 5)
+"""Of the strengths, from the weakest on."""
+TOGETHER = 3
+"""The strength at which all axes are tried together."""
+
+
+class Scale(NamedTuple):
+    """Along which steps of an axis are compared: areas are taken and middles are found on it."""
+
+    there: Callable[[float], float]
+    back: Callable[[float], float]
+    rises: bool = True
+    """Whether greater values lie higher on it."""
+
+
+LINEAR = Scale(float, float)
+FACTORS = Scale(math.log, math.exp)
+"""Half as much is as far as twice as much."""
+INVERSE = Scale(lambda x: 1.0 / x, lambda x: math.inf if x == 0 else 1.0 / x, rises=False)
+"""Infinitely much is none."""
+
+
+def _as_it_is(strength: float, subject: PolicySpec) -> float:
+    return strength
+
+
+@dataclasses.dataclass(frozen=True)
+class Axis:
+    """One thing that can be different."""
+
+    name: str
+    group: str
+    """One of the ten kinds of shift."""
+    unit: str
+    """Of its values."""
+    neutral: float
+    """The strength of no difference."""
+    strengths: tuple[float, float, float, float, float]
+    """From the weakest on; those of an axis with two ends lie on both sides of the neutral one."""
+    make: Callable[[float, PolicySpec], Condition]
+    """What a strength makes different for a policy.
+
+    Raises:
+        InputError: This task has no such thing.
+    """
+    value: Callable[[float, PolicySpec], float] = _as_it_is
+    """A strength in the axis's unit, where strengths are told by what the policy has itself."""
+    own: Callable[[PolicySpec], float] | None = None
+    """What the neutral strength is for a policy, where that is not the same for all."""
+    scale: Scale = LINEAR
+    whole: bool = False
+    """Whether there is nothing between whole numbers."""
+    touched_by: tuple[str, ...] = ()
+    """Settings of a training that make a difference of this kind, as in appearance.exposure: a
+    training in which one of them is not as by default knows the axis."""
+
+    def position(self, strength: float) -> float:
+        """Where a strength lies on the axis's scale; 0 where nothing is different."""
+        return self.scale.there(strength) - self.scale.there(self.neutral)
+
+    @property
+    def signs(self) -> dict[str, int]:
+        """By end of a range of values, "low" and "high", on which side of the scale it lies."""
+        return {"low": -1, "high": 1} if self.scale.rises else {"low": 1, "high": -1}
+
+    def strength(self, value: float, subject: PolicySpec) -> float:
+        """The strength that has this value for a policy: the inverse of `value`, which is affine.
+
+        Args:
+            value: In the axis's unit.
+            subject: The policy.
+        """
+        if not math.isfinite(value):
+            return value
+        zero, one = (self.value(strength, subject) for strength in (0.0, 1.0))
+        strength = (value - zero) / (one - zero)
+        return float(round(strength)) if self.whole else strength
+
+    def between(self, low: float, high: float, share: float = 0.5) -> float | None:
+        """The strength a share of the way from one to another; None where there is none."""
+        there, back, _ = self.scale
+        if not self.whole:
+            return back(there(low) + share * (there(high) - there(low)))
+        inside = round(abs(high - low)) - 1
+        nearer = 1 + min(math.floor(share * inside), inside - 1)
+        return math.copysign(nearer, high - low) + low if inside > 0 else None
+
+    def at(self, position: float) -> float:
+        """The strength that lies there on the axis's scale."""
+        return self.scale.back(position + self.scale.there(self.neutral))
+
 
 CORRELATION_TIME = -1.0 / math.log(0.95)
 """Frames: of one frame's noise 0.95 is left in the next."""
@@ -45,14 +143,14 @@ _DISTRACTORS = _below(
 )
 
 
-def _size(subject: Subject) -> str:
+def _size(subject: PolicySpec) -> str:
     name = subject.task.name
     if name not in _SIZES:
         raise InputError(f"axis=object_size is not for task={name}; leave it out of axes")
     return _SIZES[name]
 
 
-def _drawn(subject: Subject, condition: Condition) -> Condition:
+def _drawn(subject: PolicySpec, condition: Condition) -> Condition:
     """A condition that our own ray tracer alone can draw."""
     if subject.renderer != "raytrace":
         raise InputError(
@@ -62,8 +160,8 @@ def _drawn(subject: Subject, condition: Condition) -> Condition:
     return condition
 
 
-def _cluttered(subject: Subject, count: int) -> Condition:
-    told_by(subject.task)
+def _cluttered(subject: PolicySpec, count: int) -> Condition:
+    task_things(subject.task)
     return Condition(clutter=count)
 
 
@@ -72,7 +170,7 @@ def _middle(value: float | tuple[float, float]) -> float:
     return sum(value) / 2 if isinstance(value, tuple) else value
 
 
-def _times(setting: str, factor: float, subject: Subject) -> float:
+def _times(setting: str, factor: float, subject: PolicySpec) -> float:
     return factor * getattr(subject.task, setting)
 
 
@@ -220,7 +318,7 @@ def check_axes(names: Iterable[str]) -> None:
             raise InputError(f"axes={name} is unknown; give some of: {known}")
 
 
-def find_axes(names: Iterable[str] | None, subject: Subject) -> list[Axis]:
+def find_axes(names: Iterable[str] | None, subject: PolicySpec) -> list[Axis]:
     """Axes by name or by group, in the order of `AXES`.
 
     Args:
@@ -240,12 +338,12 @@ def find_axes(names: Iterable[str] | None, subject: Subject) -> list[Axis]:
     return [_owned(axis, subject) for axis in found]
 
 
-def _owned(axis: Axis, subject: Subject) -> Axis:
+def _owned(axis: Axis, subject: PolicySpec) -> Axis:
     """With the policy's own neutral strength."""
     return axis if axis.own is None else dataclasses.replace(axis, neutral=axis.own(subject))
 
 
-def _is_for(axis: Axis, subject: Subject) -> bool:
+def _is_for(axis: Axis, subject: PolicySpec) -> bool:
     try:
         axis.make(axis.strengths[0], subject)
     except InputError:

@@ -8,8 +8,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from drone_rl.evaluation.plots.images import enlarge, titled
-from drone_rl.evaluation.plots.palette import BACKGROUND, INK, MUTED
+from drone_rl.evaluation.plots.images import BACKGROUND, INK, MUTED, enlarge, titled
 from drone_rl.robustness.shifts_text import NAMES, told
 
 _COLUMNS = 4

@@ -1,15 +1,15 @@
 """Whether the figures of `shifts.json` go together: counts, intervals, areas, and courses.
 
-These checks do not prove that a file is genuine; `drone_rl.verdicts.domain_check` re-runs a sample.
+These checks do not prove that a file is genuine; `drone_rl.verdicts.coverage` re-runs a sample.
 """
 
 import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from drone_rl.robustness.axis import Axis
+from drone_rl.robustness.axes import Axis
 from drone_rl.robustness.domain import walk
-from drone_rl.robustness.modes import Mode
+from drone_rl.robustness.perturbations import Mode
 from drone_rl.robustness.suite import finite, mcnemar_p, success_area
 from drone_rl.sim.tasks import Task
 from drone_rl.utils.errors import InputError

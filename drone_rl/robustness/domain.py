@@ -20,16 +20,14 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from drone_rl.evaluation.branches import Outcomes
 from drone_rl.evaluation.judge import measure, widen
-from drone_rl.evaluation.kinds import Kind
 from drone_rl.evaluation.metrics import Episodes
-from drone_rl.evaluation.rule import Quantity, Rule, kinds_within
-from drone_rl.robustness.axis import Axis
-from drone_rl.robustness.condition import Condition
-from drone_rl.robustness.eyes import PolicyEyes
-from drone_rl.robustness.flying import Airfield
-from drone_rl.robustness.oracle import OracleEyes, has_oracle
+from drone_rl.evaluation.outcomes import Outcomes
+from drone_rl.evaluation.rule import Kind, Quantity, Rule, kinds_within
+from drone_rl.robustness.agents import OracleAgent, PolicyAgent, has_oracle
+from drone_rl.robustness.axes import Axis
+from drone_rl.robustness.paired_evaluation import PairedEvaluator
+from drone_rl.robustness.perturbations import Condition
 from drone_rl.robustness.suite import finite
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import proportion
@@ -94,7 +92,7 @@ class Prober:
 
     def __init__(
         self,
-        bed: Airfield,
+        bed: PairedEvaluator,
         oracle: Episodes,
         good_share: float,
         possible_share: float = 0.9,
@@ -159,7 +157,7 @@ class Prober:
     def _fly(self, condition: Condition) -> tuple[Episodes, Tensor]:
         """The policy's episodes, and which of them depend on rounding. Shape: (n,), bool."""
         subject, count = self._bed.subject, self._bed.episodes
-        eyes = PolicyEyes(subject.network, subject.transforms, count, examines_rounding=True)
+        eyes = PolicyAgent(subject.network, subject.transforms, count, examines_rounding=True)
         return self._bed.fly(condition, eyes=eyes).episodes, eyes.is_fragile
 
     def search(self, axis: Axis) -> dict[str, Any]:
@@ -215,7 +213,7 @@ class Prober:
         if found["refused"] is not None or not has_oracle(self._oracle.task):
             return {**found, "oracle": None, "impossible": False}
         condition = axis.make(strength, self._bed.subject)
-        success = self._bed.fly(condition, eyes=OracleEyes()).episodes.success
+        success = self._bed.fly(condition, eyes=OracleAgent()).episodes.success
         seen = proportion(int(success.sum()), len(success))
         return {**found, "oracle": seen, "impossible": seen["upper95"] < self._possible}
 

@@ -150,7 +150,7 @@ class Late(Fault):
         return memory[:, 0]
 
 
-class Spoiling:
+class FaultPipeline:
     """Faults at work in many worlds at once, of which fewer and fewer still fly."""
 
     def __init__(

@@ -13,35 +13,31 @@ import yaml
 from numpy.typing import NDArray
 
 from drone_rl.config import MINIMAL, BaseTaskSettings
-from drone_rl.config.shifting import ShiftSettings
+from drone_rl.config.commands import ShiftSettings
 from drone_rl.envs import worlds_of
-from drone_rl.evaluation.agreement import require_function
+from drone_rl.evaluation.rounding_sensitivity import require_function
 from drone_rl.evaluation.verdict_text import unlike as say_unlike
 from drone_rl.policies.base_policy import Pilot
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_pilot
 from drone_rl.policies.policy import Policy
-from drone_rl.robustness.axes import check_axes, find_axes
-from drone_rl.robustness.axis import Axis
+from drone_rl.robustness.agents import OracleAgent
+from drone_rl.robustness.axes import Axis, check_axes, find_axes
 from drone_rl.robustness.charts import chart, strips
-from drone_rl.robustness.condition import Condition
 from drone_rl.robustness.domain import Prober
-from drone_rl.robustness.flying import Airfield, Subject
-from drone_rl.robustness.measured import FORMAT, FORMAT_VERSION
-from drone_rl.robustness.modes import Mode
-from drone_rl.robustness.needs import ranges_of
-from drone_rl.robustness.oracle import OracleEyes
+from drone_rl.robustness.paired_evaluation import PairedEvaluator, PolicySpec
+from drone_rl.robustness.perturbations import Condition, Mode
+from drone_rl.robustness.requirements import ranges_of
+from drone_rl.robustness.shifts_file import FORMAT, FORMAT_VERSION
 from drone_rl.robustness.shifts_text import SHIFTS, rows
-from drone_rl.robustness.strips import make_strip, packed
-from drone_rl.robustness.suite import Suite
+from drone_rl.robustness.suite import Suite, make_strip, packed
 from drone_rl.sim.tasks import as_task
 from drone_rl.utils.display import aligned, paragraph, picture, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
-from drone_rl.utils.seed_text import seed_line
 from drone_rl.utils.seeding import RootSeed, with_seed
-from drone_rl.utils.sentences import say
+from drone_rl.utils.text import say, seed_line
 from drone_rl.verification.checker import fingerprint
 
 
@@ -136,12 +132,12 @@ def shifts(
     pilot = pilot.in_dynamics(**dynamics) if dynamics else pilot
     begin = time.perf_counter()
     require_function(pilot, seed=seed.value, device=settings.device, renderer=settings.renderer)
-    subject = make_subject(pilot, settings)
+    subject = make_policy_spec(pilot, settings)
     axes = find_axes(settings.axes, subject)
     total = len(axes) * (len(settings.strengths) + settings.domain) + 1
     done = itertools.count()
     found = _fly(subject, axes, settings, seed, lambda text: progress(text, next(done), total))
-    with closing(Airfield(subject, 1, seed.value)) as filmed:
+    with closing(PairedEvaluator(subject, 1, seed.value)) as filmed:
         pictures = {axis.name: make_strip(filmed, axis) for axis in axes}
     progress("flown", total, total)
     numbers = {
@@ -151,7 +147,7 @@ def shifts(
         "network": _identity(pilot),
         "settings": settings.values(),
         **seed.as_dict(),
-        "terms": as_task(subject.task).terms.as_dict(),
+        "terms": as_task(subject.task).vocabulary.as_dict(),
         **found,
         "seconds": time.perf_counter() - begin,
     }
@@ -159,7 +155,7 @@ def shifts(
 
 
 def _fly(
-    subject: Subject,
+    subject: PolicySpec,
     axes: Sequence[Axis],
     settings: ShiftSettings,
     seed: RootSeed,
@@ -170,17 +166,17 @@ def _fly(
     Raises:
         InputError: See `_domain`.
     """
-    with closing(Airfield(subject, settings.episodes, seed.value)) as bed:
+    with closing(PairedEvaluator(subject, settings.episodes, seed.value)) as bed:
         suite = Suite(bed, [Mode(mode) for mode in settings.modes], settings.possible_share)
         found = suite.run(axes, settings.strengths, tell)
     if not settings.domain:
         return {**found, "domain": None}
-    with closing(Airfield(subject, settings.domain_episodes, seed.value)) as wide:
+    with closing(PairedEvaluator(subject, settings.domain_episodes, seed.value)) as wide:
         return {**found, "domain": _domain(wide, axes, settings, tell)}
 
 
 def _domain(
-    bed: Airfield, axes: Sequence[Axis], settings: ShiftSettings, tell: Callable[[str], None]
+    bed: PairedEvaluator, axes: Sequence[Axis], settings: ShiftSettings, tell: Callable[[str], None]
 ) -> dict[str, Any]:
     """Where it is surely good: "plain", and "ranges" by axis.
 
@@ -190,7 +186,7 @@ def _domain(
     task = as_task(bed.subject.task)
     if task.oracle is None:
         raise InputError(f"task={task.name} has no oracle to compare with; give domain=false")
-    oracle = bed.fly(Condition(), eyes=OracleEyes(looks=False)).episodes
+    oracle = bed.fly(Condition(), eyes=OracleAgent(looks=False)).episodes
     prober = Prober(bed, oracle, settings.good_share, settings.possible_share)
     ranges: dict[str, Any] = {}
     for axis in axes:
@@ -207,7 +203,7 @@ def _identity(pilot: Pilot) -> dict[str, Any] | None:
     return {"weights": fingerprint(pilot.state["policy"]), "description": described}
 
 
-def make_subject(pilot: Pilot, settings: ShiftSettings) -> Subject:
+def make_policy_spec(pilot: Pilot, settings: ShiftSettings) -> PolicySpec:
     """What is flown: the policy's network, and the task and the camera that it has.
 
     Raises:
@@ -227,7 +223,7 @@ def make_subject(pilot: Pilot, settings: ShiftSettings) -> Subject:
     network = pilot.make_network(settings.device).eval()
     described = getattr(pilot, "description", None)  # of who comes from a file
     look = MINIMAL if described is None else described.appearance
-    return Subject(
+    return PolicySpec(
         network,
         task,
         camera,

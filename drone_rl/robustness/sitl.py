@@ -13,11 +13,10 @@ from torchrl.envs.utils import ExplorationType, set_exploration_type, step_mdp
 
 from drone_rl.envs import worlds_of
 from drone_rl.evaluation.metrics import Episodes, summarise
-from drone_rl.flight.firmware.errors import NotBegunError
-from drone_rl.flight.firmware.firmware import find_firmware
-from drone_rl.flight.firmware.looped_dynamics import LoopedDynamics
-from drone_rl.flight.firmware.sitl import Betaflight
-from drone_rl.flight.firmware.trial import betaflight_drone
+from drone_rl.flight.betaflight.build import find_firmware
+from drone_rl.flight.betaflight.sitl import Betaflight, betaflight_drone
+from drone_rl.flight.in_the_loop.drone import NotReadyError
+from drone_rl.flight.in_the_loop.dynamics import InTheLoopDynamics
 from drone_rl.policies.base_policy import Pilot
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_pilot
@@ -25,9 +24,8 @@ from drone_rl.sim.dynamics import BodyState
 from drone_rl.sim.tasks import as_task
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Bar, Progress
-from drone_rl.utils.seed_text import LOOPED, seed_line
 from drone_rl.utils.seeding import RootSeed, root_seed
-from drone_rl.utils.sentences import say
+from drone_rl.utils.text import LOOPED, say, seed_line
 
 STARTS = 3
 """Of a firmware, for one flight."""
@@ -109,15 +107,15 @@ def fly_in_the_loop(
         policy: What `judge` takes. In computer-vision mode it flies AirSim's drone.
         flights: How many, each at about the pace of real time at best.
         seed: Root of the environments' random streams; a fresh one by default.
-        firmware: See `drone_rl.flight.firmware.firmware.find_firmware`.
-        isolated: See `drone_rl.flight.firmware.trial.betaflight_drone`.
+        firmware: See `drone_rl.flight.betaflight.build.find_firmware`.
+        isolated: See `drone_rl.flight.betaflight.sitl.betaflight_drone`.
         outputs: See `load_policy`.
         progress: Told of what is being flown; a bar by default.
         drawn_seed: The seed of a larger analysis of which this is a part; takes precedence.
 
     Raises:
         InputError: The policy or a number is unusable, or no firmware was built.
-        LoopError: The firmware failed, or the machine was too busy for it.
+        FlightControllerError: The firmware failed, or the machine was too busy for it.
     """
     if not (isinstance(flights, int) and flights >= 1):
         raise InputError(f"flights={flights} is out of range; give a whole number from 1")
@@ -154,7 +152,7 @@ def _fly_or_restart(pilot: Pilot, world: int, *given: Any) -> _Flown:
     That has nothing to do with the policy, which was not asked for anything yet.
     """
     for _ in range(STARTS - 1):
-        with contextlib.suppress(NotBegunError):
+        with contextlib.suppress(NotReadyError):
             return _fly(pilot, world, *given)
     return _fly(pilot, world, *given)
 
@@ -171,7 +169,7 @@ def _fly(
         drone = stack.enter_context(
             betaflight_drone(settings, firmware=program, folder=folder, isolated=isolated)
         )
-        dynamics = LoopedDynamics(drone, settings, pilot.actions)
+        dynamics = InTheLoopDynamics(drone, settings, pilot.actions)
         env, actor = stack.enter_context(
             pilot.flying(1, seed=seed, first_world=world, dynamics=dynamics)
         )

@@ -3,20 +3,22 @@
 The worlds are the same at every strength, so that differences are paired.
 """
 
+import base64
 import functools
 import math
+import zlib
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
-from drone_rl.robustness.axis import TOGETHER, Axis
-from drone_rl.robustness.condition import Condition
-from drone_rl.robustness.flying import Airfield, Flown
-from drone_rl.robustness.modes import Mode
-from drone_rl.robustness.oracle import OracleEyes, has_oracle
+from drone_rl.robustness.agents import OracleAgent, StepContext, has_oracle
+from drone_rl.robustness.axes import TOGETHER, Axis
+from drone_rl.robustness.paired_evaluation import ConditionResult, PairedEvaluator
+from drone_rl.robustness.perturbations import Condition, Mode
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import mean_bounds, proportion
 
@@ -26,7 +28,7 @@ Told = Callable[[str], None]
 class Suite:
     """A policy's flights under all conditions."""
 
-    def __init__(self, bed: Airfield, modes: Sequence[Mode], possible_share: float) -> None:
+    def __init__(self, bed: PairedEvaluator, modes: Sequence[Mode], possible_share: float) -> None:
         """Flies where nothing is different.
 
         Args:
@@ -109,7 +111,7 @@ class Suite:
             },
         }
 
-    def _fly_oracle(self, condition: Condition) -> Flown:
+    def _fly_oracle(self, condition: Condition) -> ConditionResult:
         """Who knows where all is that shows: light, colours and noise are all the same to it."""
         faults = tuple(fault for fault in condition.faults if fault.hides)
         differs = (
@@ -121,9 +123,9 @@ class Suite:
         )
         if not (differs or faults) and hasattr(self, "oracle") and self.oracle is not None:
             return self.oracle
-        return self._bed.fly(condition, eyes=OracleEyes())
+        return self._bed.fly(condition, eyes=OracleAgent())
 
-    def _figures(self, flown: Flown) -> dict[str, Any]:
+    def _figures(self, flown: ConditionResult) -> dict[str, Any]:
         episodes, plain = flown.episodes, self.plain.episodes
         task = episodes.task
         shares = {"all": mean_bounds(episodes.share)}
@@ -193,8 +195,82 @@ def success_area(levels: Iterable[dict[str, Any]], plain: float, mode: Mode) -> 
     return area(positions, shares)
 
 
-def _success(flown: Flown | None) -> dict[str, Any] | None:
+def _success(flown: ConditionResult | None) -> dict[str, Any] | None:
     if flown is None:
         return None
     success = flown.episodes.success
     return proportion(int(success.sum()), len(success))
+
+
+STEP = 8
+"""The step whose picture is shown: the first cube is near, and late pictures show it late."""
+
+
+class FrameRecorder:
+    """Flies straight on and keeps one picture, in colour, as the camera gave it."""
+
+    knows_truth = False
+
+    def __init__(self) -> None:
+        """Has kept none yet."""
+        self._step = 0
+        self.picture: Tensor | None = None
+
+    def act(self, sight: StepContext) -> tuple[Tensor, Tensor | None]:
+        """See `Agent`."""
+        pictures = sight.draw("rgb").movedim(-1, 1).float() / 255.0
+        pictures = sight.spoil(pictures, sight.flying)
+        if self._step <= STEP:  # some flights end before
+            self.picture = (pictures[0] * 255).round().to(torch.uint8).movedim(0, -1)
+        self._step += 1
+        return torch.zeros_like(sight.flying), None
+
+
+def make_strip(bed: PairedEvaluator, axis: Axis) -> list[NDArray | None]:
+    """The policy's camera with nothing different, then at each strength; None where it can't be.
+
+    Args:
+        bed: Of one world.
+        axis: Which.
+
+    Returns:
+        Shapes: (H, W, 3), uint8.
+    """
+    made = (axis.make(strength, bed.subject) for strength in axis.strengths)
+    return [_picture(bed, condition) for condition in (Condition(), *made)]
+
+
+def _picture(bed: PairedEvaluator, condition: Condition) -> NDArray | None:
+    eyes = FrameRecorder()
+    try:
+        bed.fly(condition, eyes=eyes)
+    except InputError:
+        return None
+    return None if eyes.picture is None else eyes.picture.cpu().numpy()
+
+
+def packed(picture: NDArray) -> str:
+    """A picture as text for a file."""
+    return base64.b64encode(zlib.compress(picture.tobytes(), 9)).decode()
+
+
+def unpacked(text: str, shape: tuple[int, ...], where: str) -> NDArray:
+    """A picture out of such text.
+
+    Args:
+        text: From `packed`, perhaps.
+        shape: That it must have, as uint8.
+        where: Its name, for people.
+
+    Raises:
+        InputError: It is none, or of another shape.
+    """
+    size = math.prod(shape)
+    try:
+        unpacking = zlib.decompressobj()
+        content = unpacking.decompress(base64.b64decode(text, validate=True), size + 1)
+    except (ValueError, zlib.error):
+        content = b""
+    if len(content) != size:
+        raise InputError(f"{where} is no picture of {shape[0]} rows and {shape[1]} columns")
+    return np.frombuffer(content, np.uint8).reshape(shape)

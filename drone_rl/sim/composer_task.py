@@ -19,19 +19,22 @@ from drone_rl.config import (
     CameraSettings,
     DynamicsSettings,
 )
-from drone_rl.sim.appearances import Appearances
-from drone_rl.sim.clutter import things_of
 from drone_rl.sim.dynamics import BodyState, Dynamics, Quadrotor, draw_seeds, make_dynamics
-from drone_rl.sim.dynamics.body import heading_only
-from drone_rl.sim.entities.arena import DRAW_DISTANCE, SKY_COLOR, Field
-from drone_rl.sim.entities.distractor import make_distractors
-from drone_rl.sim.entities.drone import Drone, hide_drone
+from drone_rl.sim.dynamics.state import heading_only
+from drone_rl.sim.entities import (
+    DRAW_DISTANCE,
+    SKY_COLOR,
+    Drone,
+    Field,
+    hide_drone,
+    make_distractors,
+)
 from drone_rl.sim.mujoco_flight import MujocoFlight
-from drone_rl.sim.rendering import Appearance, opengl_looks
-from drone_rl.sim.rendering.opengl_looks import OpenGlLooks
-from drone_rl.sim.rendering.scene import Scene
-from drone_rl.sim.rendering.semantics import Meaning
+from drone_rl.sim.rendering import Appearance, opengl
+from drone_rl.sim.rendering.opengl import OpenGlLooks
+from drone_rl.sim.rendering.scene import Meaning, Scene
 from drone_rl.sim.tasks import State, Task, as_task
+from drone_rl.sim.visual_randomization import Appearances, things_of
 
 _SKY = 0.69 * DRAW_DISTANCE
 """Metres behind which there is nothing: MuJoCo's sky is a ball of 0.7 of the drawing distance."""
@@ -264,9 +267,9 @@ class ComposerTask(composer.Task):
     def _prepare(self) -> None:
         """Makes room for textures, and sees to it that the camera shows what there is to show."""
         root: Any = self._arena.mjcf_model
-        opengl_looks.prepare(root)
+        opengl.prepare(root)
         camera = self._drone.observables.front_center
-        camera.render_flag_overrides = opengl_looks.RENDER_FLAGS
+        camera.render_flag_overrides = opengl.RENDER_FLAGS
         camera.corruptor = self._in_fog
 
     def _wear(self, physics: mjcf.Physics, look: Appearance) -> None:
@@ -288,7 +291,7 @@ class ComposerTask(composer.Task):
         option = hide_drone()
         depth = self._physics.render(height, width, number, depth=True, scene_option=option)
         fovy = float(model.cam_fovy[number])
-        return opengl_looks.in_fog(picture, depth, self._look, fovy, _SKY)
+        return opengl.in_fog(picture, depth, self._look, fovy, _SKY)
 
     def _read(self, name: str) -> np.ndarray:
         return self.rules.info(self._state)[name][0].numpy()

@@ -1,6 +1,6 @@
 """What the sentences of a sweep count in its `summary.json`."""
 
-from drone_rl.utils.sentences import Evidence
+from drone_rl.utils.text import Evidence
 
 FEWEST = 6
 """Runs from which on their median has an exact 95% interval."""

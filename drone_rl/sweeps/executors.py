@@ -12,8 +12,7 @@ from typing import Any, Protocol
 
 from drone_rl.sweeps.process import POLL_S, RunProcess, finish_run, note_failure
 from drone_rl.sweeps.runs import Run
-from drone_rl.utils.errors import InputError
-from drone_rl.utils.extras import extra
+from drone_rl.utils.errors import InputError, extra
 from drone_rl.utils.provenance import num_cores
 
 

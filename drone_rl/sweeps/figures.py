@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from drone_rl.evaluation.kinds import KINDS
-from drone_rl.sim.action_display import MOVES
+from drone_rl.evaluation.rule import KINDS
+from drone_rl.sim.vocabulary import SHOWN_MOVES
 from drone_rl.sweeps.groups import FAILED, Group
 from drone_rl.sweeps.rows import Row
 from drone_rl.sweeps.statistics import median_band, on_grid
@@ -32,7 +32,7 @@ LOG_FROM = 3.0
 """Greatest to least value from which on the axis is logarithmic."""
 MOST_LABELS = 7
 """Labels side by side that an axis has room for."""
-UNIFORM = float(np.log(len(MOVES.names)))
+UNIFORM = float(np.log(len(SHOWN_MOVES.names)))
 """Entropy of the chapter's actions where all are as probable, nats."""
 _ROUNDING = 1e-4
 

@@ -13,7 +13,7 @@ from drone_rl.sweeps.counts import (
     still,
     unsolved,
 )
-from drone_rl.utils.sentences import Sentence
+from drone_rl.utils.text import Sentence
 
 SENTENCES = (
     Sentence(

@@ -4,7 +4,7 @@ import dataclasses
 from collections.abc import Sequence
 from typing import Any
 
-from drone_rl.evaluation.kinds import KINDS
+from drone_rl.evaluation.rule import KINDS
 from drone_rl.sweeps.rows import Row
 from drone_rl.sweeps.statistics import median_of_runs, share_of_runs
 

@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from drone_rl.evaluation.selection import judge_to_choose
+from drone_rl.evaluation.judge import judge_for_selection
 from drone_rl.sweeps.runs import read_result
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock, write_atomically
@@ -40,7 +40,7 @@ def judge_run(
         if result is None:
             raise InputError(f"{folder} has no result.json; give the sweep's command to finish it")
         last = folder / "checkpoints" / "last.pt"
-        verdict, progress = judge_to_choose(last, episodes, device, seed=seed)
+        verdict, progress = judge_for_selection(last, episodes, device, seed=seed)
         if progress["frames"] != result.get("frames"):
             raise InputError(
                 f"{folder}/checkpoints/last.pt is of frame {progress['frames']}, result.json of "

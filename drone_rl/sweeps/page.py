@@ -14,9 +14,9 @@ from drone_rl.sweeps.groups import Group, make_groups
 from drone_rl.sweeps.manifest import Sweep
 from drone_rl.sweeps.rows import read_rows
 from drone_rl.sweeps.summary import summarise_sweep, to_csv
+from drone_rl.utils.display import content_security_policy, page_environment, static_text
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import write_atomically
-from drone_rl.utils.pages import content_security_policy, page_environment, static_text
 
 STYLES = ("style.css", "sweep.css")
 """Files of the page's one style element."""

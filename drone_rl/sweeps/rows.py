@@ -10,16 +10,15 @@ from typing import Any
 import numpy as np
 
 from drone_rl.evaluation.consistency import check_verdict
-from drone_rl.evaluation.kinds import Kind
-from drone_rl.evaluation.rule import SIDES, Rule
+from drone_rl.evaluation.rule import SIDES, Kind, Rule
 from drone_rl.sweeps.manifest import Sweep
 from drone_rl.sweeps.runs import Run, read_failure, read_result
 from drone_rl.sweeps.statistics import Array
 from drone_rl.utils.consistency import read_entry
-from drone_rl.utils.csv_table import TablesAllowance, read_table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.former_names import FORMER_NAMES
 from drone_rl.utils.limits import SWEEP_RESULTS_BYTES, Allowance
+from drone_rl.utils.readers import TablesAllowance, read_table
 from drone_rl.utils.schema import Real, Whole
 
 _MOST = 1e15

@@ -14,7 +14,7 @@ from drone_rl.sweeps.groups import Group, make_groups
 from drone_rl.sweeps.manifest import Sweep
 from drone_rl.sweeps.rows import Row
 from drone_rl.sweeps.runs import quoted
-from drone_rl.utils.sentences import said
+from drone_rl.utils.text import said
 
 STATES = ("finished", "failed", "damaged", "unfinished")
 

@@ -10,7 +10,7 @@ from drone_rl.sweeps.page import write_sweep_report
 from drone_rl.sweeps.runs import read_result
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import newest
-from drone_rl.utils.seed_text import seed_line
+from drone_rl.utils.text import seed_line
 
 _log = logging.getLogger(__name__)
 

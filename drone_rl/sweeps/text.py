@@ -2,7 +2,7 @@
 
 from drone_rl.sweeps import figures_text as sweep_figures
 from drone_rl.sweeps.counts import FEWEST, censored, count, ended, few, from_to, in_words, solved
-from drone_rl.utils.sentences import Evidence, Sentence, percent
+from drone_rl.utils.text import Evidence, Sentence, percent
 
 _OF_THE_RUNS = (
     Sentence(

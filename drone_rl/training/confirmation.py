@@ -9,7 +9,7 @@ from torchrl.envs import TransformedEnv
 
 from drone_rl.config.configuration import as_config
 from drone_rl.config.training import TrainSettings
-from drone_rl.evaluation.evaluator import run_episodes
+from drone_rl.evaluation.rollouts import run_episodes
 from drone_rl.policies import make_actor
 from drone_rl.policies.zoo import describe
 from drone_rl.utils.seeding import Stream

@@ -1,14 +1,118 @@
 """The card of an exported policy: its verdict, its figures, and where they come from."""
 
-from collections.abc import Mapping
-from typing import Any
-
+from drone_rl.evaluation.certificate_text import is_quoted
 from drone_rl.evaluation.verdict_text import best_luck
-from drone_rl.sim.vocabulary import terms_of
-from drone_rl.utils.sentences import said
-from drone_rl.verdicts.card_text import SENTENCES
+from drone_rl.robustness.domain_text import QUOTED, untested
+from drone_rl.robustness.domain_text import is_quoted as has_domain
+from drone_rl.sim.vocabulary import some_cubes, terms_of
+from drone_rl.utils.text import Evidence, Sentence, listed, said, say
 
-Evidence = Mapping[str, Any]
+
+def _verdict(card: Evidence) -> str:
+    verdict = card["verdict"]
+    certain = f"certain, with a chance of error of at most {100 * verdict['error_rate']:g}%"
+    return (
+        f"**{verdict['kind']}** ({certain if verdict['certain'] else 'not certain'}): "
+        f"{verdict['sentence']}"
+    )
+
+
+def _reported(card: Evidence) -> str:
+    but = " but those of the certificate" if is_quoted(card["verdict"]) else ""
+    return (
+        f"All figures{but} are of {card['verdict']['greedy']['episodes']:,} episodes in worlds to "
+        f"report on (seed {card['seed']}), which neither a training nor the choice in a sweep uses."
+    )
+
+
+def _chosen(card: Evidence) -> str:
+    chosen = card["chosen"]
+    text = f"It is one of the {chosen['runs']} runs of a sweep"
+    if chosen["episodes"] is None:
+        return f"{text}, in which it was not judged."
+    return f"{text}, which are compared by {chosen['episodes']} episodes in worlds to choose by."
+
+
+def _tested(card: Evidence) -> str:
+    tested = terms_of(card["verdict"]).tested or some_cubes(card["task"])
+    unknown = listed(untested(card), "or")
+    but = f": nothing is known of other {unknown}" if unknown else ", but for what is said here"
+    what = "The verdict is of" if has_domain(card) else "Tested with"
+    return f"{what} {tested}, in this task's look and light only{but}."
+
+
+def _flies(card: Evidence) -> bool:
+    dynamics = card.get("dynamics")
+    return dynamics is not None and dynamics["mode"] == "simple_flight"
+
+
+def _body(card: Evidence) -> str:
+    dynamics = card["dynamics"]
+    speed = sum(along**2 for along in dynamics["wind"]) ** 0.5
+    gusts = f"gusts of {dynamics['gusts']:g} m/s" if dynamics["gusts"] else ""
+    wind = f"wind of {speed:.3g} m/s" if speed else ""
+    air = " and ".join(filter(None, (wind, gusts))) or "still air"
+    every = dynamics["control_ticks"] * dynamics["tick"]
+    return (
+        f"Its drone has a body: a quadrotor of {dynamics['mass']:g} kg in {air}, told what to do "
+        f"every {every:.3g} s; nothing is known here of other drones, air or modes (drone-rl "
+        "bodies)."
+    )
+
+
+SENTENCES = (
+    Sentence("card.verdict", "always", lambda c: True, _verdict),
+    Sentence(
+        "card.intervals",
+        "always",
+        lambda c: True,
+        lambda c: (
+            "In brackets: 95% intervals that count episodes, whatever depends on what within one; "
+            "those of the failures hold all at once."
+        ),
+    ),
+    Sentence(
+        "card.reported",
+        "the figures are from worlds to report on",
+        lambda c: c["worlds"] == "report",
+        _reported,
+    ),
+    Sentence(
+        "card.chosen",
+        "the run lies in a sweep's folder",
+        lambda c: c["chosen"] is not None,
+        _chosen,
+    ),
+    Sentence(
+        "card.not_chosen",
+        "the run does not lie in a sweep's folder",
+        lambda c: c["chosen"] is None,
+        lambda c: "Whether it was chosen among several trainings, and how, is not recorded.",
+    ),
+    Sentence("card.tested", "always", lambda c: True, _tested),
+    Sentence("card.body", "its drone has a body", _flies, _body),
+    Sentence(
+        "card.domain",
+        "flights under other conditions are of this network and task, and none speak against them",
+        has_domain,
+        lambda c: say(QUOTED, c),
+    ),
+    Sentence(
+        "card.greedy_only",
+        "no flights with drawn actions were made",
+        lambda c: c["verdict"]["sampled"] is None,
+        lambda c: "Flights with actions drawn by their probabilities were not made.",
+    ),
+    Sentence(
+        "card.use",
+        "always",
+        lambda c: True,
+        lambda c: (
+            "Intended use: to study what a policy sees and whether to trust it, in this simulator; "
+            "not for a real drone."
+        ),
+    ),
+)
 
 
 def write_card(name: str, digest: str, about: Evidence) -> str:

@@ -1,6 +1,5 @@
 """Policies as files for others: with a card that tells all about them, or as ONNX models."""
 
-import dataclasses
 import hashlib
 import shlex
 from collections.abc import Mapping
@@ -9,29 +8,23 @@ from typing import Any
 
 from safetensors import SafetensorError
 
-from drone_rl.config.judging import FlightSettings
-from drone_rl.evaluation.agreement import Agreement, agreement
+from drone_rl.config.commands import FlightSettings
 from drone_rl.evaluation.certificate_text import is_quoted
 from drone_rl.evaluation.judge import judge_policy
-from drone_rl.policies.policy import Policy, load_policy
-from drone_rl.policies.zoo import certificate_path, make_onnx, open_onnx, shifts_path
+from drone_rl.policies.policy import Policy
+from drone_rl.policies.zoo import certificate_path, shifts_path
 from drone_rl.policies.zoo.files import exported_bytes
 from drone_rl.robustness.domain_text import is_quoted as is_told
 from drone_rl.sweeps.manifest import read_sweep
 from drone_rl.sweeps.rows import read_rows
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import read_bytes, write_all_atomically, write_atomically
+from drone_rl.utils.files import read_bytes, write_all_atomically
 from drone_rl.utils.limits import CERTIFICATE_BYTES, SHIFTS_BYTES
 from drone_rl.utils.overrides import COMMAND, read_overrides
-from drone_rl.utils.seeding import RootSeed, root_seed, with_seed
+from drone_rl.utils.seeding import RootSeed, with_seed
 from drone_rl.verdicts.card import write_card
-from drone_rl.verdicts.domains import find_domain
-from drone_rl.verdicts.quoting import find_claim
-
-MOST_DIFFERENCE = 1e-5
-"""Of a probability that an ONNX model gives, from PyTorch's."""
-_WORLDS, _STEPS = 100, 100
-"""Of the flights on which it is compared: 10,000 pictures."""
+from drone_rl.verdicts.certificate import find_claim
+from drone_rl.verdicts.coverage import find_domain
 
 
 def export(
@@ -88,52 +81,6 @@ def export(
         carried=carried,
     )
     return seed
-
-
-def export_onnx(
-    policy: str | Path | Policy,
-    target: str | Path,
-    *,
-    command: str | None = None,
-    seed: int | None = None,
-) -> Agreement:
-    """Writes a policy as an ONNX model, if that does what the policy does: all of it on the CPU.
-
-    Args:
-        policy: The policy, or what `load_policy` takes.
-        target: Of the file, ending in .onnx; what is in it, see `drone_rl.policies.zoo.make_onnx`.
-        command: That trained it, for the model's metadata; None names what its file or folder says.
-        seed: Root of the random streams of the environments in which the two are compared; a fresh
-            one by default.
-
-    Returns:
-        How far the model and PyTorch agree, on 10,000 pictures that the policy met.
-
-    Raises:
-        InputError: It can't be an ONNX model, or not be written, or the model is another function
-            than the policy; then nothing is written.
-    """
-    policy = policy if isinstance(policy, Policy) else load_policy(policy)
-    told = {"command": command or origin_of(policy.path, policy.state)[0]}
-    content = make_onnx(policy.description, policy.make_network(), told)
-    model = open_onnx(content)
-    sound = dataclasses.replace(policy, description=policy.description.without_faults())
-    with sound.flying(_WORLDS, seed=root_seed(seed).value) as (env, actor):
-        found = agreement(env, actor, model, _STEPS)
-    if not found.difference <= MOST_DIFFERENCE:
-        raise InputError(
-            f"policy {policy.name} as an ONNX model gives probabilities that differ by up to "
-            f"{found.difference:.2g} from its own, and {MOST_DIFFERENCE:g} is allowed; export it "
-            "with format=safetensors"
-        )
-    try:
-        write_atomically(Path(target), content)
-    except OSError as error:
-        raise InputError(
-            f"policy {target} can't be written ({error.strerror}); free some space or choose "
-            "another folder with hydra.run.dir=..."
-        ) from error
-    return found
 
 
 def _as_carried(numbers: dict[str, Any] | None, target: Path) -> dict[str, Any] | None:

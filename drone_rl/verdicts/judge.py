@@ -5,35 +5,91 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, cast, overload
+from typing import Any, Protocol, TypeVar, cast, overload
 
 from tensordict.nn import TensorDictModuleBase
 from torchrl.envs import EnvBase
 
 from drone_rl.config import DynamicsSettings, TaskSettings
-from drone_rl.config.changes import Changes
-from drone_rl.config.judging import FlightSettings, JudgeSettings
+from drone_rl.config.commands import FlightSettings, JudgeSettings
+from drone_rl.config.configuration import Changes
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation.baselines import BASELINES, make_baseline
-from drone_rl.evaluation.evaluate import held_out
+from drone_rl.evaluation.evaluate import held_out_environments
 from drone_rl.evaluation.judge import Verdict, judge_policy
-from drone_rl.evaluation.kinds import NOT_COVERED, NOT_PROVED
-from drone_rl.evaluation.rule import Rule
+from drone_rl.evaluation.rule import NOT_COVERED, NOT_PROVED, Rule
 from drone_rl.evaluation.verdict_text import quantity_label
 from drone_rl.policies.base_policy import Pilot
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_pilot
-from drone_rl.robustness.measured import Measured
-from drone_rl.utils.display import paragraph, table
+from drone_rl.robustness.shifts_file import SavedShifts
+from drone_rl.utils.display import aligned, interval, paragraph, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
-from drone_rl.utils.seed_text import seed_line
 from drone_rl.utils.seeding import RootSeed, Stream, root_seed, torch_generator, with_seed
-from drone_rl.verdicts.domain_check import refly
-from drone_rl.verdicts.domains import Coverage, beside, find_domain, require, sentence
-from drone_rl.verdicts.judgements import Judgements
-from drone_rl.verdicts.quoting import find_claim
+from drone_rl.utils.text import seed_line
+from drone_rl.verdicts.certificate import find_claim
+from drone_rl.verdicts.coverage import (
+    Coverage,
+    beside,
+    find_domain,
+    recheck_domain,
+    require,
+    sentence,
+)
+
+
+class _Judged(Protocol):
+    """A judgement, as far as the table shows it."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def verdict(self) -> Verdict: ...
+
+
+T = TypeVar("T", bound=_Judged)
+
+
+@dataclasses.dataclass(frozen=True)
+class Judgements(Sequence[T]):
+    """Several judgements, in the order in which they were asked for."""
+
+    each: tuple[T, ...]
+
+    @overload
+    def __getitem__(self, index: int) -> T: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[T]: ...
+
+    def __getitem__(self, index: int | slice) -> T | Sequence[T]:
+        """One of them, or some."""
+        return self.each[index]
+
+    def __len__(self) -> int:
+        """How many."""
+        return len(self.each)
+
+    def rows(self) -> list[list[str]]:
+        """Names of columns, then a row for each policy."""
+        rows = [["policy", "verdict", "certain", "success rate (95% interval)"]]
+        for one in self.each:
+            verdict = one.verdict
+            success = interval(verdict.evidence["greedy"]["success"], "share")
+            certain = "yes" if verdict.certain else "no"
+            rows.append([one.name, verdict.kind.value, certain, success])
+        return rows
+
+    def __str__(self) -> str:
+        """The table for a terminal."""
+        return aligned(self.rows())
+
+    def _repr_html_(self) -> str:
+        head, *rows = self.rows()
+        return table(head, rows)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -45,7 +101,7 @@ class Judgement:
     verdict: Verdict
     certificate: Path | None = None
     """That lies with the policy or was given, whether it is quoted or not."""
-    measured: Measured | None = None
+    measured: SavedShifts | None = None
     """Its flights under other conditions, if there are any."""
     coverage: Coverage | None = None
     """What was required beside its operating domain, if something was."""
@@ -184,9 +240,9 @@ def judge_one(
         certificate: A proof's file to quote; by default the one that lies with the policy, see
             `drone_rl.policies.zoo.certificate_path`, if it is of this task.
         shifts: A file of its flights under other conditions to quote; by default what lies with the
-            policy or the newest under `outputs`, see `drone_rl.verdicts.domains.find_domain`.
+            policy or the newest under `outputs`, see `drone_rl.verdicts.coverage.find_domain`.
         require_domain: A file that says under which conditions it has to be good, see
-            `drone_rl.robustness.needs.read_needs`.
+            `drone_rl.robustness.requirements.read_requirements`.
         outputs: Folder under which runs are kept.
         progress: Told of what is being done; a bar by default.
         drawn_seed: The seed of a larger analysis of which this is a part; that of the settings by
@@ -224,7 +280,7 @@ def judge_one(
             device=settings.device,
             renderer=settings.renderer,
         )
-        worlds = held_out(pilot, settings, seed)
+        worlds = held_out_environments(pilot, settings, seed)
     draws, rule = settings.sampled and pilot is not None, Rule(good_share=settings.good_share)
     with worlds as (env, actor):
         verdict = judge_policy(
@@ -247,7 +303,7 @@ def judge_one(
 def _reflown(
     pilot: Pilot,
     coverage: Coverage | None,
-    measured: Measured | None,
+    measured: SavedShifts | None,
     settings: JudgeSettings,
     seed: RootSeed,
 ) -> Coverage | None:
@@ -255,11 +311,11 @@ def _reflown(
     numbers = None if measured is None else measured.numbers
     if coverage is None or numbers is None or not coverage.is_stated or not settings.domain_flights:
         return coverage
-    reflown = refly(pilot, coverage.needs, numbers, settings, seed)
+    reflown = recheck_domain(pilot, coverage.needs, numbers, settings, seed)
     return dataclasses.replace(coverage, reflown=reflown)
 
 
-def _told(measured: Measured, verdict: Verdict) -> dict[str, Any]:
+def _told(measured: SavedShifts, verdict: Verdict) -> dict[str, Any]:
     """Evidence of what may be quoted."""
     return {"shifts": measured.evidence, "verdict": verdict.evidence}
 

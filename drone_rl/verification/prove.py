@@ -10,22 +10,20 @@ from typing import Any
 
 import numpy as np
 
-from drone_rl.config.proving import ProveSettings
+from drone_rl.config.verification import ProveSettings
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.utils.display import aligned, paragraph, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock, write_atomically
 from drone_rl.utils.limits import ARRAYS_BYTES
-from drone_rl.utils.numbers import plural
 from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import fresh_seed, legacy_seed
-from drone_rl.verification.proof_text import sentence, why_stopped
-from drone_rl.verification.prover.certificate import certify, weights_hash
+from drone_rl.utils.text import plural
+from drone_rl.verification.prover.policy_spec import Subject, make_subject, one_thread
+from drone_rl.verification.prover.proof_files import certify, load, save, weights_hash
 from drone_rl.verification.prover.prover import Prover
-from drone_rl.verification.prover.saving import load, save
-from drone_rl.verification.prover.subject import Subject, make_subject
-from drone_rl.verification.prover.threads import one_thread
+from drone_rl.verification.text import sentence, why_stopped
 
 _BYTES_PER_SIDE = 64
 """Of a state, for each cube of each box under way: two borders, kept up to four times."""
@@ -36,7 +34,7 @@ class Proof:
     """How all placements of the cubes end, exactly, as far as it is decided."""
 
     certificate: dict[str, Any]
-    """Plain data, see `drone_rl.verification.prover.certificate`."""
+    """Plain data, see `drone_rl.verification.prover.proof_files`."""
     folder: Path | None = None
     """Where it lies, as `certificate.json`."""
 

@@ -8,7 +8,7 @@ import drone_rl
 from benchmarks import domain_axes
 from benchmarks.domain_axes import bench_domain_axes
 from drone_rl.robustness.axes import AXES
-from drone_rl.robustness.needs import ranges_of
+from drone_rl.robustness.requirements import ranges_of
 from tests.robustness.making import shifts_of
 
 robust = drone_rl.load_policy(domain_axes.POLICY)
@@ -30,7 +30,9 @@ class Made:
 def count(tmp_path, monkeypatch):
     def run(made):
         monkeypatch.setattr(domain_axes, "shifts", lambda *a, **k: made)
-        monkeypatch.setattr(domain_axes, "refly", lambda *a: type("R", (), {"contradictions": ()}))
+        monkeypatch.setattr(
+            domain_axes, "recheck_domain", lambda *a: type("R", (), {"contradictions": ()})
+        )
         return bench_domain_axes(tmp_path / "bench", quick=True)
 
     return run
@@ -64,7 +66,7 @@ def test_two_sided_axes_are_tried_at_both_ends(tmp_path, count):
 def test_an_axis_that_is_enforced_the_other_way_round_is_found(count, monkeypatch):
     """As limits of fog were: the greatest visibility in place of the least."""
     monkeypatch.setattr(
-        "drone_rl.verdicts.domains.lacking",
+        "drone_rl.verdicts.coverage.lacking",
         lambda numbers, name, need: None if need["low"] is None else "reversed",
     )
     found = count(Made(("fog", "blur")))

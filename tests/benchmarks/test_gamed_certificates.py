@@ -6,7 +6,7 @@ import drone_rl
 from benchmarks import gamed_certificates
 from benchmarks.gamed_certificates import cases, invented
 from drone_rl.policies.zoo import shifts_path
-from drone_rl.verdicts.domains import find_domain
+from drone_rl.verdicts.coverage import find_domain
 
 NAMES = [case.name for case in cases(drone_rl.load_policy("good").path.parent)]
 

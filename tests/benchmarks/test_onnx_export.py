@@ -4,7 +4,7 @@ import pytest
 
 from benchmarks import onnx_export
 from benchmarks.onnx_export import bench_onnx
-from drone_rl.evaluation.agreement import Agreement
+from drone_rl.verdicts.onnx_export import Agreement
 
 
 def test_a_shipped_policy_does_the_same_as_an_onnx_model(tmp_path):

@@ -8,7 +8,7 @@ from benchmarks.places import bench_places, compare
 @pytest.fixture
 def subject():
     import drone_rl
-    from drone_rl.verification.prover.subject import make_subject
+    from drone_rl.verification.prover.policy_spec import make_subject
 
     policy = drone_rl.load_policy("good").in_task(num_cubes=2)
     made = make_subject(policy.description, policy.make_network(), 0.0)
@@ -27,6 +27,6 @@ def test_the_figures(monkeypatch):
 def test_a_closed_form_that_is_wrong_is_noticed(subject, monkeypatch):
     random_state = np.random.RandomState(0)
     assert compare(subject.seeing, 35.0, 2, 20, random_state)[0] == 0
-    monkeypatch.setattr("drone_rl.verification.prover.seeing.camera_ahead", lambda: 0.9)
+    monkeypatch.setattr("drone_rl.verification.prover.cube_images.camera_ahead", lambda: 0.9)
     wrong, compared = compare(subject.seeing, 35.0, 2, 20, random_state)
     assert 0 < wrong <= compared <= 20

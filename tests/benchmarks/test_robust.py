@@ -6,12 +6,12 @@ import pytest
 
 from benchmarks import commands, robust
 from benchmarks.robust import ARMS, bench_robust, fly
+from benchmarks.robust_comparison import PLAIN
 from drone_rl.config import AppearanceSettings
 from drone_rl.config.configuration import as_config
 from drone_rl.config.training import TrainSettings
 from drone_rl.config.transforms import Gray, Noise, Shift, Standardize
 from drone_rl.robustness.axes import AXES
-from drone_rl.robustness.comparing import PLAIN
 
 LOOKS = AppearanceSettings(
     exposure=(0.5, 2.0), fog_visibility=(40.0, 100.0), ground_color=((0, 0, 0), (1, 1, 1))

@@ -3,8 +3,7 @@ import pytest
 
 from benchmarks import simulated
 from benchmarks.simulated import A, L, R, Simulated, _join, _mixture, judge_samples, policies
-from drone_rl.evaluation.kinds import Kind
-from drone_rl.evaluation.rule import Rule
+from drone_rl.evaluation.rule import Kind, Rule
 
 
 def sampled(policy, episodes, draws):

@@ -5,7 +5,7 @@ import pytest
 
 from benchmarks.tampered_wholes import WHOLES
 from drone_rl.verification.checker.certificate import parse_certificate
-from drone_rl.verification.checker.claims import find_lies
+from drone_rl.verification.checker.consistency import find_lies
 from tests.benchmarks.test_tampering import CERTIFICATE
 
 

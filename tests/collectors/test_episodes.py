@@ -13,7 +13,7 @@ from torchrl.envs import EnvBase
 from drone_rl.collectors import EpisodeCollector
 from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv
-from drone_rl.evaluation.oracle import Oracle
+from drone_rl.evaluation.baselines import Oracle
 from drone_rl.objectives import RewardToGo
 from drone_rl.utils.errors import InputError
 

@@ -23,7 +23,7 @@ PAGES = [DOCS / "flight.md", DOCS / "pilot.md", *sorted((DOCS / "tutorials").glo
 BLOCK = re.compile(r'^```(\w+)(?: title="([^"]+)")?\n(.*?)^```$', re.DOTALL | re.MULTILINE)
 SHORT = (
     "trainer=drone_rl.TrainerSettings(total_frames=1500, checkpoint_interval_s=0.0), "
-    "collector=drone_rl.config.collecting.Threads(num_envs=8)"
+    "collector=drone_rl.config.learning.Threads(num_envs=8)"
 )
 SMALLER = {
     "notebook": {
@@ -125,3 +125,9 @@ def test_it_runs(page, workplace):
             run(code, f"{page.stem}, block {number}", names)
         elif language == "sh":
             check_commands(code)
+
+
+def test_a_minimal_task_takes_at_most_80_lines():
+    blocks = BLOCK.findall((DOCS / "tutorials" / "task.md").read_text())
+    (post,) = [text for _, title, text in blocks if title == "post.py"]
+    assert len(post.splitlines()) <= 80

@@ -4,8 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drone_rl.evaluation.kinds import Kind
-from drone_rl.evaluation.rule import LUCK, SIDES, Quantity, Rule, decide, kinds_within, level
+from drone_rl.evaluation.rule import LUCK, SIDES, Kind, Quantity, Rule, decide, kinds_within, level
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.utils.errors import InputError
 

@@ -21,7 +21,7 @@ from drone_rl.evaluation.video import (
 )
 from drone_rl.sim.actions import MOVES
 from drone_rl.sim.continuous_actions import ContinuousActions
-from drone_rl.sim.rendering.semantics import Meaning
+from drone_rl.sim.rendering.scene import Meaning
 from drone_rl.utils.errors import InputError
 from tests.continuous import SETTINGS
 from tests.five_actions import FIVE

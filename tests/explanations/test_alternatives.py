@@ -2,9 +2,9 @@ import torch
 
 from drone_rl.explanations.alternatives import BRIGHT, DARK, DARK_GROUND, alternatives
 from drone_rl.explanations.scenes import Region, empty_scene, place_target
-from drone_rl.sim.entities.arena import FLOOR_COLOR, SKY_COLOR
+from drone_rl.sim.entities import FLOOR_COLOR, SKY_COLOR
 from drone_rl.sim.rendering import Appearance
-from drone_rl.sim.rendering.semantics import Meaning
+from drone_rl.sim.rendering.scene import Meaning
 
 
 def test_what_the_simulator_draws_otherwise(scenes, world):

@@ -8,7 +8,7 @@ from drone_rl.envs import DroneEnv, GrayPixels, with_transforms
 from drone_rl.explanations.flying import fly_on
 from drone_rl.explanations.scenes import Scenes, place_target
 from drone_rl.sim.actions import Move
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.sim.tasks.collect_cubes import EndReason
 
 F, L, R = Move.FORWARD, Move.LEFT, Move.RIGHT
 

@@ -7,8 +7,8 @@ from drone_rl.explanations.alternatives import DARK_GROUND
 from drone_rl.explanations.hooks import probabilities
 from drone_rl.explanations.interventions import OTHER_TARGETS, _patches, intervene, to_the_middle
 from drone_rl.explanations.scenes import Region, empty_scene, place_target
-from drone_rl.sim.entities.arena import FLOOR_COLOR
-from drone_rl.sim.rendering.semantics import Meaning
+from drone_rl.sim.entities import FLOOR_COLOR
+from drone_rl.sim.rendering.scene import Meaning
 
 
 def test_only_what_was_changed_changes(scenes, world):

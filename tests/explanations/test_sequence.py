@@ -3,7 +3,7 @@ import numpy as np
 from drone_rl.explanations.dataset import RolloutDataset
 from drone_rl.explanations.sequence import key_frames
 from drone_rl.sim.tasks import CollectCubes
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.sim.tasks.collect_cubes import EndReason
 
 
 def fake(length, collects=(), misses=(), end=EndReason.ALL_CUBES):

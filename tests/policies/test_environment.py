@@ -4,7 +4,7 @@ from torchrl.envs.utils import check_env_specs
 
 import drone_rl
 from drone_rl.config.transforms import Gray, Resize
-from drone_rl.evaluation.film import film
+from drone_rl.evaluation.video import film
 from drone_rl.policies.zoo import certificate_path, policy_path
 from drone_rl.sim import worlds as worlds_module
 from drone_rl.sim.rendering import Raytracer

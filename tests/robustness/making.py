@@ -6,10 +6,10 @@ import zlib
 
 import torch
 
-from drone_rl.config.shifting import ShiftSettings
+from drone_rl.config.commands import ShiftSettings
 from drone_rl.robustness.axes import AXES
 from drone_rl.robustness.domain import walk
-from drone_rl.robustness.modes import Mode
+from drone_rl.robustness.perturbations import Mode
 from drone_rl.robustness.suite import finite, mcnemar, success_area
 from drone_rl.sim.tasks import as_task
 from drone_rl.utils.intervals import mean_bounds, proportion
@@ -109,7 +109,7 @@ def shifts_of(policy, *, axes=("blur", "dead_rows"), weights=None):
         "settings": ShiftSettings(seed=0).values(),
         "seed": 0,
         "seed_is_fixed": True,
-        "terms": as_task(of.task).terms.as_dict(),
+        "terms": as_task(of.task).vocabulary.as_dict(),
         "plain": {"oracle": share(200), **figures()},
         "axes": {name: along(owned(name, of), of, AXES[name].strengths[2]) for name in axes},
         "together": flown(),

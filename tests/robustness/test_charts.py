@@ -1,7 +1,7 @@
 import numpy as np
 
 from benchmarks.evidence import SHIFTS, changed
-from drone_rl.evaluation.plots.palette import INK
+from drone_rl.evaluation.plots.images import INK
 from drone_rl.robustness.charts import chart, strips
 
 PICTURES = [np.full((25, 64, 3), 40 * i, np.uint8) for i in range(6)]

@@ -9,13 +9,12 @@ import torch
 from drone_rl.config import TaskSettings
 from drone_rl.evaluation.rule import Quantity, Rule
 from drone_rl.robustness import domain
-from drone_rl.robustness.axes import AXES
-from drone_rl.robustness.axis import Axis
-from drone_rl.robustness.condition import Condition
+from drone_rl.robustness.agents import OracleAgent
+from drone_rl.robustness.axes import AXES, Axis
 from drone_rl.robustness.domain import Prober, is_surely_good
 from drone_rl.robustness.faults import DeadRows
-from drone_rl.robustness.flying import Airfield
-from drone_rl.robustness.oracle import OracleEyes
+from drone_rl.robustness.paired_evaluation import PairedEvaluator
+from drone_rl.robustness.perturbations import Condition
 from drone_rl.utils.intervals import mean_bounds
 from tests.robustness.subjects import Blind, Steering, subject
 
@@ -25,9 +24,9 @@ def make_prober():
     beds = []
 
     def make(of, episodes=300):
-        bed = Airfield(of, episodes)
+        bed = PairedEvaluator(of, episodes)
         beds.append(bed)
-        return Prober(bed, bed.fly(Condition(), eyes=OracleEyes(looks=False)).episodes, 0.9)
+        return Prober(bed, bed.fly(Condition(), eyes=OracleAgent(looks=False)).episodes, 0.9)
 
     yield make
     for bed in beds:

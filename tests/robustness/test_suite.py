@@ -4,10 +4,9 @@ import pytest
 import torch
 
 from drone_rl.robustness.axes import AXES
-from drone_rl.robustness.condition import Condition
 from drone_rl.robustness.faults import DeadRows
-from drone_rl.robustness.flying import Airfield
-from drone_rl.robustness.modes import Mode
+from drone_rl.robustness.paired_evaluation import PairedEvaluator
+from drone_rl.robustness.perturbations import Condition, Mode
 from drone_rl.robustness.suite import Suite, area, mcnemar
 from tests.robustness.subjects import Blind, subject
 
@@ -18,7 +17,7 @@ def silent(text):
 
 @pytest.fixture(scope="module")
 def suite():
-    bed = Airfield(subject(Blind(0)), 20)
+    bed = PairedEvaluator(subject(Blind(0)), 20)
     yield Suite(bed, [*Mode], 0.9)
     bed.close()
 

@@ -4,11 +4,11 @@ import torch
 from dm_control import composer
 
 from drone_rl.config import DynamicsSettings, TaskSettings
+from drone_rl.sim import entities
 from drone_rl.sim.actions import Move
 from drone_rl.sim.composer_task import ComposerTask, make_environment
-from drone_rl.sim.entities import cameras
-from drone_rl.sim.tasks.collect_cubes.playing import VANISHED_DEPTH
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.sim.tasks.collect_cubes import EndReason
+from drone_rl.sim.tasks.common import HIDDEN_DEPTH
 
 
 @pytest.fixture
@@ -57,7 +57,7 @@ def test_collected_cube_is_out_of_sight(env):
     env.task.drone.set_pose(env.physics, place - (1.0, 0.0, 0.0), (1, 0, 0, 0))
     env.step(Move.FORWARD)
     shown = env.physics.bind(env.task.root_entity.mjcf_model.find("geom", "cube_0/geom")).xpos
-    assert shown[2] == pytest.approx(place[2] - VANISHED_DEPTH)
+    assert shown[2] == pytest.approx(place[2] - HIDDEN_DEPTH)
 
 
 def test_physics_does_not_move_the_drone(env):
@@ -82,14 +82,14 @@ def test_resets_differ_and_seeds_repeat():
 
 def test_five_cameras_with_airsims_names():
     model = ComposerTask(pixels=False).drone.mjcf_model
-    names = [spec.name for spec in cameras.DRONE_CAMERAS]
+    names = [spec.name for spec in entities.DRONE_CAMERAS]
     assert names == ["front_center", "front_right", "front_left", "bottom_center", "back_center"]
     assert all(model.find("camera", name) is not None for name in names)
 
 
 def test_observables_are_off_until_a_task_enables_them():
     from drone_rl.config import CameraSettings
-    from drone_rl.sim.entities.drone import Drone
+    from drone_rl.sim.entities import Drone
 
     drone = Drone(size=0.8, camera=CameraSettings())
     assert not any(o.enabled for o in drone.observables.as_dict().values())

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from drone_rl.evaluation.consistency import _expected
-from drone_rl.evaluation.kinds import Kind
-from drone_rl.evaluation.rule import LUCK, Rule
+from drone_rl.evaluation.rule import LUCK, Kind, Rule
 from drone_rl.sweeps import process
 from drone_rl.sweeps.manifest import open_sweep
 from drone_rl.sweeps.runs import Run

@@ -6,7 +6,7 @@ import pytest
 
 from benchmarks.evidence import SWEEP
 from drone_rl.sweeps.figures_text import SENTENCES
-from drone_rl.utils.sentences import said
+from drone_rl.utils.text import said
 
 
 def speak(change=lambda summary: None):

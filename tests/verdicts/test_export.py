@@ -4,16 +4,14 @@ import dataclasses
 import json
 
 import pytest
-import torch
 
 import drone_rl
-from drone_rl.config.judging import FlightSettings
-from drone_rl.policies.zoo import certificate_path, open_onnx, parse
+from drone_rl.config.commands import FlightSettings
+from drone_rl.policies.zoo import certificate_path
 from drone_rl.sweeps.manifest import Sweep
 from drone_rl.sweeps.runs import Run
 from drone_rl.utils.errors import InputError
-from drone_rl.verdicts import export as exporting
-from drone_rl.verdicts.domains import find_domain
+from drone_rl.verdicts.coverage import find_domain
 from drone_rl.verdicts.export import export, origin_of
 from tests.robustness.making import shifts_of
 from tests.sweeps.conftest import _verdict
@@ -122,66 +120,3 @@ def test_a_card_quotes_conditions_that_then_travel_with_the_policy(tmp_path, nam
         again = drone_rl.load_policy(tmp_path / "mine.safetensors")
         assert find_domain(again).path == beside
         assert "Read from mine.shifts.json, dated" in card  # and no path of this machine
-
-
-def test_an_onnx_model_that_agrees_is_left_with_its_command(tmp_path):
-    target = tmp_path / "mine.onnx"
-    found = drone_rl.export_onnx(drone_rl.load_policy("good"), target)
-    assert found.frames == 10_000 and found.actions_differ == 0
-    assert 0 < found.difference <= 1e-5
-    assert b'"drone-rl train"' in target.read_bytes()
-    assert [path.name for path in tmp_path.iterdir()] == ["mine.onnx"]
-
-
-def test_an_onnx_model_is_of_the_policy_and_not_of_what_goes_wrong_in_its_camera(
-    tmp_path, monkeypatch
-):
-    monkeypatch.setattr(exporting, "_STEPS", 3)
-    policy = drone_rl.load_policy("good")
-    described = policy.description.as_dict()
-    described["transforms"].insert(1, {"name": "noise", "strength": 0.2, "correlation_time": 0.0})
-    described["transforms"].insert(2, {"name": "late_frames", "frames": 2})
-    trained = dataclasses.replace(policy, description=parse(described))
-    assert drone_rl.export_onnx(trained, tmp_path / "mine.onnx").difference <= 1e-5
-    drone_rl.export_onnx(policy, tmp_path / "clean.onnx")
-    frames = torch.randint(0, 256, (2, 25, 64, 3), dtype=torch.uint8)
-    models = [open_onnx((tmp_path / f"{n}.onnx").read_bytes()) for n in ("mine", "clean")]
-    assert torch.equal(models[0](frames), models[1](frames))
-
-
-@pytest.mark.parametrize("wrong", [1 / 3 + 1.1e-5, float("nan")])
-def test_an_onnx_model_that_does_otherwise_is_not_left(tmp_path, monkeypatch, wrong):
-    """A policy that always goes left is said to have one chance in three."""
-    monkeypatch.setattr(exporting, "_STEPS", 3)
-    monkeypatch.setattr(exporting, "make_onnx", lambda *_: b"a model")
-    monkeypatch.setattr(exporting, "open_onnx", lambda _: lambda f: torch.full((len(f), 3), wrong))
-    (tmp_path / "mine.onnx").write_text("an older one")
-    with pytest.raises(InputError, match=r"differ by up to (0.67|nan).*format=safetensors"):
-        drone_rl.export_onnx(drone_rl.load_policy("poor"), tmp_path / "mine.onnx")
-    assert (tmp_path / "mine.onnx").read_text() == "an older one"
-
-
-@pytest.mark.parametrize(("added", "is_left"), [(0.9e-5, True), (1.1e-5, False)])
-def test_the_limit_is_one_in_a_hundred_thousand(tmp_path, monkeypatch, added, is_left):
-    """A policy that surely goes left, whatever it sees."""
-    always = torch.tensor([0.0, 1.0, 0.0], dtype=torch.float64)
-    other = (always - added * always).expand(100, 3)
-    monkeypatch.setattr(exporting, "_STEPS", 3)
-    monkeypatch.setattr(exporting, "make_onnx", lambda *_: b"a model")
-    monkeypatch.setattr(exporting, "open_onnx", lambda _: lambda f: other)
-    policy = drone_rl.load_policy("poor")
-    if is_left:
-        assert drone_rl.export_onnx(policy, tmp_path / "m.onnx").difference < 1e-5
-    else:
-        with pytest.raises(InputError, match="1e-05 is allowed"):
-            drone_rl.export_onnx(policy, tmp_path / "m.onnx")
-    assert (tmp_path / "m.onnx").exists() == is_left
-
-
-def test_a_place_for_an_onnx_model_that_is_none(tmp_path, monkeypatch):
-    monkeypatch.setattr(exporting, "_STEPS", 3)
-    monkeypatch.setattr(exporting, "MOST_DIFFERENCE", 2.0)
-    monkeypatch.setattr(exporting, "make_onnx", lambda *_: b"a model")
-    monkeypatch.setattr(exporting, "open_onnx", lambda _: lambda f: torch.zeros(len(f), 3))
-    with pytest.raises(InputError, match=r"nowhere/m\.onnx can't be written"):
-        drone_rl.export_onnx(drone_rl.load_policy("poor"), tmp_path / "nowhere" / "m.onnx")

@@ -8,7 +8,7 @@ import torch
 import drone_rl
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
-from drone_rl.verification.prover.chance_bounds import Bounded
+from drone_rl.verification.prover.markov_chain import Bounded
 
 ONE = {"num_cubes": 1, "side_margin": 2.0}
 

@@ -13,7 +13,7 @@ from drone_rl.policies.policy import Policy
 from drone_rl.policies.zoo import parse
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
-from drone_rl.verification.prover.silhouettes import camera_ahead
+from drone_rl.verification.prover.cube_images import camera_ahead
 
 
 @pytest.fixture(scope="module")

@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from benchmarks.robust import ALL_KINDS, ARMS
+from benchmarks.robust_comparison import PLAIN, mean
 from drone_rl.robustness.axes import GROUPS
-from drone_rl.robustness.comparing import PLAIN, mean
 from tools.readme.tables import UNKNOWN
 
 _UNTOUCHED = "untouched"

@@ -11,7 +11,7 @@ from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path
 from numpy.typing import NDArray
 
-from drone_rl.sim.action_display import ShownActions
+from drone_rl.sim.vocabulary import ShownActions
 
 _LINE = 'fill="none" class="line"'
 

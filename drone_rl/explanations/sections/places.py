@@ -7,18 +7,17 @@ import torch
 from numpy.typing import NDArray
 
 from drone_rl.config import TaskSettings
-from drone_rl.config.mapping import PlacesSettings
+from drone_rl.config.verification import PlacesSettings
 from drone_rl.explanations.context import Context
 from drone_rl.sim.actions import MOVES
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import legacy_seed
+from drone_rl.verification.prover.action_map import Look, PlaceMap, map_places
 from drone_rl.verification.prover.arrangement import Window
+from drone_rl.verification.prover.cube_images import NOTHING, Eye, Seeing
 from drone_rl.verification.prover.lattice import Lattice
-from drone_rl.verification.prover.places import Look, PlaceMap, map_places
-from drone_rl.verification.prover.seeing import Seeing
-from drone_rl.verification.prover.silhouettes import NOTHING, Eye
-from drone_rl.verification.prover.subject import check_task
+from drone_rl.verification.prover.policy_spec import check_task
 
 _COMPARED = 1000
 """Pictures of the renderer that must be the closed form's."""

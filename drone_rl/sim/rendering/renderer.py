@@ -1,14 +1,17 @@
 """What a renderer must offer: pictures of worlds that it does not hold."""
 
 import dataclasses
+import importlib
 from typing import Protocol
 
 from torch import Tensor
 
+from drone_rl.config.camera import RENDERERS
 from drone_rl.sim.rendering.appearance import Appearance
 from drone_rl.sim.rendering.scene import Scene
 from drone_rl.sim.rendering.view import Modality, View
 from drone_rl.utils.batch import Batch
+from drone_rl.utils.errors import InputError
 
 
 @dataclasses.dataclass
@@ -77,3 +80,20 @@ class MakeRenderer(Protocol):
             device: Where pictures are wanted: "cpu", "cuda" or "cuda:N".
         """
         ...
+
+
+def find_renderer(which: str | MakeRenderer) -> MakeRenderer:
+    """What makes a renderer.
+
+    Args:
+        which: Its name, see `RENDERERS`, or what makes it itself.
+
+    Raises:
+        InputError: There is none of that name.
+    """
+    if not isinstance(which, str):
+        return which
+    if which not in RENDERERS:
+        raise InputError(f"renderer={which!r} is unknown; give one of: {', '.join(RENDERERS)}")
+    module, _, name = RENDERERS[which].rpartition(".")
+    return getattr(importlib.import_module(module), name)

@@ -3,13 +3,25 @@
 """A compiled model of a task's world, in which everything that is drawn has a meaning."""
 
 import dataclasses
+import enum
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from drone_rl.sim.rendering.semantics import Meaning
 from drone_rl.utils.errors import InputError
+
+
+class Meaning(enum.IntEnum):
+    """Of one thing. Which target is the next one is not told here: that is the state's business."""
+
+    SKY = 0
+    GROUND = 1
+    TARGET = 2
+    OBSTACLE = 3
+    DRONE = 4
+    DISTRACTOR = 5
+
 
 _UNSET = (0.5, 0.5, 0.5, 1.0)
 """Of a geom that was given none."""

@@ -1,11 +1,8 @@
 """What drones sense beside pictures: inertia, pressure, Earth's field, their place, and touch."""
 
-from drone_rl.sim.sensors.barometer import Barometer, BarometerReading
-from drone_rl.sim.sensors.collision import CollisionState
-from drone_rl.sim.sensors.gps import Fix, Gps, GpsReading
-from drone_rl.sim.sensors.imu import Imu, ImuReading
-from drone_rl.sim.sensors.magnetometer import Magnetometer, MagnetometerReading
-from drone_rl.sim.sensors.senses import Senses, SensesState
+from drone_rl.sim.sensors.inertial import Imu, ImuReading, Magnetometer, MagnetometerReading
+from drone_rl.sim.sensors.position import Barometer, BarometerReading, Fix, Gps, GpsReading
+from drone_rl.sim.sensors.suite import CollisionState, Senses, SensesState
 
 __all__ = [
     "Barometer",

@@ -1,10 +1,19 @@
 """The second checker of certificates: slow, plain, and with nothing of the prover in it."""
 
-from drone_rl.verification.checker.certificate import Certificate, Outcome, read_certificate
-from drone_rl.verification.checker.checker import Contradiction, Findings, check_certificate
-from drone_rl.verification.checker.identity import fingerprint, refuse_another
-from drone_rl.verification.checker.places import find
-from drone_rl.verification.checker.trying import read_tried
+from drone_rl.verification.checker.certificate import (
+    Certificate,
+    Outcome,
+    fingerprint,
+    read_certificate,
+    refuse_another,
+)
+from drone_rl.verification.checker.checker import (
+    Contradiction,
+    Findings,
+    check_certificate,
+    read_tried,
+)
+from drone_rl.verification.checker.sampling import find
 
 __all__ = [
     "Certificate",

@@ -3,18 +3,25 @@
 import dataclasses
 from collections.abc import Mapping, Sequence
 from contextlib import closing
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason
-from drone_rl.verification.checker.certificate import Certificate, Outcome
-from drone_rl.verification.checker.claims import find_lies, missing_steps
-from drone_rl.verification.checker.drawing import ANYWHERE, BORDER, INSIDE, draw_places
-from drone_rl.verification.checker.flights import Flown, Simulator, Tell
-from drone_rl.verification.checker.tallies import find_wrong_tallies
+from drone_rl.policies.zoo import PolicyDescription
+from drone_rl.sim.tasks.collect_cubes import EndReason
+from drone_rl.utils.errors import InputError
+from drone_rl.verification.checker.certificate import (
+    Certificate,
+    Outcome,
+    read_certificate,
+    refuse_another,
+)
+from drone_rl.verification.checker.consistency import find_lies, find_wrong_tallies, missing_steps
+from drone_rl.verification.checker.rollouts import Flown, Simulator, Tell
+from drone_rl.verification.checker.sampling import ANYWHERE, BORDER, INSIDE, draw_places
 
 MOST_TOLD = 20
 """Lines about flights that ended otherwise."""
@@ -186,3 +193,26 @@ def _found(flown: Flown, i: int) -> str:
     loops = end == EndReason.STEP_LIMIT and bool(flown.repeats[i])
     as_outcome = Outcome(end, collected, loops, 0.0, {}, np.zeros((0, len(collected), 2)))
     return f"{as_outcome}, steps: {flown.steps[i]}"
+
+
+def read_tried(
+    path: Path, described: PolicyDescription, weights: Mapping[str, torch.Tensor]
+) -> Certificate:
+    """A certificate of this very policy and task, whose boxes and shares go together exactly.
+
+    That flights end as it states is not looked at, see `check_certificate`.
+
+    Args:
+        path: Of the file.
+        described: The policy's description, in the task that counts.
+        weights: Of its network.
+
+    Raises:
+        InputError: It can't be read, is of another network, camera or task, or contradicts itself.
+    """
+    certificate = read_certificate(path)
+    refuse_another(certificate, described, weights, described.task)
+    lie = next(find_lies(certificate), None)
+    if lie is not None:
+        raise InputError(f"certificate {path} contradicts itself: {lie}; prove the policy again")
+    return certificate

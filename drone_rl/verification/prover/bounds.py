@@ -9,7 +9,9 @@ and flattening commute with multiplication, so nothing is halved on the way: bia
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional
 
@@ -19,6 +21,7 @@ from drone_rl.policies.rounded_layers import SLACK, UNIT, Layer, layer_of
 from drone_rl.policies.rounding import PIXEL_UNITS, RoundingBound
 from drone_rl.sim.actions import MOVES
 from drone_rl.utils.errors import InputError
+from drone_rl.verification.prover.cube_images import NOTHING
 
 
 class Bounds:
@@ -239,3 +242,135 @@ def _linear(layer: nn.Linear, scale: int) -> Step:
         return functional.linear(total, weight, bias), functional.linear(width, weight.abs())
 
     return step
+
+
+Transform = Callable[[Tensor], Tensor]
+
+Part = tuple[slice, slice]
+"""Rows and columns of a picture."""
+_FACES = 4
+
+
+class Painter:
+    """Paints cubes over each other, the nearer one in front, before an even background."""
+
+    def __init__(self, background: Tensor, faces: Tensor, rest: Transform | None = None) -> None:
+        """Notes the brightness of everything.
+
+        Args:
+            background: Of what is seen where no cube is. Shape: (height, width), float32.
+            faces: Of a cube's front, left and right side. Shape: (3,), float32.
+            rest: What becomes of a picture (N, 1, height, width) before the network sees it;
+                brighter pixels must not make anything darker. Nothing by default.
+        """
+        self._background = background
+        self._rest = rest
+        inf = torch.inf
+        bits = torch.arange(2**_FACES)[:, None] >> torch.arange(1, _FACES) & 1 == 1
+        self._shades = torch.cat([faces.new_zeros(1), faces])
+        self._lowest = torch.where(bits, faces, inf).min(-1).values
+        self._highest = torch.where(bits, faces, -inf).max(-1).values
+        is_open = torch.arange(2**_FACES) >> NOTHING & 1 == 1
+        self._shut = torch.where(is_open, 0.0, inf)
+        """Added to what stands behind: it counts where the cube may leave it open."""
+
+    def paint(
+        self, cubes: Sequence[tuple[Part, Tensor, Tensor]], num_pictures: int
+    ) -> tuple[Tensor, Tensor]:
+        """Bounds on pictures.
+
+        Args:
+            cubes: Of each, the nearest first: rows and columns outside which nothing is seen of
+                it; masks of what pixels may show there in different cases (bit f for face f),
+                shape (cases, rows, columns), uint8; which case each picture is, shape (N,).
+            num_pictures: N.
+
+        Returns:
+            Lower and upper bounds. Shape: (N, height, width).
+        """
+        lower = self._background.repeat(num_pictures, 1, 1)
+        upper = lower.clone()
+        for part, masks, case in reversed(cubes):
+            index = masks.int()
+            shut = self._shut[index].index_select(0, case)
+            low, high = lower[:, *part], upper[:, *part]
+            low.add_(shut).clamp_max_(self._lowest[index].index_select(0, case))
+            high.sub_(shut).clamp_min_(self._highest[index].index_select(0, case))
+        return lower, upper
+
+    def paint_one(self, cubes: Sequence[tuple[Part, Tensor]], num_pictures: int) -> Tensor:
+        """Pictures of which everything is known.
+
+        Args:
+            cubes: Of each, the nearest first: rows and columns outside which nothing is seen of
+                it, and what pixels show there, shape (N, rows, columns), uint8.
+            num_pictures: N.
+
+        Returns:
+            Shape: (N, height, width).
+        """
+        pictures = self._background.repeat(num_pictures, 1, 1)
+        for part, faces in reversed(cubes):
+            shade = self._shades[faces.int()]
+            behind = pictures[:, *part]
+            behind.copy_(torch.where(faces == NOTHING, behind, shade))
+        return pictures
+
+    def see(self, pictures: Tensor) -> Tensor:
+        """What the network sees. Shape: (N, height, width) to (N, C, H, W)."""
+        return pictures[:, None] if self._rest is None else self._rest(pictures[:, None])
+
+
+class Ranges:
+    """The pictures of one cube, one after the other, each range of them looked up in two steps."""
+
+    def __init__(self, pictures: Tensor) -> None:
+        """Notes them.
+
+        Args:
+            pictures: What each pixel shows. Shape: (pictures, height, width).
+        """
+        shown = pictures.any(0)
+        rows, columns = shown.any(1).nonzero(), shown.any(0).nonzero()
+        self.part = (
+            slice(int(rows.min()), int(rows.max()) + 1) if len(rows) else slice(0, 0),
+            slice(int(columns.min()), int(columns.max()) + 1) if len(rows) else slice(0, 0),
+        )
+        """Rows and columns outside which nothing is ever seen of the cube."""
+        self.pictures = pictures = pictures[:, *self.part].contiguous()
+        masks = torch.bitwise_left_shift(torch.ones_like(pictures), pictures)
+        self._levels = [masks]
+        while len(masks) > (reach := 1 << (len(self._levels) - 1)):
+            masks = masks[:-reach] | masks[reach:]
+            self._levels.append(masks)
+        self._doubts = np.full((len(pictures), len(pictures)), -1, np.int32)
+        """Of each range, by its first and last picture; -1 where not yet counted."""
+
+    def of(self, ranges: NDArray) -> tuple[Tensor, Tensor]:
+        """Masks of the different ranges, within the part, and which of them each one is."""
+        code, case = np.unique(self._code(ranges), return_inverse=True)
+        return self._masks(code), torch.from_numpy(case)
+
+    def doubts(self, ranges: NDArray) -> NDArray[np.int64]:
+        """How many pixels may show several things in each range."""
+        code, counts = self._code(ranges), self._doubts.reshape(-1)
+        unknown = np.unique(code[counts[code] < 0])
+        if len(unknown):
+            masks = self._masks(unknown)
+            counts[unknown] = (masks & (masks - 1) != 0).flatten(1).sum(-1).numpy()
+        return counts[code].astype(np.int64)
+
+    def _code(self, ranges: NDArray) -> NDArray[np.int64]:
+        """One number for each range."""
+        return ranges[:, 0] * len(self.pictures) + ranges[:, 1]
+
+    def _masks(self, code: NDArray[np.int64]) -> Tensor:
+        """What pixels may show anywhere in ranges. Shape: (N, rows, columns)."""
+        first, last = np.divmod(code, len(self.pictures))
+        levels = np.frexp(last - first + 1)[1] - 1
+        masks = self._levels[0].new_empty(len(code), *self._levels[0].shape[1:])
+        for level in np.unique(levels):
+            those = np.flatnonzero(levels == level)
+            found, reach = self._levels[level], 1 << int(level)
+            masks[those] = found[first[those]] | found[last[those] + 1 - reach]
+        return masks

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drone_rl.utils.errors import InputError
-from drone_rl.verification.prover.silhouettes import Eye
+from drone_rl.verification.prover.cube_images import Eye
 
 NARROWER = 8
 """A renderer that is asked shows its bands: by so much they are narrower than rounding allows."""

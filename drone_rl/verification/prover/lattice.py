@@ -8,11 +8,17 @@ import dataclasses
 import functools
 import math
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
+import torch
+from torch import Tensor
 
 from drone_rl.config import TaskSettings
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.sim.actions import DIRECTIONS
+from drone_rl.sim.dynamics import BodyState
+from drone_rl.sim.tasks.collect_cubes import CollectCubes, EndReason, WorldState
+from drone_rl.utils.batch import Batch
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.prover.boxes import Boxes, cut
 
@@ -157,3 +163,191 @@ def _least(y: float, reach: float) -> float:
     while abs(y - least) > reach:
         least = math.nextafter(least, math.inf)
     return least
+
+
+MOST_NODES = 2**24
+"""Of one placement, reachable or not; bounds memory."""
+
+
+@dataclasses.dataclass
+class Nodes(Batch):
+    """Some nodes; `K` is how many."""
+
+    placement: Tensor  # (K,) int64
+    """Which placement of the cubes."""
+    ahead: Tensor  # (K,) int64
+    """Steps forward from the origin."""
+    aside: Tensor  # (K,) int64
+    """Steps to the left of it; below 0 to the right."""
+    collected: Tensor  # (K,) int64
+    """Cubes collected on the way here; bit k says whether cube k is one of them."""
+
+
+class Shape(NamedTuple):
+    """How many values each part of a node can have: those of `Nodes`, without the placement."""
+
+    ahead: int
+    aside: int
+    collected: int
+
+    @property
+    def nodes(self) -> int:
+        """Of one placement."""
+        return self.ahead * self.aside * self.collected
+
+
+@dataclasses.dataclass
+class Graph:
+    """All nodes that can be reached by any moves, and what each move leads to; `A` moves."""
+
+    settings: TaskSettings
+    cubes: Tensor  # (P, C, 3) float64
+    """The placements, metres."""
+    nodes: Nodes
+    """The first P are where the episodes start, in the placements' order."""
+    target: Tensor  # (K, A) int64
+    """Number of the node that a move leads to; -1 where the episode ends."""
+    reason: Tensor  # (K, A) int64
+    """Why it ends, an `EndReason`; never for its length, of which nodes know nothing."""
+    collected: Tensor  # (K, A) int64
+    """Cubes collected after the move, as in `Nodes`."""
+
+    def states(self) -> WorldState:
+        """The nodes as worlds that can be drawn."""
+        return states(self.settings, self.cubes, self.nodes)
+
+    def pictures(self) -> tuple[Tensor, Tensor]:
+        """Which nodes look different, by place and standing cubes.
+
+        Which of the cubes behind the drone were collected can't be seen.
+
+        Returns:
+            The number of a node that shows each picture, and of the picture that each node shows.
+            Shapes: (U,), (K,).
+        """
+        standing = dataclasses.replace(self.nodes, collected=_as_bits(self.states().present))
+        keys, picture = _keys(shape_of(self.settings), standing).unique(return_inverse=True)
+        node = torch.empty_like(keys)
+        node[picture] = torch.arange(len(picture))  # whichever node is written last is one of them
+        return node, picture
+
+
+def explore(settings: TaskSettings, cubes: Tensor) -> Graph:
+    """Follows every move from the start of the episodes until no node is new.
+
+    Args:
+        settings: The task's.
+        cubes: Placements, metres, world frame. Shape: (P, C, 3), float64.
+
+    Raises:
+        InputError: The task has too many nodes.
+    """
+    shape = shape_of(settings)
+    count = len(cubes)
+    number = torch.full((count * shape.nodes,), -1)
+    zeros = torch.zeros(count, dtype=torch.int64)
+    frontier = Nodes(torch.arange(count), zeros, zeros, zeros)
+    parts, known = [], 0
+    while len(frontier):
+        number[_keys(shape, frontier)] = torch.arange(known, known + len(frontier))
+        known += len(frontier)
+        moved, reason = follow(settings, cubes, frontier)
+        goes_on = reason == EndReason.RUNNING
+        keys = torch.where(goes_on.flatten(), _keys(shape, moved), -1).view(reason.shape)
+        parts.append((frontier, keys, reason, moved.collected.view(reason.shape)))
+        new = keys[goes_on].unique()
+        frontier = _cells(shape, new[number[new] < 0])
+    nodes, keys, reason, collected = zip(*parts, strict=True)
+    key = torch.cat(keys)
+    return Graph(
+        settings,
+        cubes,
+        Nodes(*(torch.cat(values) for values in zip(*map(_values, nodes), strict=True))),
+        target=torch.where(key < 0, -1, number[key]),
+        reason=torch.cat(reason),
+        collected=torch.cat(collected),
+    )
+
+
+def follow(settings: TaskSettings, cubes: Tensor, nodes: Nodes) -> tuple[Nodes, Tensor]:
+    """What every move makes of some nodes, by `CollectCubes.judge`.
+
+    Returns:
+        The nodes after each move, those of the first node first (K * A), and the `EndReason` of
+        each, which is never the step limit. Shape: (K, A).
+    """
+    moves = torch.tensor(DIRECTIONS).long()
+    each = torch.arange(len(nodes)).repeat_interleave(len(moves))
+    before = nodes[each]
+    ahead, aside, _ = (moves.repeat(len(nodes), 1)).unbind(-1)
+    moved = dataclasses.replace(before, ahead=before.ahead + ahead, aside=before.aside + aside)
+    body = BodyState.at_rest(_positions(settings, moved))
+    judged, _ = CollectCubes(settings).judge(states(settings, cubes, before), body)
+    moved.collected = _as_bits(judged.collected)
+    return moved, judged.end_reason.view(len(nodes), len(moves))
+
+
+def states(settings: TaskSettings, cubes: Tensor, nodes: Nodes) -> WorldState:
+    """Nodes as worlds, one step short of having taken none: the step limit is never met."""
+    body = BodyState.at_rest(_positions(settings, nodes))
+    state = CollectCubes(settings).start(cubes[nodes.placement], body)
+    bit = torch.arange(cubes.shape[1])
+    state.collected = (nodes.collected[:, None] >> bit & 1).bool()
+    state.passed = ~state.collected & (state.drone[:, None, 0] > state.cubes[..., 0])
+    state.steps = state.steps - 1
+    return state
+
+
+def shape_of(settings: TaskSettings) -> Shape:
+    """How many nodes there can be.
+
+    Raises:
+        InputError: Too many.
+    """
+    ahead = math.ceil(settings.front_bound / settings.step_length) + 2
+    aside = 2 * (math.ceil(settings.side_bound / settings.step_length) + 1) + 1
+    shape = Shape(ahead, aside, 2**settings.num_cubes)
+    if shape.nodes > MOST_NODES:
+        raise InputError(
+            f"num_cubes={settings.num_cubes} and step_length={settings.step_length} make "
+            f"{shape.nodes:.2g} nodes of each placement; give fewer cubes or longer steps, for at "
+            f"most {MOST_NODES:.2g}"
+        )
+    return shape
+
+
+def _positions(settings: TaskSettings, nodes: Nodes) -> Tensor:
+    """Metres, each the sum that as many steps straight on make, rounded alike. Shape: (K, 3).
+
+    So x is the simulator's to the last bit, and y is if the drone came straight or if steps are
+    sums of halves, quarters and so on; otherwise the simulator's y hangs on the way by some 1e-15.
+    """
+    farthest = max(int(nodes.ahead.max()), int(nodes.aside.abs().max()))
+    steps = np.full(farthest + 1, settings.step_length)
+    steps[0] = 0.0
+    metres = torch.from_numpy(np.add.accumulate(steps))
+    y = metres[nodes.aside.abs()] * nodes.aside.sign()
+    return torch.stack([metres[nodes.ahead], y, torch.full_like(y, settings.altitude)], -1)
+
+
+def _as_bits(flags: Tensor) -> Tensor:
+    """Truth values as one whole number. Shapes: (K, C), (K,)."""
+    return (flags.long() << torch.arange(flags.shape[1])).sum(-1)
+
+
+def _keys(shape: Shape, nodes: Nodes) -> Tensor:
+    """A number for each node, of its own. Shape: (K,)."""
+    row = nodes.placement * shape.ahead + nodes.ahead
+    place = row * shape.aside + nodes.aside + shape.aside // 2
+    return place * shape.collected + nodes.collected
+
+
+def _cells(shape: Shape, keys: Tensor) -> Nodes:
+    """The nodes of keys."""
+    place, collected = keys // shape.collected, keys % shape.collected
+    row, column = place // shape.aside, place % shape.aside
+    return Nodes(row // shape.ahead, row % shape.ahead, column - shape.aside // 2, collected)
+
+
+def _values(nodes: Nodes) -> tuple[Tensor, ...]:
+    return nodes.placement, nodes.ahead, nodes.aside, nodes.collected

@@ -4,9 +4,7 @@ import numpy as np
 from PIL import Image
 
 from drone_rl.evaluation.plots import images as pictures
-from drone_rl.evaluation.plots.images import SCALE
-from drone_rl.evaluation.plots.indicator import indicator
-from drone_rl.evaluation.plots.palette import BACKGROUND
+from drone_rl.evaluation.plots.images import BACKGROUND, SCALE, indicator
 
 BLACK = np.zeros((4, 6, 3), np.uint8)
 RED, BLUE = (214, 39, 40), (31, 96, 200)

@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from drone_rl.explanations.sections.evaluation import section
-from drone_rl.verdicts.proof import Claim
+from drone_rl.verdicts.certificate import Claim
 
 
 def test_the_verdict_rests_on_the_first_episodes_whoever_flew_before(context):

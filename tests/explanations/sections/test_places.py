@@ -8,7 +8,7 @@ from drone_rl.explanations.scenes import place_target
 from drone_rl.explanations.sections import places
 from drone_rl.policies import ForeignNetwork
 from drone_rl.sim.actions import MOVES
-from drone_rl.verification.prover.silhouettes import camera_ahead
+from drone_rl.verification.prover.cube_images import camera_ahead
 from tests.five_actions import FIVE
 
 

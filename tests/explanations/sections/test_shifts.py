@@ -4,12 +4,12 @@ from types import SimpleNamespace
 import numpy as np
 
 from drone_rl.explanations.sections.shifts import section
-from drone_rl.robustness.measured import Measured
+from drone_rl.robustness.shifts_file import SavedShifts
 
 
 def test_what_was_measured_is_taken_over():
     strip = [np.full((5, 16, 3), 7, np.uint8), None, *[np.zeros((5, 16, 3), np.uint8)] * 4]
-    measured = Measured(Path("shifts.json"), {"axes": {"blur": {}}}, {"blur": strip})
+    measured = SavedShifts(Path("shifts.json"), {"axes": {"blur": {}}}, {"blur": strip})
     numbers, arrays = section(SimpleNamespace(measured=measured))
     assert numbers == {"shifts": {"axes": {"blur": {}}}}
     assert arrays["shifts_blur"].shape == (6, 5, 16, 3)
@@ -17,7 +17,7 @@ def test_what_was_measured_is_taken_over():
 
 
 def test_why_it_is_refused_and_nothing_without():
-    refused = Measured(Path("shifts.json"), None, refused="it is of another task")
+    refused = SavedShifts(Path("shifts.json"), None, refused="it is of another task")
     assert section(SimpleNamespace(measured=refused)) == (
         {"shifts": {"refused": "it is of another task"}},
         {},

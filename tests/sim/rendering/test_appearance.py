@@ -2,7 +2,7 @@ import torch
 
 from drone_rl.sim.rendering import Appearance, Texture
 from drone_rl.sim.rendering.appearance import each
-from drone_rl.sim.rendering.semantics import Meaning
+from drone_rl.sim.rendering.scene import Meaning
 
 RED = (1.0, 0.0, 0.0)
 SEVERAL = torch.tensor([[0.1, 0.2, 0.3], [0.4, 0.5, 0.6], [0.7, 0.8, 0.9]])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from drone_rl.sim.rendering.opengl_textures import _fitting, _points, box_sides, flat, sky_sides
+from drone_rl.sim.rendering.opengl import _fitting, _points, box_sides, flat, sky_sides
 from drone_rl.sim.rendering.textures import levels
 
 QUARTERS = np.array([[[10] * 3, [20] * 3], [[30] * 3, [40] * 3]], np.uint8)

@@ -7,11 +7,10 @@ import torch
 from drone_rl.config import CameraSettings, TaskSettings
 from drone_rl.envs import GrayPixels
 from drone_rl.sim.composer_task import make_environment
-from drone_rl.sim.entities.arena import FLOOR_COLOR
-from drone_rl.sim.entities.cameras import CHASE, DRONE_CAMERAS
+from drone_rl.sim.entities import CHASE, DRONE_CAMERAS, FLOOR_COLOR
 from drone_rl.sim.rendering import Appearance, Raytracer
-from drone_rl.sim.rendering.semantics import Meaning
-from drone_rl.sim.rendering.warp import WarpRenderer
+from drone_rl.sim.rendering.mujoco_warp import WarpRenderer
+from drone_rl.sim.rendering.scene import Meaning
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import world_random_state

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from drone_rl.sim.rendering import Scene
-from drone_rl.sim.rendering.semantics import Meaning
+from drone_rl.sim.rendering.scene import Meaning
 from drone_rl.utils.errors import InputError
 
 

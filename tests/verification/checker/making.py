@@ -5,9 +5,9 @@ import itertools
 import numpy as np
 
 import drone_rl
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.verification.checker import fingerprint
-from drone_rl.verification.checker.flights import Simulator
+from drone_rl.verification.checker.rollouts import Simulator
 
 BAND = 1e-5
 """Metres on either side of a border that are left undecided."""

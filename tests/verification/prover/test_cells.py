@@ -5,7 +5,7 @@ import pytest
 
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.prover.cells import Cells
-from drone_rl.verification.prover.silhouettes import Eye
+from drone_rl.verification.prover.cube_images import Eye
 
 TINY = Eye(
     left=np.array([1.0, -1.0]), up=np.array([0.0]), half=1.0, farthest=40.0, widest=20.0, bound=6.0

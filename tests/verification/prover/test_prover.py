@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import drone_rl
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.verification.prover.boxes import volumes
+from drone_rl.verification.prover.policy_spec import make_subject
 from drone_rl.verification.prover.prover import Prover
-from drone_rl.verification.prover.subject import make_subject
 
 
 def prove(name, gap=1e-4, most=500_000_000, **task):

@@ -10,7 +10,7 @@ from drone_rl.evaluation.plots import regions
 from drone_rl.evaluation.plots.saving import Rows
 from drone_rl.explanations.report.explanation import Explanation
 from drone_rl.explanations.report.part import Drawn, Part
-from drone_rl.verification.places_text import PLACES, rows
+from drone_rl.verification.text import PLACES, rows
 
 
 def _is_made(explanation: Explanation) -> bool:

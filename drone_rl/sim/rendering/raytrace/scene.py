@@ -8,26 +8,30 @@ Frame 0 is the world's, frame 1 the drone's, and one follows for each of the tas
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
+from typing import Any
 
 import mujoco
 import numpy as np
+import torch
 import warp as wp
 from numpy.typing import NDArray
+from torch import Tensor
 
-from drone_rl.sim.rendering.raytrace import solids, structs
-from drone_rl.sim.rendering.scene import Scene
-from drone_rl.sim.rendering.semantics import Meaning
+from drone_rl.sim.rendering.appearance import Beside, Mounting, product
+from drone_rl.sim.rendering.raytrace import intersection_kernel, structs_kernel
+from drone_rl.sim.rendering.renderer import Poses
+from drone_rl.sim.rendering.scene import Meaning, Scene
 from drone_rl.sim.rendering.view import View
 from drone_rl.utils.errors import InputError
 
 REACH: Mapping[int, Callable[[NDArray], NDArray]] = MappingProxyType(
     {
-        solids.PLANE: lambda size: size,
-        solids.SPHERE: lambda size: size[[0, 0, 0]],
-        solids.CAPSULE: lambda size: size[[0, 0, 1]] + [0.0, 0.0, size[0]],
-        solids.ELLIPSOID: lambda size: size,
-        solids.CYLINDER: lambda size: size[[0, 0, 1]],
-        solids.BOX: lambda size: size,
+        intersection_kernel.PLANE: lambda size: size,
+        intersection_kernel.SPHERE: lambda size: size[[0, 0, 0]],
+        intersection_kernel.CAPSULE: lambda size: size[[0, 0, 1]] + [0.0, 0.0, size[0]],
+        intersection_kernel.ELLIPSOID: lambda size: size,
+        intersection_kernel.CYLINDER: lambda size: size[[0, 0, 1]],
+        intersection_kernel.BOX: lambda size: size,
     }
 )
 """Half extents of the box around each kind of geom, from its size as MuJoCo keeps it."""
@@ -76,9 +80,9 @@ class Frames:
         for geom, (meaning, prop) in enumerate(zip(scene.meanings, scene.props, strict=True)):
             root = model.body_rootid[model.geom_bodyid[geom]]
             if meaning is Meaning.DRONE:
-                self._of_body[model.body_rootid == root] = structs.DRONE_FRAME
+                self._of_body[model.body_rootid == root] = structs_kernel.DRONE_FRAME
             elif prop >= 0:
-                self._of_body[model.body_rootid == root] = structs.DRONE_FRAME + 1 + prop
+                self._of_body[model.body_rootid == root] = structs_kernel.DRONE_FRAME + 1 + prop
 
     def place(
         self, body: int, position: NDArray, attitude: NDArray
@@ -105,17 +109,17 @@ class Frames:
         return frame, there, relative
 
 
-def make_view(scene: Scene, frames: Frames, view: View, device: str) -> structs.View:
+def make_view(scene: Scene, frames: Frames, view: View, device: str) -> structs_kernel.View:
     """A view, but for what it shows.
 
     Raises:
         InputError: A camera is not in the model, or of another kind.
     """
-    made, model = structs.View(), scene.model
+    made, model = structs_kernel.View(), scene.model
     cameras = [make_camera(scene, frames, name, view.width / view.height) for name in view.cameras]
     rays = np.stack([make_rays(camera, view.height, view.width) for camera in cameras])
     rays = rays.reshape(len(cameras), -1, 3)
-    made.cameras = wp.array(cameras, dtype=structs.Camera, device=device)
+    made.cameras = wp.array(cameras, dtype=structs_kernel.Camera, device=device)
     made.rays = wp.array(rays, dtype=wp.vec3, device=device)
     made.cosines = wp.array(-rays[..., 2], dtype=float, device=device)
     made.count, made.width, made.height = len(cameras), view.width, view.height
@@ -123,7 +127,7 @@ def make_view(scene: Scene, frames: Frames, view: View, device: str) -> structs.
     return made
 
 
-def make_camera(scene: Scene, frames: Frames, name: str, aspect: float) -> structs.Camera:
+def make_camera(scene: Scene, frames: Frames, name: str, aspect: float) -> structs_kernel.Camera:
     """A camera.
 
     Args:
@@ -144,7 +148,7 @@ def make_camera(scene: Scene, frames: Frames, name: str, aspect: float) -> struc
             f"camera {name!r} is not a fixed one with an angle of view, which is all that "
             "Raytracer knows; give renderer=mujoco_warp"
         )
-    made = structs.Camera()
+    made = structs_kernel.Camera()
     made.frame, position, attitude = frames.place(camera.bodyid[0], camera.pos, camera.quat)
     made.position, made.attitude = wp.vec3(position), wp.vec4(attitude)
     half_angle = np.float32(0.5) * np.float32(camera.fovy[0]) * np.float32(np.pi / 180.0)
@@ -153,7 +157,7 @@ def make_camera(scene: Scene, frames: Frames, name: str, aspect: float) -> struc
     return made
 
 
-def make_rays(camera: structs.Camera, height: int, width: int) -> NDArray:
+def make_rays(camera: structs_kernel.Camera, height: int, width: int) -> NDArray:
     """Directions through the middles of all pixels in the camera's frame.
 
     Returns:
@@ -165,7 +169,7 @@ def make_rays(camera: structs.Camera, height: int, width: int) -> NDArray:
     return (rays / np.linalg.norm(rays, axis=-1, keepdims=True)).astype(np.float32)
 
 
-def make_geoms(scene: Scene, frames: Frames, show_drone: bool, device: str) -> structs.Geoms:
+def make_geoms(scene: Scene, frames: Frames, show_drone: bool, device: str) -> structs_kernel.Geoms:
     """What is drawn.
 
     Args:
@@ -188,7 +192,127 @@ def make_geoms(scene: Scene, frames: Frames, show_drone: bool, device: str) -> s
         "size": (model.geom_size[seen], wp.vec3),
         "reach": ([REACH[model.geom_type[i]](model.geom_size[i]) for i in seen], wp.vec3),
     }
-    geoms = structs.Geoms()
+    geoms = structs_kernel.Geoms()
     for name, (value, dtype) in values.items():
         setattr(geoms, name, wp.array(value, dtype=dtype, device=device))
     return geoms
+
+
+class Cameras:
+    """Those of a view, as they are in the model and as they are mounted otherwise."""
+
+    def __init__(self, view: View, made: structs_kernel.View, device: torch.device) -> None:
+        """Takes the model's.
+
+        Args:
+            view: What is asked for.
+            made: The same for the kernels.
+            device: Of the kernels.
+        """
+        self._view, self._made, self._device = view, made, device
+        self._cameras = made.cameras.numpy()
+        self._rays, self._cosines = wp.to_torch(made.rays), wp.to_torch(made.cosines)
+        self._last: tuple[Mounting | None, int, structs_kernel.View] = (None, 0, made)
+
+    def of(self, mounting: Mounting | None, num_worlds: int) -> structs_kernel.View:
+        """The view for the kernels.
+
+        Args:
+            mounting: As in the model by default; one that was given before is not read again.
+            num_worlds: As many as it has.
+        """
+        if mounting is None or mounting.camera not in self._view.cameras:
+            return self._made
+        if self._last[0] is not mounting or self._last[1] != num_worlds:
+            self._last = (mounting, num_worlds, self._mounted(mounting, num_worlds))
+        return self._last[2]
+
+    def _mounted(self, mounting: Mounting, num_worlds: int) -> structs_kernel.View:
+        which = self._view.cameras.index(mounting.camera)
+        cameras = np.tile(self._cameras, (num_worlds, 1))
+        one = cameras[:, which]
+        one["position"] += _array(mounting.offset)
+        attitude = torch.tensor(one["attitude"]).double()
+        turn = torch.as_tensor(mounting.turn, dtype=torch.float64).cpu()
+        one["attitude"] = product(turn, attitude).numpy()
+        made = structs_kernel.View()
+        for name in ("count", "width", "height", "far", "what"):
+            setattr(made, name, getattr(self._made, name))
+        rays, cosines = (
+            self._of_each(values, num_worlds) for values in (self._rays, self._cosines)
+        )
+        if mounting.zoom is not None:
+            for name in ("half_width", "half_height"):
+                one[name] /= _array(mounting.zoom)
+            rays = rays.clone()
+            rays[which :: len(self._view.cameras)] = self._rays_of(which, mounting.zoom)
+            cosines = -rays[..., 2].contiguous()
+        where = str(self._device)
+        made.cameras = wp.array(cameras.reshape(-1), dtype=structs_kernel.Camera, device=where)
+        made.rays = wp.from_torch(rays, dtype=wp.vec3)
+        made.cosines = wp.from_torch(cosines)
+        return made
+
+    def _of_each(self, values: Tensor, num_worlds: int) -> Tensor:
+        """The same for every world, without a copy where there is one camera."""
+        if len(values) == 1:
+            return values.expand(num_worlds, *values.shape[1:])
+        return values.repeat(num_worlds, *[1] * (values.dim() - 1))
+
+    def _rays_of(self, which: int, zoom: float | Tensor) -> Tensor:
+        """Directions through the same pixels. Shape: (num_worlds or 1, pixels, 3)."""
+        rays = self._rays[which]
+        flat = rays / -rays[:, 2:]
+        much = torch.as_tensor(zoom, dtype=torch.float32).to(self._device).reshape(-1, 1)
+        wide = torch.stack([flat[:, 0] / much, flat[:, 1] / much], -1)
+        wide = torch.nn.functional.pad(wide, (0, 1), value=-1.0)
+        return wide / wide.norm(dim=-1, keepdim=True)
+
+
+def _array(value: object) -> np.ndarray:
+    return torch.as_tensor(value).cpu().numpy()
+
+
+class Places:
+    """Frames of as many worlds as were drawn at a time: the world's, the drones', the props'."""
+
+    def __init__(self, device: torch.device) -> None:
+        """Makes room when poses come.
+
+        Args:
+            device: Of the kernels.
+        """
+        self._device = device
+        self._places: Tensor = torch.empty(0, 0, 3)
+        self._attitudes: Tensor = torch.empty(0, 4)
+        self._scales: Tensor = torch.empty(0, 0)
+        self._scaled: Any = None
+        self._made = structs_kernel.Poses()
+
+    def of(self, poses: Poses, beside: Beside | None = None) -> structs_kernel.Poses:
+        """The same for the kernels; what it returned before is overwritten.
+
+        Args:
+            poses: Of any number of worlds.
+            beside: The last of the props, whose sizes are not those of the model.
+        """
+        count, frames = len(poses), 2 + poses.props.shape[1]
+        if len(self._places) < count or self._places.shape[1] != frames:
+            self._make(count, frames)
+        self._places[:count, 1] = poses.position
+        self._places[:count, 2:] = poses.props
+        self._attitudes[:count] = poses.attitude
+        if beside is not None:
+            sizes = beside.sizes
+            self._scales[:count, frames - sizes.shape[-1] :] = sizes
+            self._made.scales = self._scaled
+        return self._made
+
+    def _make(self, count: int, frames: int) -> None:
+        self._places = torch.zeros(count, frames, 3, device=self._device)
+        self._attitudes = torch.zeros(count, 4, device=self._device)
+        self._scales = torch.ones(count, frames, device=self._device)
+        self._scaled = wp.from_torch(self._scales)
+        self._made = structs_kernel.Poses()
+        self._made.places = wp.from_torch(self._places, dtype=wp.vec3)
+        self._made.attitudes = wp.from_torch(self._attitudes, dtype=wp.vec4)

@@ -6,10 +6,10 @@ import pytest
 import torch
 
 from drone_rl.sim.rendering import Appearance, Poses, Raytracer, Scene, View
-from drone_rl.sim.rendering.raytrace.painters import GpuPainter
-from drone_rl.sim.rendering.semantics import Meaning
+from drone_rl.sim.rendering.mujoco_warp import WarpRenderer
+from drone_rl.sim.rendering.raytrace.renderer import GpuPainter
+from drone_rl.sim.rendering.scene import Meaning
 from drone_rl.sim.rendering.view import MODALITIES
-from drone_rl.sim.rendering.warp import WarpRenderer
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import world_random_state

@@ -14,7 +14,7 @@ from drone_rl.sim.rendering.raytrace.scene import (
     make_rays,
     make_view,
 )
-from drone_rl.sim.rendering.semantics import Meaning
+from drone_rl.sim.rendering.scene import Meaning
 
 XML = """<mujoco><statistic extent="2"/><visual><map zfar="10"/></visual><worldbody>
 <geom name="still" type="box" size="1 2 3" pos="1 2 3"/>

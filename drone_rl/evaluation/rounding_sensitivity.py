@@ -1,0 +1,365 @@
+"""Check whether a policy's episodes depend on rounding, and whether implementations agree."""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any, cast
+
+import torch
+from tensordict import TensorDictBase
+from tensordict.nn import TensorDictModuleBase
+from torch import Tensor
+from torchrl.envs import EnvBase
+
+from drone_rl.envs import worlds_of
+from drone_rl.envs.direct_renderer import DirectRenderer, Reasons
+from drone_rl.evaluation.metrics import Episodes
+from drone_rl.evaluation.outcomes import (
+    MOST_FRAGILE_EPISODES,
+    MOST_UNEXPLAINED,
+    Outcomes,
+    Rounding,
+    enumerate_outcomes,
+)
+from drone_rl.evaluation.rollouts import (
+    StepLog,
+    base_env,
+    env_state,
+    episode_batches,
+    final_episodes,
+    first_difference,
+    only_index,
+    outcome_difference,
+    run_episodes,
+)
+from drone_rl.policies import PictureNetwork, make_actor
+from drone_rl.policies.base_policy import Pilot
+from drone_rl.policies.external_policy import ForeignPolicy
+from drone_rl.policies.finite import require_finite
+from drone_rl.policies.regrouped import REMEDY, Regrouped, require_same_in_any_batch
+from drone_rl.policies.rounding import Decide, RoundingBound, arithmetic_on, decider
+from drone_rl.sim.actions import DiscreteActions
+from drone_rl.sim.dynamics import ComputerVision
+from drone_rl.utils.errors import InputError
+
+_CHECKED_EPISODES = 32
+"""Episodes that check whether a third-party policy acts by the current frame only."""
+COMPARED = 50
+"""Episodes that are run again: by the other implementation, or in other batches."""
+ALONE = 16
+"""Episodes that a third-party network runs again one frame at a time and in other batches."""
+_PAIR = 2
+"""Possible actions of a frame of which each is tried."""
+
+
+def run_compared(
+    env: EnvBase, actor: TensorDictModuleBase, num_episodes: int
+) -> tuple[Episodes, Rounding | None]:
+    """Run greedy episodes in PyTorch, and the first ones again by another implementation.
+
+    Args:
+        env: A batch of environments.
+        actor: The policy.
+        num_episodes: How many.
+
+    Returns:
+        The episodes, and what `compare_implementations` returns.
+
+    Raises:
+        InputError: See `check_rounding`.
+    """
+    state, log = env_state(env), StepLog()
+    episodes = run_episodes(env, actor, num_episodes, log=log)
+    base_env(env).load_state_dict(state)
+    return episodes, compare_implementations(env, actor, flown=episodes, log=log)
+
+
+def require_function(
+    policy: Pilot, *, seed: int, device: str = "cpu", renderer: str = "raytrace"
+) -> None:
+    """Check that a third-party policy acts by the current frame only.
+
+    Args:
+        policy: Any; policies of this package act so by construction.
+        seed: Root of the environments' random streams.
+        device: Where to run.
+        renderer: Name of the renderer.
+
+    Raises:
+        InputError: Its actions depend on the batch, on a frame's row, or on earlier calls.
+    """
+    if isinstance(policy, ForeignPolicy):
+        how = {"seed": seed, "device": device, "renderer": renderer}
+        with policy.flying(_CHECKED_EPISODES, **how) as (env, actor):
+            run_compared(env, actor, _CHECKED_EPISODES)
+
+
+def check_rounding(
+    env: EnvBase,
+    actor: TensorDictModuleBase,
+    episodes: int,
+    *,
+    flown: Episodes,
+    log: StepLog,
+) -> Rounding | None:
+    """Run the first episodes again in PyTorch, with a bound on the rounding error at every frame.
+
+    Args:
+        env: In the state from which `flown` started.
+        actor: The policy.
+        episodes: How many; all of `flown` at most.
+        flown: Greedy episodes to compare with.
+        log: Their actions.
+
+    Returns:
+        None for an actor without a network.
+
+    Raises:
+        InputError: An output is not finite, or a third-party network is no function of the frame.
+    """
+    network = getattr(actor, "network", None)
+    if not isinstance(network, PictureNetwork):
+        return None
+    decide, is_bound = decider(network)
+    arithmetic, is_exact = arithmetic_on(worlds_of(env).device)
+    episodes, before = min(episodes, len(flown)), env_state(env)
+    checked, again = _run_checked(env, decide, network, episodes)
+    # implementations of flight dynamics round differently, so frames are not the same
+    is_counted = isinstance(network.actions, DiscreteActions) and isinstance(
+        worlds_of(env).dynamics, ComputerVision
+    )
+    compared, count, ends = "PyTorch", episodes, checked.episodes
+    if log.implementation == "PyTorch":
+        base_env(env).load_state_dict(before)
+        compared, count = "PyTorch, in other batches", min(COMPARED, episodes)
+        again, ends = _run_regrouped(env, network, count)
+    first = _first_differences(flown, ends, log.actions, again, count, is_counted=is_counted)
+    differing = {i: step for i, step in enumerate(first) if step is not None}
+    unexplained = [i for i, step in differing.items() if not checked.explains(i, step)]
+    if not RoundingBound.find(network):
+        base_env(env).load_state_dict(before)
+        _require_function_of_frames(env, network, log, checked)
+    return Rounding(
+        arithmetic=f"{arithmetic}, {log.implementation}",
+        is_bound=is_bound and is_counted and is_exact,
+        frames=sum(map(len, checked.fragile)),
+        fragile=int(sum(f.sum() for f in checked.fragile)),
+        is_fragile=torch.tensor([bool(f.any()) for f in checked.fragile]),
+        outcomes=checked.outcomes(),
+        compared=compared,
+        compared_episodes=count,
+        differing=len(differing),
+        unexplained=len(unexplained),
+    )
+
+
+def compare_implementations(
+    env: EnvBase, actor: TensorDictModuleBase, *, flown: Episodes, log: StepLog
+) -> Rounding | None:
+    """Run the first episodes again by another implementation: the fused kernel if there is one.
+
+    Args:
+        env: In the state from which `flown` started.
+        actor: The policy.
+        flown: Greedy episodes, run in PyTorch.
+        log: Their actions.
+
+    Returns:
+        None for an actor without a network.
+
+    Raises:
+        InputError: See `check_rounding`.
+    """
+    state, count = env_state(env), min(COMPARED, len(flown))
+    found = check_rounding(env, actor, count, flown=flown, log=log)
+    if found is None:
+        return None
+    base_env(env).load_state_dict(state)
+    again = StepLog()
+    batches = episode_batches(env, actor, count, is_compiled=True, log=again)
+    finals = [final_episodes(env, batch) for batch in batches]
+    if again.implementation == log.implementation:
+        return found
+    first = _first_differences(
+        flown,
+        Episodes.joined(finals),
+        log.actions,
+        again.actions,
+        count,
+        is_counted=isinstance(worlds_of(env).dynamics, ComputerVision),
+    )
+    differing = [i for i, at in enumerate(first) if at is not None]
+    return dataclasses.replace(
+        found,
+        compared=again.implementation,
+        differing=len(differing),
+        unexplained=sum(not found.is_fragile[i] for i in differing),
+    )
+
+
+def _first_differences(
+    flown: Episodes,
+    ends: Episodes,
+    actions: Sequence[Tensor],
+    again: Sequence[Tensor],
+    count: int,
+    *,
+    is_counted: bool,
+) -> list[int | None]:
+    """By episode the first step at which actions differ, or the last one where outcomes do."""
+    if is_counted:
+        pairs = zip(actions[:count], again[:count], strict=True)
+        return [first_difference(one, other) for one, other in pairs]
+    return [outcome_difference(flown, ends, i) for i in range(count)]
+
+
+class _CheckingActor(TensorDictModuleBase):
+    """Act greedily, and write whether rounding could change the action."""
+
+    def __init__(
+        self, decide: Decide, network: PictureNetwork, *, is_contrary: bool = False
+    ) -> None:
+        """Take a network; `is_contrary` takes its second best action where that is possible."""
+        super().__init__()
+        self.in_keys, self.out_keys = ["pixels"], ["action", "fragile"]
+        self._decide, self._network, self._is_contrary = decide, network, is_contrary
+
+    def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
+        """Write "action" and "fragile"."""
+        found = self._decide(cast(Tensor, tensordict.get("pixels")))
+        require_finite(found.outputs, self._network.owner)
+        tensordict.set("fragile", found.is_fragile)
+        action = self._network.actions.greedy(found.outputs)
+        if self._is_contrary:
+            second = found.outputs.topk(2).indices[:, 1]
+            action = torch.where(found.possible.sum(-1) == _PAIR, second, action)
+        return tensordict.set("action", action)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Checked:
+    """Episodes whose every frame was checked for rounding."""
+
+    episodes: Episodes
+    fragile: list[Tensor]
+    """By episode, which frames are fragile. Shapes: (T,), bool."""
+    followed: list[tuple[int, Outcomes, Tensor]]
+    """By batch: its first episode, the outcomes of its fragile ones, and which these are."""
+    are_followed: bool
+    """Whether the outcomes can be enumerated at all."""
+
+    def explains(self, episode: int, step: int) -> bool:
+        """Whether a frame was fragile up to that step."""
+        return bool(self.fragile[episode][: step + 1].any())
+
+    def outcomes(self) -> Outcomes:
+        """Possible outcomes of all episodes."""
+        is_fragile = torch.tensor([bool(f.any()) for f in self.fragile])
+        nobody = torch.empty(0, dtype=torch.int64)
+        if not self.are_followed:
+            return Outcomes(None, nobody, is_fragile)
+        is_open = torch.zeros_like(is_fragile)
+        ends, owners = [], []
+        for first, found, worlds in self.followed:
+            is_open[first + worlds] = found.is_open
+            if found.episodes is not None:
+                ends.append(found.episodes)
+                owners.append(first + worlds[found.owner])
+        if not ends:
+            return Outcomes(None, nobody, is_open)
+        return Outcomes(Episodes.joined(ends), torch.cat(owners), is_open)
+
+
+def _run_checked(
+    env: EnvBase, decide: Decide, network: PictureNetwork, episodes: int
+) -> tuple[_Checked, list[Tensor]]:
+    """Run episodes and check each frame. Returns also the actions of each episode."""
+    renderer = DirectRenderer.try_create(env, ("pixels",), ())
+    is_counted = isinstance(network.actions, DiscreteActions)
+    fragile, followed, log, finals, first = [], [], StepLog(), [], 0
+    before, actor = env_state(env), _CheckingActor(decide, network)
+    for batch in episode_batches(env, actor, episodes, ("fragile",), log=log):
+        lengths = [len(a) for a in log.actions[first:]]
+        fragile += cast(Tensor, batch["fragile"]).cpu().split(lengths)
+        finals.append(final_episodes(env, batch))
+        worlds = torch.tensor([bool(f.any()) for f in fragile[first:]]).nonzero()[:, 0]
+        is_few = len(worlds) <= MOST_FRAGILE_EPISODES * len(lengths)
+        if is_counted and len(worlds):
+            if not is_few:
+                found = Outcomes(None, worlds[:0], torch.ones_like(worlds, dtype=torch.bool))
+            elif not isinstance(renderer, Reasons):
+                found = enumerate_outcomes(renderer, decide, worlds.to(env.device))
+            else:
+                contrary = _CheckingActor(decide, network, is_contrary=True)
+                found = _run_second_best(env, contrary, before, fragile[first:], worlds)
+            followed.append((first, found, worlds))
+        first += len(lengths)
+        before = env_state(env)
+    return _Checked(Episodes.joined(finals), fragile, followed, is_counted), log.actions
+
+
+def _run_second_best(
+    env: EnvBase,
+    actor: TensorDictModuleBase,
+    before: dict[str, Any],
+    fragile: Sequence[Tensor],
+    worlds: Tensor,
+) -> Outcomes:
+    """Run a batch again with the second best action in fragile frames.
+
+    For policies whose observations cannot be rendered from a state alone. The two rollouts are all
+    that an episode can become if each has a single fragile frame, the same one.
+
+    Args:
+        env: Its random streams are restored.
+        actor: Takes the second best action where two are possible.
+        before: Random streams at the start of the batch.
+        fragile: Fragile frames of each episode of the batch.
+        worlds: Episodes that have any. Shape: (k,).
+    """
+    after, log = env_state(env), StepLog()
+    base_env(env).load_state_dict(before)
+    (batch,) = episode_batches(env, actor, len(fragile), ("fragile",), log=log)
+    base_env(env).load_state_dict(after)
+    again = cast(Tensor, batch["fragile"]).cpu().split([len(a) for a in log.actions])
+    pairs = [(only_index(fragile[i]), only_index(again[i])) for i in worlds.tolist()]
+    is_open = torch.tensor([one is None or one != other for one, other in pairs])
+    return Outcomes(final_episodes(env, batch)[worlds], torch.arange(len(worlds)), is_open)
+
+
+def _run_regrouped(
+    env: EnvBase, network: PictureNetwork, episodes: int
+) -> tuple[list[Tensor], Episodes]:
+    """Run with the network evaluated in other batches. Returns actions and episodes."""
+    log, actor = StepLog(), make_actor(Regrouped(network, "mixed"), env.action_spec)
+    batches = episode_batches(env, actor, episodes, log=log)
+    finals = [final_episodes(env, batch) for batch in batches]
+    return log.actions, Episodes.joined(finals)
+
+
+def _require_function_of_frames(
+    env: EnvBase, network: PictureNetwork, log: StepLog, checked: _Checked
+) -> None:
+    """Check that a third-party network acts by the frame alone.
+
+    Episodes of one batch are run again one frame at a time and in mixed batches; then frames are
+    evaluated in batches of many sizes.
+
+    Raises:
+        InputError: It does not.
+    """
+    before, frames = env_state(env), torch.empty(0)
+    count = min(ALONE, len(checked.fragile))
+    for groups, how in (("single", "one frame at a time"), ("mixed", "in other batches")):
+        base_env(env).load_state_dict(before)
+        again, actor = StepLog(), make_actor(Regrouped(network, groups), env.action_spec)
+        for batch in episode_batches(env, actor, count, ("pixels",), log=again):
+            frames = cast(Tensor, batch["pixels"])
+        pairs = zip(log.actions, again.actions, strict=False)
+        first = enumerate(first_difference(a, b) for a, b in pairs)
+        other = [i for i, at in first if at is not None and not checked.explains(i, at)]
+        if isinstance(network.actions, DiscreteActions) and len(other) > MOST_UNEXPLAINED * count:
+            raise InputError(
+                f"{network.owner} acts by more than the frame: evaluated {how} it takes other "
+                f"actions in {len(other)} of {count} episodes; {REMEDY}"
+            )
+    require_same_in_any_batch(network, frames, env.batch_size[0])

@@ -1,0 +1,350 @@
+"""Flights under other conditions out of a file: read strictly, and of the policy that is asked of.
+
+What was counted can't be told from a file, but all else is held against what this program knows:
+axes, units, strengths and their values, sums, and limits against what was flown at.
+"""
+
+import dataclasses
+import datetime
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import torch
+from numpy.typing import NDArray
+
+from drone_rl.config.commands import MODES, ShiftSettings
+from drone_rl.policies.zoo import PolicyDescription, parse
+from drone_rl.robustness.axes import AXES, GROUPS, Axis
+from drone_rl.robustness.consistency import CLOSE, check_counts, check_probe, check_range
+from drone_rl.robustness.suite import finite, unpacked
+from drone_rl.sim.tasks import as_task
+from drone_rl.sim.vocabulary import terms_of
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.files import parse_json, read_bytes
+from drone_rl.utils.intervals import proportion
+from drone_rl.utils.limits import SHIFTS_BYTES
+from drone_rl.utils.schema import (
+    Flag,
+    Kind,
+    Maybe,
+    OneOf,
+    Plain,
+    Real,
+    Record,
+    Several,
+    Text,
+    Whole,
+    as_mapping,
+)
+from drone_rl.utils.text import SEED_KEYS
+from drone_rl.verification.checker import fingerprint
+
+FORMAT = "drone_rl shifts"
+FORMAT_VERSION = 2
+_MOST_PICTURE = 2**22
+"""Characters of one picture."""
+
+
+@dataclasses.dataclass(frozen=True)
+class SavedShifts:
+    """Flights under other conditions that were found, or why they are not quoted."""
+
+    path: Path
+    """Their file."""
+    numbers: dict[str, Any] | None
+    """As in `shifts.json`, without pictures but with the "file" that they were read from, its
+    "path" and when it was written ("dated"); None if they are refused."""
+    pictures: Mapping[str, list[NDArray | None]] = dataclasses.field(default_factory=dict)
+    """See `Shifts.pictures`."""
+    refused: str | None = None
+    """Why, in one line."""
+
+    @property
+    def evidence(self) -> dict[str, Any]:
+        """What sentences are made of."""
+        return {"refused": self.refused} if self.numbers is None else self.numbers
+
+    @property
+    def has_ranges(self) -> bool:
+        """Whether an operating domain was looked for."""
+        return self.numbers is not None and self.numbers["domain"] is not None
+
+
+def read_shifts(
+    path: Path, described: PolicyDescription, weights: Mapping[str, torch.Tensor]
+) -> SavedShifts:
+    """Flights under other conditions out of a file.
+
+    Args:
+        path: Of the JSON file.
+        described: The policy's, in the task that counts.
+        weights: Of its network.
+
+    Raises:
+        InputError: It is missing, damaged, of another network, camera or task, or contradicts
+            itself.
+    """
+    content = read_bytes(path, SHIFTS_BYTES)
+    try:
+        data = _upgraded(dict(as_mapping(parse_json(content, "it"), "it")))
+        pictures = as_mapping(data.pop("pictures", None), "pictures")
+        _WHOLE.read(data, "shifts")
+        numbers = data
+        _refuse_another(numbers, described, weights)
+        terms_of(numbers)
+        for name, along in numbers["axes"].items():
+            _check_axis(_own(AXES[name], described), along, described, f"axes.{name}")
+        check_counts(numbers, as_task(described.task))
+        _check_domain(numbers, described)
+        shape = (described.camera.height, described.camera.width, 3)
+        shown = {name: _read_strip(pictures.get(name), shape, name) for name in numbers["axes"]}
+    except InputError as error:
+        raise InputError(f"shifts {path} can't be used: {error}") from None
+    when = datetime.datetime.fromtimestamp(path.stat().st_mtime).strftime("%Y-%m-%d %H:%M")
+    return SavedShifts(path, {**numbers, "file": {"path": str(path), "dated": when}}, shown)
+
+
+class _Named:
+    """The kind of value that gives values of a kind by some names."""
+
+    def __init__(self, names: Any, kind: Kind) -> None:
+        self._names, self._kind = OneOf(tuple(names)), kind
+
+    def read(self, value: Any, where: str) -> dict[str, Any]:
+        """See `drone_rl.utils.schema.Kind`."""
+        given = as_mapping(value, where)
+        return {
+            self._names.read(key, f"a name in {where}"): self._kind.read(item, f"{where}.{key}")
+            for key, item in given.items()
+        }
+
+
+class _Each:
+    """The kind of value that gives values of a kind by any short names."""
+
+    def __init__(self, kind: Kind) -> None:
+        self._kind = kind
+
+    def read(self, value: Any, where: str) -> dict[str, Any]:
+        """See `drone_rl.utils.schema.Kind`."""
+        given = Plain(most=1000).read(as_mapping(value, where), where)
+        return {str(key): self._kind.read(item, f"{where}.{key}") for key, item in given.items()}
+
+
+class _Counted:
+    """The kind of value that is a share of flights, which must be what was counted."""
+
+    def read(self, value: Any, where: str) -> dict[str, Any]:
+        """See `drone_rl.utils.schema.Kind`."""
+        read = _SHARE.read(value, where)
+        if read["successes"] > read["trials"]:
+            raise InputError(f"{where}.share is not what was counted; run drone-rl shifts again")
+        right = proportion(read["successes"], read["trials"])
+        if read["share"] != right["share"]:
+            raise InputError(f"{where}.share is not what was counted; run drone-rl shifts again")
+        for end in ("lower95", "upper95"):
+            if not math.isclose(read[end], right[end], rel_tol=CLOSE, abs_tol=CLOSE):
+                raise InputError(
+                    f"{where}.{end}={read[end]} is not the interval's end of "
+                    f"{read['successes']} of {read['trials']}, {right[end]:.6g}; run drone-rl "
+                    "shifts again"
+                )
+        return read
+
+
+_ANY = Real(-1e12, 1e12)
+_COUNT, _PART = Whole(0, 10**9), Real(0.0, 1.0)
+_SHARE = Record(
+    {
+        "share": Maybe(_PART),
+        "lower95": _PART,
+        "upper95": _PART,
+        "successes": _COUNT,
+        "trials": _COUNT,
+    }
+)
+_FREE = Plain(most=1000, deepest=3)
+_SIGNED = Real(-1.0, 1.0)
+_MEAN = Record({"mean": Maybe(_PART), "lower95": _PART, "upper95": _PART, "count": _COUNT})
+_FIGURES = {
+    "success": _Counted(),
+    "difference": Record(
+        {"mean": _SIGNED, "lower95": _SIGNED, "upper95": _SIGNED, "count": _COUNT}
+    ),
+    "paired": Record({"lost": _COUNT, "gained": _COUNT, "p": _PART}),
+    "shares": _Each(_MEAN),
+    "ends": _Each(_COUNT),
+    "unchanged": Flag(),
+}
+_FLOWN = {
+    "refused": Maybe(Text()),
+    "oracle": Maybe(_Counted()),
+    "impossible": Maybe(Flag()),
+    "modes": _Named(MODES, Record(_FIGURES)),
+}
+_LEVEL = Record({"number": Whole(1, 5), "value": _ANY, "position": _ANY, **_FLOWN})
+_AXIS = Record(
+    {
+        "group": OneOf(GROUPS),
+        "unit": Text(),
+        "neutral": Maybe(_ANY),
+        "areas": _Named(MODES, Maybe(_PART)),
+        "levels": Several(_LEVEL, 1, 5),
+    }
+)
+_WORST = Record({"side": Text(200), "share": _PART})
+_PROBE: dict[str, Kind] = {
+    "good": Flag(),
+    "bad": Flag(),
+    "refused": Maybe(Text()),
+    "success": _PART,
+    "worst": Maybe(_WORST),
+}
+_UNLESS_REFUSED = frozenset({"success", "worst"})
+_FAILED = Record(
+    {
+        "end": OneOf(("low", "high")),
+        "value": Maybe(_ANY),
+        "oracle": Maybe(_Counted()),
+        "impossible": Flag(),
+        **_PROBE,
+    },
+    optional=_UNLESS_REFUSED,
+)
+_RANGE = Record(
+    {
+        "low": Maybe(_ANY),
+        "high": Maybe(_ANY),
+        "positions": Maybe(Several(_ANY, 2, 2)),
+        "low_open": Maybe(Flag()),
+        "high_open": Maybe(Flag()),
+        "failed": Several(_FAILED, 0, 2),
+        "flown": Several(Record({"position": _ANY, "value": Maybe(_ANY), "good": Flag()}), 0, 100),
+    }
+)
+_PARTS = ("appearance", "dynamics", "actions", "camera", "transforms", "network")
+_ORIGIN = {"versions": _FREE, "git_revision": _FREE, "machine": _FREE}
+_WHOLE = Record(
+    {
+        "format": OneOf((FORMAT,)),
+        "format_version": Whole(FORMAT_VERSION, FORMAT_VERSION),
+        "policy": Text(),
+        "network": Record({"weights": Text(64), "description": Plain(most=1000)}),
+        "settings": Plain(most=1000),
+        "seed": Whole(0),
+        "seed_is_fixed": Flag(),
+        "terms": Plain(),
+        "plain": Record({"oracle": Maybe(_Counted()), **_FIGURES}),
+        "axes": _Named(AXES, _AXIS),
+        "together": Record(_FLOWN),
+        "domain": Maybe(
+            Record(
+                {
+                    "plain": Record(_PROBE, optional=_UNLESS_REFUSED),
+                    "ranges": _Named(AXES, _RANGE),
+                }
+            )
+        ),
+        "seconds": Real(0.0),
+        **_ORIGIN,
+    },
+    optional=frozenset((*_ORIGIN, *SEED_KEYS)),
+)
+
+
+def _refuse_another(
+    numbers: Mapping[str, Any], described: PolicyDescription, weights: Mapping[str, torch.Tensor]
+) -> None:
+    """Makes sure that it is of this network, camera and task, flown by settings that there are."""
+    stated = numbers["network"]["weights"]
+    if stated != (own := fingerprint(weights)):
+        raise InputError(
+            f"it is of a network with the hash {stated[:12]}..., the policy's has {own[:12]}..."
+        )
+    of, mine = parse(numbers["network"]["description"]).as_dict(), described.as_dict()
+    for part in ("task", *_PARTS):
+        if of.get(part) != mine.get(part):
+            raise InputError(f"it is of another {part} than the policy's")
+    stated = ShiftSettings.read(numbers["settings"], "settings")
+    if stated.seed is None or stated.seed != numbers.get("seed", stated.seed):
+        shown = numbers.get("seed")
+        raise InputError(
+            f"seed={shown} is not settings.seed={stated.seed}; run drone-rl shifts again"
+        )
+    if ("seed" in numbers) != ("seed_is_fixed" in numbers):
+        raise InputError("it has one of seed and seed_is_fixed; run drone-rl shifts again")
+
+
+def _own(axis: Axis, described: PolicyDescription) -> Axis:
+    """With the policy's own neutral strength."""
+    of: Any = described
+    return axis if axis.own is None else dataclasses.replace(axis, neutral=axis.own(of))
+
+
+def _check_axis(axis: Axis, along: Mapping[str, Any], of: Any, where: str) -> None:
+    """An axis's group, unit and strengths are those of this program."""
+    levels = along["levels"]
+    known = (axis.group, axis.unit, finite(axis.value(axis.neutral, of)))
+    is_own = (along["group"], along["unit"], along["neutral"]) == known
+    strengths = [axis.strengths[level["number"] - 1] for level in levels]
+    flown = [(level["value"], level["position"]) for level in levels]
+    if not is_own or flown != [(axis.value(s, of), axis.position(s)) for s in strengths]:
+        raise InputError(f"{where} has other strengths or units than drone-rl shifts flies")
+    if any(not level["refused"] and MODES[0] not in level["modes"] for level in levels):
+        raise InputError(f"{where} tells nothing of constant conditions")
+
+
+def _check_domain(numbers: Mapping[str, Any], of: Any) -> None:
+    """Limits are those of what was flown at, and nobody is good on an axis who is not without."""
+    domain, episodes = numbers["domain"], numbers["settings"]["domain_episodes"]
+    if domain is None:
+        return
+    check_probe(domain["plain"], episodes, "domain.plain")
+    for name, found in domain["ranges"].items():
+        if name not in numbers["axes"]:
+            raise InputError(f"domain.ranges.{name} contradicts what was flown at")
+        check_range(_own(AXES[name], of), found, of, numbers)
+        for failure in found["failed"]:
+            check_probe(failure, episodes, f"domain.ranges.{name}.failed")
+
+
+def _upgraded(data: dict[str, Any]) -> dict[str, Any]:
+    """The same in the present format.
+
+    Until version 1 "low" was the end of lower positions, also of an axis where less is stronger.
+    """
+    if data.get("format_version") != 1:
+        return data
+    ranges = as_mapping(as_mapping(data.get("domain") or {}, "domain").get("ranges", {}), "ranges")
+    swapped = {
+        name: _swapped(as_mapping(found, name))
+        for name, found in ranges.items()
+        if name in AXES and not AXES[name].scale.rises
+    }
+    if not swapped:
+        return {**data, "format_version": FORMAT_VERSION}
+    domain = {**data["domain"], "ranges": {**ranges, **swapped}}
+    return {**data, "format_version": FORMAT_VERSION, "domain": domain}
+
+
+def _swapped(found: Mapping[str, Any]) -> dict[str, Any]:
+    other = {"low": "high", "high": "low", "low_open": "high_open", "high_open": "low_open"}
+    ends = {key: found[name] for key, name in other.items() if name in found}
+    failed = found.get("failed")
+    if type(failed) is list:
+        failed = [
+            {**one, "end": other.get(str(one.get("end")), one.get("end"))}
+            if type(one) is dict
+            else one
+            for one in failed
+        ]
+    return {**found, **ends, "failed": failed}
+
+
+def _read_strip(value: Any, shape: tuple[int, int, int], name: str) -> list[NDArray | None]:
+    texts = Several(Maybe(Text(_MOST_PICTURE)), 6, 6).read(value, f"pictures.{name}")
+    if texts[0] is None:
+        raise InputError(f"pictures.{name} does not show the world as it is")
+    return [None if t is None else unpacked(t, shape, f"pictures.{name}") for t in texts]

@@ -1,1 +1,0 @@
-"""What stands in a world, as dm_control entities, each with its meaning."""

@@ -1,0 +1,334 @@
+"""What is done alike to pixels that follow each other, in C++: many of them at a time.
+
+Warp lets an array have gaps and reads a pixel's place anew each time, so that its own loops take
+pixels one by one. These arrays have none.
+"""
+
+import warp as wp
+
+_FILL = "for (int i = first; i < last; ++i) values.data[i] = value;"
+
+
+@wp.func_native(_FILL)
+def fill_floats(values: wp.array[float], first: int, last: int, value: float) -> None:
+    """Writes one number into pixels from the first to the one before the last."""
+    ...
+
+
+@wp.func_native(_FILL)
+def fill_ints(values: wp.array[int], first: int, last: int, value: int) -> None:
+    """The same of whole numbers."""
+    ...
+
+
+@wp.func_native(_FILL)
+def fill_bytes(values: wp.array[wp.vec3ub], first: int, last: int, value: wp.vec3ub) -> None:
+    """The same of colours."""
+    ...
+
+
+@wp.func_native("""
+const float x = value[0], y = value[1], z = value[2];
+float *const at = (float *)values.data;
+for (int i = first; i < last; ++i) {
+    at[3 * i] = x;
+    at[3 * i + 1] = y;
+    at[3 * i + 2] = z;
+}""")
+def fill_vectors(values: wp.array[wp.vec3], first: int, last: int, value: wp.vec3) -> None:
+    """The same of vectors."""
+    ...
+
+
+@wp.func_native("for (int i = first; i < last; ++i) values.data[i] = given.data[i];")
+def copy(values: wp.array[float], first: int, last: int, given: wp.array[float]) -> None:
+    """Writes the numbers of others."""
+    ...
+
+
+@wp.func_native("for (int i = first; i < last; ++i) values.data[i] = given.data[i] * by.data[i];")
+def multiply(
+    values: wp.array[float], first: int, last: int, given: wp.array[float], by: wp.array[float]
+) -> None:
+    """Writes the products of others."""
+    ...
+
+
+@wp.func_native("""
+for (int i = first; i < last; ++i) {
+    const wp::vec_t<3, float> ray = rays.data[i];
+    const float along = height / (down[0] * ray[0] + down[1] * ray[1] + down[2] * ray[2]);
+    const float so_far = nearest.data[i];
+    const bool is_nearer = along - so_far <= same * (so_far > 1.0f ? so_far : 1.0f);
+    nearest.data[i] = is_nearer ? along : so_far;
+    owner.data[i] = is_nearer ? mark : owner.data[i];
+}""")
+def meet_level(
+    nearest: wp.array[float],
+    owner: wp.array[int],
+    first: int,
+    last: int,
+    rays: wp.array[wp.vec3],
+    down: wp.vec3,
+    height: float,
+    same: float,
+    mark: int,
+) -> None:
+    """Marks the pixels in which a plane, which all of them meet, is the nearest.
+
+    Args:
+        nearest: How far away the nearest was before.
+        owner: Whose it is.
+        first: The first pixel.
+        last: The one after the last.
+        rays: Of the pixels.
+        down: What a ray is multiplied by to find how fast it comes nearer to the plane.
+        height: Of the eye over the plane.
+        same: Relative distance within which the plane is in front.
+        mark: For the owner.
+    """
+    ...
+
+
+@wp.func_native("""
+#pragma clang fp contract(off)
+for (int i = first; i < last; ++i) {
+    const wp::vec_t<3, unsigned char> color = colors.data[i];
+    const float two = (float)((double)((float)color[0] * red) + (double)color[1] * (double)green);
+    gray.data[i] = (float)((double)two + (double)((float)color[2] * blue));
+}""")
+def mix_gray(
+    gray: wp.array[float],
+    first: int,
+    last: int,
+    colors: wp.array[wp.vec3ub],
+    red: float,
+    green: float,
+    blue: float,
+) -> None:
+    """Gray of colours by weights, each sum rounded as by torch on x86."""
+    ...
+
+
+@wp.func_native("for (int i = first; i < last; ++i) values.data[i] = given.data[i];")
+def copy_colors(
+    values: wp.array[wp.vec3ub], first: int, last: int, given: wp.array[wp.vec3ub]
+) -> None:
+    """Writes the colours of others."""
+    ...
+
+
+@wp.struct
+class Cover:
+    """A texture as it lies on a face, for one camera."""
+
+    start: int
+    """The first texel; `levels` says what follows."""
+    side: int
+    """Texels each way: a power of 2."""
+    across: wp.vec3
+    """What the way along a ray is multiplied by to go across the texture, in tiles."""
+    down: wp.vec3
+    corner: wp.vec2
+    """Where the camera is, across and down."""
+    facing: wp.vec3
+    """Against the face, in the camera's frame."""
+    area: float
+    """Texels, of the finest, that a pixel at the middle of the picture covers in 1 m."""
+
+
+@wp.func_native("""
+for (int i = first; i < last; ++i) {
+    const wp::vec_t<3, float> ray = rays.data[i];
+    const float height = up[0] * ray[0] + up[1] * ray[1] + up[2] * ray[2];
+    const float share = height > 0.0f ? height : 0.0f;
+    for (int c = 0; c < 3; ++c)
+        colors.data[i][c] = (unsigned char)(int)(horizon[c] + share * (zenith[c] - horizon[c]));
+}""")
+def shade_sky(
+    colors: wp.array[wp.vec3ub],
+    first: int,
+    last: int,
+    rays: wp.array[wp.vec3],
+    up: wp.vec3,
+    horizon: wp.vec3,
+    zenith: wp.vec3,
+) -> None:
+    """Colours the sky.
+
+    Args:
+        colors: Are written.
+        first: The first pixel.
+        last: The one after the last.
+        rays: Of the pixels.
+        up: What a ray is multiplied by to find the sine of its elevation.
+        horizon: Colour of the sky there and below, from 0 to 255.
+        zenith: The same overhead.
+    """
+    ...
+
+
+_FADE = """
+    const float power = wp::max(-1.44269504f * fog * nearest.data[i], -120.0f);
+    const int whole = (int)(power - 0.5f);
+    const float part = power - (float)whole;
+    union { int bits; float number; } two;
+    two.bits = (whole + 127) << 23;
+    const float clear = two.number * (1.0f + part * (0.69314718f + part * (0.24022651f + part
+        * (0.05550411f + part * (0.00961813f + part * 0.00133336f)))));
+"""
+"""The share of a colour that fog leaves over."""
+_WRITE = """
+    for (int c = 0; c < 3; ++c) {
+        const float full = color[c] < 255.0f ? color[c] : 255.0f;
+        colors.data[i][c] = (unsigned char)(int)(clear * full + (1.0f - clear) * horizon[c]);
+    }
+"""
+
+
+@wp.func_native(f"""
+for (int i = first; i < last; ++i) {{
+    {_FADE}
+    const float in_sun = dark.data[i] ? 0.0f : 1.0f;
+    const float color[3] = {{
+        shaded[0] + in_sun * (lit[0] - shaded[0]),
+        shaded[1] + in_sun * (lit[1] - shaded[1]),
+        shaded[2] + in_sun * (lit[2] - shaded[2])}};
+    {_WRITE}
+}}""")
+def shade_even(
+    colors: wp.array[wp.vec3ub],
+    first: int,
+    last: int,
+    nearest: wp.array[float],
+    dark: wp.array[int],
+    lit: wp.vec3,
+    shaded: wp.vec3,
+    fog: float,
+    horizon: wp.vec3,
+) -> None:
+    """Colours a flat face.
+
+    Args:
+        colors: Are written.
+        first: The first pixel.
+        last: The one after the last.
+        nearest: How far along its ray it is.
+        dark: Whether it is in shadow there.
+        lit: Its colour in the sun, from 0 to 255 or more.
+        shaded: The same in shadow.
+        fog: See `Scenery.fog`.
+        horizon: Colour of the fog.
+    """
+    ...
+
+
+_AT_ONCE = """
+#ifdef __CUDA_ARCH__
+const int at_once = 1;
+#else
+const int at_once = 64;
+#endif
+"""
+"""Pixels; where texels are read one by one between sums over all of these, both are faster."""
+
+
+@wp.func_native(f"""
+{_AT_ONCE}
+const float x_on = cover.across[0], y_on = cover.across[1], z_on = cover.across[2];
+const float x_down = cover.down[0], y_down = cover.down[1], z_down = cover.down[2];
+const float x_against = cover.facing[0], y_against = cover.facing[1], z_against = cover.facing[2];
+const float corner_x = cover.corner[0], corner_y = cover.corner[1], area = cover.area;
+const int begin = cover.start, whole_side = cover.side;
+const unsigned *const stored = texels.data;
+const wp::vec_t<3, float> *const seen = rays.data;
+const float *const far = nearest.data;
+int of_a[at_once], of_b[at_once], of_c[at_once], of_d[at_once];
+int lower[at_once], right[at_once];
+unsigned a[at_once], b[at_once], c[at_once], d[at_once];
+for (int from = first; from < last; from += at_once) {{
+const int count = last - from < at_once ? last - from : at_once;
+for (int k = 0; k < count; ++k) {{
+    const float x = seen[from + k][0], y = seen[from + k][1], z = seen[from + k][2];
+    const float along = far[from + k];
+    const float facing = x_against * x + y_against * y + z_against * z;
+    union {{ int bits; float number; }} covered;
+    covered.number = -area * along * along * z * z * z / (facing > 1e-3f ? facing : 1e-3f);
+    int level = ((covered.bits >> 23) - 126) >> 1;
+    level = level < 0 ? 0 : level;
+    const int finer = whole_side >> (level < 31 ? level : 31);
+    const int side = finer > 1 ? finer : 1, mask = side - 1;
+    const int start = begin + (whole_side * whole_side - side * side) / 3 * 4;
+    const float across = (corner_x + along * (x_on * x + y_on * y + z_on * z)) * side - 0.5f;
+    const float down = (corner_y + along * (x_down * x + y_down * y + z_down * z)) * side - 0.5f;
+    const int column = (int)across - (across < (float)(int)across);
+    const int row = (int)down - (down < (float)(int)down);
+    const int share_right = (int)((across - column) * 256.0f);
+    const int share_lower = (int)((down - row) * 256.0f);
+    right[k] = share_right < 255 ? share_right : 255;
+    lower[k] = share_lower < 255 ? share_lower : 255;
+    const int above = start + (row & mask) * side, below = start + ((row + 1) & mask) * side;
+    of_a[k] = above + (column & mask);
+    of_b[k] = above + ((column + 1) & mask);
+    of_c[k] = below + (column & mask);
+    of_d[k] = below + ((column + 1) & mask);
+}}
+#pragma clang loop vectorize(disable)
+for (int k = 0; k < count; ++k) {{
+    a[k] = stored[of_a[k]];
+    b[k] = stored[of_b[k]];
+    c[k] = stored[of_c[k]];
+    d[k] = stored[of_d[k]];
+}}
+for (int k = 0; k < count; ++k) {{
+    const int i = from + k;
+    {_FADE}
+    const unsigned share_d = (right[k] * lower[k]) >> 8;
+    const unsigned share_b = right[k] - share_d, share_c = lower[k] - share_d;
+    const unsigned share_a = 256u - right[k] - share_c;
+    const unsigned red_and_blue = share_a * (a[k] & 0xff00ffu) + share_b * (b[k] & 0xff00ffu)
+        + share_c * (c[k] & 0xff00ffu) + share_d * (d[k] & 0xff00ffu);
+    const unsigned green = share_a * ((a[k] >> 8) & 255u) + share_b * ((b[k] >> 8) & 255u)
+        + share_c * ((c[k] >> 8) & 255u) + share_d * ((d[k] >> 8) & 255u);
+    const float in_sun = dark.data[i] ? 0.0f : 1.0f, unit = 1.0f / 65280.0f;
+    const float color[3] = {{
+        (shaded[0] + in_sun * (lit[0] - shaded[0])) * unit * (int)(red_and_blue & 0xffffu),
+        (shaded[1] + in_sun * (lit[1] - shaded[1])) * unit * (int)green,
+        (shaded[2] + in_sun * (lit[2] - shaded[2])) * unit * (int)(red_and_blue >> 16)}};
+    {_WRITE}
+}}
+}}""")
+def shade_covered(
+    colors: wp.array[wp.vec3ub],
+    first: int,
+    last: int,
+    rays: wp.array[wp.vec3],
+    nearest: wp.array[float],
+    dark: wp.array[int],
+    texels: wp.array[wp.uint32],
+    cover: Cover,
+    lit: wp.vec3,
+    shaded: wp.vec3,
+    fog: float,
+    horizon: wp.vec3,
+) -> None:
+    """The same of a face with a texture, which is multiplied by its colour.
+
+    Of the four texels around a place each has a share; how much a pixel covers, in the mean of its
+    two sides, chooses the level.
+
+    Args:
+        colors: See `shade_even`, as what is not told here.
+        first: The first pixel.
+        last: The one after the last.
+        rays: Of the pixels.
+        nearest: How far along its ray it is.
+        dark: Whether it is in shadow there.
+        texels: Of all textures, see `Scenery`.
+        cover: The texture on this face.
+        lit: In the sun, of what is white in the texture.
+        shaded: The same in shadow.
+        fog: See `Scenery.fog`.
+        horizon: Colour of the fog.
+    """
+    ...

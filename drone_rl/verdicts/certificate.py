@@ -1,0 +1,196 @@
+"""A certificate beside a verdict: what it states of all placements, or why it is not quoted."""
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drone_rl.config.commands import JudgeSettings
+from drone_rl.evaluation.metrics import Episodes
+from drone_rl.evaluation.outcomes import Rounding
+from drone_rl.policies.base_policy import Pilot
+from drone_rl.policies.policy import Policy
+from drone_rl.policies.zoo import certificate_path
+from drone_rl.sim.tasks.collect_cubes import EndReason
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.seeding import RootSeed, root_seed
+from drone_rl.verification.checker import Certificate, check_certificate, find, read_tried
+from drone_rl.verification.checker.sampling import ANYWHERE
+
+
+@dataclasses.dataclass(frozen=True)
+class Claim:
+    """A certificate that was found, tried as far as that goes without this verdict's flights."""
+
+    path: Path
+    """Its file."""
+    certificate: Certificate | None
+    """See `drone_rl.verification.checker.read_tried`; None if it was refused."""
+    refused: str | None = None
+    """Why, in one line."""
+    flights: int = 0
+    """Rollouts that re-checked it, all of which ended as it states; 0 if none were."""
+    uniform: int = 0
+    """Those of them from placements that were drawn uniformly."""
+    seed: int | None = None
+    """Of their placements."""
+    seed_is_fixed: bool = True
+    """Whether the seed was chosen beforehand, so that a certificate could be fitted to it."""
+
+    @property
+    def wrong_at_most(self) -> float | None:
+        """The fraction of placements about which it may be wrong, with 95% confidence.
+
+        A certificate that is wrong about more passes so many uniform rollouts with a probability
+        of at most 5%. None if none were flown.
+        """
+        return 1.0 - 0.05 ** (1.0 / self.uniform) if self.uniform else None
+
+    def beside(self, greedy: Episodes, *, rounding: Rounding | None = None) -> dict[str, Any]:
+        """What a verdict may quote of it, which is nothing if a flight ended otherwise.
+
+        Args:
+            greedy: The verdict's episodes with the most probable actions, in the same task.
+            rounding: What rounding can change in these. If it can lead to an end that is not
+                stated, nothing is quoted, for a proof holds for any order of sums.
+
+        Returns:
+            Plain values: "refused" (why, or None) and, unless it is, "every" (whether all is
+            collected from every placement), the shares of placements from which all is collected
+            ("share"), is not ("lost"), and of which nothing is stated ("undecided"), "finished",
+            "checked" (rollouts that re-checked it), "wrong_at_most" (see there), "seed" and
+            "seed_is_fixed" (of their placements) and "agreeing" (the verdict's own flights that
+            started where an end is stated, and ended so).
+        """
+        stated = self.certificate
+        if stated is None:
+            return {"refused": self.refused}
+        held = _ends_as_stated(stated, greedy)
+        if not all(held):
+            count = f"{len(held) - sum(held)} of {len(held)} greedy flights of this verdict"
+            return {"refused": f"{count} ended otherwise than it states"}
+        if rounding is not None and _can_end_otherwise(stated, greedy, rounding):
+            return {"refused": "decisions of the policy depend on rounding"}
+        won, lost = (
+            [o for o in stated.outcomes if len(o.boxes) and (o.end == EndReason.ALL_CUBES) == wins]
+            for wins in (True, False)
+        )
+        return {
+            "refused": None,
+            "every": not lost and not len(stated.undecided),
+            "share": sum(outcome.share for outcome in won),
+            "lost": sum(outcome.share for outcome in lost),
+            "undecided": stated.undecided_share,
+            "finished": stated.finished,
+            "checked": self.flights,
+            "wrong_at_most": self.wrong_at_most,
+            "seed": self.seed,
+            "seed_is_fixed": self.seed_is_fixed,
+            "agreeing": len(held),
+        }
+
+
+def _can_end_otherwise(stated: Certificate, greedy: Episodes, rounding: Rounding) -> bool:
+    """Whether rounding can lead from a place of which an end is stated to another end."""
+    ends = rounding.outcomes
+    is_stated = _outcomes_of(stated, greedy) < len(stated.outcomes)
+    unknown = bool((ends.is_open.numpy() & is_stated).any())
+    is_other = ends.episodes is not None and not all(_ends_as_stated(stated, ends.episodes))
+    return rounding.is_excessive or unknown or is_other
+
+
+def _outcomes_of(stated: Certificate, episodes: Episodes) -> NDArray[np.int64]:
+    """The number of each episode's outcome; as many as there are where nothing is stated."""
+    groups = stated.groups
+    owner = np.repeat(np.arange(len(groups)), [len(boxes) for boxes in groups])
+    return owner[find(np.concatenate(groups), _placements(episodes))]
+
+
+def _ends_as_stated(stated: Certificate, greedy: Episodes) -> list[bool]:
+    """Of each episode from a place of which an end is stated: whether it was that end."""
+    outcome = _outcomes_of(stated, greedy)
+    flown = zip(outcome, greedy.end_reason.tolist(), greedy.goals.reached.tolist(), strict=True)
+    return [
+        (end, tuple(reached)) == (stated.outcomes[i].end, stated.outcomes[i].collected)
+        for i, end, reached in flown
+        if i < len(stated.outcomes)
+    ]
+
+
+def _placements(episodes: Episodes) -> NDArray[np.float64]:
+    """Metres to the left of each cube. Shape: (n, cubes)."""
+    places = episodes.goals.world.reshape(len(episodes), -1, 3)  # x, y, z of each cube
+    return places[..., 1].double().numpy()
+
+
+def find_claim(
+    policy: Pilot,
+    given: str | Path | None = None,
+    *,
+    flights: int = JudgeSettings.certificate_flights,
+    seed: RootSeed | None = None,
+    device: str = "cpu",
+    renderer: str = "raytrace",
+) -> Claim | None:
+    """Find and check the certificate of a policy; see `drone_rl.verification.checker.read_tried`.
+
+    Args:
+        policy: Which, in the task that counts.
+        given: The certificate's file, or a folder that holds a certificate.json; by default the one
+            that lies with the policy, see `drone_rl.policies.zoo.certificate_path`.
+        flights: Rollouts that re-check it from other placements; 0 for none.
+        seed: Root of the random stream of these placements; a fresh one by default.
+        device: Where they are flown.
+        renderer: Who draws, see `drone_rl.sim.rendering.find_renderer`.
+
+    Returns:
+        None if none is given and none lies there, as for a policy in no file. One that lies there
+        and can't be believed is returned as refused.
+
+    Raises:
+        InputError: The one that is given can't be read, is of another network or task, contradicts
+            itself, or is refuted by a flight.
+    """
+    if not isinstance(policy, Policy):
+        if given is not None:
+            raise InputError(
+                f"certificate={given}, but policy={policy.name} was made elsewhere, and nothing is "
+                "proved of it; leave the certificate out"
+            )
+        return None
+    path = certificate_path(policy.path) if given is None else _file(Path(given))
+    if given is None and not path.is_file():
+        return None
+    try:
+        return _try(policy, path, flights, seed=seed, device=device, renderer=renderer)
+    except InputError as error:
+        if given is not None:
+            raise
+        return Claim(path, None, refused=str(error))
+
+
+def _file(path: Path) -> Path:
+    return path / "certificate.json" if path.is_dir() else path
+
+
+def _try(
+    policy: Policy, path: Path, flights: int, *, seed: RootSeed | None, **flying: Any
+) -> Claim:
+    weights = policy.state["policy"]
+    certificate = read_tried(path, policy.description, weights)
+    if not flights:
+        return Claim(path, certificate)
+    seed = seed or root_seed(None)
+    found = check_certificate(certificate, weights, flights=flights, seed=seed.value, **flying)
+    if not found.accepted:
+        raise InputError(f"certificate {path} does not hold: {found.lines()[0]}; prove again")
+    return Claim(
+        path,
+        certificate,
+        flights=sum(found.flights.values()),
+        uniform=found.flights.get(ANYWHERE, 0),
+        seed=seed.value,
+        seed_is_fixed=seed.is_fixed,
+    )

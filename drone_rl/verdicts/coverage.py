@@ -1,0 +1,296 @@
+"""Which flights under other conditions a verdict, a card or a report may quote of a policy."""
+
+import dataclasses
+from collections.abc import Iterator, Mapping
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from drone_rl.config.commands import JudgeSettings, ShiftSettings
+from drone_rl.evaluation.rule import Rule
+from drone_rl.policies.base_policy import Pilot
+from drone_rl.policies.policy import Policy
+from drone_rl.policies.zoo import shifts_path
+from drone_rl.robustness.agents import OracleAgent
+from drone_rl.robustness.axes import Axis, find_axes
+from drone_rl.robustness.domain import Prober
+from drone_rl.robustness.domain_text import QUOTED, contradicted, lacking, needed_range, why_not
+from drone_rl.robustness.paired_evaluation import PairedEvaluator, PolicySpec
+from drone_rl.robustness.perturbations import Condition
+from drone_rl.robustness.requirements import Need, read_requirements
+from drone_rl.robustness.shifts_file import SavedShifts, read_shifts
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.intervals import mean_bounds
+from drone_rl.utils.seeding import RootSeed
+from drone_rl.utils.text import say
+
+RANDOM = 2
+"""Strengths that are drawn at random within each range, besides its ends."""
+
+
+@dataclasses.dataclass(frozen=True)
+class DomainRecheck:
+    """New rollouts under required conditions, held against what a file says of these."""
+
+    episodes: int
+    """At each strength."""
+    seed: int
+    """Of the episodes and of the random strengths."""
+    seed_is_fixed: bool
+    """Whether it was chosen beforehand, so that a policy could be fitted to it."""
+    strengths: Mapping[str, tuple[float, ...]]
+    """By axis, the values that were flown."""
+    contradictions: tuple[str, ...]
+    """What speaks against the file, one line each."""
+    fewest: int
+    """Successes at a strength; with fewer it would have been contradicted."""
+
+    @property
+    def count(self) -> int:
+        """Strengths of all axes."""
+        return sum(map(len, self.strengths.values()))
+
+    def __str__(self) -> str:
+        """By how many episodes, and what these rule out."""
+        fitted = ", to which a policy could have been fitted" if self.seed_is_fixed else ""
+        kind = "fixed" if self.seed_is_fixed else "fresh"
+        return (
+            f"re-flown by {self.episodes:,} episodes at each of {self.count} strengths, ends of "
+            f"the ranges and random ones ({kind} seed {self.seed}{fitted}); fewer than "
+            f"{self.fewest:,} successes at one would have contradicted the file"
+        )
+
+
+def recheck_domain(
+    policy: Pilot,
+    needs: Mapping[str, Need],
+    numbers: Mapping[str, Any],
+    settings: JudgeSettings,
+    seed: RootSeed,
+) -> DomainRecheck:
+    """Fly new episodes at the ends of the required ranges and at random strengths within them.
+
+    Args:
+        policy: Which, in the task that counts.
+        needs: By axis, see `drone_rl.robustness.requirements.read_requirements`.
+        numbers: As in `shifts.json`, with the axes.
+        settings: `domain_flights`, `good_share`, device and renderer count.
+        seed: Root of the random streams of the sample and of its environments.
+    """
+    from drone_rl.robustness.shifts import make_policy_spec  # slow to import: it draws charts
+
+    how = ShiftSettings(device=settings.device, renderer=settings.renderer)
+    subject, rng = make_policy_spec(policy, how), np.random.default_rng(seed.value)
+    tried = {
+        axis: [*_strengths(axis, subject, needs[axis.name], numbers, rng)]
+        for axis in find_axes(needs, subject)
+    }
+    count = sum(map(len, tried.values())) + 1
+    with closing(PairedEvaluator(subject, settings.domain_flights, seed.value)) as bed:
+        oracle = bed.fly(Condition(), eyes=OracleAgent(looks=False)).episodes
+        prober = Prober(bed, oracle, settings.good_share, plain_part=1 / count)
+        found = [_contradiction(None, prober.plain, 0.0, "")]
+        for axis, strengths in tried.items():
+            for strength in strengths:
+                probed = prober.probe(axis.make(strength, subject), 1 / count)
+                value = axis.value(strength, subject)
+                found.append(_contradiction(axis.name, probed, value, axis.unit))
+    return DomainRecheck(
+        episodes=settings.domain_flights,
+        seed=seed.value,
+        seed_is_fixed=seed.is_fixed,
+        strengths={
+            axis.name: tuple(axis.value(strength, subject) for strength in strengths)
+            for axis, strengths in tried.items()
+        },
+        contradictions=tuple(line for line in found if line is not None),
+        fewest=_fewest(settings.domain_flights, prober.rule_at(1 / count)),
+    )
+
+
+def _strengths(
+    axis: Axis,
+    subject: PolicySpec,
+    need: Need,
+    numbers: Mapping[str, Any],
+    rng: np.random.Generator,
+) -> Iterator[float]:
+    """The ends that differ from no difference, and random strengths between them, each once."""
+    low, high = needed_range(numbers["axes"][axis.name], need)
+    ends = sorted(axis.position(axis.strength(value, subject)) for value in (low, high))
+    drawn = rng.uniform(ends[0], ends[1], RANDOM) if ends[0] < ends[1] else []
+    seen: set[float] = set()
+    for position in (*ends, *(float(one) for one in drawn)):
+        strength = axis.at(position)
+        strength = float(round(strength)) if axis.whole else strength
+        if abs(axis.position(strength)) > 1e-12 and strength not in seen:
+            seen.add(strength)
+            yield strength
+
+
+def _contradiction(
+    name: str | None, probed: Mapping[str, Any], value: float, unit: str
+) -> str | None:
+    return contradicted(name, value, unit, probed) if probed["bad"] else None
+
+
+def _fewest(episodes: int, rule: Rule) -> int:
+    """The fewest successes that do not contradict, next to an oracle that always succeeds."""
+    least, most = 0, episodes
+    while least < most:
+        middle = (least + most) // 2
+        values = np.repeat([1.0, 0.0], [middle, episodes - middle]) - rule.good_share
+        upper = mean_bounds(values, -rule.good_share, 1.0, rule.confidence)["upper95"]
+        least, most = (least, middle) if upper > 0 else (middle + 1, most)
+    return least
+
+
+MOST_LOOKED_AT = 100
+"""Results of `drone-rl shifts`, the newest ones."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Coverage:
+    """What is needed beside what was found."""
+
+    needs: Mapping[str, Need]
+    """By axis."""
+    lacking: Mapping[str, str]
+    """By axis, what the operating domain lacks of it; nothing if all that is needed is covered."""
+    against: str | None = None
+    """Why the operating domain is not believed; None if nothing speaks against it."""
+    reflown: DomainRecheck | None = None
+    """New episodes at a sample of what is needed; None if none were flown."""
+
+    @property
+    def is_stated(self) -> bool:
+        """Whether the file says that it is good under all that is needed."""
+        return not self.lacking and self.against is None
+
+    @property
+    def is_covered(self) -> bool:
+        """Whether it says so, and new episodes were flown that do not contradict it."""
+        return self.is_stated and self.reflown is not None and not self.reflown.contradictions
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values."""
+        return dataclasses.asdict(self)
+
+    def __str__(self) -> str:
+        """A line for each axis that is not covered, or one for all."""
+        if self.is_covered:
+            return f"covered: {', '.join(self.needs)}, each by itself, {self.reflown}"
+        lines = [*self.lacking.values(), *filter(None, [self.against])]
+        if self.reflown is not None:
+            lines += self.reflown.contradictions
+        elif not lines:
+            lines.append(
+                "the file says so, and no episode was flown to check it (domain_flights=0)"
+            )
+        return "\n".join(f"not covered: {line}" for line in lines)
+
+
+def find_domain(
+    policy: Pilot, given: str | Path | None = None, outputs: str | Path = "outputs"
+) -> SavedShifts | None:
+    """A policy's flights under other conditions, in its task.
+
+    Args:
+        policy: Which, in the task that counts.
+        given: Their file, or a folder that holds a shifts.json; by default what lies with the
+            policy (`drone_rl.policies.zoo.shifts_path`), else the newest file that
+            `drone-rl shifts` wrote for it, preferably one with ranges.
+        outputs: Folder under which commands leave what they make.
+
+    Returns:
+        None if there are none. What lies with the policy and can't be believed is refused.
+
+    Raises:
+        InputError: What is given can't be read, is of another network or task, or contradicts
+            itself.
+    """
+    if not isinstance(policy, Policy):
+        if given is not None:
+            raise InputError(
+                f"shifts={given}, but policy={policy.name} was made elsewhere, and is known by no "
+                "hash; leave shifts out"
+            )
+        return None
+    if given is not None:
+        path = Path(given)
+        return _read(path / "shifts.json" if path.is_dir() else path, policy)
+    beside = shifts_path(policy.path)
+    if beside.is_file():
+        try:
+            return _read(beside, policy)
+        except InputError as error:
+            return SavedShifts(beside, None, refused=str(error))
+    found = None
+    for measured in _made(policy, Path(outputs)):
+        if measured.has_ranges:
+            return measured
+        found = found or measured
+    return found
+
+
+def require(policy: Pilot, needed: str | Path, measured: SavedShifts | None) -> Coverage:
+    """Compares what is needed with a policy's operating domain.
+
+    Args:
+        policy: Which.
+        needed: A file, see `drone_rl.robustness.requirements.read_requirements`.
+        measured: From `find_domain`.
+
+    Raises:
+        InputError: The file is unusable, or no operating domain was measured, or it is refused.
+    """
+    needs = read_requirements(Path(needed))
+    remedy = f"run drone-rl shifts policy={_given(policy)} first, in the same task"
+    if measured is None:
+        raise InputError(f"require_domain={needed}, but no domain of it was measured; {remedy}")
+    if measured.numbers is None:
+        raise InputError(f"require_domain={needed}, but {measured.refused}; {remedy}")
+    if not measured.has_ranges:
+        raise InputError(
+            f"require_domain={needed}, but {measured.path} has no ranges (domain=false); {remedy}"
+        )
+    lacks = {name: lacking(measured.numbers, name, need) for name, need in needs.items()}
+    return Coverage(needs, {name: line for name, line in lacks.items() if line is not None})
+
+
+def beside(coverage: Coverage, evidence: Mapping[str, Any]) -> Coverage:
+    """The same with what a verdict says against it.
+
+    Args:
+        coverage: From `require`.
+        evidence: "shifts" and "verdict", see `drone_rl.robustness.domain_text`.
+    """
+    return dataclasses.replace(coverage, against=why_not(evidence))
+
+
+def sentence(evidence: Mapping[str, Any]) -> str:
+    """What may be quoted, for a person."""
+    return say(QUOTED, evidence)
+
+
+def _given(policy: Pilot) -> str:
+    return str(policy.path) if isinstance(policy, Policy) else policy.name
+
+
+def _read(path: Path, policy: Policy) -> SavedShifts:
+    return read_shifts(path, policy.description, policy.state["policy"])
+
+
+def _made(policy: Policy, outputs: Path) -> Iterator[SavedShifts]:
+    """What `drone-rl shifts` left of this network and task, the newest first."""
+    there = [
+        *outputs.glob("shifts/runs/*/shifts.json"),
+        *outputs.glob("shifts/multiruns/*/*/shifts.json"),
+    ]
+    for path in sorted(there, key=lambda p: p.stat().st_mtime, reverse=True)[:MOST_LOOKED_AT]:
+        try:
+            yield _read(path, policy)
+        except InputError:
+            continue  # of another one

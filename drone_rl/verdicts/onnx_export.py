@@ -1,0 +1,116 @@
+"""Does another program do what a policy does? Asked about every picture of the policy's flights."""
+
+import dataclasses
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import torch
+from tensordict.nn import TensorDictModuleBase
+from torch import Tensor
+from torchrl.envs import TransformedEnv
+from torchrl.envs.utils import ExplorationType, set_exploration_type
+
+from drone_rl.envs import worlds_of
+from drone_rl.policies.policy import Policy, load_policy
+from drone_rl.policies.zoo import make_onnx, open_onnx
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.files import write_atomically
+from drone_rl.utils.seeding import root_seed
+from drone_rl.verdicts.export import origin_of
+
+MOST_DIFFERENCE = 1e-5
+"""Of a probability that an ONNX model gives, from PyTorch's."""
+_WORLDS, _STEPS = 100, 100
+"""Of the flights on which it is compared: 10,000 pictures."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Agreement:
+    """How far two programs agree on the probabilities of actions, or of their parts."""
+
+    frames: int
+    """Pictures that both were asked about."""
+    difference: float
+    """The greatest in any probability; NaN if any is no number."""
+    actions_differ: int
+    """Pictures of which they call different actions, or parts, the most probable."""
+
+
+@torch.no_grad()
+def agreement(
+    env: TransformedEnv,
+    actor: TensorDictModuleBase,
+    other: Callable[[Tensor], Tensor],
+    steps: int,
+) -> Agreement:
+    """Flies a policy, with drawn actions, and compares another program with it at every step.
+
+    Args:
+        env: Worlds of `DroneEnv` behind transforms.
+        actor: The policy; it writes "logits".
+        other: Takes RGB pictures (N, H, W, 3), uint8, and gives probabilities (N, A), see
+            `Actions.wish`; on the CPU.
+        steps: Of each world; those whose episode ends begin another.
+    """
+    base: Any = env.base_env
+    actions = worlds_of(env).dynamics.actions
+    wishes, others, state = [], [], env.reset()
+    with set_exploration_type(ExplorationType.RANDOM):
+        for _ in range(steps):
+            state = actor(state)
+            wishes.append(actions.wish(state["logits"]).cpu())
+            others.append(other(base.last_pixels.cpu()))
+            state = env.step_and_maybe_reset(state)[1]
+    mine, its = torch.cat(wishes), torch.cat(others)
+    return Agreement(
+        frames=len(mine),
+        difference=float((mine - its).abs().max()),
+        actions_differ=int((actions.chosen(mine) != actions.chosen(its)).sum()),
+    )
+
+
+def export_onnx(
+    policy: str | Path | Policy,
+    target: str | Path,
+    *,
+    command: str | None = None,
+    seed: int | None = None,
+) -> Agreement:
+    """Writes a policy as an ONNX model, if that does what the policy does: all of it on the CPU.
+
+    Args:
+        policy: The policy, or what `load_policy` takes.
+        target: Of the file, ending in .onnx; what is in it, see `drone_rl.policies.zoo.make_onnx`.
+        command: That trained it, for the model's metadata; None names what its file or folder says.
+        seed: Root of the random streams of the environments in which the two are compared; a fresh
+            one by default.
+
+    Returns:
+        How far the model and PyTorch agree, on 10,000 pictures that the policy met.
+
+    Raises:
+        InputError: It can't be an ONNX model, or not be written, or the model is another function
+            than the policy; then nothing is written.
+    """
+    policy = policy if isinstance(policy, Policy) else load_policy(policy)
+    told = {"command": command or origin_of(policy.path, policy.state)[0]}
+    content = make_onnx(policy.description, policy.make_network(), told)
+    model = open_onnx(content)
+    sound = dataclasses.replace(policy, description=policy.description.without_faults())
+    with sound.flying(_WORLDS, seed=root_seed(seed).value) as (env, actor):
+        found = agreement(env, actor, model, _STEPS)
+    if not found.difference <= MOST_DIFFERENCE:
+        raise InputError(
+            f"policy {policy.name} as an ONNX model gives probabilities that differ by up to "
+            f"{found.difference:.2g} from its own, and {MOST_DIFFERENCE:g} is allowed; export it "
+            "with format=safetensors"
+        )
+    try:
+        write_atomically(Path(target), content)
+    except OSError as error:
+        raise InputError(
+            f"policy {target} can't be written ({error.strerror}); free some space or choose "
+            "another folder with hydra.run.dir=..."
+        ) from error
+    return found

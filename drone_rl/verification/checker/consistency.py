@@ -1,0 +1,199 @@
+"""What a certificate says must go together, before any flight: shares, outcomes, the partition."""
+
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drone_rl.sim.tasks.collect_cubes import EndReason
+from drone_rl.utils.intervals import proportion
+from drone_rl.verification.checker.certificate import Certificate, Outcome
+
+
+def volume(boxes: NDArray[np.float64]) -> Fraction:
+    """The exact sum of the boxes' volumes, metres to the power of n. Boxes: (boxes, n, 2)."""
+    if not len(boxes):
+        return Fraction(0)
+    borders, rank = np.unique(boxes, return_inverse=True)
+    ratios = [border.as_integer_ratio() for border in borders.tolist()]
+    unit = max(denominator for _, denominator in ratios)  # all are powers of two
+    whole = np.array([n * (unit // d) for n, d in ratios], object)[rank.reshape(boxes.shape)]
+    sizes = whole[..., 1] - whole[..., 0]
+    return Fraction(int(sizes.prod(1).sum()), unit ** boxes.shape[1])
+
+
+def find_misfit(boxes: NDArray[np.float64], bound: float) -> tuple[list[float], int] | None:
+    """A place at which boxes are no partition of the cube [-bound, bound]^n.
+
+    Args:
+        boxes: None of them empty. Shape: (boxes, n, 2).
+        bound: Half the edge of the cube, metres.
+
+    Returns:
+        The place, and how many boxes hold it: once is right in the cube, never outside; None if
+        the boxes are a partition.
+    """
+    n = boxes.shape[1]
+    cube = np.full((1, n, 2), (-bound, bound))
+    every = np.concatenate([cube, boxes])
+    axes = [np.unique(every[:, i]) for i in range(n)]
+    ranks = np.stack([np.searchsorted(axis, every[:, i]) for i, axis in enumerate(axes)], 1)
+    corner = _uncancelled(ranks)
+    if corner is None:
+        return None
+    return next(_around(corner, ranks, axes))
+
+
+def _uncancelled(ranks: NDArray[np.intp]) -> NDArray[np.intp] | None:
+    """A corner that is left over; the first box counts as taken away. Ranks: (boxes, n, 2)."""
+    n = ranks.shape[1]
+    ends = np.array(list(product((0, 1), repeat=n)))  # (2^n, n)
+    sign = 1 - 2 * (ends.sum(1) % 2)
+    key = np.zeros((len(ranks), len(ends)), np.int64)
+    for i in range(n):  # corners by number; numbered anew at each axis, so that none overflows
+        key = key * (int(ranks[:, i].max()) + 1) + ranks[:, i][:, ends[:, i]]
+        key = np.unique(key, return_inverse=True)[1].reshape(key.shape)
+    weight = np.repeat(sign[None], len(ranks), 0)
+    weight[0] *= -1
+    left = np.bincount(key.ravel(), weight.ravel())  # exact: sums of at most 2^25 ones
+    if not left.any():
+        return None
+    box, end = np.argwhere(key == np.flatnonzero(left)[0])[0]
+    return ranks[box, np.arange(n), ends[end]]
+
+
+def _around(
+    corner: NDArray[np.intp], ranks: NDArray[np.intp], axes: Sequence[NDArray[np.float64]]
+) -> Iterator[tuple[list[float], int]]:
+    """The places around a corner of which boxes tell wrongly; there is one at least."""
+    sides = [
+        [c for c in (r - 1, r) if 0 <= c < len(axis) - 1]
+        for r, axis in zip(corner, axes, strict=True)
+    ]
+    for cell in product(*sides):
+        at = np.array(cell)
+        holding = np.flatnonzero(((ranks[..., 0] <= at) & (at < ranks[..., 1])).all(1)).tolist()
+        count = len(holding) - (0 in holding)
+        if count != (0 in holding):
+            place = [float((a[c] + a[c + 1]) / 2) for a, c in zip(axes, cell, strict=True)]
+            yield place, count
+
+
+MOST_MISSING = 0.05
+"""Of the stated placements, those whose number of steps may be left open."""
+FEWEST_STATED = 1e-3
+"""Share of the placements from which on an outcome has to state a number of steps."""
+TOLERANCE = 1e-12
+"""Of a stated share, relative to the exact one: what adding up floats may lose."""
+
+
+def find_lies(certificate: Certificate) -> Iterator[str]:
+    """What can't be, one line each.
+
+    Args:
+        certificate: Which.
+    """
+    whole = Fraction(2 * certificate.bound) ** certificate.task.num_cubes
+    yield from _misfits(certificate, whole)
+    seen: dict[tuple, int] = {}
+    for i, outcome in enumerate(certificate.outcomes):
+        key = (outcome.end, outcome.collected, outcome.loops)
+        if seen.setdefault(key, i) != i:
+            yield f"outcomes {seen[key]} and {i} are the same: {outcome}"
+        wrong = [
+            *_impossible(outcome, certificate.task.step_limit),
+            *_wrong_share(outcome.share, volume(outcome.boxes) / whole),
+        ]
+        yield from (f"outcome {i} ({outcome}) {what}" for what in wrong)
+    yield from _missing(certificate)
+    left = volume(certificate.undecided) / whole
+    yield from (f"undecided {what}" for what in _wrong_share(certificate.undecided_share, left))
+    if not certificate.finished and not left:
+        yield "finished is false, but nothing is undecided"
+
+
+def missing_steps(outcome: Outcome) -> float:
+    """Share of the placements with this outcome whose number of steps is not stated; 0 for none."""
+    missing = outcome.share - sum(outcome.steps.values())
+    return missing if missing > TOLERANCE * outcome.share else 0.0
+
+
+def _missing(certificate: Certificate) -> Iterator[str]:
+    """Numbers of steps that are left open, which no check could hold against a rollout."""
+    for i, outcome in enumerate(certificate.outcomes):
+        if not outcome.steps and outcome.share > FEWEST_STATED:
+            yield f"outcome {i} ({outcome}) states no number of steps"
+    stated = sum(outcome.share for outcome in certificate.outcomes)
+    missing = sum(map(missing_steps, certificate.outcomes))
+    if missing > MOST_MISSING * stated:
+        yield f"numbers of steps are left open for a share of {missing:.6g} of all placements"
+
+
+def _misfits(certificate: Certificate, whole: Fraction) -> Iterator[str]:
+    """Whether the boxes are a partition of the placements; told twice, by corners and volumes."""
+    boxes = np.concatenate(certificate.groups)
+    misfit = find_misfit(boxes, certificate.bound)
+    if misfit is not None:
+        place, count = misfit
+        yield (
+            f"the boxes are no partition of the placements: {count} of them hold the place "
+            f"{place}, where lateral_bound={certificate.bound}"
+        )
+    if (total := volume(boxes)) != whole:
+        yield f"the boxes have {float(total / whole):.17g} of the volume of all placements"
+
+
+def _impossible(outcome: Outcome, step_limit: int) -> Iterator[str]:
+    """What the rules of the task don't allow."""
+    if (outcome.end == EndReason.ALL_CUBES) != all(outcome.collected):
+        yield "can't be: a flight ends with all_cubes if and only if all are collected"
+    if outcome.loops and outcome.end != EndReason.STEP_LIMIT:
+        yield "can't be: going to and fro ends at the step limit"
+    if any(steps > step_limit for steps in outcome.steps):
+        yield f"has more steps than step_limit={step_limit}"
+    if outcome.end == EndReason.STEP_LIMIT and {*outcome.steps} - {step_limit}:
+        yield f"has another number of steps than step_limit={step_limit}"
+    if (total := sum(outcome.steps.values())) > outcome.share * (1 + TOLERANCE):
+        yield f"has a share of {outcome.share!r}, but its steps add up to {total!r}"
+
+
+def _wrong_share(stated: float, exact: Fraction) -> Iterator[str]:
+    if abs(Fraction(stated) - exact) > Fraction(TOLERANCE) * exact:
+        yield f"has a share of {stated!r}, but boxes of {float(exact)!r}"
+
+
+DOUBT = 1e-9
+"""Probability at which luck may refuse what is true, for each number of steps, and all others."""
+
+
+def find_wrong_tallies(
+    outcomes: Sequence[Outcome], owner: NDArray[np.int64], steps: NDArray[np.int64]
+) -> Iterator[str]:
+    """Shares of numbers of steps that random flights refute, one line each.
+
+    Args:
+        outcomes: As stated.
+        owner: Outcome of each flight's placement, uniform over all placements; as many as there
+            are outcomes where nothing is stated. Shape: (flights,).
+        steps: How many each flight had. Shape: (flights,).
+    """
+    for i, outcome in enumerate(outcomes):
+        here, missing = steps[owner == i], missing_steps(outcome)
+        for number, stated in sorted(outcome.steps.items()):
+            found = proportion(int((here == number).sum()), len(steps), 1 - DOUBT)
+            if found["upper95"] < stated or found["lower95"] > stated + missing:
+                yield (
+                    f"outcome {i} ({outcome}) is said to take {number} steps from a share of "
+                    f"{stated:.6g}, which {found['successes']} of {found['trials']} random flights "
+                    "refute"
+                )
+        is_other = ~np.isin(here, list(outcome.steps))
+        found = proportion(int(is_other.sum()), len(steps), 1 - DOUBT)
+        if found["lower95"] > missing:
+            yield (
+                f"outcome {i} ({outcome}) is said to take other numbers of steps than those stated "
+                f"from a share of {missing:.6g}, which {found['successes']} of {found['trials']} "
+                "random flights refute"
+            )

@@ -1,0 +1,258 @@
+"""A proof on its way as one file of arrays, so that it goes on after whatever ended it."""
+
+import dataclasses
+import hashlib
+import io
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from torch import Tensor
+
+from drone_rl.policies.zoo import PolicyDescription
+from drone_rl.sim.tasks.collect_cubes import EndReason
+from drone_rl.utils.archives import read_arrays
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.files import write_atomically
+from drone_rl.utils.limits import ARRAYS_BYTES, check_indices
+from drone_rl.verification.prover.boxes import Boxes, volumes
+from drone_rl.verification.prover.lattice import Ending, Place
+from drone_rl.verification.prover.prover import Findings, Prover, together
+
+_COUNTS = ("num_places", "pictures", "most_boxes", "least_gap", "largest_band", "decided")
+_SETS = ("waiting", "ended", "ways", "forked", "parts", "part", "done", "undecided")
+_DAMAGE = (*(ValueError, TypeError, LookupError, ArithmeticError, AttributeError),)
+"""What the reading of something else raises."""
+_MOST = 2**40
+"""Of any number by which places and endings are known."""
+_NOWHERE = (-1, 0, 0)
+"""Stands for what is not followed to its end."""
+
+
+def save(prover: Prover, path: Path, subject: str) -> None:
+    """Writes a proof's state.
+
+    Args:
+        prover: The proof, between two places.
+        path: The file; the old one stays until the new one is whole.
+        subject: Of what it is a proof, in one line.
+    """
+    waiting = [
+        ((*dataclasses.astuple(p), prover.longest.get(p, 0)), b)
+        for p, boxes in prover.waiting.items()
+        for b in boxes
+    ]
+    ended = [((*_row(e), s), b) for (e, s), boxes in prover.ended.items() for b in boxes]
+    ways = [(_row(e), b) for e, boxes in prover.fork_ends.items() for b in boxes]
+    steps = [((*_row(e), s), v) for e, known in prover.done.steps.items() for s, v in known.items()]
+    arrays = {
+        "subject": np.frombuffer(subject.encode(), np.uint8),
+        "counts": np.array([getattr(prover, name) for name in _COUNTS], np.float64),
+        **_packed("waiting", waiting),
+        **_packed("ended", ended),
+        **_packed("ways", ways),
+        **_packed("forked", [((), b) for b in prover.forked]),
+        **_packed("parts", [((), prover.parts)]),
+        **_packed("part", [((), prover.part)]),
+        **_packed("done", [(_row(e), b) for e, b in prover.done.endings.items()]),
+        **_packed("undecided", [((), prover.done.undecided)]),
+        "steps_rows": np.array([row for row, _ in steps], np.int64).reshape(len(steps), 4),
+        "steps_volumes": np.array([volume for _, volume in steps], np.float64),
+    }
+    buffer = io.BytesIO()
+    np.savez(buffer, **arrays)
+    write_atomically(path, buffer.getvalue())
+
+
+def load(prover: Prover, path: Path, subject: str, most: int = ARRAYS_BYTES) -> None:
+    """Lets a fresh proof go on from a state.
+
+    Args:
+        prover: The proof; left as it is if the state is refused.
+        path: The file.
+        subject: As it was saved.
+        most: Bytes that the file may have.
+
+    Raises:
+        InputError: The file is no such state, or one of another proof.
+    """
+    try:
+        state = read_arrays(path, most=most)
+        saved = bytes(state["subject"]).decode()
+        counts = {
+            name: type(getattr(prover, name))(count)
+            for name, count in zip(_COUNTS, state["counts"].tolist(), strict=True)
+        }
+        shape = prover.parts.shape[1:]
+        sets = {name: _unpacked(name, state, shape) for name in _SETS}
+        waiting = [(_place(row[:-1]), row[-1], b) for row, b in sets["waiting"]]
+        ended = [((_ending(row), row[3]), b) for row, b in sets["ended"]]
+        ways = [(None if row == _NOWHERE else _ending(row), b) for row, b in sets["ways"]]
+        forked = [boxes for _, boxes in sets["forked"]]
+        parts, part, left = (_only(sets[name]) for name in ("parts", "part", "undecided"))
+        _check(part, waiting, [*ended, *ways, *forked])
+        done = [Findings({_ending(row): b}, left[:0], {}) for row, b in sets["done"]]
+        done = together([Findings({}, left, _steps(state)), *done])
+    except _DAMAGE as error:
+        raise InputError(f"{path} is no state of a proof ({error}); delete it to begin") from None
+    if saved != subject:
+        raise InputError(f"{path} is of another proof; delete it, or give another folder")
+    prover.waiting.clear()
+    prover.boxes_under_way = 0
+    for place, longest, boxes in waiting:
+        prover.wait(place, boxes)
+        if place.is_fork:
+            prover.longest[place] = longest
+    for key, boxes in ended:
+        prover.ended[key].append(boxes)
+    for way, boxes in ways:
+        prover.fork_ends[way].append(boxes)
+    prover.forked, prover.parts, prover.part, prover.done = forked, parts, part, done
+    for name, count in counts.items():
+        setattr(prover, name, count)
+
+
+def _place(row: tuple[int, ...]) -> Place:
+    ahead, left, collected, steps, came, is_fork = row
+    return Place(ahead, left, collected, steps, came, bool(is_fork))
+
+
+def _row(ending: Ending | None) -> tuple[int, int, int]:
+    if ending is None:
+        return _NOWHERE
+    return int(ending.reason), ending.collected, int(ending.loops)
+
+
+def _ending(row: tuple[int, ...]) -> Ending:
+    return Ending(EndReason(row[0]), row[1], bool(row[2]))
+
+
+def _only(parts: Sequence[tuple[tuple[int, ...], Boxes]]) -> Boxes:
+    ((_, boxes),) = parts
+    return boxes
+
+
+def _check(part: Boxes, waiting: Sequence[tuple], known: Sequence) -> None:
+    """Something waits where a part is under way, and only there more can be known than is done."""
+    if len(part) != bool(waiting) or (known and not waiting):
+        raise ValueError(f"{len(part)} parts are under way at {len(waiting)} places")
+
+
+def _steps(state: dict[str, NDArray]) -> dict[Ending, dict[int, float]]:
+    """See `Findings`."""
+    rows, volumes = state["steps_rows"], state["steps_volumes"]
+    if rows.shape != (*volumes.shape, 4) or not np.isfinite(volumes).all():
+        raise ValueError(f"steps are {volumes.dtype} of shape {rows.shape}")
+    steps: dict[Ending, dict[int, float]] = defaultdict(dict)
+    for row, volume in zip(rows.tolist(), volumes.tolist(), strict=True):
+        steps[_ending(row)][row[3]] = volume
+    return dict(steps)
+
+
+def _packed(name: str, parts: Iterable[tuple[tuple, Boxes]]) -> dict[str, NDArray]:
+    rows, boxes = [row for row, _ in parts], [b for _, b in parts]
+    return {
+        f"{name}_rows": np.array(rows, np.int64).reshape(len(rows), -1 if rows and rows[0] else 0),
+        f"{name}_counts": np.array([len(b) for b in boxes], np.int64),
+        f"{name}_boxes": np.concatenate(boxes) if boxes else np.empty((0, 0, 2)),
+    }
+
+
+def _unpacked(
+    name: str, state: dict[str, NDArray], shape: tuple[int, ...]
+) -> list[tuple[tuple[int, ...], Boxes]]:
+    rows, counts, boxes = (state[f"{name}_{part}"] for part in ("rows", "counts", "boxes"))
+    if not len(counts):
+        return []
+    check_indices(counts, 1 + len(boxes), f"{name}_counts")
+    check_indices(abs(rows), _MOST, f"{name}_rows")
+    is_sound = boxes.dtype == np.float64 and bool(np.isfinite(boxes).all())
+    if boxes.shape != (counts.sum(), *shape) or not is_sound:
+        raise ValueError(f"{name} are {boxes.dtype} of shape {boxes.shape}")
+    parts = np.split(boxes, np.cumsum(counts)[:-1])
+    return [(tuple(row), b) for row, b in zip(rows.tolist(), parts, strict=True)]
+
+
+FORMAT = "drone_rl certificate"
+FORMAT_VERSION = 1
+
+
+def weights_hash(weights: Mapping[str, Tensor]) -> str:
+    """SHA-256 of a network's weights, whatever file they come from.
+
+    Args:
+        weights: Its state, by name.
+    """
+    digest = hashlib.sha256()
+    for name in sorted(weights):
+        value = weights[name].detach().cpu().float().contiguous()
+        digest.update(f"{name} {list(value.shape)}\n".encode())
+        digest.update(value.numpy().astype("<f4").tobytes())
+    return digest.hexdigest()
+
+
+def certify(
+    name: str,
+    description: PolicyDescription,
+    weights: str,
+    prover: Prover,
+    seconds: float,
+    stopped_by: str | None = None,
+) -> dict[str, Any]:
+    """What is known by now, as plain data.
+
+    Args:
+        name: Of the policy, for people.
+        description: Of the policy, in the task of the proof.
+        weights: See `weights_hash`.
+        prover: The proof.
+        seconds: That it took.
+        stopped_by: The setting that stopped it before its end.
+    """
+    findings = prover.findings()
+    task = prover.lattice.task
+    total = (2 * task.lateral_bound) ** task.num_cubes
+    return {
+        "format": FORMAT,
+        "format_version": FORMAT_VERSION,
+        "policy": {"name": name, "weights": weights, "description": description.as_dict()},
+        "outcomes": [
+            _outcome(ending, boxes, findings, task.num_cubes, total)
+            for ending, boxes in sorted(findings.endings.items())
+            if len(boxes)
+        ],
+        "undecided": {
+            "share": float(volumes(findings.undecided).sum()) / total,
+            "boxes": findings.undecided.tolist(),
+        },
+        "finished": prover.is_finished,
+        "stated": {
+            "logit_gap": prover.gap,
+            "largest_band": prover.largest_band,
+            "renderer": prover.renderer,
+        },
+        "found": {
+            "least_gap": prover.least_gap if prover.least_gap < float("inf") else None,
+            "pictures": prover.pictures,
+            "states": prover.num_places,
+            "most_boxes": prover.most_boxes,
+            "seconds": seconds,
+            "stopped_by": stopped_by,
+        },
+    }
+
+
+def _outcome(
+    ending: Ending, boxes: Boxes, findings: Findings, num_cubes: int, total: float
+) -> dict[str, Any]:
+    return {
+        "end": ending.reason.name.lower(),
+        "collected": [bool(ending.collected >> k & 1) for k in range(num_cubes)],
+        "loops": ending.loops,
+        "share": float(volumes(boxes).sum()) / total,
+        "steps": {str(k): v / total for k, v in sorted(findings.steps.get(ending, {}).items())},
+        "boxes": boxes.tolist(),
+    }

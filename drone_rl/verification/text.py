@@ -1,0 +1,194 @@
+"""Report text about exact maps and proofs; imports nothing heavy."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from drone_rl.sim.vocabulary import shown_actions
+from drone_rl.utils.text import Evidence, Sentence, all_cubes, exact, listed
+
+WHERE = {"left": "on its left", "ahead": "straight ahead", "right": "on its right"}
+"""Sides, and how people say them."""
+
+
+def exact_percent(share: float) -> str:
+    """A share that is known; never 0% or 100% of what is only nearly none or nearly all."""
+    if share in (0, 1):
+        return f"{share:.0%}"
+    text = f"{100 * share:.2f}%"
+    return {"0.00%": "less than 0.01%", "100.00%": "more than 99.99%"}.get(text, text)
+
+
+def rows(places: Evidence, names: Sequence[str]) -> list[list[str]]:
+    """The figures as texts: names, then a row for each side and one for all.
+
+    Args:
+        places: "places" of `explanation.json`, or `places.json`.
+        names: Of the actions.
+    """
+    head = ["one cube", "share of places", *names, "not seen", "blind"]
+    every = {**{n: places[n] for n in ("actions", "unseen", "blind")}, "share": 1.0}
+    told = {WHERE[s]: of for s, of in places["sides"].items()} | {"anywhere": every}
+    return [
+        head,
+        *(
+            [where, *map(exact_percent, (of["share"], *of["actions"], of["unseen"], of["blind"]))]
+            for where, of in told.items()
+        ),
+    ]
+
+
+def _made(evidence: Evidence) -> bool:
+    return "refused" not in evidence["places"]
+
+
+def _does(evidence: Evidence) -> str:
+    places, names = evidence["places"], shown_actions(evidence).names
+    window, parts = places["window"], []
+    for side, of in places["sides"].items():
+        needed = "forward" if side == "ahead" else side
+        share = of["actions"][names.index(needed)]
+        parts.append(f"{needed} for {exact_percent(share)} of those {WHERE[side]}")
+    return (
+        f"With one cube {window['nearest']:g} to {window['farthest']:g} m ahead of its camera and "
+        f"up to {window['sideways']:g} m to either side, exactly and over all places, it goes "
+        f"{listed(parts)}."
+    )
+
+
+def _unseen(evidence: Evidence) -> str:
+    share = exact_percent(evidence["places"]["unseen"])
+    return f"At {share} of the places not one pixel shows the cube."
+
+
+def _blind(evidence: Evidence) -> str:
+    places, names = evidence["places"], shown_actions(evidence).names
+    shares = [
+        f"{exact_percent(of['blind'])} of those {WHERE[side]}"
+        for side, of in places["sides"].items()
+        if of["blind"]
+    ]
+    return (
+        f"It is blind to {listed(shares)}: a turn is called for, and it goes "
+        f"{names[places['alone']]}, as with no cube in sight. Farther on it may see the cube yet."
+    )
+
+
+def _gap(evidence: Evidence) -> str:
+    places = evidence["places"]
+    left = places["least_gap_left"]
+    return (
+        f"Its two highest logits come closest, to {places['least_gap']:.2g}, with the cube "
+        f"{places['least_gap_ahead']:.2f} m ahead and {abs(left):.2f} m to the "
+        f"{'left' if left > 0 else 'right'}."
+    )
+
+
+def _close(evidence: Evidence) -> str:
+    places = evidence["places"]
+    return (
+        f"At {exact_percent(places['close'])} of the places they are no farther apart than "
+        f"{places['logit_gap']:g}, where rounding may decide between the two actions."
+    )
+
+
+def _doubt(evidence: Evidence) -> str:
+    return (
+        f"At most {exact_percent(evidence['places']['in_doubt'])} of the places lie so near to a "
+        "border between two pictures that the renderer, by rounding, may show the other one."
+    )
+
+
+PLACES = (
+    Sentence("places.does", "every cell of places was decided", _made, _does),
+    Sentence(
+        "places.unseen",
+        "there are places where no pixel shows the cube",
+        lambda e: _made(e) and e["places"]["unseen"] > 0,
+        _unseen,
+    ),
+    Sentence(
+        "places.blind",
+        "there are places where a turn is called for and only what is done anyway is done",
+        lambda e: _made(e) and e["places"]["blind"] > 0,
+        _blind,
+    ),
+    Sentence(
+        "places.sees",
+        "there are none",
+        lambda e: _made(e) and e["places"]["blind"] == 0,
+        lambda e: (
+            "Nowhere a turn is called for does it do just what it does with no cube in sight, "
+            "unless that is the turn."
+        ),
+    ),
+    Sentence("places.gap", "all logits were compared", _made, _gap),
+    Sentence(
+        "places.close",
+        "somewhere the two highest logits are closer than sums are sure to be",
+        lambda e: _made(e) and e["places"]["close"] > 0,
+        _close,
+    ),
+    Sentence(
+        "places.doubt",
+        "pictures have borders",
+        lambda e: _made(e) and e["places"]["in_doubt"] > 0,
+        _doubt,
+    ),
+    Sentence(
+        "places.refused",
+        "no closed form is known of what it sees, or it chooses among other actions",
+        lambda e: not _made(e),
+        lambda e: f"Of this policy there is no exact map: {e['places']['refused']}.",
+    ),
+)
+
+
+def sentence(certificate: Mapping[str, Any]) -> str:
+    """Says no more than the certificate does.
+
+    Args:
+        certificate: See `drone_rl.verification.prover.proof_files`.
+    """
+    task = certificate["policy"]["description"]["task"]
+    cubes = all_cubes(task["num_cubes"])
+    outcomes, undecided = certificate["outcomes"], certificate["undecided"]
+    success = sum(o["share"] for o in outcomes if o["end"] == "all_cubes")
+    if not undecided["boxes"] and all(o["end"] == "all_cubes" for o in outcomes):
+        return f"Proved: greedy, it collects {cubes} from every placement."
+    lost = sum(o["share"] for o in outcomes if o["end"] != "all_cubes")
+    lost = exact(lost, is_all=not success and not undecided["boxes"])
+    text = f"Proved: greedy, it collects {cubes} from a share of {exact(success)} of all placements"
+    text += f" and does not from a share of {lost}"
+    if undecided["boxes"]:
+        text += f"; a share of {exact(undecided['share'], is_all=not outcomes)} are undecided"
+    if not certificate["finished"]:
+        text += f" so far ({why_stopped(certificate['found'].get('stopped_by'))})"
+    return text + "."
+
+
+def why_stopped(setting: str | None) -> str:
+    """Why a proof has not come to its end, and what helps.
+
+    Args:
+        setting: The one that stopped it, if it is known.
+    """
+    if setting != "most_boxes":
+        return "the proof was stopped"
+    return (
+        "the proof was stopped, for more than most_boxes boxes were under way; begin anew with a "
+        "smaller most_combinations, which makes parts of fewer boxes"
+    )
+
+
+def found(search: Mapping[str, Any]) -> str:
+    """What a training found in one of its searches for failures.
+
+    Args:
+        search: A row of "rounds" in `result.json`, see `drone_rl.verification.provable.Round`.
+    """
+    text = f"at frame {search['frames']:,}: {search['failures']} of {search['flights']:,} flights"
+    if search["losing"] is None:
+        return f"{text} failed"
+    losing, undecided = exact(search["losing"]), exact(search["undecided"])
+    text += f" failed; proof in {search['proof_s']:.0f} s: fails from a share of {losing}"
+    return f"{text}, undecided a share of {undecided}"

@@ -1,0 +1,66 @@
+"""What a training knows of shifts, as its settings and nobody else say."""
+
+import dataclasses
+
+import pytest
+
+from benchmarks.robust_comparison import changed, touched_axes, untouched_kinds
+from drone_rl.config import AppearanceSettings, CameraSettings, TaskSettings
+from drone_rl.config.training import TrainSettings
+from drone_rl.config.transforms import Blur, Fault, Gray, LateFrames, Noise, Shift, Standardize
+from drone_rl.robustness.axes import AXES, GROUPS
+from drone_rl.utils.settings import snake_case
+
+
+def seeing(*steps):
+    return TrainSettings(transforms=(Gray(), *steps, Standardize()))
+
+
+def test_the_default_knows_nothing():
+    assert changed(TrainSettings()) == set()
+    assert touched_axes(TrainSettings()) == []
+    assert untouched_kinds(TrainSettings()) == [*GROUPS]
+
+
+def test_how_it_learns_makes_no_difference():
+    settings = TrainSettings(seed=3, evaluate_after=10)
+    assert changed(settings) == set()
+
+
+@pytest.mark.parametrize(
+    ("settings", "axes"),
+    [
+        (TrainSettings(appearance=AppearanceSettings(exposure=(0.5, 2.0))), ["brightness"]),
+        (TrainSettings(appearance=AppearanceSettings(shadows=0.5)), ["sun"]),
+        (TrainSettings(appearance=AppearanceSettings(ambient_strength=0.4)), ["sun", "brightness"]),
+        (TrainSettings(task=TaskSettings(cube_size=2.0)), ["object_size"]),
+        (TrainSettings(camera=CameraSettings(horizontal_fov=120.0)), ["field_of_view"]),
+        (seeing(Shift()), ["camera_yaw", "camera_pitch"]),
+        (
+            TrainSettings(appearance=AppearanceSettings(camera_turn=(0.0, 3.0, 0.0))),
+            ["camera_yaw", "camera_pitch", "camera_roll"],
+        ),
+        (TrainSettings(appearance=AppearanceSettings(distractors=(0, 8))), ["distractors"]),
+        (seeing(Noise()), ["noise", "slow_noise"]),
+        (seeing(LateFrames(), Blur()), ["blur", "late_frames", "action_delay"]),
+    ],
+)
+def test_what_settings_touch(settings, axes):
+    assert touched_axes(settings) == axes
+    kinds = {AXES[name].group for name in axes}
+    assert untouched_kinds(settings) == [kind for kind in GROUPS if kind not in kinds]
+
+
+def test_no_look_and_no_fault_goes_unseen():
+    named = {name for axis in AXES.values() for name in axis.touched_by}
+    looks = {f"appearance.{field.name}" for field in dataclasses.fields(AppearanceSettings)}
+    faults = {f"transforms.{snake_case(fault)}" for fault in (Blur, *Fault.variants())}
+    assert looks | faults <= named
+
+
+def test_settings_that_axes_name_exist():
+    known = {f"appearance.{f.name}" for f in dataclasses.fields(AppearanceSettings)}
+    known |= {f"transforms.{snake_case(fault)}" for fault in (Blur, *Fault.variants())}
+    known |= {f"task.{f.name}" for f in dataclasses.fields(TaskSettings)}
+    known |= {"camera.horizontal_fov", "task.width", "task.pillar_color"}
+    assert {name for axis in AXES.values() for name in axis.touched_by} <= known

@@ -1,0 +1,32 @@
+from drone_rl.evaluation.evaluate import EVALUATION
+from drone_rl.utils.text import say
+
+FRESH = {"seed": 5, "seed_is_fixed": False}
+FOUND = {
+    "arithmetic": "float32 on cpu, PyTorch",
+    "frames": 2000,
+    "fragile": 400,
+    "fragile_rate": 0.2,
+    "excessive": True,
+    "compared": "fused kernel",
+    "compared_episodes": 50,
+    "differing": 0,
+}
+
+
+def said(**changes):
+    return say(EVALUATION, {**FRESH, "rounding": {**FOUND, **changes}})
+
+
+def test_an_evaluation_that_depends_on_rounding_says_so_even_if_both_implementations_agree():
+    assert said().endswith(
+        "when computed again (fused kernel). These figures hold for this arithmetic only: in 400 "
+        "of 2,000 of these episodes' frames (20%) the order in which float32 sums are computed can "
+        "change the action."
+    )
+
+
+def test_few_frames_and_other_differences_are_not_called_fragile():
+    for changes in ({"excessive": False}, {"fragile": 0, "differing": 9}):
+        assert "only" not in said(**changes)
+    assert "decisions depend on rounding" in said(fragile=0, differing=9)

@@ -1,0 +1,51 @@
+import torch
+
+import drone_rl
+from drone_rl.envs.direct_renderer import DirectRenderer
+from drone_rl.evaluation.outcomes import MOST, enumerate_outcomes
+from drone_rl.policies.rounding import Decisions
+from drone_rl.sim.actions import Move
+from drone_rl.sim.tasks.collect_cubes import EndReason
+
+
+def ends(possible):
+    with drone_rl.load_policy("good").flying(3, seed=0) as (env, _):
+        env.reset()
+        renderer = DirectRenderer.try_create(env, ("pixels",), ())
+
+        def decide(pixels):
+            return Decisions(torch.zeros(len(pixels), 3), possible(pixels))
+
+        return enumerate_outcomes(renderer, decide, torch.tensor([0, 2]))
+
+
+def test_one_possible_action_gives_one_end():
+    found = ends(lambda x: torch.tensor([[False, True, False]]).expand(len(x), 3))
+    assert found.owner.tolist() == [0, 1]
+    assert found.episodes.end_reason.tolist() == [EndReason.SIDE_BOUNDARY] * 2
+    assert not found.is_open.any()
+
+
+def test_two_possible_first_actions_give_all_ends_of_both():
+    calls = 0
+
+    def possible(pixels):
+        nonlocal calls
+        calls += 1
+        made = torch.zeros(len(pixels), 3, dtype=torch.bool)
+        if calls == 1:
+            made[:, [Move.LEFT, Move.RIGHT]] = True
+        else:  # every branch goes on to the left
+            made[:, Move.LEFT] = True
+        return made
+
+    found = ends(possible)
+    assert sorted(found.owner.tolist()) == [0, 0, 1, 1]
+    assert (found.episodes.end_reason == EndReason.SIDE_BOUNDARY).all()
+    assert len(set(found.episodes.length.tolist())) == 2
+
+
+def test_too_many_branches_are_left_open():
+    found = ends(lambda x: torch.ones(len(x), 3, dtype=torch.bool))
+    assert found.is_open.all()
+    assert len(found.owner) <= 4 * MOST

@@ -1,0 +1,27 @@
+"""Films of a policy's flights, and the viewer that needs a display."""
+
+import pytest
+
+import drone_rl
+from drone_rl.evaluation.video import film, view
+from drone_rl.utils.errors import InputError
+
+
+def test_one_mp4_and_one_gif_each(tmp_path):
+    policy = drone_rl.load_policy("good").in_task(num_cubes=1, first_distance=4.0)
+    files = film(policy, tmp_path, 1)
+    assert [file.name for file in files] == ["episode_0.mp4", "episode_0.gif"]
+    assert all(file.stat().st_size > 0 for file in files)
+
+
+def test_no_display(monkeypatch):
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    with pytest.raises(InputError, match="needs a display"):
+        view(drone_rl.load_policy("good"))
+
+
+def test_another_body_is_filmed_too(tmp_path):
+    policy = drone_rl.load_policy("good").in_task(num_cubes=1, first_distance=4.0)
+    moved = policy.in_dynamics(mode="simple_flight")
+    assert len(film(moved, tmp_path, 1)) == 2

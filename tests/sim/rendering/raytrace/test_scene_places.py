@@ -1,0 +1,39 @@
+"""Frames as the kernels get them."""
+
+import pytest
+import torch
+
+from drone_rl.sim.rendering.devices import start_warp
+from drone_rl.sim.rendering.raytrace.scene import Places
+from drone_rl.sim.rendering.renderer import Poses
+
+
+@pytest.fixture(autouse=True)
+def warp():
+    """Started, as whoever flies or draws has it."""
+    start_warp("cpu")
+
+
+def some(count, props=2):
+    generator = torch.Generator().manual_seed(count)
+    draw = (torch.rand(*size, generator=generator).double() for size in ((3,), (4,), (props, 3)))
+    one = [values[None].repeat(count, *[1] * values.dim()) for values in draw]
+    return Poses(*(v + torch.arange(count).reshape(-1, *[1] * (v.dim() - 1)) for v in one))
+
+
+def test_whatever_number_of_worlds_comes_the_kernels_find_theirs():
+    places = Places(torch.device("cpu"))
+    for count, props in ((2, 2), (5, 2), (3, 2), (3, 1), (0, 1), (4, 0)):
+        poses = some(count, props)
+        made = places.of(poses)
+        frames, attitudes = made.places.numpy()[:count], made.attitudes.numpy()[:count]
+        assert frames.shape == (count, 2 + props, 3) and (frames[:, 0] == 0).all()
+        assert (frames[:, 1] == poses.position.float().numpy()).all()
+        assert (frames[:, 2:] == poses.props.float().numpy()).all()
+        assert (attitudes == poses.attitude.float().numpy()).all()
+
+
+def test_fewer_worlds_are_drawn_from_the_same_arrays():
+    places = Places(torch.device("cpu"))
+    assert places.of(some(4)) is places.of(some(3))
+    assert places.of(some(3)) is not places.of(some(5))

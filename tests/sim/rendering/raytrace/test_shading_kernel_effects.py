@@ -1,0 +1,57 @@
+"""Light in the sun and in the shade, and how a texture lies on the faces of a geom."""
+
+import numpy as np
+import pytest
+import warp as wp
+
+from drone_rl.sim.rendering.raytrace import structs_kernel
+from drone_rl.sim.rendering.raytrace.intersection_kernel import ROUND
+from drone_rl.sim.rendering.raytrace.shading_kernel import lay, light_on
+from drone_rl.sim.rendering.raytrace.spans_kernel import Cover
+from tests.box_ahead import array, looks
+
+
+@wp.kernel(enable_backward=False)
+def light(worn: structs_kernel.Looks, out: wp.array[wp.vec3]):
+    lit, dark = light_on(worn, 0, wp.vec3(0.0, 0.0, 1.0))
+    out[0] = lit
+    out[1] = dark
+
+
+def test_the_first_light_alone_is_kept_away():
+    worn = looks()
+    worn.ambient = array([[[0.1] * 3, [0.05] * 3]], wp.vec3)
+    worn.diffuse = array([[[0.5] * 3, [0.2, 0.0, 0.0]]], wp.vec3)
+    worn.direction = array([[[0.0, -0.6, -0.8], [0.0, 0.0, -1.0]]], wp.vec3)
+    out = wp.zeros(2, dtype=wp.vec3, device="cpu")
+    wp.launch(light, 1, inputs=[worn, out], device="cpu")
+    np.testing.assert_allclose(out.numpy()[0], [0.75, 0.55, 0.55], atol=1e-6)
+    np.testing.assert_allclose(out.numpy()[1], [0.35, 0.15, 0.15], atol=1e-6)
+
+
+@wp.kernel(enable_backward=False)
+def cover(sight: structs_kernel.Sight, face: int, normal: wp.vec3, out: wp.array[Cover]):
+    out[0] = lay(5, 8, 2.0, sight, face, normal)
+
+
+@pytest.mark.parametrize(
+    "face, normal, corner",
+    [
+        (1, (1, 0, 0), (4, -6)),  # that looks along x shows y to the right, z up
+        (2, (0, -1, 0), (2, -6)),
+        (5, (0, 0, 1), (2, -4)),
+        (int(ROUND), (0.1, 0.8, -0.5), (2, -6)),
+        (int(ROUND), (0.1, 0.2, -0.9), (2, -4)),
+    ],
+)
+def test_a_face_shows_two_coordinates_of_the_geom(face, normal, corner):
+    sight = structs_kernel.Sight()
+    sight.eye, sight.into = wp.vec3(1.0, 2.0, 3.0), wp.mat33(*np.eye(3).flatten())
+    out = wp.zeros(1, dtype=Cover, device="cpu")
+    wp.launch(cover, 1, inputs=[sight, face, wp.vec3(*normal), out], device="cpu")
+    laid = out.numpy()[0]
+    assert (laid["start"], laid["side"]) == (5, 8)
+    assert laid["corner"].tolist() == list(corner)
+    # a metre along its own axis goes two tiles across, or down
+    assert np.abs(laid["across"]).sum() == 2.0 and np.abs(laid["down"]).sum() == 2.0
+    np.testing.assert_allclose(laid["facing"], -np.array(normal), atol=1e-6)

@@ -1,0 +1,180 @@
+"""How far shadows are looked for, where in the picture, and who casts them on what."""
+
+import numpy as np
+import pytest
+import warp as wp
+
+from drone_rl.sim.rendering.raytrace import structs_kernel
+from drone_rl.sim.rendering.raytrace.intersection_kernel import (
+    BOX,
+    CYLINDER,
+    ELLIPSOID,
+    PLANE,
+    SPHERE,
+)
+from drone_rl.sim.rendering.raytrace.projection_kernel import look_at, stand
+from drone_rl.sim.rendering.raytrace.shadows_kernel import (
+    around_shadow,
+    find_ground,
+    hide_by_box,
+    is_behind,
+    mark_near,
+    shadow_length,
+)
+from tests.box_ahead import SIZE, array, geoms, poses, view
+
+
+@wp.kernel(enable_backward=False)
+def look(
+    seen: structs_kernel.View,
+    scene: structs_kernel.Geoms,
+    placed: structs_kernel.Poses,
+    sun: wp.vec3,
+    sights: wp.array[structs_kernel.Sight],
+    length: wp.array[float],
+    parts: wp.array[wp.vec4i],
+):
+    camera = seen.cameras[0]
+    for geom in range(sights.shape[0]):
+        sights[geom] = look_at(scene, geom, placed, 0, stand(camera, placed, 0))
+    ground = find_ground(seen, sights, sun)
+    length[0] = shadow_length(seen, sights, 0, ground, sun)
+    parts[0] = around_shadow(seen, camera, sights[0], sun * length[0])
+
+
+def looked(sun, box=(0.0, 0.0, -6.0), *, size=(0.0, 0.0, 1.0), floor=True):
+    """A box and a floor at z = -20, below the camera that looks down; its far end is at 50 m."""
+    scene = geoms(-6.0, -20.0, numbers=(0, 1)) if floor else geoms(-6.0)
+    kinds, places = [int(BOX), int(PLANE)], [box, (0.0, 0.0, -20.0)]
+    count = len(scene.kind)
+    scene.kind, scene.position = array(kinds[:count], int), array(places[:count], wp.vec3)
+    scene.size = array([(1.0, 1.0, 1.0), size][:count], wp.vec3)
+    sights = wp.zeros(count, dtype=structs_kernel.Sight, device="cpu")
+    length, parts = (wp.zeros(1, dtype=of, device="cpu") for of in (float, wp.vec4i))
+    given = [view(int(structs_kernel.DEPTH)), scene, poses(), wp.vec3(*sun), sights, length, parts]
+    wp.launch(look, 1, inputs=given, device="cpu")
+    return length.numpy()[0], parts.numpy()[0].tolist()
+
+
+def test_a_shadow_ends_on_the_ground():
+    """The box's top is 15 m above it: so far down, and 5 / 4 of it along a slope of 0.8."""
+    assert looked((0.0, 0.0, -1.0))[0] == pytest.approx(15.0)
+    assert looked((0.6, 0.0, -0.8))[0] == pytest.approx(15.0 / 0.8)
+
+
+@pytest.mark.parametrize(
+    "given", [{"floor": False}, {"size": (3.0, 3.0, 1.0)}, {"sun": (0.0, 0.6, 0.8)}]
+)
+def test_without_a_wide_plane_that_the_sun_shines_on_it_is_looked_for_as_far_as_one_sees(given):
+    assert looked(**{"sun": (0.0, 0.0, -1.0), **given})[0] == 50.0
+
+
+def test_straight_down_the_shadow_is_behind_the_box():
+    """A square of a fifth of the picture, as in test_raytrace_sight."""
+    assert looked((0.0, 0.0, -1.0))[1] == [14, 25, 14, 25]
+
+
+def test_aside_the_picture_is_searched_to_where_the_shadow_ends():
+    """It moves 15 m / 0.8 * 0.6 to the right, where the floor is 20 m away: to a slope of 0.61."""
+    first, last, top, bottom = looked((0.6, 0.0, -0.8))[1]
+    assert first == 14 and (top, bottom) == (14, 25)
+    end = (1.0 + 15.0 * 0.75) / 19.0  # the box's lower side ends there, 1 m above the floor's place
+    assert abs(last - (20 + 20 * end)) <= 3
+
+
+def test_a_shadow_from_behind_the_camera_is_searched():
+    """A box above the camera, whose shadow falls into the picture."""
+    first, last, top, bottom = looked((0.0, 0.0, -1.0), box=(4.0, 0.0, 6.0))[1]
+    assert first >= 20 and last == SIZE and top < 20 < bottom
+
+
+def test_what_stays_behind_the_camera_is_not():
+    first, last, _, _ = looked((0.0, 0.0, 1.0), box=(0.0, 0.0, 6.0))[1]
+    assert first >= last
+
+
+@wp.kernel(enable_backward=False)
+def hide(
+    sight: structs_kernel.Sight,
+    rays: wp.array[wp.vec3],
+    nearest: wp.array[float],
+    owners: wp.array[int],
+    sun: wp.vec3,
+    dark: wp.array[int],
+    behind: wp.array[int],
+):
+    hide_by_box(dark, 0, rays.shape[0], rays, nearest, owners, 8, 0, sight, sun)
+    for i in range(rays.shape[0]):
+        behind[i] = int(is_behind(sight, rays[i], nearest[i], sun))
+
+
+def test_a_box_hides_what_is_beyond_it_alone():
+    """20,000 places around a box, as by the function that serves all solids."""
+    source = np.random.RandomState(0)
+    rays = source.normal(size=(20_000, 3))
+    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    nearest = source.uniform(0.0, 8.0, 20_000)
+    owners = source.choice([-1, 5, 8, 16], 20_000)  # the sky, the box itself, two others
+    sight = structs_kernel.Sight()
+    sight.kind, sight.size = int(BOX), wp.vec3(1.0, 2.0, 0.5)
+    sight.eye, sight.into = wp.vec3(0.5, 1.0, 2.0), wp.mat33(*np.eye(3).flatten())
+    dark, behind = (wp.zeros(20_000, dtype=int, device="cpu") for _ in range(2))
+    sun = np.array([0.0, 0.6, -0.8])
+    given = [array(rays, wp.vec3), array(nearest, float), array(owners, int), wp.vec3(*sun)]
+    wp.launch(hide, 1, inputs=[sight, *given, dark, behind], device="cpu")
+    others = owners >= 8
+    assert np.array_equal(dark.numpy()[others], behind.numpy()[others])
+    assert 50 < dark.numpy().sum() < 5000 and not dark.numpy()[~others].any()
+    place = np.array([0.5, 1.0, 2.0]) + nearest[:, None] * rays
+    beneath = place - sun / sun[2] * (place[:, 2:] + 0.5)  # back to the box's lower side
+    is_under = (place[:, 2] < -0.5) & (np.abs(beneath[:, :2]) <= [1.0, 2.0]).all(1)
+    assert dark.numpy()[others & is_under].all()
+
+
+@wp.kernel(enable_backward=False)
+def near(
+    sight: structs_kernel.Sight,
+    rays: wp.array[wp.vec3],
+    nearest: wp.array[float],
+    owners: wp.array[int],
+    sun: wp.vec3,
+    dark: wp.array[int],
+    behind: wp.array[int],
+):
+    mark_near(dark, 0, rays.shape[0], rays, nearest, owners, 8, 0, sight, sun, 2)
+    for i in range(rays.shape[0]):
+        behind[i] = int(is_behind(sight, rays[i], nearest[i], sun))
+
+
+@pytest.mark.parametrize(
+    ("kind", "reach"),
+    [(SPHERE, (1.0, 1.0, 1.0)), (CYLINDER, (0.5, 0.5, 2.0)), (ELLIPSOID, (1.0, 2.0, 0.5))],
+)
+def test_what_may_be_in_the_shadow_is_all_that_is(kind, reach):
+    """20,000 places; those by whose way to the sun the ball of that reach lies, and no others."""
+    source = np.random.RandomState(0)
+    rays = source.normal(size=(20_000, 3))
+    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    nearest = source.uniform(0.0, 8.0, 20_000)
+    owners = source.choice([-1, 5, 8, 16], 20_000)  # the sky, the geom itself, two others
+    before = source.choice([0, 1], 20_000)
+    sight = structs_kernel.Sight()
+    sight.kind, sight.size, sight.reach = (
+        int(kind),
+        wp.vec3(reach[0], reach[2], 0.0),
+        wp.vec3(reach),
+    )
+    if kind == ELLIPSOID:
+        sight.size = wp.vec3(reach)
+    sight.eye, sight.into = wp.vec3(0.5, 1.0, 2.0), wp.mat33(*np.eye(3).flatten())
+    dark, behind = array(before, int), wp.zeros(20_000, dtype=int, device="cpu")
+    sun = np.array([0.0, 0.6, -0.8])
+    given = [array(rays, wp.vec3), array(nearest, float), array(owners, int), wp.vec3(*sun)]
+    wp.launch(near, 1, inputs=[sight, *given, dark, behind], device="cpu")
+    marked = dark.numpy() == 2
+    is_open = (owners >= 8) & (before == 0)
+    assert (dark.numpy() == before)[~is_open].all()
+    assert marked[is_open & (behind.numpy() == 1)].all() and behind.numpy()[is_open].sum() > 20
+    place = np.array([0.5, 1.0, 2.0]) + nearest[:, None] * rays
+    away = np.linalg.norm(np.cross(place, sun), axis=1) / np.linalg.norm(reach)
+    assert marked[is_open & (away < 0.999)].all() and not marked[away > 1.01].any()

@@ -1,0 +1,91 @@
+"""Colours of single pixels; whole pictures are in test_raytrace_scenic."""
+
+import numpy as np
+import pytest
+import warp as wp
+
+from drone_rl.sim.rendering.raytrace.spans_kernel import Cover, shade_covered, shade_even, shade_sky
+from drone_rl.sim.rendering.textures import levels
+from tests.box_ahead import array
+
+LIT, SHADED, HORIZON = (wp.vec3(*c) for c in ((200, 100, 300), (20, 10, 30), (50, 60, 70)))
+
+
+@wp.kernel(enable_backward=False)
+def shade(
+    colors: wp.array[wp.vec3ub],
+    rays: wp.array[wp.vec3],
+    nearest: wp.array[float],
+    dark: wp.array[int],
+    texels: wp.array[wp.uint32],
+    cover: Cover,
+    fog: float,
+    what: int,
+):
+    count = colors.shape[0]
+    if what == 0:
+        shade_sky(colors, 0, count, rays, wp.vec3(0.0, 1.0, 0.0), HORIZON, LIT)
+    if what == 1:
+        shade_even(colors, 0, count, nearest, dark, LIT, SHADED, fog, HORIZON)
+    if what == 2:
+        shade_covered(
+            colors, 0, count, rays, nearest, dark, texels, cover, LIT, SHADED, fog, HORIZON
+        )
+
+
+def shaded(what, rays, nearest=None, dark=None, texels=(0,), cover=None, fog=0.0):
+    count = len(rays)
+    colors = wp.zeros(count, dtype=wp.vec3ub, device="cpu")
+    given = [array(rays, wp.vec3), array(nearest or [1.0] * count, float)]
+    given += [array(dark or [0] * count, int), array(texels, wp.uint32), cover or Cover()]
+    wp.launch(shade, 1, inputs=[colors, *given, fog, what], device="cpu")
+    return colors.numpy().tolist()
+
+
+def test_the_sky_is_between_its_two_colours():
+    rays = [(0.0, 0.0, -1.0), (0.0, 0.6, -0.8), (0.0, -0.6, -0.8)]
+    found = shaded(0, rays)
+    assert found == [[50, 60, 70], [140, 84, 208], [50, 60, 70]]
+
+
+def test_an_even_face_is_lit_or_dark_and_cut_off_at_white():
+    assert shaded(1, [(0, 0, -1)] * 2, dark=[0, 1]) == [[200, 100, 255], [20, 10, 30]]
+
+
+@pytest.mark.parametrize("metres", [1.0, 7.0, 40.0, 1000.0])
+def test_what_fog_leaves_goes_with_the_exponential_of_the_way(metres):
+    clear = np.exp(-0.05 * metres)
+    wanted = clear * np.array([200, 100, 255]) + (1 - clear) * np.array([50, 60, 70])
+    (found,) = shaded(1, [(0, 0, -1)], [metres], fog=0.05)
+    assert np.abs(np.array(found) - wanted).max() <= 1
+
+
+def covered(place, metres=1.0, area=0.0):
+    """A texture of 2 by 2 texels, black, red / green, blue, of which a tile is 1 m."""
+    colors = np.array([[[0, 0, 0], [255, 0, 0]], [[0, 255, 0], [0, 0, 255]]], np.uint8)
+    texels = levels(colors).astype(np.uint32) @ np.array([1, 256, 65536], np.uint32)
+    cover = Cover()
+    cover.start, cover.side, cover.area = 1, 2, area
+    cover.facing, cover.corner = wp.vec3(0.0, 0.0, -1.0), wp.vec2(*place)
+    return shaded(2, [(0, 0, -1)], [metres], texels=[7, *texels], cover=cover)[0]
+
+
+@pytest.mark.parametrize("tile", [-3, 0, 5])
+def test_the_middle_of_a_texel_has_its_colour(tile):
+    assert covered((tile + 0.25, tile + 0.25)) == [0, 0, 0]
+    assert covered((tile + 0.75, tile + 0.25)) == pytest.approx([200, 0, 0], abs=1)
+    assert covered((tile + 0.25, tile + 0.75)) == pytest.approx([0, 100, 0], abs=1)
+    assert covered((tile + 0.75, tile + 0.75)) == pytest.approx([0, 0, 255], abs=1)
+
+
+def test_between_texels_their_colours_are_mixed():
+    assert covered((0.5, 0.25)) == pytest.approx([100, 0, 0], abs=1)
+    assert covered((0.0, 0.25)) == pytest.approx([100, 0, 0], abs=1)  # over the edge of the tile
+    assert covered((0.5, 0.5)) == pytest.approx([50, 25, 75], abs=1)
+
+
+def test_a_pixel_that_covers_a_tile_has_its_mean():
+    assert covered((0.25, 0.25), area=1.9) == [0, 0, 0]
+    assert covered((0.25, 0.25), area=2.1) == pytest.approx([50, 25, 75], abs=1)
+    assert covered((0.25, 0.25), metres=2.0, area=0.6) == pytest.approx([50, 25, 75], abs=1)
+    assert covered((0.25, 0.25), metres=9.0, area=1e30) == pytest.approx([50, 25, 75], abs=1)

@@ -1,0 +1,124 @@
+"""dm_control's simulation as an appearance has it: in its model, and by its pictures."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import torch
+
+from benchmarks import speed
+from drone_rl.config import AppearanceSettings, CameraSettings
+from drone_rl.envs import DroneEnv
+from drone_rl.sim.composer_task import make_environment
+from drone_rl.sim.rendering import Appearance
+from drone_rl.sim.rendering.opengl import in_fog
+from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.textures import load
+from drone_rl.utils.seeding import world_random_state
+
+BLOCKS = dataclasses.replace(
+    speed.BLOCKS,
+    camera_turn=((-3.0, -3.0, -3.0), (3.0, 3.0, 3.0)),
+    camera_widening=(-5.0, 5.0),
+)
+"""As in conf/appearance/blocks.yaml, by a camera that differs from flight to flight, too."""
+
+
+def test_its_model_has_what_was_drawn_for_the_same_stream():
+    env = make_environment(pixels=False, random_state=world_random_state(0, 0), appearance=BLOCKS)
+    worlds = DroneEnv(1, appearance=BLOCKS, pixels=False)
+    look = None
+    for _ in range(2):
+        env.reset()
+        worlds.start()
+        look = worlds.looks.drawn()
+        model = env.physics.model
+        places = worlds.worlds.poses(worlds.worlds.state, look).props[0].numpy()
+        np.testing.assert_allclose(env.physics.data.mocap_pos, places, atol=1e-9)
+    assert look is not None
+    geoms = env.task.compile().geoms(Meaning.DISTRACTOR)
+    sizes = model.geom_size[geoms, 0]
+    np.testing.assert_allclose(sizes, look.beside.sizes[0] / 2)
+    np.testing.assert_allclose(model.geom_rgba[geoms, :3], look.beside.colors[0], atol=1e-6)
+    np.testing.assert_allclose(model.light_dir[0], look.sun_direction[0], atol=1e-9)
+    assert model.light_castshadow[0] and model.vis.headlight.ambient[0] == pytest.approx(0.42)
+    camera = model.name2id("drone/front_center", "camera")
+    own = CameraSettings().vertical_fov
+    half = np.tan(np.radians([model.cam_fovy[camera], own]) / 2)
+    assert half[1] / half[0] == pytest.approx(float(look.camera.zoom[0]))
+    worlds.close()
+
+
+def test_the_minimal_look_leaves_the_model_as_it_is():
+    plain, minimal = (
+        make_environment(pixels=False, appearance=look, random_state=0)
+        for look in (None, AppearanceSettings())
+    )
+    assert plain.task.root_entity.mjcf_model.to_xml_string() == (
+        minimal.task.root_entity.mjcf_model.to_xml_string()
+    )
+
+
+def test_fog_by_hand():
+    look = Appearance(colors={Meaning.SKY: (1.0, 0.0, 0.0)}, fog=10.0)
+    picture = np.full((1, 1, 3), 100, np.uint8)
+    for depth, share in ((0.0, 0.0), (10.0, 0.95), (5.0, 1 - 0.05**0.5), (90.0, 0.0)):
+        fogged = in_fog(picture, np.full((1, 1), depth), look, 90.0, 80.0)
+        wanted = 100 + share * (np.array([255, 0, 0]) - 100)
+        assert np.abs(fogged[0, 0] - wanted).max() <= 1
+    assert in_fog(picture, np.ones((1, 1)), Appearance(), 90.0, 80.0) is picture
+
+
+def inner(mask):
+    """Without the pixels along its edges."""
+    around = (np.roll(mask, by, axis) for by in (-1, 1) for axis in (0, 1))
+    return np.logical_and.reduce([mask, *around])
+
+
+@pytest.mark.render
+def test_pictures_of_blocks_agree_with_ours(egl):
+    """Mean colours within each thing, but for edges, which blend: 4 of 255; of all pixels: 5."""
+    camera = CameraSettings(width=240, height=120, horizontal_fov=100.0)
+    env = make_environment(camera=camera, random_state=world_random_state(0, 0), appearance=BLOCKS)
+    ours = DroneEnv(1, camera=camera, appearance=BLOCKS)
+    worlds, timestep = ours.worlds, env.reset()
+    ours.reset()
+    for action in (0, 0, 1, 0):
+        view = worlds.view(modality=("rgb", "segmentation"))
+        pictures = worlds.render_all(worlds.state, view, ours.looks.drawn())
+        traced, seen = (pictures[name][0, 0].numpy() for name in view.modalities)
+        drawn = timestep.observation["drone/front_center"].astype(int)
+        assert np.abs(traced - drawn).mean() < 5
+        for geom in np.unique(seen):
+            pixels = inner(seen == geom)
+            if pixels.sum() >= 100:
+                difference = traced[pixels].mean(0) - drawn[pixels].mean(0)
+                assert np.abs(difference).max() < 4, (geom, difference)
+        timestep = env.step(action)
+        worlds.step(torch.arange(1), torch.tensor([action]))
+    ours.close()
+
+
+def test_fog_grows_with_the_distance_along_each_ray():
+    """Two rows of four pixels, 90 degrees high: rays through (+-1.5, +-0.5) and (+-0.5, +-0.5)."""
+    look = Appearance(colors={Meaning.SKY: (0.5, 0.5, 0.5)}, fog=10.0, exposure=2.0)
+    fogged = in_fog(np.zeros((2, 4, 3), np.uint8), np.full((2, 4), 5.0), look, 90.0, 80.0)
+    near, far = (int(255 * (1 - 0.05 ** (0.5 * d**0.5))) for d in (1.5, 3.5))
+    assert fogged[..., 0].tolist() == [[far, near, near, far]] * 2
+    narrow = in_fog(np.zeros((2, 4, 3), np.uint8), np.full((2, 4), 5.0), look, 53.13010235, 80.0)
+    near, far = (int(255 * (1 - 0.05 ** (0.5 * (1 + d / 4) ** 0.5))) for d in (0.5, 2.5))
+    assert np.abs(narrow[0, :2, 0] - np.array([far, near])).max() <= 1
+
+
+@pytest.mark.parametrize(("texture", "size", "repeat"), [("grid", 4.0, 0.25), (None, None, 1.0)])
+def test_tiles_of_the_ground_are_as_large_as_asked_for(texture, size, repeat):
+    own = {} if texture is None else {"ground_texture": texture, "ground_tile": size}
+    look = AppearanceSettings(sun_elevation=40.0, **own)
+    env = make_environment(pixels=False, random_state=0, appearance=look)
+    env.reset()
+    model = env.physics.model
+    number = model.name2id("ground", "material")
+    assert model.mat_texrepeat[number].tolist() == [repeat, repeat]
+    start = model.tex_adr[model.name2id("ground", "texture")]
+    texels = model.tex_data[start : start + 3 * 256 * 256].reshape(256, 256, 3)
+    assert np.array_equal(texels, np.full_like(texels, 255) if texture is None else load(texture))

@@ -1,0 +1,44 @@
+import pytest
+import torch
+
+from drone_rl.sim.sensors.sensor import forgotten, normal, walked
+
+
+def generator():
+    return torch.Generator().manual_seed(3)
+
+
+def test_white_noise_has_mean_0_and_deviation_1():
+    drawn = normal(torch.zeros(10_000, 2, dtype=torch.float64), generator())
+    assert drawn.dtype == torch.float64
+    assert abs(drawn.mean().item()) < 0.03 and drawn.std().item() == pytest.approx(1.0, abs=0.02)
+    again = normal(torch.zeros(10_000, 2, dtype=torch.float64), generator())
+    assert torch.equal(drawn, again)
+
+
+@pytest.mark.parametrize("steps", [1, 40])
+def test_a_walk_goes_as_far_in_many_steps_as_in_one(steps):
+    """2 in 5 s: in 20 s, twice as far."""
+    value, stream = torch.zeros(20_000, 1, dtype=torch.float64), generator()
+    seconds = torch.full((20_000,), 20.0 / steps, dtype=torch.float64)
+    for _ in range(steps):
+        value = walked(value, 2.0, 5.0, seconds, stream)
+    assert value.std().item() == pytest.approx(4.0, rel=0.02)
+
+
+@pytest.mark.parametrize("steps", [1, 40])
+def test_what_forgets_itself_stays_within_bounds_however_small_the_steps(steps):
+    """From 3, after one time constant 37% are left, and 1 - e^-2 of the variance is there."""
+    value, stream = torch.full((20_000, 1), 3.0, dtype=torch.float64), generator()
+    seconds = torch.full((20_000,), 60.0 / steps, dtype=torch.float64)
+    for _ in range(steps):
+        value = forgotten(value, 0.5, 60.0, seconds, stream)
+    assert value.mean().item() == pytest.approx(3.0 * 0.36788, abs=0.02)
+    assert value.std().item() == pytest.approx(0.5 * 0.92987, rel=0.02)
+
+
+def test_no_time_changes_nothing():
+    value = torch.tensor([[1.0], [2.0]], dtype=torch.float64)
+    still = torch.zeros(2, dtype=torch.float64)
+    assert torch.equal(walked(value, 1.0, 1.0, still, generator()), value)
+    assert torch.equal(forgotten(value, 1.0, 1.0, still, generator()), value)

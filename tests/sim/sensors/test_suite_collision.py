@@ -1,0 +1,64 @@
+import torch
+
+from drone_rl.sim.dynamics.state import GROUND, NOTHING, Contact
+from drone_rl.sim.sensors import suite
+
+
+def contact(things, times):
+    """Each in another place, to be told apart."""
+    count = len(things)
+    numbers = torch.arange(1.0, count + 1, dtype=torch.float64)
+    up = torch.tensor([[0.0, 0.0, 1.0]], dtype=torch.float64).repeat(count, 1)
+    time = torch.tensor(times, dtype=torch.float64)
+    return Contact(torch.tensor(things), up, up * numbers[:, None], 0.01 * numbers, time)
+
+
+def place(x):
+    return torch.full((2, 3), float(x), dtype=torch.float64)
+
+
+def test_a_touch_is_remembered_until_it_is_read():
+    state = suite.start(place(0))
+    assert state.has_collided.tolist() == [False, False]
+    state = suite.update(state, contact([NOTHING] * 2, [0.0] * 2), place(1))
+    assert state.has_collided.tolist() == [False, False]
+    touched = contact([NOTHING, 3], [0.0, 0.5])
+    state = suite.update(state, touched, place(2))
+    state = suite.update(state, touched, place(3))
+    assert state.has_collided.tolist() == [False, True]
+    told, state = suite.read(state)
+    assert told.has_collided.tolist() == [False, True]
+    assert told.contact.thing.tolist() == [NOTHING, 3]
+    assert told.contact.normal[1].tolist() == [0.0, 0.0, 1.0]
+    assert told.contact.point[1].tolist() == [0.0, 0.0, 2.0]
+    assert told.contact.depth[1].item() == 0.02
+    assert told.contact.time[1].item() == 0.5
+    assert told.position[1].tolist() == [2.0, 2.0, 2.0]
+    again, state = suite.read(state)
+    assert again.has_collided.tolist() == [False, False]
+    assert again.contact.thing.tolist() == [NOTHING, 3]
+    state = suite.update(state, touched, place(4))
+    assert state.has_collided.tolist() == [False, False]
+
+
+def test_a_later_touch_of_the_same_thing_is_another():
+    state = suite.update(suite.start(place(0)), contact([GROUND] * 2, [0.0] * 2), place(1))
+    _, state = suite.read(state)
+    state = suite.update(state, contact([GROUND] * 2, [0.0, 0.003]), place(2))
+    assert state.has_collided.tolist() == [False, True]
+    assert state.position[:, 0].tolist() == [1.0, 2.0]
+
+
+def test_one_drone_is_read_alone():
+    state = suite.update(suite.start(place(0)), contact([1, 2], [0.1] * 2), place(1))
+    told, after = suite.read(state, torch.tensor([1]))
+    assert told.contact.thing.tolist() == [2]
+    assert after.has_collided.tolist() == [True, False]
+    assert state.has_collided.tolist() == [True, True]
+
+
+def test_things_have_names():
+    assert suite.thing_name(NOTHING) == ""
+    assert suite.thing_name(GROUND) == "ground"
+    assert suite.thing_name(4) == "obstacle_4"
+    assert suite.thing_name(0, "target") == "target_0"

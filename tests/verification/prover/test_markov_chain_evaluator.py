@@ -1,0 +1,54 @@
+"""What a policy is shown of a node is what its camera shows it there."""
+
+import pytest
+import torch
+from torchrl.envs import CatFrames
+
+from drone_rl.config import TaskSettings
+from drone_rl.envs import DroneEnv, GrayPixels, LateFrames, with_transforms
+from drone_rl.utils.errors import InputError
+from drone_rl.verification.prover.lattice import explore
+from drone_rl.verification.prover.markov_chain import Sight
+
+
+def test_wishes_are_those_of_the_same_pictures_in_flight(make_pipeline):
+    env, actor = make_pipeline(3, task=TaskSettings(num_cubes=2))
+    network = actor.module[0].module
+    now = env.reset()
+    task = env.base_env.worlds.task.settings
+    cubes = env.base_env.worlds.state.cubes.clone()
+    graph, sight = explore(task, cubes), Sight(env, network)
+    ask, node = sight.on(graph), torch.arange(3)
+    wishes = ask(torch.arange(len(graph.nodes)))
+    assert sight.pictures == len(graph.pictures()[0])
+    assert torch.equal(ask(torch.tensor([7, 3, 7])), wishes[[7, 3, 7]])
+    assert sight.pictures == len(graph.pictures()[0])  # no more than before
+    random = torch.Generator().manual_seed(0)
+    for _ in range(20):
+        with torch.no_grad():
+            expected = network(now["pixels"]).double().softmax(-1)
+        assert torch.allclose(wishes[node], expected, atol=1e-6, rtol=0)
+        action = torch.randint(0, 3, (3,), generator=random) * (torch.arange(3) % 2)  # one wanders
+        node = graph.target[node, action]
+        now = env.step(now.set("action", action))["next"]
+    assert len(wishes) == len(graph.nodes)
+    assert torch.allclose(wishes.sum(-1), torch.ones(len(wishes)).double())
+
+
+def test_a_policy_with_a_memory_is_refused():
+    env = with_transforms(
+        DroneEnv(1, TaskSettings(num_cubes=1)),
+        [GrayPixels(), CatFrames(N=2, dim=-3, in_keys=["pixels"])],
+    )
+    with pytest.raises(InputError, match=r"stacks 2 frames.*give a policy that sees one picture"):
+        Sight(env, lambda pixels: pixels)
+    env.close()
+
+
+def test_a_camera_that_goes_wrong_is_refused():
+    env = with_transforms(DroneEnv(1, TaskSettings(num_cubes=1)), [GrayPixels(), LateFrames(1)])
+    with pytest.raises(
+        InputError, match=r"goes wrong \(LateFrames\(frames=1\)\).*a policy without"
+    ):
+        Sight(env, lambda pixels: pixels)
+    env.close()

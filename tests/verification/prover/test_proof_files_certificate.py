@@ -1,0 +1,85 @@
+"""Certificates: what is in one, and that the second checker, which shares nothing, accepts it."""
+
+import json
+from contextlib import closing
+
+import pytest
+import torch
+
+import drone_rl
+from drone_rl.utils.provenance import provenance
+from drone_rl.verification.prover.policy_spec import make_subject
+from drone_rl.verification.prover.proof_files import certify, weights_hash
+from drone_rl.verification.prover.prover import Prover
+
+
+@pytest.fixture(scope="module")
+def proof(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("proof")
+    task = {"num_cubes": 1}
+    return drone_rl.prove("right_and_forward", folder=folder, task=task, compared=100)
+
+
+def test_the_hash_by_hand():
+    import hashlib
+
+    weights = {"b": torch.tensor([1.0]), "a": torch.tensor([[2.0, 3.0]])}
+    expected = hashlib.sha256()
+    expected.update(b"a [1, 2]\n\x00\x00\x00\x40\x00\x00\x40\x40b [1]\n\x00\x00\x80\x3f")
+    assert weights_hash(weights) == expected.hexdigest()
+
+
+def test_shares_add_up(proof):
+    found = proof.certificate
+    total = sum(o["share"] for o in found["outcomes"]) + found["undecided"]["share"]
+    assert total == pytest.approx(1.0, abs=1e-12)
+    assert found["finished"] is True
+    for outcome in found["outcomes"]:
+        assert sum(outcome["steps"].values()) <= outcome["share"] + 1e-12
+
+
+def test_it_is_data(proof):
+    assert json.loads((proof.folder / "certificate.json").read_text()) == proof.certificate
+
+
+def test_the_second_checker_accepts_it(proof):
+    assert drone_rl.check(proof.folder / "certificate.json", flights=300).accepted
+
+
+def test_what_is_stated_when_it_is_stopped_within_a_part_is_accepted(tmp_path):
+    policy = drone_rl.load_policy("right_and_forward").in_task(num_cubes=1, lateral_bound=2.0)
+    network = policy.make_network()
+    path, found = tmp_path / "certificate.json", {}
+    with closing(make_subject(policy.description, network, 1e-4)) as subject:
+        prover = Prover(subject, 100)
+        while prover.parts.size:
+            prover.advance()
+        while not prover.ended:
+            prover.advance()
+        assert prover.part.size and prover.waiting and prover.done.endings
+        weights = weights_hash(policy.state["policy"])
+        found = certify(policy.name, policy.description, weights, prover, 1.0, "limit_s")
+    path.write_text(json.dumps(found | provenance()))
+    assert not found["finished"] and found["found"]["stopped_by"] == "limit_s"
+    shares = sum(o["share"] for o in found["outcomes"])
+    assert 0.0 < shares < 1.0 and shares + found["undecided"]["share"] == pytest.approx(1.0)
+    assert drone_rl.check(path, flights=300).accepted
+    found["outcomes"][0]["boxes"] += found["undecided"]["boxes"][:1]
+    path.write_text(json.dumps(found | provenance()))
+    assert not drone_rl.check(path, flights=300).accepted
+
+
+def test_the_second_checker_refuses_what_was_changed(proof, tmp_path):
+    """The border moved by half a metre: flights there end otherwise."""
+    changed = json.loads(json.dumps(proof.certificate))
+    lost, won = sorted(changed["outcomes"], key=lambda o: o["end"] == "all_cubes")
+    low, high = min(won["boxes"])[0], max(lost["boxes"])[0]
+    assert low[0] == -6.0 and high[1] == 6.0
+    moved = 0.5
+    won["boxes"], lost["boxes"] = [[[-6.0, 1.65 + moved]]], [[[1.65 + moved, 6.0]]]
+    won["share"], lost["share"] = (7.65 + moved) / 12, (4.35 - moved) / 12
+    won["steps"], lost["steps"], changed["undecided"] = {}, {}, {"share": 0.0, "boxes": []}
+    path = tmp_path / "changed.json"
+    path.write_text(json.dumps(changed))
+    found = drone_rl.check(path, flights=300)
+    assert not found.accepted
