@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from drone_rl.config.judging import JudgeSettings
+from drone_rl.config.commands import JudgeSettings
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.robustness.axes import AXES, Axis
 from drone_rl.robustness.shifts import shifts

@@ -18,8 +18,8 @@ from torchrl.envs.utils import ExplorationType, set_exploration_type
 from benchmarks.gamed_case import GamedCase
 from drone_rl.collectors import EpisodeCollector
 from drone_rl.config import TaskSettings
+from drone_rl.config.commands import FlightSettings
 from drone_rl.config.configuration import as_config
-from drone_rl.config.judging import FlightSettings
 from drone_rl.config.networks import Mlp
 from drone_rl.config.training import TrainSettings
 from drone_rl.evaluation.evaluate import evaluate

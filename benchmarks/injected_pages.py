@@ -22,12 +22,11 @@ from drone_rl.explanations.report.explanation import Explanation
 from drone_rl.explanations.report.page import Policy, render_page
 from drone_rl.explanations.report.part import Part
 from drone_rl.explanations.report.sections import embedding
-from drone_rl.sim.action_display import ShownActions
-from drone_rl.sim.vocabulary import TaskVocabulary
+from drone_rl.sim.vocabulary import ShownActions, TaskVocabulary
 from drone_rl.sweeps.report import render_page as render_sweep
 from drone_rl.utils.display import page, paragraph, table
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.sentences import say
+from drone_rl.utils.text import say
 
 Place = tuple[tuple[Any, ...], bool]
 """Keys that lead to an entry, and whether its name is meant and not its value."""

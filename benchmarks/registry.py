@@ -134,7 +134,7 @@ BENCHMARKS: dict[str, Benchmark] = {
         (
             *_CLAIMS,
             "utils/display",
-            "utils/pages",
+            "utils/display",
             "benchmarks/injections",
             "benchmarks/injected_pages",
             "benchmarks/injection_payloads",

@@ -14,7 +14,7 @@ from typing import Any
 from benchmarks.commands import train
 from benchmarks.robust_comparison import PLAIN, by_kind, compare, mean, untouched_kinds
 from drone_rl.config import MINIMAL
-from drone_rl.config.shifting import ShiftSettings
+from drone_rl.config.commands import ShiftSettings
 from drone_rl.policies.policy import load_policy
 from drone_rl.policies.zoo import read_checkpoint
 from drone_rl.robustness.axes import AXES, GROUPS, find_axes
@@ -94,15 +94,15 @@ def fly(
     """
     asked = ShiftSettings(episodes=episodes)
     subjects = {str(run): _in_plain_worlds(run, asked) for run in runs}
-    bed = PairedEvaluator(next(iter(subjects.values())), episodes, seed=0)
+    evaluator = PairedEvaluator(next(iter(subjects.values())), episodes, seed=0)
     try:
         axes = [
             dataclasses.replace(axis, strengths=axis.strengths[:strengths])
-            for axis in find_axes(None, bed.subject)
+            for axis in find_axes(None, evaluator.subject)
         ]
-        found = compare(bed, subjects, axes, possible_share=asked.possible_share)
+        found = compare(evaluator, subjects, axes, possible_share=asked.possible_share)
     finally:
-        bed.close()
+        evaluator.close()
     return {Path(name): shares for name, shares in found.items()}
 
 

@@ -33,8 +33,8 @@ from drone_rl.explanations.report import (
 from drone_rl.robustness import domain_text as domain
 from drone_rl.robustness import shifts_text as shifts
 from drone_rl.sweeps import text as sweep
-from drone_rl.utils import seed_text as seeds
-from drone_rl.utils.sentences import Sentence, said
+from drone_rl.utils import text as seeds
+from drone_rl.utils.text import Sentence, said
 from drone_rl.verdicts import card as card
 
 Changes = Mapping[str, Any]

@@ -6,9 +6,8 @@ What is listed here is imported when it is first used, so that `import drone_rl`
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from drone_rl.utils.garbage import collecting_no_garbage
-from drone_rl.utils.gymnasium_registration import register
-from drone_rl.utils.when_imported import import_quietly, when_imported
+from drone_rl.utils.imports import import_quietly, register, when_imported
+from drone_rl.utils.memory import collecting_no_garbage
 
 if TYPE_CHECKING:
     from drone_rl.config import (
@@ -18,16 +17,21 @@ if TYPE_CHECKING:
         PillarsSettings,
         TaskSettings,
     )
-    from drone_rl.config.bodies import BodiesSettings
-    from drone_rl.config.chances import ChanceSettings
-    from drone_rl.config.checking import CheckSettings
-    from drone_rl.config.judging import EvaluateSettings, JudgeSettings
-    from drone_rl.config.mapping import PlacesSettings
-    from drone_rl.config.provable import ProvableSettings
-    from drone_rl.config.proving import ProveSettings
+    from drone_rl.config.commands import (
+        BodiesSettings,
+        EvaluateSettings,
+        JudgeSettings,
+        ShiftSettings,
+    )
     from drone_rl.config.sensors import SensorSettings
-    from drone_rl.config.shifting import ShiftSettings
     from drone_rl.config.training import TrainerSettings, TrainSettings
+    from drone_rl.config.verification import (
+        ChanceSettings,
+        CheckSettings,
+        PlacesSettings,
+        ProvableSettings,
+        ProveSettings,
+    )
     from drone_rl.envs.gymnasium.world import DroneWorld
     from drone_rl.envs.gymnasium.worlds import DroneWorlds
     from drone_rl.envs.sb3.worlds import Sb3Worlds
@@ -190,7 +194,7 @@ def __getattr__(name: str) -> Any:
     """Imports a public name when it is first asked for."""
     if name not in _HOMES:
         raise AttributeError(f"module 'drone_rl' has no attribute {name!r}")
-    from drone_rl.utils.quiet import noise_held_back
+    from drone_rl.utils.imports import noise_held_back
 
     with collecting_no_garbage(), noise_held_back():
         value = getattr(importlib.import_module(_HOMES[name]), name)

@@ -68,6 +68,6 @@ def test_settings_are_given_by_name(all_of_them):
         for name, kind in all_of_them.items()
         for field in dataclasses.fields(kind)
         if name.startswith(BY_NAME_ALONE) and field.init and not field.kw_only
-        if name != "drone_rl.config.changes:Changes"  # a type, and nothing else
+        if name != "drone_rl.config.configuration:Changes"  # a type, and nothing else
     }
     assert by_place == set()

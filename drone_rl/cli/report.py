@@ -5,7 +5,7 @@ import logging
 from pathlib import Path
 from typing import Annotated, Any
 
-from drone_rl.config.paths import PathsSettings
+from drone_rl.config.commands import PathsSettings
 from drone_rl.utils.schema import Listed
 from drone_rl.utils.settings import Settings
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
-from drone_rl.config.paths import PathsSettings
+from drone_rl.config.commands import PathsSettings
 from drone_rl.utils.schema import Whole
 from drone_rl.utils.settings import Settings
 

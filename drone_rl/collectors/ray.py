@@ -24,8 +24,7 @@ from torch import nn
 from torchrl.collectors import BaseCollector
 
 from drone_rl.collectors.episodes import EpisodeCollector
-from drone_rl.utils.errors import InputError
-from drone_rl.utils.extras import extra
+from drone_rl.utils.errors import InputError, extra
 
 Parts = tuple[EpisodeCollector, nn.Module, torch.Generator]
 """A worker's collector, the network inside it and the stream of its actions."""

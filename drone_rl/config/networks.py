@@ -3,7 +3,7 @@
 import dataclasses
 from typing import Annotated, ClassVar
 
-from drone_rl.config.variant import Variant
+from drone_rl.config.configuration import Variant
 from drone_rl.utils.schema import Several, Whole
 
 Channels = Annotated[tuple[int, ...], Several(Whole(1, 512, "channels"), 1, 8)]

@@ -3,7 +3,7 @@
 import dataclasses
 from typing import Annotated, Any, ClassVar
 
-from drone_rl.config.variant import Variant
+from drone_rl.config.configuration import Variant
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Real, Several, Whole
 

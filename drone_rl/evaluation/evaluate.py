@@ -7,7 +7,7 @@ from typing import Any
 
 from tensordict.nn import TensorDictModuleBase
 
-from drone_rl.config.judging import EvaluateSettings, FlightSettings
+from drone_rl.config.commands import EvaluateSettings, FlightSettings
 from drone_rl.envs import worlds_of
 from drone_rl.evaluation.baselines import run_baselines
 from drone_rl.evaluation.metrics import summarise
@@ -21,9 +21,8 @@ from drone_rl.sim.tasks import as_task
 from drone_rl.utils.display import aligned, interval, paragraph, table
 from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
-from drone_rl.utils.seed_text import fixed_seed, seed_line
 from drone_rl.utils.seeding import RootSeed, with_seed
-from drone_rl.utils.sentences import Evidence, Sentence, percent, say
+from drone_rl.utils.text import Evidence, Sentence, fixed_seed, percent, say, seed_line
 
 
 @dataclasses.dataclass(frozen=True)

@@ -24,7 +24,7 @@ from drone_rl.evaluation.verdict_text import SENTENCES
 from drone_rl.policies.policy import load_policy
 from drone_rl.utils.intervals import mean_bounds, proportion
 from drone_rl.utils.seeding import RootSeed, Stream, root_seed
-from drone_rl.utils.sentences import say
+from drone_rl.utils.text import say
 
 MANY = (2, 3, 5, 10, 20, 50, 100)
 """Multiples of the number of episodes for which certainty is extrapolated."""

@@ -20,8 +20,8 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import to_file_name
 from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
-from drone_rl.utils.seed_text import seed_line
 from drone_rl.utils.seeding import RootSeed, with_seed
+from drone_rl.utils.text import seed_line
 from drone_rl.verdicts.certificate import find_claim
 from drone_rl.verdicts.coverage import find_domain
 

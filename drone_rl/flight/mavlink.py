@@ -21,9 +21,8 @@ import numpy as np
 from drone_rl.flight.in_the_loop.control import RcSticks
 from drone_rl.flight.in_the_loop.drone import FlightControllerError
 from drone_rl.flight.in_the_loop.instruments import Readings, Vector, into_body
-from drone_rl.sim.frames import frd_from_body, ned_from_world, world_from_ned
-from drone_rl.utils.errors import InputError
-from drone_rl.utils.extras import extra
+from drone_rl.sim.coordinates import frd_from_body, ned_from_world, world_from_ned
+from drone_rl.utils.errors import InputError, extra
 
 TCP_PORT = 4560
 """Port at which PX4 expects a simulator."""

@@ -16,8 +16,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from drone_rl.sweeps.runs import THREADS, Run, read_result
-from drone_rl.utils.errors import InputError
-from drone_rl.utils.extras import extra
+from drone_rl.utils.errors import InputError, extra
 from drone_rl.utils.files import is_locked, read_tail, write_atomically
 from drone_rl.utils.limits import LOG_BYTES
 from drone_rl.utils.provenance import num_cores

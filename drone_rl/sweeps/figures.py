@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from drone_rl.evaluation.rule import KINDS
-from drone_rl.sim.action_display import MOVES
+from drone_rl.sim.vocabulary import SHOWN_MOVES
 from drone_rl.sweeps.rows import Row
 from drone_rl.sweeps.summary import FAILED, Group, median_band, on_grid
 
@@ -31,7 +31,7 @@ LOG_FROM = 3.0
 """Ratio of the greatest to the least value from which the axis is logarithmic."""
 MOST_LABELS = 7
 """Greatest number of tick labels."""
-UNIFORM = float(np.log(len(MOVES.names)))
+UNIFORM = float(np.log(len(SHOWN_MOVES.names)))
 """Entropy of the uniform distribution over the moves, nats."""
 _ROUNDING = 1e-4
 

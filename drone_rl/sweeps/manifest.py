@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from drone_rl.config.comparison import check_same_config
+from drone_rl.config.configuration import check_same_config
 from drone_rl.sweeps.runs import Run
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import read_json, refuse_links, write_atomically

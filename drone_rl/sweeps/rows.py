@@ -15,10 +15,10 @@ from drone_rl.evaluation.rule import SIDES, Kind, Rule
 from drone_rl.sweeps.manifest import Sweep
 from drone_rl.sweeps.runs import Run, read_failure, read_result
 from drone_rl.utils.consistency import read_entry
-from drone_rl.utils.csv_table import TablesAllowance, read_table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.former_names import FORMER_NAMES
 from drone_rl.utils.limits import SWEEP_RESULTS_BYTES, Allowance
+from drone_rl.utils.readers import TablesAllowance, read_table
 from drone_rl.utils.schema import Real, Whole
 
 Array = NDArray[np.float64]

@@ -8,8 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from drone_rl.utils.errors import InputError
-from drone_rl.utils.extras import extra
+from drone_rl.utils.errors import InputError, extra
 from drone_rl.utils.files import parse_json, read_bytes
 from drone_rl.utils.limits import JOURNAL_BYTES
 from drone_rl.utils.schema import Whole, as_mapping

@@ -18,7 +18,7 @@ from drone_rl.sweeps.rows import Array, Row
 from drone_rl.sweeps.runs import quoted
 from drone_rl.sweeps.text import GROUP_SENTENCES, SENTENCES
 from drone_rl.utils.intervals import median_bounds, proportion
-from drone_rl.utils.sentences import said
+from drone_rl.utils.text import said
 
 STATES = ("finished", "failed", "damaged", "unfinished")
 FAILED = "failed"

@@ -1,6 +1,6 @@
 """The sentences of a sweep's page and terminal lines; the evidence is its `summary.json`."""
 
-from drone_rl.utils.sentences import Evidence, Sentence, percent
+from drone_rl.utils.text import Evidence, Sentence, percent
 
 FEWEST = 6
 """Fewest runs whose median has an exact 95% interval."""

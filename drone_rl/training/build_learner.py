@@ -6,10 +6,9 @@ import torch
 from torch import nn
 
 from drone_rl.collectors import ThreadedCollector
-from drone_rl.config.configuration import as_config
-from drone_rl.config.objectives import WithCritic
+from drone_rl.config.configuration import as_config, locate
+from drone_rl.config.learning import WithCritic
 from drone_rl.config.training import TrainSettings
-from drone_rl.config.variant import locate
 from drone_rl.policies import ActorCritic, make_actor
 from drone_rl.policies.learning_network import LearningNetwork
 from drone_rl.policies.zoo import describe

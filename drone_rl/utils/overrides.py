@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.plain_yaml import read_yaml
+from drone_rl.utils.readers import read_yaml
 from drone_rl.utils.schema import Kind, Several, Text, shown
 
 _OF_ONE_FOLDER = re.compile(r"\+{0,2}(resume|trial|paths(\.\w+)?)")

@@ -5,8 +5,7 @@ from drone_rl.evaluation.verdict_text import best_luck
 from drone_rl.robustness.domain_text import QUOTED, untested
 from drone_rl.robustness.domain_text import is_quoted as has_domain
 from drone_rl.sim.vocabulary import some_cubes, terms_of
-from drone_rl.utils.numbers import listed
-from drone_rl.utils.sentences import Evidence, Sentence, said, say
+from drone_rl.utils.text import Evidence, Sentence, listed, said, say
 
 
 def _verdict(card: Evidence) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drone_rl.config.judging import JudgeSettings
+from drone_rl.config.commands import JudgeSettings
 from drone_rl.evaluation.metrics import Episodes
 from drone_rl.evaluation.outcomes import Rounding
 from drone_rl.policies.base_policy import Pilot

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from drone_rl.config.judging import JudgeSettings
-from drone_rl.config.shifting import ShiftSettings
+from drone_rl.config.commands import JudgeSettings, ShiftSettings
 from drone_rl.evaluation.rule import Rule
 from drone_rl.policies.base_policy import Pilot
 from drone_rl.policies.policy import Policy
@@ -25,7 +24,7 @@ from drone_rl.robustness.shifts_file import SavedShifts, read_shifts
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import mean_bounds
 from drone_rl.utils.seeding import RootSeed
-from drone_rl.utils.sentences import say
+from drone_rl.utils.text import say
 
 RANDOM = 2
 """Strengths that are drawn at random within each range, besides its ends."""
@@ -89,9 +88,9 @@ def recheck_domain(
         for axis in find_axes(needs, subject)
     }
     count = sum(map(len, tried.values())) + 1
-    with closing(PairedEvaluator(subject, settings.domain_flights, seed.value)) as bed:
-        oracle = bed.fly(Condition(), eyes=OracleAgent(looks=False)).episodes
-        prober = Prober(bed, oracle, settings.good_share, plain_part=1 / count)
+    with closing(PairedEvaluator(subject, settings.domain_flights, seed.value)) as evaluator:
+        oracle = evaluator.run(Condition(), agent=OracleAgent(looks=False)).episodes
+        prober = Prober(evaluator, oracle, settings.good_share, plain_part=1 / count)
         found = [_contradiction(None, prober.plain, 0.0, "")]
         for axis, strengths in tried.items():
             for strength in strengths:

@@ -12,8 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from drone_rl.config import DynamicsSettings
-from drone_rl.config.bodies import BodiesSettings
-from drone_rl.config.judging import JudgeSettings
+from drone_rl.config.commands import BodiesSettings, JudgeSettings
 from drone_rl.flight.in_the_loop.drone import FlightControllerError
 from drone_rl.policies.base_policy import Pilot
 from drone_rl.policies.external_policy import as_pilot
@@ -22,9 +21,8 @@ from drone_rl.utils.display import aligned, paragraph, picture, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Bar, Progress, silent
 from drone_rl.utils.provenance import provenance
-from drone_rl.utils.seed_text import BODIES, seed_line
 from drone_rl.utils.seeding import RootSeed, with_seed
-from drone_rl.utils.sentences import Evidence, percent, say
+from drone_rl.utils.text import BODIES, Evidence, percent, say, seed_line
 from drone_rl.verdicts.judge import judge
 
 LOOPED = "software in the loop"

@@ -8,7 +8,7 @@ from typing import Any
 
 from safetensors import SafetensorError
 
-from drone_rl.config.judging import FlightSettings
+from drone_rl.config.commands import FlightSettings
 from drone_rl.evaluation.certificate_text import is_quoted
 from drone_rl.evaluation.judge import judge_policy
 from drone_rl.policies.policy import Policy

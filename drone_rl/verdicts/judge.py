@@ -11,8 +11,8 @@ from tensordict.nn import TensorDictModuleBase
 from torchrl.envs import EnvBase
 
 from drone_rl.config import DynamicsSettings, TaskSettings
-from drone_rl.config.changes import Changes
-from drone_rl.config.judging import FlightSettings, JudgeSettings
+from drone_rl.config.commands import FlightSettings, JudgeSettings
+from drone_rl.config.configuration import Changes
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation.baselines import BASELINES, make_baseline
 from drone_rl.evaluation.evaluate import held_out_environments
@@ -27,8 +27,8 @@ from drone_rl.utils.display import aligned, interval, paragraph, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
-from drone_rl.utils.seed_text import seed_line
 from drone_rl.utils.seeding import RootSeed, Stream, root_seed, torch_generator, with_seed
+from drone_rl.utils.text import seed_line
 from drone_rl.verdicts.certificate import find_claim
 from drone_rl.verdicts.coverage import (
     Coverage,

@@ -14,7 +14,7 @@ from drone_rl.envs import CropRows, DroneEnv, GrayPixels, StandardizePixels, wit
 from drone_rl.policies import MLP, SmallCNN, make_actor
 from drone_rl.policies.learning_network import LearningNetwork
 from drone_rl.sim.dynamics import Quadrotor
-from drone_rl.sim.dynamics.flight_state import LOST
+from drone_rl.sim.dynamics.state import LOST
 from drone_rl.sim.tasks.collect_cubes import EndReason
 
 SHORT = TaskSettings(num_cubes=2, first_distance=3.0, spacing=3.0, step_limit=12, front_margin=3.0)

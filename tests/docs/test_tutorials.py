@@ -23,7 +23,7 @@ PAGES = [DOCS / "flight.md", DOCS / "pilot.md", *sorted((DOCS / "tutorials").glo
 BLOCK = re.compile(r'^```(\w+)(?: title="([^"]+)")?\n(.*?)^```$', re.DOTALL | re.MULTILINE)
 SHORT = (
     "trainer=drone_rl.TrainerSettings(total_frames=1500, checkpoint_interval_s=0.0), "
-    "collector=drone_rl.config.collecting.Threads(num_envs=8)"
+    "collector=drone_rl.config.learning.Threads(num_envs=8)"
 )
 SMALLER = {
     "notebook": {

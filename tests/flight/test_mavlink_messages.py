@@ -5,7 +5,7 @@ import pytest
 
 from drone_rl.flight.in_the_loop.instruments import Readings
 from drone_rl.flight.mavlink import FIELD, gps_fields, rotor_outputs, sensor_fields
-from drone_rl.sim.geodesy import GeoPoint
+from drone_rl.sim.coordinates import GeoPoint
 
 HALF = math.sqrt(0.5)
 READINGS = Readings(

@@ -6,7 +6,7 @@ import zlib
 
 import torch
 
-from drone_rl.config.shifting import ShiftSettings
+from drone_rl.config.commands import ShiftSettings
 from drone_rl.robustness.axes import AXES
 from drone_rl.robustness.domain import walk
 from drone_rl.robustness.perturbations import Mode

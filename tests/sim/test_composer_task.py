@@ -6,9 +6,9 @@ from dm_control import composer
 from drone_rl.config import DynamicsSettings, TaskSettings
 from drone_rl.sim import entities
 from drone_rl.sim.actions import Move
-from drone_rl.sim.clutter import HIDDEN_DEPTH
 from drone_rl.sim.composer_task import ComposerTask, make_environment
 from drone_rl.sim.tasks.collect_cubes import EndReason
+from drone_rl.sim.tasks.common import HIDDEN_DEPTH
 
 
 @pytest.fixture

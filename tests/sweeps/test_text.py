@@ -5,7 +5,7 @@ import copy
 import pytest
 
 from drone_rl.sweeps.text import GROUP_SENTENCES, SENTENCES
-from drone_rl.utils.sentences import said
+from drone_rl.utils.text import said
 
 SHARE = {"successes": 1, "trials": 1, "certain": 1}
 GROUP = {

@@ -6,7 +6,7 @@ import pytest
 
 from benchmarks.evidence import SWEEP
 from drone_rl.sweeps import text
-from drone_rl.utils.sentences import said
+from drone_rl.utils.text import said
 
 PARTS = ("curves.", "shares.", "sides.", "entropies.", "costs.")
 SENTENCES = [sentence for sentence in text.SENTENCES if sentence.name.startswith(PARTS)]

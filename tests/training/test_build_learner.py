@@ -11,12 +11,9 @@ from torchrl.objectives.value import GAE
 
 import drone_rl
 from drone_rl.config import TaskSettings
-from drone_rl.config.collecting import Rollouts, Threads
-from drone_rl.config.judging import FlightSettings
-from drone_rl.config.learning import Sgd
+from drone_rl.config.commands import FlightSettings
+from drone_rl.config.learning import A2c, Gae, Ppo, Rollouts, Sgd, Threads
 from drone_rl.config.networks import SmallCnn
-from drone_rl.config.objectives import A2c, Ppo
-from drone_rl.config.returns import Gae
 from drone_rl.config.training import TrainerSettings, TrainSettings
 from drone_rl.config.transforms import EpisodeReward, Gray, Stack
 from drone_rl.policies.known_outputs import KnownOutputs

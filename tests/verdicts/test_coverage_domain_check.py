@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import drone_rl
-from drone_rl.config.judging import JudgeSettings
+from drone_rl.config.commands import JudgeSettings
 from drone_rl.evaluation.rule import Rule
 from drone_rl.robustness.axes import AXES
 from drone_rl.utils.intervals import mean_bounds

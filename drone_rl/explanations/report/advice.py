@@ -2,9 +2,7 @@
 
 from drone_rl.evaluation.verdict_text import depends_on_rounding
 from drone_rl.robustness.domain_text import is_quoted, untested
-from drone_rl.utils.numbers import listed
-from drone_rl.utils.seed_text import is_fixed, seed_of
-from drone_rl.utils.sentences import Evidence, Sentence
+from drone_rl.utils.text import Evidence, Sentence, is_fixed, listed, seed_of
 
 
 def _more(evidence: Evidence) -> str:

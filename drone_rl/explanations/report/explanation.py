@@ -9,15 +9,14 @@ from numpy.typing import NDArray
 from drone_rl.evaluation.consistency import check_verdict
 from drone_rl.explanations.report.fitting import check_fit
 from drone_rl.explanations.report.shapes import check_sizes
-from drone_rl.sim.action_display import ShownActions, shown_actions
-from drone_rl.sim.vocabulary import TaskVocabulary, terms_of
+from drone_rl.sim.vocabulary import ShownActions, TaskVocabulary, shown_actions, terms_of
 from drone_rl.utils.archives import read_arrays
 from drone_rl.utils.consistency import check_intervals
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import parse_json, read_bytes, refuse_links
 from drone_rl.utils.limits import ARRAYS_BYTES, EXPLANATION_BYTES, EXPLANATION_VALUES, Allowance
 from drone_rl.utils.schema import Flag, Maybe, Text, Whole, as_mapping
-from drone_rl.utils.seed_text import SEED_KEYS
+from drone_rl.utils.text import SEED_KEYS
 
 FORMAT = "drone_rl explanation"
 FORMAT_VERSION = 3

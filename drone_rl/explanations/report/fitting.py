@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drone_rl.explanations.report.truth_text import NAMES
-from drone_rl.sim.action_display import ShownActions
+from drone_rl.sim.vocabulary import ShownActions
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.limits import check_indices
 from drone_rl.utils.schema import Kind, Maybe, OneOf, Real, Several, Whole, as_mapping

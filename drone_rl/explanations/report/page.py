@@ -15,11 +15,11 @@ from drone_rl.explanations.report.explanation import FRAME, Explanation
 from drone_rl.explanations.report.part import Drawn, Part
 from drone_rl.explanations.report.sections import find_parts
 from drone_rl.explanations.report.source_text import SENTENCES as SOURCE
+from drone_rl.utils.display import content_security_policy, page_environment, static_text
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import to_file_name
 from drone_rl.utils.limits import ARRAYS_BYTES, Allowance
-from drone_rl.utils.pages import content_security_policy, page_environment, static_text
-from drone_rl.utils.sentences import percent, say
+from drone_rl.utils.text import percent, say
 
 STYLES = ("style.css", "report.css")
 """Files of the page's one style element."""

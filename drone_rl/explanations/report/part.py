@@ -15,7 +15,7 @@ from PIL import Image
 
 from drone_rl.evaluation.plots.saving import Rows
 from drone_rl.explanations.report.explanation import Explanation
-from drone_rl.utils.sentences import Sentence
+from drone_rl.utils.text import Sentence
 
 Drawn = Mapping[str, Image.Image | Figure | NDArray]
 """Pictures, charts and films by name. A film: (T, H, W, 3), uint8, sizes multiples of 16."""

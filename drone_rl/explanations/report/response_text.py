@@ -3,8 +3,7 @@
 from collections.abc import Sequence
 
 from drone_rl.sim.vocabulary import terms_of
-from drone_rl.utils.numbers import bounds, listed
-from drone_rl.utils.sentences import Evidence, Sentence, percent
+from drone_rl.utils.text import Evidence, Sentence, bounds, listed, percent
 
 
 def _level(evidence: Evidence, level: bool = True) -> list[Evidence]:

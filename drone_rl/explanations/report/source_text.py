@@ -1,7 +1,7 @@
 """Where the figures on a page come from. Evidence: `explanation.json`, and "source", its name."""
 
 from drone_rl.utils.schema import as_mapping
-from drone_rl.utils.sentences import Evidence, Sentence
+from drone_rl.utils.text import Evidence, Sentence
 
 
 def _file(evidence: Evidence) -> str:

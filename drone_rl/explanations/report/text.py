@@ -4,10 +4,8 @@ from collections.abc import Sequence
 
 from drone_rl.explanations.report.response_text import ASYMMETRY, RESPONSE
 from drone_rl.explanations.report.truth_text import NAMES
-from drone_rl.sim.action_display import shown_actions
-from drone_rl.sim.vocabulary import terms_of
-from drone_rl.utils.numbers import among, bounds, listed, plural
-from drone_rl.utils.sentences import Evidence, Sentence, percent
+from drone_rl.sim.vocabulary import shown_actions, terms_of
+from drone_rl.utils.text import Evidence, Sentence, among, bounds, listed, percent, plural
 from drone_rl.verification.text import PLACES
 
 

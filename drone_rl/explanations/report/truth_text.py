@@ -4,8 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from drone_rl.sim.vocabulary import terms_of
-from drone_rl.utils.numbers import bounds, listed, plural
-from drone_rl.utils.sentences import Evidence, Sentence, percent
+from drone_rl.utils.text import Evidence, Sentence, bounds, listed, percent, plural
 
 NAMES = {
     "grad_cam": "Grad-CAM",

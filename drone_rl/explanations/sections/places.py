@@ -7,7 +7,7 @@ import torch
 from numpy.typing import NDArray
 
 from drone_rl.config import TaskSettings
-from drone_rl.config.mapping import PlacesSettings
+from drone_rl.config.verification import PlacesSettings
 from drone_rl.explanations.context import Context
 from drone_rl.sim.actions import MOVES
 from drone_rl.sim.tasks import CollectCubes

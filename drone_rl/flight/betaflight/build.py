@@ -13,8 +13,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from drone_rl.utils.errors import InputError
-from drone_rl.utils.extras import extra
+from drone_rl.utils.errors import InputError, extra
 
 LOCKSTEP = "SIMULATOR_GYROPID_SYNC"
 """Option of Betaflight's makefile for lockstep."""

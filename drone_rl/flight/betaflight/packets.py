@@ -10,7 +10,7 @@ import numpy as np
 
 from drone_rl.flight.in_the_loop.control import HIGHEST, LOWEST
 from drone_rl.flight.in_the_loop.instruments import Readings, Vector
-from drone_rl.sim.frames import enu_from_world, frd_from_body, ned_attitude_from_world
+from drone_rl.sim.coordinates import enu_from_world, frd_from_body, ned_attitude_from_world
 
 STATE_PORT, RC_PORT, ROTOR_PORT, CLI_PORT = 9003, 9004, 9002, 5761
 """UDP into the firmware: state, RC channels; UDP out of it: rotors; TCP: its command line."""

@@ -42,7 +42,7 @@ from drone_rl.flight.in_the_loop.drone import TICK, DroneInTheLoop, FlightContro
 from drone_rl.flight.in_the_loop.instruments import Readings, Vector
 from drone_rl.flight.in_the_loop.trial_flight import fly_course
 from drone_rl.sim.dynamics import FlightState, Quadrotor
-from drone_rl.sim.dynamics.body import LEVEL
+from drone_rl.sim.dynamics.state import LEVEL
 from drone_rl.utils.errors import InputError
 
 MEMORY = "eeprom.bin"

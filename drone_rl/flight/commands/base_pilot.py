@@ -17,7 +17,7 @@ from drone_rl.flight.commands.drone import Drone, Runner, Sensors
 from drone_rl.flight.commands.movement import Sticks
 from drone_rl.flight.commands.state import PilotState, Trajectory, state_html
 from drone_rl.sim.dynamics import Obstacles, Quadrotor
-from drone_rl.sim.dynamics.body import heading_only
+from drone_rl.sim.dynamics.state import heading_only
 from drone_rl.sim.entities import FRONT_CENTER
 from drone_rl.sim.image_types import ImageRequest, images
 from drone_rl.sim.rendering.view import Modality

@@ -10,7 +10,7 @@ from torch import Tensor
 
 from drone_rl.config import DynamicsSettings
 from drone_rl.sim.dynamics import FlightState, Goals, Mode, Obstacles, Quadrotor
-from drone_rl.sim.dynamics.goals import Modes
+from drone_rl.sim.dynamics.control import Modes
 from drone_rl.utils.errors import InputError
 
 PERIOD = 0.02

@@ -17,8 +17,8 @@ from drone_rl.flight.commands.state import (
     triple,
 )
 from drone_rl.sim.dynamics import FlightState, Goals, Obstacles, Quadrotor
-from drone_rl.sim.dynamics.flight_state import CLIMB, NOTHING, TICKS
-from drone_rl.sim.dynamics.goals import rotor_goals
+from drone_rl.sim.dynamics.control import rotor_goals
+from drone_rl.sim.dynamics.state import CLIMB, NOTHING, TICKS
 from drone_rl.sim.sensors import (
     BarometerReading,
     CollisionState,

@@ -13,7 +13,7 @@ from drone_rl.flight.commands.command import ACCURACY, Command, goals_of, hold
 from drone_rl.flight.commands.path_following import PathCommand
 from drone_rl.flight.commands.yaw import YawControl
 from drone_rl.sim.dynamics import FlightState, Goals, Mode
-from drone_rl.sim.dynamics.goals import Modes, rotor_goals
+from drone_rl.sim.dynamics.control import Modes, rotor_goals
 from drone_rl.utils.errors import InputError
 
 LANDING_SPEED = 0.2

@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from drone_rl.sim.dynamics import FlightState
-from drone_rl.sim.dynamics.flight_state import (
+from drone_rl.sim.dynamics.state import (
     ATTITUDE,
     GROUND,
     NOTHING,

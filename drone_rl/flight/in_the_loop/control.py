@@ -14,7 +14,7 @@ from torch import Tensor
 from drone_rl.config import DynamicsSettings
 from drone_rl.flight.in_the_loop.instruments import Readings, Vector
 from drone_rl.sim.dynamics import FlightState, Goals, Mode
-from drone_rl.sim.dynamics.goals import HEADING, Y, Z
+from drone_rl.sim.dynamics.control import HEADING, Y, Z
 from drone_rl.utils.errors import InputError
 
 LOWEST, MIDDLE, HIGHEST = 1000, 1500, 2000

@@ -18,8 +18,8 @@ from drone_rl.flight.in_the_loop.control import (
     sticks_for,
 )
 from drone_rl.flight.in_the_loop.instruments import Readings, Vector, measure
+from drone_rl.sim.coordinates import HOME, GeoPoint
 from drone_rl.sim.dynamics import BodyState
-from drone_rl.sim.geodesy import HOME, GeoPoint
 
 TICK = 0.001
 """Physics time step for Betaflight, seconds; the firmware runs at 1 kHz."""

@@ -18,8 +18,8 @@ from drone_rl.flight.in_the_loop.instruments import Readings
 from drone_rl.flight.in_the_loop.trial_flight import HoldPosition, take_off
 from drone_rl.sim.actions import Actions
 from drone_rl.sim.dynamics import BodyState, Dynamics, FlightState, Obstacles, Quadrotor
-from drone_rl.sim.dynamics.flight_state import SEED
-from drone_rl.sim.dynamics.goals import rotor_goals
+from drone_rl.sim.dynamics.control import rotor_goals
+from drone_rl.sim.dynamics.state import SEED
 
 NEAR, SLOW = 0.1, 0.1
 """Position error in metres, and speed in m/s, within which a drone hovers."""

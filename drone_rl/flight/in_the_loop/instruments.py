@@ -8,8 +8,8 @@ import torch
 from numpy.typing import NDArray
 
 from drone_rl.config.dynamics import GRAVITY
+from drone_rl.sim.coordinates import HOME, GeoPoint, geo_from_world
 from drone_rl.sim.dynamics import BodyState
-from drone_rl.sim.geodesy import HOME, GeoPoint, geo_from_world
 
 Vector = NDArray[np.float64]
 SEA_LEVEL_PRESSURE = 101_325.0

@@ -1,8 +1,8 @@
 """Tasks: what stands in the scene, how an episode starts, its rules, and what counts as success."""
 
 from drone_rl.sim.tasks.collect_cubes import CollectCubes
+from drone_rl.sim.tasks.failure_replay import FailureReplayTask
 from drone_rl.sim.tasks.pillars import Pillars
-from drone_rl.sim.tasks.practice import Practice
 from drone_rl.sim.tasks.registry import as_task, register_task
 from drone_rl.sim.tasks.task import (
     DrawnState,
@@ -19,11 +19,11 @@ __all__ = [
     "CollectCubes",
     "DrawnState",
     "EndReason",
+    "FailureReplayTask",
     "Goals",
     "Grid",
     "OracleRule",
     "Pillars",
-    "Practice",
     "Prop",
     "State",
     "Task",

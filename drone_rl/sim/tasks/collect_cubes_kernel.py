@@ -1,14 +1,8 @@
 # ruff: noqa: RUF046, UP018
-# pyright: reportIndexIssue=false
-# pyright: reportReturnType=false
-# pyright: reportAssignmentType=false
-# pyright: reportGeneralTypeIssues=false
-# pyright: reportArgumentType=false
-# pyright: reportCallIssue=false
-# pyright: reportOperatorIssue=false
-# pyright: reportAttributeAccessIssue=false
-# (Warp compiles this file; Python's types say nothing about it, and what a loop changes is
-# declared by its type.)
+# pyright: reportIndexIssue=false, reportGeneralTypeIssues=false, reportOperatorIssue=false
+# pyright: reportAttributeAccessIssue=false, reportReturnType=false, reportArgumentType=false
+# pyright: reportCallIssue=false, reportAssignmentType=false
+# (Warp compiles this file: its types are not those of Python.)
 """The rules of `collect_cubes` as Warp functions, for the fused episode kernel.
 
 They compute the same numbers as the rules in torch, bit for bit, in double precision.
@@ -21,12 +15,18 @@ import torch
 import warp as wp
 
 from drone_rl.config import TaskSettings
-from drone_rl.sim.clutter import HIDDEN_DEPTH
 from drone_rl.sim.dynamics import ComputerVision, Dynamics, FlightState, Quadrotor
-from drone_rl.sim.dynamics.body import LEVEL
-from drone_rl.sim.dynamics.fleet import FlyingFleet
-from drone_rl.sim.dynamics.moves_kernel import Fleet, camera_attitude, fly_move, is_flying, is_lost
+from drone_rl.sim.dynamics.moves_kernel import (
+    Fleet,
+    FlyingFleet,
+    camera_attitude,
+    fly_move,
+    is_flying,
+    is_lost,
+)
+from drone_rl.sim.dynamics.state import LEVEL
 from drone_rl.sim.rendering.raytrace.structs_kernel import DRONE_FRAME, Poses
+from drone_rl.sim.tasks.common import HIDDEN_DEPTH
 
 
 class EndReason(enum.IntEnum):

@@ -8,10 +8,12 @@ import torch
 from torch import Tensor
 
 from drone_rl.config import CameraSettings
-from drone_rl.sim.clutter import HIDDEN_DEPTH
 from drone_rl.sim.dynamics import BodyState
 from drone_rl.sim.tasks.task import Goals
-from drone_rl.utils.numbers import ordinal
+from drone_rl.utils.text import ordinal
+
+HIDDEN_DEPTH = 100.0
+"""Metres below its place at which an absent prop is kept, out of sight under the floor."""
 
 
 def hide_absent(places: Tensor, present: Tensor) -> Tensor:

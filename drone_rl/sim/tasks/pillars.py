@@ -30,7 +30,7 @@ from drone_rl.sim.tasks.common import (
 from drone_rl.sim.tasks.pillars_lanes import Lanes, meets, nearest_pillar
 from drone_rl.sim.tasks.task import Goals, Grid, OracleRule, State, Task
 from drone_rl.sim.vocabulary import PILLARS
-from drone_rl.utils.numbers import plural
+from drone_rl.utils.text import plural
 
 
 class EndReason(enum.IntEnum):

@@ -15,8 +15,8 @@ import torch
 from torch import Tensor
 
 from drone_rl.config import TaskSettings
+from drone_rl.sim.actions import DIRECTIONS
 from drone_rl.sim.dynamics import BodyState
-from drone_rl.sim.dynamics.computer_vision import DIRECTIONS
 from drone_rl.sim.tasks.collect_cubes import CollectCubes, EndReason, WorldState
 from drone_rl.utils.batch import Batch
 from drone_rl.utils.errors import InputError

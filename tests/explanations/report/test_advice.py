@@ -2,7 +2,7 @@ import pytest
 
 from benchmarks.evidence import EXPLANATION, changed
 from drone_rl.explanations.report.advice import ADVICE, SCOPE
-from drone_rl.utils.sentences import said, say
+from drone_rl.utils.text import said, say
 
 
 @pytest.mark.parametrize(

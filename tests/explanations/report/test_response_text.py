@@ -4,7 +4,7 @@ import pytest
 
 from benchmarks.evidence import EXPLANATION, HIGHER, changed
 from drone_rl.explanations.report.response_text import ASYMMETRY, RESPONSE
-from drone_rl.utils.sentences import said
+from drone_rl.utils.text import said
 
 
 def speak(**changes):

@@ -1,5 +1,5 @@
 from drone_rl.explanations.report.source_text import SENTENCES
-from drone_rl.utils.sentences import say
+from drone_rl.utils.text import say
 
 
 def test_a_page_names_the_file_that_its_figures_were_read_from():

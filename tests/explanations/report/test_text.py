@@ -5,7 +5,7 @@ That each sentence goes or turns with its evidence: tests/benchmarks/test_senten
 
 from benchmarks.evidence import EXPLANATION, changed
 from drone_rl.explanations.report.text import SECTIONS, SENTENCES
-from drone_rl.utils.sentences import said
+from drone_rl.utils.text import said
 
 
 def speak(**changes):

@@ -1,6 +1,6 @@
 from benchmarks.evidence import EXPLANATION, changed
 from drone_rl.explanations.report.truth_text import SENTENCES, best_placebo
-from drone_rl.utils.sentences import said
+from drone_rl.utils.text import said
 
 NONE = {
     "truth.trusted": None,

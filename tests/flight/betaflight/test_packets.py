@@ -6,7 +6,7 @@ import pytest
 from drone_rl.flight.betaflight import packets
 from drone_rl.flight.betaflight.packets import pack_state, pack_sticks, setup_lines, unpack_rotors
 from drone_rl.flight.in_the_loop.instruments import Readings
-from drone_rl.sim.geodesy import GeoPoint
+from drone_rl.sim.coordinates import GeoPoint
 
 READINGS = Readings(
     time=7.0,

@@ -8,9 +8,9 @@ import torch
 from drone_rl.config.sensors import GpsSettings, SensorSettings
 from drone_rl.flight.commands.drone import Sensors
 from drone_rl.flight.commands.pilot import Pilot
+from drone_rl.sim.coordinates import HOME
 from drone_rl.sim.dynamics import FlightState
-from drone_rl.sim.dynamics.flight_state import GROUND
-from drone_rl.sim.geodesy import HOME
+from drone_rl.sim.dynamics.state import GROUND
 
 PERFECT = SensorSettings(gps=GpsSettings(latency=0.0)).perfect
 

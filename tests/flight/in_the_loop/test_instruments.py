@@ -11,8 +11,8 @@ from drone_rl.flight.in_the_loop.instruments import (
     pressure_at,
     rotation_between,
 )
+from drone_rl.sim.coordinates import GeoPoint
 from drone_rl.sim.dynamics import BodyState
-from drone_rl.sim.geodesy import GeoPoint
 from tests.flight.simple_body import SimpleBody
 
 HALF = math.sqrt(0.5)

@@ -4,8 +4,8 @@ import torch
 
 from drone_rl.config import TaskSettings
 from drone_rl.sim.actions import MOVES, Move
-from drone_rl.sim.clutter import HIDDEN_DEPTH
 from drone_rl.sim.tasks.collect_cubes import CollectCubes, CubeGoals, EndReason, turn_towards
+from drone_rl.sim.tasks.common import HIDDEN_DEPTH
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.seeding import world_random_state
 

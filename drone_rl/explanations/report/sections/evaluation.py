@@ -3,7 +3,7 @@
 from drone_rl.explanations.report.advice import ADVICE, SCOPE, SEED
 from drone_rl.explanations.report.part import Part
 from drone_rl.explanations.report.truth_text import NAMES
-from drone_rl.utils.seed_text import seed_line
+from drone_rl.utils.text import seed_line
 
 PART = Part(
     title="Verdict",

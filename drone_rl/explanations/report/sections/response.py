@@ -14,7 +14,7 @@ from drone_rl.evaluation.plots.saving import Rows
 from drone_rl.explanations.report.explanation import Explanation
 from drone_rl.explanations.report.part import Part
 from drone_rl.explanations.report.response_text import RESPONSE
-from drone_rl.sim.action_display import ShownActions
+from drone_rl.sim.vocabulary import ShownActions
 
 _OUTCOMES = ("#d9d9de", "#4269d0")
 """Colours of what is not handled, and of what is."""

@@ -1,5 +1,5 @@
 from drone_rl.explanations.report.sections.left_out import PART
-from drone_rl.utils.sentences import say
+from drone_rl.utils.text import say
 
 
 def test_it_says_why_where_something_is_left_out(make_explanation):
