@@ -88,9 +88,9 @@ def recheck_domain(
         for axis in find_axes(needs, subject)
     }
     count = sum(map(len, tried.values())) + 1
-    with closing(PairedEvaluator(subject, settings.domain_flights, seed.value)) as bed:
-        oracle = bed.fly(Condition(), eyes=OracleAgent(looks=False)).episodes
-        prober = Prober(bed, oracle, settings.good_share, plain_part=1 / count)
+    with closing(PairedEvaluator(subject, settings.domain_flights, seed.value)) as evaluator:
+        oracle = evaluator.run(Condition(), agent=OracleAgent(looks=False)).episodes
+        prober = Prober(evaluator, oracle, settings.good_share, plain_part=1 / count)
         found = [_contradiction(None, prober.plain, 0.0, "")]
         for axis, strengths in tried.items():
             for strength in strengths:
