@@ -1,6 +1,6 @@
 """The same command finds the same folder; another finds another."""
 
-from drone_rl.sweeps.naming import is_sweep, sweep_name
+from drone_rl.sweeps.manifest import is_sweep, sweep_name
 
 
 def test_what_counts_as_a_sweep():

@@ -8,8 +8,8 @@ import time
 
 import pytest
 
-from drone_rl.sweeps import process
-from drone_rl.sweeps.process import RunProcess, finish_run, note_failure
+from drone_rl.sweeps import executors
+from drone_rl.sweeps.executors import RunProcess, finish_run, note_failure
 from drone_rl.sweeps.runs import read_failure, read_result
 from drone_rl.utils.files import folder_lock
 
@@ -68,7 +68,7 @@ def test_a_process_that_came_too_late_is_no_failure(make_runs):
 )
 def test_the_line_that_says_why_a_run_failed_is_kept(make_runs, monkeypatch, program, error):
     code = f"import os, signal, sys; {program}"
-    monkeypatch.setattr(process, "PROGRAM", (sys.executable, "-u", "-c", code))
+    monkeypatch.setattr(executors, "PROGRAM", (sys.executable, "-u", "-c", code))
     (run,) = make_runs("seed=0")
     assert finish_run(run) != 0
     assert read_failure(run) == error
@@ -88,7 +88,7 @@ def test_a_run_that_is_stopped_ends_by_sigterm(make_runs):
 
 def test_a_run_has_one_thread_and_no_input(make_runs, monkeypatch):
     code = "import os, sys; sys.exit('error: ' + os.environ['OMP_NUM_THREADS'] + sys.stdin.read())"
-    monkeypatch.setattr(process, "PROGRAM", (sys.executable, "-c", code))
+    monkeypatch.setattr(executors, "PROGRAM", (sys.executable, "-c", code))
     (run,) = make_runs("seed=0")
     finish_run(run)
     assert read_failure(run) == "1"

@@ -2,7 +2,7 @@
 
 import pytest
 
-from drone_rl.sweeps import counts as sweep_counts
+from drone_rl.sweeps import text as sweep_counts
 
 SOLVED, CENSORED = {"more_than": None}, {"more_than": 9.0}
 SUMMARY = {

@@ -4,8 +4,8 @@ import json
 
 import pytest
 
-from drone_rl.sweeps.groups import make_groups
 from drone_rl.sweeps.rows import read_rows
+from drone_rl.sweeps.summary import make_groups
 from drone_rl.utils.intervals import proportion
 
 

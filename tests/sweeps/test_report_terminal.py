@@ -7,8 +7,8 @@ import sys
 import pytest
 
 from drone_rl.sweeps.manifest import Sweep
+from drone_rl.sweeps.report import find_sweep, terminal_lines
 from drone_rl.sweeps.runs import Run
-from drone_rl.sweeps.sweeping import _lines, find_sweep
 from drone_rl.utils.errors import InputError
 
 
@@ -43,15 +43,15 @@ def test_the_sentences_in_order():
         "runs": [{"run": 1, "state": "failed", "error": "no memory"}, {"run": 2, "error": None}],
         "best": {"command": "drone-rl train seed=2"},
     }
-    lines = _lines(figures).splitlines()
+    lines = terminal_lines(figures).splitlines()
     assert lines[:2] == ["3 runs.", "All."]
     assert lines[2].split(maxsplit=1) == ["lr=0.1", "one; two"]
     assert lines[3:] == [
         *("run 1 failed: no memory", "best run: Run 2."),
-        "the same again: drone-rl train seed=2",
+        "to repeat it: drone-rl train seed=2",
     ]
 
 
 def test_a_report_needs_no_torch():
-    code = "import sys, drone_rl.sweeps.sweeping; assert 'torch' not in sys.modules"
+    code = "import sys, drone_rl.sweeps.report; assert 'torch' not in sys.modules"
     subprocess.run([sys.executable, "-c", code], check=True)

@@ -4,8 +4,8 @@ import json
 
 import pytest
 
-from drone_rl.sweeps.page import _code, _figure, write_picture, write_sweep_report
-from drone_rl.sweeps.statistics import median_of_runs, share_of_runs
+from drone_rl.sweeps.report import _code, _figure, write_picture, write_sweep_report
+from drone_rl.sweeps.summary import median_of_runs, share_of_runs
 from drone_rl.utils.errors import InputError
 
 

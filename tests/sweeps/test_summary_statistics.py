@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from drone_rl.sweeps.statistics import median_band, median_of_runs, on_grid, share_of_runs
+from drone_rl.sweeps.summary import median_band, median_of_runs, on_grid, share_of_runs
 from drone_rl.utils.intervals import proportion
 
 

@@ -5,7 +5,7 @@ import json
 import pytest
 
 import drone_rl
-from drone_rl.sweeps.judging import judge_run
+from drone_rl.sweeps.report import judge_run
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 from drone_rl.utils.seeding import RootSeed
@@ -33,7 +33,7 @@ def test_a_run_keeps_its_verdict_beside_its_result(trained):
 def test_a_checkpoint_that_is_not_that_of_the_result_is_refused(trained):
     result = json.loads((trained / "result.json").read_text())
     (trained / "result.json").write_text(json.dumps({**result, "frames": 7}))
-    with pytest.raises(InputError, match=r"frame 7; go on with"):
+    with pytest.raises(InputError, match=r"frame 7; resume with"):
         judge_run(trained, 4, "cpu")
     (trained / "result.json").unlink()
     with pytest.raises(InputError, match=r"no result\.json"):
