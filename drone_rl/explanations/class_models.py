@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional
 
+from drone_rl.collectors.speedups import accelerated_gradients
 from drone_rl.explanations.context import Context, LeftOutError
 from drone_rl.explanations.heat_maps import Objective
 from drone_rl.explanations.hooks import actions_of
 from drone_rl.policies import PictureNetwork
-from drone_rl.policies.learning_network import LearningNetwork
 from drone_rl.utils.errors import InputError
 
 AS_PROBABLE = 0.01
@@ -191,7 +191,7 @@ def visualise(
     pictures = start.repeat(num_actions, 1, 1, 1)
     action = torch.arange(num_actions).repeat_interleave(settings.starts)
     ascend = _ascend_fourier if settings.parameterisation == "fourier" else _ascend_pixels
-    quick = LearningNetwork.find(network, of="pictures") or network
+    quick = accelerated_gradients(network, of="pixels") or network
     reached = ascend(quick, pictures, action, statistics, settings, generator)
     with torch.no_grad():
         each = actions_of(network).wish(network(reached)).gather(1, action[:, None])[:, 0]

@@ -9,10 +9,10 @@ from captum.attr import IntegratedGradients, LayerGradCam, Saliency
 from torch import Tensor, nn
 from torch.nn import functional
 
+from drone_rl.collectors.speedups import accelerated_gradients
 from drone_rl.explanations.hooks import actions_of, find_layer, probabilities, spatial_layers
 from drone_rl.explanations.patches import replaced
 from drone_rl.policies import PictureNetwork
-from drone_rl.policies.learning_network import LearningNetwork
 from drone_rl.utils.errors import InputError
 
 Objective = Literal["probability", "logit"]
@@ -156,7 +156,7 @@ class Explainer:
 
     def _integrated(self, observations: Tensor, actions: Tensor) -> Tensor:
         """The path integral of each channel of each pixel. Shape: (T, C, H, W)."""
-        quick = LearningNetwork.find(self.network, of="pictures")
+        quick = accelerated_gradients(self.network, of="pixels")
         method = IntegratedGradients(self._forward("probability", quick))
 
         def attribute(x: Tensor, a: Tensor) -> Tensor:
