@@ -61,10 +61,12 @@ def test_they_are_behind_the_props_of_a_task():
 
 
 def test_who_knows_what_is_what_does_not_mind_them():
-    bed = PairedEvaluator(subject(task=TaskSettings(num_cubes=1), camera=CameraSettings()), 20)
+    evaluator = PairedEvaluator(
+        subject(task=TaskSettings(num_cubes=1), camera=CameraSettings()), 20
+    )
     for count in (0, 16):
-        assert bed.fly(Condition(clutter=count), eyes=OracleAgent()).episodes.success.all()
-    bed.close()
+        assert evaluator.run(Condition(clutter=count), agent=OracleAgent()).episodes.success.all()
+    evaluator.close()
 
 
 def test_tasks_of_which_nothing_is_known():
