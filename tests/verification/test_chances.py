@@ -115,7 +115,7 @@ def test_mistakes_are_told_in_a_line(good, cubes, change, message):
 
 
 def test_flights_have_no_places_that_could_be_counted(good):
-    with pytest.raises(InputError, match="chance of each placement is known of computer-vision"):
+    with pytest.raises(InputError, match="exact probabilities support only dynamics"):
         drone_rl.chances(good.in_dynamics(mode="simple_flight"), progress=silent)
 
 

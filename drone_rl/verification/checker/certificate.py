@@ -38,8 +38,7 @@ MOST_CORNERS = 2**20  # corners of all boxes together
 MOST_CUBES = 8
 MOST_OUTCOMES = 2**11
 MOST_STEPS = 20_000  # step counts of all outcomes together
-LEAST_BORDER = 2.0**-100
-"""Metres. Smallest nonzero |border|; bounds the bits of exact sums."""
+LEAST_BORDER = 2.0**-100  # metres. Smallest nonzero |border|; bounds the bits of exact sums.
 MOST_BORDER = 2.0**20  # metres. Largest |border|
 _NO_ENDS = (EndReason.RUNNING, EndReason.LOST_CONTROL)
 """Control cannot be lost in computer-vision mode."""
@@ -96,9 +95,6 @@ class Certificate:
 
 def read_certificate(path: Path) -> Certificate:
     """Read a certificate from a JSON file.
-
-    Args:
-        path: The file.
 
     Raises:
         InputError: It is missing, too large, damaged, or no certificate.
@@ -249,11 +245,7 @@ def _is_list(value: Any, length: int) -> bool:
 
 
 def fingerprint(weights: Mapping[str, torch.Tensor]) -> str:
-    """Return the SHA-256 hash of a network's weights, as certificates state it.
-
-    Args:
-        weights: State dict; order and device do not matter.
-    """
+    """Return the SHA-256 hash of a network's weights; order and device do not matter."""
     digest = hashlib.sha256()
     for name in sorted(weights):
         value = weights[name].detach().cpu().contiguous()

@@ -39,8 +39,7 @@ class Contradiction:
 
     where: str
     """Why it was simulated: "inside" a box, at a "border", or "anywhere"."""
-    placement: tuple[float, ...]
-    """Metres to the left of each cube."""
+    placement: tuple[float, ...]  # metres to the left of each cube
     stated: str
     found: str
 
@@ -58,12 +57,9 @@ class Findings:
 
     inconsistencies: tuple[str, ...]
     """Impossible or refuted statements, one line each, without single episodes."""
-    contradictions: tuple[Contradiction, ...]
-    """The first episodes that ended otherwise than stated."""
-    contradicted: int
-    """Number of such episodes."""
-    flights: Mapping[str, int]
-    """Number of episodes, by why they were simulated."""
+    contradictions: tuple[Contradiction, ...]  # the first episodes that ended otherwise than stated
+    contradicted: int  # number of such episodes
+    flights: Mapping[str, int]  # number of episodes, by why they were simulated
 
     @property
     def accepted(self) -> bool:
@@ -163,13 +159,7 @@ def read_validated(
 
 
 def ends_as_stated(outcome: Outcome, flown: Rollouts, i: int) -> bool:
-    """Return whether episode i ended as stated, after a stated number of steps.
-
-    Args:
-        outcome: The statement.
-        flown: Episodes.
-        i: Index of the episode.
-    """
+    """Return whether episode i ended as stated, after a stated number of steps."""
     if flown.end[i] != outcome.end or tuple(flown.collected[i]) != outcome.collected:
         return False
     if outcome.end == EndReason.STEP_LIMIT:

@@ -34,14 +34,9 @@ def volume(boxes: NDArray[np.float64]) -> Fraction:
 def find_partition_error(
     boxes: NDArray[np.float64], bound: float
 ) -> tuple[list[float], int] | None:
-    """Return a point at which boxes do not partition the cube [-bound, bound]^n.
+    """Return a point of [-bound, bound]^n not held by exactly one box, and by how many.
 
-    Args:
-        boxes: Not empty ones. Shape: (boxes, n, 2).
-        bound: Half the edge of the cube, metres.
-
-    Returns:
-        The point, and how many boxes hold it; None if the boxes are a partition.
+    None if nonempty boxes, shape (boxes, n, 2), are a partition.
     """
     n = boxes.shape[1]
     cube = np.full((1, n, 2), (-bound, bound))
@@ -90,8 +85,7 @@ def _around(
 
 
 MOST_MISSING = 0.05  # largest fraction of the stated placements without a stated number of steps
-FEWEST_STATED = 1e-3
-"""Fraction of placements from which on an outcome must state a number of steps."""
+FEWEST_STATED = 1e-3  # fraction of placements from which on an outcome must state a number of steps
 TOLERANCE = 1e-12  # relative error of a stated fraction from summing floats
 
 
@@ -166,8 +160,7 @@ def _wrong_share(stated: float, exact: Fraction) -> Iterator[str]:
         yield f"has a share of {stated!r}, but boxes of {float(exact)!r}"
 
 
-DOUBT = 1e-9
-"""Probability of refusing a true statement by chance, per number of steps."""
+DOUBT = 1e-9  # probability of refusing a true statement by chance, per number of steps
 
 
 def find_wrong_step_counts(
@@ -177,8 +170,7 @@ def find_wrong_step_counts(
 
     Args:
         outcomes: As stated.
-        owner: Outcome of each episode's placement, uniform over all placements; the number of
-            outcomes where nothing is stated. Shape: (flights,).
+        owner: Index of each episode's outcome; their number where nothing is stated. (flights,)
         steps: Steps of each episode. Shape: (flights,).
     """
     for i, outcome in enumerate(outcomes):

@@ -50,17 +50,7 @@ class Simulator:
         device: str = "cpu",
         renderer: str = "raytrace",
     ) -> None:
-        """Build the environment and the network.
-
-        Args:
-            described: The policy, in the task to simulate.
-            weights: State dict of its network.
-            device: Device of the simulation and the network.
-            renderer: Name, see `drone_rl.sim.rendering.find_renderer`.
-
-        Raises:
-            InputError: There is no such device.
-        """
+        """Build the environment of a policy's task, and its network; see `check_certificate`."""
         pixels = described.camera.width * described.camera.height
         self.at_once = max(1, min(MOST_AT_ONCE, MOST_PIXELS // pixels))
         count = min(self.at_once, 64)
@@ -75,12 +65,7 @@ class Simulator:
     def fly(
         self, placements: NDArray[np.float64], tell: ProgressCallback = lambda done, total: None
     ) -> Rollouts:
-        """Simulate episodes to their ends, in batches.
-
-        Args:
-            placements: Metres to the left of each cube. Shape: (k, cubes).
-            tell: Called after each batch.
-        """
+        """Simulate episodes in batches, from metres to the left of each cube (k, cubes)."""
         parts = [self._fly(placements[:0])]
         for first in range(0, len(placements), self.at_once):
             parts.append(self._fly(placements[first : first + self.at_once]))

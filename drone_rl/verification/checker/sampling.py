@@ -44,14 +44,7 @@ def sample_anywhere(boxes: Boxes, count: int, rng: np.random.Generator) -> tuple
 def sample_borders(
     groups: Sequence[Boxes], bound: float, count: int, rng: np.random.Generator
 ) -> Points:
-    """Return pairs of points on both sides of faces between boxes of different groups.
-
-    Args:
-        groups: Boxes that together are a partition.
-        bound: Largest |y| of cubes, metres.
-        count: Largest number of points.
-        rng: Random generator.
-    """
+    """Return at most `count` points on both sides of faces between boxes of different groups."""
     boxes, sizes = np.concatenate(groups), np.array([len(group) for group in groups])
     tries = max(1, min(4 * count, _MOST_WORK // (4 * boxes.size)))
     some = rng.choice(np.flatnonzero(sizes), tries)
@@ -127,13 +120,7 @@ class Placements:
 
 
 def sample_placements(certificate: Certificate, count: int, rng: np.random.Generator) -> Placements:
-    """Sample placements: half in boxes of each outcome, a quarter at borders, the rest anywhere.
-
-    Args:
-        certificate: Its boxes are a partition.
-        count: Number of placements.
-        rng: Random generator.
-    """
+    """Sample placements: half in boxes of each outcome, a quarter at borders, the rest anywhere."""
     groups = certificate.groups
     boxes = np.concatenate(groups)
     group = np.repeat(np.arange(len(groups)), [len(boxes) for boxes in groups])

@@ -62,19 +62,11 @@ class ActionMap:
         return (self.action == self.alone)[:, None] & (self.action[:, None] != needed) & turns
 
     def at(self, places: NDArray[np.float64]) -> NDArray[np.int64]:
-        """Return the actions at positions inside the window.
-
-        Args:
-            places: Metres ahead of the camera and to its left. Shape: (N, 2).
-        """
+        """Return the actions at positions inside the window. Shape: (N, 2) to (N,)."""
         return self.action[self.arrangement.locate(places)]
 
     def summary(self, logit_gap: float) -> dict[str, Any]:
-        """Return plain numbers; all fractions are of areas.
-
-        Args:
-            logit_gap: Where the two highest logits are closer, the action is not certain.
-        """
+        """Return plain numbers; fractions are of areas. Logits closer than `logit_gap` may tie."""
         areas, total = self.areas, self.areas.sum()
         counts = [np.bincount(self.action, area, len(MOVES)) for area in areas.T]
         blind, unseen = areas * self.is_blind, areas * self.is_unseen[:, None]
@@ -182,12 +174,7 @@ def map_actions(
 
 
 def find_borders(camera: CameraModel, window: Window) -> Pieces:
-    """Return all borders within a window; collinear ones do not overlap.
-
-    Args:
-        camera: The camera.
-        window: Relative to the camera; all x exceed half a cube's edge.
-    """
+    """Return all borders within a window whose x all exceed half a cube's edge; none overlap."""
     slopes, half = np.unique(camera.left), camera.half
     with np.errstate(divide="ignore"):
         leaves = half / np.unique(np.abs(camera.up).round(_DIGITS))

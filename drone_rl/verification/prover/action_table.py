@@ -43,8 +43,8 @@ class ActionTable:
             bounds: Of the network.
             compositor: Composes images.
             cells: Cells of each visible cube, nearest first.
-            record: Blocks on which bounds were tried, and were decisive, by the power of two of the
-                uncertain pixels; shared by all tables of a proof. Shape: (32, 2).
+            record: Bounds tried, and decisive, by log2 of the uncertain pixels; shared by all
+                tables of a proof. Shape: (32, 2).
         """
         self.cells = list(cells)
         self.table = np.zeros([len(c) for c in reversed(self.cells)], np.uint8)
@@ -68,20 +68,12 @@ class ActionTable:
         return min(self._gaps)
 
     def spans(self, boxes: Boxes) -> NDArray[np.int64]:
-        """Return the first and last cell of each cube that boxes intersect. Shape: (N, cubes, 2).
-
-        Args:
-            boxes: Positions of the visible cubes, nearest first, metres to the left of the camera.
-        """
+        """Return the first and last cell of each cube that boxes intersect. (N, cubes, 2)."""
         ends = [c.span(boxes[:, k, 0], boxes[:, k, 1]) for k, c in enumerate(self.cells)]
         return np.stack([np.stack(pair, -1) for pair in ends], 1)
 
     def fill(self, spans: NDArray[np.int64]) -> None:
-        """Compute the table within spans.
-
-        Args:
-            spans: First and last cell of each cube. Shape: (N, cubes, 2).
-        """
+        """Compute the table within spans, shape (N, cubes, 2)."""
         unknown = _open(self.table, spans[self._is_unknown(spans)])
         tasks = _open(self._known, self._pictures_of(unknown))
         stack = [tasks] if len(tasks) else []

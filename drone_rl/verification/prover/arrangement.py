@@ -112,11 +112,7 @@ class Arrangement:
         return np.bincount(cell, (x - next_x) * mean, self.num_cells).astype(np.float64)
 
     def locate(self, places: NDArray[np.float64]) -> NDArray[np.int64]:
-        """Return the cell of each position; positions must lie inside the window and on no border.
-
-        Args:
-            places: x and y. Shape: (N, 2).
-        """
+        """Return the cells of positions inside the window, on no border. (N, 2) to (N,)."""
         origin, end = self.points[self.origin], self.points[self.origin[self.twin]]
         goes_right = np.flatnonzero((end[:, 0] - origin[:, 0] > 0) & (self.cell >= 0))
         (x, y), (far_x, far_y) = origin[goes_right].T, end[goes_right].T
@@ -142,14 +138,9 @@ class Arrangement:
         return found
 
     def outlines(self, labels: NDArray[np.int64]) -> list[tuple[int, NDArray[np.float64]]]:
-        """Return the borders between cells with different labels.
+        """Return the borders between cells with different labels (num_cells,).
 
-        Args:
-            labels: Label of each cell, from 0. Shape: (num_cells,).
-
-        Returns:
-            Pairs of a label and a closed polygon with that label on its left. Polygon shape:
-            (corners, 2).
+        Each is a label and a closed polygon with that label on its left. Shape: (corners, 2).
         """
         label = np.append(labels, -1)[self.cell]
         twin = self.twin

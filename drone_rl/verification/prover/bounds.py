@@ -79,15 +79,7 @@ class NetworkBounds:
 
     @torch.no_grad()
     def probabilities(self, lower: Tensor, upper: Tensor) -> tuple[Tensor, Tensor]:
-        """Bound the probability of each sampled action.
-
-        Args:
-            lower: See `possible`.
-            upper: See `possible`.
-
-        Returns:
-            Lower and upper bounds. Shapes: (N, actions), float64.
-        """
+        """Return bounds of the probability of each sampled action. Shapes: (N, actions)."""
         largest: list[Tensor] = []
         least = self._least(lower, upper, largest).double() / self._scale
         least -= self._error(largest).clamp(min=self.gap)
@@ -113,11 +105,7 @@ class NetworkBounds:
 
     @torch.no_grad()
     def decide(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
-        """Return the bits of the possible actions of images, and the gap of the top two logits.
-
-        Args:
-            pictures: Shape (N, C, H, W).
-        """
+        """Return the bits of the possible actions of images, and the gap of the top two logits."""
         logits = self._answers(pictures)
         first, second = torch.tensor(self._pairs).T
         highest = logits.topk(2).values
@@ -306,11 +294,7 @@ class ImageRanges:
     """The images of one cube in order; each range of them is looked up in two steps."""
 
     def __init__(self, pictures: Tensor) -> None:
-        """Prepare the masks of all ranges of power-of-two length.
-
-        Args:
-            pictures: Faces of each pixel. Shape: (images, height, width).
-        """
+        """Prepare masks of ranges of power-of-two length, from faces (images, height, width)."""
         shown = pictures.any(0)
         rows, columns = shown.any(1).nonzero(), shown.any(0).nonzero()
         self.part = (

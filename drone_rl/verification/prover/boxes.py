@@ -69,12 +69,7 @@ def merge(boxes: NDArray[_Number]) -> NDArray[_Number]:
 
 
 def union(boxes: Boxes, most: int = MOST_GRIDS) -> Boxes:
-    """Return the union of overlapping boxes as disjoint boxes.
-
-    Args:
-        boxes: Any.
-        most: Largest number of grids; if it takes more, overlapping boxes stay as they are.
-    """
+    """Return the union of boxes as disjoint boxes; unchanged if it takes more than `most` grids."""
     if len(boxes) < 2:
         return boxes
     boxes = np.unique(boxes, axis=0)
@@ -86,15 +81,9 @@ def union(boxes: Boxes, most: int = MOST_GRIDS) -> Boxes:
 
 
 def complement(boxes: Boxes, space: Boxes, most: int = MOST_GRIDS) -> Boxes | None:
-    """Return the part of a space that no box covers, as disjoint boxes.
+    """Return the part of a space, shape (1, n, 2), outside all boxes, as disjoint boxes.
 
-    Args:
-        boxes: Any inside the space.
-        space: One box. Shape: (1, n, 2).
-        most: Largest number of grids.
-
-    Returns:
-        The boxes; None if it takes more grids.
+    None if it takes more than `most` grids.
     """
     grids = _grids(boxes, space, most)
     if grids is None:
@@ -103,11 +92,7 @@ def complement(boxes: Boxes, space: Boxes, most: int = MOST_GRIDS) -> Boxes | No
 
 
 def blocks(mask: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Return the set cells of a grid as disjoint blocks, not necessarily the fewest.
-
-    Returns:
-        First cell along each axis, and the one after the last. Shape: (N, axes, 2).
-    """
+    """Return the set cells of a grid as blocks: first cell and end. Shape: (N, axes, 2)."""
     edges = np.diff(mask.view(np.int8), prepend=0, append=0, axis=-1)
     first, last = np.argwhere(edges > 0), np.argwhere(edges < 0)
     after = first + 1

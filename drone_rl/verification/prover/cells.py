@@ -88,12 +88,7 @@ class Cells:
         return some
 
     def span(self, lower: NDArray, upper: NDArray) -> tuple[NDArray, NDArray]:
-        """Return the first and last cell or band that each interval intersects.
-
-        Args:
-            lower: Starts of the intervals, metres to the left of the camera.
-            upper: Their ends.
-        """
+        """Return the first and last cell or band that intervals of positions intersect."""
         first = np.searchsorted(self.limits, lower, side="right") - 1
         last = np.searchsorted(self.limits, upper, side="left") - 1
         return first.clip(0, len(self) - 1), last.clip(0, len(self) - 1)

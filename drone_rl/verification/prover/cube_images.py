@@ -153,11 +153,6 @@ class CubeImages:
     def __init__(self, worlds: Worlds, lattice: Lattice, camera: CameraModel) -> None:
         """Read the colours from the renderer.
 
-        Args:
-            worlds: Environments of the task with the policy's camera.
-            lattice: The task's.
-            camera: The camera.
-
         Raises:
             InputError: A face or the background has several colours, or two share one.
         """
@@ -239,11 +234,7 @@ class CubeImages:
     def closed_form(
         self, cubes: NDArray[np.float64], places: NDArray[np.int64]
     ) -> tuple[Tensor, NDArray[np.bool_]]:
-        """Compute the same images in closed form.
-
-        Returns:
-            The images; and which are on no border, so that the renderer's must be identical.
-        """
+        """Compute the same images in closed form, and which of them are on no border."""
         count = len(cubes)
         shown = np.full((count, *self.background.shape[:2]), NOTHING, np.uint8)
         is_clear = np.ones(count, bool)
@@ -268,14 +259,7 @@ class CubeImages:
         return torch.from_numpy(pictures), is_clear
 
     def check(self, count: int, random_state: np.random.RandomState) -> int:
-        """Compare the renderer with the closed form at random placements and positions.
-
-        Args:
-            count: Number of images.
-            random_state: Random stream.
-
-        Returns:
-            Number of images compared: those on no border.
+        """Compare `count` random images with the closed form; return how many were on no border.
 
         Raises:
             InputError: They differ.
@@ -325,14 +309,7 @@ class CubeView:
     steps: int
 
     def look(self, left: NDArray[np.float32]) -> NDArray[np.uint8]:
-        """Render the cube at each lateral position.
-
-        Args:
-            left: Metres to the left of the camera. Shape: (N,).
-
-        Returns:
-            RGB. Shape: (N, height, width, 3).
-        """
+        """Render the cube, metres left of the camera (N,), as RGB (N, height, width, 3)."""
         count = len(left)
         cubes = np.zeros((count, self.images.num_cubes))
         cubes[:, self.cube] = left

@@ -57,11 +57,7 @@ class Lattice:
     """A task's rules on the lattice."""
 
     def __init__(self, task: TaskSettings) -> None:
-        """Compute the cubes' positions.
-
-        Raises:
-            InputError: Rounding makes positions depend on the path.
-        """
+        """Raise InputError if rounding makes positions depend on the path."""
         self.task = task
         step, count = task.step_length, task.step_limit + 1
         multiples = np.arange(-count, count + 1) * step
@@ -96,13 +92,7 @@ class Lattice:
     def move(
         self, place: LatticeState, action: int, boxes: Boxes
     ) -> Iterator[tuple[LatticeState, Boxes]]:
-        """Yield the next state and its part of the boxes, for each set of cubes then collected.
-
-        Args:
-            place: The current state.
-            action: The action.
-            boxes: Placements of the cubes, metres.
-        """
+        """Yield the next state and its part of the boxes, for each set of cubes then collected."""
         sideways = {AHEAD: 0, LEFT: 1, RIGHT: -1}[action]
         moved = dataclasses.replace(
             place,
@@ -206,11 +196,7 @@ class Graph:
         return states(self.settings, self.cubes, self.nodes)
 
     def pictures(self) -> tuple[Tensor, Tensor]:
-        """Group nodes with the same image: same position, same remaining cubes.
-
-        Returns:
-            One node per image, shape (U,); the image of each node, shape (K,).
-        """
+        """Return one node per distinct image, (U,), and the image of each node, (K,)."""
         standing = dataclasses.replace(self.nodes, collected=_as_bits(self.states().present))
         keys, picture = _keys(shape_of(self.settings), standing).unique(return_inverse=True)
         node = torch.empty_like(keys)
@@ -285,11 +271,7 @@ def states(settings: TaskSettings, cubes: Tensor, nodes: Nodes) -> WorldState:
 
 
 def shape_of(settings: TaskSettings) -> Shape:
-    """Return the possible numbers of nodes.
-
-    Raises:
-        InputError: There are too many.
-    """
+    """Return the possible numbers of nodes; raise InputError if there are too many."""
     ahead = math.ceil(settings.front_bound / settings.step_length) + 2
     aside = 2 * (math.ceil(settings.side_bound / settings.step_length) + 1) + 1
     shape = Shape(ahead, aside, 2**settings.num_cubes)

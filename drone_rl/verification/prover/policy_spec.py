@@ -43,17 +43,7 @@ class PolicySpec:
     worlds: Worlds
 
     def cells(self, cube: int, steps: int, lowest: float, highest: float) -> Cells:
-        """Compute the cells of one cube after a number of steps ahead.
-
-        Args:
-            cube: Index of the cube.
-            steps: Steps of the drone ahead.
-            lowest: Start of the first cell, metres to the left of the drone.
-            highest: End of the last one.
-
-        Raises:
-            InputError: See `Cells`.
-        """
+        """Return one cube's cells between metres to the left, after a number of steps ahead."""
         ahead = self.lattice.cubes[cube] - steps * self.lattice.task.step_length - camera_ahead()
         return Cells(self.camera, ahead, lowest, highest, self.images.of(cube, steps))
 
@@ -99,13 +89,9 @@ def make_policy_spec(
 
 
 def check_task(task: TaskSettings) -> None:
-    """Refuse tasks whose images have no closed form.
-
-    Raises:
-        InputError: The first reason.
-    """
+    """Raise InputError if the task's images have no closed form."""
     if task.vertical_bound:
-        raise InputError(f"proofs support only task.vertical_bound=0, got {task.vertical_bound}")
+        raise InputError(f"task.vertical_bound={task.vertical_bound} is not supported; give 0")
     if task.spacing <= task.cube_size:
         raise InputError(
             f"task.spacing={task.spacing} puts cubes next to each other, so neither always "
@@ -181,11 +167,7 @@ def _count(spec: PolicySpec, away: float) -> int:
 
 
 def partition_placements(spec: PolicySpec, most: int) -> Boxes:
-    """Cut all placements into parts. Shape: (N, num_cubes, 2).
-
-    Args:
-        spec: Policy and task.
-        most: Approximate number of combinations of images per part.
+    """Cut all placements into parts of about `most` images each. Shape: (N, num_cubes, 2).
 
     Raises:
         InputError: There are too many parts.

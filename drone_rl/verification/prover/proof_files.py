@@ -37,11 +37,7 @@ _NOWHERE = (-1, 0, 0)  # stands for an unknown ending
 
 
 def weights_hash(weights: Mapping[str, Tensor]) -> str:
-    """Return the SHA-256 hash of a network's weights.
-
-    Args:
-        weights: State dict; order and device do not matter.
-    """
+    """Return the SHA-256 hash of a network's weights; order and device do not matter."""
     digest = hashlib.sha256()
     for name in sorted(weights):
         value = weights[name].detach().cpu().float().contiguous()
@@ -102,13 +98,7 @@ def certify(
 
 
 def save(prover: Prover, path: Path, proof_id: str) -> None:
-    """Write a proof's state.
-
-    Args:
-        prover: The proof, between two states.
-        path: The file; replaced atomically.
-        proof_id: Identifies what is proved, in one line.
-    """
+    """Write a proof's state atomically; `proof_id` identifies what is proved."""
     waiting = [
         ((*dataclasses.astuple(p), prover.longest.get(p, 0)), b)
         for p, boxes in prover.waiting.items()
@@ -137,16 +127,10 @@ def save(prover: Prover, path: Path, proof_id: str) -> None:
 
 
 def load(prover: Prover, path: Path, proof_id: str, most: int = ARRAYS_BYTES) -> None:
-    """Resume a new proof from a saved state.
-
-    Args:
-        prover: The proof; unchanged if the state is refused.
-        path: The file.
-        proof_id: Must equal the saved one.
-        most: Largest size of the file, bytes.
+    """Resume a new proof from a saved state of at most `most` bytes.
 
     Raises:
-        InputError: The file is damaged or of another proof.
+        InputError: The file is damaged or of another proof; the proof is unchanged.
     """
     try:
         state = read_arrays(path, most=most)

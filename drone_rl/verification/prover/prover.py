@@ -291,12 +291,7 @@ def undecided(boxes: Boxes) -> Findings:
 
 
 def ended(known: Ended, none: Boxes) -> Findings:
-    """Return the findings of placements followed to their end without forks.
-
-    Args:
-        known: See `Ended`.
-        none: No boxes. Shape: (0, n, 2).
-    """
+    """Return the findings of placements followed to their end without forks."""
     found = [undecided(none)]
     for (ending, steps), parts in known.items():
         boxes = np.concatenate(parts)
@@ -310,10 +305,6 @@ def so_far(known: Ended, part: Boxes) -> Findings:
     """Return the largest boxes of each ending of a part in progress; the rest counts as undecided.
 
     Many cubes give millions of boxes, which nobody could check one by one.
-
-    Args:
-        known: See `Ended`.
-        part: The whole part. Shape: (1, n, 2).
     """
     if not known:
         return undecided(part)
@@ -349,12 +340,7 @@ def combine(some: Sequence[Findings]) -> Findings:
 
 
 def simplified(found: Findings, space: Boxes) -> Findings:
-    """Reduce the number of boxes: the largest ending becomes the complement of the others.
-
-    Args:
-        found: Disjoint boxes that cover a space.
-        space: The space. Shape: (1, n, 2).
-    """
+    """Reduce the boxes of a whole space: one ending becomes the complement of the others."""
     endings = {ending: merge(boxes) for ending, boxes in found.endings.items()}
     left = merge(found.undecided)
     if endings:

@@ -92,7 +92,7 @@ def test_a_camera_that_goes_wrong_is_refused(spec, fault):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"vertical_bound": 0.5}, "only task.vertical_bound=0, got 0.5"),
+        ({"vertical_bound": 0.5}, "vertical_bound=0.5 is not supported"),
         ({"spacing": 2.0}, "spacing=2.0 puts cubes next to each other"),
         ({"lateral_bound": 0.0}, "leaves a single placement"),
     ],
