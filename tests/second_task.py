@@ -14,7 +14,7 @@ from torch import Tensor
 from drone_rl.sim.actions import MOVES, Entry
 from drone_rl.sim.dynamics import BodyState, ComputerVision
 from drone_rl.sim.entities import Cube
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.tasks import Goals, Grid, OracleRule
 from drone_rl.sim.vocabulary import Terms
 from drone_rl.utils.batch import Batch
@@ -47,7 +47,7 @@ class PostsState(Batch):
 class Post(Cube):
     """A box that must not be touched."""
 
-    meaning = Meaning.OBSTACLE
+    semantic_class = SemanticClass.OBSTACLE
 
 
 class Posts:

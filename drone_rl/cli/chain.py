@@ -10,7 +10,7 @@ from drone_rl.cli.hydra.names import policies as prepare  # noqa: F401 -- of wha
 from drone_rl.config.chances import ChanceSettings
 from drone_rl.config.changes import TaskChanges, no_changes
 from drone_rl.config.paths import PathsSettings
-from drone_rl.utils.schema import Real, Several
+from drone_rl.utils.schema import Real, Colors
 
 _log = logging.getLogger(__name__)
 

@@ -16,7 +16,7 @@ from drone_rl.config.loggers import Logger, Tensorboard
 from drone_rl.config.paths import PathsSettings
 from drone_rl.config.provable import ProvableSettings
 from drone_rl.config.training import TrainSettings
-from drone_rl.utils.schema import Instance, Several, Whole
+from drone_rl.utils.schema import Instance, Colors, Whole
 from drone_rl.verification.text import found
 
 if TYPE_CHECKING:

@@ -26,9 +26,9 @@ from drone_rl.policies.actor import CategoricalActor
 from drone_rl.policies.finite import require_finite
 from drone_rl.policies.known_outputs import KnownOutputs
 from drone_rl.policies.packing import PackedNetwork
-from drone_rl.sim.rendering.devices import Crew, loading
+from drone_rl.sim.rendering.devices import WorkerPool, load_kernels
 from drone_rl.sim.rendering.raytrace.renderer import Raytracer
-from drone_rl.sim.rendering.raytrace.structs_kernel import Pictures
+from drone_rl.sim.rendering.raytrace.structs_kernel import Images
 from drone_rl.sim.tasks.collect_cubes.flying import FlyingCubes
 
 _LONGEST = 64
@@ -53,12 +53,12 @@ class Flight:
         """Makes what the kernel needs; see `find`."""
         self._sight, self._actor, self._network, self._worlds = sight, actor, network, worlds
         count, view = sight.worlds.num_worlds, sight.view
-        self._crew = Crew(count, num_cores)
-        tools = sight.worlds.renderer.tools(view, self._crew.size)
+        self._workers = WorkerPool(count, num_cores)
+        tools = sight.worlds.renderer.kernel_inputs(view, self._workers.size)
         self._eye = flight_kernel.Eye()
-        self._eye.view, self._eye.geoms, self._eye.looks, self._eye.desk = tools
+        self._eye.view, self._eye.geoms, self._eye.materials, self._eye.scratch = tools
         self._eye.mean, self._eye.deviation = _standard(sight)
-        self._rooms = wp.empty((self._crew.size, network.room), dtype=float, device="cpu")
+        self._rooms = wp.empty((self._workers.size, network.room), dtype=float, device="cpu")
         pixels = view.height * view.width
         self._length = max(1, min(_LONGEST, _MOST_NUMBERS // (count * pixels)))
         self._num_rows = rows = count * self._length
@@ -75,7 +75,7 @@ class Flight:
         self._known: KnownOutputs | None = None
         self._logits = torch.empty(0, num_actions)
         self._owner = getattr(actor.network, "owner", "the policy")
-        loading(flight_kernel)
+        load_kernels(flight_kernel)
 
     @classmethod
     def find(cls, sight: Sight, actor: TensorDictModuleBase, num_cores: int) -> Self | None:
@@ -122,7 +122,7 @@ class Flight:
             Episode after episode: what was seen, "action", what `Sight.tell` tells, and
             ("collector", "traj_ids"), from 0. Shape: (T_total,).
         """
-        loading(flight_kernel).result()
+        load_kernels(flight_kernel).result()
         self._sight.env.start()
         state: Any = self._sight.worlds.state
         self._worlds.begin(state)
@@ -146,7 +146,7 @@ class Flight:
 
     def close(self) -> None:
         """Ends the threads."""
-        self._crew.close()
+        self._workers.close()
 
     def _flown(self, num_worlds: int, keep_observations: bool) -> tuple[Tensor, dict[str, Tensor]]:
         """Worlds of steps, episode after episode, and what was written down of these."""
@@ -169,7 +169,7 @@ class Flight:
 
     def _open_log(self, part: int, kept: tuple[str, ...]) -> flight_kernel.Log:
         """Where a part is written, and what of it is kept."""
-        log, pictures, room = flight_kernel.Log(), Pictures(), self._book.open(part, kept)
+        log, pictures, room = flight_kernel.Log(), Images(), self._book.open(part, kept)
         pictures.gray = wp.from_torch(room["pixels"].flatten(1))
         self._logits = room["logits"]
         log.pictures, log.logits = pictures, wp.from_torch(self._logits)
@@ -200,7 +200,7 @@ class Flight:
             inputs = [first, last, member, *given]
             wp.launch(flight_kernel.fly, 1, inputs=inputs, device="cpu")
 
-        self._crew.share_out(0, num_worlds, work)
+        self._workers.map_spans(0, num_worlds, work)
 
     def _written(self, lengths: Tensor) -> tuple[Tensor, Tensor]:
         """Worlds and rows of the log, world after world.

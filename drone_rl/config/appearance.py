@@ -4,7 +4,7 @@ import dataclasses
 from typing import Annotated
 
 from drone_rl.config.task import Color
-from drone_rl.utils.schema import Listed, Real, Several, Span, Whole
+from drone_rl.utils.schema import Listed, Real, Colors, Span, Whole
 from drone_rl.utils.settings import Settings
 
 Number = float | tuple[float, float]

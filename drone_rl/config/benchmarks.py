@@ -3,7 +3,7 @@
 import dataclasses
 from typing import Annotated
 
-from drone_rl.utils.schema import Listed, Several, Whole
+from drone_rl.utils.schema import Listed, Colors, Whole
 from drone_rl.utils.settings import Settings
 
 

@@ -5,7 +5,7 @@ from typing import Annotated
 
 from drone_rl.config.judging import JudgeSettings
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import Listed, OneOf, Several, Whole
+from drone_rl.utils.schema import Listed, OneOf, Colors, Whole
 
 BODIES = (
     "computer vision",

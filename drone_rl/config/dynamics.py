@@ -8,7 +8,7 @@ import math
 from typing import Annotated
 
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import OneOf, Real, Several, Whole
+from drone_rl.utils.schema import OneOf, Real, Colors, Whole
 from drone_rl.utils.settings import Settings
 
 MODES = ("computer_vision", "simple_flight")

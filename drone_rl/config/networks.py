@@ -4,7 +4,7 @@ import dataclasses
 from typing import Annotated, ClassVar
 
 from drone_rl.config.variant import Variant
-from drone_rl.utils.schema import Several, Whole
+from drone_rl.utils.schema import Colors, Whole
 
 Channels = Annotated[tuple[int, ...], Several(Whole(1, 512, "channels"), 1, 8)]
 Widths = Annotated[tuple[int, ...], Several(Whole(1, 4096, "neurons"), 0, 8)]

@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 from drone_rl.config import RendererName
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import Listed, Maybe, OneOf, Real, Several, Whole
+from drone_rl.utils.schema import Listed, Maybe, OneOf, Real, Colors, Whole
 from drone_rl.utils.settings import Settings
 
 MODES = ("constant", "drifting", "onset")

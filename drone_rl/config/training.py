@@ -20,7 +20,7 @@ from drone_rl.config.placing import check_appearance
 from drone_rl.config.returns import Gae, LeaveOneOut, Returns
 from drone_rl.config.transforms import Gray, Standardize, Transform
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import Instance, Real, Several, Whole
+from drone_rl.utils.schema import Instance, Real, Colors, Whole
 from drone_rl.utils.settings import Settings
 
 MOST_TRANSFORMS = 16

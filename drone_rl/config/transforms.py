@@ -5,7 +5,7 @@ from typing import Annotated, Any, ClassVar
 
 from drone_rl.config.variant import Variant
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import Real, Several, Whole
+from drone_rl.utils.schema import Real, Colors, Whole
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

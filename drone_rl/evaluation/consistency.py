@@ -21,7 +21,7 @@ from drone_rl.utils.consistency import (
 )
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import proportion
-from drone_rl.utils.schema import Flag, OneOf, Plain, Real, Several, Whole, as_mapping, shown
+from drone_rl.utils.schema import Flag, OneOf, Plain, Real, Colors, Whole, as_mapping, shown
 
 _KIND = OneOf(tuple(kind.value for kind in rule.Kind))
 _ROUNDING = 1e-6

@@ -12,11 +12,11 @@ from drone_rl.explanations.hooks import probabilities
 from drone_rl.explanations.scenes import Region, Scenes
 from drone_rl.policies import PictureNetwork
 from drone_rl.sim.rendering import Appearance
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.tasks import State
 
 OTHER_TARGETS = Appearance(
-    colors={Meaning.TARGET: (0.9, 0.85, 0.2), Meaning.OBSTACLE: (0.9, 0.85, 0.2)}
+    colors={SemanticClass.TARGET: (0.9, 0.85, 0.2), SemanticClass.OBSTACLE: (0.9, 0.85, 0.2)}
 )
 MOVED_METRES = 2.0
 

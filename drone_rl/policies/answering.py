@@ -17,7 +17,7 @@ from torch import Tensor, nn
 from drone_rl.policies.finite import require_finite
 from drone_rl.policies.layers_kernel import Layers, decide, look
 from drone_rl.policies.packing import PackedNetwork
-from drone_rl.sim.rendering.devices import loading, start_warp
+from drone_rl.sim.rendering.devices import load_kernels, start_warp
 
 _TOGETHER = wp.constant(16)
 """Pictures whose linear layers are worked out together."""
@@ -59,7 +59,7 @@ class Answers:
         self._own = threading.local()
         if self._packed is not None:
             self._packed.update()
-            loading(sys.modules[__name__]).result()
+            load_kernels(sys.modules[__name__]).result()
 
     @torch.no_grad()
     def __call__(self, pictures: Tensor) -> Tensor:

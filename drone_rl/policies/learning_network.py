@@ -19,7 +19,7 @@ from drone_rl.policies.gradients_kernel import BLOCK, Lesson
 from drone_rl.policies.known_outputs import KnownOutputs
 from drone_rl.policies.network import PictureNetwork
 from drone_rl.policies.packed_layer import Order, PackedLayer, odd_lines, outputs_at, packed_layers
-from drone_rl.sim.rendering.devices import Crew, loading
+from drone_rl.sim.rendering.devices import WorkerPool, load_kernels
 
 MOST_WEIGHTS = 2**20
 """Of a network; more of them don't stay near a core, and torch is as fast."""
@@ -49,7 +49,7 @@ class LearningNetwork(PictureNetwork):
         self.known: KnownOutputs | None = None
         """Outputs that somebody else makes by the same network; looked for at each call."""
         self._work: _Work | None = None
-        loading(gradients_kernel)
+        load_kernels(gradients_kernel)
 
     @classmethod
     def find(cls, network: nn.Module, num_threads: int = 1, *, of: Of = "weights") -> Self | None:
@@ -122,9 +122,9 @@ class _Work:
         *,
         is_fixed: bool,
     ) -> None:
-        loading(gradients_kernel).result()
+        load_kernels(gradients_kernel).result()
         self._layers, self._known = layers, known
-        self._crew = Crew(num_threads, num_threads)
+        self._workers = WorkerPool(num_threads, num_threads)
         self._order = order = Order(layers)
         self._weights = torch.zeros(order.weights_at[-1])
         self._back = torch.zeros(order.back_at[-1])
@@ -138,13 +138,13 @@ class _Work:
         lesson.num_convolutions = sum(layer.is_convolution for layer in layers)
         lesson.near = odd_lines(self._logits_at - made_at[lesson.num_convolutions - 1])
         self._lesson = lesson
-        self._rooms = torch.empty(self._crew.size, int(BLOCK) * self._size)
-        self._sides = torch.empty(self._crew.size, int(BLOCK) * lesson.near)
+        self._rooms = torch.empty(self._workers.size, int(BLOCK) * self._size)
+        self._sides = torch.empty(self._workers.size, int(BLOCK) * lesson.near)
         most = max(v.num_inputs * v.geometry[0] for v in layers if v.is_convolution)
-        self._patches = torch.empty(self._crew.size, most)
+        self._patches = torch.empty(self._workers.size, most)
         self._spare: Tensor | None = None
         """Of outputs that nobody needs any more; new memory takes longer than a layer."""
-        self._gradients = torch.empty(self._crew.size, *self._weights.shape)
+        self._gradients = torch.empty(self._workers.size, *self._weights.shape)
         self._is_fixed = is_fixed
         order.pack(self._weights, self._back)
 
@@ -170,7 +170,7 @@ class _Work:
             inputs = [first, last, *given]
             wp.launch(gradients_kernel.answer, 1, inputs=inputs, device="cpu")
 
-        self._crew.share_out(0, len(pictures), work)
+        self._workers.map_spans(0, len(pictures), work)
         return _Made(made, torch.arange(len(pictures), dtype=torch.int32), None)
 
     def logits(self, made: _Made) -> Tensor:
@@ -203,7 +203,7 @@ class _Work:
             inputs = [first, last, member, *given]
             wp.launch(gradients_kernel.learn, 1, inputs=inputs, device="cpu")
 
-        self._crew.share_out(0, len(pictures), work)
+        self._workers.map_spans(0, len(pictures), work)
         if made.times is None:
             self._spare = made.outputs
 

@@ -22,7 +22,7 @@ from drone_rl.robustness.perturbations import (
     Whitened,
     told_by,
 )
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.utils.errors import InputError
 
 NUMBERS = (1, 2, 3, 4, 5)
@@ -119,7 +119,7 @@ class Axis:
 
 CORRELATION_TIME = -1.0 / math.log(0.95)
 """Frames: of one frame's noise 0.95 is left in the next."""
-_THINGS = (Meaning.TARGET, Meaning.OBSTACLE)
+_THINGS = (SemanticClass.TARGET, SemanticClass.OBSTACLE)
 _SIZES = {"collect_cubes": "cube_size", "pillars": "width"}
 _FACTORS = (0.9, 1.25, 0.75, 1.5, 0.5)
 _ANGLES = (1.0, 3.0, 9.0, 18.0, 27.0)
@@ -189,7 +189,7 @@ AXES: dict[str, Axis] = {
         ),
         Axis(
             *("floor_color", "color", "of each color", 0.0, (0.025, 0.05, 0.1, 0.2, 0.3)),
-            lambda s, _: Condition(looks=(Tinted((Meaning.GROUND,), s),)),
+            lambda s, _: Condition(looks=(Tinted((SemanticClass.GROUND,), s),)),
             touched_by=_below("appearance", "ground_color", "ground_texture", "ground_tile"),
         ),
         Axis(

@@ -13,9 +13,9 @@ from drone_rl.config import BaseTaskSettings
 from drone_rl.config.task import Things
 from drone_rl.robustness.faults import Fault
 from drone_rl.sim.clutter import stand
-from drone_rl.sim.rendering import Appearance, Beside, Scene
-from drone_rl.sim.rendering.appearance import Several, moved, turned
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering import Appearance, Distractors, Scene
+from drone_rl.sim.rendering.appearance import Colors, moved, turned
+from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.rendering.view import LUMA
 from drone_rl.utils.errors import InputError
 
@@ -96,13 +96,13 @@ def reflect(way: Tensor) -> Tensor:
 
 def look_of(scene: Scene) -> Appearance:
     """How a scene looks, with all of it given but for distractors, which are told one by one."""
-    known = [m for m in scene.meanings if m is not Meaning.DISTRACTOR]
+    known = [m for m in scene.semantic_classes if m is not SemanticClass.DISTRACTOR]
     colors = {m: tuple(scene.colors[scene.geoms(m)[0], :3].tolist()) for m in known}
     model = scene.model
     lights = (model.light_ambient[0], model.light_diffuse[0], model.light_dir[0])
     ambient, sun, direction = (tuple(light.tolist()) for light in lights)
     return Appearance(
-        colors={**colors, Meaning.SKY: scene.sky},
+        colors={**colors, SemanticClass.SKY: scene.sky},
         ambient=ambient,
         sun=sun,
         sun_direction=direction,
@@ -113,7 +113,7 @@ def look_of(scene: Scene) -> Appearance:
 class Tinted:
     """Things whose red, green and blue differ, each world in its own way."""
 
-    meanings: tuple[Meaning, ...]
+    meanings: tuple[SemanticClass, ...]
     """Of what; the others and what is not there stay as they are."""
     by: float
     """At most, of colours from 0 to 1."""
@@ -130,7 +130,7 @@ class Tinted:
 class Whitened:
     """Things with white mixed into their colour."""
 
-    meanings: tuple[Meaning, ...]
+    meanings: tuple[SemanticClass, ...]
     share: float
     """Of white: 1 leaves nothing of the colour."""
     dimensions: int = 0
@@ -186,20 +186,20 @@ class Fogged:
         return dataclasses.replace(appearance, fog=self.visibility)
 
 
-def elevation(direction: Several) -> float:
+def elevation(direction: Colors) -> float:
     """Height of a sun whose light goes there, degrees above the horizon."""
     x, y, z = _tensor(direction).tolist()
     return math.degrees(math.atan2(-z, math.hypot(x, y)))
 
 
 def _painted(
-    appearance: Appearance, meanings: tuple[Meaning, ...], paint: Callable[[Tensor], Tensor]
+    appearance: Appearance, meanings: tuple[SemanticClass, ...], paint: Callable[[Tensor], Tensor]
 ) -> Appearance:
     there = {m: paint(_tensor(c)) for m, c in appearance.colors.items() if m in meanings}
     return dataclasses.replace(appearance, colors={**appearance.colors, **there})
 
 
-def _tensor(value: Several) -> Tensor:
+def _tensor(value: Colors) -> Tensor:
     return torch.as_tensor(value, dtype=torch.float64)
 
 
@@ -253,14 +253,14 @@ def clutter(appearance: Appearance | None, things: Things, places: Tensor) -> Ap
         places: Where they stand. Shape: (num_worlds, count, 3).
     """
     color = torch.tensor(as_bright(things.color)).to(places)
-    more = Beside(
+    more = Distractors(
         places=places,
         sizes=torch.full_like(places[..., 0], things.size),
         colors=color.expand(places.shape),
     )
     appearance = appearance or Appearance()
-    own = appearance.beside
-    return dataclasses.replace(appearance, beside=more if own is None else own.and_more(more))
+    own = appearance.distractors
+    return dataclasses.replace(appearance, distractors=more if own is None else own.concat(more))
 
 
 class Look(Protocol):

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import Real, Record, Several, Text, Whole, shown
+from drone_rl.utils.schema import Real, Record, Colors, Text, Whole, shown
 
 MOST = 16
 _NAME = re.compile(r"[a-z][a-z0-9 _-]{0,23}")

@@ -14,7 +14,7 @@ from drone_rl.utils.files import read_json, refuse_links, write_atomically
 from drone_rl.utils.limits import SWEEP_BYTES
 from drone_rl.utils.overrides import COMMAND, MOST_OVERRIDES, check_harmless
 from drone_rl.utils.provenance import provenance
-from drone_rl.utils.schema import Maybe, Plain, Record, Several, Text, Whole, as_mapping, shown
+from drone_rl.utils.schema import Maybe, Plain, Record, Colors, Text, Whole, as_mapping, shown
 
 FORMAT = "drone_rl sweep"
 MAY_CHANGE = ("resume", "logger", "paths", "trainer.checkpoint_interval_s", "renderer")

@@ -43,7 +43,7 @@ from drone_rl.utils.archives import read_array
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock, read_json, write_atomically
 from drone_rl.utils.progress import Bar, Progress
-from drone_rl.utils.schema import Plain, Real, Record, Several, Whole
+from drone_rl.utils.schema import Plain, Real, Record, Colors, Whole
 from drone_rl.utils.seeding import Stream
 from drone_rl.utils.settings import Settings
 from drone_rl.verification.prove import Proof, prove

@@ -1,6 +1,6 @@
 from drone_rl.robustness.faults import Blur, Late
 from drone_rl.robustness.perturbations import Condition, Mount, SunAt, Tinted
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.scene import SemanticClass
 
 
 def test_nothing_is_different_by_default():
@@ -10,7 +10,7 @@ def test_nothing_is_different_by_default():
 
 def test_both_at_once():
     blur, late = Blur(1.0), Late(2)
-    tint, sun, mount = Tinted((Meaning.GROUND,), 0.1), SunAt(5.0), Mount(degrees=3.0)
+    tint, sun, mount = Tinted((SemanticClass.GROUND,), 0.1), SunAt(5.0), Mount(degrees=3.0)
     one = Condition(task={"cube_size": 2.0}, looks=(tint,), faults=(blur,), delay=3)
     two = Condition(
         task={"cube_size": 3.0, "step_length": 0.5},

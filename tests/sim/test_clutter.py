@@ -43,8 +43,8 @@ def test_what_is_drawn_lies_in_its_range_and_fills_it():
     assert {*stands.sum(1).tolist()} == {2, 3, 4, 5} and stands[:, :2].all()
     x, y, z, size = rows[..., :4].unbind(-1)
     assert x.min() >= 0 and 33 < x.max() <= 48  # the last cube at 33 m, the first at 15 m
-    beside = y.abs() - 6.0 - size / 2
-    assert 3 <= beside.min() < 3.1 and 5.9 < beside.max() <= 6
+    distractors = y.abs() - 6.0 - size / 2
+    assert 3 <= distractors.min() < 3.1 and 5.9 < distractors.max() <= 6
     assert (z == size / 2)[stands].all() and torch.allclose(
         z[~stands], (size / 2 - HIDDEN_DEPTH)[~stands]
     )

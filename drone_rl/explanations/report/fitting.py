@@ -10,7 +10,7 @@ from drone_rl.explanations.report.truth_text import NAMES
 from drone_rl.sim.action_display import ShownActions
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.limits import check_indices
-from drone_rl.utils.schema import Kind, Maybe, OneOf, Real, Several, Whole, as_mapping
+from drone_rl.utils.schema import Kind, Maybe, OneOf, Real, Colors, Whole, as_mapping
 from drone_rl.verification.text import WHERE
 
 _DIMENSIONS: Mapping[str, tuple[str, ...]] = {

@@ -8,7 +8,7 @@ from drone_rl.sim.sensors import (
     GpsReading,
     ImuReading,
     MagnetometerReading,
-    Senses,
+    SensorSuite,
 )
 
 
@@ -27,7 +27,7 @@ class Sensors:
             settings: Rates, latencies, noise.
             seed: Of the noise.
         """
-        self._senses = Senses(settings, seed=seed)
+        self._senses = SensorSuite(settings, seed=seed)
         self._state = self._senses.start(body)
 
     @property

@@ -18,7 +18,7 @@ from drone_rl.sim.dynamics.flight_state import CLIMB, FlightState
 from drone_rl.sim.dynamics.goals import Goals, rotor_goals
 from drone_rl.sim.dynamics.obstacles import Obstacles
 from drone_rl.sim.dynamics.steering import make_steering
-from drone_rl.sim.rendering.devices import Crew, on_torch_stream, start_warp
+from drone_rl.sim.rendering.devices import WorkerPool, on_torch_stream, start_warp
 
 _LEAST_WORK = 3000
 """Ticks of all drones together for which a second thread is worth its while."""
@@ -120,15 +120,15 @@ class Quadrotor:
             wp.launch(flight_kernel.fly, last - first, inputs=inputs, device=str(device))
 
         if device.type == "cpu" and count * ticks >= _LEAST_WORK:
-            self._crew.share_out(0, count, work)
+            self._workers.map_spans(0, count, work)
         else:
             with on_torch_stream(device):
                 work(0, 0, count)
         return FlightState(after)
 
     @functools.cached_property
-    def _crew(self) -> Crew:
-        return Crew(2**30)
+    def _workers(self) -> WorkerPool:
+        return WorkerPool(2**30)
 
 
 @functools.cache

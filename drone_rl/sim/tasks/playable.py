@@ -11,7 +11,7 @@ from torch import Tensor
 
 from drone_rl.sim.actions import Entry
 from drone_rl.sim.dynamics import BodyState, Dynamics, Obstacles
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.scene import SemanticClass
 
 
 class State(Protocol):
@@ -55,7 +55,7 @@ S = TypeVar("S", bound=State)
 class Prop(Protocol):
     """A dm_control entity that the task puts into the world, and where."""
 
-    meaning: Meaning
+    semantic_class: SemanticClass
 
     @property
     def mjcf_model(self) -> mjcf.RootElement:

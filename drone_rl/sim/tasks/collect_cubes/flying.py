@@ -57,7 +57,7 @@ class FlyingCubes:
         self.flights.front_bound = settings.front_bound
         self.flights.side_bound = settings.side_bound
         self.flights.step_limit = settings.step_limit
-        self.poses.places = wp.from_torch(places, dtype=wp.vec3)
+        self.poses.positions = wp.from_torch(places, dtype=wp.vec3)
         self.poses.attitudes = wp.from_torch(attitudes, dtype=wp.vec4)
 
     @classmethod

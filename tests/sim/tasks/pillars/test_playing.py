@@ -1,14 +1,14 @@
 import numpy as np
 import torch
 
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.tasks import Pillars
 
 
 def test_there_is_a_prop_for_each_pillar(settings):
     task = Pillars(settings)
     props = task.make_props()
-    assert len(props) == 4 and {prop.meaning for prop in props} == {Meaning.OBSTACLE}
+    assert len(props) == 4 and {prop.semantic_class for prop in props} == {SemanticClass.OBSTACLE}
     assert len({prop.mjcf_model.model for prop in props}) == 4
 
 
