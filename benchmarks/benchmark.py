@@ -7,7 +7,7 @@ from typing import Any, Self
 
 import torch
 
-from drone_rl.config.benchmarks import BenchSettings
+from drone_rl.config.commands import BenchSettings
 
 Figures = Mapping[str, Any]
 """Plain values by key. No two benchmarks make the same key."""

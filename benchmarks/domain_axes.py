@@ -6,13 +6,13 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from drone_rl.config.judging import JudgeSettings
+from drone_rl.config.commands import JudgeSettings
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.robustness.axes import AXES, Axis
 from drone_rl.robustness.shifts import shifts
 from drone_rl.utils.progress import silent
 from drone_rl.utils.seeding import root_seed
-from drone_rl.verdicts.coverage import Coverage, find_domain, refly, require
+from drone_rl.verdicts.coverage import Coverage, find_domain, recheck_domain, require
 
 POLICY = "robust"
 """Good beyond no difference on every axis."""
@@ -48,7 +48,7 @@ def bench_domain_axes(folder: Path, quick: bool) -> dict[str, Any]:
     flights = JudgeSettings(domain_flights=20 if quick else 100)
     wrong = {name: [*_problems(policy, folder, name)] for name in found.numbers["axes"]}
     needs = _required(policy, folder, folder / "domain.yaml").needs
-    reflown = refly(policy, needs, found.numbers, flights, root_seed(None))
+    reflown = recheck_domain(policy, needs, found.numbers, flights, root_seed(None))
     return {
         "domain_axes": len(wrong),
         "domain_axes_right": sum(not problems for problems in wrong.values()),

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from drone_rl.config import TaskSettings
-from drone_rl.config.collecting import Threads
+from drone_rl.config.learning import Threads
 from drone_rl.config.training import TrainerSettings
 from drone_rl.evaluation.judge import judge_policy
 from drone_rl.policies.policy import Policy, load_policy

@@ -15,8 +15,8 @@ from torch import Tensor
 from drone_rl.config import DynamicsSettings
 from drone_rl.config.dynamics import GRAVITY
 from drone_rl.sim.dynamics import FlightState, Goals, Mode, Quadrotor
-from drone_rl.sim.dynamics import flight_state as fs
-from drone_rl.sim.dynamics.forces import forces
+from drone_rl.sim.dynamics import state as fs
+from drone_rl.sim.dynamics.forces_kernel import forces
 
 SECONDS = 10.0
 HEIGHT = 1000.0

@@ -3,9 +3,9 @@
 import math
 from typing import Any
 
+from benchmarks.hover_error import HoverError, hover_error
+from benchmarks.path_following import courses, path_following
 from drone_rl.config import DynamicsSettings
-from drone_rl.flight.commands.hover_error import HoverError, hover_error
-from drone_rl.flight.commands.path_following import courses, path_following
 
 WIND = 5.0
 """Metres a second in which drones hover."""

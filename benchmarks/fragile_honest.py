@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.commands import train
-from drone_rl.config.judging import JudgeSettings
+from drone_rl.config.commands import JudgeSettings
 from drone_rl.policies.policy import load_policy
 from drone_rl.policies.zoo import policy_names
 from drone_rl.utils.progress import silent

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 
 from benchmarks.gamed_case import GamedCase
-from drone_rl.config.shifting import ShiftSettings
+from drone_rl.config.commands import ShiftSettings
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import certificate_path, shifts_path
 from drone_rl.robustness.axes import find_axes
 from drone_rl.robustness.domain import Prober
-from drone_rl.robustness.paired_evaluation import Airfield
-from drone_rl.robustness.shifts import make_subject, shifts
+from drone_rl.robustness.paired_evaluation import PairedEvaluator
+from drone_rl.robustness.shifts import make_policy_spec, shifts
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 from drone_rl.verdicts.judge import judge
@@ -130,10 +130,10 @@ def invented(policy: Policy, folder: Path) -> dict[str, Any]:
         level |= {"oracle": data["plain"]["oracle"], "impossible": False, "refused": None}
         level["modes"] = {"constant": {**won, "unchanged": False}}
     along["areas"] = {"constant": 1.0}
-    subject = make_subject(policy, ShiftSettings())
+    subject = make_policy_spec(policy, ShiftSettings())
     (axis,) = find_axes([_AXIS], subject)
-    with closing(Airfield(subject, 1, data["settings"]["seed"])) as bed:
-        prober = _Liar(bed)
+    with closing(PairedEvaluator(subject, 1, data["settings"]["seed"])) as evaluator:
+        prober = _Liar(evaluator)
         data["domain"] = {"plain": prober.plain, "ranges": {_AXIS: prober.search(axis)}}
     return data
 
@@ -141,8 +141,8 @@ def invented(policy: Policy, folder: Path) -> dict[str, Any]:
 class _Liar(Prober):
     """Finds a policy good under every condition."""
 
-    def __init__(self, bed: Airfield) -> None:
-        self._bed = bed
+    def __init__(self, evaluator: PairedEvaluator) -> None:
+        self._evaluator = evaluator
         self.plain = self.probe(None, 0.0)
 
     def probe(self, condition: Any, part: float) -> dict[str, Any]:

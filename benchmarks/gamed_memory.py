@@ -18,12 +18,12 @@ from torchrl.envs.utils import ExplorationType, set_exploration_type
 from benchmarks.gamed_case import GamedCase
 from drone_rl.collectors import EpisodeCollector
 from drone_rl.config import TaskSettings
+from drone_rl.config.commands import FlightSettings
 from drone_rl.config.configuration import as_config
-from drone_rl.config.judging import FlightSettings
 from drone_rl.config.networks import Mlp
 from drone_rl.config.training import TrainSettings
 from drone_rl.evaluation.evaluate import evaluate
-from drone_rl.evaluation.judge import judge_to_choose
+from drone_rl.evaluation.judge import judge_for_selection
 from drone_rl.policies import MLP
 from drone_rl.policies.base_policy import Pilot
 from drone_rl.policies.external_network import Logits
@@ -225,7 +225,7 @@ def _conditions(make: Callable[[], Pilot | Path], seed: int | None) -> bool:
 
 def _choice(make: Callable[[], Path], seed: int | None) -> bool:
     drawn = None if seed is None else root_seed(seed)
-    verdict, _ = judge_to_choose(make(), EPISODES, "cpu", seed=drawn)
+    verdict, _ = judge_for_selection(make(), EPISODES, "cpu", seed=drawn)
     return verdict["exit_code"] == 0
 
 

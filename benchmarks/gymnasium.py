@@ -3,7 +3,7 @@
 import numpy as np
 
 from benchmarks.parts import make_worlds, paired, random_walk
-from drone_rl.utils.extras import extra
+from drone_rl.utils.errors import extra
 
 _STEPS = 10
 """Of a batch between two looks at the clock."""

@@ -15,8 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.injection_payloads import HOST, MARKUP, PAYLOADS
-from drone_rl.utils.errors import InputError
-from drone_rl.utils.extras import extra
+from drone_rl.utils.errors import InputError, extra
 
 _TRY = """
 document.querySelectorAll("details").forEach(d => { d.open = true; });

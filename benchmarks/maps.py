@@ -9,16 +9,14 @@ import torch
 from torch import Tensor
 
 from benchmarks.liars import liars
+from benchmarks.planted import Planted, plant, reach
 from drone_rl.explanations.hooks import probabilities
-from drone_rl.explanations.planted import Planted, plant, reach
 from drone_rl.explanations.scenes import Scenes
 from drone_rl.explanations.trust import Pictures, Trial, check_maps, draw_pictures
 from drone_rl.policies import PictureNetwork, SmallCNN
 from drone_rl.policies.environment import make_env
 from drone_rl.policies.zoo import load_exported, parse, policy_names, policy_path
-from drone_rl.sim.tasks import CollectCubes
-from drone_rl.sim.tasks.collect_cubes import rules
-from drone_rl.sim.tasks.collect_cubes.rules import WorldState
+from drone_rl.sim.tasks.collect_cubes import CollectCubes, WorldState
 
 NUM_METHODS = 5
 """Methods that an explanation tries; a candidate is judged as one of so many."""
@@ -82,8 +80,8 @@ def imagined(scenes: Scenes, episodes: int, frames: int) -> tuple[WorldState, np
     assert isinstance(task, CollectCubes)  # whose cubes the planted policies look for
     settings = task.settings
     random_state = np.random.RandomState(0)
-    cubes = torch.stack([rules.draw_cubes(settings, random_state) for _ in range(episodes)])
-    state = rules.start(settings, cubes.repeat_interleave(frames, 0))
+    cubes = torch.stack([CollectCubes(settings).draw(random_state) for _ in range(episodes)])
+    state = CollectCubes(settings).start(cubes.repeat_interleave(frames, 0))
     where = torch.from_numpy(random_state.uniform(size=(len(state.drone), 2)))
     state.drone[:, 0] = where[:, 0] * (settings.last_distance - settings.touch_distance)
     state.drone[:, 1] = (2 * where[:, 1] - 1) * settings.lateral_bound

@@ -12,7 +12,7 @@ import numpy as np
 
 from benchmarks.commands import memory_status
 from drone_rl.utils.compiler import leave_compiler_unloaded
-from drone_rl.utils.garbage import look_for_garbage_rarely
+from drone_rl.utils.memory import look_for_garbage_rarely
 
 SETTLING_FRAMES = 100_000
 """After which a training has seen what it will see: numbers of worlds, lengths of batches."""

@@ -16,7 +16,7 @@ from drone_rl.config import (
     DynamicsSettings,
     TaskSettings,
 )
-from drone_rl.config.collecting import Threads
+from drone_rl.config.learning import Threads
 from drone_rl.config.training import TrainSettings
 from drone_rl.envs import DroneEnv
 from drone_rl.policies import PolicyNetwork, SmallCNN, make_actor

@@ -26,6 +26,7 @@ from benchmarks.places import bench_places
 from benchmarks.provable import bench_provable
 from benchmarks.proving import bench_many_cubes, bench_prove, bench_tampering
 from benchmarks.render_truth import bench_render_truth
+from benchmarks.revisions import bench_revisions
 from benchmarks.robust import bench_robust
 from benchmarks.scaling import bench_scaling
 from benchmarks.sentences import bench_sentences
@@ -133,7 +134,7 @@ BENCHMARKS: dict[str, Benchmark] = {
         (
             *_CLAIMS,
             "utils/display",
-            "utils/pages",
+            "utils/display",
             "benchmarks/injections",
             "benchmarks/injected_pages",
             "benchmarks/injection_payloads",
@@ -242,6 +243,11 @@ BENCHMARKS: dict[str, Benchmark] = {
         lambda s: bench_pillars(s.runs / "pillars", s.seeds[:3], s.episodes, s.device, s.quick),
         "guests",
         (*_TRAINING, "evaluation", "conf", "benchmarks/training"),
+    ),
+    "revisions": Benchmark(
+        lambda s: bench_revisions(s.runs / "revisions", s.quick),
+        "room",
+        (*_TRAINING, "evaluation", "explanations", "cli", "conf", "benchmarks/revisions"),
     ),
     "startup": Benchmark(
         lambda s: bench_startup(s.runs / "startup", s.device, s.quick),

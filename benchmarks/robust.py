@@ -14,12 +14,12 @@ from typing import Any
 from benchmarks.commands import train
 from benchmarks.robust_comparison import PLAIN, by_kind, compare, mean, untouched_kinds
 from drone_rl.config import MINIMAL
-from drone_rl.config.shifting import ShiftSettings
+from drone_rl.config.commands import ShiftSettings
 from drone_rl.policies.policy import load_policy
 from drone_rl.policies.zoo import read_checkpoint
 from drone_rl.robustness.axes import AXES, GROUPS, find_axes
-from drone_rl.robustness.paired_evaluation import Airfield, Subject
-from drone_rl.robustness.shifts import make_subject
+from drone_rl.robustness.paired_evaluation import PairedEvaluator, PolicySpec
+from drone_rl.robustness.shifts import make_policy_spec
 from drone_rl.training.train import last_of, settings_of
 
 DEFAULT, ALL = "default", "all"
@@ -94,21 +94,21 @@ def fly(
     """
     asked = ShiftSettings(episodes=episodes)
     subjects = {str(run): _in_plain_worlds(run, asked) for run in runs}
-    bed = Airfield(next(iter(subjects.values())), episodes, seed=0)
+    evaluator = PairedEvaluator(next(iter(subjects.values())), episodes, seed=0)
     try:
         axes = [
             dataclasses.replace(axis, strengths=axis.strengths[:strengths])
-            for axis in find_axes(None, bed.subject)
+            for axis in find_axes(None, evaluator.subject)
         ]
-        found = compare(bed, subjects, axes, possible_share=asked.possible_share)
+        found = compare(evaluator, subjects, axes, possible_share=asked.possible_share)
     finally:
-        bed.close()
+        evaluator.close()
     return {Path(name): shares for name, shares in found.items()}
 
 
-def _in_plain_worlds(run: Path, asked: ShiftSettings) -> Subject:
+def _in_plain_worlds(run: Path, asked: ShiftSettings) -> PolicySpec:
     """A policy, wherever it was trained; faults of its camera are none of the flights'."""
-    return dataclasses.replace(make_subject(load_policy(run), asked), appearance=MINIMAL)
+    return dataclasses.replace(make_policy_spec(load_policy(run), asked), appearance=MINIMAL)
 
 
 def _told(shares: Mapping[str, float], untouched: Sequence[str]) -> dict[str, float]:

@@ -12,7 +12,7 @@ from torchrl.envs.utils import ExplorationType, exploration_type
 
 from drone_rl.config import TaskSettings
 from drone_rl.sim.actions import Move
-from drone_rl.sim.tasks.collect_cubes.rules import Side
+from drone_rl.sim.tasks.collect_cubes import Side
 
 
 @dataclasses.dataclass

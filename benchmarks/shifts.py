@@ -3,7 +3,7 @@
 import time
 from typing import Any
 
-from drone_rl.config.shifting import ShiftSettings
+from drone_rl.config.commands import ShiftSettings
 from drone_rl.robustness.shifts import shifts
 from drone_rl.utils.progress import silent
 

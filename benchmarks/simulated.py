@@ -19,7 +19,7 @@ from drone_rl.evaluation.judge import estimate, observe
 from drone_rl.evaluation.metrics import Episodes
 from drone_rl.evaluation.rule import Kind, Quantity, Rule, decide, kinds_within
 from drone_rl.sim.tasks import CollectCubes, Goals
-from drone_rl.sim.tasks.collect_cubes.rules import Side
+from drone_rl.sim.tasks.collect_cubes import Side
 
 L, A, R = Side
 Type = tuple[tuple[Side, ...], tuple[int, ...], bool]

@@ -17,7 +17,7 @@ from benchmarks.commands import call
 from benchmarks.scripted import PILOTS, Pilot, ScriptedPolicy
 from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv
-from drone_rl.evaluation.baselines import BASELINES, fly_baselines
+from drone_rl.evaluation.baselines import BASELINES, run_baselines
 from drone_rl.evaluation.judge import judge
 from drone_rl.evaluation.metrics import Episodes
 from drone_rl.evaluation.rollouts import run_episodes
@@ -83,7 +83,7 @@ def _verdict(pilot: Pilot, episodes: int, seed: int) -> dict[str, Any]:
 @functools.cache
 def _baselines(task: TaskSettings, episodes: int, seed: int) -> dict[str, Episodes]:
     """Those of a task, flown once for all pilots."""
-    return fly_baselines(_NUM_WORLDS, task, _worlds(task, seed).state_dict(), episodes)
+    return run_baselines(_NUM_WORLDS, task, _worlds(task, seed).state_dict(), episodes)
 
 
 def _worlds(task: TaskSettings, seed: int) -> DroneEnv:

@@ -6,9 +6,8 @@ What is listed here is imported when it is first used, so that `import drone_rl`
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from drone_rl.utils.garbage import collecting_no_garbage
-from drone_rl.utils.gymnasium_registration import register
-from drone_rl.utils.when_imported import import_quietly, when_imported
+from drone_rl.utils.imports import import_quietly, register, when_imported
+from drone_rl.utils.memory import collecting_no_garbage
 
 if TYPE_CHECKING:
     from drone_rl.config import (
@@ -18,30 +17,33 @@ if TYPE_CHECKING:
         PillarsSettings,
         TaskSettings,
     )
-    from drone_rl.config.bodies import BodiesSettings
-    from drone_rl.config.chances import ChanceSettings
-    from drone_rl.config.checking import CheckSettings
-    from drone_rl.config.judging import EvaluateSettings, JudgeSettings
-    from drone_rl.config.mapping import PlacesSettings
-    from drone_rl.config.provable import ProvableSettings
-    from drone_rl.config.proving import ProveSettings
+    from drone_rl.config.commands import (
+        BodiesSettings,
+        EvaluateSettings,
+        JudgeSettings,
+        ShiftSettings,
+    )
     from drone_rl.config.sensors import SensorSettings
-    from drone_rl.config.shifting import ShiftSettings
     from drone_rl.config.training import TrainerSettings, TrainSettings
+    from drone_rl.config.verification import (
+        ChanceSettings,
+        CheckSettings,
+        PlacesSettings,
+        ProvableSettings,
+        ProveSettings,
+    )
     from drone_rl.envs.gymnasium.world import DroneWorld
     from drone_rl.envs.gymnasium.worlds import DroneWorlds
     from drone_rl.envs.sb3.worlds import Sb3Worlds
     from drone_rl.evaluation.evaluate import Evaluation, evaluate
     from drone_rl.explanations.explain import Explanations, explain
     from drone_rl.explanations.settings import ExplainSettings
-    from drone_rl.flight.commands.errors import PilotError
-    from drone_rl.flight.commands.future import FlightFuture
+    from drone_rl.flight.commands.command import FlightFuture, PilotError
+    from drone_rl.flight.commands.drone import Sensors
+    from drone_rl.flight.commands.movement import Sticks
     from drone_rl.flight.commands.pilot import Pilot
-    from drone_rl.flight.commands.sensing import Sensors
-    from drone_rl.flight.commands.state import PilotState
-    from drone_rl.flight.commands.sticks import Sticks
-    from drone_rl.flight.commands.trajectory import Trajectory
-    from drone_rl.flight.commands.turning import Drivetrain, YawMode
+    from drone_rl.flight.commands.state import PilotState, Trajectory
+    from drone_rl.flight.commands.yaw import Drivetrain, YawMode
     from drone_rl.policies.environment import make_env
     from drone_rl.policies.external_policy import ForeignPolicy, policy_from
     from drone_rl.policies.policy import Policy, load_policy
@@ -64,17 +66,16 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _PLACES = {
-    "verdicts.bodies": ("Bodies", "bodies"),
+    "verdicts.dynamics_sweep": ("Bodies", "bodies"),
     "verification.chances": ("Chances", "chances"),
     "verification.check": ("Check", "check"),
-    "verdicts.domains": ("Coverage",),
+    "verdicts.coverage": ("Coverage",),
     "policies.environment": ("make_env",),
     "evaluation.evaluate": ("Evaluation", "evaluate"),
     "explanations.explain": ("Explanations", "explain"),
-    "verdicts.export": ("export_onnx",),
+    "verdicts.onnx_export": ("export_onnx",),
     "policies.external_policy": ("ForeignPolicy", "policy_from"),
-    "verdicts.judgements": ("Judgements",),
-    "verdicts.judge": ("Judgement", "judge"),
+    "verdicts.judge": ("Judgement", "Judgements", "judge"),
     "verification.places": ("Places", "places"),
     "policies.policy": ("Policy", "load_policy"),
     "verification.provable": ("train_until_proved",),
@@ -85,14 +86,12 @@ _PLACES = {
     "envs.gymnasium.worlds": ("DroneWorlds",),
     "envs.sb3.worlds": ("Sb3Worlds",),
     "explanations.settings": ("ExplainSettings",),
-    "flight.commands.errors": ("PilotError",),
-    "flight.commands.future": ("FlightFuture",),
+    "flight.commands.command": ("FlightFuture", "PilotError"),
+    "flight.commands.drone": ("Sensors",),
+    "flight.commands.movement": ("Sticks",),
     "flight.commands.pilot": ("Pilot",),
-    "flight.commands.sensing": ("Sensors",),
-    "flight.commands.state": ("PilotState",),
-    "flight.commands.sticks": ("Sticks",),
-    "flight.commands.trajectory": ("Trajectory",),
-    "flight.commands.turning": ("Drivetrain", "YawMode"),
+    "flight.commands.state": ("PilotState", "Trajectory"),
+    "flight.commands.yaw": ("Drivetrain", "YawMode"),
     "policies.sb3.logits": ("Sb3Logits",),
     "policies.sb3.trunk": ("Sb3Trunk",),
     "config.bodies": ("BodiesSettings",),
@@ -195,7 +194,7 @@ def __getattr__(name: str) -> Any:
     """Imports a public name when it is first asked for."""
     if name not in _HOMES:
         raise AttributeError(f"module 'drone_rl' has no attribute {name!r}")
-    from drone_rl.utils.quiet import noise_held_back
+    from drone_rl.utils.imports import noise_held_back
 
     with collecting_no_garbage(), noise_held_back():
         value = getattr(importlib.import_module(_HOMES[name]), name)

@@ -64,4 +64,4 @@ class Floating:
 
 def floating(monkeypatch):
     """Lets all that is told to fly fly so."""
-    monkeypatch.setattr("drone_rl.sim.dynamics.making.Quadrotor", Floating)
+    monkeypatch.setattr("drone_rl.sim.dynamics.dynamics.Quadrotor", Floating)

@@ -8,7 +8,7 @@ import warp as wp
 
 from drone_rl.config import DynamicsSettings
 from drone_rl.sim.dynamics import FlightState, Goals, Mode, Quadrotor
-from drone_rl.sim.dynamics.airframe import make_airframe
+from drone_rl.sim.dynamics.rigid_body_kernel import make_airframe
 
 PLACES = (Mode.POSITION, Mode.POSITION, Mode.ANGLE, Mode.POSITION)
 SPEEDS = (Mode.VELOCITY, Mode.VELOCITY, Mode.RATE, Mode.VELOCITY)

@@ -12,12 +12,10 @@ import torch
 from torch import Tensor
 
 from drone_rl.sim.actions import MOVES, Entry
-from drone_rl.sim.dynamics import BodyState, ComputerVision
 from drone_rl.sim.entities import Cube
 from drone_rl.sim.rendering.scene import SemanticClass
-from drone_rl.sim.tasks import Goals, Grid, OracleRule
-from drone_rl.sim.vocabulary import Terms
-from drone_rl.utils.batch import Batch
+from drone_rl.sim.tasks import Goals, Grid, OracleRule, State, Task
+from drone_rl.sim.vocabulary import TaskVocabulary
 
 NUM_POSTS = 2
 REACH = 1.0
@@ -34,14 +32,11 @@ class End(enum.IntEnum):
 
 
 @dataclasses.dataclass
-class PostsState(Batch):
+class PostsState(State):
     """Worlds with posts."""
 
-    body: BodyState
     posts: Tensor  # (num_worlds, NUM_POSTS, 3) float64
     passed: Tensor  # (num_worlds, NUM_POSTS) bool
-    steps: Tensor
-    end_reason: Tensor
 
 
 class Post(Cube):
@@ -50,14 +45,16 @@ class Post(Cube):
     semantic_class = SemanticClass.OBSTACLE
 
 
-class Posts:
+class Posts(Task[PostsState]):
     """The task."""
 
     name = "posts"
     ends = End
     truncation = End.TIME
+    success_end = End.THROUGH
+    expected_end = End.TIME
     observed = ("passed", "end_reason")
-    terms = Terms(
+    vocabulary = TaskVocabulary(
         goal="post",
         reach="pass",
         reached="passed",
@@ -68,8 +65,6 @@ class Posts:
         follows=False,
         tested="two posts",
     )
-    success_end = End.THROUGH
-    expected_end = End.TIME
     strata = ("left", "right")
     luck = ("random", "forward")
     scored = ("passed", "sides")
@@ -78,8 +73,6 @@ class Posts:
     )
     oracle = OracleRule(("end_reason",), lambda end: torch.zeros_like(end[..., 0]), MOVES)
     largest_reward = float(NUM_POSTS)
-    drone_size = 0.5
-    origin = (0.0, 0.0, 1.0)
 
     @property
     def entries(self):
@@ -90,10 +83,6 @@ class Posts:
             "end_reason": Entry((1,), torch.int64, 0, len(End) - 1),
             "posts": Entry((NUM_POSTS, 3), torch.float32),
         }
-
-    def make_dynamics(self):
-        """Steps of a metre."""
-        return ComputerVision()
 
     def make_props(self):
         """The posts."""
@@ -131,9 +120,6 @@ class Posts:
         """Where the posts are."""
         return state.posts
 
-    def obstacles(self, state):
-        """None: touching a post is a rule."""
-
     def info(self, state):
         """See `entries`."""
         return {
@@ -147,11 +133,6 @@ class Posts:
         """Each post is a goal; all come up at once."""
         sides = info["sides"]
         return Goals(reached=info["passed"], stratum=sides, world=sides.double())
-
-    def classes(self, goals):
-        """By the side on which a post stands."""
-        for number, name in enumerate(self.strata):
-            yield "side", name, goals.stratum == number
 
     def remember(self, info):
         """Where the posts are, and how many lie behind."""
@@ -176,20 +157,9 @@ class Posts:
         """The nearest post ahead."""
         return state.passed.sum(-1)
 
-    def next_offset(self, state):
-        """From the drone to it."""
-        following = self.next_target(state)
-        post = state.posts[torch.arange(len(state)), following.clamp(max=NUM_POSTS - 1)]
-        there = (following < NUM_POSTS)[:, None]
-        return torch.where(there, post - state.body.position, torch.nan)
-
     def is_reached(self, state, target):
         """Whether it was passed."""
         return state.passed[torch.arange(len(state)), target]
-
-    def is_behind(self, state, target):
-        """Whether it lies behind."""
-        return state.body.position[:, 0] > state.posts[torch.arange(len(state)), target, 0]
 
     def needed(self, offset):
         """Away from a post in the way."""
@@ -242,6 +212,3 @@ class Posts:
         posts = state.posts.clone()
         posts[..., :2] = state.body.position[:, None, :2] + away
         return dataclasses.replace(state, posts=posts, passed=torch.zeros_like(state.passed))
-
-    def _is_next(self, state):
-        return torch.arange(NUM_POSTS) == self.next_target(state)[:, None]

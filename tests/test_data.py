@@ -12,17 +12,17 @@ from drone_rl.utils.batch import Batch
 
 MUTABLE = {
     "api.journal:Journal",
-    "conditions.domain:End",
-    "evaluation.evaluator:StepLog",
+    "robustness.domain:End",
+    "evaluation.rollouts:StepLog",
     "evaluation.metrics:Episodes",
-    "explanations.attribution:Explainer",
-    "explanations.class_model:Attempts",
-    "explanations.class_model:ClassModel",
-    "explanations.dataset:RolloutDataset",
+    "explanations.heat_maps:Explainer",
+    "explanations.class_models:Attempts",
+    "explanations.class_models:ClassModel",
+    "explanations.rollouts:RolloutDataset",
     "explanations.interventions:Intervention",
     "explanations.response:OutcomeMap",
     "explanations.response:ResponseMap",
-    "explanations.tsne:Embedding",
+    "explanations.embedding:Embedding",
     "proofs.findings:Findings",
     "proofs.graph:Graph",
     "report.explanation:Explanation",
@@ -68,6 +68,6 @@ def test_settings_are_given_by_name(all_of_them):
         for name, kind in all_of_them.items()
         for field in dataclasses.fields(kind)
         if name.startswith(BY_NAME_ALONE) and field.init and not field.kw_only
-        if name != "drone_rl.config.changes:Changes"  # a type, and nothing else
+        if name != "drone_rl.config.configuration:Changes"  # a type, and nothing else
     }
     assert by_place == set()

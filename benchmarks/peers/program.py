@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from drone_rl.utils.extras import extra
+from drone_rl.utils.errors import extra
 
 
 def _sb3(algorithm: str) -> Callable[..., Any]:

@@ -8,8 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
 
-from drone_rl.config.benchmarks import BenchSettings
-from drone_rl.config.paths import PathsSettings
+from drone_rl.config.commands import BenchSettings, PathsSettings
 from drone_rl.utils.errors import InputError
 
 _log = logging.getLogger(__name__)

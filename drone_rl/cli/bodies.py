@@ -5,8 +5,7 @@ import logging
 from pathlib import Path
 
 import drone_rl
-from drone_rl.config.bodies import BodiesSettings
-from drone_rl.config.paths import PathsSettings
+from drone_rl.config.commands import BodiesSettings, PathsSettings
 
 _log = logging.getLogger(__name__)
 

@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Annotated
 
 import drone_rl
-from drone_rl.cli.hydra.names import policies as prepare  # noqa: F401 -- of what was typed
-from drone_rl.config.chances import ChanceSettings
-from drone_rl.config.changes import TaskChanges, no_changes
-from drone_rl.config.paths import PathsSettings
-from drone_rl.utils.schema import Real, Colors
+from drone_rl.cli.hydra.resuming import policies as prepare  # noqa: F401 -- of what was typed
+from drone_rl.config.commands import PathsSettings
+from drone_rl.config.configuration import TaskChanges, no_changes
+from drone_rl.config.verification import ChanceSettings
+from drone_rl.utils.schema import Real, Several
 
 _log = logging.getLogger(__name__)
 

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import drone_rl
-from drone_rl.cli.hydra.names import policies as prepare  # noqa: F401 -- of what was typed
-from drone_rl.config.changes import DynamicsChanges, TaskChanges, no_changes
-from drone_rl.config.paths import PathsSettings
+from drone_rl.cli.hydra.resuming import policies as prepare  # noqa: F401 -- of what was typed
+from drone_rl.config.commands import PathsSettings
+from drone_rl.config.configuration import DynamicsChanges, TaskChanges, no_changes
 from drone_rl.evaluation.rule import Kind
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.utils.schema import Listed, OneOf, Whole

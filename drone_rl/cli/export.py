@@ -6,13 +6,12 @@ from pathlib import Path
 from typing import Annotated
 
 import drone_rl
-from drone_rl.cli.hydra.names import policies as prepare  # noqa: F401 -- of what was typed
-from drone_rl.config.judging import FlightSettings
-from drone_rl.config.paths import PathsSettings
+from drone_rl.cli.hydra.resuming import policies as prepare  # noqa: F401 -- of what was typed
+from drone_rl.config.commands import FlightSettings, PathsSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.overrides import COMMAND
 from drone_rl.utils.schema import FileName, OneOf
-from drone_rl.utils.seed_text import seed_line
+from drone_rl.utils.text import seed_line
 
 _log = logging.getLogger(__name__)
 

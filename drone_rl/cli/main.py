@@ -8,7 +8,7 @@ from typing import cast
 import drone_rl
 from drone_rl.cli.usage import COMMANDS, DEMO_USAGE, USAGE
 from drone_rl.utils.compiler import leave_compiler_unloaded
-from drone_rl.utils.garbage import leave_garbage_to_the_system, look_for_garbage_rarely
+from drone_rl.utils.memory import leave_garbage_to_the_system, look_for_garbage_rarely
 
 CLOSED = 128 + 13
 """Exit status if nobody reads standard output any more, as of a program that SIGPIPE ends."""

@@ -5,10 +5,10 @@ import logging
 from pathlib import Path
 
 import drone_rl
-from drone_rl.cli.hydra.names import policies as prepare  # noqa: F401 -- of what was typed
-from drone_rl.config.changes import TaskChanges, no_changes
-from drone_rl.config.paths import PathsSettings
-from drone_rl.config.proving import ProveSettings
+from drone_rl.cli.hydra.resuming import policies as prepare  # noqa: F401 -- of what was typed
+from drone_rl.config.commands import PathsSettings
+from drone_rl.config.configuration import TaskChanges, no_changes
+from drone_rl.config.verification import ProveSettings
 
 NOT_PROVED = 15
 """Exit status: some placements are lost, or undecided."""

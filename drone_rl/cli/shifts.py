@@ -5,10 +5,9 @@ import logging
 from pathlib import Path
 
 import drone_rl
-from drone_rl.cli.hydra.names import policies as prepare  # noqa: F401 -- of what was typed
-from drone_rl.config.changes import DynamicsChanges, TaskChanges, no_changes
-from drone_rl.config.paths import PathsSettings
-from drone_rl.config.shifting import ShiftSettings
+from drone_rl.cli.hydra.resuming import policies as prepare  # noqa: F401 -- of what was typed
+from drone_rl.config.commands import PathsSettings, ShiftSettings
+from drone_rl.config.configuration import DynamicsChanges, TaskChanges, no_changes
 
 _log = logging.getLogger(__name__)
 

@@ -10,13 +10,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import drone_rl
 from drone_rl.cli.hydra import resuming
-from drone_rl.cli.hydra.launchers import LocalLauncher, RayLauncher, SlurmLauncher, register_plugins
-from drone_rl.cli.hydra.optuna_sweeper import OptunaSweeper
-from drone_rl.config.loggers import Logger, Tensorboard
-from drone_rl.config.paths import PathsSettings
-from drone_rl.config.provable import ProvableSettings
-from drone_rl.config.training import TrainSettings
-from drone_rl.utils.schema import Instance, Colors, Whole
+from drone_rl.cli.hydra.launchers import (
+    LocalLauncher,
+    OptunaSweeper,
+    RayLauncher,
+    SlurmLauncher,
+    register_plugins,
+)
+from drone_rl.config.commands import PathsSettings
+from drone_rl.config.training import Logger, Tensorboard, TrainSettings
+from drone_rl.config.verification import ProvableSettings
+from drone_rl.utils.schema import Instance, Several, Whole
 from drone_rl.verification.text import found
 
 if TYPE_CHECKING:

@@ -24,8 +24,7 @@ from torch import nn
 from torchrl.collectors import BaseCollector
 
 from drone_rl.collectors.episodes import EpisodeCollector
-from drone_rl.utils.errors import InputError
-from drone_rl.utils.extras import extra
+from drone_rl.utils.errors import InputError, extra
 
 Parts = tuple[EpisodeCollector, nn.Module, torch.Generator]
 """A worker's collector, the network inside it and the stream of its actions."""
@@ -127,6 +126,9 @@ class RayEpisodeCollector:
     def workers(self) -> list[Any]:
         """Handles of the remote `RemoteEpisodes`."""
         return self._pool.remote_collectors
+
+    def cache_activations(self) -> None:
+        """Return None: activations do not travel between processes."""
 
     def __iter__(self) -> Iterator[TensorDictBase]:
         """Yields batches without end."""

@@ -1,13 +1,16 @@
 """What can be chosen about tasks and the camera; known without what they are made of."""
 
-from drone_rl.config.actions import MOVES_SETTINGS, ActionSettings
 from drone_rl.config.appearance import MINIMAL, AppearanceSettings
-from drone_rl.config.camera import CameraSettings
+from drone_rl.config.camera import RENDERERS, CameraSettings, RendererName
 from drone_rl.config.cubes import TaskSettings
-from drone_rl.config.dynamics import COMPUTER_VISION, DynamicsSettings
+from drone_rl.config.dynamics import (
+    COMPUTER_VISION,
+    MOVES_SETTINGS,
+    ActionSettings,
+    DynamicsSettings,
+)
 from drone_rl.config.pillars import PillarsSettings
 from drone_rl.config.registry import TASKS, named_settings, read_task, settings_of
-from drone_rl.config.renderers import RENDERERS, RendererName
 from drone_rl.config.sensors import SensorSettings
 from drone_rl.config.task import BaseTaskSettings
 

@@ -1,10 +1,10 @@
-"""What can be chosen about the policy's camera."""
+"""Settings of the policy's camera and the names of renderers."""
 
 import dataclasses
 import math
 from typing import Annotated
 
-from drone_rl.utils.schema import Real, Whole
+from drone_rl.utils.schema import OneOf, Real, Whole
 from drone_rl.utils.settings import Settings
 
 FRONT = (0.4, 0.0, 0.0)
@@ -31,3 +31,13 @@ class CameraSettings(Settings):
         """Vertical field of view in degrees, for square pixels."""
         half = math.tan(math.radians(self.horizontal_fov) / 2) * self.height / self.width
         return math.degrees(2 * math.atan(half))
+
+
+RENDERERS = {
+    "raytrace": "drone_rl.sim.rendering.raytrace.renderer.Raytracer",
+    "mujoco_warp": "drone_rl.sim.rendering.mujoco_warp.WarpRenderer",
+}
+"""Where each is to be imported from: our own of simple solids, and MuJoCo Warp's of anything."""
+
+RendererName = Annotated[str, OneOf(tuple(RENDERERS))]
+"""A setting that chooses one."""

@@ -1,10 +1,165 @@
-"""How parameters are changed: the optimiser and the schedule of its rate."""
+"""Settings of what learns: returns, loss, optimizer, scheduler and collector."""
 
 import dataclasses
-from typing import Annotated, ClassVar
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar
 
-from drone_rl.config.variant import Variant
-from drone_rl.utils.schema import Real, Whole
+from drone_rl.config.configuration import Variant, locate
+from drone_rl.utils.schema import OneOf, Real, Whole
+
+Rate = Annotated[float, Real(0.0, 1.0)]
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Returns(Variant):
+    """Which estimator, and with which values."""
+
+    scale: bool = False
+    """Whether to divide a batch's returns by their root mean square."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class _Discounted(Returns):
+    gamma: Rate = 0.99
+    """Discount rate, 0 to 1."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class TotalReward(Returns):
+    """The whole episode's reward at every step (Eq. 12)."""
+
+    target: ClassVar[str] = "drone_rl.objectives.TotalReward"
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class LinearRamp(Returns):
+    """The episode's reward times a ramp over the episode (variant 1)."""
+
+    target: ClassVar[str] = "drone_rl.objectives.LinearRamp"
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class RewardToGo(_Discounted):
+    """Discounted return (Eq. 14; the original's variant 2)."""
+
+    target: ClassVar[str] = "drone_rl.objectives.RewardToGo"
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Standardised(_Discounted):
+    """Discounted return, standardised over each episode (Algorithm 4; variant 0)."""
+
+    target: ClassVar[str] = "drone_rl.objectives.Standardised"
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class SuccessScaled(_Discounted):
+    """Discounted return scaled by exp(reward - max_reward) (variant 3)."""
+
+    target: ClassVar[str] = "drone_rl.objectives.SuccessScaled"
+    max_reward: Annotated[float, Real(0.0, 1e6)] = 3.0
+    """Reward of a perfect episode: the task's cubes."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class TimeBaseline(_Discounted):
+    """Discounted return minus a running mean for each time step (variant 4)."""
+
+    target: ClassVar[str] = "drone_rl.objectives.TimeBaseline"
+    scale: bool = True
+    """Whether to divide a batch's returns by their root mean square."""
+    decay: Annotated[float, Real(0.0, 1.0, is_below=True)] = 0.9
+    """Share of the old mean that is kept at each batch, 0 to below 1."""
+    max_steps: Annotated[int, Whole(1, 100_000, "steps")] = 300
+    """Time steps that have a mean of their own: the task's limit."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class LeaveOneOut(_Discounted):
+    """Discounted return minus the other episodes' mean at the same time step."""
+
+    target: ClassVar[str] = "drone_rl.objectives.LeaveOneOut"
+    scale: bool = True
+    """Whether to divide a batch's returns by their root mean square."""
+    gamma: Rate = 0.95
+    """Discount rate, 0 to 1."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class BatchNormalised(_Discounted):
+    """Discounted return, normalised over the batch."""
+
+    target: ClassVar[str] = "drone_rl.objectives.BatchNormalised"
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Gae(_Discounted):
+    """Generalised advantage estimates, for objectives with a critic."""
+
+    target: ClassVar[str] = "drone_rl.objectives.Advantages"
+    scale: bool = True
+    """Whether to standardise a batch's advantages."""
+    gamma: Rate = 0.95
+    """Discount rate, 0 to 1."""
+    lmbda: Rate = 0.95
+    """Weight of estimates that look one step farther, 0 to 1; 0 looks one step."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Collector(Variant):
+    """Which workers, and how many."""
+
+    num_envs: Annotated[int, Whole(1, unit="worlds")] = 16
+    """Worlds, each with one episode in a batch, or with as many steps as the others."""
+    num_threads: Annotated[int, Whole(1, unit="threads")] = 1
+    """Groups of worlds collected at the same time, each on a thread or worker of its own. Each
+    draws its actions from its own stream: this is part of what a seed means."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Episodes(Collector):
+    """Batches of complete episodes."""
+
+    compiled: bool = True
+    """Whether whole episodes are flown by one compiled kernel, where task, pictures and network are
+    such as it knows: many times as fast on a CPU. It draws its actions in another order, so this is
+    part of what a seed means."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Threads(Episodes):
+    """Batches of complete episodes from threads of this process."""
+
+    target: ClassVar[str] = "drone_rl.training.build_collector.threaded_collector"
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Ray(Episodes):
+    """Batches of complete episodes from workers on a Ray cluster."""
+
+    target: ClassVar[str] = "drone_rl.training.build_collector.ray_collector"
+    num_threads: Annotated[int, Whole(1, unit="workers")] = 2
+    """Workers, each with its share of the worlds and a stream of actions of its own: this is part
+    of what a seed means."""
+    address: str | None = None
+    """Of the cluster, such as auto or ray://host:10001; none starts one on this machine."""
+    num_cpus: Annotated[float, Real(0.0, is_above=True, unit="cores")] = 1.0
+    """Cores that a worker takes of the cluster."""
+    max_lost_workers: Annotated[int, Whole(0, unit="workers")] = 10
+    """Workers that may be lost, and replaced, before training stops."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Rollouts(Collector):
+    """Batches of the next steps of each world, with what was seen after them, from threads.
+
+    How many steps is the objective's business. Episodes go on from one batch to the next.
+    """
+
+    target: ClassVar[str] = "drone_rl.training.build_collector.rollout_collector"
+    num_envs: Annotated[int, Whole(1, unit="worlds")] = 64
+    """Worlds."""
+
 
 LearningRate = Annotated[float, Real(0.0, 1e30, is_above=True)]
 """Bounded so that a step is a number in float32, of which Adam's first takes ten times the rate;
@@ -59,3 +214,81 @@ class StepDecay(Scheduler):
     """Updates from one decay to the next."""
     gamma: Annotated[float, Real(0.0, 1.0)] = 0.99
     """Factor of a decay."""
+
+
+Weight = Annotated[float, Real(0.0)]
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Objective(Variant):
+    """Which loss, and with which values."""
+
+    learner: ClassVar[str] = "drone_rl.training.build_learner.reinforce_learner"
+    """Where that which makes the learner is to be imported from."""
+    needs: ClassVar[Mapping[str, Variant]] = {}
+    """Other parts of a training that it can't do without, and brings unless they are given."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Reinforce(Objective):
+    """REINFORCE without a critic."""
+
+    target: ClassVar[str] = "drone_rl.objectives.ReinforceLoss"
+    entropy_coeff: Weight = 0.01
+    """Weight of the entropy bonus, which keeps a policy from giving up a side early; 0 for none."""
+    reduction: Annotated[str, OneOf(("mean", "sum"))] = "mean"
+    """Over a batch's steps: mean, or sum as in Algorithm 4."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class WithCritic(Objective):
+    """One that learns, besides, what a state is worth."""
+
+    learner: ClassVar[str] = "drone_rl.training.build_learner.actor_critic_learner"
+    needs: ClassVar[Mapping[str, Variant]] = {"returns": Gae(), "collector": Rollouts()}
+    num_steps: Annotated[int, Whole(2, 4096)] = 32
+    """Steps of each world in a batch."""
+    shares_trunk: bool = True
+    """Whether the critic sees the features that the policy makes; else it has its own network."""
+    critic_coeff: Annotated[float, Real(0.0, is_above=True)] = 1.0
+    """Weight of the critic's loss."""
+    entropy_coeff: Weight = 0.0
+    """Weight of the entropy bonus; 0 for none."""
+
+    @property
+    def passes(self) -> dict[str, int]:
+        """How often and in which pieces a batch is gone through, by name; once, as a whole."""
+        return {}
+
+    def make(self, *args: Any, **kwargs: Any) -> Any:
+        """See `Variant`; the loss is told what is the loss's."""
+        others = {"num_steps", "shares_trunk", *self.passes}
+        values = {name: value for name, value in self.values().items() if name not in others}
+        return locate(self.target)(*args, functional=False, **values, **kwargs)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class A2c(WithCritic):
+    """Advantage actor-critic: one step of the optimiser from each batch."""
+
+    target: ClassVar[str] = "torchrl.objectives.A2CLoss"
+    num_steps: Annotated[int, Whole(2, 4096)] = 16
+    """Steps of each world in a batch."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Ppo(WithCritic):
+    """Proximal policy optimisation with clipped ratios: several passes over each batch."""
+
+    target: ClassVar[str] = "torchrl.objectives.ClipPPOLoss"
+    clip_epsilon: Annotated[float, Real(0.0, 1.0, is_above=True)] = 0.2
+    """How far the probability of an action may change, as a share, before it counts no more."""
+    epochs: Annotated[int, Whole(1)] = 2
+    """Passes over a batch."""
+    minibatch_size: Annotated[int, Whole(1)] = 512
+    """About how many steps of a batch make one step of the optimiser."""
+
+    @property
+    def passes(self) -> dict[str, int]:
+        """See `WithCritic`."""
+        return {"epochs": self.epochs, "minibatch_size": self.minibatch_size}

@@ -3,8 +3,8 @@
 import dataclasses
 from typing import Annotated, ClassVar
 
-from drone_rl.config.variant import Variant
-from drone_rl.utils.schema import Colors, Whole
+from drone_rl.config.configuration import Variant
+from drone_rl.utils.schema import Several, Whole
 
 Channels = Annotated[tuple[int, ...], Several(Whole(1, 512, "channels"), 1, 8)]
 Widths = Annotated[tuple[int, ...], Several(Whole(1, 4096, "neurons"), 0, 8)]

@@ -3,7 +3,7 @@
 import dataclasses
 from typing import Annotated, Any, ClassVar, NamedTuple
 
-from drone_rl.utils.schema import Real, Colors
+from drone_rl.utils.schema import Real, Several
 from drone_rl.utils.settings import Settings
 
 Length = Annotated[float, Real(0.001, 10_000.0, unit="m")]

@@ -1,7 +1,8 @@
-"""Everything that a training can be told."""
+"""Settings of a training."""
 
 import dataclasses
-from typing import Annotated, Any, Self
+import re
+from typing import Annotated, Any, ClassVar, Self
 
 from drone_rl.config import (
     ActionSettings,
@@ -12,15 +13,26 @@ from drone_rl.config import (
     RendererName,
     TaskSettings,
 )
-from drone_rl.config.collecting import Collector, Rollouts, Threads
-from drone_rl.config.learning import Adam, Constant, Optimiser, Scheduler
+from drone_rl.config.appearance import check_appearance
+from drone_rl.config.configuration import Variant
+from drone_rl.config.learning import (
+    Adam,
+    Collector,
+    Constant,
+    Gae,
+    LeaveOneOut,
+    Objective,
+    Optimiser,
+    Reinforce,
+    Returns,
+    Rollouts,
+    Scheduler,
+    Threads,
+)
 from drone_rl.config.networks import Network, SmallCnn
-from drone_rl.config.objectives import Objective, Reinforce
-from drone_rl.config.placing import check_appearance
-from drone_rl.config.returns import Gae, LeaveOneOut, Returns
 from drone_rl.config.transforms import Gray, Standardize, Transform
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import Instance, Real, Colors, Whole
+from drone_rl.utils.schema import Instance, Real, Several, Whole
 from drone_rl.utils.settings import Settings
 
 MOST_TRANSFORMS = 16
@@ -130,3 +142,40 @@ class TrainSettings(Settings):
                 if not isinstance(getattr(self, name), type(part)):
                     changes.setdefault(name, part)
         return super().replace(**changes)
+
+
+_NEEDS = re.compile(r"([a-z][\w.-]*) (?:could not be imported|is not installed|is required)")
+"""What TorchRL's loggers say of a package that they miss."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Logger(Variant):
+    """Which of TorchRL's loggers, and with which values."""
+
+    def make(self, *args: Any, **kwargs: Any) -> Any:
+        """Make the logger.
+
+        Raises:
+            InputError: It doesn't exist, or the package that it needs is not installed.
+        """
+        try:
+            return super().make(*args, **kwargs)
+        except ImportError as error:  # TorchRL raises it without the name of the package
+            words = _NEEDS.match(str(error).lower())
+            package = (error.name or (words and words[1]) or "").partition(".")[0]
+            remedy = f"pip install {package}" if package else "pip install with what it needs"
+            raise InputError(
+                f"logger _target_={self.target} can't be made ({error}); install what it needs: "
+                f"{remedy}, or choose another logger"
+            ) from error
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Tensorboard(Logger):
+    """TensorBoard event files."""
+
+    target: ClassVar[str] = "torchrl.record.loggers.tensorboard.TensorboardLogger"
+    exp_name: str = "tensorboard"
+    """Folder of this logger under log_dir."""
+    log_dir: str = "outputs"
+    """Where the logs go."""

@@ -3,9 +3,9 @@
 import dataclasses
 from typing import Annotated, Any, ClassVar
 
-from drone_rl.config.variant import Variant
+from drone_rl.config.configuration import Variant
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import Real, Colors, Whole
+from drone_rl.utils.schema import Real, Several, Whole
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -23,10 +23,10 @@ from drone_rl.config import (
     DynamicsSettings,
 )
 from drone_rl.sim.actions import Entry
-from drone_rl.sim.appearances import Appearances
 from drone_rl.sim.dynamics import Dynamics
 from drone_rl.sim.rendering import RendererFactory, check_device
 from drone_rl.sim.tasks import Task, as_task
+from drone_rl.sim.visual_randomization import Appearances
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import Stream, get_state, set_state, side_stream, world_random_state

@@ -1,4 +1,4 @@
-"""What luck and knowledge achieve in the very worlds in which a policy was flown."""
+"""Baselines that ignore the images: an oracle, random actions and constant actions."""
 
 from typing import Any
 
@@ -19,17 +19,17 @@ from drone_rl.utils.errors import InputError
 
 
 class Oracle(TensorDictModuleBase):
-    """Acts by the true positions: the best that can be hoped for."""
+    """Act by the true state: an upper bound for a policy that sees images."""
 
     def __init__(self, task: BaseTaskSettings | Task[Any], actions: Actions | None = None) -> None:
-        """Learns the task's rule.
+        """Take the oracle's rule from a task.
 
         Args:
-            task: The task, or the settings of cube collection.
-            actions: What it may do; the actions of the task's own choice of dynamics by default.
+            task: The task or its settings.
+            actions: Available actions; those of the task's default dynamics by default.
 
         Raises:
-            InputError: The task has no oracle, or none that acts so.
+            InputError: The task has no oracle, or none for these actions.
         """
         super().__init__()
         task = as_task(task)
@@ -50,21 +50,16 @@ class Oracle(TensorDictModuleBase):
         self.out_keys = ["action"]
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
-        """Writes the action of each world."""
+        """Write the action of each environment."""
         known = [tensordict.get(key) for key in self.in_keys]
         return tensordict.set("action", self.rule.decide(known, self.actions))
 
 
 class RandomPolicy(TensorDictModuleBase):
-    """Draws every action with the same probability."""
+    """Sample every action with the same probability."""
 
     def __init__(self, actions: Actions, generator: torch.Generator) -> None:
-        """Sets the source of its actions.
-
-        Args:
-            actions: What can be done.
-            generator: Where they are drawn from.
-        """
+        """Take the available actions and the generator that samples them."""
         super().__init__()
         self.in_keys = ["done"]
         self.out_keys = ["action"]
@@ -72,34 +67,30 @@ class RandomPolicy(TensorDictModuleBase):
         self.generator = generator
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
-        """Writes the action of each world."""
+        """Write the action of each environment."""
         return tensordict.set("action", self.actions.draw(tensordict.batch_size, self.generator))
 
 
 class ConstantPolicy(TensorDictModuleBase):
-    """Takes the same action whatever happens."""
+    """Take the same action at every step."""
 
     def __init__(self, action: int | Tensor) -> None:
-        """Sets the action.
-
-        Args:
-            action: Taken at every step: a number, or of the shape and type of one world's.
-        """
+        """Take the action: a number, or a tensor of one environment's shape and type."""
         super().__init__()
         self.in_keys = ["done"]
         self.out_keys = ["action"]
         self.action = torch.as_tensor(action)
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
-        """Writes the action of each world."""
+        """Write the action of each environment."""
         action = self.action.expand(*tensordict.batch_size, *self.action.shape)
         return tensordict.set("action", action.to(tensordict["done"].device, copy=True))
 
 
 BASELINES = (*LUCK, "oracle")
-"""Policies that see no picture, of cube collection."""
+"""Baselines of cube collection."""
 _RANDOM_ACTIONS = 5
-"""Key of the stream of random actions, derived from the first environment's."""
+"""Key of the random actions' stream, derived from that of the first environment."""
 
 
 def make_baseline(
@@ -108,13 +99,13 @@ def make_baseline(
     generator: torch.Generator,
     actions: Actions | None = None,
 ) -> TensorDictModuleBase:
-    """A policy that sees no picture.
+    """Build a baseline of a task.
 
     Args:
-        name: "oracle" or one of the task's luck.
-        task: The task, which the oracle knows.
+        name: "oracle" or one of the task's random and constant baselines.
+        task: The task or its settings.
         generator: Source of random actions.
-        actions: What can be done; by the task's own choice of dynamics by default.
+        actions: Available actions; those of the task's default dynamics by default.
 
     Raises:
         InputError: The task has no oracle.
@@ -128,7 +119,7 @@ def make_baseline(
     return ConstantPolicy(actions.always(name))
 
 
-def fly_baselines(
+def run_baselines(
     num_worlds: int,
     task: BaseTaskSettings | Task[Any],
     worlds: dict[str, Any],
@@ -136,15 +127,15 @@ def fly_baselines(
     device: str = "cpu",
     dynamics: Dynamics | None = None,
 ) -> dict[str, Episodes]:
-    """Every baseline's episodes, the k-th of each in the same world.
+    """Run the episodes of every baseline, the k-th of each from the same initial state.
 
     Args:
-        num_worlds: Worlds in a batch, as the policy had.
-        task: The task.
+        num_worlds: Environments in a batch, as for the policy.
+        task: The task or its settings.
         worlds: `DroneEnv.state_dict` from before the policy's first episode.
         episodes: How many.
         device: Where to run.
-        dynamics: How the policy's drones move; the task's own choice by default.
+        dynamics: Vehicle dynamics; the task's default by default.
 
     Raises:
         InputError: The task has no oracle.

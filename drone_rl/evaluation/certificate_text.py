@@ -1,7 +1,6 @@
 """What a verdict quotes of a certificate. Evidence: `verdict.json`; old ones have no "proof"."""
 
-from drone_rl.utils.numbers import all_cubes, exact
-from drone_rl.utils.sentences import Evidence, Sentence
+from drone_rl.utils.text import Evidence, Sentence, all_cubes, exact
 
 MOST_WRONG = 0.01
 """Fraction of placements about which a re-checked certificate may be wrong, with 95% confidence."""

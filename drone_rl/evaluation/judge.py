@@ -1,4 +1,4 @@
-"""From flown episodes to a verdict."""
+"""Judge a policy: run episodes, apply the rule and return a verdict."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -13,57 +13,57 @@ from torch import Tensor
 from torchrl.envs import EnvBase
 
 from drone_rl.envs import worlds_of
-from drone_rl.evaluation.baselines import fly_baselines
+from drone_rl.evaluation.baselines import run_baselines
 from drone_rl.evaluation.certificate_text import is_proved
 from drone_rl.evaluation.metrics import Episodes, failure_table, summarise
-from drone_rl.evaluation.outcomes import Outcomes
+from drone_rl.evaluation.outcomes import Outcomes, Rounding
 from drone_rl.evaluation.rollouts import StepLog, run_episodes
-from drone_rl.evaluation.rounding_sensitivity import Rounding, examine
+from drone_rl.evaluation.rounding_sensitivity import check_rounding
 from drone_rl.evaluation.rule import NOT_CERTAIN, Kind, Quantity, Rule, decide, kinds_within
 from drone_rl.evaluation.verdict_text import SENTENCES
 from drone_rl.policies.policy import load_policy
 from drone_rl.utils.intervals import mean_bounds, proportion
 from drone_rl.utils.seeding import RootSeed, Stream, root_seed
-from drone_rl.utils.sentences import say
+from drone_rl.utils.text import say
 
 MANY = (2, 3, 5, 10, 20, 50, 100)
-"""How many times as many episodes are tried out, in thought, where they are not enough."""
+"""Multiples of the number of episodes for which certainty is extrapolated."""
 
 
 class Claim(Protocol):
     """A certificate of the policy; `drone_rl.verdicts.certificate` has the implementation."""
 
     def beside(self, greedy: Episodes, *, rounding: Rounding | None = None) -> dict[str, Any]:
-        """Return what a verdict on these greedy episodes may quote of it."""
+        """Return what a verdict on these greedy episodes may quote of the certificate."""
         ...
 
 
 @dataclasses.dataclass(frozen=True)
 class Verdict:
-    """The kind, whether the episodes are enough to be certain of it, and all that it rests on."""
+    """The kind of a policy, whether that is certain, and the evidence."""
 
     kind: Kind
     certain: bool
     evidence: dict[str, Any]
-    """Plain values; what `as_dict` returns but for the sentence."""
+    """Plain values: all of `as_dict` but the sentence."""
 
     @property
     def exit_code(self) -> int:
-        """The kind's if it is certain, else 13."""
+        """Exit code of the kind if it is certain, else 13."""
         return self.evidence["exit_code"]
 
     @property
     def is_proved(self) -> bool:
-        """Whether a certificate says so of every placement, and rollouts re-checked it."""
+        """Whether a re-checked certificate states success from every placement."""
         return is_proved(self.evidence)
 
     @property
     def sentence(self) -> str:
-        """For a person."""
+        """The verdict as text."""
         return say(SENTENCES, self.evidence)
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain values, as in `verdict.json`."""
+        """Return plain values, as in `verdict.json`."""
         return {**self.evidence, "sentence": self.sentence}
 
 
@@ -78,18 +78,17 @@ def judge_policy(
     unlike: Mapping[str, Any] | None = None,
     seed: RootSeed | None = None,
 ) -> Verdict:
-    """Flies a policy, greedily and sampled, and the baselines, all in the same worlds, and judges.
+    """Run a policy and the baselines on the same initial states, and apply the rule.
 
     Args:
-        env: A batch of worlds.
+        env: A batch of environments.
         actor: The policy.
         episodes: How many of each.
         rule: Thresholds.
-        sampled: Whether to fly the policy with drawn actions, too; one that has no probabilities
-            to draw from need not.
-        claim: A certificate of the policy in the task of the worlds, if there is one.
-        unlike: By what the drones' dynamics differ from those that the policy was made for: setting
-            to "own" and "flown", plain values.
+        sampled: Whether to run the policy with sampled actions, too.
+        claim: A certificate of the policy in this task, if there is one.
+        unlike: How the dynamics differ from those that the policy was trained with: setting to
+            "own" and "flown", plain values.
         seed: Root of the environments' random streams; without it the verdict says that a policy
             could have been fitted to these environments.
     """
@@ -101,8 +100,8 @@ def judge_policy(
         base.load_state_dict(state)
         drawn = run_episodes(env, actor, episodes, greedy=False)
     base.load_state_dict(state)
-    rounding = examine(env, actor, episodes, flown=greedy, log=log)
-    baselines = fly_baselines(
+    rounding = check_rounding(env, actor, episodes, flown=greedy, log=log)
+    baselines = run_baselines(
         env.batch_size[0], worlds.task, state, episodes, str(worlds.device), worlds.dynamics
     )
     return judge(
@@ -128,21 +127,20 @@ def judge(
     seed: RootSeed | None = None,
     rounding: Rounding | None = None,
 ) -> Verdict:
-    """Applies the rule.
+    """Apply the rule to episodes.
 
     Args:
-        greedy: The policy's episodes, each with the most probable actions.
-        baselines: Those of the task's luck and of the oracle, the k-th in the same world as the
-            policy's.
+        greedy: The policy's episodes with the most probable actions.
+        baselines: Those of each baseline; the k-th starts in the same state as the policy's.
         rule: Thresholds.
-        sampled: The policy's episodes with drawn actions, in the same worlds.
-        claim: A certificate of the policy in the same task, if there is one.
+        sampled: The policy's episodes with sampled actions, from the same states.
+        claim: See `judge_policy`.
         unlike: See `judge_policy`.
         seed: See `judge_policy`.
-        rounding: What rounding can change in `greedy`; None if that was not examined.
+        rounding: How rounding can change `greedy`; None if that was not checked.
 
     Raises:
-        ValueError: They were flown in different worlds.
+        ValueError: The initial states differ.
     """
     task = greedy.task
     rule = dataclasses.replace(rule or Rule(), strata=task.strata, luck=task.luck)
@@ -162,7 +160,7 @@ def judge(
         "rule": rule.text,
         "error_rate": rule.error_rate,
         "good_share": rule.good_share,
-        "terms": task.terms.as_dict(),
+        "terms": task.vocabulary.as_dict(),
         "num_cubes": greedy.goals.reached.shape[-1],
         "rounding": None if rounding is None else {**rounding.as_dict(), "decides": depends},
         "proof": None if claim is None else claim.beside(greedy, rounding=rounding),
@@ -182,13 +180,13 @@ def judge(
 def measure(
     greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule, times: int = 1
 ) -> tuple[Quantity, ...]:
-    """The rule's quantities with intervals that hold all at once.
+    """Return the rule's quantities with intervals that hold all at once.
 
     Args:
         greedy: The policy's episodes.
-        baselines: Those of the baselines in the same worlds.
+        baselines: Those of the baselines.
         rule: Thresholds.
-        times: Counts every episode so often, to see what more of the same would tell.
+        times: Count every episode so often, to extrapolate to more episodes.
     """
     observed = observe(greedy, baselines, rule)
     return tuple(estimate(i, np.tile(values, times), rule) for i, values in enumerate(observed))
@@ -201,17 +199,17 @@ def widen(
     rule: Rule,
     outcomes: Outcomes,
 ) -> tuple[Quantity, ...]:
-    """Widen the intervals of quantities by all ends that rounding leaves possible.
+    """Widen the intervals of quantities by all outcomes that rounding leaves possible.
 
-    The lower ends hold even if every episode takes the worst of its possible ends for a quantity,
-    the upper ends even if each takes the best one.
+    Lower bounds hold even if every episode has the worst of its possible outcomes for a quantity,
+    upper bounds even if each has the best one.
 
     Args:
         found: As `measure` returns them.
         greedy: The policy's episodes.
-        baselines: Those of the baselines in the same worlds.
+        baselines: Those of the baselines.
         rule: Thresholds.
-        outcomes: Possible ends of some episodes.
+        outcomes: Possible outcomes of some episodes.
     """
     observed = _observe_each(greedy, baselines, rule)
     if outcomes.episodes is None:
@@ -235,18 +233,18 @@ def widen(
 
 
 def observe(greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule) -> list[NDArray]:
-    """What each episode says of each of the rule's quantities: one value, or none.
+    """Return each episode's value of each of the rule's quantities.
 
     Returns:
-        One array a quantity; those of "collected" have a value for each episode that offered such a
-        cube, the others one for each episode. Shape: (at most n,), float64.
+        One array per quantity, shape (at most n,), float64; those of "collected" have a value for
+        each episode that offered such a cube, the others one for each episode.
     """
     each = _observe_each(greedy, baselines, rule)
     return [values[~np.isnan(values)] for values in each]
 
 
 def _observe_each(greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule) -> list[NDArray]:
-    """The same of every episode, NaN where it says nothing. Shapes: (n,), float64."""
+    """The same for all episodes, NaN where there is no value. Shapes: (n,), float64."""
     oracle = baselines["oracle"]
     observed = [greedy.success - rule.good_share * oracle.success]
     offered = [greedy.offered(stratum) for stratum in range(len(rule.strata))]
@@ -264,11 +262,11 @@ def _observe_each(greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rul
 
 
 def estimate(quantity: int, values: NDArray, rule: Rule) -> Quantity:
-    """One of the rule's quantities from what episodes say of it.
+    """Estimate one of the rule's quantities from its values, as `observe` returns them.
 
     Args:
-        quantity: Its place among them.
-        values: As `observe` returns them.
+        quantity: Its index.
+        values: By episode.
         rule: Thresholds.
     """
     name, thresholds = rule.quantities[quantity], rule.thresholds[quantity]
@@ -285,7 +283,7 @@ def _is_certain(found: tuple[Quantity, ...], rule: Rule) -> bool:
 
 
 def _enough(greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule) -> int | None:
-    """Roughly how many episodes would do if they went on like this; None for very many."""
+    """About how many such episodes would be enough to be certain; None for very many."""
     for times in MANY:
         if _is_certain(measure(greedy, baselines, rule, times), rule):
             return times * len(greedy)
@@ -293,17 +291,17 @@ def _enough(greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule) -> 
 
 
 def _gain(ours: Tensor, theirs: Tensor) -> dict[str, Any]:
-    """The mean paired difference of two shares, with its interval."""
+    """Mean paired difference of two fractions, with its interval."""
     return mean_bounds(ours - theirs, -1.0, 1.0)
 
 
 def _check_pairs(greedy: Episodes, others: list[Episodes]) -> None:
     for other in others:
         if not torch.equal(other.goals.world, greedy.goals.world):
-            raise ValueError("policy and baselines were flown in different worlds; pair them")
+            raise ValueError("policy and baselines have different initial states; pair them")
 
 
-def judge_to_choose(
+def judge_for_selection(
     path: Path,
     episodes: int,
     device: str,
@@ -311,14 +309,14 @@ def judge_to_choose(
     *,
     seed: RootSeed | None = None,
 ) -> tuple[dict[str, Any], dict]:
-    """What a checkpoint's policy is, in environments of which no report shows figures.
+    """Judge a checkpoint in environments reserved for selection, of which no report shows figures.
 
     Args:
         path: The checkpoint.
-        episodes: To fly.
-        device: Where to fly them.
-        renderer: Who draws them.
-        seed: Root of their random streams; a fresh one by default.
+        episodes: How many.
+        device: Where to run.
+        renderer: Name of the renderer.
+        seed: Root of the random streams; a fresh one by default.
 
     Returns:
         The verdict, as in verdict.json, and the checkpoint's progress.

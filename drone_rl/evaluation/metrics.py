@@ -1,7 +1,6 @@
-"""How good a policy is: pure functions of finished episodes, each of which counts once.
+"""Success rates, returns and failures of finished episodes.
 
-An episode's goals depend on one another: who leaves after the first cube misses all the others.
-So every interval rests on one value an episode.
+Goals within an episode are correlated, so every interval is computed from one value per episode.
 """
 
 import dataclasses
@@ -21,35 +20,34 @@ class Episodes:
 
     task: Task[Any]
     goals: Goals
-    """What was to do in them, and what was done."""
+    """The episodes' goals, and which were reached."""
     end_reason: Tensor  # (n,) int64
-    """Why each ended, one of the task's ends."""
+    """One of the task's ends."""
     length: Tensor  # (n,) int64
-    """Steps of each."""
 
     @classmethod
     def ended(cls, task: Task[Any], info: Mapping[str, Tensor], length: Tensor) -> "Episodes":
-        """Episodes by what was true of them when they ended; on the CPU.
+        """Build episodes from the last step's info, on the CPU.
 
         Args:
-            task: Theirs.
+            task: Their task.
             info: The task's `scored` and "end_reason", as in `Worlds.info`. Shapes: (n, *).
-            length: Steps of each. Shape: (n,).
+            length: Steps of each episode. Shape: (n,).
         """
         goals = task.score({name: info[name].cpu() for name in task.scored})
         return cls(task, goals, info["end_reason"][:, 0].cpu(), length.cpu())
 
     def __len__(self) -> int:
-        """Returns the number of episodes."""
+        """Return the number of episodes."""
         return len(self.length)
 
     def __getitem__(self, rows: slice | Tensor) -> "Episodes":
-        """Returns some of the episodes."""
+        """Return some of the episodes."""
         return Episodes(self.task, self.goals[rows], self.end_reason[rows], self.length[rows])
 
     @classmethod
     def joined(cls, parts: Sequence["Episodes"]) -> "Episodes":
-        """All episodes of one task, one part after the other."""
+        """Concatenate episodes of one task."""
         first = parts[0].goals
         goals = type(first)(
             **{name: torch.cat([vars(p.goals)[name] for p in parts]) for name in vars(first)}
@@ -64,15 +62,15 @@ class Episodes:
 
     @property
     def share(self) -> Tensor:
-        """Each episode's share of goals reached; those that never came up are missed. (n,)."""
+        """Fraction of goals reached; goals that never came up count as missed. Shape: (n,)."""
         return self.goals.reached.double().mean(-1)
 
     def offered(self, stratum: int) -> Tensor:
-        """Episodes in which some goal came up in this stratum. Shape: (n,), bool."""
+        """Return which episodes offered a goal of this stratum. Shape: (n,), bool."""
         return (self.goals.stratum == stratum).any(-1)
 
     def stratum_share(self, stratum: int) -> Tensor:
-        """The share of the goals of a stratum that each episode that offered one reached.
+        """Return the fraction of a stratum's goals that was reached, by episode that offered one.
 
         Returns:
             Shape: (number of such episodes,), float64.
@@ -83,12 +81,11 @@ class Episodes:
 
 
 def summarise(episodes: Episodes) -> dict[str, Any]:
-    """The figures of an evaluation, as plain values, with intervals that count episodes.
+    """Return the figures of an evaluation as plain values, with 95% intervals over episodes.
 
-    "success" is the share of episodes in which every goal (cube) was reached. "shares" are means
-    over episodes of the share of cubes that an episode collected: of all, and of those that came up
-    in a stratum (on a side), over the episodes that offered such a cube; a mean of None says that
-    none was offered. Cubes that never came up ("never_reached") count among all as missed.
+    "success" is the success rate. "shares" are mean fractions of goals reached: of all goals, and
+    by stratum over the episodes that offered such a goal (None if there are none). Goals that never
+    came up ("never_reached") count as missed among all.
     """
     goals, task = episodes.goals, episodes.task
     shares = {"all": _share(episodes.share, goals.reached.numel())}
@@ -117,20 +114,21 @@ def _share(values: Tensor, count: int) -> dict[str, Any]:
 
 
 def failure_table(episodes: Episodes, confidence: float = 0.95) -> dict[str, Any]:
-    """Rows by the task's classes of goals and by how the episode ended.
+    """Count first failures by class of goal and by how the episode ended.
+
+    An episode fails once, at the first goal that it misses. So each row is a binomial count, and
+    its interval is exact.
 
     Args:
         episodes: Finished episodes.
-        confidence: That all the rows' intervals hold at once.
+        confidence: With which the intervals of all rows hold at once (Bonferroni).
 
     Returns:
         "rows": each with "by", "value", "episodes" (that offered such a goal at or before their
         first failure), "failed" (whose first failure it was), "share" and its interval; "largest":
-        the row that holds many failures and little else, by the number of failures times the least
-        share of them, None if nothing failed (the end that every missed goal leads to, as that of
-        the field does who flies on behind a passed cube, is left out);
-        "expected_end": that end; "bound": the share of episodes that failed, with its exact
-        interval.
+        the row with the greatest product of failures and lower bound, None if nothing failed,
+        without the end to which every missed goal leads; "expected_end": that end; "bound": the
+        fraction of episodes that failed, with its exact interval.
     """
     reached, task = episodes.goals.reached, episodes.task
     first = reached.long().cumprod(-1).sum(-1)  # number of goals where none failed

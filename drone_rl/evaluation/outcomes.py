@@ -1,4 +1,4 @@
-"""All ways in which episodes can go on where rounding leaves the action open."""
+"""Enumerate all outcomes of episodes in which rounding leaves an action open."""
 
 import dataclasses
 from typing import Any
@@ -6,46 +6,110 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from drone_rl.collectors.sight import Sight
+from drone_rl.envs.direct_renderer import DirectRenderer
 from drone_rl.evaluation.metrics import Episodes
 from drone_rl.policies.rounding import Decide
 from drone_rl.sim.tasks import State
 
+MOST_FRAGILE = 0.02
+"""Largest fraction of fragile frames with which a verdict can be certain. Honest policies have at
+most 0.002."""
+MOST_FRAGILE_EPISODES = 0.25
+"""The same of episodes with a fragile frame. Honest policies have at most 0.06."""
+MOST_UNEXPLAINED = 0.04
+"""Largest fraction of episodes that may end differently in another implementation if there is no
+bound on rounding, actions are continuous, or drones have flight dynamics. Otherwise an episode may
+take other actions only after a fragile frame."""
 MOST = 64
-"""Branches of an episode that are followed; one that has more is left open."""
+"""Branches per episode; the outcome of an episode with more is left open."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Outcomes:
-    """How episodes can end."""
+    """Possible outcomes of episodes."""
 
     episodes: Episodes | None
-    """One for each end that was found; None if no episode was followed."""
+    """One for each outcome that was found; None if no episode was followed."""
     owner: Tensor
-    """The episode that each is an end of. Shape: (number of ends,), int64."""
+    """The episode that each is an outcome of. Shape: (number of outcomes,), int64."""
     is_open: Tensor
-    """Episodes of which not all ends are known. Shape: (number of episodes,), bool."""
+    """Episodes of which not all outcomes are known. Shape: (number of episodes,), bool."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Rounding:
+    """How rounding can change some episodes."""
+
+    arithmetic: str
+    """That computed the episodes, such as "float32 on cpu, fused kernel"."""
+    is_bound: bool
+    """Whether the rounding error is bounded, not estimated."""
+    frames: int
+    fragile: int
+    """Frames in which rounding can change the action."""
+    is_fragile: Tensor
+    """Episodes with such a frame. Shape: (n,), bool."""
+    outcomes: Outcomes
+    """Possible ends of these; `owner` and `is_open` index all n episodes."""
+    compared: str
+    """Implementation that ran the episodes again."""
+    compared_episodes: int
+    differing: int
+    """Episodes in which it took other actions."""
+    unexplained: int
+    """Those of them without a fragile frame before the first difference."""
+
+    @property
+    def is_excessive(self) -> bool:
+        """Whether too much is fragile or unexplained for any verdict to be certain."""
+        if not self.frames:
+            return False
+        allowed = 0.0 if self.is_bound else MOST_UNEXPLAINED
+        return (
+            self.fragile > MOST_FRAGILE * self.frames
+            or int(self.is_fragile.sum()) > MOST_FRAGILE_EPISODES * len(self.is_fragile)
+            or self.unexplained > allowed * self.compared_episodes
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain values, as in `verdict.json`."""
+        fragile = int(self.is_fragile.sum())
+        return {
+            "arithmetic": self.arithmetic,
+            "bound": self.is_bound,
+            "frames": self.frames,
+            "fragile": self.fragile,
+            "fragile_rate": self.fragile / max(1, self.frames),
+            "threshold": MOST_FRAGILE,
+            "episodes": len(self.is_fragile),
+            "fragile_episodes": fragile,
+            "fragile_episodes_rate": fragile / max(1, len(self.is_fragile)),
+            "threshold_episodes": MOST_FRAGILE_EPISODES,
+            "open_episodes": int(self.outcomes.is_open.sum()),
+            "compared": self.compared,
+            "compared_episodes": self.compared_episodes,
+            "differing": self.differing,
+            "unexplained": self.unexplained,
+            "excessive": self.is_excessive,
+        }
 
 
 @torch.no_grad()
-def follow(sight: Sight, decide: Decide, worlds: Tensor) -> Outcomes:
-    """Fly episodes from their starts, with every possible action wherever there are several.
+def enumerate_outcomes(renderer: DirectRenderer, decide: Decide, worlds: Tensor) -> Outcomes:
+    """Run episodes from their starts, with every possible action wherever there are several.
 
     Args:
-        sight: Of an environment whose worlds are as they were at the start.
-        decide: The policy, of counted actions and without memory.
-        worlds: Indices of the environment's. Shape: (k,).
-
-    Returns:
-        The k episodes' ends.
+        renderer: Renders an environment in the state at the start of the episodes.
+        decide: The policy, of discrete actions and without memory.
+        worlds: Indices of the episodes. Shape: (k,).
     """
-    simulated, count = sight.worlds, len(worlds)
+    simulated, count = renderer.worlds, len(worlds)
     state: Any = simulated.state[worlds]
     owner = torch.arange(count, device=worlds.device)
     is_open = torch.zeros_like(owner, dtype=torch.bool)
     ends, owners = [], []
     while len(owner):
-        possible = decide(sight.look(state, worlds[owner]).get("pixels")).possible
+        possible = decide(renderer.look(state, worlds[owner]).get("pixels")).possible
         row, action = possible.nonzero().unbind(-1)
         state, owner = state[row], owner[row]
         state, _ = simulated.advance(state, action)
@@ -54,7 +118,8 @@ def follow(sight: Sight, decide: Decide, worlds: Tensor) -> Outcomes:
         owners.append(owner[is_over])
         kept = _distinct(state, owner, ~is_over)
         state, owner = state[kept], owner[kept]
-        is_open |= (owner.bincount(minlength=count) + _counts(owners, count)) > MOST
+        ended = torch.cat(owners).bincount(minlength=count)
+        is_open |= (owner.bincount(minlength=count) + ended) > MOST
         going = (~is_open[owner]).nonzero()[:, 0]
         state, owner = state[going], owner[going]
     episodes = [
@@ -66,7 +131,7 @@ def follow(sight: Sight, decide: Decide, worlds: Tensor) -> Outcomes:
 
 
 def _distinct(state: State, owner: Tensor, is_kept: Tensor) -> Tensor:
-    """Rows that go on, one of those that are the same state of the same episode."""
+    """Rows to keep, without duplicate states of the same episode."""
     rows = is_kept.nonzero()[:, 0]
     if len(rows) < 2:
         return rows
@@ -78,7 +143,7 @@ def _distinct(state: State, owner: Tensor, is_kept: Tensor) -> Tensor:
 
 
 def _columns(tensors: dict[str, Any], count: int) -> list[Tensor]:
-    """All numbers of a state, a row a world."""
+    """All numbers of a state, one row per environment."""
     found = []
     for value in tensors.values():
         if isinstance(value, dict):
@@ -86,7 +151,3 @@ def _columns(tensors: dict[str, Any], count: int) -> list[Tensor]:
         else:
             found.append(value.reshape(count, -1).double())
     return found
-
-
-def _counts(owners: list[Tensor], count: int) -> Tensor:
-    return torch.cat(owners).bincount(minlength=count)

@@ -1,7 +1,8 @@
-"""Runs a policy on many worlds at once and gathers how the episodes ended."""
+"""Run complete episodes with a policy, and compare the episodes of two implementations."""
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+import itertools
+from collections.abc import Callable, Iterator
 from typing import Any, cast
 
 import numpy as np
@@ -9,30 +10,31 @@ import torch
 from numpy.typing import NDArray
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
-from torch import Tensor, equal
+from torch import Tensor
 from torchrl.envs import EnvBase
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
-from drone_rl.collectors import EpisodeCollector, take_rows
+from drone_rl.collectors import EpisodeCollector
 from drone_rl.envs import worlds_of
 from drone_rl.evaluation.metrics import Episodes
+from drone_rl.sim.tasks import State
 from drone_rl.utils.provenance import num_cores
+
+_PLACEMENT = ("collected", "cube_positions")
 
 
 @dataclasses.dataclass
 class StepLog:
-    """What was done at each step of some episodes, to compare implementations by."""
+    """The actions of some episodes, to compare implementations by."""
 
     implementation: str = ""
     """What computed the actions: "fused kernel" or "PyTorch"."""
     actions: list[Tensor] = dataclasses.field(default_factory=list)
     """Of each episode. Shapes: (T, *)."""
 
-    def note(self, batch: TensorDictBase) -> None:
-        """Add a batch of whole episodes, one after the other."""
-        action, episode = (cast(Tensor, batch[k]) for k in ("action", ("collector", "traj_ids")))
-        lengths = episode.unique_consecutive(return_counts=True)[1]
-        self.actions += action.cpu().split(lengths.tolist())
+    def add(self, batch: TensorDictBase) -> None:
+        """Add a batch of complete episodes, one after the other."""
+        self.actions += cast(Tensor, batch["action"]).cpu().split(_lengths(batch).tolist())
 
 
 def run_episodes(
@@ -44,103 +46,147 @@ def run_episodes(
     is_compiled: bool = False,
     log: StepLog | None = None,
 ) -> Episodes:
-    """Runs complete episodes, `env.batch_size[0]` at a time.
+    """Run complete episodes, `env.batch_size[0]` at a time.
 
-    World i draws its episodes from a stream of its own, one at a time, so that whatever the policy
-    the k-th episode is flown in the same world.
+    Environment i samples its episodes from its own random stream, so that the k-th episode has the
+    same initial state for every policy.
 
     Args:
-        env: A batch of worlds.
+        env: A batch of environments.
         actor: The policy.
-        num_episodes: How many; what a last batch has more is not used.
-        greedy: Whether to take the most probable action instead of drawing one.
-        is_compiled: Whether a kernel may fly them, see `EpisodeCollector`.
-        log: Takes the actions, of whole batches.
+        num_episodes: How many; surplus episodes of the last batch are dropped.
+        greedy: Whether to take the most probable action instead of sampling one.
+        is_compiled: Whether to use the fused kernel if it supports the policy.
+        log: Receives the actions, those of surplus episodes included.
 
     Returns:
         The episodes, on the CPU.
     """
-    task = worlds_of(env).task
-    keep = tuple(("next", "info", name) for name in (*task.scored, "end_reason"))
+    batches = episode_batches(
+        env, actor, num_episodes, greedy=greedy, is_compiled=is_compiled, log=log, is_exact=False
+    )
+    return Episodes.joined([final_episodes(env, batch) for batch in batches])[:num_episodes]
+
+
+def episode_batches(
+    env: EnvBase,
+    actor: TensorDictModuleBase,
+    num_episodes: int,
+    noted: tuple[str, ...] = (),
+    *,
+    keep: tuple[str, ...] | None = None,
+    greedy: bool = True,
+    is_compiled: bool = False,
+    is_exact: bool = True,
+    log: StepLog | None = None,
+) -> Iterator[TensorDictBase]:
+    """Yield batches of complete episodes until there are `num_episodes`.
+
+    Args:
+        env: A batch of environments.
+        actor: The policy.
+        num_episodes: How many.
+        noted: Entries to keep of those that the actor reads or writes, besides the action.
+        keep: Entries of ("next", "info") to keep; by default what `final_episodes` needs.
+        greedy: Whether to take the most probable action instead of sampling one.
+        is_compiled: Whether to use the fused kernel if it supports the policy.
+        is_exact: Whether the last batch has no surplus episodes.
+        log: Receives the implementation and all actions.
+    """
+    if keep is None:
+        keep = (*worlds_of(env).task.scored, "end_reason")
     collector = EpisodeCollector(
         env,
         actor,
-        keep=keep,
+        keep=tuple(("next", "info", name) for name in keep),
         keep_observations=False,
-        is_compiled=is_compiled,
-        num_cores=num_cores(),
+        noted=noted,
+        acceleration="fused" if is_compiled else "direct",
+        num_threads=num_cores(),
     )
-    kind = ExplorationType.DETERMINISTIC if greedy else ExplorationType.RANDOM
-    finals, lengths, count = [], [], 0
     if log is not None:
-        log.implementation = collector.implementation
-    with set_exploration_type(kind):
-        while count < num_episodes:
-            batch = collector.collect()
-            if log is not None:
-                log.note(batch)
-            done = cast(Tensor, batch["next", "done"])[:, 0].nonzero()[:, 0]
-            finals.append(take_rows(cast(TensorDictBase, batch["next", "info"]), done))
-            lengths.append(batch["collector", "traj_ids"].unique(return_counts=True)[1])
-            count += len(lengths[-1])
-    info = cast(Mapping[str, Tensor], torch.cat(finals)[:num_episodes])
-    return Episodes.ended(task, info, torch.cat(lengths)[:num_episodes])
+        log.implementation = collector.source.implementation
+    kind = ExplorationType.DETERMINISTIC if greedy else ExplorationType.RANDOM
+    while (missing := num_episodes - collector.episodes) > 0:
+        with set_exploration_type(kind):
+            batch = collector.collect(min(missing, env.batch_size[0]) if is_exact else None)
+        if log is not None:
+            log.add(batch)
+        yield batch
 
 
-def env_base(env: EnvBase) -> Any:
-    """The environment behind transforms."""
+def final_episodes(env: EnvBase, batch: TensorDictBase) -> Episodes:
+    """Return the outcomes of a batch of complete episodes, on the CPU."""
+    task = worlds_of(env).task
+    done = cast(Tensor, batch["next", "done"])[:, 0].nonzero()[:, 0]
+    names = (*task.scored, "end_reason")
+    info = {name: cast(Tensor, batch["next", "info", name])[done] for name in names}
+    return Episodes.ended(task, info, _lengths(batch))
+
+
+def rollout(start: State, step: Callable[[int, State, Tensor], tuple[State, Tensor]]) -> State:
+    """Step a batch of simulated scenes until each is over.
+
+    Args:
+        start: Initial states. Length: n.
+        step: Called with the number of the step, the states of the active scenes and their indices;
+            returns the next states and which of them remain active, shape (number active,), bool.
+
+    Returns:
+        The final states. Length: n.
+    """
+    active = torch.arange(len(start), device=start.end_reason.device)
+    final, state = start[active], start
+    for number in itertools.count():
+        state, is_active = step(number, state, active)
+        final[active] = state
+        if not is_active.all():
+            state, active = state[is_active], active[is_active]
+        if not len(active):
+            break
+    return final
+
+
+def find_failures(
+    env: EnvBase, actor: TensorDictModuleBase, num_episodes: int, enough: int
+) -> tuple[NDArray[np.float64], int]:
+    """Search for cube placements from which a greedy policy misses a cube.
+
+    Args:
+        env: A batch of environments.
+        actor: The policy.
+        num_episodes: Minimum number of episodes; batches are never cut.
+        enough: Number of failures after which the search stops.
+
+    Returns:
+        The placements, metres to the left of the start, shape (failures, num_cubes), and the
+        number of episodes.
+    """
+    found: list[NDArray[np.float64]] = []
+    episodes = 0
+    for batch in episode_batches(env, actor, num_episodes, keep=_PLACEMENT, is_exact=False):
+        is_last = batch["next", "done"][:, 0]
+        collected, cubes = (batch["next", "info", name][is_last] for name in _PLACEMENT)
+        failed = cubes[~collected.all(-1)]
+        found.append(np.asarray(failed[..., 1].double().cpu()))
+        episodes += len(collected)
+        if sum(map(len, found)) >= enough:
+            break
+    return np.concatenate(found), episodes
+
+
+def base_env(env: EnvBase) -> Any:
+    """Return the environment below all transforms."""
     return getattr(env, "base_env", env)
 
 
-def streams(env: EnvBase) -> dict[str, Any]:
-    """What an environment's next episodes follow from."""
-    return env_base(env).state_dict()
+def env_state(env: EnvBase) -> dict[str, Any]:
+    """Return the random streams from which the next episodes follow."""
+    return base_env(env).state_dict()
 
 
-def batches(
-    env: EnvBase,
-    actor: TensorDictModuleBase,
-    episodes: int,
-    noted: tuple[str, ...] = (),
-    *,
-    is_compiled: bool = False,
-    log: StepLog | None = None,
-) -> Iterator[TensorDictBase]:
-    """Greedy episodes, no more than are asked for; by the fused kernel if it may and can."""
-    keep = tuple(("next", "info", name) for name in (*worlds_of(env).task.scored, "end_reason"))
-    collector = EpisodeCollector(
-        env,
-        actor,
-        keep=keep,
-        keep_observations=False,
-        noted=noted,
-        is_compiled=is_compiled,
-        num_cores=num_cores(),
-    )
-    if log is not None:
-        log.implementation = collector.implementation
-    left = episodes
-    with set_exploration_type(ExplorationType.DETERMINISTIC):
-        while left > 0:
-            count = min(left, env.batch_size[0])
-            yield collector.collect(count)
-            left -= count
-
-
-def final(env: EnvBase, batch: TensorDictBase) -> Episodes:
-    """How the episodes of a batch ended."""
-    task = worlds_of(env).task
-    done = cast(Tensor, batch["next", "done"])[:, 0].nonzero()[:, 0]
-    info = {
-        name: cast(Tensor, batch["next", "info", name])[done]
-        for name in (*task.scored, "end_reason")
-    }
-    lengths = cast(Tensor, batch["collector", "traj_ids"]).unique_consecutive(return_counts=True)
-    return Episodes.ended(task, info, lengths[1])
-
-
-def parting(one: Tensor, other: Tensor) -> int | None:
-    """The first step at which actions differ; None if none do."""
+def first_difference(one: Tensor, other: Tensor) -> int | None:
+    """Return the first step at which two sequences of actions differ, or None."""
     shared = min(len(one), len(other))
     steps = (one[:shared] != other[:shared]).nonzero()
     if len(steps):
@@ -148,46 +194,21 @@ def parting(one: Tensor, other: Tensor) -> int | None:
     return None if len(one) == len(other) else shared
 
 
-def ending(one: Episodes, other: Episodes, i: int) -> int | None:
-    """The last step if episodes end otherwise; None if they end alike."""
-    is_same = bool(one.end_reason[i] == other.end_reason[i]) and equal(
+def outcome_difference(one: Episodes, other: Episodes, i: int) -> int | None:
+    """Return the length of episode i if its outcomes differ, or None."""
+    is_same = bool(one.end_reason[i] == other.end_reason[i]) and torch.equal(
         one.goals.reached[i], other.goals.reached[i]
     )
     return None if is_same else int(one.length[i])
 
 
-def only(flags: Tensor) -> int | None:
-    """The place of the only true flag; None if there is another number of them."""
+def only_index(flags: Tensor) -> int | None:
+    """Return the index of the only true flag, or None if there is not exactly one."""
     places = flags.nonzero()[:, 0]
     return int(places[0]) if len(places) == 1 else None
 
 
-_TOLD = ("collected", "cube_positions")
-
-
-def find_failures(
-    env: EnvBase, actor: TensorDictModuleBase, num_episodes: int, enough: int
-) -> tuple[NDArray[np.float64], int]:
-    """Flies complete episodes greedily, and notes those in which a cube is left behind.
-
-    Args:
-        env: A batch of worlds.
-        actor: The policy.
-        num_episodes: How many, at least: whole batches are flown.
-        enough: After so many failures no further batch is flown.
-
-    Returns:
-        Where the cubes stood when it failed, metres to the left of the start, of shape (failures,
-        num_cubes), and how many episodes were flown.
-    """
-    keep = tuple(("next", "info", name) for name in _TOLD)
-    collector = EpisodeCollector(env, actor, keep=keep, keep_observations=False)
-    found: list[NDArray[np.float64]] = []
-    with set_exploration_type(ExplorationType.DETERMINISTIC):
-        while collector.episodes < num_episodes and sum(map(len, found)) < enough:
-            batch = collector.collect()
-            is_last = batch["next", "done"][:, 0]
-            collected, cubes = (batch["next", "info", name][is_last] for name in _TOLD)
-            failed = cubes[~collected.all(-1)]
-            found.append(np.asarray(failed[..., 1].double().cpu()))
-    return np.concatenate(found), collector.episodes
+def _lengths(batch: TensorDictBase) -> Tensor:
+    """Steps of each episode of a batch. Shape: (episodes,)."""
+    episode = cast(Tensor, batch["collector", "traj_ids"])
+    return episode.unique_consecutive(return_counts=True)[1]

@@ -16,23 +16,20 @@ from typing import NamedTuple
 from drone_rl.utils.errors import InputError
 
 NOT_CERTAIN = 13
-"""Exit status where the episodes are too few to be certain of the kind."""
+"""Exit code if the episodes are too few to be certain of the kind."""
 NOT_PROVED = 16
-"""Exit status where a proof for every placement is required, and no certificate gives it."""
-
+"""Exit code if a proof for every placement is required and no certificate gives it."""
 NOT_COVERED = 17
-"""Exit status where conditions are required in which the policy was not found to be good."""
-
-
+"""Exit code if an operating domain is required in which the policy was not found to be good."""
 _TRIVIAL_CODE = 18
 
 
 class Kind(enum.StrEnum):
-    """What a policy is."""
+    """Kind of a policy."""
 
     GOOD = "good"
     TRIVIAL = "good, but trivial"
-    """It succeeds as a good policy does, and so does a baseline that ignores the observations."""
+    """As good as required, and so is a baseline that ignores the observations."""
     POOR = "poor"
     ONE_SIDED_LEFT = "one-sided (left)"
     ONE_SIDED_RIGHT = "one-sided (right)"
@@ -46,7 +43,7 @@ class Kind(enum.StrEnum):
 
     @property
     def mirrored(self) -> "Kind":
-        """What it is in a world where left is right."""
+        """The kind with left and right exchanged."""
         left, right = Kind.ONE_SIDED_LEFT, Kind.ONE_SIDED_RIGHT
         return {left: right, right: left}.get(self, self)
 
@@ -57,15 +54,15 @@ class Kind(enum.StrEnum):
 
 
 KINDS = ("good", "good, but trivial", "one-sided", "poor", "none of these")
-"""Families of kinds, best first, for those to whom the side doesn't matter."""
+"""Families of kinds, best first, without the side."""
 
 
 SIDES = ("left", "ahead", "right")
 """Strata of cube collection."""
 LUCK = ("random", "forward", "left", "right")
-"""Its policies that see nothing: any action alike, and each action always."""
+"""Its random and constant baselines."""
 TOLERANCE = 1e-9
-"""Rounding of a mean; who exceeds a threshold by no more stands on it."""
+"""Rounding of a mean: a value that exceeds a threshold by less counts as equal to it."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -77,24 +74,25 @@ class Rule:
     """
 
     good_share: float = 0.9
-    """A good policy succeeds in more than this share of the oracle's episodes."""
+    """Fraction of the oracle's success rate that a good policy exceeds."""
     side_share: float = 0.7
-    """A good policy collects more than this share on each side, a one-sided one on its side."""
+    """Fraction of goals that a good policy exceeds on each side, a one-sided one on its side."""
     other_share: float = 0.3
-    """A one-sided policy collects no more than this share on the other side."""
+    """Fraction of goals that a one-sided policy does not exceed on the other side."""
     offered_share: float = 0.05
-    """A side counts if more than this share of episodes offer a cube there."""
+    """Fraction of episodes that must offer a goal on a side for the side to count."""
     luck_margin: float = 1 / 6
-    """A poor policy is no farther than this part of the way from luck to the oracle."""
+    """Fraction of the way from the best random or constant baseline to the oracle up to which a
+    policy is poor."""
     error_rate: float = 0.05
-    """Largest probability of being certain and wrong."""
+    """Largest probability of a certain and wrong verdict."""
     strata: tuple[str, ...] = SIDES
-    """The task's, from left to right; one-sided policies differ between first and last."""
+    """Of the task, from left to right; one-sided policies differ between first and last."""
     luck: tuple[str, ...] = LUCK
-    """The task's."""
+    """Random and constant baselines of the task."""
 
     def __post_init__(self) -> None:
-        """Refuses what no policy could meet or miss."""
+        """Refuse thresholds that no policy could meet or miss."""
         for field in dataclasses.fields(self):
             if field.type is not float:
                 continue
@@ -111,7 +109,7 @@ class Rule:
 
     @property
     def quantities(self) -> tuple[str, ...]:
-        """Names of all that the rule looks at, in order."""
+        """Names of the rule's quantities, in order."""
         return (
             "success",
             *(f"offered {stratum}" for stratum in self.strata),
@@ -122,14 +120,14 @@ class Rule:
 
     @property
     def thresholds(self) -> tuple[tuple[float, ...], ...]:
-        """Of each of `quantities`, in rising order."""
+        """Thresholds of each of `quantities`, in rising order."""
         shares = [(self.other_share, self.side_share)] * len(self.strata)
         offered = [(self.offered_share,)] * len(self.strata)
         return ((0.0,), *offered, *shares, *[(0.0,)] * (2 * len(self.luck)))
 
     @property
     def ranges(self) -> tuple[tuple[float, float], ...]:
-        """The least and the greatest value that an episode can have of each of `quantities`."""
+        """Least and greatest value of each of `quantities` in an episode."""
         count = len(self.strata)
         above = [(-1.0, 1.0)] * len(self.luck)
         unsolved = [(-1.0, self.good_share)] * len(self.luck)
@@ -137,12 +135,12 @@ class Rule:
 
     @property
     def confidence(self) -> float:
-        """Of each quantity's interval, so that all of them hold at once (Bonferroni)."""
+        """Confidence of each quantity's interval, so that all hold at once (Bonferroni)."""
         return 1.0 - self.error_rate / len(self.quantities)
 
     @property
     def text(self) -> str:
-        """The rule in words."""
+        """The rule as text."""
         return f"""\
 good: the share of episodes in which every cube is collected is more than {self.good_share:.0%} of \
 the oracle's, and more than {self.side_share:.0%} of the cubes to the left, ahead and to the right \
@@ -159,37 +157,37 @@ what within an episode."""
 
 
 class Quantity(NamedTuple):
-    """One number of the rule, as far as it is known."""
+    """One number of the rule, with its interval."""
 
     value: float | None
-    """None if nothing tells it, as a share of cubes that were never offered."""
+    """None if there are no data, as for goals that were never offered."""
     lower: float
     upper: float
     thresholds: tuple[float, ...]
 
     @property
     def level(self) -> int:
-        """How many thresholds the value exceeds."""
+        """Number of thresholds that the value exceeds."""
         return 0 if self.value is None else level(self.value - TOLERANCE, self.thresholds)
 
     @property
     def levels(self) -> tuple[int, int]:
-        """The least and the greatest level within the interval."""
+        """Least and greatest level within the interval."""
         lower = level(self.lower - TOLERANCE, self.thresholds)
         return lower, level(self.upper + TOLERANCE, self.thresholds)
 
 
 def level(value: float, thresholds: Iterable[float]) -> int:
-    """How many thresholds a value exceeds; one that equals a threshold doesn't exceed it."""
+    """Return the number of thresholds that a value exceeds."""
     return sum(value > threshold for threshold in thresholds)
 
 
 def decide(levels: Sequence[int], num_strata: int = len(SIDES)) -> Kind:
-    """The kind.
+    """Return the kind.
 
     Args:
         levels: Of each of `Rule.quantities`.
-        num_strata: How many strata are among them.
+        num_strata: Number of strata among them.
     """
     success, *rest = levels
     offered, shares = rest[:num_strata], rest[num_strata : 2 * num_strata]
@@ -209,15 +207,15 @@ def decide(levels: Sequence[int], num_strata: int = len(SIDES)) -> Kind:
 
 @functools.lru_cache(maxsize=4096)
 def kinds_within(box: tuple[tuple[int, int], ...], num_strata: int = len(SIDES)) -> frozenset[Kind]:
-    """The kinds of all cells of a box.
+    """Return the kinds of all cells of a box.
 
     Args:
-        box: The least and the greatest level of each of `Rule.quantities`.
-        num_strata: How many strata are among them.
+        box: Least and greatest level of each of `Rule.quantities`.
+        num_strata: Number of strata among them.
     """
     luck = box[1 + 2 * num_strata :]
     halves = luck[: len(luck) // 2], luck[len(luck) // 2 :]
-    # `decide` asks of each half only whether all its levels are above 0: the least one tells
+    # `decide` uses only whether all levels of a half are above 0, so the least one is enough
     least = [
         (min(low for low, _ in half), min(high for _, high in half)) for half in halves if half
     ]

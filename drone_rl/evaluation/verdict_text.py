@@ -5,8 +5,7 @@ from typing import Any
 
 from drone_rl.evaluation.certificate_text import PROOF
 from drone_rl.sim.vocabulary import terms_of
-from drone_rl.utils.seed_text import fixed_seed
-from drone_rl.utils.sentences import Evidence, Sentence, percent
+from drone_rl.utils.text import Evidence, Sentence, fixed_seed, percent
 
 FREQUENT = 0.02
 """How an episode ends is worth a word if surely more than this share of episodes end so."""

@@ -18,7 +18,7 @@ from drone_rl.config import (
     DynamicsSettings,
     TaskSettings,
 )
-from drone_rl.config.changes import Changes
+from drone_rl.config.configuration import Changes
 from drone_rl.config.transforms import Gray, Rgb, Standardize, Transform
 from drone_rl.policies import ForeignNetwork
 from drone_rl.policies.base_policy import Pilot

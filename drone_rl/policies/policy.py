@@ -8,7 +8,7 @@ import torch
 from torchrl.envs import TransformedEnv
 
 from drone_rl.config import ActionSettings, BaseTaskSettings, DynamicsSettings
-from drone_rl.config.changes import Changes
+from drone_rl.config.configuration import Changes
 from drone_rl.policies import PolicyNetwork
 from drone_rl.policies.base_policy import Pilot
 from drone_rl.policies.zoo import PolicyDescription, parse, policy_names, policy_path, read_policy

@@ -8,8 +8,7 @@ import math
 from collections.abc import Mapping
 
 from drone_rl.robustness.shifts_text import MOST_NAMED, NAMES, SHIFTS, is_tested
-from drone_rl.utils.numbers import listed, plural
-from drone_rl.utils.sentences import Evidence, Sentence, percent, say
+from drone_rl.utils.text import Evidence, Sentence, listed, percent, plural, say
 
 _OTHERS = {"color": "colours", "light": "light", "object size": "sizes"}
 """What a verdict is told to say nothing of, by the kind of shift that does."""

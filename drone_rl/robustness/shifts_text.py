@@ -5,9 +5,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from drone_rl.sim.vocabulary import terms_of
-from drone_rl.utils.numbers import listed
-from drone_rl.utils.seed_text import fixed_seed
-from drone_rl.utils.sentences import Evidence, Sentence, percent
+from drone_rl.utils.text import Evidence, Sentence, fixed_seed, listed, percent
 
 NAMES: Mapping[str, str] = {
     "object_color": "color of the objects",

@@ -19,10 +19,8 @@ from drone_rl.config import (
     CameraSettings,
     DynamicsSettings,
 )
-from drone_rl.sim.appearances import Appearances
-from drone_rl.sim.clutter import things_of
 from drone_rl.sim.dynamics import BodyState, Dynamics, Quadrotor, draw_seeds, make_dynamics
-from drone_rl.sim.dynamics.body import heading_only
+from drone_rl.sim.dynamics.state import heading_only
 from drone_rl.sim.entities import (
     DRAW_DISTANCE,
     SKY_COLOR,
@@ -36,6 +34,7 @@ from drone_rl.sim.rendering import Appearance, opengl
 from drone_rl.sim.rendering.opengl import OpenGlAppearance
 from drone_rl.sim.rendering.scene import Scene, SemanticClass
 from drone_rl.sim.tasks import State, Task, as_task
+from drone_rl.sim.visual_randomization import Appearances, things_of
 
 _SKY = 0.69 * DRAW_DISTANCE
 """Metres behind which there is nothing: MuJoCo's sky is a ball of 0.7 of the drawing distance."""

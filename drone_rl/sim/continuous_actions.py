@@ -25,9 +25,8 @@ from typing import Any, Self
 import torch
 from torch import Tensor
 
-from drone_rl.config.actions import ActionSettings
-from drone_rl.sim.actions import Entry, listed
-from drone_rl.sim.parts import Parts
+from drone_rl.config.dynamics import ActionSettings
+from drone_rl.sim.actions import Entry, Parts, listed
 
 FORWARD, SIDEWAYS, YAW = range(3)
 """Numbers of an action."""

@@ -21,9 +21,9 @@ from torch import Tensor
 from drone_rl.config import DynamicsSettings
 from drone_rl.config.dynamics import GRAVITY
 from drone_rl.sim.dynamics import BodyState, FlightState, Goals, Quadrotor
-from drone_rl.sim.dynamics import flight_state as fs
-from drone_rl.sim.dynamics.body import heading_only
-from drone_rl.sim.dynamics.forces import forces, told
+from drone_rl.sim.dynamics import state as fs
+from drone_rl.sim.dynamics.forces_kernel import forces, told
+from drone_rl.sim.dynamics.state import heading_only
 from drone_rl.sim.entities import DRONE_CAMERAS, Drone
 
 _GROUND, _OBSTACLE = 2, 4

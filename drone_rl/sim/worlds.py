@@ -10,10 +10,9 @@ from torch import Tensor
 
 from drone_rl.config import ActionSettings, BaseTaskSettings, CameraSettings, DynamicsSettings
 from drone_rl.sim.actions import Entry
-from drone_rl.sim.clutter import HIDDEN_DEPTH
 from drone_rl.sim.composer_task import ComposerTask
 from drone_rl.sim.dynamics import BodyState, Dynamics, draw_seeds, make_dynamics
-from drone_rl.sim.dynamics.body import heading_only
+from drone_rl.sim.dynamics.state import heading_only
 from drone_rl.sim.entities import FRONT_CENTER
 from drone_rl.sim.rendering import (
     Appearance,
@@ -26,6 +25,7 @@ from drone_rl.sim.rendering import (
 )
 from drone_rl.sim.rendering.view import Modality
 from drone_rl.sim.tasks import State, Task, as_task
+from drone_rl.sim.tasks.common import HIDDEN_DEPTH
 from drone_rl.utils.errors import InputError
 
 _POSE = {"drone": Entry((3,), torch.float32), "attitude": Entry((4,), torch.float32)}
@@ -260,9 +260,9 @@ class Worlds:
         return Poses(state.body.position, attitude, props)
 
     def _distractors(self, appearance: Appearance | None, count: int) -> Tensor:
-        distractors = None if appearance is None else appearance.distractors
-        if distractors is not None:
-            return distractors.expand(count).places
+        beside = None if appearance is None else appearance.distractors
+        if beside is not None:
+            return beside.expand(count).places
         return torch.tensor([0.0, 0.0, -HIDDEN_DEPTH]).expand(count, self.distractors, 3)
 
     def prepare(self, view: View | None = None) -> None:

@@ -15,8 +15,7 @@ from drone_rl.training.learners import (
 )
 from drone_rl.training.progress import Progress
 from drone_rl.training.trainer import Collector, Trainer
-from drone_rl.utils.checkpoint import load_checkpoint, save_checkpoint
-from drone_rl.utils.weights import check_weights
+from drone_rl.utils.checkpoint import check_weights, load_checkpoint, save_checkpoint
 
 __all__ = [
     "ActorCriticLearner",

@@ -7,26 +7,24 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import torch
 
 from drone_rl.collectors import (
+    BatchedCollector,
     EpisodeCollector,
     RolloutCollector,
     ThreadedCollector,
-    WorldsCollector,
 )
-from drone_rl.config.collecting import Episodes, Ray
-from drone_rl.config.configuration import as_config, from_config
-from drone_rl.config.objectives import WithCritic
+from drone_rl.config.configuration import as_config, from_config, locate
+from drone_rl.config.learning import Episodes, Ray, WithCritic
 from drone_rl.config.training import TrainSettings
-from drone_rl.config.variant import locate
 from drone_rl.policies import PolicyNetwork, make_actor
 from drone_rl.policies.zoo import describe
-from drone_rl.sim.tasks import Practice
+from drone_rl.sim.tasks import FailureReplayTask
 from drone_rl.utils.provenance import num_cores
 from drone_rl.utils.seeding import Stream, torch_generator
 
 if TYPE_CHECKING:
     from drone_rl.collectors.ray import RayEpisodeCollector
 
-C = TypeVar("C", bound=WorldsCollector)
+C = TypeVar("C", bound=BatchedCollector)
 
 
 class Collecting(NamedTuple):
@@ -38,7 +36,9 @@ class Collecting(NamedTuple):
     """Random streams of this process, by name."""
 
 
-def build_collector(settings: TrainSettings, practice: Practice | None = None) -> Collecting:
+def build_collector(
+    settings: TrainSettings, practice: FailureReplayTask | None = None
+) -> Collecting:
     """The collector that the settings ask for, over worlds that fly by an untrained network.
 
     Args:
@@ -52,13 +52,17 @@ def build_collector(settings: TrainSettings, practice: Practice | None = None) -
     return make(settings) if practice is None else make(settings, practice)
 
 
-def threaded_collector(settings: TrainSettings, practice: Practice | None = None) -> Collecting:
+def threaded_collector(
+    settings: TrainSettings, practice: FailureReplayTask | None = None
+) -> Collecting:
     """`Threads`: complete episodes from threads of this process."""
     cores = max(1, num_cores() // _num_workers(settings))
     return _threaded(settings, practice, _episodes(settings, cores))
 
 
-def rollout_collector(settings: TrainSettings, practice: Practice | None = None) -> Collecting:
+def rollout_collector(
+    settings: TrainSettings, practice: FailureReplayTask | None = None
+) -> Collecting:
     """`Rollouts`: the next steps of each world, from threads of this process."""
     objective = settings.objective
     assert isinstance(objective, WithCritic)
@@ -67,7 +71,9 @@ def rollout_collector(settings: TrainSettings, practice: Practice | None = None)
 
 
 def _threaded(
-    settings: TrainSettings, practice: Practice | None, collect: Callable[..., WorldsCollector]
+    settings: TrainSettings,
+    practice: FailureReplayTask | None,
+    collect: Callable[..., BatchedCollector],
 ) -> Collecting:
     """The worlds shared out to threads, each with a collector made of worlds and an actor."""
     shares = _shares(settings)
@@ -82,7 +88,7 @@ def _threaded(
     return Collecting(ThreadedCollector(collectors), network, generators)
 
 
-def ray_collector(settings: TrainSettings, practice: Practice | None = None) -> Collecting:
+def ray_collector(settings: TrainSettings, practice: FailureReplayTask | None = None) -> Collecting:
     """`Ray`: the workers are processes of a Ray cluster."""
     from drone_rl.collectors.ray import RayEpisodeCollector  # slow to import, seldom needed
 
@@ -111,7 +117,7 @@ def build_share(
     shares: list[int],
     number: int,
     network: PolicyNetwork | None = None,
-    practice: Practice | None = None,
+    practice: FailureReplayTask | None = None,
     *,
     collect: Callable[..., C],
 ) -> tuple[C, PolicyNetwork, torch.Generator]:
@@ -143,7 +149,7 @@ def build_share(
 
 
 def _remote_share(
-    config: dict[str, Any], shares: list[int], number: int, practice: Practice | None
+    config: dict[str, Any], shares: list[int], number: int, practice: FailureReplayTask | None
 ) -> tuple[EpisodeCollector, PolicyNetwork, torch.Generator]:
     """`build_share` from what can be sent."""
     settings = from_config(TrainSettings, config)
@@ -155,8 +161,8 @@ def _remote_share(
 def _episodes(settings: TrainSettings, cores: int) -> Callable[..., EpisodeCollector]:
     """Makes collectors of complete episodes, each on so many cores."""
     asked = settings.collector
-    is_compiled = isinstance(asked, Episodes) and asked.compiled
-    return functools.partial(EpisodeCollector, is_compiled=is_compiled, num_cores=cores)
+    acceleration = "fused" if isinstance(asked, Episodes) and asked.compiled else "none"
+    return functools.partial(EpisodeCollector, acceleration=acceleration, num_threads=cores)
 
 
 def _num_workers(settings: TrainSettings) -> int:

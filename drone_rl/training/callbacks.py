@@ -15,10 +15,10 @@ from tqdm import tqdm
 
 from drone_rl.training.progress import OngoingTraining
 from drone_rl.utils.checkpoint import save_checkpoint
-from drone_rl.utils.csv_table import read_table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import remove_leftovers, write_atomically
 from drone_rl.utils.former_names import FORMER_NAMES
+from drone_rl.utils.readers import read_table
 from drone_rl.utils.schema import shown
 
 _DIGITS = 20

@@ -12,24 +12,23 @@ from typing import Any
 import torch
 import yaml
 
-from drone_rl.config.comparison import check_same_config, modern
-from drone_rl.config.configuration import as_config, from_config
+from drone_rl.config.configuration import as_config, check_same_config, from_config, modern
 from drone_rl.config.training import TrainSettings
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import describe, read_checkpoint
-from drone_rl.sim.tasks import Practice, as_task
+from drone_rl.sim.tasks import FailureReplayTask, as_task
 from drone_rl.training import Callback, CheckpointCallback, CsvCallback, NotANumberError, Trainer
 from drone_rl.training.build_collector import build_collector
 from drone_rl.training.build_learner import build_learner
 from drone_rl.training.confirmation import Confirmation
 from drone_rl.training.progress import OngoingTraining
-from drone_rl.utils.csv_table import read_table
 from drone_rl.utils.display import picture, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock, remove_leftovers, write_atomically
 from drone_rl.utils.memory import bound_kernels
 from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
+from drone_rl.utils.readers import read_table
 from drone_rl.utils.schema import Real
 from drone_rl.utils.settings import kinds_of
 
@@ -162,7 +161,7 @@ def learn(
     folder: Path,
     state: Mapping[str, Any] | None,
     callbacks: Sequence[Callback],
-    practice: Practice | None = None,
+    practice: FailureReplayTask | None = None,
 ) -> dict[str, Any]:
     """Trains until solved, out of budget or told to stop, and leaves checkpoints and metrics.
 
@@ -210,17 +209,20 @@ def finish(settings: TrainSettings, folder: Path, result: dict[str, Any]) -> Tra
         result: Goes into `result.json`.
     """
     if settings.evaluate_after and not result["reason"].startswith("SIG"):
-        from drone_rl.evaluation.judge import judge_to_choose  # slow to import, and few need it
+        from drone_rl.evaluation.judge import judge_for_selection  # slow to import, and few need it
 
         last, episodes = last_of(folder), settings.evaluate_after
         given = (settings.device, settings.renderer)
-        result["verdict"], _ = judge_to_choose(last, episodes, *given)
+        result["verdict"], _ = judge_for_selection(last, episodes, *given)
     write_atomically(folder / "result.json", json.dumps(result, indent=2))
     return Training(folder, result["reason"], result)
 
 
 def _build(
-    settings: TrainSettings, folder: Path, callbacks: Sequence[Callback], practice: Practice | None
+    settings: TrainSettings,
+    folder: Path,
+    callbacks: Sequence[Callback],
+    practice: FailureReplayTask | None,
 ) -> tuple[Trainer, CheckpointCallback, Confirmation | None]:
     config, origin = as_config(settings), provenance()
     description = describe(config).as_dict()

@@ -1,19 +1,194 @@
-"""Checkpoints that are whole or not there, and that can't run code when loaded."""
+"""Checkpoints: written atomically, read without executing code or trusting sizes.
 
+`torch.load(weights_only=True)` runs no code, but it allocates what a file requests, trusts the
+sizes of storages and supports types that a checkpoint never contains. The reader here supports a
+dozen pickle instructions, builds tensors from the bytes that are present, and calls nothing.
+"""
+
+import collections
 import contextlib
+import io
+import math
 import os
+import pickle
+import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar, NoReturn
 
 import torch
+from torch import Tensor
 
+from drone_rl.utils.archives import read_members
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import read_bytes, temporary_of
 from drone_rl.utils.former_names import with_present_names
-from drone_rl.utils.limits import CHECKPOINT_BYTES
-from drone_rl.utils.schema import shown
-from drone_rl.utils.unpickling import ForeignError, unpickle
+from drone_rl.utils.limits import CHECKPOINT_BYTES, DIMENSIONS, PICKLED_BYTES
+from drone_rl.utils.schema import as_mapping, shown
+
+_MEMBER = re.compile(r"[^/]+/(data\.pkl|data/\d+|byteorder|version|\.[\w/.]+)")
+_DTYPES = {
+    "FloatStorage": torch.float32,
+    "DoubleStorage": torch.float64,
+    "HalfStorage": torch.float16,
+    "BFloat16Storage": torch.bfloat16,
+    "LongStorage": torch.int64,
+    "IntStorage": torch.int32,
+    "ShortStorage": torch.int16,
+    "CharStorage": torch.int8,
+    "ByteStorage": torch.uint8,
+    "BoolStorage": torch.bool,
+    "ComplexFloatStorage": torch.complex64,
+    "ComplexDoubleStorage": torch.complex128,
+}
+_INSTRUCTIONS = {
+    name: getattr(pickle, name)[0]
+    for name in (
+        *("PROTO", "STOP", "MARK", "NONE", "NEWTRUE", "NEWFALSE"),
+        *("BININT", "BININT1", "BININT2", "LONG1", "BINFLOAT", "BINUNICODE"),
+        *("EMPTY_TUPLE", "TUPLE", "TUPLE1", "TUPLE2", "TUPLE3"),
+        *("EMPTY_LIST", "APPEND", "APPENDS", "EMPTY_DICT", "SETITEM", "SETITEMS"),
+        *("BINPUT", "LONG_BINPUT", "BINGET", "LONG_BINGET"),
+        *("GLOBAL", "REDUCE", "BUILD", "BINPERSID"),
+    )
+}
+
+
+class DamagedError(ValueError):
+    """The file is damaged or cut short."""
+
+
+class ForeignError(ValueError):
+    """The file holds more than tensors and plain values."""
+
+
+def unpickle(content: bytes, where: str) -> Any:
+    """What was saved, on the CPU.
+
+    Args:
+        content: Of the file.
+        where: Its name, for people.
+
+    Raises:
+        InputError: It is no archive, or too large.
+        DamagedError: It is damaged.
+        ForeignError: It holds something else.
+    """
+    members: dict[str, bytes] = {}
+    for name, data in read_members(content, where, most=CHECKPOINT_BYTES):
+        if not _MEMBER.fullmatch(name):
+            raise ForeignError(f"a file {name[:80]!r}")
+        members[name.partition("/")[2]] = data
+    program = members.get("data.pkl")
+    if program is None or members.get("byteorder", b"little") != b"little":
+        raise DamagedError("it has no data.pkl of this byte order")
+    if len(program) > PICKLED_BYTES:
+        raise ForeignError("more values than a checkpoint has")
+    reader = _Unpickler(program, members)
+    members.clear()
+    try:
+        return reader.load()
+    except (DamagedError, ForeignError):
+        raise
+    except _DAMAGE as error:
+        raise DamagedError(type(error).__name__) from None
+
+
+_DAMAGE = (
+    *(pickle.UnpicklingError, EOFError, ValueError, TypeError, LookupError, AttributeError),
+    *(RuntimeError, OverflowError, RecursionError),
+)
+"""What nonsensical instructions end in."""
+
+
+class _Rebuild:
+    """Stands for the function that makes a tensor of a storage."""
+
+    __slots__ = ()
+
+    def __call__(self, storage: Any, offset: Any, size: Any, stride: Any, *_: Any) -> Tensor:
+        numbers = (offset, *size, *stride)
+        if not isinstance(storage, Tensor) or any(type(n) is not int or n < 0 for n in numbers):
+            raise DamagedError("a tensor without a storage")
+        extent = offset + sum((n - 1) * step for n, step in zip(size, stride, strict=True)) + 1
+        count = math.prod(size)
+        if len(size) > DIMENSIONS or count > len(storage) or (count and extent > len(storage)):
+            raise DamagedError("a tensor is larger than its storage")
+        return storage.as_strided(size, stride, offset)
+
+
+class _NewMapping:
+    """Stands for an ordered mapping, which is made empty and then filled."""
+
+    __slots__ = ()
+
+    def __call__(self) -> dict:
+        return collections.OrderedDict()
+
+
+class _Unpickler(pickle._Unpickler):
+    """Python's own unpickler with the instructions that are needed left over."""
+
+    dispatch: ClassVar[dict] = {
+        code: pickle._Unpickler.dispatch[code] for code in _INSTRUCTIONS.values()
+    }
+
+    def __init__(self, program: bytes, members: Mapping[str, bytes]) -> None:
+        super().__init__(io.BytesIO(program))
+        self._members = dict(members)
+        self._storages: dict[str, Tensor] = {}
+
+    def load(self) -> Any:
+        """Runs the instructions."""
+        used = _Watched(self.dispatch)
+        self.dispatch = used
+        return super().load()
+
+    def find_class(self, module: str, name: str) -> Any:
+        """The three things that a checkpoint names."""
+        if (module, name) == ("torch._utils", "_rebuild_tensor_v2"):
+            return _Rebuild()
+        if (module, name) == ("collections", "OrderedDict"):
+            return _NewMapping()
+        if module == "torch" and name in _DTYPES:
+            return _DTYPES[name]
+        raise ForeignError(f"{module}.{name}"[:80])
+
+    def persistent_load(self, pid: Any) -> Tensor:
+        """A storage, as long as its bytes say."""
+        kind, dtype, key, _, length = pid
+        if kind != "storage" or not isinstance(dtype, torch.dtype) or not isinstance(key, str):
+            raise ForeignError("a reference to something else than a storage")
+        if key not in self._storages:  # its bytes are there once: as a member, then as a tensor
+            content = self._members.pop(f"data/{key}")
+            if length * dtype.itemsize != len(content):
+                raise DamagedError("a storage is not as long as it says")
+            self._storages[key] = _tensor(content, dtype)
+        storage = self._storages[key]
+        if storage.dtype != dtype or length != len(storage):
+            raise DamagedError("one storage is named with two types or lengths")
+        return storage
+
+    def _ignore_state(self) -> None:
+        """What modules note beside their parameters (versions of layers) is not needed."""
+        self.stack.pop()
+
+    dispatch[_INSTRUCTIONS["BUILD"]] = _ignore_state
+
+
+class _Watched(dict):
+    """Instructions, of which an unknown one means that the file is not ours."""
+
+    def __missing__(self, code: int) -> NoReturn:
+        raise ForeignError(f"instruction {code}")
+
+
+def _tensor(content: bytes, dtype: torch.dtype) -> Tensor:
+    """A tensor that owns its numbers. Shape: (n,)."""
+    if not content:
+        return torch.empty(0, dtype=dtype)
+    return torch.frombuffer(bytearray(content), dtype=dtype)
+
 
 FORMAT = "drone_rl checkpoint"
 FORMAT_VERSION = 2
@@ -94,3 +269,45 @@ def load_checkpoint(path: str | Path) -> dict[str, Any]:
     if isinstance(state.get("progress"), Mapping):
         state["progress"] = with_present_names(state["progress"])
     return state
+
+
+def check_weights(weights: Any, expected: Mapping[str, Tensor]) -> dict[str, Tensor]:
+    """Refuses all but finite tensors of the expected names, shapes and types.
+
+    Args:
+        weights: Out of a file.
+        expected: The network's `state_dict`; it may lie on the meta device, without numbers.
+
+    Returns:
+        The weights.
+
+    Raises:
+        InputError: They differ; the first difference is named.
+    """
+    found = dict(as_mapping(weights, "the policy's weights"))
+    for name in [*expected, *(name for name in found if name not in expected)]:
+        _check_shape(name, found.get(name), expected.get(name))
+    for name, value in found.items():
+        if value.is_floating_point() and not bool(torch.isfinite(value).all()):
+            raise InputError(
+                f"the weights {name} hold NaN or infinity; use a checkpoint from before that"
+            )
+    return found
+
+
+def _check_shape(name: str, found: Any, expected: Tensor | None) -> None:
+    there, here = _kind(found), _kind(expected)
+    if there != here:
+        raise InputError(
+            f"the saved weights are not those of the described policy: {shown(name)} is {there} in "
+            f"the file and {here} by the description; choose the policy and camera of the training"
+        )
+
+
+def _kind(value: Any) -> str:
+    if value is None:
+        return "absent"
+    if not isinstance(value, Tensor):
+        return f"no tensor ({type(value).__name__})"
+    kind = "" if value.dtype == torch.float32 else f" of {value.dtype}".replace("torch.", "")
+    return f"{tuple(value.shape)}{kind}"

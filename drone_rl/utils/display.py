@@ -1,12 +1,22 @@
-"""Tables and figures of results: as text for a terminal, as HTML for a notebook."""
+"""Tables, figures and HTML pages of results.
+
+Pages show strings from files of unknown origin. Two independent defences keep these strings from
+being executed. Templates escape every value, so that a string reaches the page as text. And the
+page's Content-Security-Policy allows exactly the page's own script and style, by their hashes:
+no inline script, event handler, style attribute or request to another host.
+"""
 
 import base64
+import hashlib
 import html
 import io
+import urllib.parse
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    import jinja2
+    from markupsafe import Markup
     from matplotlib.figure import Figure
 
 
@@ -71,3 +81,80 @@ def interval(figure: Mapping[str, Any], key: str) -> str:
         return "not offered"
     share, low, high = (f"{100 * figure[k]:.3g}" for k in (key, "lower95", "upper95"))
     return f"{share}% [{low}, {high}]"
+
+
+_SOURCES = (
+    "default-src 'none'",
+    "base-uri 'none'",
+    "form-action 'none'",
+    "object-src 'none'",
+    "img-src data:",
+    "media-src data:",
+)
+"""What every page may load: images and films that are part of it."""
+_TYPES = ("require-trusted-types-for 'script'", "trusted-types 'none'")
+"""Makes it an error of the page's own script to turn text into markup or into code."""
+
+
+def page_environment(*packages: str) -> "jinja2.Environment":
+    """Return an environment for the templates of a page; every value is escaped.
+
+    It has the filters `folder_link`, a relative link to a folder by its name, and jinja's `tojson`,
+    whose result can stand in a script element: no character of it ends that element.
+
+    Args:
+        packages: Each has a folder `templates`; earlier ones come first.
+    """
+    import jinja2  # most users of this module need no template
+
+    loaders = [jinja2.PackageLoader(package) for package in packages]
+    environment = jinja2.Environment(
+        loader=jinja2.ChoiceLoader(loaders),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+    )
+    environment.filters["folder_link"] = folder_link
+    return environment
+
+
+def static_text(environment: "jinja2.Environment", names: Sequence[str]) -> "Markup":
+    """Return files of a page's style or script, joined, without any value put into them.
+
+    Args:
+        environment: From `page_environment`.
+        names: Of files in a folder of templates.
+
+    Raises:
+        ValueError: A file would end the element that it stands in.
+    """
+    assert environment.loader is not None
+    files = [environment.loader.get_source(environment, name)[0] for name in names]
+    text = "\n".join(files).replace("\r\n", "\n")  # as browsers read it before they hash it
+    if "</" in text or "<!--" in text:
+        raise ValueError(f"{', '.join(names)} would end the element that holds them")
+    from markupsafe import Markup
+
+    return Markup(text)
+
+
+def content_security_policy(style: str, script: str = "") -> str:
+    """Return the policy of a page with one style element and at most one script element.
+
+    Args:
+        style: Text of the style element.
+        script: Text of the script element; none is allowed if it is empty.
+    """
+    scripts = f"script-src {_hash(script)}" if script else "script-src 'none'"
+    return "; ".join((*_SOURCES, f"style-src {_hash(style)}", scripts, *_TYPES))
+
+
+def folder_link(name: str) -> str:
+    """Return a link to a folder next to the page, whatever the folder is called."""
+    return f"./{urllib.parse.quote(name, safe='')}/"
+
+
+def _hash(text: str) -> str:
+    """The source expression that allows an inline element with exactly this text."""
+    digest = hashlib.sha256(text.encode()).digest()
+    return f"'sha256-{base64.b64encode(digest).decode()}'"

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.plain_yaml import read_yaml
-from drone_rl.utils.schema import Kind, Colors, Text, shown
+from drone_rl.utils.readers import read_yaml
+from drone_rl.utils.schema import Kind, Several, Text, shown
 
 _OF_ONE_FOLDER = re.compile(r"\+{0,2}(resume|trial|paths(\.\w+)?)")
 """Settings that say where a run was or which sweep it was a part of: not what it learns.

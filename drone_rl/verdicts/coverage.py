@@ -1,4 +1,4 @@
-"""Which flights under other conditions a verdict, a card or a report may quote of a policy."""
+"""Find a policy's operating domain, compare it with a required one, and re-run a sample of it."""
 
 import dataclasses
 from collections.abc import Iterator, Mapping
@@ -8,53 +8,51 @@ from typing import Any
 
 import numpy as np
 
-from drone_rl.config.judging import JudgeSettings
-from drone_rl.config.shifting import ShiftSettings
+from drone_rl.config.commands import JudgeSettings, ShiftSettings
 from drone_rl.evaluation.rule import Rule
 from drone_rl.policies.base_policy import Pilot
 from drone_rl.policies.policy import Policy
 from drone_rl.policies.zoo import shifts_path
-from drone_rl.robustness.agents import OracleEyes
+from drone_rl.robustness.agents import OracleAgent
 from drone_rl.robustness.axes import Axis, find_axes
 from drone_rl.robustness.domain import Prober
-from drone_rl.robustness.domain_text import QUOTED, contradicted, lacking, needed_range, why_not
-from drone_rl.robustness.paired_evaluation import Airfield, Subject
+from drone_rl.robustness.domain_text import contradicted, lacking, needed_range
+from drone_rl.robustness.paired_evaluation import PairedEvaluator, PolicySpec
 from drone_rl.robustness.perturbations import Condition
-from drone_rl.robustness.requirements import Need, read_needs
-from drone_rl.robustness.shifts_file import Measured, read_measured
+from drone_rl.robustness.requirements import Need, read_requirements
+from drone_rl.robustness.shifts_file import SavedShifts, read_shifts
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import mean_bounds
 from drone_rl.utils.seeding import RootSeed
-from drone_rl.utils.sentences import say
 
 RANDOM = 2
-"""Strengths that are drawn at random within each range, besides its ends."""
+"""Number of random strengths within each range, in addition to its ends."""
 
 
 @dataclasses.dataclass(frozen=True)
-class Reflown:
-    """New rollouts under required conditions, held against what a file says of these."""
+class DomainRecheck:
+    """New episodes under required conditions, compared with a file."""
 
     episodes: int
     """At each strength."""
     seed: int
     """Of the episodes and of the random strengths."""
     seed_is_fixed: bool
-    """Whether it was chosen beforehand, so that a policy could be fitted to it."""
+    """Whether it was chosen, so that a policy could have been fitted to it."""
     strengths: Mapping[str, tuple[float, ...]]
-    """By axis, the values that were flown."""
+    """By axis, the values that were run."""
     contradictions: tuple[str, ...]
-    """What speaks against the file, one line each."""
+    """What contradicts the file, one line each."""
     fewest: int
-    """Successes at a strength; with fewer it would have been contradicted."""
+    """Fewest successes at a strength that do not contradict the file."""
 
     @property
     def count(self) -> int:
-        """Strengths of all axes."""
+        """Number of strengths of all axes."""
         return sum(map(len, self.strengths.values()))
 
     def __str__(self) -> str:
-        """By how many episodes, and what these rule out."""
+        """Return the number of episodes, and what they rule out."""
         fitted = ", to which a policy could have been fitted" if self.seed_is_fixed else ""
         kind = "fixed" if self.seed_is_fixed else "fresh"
         return (
@@ -64,41 +62,41 @@ class Reflown:
         )
 
 
-def refly(
+def recheck_domain(
     policy: Pilot,
     needs: Mapping[str, Need],
     numbers: Mapping[str, Any],
     settings: JudgeSettings,
     seed: RootSeed,
-) -> Reflown:
-    """Fly new episodes at the ends of the required ranges and at random strengths within them.
+) -> DomainRecheck:
+    """Run new episodes at the ends of the required ranges and at random strengths within them.
 
     Args:
-        policy: Which, in the task that counts.
-        needs: By axis, see `drone_rl.robustness.requirements.read_needs`.
+        policy: Which, in its task.
+        needs: By axis, see `drone_rl.robustness.requirements.read_requirements`.
         numbers: As in `shifts.json`, with the axes.
         settings: `domain_flights`, `good_share`, device and renderer count.
         seed: Root of the random streams of the sample and of its environments.
     """
-    from drone_rl.robustness.shifts import make_subject  # slow to import: it draws charts
+    from drone_rl.robustness.shifts import make_policy_spec  # slow to import: it draws charts
 
     how = ShiftSettings(device=settings.device, renderer=settings.renderer)
-    subject, rng = make_subject(policy, how), np.random.default_rng(seed.value)
+    subject, rng = make_policy_spec(policy, how), np.random.default_rng(seed.value)
     tried = {
         axis: [*_strengths(axis, subject, needs[axis.name], numbers, rng)]
         for axis in find_axes(needs, subject)
     }
     count = sum(map(len, tried.values())) + 1
-    with closing(Airfield(subject, settings.domain_flights, seed.value)) as bed:
-        oracle = bed.fly(Condition(), eyes=OracleEyes(looks=False)).episodes
-        prober = Prober(bed, oracle, settings.good_share, plain_part=1 / count)
+    with closing(PairedEvaluator(subject, settings.domain_flights, seed.value)) as evaluator:
+        oracle = evaluator.run(Condition(), agent=OracleAgent(looks=False)).episodes
+        prober = Prober(evaluator, oracle, settings.good_share, plain_part=1 / count)
         found = [_contradiction(None, prober.plain, 0.0, "")]
         for axis, strengths in tried.items():
             for strength in strengths:
                 probed = prober.probe(axis.make(strength, subject), 1 / count)
                 value = axis.value(strength, subject)
                 found.append(_contradiction(axis.name, probed, value, axis.unit))
-    return Reflown(
+    return DomainRecheck(
         episodes=settings.domain_flights,
         seed=seed.value,
         seed_is_fixed=seed.is_fixed,
@@ -113,12 +111,12 @@ def refly(
 
 def _strengths(
     axis: Axis,
-    subject: Subject,
+    subject: PolicySpec,
     need: Need,
     numbers: Mapping[str, Any],
     rng: np.random.Generator,
 ) -> Iterator[float]:
-    """The ends that differ from no difference, and random strengths between them, each once."""
+    """The ends other than no perturbation, and random strengths between them, each once."""
     low, high = needed_range(numbers["axes"][axis.name], need)
     ends = sorted(axis.position(axis.strength(value, subject)) for value in (low, high))
     drawn = rng.uniform(ends[0], ends[1], RANDOM) if ends[0] < ends[1] else []
@@ -138,7 +136,7 @@ def _contradiction(
 
 
 def _fewest(episodes: int, rule: Rule) -> int:
-    """The fewest successes that do not contradict, next to an oracle that always succeeds."""
+    """Fewest successes that do not contradict, with an oracle that always succeeds."""
     least, most = 0, episodes
     while least < most:
         middle = (least + most) // 2
@@ -149,38 +147,38 @@ def _fewest(episodes: int, rule: Rule) -> int:
 
 
 MOST_LOOKED_AT = 100
-"""Results of `drone-rl shifts`, the newest ones."""
+"""Largest number of results of `drone-rl shifts` to read."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Coverage:
-    """What is needed beside what was found."""
+    """A required operating domain compared with a measured one."""
 
     needs: Mapping[str, Need]
     """By axis."""
     lacking: Mapping[str, str]
-    """By axis, what the operating domain lacks of it; nothing if all that is needed is covered."""
+    """By axis that is not covered, what the operating domain lacks."""
     against: str | None = None
-    """Why the operating domain is not believed; None if nothing speaks against it."""
-    reflown: Reflown | None = None
-    """New episodes at a sample of what is needed; None if none were flown."""
+    """The reason why the operating domain is refused, if it is."""
+    reflown: DomainRecheck | None = None
+    """New episodes at a sample of the requirements, if any were run."""
 
     @property
     def is_stated(self) -> bool:
-        """Whether the file says that it is good under all that is needed."""
+        """Whether the file states that the policy is good under all requirements."""
         return not self.lacking and self.against is None
 
     @property
     def is_covered(self) -> bool:
-        """Whether it says so, and new episodes were flown that do not contradict it."""
+        """Whether it states so, and new episodes do not contradict it."""
         return self.is_stated and self.reflown is not None and not self.reflown.contradictions
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain values."""
+        """Return plain values."""
         return dataclasses.asdict(self)
 
     def __str__(self) -> str:
-        """A line for each axis that is not covered, or one for all."""
+        """Return a line for each axis that is not covered, or one for all."""
         if self.is_covered:
             return f"covered: {', '.join(self.needs)}, each by itself, {self.reflown}"
         lines = [*self.lacking.values(), *filter(None, [self.against])]
@@ -195,22 +193,21 @@ class Coverage:
 
 def find_domain(
     policy: Pilot, given: str | Path | None = None, outputs: str | Path = "outputs"
-) -> Measured | None:
-    """A policy's flights under other conditions, in its task.
+) -> SavedShifts | None:
+    """Find the robustness evaluation of a policy in its task.
 
     Args:
-        policy: Which, in the task that counts.
-        given: Their file, or a folder that holds a shifts.json; by default what lies with the
-            policy (`drone_rl.policies.zoo.shifts_path`), else the newest file that
-            `drone-rl shifts` wrote for it, preferably one with ranges.
-        outputs: Folder under which commands leave what they make.
+        policy: Which, in its task.
+        given: The file, or a folder with a shifts.json; by default the file next to the policy
+            (`drone_rl.policies.zoo.shifts_path`), otherwise the newest that `drone-rl shifts`
+            wrote for it, preferably one with ranges.
+        outputs: Folder of all runs.
 
     Returns:
-        None if there are none. What lies with the policy and can't be believed is refused.
+        None if there is none. An invalid file next to the policy is returned as refused.
 
     Raises:
-        InputError: What is given can't be read, is of another network or task, or contradicts
-            itself.
+        InputError: The given file is unreadable, of another network or task, or contradicts itself.
     """
     if not isinstance(policy, Policy):
         if given is not None:
@@ -227,7 +224,7 @@ def find_domain(
         try:
             return _read(beside, policy)
         except InputError as error:
-            return Measured(beside, None, refused=str(error))
+            return SavedShifts(beside, None, refused=str(error))
     found = None
     for measured in _made(policy, Path(outputs)):
         if measured.has_ranges:
@@ -236,18 +233,18 @@ def find_domain(
     return found
 
 
-def require(policy: Pilot, needed: str | Path, measured: Measured | None) -> Coverage:
-    """Compares what is needed with a policy's operating domain.
+def require(policy: Pilot, needed: str | Path, measured: SavedShifts | None) -> Coverage:
+    """Compare requirements with a policy's operating domain.
 
     Args:
         policy: Which.
-        needed: A file, see `drone_rl.robustness.requirements.read_needs`.
+        needed: A file, see `drone_rl.robustness.requirements.read_requirements`.
         measured: From `find_domain`.
 
     Raises:
         InputError: The file is unusable, or no operating domain was measured, or it is refused.
     """
-    needs = read_needs(Path(needed))
+    needs = read_requirements(Path(needed))
     remedy = f"run drone-rl shifts policy={_given(policy)} first, in the same task"
     if measured is None:
         raise InputError(f"require_domain={needed}, but no domain of it was measured; {remedy}")
@@ -261,31 +258,16 @@ def require(policy: Pilot, needed: str | Path, measured: Measured | None) -> Cov
     return Coverage(needs, {name: line for name, line in lacks.items() if line is not None})
 
 
-def beside(coverage: Coverage, evidence: Mapping[str, Any]) -> Coverage:
-    """The same with what a verdict says against it.
-
-    Args:
-        coverage: From `require`.
-        evidence: "shifts" and "verdict", see `drone_rl.robustness.domain_text`.
-    """
-    return dataclasses.replace(coverage, against=why_not(evidence))
-
-
-def sentence(evidence: Mapping[str, Any]) -> str:
-    """What may be quoted, for a person."""
-    return say(QUOTED, evidence)
-
-
 def _given(policy: Pilot) -> str:
     return str(policy.path) if isinstance(policy, Policy) else policy.name
 
 
-def _read(path: Path, policy: Policy) -> Measured:
-    return read_measured(path, policy.description, policy.state["policy"])
+def _read(path: Path, policy: Policy) -> SavedShifts:
+    return read_shifts(path, policy.description, policy.state["policy"])
 
 
-def _made(policy: Policy, outputs: Path) -> Iterator[Measured]:
-    """What `drone-rl shifts` left of this network and task, the newest first."""
+def _made(policy: Policy, outputs: Path) -> Iterator[SavedShifts]:
+    """Evaluations of this network and task under `outputs`, newest first."""
     there = [
         *outputs.glob("shifts/runs/*/shifts.json"),
         *outputs.glob("shifts/multiruns/*/*/shifts.json"),

@@ -12,18 +12,15 @@ import torch
 from torch import Tensor
 
 from drone_rl.config import TaskSettings
-from drone_rl.config.chances import ChanceSettings
-from drone_rl.config.proving import ProveSettings
+from drone_rl.config.verification import ChanceSettings, ProveSettings
 from drone_rl.policies.policy import Policy, load_policy
-from drone_rl.sim.tasks.collect_cubes import require_cubes, require_moves, rules
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.sim.tasks.collect_cubes import CollectCubes, EndReason
 from drone_rl.utils.display import aligned, paragraph, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
-from drone_rl.utils.seed_text import CHANCES, seed_line
 from drone_rl.utils.seeding import RootSeed, Stream, with_seed, world_random_state
-from drone_rl.utils.sentences import say
+from drone_rl.utils.text import CHANCES, say, seed_line
 from drone_rl.verification.prover.lattice import explore, shape_of
 from drone_rl.verification.prover.markov_chain import (
     Bounded,
@@ -33,6 +30,7 @@ from drone_rl.verification.prover.markov_chain import (
     follow_chances,
 )
 from drone_rl.verification.prover.policy_spec import make_subject
+from drone_rl.verification.requirements import require_cubes, require_moves
 
 _BOUNDS = {
     "least": "everywhere at least",
@@ -236,7 +234,7 @@ def _drawn(task: TaskSettings, count: int, seed: RootSeed) -> Tensor:
     """The first placement of each of so many held-out worlds."""
     worlds = range(count)
     streams = (world_random_state(seed.value, world, Stream.REPORT) for world in worlds)
-    return torch.stack([rules.draw_cubes(task, stream) for stream in streams])
+    return torch.stack([CollectCubes(task).draw(stream) for stream in streams])
 
 
 def _given(task: TaskSettings, cubes: Any) -> Tensor:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from drone_rl.config.checking import CheckSettings
+from drone_rl.config.verification import CheckSettings
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import policy_names
 from drone_rl.utils.display import table
@@ -15,9 +15,8 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import newest
 from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
-from drone_rl.utils.seed_text import CHECK, seed_line
 from drone_rl.utils.seeding import RootSeed, with_seed
-from drone_rl.utils.sentences import say
+from drone_rl.utils.text import CHECK, say, seed_line
 from drone_rl.verification.checker import (
     Certificate,
     Findings,

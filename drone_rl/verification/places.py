@@ -12,16 +12,16 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from drone_rl.config.mapping import PlacesSettings
+from drone_rl.config.verification import PlacesSettings
 from drone_rl.evaluation.plots import regions
 from drone_rl.policies.policy import Policy, load_policy
-from drone_rl.sim.action_display import MOVES
+from drone_rl.sim.vocabulary import SHOWN_MOVES
 from drone_rl.utils.display import aligned, paragraph, picture, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import fresh_seed, legacy_seed
-from drone_rl.utils.sentences import say
+from drone_rl.utils.text import say
 from drone_rl.verification.prover.action_map import Look, PlaceMap, map_places
 from drone_rl.verification.prover.arrangement import Window
 from drone_rl.verification.prover.bounds import Painter
@@ -59,24 +59,24 @@ class Places:
                 f"ahead={ahead}, left={left} is outside of the map; give {window.nearest:g} to "
                 f"{window.farthest:g} metres ahead and up to {window.sideways:g} to either side"
             )
-        return MOVES.names[self.places.at(np.array([[ahead, left]]))[0]]
+        return SHOWN_MOVES.names[self.places.at(np.array([[ahead, left]]))[0]]
 
     def save(self, folder: Path) -> None:
         """Writes `places.json`, `places.png` and `places.svg`, which can be zoomed into."""
         (folder / "places.json").write_text(json.dumps(self.numbers | provenance(), indent=2))
         ways = self.places.outlines()
-        regions.chart(self.numbers, ways, MOVES).savefig(folder / "places.png", dpi=200)
-        drawn = regions.svg(self.numbers, ways, MOVES)
+        regions.chart(self.numbers, ways, SHOWN_MOVES).savefig(folder / "places.png", dpi=200)
+        drawn = regions.svg(self.numbers, ways, SHOWN_MOVES)
         head = drawn.replace("<svg ", '<svg xmlns="http://www.w3.org/2000/svg" ', 1)
         (folder / "places.svg").write_text(head)
 
     def __str__(self) -> str:
         """The table and what it comes to."""
-        return f"{aligned(rows(self.numbers, MOVES.names))}\n{self._about()}"
+        return f"{aligned(rows(self.numbers, SHOWN_MOVES.names))}\n{self._about()}"
 
     def _repr_html_(self) -> str:
-        head, *lines = rows(self.numbers, MOVES.names)
-        figure = regions.chart(self.numbers, self.places.outlines(), MOVES)
+        head, *lines = rows(self.numbers, SHOWN_MOVES.names)
+        figure = regions.chart(self.numbers, self.places.outlines(), SHOWN_MOVES)
         return table(head, lines) + paragraph(self._about()) + picture(figure)
 
     def _about(self) -> str:
@@ -133,7 +133,7 @@ def places(
         "policy": policy.name,
         "path": str(policy.path),
         "task": policy.task.values(),
-        "names": list(MOVES.names),
+        "names": list(SHOWN_MOVES.names),
         **found.summary(settings.logit_gap),
         "compared": compared,
         "seconds": time.perf_counter() - begin,

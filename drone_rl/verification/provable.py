@@ -16,16 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drone_rl.config import TaskSettings
-from drone_rl.config.comparison import check_same_config
-from drone_rl.config.configuration import as_config
-from drone_rl.config.provable import ProvableSettings
+from drone_rl.config.configuration import as_config, check_same_config
 from drone_rl.config.training import TrainSettings
+from drone_rl.config.verification import ProvableSettings
 from drone_rl.evaluation.rollouts import find_failures
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import read_checkpoint
-from drone_rl.sim.tasks import Practice
-from drone_rl.sim.tasks.collect_cubes import require_cubes, require_moves
-from drone_rl.sim.tasks.collect_cubes.practice import inflated
+from drone_rl.sim.tasks import FailureReplayTask
+from drone_rl.sim.tasks.failure_replay import inflated
 from drone_rl.training import Callback
 from drone_rl.training.progress import OngoingTraining
 from drone_rl.training.train import (
@@ -43,11 +41,12 @@ from drone_rl.utils.archives import read_array
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock, read_json, write_atomically
 from drone_rl.utils.progress import Bar, Progress
-from drone_rl.utils.schema import Plain, Real, Record, Colors, Whole
+from drone_rl.utils.schema import Plain, Real, Record, Several, Whole
 from drone_rl.utils.seeding import Stream
 from drone_rl.utils.settings import Settings
 from drone_rl.verification.prove import Proof, prove
 from drone_rl.verification.prover.boxes import volumes
+from drone_rl.verification.requirements import require_cubes, require_moves
 
 HOW_MAY_CHANGE = ("rounds", "limit_s")
 """What a resumed run may change of its rounds."""
@@ -295,7 +294,7 @@ def _learn(
         until = min(journal.rounds[-1].frames + more, settings.trainer.total_frames)
         trainer = settings.trainer.replace(total_frames=until, target_share=None)
         settings, failures = settings.replace(trainer=trainer), journal.failures()
-        practice = Practice(journal.task, failures, how.share) if len(failures) else None
+        practice = FailureReplayTask(journal.task, failures, how.share) if len(failures) else None
     return learn(settings, journal.folder, state, callbacks, practice)
 
 

@@ -10,16 +10,16 @@ from typing import Any
 
 import numpy as np
 
-from drone_rl.config.proving import ProveSettings
+from drone_rl.config.verification import ProveSettings
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.utils.display import aligned, paragraph, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock, write_atomically
 from drone_rl.utils.limits import ARRAYS_BYTES
-from drone_rl.utils.numbers import plural
 from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import fresh_seed, legacy_seed
+from drone_rl.utils.text import plural
 from drone_rl.verification.prover.policy_spec import Subject, make_subject, one_thread
 from drone_rl.verification.prover.proof_files import certify, load, save, weights_hash
 from drone_rl.verification.prover.prover import Prover

@@ -3,9 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from drone_rl.sim.action_display import shown_actions
-from drone_rl.utils.numbers import all_cubes, exact, listed
-from drone_rl.utils.sentences import Evidence, Sentence
+from drone_rl.sim.vocabulary import shown_actions
+from drone_rl.utils.text import Evidence, Sentence, all_cubes, exact, listed
 
 WHERE = {"left": "on its left", "ahead": "straight ahead", "right": "on its right"}
 """Sides, and how people say them."""

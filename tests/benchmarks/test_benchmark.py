@@ -1,7 +1,7 @@
 import torch
 
 from benchmarks.benchmark import Setup
-from drone_rl.config.benchmarks import BenchSettings
+from drone_rl.config.commands import BenchSettings
 
 
 def setup(tmp_path, **changes):

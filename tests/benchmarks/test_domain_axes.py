@@ -30,7 +30,9 @@ class Made:
 def count(tmp_path, monkeypatch):
     def run(made):
         monkeypatch.setattr(domain_axes, "shifts", lambda *a, **k: made)
-        monkeypatch.setattr(domain_axes, "refly", lambda *a: type("R", (), {"contradictions": ()}))
+        monkeypatch.setattr(
+            domain_axes, "recheck_domain", lambda *a: type("R", (), {"contradictions": ()})
+        )
         return bench_domain_axes(tmp_path / "bench", quick=True)
 
     return run

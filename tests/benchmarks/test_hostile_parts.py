@@ -4,15 +4,14 @@ import pytest
 
 from benchmarks import hostile_parts as made
 from benchmarks.evidence import changed
-from drone_rl.explanations.report.fitting import check_fit
-from drone_rl.explanations.report.shapes import check_sizes
-from drone_rl.sim.action_display import MOVES
+from drone_rl.explanations.report.validation import check_fit, check_sizes
+from drone_rl.sim.vocabulary import SHOWN_MOVES
 from drone_rl.utils.errors import InputError
 
 
 def check(numbers, arrays):
     check_sizes(numbers, arrays, made.data())
-    check_fit(numbers, arrays, made.data(), MOVES)
+    check_fit(numbers, arrays, made.data(), SHOWN_MOVES)
 
 
 def test_the_rest_is_valid():

@@ -5,7 +5,7 @@ import torch
 
 from benchmarks import hostile_policies as made
 from benchmarks.hostile_files import _about, weights
-from drone_rl.utils.unpickling import unpickle
+from drone_rl.utils.checkpoint import unpickle
 
 
 def test_what_the_lies_are_made_from_is_true():

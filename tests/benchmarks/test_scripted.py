@@ -7,7 +7,7 @@ import torch
 
 from benchmarks.scripted import PILOTS, ScriptedPolicy
 from drone_rl.envs import DroneEnv
-from drone_rl.evaluation.baselines import fly_baselines
+from drone_rl.evaluation.baselines import run_baselines
 from drone_rl.evaluation.judge import judge
 from drone_rl.evaluation.rollouts import run_episodes
 from drone_rl.utils.seeding import RootSeed, Stream
@@ -94,7 +94,7 @@ WANTED = {
 @functools.cache
 def baselines(task):
     env = DroneEnv(EPISODES, task, pixels=False, stream=Stream.REPORT)
-    return fly_baselines(EPISODES, task, env.state_dict(), EPISODES)
+    return run_baselines(EPISODES, task, env.state_dict(), EPISODES)
 
 
 UNKNOWN = RootSeed(0, False)

@@ -6,7 +6,7 @@ import pytest
 import drone_rl
 from benchmarks.evidence import changed
 from benchmarks.sentences import NO_CLAIMS, PLANTS, SPOKEN, Plant, bench_sentences
-from drone_rl.utils.sentences import Sentence
+from drone_rl.utils.text import Sentence
 
 
 @pytest.mark.parametrize("plant", PLANTS, ids=lambda p: f"{p.of}: {p.name}: {sorted(p.lie)}")

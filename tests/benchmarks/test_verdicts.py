@@ -28,13 +28,13 @@ def test_enough_policies_are_judged():
 
 def test_the_truth_comes_from_other_worlds(monkeypatch):
     flown = []
-    fly = verdicts.fly_baselines
+    fly = verdicts.run_baselines
 
     def watch(num_worlds, task, worlds, episodes):
         flown.append(worlds["random_states"][0])
         return fly(20, task, {"random_states": worlds["random_states"][:20]}, episodes)
 
-    monkeypatch.setattr(verdicts, "fly_baselines", watch)
+    monkeypatch.setattr(verdicts, "run_baselines", watch)
     monkeypatch.setattr(verdicts, "_NUM_WORLDS", 20)
     monkeypatch.setattr(verdicts, "_sizes", lambda quick: (20, 40))
     verdicts._baselines.cache_clear()

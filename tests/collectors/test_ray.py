@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from drone_rl.config import TaskSettings
-from drone_rl.config.collecting import Ray, Threads
+from drone_rl.config.learning import Ray, Threads
 from drone_rl.config.training import TrainSettings
 from drone_rl.training.build_collector import build_collector
 from drone_rl.training.metrics import episode_rewards

@@ -7,8 +7,7 @@ import shlex
 from hydra import compose, initialize_config_dir
 from hydra.core.global_hydra import GlobalHydra
 
-from drone_rl.cli.hydra.composition import conf_dir, read_settings
-from drone_rl.cli.hydra.schemas import register_schemas
+from drone_rl.cli.hydra.composition import conf_dir, read_settings, register_schemas
 from drone_rl.cli.usage import COMMANDS
 
 COMMAND = re.compile(r"^(?:[A-Z]+=\S+ )?drone-rl ([a-z-]+)(.*)$", re.MULTILINE)

@@ -10,10 +10,9 @@ import jinja2
 import pytest
 import torch
 
-from drone_rl.explanations import sections, study
+import drone_rl.explanations
+from drone_rl.explanations import explain, report
 from drone_rl.explanations.report import page as report_page
-from drone_rl.explanations.report import sections as parts
-from drone_rl.explanations.sections import find_sections
 from drone_rl.policies.zoo.registry import NETWORKS
 from drone_rl.utils.settings import kinds_of, types_of
 from tests.docs.commands import check_commands
@@ -23,7 +22,7 @@ PAGES = [DOCS / "flight.md", DOCS / "pilot.md", *sorted((DOCS / "tutorials").glo
 BLOCK = re.compile(r'^```(\w+)(?: title="([^"]+)")?\n(.*?)^```$', re.DOTALL | re.MULTILINE)
 SHORT = (
     "trainer=drone_rl.TrainerSettings(total_frames=1500, checkpoint_interval_s=0.0), "
-    "collector=drone_rl.config.collecting.Threads(num_envs=8)"
+    "collector=drone_rl.config.learning.Threads(num_envs=8)"
 )
 SMALLER = {
     "notebook": {
@@ -68,13 +67,14 @@ def workplace(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(str(tmp_path))
     inside = tmp_path / "drone_rl"
-    for package in (sections, parts):
+    for package in (drone_rl.explanations, report):
         folder = inside.joinpath(*package.__name__.split(".")[1:])
         monkeypatch.setattr(package, "__path__", [*package.__path__, str(folder)])
-    few = {name: find_sections()[name] for name in ("dataset", "evaluation")}
-    monkeypatch.setattr(study, "find_sections", lambda: few)  # all of them take a minute
+    few = {name: explain.SECTIONS[name] for name in ("dataset", "evaluation")}
+    monkeypatch.setattr(explain, "SECTIONS", few)  # all of them take a minute
+    monkeypatch.setattr(report_page, "PARTS", dict(report_page.PARTS))
     known, networks, threads = set(sys.modules), dict(NETWORKS), torch.get_num_threads()
-    templates = jinja2.FileSystemLoader(inside / "report" / "templates")
+    templates = jinja2.FileSystemLoader(inside / "explanations" / "report" / "templates")
     theirs = jinja2.PackageLoader("drone_rl.explanations.report")
     loader = jinja2.ChoiceLoader([theirs, templates])
     monkeypatch.setattr(jinja2, "PackageLoader", lambda _: loader)
@@ -125,3 +125,9 @@ def test_it_runs(page, workplace):
             run(code, f"{page.stem}, block {number}", names)
         elif language == "sh":
             check_commands(code)
+
+
+def test_a_minimal_task_takes_at_most_80_lines():
+    blocks = BLOCK.findall((DOCS / "tutorials" / "task.md").read_text())
+    (post,) = [text for _, title, text in blocks if title == "post.py"]
+    assert len(post.splitlines()) <= 80

@@ -9,7 +9,7 @@ from torchrl.envs.utils import check_env_specs
 
 from drone_rl.config import AppearanceSettings, TaskSettings
 from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.utils.errors import InputError
 
 SHORT = TaskSettings(num_cubes=1, first_distance=3.0, step_limit=5, front_margin=3.0)

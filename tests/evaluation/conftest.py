@@ -6,8 +6,7 @@ import torch
 from drone_rl.evaluation.baselines import BASELINES
 from drone_rl.evaluation.metrics import Episodes
 from drone_rl.sim.tasks import CollectCubes
-from drone_rl.sim.tasks.collect_cubes.goals import CubeGoals
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason, Side
+from drone_rl.sim.tasks.collect_cubes import CubeGoals, EndReason, Side
 
 METRES = {Side.LEFT: 4.0, Side.AHEAD: 0.0, Side.RIGHT: -4.0}
 

@@ -10,7 +10,7 @@ from drone_rl.evaluation.baselines import (
     ConstantPolicy,
     Oracle,
     RandomPolicy,
-    fly_baselines,
+    run_baselines,
 )
 from drone_rl.evaluation.rollouts import run_episodes
 from drone_rl.sim.actions import MOVES, Move
@@ -36,7 +36,7 @@ def test_baselines_are_flown_in_the_same_worlds_one_by_one(policies, monkeypatch
     monkeypatch.setattr(Worlds, "render", lambda *args: pytest.fail("nobody looks"))
     env = DroneEnv(4, TASK, pixels=False, seed=5)
     worlds = env.state_dict()
-    flown = fly_baselines(4, TASK, worlds, 6)
+    flown = run_baselines(4, TASK, worlds, 6)
     assert tuple(flown) == BASELINES and set(BASELINES) == set(policies)
     for name, episodes in flown.items():
         env.load_state_dict(worlds)
@@ -54,16 +54,16 @@ def test_random_actions_differ_with_the_seed():
         env = DroneEnv(4, TASK, pixels=False, seed=seed)
         source = env.side_streams(torch.tensor([0]), 5)[0]
         lengths.append(int(source.integers(2**63)))
-        flown = fly_baselines(4, TASK, env.state_dict(), 4)
+        flown = run_baselines(4, TASK, env.state_dict(), 4)
         assert torch.equal(
-            flown["random"].length, fly_baselines(4, TASK, env.state_dict(), 4)["random"].length
+            flown["random"].length, run_baselines(4, TASK, env.state_dict(), 4)["random"].length
         )
     assert lengths[0] != lengths[1]
 
 
 def test_another_task_has_luck_of_its_own():
     env = DroneEnv(4, Posts(), pixels=False, seed=5)
-    flown = fly_baselines(4, Posts(), env.state_dict(), 8)
+    flown = run_baselines(4, Posts(), env.state_dict(), 8)
     assert tuple(flown) == ("random", "forward", "oracle")
     assert flown["oracle"].success.all() and flown["forward"].success.all()
     assert flown["random"].success.mean() < 0.5
@@ -71,7 +71,7 @@ def test_another_task_has_luck_of_its_own():
 
 def test_luck_flies_at_full_speed_where_speeds_are_asked_for():
     env = make_worlds(6)
-    flown = fly_baselines(
+    flown = run_baselines(
         6,
         env.base_env.worlds.task,
         env.base_env.state_dict(),
@@ -91,7 +91,7 @@ def test_a_task_without_an_oracle_says_so_in_one_line():
 
     env = DroneEnv(2, Blind(), pixels=False)
     with pytest.raises(InputError, match="task=fog has no oracle; choose a task that has one"):
-        fly_baselines(2, Blind(), env.state_dict(), 2)
+        run_baselines(2, Blind(), env.state_dict(), 2)
 
 
 def test_an_oracle_flies_no_dynamics_that_it_does_not_know():

@@ -8,7 +8,7 @@ import pytest
 from benchmarks.evidence import changed
 from drone_rl.evaluation.consistency import check_verdict
 from drone_rl.evaluation.judge import judge
-from drone_rl.sim.tasks.collect_cubes.rules import Side
+from drone_rl.sim.tasks.collect_cubes import Side
 from drone_rl.utils.errors import InputError
 
 LEFT, AHEAD, RIGHT = Side

@@ -1,5 +1,5 @@
 from drone_rl.evaluation.evaluate import EVALUATION
-from drone_rl.utils.sentences import say
+from drone_rl.utils.text import say
 
 FRESH = {"seed": 5, "seed_is_fixed": False}
 FOUND = {

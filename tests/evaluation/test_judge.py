@@ -11,12 +11,11 @@ from drone_rl.config import DynamicsSettings, TaskSettings
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation.baselines import ConstantPolicy, Oracle
 from drone_rl.evaluation.judge import judge, judge_policy, measure, observe
-from drone_rl.evaluation.outcomes import Outcomes
+from drone_rl.evaluation.outcomes import Outcomes, Rounding
 from drone_rl.evaluation.rollouts import run_episodes
-from drone_rl.evaluation.rounding_sensitivity import Rounding
 from drone_rl.evaluation.rule import Kind, Rule
 from drone_rl.sim.actions import Move
-from drone_rl.sim.tasks.collect_cubes.rules import Side
+from drone_rl.sim.tasks.collect_cubes import Side
 from drone_rl.utils.intervals import mean_bounds, proportion
 from tests.fake_flight import floating
 from tests.second_task import Posts
@@ -169,16 +168,16 @@ def test_baselines_fly_with_the_dynamics_of_the_environment(monkeypatch):
 def test_other_worlds_are_no_baseline(make_episodes, make_baselines):
     ours = make_episodes([[LEFT, LEFT]] * 2, [[1, 1]] * 2)
     theirs = make_episodes([[RIGHT, LEFT]] * 2, [[1, 1]] * 2)
-    with pytest.raises(ValueError, match="different worlds"):
+    with pytest.raises(ValueError, match="different initial states"):
         judge(ours, make_baselines(theirs))
-    with pytest.raises(ValueError, match="different worlds"):
+    with pytest.raises(ValueError, match="different initial states"):
         judge(ours, make_baselines(ours), sampled=ours[:1])
 
 
 def test_one_other_world_is_enough_to_be_no_baseline(make_episodes, make_baselines):
     ours = make_episodes([[LEFT, LEFT]] * 3, [[1, 1]] * 3)
     theirs = make_episodes([[LEFT, LEFT]] * 2 + [[RIGHT, LEFT]], [[1, 1]] * 3)
-    with pytest.raises(ValueError, match="different worlds"):
+    with pytest.raises(ValueError, match="different initial states"):
         judge(ours, make_baselines(theirs))
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 import drone_rl
-from drone_rl.evaluation.judge import judge_to_choose
+from drone_rl.evaluation.judge import judge_for_selection
 from drone_rl.policies.policy import Policy
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
@@ -26,10 +26,10 @@ def test_the_worlds_are_those_to_choose_by(trained, monkeypatch):
 
     monkeypatch.setattr(Policy, "make_env", note)
     with pytest.raises(InputError, match="enough"):
-        judge_to_choose(trained / "checkpoints" / "last.pt", 5, "cpu", "mujoco_warp")
+        judge_for_selection(trained / "checkpoints" / "last.pt", 5, "cpu", "mujoco_warp")
     where = {"device": "cpu", "renderer": "mujoco_warp"}
     seed = asked.pop("seed")
     assert asked == {"stream": Stream.CHOICE, "num_envs": 5, **where}
     with pytest.raises(InputError, match="enough"):
-        judge_to_choose(trained / "checkpoints" / "last.pt", 5, "cpu")
+        judge_for_selection(trained / "checkpoints" / "last.pt", 5, "cpu")
     assert asked["seed"] != seed, "both are fresh"

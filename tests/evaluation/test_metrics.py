@@ -3,7 +3,7 @@ import torch
 
 from drone_rl.evaluation.metrics import Episodes, summarise
 from drone_rl.sim.tasks import CollectCubes, Goals
-from drone_rl.sim.tasks.collect_cubes.rules import Side
+from drone_rl.sim.tasks.collect_cubes import Side
 from drone_rl.utils.intervals import mean_bounds, proportion
 from tests.second_task import End, Posts
 

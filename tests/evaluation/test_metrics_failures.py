@@ -4,7 +4,7 @@ import torch
 from drone_rl.config import TaskSettings
 from drone_rl.evaluation.metrics import Episodes, failure_table
 from drone_rl.sim.tasks import CollectCubes, Goals
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason, Side
+from drone_rl.sim.tasks.collect_cubes import EndReason, Side
 from drone_rl.utils.intervals import proportion
 from tests.second_task import End, Posts
 

@@ -8,7 +8,7 @@ from drone_rl.evaluation.baselines import ConstantPolicy, Oracle, RandomPolicy
 from drone_rl.evaluation.metrics import summarise
 from drone_rl.evaluation.rollouts import run_episodes
 from drone_rl.sim.actions import MOVES, Move
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.utils.seeding import Stream
 
 
@@ -74,7 +74,7 @@ def test_greedy_flies_by_the_mode_and_sampling_by_the_odds(make_pipeline):
 def test_no_batch_is_flown_in_vain_and_no_picture_kept(make_pipeline, monkeypatch, number, batches):
     collected, collect = [], EpisodeCollector.collect
     monkeypatch.setattr(
-        EpisodeCollector, "collect", lambda self: collected.append(collect(self)) or collected[-1]
+        EpisodeCollector, "collect", lambda *how: collected.append(collect(*how)) or collected[-1]
     )
     task = TaskSettings(num_cubes=1, first_distance=4.0, step_limit=4)
     env, actor = make_pipeline(8, task=task)

@@ -8,14 +8,14 @@ import torch
 import drone_rl
 from drone_rl.evaluation.rollouts import (
     StepLog,
-    batches,
-    ending,
-    env_base,
-    final,
-    only,
-    parting,
+    base_env,
+    env_state,
+    episode_batches,
+    final_episodes,
+    first_difference,
+    only_index,
+    outcome_difference,
     run_episodes,
-    streams,
 )
 
 
@@ -30,7 +30,7 @@ from drone_rl.evaluation.rollouts import (
     ],
 )
 def test_episodes_part_at_the_first_action_that_differs(one, other, step):
-    assert parting(torch.tensor(one), torch.tensor(other)) == step
+    assert first_difference(torch.tensor(one), torch.tensor(other)) == step
 
 
 def episodes(reasons, reached, lengths):
@@ -42,14 +42,14 @@ def episodes(reasons, reached, lengths):
 def test_ends_differ_by_reason_or_by_what_was_reached_and_count_as_the_last_step():
     one = episodes([1, 1, 1], [[True], [True], [True]], [5, 6, 7])
     other = episodes([1, 2, 1], [[True], [True], [False]], [9, 9, 9])
-    assert [ending(one, other, i) for i in range(3)] == [None, 6, 7]
+    assert [outcome_difference(one, other, i) for i in range(3)] == [None, 6, 7]
 
 
 @pytest.mark.parametrize(
     ("flags", "place"), [([False, True, False], 1), ([True, True], None), ([False], None)]
 )
 def test_the_place_of_the_only_true_flag(flags, place):
-    assert only(torch.tensor(flags)) == place
+    assert only_index(torch.tensor(flags)) == place
 
 
 @pytest.mark.parametrize(
@@ -59,13 +59,11 @@ def test_episodes_of_the_same_streams_are_those_of_an_evaluation(is_compiled, im
     """Of 4 environments, 6 episodes: two batches, of four and of two."""
     policy, log = drone_rl.load_policy("good"), StepLog()
     with policy.flying(4, seed=3) as (env, actor):
-        before = streams(env)
+        before = env_state(env)
         flown = run_episodes(env, actor, 6)
-        env_base(env).load_state_dict(before)
-        found = []
-        for batch in batches(env, actor, 6, is_compiled=is_compiled, log=log):
-            log.note(batch)
-            found.append(final(env, batch))
+        base_env(env).load_state_dict(before)
+        batches = episode_batches(env, actor, 6, is_compiled=is_compiled, log=log)
+        found = [final_episodes(env, batch) for batch in batches]
     assert log.implementation == implementation
     assert [len(one) for one in found] == [4, 2]
     assert torch.cat([one.length for one in found]).equal(flown.length)

@@ -5,7 +5,11 @@ import torch
 
 import drone_rl
 from drone_rl.evaluation.rollouts import StepLog, run_episodes
-from drone_rl.evaluation.rounding_sensitivity import compare, examine, require_same_in_any_batch
+from drone_rl.evaluation.rounding_sensitivity import (
+    check_rounding,
+    compare_implementations,
+    require_same_in_any_batch,
+)
 from drone_rl.policies.external_network import ForeignNetwork
 from drone_rl.policies.external_policy import policy_from
 from drone_rl.sim.actions import MOVES, Move
@@ -19,7 +23,7 @@ def examined(policy, is_compiled=True):
         state, log = env.base_env.state_dict(), StepLog()
         flown = run_episodes(env, actor, EPISODES, is_compiled=is_compiled, log=log)
         env.base_env.load_state_dict(state)
-        how = examine if is_compiled else compare
+        how = check_rounding if is_compiled else compare_implementations
         count = (EPISODES,) if is_compiled else ()
         return how(env, actor, *count, flown=flown, log=log), flown, log
 

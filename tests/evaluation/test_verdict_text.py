@@ -5,7 +5,7 @@ import copy
 import pytest
 
 from drone_rl.evaluation.verdict_text import SENTENCES, quantity_label
-from drone_rl.utils.sentences import said
+from drone_rl.utils.text import said
 
 
 def share(value, **more):

@@ -3,10 +3,9 @@ import pytest
 import torch
 
 from drone_rl.config import TaskSettings
-from drone_rl.explanations.alternatives import DARK_GROUND
 from drone_rl.explanations.hooks import probabilities
 from drone_rl.explanations.interventions import OTHER_TARGETS, _patches, intervene, to_the_middle
-from drone_rl.explanations.scenes import Region, empty_scene, place_target
+from drone_rl.explanations.scenes import DARK_GROUND, Region, empty_scene, place_target
 from drone_rl.sim.entities import FLOOR_COLOR
 from drone_rl.sim.rendering.scene import SemanticClass
 

@@ -6,7 +6,7 @@ import zlib
 
 import torch
 
-from drone_rl.config.shifting import ShiftSettings
+from drone_rl.config.commands import ShiftSettings
 from drone_rl.robustness.axes import AXES
 from drone_rl.robustness.domain import walk
 from drone_rl.robustness.perturbations import Mode
@@ -109,7 +109,7 @@ def shifts_of(policy, *, axes=("blur", "dead_rows"), weights=None):
         "settings": ShiftSettings(seed=0).values(),
         "seed": 0,
         "seed_is_fixed": True,
-        "terms": as_task(of.task).terms.as_dict(),
+        "terms": as_task(of.task).vocabulary.as_dict(),
         "plain": {"oracle": share(200), **figures()},
         "axes": {name: along(owned(name, of), of, AXES[name].strengths[2]) for name in axes},
         "together": flown(),

@@ -5,7 +5,7 @@ import torch
 from drone_rl.config import CameraSettings, TaskSettings
 from drone_rl.envs import GrayPixels
 from drone_rl.policies import PictureNetwork
-from drone_rl.robustness.paired_evaluation import Subject
+from drone_rl.robustness.paired_evaluation import PolicySpec
 
 TASK = TaskSettings(num_cubes=1, first_distance=8.0, front_margin=4.0)
 
@@ -41,7 +41,7 @@ SMALL = CameraSettings(width=16, height=5)
 
 
 def subject(network=None, task=TASK, transforms=None, camera=SMALL):
-    return Subject(
+    return PolicySpec(
         network or Steering(),
         task,
         camera,

@@ -4,7 +4,7 @@ from torchrl.envs import CatFrames
 from drone_rl.config import CameraSettings
 from drone_rl.envs import GrayPixels, RgbPixels
 from drone_rl.policies import PictureNetwork
-from drone_rl.robustness.agents import BlindEyes, PolicyEyes, Sight
+from drone_rl.robustness.agents import BaselineAgent, PolicyAgent, StepContext
 from drone_rl.sim.actions import MOVES
 from drone_rl.sim.continuous_actions import ContinuousActions
 from drone_rl.sim.worlds import Worlds
@@ -26,7 +26,7 @@ class Looking(PictureNetwork):
 
 def sight(worlds, flying, spoil=lambda pictures, flying, nothing=0.0: pictures):
     state = worlds.state[flying]
-    return Sight(worlds, state, flying, worlds.poses(state), None, spoil, [])
+    return StepContext(worlds, state, flying, worlds.poses(state), None, spoil, [])
 
 
 def make_worlds():
@@ -36,8 +36,8 @@ def make_worlds():
 def test_a_policy_sees_what_its_transforms_make_of_spoilt_pictures():
     worlds, network = make_worlds(), Looking()
     flying = torch.tensor([0, 2])
-    eyes = PolicyEyes(network, [GrayPixels()], 3)
-    action, seen = eyes.act(sight(worlds, flying, lambda p, f, nothing=0.0: p / 2))
+    agent = PolicyAgent(network, [GrayPixels()], 3)
+    action, seen = agent.act(sight(worlds, flying, lambda p, f, nothing=0.0: p / 2))
     gray = GrayPixels()._apply_transform(worlds.render(worlds.state[flying]))
     worlds.close()
     assert action.tolist() == [1, 1]
@@ -47,21 +47,21 @@ def test_a_policy_sees_what_its_transforms_make_of_spoilt_pictures():
 
 def test_colours_are_drawn_for_who_sees_colours():
     worlds, network = make_worlds(), Looking()
-    PolicyEyes(network, [RgbPixels()], 3).act(sight(worlds, torch.arange(3)))
+    PolicyAgent(network, [RgbPixels()], 3).act(sight(worlds, torch.arange(3)))
     worlds.close()
     assert network.shown[0].shape == (3, 3, 5, 16)
 
 
 def test_a_stack_of_frames_holds_those_of_the_worlds_that_still_fly():
     worlds, network = make_worlds(), Looking()
-    eyes = PolicyEyes(network, [GrayPixels(), CatFrames(N=2, dim=-3, in_keys=["pixels"])], 3)
+    agent = PolicyAgent(network, [GrayPixels(), CatFrames(N=2, dim=-3, in_keys=["pixels"])], 3)
     step = iter((0.25, 0.5))
 
     def mark(pictures, flying, nothing=0.0):
         return torch.zeros_like(pictures) + next(step) + flying[:, None, None, None]
 
-    eyes.act(sight(worlds, torch.arange(3), mark))
-    eyes.act(sight(worlds, torch.tensor([1, 2]), mark))
+    agent.act(sight(worlds, torch.arange(3), mark))
+    agent.act(sight(worlds, torch.tensor([1, 2]), mark))
     worlds.close()
     assert network.shown[0][:, :, 0, 0].tolist() == [[0.25] * 2, [1.25] * 2, [2.25] * 2]
     assert network.shown[1][:, :, 0, 0].tolist() == [[1.25, 1.5], [2.25, 2.5]]
@@ -81,10 +81,10 @@ def test_episodes_with_a_frame_on_which_rounding_decides_are_noted():
     worlds = make_worlds()
     bright = torch.tensor([1.0, 0.0, 0.0])
     for examines in (True, False):
-        eyes = PolicyEyes(Tied(), [GrayPixels()], 3, examines_rounding=examines)
+        agent = PolicyAgent(Tied(), [GrayPixels()], 3, examines_rounding=examines)
         for flying in (torch.arange(3), torch.tensor([1, 2])):
-            eyes.act(sight(worlds, flying, lambda p, f: 0 * p + bright[f, None, None, None]))
-        assert eyes.is_fragile.tolist() == [examines, False, False]
+            agent.act(sight(worlds, flying, lambda p, f: 0 * p + bright[f, None, None, None]))
+        assert agent.is_fragile.tolist() == [examines, False, False]
     worlds.close()
 
 
@@ -92,10 +92,10 @@ def test_who_looks_at_nothing_does_the_same_always_or_anything_alike():
     worlds = make_worlds()
     where = sight(worlds, torch.arange(3))
     generator = torch.Generator().manual_seed(0)
-    action, seen = BlindEyes("right", MOVES, generator).act(where)
+    action, seen = BaselineAgent("right", MOVES, generator).act(where)
     assert (action.tolist(), seen) == ([2, 2, 2], None)
-    eyes = BlindEyes("random", MOVES, generator)
-    drawn = torch.cat([eyes.act(where)[0] for _ in range(200)])
+    agent = BaselineAgent("random", MOVES, generator)
+    drawn = torch.cat([agent.act(where)[0] for _ in range(200)])
     worlds.close()
     assert (drawn.bincount() / 600 - 1 / 3).abs().max() < 0.08
 
@@ -103,7 +103,7 @@ def test_who_looks_at_nothing_does_the_same_always_or_anything_alike():
 def test_who_looks_at_nothing_may_have_speeds_to_choose():
     worlds, actions = make_worlds(), ContinuousActions.of(SETTINGS)
     where, generator = sight(worlds, torch.arange(2)), torch.Generator().manual_seed(0)
-    action, _ = BlindEyes("forward", actions, generator).act(where)
+    action, _ = BaselineAgent("forward", actions, generator).act(where)
     assert action.tolist() == [[1, 0, 0]] * 2
-    assert BlindEyes("random", actions, generator).act(where)[0].shape == (2, 3)
+    assert BaselineAgent("random", actions, generator).act(where)[0].shape == (2, 3)
     worlds.close()

@@ -9,7 +9,7 @@ from drone_rl.robustness.domain_text import (
     untested,
     why_not,
 )
-from drone_rl.utils.sentences import said
+from drone_rl.utils.text import said
 
 GOOD = {"verdict": {**VERDICT, "kind": "good", "certain": True}, "shifts": SHIFTS}
 

@@ -2,15 +2,15 @@ import pytest
 import torch
 
 from drone_rl.config import CameraSettings, PillarsSettings, TaskSettings
-from drone_rl.robustness.agents import OracleEyes
-from drone_rl.robustness.paired_evaluation import Airfield
+from drone_rl.robustness.agents import OracleAgent
+from drone_rl.robustness.paired_evaluation import PairedEvaluator
 from drone_rl.robustness.perturbations import (
     MOST,
     Condition,
     as_bright,
     clutter,
-    draw_places,
-    told_by,
+    sample_distractors,
+    task_things,
 )
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.worlds import Worlds
@@ -32,7 +32,7 @@ def test_they_are_blue_and_as_bright():
 
 
 def test_they_stand_beside_the_way():
-    places = draw_places(CUBES.things, 500, torch.Generator().manual_seed(0))
+    places = sample_distractors(CUBES.things, 500, torch.Generator().manual_seed(0))
     assert places.shape == (500, MOST, 3)
     x, y, z = places.flatten(0, 1).T
     assert 7.5 <= x.min() < 8 and 40 < x.max() <= 7.5 + 33
@@ -61,18 +61,20 @@ def test_they_are_behind_the_props_of_a_task():
 
 
 def test_who_knows_what_is_what_does_not_mind_them():
-    bed = Airfield(subject(task=TaskSettings(num_cubes=1), camera=CameraSettings()), 20)
+    evaluator = PairedEvaluator(
+        subject(task=TaskSettings(num_cubes=1), camera=CameraSettings()), 20
+    )
     for count in (0, 16):
-        assert bed.fly(Condition(clutter=count), eyes=OracleEyes()).episodes.success.all()
-    bed.close()
+        assert evaluator.run(Condition(clutter=count), agent=OracleAgent()).episodes.success.all()
+    evaluator.close()
 
 
 def test_tasks_of_which_nothing_is_known():
-    assert told_by(PillarsSettings()).size == 1.0
+    assert task_things(PillarsSettings()).size == 1.0
 
     class Other(PillarsSettings):
         name = "other"
         things = None
 
     with pytest.raises(InputError, match="axes=distractors is not for task=other"):
-        told_by(Other())
+        task_things(Other())

@@ -3,7 +3,7 @@ import json
 import pytest
 
 from benchmarks.evidence import SHIFTS, changed
-from drone_rl.robustness.requirements import ranges_of, read_needs
+from drone_rl.robustness.requirements import ranges_of, read_requirements
 from drone_rl.utils.errors import InputError
 
 
@@ -11,7 +11,7 @@ from drone_rl.utils.errors import InputError
 def read(tmp_path):
     def build(text, name="needs.yaml"):
         (tmp_path / name).write_text(text)
-        return read_needs(tmp_path / name)
+        return read_requirements(tmp_path / name)
 
     return build
 
@@ -62,4 +62,4 @@ def test_mistakes_get_one_line_that_names_the_file(read, text, message):
 
 def test_no_file(tmp_path):
     with pytest.raises(InputError, match=r"require_domain=.*none\.yaml can't be read"):
-        read_needs(tmp_path / "none.yaml")
+        read_requirements(tmp_path / "none.yaml")

@@ -6,11 +6,11 @@ import drone_rl
 from benchmarks.evidence import changed
 from drone_rl.robustness.axes import AXES
 from drone_rl.robustness.perturbations import Mode
-from drone_rl.robustness.shifts_file import read_measured
+from drone_rl.robustness.shifts_file import read_shifts
 from drone_rl.robustness.shifts_text import SHIFTS
 from drone_rl.robustness.suite import success_area
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.sentences import said
+from drone_rl.utils.text import said
 from tests.robustness.making import figures, share, shifts_of
 
 
@@ -26,7 +26,7 @@ def read(good, tmp_path):
     def build(changes=None, policy=good):
         path = tmp_path / "shifts.json"
         path.write_text(json.dumps(changed(shifts_of(good), changes or {})))
-        return read_measured(path, policy.description, policy.state["policy"])
+        return read_shifts(path, policy.description, policy.state["policy"])
 
     return build
 
@@ -155,7 +155,7 @@ def test_a_strength_that_another_seed_draws_is_missed(read):
 
 
 def fog_of(good):
-    """Good down to 40 m of sight, in the present format and in the first one."""
+    """Good down to 40 m of visibility, and the same with low and high exchanged."""
     made = shifts_of(good, axes=("fog",))
     found = made["domain"]["ranges"]["fog"]
     assert (found["low"], found["high"]) == (40.0, None)
@@ -164,25 +164,22 @@ def fog_of(good):
     assert [failed["end"] for failed in found["failed"]] == ["low"]
     swapped = {"low": None, "high": 40.0, "low_open": None, "high_open": False}
     first = {f"domain.ranges.fog.{key}": value for key, value in swapped.items()}
-    return made, changed(
-        made, {**first, "format_version": 1, "domain.ranges.fog.failed.0.end": "high"}
-    )
+    return made, changed(made, {**first, "domain.ranges.fog.failed.0.end": "high"})
 
 
-def test_the_first_format_had_fog_the_other_way_round(good, tmp_path):
-    made, old = fog_of(good)
+def test_ends_of_an_inverse_axis_and_other_formats(good, tmp_path):
+    made, exchanged = fog_of(good)
     path = tmp_path / "shifts.json"
-    for data in (made, old):
-        path.write_text(json.dumps(data))
-        found = read_measured(path, good.description, good.state["policy"])
-        assert found.numbers["domain"] == made["domain"]
-        assert found.numbers["format_version"] == 2
-    path.write_text(json.dumps({**old, "format_version": 2}))
+    path.write_text(json.dumps(made))
+    found = read_shifts(path, good.description, good.state["policy"])
+    assert found.numbers["domain"] == made["domain"]
+    path.write_text(json.dumps(exchanged))
     with pytest.raises(InputError, match="contradicts"):
-        read_measured(path, good.description, good.state["policy"])
-    path.write_text(json.dumps({**made, "format_version": 3}))
-    with pytest.raises(InputError, match="format_version=3"):
-        read_measured(path, good.description, good.state["policy"])
+        read_shifts(path, good.description, good.state["policy"])
+    for version in (1, 3):
+        path.write_text(json.dumps({**made, "format_version": version}))
+        with pytest.raises(InputError, match=f"format_version={version}"):
+            read_shifts(path, good.description, good.state["policy"])
 
 
 @pytest.mark.parametrize("broken", [3, {"ranges": 3}, {"ranges": {"fog": 3}}])
@@ -190,7 +187,7 @@ def test_a_damaged_first_format_gets_one_line(good, tmp_path, broken):
     path = tmp_path / "shifts.json"
     path.write_text(json.dumps({**fog_of(good)[1], "domain": broken}))
     with pytest.raises(InputError, match=r"shifts\.json can't be used"):
-        read_measured(path, good.description, good.state["policy"])
+        read_shifts(path, good.description, good.state["policy"])
 
 
 @pytest.mark.parametrize("name", list(AXES))
@@ -198,7 +195,7 @@ def test_every_axis_is_read_as_it_is_written(good, tmp_path, name):
     made = shifts_of(good, axes=(name,))
     path = tmp_path / "shifts.json"
     path.write_text(json.dumps(made))
-    found = read_measured(path, good.description, good.state["policy"]).numbers
+    found = read_shifts(path, good.description, good.state["policy"]).numbers
     assert found["domain"]["ranges"][name]["positions"] == sorted(
         made["domain"]["ranges"][name]["positions"]
     )
@@ -209,7 +206,7 @@ def test_a_damaged_file_is_refused(good, tmp_path):
     for content in ("{", "[]", "{}", '{"pictures": 3}'):
         path.write_text(content)
         with pytest.raises(InputError, match="can't be used"):
-            read_measured(path, good.description, good.state["policy"])
+            read_shifts(path, good.description, good.state["policy"])
 
 
 def test_a_file_of_version_0_1_has_a_fixed_seed(good, tmp_path):
@@ -218,8 +215,8 @@ def test_a_file_of_version_0_1_has_a_fixed_seed(good, tmp_path):
     del made["seed"]
     path.write_text(json.dumps(made))
     with pytest.raises(InputError, match="one of seed and seed_is_fixed"):
-        read_measured(path, good.description, good.state["policy"])
+        read_shifts(path, good.description, good.state["policy"])
     del made["seed_is_fixed"]
     path.write_text(json.dumps(made))
-    measured = read_measured(path, good.description, good.state["policy"])
+    measured = read_shifts(path, good.description, good.state["policy"])
     assert said(SHIFTS, measured.evidence)["shifts.fixed_seed"].startswith("Fixed seed 0: ")

@@ -3,7 +3,7 @@ import pytest
 from benchmarks.evidence import SHIFTS as EVIDENCE
 from benchmarks.evidence import changed
 from drone_rl.robustness.shifts_text import NAMES, SHIFTS, inward, rows
-from drone_rl.utils.sentences import said
+from drone_rl.utils.text import said
 
 
 def test_the_whole():

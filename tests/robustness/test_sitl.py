@@ -9,21 +9,21 @@ import torch
 
 import drone_rl
 from drone_rl.envs import worlds_of
-from drone_rl.flight.firmware.errors import LoopError, NotBegunError
-from drone_rl.flight.firmware.keeping import Keeping
+from drone_rl.flight.betaflight.process import FirmwareProcess
+from drone_rl.flight.in_the_loop.drone import FlightControllerError, NotReadyError
 from drone_rl.robustness import sitl as looped
 from drone_rl.robustness.sitl import fly_in_the_loop
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 from drone_rl.verdicts.dynamics_sweep import chart
 
-STUB = Path(__file__).parents[1] / "loops" / "stub_firmware.py"
+STUB = Path(__file__).parents[1] / "flight" / "stub_firmware.py"
 
 
 @pytest.fixture
 def program(tmp_path):
     """The stub as a program of its own, where it can have a network of its own."""
-    with Keeping() as keeping:
+    with FirmwareProcess() as keeping:
         if keeping.shared:
             pytest.skip(f"no network namespaces here: {keeping.shared}")
     path = tmp_path / "stub"
@@ -77,10 +77,10 @@ def test_a_flight_that_has_not_begun_begins_anew(program, monkeypatch):
 
     def fly(pilot, world, *given):
         tried.append(world)
-        raise NotBegunError("the firmware refuses to arm")
+        raise NotReadyError("the firmware refuses to arm")
 
     monkeypatch.setattr(looped, "_fly", fly)
-    with pytest.raises(LoopError, match="refuses to arm"):
+    with pytest.raises(FlightControllerError, match="refuses to arm"):
         fly_in_the_loop(near(), 2, firmware=program, progress=silent)
     assert tried == [0, 0, 0]
 
@@ -88,7 +88,7 @@ def test_a_flight_that_has_not_begun_begins_anew(program, monkeypatch):
 def test_what_is_refused(tmp_path):
     with pytest.raises(InputError, match="flights=0 is out of range"):
         fly_in_the_loop("good", 0)
-    with pytest.raises(InputError, match=r"isn't there; install it with"):
+    with pytest.raises(InputError, match=r"doesn't exist; install it with"):
         fly_in_the_loop("good", 1, firmware=tmp_path / "none")
 
 

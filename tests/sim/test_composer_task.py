@@ -7,8 +7,8 @@ from drone_rl.config import DynamicsSettings, TaskSettings
 from drone_rl.sim import entities
 from drone_rl.sim.actions import Move
 from drone_rl.sim.composer_task import ComposerTask, make_environment
-from drone_rl.sim.tasks.collect_cubes.playing import VANISHED_DEPTH
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.sim.tasks.collect_cubes import EndReason
+from drone_rl.sim.tasks.common import HIDDEN_DEPTH
 
 
 @pytest.fixture
@@ -57,7 +57,7 @@ def test_collected_cube_is_out_of_sight(env):
     env.task.drone.set_pose(env.physics, place - (1.0, 0.0, 0.0), (1, 0, 0, 0))
     env.step(Move.FORWARD)
     shown = env.physics.bind(env.task.root_entity.mjcf_model.find("geom", "cube_0/geom")).xpos
-    assert shown[2] == pytest.approx(place[2] - VANISHED_DEPTH)
+    assert shown[2] == pytest.approx(place[2] - HIDDEN_DEPTH)
 
 
 def test_physics_does_not_move_the_drone(env):

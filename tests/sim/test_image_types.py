@@ -4,8 +4,16 @@ import pytest
 import torch
 
 from drone_rl.config import CameraSettings
-from drone_rl.sim.image_types import ImageRequest, ImageType, image, images, pixels
-from drone_rl.sim.segmentation import default_id, object_names, palette
+from drone_rl.sim.image_types import (
+    ImageRequest,
+    ImageType,
+    default_id,
+    image,
+    images,
+    object_names,
+    palette,
+    pixels,
+)
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import world_random_state

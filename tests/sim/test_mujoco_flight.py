@@ -10,7 +10,7 @@ from drone_rl.config import ActionSettings, PillarsSettings
 from drone_rl.sim.actions import Move
 from drone_rl.sim.composer_task import ComposerTask, make_environment
 from drone_rl.sim.dynamics import FlightState, Mode, Obstacles, Quadrotor
-from drone_rl.sim.dynamics.flight_state import GROUND, NOTHING
+from drone_rl.sim.dynamics.state import GROUND, NOTHING
 from drone_rl.utils.seeding import world_random_state
 from tests.flying import (
     PLACES,

@@ -8,7 +8,7 @@ from drone_rl.sim.actions import Move
 from drone_rl.sim.composer_task import make_environment
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.rendering.scene import SemanticClass
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.seeding import world_random_state
 

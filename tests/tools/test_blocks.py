@@ -105,5 +105,5 @@ def test_what_runs_reports_and_works_as_before(monkeypatch):
 
 
 def test_names_of_modules():
-    assert module_name("drone_rl/sim/parts.py") == "drone_rl.sim.parts"
+    assert module_name("drone_rl/sim/actions.py") == "drone_rl.sim.actions"
     assert module_name("drone_rl/sim/__init__.py") == "drone_rl.sim"

@@ -6,12 +6,12 @@ from typing import Annotated, ClassVar
 
 import pytest
 
-from drone_rl.cli.hydra.schemas import GROUPS, PARTS, SEVERAL
+from drone_rl.cli.hydra.composition import GROUPS, PARTS, SEVERAL
 from drone_rl.cli.usage import COMMANDS
 from drone_rl.config import DynamicsSettings
 from drone_rl.config.networks import SmallCnn
 from drone_rl.config.transforms import Crop
-from drone_rl.utils.schema import OneOf, Real, Colors, Whole
+from drone_rl.utils.schema import OneOf, Real, Several, Whole
 from drone_rl.utils.settings import Settings, kinds_of
 from tools.readme.__main__ import ROOT
 from tools.readme.settings import (

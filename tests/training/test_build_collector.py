@@ -7,7 +7,7 @@ import torch
 
 from drone_rl.collectors import ThreadedCollector
 from drone_rl.config import TaskSettings
-from drone_rl.config.collecting import Ray, Threads
+from drone_rl.config.learning import Ray, Threads
 from drone_rl.config.training import TrainSettings
 from drone_rl.training.build_collector import _shares, build_collector
 from drone_rl.utils.errors import InputError

@@ -14,7 +14,7 @@ import yaml
 
 import drone_rl
 from drone_rl.config import DynamicsSettings, TaskSettings
-from drone_rl.config.collecting import Threads
+from drone_rl.config.learning import Threads
 from drone_rl.config.training import TrainerSettings, TrainSettings
 from drone_rl.training import Callback
 from drone_rl.training.train import _read_best

@@ -4,7 +4,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drone_rl.config.judging import JudgeSettings
+from drone_rl.config.commands import JudgeSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import (
     FRESH_BITS,

@@ -6,7 +6,7 @@ from typing import Annotated
 import pytest
 
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import Real, Colors, Whole
+from drone_rl.utils.schema import Real, Several, Whole
 from drone_rl.utils.settings import Settings, below, kinds_of, plain, snake_case, types_of
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from drone_rl.utils.sentences import said
+from drone_rl.utils.text import said
 from drone_rl.verdicts.card import SENTENCES
 
 SHARE = {"mean": 0.9, "lower95": 0.8, "upper95": 1.0}

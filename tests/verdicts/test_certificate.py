@@ -7,11 +7,9 @@ import torch
 
 import drone_rl
 from drone_rl.evaluation.metrics import Episodes
-from drone_rl.evaluation.outcomes import Outcomes
-from drone_rl.evaluation.rounding_sensitivity import Rounding
+from drone_rl.evaluation.outcomes import Outcomes, Rounding
 from drone_rl.sim.tasks import CollectCubes
-from drone_rl.sim.tasks.collect_cubes.goals import CubeGoals
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.sim.tasks.collect_cubes import CubeGoals, EndReason
 from drone_rl.verdicts.certificate import Claim
 from drone_rl.verification.checker.certificate import parse_certificate
 from tests.verification.checker.making import of_every_place

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 import drone_rl
-from drone_rl.config.judging import JudgeSettings
+from drone_rl.config.commands import JudgeSettings
 from drone_rl.evaluation.rule import Rule
 from drone_rl.robustness.axes import AXES
 from drone_rl.utils.intervals import mean_bounds
 from drone_rl.utils.seeding import RootSeed
-from drone_rl.verdicts.coverage import _strengths, refly
+from drone_rl.verdicts.coverage import _strengths, recheck_domain
 from tests.robustness.making import shifts_of
 
 FEW = JudgeSettings(domain_flights=60)
@@ -28,7 +28,7 @@ def need(**ends):
 
 
 def test_what_is_so_is_not_contradicted(good):
-    found = refly(good, {"blur": need(high=0.5)}, shifts_of(good), FEW, SEED)
+    found = recheck_domain(good, {"blur": need(high=0.5)}, shifts_of(good), FEW, SEED)
     assert found.contradictions == ()
     assert found.strengths["blur"][0] == 0.5 and found.count == 3
     assert all(0 < value < 0.5 for value in found.strengths["blur"][1:])
@@ -39,7 +39,7 @@ def test_what_is_so_is_not_contradicted(good):
 def test_an_invented_range_is_contradicted(good):
     """Good, says the file, with twelve of 25 rows dead."""
     numbers = shifts_of(good, axes=("dead_rows",))
-    found = refly(good, {"dead_rows": need(low=12.0, high=12.0)}, numbers, FEW, SEED)
+    found = recheck_domain(good, {"dead_rows": need(low=12.0, high=12.0)}, numbers, FEW, SEED)
     assert found.contradictions and all(
         line.startswith("dead rows at 12 rows: ") and "surely not good there" in line
         for line in found.contradictions
@@ -48,20 +48,20 @@ def test_an_invented_range_is_contradicted(good):
 
 def test_a_poor_policy_is_contradicted_where_nothing_is_different():
     poor = drone_rl.load_policy("poor").in_task(num_cubes=1)
-    found = refly(poor, {"blur": need(high=0.5)}, shifts_of(poor), FEW, SEED)
+    found = recheck_domain(poor, {"blur": need(high=0.5)}, shifts_of(poor), FEW, SEED)
     assert found.contradictions[0].startswith("where nothing is different: new episodes succeed in")
 
 
 def test_a_fresh_seed_is_stated_as_such(good, monkeypatch):
     monkeypatch.setattr("drone_rl.verdicts.coverage.RANDOM", 0)
     few, seed = FEW.replace(domain_flights=2), RootSeed(8, False)
-    found = refly(good, {"blur": need(high=0.5)}, shifts_of(good), few, seed)
+    found = recheck_domain(good, {"blur": need(high=0.5)}, shifts_of(good), few, seed)
     assert (found.seed, found.seed_is_fixed) == (8, False) and "(fresh seed 8" in str(found)
 
 
 def test_with_fewer_successes_it_would_have_been_contradicted(good, monkeypatch):
     monkeypatch.setattr("drone_rl.verdicts.coverage.RANDOM", 0)
-    found = refly(good, {"blur": need(high=0.5)}, shifts_of(good), FEW, SEED)
+    found = recheck_domain(good, {"blur": need(high=0.5)}, shifts_of(good), FEW, SEED)
     confidence = 1 - 0.05 / 2 / len(Rule().quantities)  # two strengths, the neutral one included
 
     def upper(count):

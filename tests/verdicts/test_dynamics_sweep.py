@@ -6,7 +6,7 @@ import pytest
 
 import drone_rl
 from drone_rl.config import DynamicsSettings
-from drone_rl.config.bodies import BODIES
+from drone_rl.config.commands import BODIES
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 from drone_rl.verdicts.dynamics_sweep import changes_of

@@ -6,7 +6,7 @@ import json
 import pytest
 
 import drone_rl
-from drone_rl.config.judging import FlightSettings
+from drone_rl.config.commands import FlightSettings
 from drone_rl.policies.zoo import certificate_path
 from drone_rl.sweeps.manifest import Sweep
 from drone_rl.sweeps.runs import Run

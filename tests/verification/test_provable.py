@@ -9,9 +9,9 @@ import torch
 
 import drone_rl
 from drone_rl.config import TaskSettings
-from drone_rl.config.collecting import Threads
-from drone_rl.config.provable import ProvableSettings
+from drone_rl.config.learning import Threads
 from drone_rl.config.training import TrainerSettings, TrainSettings
+from drone_rl.config.verification import ProvableSettings
 from drone_rl.training import Callback
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
@@ -114,13 +114,13 @@ def test_the_first_part_is_the_usual_training(tmp_path, prover):
 
 def test_failures_are_practised(tmp_path, monkeypatch):
     begun = []
-    draw = provable.Practice.draw
+    draw = provable.FailureReplayTask.draw
 
     def note(self, random_state):
         begun.append((self.boxes[0, 0, 0], float(draw(self, random_state)[0, 1])))
         return draw(self, random_state)
 
-    monkeypatch.setattr(provable.Practice, "draw", note)
+    monkeypatch.setattr(provable.FailureReplayTask, "draw", note)
     train(tmp_path)
     first = [y for low, y in begun if low == 1.75]
     second = [y for low, y in begun if low == 0.75]

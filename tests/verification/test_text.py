@@ -3,7 +3,7 @@
 import pytest
 
 from benchmarks.evidence import EXPLANATION, changed
-from drone_rl.utils.sentences import said
+from drone_rl.utils.text import said
 from drone_rl.verification.text import PLACES, exact_percent, rows
 
 

@@ -22,7 +22,7 @@ class Block:
     """A part of a function."""
 
     name: str
-    """Such as "drone_rl.sim.parts:Parts.split#2"; "#0" is the function itself."""
+    """Such as "drone_rl.sim.actions:Parts.split#2"; "#0" is the function itself."""
     start: Position
     end: Position
     statements: list[ast.stmt]

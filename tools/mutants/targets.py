@@ -6,7 +6,7 @@ NOT_RUN = ("docs", "examples", "tools", "test_wheel.py", "test_architecture.py")
 """Tests of other things; those of pages and examples start processes, which see no mutation."""
 
 ALSO = {
-    "drone_rl/config/": "tests/cli/hydra/test_schemas.py",
+    "drone_rl/config/": "tests/cli/hydra/test_composition_schemas.py",
 }
 """Tests of whole packages: those that hold settings in code and in files together."""
 OF_ALL = "tests/test_data.py"

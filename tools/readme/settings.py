@@ -12,12 +12,11 @@ from typing import Any
 
 import yaml
 
-from drone_rl.cli.hydra.schemas import GROUPS, PARTS, SEVERAL
+from drone_rl.cli.hydra.composition import GROUPS, PARTS, SEVERAL
 from drone_rl.cli.usage import COMMANDS
 from drone_rl.config import TASKS, BaseTaskSettings
-from drone_rl.config.changes import Changes, ChangesOfTask
-from drone_rl.config.variant import Variant
-from drone_rl.utils.schema import Flag, Instance, Kind, Listed, Maybe, OneOf, Colors, Span
+from drone_rl.config.configuration import Changes, ChangesOfTask, Variant
+from drone_rl.utils.schema import Flag, Instance, Kind, Listed, Maybe, OneOf, Several, Span
 from drone_rl.utils.settings import Settings, kinds_of, plain, snake_case
 
 BAR = "&#124;"

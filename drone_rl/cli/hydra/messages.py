@@ -13,9 +13,9 @@ from hydra.errors import HydraException
 from omegaconf import OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from drone_rl.cli.hydra.choices import without_schemas
+from drone_rl.cli.hydra.help import without_schemas
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.quiet import ignore_noise
+from drone_rl.utils.imports import ignore_noise
 
 MISTAKES = (InputError, HydraException, OmegaConfBaseException, OSError)
 """What a user can be blamed for; all else is a bug of ours and keeps its traceback."""

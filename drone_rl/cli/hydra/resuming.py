@@ -1,4 +1,4 @@
-"""What a training's command line leaves out: a sweep's folder, the settings of a run."""
+"""Command lines of trainings: former setting names, a sweep's folder, the settings of a run."""
 
 import re
 import shlex
@@ -9,12 +9,27 @@ import yaml
 from hydra.core.hydra_config import HydraConfig
 from omegaconf import OmegaConf
 
-from drone_rl.cli.hydra.names import former, networks
-from drone_rl.sweeps.naming import is_sweep, sweep_name
+from drone_rl.sweeps.manifest import is_sweep, sweep_name
 from drone_rl.sweeps.runs import quoted
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import refuse_links, write_atomically
 from drone_rl.utils.overrides import must_be_typed, taken_over
+
+
+def policies(overrides: Sequence[str]) -> list[str]:
+    """Lets `checkpoint=good` say `policy=good`, in commands whose policy is trained already."""
+    return [re.sub(r"^checkpoint=", "policy=", override) for override in overrides]
+
+
+def former(overrides: Sequence[str]) -> list[str]:
+    """What `networks` was given, in the words of old."""
+    return [re.sub(r"^(\+{0,2}|~)network(?=[.=])", r"\1policy", o) for o in overrides]
+
+
+def networks(overrides: Sequence[str]) -> list[str]:
+    """Lets `policy=mlp` and `policy.hidden=[64]` say `network=mlp` and so on, in trainings."""
+    return [re.sub(r"^(\+{0,2}|~)policy(?=[.=])", r"\1network", o) for o in overrides]
+
 
 _FOLDER = "hydra.sweep.dir=${paths.outputs}/${hydra.job.config_name}/multiruns/"
 _WRITE_NOTHING = ("hydra.output_subdir=null", "++hydra.job_logging.handlers.file.delay=true")

@@ -16,9 +16,8 @@ from drone_rl.config import (
     DynamicsSettings,
     TaskSettings,
 )
-from drone_rl.config.changes import Changes
-from drone_rl.config.gymnasium import GymnasiumSettings
-from drone_rl.config.variant import locate
+from drone_rl.config.commands import GymnasiumSettings
+from drone_rl.config.configuration import Changes, locate
 from drone_rl.envs.gymnasium.spaces import action_space, picture_space, vector_space
 from drone_rl.sim.composer_task import CONTROL_TIMESTEP_S
 from drone_rl.sim.entities import CHASE

@@ -35,7 +35,7 @@ class DroneWorld(gymnasium.Env[NDArray[Any], Any]):
 
         Args:
             task: What there is to do.
-            options: `drone_rl.config.gymnasium.GymnasiumSettings`, and settings of the task.
+            options: `drone_rl.config.commands.GymnasiumSettings`, and settings of the task.
 
         Raises:
             InputError: An option is unknown or out of range.

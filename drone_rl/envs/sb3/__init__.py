@@ -1,5 +1,5 @@
 """The worlds as Stable-Baselines3 knows environments."""
 
-from drone_rl.utils.extras import extra
+from drone_rl.utils.errors import extra
 
 extra("stable_baselines3", "sb3", "drone_rl.envs.sb3")

@@ -1,1 +1,1 @@
-"""One drone, flown as its pilot would: AirSim's commands (Tables 2 and 3) over simulated time."""
+"""One drone flown by AirSim's commands (Tables 2 and 3) over simulated time."""

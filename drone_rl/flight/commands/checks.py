@@ -1,4 +1,4 @@
-"""Numbers that a pilot is given, checked before the drone is told anything."""
+"""Validation of the numbers that commands take."""
 
 import math
 from typing import Any
@@ -10,7 +10,7 @@ from torch import Tensor
 from drone_rl.utils.errors import InputError
 
 FARTHEST = 1e6
-"""Metres from the origin beyond which nothing is flown to."""
+"""Greatest distance of a position from the origin, metres."""
 
 
 def real(
@@ -22,18 +22,18 @@ def real(
     is_above: bool = False,
     unit: str = "",
 ) -> float:
-    """A finite number within bounds.
+    """Return a finite number within bounds.
 
     Args:
-        value: What was given.
-        name: Its name, for people.
-        low: The least that it may be.
-        high: The most.
-        is_above: Whether it must be more than `low`.
-        unit: For people.
+        value: The value to check.
+        name: Parameter name for the message.
+        low: Lower bound.
+        high: Upper bound.
+        is_above: Whether the lower bound is exclusive.
+        unit: Unit for the message.
 
     Raises:
-        InputError: It is no such number.
+        InputError: The value is not such a number.
     """
     try:
         number = float(value)
@@ -42,55 +42,61 @@ def real(
     if not low <= number <= high or (is_above and number == low):
         least = f"above {low:g}" if is_above else f"of {low:g} or more"
         words = f"a finite number {least}, up to {high:g}" if low > -FARTHEST else "a finite number"
-        raise InputError(f"{name}={value!r} can't be; give {words}{f' ({unit})' if unit else ''}")
+        raise InputError(f"{name}={value!r} is invalid; give {words}{f' ({unit})' if unit else ''}")
     return number
 
 
 def numbers(values: Any, name: str, count: int, low: float, high: float) -> list[float]:
-    """So many finite numbers within bounds.
-
-    Args:
-        values: What was given.
-        name: Its name, for people.
-        count: How many there must be.
-        low: The least that each may be.
-        high: The most.
+    """Return `count` finite numbers, each from `low` to `high`.
 
     Raises:
-        InputError: They are others, more or fewer.
+        InputError: The values are not such numbers.
     """
     try:
         given = list(values)
     except TypeError:
         given = []
     if len(given) != count:
-        raise InputError(f"{name}={values!r} can't be; give {count} numbers")
+        raise InputError(f"{name}={values!r} is invalid; give {count} numbers")
     return [real(value, f"{name}[{i}]", low, high) for i, value in enumerate(given)]
 
 
 def duration(value: Any) -> float:
-    """Seconds that a command lasts.
-
-    Raises:
-        InputError: It is negative or no number.
-    """
+    """Return a duration in seconds, which must not be negative."""
     return real(value, "duration", 0.0, unit="s")
 
 
 def speed(value: Any, name: str = "speed") -> float:
-    """Metres a second.
-
-    Raises:
-        InputError: It is not above 0, or absurd.
-    """
+    """Return a speed above 0, at most 100 m/s."""
     return real(value, name, 0.0, 100.0, is_above=True, unit="m/s")
 
 
-def height(value: Any, name: str = "z") -> float:
-    """Metres above the ground.
+def radians(value: Any, name: str, limit: float = 3600.0) -> float:
+    """Convert an angle (or rate) given in degrees, at most `limit` either way."""
+    return math.radians(real(value, name, -limit, limit, unit="degrees"))
+
+
+def time_limit(timeout: float | None, length: float, speed: float) -> float:
+    """Return the time limit of a movement, seconds.
+
+    Args:
+        timeout: The requested limit; three times the expected time plus 10 s by default.
+        length: Length of the path, metres.
+        speed: Metres per second.
 
     Raises:
-        InputError: It is below the ground.
+        InputError: The timeout is negative.
+    """
+    if timeout is None:
+        return 10.0 + 3.0 * length / speed
+    return real(timeout, "timeout", 0.0, unit="s")
+
+
+def height(value: Any, name: str = "z") -> float:
+    """Return a height above the ground, metres.
+
+    Raises:
+        InputError: It is negative.
     """
     number = real(value, name, unit="m")
     if number < 0.0:
@@ -99,25 +105,25 @@ def height(value: Any, name: str = "z") -> float:
 
 
 def path(points: Any) -> Tensor:
-    """Points to fly through, in order.
+    """Return the points of a path.
 
     Args:
-        points: Places (x, y, z), metres, world frame: an array, a tensor or a list.
+        points: Positions (x, y, z) in metres, world frame: an array, a tensor or a list.
 
     Returns:
         Shape: (1, P, 3), float64.
 
     Raises:
-        InputError: There are none, or one of them is no place.
+        InputError: The path is empty or a point is invalid.
     """
     try:
         places = np.asarray(points, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise InputError(f"path={points!r} has no places; give some of (x, y, z)") from error
+        raise InputError(f"path={points!r} is invalid; give points (x, y, z)") from error
     if places.size == 0:
         raise InputError("path has no points; give at least one (x, y, z)")
     if places.ndim != 2 or places.shape[1] != 3:
-        raise InputError(f"a path of shape {places.shape} has no places; give points of (x, y, z)")
+        raise InputError(f"a path of shape {places.shape} is invalid; give points (x, y, z)")
     for number, place in enumerate(places):
         for axis, value in zip("xyz", place, strict=True):
             check = height if axis == "z" else real

@@ -1,132 +1,241 @@
-"""How near drones stay to the paths that they are told to fly."""
+"""Path following by pure pursuit: the drone steers to a lookahead point on a polyline.
+
+All functions are batched over `num_worlds` paths of P points each (the last point may be repeated).
+Positions are in metres in the world frame; `along` is an arc length in metres.
+"""
 
 import dataclasses
-import math
-from collections.abc import Mapping
 
 import torch
 from torch import Tensor
 
 from drone_rl.config import DynamicsSettings
-from drone_rl.flight.commands.along import AlongPath, braking_time
-from drone_rl.flight.commands.batch import fly_command
-from drone_rl.flight.commands.paths import distance_from, make_paths, stacked
-from drone_rl.sim.dynamics import Quadrotor
+from drone_rl.config.dynamics import GRAVITY
+from drone_rl.flight.commands.command import ACCURACY, PERIOD, Command
+from drone_rl.flight.commands.yaw import YawControl
+from drone_rl.sim.dynamics import FlightState, Goals, Mode
+from drone_rl.utils.errors import InputError
 
-HEIGHT = 5.0
-"""Metres at which paths begin."""
+TAKEOFF_HEIGHT = 2.0
+"""Height of a take-off above the ground, metres."""
+TAKEOFF_SPEED = 0.5
+"""Metres per second."""
+AUTOMATIC = -1.0
+"""A lookahead that is computed from the speed."""
+_TAKEOFF_MARGIN = 0.1
+"""A take-off is complete this far below its height, metres. Wind may shift it sideways."""
+_PERIODS_AHEAD = 30.0
+_PERIODS_AHEAD_FIXED = 40.0
+"""Lookahead in control periods if it does not adapt."""
+_SLOWEST = 0.6
+"""Braking keeps this speed, m/s, so that wind cannot stop a drone short of the end."""
+_VERTICAL_BRAKING = 0.5
+"""Braking time of a climb, seconds; climbs are controlled more tightly than horizontal motion."""
 
 
-@dataclasses.dataclass(frozen=True)
-class Course:
-    """A path, and how fast to fly it."""
+class PathCommand(Command):
+    """Follows a path at a given speed, brakes for its last point and holds it."""
 
-    points: Tensor  # (P, 3) float64
-    """Metres, from where the path begins."""
-    speed: float
-    """Metres a second."""
+    def __init__(
+        self,
+        points: Tensor,
+        speed: float | Tensor,
+        limit: float,
+        *,
+        yaw_control: YawControl | None = None,
+        lookahead: float = AUTOMATIC,
+        adaptive: float = 1.0,
+        accuracy: float = ACCURACY,
+        braking: float = 1.8,
+    ) -> None:
+        """Create the command.
+
+        Args:
+            points: Waypoints after the current position, metres. Shape: (num_worlds, P, 3).
+            speed: Metres per second, for all drones or for each. Shape: (num_worlds,).
+            limit: Seconds after which the command fails.
+            yaw_control: Heading control.
+            lookahead: See `lookahead_of`.
+            adaptive: Lookahead added per metre of distance from the path.
+            accuracy: Distance from the last point, metres, at which the command is complete.
+            braking: See `braking_time`.
+
+        Raises:
+            InputError: The lookahead is too short.
+        """
+        self.limit = limit
+        self.points, self.accuracy, self.adaptive = points, accuracy, adaptive
+        self.speed = torch.as_tensor(speed, dtype=torch.float64).expand(len(points))
+        ahead = [lookahead_of(pace, lookahead, adaptive) for pace in self.speed.tolist()]
+        self.lookahead = self.speed.new_tensor(ahead)
+        self.yaw_control = yaw_control or YawControl()
+        self._braking = braking
+        self._paths: Paths | None = None
 
     @property
-    def length(self) -> float:
-        """Metres."""
-        return float(self.points.diff(dim=0).norm(dim=-1).sum())
+    def paths(self) -> "Paths":
+        """The paths, from the position at the start through all waypoints."""
+        assert self._paths is not None, "call begin first"
+        return self._paths
+
+    def begin(self, body: FlightState) -> None:
+        """See `Command`."""
+        self._paths = make_paths(torch.cat([body.position[:, None], self.points], 1))
+        self.yaw_control.begin(body.heading)
+        self.along = torch.zeros(len(body), dtype=torch.float64)
+        self._ahead = self.lookahead
+        last = direction_at(self.paths, (self.paths.lengths - 1e-6).clamp(min=0.0))
+        level = last[:, :2].norm(dim=-1)
+        self.braking = level * self._braking + (1.0 - level) * _VERTICAL_BRAKING
+
+    def goals(self, body: FlightState) -> Goals:
+        """See `Command`."""
+        position, paths = body.position, self.paths
+        self.along = nearest(paths, position, self.along, self.along + self._ahead)
+        place = place_at(paths, self.along)
+        self._ahead = self.lookahead + self.adaptive * (position - place).norm(dim=-1)
+        ahead = place_at(paths, self.along + self._ahead) - position
+        pace = torch.maximum(self._pace(self._left(body)), self.speed.clamp(max=_SLOWEST))
+        sideways = ahead[:, :2] * (pace / ahead.norm(dim=-1).clamp(min=1e-9))[:, None]
+        heading = self.yaw_control.goal(ahead, ACCURACY)
+        values = torch.cat([sideways, heading[:, None], place[:, 2:]], 1)
+        drift = torch.zeros_like(values)
+        climb = self._pace(paths.lengths - self.along)
+        drift[:, 3] = climb * direction_at(paths, self.along)[:, 2]
+        modes = (Mode.VELOCITY, Mode.VELOCITY, self.yaw_control.mode, Mode.POSITION)
+        return Goals(modes, values, drift)
+
+    def is_complete(self, body: FlightState) -> Tensor:
+        """Return which drones are near the last point, with no other waypoint before it."""
+        is_last = self.along + self._ahead >= self.paths.lengths
+        return is_last & ((self.paths.ends - body.position).norm(dim=-1) <= self.accuracy)
+
+    def rest(self, body: FlightState) -> Tensor:
+        """Return the last points, with the commanded heading if there is one."""
+        heading = body.heading
+        if self.yaw_control.mode == Mode.ANGLE:
+            heading = self.yaw_control.goal(torch.zeros_like(self.paths.ends), ACCURACY)
+        x, y, z = self.paths.ends.unbind(-1)
+        return torch.stack([x, y, heading, z], -1)
+
+    def _pace(self, left: Tensor) -> Tensor:
+        """Return the speed, m/s, at a distance `left` from the end."""
+        return torch.minimum(left / self.braking, self.speed)
+
+    def _left(self, body: FlightState) -> Tensor:
+        """Return the distance to the end along the path or, beyond the end, back to it."""
+        beyond = (self.paths.ends - body.position).norm(dim=-1)
+        left = self.paths.lengths - self.along
+        return torch.where(left > self._ahead, left, torch.maximum(left, beyond))
+
+
+class TakeoffCommand(PathCommand):
+    """Climbs straight up."""
+
+    def __init__(self, body: FlightState, limit: float) -> None:
+        """Take the state on the ground and the time limit in seconds."""
+        up = body.position.new_tensor([0.0, 0.0, TAKEOFF_HEIGHT])
+        super().__init__((body.position + up)[:, None], TAKEOFF_SPEED, limit)
+
+    def is_complete(self, body: FlightState) -> Tensor:
+        """Return which drones have reached the height."""
+        return body.position[:, 2] >= self.paths.ends[:, 2] - _TAKEOFF_MARGIN
+
+
+def lookahead_of(speed: float, lookahead: float = AUTOMATIC, adaptive: float = 1.0) -> float:
+    """Return the lookahead distance, metres.
+
+    Args:
+        speed: Metres per second.
+        lookahead: The requested distance, metres; computed from the speed if negative.
+        adaptive: Lookahead added per metre of distance from the path.
+
+    Raises:
+        InputError: The lookahead is too short to make progress.
+    """
+    if lookahead < 0.0:
+        periods = _PERIODS_AHEAD if adaptive > 0.0 else _PERIODS_AHEAD_FIXED
+        return max(1.5 * ACCURACY, periods * PERIOD * speed)
+    least = max(ACCURACY, PERIOD * speed)
+    if lookahead < least:
+        raise InputError(
+            f"lookahead={lookahead:g} is too short at {speed:g} m/s; give at least {least:g}, or "
+            f"{AUTOMATIC:g} for automatic"
+        )
+    return lookahead
+
+
+def braking_time(settings: DynamicsSettings) -> float:
+    """Return the braking time without overshoot, seconds (remaining distance over speed).
+
+    It is twice the time constant of the horizontal velocity loop.
+    """
+    pull = GRAVITY * settings.velocity_gain * settings.angle_limit
+    return min(2.0 / max(pull, 1e-3), 20.0)
 
 
 @dataclasses.dataclass(frozen=True)
-class Following:
-    """How a course was flown."""
+class Paths:
+    """A batch of polylines."""
 
-    length: float
-    """Of the path, metres."""
-    speed: float
-    """That was asked for, metres a second."""
-    mean: float
-    """Distance from the path over the time of the flight, metres."""
-    greatest: float
-    """Metres."""
-    seconds: float
-    """From the first command to the end of the path; infinite if it never got there."""
+    points: Tensor  # (num_worlds, P, 3) float64
+    """Waypoints in order."""
+    along: Tensor  # (num_worlds, P) float64
+    """Arc length at each waypoint."""
+    directions: Tensor  # (num_worlds, P - 1, 3) float64
+    """Unit vectors from each waypoint to the next; zeros between equal waypoints."""
 
+    @property
+    def ends(self) -> Tensor:
+        """The last points. Shape: (num_worlds, 3)."""
+        return self.points[:, -1]
 
-def square(side: float = 10.0) -> Tensor:
-    """Four sides, back to where it began. Shape: (5, 3)."""
-    return _flat([(0, 0), (side, 0), (side, side), (0, side), (0, 0)])
-
-
-def figure_eight(width: float = 20.0, points: int = 64) -> Tensor:
-    """Gerono's lemniscate, once round from its middle. Shape: (points + 1, 3)."""
-    turn = torch.linspace(0.0, 2.0 * math.pi, points + 1, dtype=torch.float64)
-    half = 0.5 * width
-    return torch.stack([half * turn.sin(), half * turn.sin() * turn.cos(), 0.0 * turn], -1)
+    @property
+    def lengths(self) -> Tensor:
+        """Lengths of the paths. Shape: (num_worlds,)."""
+        return self.along[:, -1]
 
 
-def helix(radius: float = 5.0, climb: float = 10.0, turns: int = 2, points: int = 64) -> Tensor:
-    """Up around a cylinder. Shape: (points + 1, 3)."""
-    turn = torch.linspace(0.0, 2.0 * math.pi * turns, points + 1, dtype=torch.float64)
-    height = torch.linspace(0.0, climb, points + 1, dtype=torch.float64)
-    return torch.stack([radius * turn.sin(), radius * (1.0 - turn.cos()), height], -1)
+def make_paths(points: Tensor) -> Paths:
+    """Build paths through points. Shape: (num_worlds, P, 3), P at least 2."""
+    steps = points.diff(dim=1)
+    lengths = steps.norm(dim=-1)
+    along = torch.nn.functional.pad(lengths.cumsum(-1), (1, 0))
+    return Paths(points, along, steps / lengths.clamp(min=1e-12)[..., None])
 
 
-def zigzag(teeth: int = 6, step: float = 5.0, width: float = 5.0) -> Tensor:
-    """Forward, to one side and the other. Shape: (teeth + 1, 3)."""
-    return _flat([(step * i, width * (i % 2)) for i in range(teeth + 1)])
+def place_at(paths: Paths, along: Tensor) -> Tensor:
+    """Return the points at arc lengths, clamped to the ends. Shape: (num_worlds, 3)."""
+    row, line = _segments_at(paths, along)
+    rest = (torch.minimum(along, paths.lengths) - paths.along[row, line])[:, None]
+    return paths.points[row, line] + rest * paths.directions[row, line]
 
 
-def straight(length: float = 100.0) -> Tensor:
-    """Shape: (2, 3)."""
-    return _flat([(0, 0), (length, 0)])
+def direction_at(paths: Paths, along: Tensor) -> Tensor:
+    """Return the unit tangents at arc lengths. Shape: (num_worlds, 3)."""
+    return paths.directions[_segments_at(paths, along)]
 
 
-def staircase(steps: int = 4, step: float = 3.0) -> Tensor:
-    """Forward and up in turn. Shape: (2 * steps + 1, 3)."""
-    places = [(step * ((i + 1) // 2), 0.0, step * (i // 2)) for i in range(2 * steps + 1)]
-    return torch.tensor(places, dtype=torch.float64)
-
-
-def courses() -> dict[str, Course]:
-    """Those that are published, by name."""
-    return {
-        "square": Course(square(), 2.0),
-        "figure_eight": Course(figure_eight(), 2.0),
-        "helix": Course(helix(), 2.0),
-        "zigzag": Course(zigzag(), 2.0),
-        "straight": Course(straight(), 5.0),
-        "staircase": Course(staircase(), 1.0),
-    }
-
-
-def path_following(
-    paths: Mapping[str, Course] | None = None, settings: DynamicsSettings | None = None
-) -> dict[str, Following]:
-    """Flies courses from hovering at their first points, with automatic lookahead.
+def nearest(paths: Paths, position: Tensor, first: Tensor, last: Tensor) -> Tensor:
+    """Return the arc length of the nearest point within a part of each path.
 
     Args:
-        paths: By name; those of `courses` by default.
-        settings: Drone and air; the defaults, in still air, by default.
+        paths: The paths.
+        position: Shape: (num_worlds, 3).
+        first: Arc length at which the part begins. Shape: (num_worlds,).
+        last: Arc length at which it ends, at least `first`.
     """
-    chosen = paths or courses()
-    quadrotor = Quadrotor(settings or DynamicsSettings(mode="simple_flight"))
-    points = stacked([course.points for course in chosen.values()])
-    points[..., 2] += HEIGHT
-    speeds = torch.tensor([course.speed for course in chosen.values()], dtype=torch.float64)
-    limit = max(3.0 * course.length / course.speed + 20.0 for course in chosen.values())
-    command = AlongPath(points[:, 1:], speeds, limit, braking=braking_time(quadrotor.settings))
-    record = fly_command(quadrotor, quadrotor.start(points[:, 0].clone()), command, limit)
-    away = distance_from(
-        make_paths(points.repeat(len(record.times), 1, 1)), record.positions.flatten(0, 1)
-    ).view(len(record.times), -1)
-    return {
-        name: _following(course, record.times, away[:, number], int(record.done[number]))
-        for number, (name, course) in enumerate(chosen.items())
-    }
+    low = torch.maximum(paths.along[:, :-1], first[:, None])
+    high = torch.minimum(paths.along[:, 1:], last[:, None])
+    away = position[:, None] - paths.points[:, :-1]
+    reach = (away * paths.directions).sum(-1) + paths.along[:, :-1]
+    found = torch.minimum(torch.maximum(reach, low), high)
+    rest = (found - paths.along[:, :-1])[..., None] * paths.directions
+    distance = (away - rest).norm(dim=-1).masked_fill(low > high, torch.inf)
+    return found.gather(1, distance.argmin(1, keepdim=True))[:, 0]
 
 
-def _following(course: Course, times: Tensor, away: Tensor, done: int) -> Following:
-    """Of one course, up to the moment in which it was done; `away` is the distance at each time."""
-    flown = away[: done + 1]
-    seconds = float(times[done]) if done < len(times) else math.inf
-    return Following(course.length, course.speed, float(flown.mean()), float(flown.max()), seconds)
-
-
-def _flat(places: list[tuple[float, float]]) -> Tensor:
-    return torch.tensor([(*place, 0.0) for place in places], dtype=torch.float64)
+def _segments_at(paths: Paths, along: Tensor) -> tuple[Tensor, Tensor]:
+    """Return row and index of the segment at each arc length; the later one at a waypoint."""
+    line = (paths.along[:, 1:-1] <= along[:, None]).sum(-1)
+    return torch.arange(len(line), device=line.device), line

@@ -1,31 +1,57 @@
-"""One drone and all that its pilot can tell it."""
+"""One drone flown by AirSim's commands: automatic flight (Table 2) and navigation (Table 3)."""
 
-import copy
+import math
 from collections.abc import Sequence
+from typing import Any
 
-from torch import Tensor
+import torch
 
-from drone_rl.flight.commands.auto_flight import AutoFlight
-from drone_rl.flight.commands.errors import PilotError
-from drone_rl.flight.commands.navigation import Navigation
-from drone_rl.sim.dynamics.body import heading_only
-from drone_rl.sim.entities import FRONT_CENTER
-from drone_rl.sim.image_types import ImageRequest, images
-from drone_rl.sim.rendering.view import Modality
-from drone_rl.sim.tasks import State
-from drone_rl.sim.worlds import Worlds
+from drone_rl.flight.commands import checks
+from drone_rl.flight.commands.base_pilot import BasePilot
+from drone_rl.flight.commands.command import FlightFuture, PilotError
+from drone_rl.flight.commands.movement import (
+    LANDING_SPEED,
+    AngleCommand,
+    GoHomeCommand,
+    Height,
+    Hover,
+    Land,
+    Lift,
+    RateCommand,
+    RotateByCommand,
+    RotateToCommand,
+    RotorCommand,
+    StickCommand,
+    Throttle,
+    VelocityCommand,
+    parse_frame,
+)
+from drone_rl.flight.commands.path_following import (
+    AUTOMATIC,
+    TAKEOFF_HEIGHT,
+    TAKEOFF_SPEED,
+    PathCommand,
+    TakeoffCommand,
+    braking_time,
+)
+from drone_rl.flight.commands.yaw import Drivetrain, YawControl, YawMode
+from drone_rl.utils.errors import InputError
+
+MOVING = 0.05
+"""Speed in m/s above which a drone can't take off."""
+_FREE = Drivetrain.MAX_DEGREE_OF_FREEDOM
 
 
-class Pilot(AutoFlight, Navigation):
+class Pilot(BasePilot):
     """Flies one drone by the commands of AirSim (Tables 2 and 3), over simulated time.
 
     World frame: x forward, y left, z up, metres; angles in degrees, positive with the right side
-    down (roll), the nose down (pitch), and to the left (yaw). The drone begins on the ground,
-    disarmed. No command looks at a clock: time passes while one is waited for, or by `advance`.
+    down (roll), the nose down (pitch), and to the left (yaw). The drone starts on the ground,
+    disarmed. Simulated time advances only while a command is waited for, or by `advance`.
 
-    A command is waited for, and says whether it did what was asked for in time; with `wait=False`
-    it returns a `FlightFuture` at once. It ends the one before it. Then the drone stays where the
-    command has led, or where it is 0.06 s later.
+    A command waits until it ends and returns whether it succeeded in time; with `wait=False` it
+    returns a `FlightFuture` at once. A new command cancels the running one. After a command the
+    drone holds the position that the command reached, or else the one it has 0.06 s later.
 
     >>> with Pilot(wind=[5, 0, 0]) as pilot:
     ...     pilot.arm()
@@ -34,60 +60,277 @@ class Pilot(AutoFlight, Navigation):
     ...     pilot.land()
     """
 
-    def picture(
-        self,
-        camera: str = FRONT_CENTER.name,
-        modality: Modality = "rgb",
-        height: int | None = None,
-        width: int | None = None,
-    ) -> Tensor:
-        """What one of the drone's cameras sees of its `worlds`; level if they hang in a gimbal.
-
-        Args:
-            camera: One of AirSim's five, by name.
-            modality: What of it, see `Renderer.render`.
-            height: Pixels; the worlds' choice by default.
-            width: Pixels.
+    def take_off(self, timeout: float | None = None, *, wait: bool = True) -> bool | FlightFuture:
+        """Climb 2 m at 0.5 m/s.
 
         Raises:
-            PilotError: It has no worlds to see.
+            PilotError: The drone isn't armed, or is moving.
         """
-        worlds, state = self._seen("picture")
-        return worlds.render(state, worlds.view(camera, modality, height, width))[0]
+        self._require_armed("take_off")
+        if self._drone.speed > MOVING:
+            raise PilotError(
+                f"can't take off while moving at {self._drone.speed:.2g} m/s; wait until the drone "
+                "stands still"
+            )
+        limit = checks.time_limit(timeout, TAKEOFF_HEIGHT, TAKEOFF_SPEED)
+        return self._start("take_off", TakeoffCommand(self._drone.body, limit), wait)
 
-    def images(
+    def land(self, timeout: float | None = None, *, wait: bool = True) -> bool | FlightFuture:
+        """Descend at 0.2 m/s until the drone stands."""
+        height = float(self._drone.body.position[0, 2])
+        limit = checks.time_limit(timeout, height, LANDING_SPEED)
+        return self._fly("land", Land(limit), wait)
+
+    def go_home(
+        self, timeout: float | None = None, *, speed: float = TAKEOFF_SPEED, wait: bool = True
+    ) -> bool | FlightFuture:
+        """Fly to the starting position at the present height and land there."""
+        pace = checks.speed(speed)
+        position, home = self._drone.body.position, self._drone.home
+        over = torch.stack([home[0], home[1], position[0, 2]])[None, None]
+        away, height = float((over[0] - position).norm()), float(position[0, 2])
+        limit, braking = checks.time_limit(timeout, away, pace), braking_time(self.settings)
+        path = PathCommand(over, pace, limit, braking=braking)
+        command = GoHomeCommand(path, Land(checks.time_limit(timeout, height, LANDING_SPEED)))
+        if timeout is not None:
+            command.limit = path.limit
+        return self._fly("go_home", command, wait)
+
+    def hover(self, duration: float = 0.0, *, wait: bool = True) -> bool | FlightFuture:
+        """Hold the position for some seconds and afterwards."""
+        return self._fly("hover", Hover(checks.duration(duration)), wait)
+
+    def move_by_angle(
         self,
-        requests: Sequence[ImageRequest],
+        roll: float,
+        pitch: float,
+        duration: float,
         *,
-        height: int | None = None,
-        width: int | None = None,
-    ) -> list[Tensor]:
-        """AirSim's images of its `worlds`, all of one size: any of five cameras, of seven types.
+        z: float | None = None,
+        throttle: float | None = None,
+        yaw: float | None = None,
+        yaw_rate: float | None = None,
+        wait: bool = True,
+    ) -> bool | FlightFuture:
+        """Hold roll and pitch.
 
         Args:
-            requests: Which camera and type each is of.
-            height: Pixels; the worlds' choice by default.
-            width: Pixels.
-
-        Returns:
-            One each. Shapes: (H, W, 3), uint8; or (H, W), float32, of those asked for as numbers.
-
-        Raises:
-            PilotError: It has no worlds to see.
-            InputError: Nothing is asked for, or a size is out of range.
-        """
-        worlds, state = self._seen("images")
-        return [found[0] for found in images(worlds, state, requests, height=height, width=width)]
-
-    def _seen(self, name: str) -> tuple[Worlds, State]:
-        """Its worlds, and what they are like with its own drone in them.
+            roll: Degrees, right side down.
+            pitch: Degrees, nose down: forward.
+            duration: Seconds.
+            z: Height to hold, metres; the present one by default.
+            throttle: In place of `z`, fraction of the maximum thrust from 0 to 1.
+            yaw: Heading, degrees to the left of the world's x axis; unchanged by default.
+            yaw_rate: In place of `yaw`, degrees per second to the left.
+            wait: Whether to wait for the end.
 
         Raises:
-            PilotError: It has none.
+            InputError: Two alternatives are given, or a number is invalid.
+            PilotError: The drone isn't flying.
         """
-        if self.worlds is None:
-            raise PilotError(f"{name}: there is nothing to see; give worlds=Worlds(1, ...)")
-        state, body = copy.copy(self.worlds.state), self._drone.body
-        is_level = self._drone.quadrotor.mount == "gimbal"
-        state.body = body.moved(body.position, heading_only(body.attitude)) if is_level else body
-        return self.worlds, state
+        if yaw is not None and yaw_rate is not None:
+            raise InputError(f"yaw={yaw} and yaw_rate={yaw_rate} are both given; give one of them")
+        command = AngleCommand(
+            checks.radians(roll, "roll", 90.0),
+            checks.radians(pitch, "pitch", 90.0),
+            self._lift(z, throttle),
+            checks.duration(duration),
+            yaw=None if yaw is None else checks.radians(yaw, "yaw"),
+            yaw_rate=None if yaw_rate is None else checks.radians(yaw_rate, "yaw_rate"),
+        )
+        return self._fly("move_by_angle", command, wait)
+
+    def move_by_rates(
+        self,
+        roll: float,
+        pitch: float,
+        yaw: float,
+        duration: float,
+        *,
+        z: float | None = None,
+        throttle: float | None = None,
+        wait: bool = True,
+    ) -> bool | FlightFuture:
+        """Hold body rates, degrees per second; see `move_by_angle`."""
+        named = ((roll, "roll"), (pitch, "pitch"), (yaw, "yaw"))
+        x, y, z_rate = (checks.radians(value, name) for value, name in named)
+        command = RateCommand((x, y, z_rate), self._lift(z, throttle), checks.duration(duration))
+        return self._fly("move_by_rates", command, wait)
+
+    def move_by_rotors(
+        self, shares: Sequence[float], duration: float, *, wait: bool = True
+    ) -> bool | FlightFuture:
+        """Set all rotors: front right, rear left, front left, rear right, each from 0 to 1."""
+        a, b, c, d = checks.numbers(shares, "shares", 4, 0.0, 1.0)
+        command = RotorCommand((a, b, c, d), checks.duration(duration))
+        return self._fly("move_by_rotors", command, wait)
+
+    def move_by_velocity(
+        self,
+        vx: float,
+        vy: float,
+        vz: float = 0.0,
+        duration: float = 1.0,
+        *,
+        z: float | None = None,
+        frame: str = "world",
+        drivetrain: str = _FREE,
+        yaw_mode: YawMode | None = None,
+        wait: bool = True,
+    ) -> bool | FlightFuture:
+        """Hold a velocity.
+
+        Args:
+            vx: Forward, metres per second.
+            vy: To the left.
+            vz: Up.
+            duration: Seconds.
+            z: Height to hold in place of `vz`, metres.
+            frame: "world", or "body" for vx ahead of the drone and vy to its left.
+            drivetrain: See `Drivetrain`.
+            yaw_mode: See `YawMode`.
+            wait: Whether to wait for the end.
+
+        Raises:
+            InputError: A number is invalid, or drivetrain, yaw mode and frame are incompatible.
+            PilotError: The drone isn't flying.
+        """
+        x, y, up = (
+            checks.real(v, n, -100.0, 100.0, unit="m/s")
+            for v, n in ((vx, "vx"), (vy, "vy"), (vz, "vz"))
+        )
+        if z is not None and up != 0.0:
+            raise InputError(f"z={z} and vz={up:g} are both given; give one of them")
+        command = VelocityCommand(
+            (x, y),
+            checks.duration(duration),
+            climb=up,
+            z=None if z is None else checks.height(z),
+            frame=parse_frame(frame),
+            yaw_control=YawControl(drivetrain, yaw_mode),
+        )
+        return self._fly("move_by_velocity", command, wait)
+
+    def move_along(
+        self,
+        path: Any,
+        speed: float = 1.0,
+        timeout: float | None = None,
+        *,
+        drivetrain: str = _FREE,
+        yaw_mode: YawMode | None = None,
+        lookahead: float = AUTOMATIC,
+        adaptive_lookahead: float = 1.0,
+        wait: bool = True,
+    ) -> bool | FlightFuture:
+        """Follow a path from the present position by pure pursuit.
+
+        Args:
+            path: Points (x, y, z), metres. The last one is reached within 0.5 m, and held.
+            speed: Metres per second; less near the end.
+            timeout: Seconds after which the command fails; three times the expected duration plus
+                10 s by default.
+            drivetrain: See `Drivetrain`.
+            yaw_mode: See `YawMode`.
+            lookahead: Lookahead distance, metres; computed from the speed if negative.
+            adaptive_lookahead: Lookahead added per metre of distance from the path.
+            wait: Whether to wait for the end.
+
+        Raises:
+            InputError: The path is empty, a number is invalid, the lookahead is too short, or
+                drivetrain and yaw mode are incompatible.
+            PilotError: The drone isn't flying.
+        """
+        points, pace = checks.path(path), checks.speed(speed)
+        whole = torch.cat([self._drone.body.position[:, None], points], 1)
+        length = float(whole.diff(dim=1).norm(dim=-1).sum())
+        command = PathCommand(
+            points,
+            pace,
+            checks.time_limit(timeout, length, pace),
+            yaw_control=YawControl(drivetrain, yaw_mode),
+            lookahead=checks.real(lookahead, "lookahead", unit="m"),
+            adaptive=checks.real(adaptive_lookahead, "adaptive_lookahead", 0.0, 100.0),
+            braking=braking_time(self.settings),
+        )
+        return self._fly("move_along", command, wait)
+
+    def move_to(
+        self, x: float, y: float, z: float, speed: float = 1.0, timeout: float | None = None,
+        **choices: Any,
+    ) -> bool | FlightFuture:  # fmt: skip
+        """Fly to a position; see `move_along` for the options."""
+        return self.move_along([(x, y, z)], speed, timeout, **choices)
+
+    def move_to_z(
+        self, z: float, speed: float = 1.0, timeout: float | None = None, **choices: Any
+    ) -> bool | FlightFuture:
+        """Fly straight up or down to a height; see `move_along`."""
+        x, y, _ = self._drone.body.position[0].tolist()
+        return self.move_along([(x, y, z)], speed, timeout, **choices)
+
+    def rotate_to(
+        self, yaw: float, timeout: float | None = None, *, margin: float = 5.0, wait: bool = True
+    ) -> bool | FlightFuture:
+        """Turn to a heading the shorter way round.
+
+        Args:
+            yaw: Degrees to the left of the world's x axis.
+            timeout: Seconds after which the command fails; 20 by default.
+            margin: Heading error in degrees at which it succeeds, once the drone no longer turns.
+            wait: Whether to wait for the end.
+        """
+        limit = 20.0 if timeout is None else checks.duration(timeout)
+        near = math.radians(checks.real(margin, "margin", 0.0, 180.0, is_above=True))
+        return self._fly(
+            "rotate_to", RotateToCommand(checks.radians(yaw, "yaw"), near, limit), wait
+        )
+
+    def rotate_by(self, rate: float, duration: float, *, wait: bool = True) -> bool | FlightFuture:
+        """Turn at a rate, degrees per second to the left, for some seconds."""
+        command = RotateByCommand(checks.radians(rate, "rate"), checks.duration(duration))
+        return self._fly("rotate_by", command, wait)
+
+    def move_by_manual(
+        self,
+        vx_max: float,
+        vy_max: float,
+        z_max: float,
+        duration: float,
+        *,
+        drivetrain: str = _FREE,
+        yaw_mode: YawMode | None = None,
+        wait: bool = True,
+    ) -> bool | FlightFuture:
+        """Follow `sticks`, which may change meanwhile.
+
+        Args:
+            vx_max: Forward speed at full stick, metres per second.
+            vy_max: Sideways speed at full stick.
+            z_max: Height of the goal above the drone at full throttle, metres.
+            duration: Seconds.
+            drivetrain: See `Drivetrain`.
+            yaw_mode: See `YawMode`.
+            wait: Whether to wait for the end.
+        """
+        command = StickCommand(
+            lambda: self.sticks,
+            checks.duration(duration),
+            vx_max=checks.speed(vx_max, "vx_max"),
+            vy_max=checks.speed(vy_max, "vy_max"),
+            z_max=checks.height(z_max, "z_max"),
+            yaw_control=YawControl(drivetrain, yaw_mode),
+        )
+        return self._fly("move_by_manual", command, wait)
+
+    def _lift(self, z: float | None, throttle: float | None) -> Lift:
+        """Return the vertical goal; hold the present height by default.
+
+        Raises:
+            InputError: Both are given, or one is invalid.
+        """
+        if throttle is None:
+            return Height(float(self._drone.body.position[0, 2]) if z is None else checks.height(z))
+        if z is not None:
+            raise InputError(f"z={z} and throttle={throttle} are both given; give one of them")
+        return Throttle(checks.real(throttle, "throttle", 0.0, 1.0))

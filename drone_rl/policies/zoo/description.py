@@ -30,7 +30,7 @@ from drone_rl.sim.actions import Actions
 from drone_rl.sim.dynamics import Dynamics, make_dynamics
 from drone_rl.sim.tasks import Task, as_task
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import Record, Colors, as_mapping, shown
+from drone_rl.utils.schema import Record, Several, as_mapping, shown
 from drone_rl.utils.settings import Settings, plain
 
 FORMAT = "drone_rl policy"

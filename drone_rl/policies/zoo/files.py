@@ -11,13 +11,12 @@ from safetensors.torch import load, save
 
 from drone_rl.policies.zoo.description import FORMAT, MOST_PARAMETERS, parse
 from drone_rl.policies.zoo.migration import describe
-from drone_rl.utils.checkpoint import load_checkpoint
+from drone_rl.utils.checkpoint import check_weights, load_checkpoint
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import parse_json, read_bytes
 from drone_rl.utils.former_names import with_present_names
 from drone_rl.utils.overrides import COMMAND
 from drone_rl.utils.schema import Kind, Maybe, Plain, Real, Record, Text, Whole, as_mapping, shown
-from drone_rl.utils.weights import check_weights
 
 MOST_HEADER = 2**20
 """Bytes of what an exported file says besides its weights."""

@@ -13,8 +13,7 @@ from torch import Tensor, nn
 from drone_rl.envs import on_pixels
 from drone_rl.policies import PolicyNetwork
 from drone_rl.policies.zoo.description import PolicyDescription
-from drone_rl.utils.errors import InputError
-from drone_rl.utils.extras import extra
+from drone_rl.utils.errors import InputError, extra
 
 FRAMES, PROBABILITIES, ACTION = "frames", "probabilities", "action"
 """Names of the model's input and outputs."""

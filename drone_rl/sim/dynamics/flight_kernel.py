@@ -1,13 +1,7 @@
-# pyright: reportIndexIssue=false
-# pyright: reportGeneralTypeIssues=false
-# pyright: reportOperatorIssue=false
-# pyright: reportAttributeAccessIssue=false
-# pyright: reportReturnType=false
-# pyright: reportArgumentType=false
-# pyright: reportCallIssue=false
-# pyright: reportAssignmentType=false
-# (Warp compiles this file; Python's types say nothing about it, and what a loop changes is declared
-# by its type.)
+# pyright: reportIndexIssue=false, reportGeneralTypeIssues=false, reportOperatorIssue=false
+# pyright: reportAttributeAccessIssue=false, reportReturnType=false, reportArgumentType=false
+# pyright: reportCallIssue=false, reportAssignmentType=false
+# (Warp compiles this file: its types are not those of Python.)
 """All ticks of a command for one drone after the other.
 
 On a CPU a launch goes through its drones in turn, on a GPU each has a thread. Numbers are of single
@@ -17,11 +11,12 @@ command began, so that no more is lost of them in an hour than in a command.
 
 import warp as wp
 
-from drone_rl.sim.dynamics import flight_state as fs
-from drone_rl.sim.dynamics.airframe import Airframe
-from drone_rl.sim.dynamics.cascade import ANGLE, POSITION, Goal
-from drone_rl.sim.dynamics.flight_tick import NO_THING, Flight, Touch, among, is_near, ticked
-from drone_rl.sim.dynamics.rigid_body import Motion, axes_of
+from drone_rl.sim.dynamics import state as fs
+from drone_rl.sim.dynamics.control_kernel import ANGLE, POSITION, Goal
+from drone_rl.sim.dynamics.rigid_body_kernel import Airframe, Motion, axes_of
+from drone_rl.sim.dynamics.tick_kernel import NO_THING, Flight, Touch, among, is_near, ticked
+
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 _PLACE = wp.constant(fs.POSITION.first)
 _ATTITUDE = wp.constant(fs.ATTITUDE.first)
@@ -44,8 +39,6 @@ _FASTEST = wp.constant(1000.0)
 """Metres or radians a second beyond which a motion has diverged."""
 _FARTHEST = wp.constant(1.0e18)
 """Square metres beyond which nothing is."""
-
-wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 
 @wp.func

@@ -1,27 +1,28 @@
-# pyright: reportIndexIssue=false
-# pyright: reportGeneralTypeIssues=false
-# pyright: reportOperatorIssue=false
-# pyright: reportAttributeAccessIssue=false
-# pyright: reportArgumentType=false
-# pyright: reportCallIssue=false
-# (Warp compiles this file; Python's types say nothing about it.)
+# pyright: reportIndexIssue=false, reportGeneralTypeIssues=false, reportOperatorIssue=false
+# pyright: reportAttributeAccessIssue=false, reportReturnType=false, reportArgumentType=false
+# pyright: reportCallIssue=false, reportAssignmentType=false
+# (Warp compiles this file: its types are not those of Python.)
 """The chapter's moves flown by a quadrotor, for kernels that fly whole episodes.
 
 The same numbers, bit for bit, as `Quadrotor.step` gives.
 """
 
+import torch
 import warp as wp
 
-from drone_rl.sim.dynamics import flight_state as fs
-from drone_rl.sim.dynamics.airframe import Airframe
+from drone_rl.sim.dynamics import state as fs
+from drone_rl.sim.dynamics.control import Moves
 from drone_rl.sim.dynamics.flight_kernel import command
+from drone_rl.sim.dynamics.quadrotor import Quadrotor
+from drone_rl.sim.dynamics.rigid_body_kernel import Airframe
+from drone_rl.sim.dynamics.state import NUMBERS, FlightState
+
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 _PLACE = wp.constant(fs.POSITION.first)
 _ATTITUDE = wp.constant(fs.ATTITUDE.first)
 _REFERENCE = wp.constant(fs.REFERENCE.first)
 _LOST = wp.constant(fs.LOST.first)
-
-wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 
 @wp.struct
@@ -104,3 +105,39 @@ def camera_attitude(fleet: Fleet, world: int) -> wp.vec4:
 def is_lost(fleet: Fleet, world: int) -> bool:
     """Whether a drone's motion has diverged."""
     return fleet.numbers[world, _LOST] != wp.float64(0.0)
+
+
+class FlyingFleet:
+    """Arrays for as many drones, written anew with each batch of episodes."""
+
+    def __init__(self, num_worlds: int, quadrotor: Quadrotor | None) -> None:
+        """Makes room.
+
+        Args:
+            num_worlds: How many there may be.
+            quadrotor: What they are; none for no drones in flight.
+        """
+        count = num_worlds if quadrotor else 0
+        self._numbers = torch.zeros(count, NUMBERS, dtype=torch.float64)
+        self.fleet = fleet = Fleet()
+        fleet.numbers = wp.from_torch(self._numbers)
+        fleet.goals, fleet.drifts = (wp.zeros((count, 4), dtype=wp.float64) for _ in range(2))
+        fleet.centers = wp.zeros((count, 0), dtype=wp.vec3d)
+        if quadrotor is not None:
+            steering = quadrotor.steering
+            assert isinstance(steering, Moves)
+            fleet.frame = quadrotor.frame
+            fleet.ticks = quadrotor.settings.control_ticks
+            fleet.modes = wp.vec4i(*(int(mode) for mode in steering.MODES))
+            fleet.lead = steering.lead
+            fleet.is_gimballed = int(quadrotor.mount == "gimbal")
+            fleet.moves = wp.from_torch(steering.drifts.contiguous())
+
+    @classmethod
+    def knows(cls, quadrotor: Quadrotor) -> bool:
+        """Whether kernels fly all that the drones can be told."""
+        return isinstance(quadrotor.steering, Moves)
+
+    def begin(self, state: FlightState) -> None:
+        """Takes drones over at the start of episodes; the state itself stays as it is."""
+        self._numbers[: len(state)] = state.numbers

@@ -12,12 +12,9 @@ from torch import Tensor
 from drone_rl.config import ActionSettings, DynamicsSettings
 from drone_rl.sim.actions import Actions
 from drone_rl.sim.dynamics import flight_kernel
-from drone_rl.sim.dynamics.airframe import make_airframe
-from drone_rl.sim.dynamics.body import BodyState
-from drone_rl.sim.dynamics.flight_state import CLIMB, FlightState
-from drone_rl.sim.dynamics.goals import Goals, rotor_goals
-from drone_rl.sim.dynamics.obstacles import Obstacles
-from drone_rl.sim.dynamics.steering import make_steering
+from drone_rl.sim.dynamics.control import Goals, make_steering, rotor_goals
+from drone_rl.sim.dynamics.rigid_body_kernel import make_airframe
+from drone_rl.sim.dynamics.state import CLIMB, BodyState, FlightState, Obstacles
 from drone_rl.sim.rendering.devices import WorkerPool, on_torch_stream, start_warp
 
 _LEAST_WORK = 3000

@@ -12,8 +12,8 @@ import torch
 import warp as wp
 
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.imports import standard_error_closed
 from drone_rl.utils.provenance import num_cores
-from drone_rl.utils.quiet import standard_error_closed
 
 _LOADING = threading.Lock()
 """Two threads may both be the first to load kernels."""

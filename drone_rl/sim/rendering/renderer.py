@@ -11,7 +11,7 @@ from typing import Protocol
 
 from torch import Tensor
 
-from drone_rl.config.renderers import RENDERERS
+from drone_rl.config.camera import RENDERERS
 from drone_rl.sim.rendering.appearance import Appearance
 from drone_rl.sim.rendering.scene import Scene
 from drone_rl.sim.rendering.view import Modality, View

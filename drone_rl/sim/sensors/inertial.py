@@ -8,9 +8,8 @@ from torch import Tensor
 
 from drone_rl.config.dynamics import GRAVITY
 from drone_rl.config.sensors import ImuSettings, MagnetometerSettings
-from drone_rl.sim.dynamics.body import BodyState
-from drone_rl.sim.frames import body_from_world
-from drone_rl.sim.geodesy import HOME, GeoPoint, geo_from_world
+from drone_rl.sim.coordinates import HOME, GeoPoint, body_from_world, geo_from_world
+from drone_rl.sim.dynamics.state import BodyState
 from drone_rl.sim.sensors.sensor import Samples, Sampling, normal, random_walk_step
 from drone_rl.utils.batch import Batch
 

@@ -7,8 +7,8 @@ import torch
 from torch import Tensor
 
 from drone_rl.config.sensors import BarometerSettings, GpsSettings
-from drone_rl.sim.dynamics.body import BodyState
-from drone_rl.sim.geodesy import HOME, GeoPoint, geo_from_world
+from drone_rl.sim.coordinates import HOME, GeoPoint, geo_from_world
+from drone_rl.sim.dynamics.state import BodyState
 from drone_rl.sim.sensors.sensor import Samples, Sampling, gauss_markov_step, normal
 from drone_rl.utils.batch import Batch
 

@@ -6,9 +6,8 @@ import torch
 from torch import Tensor
 
 from drone_rl.config.sensors import SensorSettings
-from drone_rl.sim.dynamics.body import BodyState
-from drone_rl.sim.dynamics.flight_state import GROUND, NOTHING, Contact, FlightState
-from drone_rl.sim.geodesy import HOME, GeoPoint
+from drone_rl.sim.coordinates import HOME, GeoPoint
+from drone_rl.sim.dynamics.state import GROUND, NOTHING, BodyState, Contact, FlightState
 from drone_rl.sim.sensors.inertial import (
     Imu,
     ImuReading,

@@ -1,20 +1,29 @@
-"""What there is to do in a world, and what can be asked about it."""
+"""Tasks: what stands in the scene, how an episode starts, its rules, and what counts as success."""
 
-from drone_rl.sim.tasks.collect_cubes import CollectCubes, Practice
-from drone_rl.sim.tasks.explainable import Grid
-from drone_rl.sim.tasks.judgeable import Goals, OracleRule
+from drone_rl.sim.tasks.collect_cubes import CollectCubes
+from drone_rl.sim.tasks.failure_replay import FailureReplayTask
 from drone_rl.sim.tasks.pillars import Pillars
-from drone_rl.sim.tasks.playable import Prop, State
 from drone_rl.sim.tasks.registry import as_task, register_task
-from drone_rl.sim.tasks.task import Task
+from drone_rl.sim.tasks.task import (
+    DrawnState,
+    EndReason,
+    Goals,
+    Grid,
+    OracleRule,
+    Prop,
+    State,
+    Task,
+)
 
 __all__ = [
     "CollectCubes",
+    "DrawnState",
+    "EndReason",
+    "FailureReplayTask",
     "Goals",
     "Grid",
     "OracleRule",
     "Pillars",
-    "Practice",
     "Prop",
     "State",
     "Task",

@@ -1,4 +1,4 @@
-"""What makes the task of settings."""
+"""The tasks that settings and files name."""
 
 from collections.abc import Callable
 from typing import Any
@@ -42,7 +42,7 @@ def as_task(task: BaseTaskSettings | Task[Any] | str | None) -> Task[Any]:
     if isinstance(task, str):
         task = settings_of(task, "task")()
     if not isinstance(task, BaseTaskSettings):
-        if not hasattr(task, "largest_reward"):  # of every task, and of no plain value
+        if not isinstance(task, Task):
             raise InputError(
                 f"task={shown(task)} is no task; give one of {', '.join(TASKS)}, settings such as "
                 "drone_rl.TaskSettings(num_cubes=2), or a task of your own"

@@ -1,11 +1,345 @@
-"""A task: all that simulators, verdicts and explanations must know of it."""
+"""The base class of tasks: scene, reset, rules, goals and the changes that explanations make.
 
-from typing import Protocol
+A task holds no environment. Its methods are functions of batches of states: the first dimension of
+every tensor counts environments. World frame in metres: x forward, y left, z up.
+"""
 
-from drone_rl.sim.tasks.explainable import Explainable
-from drone_rl.sim.tasks.judgeable import Judgeable
-from drone_rl.sim.tasks.playable import Playable, S
+import abc
+import dataclasses
+import enum
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any, Generic, NamedTuple, NoReturn, Protocol, TypeVar
+
+import numpy as np
+import torch
+from dm_control import mjcf
+from torch import Tensor
+
+from drone_rl.config import CameraSettings
+from drone_rl.sim.actions import Actions, Entry
+from drone_rl.sim.dynamics import BodyState, ComputerVision, Dynamics, Obstacles
+from drone_rl.sim.rendering.scene import SemanticClass
+from drone_rl.sim.vocabulary import TaskVocabulary
+from drone_rl.utils.batch import Batch
+from drone_rl.utils.errors import InputError
 
 
-class Task(Playable[S], Judgeable, Explainable[S], Protocol[S]):
-    """Something to do. It holds no world: all its methods are functions of what they are given."""
+@dataclasses.dataclass
+class State(Batch):
+    """State of N environments; tasks add fields of their own."""
+
+    body: BodyState
+    """The drones."""
+    steps: Tensor  # (N,) int64
+    """Steps taken in this episode."""
+    end_reason: Tensor  # (N,) int64
+    """Why the episode ended, one of `Task.ends`."""
+
+    @property
+    def drone(self) -> Tensor:
+        """Position of the drone, metres. Shape: (N, 3)."""
+        return self.body.position
+
+
+@dataclasses.dataclass
+class DrawnState(State):
+    """The state of a task without a state class of its own."""
+
+    drawn: Tensor  # (N, *)
+    """What `Task.draw` returned for each environment."""
+
+
+S = TypeVar("S", bound=State)
+
+
+class EndReason(enum.IntEnum):
+    """Why an episode ended, for tasks without reasons of their own."""
+
+    RUNNING = 0
+    SUCCESS = 1
+    FAILURE = 2
+    STEP_LIMIT = 3
+
+
+class Prop(Protocol):
+    """A dm_control entity that a task adds to the scene."""
+
+    semantic_class: SemanticClass
+
+    @property
+    def mjcf_model(self) -> mjcf.RootElement:
+        """Its model."""
+        ...
+
+
+@dataclasses.dataclass
+class Goals(Batch):
+    """Goals of n finished episodes, C each, in the order in which they come up."""
+
+    reached: Tensor  # (n, C) bool
+    """Which goals were reached."""
+    stratum: Tensor  # (n, C) int64
+    """Where each stood when it came up, an index into `Task.strata`; -1 if it never did."""
+    world: Tensor  # (n, k)
+    """What was drawn for each episode: identifies it whatever the drone did."""
+
+
+class OracleRule(NamedTuple):
+    """The best action given the true state."""
+
+    reads: tuple[str, ...]
+    """Entries of the information that it reads."""
+    act: Callable[..., Tensor]
+    """Maps them, each of shape (N, *), to actions of shape (N,) and then the entry's."""
+    actions: Actions
+    """The action set that it returns actions of."""
+
+    def can_fly(self, actions: Actions) -> bool:
+        """Return whether an action set has all parts that the oracle uses, by name."""
+        return set(self.actions.names) <= set(actions.names)
+
+    def decide(self, known: Sequence[Tensor], actions: Actions) -> Tensor:
+        """Return actions of any set that `can_fly` accepts.
+
+        In an action set other than its own the oracle takes the part of the same name, at full
+        speed.
+
+        Args:
+            known: What it reads. Each shape: (N, *).
+            actions: The action set to act in.
+
+        Returns:
+            Shape: (N,), then the entry's.
+        """
+        own = self.act(*known)
+        if actions == self.actions:
+            return own
+        same = torch.stack([actions.always(name) for name in self.actions.names])
+        return same.to(own.device)[self.actions.part(own)]
+
+
+class Grid(NamedTuple):
+    """Positions at which targets can stand, metres from the drone, as three axes of float64."""
+
+    height: Tensor  # (Z,)
+    forward: Tensor  # (F,)
+    lateral: Tensor  # (L,)
+
+
+class FusedRules(Protocol):
+    """Arrays of environments on which the fused episode kernel runs the rules of a task."""
+
+    flights: Any
+    """Warp structure of the states."""
+    poses: Any
+    """Warp structure of the poses that are rendered."""
+    steps: Tensor
+    """Steps taken so far. Shape: (num_envs,), int32."""
+    end_reasons: Tensor
+    """Shape: (num_envs,), int32."""
+
+    def begin(self, state: Any) -> None:
+        """Copy states at the start of episodes."""
+        ...
+
+
+class Task(abc.ABC, Generic[S]):
+    """Something to do. A subclass defines `name`, `draw` and `judge`; all else has a default.
+
+    With the defaults a task has one goal, which is reached where the episode ends by `success_end`.
+    Explanations need the methods from `remember` on, which have no default.
+    """
+
+    name: str
+    """What files and people call it."""
+    ends: type[enum.IntEnum] = EndReason
+    """Why an episode ends; 0 while it goes on."""
+    truncation: int = EndReason.STEP_LIMIT
+    """The member of `ends` that truncates an episode; all others terminate it."""
+    success_end: int = EndReason.SUCCESS
+    """The member of `ends` of an episode that reached all goals."""
+    expected_end: int = EndReason.FAILURE
+    """How an episode ends in which a goal was missed and nothing else went wrong."""
+    observed: tuple[str, ...] = ("end_reason",)
+    """Entries of the information that dm_control's observations hold."""
+    largest_reward: float = 1.0
+    """The return of a perfect episode."""
+    drone_size: float = 0.5
+    """Edge in metres of the box around the drone."""
+    origin: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    """Where the drone starts, metres."""
+    vocabulary: TaskVocabulary = TaskVocabulary()
+    """What reports call its goals and targets."""
+    strata: tuple[str, ...] = ("anywhere",)
+    """Where a goal can stand, from left to right: verdicts count each stratum separately."""
+    luck: tuple[str, ...] = ("random", "forward", "left", "right")
+    """Baselines that see nothing: "random", and actions that are always taken, by name."""
+    scored: tuple[str, ...] = ("drawn", "end_reason")
+    """Entries of an episode's last information that `score` reads."""
+    oracle: OracleRule | None = None
+    """The best action given the true state; None if it is unknown."""
+    remembered: Mapping[str, str] = {}
+    """Entries that data sets keep of each frame, with descriptions.
+
+    "next_target" is the index of the next target, their number if none is left.
+    """
+
+    @property
+    def entries(self) -> Mapping[str, Entry]:
+        """Shapes and types of what `info` returns, for one environment."""
+        drawn = self.draw(np.random.RandomState(0))
+        return {
+            "drawn": Entry(tuple(drawn.shape), torch.float32),
+            "end_reason": Entry((1,), torch.int64, 0, len(self.ends) - 1),
+        }
+
+    def make_dynamics(self) -> Dynamics:
+        """Return the default dynamics of the drone: moves of a metre."""
+        return ComputerVision()
+
+    def make_props(self) -> Sequence[Prop]:
+        """Return new entities for all that the scene holds besides field and drone.
+
+        Their frames are mocap bodies, positioned by `places`.
+        """
+        return ()
+
+    @abc.abstractmethod
+    def draw(self, random_state: np.random.RandomState) -> Tensor:
+        """Sample what is random about an episode, always of one shape."""
+
+    def start(self, drawn: Tensor, body: BodyState) -> S:
+        """Return states at the start of episodes.
+
+        Args:
+            drawn: From `draw`, stacked. Shape: (N, *).
+            body: The drones at `origin`.
+        """
+        zero = torch.zeros(len(drawn), dtype=torch.int64, device=drawn.device)
+        state: Any = DrawnState(body, zero, zero.clone(), drawn)
+        return state
+
+    @abc.abstractmethod
+    def judge(self, state: S, body: BodyState) -> tuple[S, Tensor]:
+        """Apply the rules after a step.
+
+        Args:
+            state: Before the step; stays as it is.
+            body: The drones after the step.
+
+        Returns:
+            The state after the step, and the reward: float64, shape (N,).
+        """
+
+    def fused_rules(self, dynamics: Dynamics, num_envs: int) -> "FusedRules | None":
+        """Return the arrays on which the fused episode kernel runs the task; None without one."""
+        del dynamics, num_envs
+
+    def places(self, state: S) -> Tensor:
+        """Return where the props are, metres; below the ground if absent. Shape: (N, P, 3)."""
+        return state.body.position.new_zeros(len(state), 0, 3)
+
+    def obstacles(self, state: S) -> Obstacles | None:
+        """Return what the drones can collide with, for dynamics with contacts; None if nothing."""
+        del state
+
+    def info(self, state: S) -> dict[str, Tensor]:
+        """Return the true state of each environment, as `entries` describes. Shapes: (N, *)."""
+        drawn: Tensor = getattr(state, "drawn")  # noqa: B009 (of `DrawnState`)
+        return {"drawn": drawn.float(), "end_reason": state.end_reason[:, None].clone()}
+
+    def score(self, info: Mapping[str, Tensor]) -> Goals:
+        """Return what became of the goals.
+
+        Args:
+            info: The entries `scored` at the ends of episodes. Shapes: (n, *).
+        """
+        is_reached = info["end_reason"] == self.success_end
+        return Goals(is_reached, is_reached.long() * 0, info["drawn"].flatten(1).double())
+
+    def classes(self, goals: Any) -> Iterator[tuple[str, str, Tensor]]:
+        """Yield the classes of goals that failure tables count: by stratum.
+
+        Args:
+            goals: From `score`.
+
+        Yields:
+            Name of the property, its value, and which goals have it: bool, shape (n, C).
+        """
+        for number, stratum in enumerate(self.strata):
+            yield "side", stratum, goals.stratum == number
+
+    # Explanations. A target is a prop to which the drone flies or which it avoids, known by its
+    # index. Methods that take a state return a new one.
+
+    def remember(self, info: Mapping[str, Tensor]) -> dict[str, Tensor]:
+        """Return the entries `remembered`, from the information before actions. Shapes: (T, *)."""
+        self._lacks("remember")
+
+    def tally(self, info: Mapping[str, Tensor]) -> tuple[Tensor, Tensor]:
+        """Return how many goals are reached, and how many missed for good. int64, (T,)."""
+        self._lacks("tally")
+
+    def recall(self, kept: Mapping[str, Tensor], body: BodyState) -> S:
+        """Return states again from the entries `remembered`, "step", and the drones."""
+        self._lacks("recall")
+
+    def next_target(self, state: S) -> Tensor:
+        """Return the target that calls for action now; their number if none does. (N,)."""
+        self._lacks("next_target")
+
+    def next_offset(self, state: S) -> Tensor:
+        """Return where it stands, metres from the drone; NaN if there is none. (N, 3)."""
+        target, places = self.next_target(state), self.places(state)
+        last, env = places.shape[1] - 1, torch.arange(len(state), device=places.device)
+        away = places[env, target.clamp(max=last)] - state.body.position
+        return torch.where((target <= last)[:, None], away, torch.nan)
+
+    def is_reached(self, state: S, target: Tensor) -> Tensor:
+        """Return whether a target of each environment is done. Shape of both: (N,)."""
+        self._lacks("is_reached")
+
+    def is_behind(self, state: S, target: Tensor) -> Tensor:
+        """Return whether a target, or its place, lies behind the drone. Shape of both: (N,)."""
+        env = torch.arange(len(state), device=target.device)
+        return state.body.position[:, 0] > self.places(state)[env, target, 0]
+
+    def needed(self, offset: Tensor) -> Tensor:
+        """Return the action for a target at an offset from the drone. (N, 3) to (N, *)."""
+        self._lacks("needed")
+
+    def stratum_at(self, offset: Tensor) -> Tensor:
+        """Return the stratum of a target at an offset from the drone. (N, 3) to (N,)."""
+        self._lacks("stratum_at")
+
+    def grid(self, num_forward: int, num_lateral: int) -> Grid:
+        """Return where next targets can stand, seen from the drone; symmetric sideways."""
+        self._lacks("grid")
+
+    def one_target(self, body: BodyState, offset: Tensor) -> S:
+        """Return states with a single target, at that offset from each drone. Shape: (N, 3)."""
+        self._lacks("one_target")
+
+    def without_targets(self, state: S) -> S:
+        """Remove all targets."""
+        self._lacks("without_targets")
+
+    def without_next(self, state: S) -> S:
+        """Remove the next target, if there is one."""
+        self._lacks("without_next")
+
+    def next_moved(self, state: S, metres: Tensor | float) -> S:
+        """Move the next target to the left. Shape of `metres`: (N,), or a number."""
+        self._lacks("next_moved")
+
+    def elsewhere(self, state: S, camera: CameraSettings, generator: torch.Generator) -> S:
+        """Move all targets to random positions in view of the camera."""
+        self._lacks("elsewhere")
+
+    def _is_next(self, state: S) -> Tensor:
+        """Return which prop is the next target. Shape: (N, P), bool."""
+        target = self.next_target(state)[:, None]
+        return torch.arange(self.places(state).shape[1], device=target.device) == target
+
+    def _lacks(self, method: str) -> NoReturn:
+        raise InputError(f"task={self.name} cannot be explained; define {method} in its class")

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from drone_rl.config import BaseTaskSettings, TaskSettings
 from drone_rl.policies.zoo import PolicyDescription, parse
-from drone_rl.sim.tasks.collect_cubes import require_cubes, require_moves
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import parse_json, read_bytes
 from drone_rl.utils.limits import CERTIFICATE_BYTES, CERTIFICATE_VALUES
@@ -30,6 +29,7 @@ from drone_rl.utils.schema import (
     as_mapping,
     shown,
 )
+from drone_rl.verification.requirements import require_cubes, require_moves
 
 FORMAT = "drone_rl certificate"
 FORMAT_VERSION = 1

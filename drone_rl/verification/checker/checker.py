@@ -11,7 +11,7 @@ import torch
 from numpy.typing import NDArray
 
 from drone_rl.policies.zoo import PolicyDescription
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.checker.certificate import (
     Certificate,

@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.utils.intervals import proportion
 from drone_rl.verification.checker.certificate import Certificate, Outcome
 

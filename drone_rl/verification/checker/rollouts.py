@@ -14,8 +14,8 @@ from torchrl.envs import Transform
 from drone_rl.envs import worlds_of
 from drone_rl.policies.zoo import PolicyDescription
 from drone_rl.sim.tasks import State
-from drone_rl.sim.tasks.collect_cubes import require_cubes
-from drone_rl.sim.tasks.collect_cubes.rules import WorldState
+from drone_rl.sim.tasks.collect_cubes import WorldState
+from drone_rl.verification.requirements import require_cubes
 
 MOST_AT_ONCE = 1024
 """Flights in one batch."""

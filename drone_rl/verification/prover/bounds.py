@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional
 
+from drone_rl.collectors.speedups import accelerated_inference
 from drone_rl.policies import PolicyNetwork
-from drone_rl.policies.answering import Answers
 from drone_rl.policies.rounded_layers import SLACK, UNIT, Layer, layer_of
 from drone_rl.policies.rounding import PIXEL_UNITS, RoundingBound
 from drone_rl.sim.actions import MOVES
@@ -44,7 +44,7 @@ class Bounds:
         if not isinstance(last, nn.Linear):
             raise InputError("the network's last layer is not linear; prove a policy whose is")
         self.gap = gap
-        self._answers = Answers(network)
+        self._answers = accelerated_inference(network)
         scale, self._steps = 2, []
         for layer in inner:
             self._steps.append((_step(layer, scale), scale))

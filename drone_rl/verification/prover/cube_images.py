@@ -22,7 +22,7 @@ from torch import Tensor
 
 from drone_rl.config import CameraSettings, TaskSettings
 from drone_rl.sim.entities import FRONT_CENTER
-from drone_rl.sim.tasks.collect_cubes.rules import WorldState
+from drone_rl.sim.tasks.collect_cubes import WorldState
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.prover.lattice import Lattice

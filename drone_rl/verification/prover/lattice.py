@@ -15,10 +15,9 @@ import torch
 from torch import Tensor
 
 from drone_rl.config import TaskSettings
+from drone_rl.sim.actions import DIRECTIONS
 from drone_rl.sim.dynamics import BodyState
-from drone_rl.sim.dynamics.computer_vision import DIRECTIONS
-from drone_rl.sim.tasks.collect_cubes import rules
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason, WorldState
+from drone_rl.sim.tasks.collect_cubes import CollectCubes, EndReason, WorldState
 from drone_rl.utils.batch import Batch
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.prover.boxes import Boxes, cut
@@ -271,7 +270,7 @@ def explore(settings: TaskSettings, cubes: Tensor) -> Graph:
 
 
 def follow(settings: TaskSettings, cubes: Tensor, nodes: Nodes) -> tuple[Nodes, Tensor]:
-    """What every move makes of some nodes, by `rules.judge`.
+    """What every move makes of some nodes, by `CollectCubes.judge`.
 
     Returns:
         The nodes after each move, those of the first node first (K * A), and the `EndReason` of
@@ -283,7 +282,7 @@ def follow(settings: TaskSettings, cubes: Tensor, nodes: Nodes) -> tuple[Nodes, 
     ahead, aside, _ = (moves.repeat(len(nodes), 1)).unbind(-1)
     moved = dataclasses.replace(before, ahead=before.ahead + ahead, aside=before.aside + aside)
     body = BodyState.at_rest(_positions(settings, moved))
-    judged, _ = rules.judge(settings, states(settings, cubes, before), body)
+    judged, _ = CollectCubes(settings).judge(states(settings, cubes, before), body)
     moved.collected = _as_bits(judged.collected)
     return moved, judged.end_reason.view(len(nodes), len(moves))
 
@@ -291,7 +290,7 @@ def follow(settings: TaskSettings, cubes: Tensor, nodes: Nodes) -> tuple[Nodes, 
 def states(settings: TaskSettings, cubes: Tensor, nodes: Nodes) -> WorldState:
     """Nodes as worlds, one step short of having taken none: the step limit is never met."""
     body = BodyState.at_rest(_positions(settings, nodes))
-    state = rules.start(settings, cubes[nodes.placement], body)
+    state = CollectCubes(settings).start(cubes[nodes.placement], body)
     bit = torch.arange(cubes.shape[1])
     state.collected = (nodes.collected[:, None] >> bit & 1).bool()
     state.passed = ~state.collected & (state.drone[:, None, 0] > state.cubes[..., 0])

@@ -16,7 +16,7 @@ from torchrl.envs import CatFrames, Transform, TransformedEnv
 
 from drone_rl.envs import CameraFault, worlds_of
 from drone_rl.policies.rounding import RoundingBound
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason, WorldState
+from drone_rl.sim.tasks.collect_cubes import EndReason, WorldState
 from drone_rl.utils.batch import Batch
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.prover.bounds import Part, Ranges

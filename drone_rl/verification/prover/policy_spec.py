@@ -13,7 +13,6 @@ from drone_rl.envs import on_pixels
 from drone_rl.policies import PolicyNetwork
 from drone_rl.policies.zoo import PolicyDescription
 from drone_rl.sim.actions import MOVES
-from drone_rl.sim.tasks.collect_cubes import require_cubes, require_moves
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.prover.bounds import Bounds, Painter
@@ -21,6 +20,7 @@ from drone_rl.verification.prover.boxes import Boxes, whole
 from drone_rl.verification.prover.cells import Cells
 from drone_rl.verification.prover.cube_images import FRONT, Eye, Seeing, camera_ahead
 from drone_rl.verification.prover.lattice import Lattice
+from drone_rl.verification.requirements import require_cubes, require_moves
 
 _SHADES = ("gray", "standardize")
 """Transforms of each pixel alone, by which a brighter pixel stays brighter."""

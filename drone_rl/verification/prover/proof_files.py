@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from drone_rl.policies.zoo import PolicyDescription
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.utils.archives import read_arrays
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import write_atomically

@@ -14,7 +14,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.verification.prover.action_table import Outlook, runs
 from drone_rl.verification.prover.boxes import (
     Boxes,

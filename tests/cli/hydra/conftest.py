@@ -5,8 +5,7 @@ import importlib
 import pytest
 from hydra import compose, initialize_config_dir
 
-from drone_rl.cli.hydra.composition import conf_dir, read_settings
-from drone_rl.cli.hydra.schemas import register_schemas
+from drone_rl.cli.hydra.composition import conf_dir, read_settings, register_schemas
 from drone_rl.cli.usage import COMMANDS
 
 MODULES = {c.replace("-", "_"): None for c in COMMANDS}

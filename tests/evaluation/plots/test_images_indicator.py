@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from drone_rl.evaluation.plots.images import CHOSEN, HEIGHT, MUTED, ROW, indicator
-from drone_rl.sim.action_display import MOVES, ShownActions
+from drone_rl.sim.vocabulary import SHOWN_MOVES, ShownActions
 
 FIVE = ShownActions(
     ("up", "down", "left", "right", "stay"),
@@ -42,7 +42,9 @@ def test_bars_point_where_the_actions_do(chosen, where):
 
 
 def test_where_they_stand_in_the_file_does_not_matter():
-    turned = dataclasses.replace(MOVES, names=MOVES.names[::-1], arrows=MOVES.arrows[::-1])
+    turned = dataclasses.replace(
+        SHOWN_MOVES, names=SHOWN_MOVES.names[::-1], arrows=SHOWN_MOVES.arrows[::-1]
+    )
     here = pixels(indicator([0.2, 0.5, 0.3], 1, 300), CHOSEN)
     there = pixels(indicator([0.3, 0.5, 0.2], 1, 300, turned), CHOSEN)
     assert np.array_equal(here, there)

@@ -8,7 +8,7 @@ import pytest
 from matplotlib.patches import PathPatch
 
 from drone_rl.evaluation.plots.regions import _ticks, chart, svg
-from drone_rl.sim.action_display import MOVES
+from drone_rl.sim.vocabulary import SHOWN_MOVES
 
 NUMBERS = {
     "window": {"nearest": 2.0, "farthest": 4.0, "sideways": 3.0},
@@ -32,20 +32,20 @@ WAYS = {
 
 
 def test_the_chart_has_left_on_the_left():
-    figure = chart(NUMBERS, WAYS, MOVES)
+    figure = chart(NUMBERS, WAYS, SHOWN_MOVES)
     (axis,) = figure.axes
     assert axis.get_xlim() == (3, -3)
     forward, left, unseen = (p for p in axis.patches if isinstance(p, PathPatch))
     assert forward.get_path().get_extents().bounds == (-3, 2, 4, 2)
     assert left.get_path().get_extents().bounds == (1, 2, 2, 2)
-    assert forward.get_facecolor()[:3] == pytest.approx(np.array(MOVES.colors[0]) / 255)
+    assert forward.get_facecolor()[:3] == pytest.approx(np.array(SHOWN_MOVES.colors[0]) / 255)
     assert unseen.get_hatch()
     texts = [text.get_text() for text in axis.get_legend().get_texts()]
     assert texts[:4] == ["goes left", "goes forward", "goes right", "cube not seen"]
 
 
 def test_what_is_seen_everywhere_has_no_hatch_in_the_key():
-    figure = chart(NUMBERS | {"unseen": 0.0}, WAYS, MOVES)
+    figure = chart(NUMBERS | {"unseen": 0.0}, WAYS, SHOWN_MOVES)
     texts = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
     assert "cube not seen" not in texts
 
@@ -58,7 +58,7 @@ def corners(words):
 
 
 def test_the_element_has_the_same_corners_turned_upwards():
-    root = ElementTree.fromstring(svg(NUMBERS, WAYS, MOVES))
+    root = ElementTree.fromstring(svg(NUMBERS, WAYS, SHOWN_MOVES))
     paths = [p for p in root.iter("path") if p.get("fill-rule")]
     assert [p.get("fill") for p in paths] == ["#d62728", "#2ca02c", "url(#unseen)"]
     assert corners(paths[0].get("d")).tolist() == [[3, -2], [3, -4], [-1, -4], [-1, -2]]
@@ -82,7 +82,7 @@ def test_round_numbers(most, ticks):
 
 def test_marks_and_scale_of_the_element_by_the_centimetre():
     """A unit is a 60th of 3 + 4 metres."""
-    text = svg(NUMBERS, WAYS, MOVES)
+    text = svg(NUMBERS, WAYS, SHOWN_MOVES)
     root = ElementTree.fromstring(text)
     unit = 7 / 60
     box = (-3 - 3 * unit, -4 - unit, 6 + 4 * unit, 4 + 5.5 * unit)
@@ -104,7 +104,7 @@ def test_marks_and_scale_of_the_element_by_the_centimetre():
 
 
 def test_the_charts_outlines_are_closed_and_its_size_follows_the_window():
-    figure = chart(NUMBERS, WAYS, MOVES)
+    figure = chart(NUMBERS, WAYS, SHOWN_MOVES)
     assert figure.get_size_inches() == pytest.approx([9.0, 1.6 + 0.88 * 9.0 * 4 / 6])
     forward = next(p for p in figure.axes[0].patches if isinstance(p, PathPatch)).get_path()
     assert forward.codes.tolist() == [1, 2, 2, 2, 79]

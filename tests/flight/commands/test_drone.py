@@ -6,7 +6,7 @@ import torch
 from drone_rl.flight.commands.command import hold
 from drone_rl.flight.commands.drone import Drone
 from drone_rl.flight.commands.state import LandedState
-from drone_rl.sim.dynamics.goals import rotor_goals
+from drone_rl.sim.dynamics.control import rotor_goals
 
 GROUND = torch.tensor([1.0, 2.0, 0.3], dtype=torch.float64)
 

@@ -1,64 +1,59 @@
-import math
-
 import pytest
 import torch
 
 from drone_rl.flight.commands import path_following as of
 
 
-def test_the_courses_are_what_they_are_called():
-    courses = of.courses()
-    assert len(courses) >= 5
-    assert courses["square"].length == 40.0
-    assert courses["straight"].length == 100.0
-    assert courses["zigzag"].length == pytest.approx(6 * math.sqrt(50))
-    assert courses["staircase"].length == 24.0
-    around = math.hypot(2 * 2 * math.pi * 5, 10)
-    assert courses["helix"].length == pytest.approx(around, rel=0.01)
-    eight = courses["figure_eight"].points
-    assert eight[[0, 32, 64]].abs().max() < 1e-12
-    assert eight[16].tolist() == pytest.approx([10, 0, 0])
+def rows(*values):
+    return torch.tensor(values, dtype=torch.float64)
 
 
-def test_a_short_way_is_followed():
-    course = of.Course(torch.tensor([[0.0, 0, 0], [3, 0, 0], [3, 3, 0]]).double(), 1.0)
-    followed = of.path_following({"corner": course})["corner"]
-    assert (followed.length, followed.speed) == (6.0, 1.0)
-    assert 0.0 < followed.mean < followed.greatest < 0.6
-    assert 6.0 < followed.seconds < 12.0
+CORNER = rows([[0, 0, 1], [4, 0, 1], [4, 3, 1]], [[0, 0, 0], [0, 0, 2], [0, 0, 2]])
+"""Four metres ahead and three to the left; two metres up, the end of which is repeated."""
 
 
-def test_the_square_meets_its_target():
-    square = of.path_following({"square": of.courses()["square"]})["square"]
-    assert square.mean <= 0.5
-    assert math.isfinite(square.seconds)
+@pytest.fixture
+def paths():
+    return of.make_paths(CORNER)
 
 
-def test_courses_point_by_point():
-    assert of.square(2.0).tolist() == [[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0], [0, 0, 0]]
-    assert of.zigzag(3, 5.0, 4.0).tolist() == [[0, 0, 0], [5, 4, 0], [10, 0, 0], [15, 4, 0]]
-    assert of.staircase(2, 3.0).tolist() == [[0, 0, 0], [3, 0, 0], [3, 0, 3], [6, 0, 3], [6, 0, 6]]
-    turns = of.helix(2.0, 8.0, turns=1, points=4)
-    expected = [[0, 0, 0], [2, 2, 2], [0, 4, 4], [-2, 2, 6], [0, 0, 8]]
-    torch.testing.assert_close(turns, torch.tensor(expected).double(), atol=1e-6, rtol=0)
-    eight = of.figure_eight(4.0, points=8)
-    half = math.sqrt(0.5)
-    expected = [[0, 0, 0], [2 * half, 1, 0], [2, 0, 0], [2 * half, -1, 0], [0, 0, 0]]
-    torch.testing.assert_close(eight[:5], torch.tensor(expected).double(), atol=1e-6, rtol=0)
-    speeds = {name: course.speed for name, course in of.courses().items()}
-    assert speeds == {"square": 2, "figure_eight": 2, "helix": 2, "zigzag": 2, "straight": 5,
-                      "staircase": 1}  # fmt: skip
+def test_lengths_and_directions(paths):
+    assert paths.along.tolist() == [[0, 4, 7], [0, 2, 2]]
+    assert paths.lengths.tolist() == [7, 2]
+    assert paths.directions.tolist() == [[[1, 0, 0], [0, 1, 0]], [[0, 0, 1], [0, 0, 0]]]
+    assert paths.ends.tolist() == [[4, 3, 1], [0, 0, 2]]
 
 
-def test_a_course_may_take_three_times_as_long_as_it_should_and_20_s(monkeypatch):
-    class EnoughError(Exception):
-        pass
+def test_places_along(paths):
+    assert of.place_at(paths, rows(5, 1.5)).tolist() == [[4, 1, 1], [0, 0, 1.5]]
+    assert of.place_at(paths, rows(0, 9)).tolist() == [[0, 0, 1], [0, 0, 2]]
+    assert of.place_at(paths, rows(99, 2)).tolist() == [[4, 3, 1], [0, 0, 2]]
 
-    def fly(quadrotor, body, command, seconds):
-        raise EnoughError(seconds, command.limit)
 
-    monkeypatch.setattr(of, "fly_command", fly)
-    way = torch.tensor([[0.0, 0, 0], [6, 0, 0]]).double()
-    with pytest.raises(EnoughError) as found:
-        of.path_following({"fast": of.Course(way, 4.0), "slow": of.Course(way, 0.8)})
-    assert found.value.args == (3 * 6 / 0.8 + 20, 3 * 6 / 0.8 + 20)
+def test_of_a_corner_the_later_direction_counts(paths):
+    assert of.direction_at(paths, rows(4, 0)).tolist() == [[0, 1, 0], [0, 0, 1]]
+    assert of.direction_at(paths, rows(3.9, 1)).tolist() == [[1, 0, 0], [0, 0, 1]]
+
+
+def test_the_nearest_place_of_a_part(paths):
+    position = rows([3.5, 2, 1], [1, 1, 1.25])
+    whole = of.nearest(paths, position, rows(0, 0), paths.lengths)
+    assert whole.tolist() == [6, 1.25]
+    part = of.nearest(paths, position, rows(0, 1.5), rows(3, 2))
+    assert part.tolist() == [3, 1.5]
+    point = of.nearest(paths, position, rows(5, 2), rows(5, 2))
+    assert point.tolist() == [5, 2]
+
+
+def test_the_nearest_place_is_never_outside_the_part(paths):
+    """The corner, 4 m along, is nearer than all of the part from 5 m to 6 m."""
+    position = rows([4, 0.1, 1], [0, 0, 0])
+    assert of.nearest(paths, position, rows(5, 1), rows(6, 2)).tolist() == [5, 1]
+
+
+def test_a_part_keeps_to_one_way_through_a_crossing():
+    """There and back again: the same place is 2 m and 8 m along."""
+    paths = of.make_paths(rows([[0, 0, 0], [5, 0, 0], [0, 0, 0]]))
+    position = rows([2, 0.1, 0])
+    assert of.nearest(paths, position, rows(1), rows(4)).tolist() == [2]
+    assert of.nearest(paths, position, rows(6), rows(9)).tolist() == [8]

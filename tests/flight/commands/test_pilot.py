@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from drone_rl.config import CameraSettings, DynamicsSettings, PillarsSettings
-from drone_rl.flight.commands.errors import PilotError
+from drone_rl.flight.commands.command import PilotError
 from drone_rl.flight.commands.pilot import Pilot
 from drone_rl.sim.image_types import ImageRequest, ImageType
 from drone_rl.sim.worlds import Worlds
@@ -82,7 +82,7 @@ def test_what_stands_in_its_worlds_is_in_the_way():
 
 
 def test_without_worlds_there_is_nothing_to_see(flying):
-    with pytest.raises(PilotError, match="picture: there is nothing to see; give worlds"):
+    with pytest.raises(PilotError, match="picture: there is nothing to render; give worlds"):
         flying.picture()
-    with pytest.raises(PilotError, match="images: there is nothing to see; give worlds"):
+    with pytest.raises(PilotError, match="images: there is nothing to render; give worlds"):
         flying.images([ImageRequest()])

@@ -11,7 +11,7 @@ from drone_rl.flight.commands.state import (
     collision_of,
     triple,
 )
-from drone_rl.sim.dynamics.flight_state import DEPTH, GROUND, NORMAL, THING
+from drone_rl.sim.dynamics.state import DEPTH, GROUND, NORMAL, THING
 
 HALF = math.sqrt(0.5)
 

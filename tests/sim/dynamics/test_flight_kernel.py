@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from drone_rl.sim.dynamics import FlightState, Mode
-from drone_rl.sim.dynamics.flight_state import NUMBERS
+from drone_rl.sim.dynamics.state import NUMBERS
 from drone_rl.sim.rendering.devices import WorkerPool
 from tests.flying import ANGLES, PLACES, SPEEDS, falling, numbers, quadrotor, still, told
 

@@ -6,9 +6,15 @@ import warp as wp
 
 from drone_rl.config import DynamicsSettings
 from drone_rl.sim.dynamics import Quadrotor
-from drone_rl.sim.dynamics.body import heading_only
-from drone_rl.sim.dynamics.fleet import FlyingFleet
-from drone_rl.sim.dynamics.moves_kernel import Fleet, camera_attitude, fly_move, is_flying, is_lost
+from drone_rl.sim.dynamics.moves_kernel import (
+    Fleet,
+    FlyingFleet,
+    camera_attitude,
+    fly_move,
+    is_flying,
+    is_lost,
+)
+from drone_rl.sim.dynamics.state import heading_only
 from drone_rl.sim.rendering.devices import start_warp
 
 start_warp("cpu")

@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from drone_rl.config.sensors import ImuSettings
-from drone_rl.sim.dynamics.body import BodyState
+from drone_rl.sim.dynamics.state import BodyState
 from drone_rl.sim.rendering.appearance import turned
 from drone_rl.sim.sensors.inertial import Imu, specific_force
 

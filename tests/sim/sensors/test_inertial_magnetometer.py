@@ -2,7 +2,7 @@ import pytest
 import torch
 
 from drone_rl.config.sensors import MagnetometerSettings
-from drone_rl.sim.dynamics.body import BodyState
+from drone_rl.sim.dynamics.state import BodyState
 from drone_rl.sim.rendering.appearance import turned
 from drone_rl.sim.sensors.inertial import Magnetometer, dipole_field
 

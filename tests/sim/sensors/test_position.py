@@ -5,8 +5,8 @@ import pytest
 import torch
 
 from drone_rl.config.sensors import GpsSettings
-from drone_rl.sim.dynamics.body import BodyState
-from drone_rl.sim.geodesy import HOME, world_from_geo
+from drone_rl.sim.coordinates import HOME, world_from_geo
+from drone_rl.sim.dynamics.state import BodyState
 from drone_rl.sim.sensors.position import Fix, Gps
 
 TICK = 0.003

@@ -5,8 +5,7 @@ import pytest
 import torch
 
 from drone_rl.config.sensors import GpsSettings, SensorSettings
-from drone_rl.sim.dynamics.body import BodyState
-from drone_rl.sim.dynamics.flight_state import GROUND, THING, TIME, FlightState
+from drone_rl.sim.dynamics.state import GROUND, THING, TIME, BodyState, FlightState
 from drone_rl.sim.sensors import SensorSuite
 from drone_rl.utils.errors import InputError
 

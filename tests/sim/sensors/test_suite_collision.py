@@ -1,6 +1,6 @@
 import torch
 
-from drone_rl.sim.dynamics.flight_state import GROUND, NOTHING, Contact
+from drone_rl.sim.dynamics.state import GROUND, NOTHING, Contact
 from drone_rl.sim.sensors import suite
 
 

@@ -1,5 +1,8 @@
 """A second task fits wherever cube collection does."""
 
+import dataclasses
+
+import pytest
 import torch
 from torchrl.envs.utils import check_env_specs
 
@@ -8,8 +11,9 @@ from drone_rl.envs import DroneEnv
 from drone_rl.envs.composer_env import ComposerEnv
 from drone_rl.sim.composer_task import make_environment
 from drone_rl.sim.rendering.scene import SemanticClass
-from drone_rl.sim.tasks import CollectCubes, as_task
+from drone_rl.sim.tasks import CollectCubes, EndReason, Task, as_task
 from drone_rl.sim.worlds import Worlds
+from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import world_random_state
 from tests.second_task import End, Posts
 
@@ -71,3 +75,32 @@ def test_torchrl_sees_what_it_tells():
     assert waiting["next", "truncated"][:, -1].all() and waiting.shape[1] == 12
     env.close()
     check_env_specs(ComposerEnv(make_environment(Posts(), pixels=False, random_state=0)))
+
+
+class Minimal(Task):
+    name = "minimal"
+
+    def draw(self, random_state):
+        return torch.from_numpy(random_state.uniform(size=2))
+
+    def judge(self, state, body):
+        end = (body.position[:, 0] > state.drawn[:, 0]).long() * EndReason.SUCCESS
+        steps = state.steps + 1
+        return dataclasses.replace(state, body=body, steps=steps, end_reason=end), end.double()
+
+
+def test_all_but_the_name_the_draw_and_the_rules_has_a_default():
+    env = DroneEnv(3, Minimal(), pixels=False)
+    check_env_specs(env)
+    step = env.rollout(5, policy=lambda td: td.set("action", torch.zeros(3).long()))
+    info = step["next", "info"]
+    assert step.shape[1] == 1 and step["next", "terminated"].all()
+    task = Minimal()
+    goals = task.score({name: info[name][:, 0] for name in task.scored})
+    assert goals.reached.all() and goals.world.shape == (3, 2)
+    (by, value, of) = next(iter(task.classes(goals)))
+    assert (by, value) == ("side", "anywhere") and of.all()
+    assert task.vocabulary.goals == "goals" and task.fused_rules(task.make_dynamics(), 3) is None
+    with pytest.raises(InputError, match="task=minimal cannot be explained; define next_target in"):
+        task.next_target(env.worlds.state)
+    env.close()

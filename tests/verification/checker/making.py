@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 
 import drone_rl
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.verification.checker import fingerprint
 from drone_rl.verification.checker.rollouts import Simulator
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.checker import certificate as module
 from drone_rl.verification.checker.certificate import parse_certificate, read_certificate

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 import drone_rl
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.verification.checker import check_certificate
 from drone_rl.verification.checker.certificate import Outcome, parse_certificate
 from drone_rl.verification.checker.checker import Contradiction, Findings, ends_as_stated

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.verification.checker.certificate import Outcome
 from drone_rl.verification.checker.consistency import find_wrong_tallies
 

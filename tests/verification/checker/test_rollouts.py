@@ -6,7 +6,7 @@ import torch
 
 import drone_rl
 from drone_rl.evaluation.rollouts import run_episodes
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.verification.checker.rollouts import Flown, Simulator
 
 

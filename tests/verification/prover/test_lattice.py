@@ -8,8 +8,8 @@ import torch
 
 from drone_rl.config import TaskSettings
 from drone_rl.sim.dynamics import ComputerVision
-from drone_rl.sim.tasks.collect_cubes import rules
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.sim.tasks import CollectCubes
+from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.prover.boxes import volumes, whole
 from drone_rl.verification.prover.lattice import AHEAD, LEFT, RIGHT, Ending, Lattice, Place
@@ -90,12 +90,12 @@ def test_random_walks_end_as_the_simulator_has_it():
     for _ in range(100):
         y = random.uniform(-6, 6, 2)
         cubes = torch.tensor([[[15.0, y[0], 2.5], [24.0, y[1], 2.5]]], dtype=torch.float64)
-        state, place = rules.start(TASK, cubes), Place(0, 0)
+        state, place = CollectCubes(TASK).start(cubes), Place(0, 0)
         dynamics = ComputerVision(TASK.step_length)
         while True:
             action = int(random.choice([AHEAD, AHEAD, AHEAD, LEFT, RIGHT]))
             body = dynamics.step(state.body, torch.tensor([action]))
-            state, _ = rules.judge(TASK, state, body)
+            state, _ = CollectCubes(TASK).judge(state, body)
             boxes = np.stack([y, np.nextafter(y, 9)], -1)[None]
             ((place, _),) = moves(place, action, boxes, lattice).items()
             collected = sum(int(c) << k for k, c in enumerate(state.collected[0]))

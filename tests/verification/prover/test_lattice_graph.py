@@ -8,7 +8,7 @@ import torch
 
 from drone_rl.config import TaskSettings
 from drone_rl.sim.dynamics import ComputerVision
-from drone_rl.sim.tasks.collect_cubes import rules
+from drone_rl.sim.tasks import CollectCubes
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.prover.lattice import Nodes, explore, shape_of
 
@@ -43,11 +43,11 @@ TASKS = [
 def test_random_walks_go_as_the_rules_have_it(settings):
     random = np.random.RandomState(0)
     walks = 24
-    cubes = torch.stack([rules.draw_cubes(settings, random) for _ in range(walks)])
+    cubes = torch.stack([CollectCubes(settings).draw(random) for _ in range(walks)])
     graph = explore(settings, cubes)
     every = graph.states()
     dynamics = ComputerVision(settings.step_length)
-    state, node = rules.start(settings, cubes), torch.arange(walks)
+    state, node = CollectCubes(settings).start(cubes), torch.arange(walks)
     ends = torch.zeros(5)
     bit = torch.arange(settings.num_cubes)
     for _ in range(settings.step_limit - 1):
@@ -56,7 +56,7 @@ def test_random_walks_go_as_the_rules_have_it(settings):
         for name in ("cubes", "collected", "passed", "next_cube", "end_reason"):
             assert torch.equal(getattr(shown, name), getattr(state, name)), name
         action = torch.from_numpy(random.choice(3, len(state), p=[0.4, 0.35, 0.25]))
-        state, _ = rules.judge(settings, state, dynamics.step(state.body, action))
+        state, _ = CollectCubes(settings).judge(state, dynamics.step(state.body, action))
         assert torch.equal(graph.reason[node, action], state.end_reason)
         collected = (graph.collected[node, action][:, None] >> bit & 1).bool()
         assert torch.equal(collected, state.collected)

@@ -14,7 +14,7 @@ from drone_rl.evaluation.metrics import summarise
 from drone_rl.evaluation.rollouts import run_episodes
 from drone_rl.policies import make_actor
 from drone_rl.policies.zoo import parse, policy_path, read_policy
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.verification.prover import markov_chain
 from drone_rl.verification.prover.lattice import explore
 from drone_rl.verification.prover.markov_chain import NEGLIGIBLE, Outcomes, Sight, follow_chances

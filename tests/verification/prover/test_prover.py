@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import drone_rl
-from drone_rl.sim.tasks.collect_cubes.rules import EndReason
+from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.verification.prover.boxes import volumes
 from drone_rl.verification.prover.policy_spec import make_subject
 from drone_rl.verification.prover.prover import Prover

@@ -1,0 +1,1 @@
+"""Betaflight's firmware in the loop: build it, run it, exchange packets with it."""

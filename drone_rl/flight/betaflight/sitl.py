@@ -1,0 +1,302 @@
+"""Software in the loop: Betaflight's firmware in lockstep with the simulation.
+
+`python -m drone_rl.flight.betaflight.sitl` flies a trial flight. The firmware is a process in its
+own folder and, if the system allows it, its own network namespace; it ends with the `Betaflight`
+that started it.
+
+The firmware makes one step of its controllers, of 1 ms, for each state that it receives. It
+measures everything else, such as stick speeds, by the wall clock: if its clock followed simulated
+time, firmware and simulation would wait for each other, slower and slower.
+"""
+
+import contextlib
+import json
+import socket
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+import torch
+
+from drone_rl.config import DynamicsSettings
+from drone_rl.config.dynamics import GRAVITY
+from drone_rl.flight.betaflight.build import find_firmware
+from drone_rl.flight.betaflight.packets import (
+    CLI_PORT,
+    RC_PORT,
+    ROTOR_PORT,
+    STATE_PORT,
+    pack_state,
+    pack_sticks,
+    setup_lines,
+    unpack_rotors,
+)
+from drone_rl.flight.betaflight.process import FirmwareProcess
+from drone_rl.flight.in_the_loop.control import FULL_ANGLE, FULL_YAW_RATE, RcSticks
+from drone_rl.flight.in_the_loop.drone import TICK, DroneInTheLoop, FlightControllerError
+from drone_rl.flight.in_the_loop.instruments import Readings, Vector
+from drone_rl.flight.in_the_loop.trial_flight import fly_course
+from drone_rl.sim.dynamics import FlightState, Quadrotor
+from drone_rl.sim.dynamics.state import LEVEL
+from drone_rl.utils.errors import InputError
+
+MEMORY = "eeprom.bin"
+"""The file in which the firmware stores its settings."""
+STICKS_EVERY = 0.01
+"""Simulated seconds between RC packets."""
+STARTS = 3
+"""Greatest number of attempts to start the firmware."""
+_AWAKE = 10
+"""Consecutive answers after which a firmware counts as running."""
+_WAKES_WITHIN = 0.05
+_STANDING = Readings(
+    time=0.0,
+    position=np.zeros(3),
+    velocity=np.zeros(3),
+    attitude=np.array(LEVEL),
+    rates=np.zeros(3),
+    force=np.array([0.0, 0.0, GRAVITY]),
+)
+_PROMPT = b"\n# "
+
+
+class Betaflight:
+    """One running firmware, as a context manager."""
+
+    def __init__(
+        self,
+        program: Sequence[str],
+        folder: Path,
+        *,
+        isolated: bool = True,
+        patience: float = 10.0,
+        answer_within: float = 0.02,
+    ) -> None:
+        """Configure the firmware; it starts in `__enter__`.
+
+        Args:
+            program: The firmware and its arguments.
+            folder: Folder of its settings and log; created if missing. Settings in it are used,
+                else the firmware is set up.
+            isolated: See `FirmwareProcess`.
+            patience: Seconds of silence after which the firmware counts as dead; half of them while
+                it starts.
+            answer_within: Seconds to wait for the answer to one state; then the rotors keep their
+                commands.
+        """
+        self.program = list(program)
+        self.folder = folder
+        self.isolated = isolated
+        self.patience = patience
+        self.answer_within = answer_within
+        self.steps = 0
+        """States sent."""
+        self.missed = 0
+        """States that were not answered in time."""
+        self._rotors = np.zeros(4)
+        self._next_sticks = -np.inf
+        self._heard = 0.0
+        self._open = contextlib.ExitStack()
+
+    @property
+    def log(self) -> Path:
+        """The firmware's log file."""
+        return self.folder / "firmware.log"
+
+    def __enter__(self) -> Self:
+        """Start the firmware; set it up first if the folder has no settings.
+
+        Raises:
+            InputError: See `FirmwareProcess`.
+            FlightControllerError: It can't be started or set up.
+        """
+        self.folder.mkdir(parents=True, exist_ok=True)
+        with contextlib.ExitStack() as stack:
+            self._process = stack.enter_context(FirmwareProcess(isolated=self.isolated))
+            if not (self.folder / MEMORY).exists():
+                self._set_up()
+            self._hear = stack.enter_context(self._process.connect("bound", ROTOR_PORT))
+            self._state = stack.enter_context(self._process.connect("udp", STATE_PORT))
+            self._sticks = stack.enter_context(self._process.connect("udp", RC_PORT))
+            self._start()
+            self._open = stack.pop_all()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Stop the firmware."""
+        self._open.close()
+
+    def step(self, readings: Readings, sticks: RcSticks) -> Vector:
+        """Send a state and return the rotor commands.
+
+        Args:
+            readings: Measurements.
+            sticks: Stick positions.
+
+        Returns:
+            Front right, rear left, front left, rear right, 0 to 1. Shape: (4,).
+
+        Raises:
+            FlightControllerError: The firmware has ended, or has been silent for too long.
+        """
+        if readings.time >= self._next_sticks:
+            self._next_sticks = readings.time + STICKS_EVERY
+            self._send(self._sticks, pack_sticks(readings.time, sticks.channels))
+        self._drop_late_answers()
+        self._send(self._state, pack_state(readings, 0.0))
+        self.steps += 1
+        try:
+            self._rotors = unpack_rotors(self._hear.recv(64))
+            self._heard = time.monotonic()
+        except TimeoutError:
+            self.missed += 1
+            if time.monotonic() - self._heard > self.patience:
+                raise self._failure() from None
+        return self._rotors
+
+    def _failure(self) -> FlightControllerError:
+        status = self._process.status()
+        what = f"has been silent for {self.patience:g} s"
+        if status is not None:
+            what = f"ended with status {status}"
+        return FlightControllerError(f"the firmware {what}; see its log {self.log}")
+
+    def _send(self, sock: socket.socket, packet: bytes) -> None:
+        with contextlib.suppress(ConnectionRefusedError):  # not running yet, or dead: see step
+            sock.send(packet)
+
+    def _drop_late_answers(self) -> None:
+        self._hear.setblocking(False)
+        with contextlib.suppress(BlockingIOError):
+            while True:
+                self._hear.recv(64)
+        self._hear.settimeout(self.answer_within)
+
+    def _start(self) -> None:
+        """Start the firmware and wait until it steps.
+
+        Its threads share a clock without a lock, so that it sometimes hangs while starting; then it
+        is started again.
+        """
+        for _ in range(STARTS):
+            self._process.start(self.program, self.folder, self.log)
+            end = time.monotonic() + self.patience / 2
+            while time.monotonic() < end:
+                if self._answers(_STANDING):
+                    self._heard = time.monotonic()
+                    return
+        raise self._failure()
+
+    def _answers(self, readings: Readings) -> bool:
+        """Return whether it answers several states in a row."""
+        for _ in range(_AWAKE):
+            self._drop_late_answers()
+            self._send(self._state, pack_state(readings, 0.0))
+            self._hear.settimeout(_WAKES_WITHIN)  # packets before it listens are lost
+            try:
+                self._hear.recv(64)
+            except TimeoutError:
+                return False
+        return True
+
+    def _set_up(self) -> None:
+        """Set up a new firmware by its command line."""
+        self._process.start(self.program, self.folder, self.log)
+        angle = round(float(np.degrees(FULL_ANGLE)))
+        yaw = round(float(np.degrees(FULL_YAW_RATE)) / 10.0)
+        try:
+            with self._process.connect_within("tcp", CLI_PORT, self.patience) as cli:
+                cli.settimeout(self.patience)
+                _command(cli, b"#")
+                for line in setup_lines(angle, yaw):
+                    _command(cli, line.encode() + b"\n")
+                cli.sendall(b"save\n")
+                self._wait_for_end()
+        except (OSError, FlightControllerError) as error:
+            (self.folder / MEMORY).unlink(missing_ok=True)  # partial settings must not be reused
+            raise FlightControllerError(f"the firmware can't be set up: {error}") from error
+
+    def _wait_for_end(self) -> None:
+        """Wait for the firmware to exit, as it does after saving."""
+        end = time.monotonic() + self.patience
+        while self._process.status() is None:
+            if time.monotonic() > end:
+                raise FlightControllerError("it doesn't exit after `save`")
+            time.sleep(0.02)
+
+
+def _command(cli: socket.socket, line: bytes) -> bytes:
+    """Send a command line and return the answer up to the next prompt.
+
+    Raises:
+        FlightControllerError: The firmware rejects the command.
+    """
+    cli.sendall(line)
+    answer = b""
+    while not answer.endswith(_PROMPT):
+        part = cli.recv(4096)
+        if not part:
+            raise FlightControllerError(f"its command line closed after {line.decode().strip()!r}")
+        answer += part
+    if b"ERROR" in answer or b"INVALID" in answer.upper():
+        words = answer.decode(errors="replace").strip("# \r\n").replace("\r\n", " ")
+        raise FlightControllerError(f"its command line refuses {line.decode().strip()!r}: {words}")
+    return answer
+
+
+@contextlib.contextmanager
+def betaflight_drone(
+    settings: DynamicsSettings | None = None,
+    *,
+    firmware: str | Path | None = None,
+    folder: str | Path | None = None,
+    isolated: bool = True,
+) -> Iterator[DroneInTheLoop[FlightState]]:
+    """Yield a disarmed drone at the world's origin; the firmware ends with the block.
+
+    Args:
+        settings: Vehicle, wind, and gains of the outer loops; AirSim's by default. The tick is
+            replaced by the firmware's.
+        firmware: See `find_firmware`.
+        folder: Folder of the firmware's settings; a temporary one by default.
+        isolated: See `drone_rl.flight.betaflight.process.FirmwareProcess`.
+
+    Raises:
+        InputError: No firmware was built, or a port is in use.
+        FlightControllerError: The firmware can't be started.
+    """
+    program = find_firmware(firmware)
+    chosen = (settings or DynamicsSettings()).replace(mode="simple_flight", tick=TICK)
+    physics = Quadrotor(chosen)
+    place = torch.tensor([[0.0, 0.0, chosen.radius]], dtype=torch.float64)
+    body = FlightState.at_rest(place)
+    physics.push(body, torch.zeros(1, 4, dtype=torch.float64), 1)  # load its kernels now
+    with contextlib.ExitStack() as stack:
+        if folder is None:
+            folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="betaflight-"))
+        controller = Betaflight([str(program)], Path(folder), isolated=isolated)
+        yield DroneInTheLoop(physics, body, stack.enter_context(controller), chosen)
+
+
+def main() -> None:
+    """Fly a trial flight and print its results as JSON."""
+    try:
+        with betaflight_drone() as drone:
+            report = fly_course(drone)
+    except (InputError, FlightControllerError) as error:
+        sys.exit(f"error: {error}")
+    sys.stdout.write(json.dumps(report.values(), indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""A simulated drone flown by an external flight controller (software or hardware in the loop)."""

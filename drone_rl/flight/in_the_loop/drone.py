@@ -1,0 +1,216 @@
+"""A simulated drone flown by an external flight controller, in lockstep."""
+
+import dataclasses
+import time
+from collections.abc import Callable
+from typing import Generic, Protocol, TypeVar
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from drone_rl.config import DynamicsSettings
+from drone_rl.flight.in_the_loop.control import (
+    AT_REST,
+    ClimbState,
+    RcSticks,
+    Setpoint,
+    sticks_for,
+)
+from drone_rl.flight.in_the_loop.instruments import Readings, Vector, measure
+from drone_rl.sim.coordinates import HOME, GeoPoint
+from drone_rl.sim.dynamics import BodyState
+
+TICK = 0.001
+"""Physics time step for Betaflight, seconds; the firmware runs at 1 kHz."""
+SETPOINT_PERIOD = 0.02
+"""Default period of setpoints, seconds."""
+STICKS_TICKS = 10
+"""Ticks between stick updates."""
+LONGEST_DECISION = 0.2
+"""Wall-clock seconds after which the firmware's failsafe would take over from a silent pilot."""
+
+
+class FlightControllerError(RuntimeError):
+    """A flight controller stopped, fell silent or refused a command."""
+
+
+class NotReadyError(FlightControllerError):
+    """A flight controller did not bring the drone to the start of an episode."""
+
+
+B = TypeVar("B", bound=BodyState)
+
+
+class Physics(Protocol[B]):
+    """Vehicle dynamics under rotor commands, such as `Quadrotor`."""
+
+    def push(self, body: B, rotors: Tensor, ticks: int) -> B:
+        """Return the state some ticks later. Shape of rotors: (1, 4)."""
+        ...
+
+
+class Controller(Protocol):
+    """A flight controller, such as `Betaflight`."""
+
+    def step(self, readings: Readings, sticks: RcSticks) -> Vector:
+        """Return thrust fractions: front right, rear left, front left, rear right."""
+        ...
+
+
+Guidance = Callable[[B, Readings], Setpoint]
+"""Returns the next setpoint, from the drone's state and measurements: a policy or a path."""
+
+
+@dataclasses.dataclass(frozen=True)
+class TraceSample:
+    """State of a flight at one setpoint."""
+
+    time: float
+    """Seconds."""
+    position: Vector
+    """Metres, world frame. Shape: (3,)."""
+    velocity: Vector
+    """Metres per second, world frame. Shape: (3,)."""
+    rotors: Vector
+    """Rotor commands. Shape: (4,)."""
+
+
+class DroneInTheLoop(Generic[B]):
+    """One simulated drone with an external flight controller."""
+
+    def __init__(
+        self,
+        physics: Physics[B],
+        body: B,
+        controller: Controller,
+        settings: DynamicsSettings,
+        home: GeoPoint = HOME,
+    ) -> None:
+        """Create the drone.
+
+        Args:
+            physics: Vehicle dynamics with a time step of `settings.tick` seconds.
+            body: State of one drone, at rest.
+            controller: The flight controller.
+            settings: Vehicle, and gains of the outer loops. Betaflight needs `tick=TICK`.
+            home: The world's origin on Earth.
+        """
+        self.physics = physics
+        self.body = body
+        self.controller = controller
+        self.settings = settings
+        self.home = home
+        self.readings = measure(body, body, settings.tick, 0.0, home)
+        self.rotors: Vector = np.zeros(4)
+        self.trace: list[TraceSample] = []
+        """One sample a setpoint."""
+        self._ticks = 0
+        self._climb = ClimbState()
+
+    @property
+    def time(self) -> float:
+        """Simulated seconds."""
+        return self._ticks * self.settings.tick
+
+    def tick(self, sticks: RcSticks) -> None:
+        """Step the controller and the physics once.
+
+        Raises:
+            FlightControllerError: The simulation has diverged, or the controller failed.
+        """
+        self.rotors = self.controller.step(self.readings, sticks)
+        before = self.body
+        self.body = self.physics.push(before, torch.from_numpy(self.rotors)[None], 1)
+        self._ticks += 1
+        self.readings = measure(before, self.body, self.settings.tick, self.time, self.home)
+        if bool(self.body.is_lost[0]) or not np.isfinite(self.readings.position).all():
+            raise FlightControllerError(f"the drone's motion diverged after {self.time:.3g} s")
+
+    def hold(self, sticks: RcSticks, seconds: float) -> None:
+        """Advance with constant sticks."""
+        for _ in range(round(seconds / self.settings.tick)):
+            self.tick(sticks)
+
+    def arm(self, tries: int = 3, settle: float = 3.5, within: float = 1.0) -> None:
+        """Arm the firmware: throttle low, the switch first off, then on, until the rotors turn.
+
+        Args:
+            tries: Number of attempts.
+            settle: Seconds before the first, in which the firmware calibrates its sensors.
+            within: Seconds in which the rotors must turn.
+
+        Raises:
+            FlightControllerError: They don't.
+        """
+        self._climb = ClimbState()
+        self.hold(AT_REST, settle)
+        for _ in range(tries):
+            for _ in range(round(within / self.settings.tick)):
+                self.tick(dataclasses.replace(AT_REST, armed=True))
+                if self.rotors.min() > 0.0:
+                    return
+            self.hold(AT_REST, 0.5)
+        raise FlightControllerError(
+            f"the firmware refuses to arm: no rotor turned in {tries} attempts"
+        )
+
+    def disarm(self, seconds: float = 0.5) -> None:
+        """Hold the throttle low and the switch off for a while."""
+        self.hold(AT_REST, seconds)
+
+    def fly(
+        self,
+        guidance: Guidance[B],
+        seconds: float,
+        *,
+        every: float = SETPOINT_PERIOD,
+        until: Callable[[Readings], bool] = lambda readings: False,
+    ) -> bool:
+        """Fly by setpoints.
+
+        Args:
+            guidance: Returns the setpoint; called at once and then periodically.
+            seconds: Greatest duration.
+            every: Setpoint period, seconds.
+            until: Ends the flight if it returns True; called before each setpoint.
+
+        Returns:
+            Whether `until` ended the flight.
+
+        Raises:
+            FlightControllerError: See `tick`; or `guidance` took longer than the firmware's
+                failsafe allows.
+        """
+        tick, between = self.settings.tick, max(1, round(every / self.settings.tick))
+        setpoint, sticks = Setpoint((0.0, 0.0, 0.0)), AT_REST
+        for count in range(round(seconds / tick)):
+            if count % between == 0:
+                if until(self.readings):
+                    return True
+                setpoint = self._timed(guidance)
+                r = self.readings
+                self.trace.append(TraceSample(r.time, r.position, r.velocity, self.rotors))
+            if count % STICKS_TICKS == 0:
+                sticks = self._move_sticks(setpoint)
+            self.tick(sticks)
+        return until(self.readings)
+
+    def _move_sticks(self, setpoint: Setpoint) -> RcSticks:
+        seconds = STICKS_TICKS * self.settings.tick
+        sticks, self._climb = sticks_for(
+            setpoint, self.readings, self._climb, seconds, self.settings
+        )
+        return sticks
+
+    def _timed(self, guidance: Guidance[B]) -> Setpoint:
+        """Return the setpoint; raise if that took too long."""
+        begin = time.monotonic()
+        setpoint = guidance(self.body, self.readings)
+        seconds = time.monotonic() - begin
+        if seconds > LONGEST_DECISION:
+            raise FlightControllerError(
+                f"the setpoint took {seconds:.2f} s, more than {LONGEST_DECISION:g} s; "
+                "call the function once before the flight, to compile its kernels"
+            )
+        return setpoint

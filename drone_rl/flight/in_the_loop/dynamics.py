@@ -1,0 +1,153 @@
+"""A drone in the loop as the dynamics of a world, so that policies can fly it."""
+
+import time
+
+import numpy as np
+from torch import Tensor
+
+from drone_rl.config import ActionSettings, DynamicsSettings
+from drone_rl.flight.in_the_loop.control import Setpoint, reference_after, setpoint_of
+from drone_rl.flight.in_the_loop.drone import (
+    LONGEST_DECISION,
+    STICKS_TICKS,
+    DroneInTheLoop,
+    FlightControllerError,
+    NotReadyError,
+)
+from drone_rl.flight.in_the_loop.instruments import Readings
+from drone_rl.flight.in_the_loop.trial_flight import HoldPosition, take_off
+from drone_rl.sim.actions import Actions
+from drone_rl.sim.dynamics import BodyState, Dynamics, FlightState, Obstacles, Quadrotor
+from drone_rl.sim.dynamics.control import rotor_goals
+from drone_rl.sim.dynamics.state import SEED
+
+NEAR, SLOW = 0.1, 0.1
+"""Position error in metres, and speed in m/s, within which a drone hovers."""
+_ARM_TRIES = 6
+"""A firmware on a busy machine refuses the first attempts."""
+_HOVER_WITHIN = 15.0
+"""Seconds in which the drone must hover after take-off."""
+
+
+class InTheLoopDynamics(Dynamics):
+    """Dynamics of one world in which each step flies the drone in the loop for one action.
+
+    Unlike other dynamics it holds a drone that has one flight only: `start` chooses where the
+    episode begins, `begin` flies there, then each `step` continues.
+    """
+
+    def __init__(
+        self,
+        drone: DroneInTheLoop[FlightState],
+        settings: DynamicsSettings,
+        actions: ActionSettings | None = None,
+    ) -> None:
+        """Take a drone.
+
+        Args:
+            drone: A disarmed drone on the ground.
+            settings: Duration of an action and camera mount; the drone has its own vehicle.
+            actions: Action space; the three moves by default.
+        """
+        self.drone = drone
+        self.settings = settings
+        self._quadrotor = Quadrotor(settings, actions)
+        self._physics = _ObstaclePhysics(Quadrotor(drone.settings))
+        self._last = 0.0
+
+    @property
+    def actions(self) -> Actions:
+        """The action space."""
+        return self._quadrotor.actions
+
+    @property
+    def mount(self) -> str:
+        """See `DynamicsSettings.camera_mount`."""
+        return self.settings.camera_mount
+
+    @property
+    def is_random(self) -> bool:
+        """The same as without the loop, so that the same worlds are sampled."""
+        return self._quadrotor.is_random
+
+    @property
+    def needs_obstacles(self) -> bool:
+        """True: the vehicle collides with obstacles."""
+        return True
+
+    def start(self, position: Tensor, seeds: Tensor | None = None) -> FlightState:
+        """Return the start of an episode; the drone itself moves in `begin`."""
+        return self._quadrotor.start(position, seeds)
+
+    def begin(self, body: BodyState) -> None:
+        """Arm the drone, take off and hover where the episode begins.
+
+        Args:
+            body: State from `start`.
+
+        Raises:
+            NotReadyError: The drone doesn't arm, or doesn't hover there.
+        """
+        assert isinstance(body, FlightState)
+        drone, place = self.drone, body.position[0].numpy()
+        drone.physics = self._physics
+        drone.body.numbers[:, SEED.first] = body.numbers[:, SEED.first]
+
+        def hovers(readings: Readings) -> bool:
+            off = np.linalg.norm(readings.position - place)
+            return bool(off < NEAR and np.linalg.norm(readings.velocity) < SLOW)
+
+        try:
+            drone.arm(tries=_ARM_TRIES)
+            take_off(drone, place)
+        except FlightControllerError as error:
+            raise NotReadyError(str(error)) from error
+        if not drone.fly(HoldPosition(place, drone.settings), _HOVER_WITHIN, until=hovers):
+            raise NotReadyError(f"the drone doesn't hover {_HOVER_WITHIN:g} s after its take-off")
+        self._last = time.monotonic()
+
+    def step(
+        self, body: BodyState, action: Tensor, obstacles: Obstacles | None = None
+    ) -> FlightState:
+        """Fly for one action; see `Dynamics`.
+
+        Args:
+            body: State from `start` or the last step; only its reference pose is used.
+            action: Action of one world. Shape: (1, *).
+            obstacles: Obstacles to collide with.
+
+        Raises:
+            FlightControllerError: See `DroneInTheLoop.tick`; or the policy took too long.
+        """
+        assert isinstance(body, FlightState)
+        seconds = time.monotonic() - self._last
+        if seconds > LONGEST_DECISION:
+            raise FlightControllerError(
+                f"the policy took {seconds:.2f} s for an action, more than {LONGEST_DECISION:g} s; "
+                "fly it on a machine that is less busy"
+            )
+        drone, goals = self.drone, self._quadrotor.steering.goals(body, action)
+        begin = drone.time
+
+        def track(body: BodyState, readings: Readings) -> Setpoint:
+            del body
+            return setpoint_of(goals, readings.time - begin, readings, drone.settings)
+
+        self._physics.obstacles = obstacles
+        seconds, every = self.settings.control_timestep, STICKS_TICKS * drone.settings.tick
+        drone.fly(track, seconds, every=every)
+        self._last = time.monotonic()
+        after = FlightState(drone.body.numbers.clone())
+        after.reference[:] = reference_after(goals, seconds, after)
+        return after
+
+
+class _ObstaclePhysics:
+    """Vehicle dynamics under rotor commands, with obstacles."""
+
+    def __init__(self, quadrotor: Quadrotor) -> None:
+        self._quadrotor = quadrotor
+        self.obstacles: Obstacles | None = None
+
+    def push(self, body: FlightState, rotors: Tensor, ticks: int) -> FlightState:
+        return self._quadrotor.fly(body, rotor_goals(rotors), ticks, self.obstacles)

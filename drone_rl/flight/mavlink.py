@@ -1,0 +1,414 @@
+"""Hardware in the loop: a bridge to a MAVLink autopilot, over a serial port or TCP.
+
+It sends HIL_SENSOR for each step, HIL_GPS and a heartbeat, and receives HIL_ACTUATOR_CONTROLS. It
+has not been tested with a real controller: neither PX4, nor ArduPilot, nor any hardware.
+"""
+
+import contextlib
+import math
+import os
+import select
+import socket
+import termios
+import time
+import tty
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Protocol, Self
+
+import numpy as np
+
+from drone_rl.flight.in_the_loop.control import RcSticks
+from drone_rl.flight.in_the_loop.drone import FlightControllerError
+from drone_rl.flight.in_the_loop.instruments import Readings, Vector, into_body
+from drone_rl.sim.coordinates import frd_from_body, ned_from_world, world_from_ned
+from drone_rl.utils.errors import InputError, extra
+
+TCP_PORT = 4560
+"""Port at which PX4 expects a simulator."""
+HEARTBEAT_EVERY = 1.0
+"""Wall-clock seconds between heartbeats."""
+ROTORS = 4
+ARMED = 128
+"""MAV_MODE_FLAG_SAFETY_ARMED."""
+ALL_SENSORS = 0x1FFF
+"""HIL_SENSOR fields_updated: all thirteen fields are new."""
+FIELD = (0.1795, 0.0490, 0.4903)
+"""Earth's magnetic field at AirSim's home, north, east, down, gauss."""
+TEMPERATURE = 15.0
+"""Air temperature, degrees Celsius."""
+_DIALECT = "pymavlink.dialects.v20.common"
+_READ_BYTES = 65536
+_FIX_3D, _SATELLITES, _UNKNOWN = 3, 12, 65535
+
+
+class Link(Protocol):
+    """A bidirectional byte stream. Methods raise FlightControllerError once the peer is gone."""
+
+    def read(self, within: float) -> bytes:
+        """Return received bytes; empty if there are none within so many seconds."""
+        ...
+
+    def write(self, data: bytes) -> None:
+        """Send all bytes."""
+        ...
+
+    def close(self) -> None:
+        """Close the link."""
+        ...
+
+
+class MavlinkBridge:
+    """An autopilot as the controller of a `DroneInTheLoop`; it ignores the sticks."""
+
+    def __init__(
+        self,
+        link: Link,
+        *,
+        lockstep: bool = True,
+        gps_every: float = 0.1,
+        patience: float = 5.0,
+        answer_within: float = 1.0,
+        connect_within: float = 30.0,
+    ) -> None:
+        """Create a bridge that owns and closes the link.
+
+        Args:
+            link: Connection to the autopilot.
+            lockstep: Wait in each step for controls with its time stamp or a later one; else use
+                the newest controls, as hardware with its own clock needs.
+            gps_every: Simulated seconds between HIL_GPS messages.
+            patience: Seconds without any message after which the autopilot counts as gone.
+            answer_within: Seconds to wait for controls in lockstep, once there were any (a starting
+                autopilot sends none). Then the step uses the old ones.
+            connect_within: Seconds to wait for the first heartbeat.
+
+        Raises:
+            InputError: pymavlink isn't installed.
+        """
+        self._dialect = extra(_DIALECT, "hil", "hardware in the loop")
+        self._codec: Any = self._dialect.MAVLink(None, srcSystem=1, srcComponent=200)
+        self._codec.robust_parsing = True  # skip invalid bytes
+        self.link = link
+        self.lockstep = lockstep
+        self.gps_every = gps_every
+        self.patience = patience
+        self.answer_within = answer_within
+        self.connect_within = connect_within
+        self.steps = 0
+        """States sent."""
+        self.missed = 0
+        """States without controls in time, in lockstep and after the first controls."""
+        self.is_armed = False
+        """Whether the newest controls are armed."""
+        self._rotors = np.zeros(4)
+        self._controls_time = -1
+        self._began = False
+        self._heard = self._beaten = -np.inf
+        self._next_gps = -np.inf
+
+    def __enter__(self) -> Self:
+        """Wait for the autopilot and its first heartbeat.
+
+        Raises:
+            FlightControllerError: There was none in time.
+        """
+        with contextlib.ExitStack() as stack:
+            stack.callback(self.link.close)
+            if isinstance(self.link, TcpLink):
+                self.link.accept(self.connect_within)
+            self._wait_for_heartbeat()
+            stack.pop_all()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Close the link."""
+        self.link.close()
+
+    def step(self, readings: Readings, sticks: RcSticks | None = None) -> Vector:
+        """Send measurements and return the rotor commands.
+
+        Args:
+            readings: Measurements.
+            sticks: Ignored: pilots of an autopilot have their own link to it.
+
+        Returns:
+            Front right, rear left, front left, rear right, 0 to 1. Shape: (4,).
+
+        Raises:
+            FlightControllerError: The autopilot is gone, or has been silent for too long.
+        """
+        del sticks
+        self._beat()
+        self._send("hil_sensor", sensor_fields(readings))
+        if readings.time >= self._next_gps:
+            self._next_gps = readings.time + self.gps_every
+            self._send("hil_gps", gps_fields(readings))
+        self.steps += 1
+        self._receive(0.0)
+        if self.lockstep:
+            self._wait_for_controls(round(readings.time * 1e6))
+        if time.monotonic() - self._heard > self.patience:
+            raise FlightControllerError(f"the autopilot has been silent for {self.patience:g} s")
+        return self._rotors
+
+    def _wait_for_controls(self, since: int) -> None:
+        """Wait for controls with this time stamp (microseconds) or a later one."""
+        end = time.monotonic() + (self.answer_within if self._began else 0.0)
+        while self._controls_time < since:
+            left = end - time.monotonic()
+            if left <= 0.0:
+                self.missed += self._began
+                return
+            self._receive(min(left, 0.05))
+
+    def _wait_for_heartbeat(self) -> None:
+        end = time.monotonic() + self.connect_within
+        while self._heard < 0.0:
+            if time.monotonic() > end:
+                raise FlightControllerError(
+                    f"no heartbeat of an autopilot in {self.connect_within:g} s"
+                )
+            self._beat()
+            self._receive(0.05)
+
+    def _beat(self) -> None:
+        now = time.monotonic()
+        if now - self._beaten < HEARTBEAT_EVERY:
+            return
+        self._beaten = now
+        kinds = self._dialect
+        self._send(
+            "heartbeat",
+            {
+                "type": kinds.MAV_TYPE_GENERIC,
+                "autopilot": kinds.MAV_AUTOPILOT_INVALID,
+                "base_mode": 0,
+                "custom_mode": 0,
+                "system_status": kinds.MAV_STATE_ACTIVE,
+            },
+        )
+
+    def _send(self, name: str, fields: dict[str, Any]) -> None:
+        message = getattr(self._codec, f"{name}_encode")(**fields)
+        self.link.write(message.pack(self._codec))
+
+    def _receive(self, within: float) -> None:
+        data = self.link.read(within)
+        for message in (self._codec.parse_buffer(data) or ()) if data else ():
+            kind = message.get_type()
+            if kind in ("BAD_DATA", "UNKNOWN"):
+                continue
+            self._heard = time.monotonic()
+            if kind == "HIL_ACTUATOR_CONTROLS" and message.time_usec >= self._controls_time:
+                self._began = True
+                self._controls_time = message.time_usec
+                self.is_armed = bool(message.mode & ARMED)
+                self._rotors = rotor_outputs(message.controls, message.mode)
+
+
+def sensor_fields(readings: Readings) -> dict[str, Any]:
+    """Return the fields of HIL_SENSOR: microseconds, m/s2, rad/s, gauss, hPa, metres, Celsius."""
+    force, rates = frd_from_body(readings.force), frd_from_body(readings.rates)
+    field = frd_from_body(into_body(readings.attitude, world_from_ned(np.array(FIELD))))
+    return {
+        "time_usec": round(readings.time * 1e6),
+        **dict(zip(("xacc", "yacc", "zacc"), map(float, force), strict=True)),
+        **dict(zip(("xgyro", "ygyro", "zgyro"), map(float, rates), strict=True)),
+        **dict(zip(("xmag", "ymag", "zmag"), map(float, field), strict=True)),
+        "abs_pressure": readings.pressure / 100.0,
+        "diff_pressure": 0.0,
+        "pressure_alt": readings.altitude,
+        "temperature": TEMPERATURE,
+        "fields_updated": ALL_SENSORS,
+    }
+
+
+def gps_fields(readings: Readings) -> dict[str, Any]:
+    """Return the fields of HIL_GPS: microseconds, 1e-7 degrees, millimetres, cm/s."""
+    latitude, longitude, altitude = readings.place
+    north, east, down = ned_from_world(readings.velocity) * 100.0
+    speed = math.hypot(north, east)
+    course = math.degrees(math.atan2(east, north)) % 360.0
+    return {
+        "time_usec": round(readings.time * 1e6),
+        "fix_type": _FIX_3D,
+        "lat": round(latitude * 1e7),
+        "lon": round(longitude * 1e7),
+        "alt": round(altitude * 1e3),
+        "eph": 100,
+        "epv": 100,
+        "vel": min(round(speed), _UNKNOWN - 1),
+        "vn": _int16(north),
+        "ve": _int16(east),
+        "vd": _int16(down),
+        "cog": round(course * 100.0) % 36000,
+        "satellites_visible": _SATELLITES,
+    }
+
+
+def rotor_outputs(controls: list[float], mode: int) -> Vector:
+    """Return the rotor commands in HIL_ACTUATOR_CONTROLS for an X frame.
+
+    Args:
+        controls: Its sixteen outputs; the first four are rotors in PX4's order, which is ours.
+        mode: Its mode flags.
+
+    Returns:
+        Front right, rear left, front left, rear right, 0 to 1; all 0 if disarmed, and 0 for an
+        output that is not finite. Shape: (4,).
+    """
+    if not mode & ARMED:
+        return np.zeros(ROTORS)
+    rotors = np.array(controls[:ROTORS], dtype=np.float64)
+    return np.nan_to_num(rotors, nan=0.0, posinf=0.0, neginf=0.0).clip(0.0, 1.0)
+
+
+def _int16(value: float) -> int:
+    return max(-32768, min(32767, round(float(value))))
+
+
+class SerialLink:
+    """A serial port, such as that of a flight controller, or a pseudo-terminal."""
+
+    def __init__(self, device: str, baud: int = 921_600, patience: float = 1.0) -> None:
+        """Open the port in raw mode.
+
+        Args:
+            device: Such as /dev/ttyACM0.
+            baud: Bits per second.
+            patience: Seconds after which a port that accepts no bytes counts as gone.
+
+        Raises:
+            InputError: The device can't be opened, is no serial port, or the speed is invalid.
+        """
+        speed = getattr(termios, f"B{baud}", None)
+        if speed is None:
+            raise InputError(f"baud={baud} is no serial speed; give one such as 921600")
+        if not Path(device).exists():
+            raise InputError(f"device={device} doesn't exist; is the controller plugged in?")
+        try:
+            self._file = os.open(device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        except OSError as error:
+            raise InputError(f"device={device} can't be opened: {error.strerror}") from error
+        try:
+            tty.setraw(self._file)
+            settings = termios.tcgetattr(self._file)
+            settings[4:6] = [speed, speed]
+            termios.tcsetattr(self._file, termios.TCSANOW, settings)
+        except termios.error as error:
+            os.close(self._file)
+            raise InputError(f"device={device} is no serial port; give one") from error
+        self.device = device
+        self.patience = patience
+
+    def read(self, within: float) -> bytes:
+        """See `Link`."""
+        if not select.select([self._file], [], [], within)[0]:
+            return b""
+        try:
+            data = os.read(self._file, _READ_BYTES)
+        except BlockingIOError:
+            return b""
+        except OSError as error:
+            raise FlightControllerError(f"{self.device} is gone: {error.strerror}") from error
+        if not data:
+            raise FlightControllerError(f"{self.device} is gone")
+        return data
+
+    def write(self, data: bytes) -> None:
+        """See `Link`."""
+        end = time.monotonic() + self.patience
+        while data:
+            try:
+                data = data[os.write(self._file, data) :]
+            except BlockingIOError:
+                select.select([], [self._file], [], 0.05)
+                if time.monotonic() > end:
+                    raise FlightControllerError(f"{self.device} accepts no more bytes") from None
+            except OSError as error:
+                raise FlightControllerError(f"{self.device} is gone: {error.strerror}") from error
+
+    def close(self) -> None:
+        """See `Link`."""
+        os.close(self._file)
+
+
+class TcpLink:
+    """A TCP port to which one autopilot connects, as PX4's simulation does."""
+
+    def __init__(self, port: int = TCP_PORT, host: str = "127.0.0.1") -> None:
+        """Listen.
+
+        Args:
+            port: 0 for any free port.
+            host: Address; by default only this machine can connect.
+
+        Raises:
+            InputError: The port is in use.
+        """
+        self._listener = socket.socket()
+        self._listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            self._listener.bind((host, port))
+        except (OSError, OverflowError) as error:
+            self._listener.close()
+            raise InputError(f"can't listen at port={port}: {error}; give another") from error
+        self._listener.listen(1)
+        self._link: socket.socket | None = None
+        self.port: int = self._listener.getsockname()[1]
+        """The port."""
+
+    def accept(self, within: float) -> None:
+        """Wait for the autopilot to connect.
+
+        Raises:
+            FlightControllerError: None connected within so many seconds.
+        """
+        self._listener.settimeout(within)
+        try:
+            self._link, _ = self._listener.accept()
+        except TimeoutError:
+            raise FlightControllerError(
+                f"no autopilot connected to port {self.port} in {within:g} s"
+            ) from None
+        self._link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+
+    def read(self, within: float) -> bytes:
+        """See `Link`."""
+        link = self._connected
+        if not select.select([link], [], [], within)[0]:
+            return b""
+        try:
+            data = link.recv(_READ_BYTES)
+        except OSError as error:
+            raise FlightControllerError(f"the autopilot is gone: {error}") from error
+        if not data:
+            raise FlightControllerError("the autopilot has closed its connection")
+        return data
+
+    def write(self, data: bytes) -> None:
+        """See `Link`."""
+        try:
+            self._connected.settimeout(1.0)
+            self._connected.sendall(data)
+        except OSError as error:
+            raise FlightControllerError(f"the autopilot is gone: {error}") from error
+
+    def close(self) -> None:
+        """See `Link`."""
+        with contextlib.ExitStack() as stack:
+            stack.callback(self._listener.close)
+            if self._link is not None:
+                stack.callback(self._link.close)
+
+    @property
+    def _connected(self) -> socket.socket:
+        if self._link is None:
+            raise FlightControllerError("no autopilot has connected yet; call accept first")
+        return self._link

@@ -1,0 +1,160 @@
+"""Goals of the flight controller, axis by axis as in SimpleFlight, and the goals of actions."""
+
+import dataclasses
+import enum
+from typing import Protocol
+
+import torch
+from torch import Tensor
+
+from drone_rl.config import ActionSettings
+from drone_rl.sim.actions import DIRECTIONS, MOVES, Actions
+from drone_rl.sim.continuous_actions import ContinuousActions
+from drone_rl.sim.dynamics.state import FlightState
+from drone_rl.utils.errors import InputError
+
+X, Y, HEADING, Z = range(4)
+"""The axes of goals."""
+
+
+class Mode(enum.IntEnum):
+    """What the number of an axis says. Controllers further in are given the rest."""
+
+    THROTTLE = 0
+    """Share of all thrust, 0 to 1."""
+    RATE = 1
+    """Radians a second about the body's axis."""
+    ANGLE = 2
+    """Radians: roll, pitch, heading."""
+    VELOCITY = 3
+    """Metres a second, world frame."""
+    HEADING_VELOCITY = 4
+    """Metres a second, forward and to the left of the heading."""
+    POSITION = 5
+    """Metres, world frame."""
+    ROTOR = 6
+    """Share of a rotor's most thrust, 0 to 1: all four are rotors then, in their order."""
+
+
+_SIDEWAYS = (Mode.RATE, Mode.ANGLE, Mode.VELOCITY, Mode.HEADING_VELOCITY, Mode.POSITION, Mode.ROTOR)
+ALLOWED = (
+    _SIDEWAYS,
+    _SIDEWAYS,
+    (Mode.RATE, Mode.ANGLE, Mode.ROTOR),
+    (Mode.THROTTLE, Mode.VELOCITY, Mode.POSITION, Mode.ROTOR),
+)
+"""Modes of each axis."""
+
+Modes = tuple[Mode, Mode, Mode, Mode]
+
+
+@dataclasses.dataclass(frozen=True)
+class Goals:
+    """What `num_worlds` drones are told, all of them axis by axis in the same modes.
+
+    Raises:
+        InputError: An axis has no such mode, or two that go together differ.
+    """
+
+    modes: Modes
+    """Of x (or roll), y (or pitch), heading and height."""
+    values: Tensor  # (num_worlds, 4) float64
+    """In the units of the modes."""
+    drift: Tensor | None = None  # (num_worlds, 4) float64
+    """How fast positions and headings that are wanted move on, a second; they stay by default."""
+
+    def __post_init__(self) -> None:
+        """Refuses what no controller can do."""
+        for axis, (mode, allowed) in enumerate(zip(self.modes, ALLOWED, strict=True)):
+            if mode not in allowed:
+                known = ", ".join(m.name.lower() for m in allowed)
+                raise InputError(f"modes[{axis}]={mode!r} is unknown; give one of: {known}")
+        names = ", ".join(m.name.lower() for m in self.modes)
+        if 0 < self.modes.count(Mode.ROTOR) < len(ALLOWED):
+            raise InputError(f"modes={names}: rotor is for all axes; give it to all or none")
+        if self.modes[X] != self.modes[Y]:
+            raise InputError(f"modes={names}: the first two go together; give both the same")
+        if self.values.dim() != 2 or self.values.shape[1] != len(ALLOWED):
+            raise InputError(
+                f"goals of shape {tuple(self.values.shape)} are not (num_worlds, 4); give a number "
+                "for each axis"
+            )
+        if self.drift is not None and self.drift.shape != self.values.shape:
+            raise InputError(
+                f"drift of shape {tuple(self.drift.shape)} is not that of the goals; give "
+                f"{tuple(self.values.shape)}"
+            )
+
+    @property
+    def drifts(self) -> Tensor:
+        """The same, zeros where nothing drifts."""
+        return torch.zeros_like(self.values) if self.drift is None else self.drift
+
+
+def rotor_goals(rotors: Tensor) -> Goals:
+    """Rotors told one by one, without any controller. Shape: (num_worlds, 4)."""
+    return Goals((Mode.ROTOR, Mode.ROTOR, Mode.ROTOR, Mode.ROTOR), rotors)
+
+
+class Steering(Protocol):
+    """What actions mean."""
+
+    @property
+    def actions(self) -> Actions:
+        """Which there are."""
+        ...
+
+    def goals(self, body: FlightState, action: Tensor) -> Goals:
+        """What controllers are told until the next action.
+
+        Args:
+            body: The drones.
+            action: One for each. Shape: (num_worlds,), then that of `actions.entry`.
+        """
+        ...
+
+
+class Moves:
+    """The chapter's moves, flown as steps of the place where a drone is wanted.
+
+    A move shifts that place along one axis of the world. It is never farther from the drone, along
+    either axis, than the lead: who moves on for long does not run away from the drone.
+    """
+
+    MODES = (Mode.POSITION, Mode.POSITION, Mode.ANGLE, Mode.POSITION)
+    actions = MOVES
+
+    def __init__(self, settings: ActionSettings) -> None:
+        """Takes the speed of moves and the lead."""
+        self.lead = settings.move_lead
+        self.drifts = torch.zeros(len(DIRECTIONS), 4, dtype=torch.float64)
+        self.drifts[:, :2] = torch.tensor(DIRECTIONS, dtype=torch.float64)[:, :2]
+        self.drifts *= settings.move_speed
+        """How fast each move shifts the place. Metres a second. Shape: (moves, 4)."""
+
+    def goals(self, body: FlightState, action: Tensor) -> Goals:
+        """See `Steering`."""
+        place = body.position[:, :2]
+        wanted = body.reference.clone()
+        wanted[:, :2] = place + (wanted[:, :2] - place).clamp(-self.lead, self.lead)
+        return Goals(self.MODES, wanted, self.drifts.to(action.device)[action])
+
+
+class Velocities:
+    """Speed forward, speed to the left and rate of turning; the height is kept."""
+
+    MODES = (Mode.HEADING_VELOCITY, Mode.HEADING_VELOCITY, Mode.RATE, Mode.POSITION)
+
+    def __init__(self, settings: ActionSettings) -> None:
+        """Takes the greatest speeds."""
+        self.actions = ContinuousActions.of(settings)
+
+    def goals(self, body: FlightState, action: Tensor) -> Goals:
+        """See `Steering`."""
+        height = body.reference[:, 3:]
+        return Goals(self.MODES, torch.cat([self.actions.to_rates(action), height], -1))
+
+
+def make_steering(settings: ActionSettings) -> Moves | Velocities:
+    """What the actions of some settings mean."""
+    return Moves(settings) if settings.kind == "moves" else Velocities(settings)

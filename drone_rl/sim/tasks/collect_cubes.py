@@ -1,0 +1,368 @@
+"""Collect the cubes (chapter, section 4): the drone moves until it has touched every cube."""
+
+import dataclasses
+import types
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from drone_rl.config import CameraSettings, TaskSettings
+from drone_rl.sim.actions import MOVES, Entry, Move
+from drone_rl.sim.dynamics import BodyState, ComputerVision, Dynamics
+from drone_rl.sim.entities import Cube
+from drone_rl.sim.tasks.collect_cubes_kernel import EndReason, FlyingCubes
+from drone_rl.sim.tasks.common import (
+    SIDES,
+    Side,
+    hide_absent,
+    interval_classes,
+    move_left,
+    number_classes,
+    place_in_view,
+    side_of,
+    unless_lost,
+)
+from drone_rl.sim.tasks.task import Goals, Grid, OracleRule, State, Task
+from drone_rl.sim.vocabulary import CUBES, some_cubes
+
+
+@dataclasses.dataclass
+class WorldState(State):
+    """State of N environments with C cubes each."""
+
+    cubes: Tensor  # (N, C, 3) float64
+    """Positions at which the cubes were placed, metres, in the order of their x."""
+    collected: Tensor  # (N, C) bool
+    """Cubes that the drone has touched."""
+    passed: Tensor  # (N, C) bool
+    """Cubes that the drone has left behind untouched."""
+    side: Tensor  # (N, C) int64
+    """`Side` of each cube when it became the next one; -1 before that."""
+    lateral: Tensor  # (N, C) float64
+    """Metres to the left of the drone at which it stood then; NaN before that."""
+
+    @property
+    def present(self) -> Tensor:
+        """Cubes that still stand. Shape: (N, C)."""
+        return ~(self.collected | self.passed)
+
+    @property
+    def next_cube(self) -> Tensor:
+        """Index of the nearest standing cube, C when none is left. Shape: (N,)."""
+        return (~self.present).long().cumprod(-1).sum(-1)
+
+
+@dataclasses.dataclass
+class CubeGoals(Goals):
+    """Cubes that were to be collected; their strata are sides."""
+
+    lateral: Tensor  # (n, C) float64
+    """Metres to the left of the drone at which each became the next one; NaN if it never did."""
+    height: Tensor  # (n, C) float64
+    """Metres by which each stands higher than the drone."""
+
+
+class CollectCubes(Task[WorldState]):
+    """Move until every cube is touched. The reward is 1 a cube."""
+
+    name = TaskSettings.name
+    ends = EndReason
+    truncation = EndReason.STEP_LIMIT
+    success_end = EndReason.ALL_CUBES
+    expected_end = EndReason.FRONT_BOUNDARY
+    observed = ("cubes", "collected", "side", "end_reason")
+    strata = SIDES
+    scored = ("collected", "side", "lateral", "cube_positions", "drone")
+    remembered = types.MappingProxyType(
+        {
+            "cubes": "positions of the cubes, metres, in order of x (T, C, 3)",
+            "present": "whether each cube still stands, bool (T, C)",
+            "collected": "whether each cube has been collected, bool (T, C)",
+            "next_target": "index of the nearest standing cube, C if none (T,)",
+        }
+    )
+
+    def __init__(self, settings: TaskSettings | None = None) -> None:
+        """Take cubes, moves and boundaries; the original study's by default."""
+        self.settings = settings = settings or TaskSettings()
+        self.largest_reward = float(settings.num_cubes)
+        self.drone_size = settings.drone_size
+        self.origin = (0.0, 0.0, settings.altitude)
+        self.vocabulary = dataclasses.replace(CUBES, tested=some_cubes(settings.values()))
+        self.oracle = OracleRule(("drone", "cube_positions", "next_cube"), self.line_up, MOVES)
+
+    @property
+    def entries(self) -> Mapping[str, Entry]:
+        """Algorithm 3's info, and the positions of the cubes (metres).
+
+        Number of cubes collected, which, on which side and how far aside each became the next one,
+        which is the next one, and why the episode ended.
+        """
+        cubes = self.settings.num_cubes
+        return {
+            "cubes": Entry((1,), torch.int64, 0, cubes),
+            "collected": Entry((cubes,), torch.bool),
+            "side": Entry((cubes,), torch.int64, -1, len(Side) - 1),
+            "lateral": Entry((cubes,), torch.float64),
+            "next_cube": Entry((1,), torch.int64, 0, cubes),
+            "end_reason": Entry((1,), torch.int64, 0, len(EndReason) - 1),
+            "cube_positions": Entry((cubes, 3), torch.float32),
+        }
+
+    def make_dynamics(self) -> ComputerVision:
+        """Return the chapter's three moves (Table 1)."""
+        return ComputerVision(self.settings.step_length)
+
+    def make_props(self) -> list[Cube]:
+        """Return the cubes, nearest first."""
+        size, color = self.settings.cube_size, self.settings.cube_color
+        return [Cube(size, color, name=f"cube_{i}") for i in range(self.settings.num_cubes)]
+
+    # Reset and rules
+
+    def draw(self, random_state: np.random.RandomState) -> Tensor:
+        """Sample the positions of the cubes (Algorithm 2). Shape: (C, 3), metres."""
+        s = self.settings
+        bounds = (s.lateral_bound, s.vertical_bound)
+        offsets = random_state.uniform(-1.0, 1.0, size=(s.num_cubes, 2)) * bounds + (
+            0.0,
+            s.altitude,
+        )
+        x = s.first_distance + s.spacing * np.arange(s.num_cubes)
+        return torch.from_numpy(np.column_stack([x, offsets]))
+
+    def start(self, drawn: Tensor, body: BodyState | None = None) -> WorldState:
+        """Return states at the start of episodes.
+
+        Args:
+            drawn: Positions of the cubes, metres. Shape: (N, C, 3).
+            body: The drones; at rest at the origin by default.
+        """
+        if body is None:
+            body = BodyState.at_rest(drawn.new_tensor(self.origin).repeat(len(drawn), 1))
+        no_cube = torch.zeros_like(drawn[..., 0], dtype=torch.bool)
+        state = WorldState(
+            body=body,
+            cubes=drawn,
+            collected=no_cube,
+            passed=no_cube.clone(),
+            side=no_cube.long() - 1,
+            lateral=torch.full_like(drawn[..., 1], torch.nan),
+            steps=no_cube[:, 0].long(),
+            end_reason=no_cube[:, 0].long(),
+        )
+        state.side, state.lateral = self._sightings(state)
+        return state
+
+    def judge(self, state: WorldState, body: BodyState) -> tuple[WorldState, Tensor]:
+        """Apply Algorithms 1 and 3 after the drone has moved.
+
+        A touched cube is collected and worth 1; a cube left behind vanishes; the episode ends when
+        all cubes are collected, when the drone is out of bounds, or at the step limit, in this
+        order; a drone whose motion has diverged ends it before all these.
+        """
+        drone = body.position
+        away = (drone[:, None] - state.cubes).abs().amax(-1)  # (N, C)
+        touched = state.present & (away <= self.settings.touch_distance)
+        collected = state.collected | touched
+        passed = state.passed | (~collected & (drone[:, None, 0] > state.cubes[..., 0]))
+        new = dataclasses.replace(
+            state, body=body, collected=collected, passed=passed, steps=state.steps + 1
+        )
+        new.side, new.lateral = self._sightings(new)
+        new.end_reason = self._end_reason(new)
+        return new, touched.sum(-1, dtype=torch.float64)
+
+    def fused_rules(self, dynamics: Dynamics, num_envs: int) -> FlyingCubes | None:
+        """See `Task.fused_rules`."""
+        if type(self).judge is CollectCubes.judge and FlyingCubes.supports(dynamics):
+            return FlyingCubes(self.settings, dynamics, num_envs)
+        return None
+
+    def _sightings(self, state: WorldState) -> tuple[Tensor, Tensor]:
+        """Return side and lateral offset, recorded of each cube up to the next one. (N, C)."""
+        offset = state.cubes[..., 1] - state.drone[:, None, 1]
+        side = side_of(offset, self.settings.touch_distance)
+        index = torch.arange(state.side.shape[-1], device=side.device)
+        is_new = (state.side < 0) & (index <= state.next_cube[:, None])
+        return torch.where(is_new, side, state.side), torch.where(is_new, offset, state.lateral)
+
+    def _end_reason(self, state: WorldState) -> Tensor:
+        """Return the first reason that holds, in the order of Algorithm 3. Shape: (N,)."""
+        x, y, _ = state.drone.unbind(-1)
+        reason = (
+            torch.zeros_like(state.steps)
+            .masked_fill(state.steps >= self.settings.step_limit, EndReason.STEP_LIMIT)
+            .masked_fill(y.abs() > self.settings.side_bound, EndReason.SIDE_BOUNDARY)
+            .masked_fill(x > self.settings.front_bound, EndReason.FRONT_BOUNDARY)
+            .masked_fill(state.collected.all(-1), EndReason.ALL_CUBES)
+        )
+        return unless_lost(reason, state.body, EndReason.LOST_CONTROL)
+
+    def places(self, state: WorldState) -> Tensor:
+        """Return the cubes' positions; under the floor once vanished."""
+        return hide_absent(state.cubes, state.present)
+
+    def info(self, state: WorldState) -> dict[str, Tensor]:
+        """See `entries`."""
+        return {
+            "cubes": state.collected.sum(-1, keepdim=True),
+            "collected": state.collected.clone(),
+            "side": state.side.clone(),
+            "lateral": state.lateral.clone(),
+            "next_cube": state.next_cube[:, None],
+            "end_reason": state.end_reason[:, None].clone(),
+            "cube_positions": state.cubes.float(),
+        }
+
+    # Oracle and goals
+
+    def line_up(self, drone: Tensor, cubes: Tensor, next_cube: Tensor) -> Tensor:
+        """Line up with the next cube sideways, then fly forward. (N, 3), (N, C, 3), (N, 1)."""
+        nearest = next_cube.clamp(max=cubes.shape[-2] - 1)
+        rows = nearest[..., None].expand(*next_cube.shape[:-1], 1, 3)
+        offset = cubes.gather(-2, rows)[..., 0, 1] - drone[..., 1]
+        tolerance = max(0.5 * self.settings.step_length, 0.5 * self.settings.touch_distance)
+        is_done = next_cube[..., 0] >= cubes.shape[-2]  # no cube stands any more
+        return turn_towards(offset, tolerance).masked_fill(is_done, Move.FORWARD)
+
+    def score(self, info: Mapping[str, Tensor]) -> CubeGoals:
+        """Each cube is a goal, which is reached by collecting it."""
+        return CubeGoals(
+            reached=info["collected"],
+            stratum=info["side"],
+            world=info["cube_positions"].flatten(1),
+            lateral=info["lateral"],
+            height=(info["cube_positions"][..., 2] - info["drone"][:, None, 2]).double(),
+        )
+
+    def classes(self, goals: CubeGoals) -> Iterator[tuple[str, str, Tensor]]:
+        """Yield classes by number of the cube, side, sideways distance and height."""
+        yield from number_classes("cube", goals)
+        yield from super().classes(goals)
+        yield from interval_classes("sideways", goals.lateral.abs(), self.sideways_edges())
+        if self.settings.vertical_bound > 0:
+            level = self.settings.vertical_bound / 3
+            yield "height", "lower", goals.height < -level
+            yield "height", "level", goals.height.abs() <= level
+            yield "height", "higher", goals.height > level
+
+    def sideways_edges(self) -> list[float]:
+        """Return the bounds of the classes of sideways distance, metres, increasing."""
+        touch, bound = self.settings.touch_distance, self.settings.lateral_bound
+        edges = [round(2 * edge) / 2 for edge in ((touch + bound) / 2, bound, 1.5 * bound)]
+        return [touch, *sorted({edge for edge in edges if edge > touch})]
+
+    # Explanations
+
+    def remember(self, info: Mapping[str, Tensor]) -> dict[str, Tensor]:
+        """See `remembered`."""
+        next_cube, collected = info["next_cube"][:, 0], info["collected"]
+        index = torch.arange(collected.shape[-1], device=next_cube.device)
+        # cubes stand in order of x, so a standing cube is the next one or one behind it
+        return {
+            "cubes": info["cube_positions"],
+            "present": ~collected & (index >= next_cube[:, None]),
+            "collected": collected,
+            "next_target": next_cube,
+        }
+
+    def tally(self, info: Mapping[str, Tensor]) -> tuple[Tensor, Tensor]:
+        """Return the number of cubes collected, and of cubes left behind."""
+        collected = info["collected"].sum(-1)
+        return collected, info["next_cube"][:, 0] - collected
+
+    def recall(self, kept: Mapping[str, Tensor], body: BodyState) -> WorldState:
+        """Return states as they were, except side and lateral, which are not kept."""
+        present, collected = kept["present"], kept["collected"]
+        state = self.start(kept["cubes"].double(), body)
+        return dataclasses.replace(
+            state,
+            collected=collected,
+            passed=~present & ~collected,
+            side=torch.full_like(state.side, -1),
+            lateral=torch.full_like(state.lateral, torch.nan),
+            steps=kept["step"].clone(),
+        )
+
+    def next_target(self, state: WorldState) -> Tensor:
+        """Return the next cube."""
+        return state.next_cube
+
+    def is_reached(self, state: WorldState, target: Tensor) -> Tensor:
+        """Return whether it is collected."""
+        return state.collected[torch.arange(len(state), device=target.device), target]
+
+    def needed(self, offset: Tensor) -> Tensor:
+        """Return a turn where flying straight on would miss."""
+        return turn_towards(offset[..., 1], self.settings.touch_distance)
+
+    def stratum_at(self, offset: Tensor) -> Tensor:
+        """Return its side."""
+        return side_of(offset[..., 1], self.settings.touch_distance)
+
+    def grid(self, num_forward: int, num_lateral: int) -> Grid:
+        """Return where next cubes can stand.
+
+        Ahead: from almost touching to an episode's first cube. Sideways: as far as a next cube ever
+        stands. Up: level, lowest and highest.
+        """
+        s = self.settings
+        reach = 2.0 * s.lateral_bound or s.touch_distance * 2
+        nearest, bound = s.touch_distance + 0.5 * s.step_length, s.vertical_bound
+        height = torch.tensor([-bound, 0.0, bound] if bound else [0.0], dtype=torch.float64)
+        forward = torch.linspace(nearest, s.first_distance, num_forward).double()
+        return Grid(height, forward, torch.linspace(reach, -reach, num_lateral).double())
+
+    def one_target(self, body: BodyState, offset: Tensor) -> WorldState:
+        """Return states with a single cube; the others are passed."""
+        cubes = body.position[:, None].repeat(1, self.settings.num_cubes, 1)
+        cubes[:, 0] += offset.to(cubes)
+        state = self.start(cubes, body)
+        state.passed[:, 1:] = True
+        return state
+
+    def without_targets(self, state: WorldState) -> WorldState:
+        """Remove all cubes."""
+        return dataclasses.replace(state, passed=torch.ones_like(state.passed))
+
+    def without_next(self, state: WorldState) -> WorldState:
+        """Remove the next cube."""
+        return dataclasses.replace(state, passed=state.passed | self._is_next(state))
+
+    def next_moved(self, state: WorldState, metres: Tensor | float) -> WorldState:
+        """Move the next cube to the left."""
+        cubes = move_left(state.cubes, metres, self._is_next(state))
+        return dataclasses.replace(state, cubes=cubes)
+
+    def elsewhere(
+        self, state: WorldState, camera: CameraSettings, generator: torch.Generator
+    ) -> WorldState:
+        """Put all cubes at random positions in view, uniform over the image's columns.
+
+        Ahead: from where a cube just fits in front of the camera to the distance of the first one
+        at the start. Sideways: no farther than cube and drone ever are.
+        """
+        s = self.settings
+        draw = torch.rand(*state.cubes.shape, generator=generator, dtype=torch.float64)
+        away = place_in_view(
+            draw[..., :2],
+            camera,
+            s.touch_distance + s.cube_size,
+            s.first_distance,
+            2 * s.lateral_bound,
+        )
+        up = (2 * draw[..., 2:] - 1) * s.vertical_bound
+        cubes = state.drone[:, None] + torch.cat([away, up], -1).to(state.drone)
+        standing = torch.zeros_like(state.passed)
+        return dataclasses.replace(state, cubes=cubes, passed=standing, collected=standing.clone())
+
+
+def turn_towards(lateral: Tensor, tolerance: float) -> Tensor:
+    """Return the move towards a cube so many metres to the left of the drone. Shape kept."""
+    move = torch.full_like(lateral, Move.FORWARD, dtype=torch.int64)
+    move[lateral > tolerance] = Move.LEFT
+    move[lateral < -tolerance] = Move.RIGHT
+    return move

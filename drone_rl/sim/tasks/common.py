@@ -1,0 +1,92 @@
+"""Functions that several tasks use: props out of sight, sides, classes of goals, views."""
+
+import enum
+import math
+from collections.abc import Iterator, Sequence
+
+import torch
+from torch import Tensor
+
+from drone_rl.config import CameraSettings
+from drone_rl.sim.dynamics import BodyState
+from drone_rl.sim.tasks.task import Goals
+from drone_rl.utils.text import ordinal
+
+HIDDEN_DEPTH = 100.0
+"""Metres below its place at which an absent prop is kept, out of sight under the floor."""
+
+
+def hide_absent(places: Tensor, present: Tensor) -> Tensor:
+    """Return places of props, those of absent ones under the floor. (N, P, 3), (N, P)."""
+    hidden = (~present).double() * HIDDEN_DEPTH
+    return places - torch.nn.functional.pad(hidden[..., None], (2, 0))
+
+
+def move_left(places: Tensor, metres: Tensor | float, which: Tensor) -> Tensor:
+    """Return places of props, some of them moved to the left. (N, P, 3), (N,) or (), (N, P)."""
+    moved = places.clone()
+    metres = torch.as_tensor(metres, dtype=places.dtype, device=places.device)
+    moved[..., 1] += metres.expand(len(places))[:, None] * which
+    return moved
+
+
+class Side(enum.IntEnum):
+    """Where something is, seen from the drone: strata of tasks that count by side."""
+
+    LEFT = 0
+    AHEAD = 1
+    RIGHT = 2
+
+
+SIDES = tuple(side.name.lower() for side in Side)
+
+
+def side_of(lateral: Tensor, tolerance: float) -> Tensor:
+    """Return the `Side` of something so many metres to the left of the drone. Shape kept."""
+    right = torch.where(lateral < -tolerance, Side.RIGHT.value, Side.AHEAD.value)
+    return torch.where(lateral > tolerance, Side.LEFT.value, right)
+
+
+def unless_lost(reason: Tensor, body: BodyState, lost: int) -> Tensor:
+    """Return end reasons, `lost` where the motion of the drone has diverged. Shape: (N,)."""
+    if type(body) is BodyState:  # whose motion can't diverge
+        return reason
+    return reason.masked_fill(body.is_lost, lost)
+
+
+def number_classes(name: str, goals: Goals) -> Iterator[tuple[str, str, Tensor]]:
+    """Yield one class for each goal of an episode: first, second, and so on."""
+    for number in range(goals.reached.shape[-1]):
+        of = torch.zeros_like(goals.reached)
+        of[:, number] = True
+        yield name, ordinal(number), of
+
+
+def interval_classes(
+    name: str, values: Tensor, edges: Sequence[float]
+) -> Iterator[tuple[str, str, Tensor]]:
+    """Yield the classes of goals whose values, in metres, lie between two edges or above all."""
+    for low, high in zip(edges, [*edges[1:], torch.inf], strict=True):
+        label = f"{low:g} to {high:g} m" if high < torch.inf else f"more than {low:g} m"
+        yield name, label, (values > low) & (values <= high)
+
+
+def place_in_view(
+    draw: Tensor, camera: CameraSettings, nearest: float, farthest: float, widest: float
+) -> Tensor:
+    """Return random positions in view of a camera, uniform over the image's columns.
+
+    Args:
+        draw: Numbers in [0, 1): how far ahead, and which column. Shape: (*, 2).
+        camera: The policy's.
+        nearest: Metres ahead at least.
+        farthest: Metres ahead at most, or less where that is too far aside.
+        widest: Metres aside at most, except at the nearest distance.
+
+    Returns:
+        Metres ahead of the camera and to its left. Shape: (*, 2).
+    """
+    slope = (2 * draw[..., 1] - 1) * math.tan(math.radians(camera.horizontal_fov / 2))
+    most = (widest / slope.abs().clamp_min(1e-9)).clamp(max=farthest).clamp(min=nearest)
+    ahead = nearest + draw[..., 0] * (most - nearest)
+    return torch.stack([ahead, slope * ahead], -1)

@@ -1,0 +1,360 @@
+"""Fly through a field of pillars to the line behind it, and touch none.
+
+N environments, R rows of K pillars, P = R K pillars.
+"""
+
+import dataclasses
+import enum
+import types
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from drone_rl.config import CameraSettings, PillarsSettings
+from drone_rl.sim.actions import MOVES, Entry, Move
+from drone_rl.sim.dynamics import BodyState, ComputerVision, Obstacles
+from drone_rl.sim.entities import Pillar
+from drone_rl.sim.tasks.common import (
+    SIDES,
+    Side,
+    hide_absent,
+    interval_classes,
+    move_left,
+    number_classes,
+    place_in_view,
+    side_of,
+    unless_lost,
+)
+from drone_rl.sim.tasks.pillars_lanes import Lanes, meets, nearest_pillar
+from drone_rl.sim.tasks.task import Goals, Grid, OracleRule, State, Task
+from drone_rl.sim.vocabulary import PILLARS
+from drone_rl.utils.text import plural
+
+
+class EndReason(enum.IntEnum):
+    """Why an episode ended."""
+
+    RUNNING = 0
+    FINISH_LINE = 1
+    PILLAR_TOUCHED = 2
+    SIDE_BOUNDARY = 3
+    STEP_LIMIT = 4
+    LOST_CONTROL = 5
+    """The drone's motion diverged, see `BodyState.is_lost`: precedes all other reasons."""
+
+
+@dataclasses.dataclass
+class FieldState(State):
+    """State of N environments."""
+
+    pillars: Tensor  # (N, P, 3) float64
+    """Positions of the pillars' middles, metres, row after row."""
+    present: Tensor  # (N, P) bool
+    """Which of them stand; in an episode all do."""
+    touched: Tensor  # (N, P) bool
+    """Pillars that the drone has touched."""
+    passed: Tensor  # (N, R) bool
+    """Rows that the drone has passed; of the last one, the line behind it."""
+    side: Tensor  # (N, R) int64
+    """`Side` of each row when it came up; -1 before that."""
+    gap: Tensor  # (N, R) float64
+    """Metres between the pillars next to the nearest open lane, then; NaN before that."""
+
+    @property
+    def next_row(self) -> Tensor:
+        """Index of the first row that is not passed, R when none is left. Shape: (N,)."""
+        return self.passed.long().cumprod(-1).sum(-1)
+
+    @property
+    def rows(self) -> Tensor:
+        """The y of the pillars, row by row; infinite where none stands. Shape: (N, R, K)."""
+        y = torch.where(self.present, self.pillars[..., 1], torch.inf)
+        return y.unflatten(-1, (self.passed.shape[-1], -1))
+
+
+@dataclasses.dataclass
+class RowGoals(Goals):
+    """Rows that were to be passed; their strata are the sides of the nearest open lane."""
+
+    gap: Tensor  # (n, R) float64
+    """Metres between the pillars next to the nearest open lane; NaN if the row never came up."""
+
+
+class Pillars(Task[FieldState]):
+    """Get to the line and touch no pillar. The reward is progress, 1 for the whole way."""
+
+    name = PillarsSettings.name
+    ends = EndReason
+    truncation = EndReason.STEP_LIMIT
+    success_end = EndReason.FINISH_LINE
+    expected_end = EndReason.PILLAR_TOUCHED
+    observed = ("passed", "side", "end_reason")
+    strata = SIDES
+    scored = ("passed", "side", "gap", "rows")
+    remembered = types.MappingProxyType(
+        {
+            "rows": "y of the pillars, metres, row by row; infinite where none stands (T, R, K)",
+            "passed": "whether each row has been passed, bool (T, R)",
+            "next_target": "index of the pillar of the next row nearest to the way, P if none (T,)",
+        }
+    )
+
+    def __init__(self, settings: PillarsSettings | None = None) -> None:
+        """Take field, pillars and moves."""
+        self.settings = s = settings or PillarsSettings()
+        self.lanes = Lanes(s)
+        self.drone_size, self.origin = s.drone_size, (0.0, 0.0, s.altitude)
+        tested = (
+            f"{plural(s.num_rows, 'row')} of pillars {s.width:g} m wide, {s.density:g} for each "
+            f"metre across, {s.spacing:g} m from row to row"
+        )
+        self.vocabulary = dataclasses.replace(PILLARS, tested=tested)
+        self.oracle = OracleRule(("drone", "rows", "next_row"), self.lanes.fly_through, MOVES)
+
+    @property
+    def entries(self) -> Mapping[str, Entry]:
+        """What became of the rows, and where the pillars are.
+
+        Which rows are passed; pillars touched; on which side the nearest open lane of each row was,
+        and how wide the gap, as the row came up; the next row; why the episode ended; the y of the
+        pillars (metres, infinite where none stands).
+        """
+        rows, size, pillars = (
+            getattr(self.settings, n) for n in ("num_rows", "row_size", "num_pillars")
+        )
+        return {
+            "passed": Entry((rows,), torch.bool),
+            "touched": Entry((pillars,), torch.bool),
+            "side": Entry((rows,), torch.int64, -1, len(Side) - 1),
+            "gap": Entry((rows,), torch.float64),
+            "next_row": Entry((1,), torch.int64, 0, rows),
+            "end_reason": Entry((1,), torch.int64, 0, len(EndReason) - 1),
+            "rows": Entry((rows, size), torch.float32),
+        }
+
+    def make_dynamics(self) -> ComputerVision:
+        """Return the chapter's three moves (Table 1)."""
+        return ComputerVision(self.settings.step_length)
+
+    def make_props(self) -> list[Pillar]:
+        """Return the pillars, row by row."""
+        s = self.settings
+        names = (f"pillar_{i}" for i in range(s.num_pillars))
+        return [Pillar(s.width, s.height, s.pillar_color, name=name) for name in names]
+
+    # Reset and rules
+
+    def draw(self, random_state: np.random.RandomState) -> Tensor:
+        """Sample the y of the pillars of a field that can be crossed. Shape: (R, K), metres."""
+        return torch.from_numpy(self.lanes.draw_field(random_state))
+
+    def start(self, drawn: Tensor, body: BodyState) -> FieldState:
+        """Return states at the start of episodes; `drawn` is the y of pillars, (N, R, K)."""
+        s = self.settings
+        row = torch.arange(drawn.shape[1], dtype=drawn.dtype, device=drawn.device)
+        x = (s.first_distance + s.spacing * row)[:, None].expand_as(drawn)
+        z = torch.full_like(drawn, 0.5 * s.height)
+        pillars = torch.stack([x, drawn, z], -1).flatten(1, 2)
+        none = torch.zeros(pillars.shape[:2], dtype=torch.bool, device=drawn.device)
+        state = FieldState(
+            body=body,
+            pillars=pillars,
+            present=~none,
+            touched=none,
+            passed=none[:, : drawn.shape[1]].clone(),
+            side=none[:, : drawn.shape[1]].long() - 1,
+            gap=torch.full_like(drawn[..., 0], torch.nan),
+            steps=none[:, 0].long(),
+            end_reason=none[:, 0].long(),
+        )
+        state.side, state.gap = self._sightings(state)
+        return state
+
+    def judge(self, state: FieldState, body: BodyState) -> tuple[FieldState, Tensor]:
+        """Apply the rules after a step.
+
+        The way from the start to the line is worth 1, each metre as much; a touched pillar costs
+        the penalty. The episode ends at the line, at a pillar, outside the field, or at the step
+        limit. Of several reasons a touched pillar comes first, then the side boundary, then the
+        line.
+        """
+        s, before, now = self.settings, state.drone, body.position
+        hit = meets(s.touch_distance, before, now, state.pillars)
+        touched = state.touched | (state.present & hit)
+        new = dataclasses.replace(state, body=body, touched=touched, steps=state.steps + 1)
+        new.passed = state.passed | (now[:, :1] > self._passing(now))
+        new.side, new.gap = self._sightings(new)
+        new.end_reason = self._end_reason(new)
+        progress = (now[:, 0].clamp(max=s.finish) - before[:, 0].clamp(max=s.finish)) / s.finish
+        is_hit = (touched & ~state.touched).any(-1)
+        return new, progress - s.collision_penalty * is_hit
+
+    def _sightings(self, state: FieldState) -> tuple[Tensor, Tensor]:
+        """Return side and width of gap, recorded of each row up to the next one. (N, R)."""
+        index = torch.arange(state.side.shape[1], device=state.side.device)
+        is_new = (state.side < 0) & (index <= state.next_row[:, None])
+        envs, rows = is_new.nonzero(as_tuple=True)
+        if not len(envs):
+            return state.side, state.gap
+        turn, width = self.lanes.nearest(state.rows[envs, rows], state.drone[envs, 1])
+        side, gap = state.side.clone(), state.gap.clone()
+        side[envs, rows] = side_of(turn, 0.5 * self.settings.step_length)
+        gap[envs, rows] = width
+        return side, gap
+
+    def _passing(self, like: Tensor) -> Tensor:
+        """Return the x beyond which each row is passed; of the last one, the line. (R,)."""
+        s = self.settings
+        x = s.first_distance + s.spacing * torch.arange(s.num_rows, device=like.device)
+        passing = x.to(like) + s.touch_distance
+        passing[-1] = s.finish - 1e-9
+        return passing
+
+    def _end_reason(self, state: FieldState) -> Tensor:
+        """Return the first reason that holds, from the last line of this upwards. (N,)."""
+        s, (x, y, _) = self.settings, state.drone.unbind(-1)
+        reason = (
+            torch.zeros_like(state.steps)
+            .masked_fill(state.steps >= s.step_limit, EndReason.STEP_LIMIT)
+            .masked_fill(x >= s.finish, EndReason.FINISH_LINE)
+            .masked_fill(y.abs() > s.spread, EndReason.SIDE_BOUNDARY)
+            .masked_fill(state.touched.any(-1), EndReason.PILLAR_TOUCHED)
+        )
+        return unless_lost(reason, state.body, EndReason.LOST_CONTROL)
+
+    def places(self, state: FieldState) -> Tensor:
+        """Return the pillars' positions; under the floor where none stands."""
+        return hide_absent(state.pillars, state.present)
+
+    def obstacles(self, state: FieldState) -> Obstacles:
+        """Return the pillars."""
+        s = self.settings
+        return Obstacles(self.places(state), (s.width / 2, s.width / 2, s.height / 2))
+
+    def info(self, state: FieldState) -> dict[str, Tensor]:
+        """See `entries`."""
+        return {
+            "passed": state.passed.clone(),
+            "touched": state.touched.clone(),
+            "side": state.side.clone(),
+            "gap": state.gap.clone(),
+            "next_row": state.next_row[:, None],
+            "end_reason": state.end_reason[:, None].clone(),
+            "rows": state.rows.float(),
+        }
+
+    # Goals
+
+    def score(self, info: Mapping[str, Tensor]) -> RowGoals:
+        """Each row is a goal, which is reached by passing it."""
+        world = info["rows"].flatten(1)
+        return RowGoals(info["passed"], info["side"], world, gap=info["gap"])
+
+    def classes(self, goals: RowGoals) -> Iterator[tuple[str, str, Tensor]]:
+        """Yield classes by number of the row, side and width of the gap."""
+        yield from number_classes("row", goals)
+        yield from super().classes(goals)
+        yield from interval_classes("gap", goals.gap, self.gap_edges())
+
+    def gap_edges(self) -> list[float]:
+        """Return the bounds of the classes of gaps, metres, from the width of the drone upwards."""
+        narrow, step = self.settings.drone_size, self.settings.step_length
+        return [narrow, narrow + step, narrow + 3 * step]
+
+    # Explanations
+
+    def remember(self, info: Mapping[str, Tensor]) -> dict[str, Tensor]:
+        """See `remembered`."""
+        drone_y, next_row = info["drone"][:, 1], info["next_row"][:, 0]
+        pillar = nearest_pillar(info["rows"], drone_y, next_row)
+        return {"rows": info["rows"], "passed": info["passed"], "next_target": pillar}
+
+    def tally(self, info: Mapping[str, Tensor]) -> tuple[Tensor, Tensor]:
+        """Return the number of rows passed; none is missed while the episode goes on."""
+        passed = info["passed"].sum(-1)
+        return passed, torch.zeros_like(passed)
+
+    def recall(self, kept: Mapping[str, Tensor], body: BodyState) -> FieldState:
+        """Return states as they were, except side and gap, which are not kept."""
+        rows = kept["rows"].double()
+        standing = rows.isfinite()
+        state = self.start(torch.where(standing, rows, 0.0), body)
+        return dataclasses.replace(
+            state,
+            present=standing.flatten(1),
+            passed=kept["passed"].clone(),
+            side=torch.full_like(state.side, -1),
+            gap=torch.full_like(state.gap, torch.nan),
+            steps=kept["step"].clone(),
+        )
+
+    def next_target(self, state: FieldState) -> Tensor:
+        """Return the standing pillar of the next row that is nearest to the drone's lane."""
+        return nearest_pillar(state.rows, state.drone[:, 1], state.next_row)
+
+    def next_offset(self, state: FieldState) -> Tensor:
+        """Return where it stands, level with the drone."""
+        return super().next_offset(state) * torch.tensor([1.0, 1.0, 0.0]).to(state.pillars)
+
+    def is_reached(self, state: FieldState, target: Tensor) -> Tensor:
+        """Return whether the drone is past it and has touched none."""
+        return self.is_behind(state, target) & ~state.touched.any(-1)
+
+    def needed(self, offset: Tensor) -> Tensor:
+        """Return a turn away from it where flying straight on would touch it."""
+        lateral = offset[..., 1]
+        is_in_way = lateral.abs() <= self.settings.touch_distance
+        turn = torch.where(lateral > 0, Move.RIGHT, Move.LEFT)
+        return torch.where(is_in_way, turn, Move.FORWARD)
+
+    def stratum_at(self, offset: Tensor) -> Tensor:
+        """Return the side of the way around it."""
+        sides = torch.tensor([Side.AHEAD, Side.LEFT, Side.RIGHT], device=offset.device)
+        return sides[self.needed(offset)]
+
+    def grid(self, num_forward: int, num_lateral: int) -> Grid:
+        """Return where pillars can stand: up to the first row, over the width of the field."""
+        s = self.settings
+        nearest = s.touch_distance + 0.5 * s.step_length
+        forward = torch.linspace(nearest, s.first_distance, num_forward).double()
+        lateral = torch.linspace(s.spread, -s.spread, num_lateral).double()
+        return Grid(torch.zeros(1, dtype=torch.float64), forward, lateral)
+
+    def one_target(self, body: BodyState, offset: Tensor) -> FieldState:
+        """Return states with a single pillar, in the first row."""
+        rows = offset.new_zeros(len(offset), self.settings.num_rows, self.settings.row_size)
+        state = self.start(rows.double(), body)
+        state.pillars[:, 0, :2] = body.position[:, :2] + offset[:, :2].to(body.position)
+        state.present[:, 1:] = False
+        return state
+
+    def without_targets(self, state: FieldState) -> FieldState:
+        """Remove all pillars."""
+        return dataclasses.replace(state, present=torch.zeros_like(state.present))
+
+    def without_next(self, state: FieldState) -> FieldState:
+        """Remove the next pillar."""
+        return dataclasses.replace(state, present=state.present & ~self._is_next(state))
+
+    def next_moved(self, state: FieldState, metres: Tensor | float) -> FieldState:
+        """Move the next pillar to the left."""
+        pillars = move_left(state.pillars, metres, self._is_next(state))
+        return dataclasses.replace(state, pillars=pillars)
+
+    def elsewhere(
+        self, state: FieldState, camera: CameraSettings, generator: torch.Generator
+    ) -> FieldState:
+        """Put all pillars at random positions in view, uniform over the image's columns.
+
+        Ahead: from where a pillar just fits in front of the camera to the distance of the second
+        row at the start. Sideways: no farther than two fields' width.
+        """
+        s = self.settings
+        draw = torch.rand(*state.pillars.shape[:2], 2, generator=generator, dtype=torch.float64)
+        nearest, farthest = s.touch_distance + s.width, s.first_distance + s.spacing
+        away = place_in_view(draw, camera, nearest, farthest, 2 * s.spread).to(state.pillars)
+        pillars = state.pillars.clone()
+        pillars[..., :2] = state.drone[:, None, :2] + away
+        return dataclasses.replace(state, pillars=pillars, present=torch.ones_like(state.present))

@@ -1,0 +1,192 @@
+"""Lanes through a field of pillars: draw fields that can be crossed, and plan the way through.
+
+A drone that moves in steps is always in one of finitely many lanes, a step apart. Between two rows
+there is room to change to any lane, so a field can be crossed if, and only if, each of its rows
+leaves a lane open.
+"""
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from drone_rl.config import PillarsSettings
+from drone_rl.sim.actions import Move
+
+MOST_TRIES = 10_000
+"""Samples of a row until one leaves a lane open."""
+
+
+class Lanes:
+    """Lanes a step apart, which a row of pillars leaves open or not. Metres, world frame."""
+
+    def __init__(self, settings: PillarsSettings) -> None:
+        """Take the settings of the task."""
+        self.settings = settings
+
+    def draw_field(self, random_state: np.random.RandomState) -> NDArray[np.float64]:
+        """Sample the y of all pillars of a field that can be crossed. Shape: (R, K).
+
+        Raises:
+            RuntimeError: None was found; `PillarsSettings` refuses settings that make this likely.
+        """
+        rows = self.draw_rows(random_state, self.settings.num_rows)
+        for _ in range(MOST_TRIES):
+            closed = ~self.is_open(rows).any(-1)
+            if not closed.any():
+                return rows
+            rows[closed] = self.draw_rows(random_state, int(closed.sum()))
+        raise RuntimeError(f"no open field in {MOST_TRIES} drawings")
+
+    def draw_rows(self, random_state: np.random.RandomState, count: int) -> NDArray[np.float64]:
+        """Sample rows, open or not: the y of their pillars. Shape: (count, K)."""
+        spread = self.settings.spread
+        return random_state.uniform(-spread, spread, (count, self.settings.row_size))
+
+    def within_field(self) -> NDArray[np.float64]:
+        """Return the y of all lanes within the field, from right to left. Shape: (L,)."""
+        step = self.settings.step_length
+        most = int(self.settings.spread / step + 1e-9)
+        return np.arange(-most, most + 1, dtype=np.float64) * step
+
+    def is_open(self, rows: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return which lanes within the field rows leave open. (*, K) to (*, L)."""
+        away = np.abs(rows[..., None, :] - self.within_field()[:, None])
+        return np.asarray((away > self.settings.touch_distance).all(-1))
+
+    def seen_from(self, rows: Tensor, y: Tensor) -> tuple[Tensor, Tensor]:
+        """Return lanes relative to drones, and which of them are open and within the field.
+
+        Args:
+            rows: The y of the pillars. Shape: (N, R, K).
+            y: Of the drones. Shape: (N,).
+
+        Returns:
+            Metres to the left of the drone, (N, L); whether open, (N, R, L).
+        """
+        step, edge = self.settings.step_length, self.settings.spread + 1e-9
+        count = int(2.0 * edge / step) + 1
+        first = step * torch.ceil((-edge - y) / step)
+        turns = first[:, None] + step * torch.arange(count, dtype=y.dtype, device=y.device)
+        lane = y[:, None] + turns
+        away = (rows[:, :, None] - lane[:, None, :, None]).abs().amin(-1)
+        return turns, (away > self.settings.touch_distance) & (lane <= edge)[:, None]
+
+    def nearest(self, rows: Tensor, y: Tensor) -> tuple[Tensor, Tensor]:
+        """Find the nearest open lane of rows; of two, that whose gap's middle is nearer.
+
+        Args:
+            rows: The y of their pillars. Shape: (n, K).
+            y: Of the drones. Shape: (n,).
+
+        Returns:
+            Metres to its left, and the width of its gap. Two of shape (n,).
+        """
+        turns, is_open = self.seen_from(rows[:, None], y)
+        left, right = self._gap(rows, y[:, None] + turns)
+        off_centre = (0.5 * (left + right) - y[:, None]).abs()
+        cost = turns.abs() + 1e-3 * off_centre / self.settings.spread
+        best = torch.where(is_open[:, 0], cost, torch.inf).argmin(-1, keepdim=True)
+        width = (left - right).gather(-1, best)[:, 0] - self.settings.width
+        return turns.gather(-1, best)[:, 0], width
+
+    def _gap(self, rows: Tensor, lane: Tensor) -> tuple[Tensor, Tensor]:
+        """Return the middles of the pillars, or the field's ends, next to lanes. (n, L) each."""
+        edge = self.settings.spread + 0.5 * self.settings.width
+        there = rows[:, None].expand(*lane.shape, rows.shape[-1])
+        is_left = there >= lane[..., None]
+        left = torch.where(is_left, there, torch.inf).amin(-1).clamp(max=edge)
+        right = torch.where(is_left, -torch.inf, there).amax(-1).clamp(min=-edge)
+        return left, right
+
+    def first_turn(self, rows: Tensor, y: Tensor, next_row: Tensor) -> Tensor:
+        """Plan the way through all rows with the fewest turns, by Bellman's recursion over rows.
+
+        Args:
+            rows: The y of the pillars. Shape: (N, R, K).
+            y: Of the drones. Shape: (N,).
+            next_row: Index of the first row that is ahead. Shape: (N,).
+
+        Returns:
+            Metres to turn left before the next row; 0 where no row is left or none can be crossed.
+            Shape: (N,).
+        """
+        turns, is_open = self.seen_from(rows, y)
+        between = (turns[:, :, None] - turns[:, None]).abs()
+        cost = torch.zeros_like(turns)  # from each lane, beyond the last row
+        for row in reversed(range(rows.shape[1])):
+            through = torch.where(is_open[:, row], cost, torch.inf)
+            here = (between + through[:, None]).amin(-1)
+            is_ahead = next_row[:, None] < row
+            at_next = next_row[:, None] == row
+            cost = torch.where(is_ahead, here, torch.where(at_next, through, cost))
+        total = turns.abs() + cost
+        best = total.argmin(-1, keepdim=True)
+        turn = turns.gather(-1, best)[:, 0]
+        is_known = torch.isfinite(total.gather(-1, best)[:, 0]) & (next_row < rows.shape[1])
+        return torch.where(is_known, turn, 0.0)
+
+    def fly_through(self, drone: Tensor, rows: Tensor, next_row: Tensor) -> Tensor:
+        """Return the oracle's moves: turn between rows, fly straight through them.
+
+        Args:
+            drone: Position. Shape: (N, 3).
+            rows: The y of the pillars. Shape: (N, R, K).
+            next_row: Index of the first row that is not passed, R if there is none. Shape: (N, 1).
+
+        Returns:
+            Shape: (N,).
+        """
+        s, x, y = self.settings, drone[:, 0].double(), drone[:, 1].double()
+        ahead = s.first_distance + s.spacing * next_row[:, 0] - x
+        # once the last row is behind, only the line is left
+        row = torch.where(ahead < -s.touch_distance, rows.shape[1], next_row[:, 0])
+        turn = self.first_turn(rows.double(), y, row)
+        is_beside = ahead.abs() <= s.touch_distance
+        move = torch.full_like(row, Move.FORWARD)
+        move[(turn > 0.5 * s.step_length) & ~is_beside] = Move.LEFT
+        move[(turn < -0.5 * s.step_length) & ~is_beside] = Move.RIGHT
+        return move
+
+
+def nearest_pillar(rows: Tensor, y: Tensor, next_row: Tensor) -> Tensor:
+    """Return the standing pillar of the next row that is nearest to a drone's lane.
+
+    Args:
+        rows: The y of the pillars; infinite where none stands. Shape: (N, R, K).
+        y: Of the drones. Shape: (N,).
+        next_row: Index of the first row that is not passed, R if there is none. Shape: (N,).
+
+    Returns:
+        Index among all pillars; their number if there is none. Shape: (N,).
+    """
+    env, (_, count, size) = torch.arange(len(rows), device=rows.device), rows.shape
+    aside = (rows[env, next_row.clamp(max=count - 1)] - y[:, None]).abs()
+    is_none = (next_row >= count) | aside.isinf().all(-1)
+    return torch.where(is_none, count * size, next_row * size + aside.argmin(-1))
+
+
+def meets(touch: float, before: Tensor, now: Tensor, pillars: Tensor) -> Tensor:
+    """Return whether drones that fly straight from one position to another touch pillars.
+
+    A drone touches a pillar where its centre is within a square around the pillar's; its path
+    enters all slabs of that square before it leaves any.
+
+    Args:
+        touch: Half the edge of that square, metres.
+        before: Metres. Shape: (N, 3).
+        now: Shape: (N, 3).
+        pillars: Shape: (N, P, 3).
+
+    Returns:
+        Shape: (N, P).
+    """
+    away, way = pillars[..., :2] - before[:, None, :2], (now - before)[:, None, :2]
+    is_still = way == 0
+    pace = torch.where(is_still, 1.0, way)
+    ends = torch.stack([(away - touch) / pace, (away + touch) / pace])
+    low, high = ends.amin(0), ends.amax(0)
+    inside = away.abs() <= touch
+    low = torch.where(is_still, torch.where(inside, 0.0, torch.inf), low)
+    high = torch.where(is_still, torch.where(inside, 1.0, -torch.inf), high)
+    return low.amax(-1).clamp(min=0.0) <= high.amin(-1).clamp(max=1.0)

@@ -1,0 +1,326 @@
+"""Visual randomization: sample the appearance of each environment when its episode begins.
+
+Each environment samples from a random stream of its own, so that episodes are the same whatever
+they look like. Distractors stand on both sides of the way, as far ahead as the task's own props.
+"""
+
+import copy
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from drone_rl.config import AppearanceSettings, BaseTaskSettings, CameraSettings
+from drone_rl.config.appearance import NO_TEXTURE, Names, check_appearance
+from drone_rl.config.task import Things
+from drone_rl.sim.rendering import Appearance, Distractors, Mounting, Texture, textures
+from drone_rl.sim.rendering.appearance import product, turned, zoom_for_fov
+from drone_rl.sim.rendering.scene import SemanticClass
+from drone_rl.sim.tasks import Task, as_task
+from drone_rl.sim.tasks.common import HIDDEN_DEPTH
+
+PALETTE = (
+    (0.93, 0.71, 0.22),
+    (0.20, 0.55, 0.62),
+    (0.87, 0.87, 0.83),
+    (0.36, 0.62, 0.36),
+    (0.29, 0.40, 0.66),
+    (0.58, 0.47, 0.66),
+)
+"""Yellow, teal, white, green, blue, violet: none is red, as cubes are, or brown, as pillars are."""
+WIDTH = 7
+"""Numbers of each: its place, its size, its colour."""
+_TURN = (5**0.5 - 1) / 2
+"""Of all shares of a way by which things go on, the one that leaves the most even gaps."""
+
+
+def things_of(task: Any) -> Things | None:
+    """Where the things of a task stand, or of its settings; none where that can't be said."""
+    settings = task if isinstance(task, BaseTaskSettings) else getattr(task, "settings", None)
+    return getattr(settings, "things", None)
+
+
+def most_distractors(settings: AppearanceSettings) -> int:
+    """How many there are at most."""
+    count = settings.distractors
+    return count[1] if isinstance(count, tuple) else count
+
+
+def stand(
+    things: Things, ahead: Tensor, aside: Tensor, is_left: Tensor, height: float | Tensor
+) -> Tensor:
+    """Places beside the way.
+
+    Args:
+        things: Whose way.
+        ahead: Metres. Shape: (*).
+        aside: Metres between them and where things may stand. Shape: (*).
+        is_left: On which side. Shape: (*).
+        height: Metres.
+
+    Returns:
+        Metres, world frame. Shape: (*, 3), float64.
+    """
+    side = (things.bound + aside) * (2.0 * is_left.double() - 1.0)
+    return torch.stack([ahead, side, torch.as_tensor(height).expand(ahead.shape)], -1)
+
+
+def draw_distractors(
+    settings: AppearanceSettings, things: Things | None, source: np.random.RandomState | None
+) -> list[float]:
+    """One number after the other: `WIDTH` of each distractor that there may be.
+
+    They stand on the ground, by turns to the left and to the right.
+
+    Args:
+        settings: What is drawn from.
+        things: Where what matters stands.
+        source: Middles of all ranges without.
+    """
+    most = most_distractors(settings)
+    if not most or things is None:
+        return []
+    number = torch.arange(most)
+    count = _drawn(settings.distractors, source, ())
+    if isinstance(settings.distractors, tuple) and source is not None:
+        count = source.randint(settings.distractors[0], most + 1)
+    begin, shift = _drawn((0.0, 1.0), source, ()), _drawn((-0.5, 0.5), source, (most,))
+    share = (begin + number // 2 * _TURN + number % 2 * 0.5 + shift / most) % 1.0
+    size = _drawn(settings.distractor_size, source, (most,))
+    away = _drawn(settings.distractor_distance, source, (most,)) + size / 2
+    height = size / 2 - HIDDEN_DEPTH * (number >= count)
+    ahead = share * (things.first + things.last)
+    places = stand(things, ahead, away, number % 2 == 0, height)
+    colors = torch.stack([_color(settings, source, i) for i in range(most)])
+    return torch.cat([places, size[:, None], colors], -1).flatten().tolist()
+
+
+def _drawn(value: Any, source: np.random.RandomState | None, shape: tuple[int, ...]) -> Tensor:
+    low, high = value if isinstance(value, tuple) else (value, value)
+    if low == high or source is None:
+        return torch.full(shape, (low + high) / 2, dtype=torch.float64)
+    return torch.as_tensor(source.uniform(low, high, shape), dtype=torch.float64)
+
+
+def _color(
+    settings: AppearanceSettings, source: np.random.RandomState | None, number: int
+) -> Tensor:
+    given = settings.distractor_color
+    if given is None:
+        turn = number + number // len(PALETTE)  # or all of a kind had one colour
+        return torch.tensor(PALETTE[turn % len(PALETTE)], dtype=torch.float64)
+    ends = given if isinstance(given[0], tuple) else (given, given)
+    return torch.stack([_drawn(pair, source, ()) for pair in zip(*ends, strict=True)])
+
+
+_OBJECTS = (SemanticClass.TARGET, SemanticClass.OBSTACLE)
+_APART = 7919
+"""Keeps the draws of an appearance apart from those of the task."""
+_STILL = (0.0, 0.0, 0.0)
+_OF_CAMERA = 7
+"""Numbers that say how the camera is mounted."""
+
+
+class Appearances:
+    """Draws them, and says what worlds look like."""
+
+    def __init__(
+        self,
+        settings: AppearanceSettings,
+        num_worlds: int,
+        device: str = "cpu",
+        *,
+        task: BaseTaskSettings | Task[Any] | None = None,
+        camera: CameraSettings | None = None,
+    ) -> None:
+        """Reads all textures; every world looks as in the middle of all ranges at first.
+
+        Args:
+            settings: What is drawn from.
+            num_worlds: How many.
+            device: Where they are drawn.
+            task: What there is to do in them; the original study's by default.
+            camera: The policy's.
+
+        Raises:
+            InputError: A texture can't be read, or is too large; there is no room for the camera or
+                for distractors.
+        """
+        task, self._camera = as_task(task), camera or CameraSettings()
+        self._things = things_of(task)
+        check_appearance(settings, self._camera, self._things, task.name)
+        self.settings, self._device = settings, device
+        self.distractors = most_distractors(settings)
+        """How many things the worlds need that stand beside the way."""
+        for name in {*(settings.ground_texture or ()), *(settings.object_texture or ())}:
+            if name != NO_TEXTURE:
+                textures.load(name)
+        middle = self._draw(None)
+        self.varies = self._draw(np.random.RandomState(0)) != middle
+        """Whether worlds look otherwise from episode to episode."""
+        self.middle = (
+            None if settings.is_minimal else self._made(torch.tensor(middle, dtype=torch.float64))
+        )
+        """The look of worlds that were only imagined; none for that of the task."""
+        self.values = torch.tensor([middle], dtype=torch.float64).repeat(num_worlds, 1)
+        """What was drawn, a row a world."""
+        self._now: Appearance | None = None
+
+    def reset(self, worlds: Tensor, random_states: Sequence[np.random.RandomState]) -> None:
+        """Draws anew.
+
+        Args:
+            worlds: Indices of the worlds. Shape: (k,).
+            random_states: Theirs, as they are before the task draws: they stay so, and episodes are
+                the same whatever they look like.
+        """
+        if not self.varies or not len(worlds):
+            return
+        rows = [self._draw(_distractors(state)) for state in random_states]
+        self.values = self.values.clone()
+        self.values[worlds.cpu()] = torch.tensor(rows, dtype=torch.float64)
+        self._now = None
+
+    def load(self, values: Tensor) -> None:
+        """Goes on with the `values` of another time."""
+        self.values, self._now = values.clone(), None
+
+    def drawn(self, worlds: Tensor | None = None) -> Appearance | None:
+        """What was drawn for worlds; none where nothing is, for all look as in the middle.
+
+        Args:
+            worlds: Indices, in order; all by default. Shape: (k,).
+        """
+        if not self.varies:
+            return None
+        if worlds is not None and len(worlds) < len(self.values):
+            return self._made(self.values[worlds.cpu()])
+        if self._now is None:
+            self._now = self._made(self.values)
+        return self._now
+
+    def _draw(self, source: np.random.RandomState | None) -> list[float]:
+        """What `_made` reads; what was added later is drawn later, so that all else stays."""
+        look, camera = _draw(self.settings, source), _draw_camera(self.settings, source)
+        return [*look, *camera, *draw_distractors(self.settings, self._things, source)]
+
+    def _made(self, values: Tensor) -> Appearance:
+        """Of rows as `_draw` makes them, or of a single one. Shape: (num_worlds, *) or (*)."""
+        settings, values = self.settings, values.to(self._device)
+        columns = iter(values.unbind(-1))
+
+        def number() -> Tensor:
+            return next(columns)
+
+        def color() -> Tensor:
+            return torch.stack([number(), number(), number()], -1)
+
+        up, around = torch.deg2rad(number()), torch.deg2rad(number())
+        sun = number()[..., None] * color()
+        ambient = number()[..., None].expand(sun.shape)
+        shadows, horizon = number(), color()
+        zenith, fog = color(), number()
+        ground, objects, exposure = color(), color(), number()
+        colors = {SemanticClass.SKY: horizon, SemanticClass.GROUND: ground}
+        if settings.object_color is not None:
+            colors |= dict.fromkeys(_OBJECTS, objects)
+        covers = {
+            SemanticClass.GROUND: _cover(settings.ground_texture, number(), number()),
+            **dict.fromkeys(_OBJECTS, _cover(settings.object_texture, number(), number())),
+        }
+        mounting = self._mounting(torch.stack([number() for _ in range(_OF_CAMERA)], -1))
+        level = -torch.cos(up)
+        direction = [level * torch.cos(around), level * torch.sin(around), -torch.sin(up)]
+        return Appearance(
+            colors=colors,
+            ambient=ambient,
+            sun=sun,
+            sun_direction=torch.stack(direction, -1),
+            zenith=None if settings.sky_zenith is None else zenith,
+            fog=None if settings.fog_visibility is None else fog,
+            shadows=shadows if settings.shadows else None,
+            exposure=None if settings.exposure == 1.0 else exposure,
+            textures={meaning: cover for meaning, cover in covers.items() if cover is not None},
+            camera=mounting,
+            distractors=self._distractors(list(columns)),
+        )
+
+    def _mounting(self, values: Tensor) -> Mounting | None:
+        """Of offset, turn and widening."""
+        s = self.settings
+        is_moved = s.camera_offset != _STILL or s.camera_turn != _STILL
+        if not is_moved and s.camera_widening == 0.0:
+            return None
+        roll, pitch, yaw = values[..., 3:6].unbind(-1)
+        turn = product(turned("yaw", yaw), product(turned("pitch", pitch), turned("roll", roll)))
+        own = self._camera.horizontal_fov
+        zoom = None if s.camera_widening == 0.0 else zoom_for_fov(own, own + values[..., 6])
+        return Mounting(offset=values[..., :3], turn=turn, zoom=zoom)
+
+    def _distractors(self, columns: list[Tensor]) -> Distractors | None:
+        """Of what `draw_distractors` draws."""
+        if not columns:
+            return None
+        rows = torch.stack(columns, -1).unflatten(-1, (self.distractors, WIDTH))
+        return Distractors(places=rows[..., :3], sizes=rows[..., 3], colors=rows[..., 4:])
+
+
+def _draw(settings: AppearanceSettings, source: np.random.RandomState | None) -> list[float]:
+    """One number after the other, in the order in which they are read; middles without a source."""
+
+    def number(value: Any) -> float:
+        if not isinstance(value, tuple):
+            return value
+        return sum(value) / 2 if source is None else source.uniform(*value)
+
+    def color(value: Any) -> list[float]:
+        if not isinstance(value[0], tuple):
+            return list(value)
+        return [number(pair) for pair in zip(*value, strict=True)]
+
+    def texture(names: Names | None) -> int:
+        if not names:
+            return -1
+        chosen = 0 if source is None else source.randint(len(names))
+        known = [name for name in names if name != NO_TEXTURE]
+        return -1 if names[chosen] == NO_TEXTURE else known.index(names[chosen])
+
+    s, fog = settings, settings.fog_visibility
+    share = 0.5 if source is None or s.shadows in (0.0, 1.0) else source.uniform()
+    drawn = [number(s.sun_elevation), number(s.sun_azimuth), number(s.sun_strength)]
+    drawn += [*color(s.sun_color), number(s.ambient_strength), float(share <= s.shadows)]
+    drawn += [*color(s.sky_horizon), *color(s.sky_zenith or s.sky_horizon)]
+    drawn += [math.inf if fog is None else number(fog), *color(s.ground_color)]
+    drawn += [*color(s.object_color or (0.0, 0.0, 0.0)), number(s.exposure)]
+    drawn += [texture(s.ground_texture), number(s.ground_tile)]
+    return [*drawn, texture(s.object_texture), number(s.object_tile)]
+
+
+def _draw_camera(settings: AppearanceSettings, source: np.random.RandomState | None) -> list[float]:
+    """Offset, turn and widening."""
+    ends = [*_pairs(settings.camera_offset), *_pairs(settings.camera_turn)]
+    widening = settings.camera_widening
+    ends.append(widening if isinstance(widening, tuple) else (widening, widening))
+    return [
+        (low + high) / 2 if source is None or low == high else source.uniform(low, high)
+        for low, high in ends
+    ]
+
+
+def _pairs(value: Any) -> list[tuple[float, float]]:
+    low, high = value if isinstance(value[0], tuple) else (value, value)
+    return [*zip(low, high, strict=True)]
+
+
+def _distractors(random_state: np.random.RandomState) -> np.random.RandomState:
+    """A stream that depends on where another is, which stays there."""
+    ahead = copy.deepcopy(random_state)
+    return np.random.RandomState([_APART, *ahead.randint(0, 2**32, 4, dtype=np.uint32)])
+
+
+def _cover(names: Names | None, choice: Tensor, tile: Tensor) -> Texture | None:
+    known = tuple(name for name in names or () if name != NO_TEXTURE)
+    return Texture(images=known, size=tile, choice=choice) if known else None

@@ -1,0 +1,153 @@
+"""Readers of YAML and CSV files that accept plain data only, bounded in size."""
+
+import csv
+import io
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.files import read_bytes
+from drone_rl.utils.limits import (
+    METRICS_BYTES,
+    METRICS_CELLS,
+    METRICS_ROWS,
+    SWEEP_METRICS_BYTES,
+    SWEEP_METRICS_CELLS,
+    SWEEP_METRICS_ROWS,
+    YAML_BYTES,
+    YAML_DEPTH,
+    YAML_VALUES,
+    Allowance,
+)
+
+_DAMAGE = (
+    *(yaml.YAMLError, RecursionError, ValueError, ArithmeticError),
+    *(LookupError, TypeError, AttributeError),
+)
+"""What PyYAML raises for damaged content; not all of it is a `YAMLError`."""
+
+
+def read_yaml(path: Path, most: int = YAML_BYTES) -> Any:
+    """Read plain data from a YAML file.
+
+    Args:
+        path: Of the file.
+        most: Bytes that it may have.
+
+    Raises:
+        InputError: It can't be read, is too large or damaged, or holds more than plain data.
+    """
+    return parse_yaml(read_bytes(path, most), str(path))
+
+
+def parse_yaml(content: bytes | str, where: str) -> Any:
+    """Read plain data from YAML.
+
+    Args:
+        content: The YAML.
+        where: Its name, for messages.
+
+    Raises:
+        InputError: It is damaged, too large, or holds anchors, aliases, tags or a name twice.
+    """
+    try:
+        return yaml.load(content, _PlainLoader)  # a safe loader
+    except InputError as error:
+        raise InputError(f"{where} is damaged: no plain YAML ({error})") from None
+    except _DAMAGE as error:
+        reason = " ".join(str(error).split())[:200] or type(error).__name__
+        raise InputError(f"{where} is damaged: no plain YAML ({reason})") from None
+
+
+class _PlainLoader(yaml.SafeLoader):
+    """Loads texts, numbers, true, false, none, lists and mappings."""
+
+    def __init__(self, stream: Any) -> None:
+        super().__init__(stream)
+        self._depth = self._values = 0
+
+    def compose_node(self, parent: Any, index: Any) -> Any:
+        """Compose a node, unless it refers to another one or names a type."""
+        event = self.peek_event()
+        if isinstance(event, yaml.AliasEvent) or getattr(event, "anchor", None) is not None:
+            raise InputError("anchors and aliases are not accepted; write values out")
+        if getattr(event, "tag", None) is not None:
+            raise InputError("tags are not accepted; write plain values")
+        self._depth, self._values = self._depth + 1, self._values + 1
+        if self._depth > YAML_DEPTH:
+            raise InputError(f"it is nested more than {YAML_DEPTH} times")
+        if self._values > YAML_VALUES:
+            raise InputError(f"it holds more than {YAML_VALUES} values")
+        node = super().compose_node(parent, index)
+        self._depth -= 1
+        return node
+
+    def flatten_mapping(self, node: yaml.MappingNode) -> None:
+        """Leave a mapping as it is: "<<" is a name like any other."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        """Construct a mapping with each name once."""
+        made = super().construct_mapping(node, deep)
+        if len(made) < len(node.value):
+            raise InputError("a name stands there twice")
+        return made
+
+
+class TablesAllowance:
+    """What the tables of one command may have together: bytes, rows and cells."""
+
+    def __init__(
+        self,
+        size: int = SWEEP_METRICS_BYTES,
+        rows: int = SWEEP_METRICS_ROWS,
+        cells: int = SWEEP_METRICS_CELLS,
+    ) -> None:
+        """Sets the limits."""
+        self.size = Allowance(size)
+        self.rows = Allowance(rows, "rows")
+        self.cells = Allowance(cells, "cells")
+
+
+def read_table(path: Path, allowance: TablesAllowance | None = None) -> Iterator[list[str]]:
+    """Read the rows of a CSV file, its header first; empty rows are left out.
+
+    Args:
+        path: Of the file.
+        allowance: What this file and others may have together.
+
+    Yields:
+        The cells of each row.
+
+    Raises:
+        InputError: The file can't be read, is too large, or is no CSV.
+    """
+    if allowance is not None:
+        allowance.size.take(_size(path), str(path))  # before it is read: there may be many
+    content = read_bytes(path, METRICS_BYTES)
+    rows = max(content.count(b"\n"), content.count(b"\r"))
+    cells = content.count(b",")
+    if rows > 1 + METRICS_ROWS:
+        raise InputError(f"{path} has more than {METRICS_ROWS} rows; files of its kind have fewer")
+    if cells > METRICS_CELLS:
+        raise InputError(
+            f"{path} has more than {METRICS_CELLS} cells; files of its kind have fewer"
+        )
+    if allowance is not None:
+        allowance.rows.take(rows, str(path))
+        allowance.cells.take(cells, str(path))
+    try:
+        for row in csv.reader(io.StringIO(content.decode(), newline="")):
+            if row:
+                yield row
+    except (csv.Error, UnicodeDecodeError) as error:
+        raise InputError(f"{path} is damaged: no CSV ({error})") from None
+
+
+def _size(path: Path) -> int:
+    try:
+        return path.stat().st_size
+    except (OSError, ValueError):
+        return 0  # the reader says what is wrong

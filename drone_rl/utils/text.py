@@ -1,0 +1,139 @@
+"""Text for reports: numbers, lists, and sentences with the condition that permits each.
+
+The program states claims only through `Sentence`: a claim whose evidence is missing or contradicts
+it is not written. Evidence is plain data, as in the JSON files, so that a test can change the
+evidence and see the sentence change or disappear.
+"""
+
+import dataclasses
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
+
+ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth")
+
+
+def bounds(interval: Mapping[str, Any], show: Callable[[float], str] = "{:.2f}".format) -> str:
+    """The 95% interval of a number."""
+    return f"95%: {show(interval['lower95'])} to {show(interval['upper95'])}"
+
+
+def among(share: Mapping[str, Any]) -> str:
+    """A share as a count of so many."""
+    return f"{share['successes']} of {share['trials']}"
+
+
+def listed(parts: Sequence[str], last: str = "and") -> str:
+    """A list in a sentence."""
+    if len(parts) < 2:
+        return "".join(parts)
+    return f"{', '.join(parts[:-1])} {last} {parts[-1]}"
+
+
+def plural(count: int, noun: str) -> str:
+    """A count with its noun, whose plural is regular."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def ordinal(number: int) -> str:
+    """What people call the thing with this index."""
+    return ORDINALS[number] if number < len(ORDINALS) else f"{number + 1}th"
+
+
+def all_cubes(count: int) -> str:
+    """All cubes of a task that has so many."""
+    return "the cube" if count == 1 else f"all {count} cubes"
+
+
+def exact(share: float, is_all: bool = False) -> str:
+    """A share in nine digits; 1 only of what is all, not of what is only nearly all."""
+    text = f"{share:.9g}"
+    return text if is_all or text != "1" else "more than 0.999999999"
+
+
+Evidence = Mapping[str, Any]
+"""Plain numbers, texts, lists and mappings."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Sentence:
+    """One claim."""
+
+    name: str
+    """Section and claim, such as "loops.never"."""
+    condition: str
+    """The condition in English, for readers of the code or the page."""
+    may: Callable[[Evidence], bool]
+    """Whether the condition holds."""
+    text: Callable[[Evidence], str]
+    """The claim; called only if the condition holds."""
+
+
+def say(sentences: Iterable[Sentence], evidence: Evidence) -> str:
+    """All that may be said, in order, as one paragraph."""
+    return " ".join(s.text(evidence) for s in sentences if s.may(evidence))
+
+
+def said(sentences: Iterable[Sentence], evidence: Evidence) -> dict[str, str]:
+    """All that may be said, by the sentences' names."""
+    return {s.name: s.text(evidence) for s in sentences if s.may(evidence)}
+
+
+def percent(share: float) -> str:
+    """A share for people; never 0% or 100% of what is only nearly none or nearly all."""
+    text = f"{100 * share:.0f}%"
+    if text == "100%" and share < 1:
+        return "more than 99%"
+    return "less than 1%" if text == "0%" and share > 0 else text
+
+
+SEED_KEYS = ("seed", "seed_is_fixed")
+"""Entries of every result that states a claim."""
+
+
+def is_fixed(evidence: Evidence) -> bool:
+    """Whether the seed was known before the analysis; results that do not say so count as fixed."""
+    return bool(evidence.get("seed_is_fixed", True))
+
+
+def seed_of(evidence: Evidence) -> int | None:
+    """The seed, which older results have among their settings; None if it is not recorded."""
+    settings = evidence.get("settings")
+    older = settings.get("seed") if isinstance(settings, Mapping) else None
+    return evidence.get("seed", older)
+
+
+def seed_line(evidence: Evidence, what: str = "environments") -> str:
+    """The seed and where it comes from, for a terminal or a page.
+
+    Args:
+        evidence: A result.
+        what: The seed's streams were used for.
+    """
+    seed, kind = seed_of(evidence), "fixed" if is_fixed(evidence) else "fresh"
+    return f"{what}: seed {'not recorded' if seed is None else seed} ({kind})"
+
+
+def fixed_seed(name: str, what: str = "environments") -> Sentence:
+    """The warning that belongs to each claim from a seed that was known before.
+
+    Args:
+        name: Of the sentence.
+        what: The seed's streams were used for.
+    """
+
+    def text(evidence: Evidence) -> str:
+        seed = seed_of(evidence)
+        known = f"Fixed {what}" if seed is None else f"Fixed seed {seed}"
+        return f"{known}: a policy could have been fitted to these {what}."
+
+    return Sentence(name, "the seed was known before the analysis", is_fixed, text)
+
+
+BODIES = (fixed_seed("bodies.fixed_seed"),)
+"""Evidence: `bodies.json`."""
+LOOPED = (fixed_seed("looped.fixed_seed"),)
+"""Evidence: see `drone_rl.robustness.sitl.LoopedFlights.as_dict`."""
+CHANCES = (fixed_seed("chances.fixed_seed", "placements"),)
+"""Evidence: `chances.json` of held-out placements; those that a user gives have no seed."""
+CHECK = (fixed_seed("check.fixed_seed", "placements"),)
+"""Evidence: `check.json`."""

@@ -1,0 +1,59 @@
+"""An earlier revision is measured by its own files, and ratios point the right way."""
+
+import json
+import subprocess
+
+import pytest
+
+from benchmarks import revisions
+from drone_rl.utils.errors import InputError
+
+
+@pytest.fixture
+def checkout(tmp_path):
+    """A repository whose program writes how fast its own revision is."""
+    root = tmp_path / "root"
+    (root / "drone_rl" / "cli").mkdir(parents=True)
+    (root / "drone_rl" / "__init__.py").touch()
+    (root / "drone_rl" / "cli" / "__init__.py").touch()
+    git = ["git", "-C", str(root), "-c", "user.name=a", "-c", "user.email=a@b"]
+    subprocess.run([*git, "init", "-q"], check=True)
+    code = (
+        "import json, pathlib, sys\n"
+        "folder = next(a.split('=')[1] for a in sys.argv if a.startswith('folder='))\n"
+        "target = pathlib.Path(folder) / ('quick' if 'quick=true' in sys.argv else '')\n"
+        "target.mkdir(parents=True)\n"
+        "(target / 'results.json').write_text(json.dumps(FIGURES))\n"
+    )
+    for number, figures in enumerate(({"explain_s": 10.0, "collector_fps": 100.0, "other": 1.0},
+                                      {"explain_s": 12.0, "collector_fps": 80.0})):  # fmt: skip
+        text = code.replace("FIGURES", repr(figures))
+        (root / "drone_rl" / "cli" / "main.py").write_text(text)
+        subprocess.run([*git, "add", "-A"], check=True)
+        subprocess.run([*git, "commit", "-q", "-m", str(number)], check=True)
+    return root
+
+
+@pytest.mark.parametrize("quick", [True, False])
+def test_both_revisions_are_measured(checkout, tmp_path, quick):
+    found = revisions.bench_revisions(tmp_path / "out", quick, before="HEAD~1", root=checkout)
+    assert found["ratio_before_after"] == {"explain_s": 1.2, "collector_fps": 1.25}
+    assert found["revisions"]["before_figures"] == {"explain_s": 10.0, "collector_fps": 100.0}
+    json.dumps(found)
+
+
+def test_an_unknown_revision(checkout, tmp_path):
+    with pytest.raises(InputError, match="no revision deadbeef"):
+        revisions.extract("deadbeef", tmp_path / "tree", checkout)
+
+
+def test_a_benchmark_that_fails(checkout, tmp_path):
+    (checkout / "drone_rl" / "cli" / "main.py").write_text("raise SystemExit('out of memory')")
+    with pytest.raises(RuntimeError, match="out of memory"):
+        revisions.measure(checkout, ["solve"], tmp_path / "out", quick=False)
+
+
+def test_a_figure_that_only_one_revision_has_is_left_out():
+    assert revisions.compare({"explain_s": 1.0}, {"explain_s": 2.0, "verdict_s": 3.0}) == {
+        "explain_s": 2.0
+    }

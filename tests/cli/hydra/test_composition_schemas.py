@@ -1,0 +1,236 @@
+"""Every file of conf/ is typed, composes, builds what it names, and says what the code says."""
+
+import dataclasses
+import re
+import typing
+from pathlib import Path
+
+import pytest
+import torch
+import yaml
+from hydra.errors import HydraException
+
+from drone_rl.cli.hydra import composition
+from drone_rl.cli.hydra.composition import conf_dir
+from drone_rl.cli.usage import COMMANDS
+from drone_rl.config import CameraSettings, DynamicsSettings, PillarsSettings, TaskSettings
+from drone_rl.config.configuration import as_config
+from drone_rl.config.training import TrainSettings
+from drone_rl.policies.zoo import describe
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.settings import kinds_of, snake_case, types_of
+from tests.cli.hydra.conftest import commands
+
+CONF = Path(__file__).parents[3] / "conf"
+STEMS = [command.replace("-", "_") for command in COMMANDS]
+
+
+NEEDS = {"returns=gae": ["objective=ppo"], "collector=rollouts": ["objective=ppo"]}
+"""What else must be chosen with a choice."""
+
+
+def files(*groups):
+    return [(g, path.stem) for g in groups for path in sorted((CONF / g).glob("*.yaml"))]
+
+
+def test_checkouts_configuration_is_used():
+    assert conf_dir() == CONF
+
+
+@pytest.mark.parametrize("command", STEMS)
+def test_a_command_is_told_the_same_by_its_file_and_in_code(command, settings):
+    told, defaults = settings(command), commands()[command]()
+    by_reference = {"logger"}  # whose folder is that of the run
+    for name in kinds_of(type(defaults)):
+        if name not in by_reference:
+            assert getattr(told, name) == getattr(defaults, name), name
+
+
+@pytest.mark.parametrize("command", STEMS)
+def test_every_setting_of_a_command_is_typed(command, config):
+    composed = config(command)
+    types = types_of(commands()[command])
+    assert set(composed) == set(types)
+    numbers = [name for name, hint in types.items() if hint in (int, float)]
+    for name in numbers:
+        with pytest.raises(HydraException):
+            config(command, [f"{name}=many"])
+
+
+PARTS = {**composition.PARTS, **composition.SEVERAL}
+
+
+@pytest.mark.parametrize(("group", "name"), files(*composition.PARTS))
+def test_every_choice_is_told_the_same_by_its_file_and_in_code(group, name, settings):
+    choice = f"{group}={name}"
+    chosen = getattr(settings("train", choice, *NEEDS.get(choice, ())), group)
+    assert chosen.is_known
+    assert chosen == type(chosen)()
+
+
+@pytest.mark.parametrize("part", PARTS.values(), ids=lambda part: part.__name__)
+def test_every_variant_has_a_file(part):
+    text = "".join(path.read_text() for path in CONF.rglob("*.yaml"))
+    for variant in part.variants():
+        name = snake_case(variant)
+        assert re.search(rf"\bbase_{name}\b", text) or f": {name}" in text, name
+
+
+@pytest.mark.parametrize(("group", "name"), files(*composition.PARTS, *composition.SEVERAL))
+def test_every_setting_of_every_choice_is_typed(group, name, config):
+    chosen = config("train", [f"{group}={name}"])[group]
+    steps = chosen.values() if group in composition.SEVERAL else [chosen]
+    for step in steps:
+        assert dataclasses.is_dataclass(typing.cast(typing.Any, step)._metadata.object_type)
+
+
+@pytest.mark.parametrize(
+    ("group", "name"), files("task", "appearance", "camera", "transforms", "network")
+)
+def test_every_choice_of_what_a_policy_is_builds(group, name, settings):
+    frame = ["camera=frame"] if name == "original" else []  # whose rows are of that frame
+    told = settings("train", f"{group}={name}", *frame).narrowed(TrainSettings)
+    described = describe(as_config(told))
+    env = described.build_env(1, seed=0, device="cpu")
+    network = described.build_network(torch.Generator().manual_seed(0))
+    assert network(env.reset()["pixels"]).shape == (1, 3)
+    env.close()
+
+
+@pytest.mark.parametrize(("group", "name"), sorted({*files("returns")} - {("returns", "gae")}))
+def test_every_return_estimator_builds_and_estimates(group, name, settings):
+    estimator = settings("train", f"{group}={name}").returns.make()
+    reward = torch.tensor([0.0, 1.0, 0.0, 1.0])[:, None]
+    done = torch.tensor([False, True, False, True])[:, None]
+    batch = {"next": {"reward": reward, "done": done}}
+    from tensordict import TensorDict
+
+    assert estimator(TensorDict(batch, [4]))["return_to_go"].shape == (4, 1)
+
+
+@pytest.mark.parametrize(("group", "name"), files("optimiser", "scheduler"))
+def test_every_optimiser_and_schedule_builds_and_steps(group, name, settings):
+    told = settings("train", f"{group}={name}")
+    weight = torch.nn.Parameter(torch.ones(1))
+    optimiser = told.optimiser.make([weight])
+    schedule = told.scheduler.make(optimiser)
+    weight.sum().backward()
+    optimiser.step()
+    schedule.step()
+    assert weight < 1
+
+
+@pytest.mark.parametrize(("group", "name"), files("experiment", "sweep"))
+def test_every_experiment_and_sweep_composes_and_describes_a_policy(group, name, settings):
+    told = settings("train", f"{group}={name}").narrowed(TrainSettings)
+    assert describe(as_config(told)).network.name
+
+
+@pytest.mark.parametrize("name", [name for _, name in files("sweep")])
+def test_every_value_of_every_sweep_is_understood(name, settings):
+    sweep = yaml.safe_load((CONF / "sweep" / f"{name}.yaml").read_text())
+    for setting, values in sweep["hydra"]["sweeper"]["params"].items():
+        if "(" not in str(values):
+            for value in str(values).split(","):
+                settings("train", f"sweep={name}", f"{setting}={value}")
+
+
+@pytest.mark.parametrize(
+    "command",
+    ["evaluate", "play", "verdict", "prove", "check", "places", "shifts", "chain", "explain"],
+)
+def test_any_setting_of_the_task_can_be_changed_for_a_trained_policy(command, config, settings):
+    assert set(config(command).task) == set(kinds_of(TaskSettings)) | set(kinds_of(PillarsSettings))
+    assert settings(command).task == {}
+    assert settings(command, "task.num_cubes=5").task == {"num_cubes": 5}
+
+
+@pytest.mark.parametrize(
+    "override",
+    [
+        *("task.num_cubs=3", "sed=1", "task.num_cubes=three", "trainer.total_frames=many"),
+        *("network=no_such", "optimiser.learning_rate=1", "returns.gamma=high"),
+        *("transforms.standardize.mean=x", "logger.tensorboard.log=x", "network.patch=big"),
+    ],
+)
+def test_typos_die_when_composing(override, config):
+    with pytest.raises(HydraException):
+        config("train", [override])
+
+
+def test_original_is_algorithm_4(settings):
+    told = settings("train", "experiment=original")
+    assert told.collector.num_envs == 1
+    assert told.objective.reduction == "sum"
+    assert told.returns.name == "standardised"
+    assert (told.optimiser.target, told.optimiser.lr) == ("torch.optim.SGD", 1e-4)
+    assert (told.scheduler.step_size, told.scheduler.gamma) == (5, 0.99)
+    assert round(3 * told.trainer.target_share, 2) == 2.99
+    assert told.trainer.running_decay == 0.9
+    assert told.trainer.total_episodes == 30_000
+
+
+@pytest.mark.parametrize("objective", ["a2c", "ppo"])
+def test_an_objective_brings_what_it_needs_unless_that_is_given(objective, settings, config):
+    brought = settings("train", f"objective={objective}")
+    in_python = TrainSettings().replace(objective=brought.objective)
+    assert brought.narrowed(TrainSettings) == in_python
+    for name, part in brought.objective.needs.items():
+        assert getattr(brought, name) == part
+    told = settings("train", "returns.lmbda=0.5", f"objective={objective}", "collector.num_envs=8")
+    assert (told.returns.lmbda, told.collector.num_envs) == (0.5, 8)
+    composed = config("train", [f"objective={objective}", "collector=episodes"])
+    assert composed.collector._target_.endswith("threaded_collector")
+
+
+def test_a_pipeline_keeps_its_order(settings):
+    names = [step.name for step in settings("train", "transforms=original").transforms]
+    assert names == ["gray", "standardize", "crop"]
+    told = settings("train", "~transforms.standardize", "transforms=original")
+    assert [step.name for step in told.transforms] == ["gray", "crop"]
+
+
+def test_what_only_the_user_knows_is_passed_on(settings):
+    told = settings("train", "+optimiser.amsgrad=true", "optimiser.lr=0.5")
+    assert told.optimiser.values() == {"lr": 0.5, "amsgrad": True}
+    made = told.optimiser.make([torch.nn.Parameter(torch.ones(1))])
+    assert made.defaults["amsgrad"] is True
+
+
+def test_the_cameras_schema_has_the_types_of_the_settings():
+    made = {f.name: f.type for f in dataclasses.fields(composition.schema_of(CameraSettings))}
+    assert made == {"width": int, "height": int, "horizontal_fov": float}
+
+
+@pytest.mark.parametrize("command", ["evaluate", "play", "verdict", "shifts", "explain"])
+def test_any_setting_of_the_dynamics_can_be_changed_for_a_trained_policy(command, settings):
+    assert settings(command).dynamics == {}
+    told = settings(command, "dynamics.wind=[5,0,0]", "dynamics.mode=simple_flight")
+    assert told.dynamics == {"mode": "simple_flight", "wind": (5.0, 0.0, 0.0)}
+    whole = settings(command, "dynamics=crazyflie", "dynamics.gusts=1.5").dynamics
+    assert whole.keys() == kinds_of(DynamicsSettings).keys()
+    assert (whole["mass"], whole["gusts"], whole["mode"]) == (0.0319, 1.5, "simple_flight")
+
+
+@pytest.mark.parametrize("override", ["dynamics.mas=1", "dynamics.mass=heavy", "dynamics=no_such"])
+def test_typos_in_dynamics_die_when_composing(override, config):
+    for command in ("train", "verdict"):
+        with pytest.raises(HydraException):
+            config(command, [override])
+
+
+def test_a_training_in_another_body_composes_and_describes_a_policy(settings):
+    told = settings("train", "dynamics=quadrotor", "dynamics.wind=[5,0,0]", "actions.move_speed=2")
+    assert told.dynamics == DynamicsSettings(mode="simple_flight", wind=(5.0, 0.0, 0.0))
+    described = describe(as_config(told.narrowed(TrainSettings)))
+    assert (described.dynamics, described.actions.move_speed) == (told.dynamics, 2.0)
+    assert settings("train", "dynamics=quadrotor", "dynamics.mode=computer_vision") == settings(
+        "train"
+    )
+    with pytest.raises(InputError, match=r"^dynamics\.wind=\[5\.0, 0\.0, 0\.0\] moves nothing"):
+        settings("train", "dynamics.wind=[5,0,0]")
+
+
+def test_a_crazyflie_weighs_32_grams_and_hovers(settings):
+    told = settings("train", "dynamics=crazyflie").dynamics
+    assert told.mass == 0.0319 and 0.64 < told.hover_throttle < 0.66

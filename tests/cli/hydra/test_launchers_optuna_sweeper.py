@@ -1,0 +1,45 @@
+"""Ranges in Hydra's grammar as Optuna's distributions."""
+
+import pytest
+from hydra.core.override_parser.overrides_parser import OverridesParser
+
+optuna = pytest.importorskip("optuna", reason="pip install 'drone-rl[optuna]'")
+
+from optuna.distributions import (  # noqa: E402
+    CategoricalDistribution,
+    FloatDistribution,
+    IntDistribution,
+)
+
+from drone_rl.cli.hydra.launchers import OptunaSweeper, check_params, distribution  # noqa: E402
+from drone_rl.utils.errors import InputError  # noqa: E402
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("a=interval(0.9,1)", FloatDistribution(0.9, 1.0)),
+        ("a=tag(log,interval(1e-4,1e-1))", FloatDistribution(1e-4, 1e-1, log=True)),
+        ("a=range(1,6)", IntDistribution(1, 5)),
+        ("a=range(0,10,4)", IntDistribution(0, 8, step=4)),
+        ("a=choice(x,y)", CategoricalDistribution(["x", "y"])),
+        ("a=1,2", CategoricalDistribution(["1", "2"])),
+    ],
+)
+def test_distributions(text, expected):
+    (override,) = OverridesParser.create().parse_overrides([text])
+    assert distribution(override) == expected
+
+
+def test_numbers_below_one_are_refused():
+    settings = {"seed": 0, "prune": True, "startup_trials": 1, "report_frames": 1, "params": {}}
+    with pytest.raises(InputError, match="num_trials=0"):
+        OptunaSweeper(num_trials=0, batch=1, **settings)
+
+
+def test_a_journal_sets_only_what_is_searched():
+    space = {"a": FloatDistribution(0.0, 1.0), "b": CategoricalDistribution(["x", "y"])}
+    check_params({"a": 0.5, "b": "x"}, space)
+    for params in ({"policy._target_": "os.system"}, {"a": 2.0}):
+        with pytest.raises(InputError, match="never draws"):
+            check_params(params, space)

@@ -1,0 +1,105 @@
+"""What an objective needs, what is its loss's, and what its learner's."""
+
+import pytest
+
+from drone_rl.config.configuration import as_config, from_config
+from drone_rl.config.learning import (
+    A2c,
+    Gae,
+    LeaveOneOut,
+    Objective,
+    Ppo,
+    Ray,
+    Reinforce,
+    Rollouts,
+    Threads,
+)
+from drone_rl.config.training import TrainSettings
+from drone_rl.utils.errors import InputError
+
+
+@pytest.mark.parametrize("objective", [A2c(), Ppo()])
+def test_a_new_objective_brings_what_it_needs(objective):
+    told = TrainSettings().replace(objective=objective, seed=3)
+    assert (told.returns, told.collector) == (Gae(), Rollouts())
+    assert (told.objective, told.seed) == (objective, 3)
+
+
+def test_what_is_given_stays():
+    told = TrainSettings().replace(objective=Ppo(), collector=Rollouts(num_envs=5))
+    assert told.collector.num_envs == 5
+    again = told.replace(returns=Gae(gamma=0.5)).replace(objective=A2c())
+    assert (again.collector.num_envs, again.returns.gamma) == (5, 0.5)
+
+
+@pytest.mark.parametrize("collector", [Threads(), Ray()])
+def test_batches_without_next_observations_are_no_good_to_a_critic(collector):
+    message = r"^objective=ppo does not go with .* of collector; give collector=rollouts$"
+    with pytest.raises(InputError, match=message):
+        TrainSettings().replace(objective=Ppo(), collector=collector)
+
+
+def test_returns_and_critics_belong_together():
+    with pytest.raises(InputError, match=r"^objective=a2c .* of returns; give returns=gae$"):
+        TrainSettings(objective=A2c(), collector=Rollouts(), returns=LeaveOneOut())
+    message = "{} is for a critic, which objective=reinforce lacks; give objective=ppo or a2c, or"
+    with pytest.raises(InputError, match=message.format("returns=gae")):
+        TrainSettings(returns=Gae())
+    with pytest.raises(InputError, match=message.format("collector=rollouts")):
+        TrainSettings(collector=Rollouts())
+    with pytest.raises(InputError, match=r"or another returns$"):
+        TrainSettings().replace(objective=Ppo()).replace(objective=Reinforce())
+
+
+def test_parts_of_the_users_own_are_not_judged():
+    config = as_config(TrainSettings().replace(objective=Ppo()))
+    config["collector"] = {"_target_": "mine.Collector", "num_envs": 3}
+    assert from_config(TrainSettings, config).collector.target == "mine.Collector"
+
+
+def test_what_a_file_says_is_what_was_said():
+    told = TrainSettings().replace(objective=Ppo(epochs=7, shares_trunk=False))
+    assert from_config(TrainSettings, as_config(told)) == told
+
+
+def test_the_loss_is_told_what_is_its_own(monkeypatch):
+    given = {}
+    monkeypatch.setattr("torchrl.objectives.ClipPPOLoss", lambda *a, **k: given.update(k, args=a))
+    Ppo(clip_epsilon=0.1).make("actor", "critic")
+    assert given.pop("args") == ("actor", "critic")
+    assert given == {
+        "functional": False,
+        "critic_coeff": Ppo().critic_coeff,
+        "entropy_coeff": Ppo().entropy_coeff,
+        "clip_epsilon": 0.1,
+    }
+
+
+def test_a_setting_of_torchrls_loss_that_is_not_ours_is_passed_on(monkeypatch):
+    monkeypatch.setattr("torchrl.objectives.ClipPPOLoss", lambda *a, **k: k)
+    config = {"_target_": Ppo.target, "clip_value": 0.3, "epochs": 5, "shares_trunk": False}
+    told = from_config(TrainSettings, {**as_config(TrainSettings().replace(objective=Ppo()))})
+    mine = from_config(TrainSettings, {**as_config(told), "objective": config}).objective
+    assert mine.make() == {"functional": False, "clip_value": 0.3}
+    assert mine.passes == {"epochs": 5, "minibatch_size": Ppo().minibatch_size}
+
+
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [
+        ({"num_steps": 1}, "num_steps=1 is out of range; give a whole number from 2 to 4096"),
+        ({"epochs": 0}, "epochs=0 is out of range; give a whole number of 1 or more"),
+        ({"minibatch_size": 0}, "minibatch_size=0 is out of range"),
+        ({"clip_epsilon": 0.0}, "clip_epsilon=0.0 is out of range; give a number above 0 up to 1"),
+        ({"critic_coeff": 0.0}, "critic_coeff=0.0 is out of range; give a number above 0"),
+        ({"entropy_coeff": -1.0}, "entropy_coeff=-1.0 is out of range"),
+        ({"shares_trunk": 1}, "shares_trunk=1 is neither true nor false"),
+    ],
+)
+def test_values_out_of_bounds(value, message):
+    with pytest.raises(InputError, match=message):
+        Ppo(**value)
+
+
+def test_the_variants_of_an_objective():
+    assert set(Objective.variants()) == {Reinforce, A2c, Ppo}

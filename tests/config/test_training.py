@@ -1,0 +1,33 @@
+"""Where metrics go, and what is said where a logger's package is missing."""
+
+from typing import ClassVar
+
+import pytest
+
+from drone_rl.config.training import Logger
+from drone_rl.utils.errors import InputError
+
+
+def refuse(error):
+    raise error
+
+
+@pytest.mark.parametrize(
+    ("error", "remedy"),
+    [
+        (ImportError("wandb could not be imported"), "pip install wandb,"),
+        (ImportError("MLFlow is not installed"), "pip install mlflow,"),
+        (ImportError("Ray is required for RayLogger. Install it"), "pip install ray,"),
+        (ModuleNotFoundError("No module named 'a.b'", name="a.b"), "pip install a,"),
+        (ImportError("broken"), "install what it needs"),
+    ],
+)
+def test_a_missing_package_is_one_line_that_names_it(monkeypatch, error, remedy):
+    class Broken(Logger):
+        target: ClassVar[str] = "os.path.join"
+        is_known: ClassVar[bool] = False
+
+    monkeypatch.setattr("os.path.join", lambda *args, **kwargs: refuse(error))
+    with pytest.raises(InputError, match=r"^logger _target_=os\.path\.join can't be made") as said:
+        Broken().make()
+    assert remedy in str(said.value) and "\n" not in str(said.value)

@@ -1,0 +1,76 @@
+"""What one drone's sensors tell while its pilot flies it."""
+
+import math
+
+import pytest
+import torch
+
+from drone_rl.config.sensors import GpsSettings, SensorSettings
+from drone_rl.flight.commands.drone import Sensors
+from drone_rl.flight.commands.pilot import Pilot
+from drone_rl.sim.coordinates import HOME
+from drone_rl.sim.dynamics import FlightState
+from drone_rl.sim.dynamics.state import GROUND
+
+PERFECT = SensorSettings(gps=GpsSettings(latency=0.0)).perfect
+
+
+def test_a_drone_that_lies_still_feels_gravity_alone():
+    body = FlightState.at_rest(torch.tensor([[0.0, 0.0, 0.3]], dtype=torch.float64))
+    sensors = Sensors(body, PERFECT)
+    sensors.update(body, 0.5)
+    assert sensors.time == 0.5
+    felt = sensors.imu()
+    assert felt.specific_force[0].tolist() == pytest.approx([0.0, 0.0, 9.81])
+    assert felt.angular_velocity[0].tolist() == [0.0, 0.0, 0.0]
+    assert float(sensors.magnetometer().field.norm()) == pytest.approx(0.5, abs=0.1)  # gauss
+
+
+def test_of_a_flight_they_tell_height_place_and_touch():
+    pilot = Pilot(sensors=PERFECT)
+    on_the_ground = float(pilot.sensors.barometer().altitude[0])
+    assert not pilot.sensors.gps().is_valid[0]  # within its first second
+    pilot.arm()
+    pilot.take_off()
+    pilot.move_to(10, 0, 5, speed=3)
+    pilot.advance(3.0)
+    x, _, z = pilot.state.position
+    risen = float(pilot.sensors.barometer().altitude[0]) - on_the_ground
+    assert risen == pytest.approx(z - 0.3, abs=0.1)
+    place = pilot.sensors.gps()
+    north = math.radians(float(place.place[0, 0]) - HOME.latitude) * 6.37e6
+    assert place.is_valid[0] and north == pytest.approx(x, abs=0.3)
+    assert pilot.sensors.time == pytest.approx(pilot.time)
+    pilot.land()
+    touched = pilot.sensors.collision()
+    assert touched.has_collided[0] and int(touched.contact.thing[0]) == GROUND
+
+
+def test_a_touch_is_news_once():
+    pilot = Pilot(sensors=PERFECT)
+    pilot.advance(0.1)
+    pilot.sensors.collision()
+    pilot.arm()
+    pilot.take_off()
+    pilot.sensors.collision()
+    pilot.advance(0.5)
+    assert not pilot.sensors.collision().has_collided[0]
+
+
+def test_noise_is_the_seeds():
+    told = []
+    for seed in (1, 1, 2):
+        pilot = Pilot(seed=seed, sensors=SensorSettings())
+        pilot.advance(0.2)
+        told.append(float(pilot.sensors.barometer().pressure[0]))
+    assert told[0] == told[1] != told[2]
+
+
+def test_where_nobody_asked_they_are_turned_on_by_the_first_look():
+    pilot, other = Pilot(), Pilot(sensors=SensorSettings())
+    for each in (pilot, other):
+        each.advance(1.0)
+    assert pilot._drone.sensors is None
+    assert pilot.sensors.time == 0.0 and pilot.sensors is pilot.sensors
+    assert pilot.sensors.settings == SensorSettings()
+    assert (pilot._drone.body.numbers == other._drone.body.numbers).all()

@@ -1,0 +1,93 @@
+import math
+
+import numpy as np
+import pytest
+
+from drone_rl.config import DynamicsSettings
+from drone_rl.flight.in_the_loop.control import (
+    AT_REST,
+    ClimbState,
+    RcSticks,
+    Setpoint,
+    sticks_for,
+    velocity_to,
+)
+from drone_rl.flight.in_the_loop.instruments import Readings
+
+SETTINGS = DynamicsSettings()
+HALF = math.sqrt(0.5)
+
+
+def readings(velocity=(0.0, 0.0, 0.0), attitude=(1.0, 0.0, 0.0, 0.0)):
+    zeros = np.zeros(3)
+    return Readings(0.0, zeros, np.array(velocity), np.array(attitude), zeros, zeros)
+
+
+def hands(setpoint, now, climb=None, seconds=0.01):
+    return sticks_for(setpoint, now, climb or ClimbState(), seconds, SETTINGS)
+
+
+def test_channels():
+    sticks = RcSticks(roll=0.5, pitch=-1.0, throttle=0.25, yaw=0.1, armed=True)
+    assert sticks.channels == [1750, 1000, 1250, 1450, 2000, 2000]
+    assert AT_REST.channels == [1500, 1500, 1000, 1500, 1000, 2000]
+    assert RcSticks(roll=9.0, throttle=9.0).channels[:3] == [2000, 1500, 2000]
+
+
+def test_forward_is_nose_down():
+    """1 m/s is missing: a fifth of pi / 5.5, of 60 degrees at full stick."""
+    sticks, _ = hands(Setpoint((1.0, 0.0, 0.0)), readings())
+    assert sticks.pitch == pytest.approx(0.2 * (math.pi / 5.5) / math.radians(60.0))
+    assert (sticks.roll, sticks.yaw, sticks.throttle) == (0.0, 0.0, 0.5)
+
+
+def test_to_the_left_is_a_roll_to_the_left():
+    sticks, _ = hands(Setpoint((0.0, 99.0, 0.0)), readings())
+    assert sticks.roll == pytest.approx(-(180 / 5.5) / 60)  # no more than the limit
+
+
+def test_sticks_are_those_of_who_looks_west():
+    """West is ahead of him, so the nose goes down; the heading that he has is the one wished."""
+    west = readings(attitude=(HALF, 0.0, 0.0, HALF))
+    sticks, _ = hands(Setpoint((0.0, 1.0, 0.0), math.pi / 2), west)
+    assert sticks.pitch > 0.1
+    assert sticks.roll == pytest.approx(0.0, abs=1e-12)
+    assert sticks.yaw == pytest.approx(0.0, abs=1e-12)
+
+
+def test_headings_take_the_short_way():
+    to_left, _ = hands(Setpoint((0.0, 0.0, 0.0), 0.1), readings())
+    assert to_left.yaw == pytest.approx(0.15 / math.radians(200))
+    over_pi, _ = hands(Setpoint((0.0, 0.0, 0.0), 2 * math.pi - 0.1), readings())
+    assert over_pi.yaw == pytest.approx(-0.15 / math.radians(200))
+
+
+def test_turning_wherever_that_leads():
+    """Half of 200 degrees a second, be the heading what it may."""
+    sticks, _ = hands(
+        Setpoint((0.0, 0.0, 0.0), heading=2.0, yaw_rate=math.radians(100)), readings()
+    )
+    assert sticks.yaw == pytest.approx(0.5)
+    faster, _ = hands(Setpoint((0.0, 0.0, 0.0), yaw_rate=-9.0), readings())
+    assert faster.yaw == -1.0
+
+
+def test_the_climb_remembers():
+    sticks, climb = hands(Setpoint((0.0, 0.0, 0.2)), readings(), ClimbState(0.1), seconds=0.5)
+    assert climb.integral == pytest.approx(0.1 + 2.0 * 0.2 * 0.5)
+    assert sticks.throttle == pytest.approx(0.5 + 0.5 * (0.4 + 0.3))
+
+
+def test_in_the_air_the_throttle_never_says_that_it_stands():
+    sticks, climb = hands(Setpoint((0.0, 0.0, -9.0)), readings())
+    assert sticks.throttle == 0.1
+    assert climb.integral == pytest.approx(-0.18)
+
+
+def test_the_way_to_a_place_is_straight_and_within_limits():
+    """A quarter of 6 m/s for each metre, 6 m/s at most along the line; up at 4 m/s at most."""
+    assert velocity_to(np.array([1.0, 0.0, -0.4]), readings(), SETTINGS) == (1.5, 0.0, -0.4)
+    fast = velocity_to(np.array([30.0, 40.0, 99.0]), readings(), SETTINGS)
+    assert fast == pytest.approx((3.6, 4.8, 4.0))
+    slow = velocity_to(np.array([30.0, 40.0, 0.0]), readings(), SETTINGS, speed=1.0)
+    assert slow == pytest.approx((0.6, 0.8, 0.0))

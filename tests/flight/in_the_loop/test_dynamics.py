@@ -1,0 +1,113 @@
+"""Steps of a world whose drone has a firmware on board: the stub, and one of three lines."""
+
+import shlex
+
+import numpy as np
+import pytest
+import torch
+
+from drone_rl.config import ActionSettings, DynamicsSettings
+from drone_rl.flight.betaflight.sitl import betaflight_drone
+from drone_rl.flight.in_the_loop import dynamics as module
+from drone_rl.flight.in_the_loop.drone import DroneInTheLoop, FlightControllerError, NotReadyError
+from drone_rl.flight.in_the_loop.dynamics import InTheLoopDynamics
+from drone_rl.sim.dynamics import FlightState, Obstacles, Quadrotor
+
+SETTINGS = DynamicsSettings(mode="simple_flight", camera_mount="body")
+FAST = SETTINGS.replace(tick=0.001)
+PLACE = torch.tensor([[0.0, 0.0, 2.0]], dtype=torch.float64)
+
+
+class Even:
+    """Turns all rotors as much: a drone that goes up or down alone."""
+
+    def __init__(self, arms=True):
+        self.arms = arms
+
+    def step(self, readings, sticks):
+        return np.full(4, max(sticks.throttle, 0.05) if sticks.armed and self.arms else 0.0)
+
+
+def drone(controller=None):
+    ground = torch.tensor([[0.0, 0.0, SETTINGS.radius]], dtype=torch.float64)
+    body = FlightState.at_rest(ground)
+    return DroneInTheLoop(Quadrotor(FAST), body, controller or Even(), FAST)
+
+
+def test_it_is_a_worlds_dynamics():
+    moves = InTheLoopDynamics(drone(), SETTINGS)
+    assert moves.actions.names == ("forward", "left", "right")
+    assert (moves.mount, moves.is_random, moves.needs_obstacles) == ("body", False, True)
+    gusty = InTheLoopDynamics(drone(), SETTINGS.replace(gusts=1.0), ActionSettings(kind="velocity"))
+    assert gusty.is_random
+    assert gusty.actions.entry.shape == (3,)
+
+
+def test_an_episode_begins_where_it_is_to():
+    """`start` moves nothing; `begin` brings the drone there, with the gusts of the episode."""
+    dynamics = InTheLoopDynamics(drone(), SETTINGS)
+    start = dynamics.start(PLACE, torch.tensor([7]))
+    assert dynamics.drone.time == 0.0
+    dynamics.begin(start)
+    assert np.linalg.norm(dynamics.drone.readings.position - [0.0, 0.0, 2.0]) < 0.1
+    assert dynamics.drone.body.numbers[0, 25] == 7.0
+
+
+def test_a_step_lasts_as_long_as_an_action():
+    """33 ticks of 3 ms are 99 of 1 ms. It keeps its height, and is wanted ahead of where it is."""
+    dynamics = InTheLoopDynamics(drone(), SETTINGS)
+    body = dynamics.start(PLACE)
+    dynamics.begin(body)
+    begun = dynamics.drone.time
+    for _ in range(2):
+        body = dynamics.step(body, torch.tensor([0]))
+    assert dynamics.drone.time - begun == pytest.approx(0.198)
+    assert abs(float(body.position[0, 2]) - 2.0) < 0.1
+    assert body.reference[0].tolist() == pytest.approx([0.792, 0.0, 0.0, 2.0])
+    assert body.position is not dynamics.drone.body.position
+
+
+def test_obstacles_are_felt():
+    """A box right above: the drone, told to be higher, stays below it."""
+    dynamics = InTheLoopDynamics(drone(), SETTINGS)
+    body = dynamics.start(PLACE)
+    dynamics.begin(body)
+    body.reference[:, 3] = 4.0
+    above = Obstacles(torch.tensor([[[0.0, 0.0, 3.5]]], dtype=torch.float64), (1.0, 1.0, 1.0))
+    for _ in range(10):
+        body = dynamics.step(body, torch.tensor([0]), above)
+        body.reference[:, 3] = 4.0
+    assert float(body.position[0, 2]) < 2.25  # 3.5 - 1 - 0.3, and a little
+    assert int(body.contact.thing[0]) == 0
+
+
+def test_a_firmware_that_never_arms():
+    dynamics = InTheLoopDynamics(drone(Even(arms=False)), SETTINGS)
+    with pytest.raises(NotReadyError, match="refuses to arm"):
+        dynamics.begin(dynamics.start(PLACE))
+
+
+def test_a_policy_that_thinks_for_too_long(monkeypatch):
+    dynamics = InTheLoopDynamics(drone(), SETTINGS)
+    body = dynamics.start(PLACE)
+    dynamics.begin(body)
+    monkeypatch.setattr(module, "LONGEST_DECISION", 0.0)
+    with pytest.raises(FlightControllerError, match="the policy took"):
+        dynamics.step(body, torch.tensor([0]))
+
+
+def test_it_goes_where_actions_lead(stub, tmp_path):
+    """The stub flies it forward, then to the left."""
+    program = tmp_path / "stub"
+    program.write_text(f"#!/bin/sh\nexec {shlex.join(stub())}\n")
+    program.chmod(0o755)
+    with betaflight_drone(SETTINGS, firmware=program) as flown:
+        dynamics = InTheLoopDynamics(flown, SETTINGS)
+        body = dynamics.start(PLACE)
+        dynamics.begin(body)
+        for action in (0, 0, 0, 0, 0, 1, 1, 1, 1, 1):
+            body = dynamics.step(body, torch.tensor([action]))
+    x, y, z = body.position[0].tolist()
+    assert x > 0.4
+    assert y > 0.1
+    assert abs(z - 2.0) < 0.3

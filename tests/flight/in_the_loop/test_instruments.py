@@ -1,0 +1,107 @@
+import math
+
+import numpy as np
+import pytest
+import torch
+
+from drone_rl.flight.in_the_loop.instruments import (
+    Readings,
+    into_body,
+    measure,
+    pressure_at,
+    rotation_between,
+)
+from drone_rl.sim.coordinates import GeoPoint
+from drone_rl.sim.dynamics import BodyState
+from tests.flight.simple_body import SimpleBody
+
+HALF = math.sqrt(0.5)
+LEFT = np.array([HALF, 0.0, 0.0, HALF])  # a quarter turn to the left
+LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
+
+
+def state(velocity=(0.0, 0.0, 0.0), attitude=(1.0, 0.0, 0.0, 0.0)):
+    body = BodyState.at_rest(torch.zeros(1, 3, dtype=torch.float64))
+    body.velocity = torch.tensor([velocity], dtype=torch.float64)
+    body.attitude = torch.tensor([attitude], dtype=torch.float64)
+    return body
+
+
+def test_at_rest_an_accelerometer_feels_the_floor():
+    readings = measure(state(), state(), 0.001, 2.0)
+    assert readings.force.tolist() == [0.0, 0.0, 9.81]
+    assert readings.rates.tolist() == [0.0, 0.0, 0.0]
+    assert (readings.time, readings.heading) == (2.0, 0.0)
+
+
+def test_in_free_fall_it_feels_nothing():
+    falling = state(velocity=(0.0, 0.0, -0.0981))
+    assert measure(state(), falling, 0.01, 0.0).force == pytest.approx([0.0, 0.0, 0.0], abs=1e-12)
+
+
+def test_forces_are_those_of_the_body():
+    """It looks west and is pushed west: forward."""
+    before, after = state(attitude=tuple(LEFT)), state((0.0, 0.02, 0.0), tuple(LEFT))
+    readings = measure(before, after, 0.01, 0.0)
+    assert readings.force == pytest.approx([2.0, 0.0, 9.81])
+    assert readings.heading == pytest.approx(math.pi / 2)
+
+
+def test_rates_are_turns_over_time():
+    after = state(attitude=(math.cos(0.01), math.sin(0.01), 0.0, 0.0))
+    assert measure(state(), after, 0.01, 0.0).rates == pytest.approx([2.0, 0.0, 0.0])
+
+
+def test_turns_know_no_sign_of_quaternions():
+    for end in (LEFT, -LEFT):
+        assert rotation_between(LEVEL, end) == pytest.approx([0.0, 0.0, math.pi / 2])
+    assert rotation_between(LEFT, LEVEL) == pytest.approx([0.0, 0.0, -math.pi / 2])
+    assert rotation_between(LEFT, LEFT).tolist() == [0.0, 0.0, 0.0]
+
+
+def test_turns_are_about_the_bodys_axes():
+    """Looking west, it rolls by a quarter: about its own x."""
+    rolled = np.array([0.5, 0.5, 0.5, 0.5])
+    assert rotation_between(LEFT, rolled) == pytest.approx([math.pi / 2, 0.0, 0.0])
+
+
+def test_a_quarter_turn_left_sees_north_on_its_right():
+    assert into_body(LEFT, np.array([1.0, 0.0, 0.0])) == pytest.approx([0.0, -1.0, 0.0])
+
+
+def test_pressure_of_the_standard_atmosphere():
+    assert pressure_at(0.0) == 101_325.0
+    assert pressure_at(1000.0) == pytest.approx(89_874.6, abs=0.5)
+
+
+def test_place_and_altitude_are_counted_from_home():
+    zeros, home = np.zeros(3), GeoPoint(50.0, 8.0, 100.0)
+    readings = Readings(0.0, np.array([0.0, 0.0, 5.0]), zeros, LEVEL, zeros, zeros, home)
+    assert readings.place.tolist() == [50.0, 8.0, 105.0]
+    assert readings.altitude == 105.0
+    assert readings.pressure == pressure_at(105.0)
+
+
+def test_the_body_of_these_tests_falls_and_turns_as_it_should():
+    body = SimpleBody()
+    high = body.start()
+    high.position = torch.tensor([[0.0, 0.0, 50.0]], dtype=torch.float64)
+    fallen = body.push(high, torch.zeros(1, 4), 1000)
+    assert fallen.velocity[0, 2] == pytest.approx(-9.81)
+    turning = body.push(high, torch.tensor([[0.5, 0.5, 0.6, 0.6]], dtype=torch.float64), 1)
+    assert turning.angular_velocity[0, 2] == pytest.approx(0.001 * 0.055562 * 0.2 / 0.01428)
+
+
+def test_the_heading_of_a_tilted_drone_is_where_its_nose_points():
+    """A quarter turn to the left, then the nose down by 40 degrees and a roll by 30."""
+    half = [math.radians(angle) / 2 for angle in (90.0, 40.0, 30.0)]
+    (cz, cy, cx), (sz, sy, sx) = (list(map(f, half)) for f in (math.cos, math.sin))
+    attitude = np.array([
+        cz * cy * cx + sz * sy * sx,
+        cz * cy * sx - sz * sy * cx,
+        cz * sy * cx + sz * cy * sx,
+        sz * cy * cx - cz * sy * sx,
+    ])  # fmt: skip
+    zeros = np.zeros(3)
+    readings = Readings(0.0, zeros, zeros, attitude, zeros, zeros)
+    assert readings.heading == pytest.approx(math.pi / 2)

@@ -1,0 +1,152 @@
+"""Bounces, friction and boxes."""
+
+import math
+
+import numpy as np
+import pytest
+import torch
+
+from drone_rl.sim.dynamics import Obstacles
+from drone_rl.sim.dynamics.control import rotor_goals
+from drone_rl.sim.dynamics.state import GROUND, NOTHING
+from tests.flying import falling, numbers, quadrotor
+
+NONE = numbers((0.0, 0.0, 0.0, 0.0))
+VACUUM = {"air_density": 0.0}
+
+
+def flown(drone, state, ticks, obstacles=None, rotors=NONE):
+    return drone.fly(state, rotor_goals(rotors), ticks, obstacles)
+
+
+def pillar(*centers, half=(0.5, 0.5, 5.0)):
+    return Obstacles(numbers(*centers)[None], half)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.55, 1.0])
+def test_a_bounce_gives_back_its_share_of_speed(share):
+    """Thrown at 2 m/s from 3 mm above the touch: within the first two ticks it is on its way up."""
+    drone = quadrotor(restitution=share, friction=0.0, **VACUUM)
+    after = flown(drone, falling(0.303, (1.0, 0.0, -2.0)), 1)
+    into = 2.0 + 9.81 * 0.003
+    np.testing.assert_allclose(after.velocity[0], (1.0, 0.0, share * into), atol=1e-5)
+    assert float(after.position[0, 2]) == pytest.approx(0.3, abs=1e-6)
+
+
+def test_friction_takes_what_the_bounce_returns_into_account():
+    """Coulomb: the impulse into the ground, 1 + 0.5 of the speed, times 0.2 is lost sideways."""
+    drone = quadrotor(restitution=0.5, friction=0.2, **VACUUM)
+    after = flown(drone, falling(0.303, (3.0, 0.0, -2.0)), 1)
+    into = 2.0 + 9.81 * 0.003
+    expected = (3.0 - 0.2 * 1.5 * into, 0.0, 0.5 * into)
+    np.testing.assert_allclose(after.velocity[0], expected, atol=1e-5)
+
+
+def test_a_slide_ends_where_friction_has_eaten_it():
+    """v^2 / (2 mu g), within what a tick of it is."""
+    for friction in (0.5, 0.25):
+        drone = quadrotor(friction=friction, **VACUUM)
+        after = flown(drone, falling(0.3, (2.0, -1.0, 0.0)), 1000)
+        path = 5.0 / (2 * friction * 9.81)
+        expected = path * np.array([2.0, -1.0]) / math.sqrt(5.0)
+        np.testing.assert_allclose(after.position[0, :2], expected, rtol=0.02)
+        assert not after.velocity.any()
+
+
+def test_it_rests_level_at_its_radius():
+    drone = quadrotor()
+    state = falling(3.0, (1.0, 0.5, 0.0), rates=(1.0, 2.0, 3.0))
+    after = flown(drone, state, 3000)
+    assert float(after.position[0, 2]) == pytest.approx(0.3, abs=1e-6)
+    assert not after.velocity.any() and not after.angular_velocity.any()
+    assert after.attitude[0, 1:3].tolist() == [0.0, 0.0]  # its heading stays
+    assert float(after.attitude.norm()) == pytest.approx(1.0, abs=1e-6)
+    assert after.contact.thing.tolist() == [GROUND]
+    again = flown(drone, after, 3000)
+    np.testing.assert_allclose(again.position, after.position, atol=1e-6)
+
+
+def test_rotors_lift_it_off_the_ground_again():
+    drone = quadrotor()
+    rested = flown(drone, falling(0.3), 100)
+    risen = flown(drone, rested, 333, rotors=numbers((0.7,) * 4))
+    assert float(risen.position[0, 2]) > 0.6
+
+
+def test_an_obstacle_throws_it_back_and_is_remembered():
+    """A ball of 0.3 m at 2 m/s, 1 m before the side of a box: touched after 0.35 s."""
+    drone = quadrotor(**VACUUM)
+    boxes = pillar((0.0, 50.0, 100.0), (2.0, 0.0, 98.0))
+    state = falling(100.0, (2.0, 0.0, 0.0))
+    state.position[0, 0] = 0.2
+    after = flown(drone, state, 300, boxes)
+    assert float(after.velocity[0, 0]) == pytest.approx(-1.1, abs=1e-5)
+    contact = after.contact
+    assert contact.thing.tolist() == [1] and contact.normal.tolist() == [[-1, 0, 0]]
+    assert float(contact.time) == pytest.approx(0.5, abs=0.004)
+    assert float(contact.point[0, 0]) == pytest.approx(1.5, abs=1e-5)
+    assert 0.0 <= float(contact.depth) <= 2.0 * 0.003
+    assert float(after.position[0, 0]) == pytest.approx(1.2 - 1.1 * 0.4, abs=0.01)
+    assert flown(drone, state, 100, boxes).contact.thing.tolist() == [NOTHING]
+
+
+def test_edges_are_round_for_a_ball():
+    """It hits the edge at 45 degrees: what comes back goes along the other axis."""
+    drone = quadrotor(restitution=1.0, friction=0.0, **VACUUM)
+    state = falling(100.0, (2.0, 0.0, 0.0))
+    reach = 0.3 * math.sqrt(0.5)
+    state.position[:] = numbers((0.5 - reach - 0.006, -0.5 - reach, 100.0))
+    after = flown(drone, state, 6, pillar((1.0, 0.0, 100.0)))
+    np.testing.assert_allclose(after.velocity[0, :2], (0.0, -2.0), atol=0.1)
+    np.testing.assert_allclose(
+        after.contact.normal[0], (-math.sqrt(0.5), -math.sqrt(0.5), 0), atol=0.02
+    )
+
+
+@pytest.mark.parametrize(
+    ("inside", "out"),
+    [
+        ((0.3, 0.0, 0.0), (0.8, 0.0, 0.0)),
+        ((-0.3, 0.1, 0.0), (-0.8, 0.1, 0.0)),
+        ((0.0, 0.4, 0.0), (0.0, 0.8, 0.0)),
+        ((0.0, -0.4, 1.0), (0.0, -0.8, 1.0)),
+        ((0.1, 0.1, 4.9), (0.1, 0.1, 5.3)),
+        ((0.1, 0.1, -4.9), (0.1, 0.1, -5.3)),
+    ],
+)
+def test_what_is_inside_leaves_by_the_nearest_side(inside, out):
+    state = falling(100.0)
+    state.position[:] += numbers(inside)
+    after = flown(quadrotor(**VACUUM), state, 1, pillar((0.0, 0.0, 100.0)))
+    np.testing.assert_allclose(after.position[0] - numbers((0, 0, 100))[0], out, atol=1e-3)
+
+
+def test_it_lands_on_a_box():
+    drone = quadrotor()
+    after = flown(drone, falling(7.0), 3000, pillar((0.2, 0.0, 5.0), half=(0.5, 0.5, 1.0)))
+    assert float(after.position[0, 2]) == pytest.approx(6.3, abs=1e-3)
+    assert after.contact.thing.tolist() == [0]
+
+
+def test_obstacles_count_more_than_the_ground():
+    """On the ground and against a box at once."""
+    drone = quadrotor()
+    state = falling(0.3, (1.0, 0.0, 0.0))
+    after = flown(drone, state, 60, pillar((0.9, 0.0, 0.5)))
+    assert after.contact.thing.tolist() == [0]
+    assert float(after.position[0, 2]) == pytest.approx(0.3, abs=1e-6)
+
+
+def test_each_world_has_obstacles_of_its_own():
+    state = falling(100.0, (2.0, 0.0, 0.0))
+    both = type(state)(state.numbers.repeat(2, 1))
+    boxes = Obstacles(numbers((1.0, 0, 100.0), (1.0, 0, -900.0)).reshape(2, 1, 3), (0.5, 0.5, 5.0))
+    rotors = torch.zeros(2, 4).double()
+    after = flown(quadrotor(**VACUUM), both, 100, boxes, rotors)
+    assert after.contact.thing.tolist() == [0, NOTHING]
+    assert float(after.velocity[0, 0]) < 0 < float(after.velocity[1, 0])
+
+
+def test_nothing_slow_bounces():
+    after = flown(quadrotor(**VACUUM), falling(0.3, (0.0, 0.0, -0.05)), 1)
+    assert float(after.velocity[0, 2]) == 0.0

@@ -1,0 +1,56 @@
+import math
+
+import pytest
+import torch
+
+from drone_rl.sim.dynamics import BodyState
+from drone_rl.sim.dynamics.state import heading_only
+
+
+def test_a_body_at_rest_is_level_unless_it_is_turned():
+    place = torch.tensor([[1.0, 2.0, 3.0]], dtype=torch.float64)
+    body = BodyState.at_rest(place)
+    assert body.position.tolist() == [[1, 2, 3]] and body.attitude.tolist() == [[1, 0, 0, 0]]
+    assert not body.velocity.any() and not body.angular_velocity.any()
+    assert all(value.dtype == torch.float64 for value in vars(body).values())
+    turned = torch.tensor([[0.0, 0.0, 0.0, 1.0]], dtype=torch.float64)
+    assert BodyState.at_rest(place, turned).attitude is turned
+
+
+def test_no_two_fields_share_memory():
+    body = BodyState.at_rest(torch.zeros(2, 3, dtype=torch.float64))
+    body.velocity += 1.0
+    body.attitude[0] = 0.5
+    assert not body.angular_velocity.any() and body.attitude[1].tolist() == [1, 0, 0, 0]
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.7, -3.0, 3.0])
+def test_of_a_turn_only_the_heading_is_left(yaw):
+    """A roll or a pitch comes first, and the turn is what comes after it."""
+
+    def about(axis, angle):
+        return [math.cos(angle / 2), *(math.sin(angle / 2) * float(i == axis) for i in range(3))]
+
+    def times(p, q):
+        a, b = p[0] * q[0] - sum(x * y for x, y in zip(p[1:], q[1:], strict=True)), []
+        for i, j, k in ((1, 2, 3), (2, 3, 1), (3, 1, 2)):
+            b.append(p[0] * q[i] + p[i] * q[0] + p[j] * q[k] - p[k] * q[j])
+        return [a, *b]
+
+    expected = torch.tensor([about(2, yaw)], dtype=torch.float64)
+    for roll, pitch in ((0.0, 0.0), (0.4, 0.0), (0.0, -0.3), (-1.2, 0.0)):
+        q = times(about(2, yaw), times(about(1, pitch), about(0, roll)))
+        for sign in (1.0, -1.0):  # both quaternions of one attitude
+            attitude = sign * torch.tensor([q], dtype=torch.float64)
+            found = heading_only(attitude)
+            torch.testing.assert_close(found, sign * expected, atol=1e-12, rtol=0)
+
+
+def test_level_is_level_to_the_bit():
+    level = torch.tensor([[[1.0, 0.0, 0.0, 0.0]]]).double()
+    assert torch.equal(heading_only(level), level)
+
+
+def test_who_is_upside_down_has_no_heading():
+    turned = torch.tensor([[0.0, 1.0, 0.0, 0.0], [0.0, 0.6, 0.8, 0.0]]).double()
+    assert heading_only(turned).tolist() == [[1.0, 0.0, 0.0, 0.0]] * 2

@@ -1,0 +1,372 @@
+import itertools
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from drone_rl.config import TaskSettings
+from drone_rl.sim.actions import Move
+from drone_rl.sim.dynamics import BodyState, ComputerVision
+from drone_rl.sim.tasks.collect_cubes import CollectCubes, EndReason, Side
+from tests.fake_flight import FLIGHT, Floating
+
+SETTINGS = TaskSettings()  # drone and cubes touch up to 1.65 m on each axis
+
+
+def at(*ys, settings=SETTINGS):
+    """One world whose cubes stand at these y."""
+    x = settings.first_distance + settings.spacing * torch.arange(len(ys))
+    y, z = torch.tensor(ys).double(), torch.full((len(ys),), settings.altitude).double()
+    return CollectCubes(settings).start(torch.stack([x, y, z], -1)[None])
+
+
+def body(*place):
+    """One drone at rest."""
+    return BodyState.at_rest(torch.tensor([place], dtype=torch.float64))
+
+
+def fly(state, x, y, settings=SETTINGS):
+    return CollectCubes(settings).judge(state, body(x, y, settings.altitude))
+
+
+def move(task, state, action):
+    """Flies all worlds in computer-vision mode."""
+    moves = torch.tensor([action] * len(state))
+    return CollectCubes(task).judge(state, ComputerVision(task.step_length).step(state.body, moves))
+
+
+def test_cubes_are_drawn_within_their_bounds_and_uniformly():
+    settings = TaskSettings(vertical_bound=1.0, altitude=5.0)
+    draws = torch.stack(
+        [CollectCubes(settings).draw(np.random.RandomState(i)) for i in range(2000)]
+    )
+    assert draws[..., 0].unique().tolist() == [15.0, 24.0, 33.0]
+    assert draws[..., 1].abs().max() <= 6.0
+    assert (draws[..., 2] - 5.0).abs().max() <= 1.0
+    assert abs(float(draws[..., 1].mean())) < 0.15  # 6 / sqrt(3) / sqrt(6000) = 0.045
+    assert abs(float(draws[..., 1].std()) - 6 / 3**0.5) < 0.1
+
+
+def test_codes_are_those_of_recorded_files():
+    assert [(a.name, a.value) for a in Move] == [("FORWARD", 0), ("LEFT", 1), ("RIGHT", 2)]
+    assert [(s.name, s.value) for s in Side] == [("LEFT", 0), ("AHEAD", 1), ("RIGHT", 2)]
+    ends = (
+        *("RUNNING", "ALL_CUBES", "FRONT_BOUNDARY", "SIDE_BOUNDARY", "STEP_LIMIT"),
+        "LOST_CONTROL",
+    )
+    assert [(e.name, e.value) for e in EndReason] == [(n, i) for i, n in enumerate(ends)]
+
+
+def test_a_cube_stands_until_it_is_collected_or_passed_and_the_next_is_the_first_that_stands():
+    flags = torch.tensor(list(itertools.product([False, True], repeat=6)))
+    state = CollectCubes(SETTINGS).start(torch.zeros(64, 3, 3).double())
+    state.collected, state.passed = flags[:, :3], flags[:, 3:]
+    for collected, passed, present, following in zip(
+        state.collected.tolist(),
+        state.passed.tolist(),
+        state.present.tolist(),
+        state.next_cube.tolist(),
+        strict=True,
+    ):
+        stands = [not (c or p) for c, p in zip(collected, passed, strict=True)]
+        assert present == stands
+        assert following == ([*stands, True].index(True))
+
+
+def test_a_start_is_at_the_origin_with_everything_to_come():
+    settings = TaskSettings(altitude=4.0)
+    cubes = CollectCubes(settings).draw(np.random.RandomState(0))
+    state = CollectCubes(settings).start(torch.stack([cubes, cubes + 1.0]))
+    assert state.drone.tolist() == [[0.0, 0.0, 4.0]] * 2
+    assert torch.equal(state.cubes[1], cubes + 1.0)
+    assert not state.collected.any() and not state.passed.any()
+    assert state.steps.tolist() == state.end_reason.tolist() == [0, 0]
+    state.collected[0, 0] = True
+    assert not state.passed.any()  # no two fields share memory
+
+
+def test_touching_collects_and_is_worth_one():
+    state, reward = fly(at(1.0, 0.0, 0.0), 14.0, 0.0)
+    assert reward.tolist() == [1.0]
+    assert reward.dtype == torch.float64
+    assert state.steps.tolist() == [1]
+    assert state.collected.tolist() == [[True, False, False]]
+    assert state.next_cube.tolist() == [1]
+    _, again = fly(state, 14.0, 1.0)
+    assert again.tolist() == [0.0]
+
+
+def beyond(value):
+    """The next float64, away from zero."""
+    return float(np.nextafter(value, 2 * value))
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_touch_distance_is_exact(axis, sign):
+    """On each axis, from both sides: 1.65 m touches, the next float64 does not."""
+    for distance, touches in ((1.65, True), (beyond(1.65), False)):
+        cube = torch.zeros(1, 1, 3).double()
+        cube[..., axis] = sign * distance
+        state = CollectCubes(SETTINGS).start(cube)
+        state, reward = CollectCubes(SETTINGS).judge(state, body(0, 0, 0))
+        assert state.collected.item() == touches
+        assert reward.item() == float(touches)
+
+
+def test_touch_needs_all_three_axes():
+    corner = torch.tensor([[[1.6, -1.6, 1.6]]]).double()
+    assert CollectCubes(SETTINGS).judge(CollectCubes(SETTINGS).start(corner), body(0, 0, 0))[1] == 1
+    for axis in range(3):
+        aside = corner.clone()
+        aside[..., axis] *= 1.1
+        state = CollectCubes(SETTINGS).start(aside)
+        assert CollectCubes(SETTINGS).judge(state, body(0, 0, 0))[1] == 0
+
+
+def test_two_cubes_touched_at_once_are_worth_two():
+    cubes = torch.tensor([[[1.0, 0.0, 0.0], [1.5, 0.0, 0.0], [1.7, 0.0, 0.0]]]).double()
+    state, reward = CollectCubes(SETTINGS).judge(CollectCubes(SETTINGS).start(cubes), body(0, 0, 0))
+    assert reward.tolist() == [2.0] and reward.dtype == torch.float64
+    assert state.collected.tolist() == [[True, True, False]]
+
+
+def test_passed_is_strictly_behind():
+    for x, passed in ((15.0, False), (beyond(15.0), True)):
+        state, _ = fly(at(5.0, 0.0), x, 0.0)
+        assert state.passed.tolist() == [[passed, False]]
+
+
+def test_passed_cubes_vanish_without_reward():
+    state, _ = fly(at(5.0, 0.0, 0.0), 15.0, 0.0)
+    assert state.present.tolist() == [[True, True, True]]  # level with it is not past it
+    state, reward = fly(state, 16.0, 0.0)
+    assert reward.item() == 0.0
+    assert state.passed.tolist() == [[True, False, False]]
+    assert state.present.tolist() == [[False, True, True]]
+    _, reward = fly(state, 16.0, 5.0)
+    assert reward.item() == 0.0  # bumping into a vanished cube is worth nothing
+
+
+def test_side_is_where_the_cube_stood_when_it_became_next():
+    state = at(5.0, -5.0, 0.5)
+    assert state.side.tolist() == [[Side.LEFT, -1, -1]]
+    state, _ = fly(state, 14.0, 5.0)  # collects the first; the second is 10 m to the right
+    assert state.side.tolist() == [[Side.LEFT, Side.RIGHT, -1]]
+    state, _ = fly(state, 25.0, 1.0)  # passes the second
+    assert state.side.tolist() == [[Side.LEFT, Side.RIGHT, Side.AHEAD]]
+    assert state.lateral.tolist() == [[5.0, -10.0, -0.5]]  # metres to the left, at that moment
+
+
+def test_lateral_offset_is_unknown_until_a_cube_is_the_next_one():
+    state = at(5.0, -5.0, 0.5)
+    assert state.lateral[0, 0] == 5.0
+    assert state.lateral[0, 1:].isnan().all()
+
+
+def test_side_is_ahead_up_to_exactly_the_touch_distance():
+    for y, side in ((1.65, Side.AHEAD), (beyond(1.65), Side.LEFT)):
+        for sign in (1, -1):
+            cubes = torch.tensor([[[15.0, sign * y, 0.0]]], dtype=torch.float64)
+            mirrored = {Side.LEFT: Side.RIGHT, Side.AHEAD: Side.AHEAD}[side] if sign < 0 else side
+            assert CollectCubes(SETTINGS).start(cubes).side.tolist() == [[mirrored]]
+
+
+def test_ends_in_the_order_of_algorithm_3():
+    state = at(0.0, 0.0, 0.0)
+    assert fly(state, 44.0, 0.0)[0].end_reason.item() == EndReason.RUNNING
+    assert fly(state, beyond(44.0), 0.0)[0].end_reason.item() == EndReason.FRONT_BOUNDARY
+    assert fly(state, -100.0, 0.0)[0].end_reason.item() == EndReason.RUNNING
+    for y in (26.0, -26.0):
+        assert fly(state, 0.0, y)[0].end_reason.item() == EndReason.RUNNING
+        assert fly(state, 0.0, beyond(y))[0].end_reason.item() == EndReason.SIDE_BOUNDARY
+    for steps, reason in ((298, EndReason.RUNNING), (299, EndReason.STEP_LIMIT)):
+        state.steps[:] = steps
+        assert fly(state, 0.0, 0.0)[0].end_reason.item() == reason
+
+
+@pytest.mark.parametrize("coinciding", list(itertools.product([False, True], repeat=4)))
+def test_of_coinciding_ends_the_first_in_the_order_counts(coinciding):
+    all_cubes, front, side, limit = coinciding
+    state = at(0.0, 0.0, 0.0)
+    state.collected[:] = all_cubes
+    state.steps[:] = 299 if limit else 0
+    ended, _ = fly(state, 45.0 if front else 0.0, 27.0 if side else 0.0)
+    order = ("ALL_CUBES", "FRONT_BOUNDARY", "SIDE_BOUNDARY", "STEP_LIMIT")
+    expected = next((n for n, holds in zip(order, coinciding, strict=True) if holds), "RUNNING")
+    assert ended.end_reason.item() == EndReason[expected]
+
+
+def test_a_lost_drone_ends_its_own_episode_and_for_that_reason():
+    cubes = torch.zeros(2, 3, 3).double()
+    cubes[..., 0] = 50.0
+    state = CollectCubes(SETTINGS).start(cubes)
+    state.collected[:] = True
+    body = Floating(FLIGHT, None).start(torch.zeros(2, 3).double())
+    body.lost[1] = True
+    ended, _ = CollectCubes(SETTINGS).judge(state, body)
+    assert ended.end_reason.tolist() == [EndReason.ALL_CUBES, EndReason.LOST_CONTROL]
+    state.collected[:] = False
+    body.position[:, 1] = 1000.0
+    ended, _ = CollectCubes(SETTINGS).judge(state, body)
+    assert ended.end_reason.tolist() == [EndReason.SIDE_BOUNDARY, EndReason.LOST_CONTROL]
+
+
+def test_collecting_but_not_passing_every_cube_ends_the_episode():
+    state = at(0.0, 0.0)
+    state.collected[:, 0] = True
+    assert fly(state, 24.0, 0.0)[0].end_reason.item() == EndReason.ALL_CUBES
+    state.collected[:], state.passed[:] = False, True
+    assert fly(state, 26.0, 0.0)[0].end_reason.item() == EndReason.RUNNING
+
+
+def test_numbers_of_enumerations_are_those_of_files_and_policies():
+    assert [a.value for a in Move] == [0, 1, 2] and Move(1).name == "LEFT"
+    assert [s.name for s in Side] == ["LEFT", "AHEAD", "RIGHT"]
+    assert [s.value for s in Side] == [0, 1, 2]
+    names = ["RUNNING", "ALL_CUBES", "FRONT_BOUNDARY", "SIDE_BOUNDARY", "STEP_LIMIT"]
+    assert [EndReason(i).name for i in range(5)] == names
+
+
+def test_next_cube_is_the_first_that_stands_and_their_number_if_none_does():
+    state = at(0.0, 0.0, 0.0)
+    for collected, passed, index in (
+        ([0, 0, 0], [0, 0, 0], 0),
+        ([1, 0, 0], [0, 0, 0], 1),
+        ([0, 1, 0], [1, 0, 0], 2),
+        ([0, 1, 0], [0, 0, 0], 0),
+        ([1, 0, 1], [0, 1, 0], 3),
+        ([1, 0, 0], [1, 0, 0], 1),
+    ):
+        state.collected, state.passed = torch.tensor([collected]) > 0, torch.tensor([passed]) > 0
+        assert state.next_cube.tolist() == [index]
+        assert state.present.tolist() == [
+            [not (c or p) for c, p in zip(collected, passed, strict=True)]
+        ]
+
+
+def test_a_start_is_at_the_altitude_with_nothing_done():
+    cubes = torch.arange(3.0).double()[:, None, None].expand(3, 2, 3)
+    state = CollectCubes(TaskSettings(altitude=4.0)).start(cubes)
+    assert state.drone.tolist() == [[0.0, 0.0, 4.0]] * 3 and state.drone.dtype == torch.float64
+    assert state.cubes[2].unique().tolist() == [2.0]
+    assert state.collected.shape == state.passed.shape == (3, 2)
+    assert not state.collected.any() and not state.passed.any()
+    assert state.collected is not state.passed
+    assert state.steps.tolist() == state.end_reason.tolist() == [0, 0, 0]
+    assert state.to("cpu").side.tolist() == state.side.tolist()
+
+
+def test_draws_are_those_of_the_stream_in_order():
+    """Lateral and vertical offset of each cube in turn; figures rest on these very worlds."""
+    task = TaskSettings(vertical_bound=1.0, num_cubes=2)
+    raw = np.random.RandomState(5).uniform(-1, 1, size=(2, 2))
+    expected = [[15.0, 6 * raw[0, 0], 2.5 + raw[0, 1]], [24.0, 6 * raw[1, 0], 2.5 + raw[1, 1]]]
+    assert CollectCubes(task).draw(np.random.RandomState(5)).tolist() == expected
+
+
+MOVES = st.lists(st.sampled_from(list(Move)), min_size=1, max_size=60)
+PLACES = st.lists(st.floats(-6, 6), min_size=1, max_size=3)
+QUICK = settings(max_examples=30, deadline=None)
+NEAR = TaskSettings(num_cubes=3, first_distance=4.0, spacing=4.0, front_margin=3.0)
+
+
+def flight(places, moves, task=NEAR):
+    """States and rewards of one world, from its start to the end of the moves."""
+    state, rewards = at(*places, settings=task), []
+    states = [state]
+    for action in moves:
+        state, reward = move(task, state, action)
+        states.append(state)
+        rewards.append(reward.item())
+    return states, rewards
+
+
+@given(PLACES, MOVES)
+@QUICK
+def test_what_is_done_is_never_undone(places, moves):
+    states, rewards = flight(places, moves)
+    for before, after, reward in zip(states[:-1], states[1:], rewards, strict=True):
+        assert (before.collected <= after.collected).all()
+        assert (before.passed <= after.passed).all()
+        assert not (after.collected & after.passed).any()
+        assert reward == int(after.collected.sum() - before.collected.sum())
+        assert (
+            after.next_cube >= before.next_cube or not after.collected[0, : after.next_cube].all()
+        )
+        known = before.side >= 0
+        assert torch.equal(after.side[known], before.side[known])
+        assert torch.equal(after.lateral[known], before.lateral[known])
+        assert torch.equal(after.side < 0, after.lateral.isnan())
+        seen = torch.arange(len(places)) <= after.next_cube
+        assert torch.equal(after.side >= 0, (before.side >= 0) | seen)
+    assert states[-1].steps.item() == len(moves)
+
+
+@given(PLACES, MOVES)
+@QUICK
+def test_mirrored_worlds_under_mirrored_moves_are_mirrored(places, moves):
+    swapped = {Move.LEFT: Move.RIGHT, Move.RIGHT: Move.LEFT, Move.FORWARD: Move.FORWARD}
+    states, rewards = flight(places, moves)
+    mirrored, others = flight([-y for y in places], [swapped[m] for m in moves])
+    assert rewards == others
+    for one, two in zip(states, mirrored, strict=True):
+        assert torch.equal(one.collected, two.collected) and torch.equal(one.passed, two.passed)
+        assert torch.equal(one.end_reason, two.end_reason)
+        torch.testing.assert_close(two.lateral, -one.lateral, equal_nan=True)
+        turned = torch.where(one.side < 0, -1, 2 - one.side)
+        assert torch.equal(two.side, turned)
+        torch.testing.assert_close(two.drone, one.drone * torch.tensor([1.0, -1.0, 1.0]).double())
+
+
+@given(st.lists(PLACES.filter(lambda p: len(p) == 3), min_size=2, max_size=4), MOVES)
+@QUICK
+def test_worlds_know_nothing_of_each_other(worlds, moves):
+    alone = [flight(places, moves)[0][-1] for places in worlds]
+    cubes = torch.cat([at(*places, settings=NEAR).cubes for places in worlds])
+    state = CollectCubes(NEAR).start(cubes)
+    for action in moves:
+        state, _ = move(NEAR, state, action)
+    for i, one in enumerate(alone):
+        found, expected = vars(state[torch.tensor([i])]), vars(one)
+        for record in (found, expected):
+            record |= vars(record.pop("body"))
+        for name, value in expected.items():
+            torch.testing.assert_close(found[name], value, equal_nan=True, rtol=0, atol=0)
+
+
+def test_always_left_leaves_after_27_steps_as_in_the_chapter():
+    state, steps = at(0.0, 0.0, 0.0), 0
+    while state.end_reason.item() == EndReason.RUNNING:
+        state, _ = move(SETTINGS, state, Move.LEFT)
+        steps += 1
+    assert (steps, state.end_reason.item()) == (27, EndReason.SIDE_BOUNDARY)
+
+
+def test_judge_leaves_its_input_alone():
+    state = at(1.0, 0.0, 0.0)
+    fly(state, 14.0, 0.0)
+    assert not state.collected.any()
+    assert state.steps.tolist() == [0]
+    assert state.drone[0, 0] == 0.0
+
+
+def test_select_and_overwrite_worlds():
+    states = CollectCubes(SETTINGS).start(torch.zeros(3, 3, 3).double())
+    part = states[torch.tensor([2])]
+    part.steps += 7
+    assert states.steps.tolist() == [0, 0, 0]
+    states[torch.tensor([2])] = part
+    assert states.steps.tolist() == [0, 0, 7]
+
+
+def test_beyond_the_step_limit_an_episode_is_over_too():
+    """A state that was saved under a longer limit."""
+    short = TaskSettings(step_limit=40)
+    state = at(5.0, 5.0, 5.0, settings=short)
+    for steps, reason in ((38, 0), (39, EndReason.STEP_LIMIT), (60, EndReason.STEP_LIMIT)):
+        state.steps[:] = steps
+        after, _ = fly(state, 1.0, 0.0, short)
+        assert after.end_reason == reason

@@ -1,0 +1,108 @@
+"""The kernel's rules are the rules, bit for bit; its arrays start from the environments' state."""
+
+import pytest
+import torch
+import warp as wp
+from numpy.random import RandomState
+
+from drone_rl.config import TaskSettings
+from drone_rl.sim.dynamics import ComputerVision
+from drone_rl.sim.rendering.devices import start_warp
+from drone_rl.sim.rendering.raytrace.structs_kernel import Poses
+from drone_rl.sim.tasks import CollectCubes, Pillars
+from drone_rl.sim.tasks.collect_cubes import EndReason
+from drone_rl.sim.tasks.collect_cubes_kernel import (
+    COLLECTED,
+    PASSED,
+    STANDS,
+    Flights,
+    FlyingCubes,
+    move,
+    place,
+)
+from drone_rl.sim.worlds import Worlds
+
+start_warp("cpu")
+WORLDS = 60
+
+
+@wp.kernel(enable_backward=False)
+def step(
+    flights: Flights, poses: Poses, actions: wp.array(dtype=int), rewards: wp.array(dtype=float)
+) -> None:
+    world = wp.tid()
+    if flights.end_reasons[world] == 0:
+        rewards[world] = move(flights, world, actions[world])
+        place(flights, world, poses)
+
+
+@pytest.mark.parametrize(
+    ("settings", "ends"),
+    [
+        ({}, {EndReason.FRONT_BOUNDARY}),
+        ({"num_cubes": 1, "lateral_bound": 2.0}, {EndReason.ALL_CUBES, EndReason.FRONT_BOUNDARY}),
+        ({"side_margin": 0.3, "vertical_bound": 1.2}, {EndReason.SIDE_BOUNDARY}),
+        ({"step_limit": 33, "step_length": 1.3}, {EndReason.STEP_LIMIT}),
+    ],
+)
+def test_random_flights_go_as_the_rules_say(settings, ends):
+    task = TaskSettings(**settings)
+    worlds, draws = Worlds(WORLDS, task), torch.Generator().manual_seed(0)
+    worlds.reset(torch.arange(WORLDS), [RandomState(i) for i in range(WORLDS)])
+    flying = worlds.task.fused_rules(worlds.dynamics, WORLDS)
+    flying.begin(worlds.state)
+    places = wp.to_torch(flying.poses.positions)
+    state, going, seen = worlds.state, torch.arange(WORLDS), set()
+    rewards = torch.zeros(WORLDS)
+    while len(going):
+        chances = torch.tensor([0.7, 0.2, 0.1] if len(going) % 2 else [0.7, 0.1, 0.2])
+        actions = chances.multinomial(WORLDS, replacement=True, generator=draws)
+        inputs = [wp.from_torch(actions.int()), wp.from_torch(rewards)]
+        wp.launch(step, WORLDS, inputs=[flying.flights, flying.poses, *inputs], device="cpu")
+        state, reward = worlds.advance(state, actions[going])
+        assert torch.equal(rewards[going].double(), reward)
+        assert torch.equal(wp.to_torch(flying.flights.drones)[going], state.drone)
+        fates = wp.to_torch(flying.flights.fates)[going]
+        assert torch.equal(fates == COLLECTED, state.collected)
+        assert torch.equal(fates == PASSED, state.passed)
+        assert torch.equal(flying.steps[going].long(), state.steps)
+        assert torch.equal(flying.end_reasons[going].long(), state.end_reason)
+        assert torch.equal(places[going, 1], state.drone.float())
+        assert torch.equal(places[going, 2:], worlds.task.places(state).float())
+        assert not places[:, 0].any()
+        is_on = state.end_reason == 0
+        seen |= {*state.end_reason.tolist()}
+        state, going = state[is_on], going[is_on]
+    assert ends <= seen
+
+
+def test_begins_where_worlds_are_and_leaves_them_alone():
+    settings = TaskSettings(num_cubes=2, altitude=3.0, vertical_bound=0.5)
+    worlds = Worlds(2, settings)
+    cubes = torch.tensor([[[15.0, 1.0, 3.0], [24.0, -2.0, 3.5]], [[15.0, 0.0, 3.0]] * 2])
+    worlds.state = worlds.start(cubes.double())
+    flying = FlyingCubes(settings, worlds.dynamics, 3)
+    for values in (flying.steps, flying.end_reasons, wp.to_torch(flying.flights.fates)):
+        values.fill_(1)  # of a batch before
+    flying.begin(worlds.state)
+    assert wp.to_torch(flying.flights.drones)[:2].tolist() == [[0.0, 0.0, 3.0]] * 2
+    assert torch.equal(wp.to_torch(flying.flights.cubes)[:2], cubes.double())
+    assert (wp.to_torch(flying.flights.fates)[:2] == STANDS).all()
+    assert flying.steps.tolist() == flying.end_reasons.tolist() == [0, 0, 1]
+    wp.to_torch(flying.flights.drones).fill_(7.0)
+    assert worlds.state.drone[0].tolist() == [0.0, 0.0, 3.0]
+    assert wp.to_torch(flying.poses.attitudes)[0].tolist() == [1.0, 0.0, 0.0, 0.0]
+
+
+def test_other_rules_and_other_moves_are_not_known():
+    class Windy(ComputerVision):
+        pass
+
+    class Strict(CollectCubes):
+        def judge(self, state, body):
+            return super().judge(state, body)
+
+    assert CollectCubes().fused_rules(ComputerVision(), 1) is not None
+    assert CollectCubes().fused_rules(Windy(), 1) is None
+    assert Strict().fused_rules(ComputerVision(), 1) is None
+    assert Pillars().fused_rules(ComputerVision(), 1) is None

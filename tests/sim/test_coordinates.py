@@ -1,0 +1,92 @@
+import numpy as np
+import pytest
+import torch
+
+from drone_rl.sim.coordinates import (
+    EQUATOR_RADIUS,
+    FLATTENING,
+    HOME,
+    geo_from_world,
+    world_from_geo,
+)
+
+KINDS = [np.array, lambda rows: torch.tensor(rows, dtype=torch.float64)]
+
+
+def earth_centred(place):
+    """Metres from Earth's middle, by the definition of the ellipsoid."""
+    latitude, longitude = np.radians(place[..., 0]), np.radians(place[..., 1])
+    squared = FLATTENING * (2 - FLATTENING)
+    across = EQUATOR_RADIUS / np.sqrt(1 - squared * np.sin(latitude) ** 2)
+    out = (across + place[..., 2]) * np.cos(latitude)
+    up = (across * (1 - squared) + place[..., 2]) * np.sin(latitude)
+    return np.stack([out * np.cos(longitude), out * np.sin(longitude), up], -1)
+
+
+def tangent_plane(place):
+    """North, west, up on the plane that touches the ellipsoid at home."""
+    latitude, longitude = np.radians(HOME.latitude), np.radians(HOME.longitude)
+    sin_n, cos_n, sin_e, cos_e = (
+        np.sin(latitude),
+        np.cos(latitude),
+        np.sin(longitude),
+        np.cos(longitude),
+    )
+    axes = np.array(
+        [
+            [-sin_n * cos_e, -sin_n * sin_e, cos_n],
+            [sin_e, -cos_e, 0.0],
+            [cos_n * cos_e, cos_n * sin_e, sin_n],
+        ]
+    )
+    return (earth_centred(place) - earth_centred(np.array(HOME))) @ axes.T
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=["numpy", "torch"])
+def test_there_and_back_within_a_kilometre(kind):
+    random = np.random.default_rng(0)
+    given = kind(random.uniform(-1000.0, 1000.0, (100, 3)).tolist())
+    back = world_from_geo(geo_from_world(given))
+    assert type(back) is type(given)
+    assert abs(back - given).max() < 1e-6
+
+
+def test_home_is_where_airsims_is():
+    there = geo_from_world(np.zeros(3))
+    np.testing.assert_allclose(there, [47.641468, -122.140165, 122.0], atol=1e-12)
+
+
+def test_a_degree_of_latitude_there_is_111_18_km_and_of_longitude_75_14():
+    """Geographers' tables: 111.179 and 75.14 km at 47.64 degrees; 122 m of altitude add 2e-5."""
+    north = world_from_geo(np.array([HOME.latitude + 0.001, HOME.longitude, 122.0]))
+    np.testing.assert_allclose(north, [111.179, 0.0, 0.0], atol=0.01)
+    east = world_from_geo(np.array([HOME.latitude, HOME.longitude + 0.001, 130.0]))
+    np.testing.assert_allclose(east, [0.0, -75.14, 8.0], atol=0.01)
+
+
+def test_places_are_those_of_the_tangent_plane():
+    """Within 10 cm a kilometre away, but for the height that the curved Earth falls away."""
+    turns = np.linspace(0.0, 2 * np.pi, 17)
+    ring = 1000.0 * np.stack([np.cos(turns), np.sin(turns), 0 * turns], -1)
+    exact = tangent_plane(geo_from_world(ring))
+    assert np.abs(exact - ring)[:, :2].max() < 0.1
+    np.testing.assert_allclose(exact[:, 2], -(1000.0**2) / (2 * 6.38e6), atol=0.005)
+    near = tangent_plane(geo_from_world(0.1 * ring))
+    assert np.abs(near - 0.1 * ring).max() < 0.002
+
+
+def test_longitudes_go_on_across_the_date_line():
+    home = HOME._replace(longitude=179.9999)
+    there = geo_from_world(np.array([0.0, -1000.0, 0.0]), home)
+    assert there[1] == pytest.approx(179.9999 - 360.0 + 1000.0 / 75140.0, abs=1e-4)
+    np.testing.assert_allclose(world_from_geo(there, home), [0.0, -1000.0, 0.0], atol=1e-6)
+
+
+def test_the_ellipsoid_is_that_of_wgs84():
+    """Its polar radius and the square of its eccentricity, as published."""
+    assert pytest.approx(6356752.314245, abs=1e-5) == EQUATOR_RADIUS * (1 - FLATTENING)
+    assert pytest.approx(6.69437999014e-3, abs=1e-13) == FLATTENING * (2 - FLATTENING)
+    north = world_from_geo(np.array([HOME.latitude + 1e-3, HOME.longitude, 0.0]), HOME)
+    share = 1 - 6.69437999014e-3 * np.sin(np.radians(HOME.latitude)) ** 2
+    meridian = 6378137.0 * (1 - 6.69437999014e-3) / share**1.5 + 122.0
+    assert north[0] == pytest.approx(np.radians(1e-3) * meridian, rel=1e-9)

@@ -1,0 +1,47 @@
+import hashlib
+
+import pytest
+import torch
+
+from drone_rl.sim.image_types import check_ids, default_id, default_ids, object_names, palette
+from drone_rl.sim.rendering.scene import SemanticClass
+from drone_rl.sim.worlds import Worlds
+from drone_rl.utils.errors import InputError
+
+FIRST = [[0, 0, 0], [153, 108, 6], [112, 105, 191], [89, 121, 72], [190, 225, 64], [206, 190, 59]]
+
+
+def test_the_colours_are_airsims():
+    colors = palette()
+    assert (tuple(colors.shape), colors.dtype) == ((256, 3), torch.uint8)
+    assert colors[:6].tolist() == FIRST
+    assert colors[255].tolist() == [255, 255, 255]
+    digest = hashlib.sha256(bytes(colors.flatten().tolist())).hexdigest()
+    assert digest == "b7217dcebb91d590f6174c4ee7395e3fab3e7edde839d004789fd146a1f5de5e"
+
+
+def test_numbers_follow_from_the_letters_of_a_name():
+    """G, r, o, u, n, d: 103 + 114 + 111 + 117 + 110 + 100 = 655; 660 - 512 = 148."""
+    assert default_id("ground") == default_id("Ground") == 148
+    assert default_id("target_0") == default_id("target_12")
+    assert default_id("") == 5
+
+
+def test_every_geom_has_a_name_and_the_number_of_it():
+    scene = Worlds(1).scene
+    names = object_names(scene)
+    assert len(names) == scene.model.ngeom
+    assert {"ground", "target_0", "target_1", "target_2", "drone"} <= set(names)
+    grounds = scene.geoms(SemanticClass.GROUND)
+    assert default_ids(scene)[grounds].tolist() == [148] * len(grounds)
+
+
+def test_numbers_that_are_none_are_refused():
+    assert check_ids(torch.tensor([0, 255]), 2).tolist() == [0, 255]
+    with pytest.raises(InputError, match=r"ids of shape \(2,\) don't fit 3 geoms"):
+        check_ids(torch.tensor([0, 255]), 3)
+    for bad in (-1, 256):
+        with pytest.raises(InputError, match=f"id {bad} is out of range; give whole numbers"):
+            check_ids(torch.tensor([0, bad]), 2)
+    with pytest.raises(InputError, match=r"id 0.5 is out of range"):
+        check_ids(torch.tensor([0.5]), 1)

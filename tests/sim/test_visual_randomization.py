@@ -1,0 +1,149 @@
+"""Looks of many worlds: fixed ones, and those drawn at every reset."""
+
+import math
+
+import numpy as np
+import pytest
+import torch
+from PIL import Image
+
+from drone_rl.config import MINIMAL, AppearanceSettings, PillarsSettings, TaskSettings
+from drone_rl.sim.rendering.scene import SemanticClass
+from drone_rl.sim.visual_randomization import Appearances
+from drone_rl.sim.worlds import Worlds
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.seeding import world_random_state
+
+DRAWN = AppearanceSettings(
+    sun_elevation=(30.0, 30.0),
+    sun_azimuth=(0.0, 90.0),
+    fog_visibility=(50.0, 100.0),
+    shadows=0.5,
+    sky_zenith=((0.0, 0.5, 1.0), (1.0, 0.5, 1.0)),
+    ground_texture=("none", "grid", "bricks"),
+    ground_tile=(2.0, 4.0),
+)
+
+
+def streams(count):
+    return [world_random_state(0, world) for world in range(count)]
+
+
+def reset(settings, count):
+    looks = Appearances(settings, count)
+    looks.reset(torch.arange(count), streams(count))
+    return looks
+
+
+def test_the_minimal_look_is_none_at_all():
+    looks = reset(MINIMAL, 3)
+    assert looks.drawn() is None and looks.middle is None and not looks.varies
+
+
+def test_a_fixed_look_is_one_for_all_worlds():
+    looks = reset(AppearanceSettings(sun_elevation=30.0, sun_azimuth=90.0, sun_strength=0.5), 3)
+    look = looks.middle
+    assert looks.drawn() is None and not looks.varies
+    # from the left, 30 degrees up: light goes to the right and down
+    wanted = [0.0, -math.sqrt(0.75), -0.5]
+    assert look.sun_direction.tolist() == pytest.approx(wanted, abs=1e-9)
+    assert look.sun.tolist() == [0.5] * 3 and look.ambient.tolist() == [0.35] * 3
+    assert look.fog is None and look.zenith is None and look.is_plain
+    assert set(look.colors) == {SemanticClass.SKY, SemanticClass.GROUND}
+
+
+def test_what_is_drawn_lies_in_its_range_and_fills_it():
+    look = reset(DRAWN, 400).drawn()
+    assert 50 <= look.fog.min() < 55 and 95 < look.fog.max() <= 100
+    assert 160 < look.shadows.sum() < 240
+    assert (look.zenith[:, 1:] == torch.tensor([0.5, 1.0])).all() and look.zenith[:, 0].std() > 0.2
+    assert torch.allclose(look.sun_direction[:, 2], torch.tensor(-0.5, dtype=torch.float64))
+    ground = look.textures[SemanticClass.GROUND]
+    assert ground.images == ("grid", "bricks") and 2 <= ground.size.min() <= ground.size.max() <= 4
+    assert all(100 < (ground.choice == which).sum() < 170 for which in (-1, 0, 1))
+
+
+def test_imagined_worlds_look_as_in_the_middle():
+    middle = Appearances(DRAWN, 2).middle
+    assert middle.fog == 75.0 and middle.zenith.tolist() == [0.5, 0.5, 1.0]
+    assert middle.textures[SemanticClass.GROUND].choice == -1  # the first
+
+
+def test_each_world_draws_by_itself_and_leaves_its_stream_alone():
+    alone, together = reset(DRAWN, 1), reset(DRAWN, 5)
+    assert torch.equal(alone.values[0], together.values[0])
+    assert len({tuple(row) for row in together.values.tolist()}) == 5
+    (state,) = streams(1)
+    alone.reset(torch.tensor([0]), [state])
+    assert state.uniform() == streams(1)[0].uniform()
+
+
+def test_only_worlds_that_begin_draw_anew():
+    looks = reset(DRAWN, 3)
+    before, part = looks.values, looks.drawn(torch.tensor([2]))
+    looks.reset(torch.tensor([1]), [np.random.RandomState(9)])
+    assert torch.equal(looks.values[[0, 2]], before[[0, 2]])
+    assert not torch.equal(looks.values[1], before[1])
+    assert torch.equal(looks.drawn().fog[2:], part.fog)
+    looks.load(before)
+    assert torch.equal(looks.drawn().fog, before[:, 14])
+
+
+MOUNTED = DRAWN.replace(
+    distractors=(1, 3), camera_offset=((-1, 0, 0), (1, 0, 0.5)), camera_turn=(0, 0, 90)
+)
+
+
+def test_what_was_added_later_changes_nothing_that_was_drawn():
+    before, after = reset(DRAWN, 5), reset(MOUNTED, 5)
+    own = before.values.shape[1] - 7  # those of the camera come last, then those of distractors
+    assert torch.equal(before.values[:, :own], after.values[:, :own])
+    assert after.values.shape[1] == own + 7 + 3 * 7
+
+
+def test_camera_and_distractors_of_each_world():
+    looks = reset(MOUNTED, 50)
+    look = looks.drawn()
+    forward, left, up = look.camera.offset.T
+    assert -1 <= forward.min() < -0.8 and 0.8 < forward.max() <= 1
+    assert (left == 0).all() and 0 <= up.min() < up.max() <= 0.5
+    half = math.sqrt(0.5)
+    assert look.camera.turn.tolist() == [pytest.approx([half, 0, 0, half])] * 50
+    assert look.camera.zoom is None and looks.distractors == 3
+    assert look.distractors.places.shape == (50, 3, 3)
+    part = looks.drawn(torch.tensor([4, 7]))
+    assert torch.equal(part.distractors.places, look.distractors.places[[4, 7]])
+    assert torch.equal(look[torch.tensor([4, 7])].distractors.colors, part.distractors.colors)
+    assert looks.middle.distractors.expand(2).sizes.shape == (2, 3)
+
+
+def test_a_wider_camera_shows_things_smaller():
+    look = reset(AppearanceSettings(camera_widening=(15.0, 15.0)), 2).middle
+    wanted = math.tan(math.radians(67.5)) / math.tan(math.radians(75.0))
+    assert float(look.camera.zoom) == pytest.approx(wanted)
+
+
+def test_what_has_no_room_is_refused_at_once():
+    with pytest.raises(InputError, match="puts the camera into the ground"):
+        Appearances(AppearanceSettings(camera_offset=(0, 0, -5)), 1)
+
+
+@pytest.mark.parametrize("size", [None, (4097, 2)])
+def test_textures_are_read_at_once(tmp_path, size):
+    path = tmp_path / "ground.png"
+    if size:
+        Image.new("RGB", size).save(path)
+    with pytest.raises(InputError, match=r"ground\.png"):
+        Appearances(AppearanceSettings(object_texture=("none", str(path))), 1)
+
+
+@pytest.mark.parametrize("task", [TaskSettings(), PillarsSettings()])
+def test_the_defaults_are_the_look_of_the_tasks(task):
+    """Told by a look that differs from them by nothing that can be seen."""
+    worlds = Worlds(2, task)
+    worlds.reset(torch.arange(2), streams(2))
+    plain = worlds.render(worlds.state)
+    worlds.appearance = Appearances(AppearanceSettings(fog_visibility=100_000.0), 2).middle
+    clear = worlds.render(worlds.state)
+    assert (plain.int() - clear.int()).abs().max() <= 2 and not torch.equal(plain, clear)
+    worlds.close()

@@ -1,0 +1,39 @@
+"""YAML is data, and no more of it than was asked for."""
+
+import pytest
+
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.readers import parse_yaml, read_yaml
+
+
+def test_plain_data_comes_back(tmp_path):
+    (tmp_path / "a.yaml").write_text("fog: {low: 40, high: null, unit: m of sight}\nsun: [1, -2.5]")
+    expected = {"fog": {"low": 40, "high": None, "unit": "m of sight"}, "sun": [1, -2.5]}
+    assert read_yaml(tmp_path / "a.yaml") == expected
+
+
+def test_a_merge_sign_is_a_name_like_any_other():
+    assert parse_yaml('"<<": {a: 1}\nb: 2', "x") == {"<<": {"a": 1}, "b": 2}
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("a: &a 1", "anchors and aliases"),
+        ("a: &a [1]\nb: *a", "anchors and aliases"),
+        ("!!python/object/apply:os.system [x]", "tags are not accepted"),
+        ('!!int ""', "tags are not accepted"),
+        ("a: 1\na: 2", "twice"),
+        ("a: [1", "expected"),
+        ("[" * 17 + "]" * 17, "nested more than 16"),
+        ("[" + "1," * 2001 + "]", "more than 2000 values"),
+        ("2001-99-99", "month must be"),
+        ("? [a]\n: 1", "unhashable"),
+        ("--- a\n--- b", "single document"),
+        ("a: \x00", "not allowed"),
+    ],
+)
+def test_what_is_refused_in_one_line(text, message):
+    with pytest.raises(InputError, match=rf"x is damaged: no plain YAML .*{message}") as error:
+        parse_yaml(text, "x")
+    assert "\n" not in str(error.value)

@@ -1,0 +1,40 @@
+from drone_rl.utils.text import all_cubes, among, bounds, exact, listed, ordinal, percent, plural
+
+
+def test_numbers_as_people_write_them():
+    found = {"lower95": 0.1, "upper95": 0.256, "successes": 3, "trials": 30}
+    assert bounds(found) == "95%: 0.10 to 0.26"
+    assert bounds(found, percent) == "95%: 10% to 26%"
+    assert among(found) == "3 of 30"
+
+
+def test_lists():
+    assert listed([]) == ""
+    assert listed(["a"]) == "a"
+    assert listed(["a", "b"]) == "a and b"
+    assert listed(["a", "b", "c"], "or") == "a, b or c"
+
+
+def test_counts():
+    assert (plural(0, "pair"), plural(1, "pair"), plural(2, "pair")) == (
+        "0 pairs", "1 pair", "2 pairs",
+    )  # fmt: skip
+
+
+def test_ordinals_go_on_beyond_their_names():
+    assert [ordinal(i) for i in (0, 8, 9, 10)] == ["first", "ninth", "10th", "11th"]
+
+
+def test_cubes():
+    assert (all_cubes(1), all_cubes(3)) == ("the cube", "all 3 cubes")
+
+
+def test_nearly_all_is_never_all():
+    assert [exact(share) for share in (0.0, 1e-12, 0.25, 1 / 3)] == [
+        "0", "1e-12", "0.25", "0.333333333",
+    ]  # fmt: skip
+    assert exact(1 - 1e-9) == "0.999999999"
+    for share in (1 - 1e-10, 1 - 1e-16, 1.0, 1 + 1e-12):  # whose digits, or the sum's, are too few
+        assert exact(share) == "more than 0.999999999"
+    assert exact(1 - 1e-16, is_all=True) == "1"
+    assert exact(0.5, is_all=True) == "0.5"
