@@ -1,4 +1,4 @@
-"""Flights under other conditions as curves, and the conditions as strips of pictures."""
+"""Charts of a robustness evaluation: curves of success rates, and strips of camera images."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -16,11 +16,11 @@ _POLICY, _ORACLE, _GOOD = "#1f60c8", "#2ca02c", "#2ca02c"
 _OTHERS = {"drifting": ("#e07b00", "--", "drifting"), "onset": ("#8a4fbf", ":", "from step 20 on")}
 _SCALE = 3
 _LABEL = 190
-"""Pixels of the names beside strips."""
+"""Width of the names next to strips, pixels."""
 
 
 def chart(numbers: Mapping[str, Any]) -> Figure:
-    """Success over strength, an axis each, with 95% intervals, the oracle, and the domain.
+    """Plot success rate over strength by axis, with 95% intervals, the oracle and the range.
 
     Args:
         numbers: As in `shifts.json`.
@@ -96,11 +96,11 @@ def _value(value: float | None) -> str:
 def strips(
     numbers: Mapping[str, Any], pictures: Mapping[str, Sequence[NDArray | None]]
 ) -> Image.Image:
-    """What the camera shows at each strength, an axis a row, and how it does there.
+    """Arrange camera images at each strength, one row per axis, with success rates.
 
     Args:
         numbers: As in `shifts.json`.
-        pictures: By axis, with nothing different and at each of its strengths. Shapes: (H, W, 3).
+        pictures: By axis, without perturbation and at each strength. Shapes: (H, W, 3).
     """
     rows = [_strip(name, numbers["axes"][name], shown) for name, shown in pictures.items()]
     width, height = max(r.width for r in rows), sum(r.height + 6 for r in rows)

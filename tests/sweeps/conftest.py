@@ -8,7 +8,7 @@ import pytest
 
 from drone_rl.evaluation.consistency import _expected
 from drone_rl.evaluation.rule import LUCK, Kind, Rule
-from drone_rl.sweeps import process
+from drone_rl.sweeps import executors
 from drone_rl.sweeps.manifest import open_sweep
 from drone_rl.sweeps.runs import Run
 from drone_rl.utils.intervals import mean_bounds, proportion
@@ -30,7 +30,7 @@ if arguments.get("fail") == "true":
 
 @pytest.fixture
 def fake_training(monkeypatch):
-    monkeypatch.setattr(process, "PROGRAM", (sys.executable, "-c", FAKE))
+    monkeypatch.setattr(executors, "PROGRAM", (sys.executable, "-c", FAKE))
 
 
 @pytest.fixture

@@ -282,14 +282,14 @@ def place(flights: Flights, world: int, poses: Poses) -> None:
         world: Which of them.
         poses: Of as many environments.
     """
-    poses.places[world, DRONE_FRAME] = wp.vec3(flights.drones[world])
+    poses.positions[world, DRONE_FRAME] = wp.vec3(flights.drones[world])
     if is_flying(flights.fleet):
         poses.attitudes[world] = camera_attitude(flights.fleet, world)
     for cube in range(flights.cubes.places.shape[1]):
         at = flights.cubes.places[world, cube]
         if not is_present(flights.cubes, world, cube):
             at[2] = at[2] - _DEPTH
-        poses.places[world, DRONE_FRAME + 1 + cube] = wp.vec3(at)
+        poses.positions[world, DRONE_FRAME + 1 + cube] = wp.vec3(at)
 
 
 @wp.func
@@ -350,7 +350,7 @@ class FlyingCubes:
             self.flights.moves = wp.from_torch(dynamics.moves.contiguous(), dtype=wp.vec3d)
         self._fleet = FlyingFleet(num_envs, dynamics if isinstance(dynamics, Quadrotor) else None)
         self.flights.fleet = self._fleet.fleet
-        self.poses.places = wp.from_torch(places, dtype=wp.vec3)
+        self.poses.positions = wp.from_torch(places, dtype=wp.vec3)
         self.poses.attitudes = wp.from_torch(attitudes, dtype=wp.vec4)
 
     @staticmethod
