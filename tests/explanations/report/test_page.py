@@ -13,7 +13,7 @@ import pytest
 from benchmarks.evidence import SHIFTS
 from benchmarks.evidence import changed as changed_copy
 from drone_rl.explanations.report import write_report
-from drone_rl.explanations.report.sections import find_parts
+from drone_rl.explanations.report.page import PARTS
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import proportion
 from tests.explanations.report.conftest import NASTY
@@ -68,7 +68,7 @@ def test_the_policy_allows_the_pages_own_style_and_script_alone(report):
 
 def test_every_part_is_there_in_order_with_a_link_to_it(report):
     page = report.read_text()
-    order = [name for name in (*find_parts(), "provenance") if name not in ("left_out", "shifts")]
+    order = [name for name in (*PARTS, "provenance") if name not in ("left_out", "shifts")]
     assert re.findall(r'<section id="([^"]+)">', page) == order
     assert re.findall(r'<a href="#([^"]+)">', page) == order
     assert order[0] == "evaluation"
