@@ -174,7 +174,7 @@ SENTENCES = (
     Sentence("card.body", "its drone has a body", _flies, _body),
     Sentence(
         "card.domain",
-        "flights under other conditions are of this network and task, and none speak against them",
+        "a robustness evaluation is of this network and task, and not refused",
         has_domain,
         lambda c: say(QUOTED, c),
     ),
