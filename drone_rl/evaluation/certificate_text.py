@@ -19,30 +19,11 @@ def is_stated(evidence: Evidence) -> bool:
 
 def is_proved(evidence: Evidence) -> bool:
     """Return whether it does, and enough rollouts from fresh placements re-checked it."""
-    return is_stated(evidence) and _is_checked(evidence)
-
-
-def _is_checked(evidence: Evidence) -> bool:
-    bound = evidence["proof"].get("wrong_at_most")
+    bound = evidence["proof"].get("wrong_at_most") if is_stated(evidence) else None
     return bound is not None and bound <= MOST_WRONG
 
 
-def _is_refused(evidence: Evidence) -> bool:
-    return evidence.get("proof") is not None and not is_quoted(evidence)
-
-
-def _is_share(evidence: Evidence) -> bool:
-    return is_quoted(evidence) and not evidence["proof"]["every"]
-
-
-def _every_placement(evidence: Evidence) -> str:
-    return (
-        "A certificate states for every placement: with its most probable actions it collects "
-        f"{all_cubes(evidence['num_cubes'])} from all places where they may stand."
-    )
-
-
-def _share(evidence: Evidence) -> str:
+def _fraction(evidence: Evidence) -> str:
     proof, cubes = evidence["proof"], all_cubes(evidence["num_cubes"])
     share, lost, undecided = (proof[name] for name in ("share", "lost", "undecided"))
     so_far = "" if proof["finished"] else " so far, for the proof was stopped"
@@ -87,19 +68,22 @@ PROOF = (
         "proof.every",
         "a valid certificate states so, and no episode contradicts it",
         is_stated,
-        _every_placement,
+        lambda e: (
+            "A certificate states for every placement: with its most probable actions it collects "
+            f"{all_cubes(e['num_cubes'])} from all places where they may stand."
+        ),
     ),
     Sentence(
         "proof.share",
         "the same, but some placements are lost or undecided",
-        _is_share,
-        _share,
+        lambda e: is_quoted(e) and not e["proof"]["every"],
+        _fraction,
     ),
     Sentence("proof.basis", "a certificate is quoted", is_quoted, _basis),
     Sentence(
         "proof.refused",
         "a certificate is refused",
-        _is_refused,
+        lambda e: e.get("proof") is not None and not is_quoted(e),
         lambda e: f"A certificate is not quoted: {e['proof']['refused']}.",
     ),
 )

@@ -5,7 +5,7 @@ from typing import Any
 
 from drone_rl.evaluation.certificate_text import PROOF
 from drone_rl.sim.vocabulary import terms_of
-from drone_rl.utils.text import Evidence, Sentence, fixed_seed, percent
+from drone_rl.utils.text import Evidence, Sentence, fixed_seed, percent, listed
 
 FREQUENT = 0.02
 """Fraction of episodes above which an end is mentioned."""
@@ -65,10 +65,6 @@ def _looks(evidence: Evidence) -> str:
         "good, but trivial": "good in a trivial task",
     }
     return others.get(str(evidence["kind"]), str(evidence["kind"]))
-
-
-def _list(parts: Sequence[str], last: str = "and") -> str:
-    return f" {last} ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else parts)
 
 
 def _kind(evidence: Evidence) -> str:
@@ -145,8 +141,8 @@ def _shares(evidence: Evidence) -> str:
     terms = terms_of(evidence)
     goals = f"the {terms.goals}"
     parts = [f"{p} of {'those' if i else goals} {v}" for i, (p, v) in enumerate(met)]
-    text = f"It {terms.reaches} {_list(parts)}"
-    return text + (f"; none were offered {_list(none, 'or')}." if none else ".")
+    text = f"It {terms.reaches} {listed(parts)}"
+    return text + (f"; none were offered {listed(none, 'or')}." if none else ".")
 
 
 def _baselines(evidence: Evidence) -> str:
@@ -170,11 +166,6 @@ def _pointless(evidence: Evidence) -> str:
         f"This task is trivial: {_acting(best)} {_every(evidence)} in {_success(flown[best])} of "
         "episodes."
     )
-
-
-def _hopeless(evidence: Evidence) -> str:
-    oracle = evidence["baselines"]["oracle"]
-    return f"Even the oracle {_every(evidence)} in only {_success(oracle)} of episodes."
 
 
 def _largest(evidence: Evidence) -> str:
@@ -206,7 +197,7 @@ def _other_ends(evidence: Evidence) -> str:
         f"{percent(row['share'])} of all end {terms_of(evidence).ending(row['value'])}"
         for row in rows
     ]
-    return f"; {_list(ends)}" if ends else ""
+    return f"; {listed(ends)}" if ends else ""
 
 
 def _never(evidence: Evidence) -> str:
@@ -226,10 +217,6 @@ def _drawing(evidence: Evidence) -> str:
         f"That is for its most probable actions: with sampled actions it {_every(evidence)} in "
         f"{sampled} of episodes, not in {greedy}."
     )
-
-
-def _misses_or_lacks(evidence: Evidence) -> bool:
-    return any(evidence["greedy"]["shares"][side]["mean"] != 1.0 for side in _sides(evidence))
 
 
 def quantity_label(name: str, evidence: Evidence) -> str:
@@ -254,13 +241,11 @@ def quantity_label(name: str, evidence: Evidence) -> str:
 
 def unlike(evidence: Evidence) -> str:
     """Return how the dynamics differ from those that a policy was trained with."""
-    changed = evidence["unlike"].items()
-    parts = [f"{_set(name, of['flown'])} instead of {_said(of['own'])}" for name, of in changed]
-    return f"It was trained with other dynamics: here it flew with {_list(parts)}."
-
-
-def _set(name: str, value: Any) -> str:
-    return f"dynamics.{name}={_said(value)}"
+    parts = [
+        f"dynamics.{name}={_said(of['flown'])} instead of {_said(of['own'])}"
+        for name, of in evidence["unlike"].items()
+    ]
+    return f"It was trained with other dynamics: here it flew with {listed(parts)}."
 
 
 def _said(value: Any) -> str:
@@ -291,7 +276,12 @@ SENTENCES = (
     ),
     fixed_seed("fixed_seed"),
     *PROOF,
-    Sentence("shares", "a goal was missed, or a side not offered", _misses_or_lacks, _shares),
+    Sentence(
+        "shares",
+        "a goal was missed, or a side not offered",
+        lambda e: any(e["greedy"]["shares"][side]["mean"] != 1.0 for side in _sides(e)),
+        _shares,
+    ),
     Sentence("baselines", "the task is not trivial", lambda e: not _is_trivial(e), _baselines),
     Sentence(
         "pointless",
@@ -303,7 +293,9 @@ SENTENCES = (
         "hopeless",
         "the oracle certainly fails in more than half of the episodes",
         lambda e: e["baselines"]["oracle"]["success"]["upper95"] < 0.5,
-        _hopeless,
+        lambda e: (
+            f"Even the oracle {_every(e)} in only {_success(e['baselines']['oracle'])} of episodes."
+        ),
     ),
     Sentence(
         "failures.largest",
