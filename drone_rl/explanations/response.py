@@ -11,7 +11,7 @@ from torch import Tensor
 
 from drone_rl.explanations.context import Context
 from drone_rl.explanations.hooks import probabilities
-from drone_rl.explanations.rollouts import fly_on
+from drone_rl.explanations.rollouts import run_to_end
 from drone_rl.explanations.scenes import Scenes, empty_scene, place_target
 from drone_rl.policies import PictureNetwork
 from drone_rl.sim.actions import Actions
@@ -171,7 +171,7 @@ def outcome_map(
     layers = []
     for up in height.tolist():
         starts = place_target(scenes, ahead.flatten(), aside.flatten(), up)
-        ends = fly_on(scenes, network, starts)
+        ends = run_to_end(scenes, network, starts)
         layers.append(scenes.task.is_reached(ends, only).view(num_forward, num_lateral))
     return OutcomeMap(
         height=height.numpy(),
