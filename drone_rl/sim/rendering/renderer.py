@@ -82,6 +82,13 @@ class MakeRenderer(Protocol):
         ...
 
 
+_CLASSES = {
+    "raytrace": "drone_rl.sim.rendering.raytrace.renderer.Raytracer",
+    "mujoco_warp": "drone_rl.sim.rendering.mujoco_warp.WarpRenderer",
+}
+"""The class of each renderer, imported when it is needed."""
+
+
 def find_renderer(which: str | MakeRenderer) -> MakeRenderer:
     """What makes a renderer.
 
@@ -95,5 +102,5 @@ def find_renderer(which: str | MakeRenderer) -> MakeRenderer:
         return which
     if which not in RENDERERS:
         raise InputError(f"renderer={which!r} is unknown; give one of: {', '.join(RENDERERS)}")
-    module, _, name = RENDERERS[which].rpartition(".")
+    module, _, name = _CLASSES[which].rpartition(".")
     return getattr(importlib.import_module(module), name)

@@ -141,7 +141,7 @@ def make_painter(description: PolicyDescription, seeing: Seeing) -> Painter:
     if names[:1] != ["gray"]:
         raise InputError("the policy does not see in gray; prove one whose first transform is gray")
     count = next((i for i, n in enumerate(names) if n not in _SHADES), len(names))
-    made = [choice.make_transform() for choice in chosen]
+    made = [choice.make() for choice in chosen]
     shade, rest = on_pixels(made[:count]), on_pixels(made[count:])
     background = shade(seeing.background[None])[0, 0]
     faces = shade(seeing.colors[None, None, FRONT:])[0, 0, 0]
