@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from drone_rl.sweeps.process import PROGRAM
+from drone_rl.sweeps.executors import PROGRAM
 from drone_rl.utils.files import read_json
 
 

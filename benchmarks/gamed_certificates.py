@@ -132,8 +132,8 @@ def invented(policy: Policy, folder: Path) -> dict[str, Any]:
     along["areas"] = {"constant": 1.0}
     subject = make_policy_spec(policy, ShiftSettings())
     (axis,) = find_axes([_AXIS], subject)
-    with closing(PairedEvaluator(subject, 1, data["settings"]["seed"])) as bed:
-        prober = _Liar(bed)
+    with closing(PairedEvaluator(subject, 1, data["settings"]["seed"])) as evaluator:
+        prober = _Liar(evaluator)
         data["domain"] = {"plain": prober.plain, "ranges": {_AXIS: prober.search(axis)}}
     return data
 
@@ -141,8 +141,8 @@ def invented(policy: Policy, folder: Path) -> dict[str, Any]:
 class _Liar(Prober):
     """Finds a policy good under every condition."""
 
-    def __init__(self, bed: PairedEvaluator) -> None:
-        self._bed = bed
+    def __init__(self, evaluator: PairedEvaluator) -> None:
+        self._evaluator = evaluator
         self.plain = self.probe(None, 0.0)
 
     def probe(self, condition: Any, part: float) -> dict[str, Any]:

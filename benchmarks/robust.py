@@ -94,15 +94,15 @@ def fly(
     """
     asked = ShiftSettings(episodes=episodes)
     subjects = {str(run): _in_plain_worlds(run, asked) for run in runs}
-    bed = PairedEvaluator(next(iter(subjects.values())), episodes, seed=0)
+    evaluator = PairedEvaluator(next(iter(subjects.values())), episodes, seed=0)
     try:
         axes = [
             dataclasses.replace(axis, strengths=axis.strengths[:strengths])
-            for axis in find_axes(None, bed.subject)
+            for axis in find_axes(None, evaluator.subject)
         ]
-        found = compare(bed, subjects, axes, possible_share=asked.possible_share)
+        found = compare(evaluator, subjects, axes, possible_share=asked.possible_share)
     finally:
-        bed.close()
+        evaluator.close()
     return {Path(name): shares for name, shares in found.items()}
 
 

@@ -1,11 +1,10 @@
-"""Which kinds of shift a training knows, as its settings say: what is not left to opinion.
+"""Compare policies under the same conditions, by axis and by kinds of shift new to a training.
 
-Whatever of looks, pictures, camera and task is not as by default touches the axes that name it. A
-kind of shift of which one axis is touched counts as touched: nothing of it is new to the policy.
+A training is exposed to an axis if one of the settings that `TOUCHED_BY` names differs from its
+default, and to a kind of shift if it is exposed to one of its axes.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
 
 from drone_rl.config.configuration import as_config
 from drone_rl.config.training import TrainSettings
@@ -16,97 +15,128 @@ from drone_rl.robustness.perturbations import Condition
 from drone_rl.utils.intervals import proportion
 
 _PARTS = ("task", "appearance", "camera", "transforms")
-"""Of a training's settings, those that say what is seen and how it moves."""
+"""Settings of a training that affect observations and dynamics."""
+
+
+def _below(part: str, *names: str) -> tuple[str, ...]:
+    return tuple(f"{part}.{name}" for name in names)
+
+
+_OBJECTS = (
+    *_below("appearance", "object_color", "object_texture", "object_tile"),
+    *_below("task", "cube_color", "pillar_color"),
+)
+_LIGHT = _below("appearance", "sun_strength", "sun_color", "ambient_strength")
+_TURNED = ("transforms.shift", "appearance.camera_turn")
+"""A shifted image looks as if the camera had been turned."""
+_MOVED = ("appearance.camera_offset",)
+_DISTRACTORS = _below(
+    *("appearance", "distractors", "distractor_size", "distractor_color", "distractor_distance")
+)
+_SIZES = ("cube_size", "width")
+TOUCHED_BY: dict[str, tuple[str, ...]] = {
+    "object_color": _OBJECTS,
+    "object_white": _OBJECTS,
+    "floor_color": _below("appearance", "ground_color", "ground_texture", "ground_tile"),
+    "camera_yaw": _TURNED,
+    "camera_pitch": _TURNED,
+    "camera_roll": ("appearance.camera_turn",),
+    "camera_height": _MOVED,
+    "camera_sideways": _MOVED,
+    "field_of_view": ("camera.horizontal_fov", "appearance.camera_widening"),
+    "sun": (*_LIGHT, *_below("appearance", "sun_elevation", "sun_azimuth", "shadows")),
+    "brightness": ("appearance.exposure", *_LIGHT),
+    "fog": _below("appearance", "fog_visibility", "sky_horizon", "sky_zenith"),
+    "object_size": _below("task", *_SIZES),
+    "distractors": _DISTRACTORS,
+    "noise": ("transforms.noise",),
+    "slow_noise": ("transforms.noise",),
+    "blur": ("transforms.blur",),
+    "dead_rows": ("transforms.dead_rows",),
+    "frozen_frames": ("transforms.frozen_frames",),
+    "late_frames": ("transforms.late_frames",),
+    "step_length": ("task.step_length",),
+    "action_delay": ("transforms.late_frames",),
+}
+"""By axis, settings of a training that expose a policy to such a shift: a training in which one of
+them differs from its default knows the axis."""
 
 
 def changed(settings: TrainSettings) -> set[str]:
-    """Settings of looks, pictures, camera and task that are not as by default.
-
-    Args:
-        settings: A training's.
+    """Return settings of appearance, transforms, camera and task that differ from the default.
 
     Returns:
-        Names as in appearance.exposure; transforms by theirs alone, as in transforms.noise.
+        Names such as appearance.exposure; transforms without settings, as in transforms.noise.
     """
-    default, told = (as_config(s) for s in (TrainSettings(), settings))
+    default, given = (as_config(s) for s in (TrainSettings(), settings))
     return {
         f"{part}.{name}"
         for part in _PARTS
-        for name in {*told[part], *default[part]}
-        if _of(told[part], name) != _of(default[part], name)
+        for name in {*given[part], *default[part]}
+        if given[part].get(name) != default[part].get(name)
     }
 
 
 def touched_axes(settings: TrainSettings) -> list[str]:
-    """Names of the axes of which a training knows something, in the order of `AXES`."""
+    """Return the axes to which a training is exposed, in the order of `AXES`."""
     differs = changed(settings)
-    return [axis.name for axis in AXES.values() if differs.intersection(axis.touched_by)]
+    return [axis.name for axis in AXES.values() if differs.intersection(TOUCHED_BY[axis.name])]
 
 
 def untouched_kinds(settings: TrainSettings) -> list[str]:
-    """Kinds of shift of which a training touches no axis, in the order of `GROUPS`."""
+    """Return the kinds of shift to which a training is not exposed, in the order of `GROUPS`."""
     touched = {AXES[name].group for name in touched_axes(settings)}
     return [kind for kind in GROUPS if kind not in touched]
 
 
-def _of(part: Mapping[str, Any], name: str) -> Any:
-    return part.get(name)
-
-
 PLAIN = "plain"
-"""What the condition is called in which nothing is different."""
+"""Name of the condition without perturbation."""
 
 
 def compare(
-    bed: PairedEvaluator,
+    evaluator: PairedEvaluator,
     subjects: Mapping[str, PolicySpec],
     axes: Iterable[Axis],
     *,
     possible_share: float = 0.9,
     tell: Callable[[str], None] = lambda _: None,
 ) -> dict[str, dict[str, float]]:
-    """How often each policy succeeds along each axis.
+    """Return the success rate of each policy along each axis.
 
     Args:
-        bed: Where all of them are flown; task, camera and look are those of its subject.
+        evaluator: Runs all of them, in the task, camera and appearance of its subject.
         subjects: The policies, by name.
-        axes: Along which.
-        possible_share: A strength at which who sees where everything is surely succeeds less often
-            is impossible, and left out for all.
-        tell: Called with the axis that is being flown.
+        axes: Which.
+        possible_share: Success rate of the oracle below which a strength is left out.
+        tell: Called with the axis that is running.
 
     Returns:
-        By policy and by axis, and `PLAIN`: the share of successful flights, over its possible
-        strengths; an axis without any is left out.
+        By policy and by axis, and `PLAIN`: the mean success rate over possible strengths; an axis
+        without any is left out.
     """
     makers = {
-        name: lambda s=s: PolicyAgent(s.network, s.transforms, bed.episodes)
+        name: lambda s=s: PolicyAgent(s.network, s.transforms, evaluator.episodes)
         for name, s in subjects.items()
     }
-    found = {name: {PLAIN: _share(bed, Condition(), make())} for name, make in makers.items()}
+    found = {name: {PLAIN: _share(evaluator, Condition(), make())} for name, make in makers.items()}
     for axis in axes:
         tell(axis.name)
-        conditions = [axis.make(strength, bed.subject) for strength in axis.strengths]
-        possible = [c for c in conditions if _is_possible(bed, c, possible_share)]
+        conditions = [axis.make(strength, evaluator.subject) for strength in axis.strengths]
+        possible = [c for c in conditions if _is_possible(evaluator, c, possible_share)]
         for name, make in makers.items():
             if possible:
-                found[name][axis.name] = mean([_share(bed, c, make()) for c in possible])
+                found[name][axis.name] = mean([_share(evaluator, c, make()) for c in possible])
     return found
 
 
 def by_kind(shares: Mapping[str, float], kinds: Iterable[str]) -> dict[str, float]:
-    """Means of the shares of axes, a kind of shift each.
-
-    Args:
-        shares: By axis.
-        kinds: Which; those without any axis are left out.
-    """
+    """Return mean success rates by kind of shift; kinds without an axis are left out."""
     grouped = {kind: [s for name, s in shares.items() if _kind(name) == kind] for kind in kinds}
     return {kind: mean(values) for kind, values in grouped.items() if values}
 
 
 def mean(values: Sequence[float]) -> float:
-    """Of one value or more."""
+    """Return the mean of one value or more."""
     return sum(values) / len(values)
 
 
@@ -114,10 +144,10 @@ def _kind(name: str) -> str | None:
     return AXES[name].group if name in AXES else None
 
 
-def _share(bed: PairedEvaluator, condition: Condition, eyes: Agent) -> float:
-    return float(bed.fly(condition, eyes=eyes).episodes.success.mean())
+def _share(evaluator: PairedEvaluator, condition: Condition, agent: Agent) -> float:
+    return float(evaluator.run(condition, agent=agent).episodes.success.mean())
 
 
-def _is_possible(bed: PairedEvaluator, condition: Condition, possible_share: float) -> bool:
-    success = bed.fly(condition, eyes=OracleAgent()).episodes.success
+def _is_possible(evaluator: PairedEvaluator, condition: Condition, possible_share: float) -> bool:
+    success = evaluator.run(condition, agent=OracleAgent()).episodes.success
     return proportion(int(success.sum()), len(success))["upper95"] >= possible_share

@@ -43,8 +43,7 @@ def prepare(overrides: Sequence[str]) -> list[str]:
 
 def run(settings: Command, folder: Path) -> tuple[int, None]:
     """Reports on a sweep, finished or not. Returns the exit status."""
-    from drone_rl.sweeps.page import write_picture
-    from drone_rl.sweeps.sweeping import find_sweep, judge_sweep, report_sweep
+    from drone_rl.sweeps.report import find_sweep, judge_sweep, report_sweep, write_picture
 
     del folder
     sweep = find_sweep(settings.folder, settings.paths.outputs)

@@ -1,1 +1,1 @@
-"""How good a policy is, measured and filmed."""
+"""Evaluate policies: rollouts, metrics, baselines, verdicts, videos."""

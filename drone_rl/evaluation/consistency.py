@@ -1,8 +1,4 @@
-"""Verdicts read from files: refused unless their parts agree with one another.
-
-The kind, the exit status, shares, intervals and the rule's quantities follow from one another; what
-can be computed again is computed again. See also `utils/consistency.py`.
-"""
+"""Check verdicts read from files: whatever can be computed again must agree."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -27,10 +23,7 @@ _ROUNDING = 1e-6
 
 
 def check_verdict(given: Any) -> None:
-    """Check a verdict that was read from a file.
-
-    Args:
-        given: As in `verdict.json`.
+    """Check a verdict that was read from a file, as in `verdict.json`.
 
     Raises:
         InputError: A number is out of range, or its parts contradict one another.
@@ -54,20 +47,22 @@ def check_verdict(given: Any) -> None:
 
 
 def _rule(verdict: Mapping[str, Any]) -> Rule:
-    """The rule that the verdict is by, for its strata and baselines."""
+    """The rule of the verdict, for its strata and baselines."""
     error_rate, good_share = (verdict.get(key) for key in ("error_rate", "good_share"))
     strata = [name for name in _shares(verdict.get("greedy"), "greedy") if name != "all"]
     if set(strata) == set(SIDES):
         strata = list(SIDES)
     flown = as_mapping(verdict.get("baselines"), "baselines")
-    luck = [name for name in flown if name != "oracle"]
-    if not 0 < len(strata) <= 8 or not 0 < len(luck) <= 32 or len(luck) == len(flown):
-        raise InputError(f"verdict has {len(strata)} strata and {len(luck)} baselines; judge again")
+    blind = [name for name in flown if name != "oracle"]
+    if not 0 < len(strata) <= 8 or not 0 < len(blind) <= 32 or len(blind) == len(flown):
+        raise InputError(
+            f"verdict has {len(strata)} strata and {len(blind)} baselines; judge again"
+        )
     rule = Rule(
         error_rate=Real(0.0, 1.0).read(error_rate, "verdict.error_rate"),
         good_share=Real(0.0, 1.0).read(good_share, "verdict.good_share"),
         strata=tuple(strata),
-        luck=tuple(luck),
+        blind_baselines=tuple(blind),
     )
     if verdict.get("rule") != rule.text:
         raise InputError("verdict.rule is not the rule of this version; judge the policy again")
@@ -79,7 +74,7 @@ def _shares(flights: Any, of: str) -> Mapping[str, Any]:
 
 
 def _check_flights(verdict: Mapping[str, Any], flights: Any, of: str, rule: Rule) -> None:
-    """The summary of one evaluation."""
+    """Check the summary of one evaluation."""
     episodes = read_entry(flights, "episodes", Whole(1, MOST_VALUES), of)
     successes = check_proportion(flights.get("success"), f"{of}.success", episodes)
     shares = _shares(flights, of)
@@ -103,7 +98,7 @@ def _check_flights(verdict: Mapping[str, Any], flights: Any, of: str, rule: Rule
 def _check_goals(
     verdict: Mapping[str, Any], flights: Mapping[str, Any], success: float, of: str
 ) -> None:
-    """An episode with success reaches all goals, another one at least one less."""
+    """Check success rates: a success reaches all goals, a failure at least one less."""
     goals = read_entry(verdict, "num_cubes", Whole(1, 10_000), "verdict")
     every = float(flights["shares"]["all"]["mean"])
     if not success - _ROUNDING <= every <= 1 - (1 - success) / goals + _ROUNDING:
@@ -118,7 +113,7 @@ def _check_goals(
 def _quantity(
     verdict: Mapping[str, Any], name: str, thresholds: tuple[float, ...], rule: Rule
 ) -> Quantity:
-    """One quantity of the rule, checked against the evaluations that it comes from."""
+    """Check one quantity of the rule against the evaluations that it is computed from."""
     where = f"verdict.quantities.{name}"
     quantities = as_mapping(verdict.get("quantities"), "verdict.quantities")
     given = as_mapping(quantities.get(name), where)
@@ -142,7 +137,7 @@ def _quantity(
 def _expected(
     verdict: Mapping[str, Any], name: str, rule: Rule
 ) -> tuple[Any, tuple[float, float], int]:
-    """What a quantity must be: its value, its least and greatest value, and of how many values."""
+    """Expected value of a quantity, its range, and the number of values that it averages."""
     greedy, flown, good = verdict["greedy"], verdict["baselines"], rule.good_share
     ours, best = (of["success"]["share"] for of in (greedy, flown["oracle"]))
     every, most = (of["shares"]["all"]["mean"] for of in (greedy, flown["oracle"]))
@@ -155,14 +150,14 @@ def _expected(
         stratum = greedy["shares"][what]
         return stratum["mean"], (0.0, 1.0), stratum["count"]
     if name.startswith("above "):
-        luck = flown[what]["shares"]["all"]["mean"]
-        share = every - (1 - rule.luck_margin) * luck - rule.luck_margin * most
+        blind = flown[what]["shares"]["all"]["mean"]
+        share = every - (1 - rule.poor_margin) * blind - rule.poor_margin * most
         return share, (-1.0, 1.0), episodes
     return good * best - flown[what]["success"]["share"], (-1.0, good), episodes
 
 
 def _check_kind(verdict: Mapping[str, Any], found: list[Quantity], rule: Rule) -> None:
-    """The kind is what the rule makes of the quantities, and certain only where they are."""
+    """Check that the rule gives this kind, and that it is certain."""
     kind = Kind(read_entry(verdict, "kind", _KIND, "verdict"))
     is_certain = read_entry(verdict, "certain", Flag(), "verdict")
     expected = decide([quantity.level for quantity in found], len(rule.strata))
@@ -177,7 +172,7 @@ def _check_kind(verdict: Mapping[str, Any], found: list[Quantity], rule: Rule) -
 
 
 def _check_differences(verdict: Mapping[str, Any]) -> None:
-    """Paired differences between the policy and others."""
+    """Check paired differences."""
     greedy = verdict["greedy"]
     for name, gain in as_mapping(verdict.get("skill", {}), "verdict.skill").items():
         mean = check_mean(gain, f"skill.{name[:40]}", (-1.0, 1.0), greedy["episodes"])
@@ -194,7 +189,7 @@ def _check_differences(verdict: Mapping[str, Any]) -> None:
 
 
 def _check_failures(verdict: Mapping[str, Any]) -> None:
-    """The table of failures."""
+    """Check the table of failures."""
     failures = as_mapping(verdict["failures"], "failures")
     episodes = verdict["greedy"]["episodes"]
     failed = check_proportion(failures.get("bound"), "failures.bound", episodes)

@@ -1,4 +1,4 @@
-"""What a pilot would read off: an artificial horizon, three speeds, and how hard motors push."""
+"""Instruments for videos: an artificial horizon, three speeds and the motors' thrust."""
 
 import math
 from typing import NamedTuple
@@ -15,34 +15,34 @@ _BACKGROUND, _TEXT, _FAINT = (24, 26, 31), (235, 235, 240), (120, 130, 150)
 _SKY, _GROUND, _NEEDLE = (70, 130, 200), (140, 95, 50), (255, 205, 60)
 _BAR = (90, 190, 120)
 _RADIUS, _DIAL = 68, (84, 102)
-"""Pixels of the horizon, and its middle."""
+"""Radius and centre of the horizon, pixels."""
 _DEGREES = 40.0
-"""Of pitch from the middle of the horizon to its edge."""
+"""Degrees of pitch from the centre of the horizon to its edge."""
 _SHARPER = 3
-"""The horizon is drawn so many times as large, then made smaller."""
+"""Supersampling factor of the horizon."""
 _SPEEDS, _BARS = (172, 30), 140
-"""Where speeds are written, and the width of their bars."""
+"""Position of the speeds, and width of their bars, pixels."""
 _MOTORS = (330, 30)
 _STILL = 0.05
-"""Metres a second that count as none."""
+"""Speed that counts as none, m/s."""
 _WORDS = (("forward", "backward"), ("left", "right"), ("climbs", "sinks"))
 _PLACES = {"front left": 2, "front right": 0, "rear left": 1, "rear right": 3}
-"""Numbers of the rotors in `FlightState.rotors`, as they lie when seen from above."""
+"""Index of each rotor in `FlightState.rotors`."""
 
 
 class Reading(NamedTuple):
-    """What there is to read of one drone."""
+    """Instrument readings of one drone."""
 
     attitude: Attitude
     """Degrees."""
     speeds: tuple[float, float, float]
-    """Forward, to the left and up, metres a second, where forward is level."""
+    """Forward (level), to the left and up, m/s."""
     rotors: tuple[float, ...]
-    """Share of its most thrust that each gives."""
+    """Thrust of each as a fraction of its maximum."""
 
 
 def read(body: FlightState) -> Reading:
-    """Of the first of some drones."""
+    """Return the readings of the first of some drones."""
     w, x, y, z = body.attitude[0].tolist()
     x_speed, y_speed, climb = body.velocity[0].tolist()
     heading = float(body.heading[0])
@@ -52,12 +52,12 @@ def read(body: FlightState) -> Reading:
 
 
 def panel(reading: Reading, most: float, hover: float) -> Image.Image:
-    """A picture of it.
+    """Draw the instruments.
 
     Args:
         reading: Of the drone.
-        most: Metres a second for which bars of speed are full.
-        hover: Share of all thrust that carries the drone: a mark on each motor's bar.
+        most: Speed at which bars are full, m/s.
+        hover: Fraction of the maximum thrust in hover: a mark on each motor's bar.
 
     Returns:
         Size: (WIDTH, HEIGHT).
@@ -71,11 +71,7 @@ def panel(reading: Reading, most: float, hover: float) -> Image.Image:
 
 
 def horizon(attitude: Attitude) -> Image.Image:
-    """The world beyond the dial: the drone's wings stay level, the ground tilts and rises.
-
-    Returns:
-        Size: twice the radius each way.
-    """
+    """Draw the artificial horizon, whose size is twice the radius each way."""
     size = 2 * _RADIUS * _SHARPER
     across = (np.arange(size) + 0.5) / size * 2.0 - 1.0
     x, y = np.meshgrid(across, -across)

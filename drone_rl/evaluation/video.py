@@ -1,4 +1,4 @@
-"""Films of an episode: what the drone sees beside the drone itself, and what it makes of it."""
+"""Videos of episodes: the drone, its cameras, the observation and the action probabilities."""
 
 import dataclasses
 import logging
@@ -41,81 +41,127 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import legacy_seed
 
 _BACK = (1.0, -1.0, -1.0, -1.0)
-"""Signs that turn a quaternion into its inverse."""
-
-
-def render_chase(worlds: Worlds, look: Appearance | None, height: int, width: int) -> Tensor:
-    """The worlds' drones from behind.
-
-    In flight the chase camera follows the heading alone, whatever holds the drone's own cameras, so
-    that one sees how the body is tilted. Else the drone is level with its cameras, as it is drawn.
-
-    Args:
-        worlds: Of which all are drawn.
-        look: How they look otherwise than all of them do.
-        height: Pixels.
-        width: Pixels.
-
-    Returns:
-        Colours. Shape: (num_worlds, height, width, 3), uint8.
-    """
-    view = worlds.view(CHASE.name, height=height, width=width, show_drone=True)
-    state = worlds.state
-    if not isinstance(state.body, FlightState):
-        return worlds.render(state, view, look)
-    attitude = state.body.attitude
-    whole = (look or Appearance()).over(worlds.appearance)
-    tilted = dataclasses.replace(worlds.poses(state, whole), attitude=attitude)
-    held = dataclasses.replace(whole, camera=level(attitude, view.cameras[0]))
-    return worlds.renderer.render(view, tilted, held)["rgb"][:, 0]
-
-
-def level(attitude: Tensor, camera: str) -> Mounting:
-    """The chase camera on bodies that are tilted, held as if they were not.
-
-    Args:
-        attitude: Of the bodies, quaternions (w, x, y, z). Shape: (num_worlds, 4).
-        camera: Its full name in the model.
-    """
-    back = product(attitude * attitude.new_tensor(_BACK), heading_only(attitude))
-    place = torch.tensor(CHASE.pos, dtype=attitude.dtype, device=attitude.device)
-    return Mounting(camera=camera, offset=rotate(back, place) - place, turn=back)
-
-
+"""Signs of a quaternion's inverse."""
+_log = logging.getLogger(__name__)
 WIDTH, HEIGHT = 1280, 720
 CHASE_HEIGHT, STRIP_HEIGHT, GAP = 532, 144, 5
 INSET_WIDTH = 320
-"""Pixels of the policy's own picture, enlarged."""
+"""Pixels of the observation, enlarged."""
 FRAMES_PER_SECOND = 10
 _STRIP = CHASE_HEIGHT + GAP
 _BOTTOM = _STRIP + STRIP_HEIGHT + 9
 _FIVE = tuple(c.name for c in (FRONT_LEFT, FRONT_CENTER, FRONT_RIGHT, BACK_CENTER, BOTTOM_CENTER))
+Font = ImageFont.FreeTypeFont | ImageFont.ImageFont
 _BACKGROUND, _TEXT, _CHOSEN, _BAR = (24, 26, 31), (235, 235, 240), (226, 74, 51), (120, 130, 150)
 
 
+def film(
+    policy: Policy,
+    folder: Path,
+    episodes: int,
+    *,
+    greedy: bool = True,
+    seed: int = 0,
+    device: str = "cpu",
+    renderer: str = "raytrace",
+    appearance: AppearanceSettings | None = None,
+) -> list[Path]:
+    """Write videos of a policy in held-out environments, one MP4 and one GIF per episode.
+
+    Args:
+        policy: The policy.
+        folder: Where the files go.
+        episodes: How many.
+        greedy: Whether to take the most probable action instead of sampling one.
+        seed: Root of the environments' random streams.
+        device: Where to run.
+        renderer: Name of the renderer, see `drone_rl.sim.rendering.find_renderer`.
+        appearance: Appearance of the scenes; as in the policy's training by default.
+
+    Returns:
+        The files.
+    """
+    files: list[Path] = []
+    look: dict[str, Any] = {} if appearance is None else {"appearance": appearance}
+    with policy.flying(1, seed=seed, device=device, renderer=renderer, **look) as (env, actor):
+        for episode in range(episodes):
+            frames = list(film_episode(env, actor, greedy=greedy))
+            files += write_video(frames, folder / f"episode_{episode}")
+    for file in files:
+        _log.info("written: %s", file)
+    return files
+
+
+def view(
+    policy: Policy,
+    *,
+    greedy: bool = True,
+    seed: int = 0,
+    device: str = "cpu",
+    renderer: str = "raytrace",
+    appearance: AppearanceSettings | None = None,
+) -> None:
+    """Open dm_control's viewer on the composer task, controlled by a policy.
+
+    The viewer shows the dm_control simulation; observations are rendered as in training.
+
+    Raises:
+        InputError: There is no display.
+    """
+    if not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        raise InputError("viewer=true needs a display, and there is none; leave it false to film")
+    import dm_env
+    from dm_control import viewer
+
+    look: dict[str, Any] = {} if appearance is None else {"appearance": appearance}
+    env = policy.make_env(1, seed=seed, device=device, renderer=renderer, **look)
+    base = cast(DroneEnv, env.base_env)
+    actor, worlds = policy.make_actor(env, seed=seed), base.worlds
+    shown = make_environment(
+        worlds.task,
+        worlds.camera,
+        dynamics=worlds.dynamics,
+        pixels=False,
+        random_state=legacy_seed(seed),
+        appearance=base.looks.settings,
+    )
+    kind = ExplorationType.DETERMINISTIC if greedy else ExplorationType.RANDOM
+
+    @torch.no_grad()
+    def act(timestep: dm_env.TimeStep) -> int:
+        del timestep
+        state = shown.task.state.to(worlds.device)
+        pixels = worlds.render(state, appearance=shown.task.look)
+        seen = env.transform(TensorDict({"pixels": pixels}, [1], device=worlds.device))
+        with set_exploration_type(kind):
+            return int(actor(seen)["action"])
+
+    viewer.launch(shown, act, title="drone-rl play")
+
+
 class _Seen(NamedTuple):
-    """Pictures of one moment. Shapes: (height, width, 3); of the five: (5, height, width, 3)."""
+    """Images of one step. Shapes: (height, width, 3); of the five: (5, height, width, 3)."""
 
     inside: Tensor
     outside: Tensor
     five: Tensor
     panel: Image.Image | None = None
-    """Instruments, if the drone flies."""
+    """Instruments, if the drone has flight dynamics."""
 
 
 @torch.no_grad()
 def film_episode(
     env: TransformedEnv, actor: TensorDictModuleBase, *, greedy: bool = True
 ) -> Iterator[np.ndarray]:
-    """Flies one episode in the first world of `env` and yields its pictures.
+    """Run one episode and yield its video frames.
 
     Args:
-        env: One world.
-        actor: The policy; its "logits", if it has any, are drawn as probabilities.
-        greedy: Whether to take the most probable action instead of drawing one.
+        env: A single environment.
+        actor: The policy; its "logits", if it has any, are shown as probabilities.
+        greedy: Whether to take the most probable action instead of sampling one.
 
     Yields:
-        RGB pictures, uint8. Shape: (720, 1280, 3).
+        RGB frames, uint8. Shape: (720, 1280, 3).
     """
     base = cast(DroneEnv, env.base_env)
     worlds = base.worlds
@@ -134,11 +180,11 @@ def film_episode(
 
 
 def write_video(frames: list[np.ndarray], path: Path) -> list[Path]:
-    """Writes an MP4 and, at half the size, a GIF.
+    """Write an MP4 and, at half the size, a GIF.
 
     Args:
-        frames: RGB pictures of one size.
-        path: Where to, without an ending.
+        frames: RGB frames of one size.
+        path: Where to, without suffix.
 
     Returns:
         The two files.
@@ -151,17 +197,12 @@ def write_video(frames: list[np.ndarray], path: Path) -> list[Path]:
         path.parent.mkdir(parents=True, exist_ok=True)
         iio.imwrite(files[0], np.stack(frames), fps=FRAMES_PER_SECOND, codec="libx264")
         half = [Image.fromarray(f).resize((f.shape[1] // 2, f.shape[0] // 2)) for f in frames]
-        palette = [
+        first, *rest = (
             image.quantize(128, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
             for image in half
-        ]
-        palette[0].save(
-            files[1],
-            save_all=True,
-            append_images=palette[1:],
-            duration=1000 // FRAMES_PER_SECOND,
-            loop=0,
         )
+        duration = 1000 // FRAMES_PER_SECOND
+        first.save(files[1], save_all=True, append_images=rest, duration=duration, loop=0)
     except OSError as error:
         raise InputError(
             f"video {path} can't be written ({error}); choose another folder"
@@ -176,7 +217,7 @@ def _caption(task: Task[Any], state: TensorDictBase, earned: float) -> str:
 
 
 def _look(base: DroneEnv) -> _Seen:
-    """What there is to see of the first world."""
+    """Render the first environment."""
     worlds, look = base.worlds, base.looks.drawn()
     five = worlds.view(_FIVE, height=STRIP_HEIGHT, width=(WIDTH + GAP) // len(_FIVE) - GAP)
     outside = render_chase(worlds, look, CHASE_HEIGHT, WIDTH)[0]
@@ -185,7 +226,7 @@ def _look(base: DroneEnv) -> _Seen:
 
 
 def _panel(worlds: Worlds) -> Image.Image | None:
-    """Instruments of the first world's drone, if it flies."""
+    """Instruments of the first environment's drone, if it has flight dynamics."""
     body, dynamics = worlds.state.body, worlds.dynamics
     if not (isinstance(body, FlightState) and isinstance(dynamics, Quadrotor)):
         return None
@@ -201,7 +242,7 @@ def _compose(
     acted: TensorDictBase | None = None,
     actions: Actions = MOVES,
 ) -> np.ndarray:
-    """The drone from behind, on it the policy's picture; below all five cameras, words and bars."""
+    """Chase view with the observation as inset; below all five cameras, a caption and bars."""
     canvas = Image.new("RGB", (WIDTH, HEIGHT), _BACKGROUND)
     draw, font = ImageDraw.Draw(canvas), ImageFont.load_default(16)
     canvas.paste(Image.fromarray(seen.outside.cpu().numpy()), (0, 0))
@@ -228,13 +269,10 @@ def _compose(
     return np.asarray(canvas)
 
 
-Font = ImageFont.FreeTypeFont | ImageFont.ImageFont
-
-
 def _draw_bars(
     draw: ImageDraw.ImageDraw, font: Font, acted: TensorDictBase, actions: Actions
 ) -> None:
-    """One bar an action, as long as it is wished for; the chosen one in red (as in Fig. 13)."""
+    """One bar per action, as long as it is probable; the chosen one in red."""
     chosen, names = int(actions.part(acted["action"][0])), actions.names
     logits = acted.get("logits", None)
     wish = torch.eye(len(names))[chosen] if logits is None else actions.wish(logits[0])
@@ -248,89 +286,39 @@ def _draw_bars(
         draw.rectangle((x + 120, y + 2, x + 120 + max(1, int(most * share)), y + 18), color)
 
 
-_log = logging.getLogger(__name__)
+def render_chase(worlds: Worlds, look: Appearance | None, height: int, width: int) -> Tensor:
+    """Render the drones from behind.
 
-
-def film(
-    policy: Policy,
-    folder: Path,
-    episodes: int,
-    *,
-    greedy: bool = True,
-    seed: int = 0,
-    device: str = "cpu",
-    renderer: str = "raytrace",
-    appearance: AppearanceSettings | None = None,
-) -> list[Path]:
-    """Writes videos of a policy in unseen worlds.
+    With flight dynamics the chase camera follows the heading only, so that the tilt of the body is
+    visible.
 
     Args:
-        policy: Who flies.
-        folder: Where the files go.
-        episodes: Flights, one MP4 and one GIF each.
-        greedy: Whether to take the most probable action instead of drawing one.
-        seed: Root of the worlds' random streams.
-        device: Where to draw.
-        renderer: Who draws, see `drone_rl.sim.rendering.find_renderer`.
-        appearance: How worlds look; as in the policy's training by default.
+        worlds: Environments to render.
+        look: Changes to the appearance that all of them share.
+        height: Pixels.
+        width: Pixels.
 
     Returns:
-        The files.
+        Colours. Shape: (num_worlds, height, width, 3), uint8.
     """
-    files: list[Path] = []
-    look = {} if appearance is None else {"appearance": appearance}
-    with policy.flying(1, seed=seed, device=device, renderer=renderer, **look) as (env, actor):
-        for episode in range(episodes):
-            frames = list(film_episode(env, actor, greedy=greedy))
-            files += write_video(frames, folder / f"episode_{episode}")
-    for file in files:
-        _log.info("written: %s", file)
-    return files
+    view = worlds.view(CHASE.name, height=height, width=width, show_drone=True)
+    state = worlds.state
+    if not isinstance(state.body, FlightState):
+        return worlds.render(state, view, look)
+    attitude = state.body.attitude
+    whole = (look or Appearance()).over(worlds.appearance)
+    tilted = dataclasses.replace(worlds.poses(state, whole), attitude=attitude)
+    held = dataclasses.replace(whole, camera=level(attitude, view.cameras[0]))
+    return worlds.renderer.render(view, tilted, held)["rgb"][:, 0]
 
 
-def view(
-    policy: Policy,
-    *,
-    greedy: bool = True,
-    seed: int = 0,
-    device: str = "cpu",
-    renderer: str = "raytrace",
-    appearance: AppearanceSettings | None = None,
-) -> None:
-    """Opens dm_control's viewer on the composer task, flown by a policy.
+def level(attitude: Tensor, camera: str) -> Mounting:
+    """Return the mounting that keeps the chase camera level on tilted bodies.
 
-    The viewer shows the dm_control simulation; the policy sees the same poses drawn as in
-    training.
-
-    Raises:
-        InputError: There is no display.
+    Args:
+        attitude: Of the bodies, quaternions (w, x, y, z). Shape: (num_worlds, 4).
+        camera: Its full name in the model.
     """
-    if not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        raise InputError("viewer=true needs a display, and there is none; leave it false to film")
-    import dm_env
-    from dm_control import viewer
-
-    look = {} if appearance is None else {"appearance": appearance}
-    env = policy.make_env(1, seed=seed, device=device, renderer=renderer, **look)
-    base = cast(DroneEnv, env.base_env)
-    actor, worlds = policy.make_actor(env, seed=seed), base.worlds
-    shown = make_environment(
-        worlds.task,
-        worlds.camera,
-        dynamics=worlds.dynamics,
-        pixels=False,
-        random_state=legacy_seed(seed),
-        appearance=base.looks.settings,
-    )
-    kind = ExplorationType.DETERMINISTIC if greedy else ExplorationType.RANDOM
-
-    @torch.no_grad()
-    def act(timestep: dm_env.TimeStep) -> int:
-        del timestep
-        state = shown.task.state.to(worlds.device)
-        pixels = worlds.render(state, appearance=shown.task.look)
-        seen = env.transform(TensorDict({"pixels": pixels}, [1], device=worlds.device))
-        with set_exploration_type(kind):
-            return int(actor(seen)["action"])
-
-    viewer.launch(shown, act, title="drone-rl play")
+    back = product(attitude * attitude.new_tensor(_BACK), heading_only(attitude))
+    place = torch.tensor(CHASE.pos, dtype=attitude.dtype, device=attitude.device)
+    return Mounting(camera=camera, offset=rotate(back, place) - place, turn=back)

@@ -1,4 +1,4 @@
-"""Who flies: a policy that sees pictures, or who acts without looking."""
+"""Agents of the robustness evaluation: the policy, random and constant baselines, the oracle."""
 
 import dataclasses
 from collections.abc import Callable, Iterable
@@ -18,42 +18,42 @@ from drone_rl.sim.rendering.view import Modality
 from drone_rl.sim.tasks import State, Task
 from drone_rl.sim.worlds import Worlds
 
+_NOTHING = -1.0
+
 
 class StepContext(NamedTuple):
-    """What there is to see at one step of the worlds that still fly, n of num_worlds."""
+    """What an agent may use at one step: n active environments of num_worlds."""
 
     worlds: Worlds
     state: State
-    flying: Tensor
-    """Which of all worlds these are. Shape: (n,)."""
+    active: Tensor
+    """Indices of the active environments. Shape: (n,)."""
     poses: Poses
-    """Where the camera has everything."""
     appearance: Appearance | None
-    spoil: Callable[..., Tensor]
-    """What becomes of pictures, see `faults.FaultPipeline`."""
+    apply_faults: Callable[..., Tensor]
+    """See `faults.FaultPipeline`."""
     pending: list[Tensor]
     """Actions decided but not yet taken, oldest first. Shapes: (n, *)."""
 
-    def draw(self, modality: Modality) -> Tensor:
-        """What the policy's camera takes. Shape: (n, H, W, *)."""
+    def render(self, modality: Modality) -> Tensor:
+        """Render the policy's camera. Shape: (n, H, W, *)."""
         view = self.worlds.view(modality=modality)
         return self.worlds.renderer.render(view, self.poses, self.appearance)[modality][:, 0]
 
 
 class Agent(Protocol):
-    """Who acts, from the start of a flight on."""
+    """Acts in a batch of environments, for one episode each."""
 
     @property
     def knows_truth(self) -> bool:
-        """Whether only faults that hide things matter to it."""
+        """Whether only faults that hide objects affect it."""
         ...
 
-    def act(self, sight: StepContext) -> tuple[Tensor, Tensor | None]:
-        """What to do.
+    def act(self, context: StepContext) -> tuple[Tensor, Tensor | None]:
+        """Choose the actions of one step.
 
         Returns:
-            An action for each world, shape (n, *), and what was seen, if anything was, from 0 to 1
-            as the camera gave it or in any other units, shape (n, *).
+            Actions, shape (n, *), and the images that the agent used, if any, shape (n, *).
         """
         ...
 
@@ -71,108 +71,97 @@ class PolicyAgent:
         *,
         examines_rounding: bool = False,
     ) -> None:
-        """Has seen nothing yet.
+        """Take the policy.
 
         Args:
             network: The policy's.
-            transforms: What becomes of pictures before it sees them.
-            num_worlds: That fly.
-            examines_rounding: Whether to find out where rounding can change the action.
+            transforms: Of its observations.
+            num_worlds: Number of environments.
+            examines_rounding: Whether to find the episodes in which rounding can change an action.
         """
         self.is_fragile = torch.zeros(num_worlds, dtype=torch.bool)
-        """Episodes with a frame on which rounding can change the action, if that is examined.
-        Shape: (num_worlds,)."""
+        """Episodes with a frame in which rounding can change the action. Shape: (num_worlds,)."""
         self._decide = decider(network)[0] if examines_rounding else None
-        looking = [t for t in transforms if "pixels" in (t.in_keys or [])]
-        self._network, self._first, self._rest = network, looking[0], looking[1:]
+        on_pixels = [t for t in transforms if "pixels" in (t.in_keys or [])]
+        self._network, self._first, self._rest = network, on_pixels[0], on_pixels[1:]
         self._memory, self._num_worlds = memory_of(self._rest), num_worlds
         self._film: list[Tensor] = []
 
-    def act(self, sight: StepContext) -> tuple[Tensor, Tensor | None]:
+    def act(self, context: StepContext) -> tuple[Tensor, Tensor | None]:
         """See `Agent`."""
         if type(self._first) is GrayPixels:
-            pictures = sight.draw("gray")[:, None]
+            images = context.render("gray")[:, None]
         else:
-            pictures = self._first._apply_transform(sight.draw("rgb"))
-        pictures = sight.spoil(pictures, sight.flying)
-        film = [*(earlier[sight.flying] for earlier in self._film), pictures]
-        seen = see_film(self._rest, film)
-        self._keep(pictures, sight.flying)
-        if self._decide is not None:
-            self.is_fragile[sight.flying.cpu()] |= self._decide(seen).is_fragile.cpu()
-        return sight.worlds.dynamics.actions.greedy(self._network(seen)), pictures
-
-    def _keep(self, pictures: Tensor, flying: Tensor) -> None:
+            images = self._first._apply_transform(context.render("rgb"))
+        images = context.apply_faults(images, context.active)
+        film = [*(earlier[context.active] for earlier in self._film), images]
+        observation = see_film(self._rest, film)
         if self._memory:
-            newest = pictures.new_zeros(self._num_worlds, *pictures.shape[1:])
-            newest[flying] = pictures
+            newest = images.new_zeros(self._num_worlds, *images.shape[1:])
+            newest[context.active] = images
             self._film = [*self._film, newest][-self._memory :]
+        if self._decide is not None:
+            is_fragile = self._decide(observation).is_fragile.cpu()
+            self.is_fragile[context.active.cpu()] |= is_fragile
+        return context.worlds.dynamics.actions.greedy(self._network(observation)), images
 
 
 class BaselineAgent:
-    """One action always, or any action alike."""
+    """A baseline that takes random actions, or always the same one."""
 
     knows_truth = True
 
     def __init__(self, name: str, actions: Actions, generator: torch.Generator) -> None:
-        """Takes what to do.
-
-        Args:
-            name: Of what is done always, or "random".
-            actions: What can be done.
-            generator: Of random ones.
-        """
+        """Take "random" or the name of an action, all actions, and the generator of random ones."""
         self._actions, self._generator = actions, generator
         self._action = None if name == "random" else actions.always(name)
 
-    def act(self, sight: StepContext) -> tuple[Tensor, Tensor | None]:
+    def act(self, context: StepContext) -> tuple[Tensor, Tensor | None]:
         """See `Agent`."""
+        active = context.active
         if self._action is not None:
-            same = self._action.expand(len(sight.flying), *self._action.shape)
-            return same.to(sight.flying.device), None
-        drawn = self._actions.draw(tuple(sight.flying.shape), self._generator)
-        return drawn.to(sight.flying.device), None
-
-
-_NOTHING = -1.0
+            return self._action.expand(len(active), *self._action.shape).to(active.device), None
+        sampled = self._actions.draw(tuple(active.shape), self._generator)
+        return sampled.to(active.device), None
 
 
 class OracleAgent:
-    """Does what the task's oracle does about the first cube that it sees."""
+    """The task's oracle, restricted to the cubes that the camera shows.
+
+    It reads the segmentation of the policy's camera, with the same faults: a cube that shows in one
+    pixel it knows exactly, one that shows in none not at all. It knows its own delay. Where it
+    fails, no policy can succeed.
+    """
 
     knows_truth = True
 
     def __init__(self, *, looks: bool = True) -> None:
-        """Sets what it knows.
-
-        Args:
-            looks: Whether it knows what its camera shows, or everything.
-        """
+        """Set `looks=False` to let it know all cubes."""
         self._looks = looks
 
-    def act(self, sight: StepContext) -> tuple[Tensor, Tensor | None]:
+    def act(self, context: StepContext) -> tuple[Tensor, Tensor | None]:
         """See `Agent`."""
-        worlds, rule = sight.worlds, sight.worlds.task.oracle
+        worlds, rule = context.worlds, context.worlds.task.oracle
         assert rule is not None
-        body = sight.state.body
-        for action in sight.pending:
+        body = context.state.body
+        for action in context.pending:
             body = worlds.dynamics.step(body, action)
-        info = worlds.info(dataclasses.replace(sight.state, body=body))  # pyright: ignore[reportArgumentType] (a dataclass)
+        info = worlds.info(dataclasses.replace(context.state, body=body))
         if self._looks:
-            info["next_cube"] = self._first_seen(sight, info["next_cube"])
+            info["next_cube"] = self._first_visible(context, info["next_cube"])
         return rule.decide([info[name] for name in rule.reads], worlds.dynamics.actions), None
 
-    def _first_seen(self, sight: StepContext, next_cube: Tensor) -> Tensor:
-        """The nearest standing cube that shows; their number if none does. Shape: (n, 1)."""
-        props = torch.tensor([*sight.worlds.scene.props, -1], device=next_cube.device)
-        shown = props[sight.draw("segmentation").long()].float()[:, None]
-        shown = sight.spoil(shown, sight.flying, _NOTHING).flatten(1)
-        count = sight.worlds.task.places(sight.state).shape[1]  # what follows are distractors
+    def _first_visible(self, context: StepContext, next_cube: Tensor) -> Tensor:
+        """Index of the nearest standing cube that shows, or their number. Shape: (n, 1)."""
+        props = torch.tensor([*context.worlds.scene.props, -1], device=next_cube.device)
+        shown = props[context.render("segmentation").long()].float()[:, None]
+        shown = context.apply_faults(shown, context.active, _NOTHING).flatten(1)
+        count = context.worlds.task.places(context.state).shape[1]  # distractors come after
         stands = (shown >= next_cube) & (shown < count)
-        there = torch.where(stands, shown, torch.full_like(shown, count))
-        return there.amin(-1, keepdim=True).long()
+        visible = torch.where(stands, shown, torch.full_like(shown, count))
+        return visible.amin(-1, keepdim=True).long()
 
 
 def has_oracle(task: Task) -> bool:
-    """Whether a task has one of whom the next cube can be hidden."""
+    """Return whether a task has an oracle from which cubes can be hidden."""
     return task.oracle is not None and "next_cube" in task.oracle.reads

@@ -1,4 +1,4 @@
-"""All axes, with the strengths at which every policy is tried.
+"""Axes of perturbation, each with five strengths that are the same for every policy.
 
 The strengths mirror published ones: colours Distracting Control Suite (Stone et al., 2021) and
 DMControl Generalization Benchmark (Hansen and Wang, 2021), camera angles the former's three levels
@@ -10,93 +10,81 @@ import math
 from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
-from drone_rl.robustness.faults import Blur, DeadRows, Frozen, Late, Noise
+from drone_rl.robustness.faults import blur, dead_rows, frozen_frames, late_frames, noise
 from drone_rl.robustness.paired_evaluation import PolicySpec
 from drone_rl.robustness.perturbations import (
     Condition,
-    Exposed,
-    Fogged,
-    Mount,
-    SunAt,
-    Tinted,
-    Whitened,
+    expose,
+    fog,
+    mount,
+    sun_at,
     task_things,
+    tint,
+    whiten,
 )
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.utils.errors import InputError
 
 NUMBERS = (1, 2, 3, 4, 5)
-"""Of the strengths, from the weakest on."""
+"""Numbers of the strengths, weakest first."""
 TOGETHER = 3
-"""The strength at which all axes are tried together."""
+"""Number of the strength at which all axes are combined."""
 
 
 class Scale(NamedTuple):
-    """Along which steps of an axis are compared: areas are taken and middles are found on it."""
+    """Scale on which distances between strengths are measured."""
 
     there: Callable[[float], float]
     back: Callable[[float], float]
     rises: bool = True
-    """Whether greater values lie higher on it."""
+    """Whether greater values have greater positions."""
 
 
 LINEAR = Scale(float, float)
 FACTORS = Scale(math.log, math.exp)
-"""Half as much is as far as twice as much."""
+"""A half is as far from 1 as 2."""
 INVERSE = Scale(lambda x: 1.0 / x, lambda x: math.inf if x == 0 else 1.0 / x, rises=False)
-"""Infinitely much is none."""
-
-
-def _as_it_is(strength: float, subject: PolicySpec) -> float:
-    return strength
+"""An infinite strength is no perturbation."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Axis:
-    """One thing that can be different."""
+    """One quantity to perturb."""
 
     name: str
     group: str
     """One of the ten kinds of shift."""
     unit: str
-    """Of its values."""
+    """Of values."""
     neutral: float
-    """The strength of no difference."""
+    """Strength of no perturbation."""
     strengths: tuple[float, float, float, float, float]
-    """From the weakest on; those of an axis with two ends lie on both sides of the neutral one."""
+    """Weakest first; on both sides of the neutral one if the axis has two ends."""
     make: Callable[[float, PolicySpec], Condition]
-    """What a strength makes different for a policy.
-
-    Raises:
-        InputError: This task has no such thing.
-    """
-    value: Callable[[float, PolicySpec], float] = _as_it_is
-    """A strength in the axis's unit, where strengths are told by what the policy has itself."""
+    """The condition of a strength; raises InputError if it is not for the task."""
+    value: Callable[[float, PolicySpec], float] = lambda strength, _: strength
+    """A strength in the axis's unit; differs where strengths are relative to the policy."""
     own: Callable[[PolicySpec], float] | None = None
-    """What the neutral strength is for a policy, where that is not the same for all."""
+    """The neutral strength of a policy, if it is not the same for all."""
     scale: Scale = LINEAR
     whole: bool = False
-    """Whether there is nothing between whole numbers."""
-    touched_by: tuple[str, ...] = ()
-    """Settings of a training that make a difference of this kind, as in appearance.exposure: a
-    training in which one of them is not as by default knows the axis."""
+    """Whether only whole numbers are strengths."""
+
+    def of(self, subject: PolicySpec) -> "Axis":
+        """Return the axis with the policy's own neutral strength."""
+        return self if self.own is None else dataclasses.replace(self, neutral=self.own(subject))
 
     def position(self, strength: float) -> float:
-        """Where a strength lies on the axis's scale; 0 where nothing is different."""
+        """Return the position of a strength on the axis's scale, relative to the neutral one."""
         return self.scale.there(strength) - self.scale.there(self.neutral)
 
     @property
     def signs(self) -> dict[str, int]:
-        """By end of a range of values, "low" and "high", on which side of the scale it lies."""
+        """By end of a range of values, "low" and "high", the sign of its position."""
         return {"low": -1, "high": 1} if self.scale.rises else {"low": 1, "high": -1}
 
     def strength(self, value: float, subject: PolicySpec) -> float:
-        """The strength that has this value for a policy: the inverse of `value`, which is affine.
-
-        Args:
-            value: In the axis's unit.
-            subject: The policy.
-        """
+        """Return the strength that has this value for a policy: the inverse of affine `value`."""
         if not math.isfinite(value):
             return value
         zero, one = (self.value(strength, subject) for strength in (0.0, 1.0))
@@ -104,7 +92,7 @@ class Axis:
         return float(round(strength)) if self.whole else strength
 
     def between(self, low: float, high: float, share: float = 0.5) -> float | None:
-        """The strength a share of the way from one to another; None where there is none."""
+        """Return the strength at a fraction of the way between two, None if there is none."""
         there, back, _ = self.scale
         if not self.whole:
             return back(there(low) + share * (there(high) - there(low)))
@@ -113,34 +101,17 @@ class Axis:
         return math.copysign(nearer, high - low) + low if inside > 0 else None
 
     def at(self, position: float) -> float:
-        """The strength that lies there on the axis's scale."""
+        """Return the strength at a position on the axis's scale."""
         return self.scale.back(position + self.scale.there(self.neutral))
 
 
 CORRELATION_TIME = -1.0 / math.log(0.95)
-"""Frames: of one frame's noise 0.95 is left in the next."""
-_THINGS = (Meaning.TARGET, Meaning.OBSTACLE)
+"""Frames; consecutive frames of noise correlate by 0.95."""
+_THINGS = (SemanticClass.TARGET, SemanticClass.OBSTACLE)
 _SIZES = {"collect_cubes": "cube_size", "pillars": "width"}
 _FACTORS = (0.9, 1.25, 0.75, 1.5, 0.5)
 _ANGLES = (1.0, 3.0, 9.0, 18.0, 27.0)
 _METRES = (0.1, 0.25, 0.5, 1.0, 2.0)
-
-
-def _below(part: str, *names: str) -> tuple[str, ...]:
-    return tuple(f"{part}.{name}" for name in names)
-
-
-_OBJECTS = (
-    *_below("appearance", "object_color", "object_texture", "object_tile"),
-    *_below("task", "cube_color", "pillar_color"),
-)
-_LIGHT = _below("appearance", "sun_strength", "sun_color", "ambient_strength")
-_TURNED = ("transforms.shift", "appearance.camera_turn")
-"""A picture that stands aside looks as if the camera had been turned."""
-_MOVED = ("appearance.camera_offset",)
-_DISTRACTORS = _below(
-    *("appearance", "distractors", "distractor_size", "distractor_color", "distractor_distance")
-)
 
 
 def _size(subject: PolicySpec) -> str:
@@ -151,7 +122,7 @@ def _size(subject: PolicySpec) -> str:
 
 
 def _drawn(subject: PolicySpec, condition: Condition) -> Condition:
-    """A condition that our own ray tracer alone can draw."""
+    """A condition that only the ray tracer can render."""
     if subject.renderer != "raytrace":
         raise InputError(
             f"renderer={subject.renderer} can't draw fog and exposure; give axes without fog and "
@@ -166,7 +137,7 @@ def _cluttered(subject: PolicySpec, count: int) -> Condition:
 
 
 def _middle(value: float | tuple[float, float]) -> float:
-    """What it is, or is on average where it is drawn from a range."""
+    """A value, or the mean of a range."""
     return sum(value) / 2 if isinstance(value, tuple) else value
 
 
@@ -179,138 +150,116 @@ AXES: dict[str, Axis] = {
     for axis in (
         Axis(
             *("object_color", "color", "of each color", 0.0, (0.025, 0.05, 0.1, 0.2, 0.3)),
-            lambda s, _: Condition(looks=(Tinted(_THINGS, s),)),
-            touched_by=_OBJECTS,
+            lambda s, _: Condition(looks=(tint(_THINGS, s),)),
         ),
         Axis(
             *("object_white", "color", "of white", 0.0, (0.1, 0.2, 0.4, 0.6, 0.8)),
-            lambda s, _: Condition(looks=(Whitened(_THINGS, s),)),
-            touched_by=_OBJECTS,
+            lambda s, _: Condition(looks=(whiten(_THINGS, s),)),
         ),
         Axis(
             *("floor_color", "color", "of each color", 0.0, (0.025, 0.05, 0.1, 0.2, 0.3)),
-            lambda s, _: Condition(looks=(Tinted((Meaning.GROUND,), s),)),
-            touched_by=_below("appearance", "ground_color", "ground_texture", "ground_tile"),
+            lambda s, _: Condition(looks=(tint((SemanticClass.GROUND,), s),)),
         ),
         Axis(
             *("camera_yaw", "camera angle", "degrees", 0.0, _ANGLES),
-            lambda s, _: Condition(mounts=(Mount(turn="yaw", degrees=s),)),
-            touched_by=_TURNED,
+            lambda s, _: Condition(mounts=(mount(turn="yaw", degrees=s),)),
         ),
         Axis(
             *("camera_pitch", "camera angle", "degrees", 0.0, _ANGLES),
-            lambda s, _: Condition(mounts=(Mount(turn="pitch", degrees=s),)),
-            touched_by=_TURNED,
+            lambda s, _: Condition(mounts=(mount(turn="pitch", degrees=s),)),
         ),
         Axis(
             *("camera_roll", "camera angle", "degrees", 0.0, _ANGLES),
-            lambda s, _: Condition(mounts=(Mount(turn="roll", degrees=s),)),
-            touched_by=("appearance.camera_turn",),
+            lambda s, _: Condition(mounts=(mount(turn="roll", degrees=s),)),
         ),
         Axis(
             *("camera_height", "camera position", "m", 0.0, _METRES),
-            lambda s, _: Condition(mounts=(Mount(offset=(0.0, 0.0, s)),)),
-            touched_by=_MOVED,
+            lambda s, _: Condition(mounts=(mount(offset=(0.0, 0.0, s)),)),
         ),
         Axis(
             *("camera_sideways", "camera position", "m", 0.0, _METRES),
-            lambda s, _: Condition(mounts=(Mount(offset=(0.0, s, 0.0)),)),
-            touched_by=_MOVED,
+            lambda s, _: Condition(mounts=(mount(offset=(0.0, s, 0.0)),)),
         ),
         Axis(
             *("field_of_view", "field of view", "degrees", 0.0, (-10.0, 10.0, -20.0, 20.0, -45.0)),
             lambda s, of: Condition(camera={"horizontal_fov": of.camera.horizontal_fov + s}),
             value=lambda s, of: of.camera.horizontal_fov + s,
-            touched_by=("camera.horizontal_fov", "appearance.camera_widening"),
         ),
         Axis(
             *("sun", "light", "degrees", 55.2, (60.0, 30.0, 15.0, 5.0, 0.0)),
-            lambda s, _: Condition(looks=(SunAt(s),)),
+            lambda s, _: Condition(looks=(sun_at(s),)),
             own=lambda of: _middle(of.appearance.sun_elevation),
-            touched_by=(*_LIGHT, *_below("appearance", "sun_elevation", "sun_azimuth", "shadows")),
         ),
         Axis(
             *("brightness", "light", "times", 1.0, (0.8, 1.25, 0.4, 2.5, 0.1)),
-            lambda s, of: _drawn(of, Condition(looks=(Exposed(s),))),
+            lambda s, of: _drawn(of, Condition(looks=(expose(s),))),
             scale=FACTORS,
-            touched_by=("appearance.exposure", *_LIGHT),
         ),
         Axis(
             *("fog", "fog", "m of sight", math.inf, (100.0, 60.0, 40.0, 25.0, 15.0)),
-            lambda s, of: _drawn(of, Condition(looks=(Fogged(s),))),
+            lambda s, of: _drawn(of, Condition(looks=(fog(s),))),
             own=lambda of: _middle(of.appearance.fog_visibility or math.inf),
             scale=INVERSE,
-            touched_by=_below("appearance", "fog_visibility", "sky_horizon", "sky_zenith"),
         ),
         Axis(
             *("object_size", "object size", "m", 1.0, _FACTORS),
             lambda s, of: Condition(task={_size(of): _times(_size(of), s, of)}),
             value=lambda s, of: _times(_size(of), s, of),
             scale=FACTORS,
-            touched_by=_below("task", *_SIZES.values()),
         ),
         Axis(
             *("distractors", "distractors", "of them", 0.0, (1.0, 2.0, 4.0, 8.0, 16.0)),
             lambda s, of: _cluttered(of, round(s)),
             whole=True,
-            touched_by=_DISTRACTORS,
         ),
         Axis(
             *("noise", "sensor", "of 255", 0.0, (2.0, 4.0, 8.0, 16.0, 32.0)),
-            lambda s, _: Condition(faults=(Noise(s / 255),)),
-            touched_by=("transforms.noise",),
+            lambda s, _: Condition(faults=(noise(s / 255),)),
         ),
         Axis(
             *("slow_noise", "sensor", "of 255", 0.0, (2.0, 4.0, 8.0, 16.0, 32.0)),
-            lambda s, _: Condition(faults=(Noise(s / 255, CORRELATION_TIME),)),
-            touched_by=("transforms.noise",),
+            lambda s, _: Condition(faults=(noise(s / 255, CORRELATION_TIME),)),
         ),
         Axis(
             *("blur", "sensor", "pixels", 0.0, (0.5, 0.75, 1.0, 1.5, 2.0)),
-            lambda s, _: Condition(faults=(Blur(s),)),
-            touched_by=("transforms.blur",),
+            lambda s, _: Condition(faults=(blur(s),)),
         ),
         Axis(
             *("dead_rows", "sensor", "rows", 0.0, (1.0, 2.0, 4.0, 8.0, 12.0)),
-            lambda s, _: Condition(faults=(DeadRows(round(s)),)),
+            lambda s, _: Condition(faults=(dead_rows(round(s)),)),
             whole=True,
-            touched_by=("transforms.dead_rows",),
         ),
         Axis(
             *("frozen_frames", "sensor", "of frames", 0.0, (0.1, 0.2, 0.4, 0.6, 0.8)),
-            lambda s, _: Condition(faults=(Frozen(s),)),
-            touched_by=("transforms.frozen_frames",),
+            lambda s, _: Condition(faults=(frozen_frames(s),)),
         ),
         Axis(
             *("late_frames", "sensor", "frames", 0.0, (1.0, 2.0, 3.0, 4.0, 5.0)),
-            lambda s, _: Condition(faults=(Late(round(s)),)),
+            lambda s, _: Condition(faults=(late_frames(round(s)),)),
             whole=True,
-            touched_by=("transforms.late_frames",),
         ),
         Axis(
             *("step_length", "dynamics", "m", 1.0, _FACTORS),
             lambda s, of: Condition(task={"step_length": _times("step_length", s, of)}),
             value=lambda s, of: _times("step_length", s, of),
             scale=FACTORS,
-            touched_by=("task.step_length",),
         ),
         Axis(
             *("action_delay", "dynamics", "steps", 0.0, (1.0, 2.0, 3.0, 4.0, 5.0)),
             lambda s, _: Condition(delay=round(s)),
             whole=True,
-            touched_by=("transforms.late_frames",),  # to who sees, late is late
         ),
     )
 }
 GROUPS = tuple(dict.fromkeys(axis.group for axis in AXES.values()))
-"""Kinds of shift, each of one axis or several."""
+"""Kinds of shift, each of one or more axes."""
 
 
 def check_axes(names: Iterable[str]) -> None:
-    """Refuses what is neither an axis nor a group.
+    """Refuse unknown names.
 
     Raises:
-        InputError: One of the names is neither; those that exist are named.
+        InputError: One of the names is neither an axis nor a group.
     """
     for name in names:
         if name not in (*GROUPS, *AXES):
@@ -319,28 +268,23 @@ def check_axes(names: Iterable[str]) -> None:
 
 
 def find_axes(names: Iterable[str] | None, subject: PolicySpec) -> list[Axis]:
-    """Axes by name or by group, in the order of `AXES`.
+    """Return axes by name or by group, in the order of `AXES`.
 
     Args:
         names: Which; all that the task has by default.
-        subject: Whom they are tried on.
+        subject: The policy to evaluate.
 
     Raises:
-        InputError: There is none of that name, or none for this task.
+        InputError: A name is unknown, or the axis is not for this task.
     """
     if names is None:
-        return [_owned(axis, subject) for axis in AXES.values() if _is_for(axis, subject)]
+        return [axis.of(subject) for axis in AXES.values() if _is_for(axis, subject)]
     wanted = [*names]
     check_axes(wanted)
     found = [axis for axis in AXES.values() if {axis.name, axis.group} & {*wanted}]
     for axis in found:
-        axis.make(axis.strengths[0], subject)  # refuses now what is not for this task
-    return [_owned(axis, subject) for axis in found]
-
-
-def _owned(axis: Axis, subject: PolicySpec) -> Axis:
-    """With the policy's own neutral strength."""
-    return axis if axis.own is None else dataclasses.replace(axis, neutral=axis.own(subject))
+        axis.make(axis.strengths[0], subject)  # raises if the axis is not for this task
+    return [axis.of(subject) for axis in found]
 
 
 def _is_for(axis: Axis, subject: PolicySpec) -> bool:

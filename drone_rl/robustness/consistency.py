@@ -1,4 +1,4 @@
-"""Whether the figures of `shifts.json` go together: counts, intervals, areas, and courses.
+"""Check whether the figures of `shifts.json` agree: counts, intervals, areas and ranges.
 
 These checks do not prove that a file is genuine; `drone_rl.verdicts.coverage` re-runs a sample.
 """
@@ -16,21 +16,21 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import proportion
 
 CLOSE = 1e-9
-"""Rounding of values, relative."""
+"""Relative rounding of values."""
 UNLIKELY = 1e-6
 """Probability of a chance difference between two samples that counts as a contradiction."""
 _REMEDY = "run drone-rl shifts again"
 
 
 def check_counts(numbers: Mapping[str, Any], task: Task[Any]) -> None:
-    """Refuse figures that no rollouts give.
+    """Check the figures of all conditions.
 
     Args:
         numbers: As in `shifts.json`, of the right types.
-        task: In which the episodes were flown.
+        task: Of the episodes.
 
     Raises:
-        InputError: A count, a share, an interval or an area contradicts another one.
+        InputError: A count, a rate, an interval or an area contradicts another one.
     """
     settings, plain = numbers["settings"], numbers["plain"]
     _refuse(_wrong_oracle(plain["oracle"], settings["episodes"]), "plain")
@@ -49,16 +49,16 @@ def check_counts(numbers: Mapping[str, Any], task: Task[Any]) -> None:
 
 
 def check_range(axis: Axis, found: Mapping[str, Any], of: Any, numbers: Mapping[str, Any]) -> None:
-    """Refuse a range that does not follow from the strengths that the search tries.
+    """Check that a range follows from the strengths that the search tries.
 
     Args:
-        axis: Of which, with the policy's own neutral strength.
+        axis: Which, with the policy's own neutral strength.
         found: Of `domain.ranges`.
         of: The policy's description.
         numbers: As in `shifts.json`.
 
     Raises:
-        InputError: A limit, or what was flown, is not what the search gives.
+        InputError: The search gives another limit or other strengths.
     """
     if not _is_sound(axis, found, of, numbers):
         raise InputError(f"domain.ranges.{axis.name} contradicts what was flown at; {_REMEDY}")
@@ -73,12 +73,12 @@ def check_range(axis: Axis, found: Mapping[str, Any], of: Any, numbers: Mapping[
 
 
 def check_probe(found: Mapping[str, Any], episodes: int, where: str) -> None:
-    """Refuse what no search finds at a strength.
+    """Check the result at one strength.
 
     Args:
-        found: "good", "bad", "success", and "oracle" with "impossible" where courses end.
+        found: "good", "bad", "success", and "oracle" with "impossible" where a side ends.
         episodes: Of the search.
-        where: Of the file, for the message.
+        where: For the message.
 
     Raises:
         InputError: It contradicts itself.

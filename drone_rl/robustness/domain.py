@@ -1,16 +1,15 @@
-"""The operating domain: how far each axis may go while the policy surely stays good.
+"""The operating domain: the range of each axis in which the policy is good with 95% confidence.
 
-From no difference outwards a course is flown: every strength of the table and, before each, one
-that is drawn at random between it and the one before, which nobody can have prepared for. Where the
-policy is not surely good the course ends, whatever would follow; the gap before that strength is
-gone through once more, in `PARTS` steps. So all that was flown within a range was surely good.
+From no perturbation outwards the search tries every strength of the table and, before each, one
+sampled at random between it and the previous one, to which a policy cannot have been fitted. It
+stops where the policy is not certainly good, and then tries the gap before that strength in `PARTS`
+steps. So the policy was certainly good at everything that was tried within a range.
 
-That is certain whatever lies where. A range is wrong only if the first strength of a course that is
-not good in truth passes, or the first such strength within the gap that is gone through. Both are
-known before anything is flown, but for which gap it is: the former may pass with the error of a
-course (`WALKING`), the latter with that of a gap (`REFINING`), and both ends of an axis, with all
-their gaps, share 5%. Nothing is assumed of how flights at different strengths depend on each other,
-nor that what is stronger is worse.
+A range is wrong only if the first strength of a side at which the policy is not truly good passes,
+or the first such strength within the gap. Except for which gap it is, both are known beforehand:
+the former passes with the error of a side (`WALKING`), the latter with that of a gap (`REFINING`),
+and both sides of an axis with all their gaps share 5%. Nothing is assumed about the dependence of
+episodes at different strengths, nor that a stronger perturbation is worse.
 """
 
 import dataclasses
@@ -34,36 +33,36 @@ from drone_rl.utils.intervals import proportion
 from drone_rl.utils.seeding import Stream, torch_generator
 
 PARTS = 4
-"""Of the gap in which a range ends."""
+"""Of the gap at the end of a range."""
 WALKING = 1 / 4
-"""Of an axis's error, for each of two courses."""
+"""Part of an axis's error for each of two sides."""
 REFINING = 1 / 20
-"""The same for each of ten gaps: five strengths, and one before each."""
+"""The same for each of ten gaps: five strengths and one before each."""
 _BETWEEN = 2000
-"""Number of the stream of strengths between those of the table."""
+"""Number of the random stream of strengths between those of the table."""
 
 
 @dataclasses.dataclass
 class End:
-    """How far a course leads."""
+    """One end of a range."""
 
     limit: float
-    """The last strength that is surely good."""
+    """The last strength at which the policy is certainly good."""
     flown: list[tuple[float, bool]]
-    """Strengths, and whether each is surely good."""
+    """Strengths, and whether the policy is certainly good at each."""
     failed: float | None = None
-    """The first strength of the course that is not."""
+    """The first strength of the course at which it is not."""
 
 
 def walk(axis: Axis, sign: int, seed: int, is_good: Callable[[float, float], bool]) -> End:
-    """Find one end of a range: the same strengths for everybody who has the same answers.
+    """Find one end of a range; the same answers give the same strengths.
 
     Args:
-        axis: Of which.
-        sign: On which side of no difference, along the axis's scale: -1 or 1.
-        seed: Of the strengths that are drawn between those of the table.
-        is_good: Whether a strength is surely good, and the part of the axis's error that the answer
-            may take.
+        axis: Which.
+        sign: Side of no perturbation on the axis's scale: -1 or 1.
+        seed: Of the random strengths.
+        is_good: Takes a strength and the part of the axis's error that its answer may use; returns
+            whether the policy is certainly good there.
     """
     end = End(axis.neutral, [])
 
@@ -88,61 +87,62 @@ def walk(axis: Axis, sign: int, seed: int, is_good: Callable[[float, float], boo
 
 
 class Prober:
-    """Says at which strengths a policy is surely good."""
+    """Tests at which strengths a policy is certainly good."""
 
     def __init__(
         self,
-        bed: PairedEvaluator,
+        evaluator: PairedEvaluator,
         oracle: Episodes,
         good_share: float,
         possible_share: float = 0.9,
         plain_part: float = WALKING,
     ) -> None:
-        """Takes what good is measured by.
+        """Test the policy without perturbation.
 
         Args:
-            bed: Where to fly.
-            oracle: Of the task's oracle where nothing is different: what is hard for it, too, is no
-                excuse.
+            evaluator: Runs the episodes.
+            oracle: Episodes of the task's oracle without perturbation.
             good_share: See `Rule`.
             possible_share: See `Suite`.
-            plain_part: Of the axis's error, that the episodes without a difference may take.
+            plain_part: Part of the axis's error for the test without perturbation.
         """
         task = oracle.task
-        self._bed, self._oracle, self._possible = bed, oracle, possible_share
-        self._rule = Rule(good_share=good_share, strata=task.strata, luck=task.luck)
-        self._luck: dict[Any, dict[str, Episodes]] = {}
+        self._evaluator, self._oracle, self._possible = evaluator, oracle, possible_share
+        self._rule = Rule(
+            good_share=good_share, strata=task.strata, blind_baselines=task.blind_baselines
+        )
+        self._baselines: dict[Any, dict[str, Episodes]] = {}
         self.plain = self.probe(Condition(), plain_part)
 
     def rule_at(self, part: float) -> Rule:
-        """The rule with so much of an axis's error."""
+        """Return the rule with this part of an axis's error."""
         return dataclasses.replace(self._rule, error_rate=part * self._rule.error_rate)
 
     def probe(self, condition: Condition, part: float) -> dict[str, Any]:
-        """Whether it is surely good under a condition.
+        """Test whether the policy is certainly good under a condition.
 
-        That is: the verdict is good, certainly, and it is surely better than luck, so that who
-        looks at nothing is never called good, however easy a condition makes the task. Episodes
-        that depend on rounding count as failures for "good", and as successes for "bad".
+        That is, the verdict is certainly good, and the policy is certainly better than the random
+        and constant baselines, however easy the condition makes the task. Episodes that depend on
+        rounding count as failures for "good", and as successes for "bad".
 
         Args:
             condition: Which.
-            part: Of the axis's error, that this may take.
+            part: Part of the axis's error that the test may use.
 
         Returns:
-            "good" and "bad", surely: neither where too few were flown; "success", a share; "worst":
-            the side on which it collects least, with "share". Of a task that can't be so:
-            "refused", why.
+            "good" and "bad" (certainly; neither if there are too few episodes), "success", and
+            "worst": the side with the least goals reached, with "share"; or "refused", the reason
+            why the task does not allow the condition.
         """
         try:
-            key = self._bed.settings(condition)
+            key = self._evaluator.settings(condition)
         except InputError as error:
             return {"good": False, "bad": True, "refused": str(error)}
         flown, is_fragile = self._fly(condition)
-        if key not in self._luck:  # who sees nothing minds neither look nor camera
-            self._luck[key] = self._bed.fly_blindly(condition)
+        if key not in self._baselines:  # appearance does not affect these baselines
+            self._baselines[key] = self._evaluator.run_baselines(condition)
         rule = self.rule_at(part)
-        baselines = {**self._luck[key], "oracle": self._oracle}
+        baselines = {**self._baselines[key], "oracle": self._oracle}
         found = dict(
             zip(rule.quantities, _measure(flown, baselines, rule, is_fragile), strict=True)
         )
@@ -155,24 +155,22 @@ class Prober:
         }
 
     def _fly(self, condition: Condition) -> tuple[Episodes, Tensor]:
-        """The policy's episodes, and which of them depend on rounding. Shape: (n,), bool."""
-        subject, count = self._bed.subject, self._bed.episodes
-        eyes = PolicyAgent(subject.network, subject.transforms, count, examines_rounding=True)
-        return self._bed.fly(condition, eyes=eyes).episodes, eyes.is_fragile
+        """Run the policy; also returns which episodes depend on rounding, (n,), bool."""
+        subject, count = self._evaluator.subject, self._evaluator.episodes
+        agent = PolicyAgent(subject.network, subject.transforms, count, examines_rounding=True)
+        return self._evaluator.run(condition, agent=agent).episodes, agent.is_fragile
 
     def search(self, axis: Axis) -> dict[str, Any]:
-        """The widest range of an axis.
+        """Find the widest range of an axis.
 
         Returns:
-            "low", "high": its least and greatest value, None for an infinite one; "positions": its
-            ends on the axis's scale, the lower one first, which is that of "high" where less is
-            stronger, as of metres of sight, None if not even no difference is good; "low_open",
-            "high_open": whether the strongest that was tried there is still good, None where none
-            was; "failed": where courses end, that of the lower values first: "end", "value", what
-            was found there, how often who knows where all is that the camera shows succeeds there
-            ("oracle", None where nobody does), and whether that shows it to be "impossible";
-            "flown": all that was tried, from the lowest position on: "value", "position", and
-            whether it is "good".
+            "low", "high": its ends in the axis's unit, None for an infinite one; "positions": its
+            ends on the axis's scale, lower first, None if the policy is not certainly good even
+            without perturbation; "low_open", "high_open": whether the policy is still good at the
+            strongest perturbation of that side, None if there is none; "failed": where the sides
+            end, lower values first: "end", "value", the result of `probe`, the success rate of the
+            oracle ("oracle", None without one), and whether that makes it "impossible"; "flown":
+            everything tried, lowest position first: "value", "position" and "good".
         """
         if not self.plain["good"]:
             nothing = {"low": None, "high": None, "positions": None, "failed": [], "flown": []}
@@ -180,12 +178,12 @@ class Prober:
         probed: dict[float, dict[str, Any]] = {}
 
         def is_good(strength: float, part: float) -> bool:
-            condition = axis.make(strength, self._bed.subject)
+            condition = axis.make(strength, self._evaluator.subject)
             probed[strength] = self.probe(condition, part)
             return probed[strength]["good"]
 
         signs = axis.signs.items()
-        ends = {name: walk(axis, sign, self._bed.seed, is_good) for name, sign in signs}
+        ends = {name: walk(axis, sign, self._evaluator.seed, is_good) for name, sign in signs}
         failed = [
             {"end": name, "value": self._value(axis, end.failed)}
             | self._explain(axis, end.failed, probed[end.failed])
@@ -209,45 +207,45 @@ class Prober:
         }
 
     def _explain(self, axis: Axis, strength: float, found: dict[str, Any]) -> dict[str, Any]:
-        """Whether it is the policy that fails, or whether nobody could do it."""
+        """Add whether the oracle fails, too."""
         if found["refused"] is not None or not has_oracle(self._oracle.task):
             return {**found, "oracle": None, "impossible": False}
-        condition = axis.make(strength, self._bed.subject)
-        success = self._bed.fly(condition, eyes=OracleAgent()).episodes.success
+        condition = axis.make(strength, self._evaluator.subject)
+        success = self._evaluator.run(condition, agent=OracleAgent()).episodes.success
         seen = proportion(int(success.sum()), len(success))
         return {**found, "oracle": seen, "impossible": seen["upper95"] < self._possible}
 
     def _value(self, axis: Axis, strength: float) -> float | None:
-        return finite(axis.value(strength, self._bed.subject))
+        return finite(axis.value(strength, self._evaluator.subject))
 
 
 def _measure(
     flown: Episodes, baselines: Mapping[str, Episodes], rule: Rule, is_fragile: Tensor
 ) -> tuple[Quantity, ...]:
-    """The rule's quantities, whatever the ends of the fragile episodes."""
+    """The rule's quantities, with unknown outcomes of the fragile episodes."""
     unknown = Outcomes(None, torch.empty(0, dtype=torch.int64), is_fragile)
     return widen(measure(flown, baselines, rule), flown, baselines, rule, unknown)
 
 
 def is_surely_good(found: Mapping[str, Quantity], rule: Rule) -> bool:
-    """Whether the verdict is good wherever the quantities lie, and luck is surely surpassed.
+    """Return whether the verdict is certainly good and certainly above all baselines.
 
     Args:
         found: The rule's quantities by name, in its order.
-        rule: With the probability of being wrong.
+        rule: With the probability of error.
     """
-    sees = all(found[f"above {name}"].levels[0] > 0 for name in rule.luck)
+    sees = all(found[f"above {name}"].levels[0] > 0 for name in rule.blind_baselines)
     return sees and _kinds(found, rule) == {Kind.GOOD}
 
 
 def _kinds(found: Mapping[str, Quantity], rule: Rule) -> frozenset[Kind]:
-    """All that it may be."""
+    """All kinds that are possible."""
     box = tuple(quantity.levels for quantity in found.values())
     return kinds_within(box, len(rule.strata))
 
 
 def _worst(found: Mapping[str, Quantity], rule: Rule) -> dict[str, Any] | None:
-    """The stratum of which the least share is reached."""
+    """The stratum with the smallest fraction of goals reached."""
     shares = {s: found[f"collected {s}"].value for s in rule.strata}
     known = {stratum: share for stratum, share in shares.items() if share is not None}
     if not known:
@@ -257,7 +255,7 @@ def _worst(found: Mapping[str, Quantity], rule: Rule) -> dict[str, Any] | None:
 
 
 def _course(axis: Axis, side: list[float], seed: int) -> Iterator[float]:
-    """The strengths of one side, from the weakest on, and one before each."""
+    """The strengths of one side, weakest first, and a random one before each."""
     generator = torch_generator(seed, Stream.SHIFTS, number=_BETWEEN)
     shares = torch.rand(len(axis.strengths), generator=generator, dtype=torch.float64)
     before = axis.neutral
@@ -268,12 +266,12 @@ def _course(axis: Axis, side: list[float], seed: int) -> Iterator[float]:
 
 
 def _side(axis: Axis, sign: int) -> list[float]:
-    """The strengths of the table on one side of no difference, from the weakest on."""
+    """The table's strengths on one side of no perturbation, weakest first."""
     there = [strength for strength in axis.strengths if sign * axis.position(strength) > 0]
     return sorted(there, key=lambda strength: abs(axis.position(strength)))
 
 
 def _inside(axis: Axis, near: float, far: float, shares: list[float]) -> list[float]:
-    """Strengths between two, from the nearer on, each once."""
+    """Strengths between two, nearest first, each once."""
     there = (axis.between(near, far, share) for share in shares)
     return list(dict.fromkeys(strength for strength in there if strength is not None))

@@ -1,8 +1,7 @@
-"""Whole flights in many worlds at once, under a condition: the same worlds for every condition."""
+"""Run a policy under conditions, from the same initial states in each of them."""
 
 import dataclasses
-import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import torch
@@ -20,6 +19,7 @@ from drone_rl.config import (
     DynamicsSettings,
 )
 from drone_rl.evaluation.metrics import Episodes
+from drone_rl.evaluation.rollouts import rollout
 from drone_rl.policies import PictureNetwork
 from drone_rl.robustness.agents import Agent, BaselineAgent, PolicyAgent, StepContext
 from drone_rl.robustness.faults import FaultPipeline
@@ -28,10 +28,10 @@ from drone_rl.robustness.perturbations import (
     Condition,
     Mode,
     clutter,
-    look_of,
     sample_distractors,
-    sways,
+    scene_appearance,
     task_things,
+    variations,
 )
 from drone_rl.sim.dynamics import draw_seeds, make_dynamics
 from drone_rl.sim.rendering import Appearance
@@ -42,12 +42,12 @@ from drone_rl.utils.seeding import Stream, torch_generator, world_random_state
 from drone_rl.utils.settings import below
 
 _CLUTTER = 1000
-"""Number of the stream of distractors; those of faults begin at 1."""
+"""Number of the distractors' random stream; those of faults begin at 1."""
 
 
 @dataclasses.dataclass(frozen=True)
 class PolicySpec:
-    """A policy, what it flies in and what it sees."""
+    """A policy with its task, camera, transforms and dynamics."""
 
     network: PictureNetwork
     task: BaseTaskSettings
@@ -62,24 +62,24 @@ class PolicySpec:
 
 @dataclasses.dataclass(frozen=True)
 class ConditionResult:
-    """How flights went."""
+    """Episodes under a condition."""
 
     episodes: Episodes
-    """One of each world."""
+    """One of each environment."""
     trace: Tensor
-    """One number a world that sums up all that was seen: equal if nothing differed. (n,)."""
+    """A checksum of all images of each episode. Shape: (n,)."""
 
 
 class PairedEvaluator:
-    """Worlds to fly a policy and others in, each condition in the same ones."""
+    """Runs agents under conditions; episode i starts in the same state under each of them."""
 
     def __init__(self, subject: PolicySpec, episodes: int, seed: int = 0) -> None:
-        """Draws the worlds; they are built when they are flown in.
+        """Sample the initial states.
 
         Args:
-            subject: Whose.
-            episodes: How many worlds, each of which is flown in once.
-            seed: Of their streams.
+            subject: The policy to evaluate.
+            episodes: Number of environments, one episode each.
+            seed: Root of the random streams.
         """
         self.subject, self.episodes, self.seed = subject, episodes, seed
         task = as_task(subject.task)
@@ -94,10 +94,10 @@ class PairedEvaluator:
         self._built: dict[tuple[Any, ...], Worlds] = {}
 
     def settings(self, condition: Condition) -> tuple[BaseTaskSettings, CameraSettings]:
-        """Task and camera under a condition.
+        """Return task and camera under a condition.
 
         Raises:
-            InputError: They can't be so.
+            InputError: A setting is out of range.
         """
         with below("task"):
             task = self.subject.task.replace(**condition.task)
@@ -106,7 +106,7 @@ class PairedEvaluator:
         return task, camera
 
     def worlds(self, condition: Condition) -> Worlds:
-        """The worlds of a condition; those of the same task and camera are built once.
+        """Return the simulated environments of a condition, cached by task and camera.
 
         Raises:
             InputError: See `settings`.
@@ -126,121 +126,107 @@ class PairedEvaluator:
             )
         return self._built[key]
 
-    def fly(
-        self, condition: Condition, mode: Mode = Mode.CONSTANT, eyes: Agent | None = None
+    @torch.no_grad()
+    def run(
+        self, condition: Condition, mode: Mode = Mode.CONSTANT, agent: Agent | None = None
     ) -> ConditionResult:
-        """Flies to the end in every world.
+        """Run one episode in every environment.
 
         Args:
-            condition: What is different.
-            mode: When.
-            eyes: Who flies; the policy by default.
+            condition: The perturbations.
+            mode: When they are active.
+            agent: Who acts; the policy by default.
         """
-        if eyes is None:
-            subject = self.subject
-            eyes = PolicyAgent(subject.network, subject.transforms, self.episodes)
-        stages = [(0, condition)]
+        if agent is None:
+            agent = PolicyAgent(self.subject.network, self.subject.transforms, self.episodes)
+        stages = {0: condition}
         if mode is Mode.ONSET:
-            stages = [(0, Condition()), (ONSET_STEP, condition)]
-        return _Flight(self, mode, eyes).fly(stages, self._drawn, self._seeds)
+            stages = {0: Condition(), ONSET_STEP: condition}
+        stage = _Stage(self, stages[0], mode, agent)
+        start = stage.worlds.start(self._drawn, self._seeds)
+        trace = torch.zeros(len(start), dtype=torch.float64, device=stage.worlds.device)
+        decided: list[Tensor] = []
 
-    def fly_blindly(self, condition: Condition) -> dict[str, Episodes]:
-        """What luck achieves: each of the task's policies that need no eyes, by name."""
+        def step(number: int, state: State, active: Tensor) -> tuple[State, Tensor]:
+            nonlocal stage
+            if number and number in stages:
+                stage = _Stage(self, stages[number], mode, agent)
+            delay = stage.delay
+            due = range(number, number + delay) if decided else ()
+            pending = [decided[max(s - delay, 0)][active] for s in due]
+            action, seen = agent.act(stage.context(state, active, pending))
+            if seen is not None:
+                trace[active] += (number + 1) * seen.flatten(1).double().sum(-1)
+            decided.append(action.new_zeros(len(start), *action.shape[1:]))
+            decided[-1][active] = action
+            state, _ = stage.worlds.advance(state, decided[max(number - delay, 0)][active])
+            return state, state.end_reason == 0
+
+        final, worlds = rollout(start, step), stage.worlds
+        episodes = Episodes.ended(worlds.task, worlds.info(final), final.steps)
+        return ConditionResult(episodes, trace.cpu())
+
+    def run_baselines(self, condition: Condition) -> dict[str, Episodes]:
+        """Return the episodes of the task's random and constant baselines, by name."""
         worlds = self.worlds(condition)
-        flown = {}
-        for name in worlds.task.luck:
+        episodes = {}
+        for name in worlds.task.blind_baselines:
             generator = torch_generator(self.seed, Stream.ACTIONS)
-            eyes = BaselineAgent(name, worlds.dynamics.actions, generator)
-            flown[name] = self.fly(condition, eyes=eyes).episodes
-        return flown
+            agent = BaselineAgent(name, worlds.dynamics.actions, generator)
+            episodes[name] = self.run(condition, agent=agent).episodes
+        return episodes
 
-    def beside(self) -> Tensor:
-        """Where the distractors of a condition stand, see `clutter.sample_distractors`."""
+    def distractor_places(self) -> Tensor:
+        """Return positions of distractors, see `perturbations.sample_distractors`."""
         generator = torch_generator(self.seed, Stream.SHIFTS, number=_CLUTTER)
         places = sample_distractors(task_things(self.subject.task), self.episodes, generator)
         return places.to(self.subject.device)
 
     def close(self) -> None:
-        """Ends what draws the worlds."""
+        """Close the renderers."""
         for worlds in self._built.values():
             worlds.close()
 
 
-class _Flight:
-    """One flight of all worlds."""
+class _Stage:
+    """A part of an episode under one condition."""
 
-    def __init__(self, bed: PairedEvaluator, mode: Mode, eyes: Agent) -> None:
-        self._bed, self._mode, self._eyes = bed, mode, eyes
+    def __init__(
+        self, evaluator: PairedEvaluator, condition: Condition, mode: Mode, agent: Agent
+    ) -> None:
+        self._evaluator, self._condition = evaluator, condition
+        self.worlds, self.delay = evaluator.worlds(condition), condition.delay
+        episodes, seed = evaluator.episodes, evaluator.seed
+        generator = torch_generator(seed, Stream.SHIFTS)
+        self._variations = variations(mode, condition.dimensions, episodes, generator)
+        self._faults = FaultPipeline(
+            condition.faults, episodes, seed, hiding_only=agent.knows_truth
+        )
+        self._own = None if evaluator.looks.varies else evaluator.looks.middle
+        self._full = scene_appearance(self.worlds.scene) if condition.looks else None
+        self._distractors = evaluator.distractor_places() if condition.clutter else None
 
-    @torch.no_grad()
-    def fly(
-        self, stages: Sequence[tuple[int, Condition]], drawn: Tensor, seeds: Tensor | None
-    ) -> ConditionResult:
-        worlds = self._bed.worlds(stages[0][1])
-        now = worlds.start(drawn, seeds)
-        flying = torch.arange(len(now), device=worlds.device)
-        done, trace = now[flying], torch.zeros(len(now), dtype=torch.float64, device=worlds.device)
-        decided: list[Tensor] = []
-        see: Callable[[State, Tensor, list[Tensor]], StepContext] | None = None
-        delay, begins = 0, dict(stages)
-        for step in itertools.count():
-            if step in begins:
-                condition = begins[step]
-                worlds, delay = self._bed.worlds(condition), condition.delay
-                see = self._stage(worlds, condition)
-            assert see is not None
-            due = range(step, step + delay) if decided else ()
-            pending = [decided[max(s - delay, 0)][flying] for s in due]
-            action, seen = self._eyes.act(see(now, flying, pending))
-            if seen is not None:
-                trace[flying] += (step + 1) * seen.flatten(1).double().sum(-1)
-            decided.append(action.new_zeros(len(done), *action.shape[1:]))
-            decided[-1][flying] = action
-            now, _ = worlds.advance(now, decided[max(step - delay, 0)][flying])
-            done[flying] = now
-            on = now.end_reason == 0
-            if not on.all():
-                now, flying = now[on], flying[on]
-            if not len(flying):
-                break
-        episodes = Episodes.ended(worlds.task, worlds.info(done), done.steps)
-        return ConditionResult(episodes, trace.cpu())
-
-    def _stage(
-        self, worlds: Worlds, condition: Condition
-    ) -> Callable[[State, Tensor, list[Tensor]], StepContext]:
-        """What there is to see from now on."""
-        bed = self._bed
-        generator = torch_generator(bed.seed, Stream.SHIFTS)
-        ways = sways(self._mode, condition.dimensions, bed.episodes, generator)
-        hiding_only = self._eyes.knows_truth
-        spoil = FaultPipeline(condition.faults, bed.episodes, bed.seed, hiding_only=hiding_only)
-        plain = look_of(worlds.scene) if condition.looks else None
-        beside = bed.beside() if condition.clutter else None
-        same = None if bed.looks.varies else bed.looks.middle
-
-        def see(now: State, flying: Tensor, pending: list[Tensor]) -> StepContext:
-            way = [part.to(worlds.device)[flying] for part in next(ways)]
-            own = bed.looks.drawn(flying) if bed.looks.varies else same
-            look = own if plain is None or own is None else own.over(plain)
-            appearance = _dress(condition, look or plain, way)
-            if beside is not None:
-                things, places = task_things(bed.subject.task), beside[flying, : condition.clutter]
-                appearance = clutter(appearance, things, places)
-            poses = worlds.poses(now, appearance)
-            return StepContext(worlds, now, flying, poses, appearance, spoil, pending)
-
-        return see
+    def context(self, state: State, active: Tensor, pending: list[Tensor]) -> StepContext:
+        """Everything that the agent may use at the next step."""
+        looks, condition = self._evaluator.looks, self._condition
+        variation = [part.to(self.worlds.device)[active] for part in next(self._variations)]
+        own = looks.drawn(active) if looks.varies else self._own
+        if self._full is not None:
+            own = self._full if own is None else own.over(self._full)
+        appearance = _change(condition, own, variation)
+        if self._distractors is not None:
+            things = task_things(self._evaluator.subject.task)
+            places = self._distractors[active, : condition.clutter]
+            appearance = clutter(appearance, things, places)
+        poses = self.worlds.poses(state, appearance)
+        return StepContext(self.worlds, state, active, poses, appearance, self._faults, pending)
 
 
-def _dress(
-    condition: Condition, own: Appearance | None, way: Sequence[Tensor]
+def _change(
+    condition: Condition, appearance: Appearance | None, variation: Sequence[Tensor]
 ) -> Appearance | None:
-    """How worlds look, through their cameras."""
-    appearance, count = own, len(condition.looks)
-    for look, sway in zip(condition.looks, way[:count], strict=True):
-        assert appearance is not None
-        appearance = look(appearance, sway)
-    for mount, sway in zip(condition.mounts, way[count:], strict=True):
-        appearance = mount(appearance, sway)
+    """Apply the changes of colours, light and camera pose."""
+    changes = (*condition.looks, *condition.mounts)
+    for change, by in zip(changes, variation, strict=True):
+        appearance = change.change(appearance or Appearance(), by)
     return appearance

@@ -1,4 +1,4 @@
-"""What somebody needs a policy to be good in: a range for each of some axes, in physical units."""
+"""Read a required operating domain: a range for each of some axes, in physical units."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -19,16 +19,13 @@ _SIGNED = frozenset({"sun"})
 """Axes with values below 0."""
 
 Need = Mapping[str, float | None]
-"""Of an axis, "low" and "high"; None for as far as no difference is."""
+"""Of an axis, "low" and "high"; None for the value without perturbation."""
 
 
 def read_requirements(path: Path) -> dict[str, Need]:
-    """What is needed, out of a YAML or JSON file.
+    """Read requirements from a YAML or JSON file.
 
-    Of each axis by name, `{low: 40, high: 100, unit: m of sight}`; one of the ends may be missing.
-
-    Returns:
-        By axis.
+    The file has for each axis `{low: 40, high: 100, unit: m of sight}`; one end may be missing.
 
     Raises:
         InputError: The file is missing or damaged, an axis does not exist, a unit is not its own,
@@ -47,11 +44,7 @@ def read_requirements(path: Path) -> dict[str, Need]:
 
 
 def ranges_of(numbers: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """An operating domain as it may be needed: axes with a range that was put to the test.
-
-    Args:
-        numbers: As in `shifts.json`, with ranges.
-    """
+    """Return an operating domain, as in `shifts.json`, in the form of requirements."""
     return {
         name: {end: found[end] for end in ("low", "high") if found[end] is not None}
         | {"unit": AXES[name].unit}

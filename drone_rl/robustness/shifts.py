@@ -1,4 +1,4 @@
-"""Flights of a policy under other conditions than its own, as an object that shows itself."""
+"""Evaluate a policy under perturbations, and find its operating domain."""
 
 import dataclasses
 import itertools
@@ -43,34 +43,33 @@ from drone_rl.verification.checker import fingerprint
 
 @dataclasses.dataclass(frozen=True)
 class Shifts:
-    """How often a policy succeeds under other conditions, and under which it stays good."""
+    """Success rates of a policy under perturbations, and its operating domain."""
 
     policy: Pilot
     settings: ShiftSettings
     numbers: dict[str, Any] = dataclasses.field(repr=False)
     """As in `shifts.json`."""
     pictures: Mapping[str, Sequence[NDArray | None]] = dataclasses.field(repr=False)
-    """By axis, what the camera shows with nothing different and at each of the five strengths; none
-    where the task can't be so. Shapes: (H, W, 3), uint8."""
+    """By axis, camera images without perturbation and at each of the five strengths; None where the
+    task does not allow one. Shapes: (H, W, 3), uint8."""
 
     @property
     def area(self) -> float:
-        """Mean over axes of the area under success over strength."""
+        """Mean over axes of the area under success rate over strength."""
         areas = [along["areas"]["constant"] for along in self.numbers["axes"].values()]
         known = [area for area in areas if area is not None]
         return sum(known) / max(len(known), 1)
 
     @property
     def sentence(self) -> str:
-        """Under which conditions it is good, for a person."""
+        """The operating domain as text."""
         return say(SHIFTS, self.numbers)
 
     def save(self, folder: Path) -> None:
-        """Writes what was found.
+        """Write `shifts.json`, which verdicts, cards and reports quote, and the charts.
 
-        `shifts.json` is what verdicts, cards and reports quote; `domain.yaml`, if ranges were
-        looked for, has them as `drone-rl verdict require_domain=FILE` reads what is needed;
-        `shifts.png` are curves, `strips.png` pictures.
+        `domain.yaml` has the ranges, if any, in the format of `drone-rl verdict
+        require_domain=FILE`; `shifts.png` has curves, `strips.png` camera images.
         """
         shown = {
             name: [None if one is None else packed(one) for one in strip]
@@ -84,7 +83,7 @@ class Shifts:
         strips(self.numbers, self.pictures).save(folder / "strips.png")
 
     def __str__(self) -> str:
-        """The table and what it comes to."""
+        """Return the table and the sentences."""
         said = f"{self.sentence}{self._unlike}"
         return "\n".join([aligned(rows(self.numbers)), said, seed_line(self.numbers)])
 
@@ -96,7 +95,7 @@ class Shifts:
 
     @property
     def _unlike(self) -> str:
-        """By what its own way of moving was another one; nothing where it was not."""
+        """How the dynamics differ from the policy's own, if they do."""
         unlike = self.policy.unlike
         return f" {say_unlike({'unlike': unlike})}" if unlike else ""
 
@@ -111,15 +110,15 @@ def shifts(
     progress: Progress | None = None,
     **changes: Any,
 ) -> Shifts:
-    """Flies a policy under other conditions than its own, one axis at a time and all together.
+    """Evaluate a policy under perturbations, one axis at a time and all combined.
 
     Args:
         policy: The policy, what `load_policy` takes, or a callable, see `policy_from`.
-        settings: Which conditions, and how often.
-        task: What to change of the policy's task.
-        dynamics: What to change of how its drone moves.
+        settings: Axes, strengths, number of episodes and so on.
+        task: Settings to change of the policy's task.
+        dynamics: Settings to change of its dynamics.
         outputs: See `load_policy`.
-        progress: Told of what is being flown; a bar by default.
+        progress: Called with what is running; a progress bar by default.
         changes: Settings to change, as in `shifts("good", axes=["light"])`.
 
     Raises:
@@ -161,13 +160,9 @@ def _fly(
     seed: RootSeed,
     tell: Callable[[str], None],
 ) -> dict[str, Any]:
-    """What the suite finds, and "domain", see `_domain`; none if nobody wants it.
-
-    Raises:
-        InputError: See `_domain`.
-    """
-    with closing(PairedEvaluator(subject, settings.episodes, seed.value)) as bed:
-        suite = Suite(bed, [Mode(mode) for mode in settings.modes], settings.possible_share)
+    """The results of the suite, and "domain", None if that is not wanted."""
+    with closing(PairedEvaluator(subject, settings.episodes, seed.value)) as evaluator:
+        suite = Suite(evaluator, [Mode(mode) for mode in settings.modes], settings.possible_share)
         found = suite.run(axes, settings.strengths, tell)
     if not settings.domain:
         return {**found, "domain": None}
@@ -176,18 +171,21 @@ def _fly(
 
 
 def _domain(
-    bed: PairedEvaluator, axes: Sequence[Axis], settings: ShiftSettings, tell: Callable[[str], None]
+    evaluator: PairedEvaluator,
+    axes: Sequence[Axis],
+    settings: ShiftSettings,
+    tell: Callable[[str], None],
 ) -> dict[str, Any]:
-    """Where it is surely good: "plain", and "ranges" by axis.
+    """The operating domain: "plain", and "ranges" by axis.
 
     Raises:
-        InputError: Nobody knows how to do the task, to be compared with.
+        InputError: The task has no oracle.
     """
-    task = as_task(bed.subject.task)
+    task = as_task(evaluator.subject.task)
     if task.oracle is None:
         raise InputError(f"task={task.name} has no oracle to compare with; give domain=false")
-    oracle = bed.fly(Condition(), eyes=OracleAgent(looks=False)).episodes
-    prober = Prober(bed, oracle, settings.good_share, settings.possible_share)
+    oracle = evaluator.run(Condition(), agent=OracleAgent(looks=False)).episodes
+    prober = Prober(evaluator, oracle, settings.good_share, settings.possible_share)
     ranges: dict[str, Any] = {}
     for axis in axes:
         tell(f"range of {axis.name}")
@@ -196,7 +194,7 @@ def _domain(
 
 
 def _identity(pilot: Pilot) -> dict[str, Any] | None:
-    """By what it is known whose flights these are; None of who was made elsewhere."""
+    """Hash and description of the policy; None for a third-party one."""
     if not isinstance(pilot, Policy):
         return None
     described = pilot.description.as_dict()
@@ -204,10 +202,10 @@ def _identity(pilot: Pilot) -> dict[str, Any] | None:
 
 
 def make_policy_spec(pilot: Pilot, settings: ShiftSettings) -> PolicySpec:
-    """What is flown: the policy's network, and the task and the camera that it has.
+    """Return the policy with its task, camera and transforms.
 
     Raises:
-        InputError: The task has no settings that could be changed.
+        InputError: The task has no settings to perturb.
     """
     task: Any = pilot.task
     task = task if isinstance(task, BaseTaskSettings) else getattr(task, "settings", None)
@@ -221,7 +219,7 @@ def make_policy_spec(pilot: Pilot, settings: ShiftSettings) -> PolicySpec:
     finally:
         env.close()
     network = pilot.make_network(settings.device).eval()
-    described = getattr(pilot, "description", None)  # of who comes from a file
+    described = getattr(pilot, "description", None)  # of policies from files
     look = MINIMAL if described is None else described.appearance
     return PolicySpec(
         network,

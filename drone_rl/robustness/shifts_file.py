@@ -1,7 +1,6 @@
-"""Flights under other conditions out of a file: read strictly, and of the policy that is asked of.
+"""Read `shifts.json` strictly, and check that it is of the given policy.
 
-What was counted can't be told from a file, but all else is held against what this program knows:
-axes, units, strengths and their values, sums, and limits against what was flown at.
+Counts cannot be checked; axes, units, strengths, values, sums and ranges are.
 """
 
 import dataclasses
@@ -44,42 +43,42 @@ from drone_rl.verification.checker import fingerprint
 FORMAT = "drone_rl shifts"
 FORMAT_VERSION = 2
 _MOST_PICTURE = 2**22
-"""Characters of one picture."""
+"""Largest number of characters of one image."""
 
 
 @dataclasses.dataclass(frozen=True)
 class SavedShifts:
-    """Flights under other conditions that were found, or why they are not quoted."""
+    """A robustness evaluation read from a file, or the reason why it is refused."""
 
     path: Path
     """Their file."""
     numbers: dict[str, Any] | None
-    """As in `shifts.json`, without pictures but with the "file" that they were read from, its
-    "path" and when it was written ("dated"); None if they are refused."""
+    """As in `shifts.json`, without images but with "file", its "path" and date ("dated"); None if
+    refused."""
     pictures: Mapping[str, list[NDArray | None]] = dataclasses.field(default_factory=dict)
     """See `Shifts.pictures`."""
     refused: str | None = None
-    """Why, in one line."""
+    """The reason, in one line."""
 
     @property
     def evidence(self) -> dict[str, Any]:
-        """What sentences are made of."""
+        """Evidence for sentences."""
         return {"refused": self.refused} if self.numbers is None else self.numbers
 
     @property
     def has_ranges(self) -> bool:
-        """Whether an operating domain was looked for."""
+        """Whether it has an operating domain."""
         return self.numbers is not None and self.numbers["domain"] is not None
 
 
 def read_shifts(
     path: Path, described: PolicyDescription, weights: Mapping[str, torch.Tensor]
 ) -> SavedShifts:
-    """Flights under other conditions out of a file.
+    """Read a robustness evaluation from a file.
 
     Args:
-        path: Of the JSON file.
-        described: The policy's, in the task that counts.
+        path: The JSON file.
+        described: Description of the policy, in its task.
         weights: Of its network.
 
     Raises:
@@ -87,17 +86,18 @@ def read_shifts(
             itself.
     """
     content = read_bytes(path, SHIFTS_BYTES)
+    policy: Any = described  # has what axes read of a PolicySpec
     try:
-        data = _upgraded(dict(as_mapping(parse_json(content, "it"), "it")))
+        data = dict(as_mapping(parse_json(content, "it"), "it"))
         pictures = as_mapping(data.pop("pictures", None), "pictures")
         _WHOLE.read(data, "shifts")
         numbers = data
         _refuse_another(numbers, described, weights)
         terms_of(numbers)
         for name, along in numbers["axes"].items():
-            _check_axis(_own(AXES[name], described), along, described, f"axes.{name}")
+            _check_axis(AXES[name].of(policy), along, policy, f"axes.{name}")
         check_counts(numbers, as_task(described.task))
-        _check_domain(numbers, described)
+        _check_domain(numbers, policy)
         shape = (described.camera.height, described.camera.width, 3)
         shown = {name: _read_strip(pictures.get(name), shape, name) for name in numbers["axes"]}
     except InputError as error:
@@ -107,7 +107,7 @@ def read_shifts(
 
 
 class _Named:
-    """The kind of value that gives values of a kind by some names."""
+    """Mapping from given names to values of a kind."""
 
     def __init__(self, names: Any, kind: Kind) -> None:
         self._names, self._kind = OneOf(tuple(names)), kind
@@ -122,7 +122,7 @@ class _Named:
 
 
 class _Each:
-    """The kind of value that gives values of a kind by any short names."""
+    """Mapping from any short names to values of a kind."""
 
     def __init__(self, kind: Kind) -> None:
         self._kind = kind
@@ -134,7 +134,7 @@ class _Each:
 
 
 class _Counted:
-    """The kind of value that is a share of flights, which must be what was counted."""
+    """A proportion that agrees with its counts."""
 
     def read(self, value: Any, where: str) -> dict[str, Any]:
         """See `drone_rl.utils.schema.Kind`."""
@@ -156,18 +156,11 @@ class _Counted:
 
 _ANY = Real(-1e12, 1e12)
 _COUNT, _PART = Whole(0, 10**9), Real(0.0, 1.0)
-_SHARE = Record(
-    {
-        "share": Maybe(_PART),
-        "lower95": _PART,
-        "upper95": _PART,
-        "successes": _COUNT,
-        "trials": _COUNT,
-    }
-)
+_BOUNDS = {"lower95": _PART, "upper95": _PART}
+_SHARE = Record({"share": Maybe(_PART), **_BOUNDS, "successes": _COUNT, "trials": _COUNT})
 _FREE = Plain(most=1000, deepest=3)
 _SIGNED = Real(-1.0, 1.0)
-_MEAN = Record({"mean": Maybe(_PART), "lower95": _PART, "upper95": _PART, "count": _COUNT})
+_MEAN = Record({"mean": Maybe(_PART), **_BOUNDS, "count": _COUNT})
 _FIGURES = {
     "success": _Counted(),
     "difference": Record(
@@ -257,7 +250,7 @@ _WHOLE = Record(
 def _refuse_another(
     numbers: Mapping[str, Any], described: PolicyDescription, weights: Mapping[str, torch.Tensor]
 ) -> None:
-    """Makes sure that it is of this network, camera and task, flown by settings that there are."""
+    """Refuse figures of another network, camera or task, or with unknown settings."""
     stated = numbers["network"]["weights"]
     if stated != (own := fingerprint(weights)):
         raise InputError(
@@ -277,14 +270,8 @@ def _refuse_another(
         raise InputError("it has one of seed and seed_is_fixed; run drone-rl shifts again")
 
 
-def _own(axis: Axis, described: PolicyDescription) -> Axis:
-    """With the policy's own neutral strength."""
-    of: Any = described
-    return axis if axis.own is None else dataclasses.replace(axis, neutral=axis.own(of))
-
-
 def _check_axis(axis: Axis, along: Mapping[str, Any], of: Any, where: str) -> None:
-    """An axis's group, unit and strengths are those of this program."""
+    """Check an axis's group, unit and strengths."""
     levels = along["levels"]
     known = (axis.group, axis.unit, finite(axis.value(axis.neutral, of)))
     is_own = (along["group"], along["unit"], along["neutral"]) == known
@@ -297,7 +284,7 @@ def _check_axis(axis: Axis, along: Mapping[str, Any], of: Any, where: str) -> No
 
 
 def _check_domain(numbers: Mapping[str, Any], of: Any) -> None:
-    """Limits are those of what was flown at, and nobody is good on an axis who is not without."""
+    """Check ranges against the strengths that were tried."""
     domain, episodes = numbers["domain"], numbers["settings"]["domain_episodes"]
     if domain is None:
         return
@@ -305,42 +292,9 @@ def _check_domain(numbers: Mapping[str, Any], of: Any) -> None:
     for name, found in domain["ranges"].items():
         if name not in numbers["axes"]:
             raise InputError(f"domain.ranges.{name} contradicts what was flown at")
-        check_range(_own(AXES[name], of), found, of, numbers)
+        check_range(AXES[name].of(of), found, of, numbers)
         for failure in found["failed"]:
             check_probe(failure, episodes, f"domain.ranges.{name}.failed")
-
-
-def _upgraded(data: dict[str, Any]) -> dict[str, Any]:
-    """The same in the present format.
-
-    Until version 1 "low" was the end of lower positions, also of an axis where less is stronger.
-    """
-    if data.get("format_version") != 1:
-        return data
-    ranges = as_mapping(as_mapping(data.get("domain") or {}, "domain").get("ranges", {}), "ranges")
-    swapped = {
-        name: _swapped(as_mapping(found, name))
-        for name, found in ranges.items()
-        if name in AXES and not AXES[name].scale.rises
-    }
-    if not swapped:
-        return {**data, "format_version": FORMAT_VERSION}
-    domain = {**data["domain"], "ranges": {**ranges, **swapped}}
-    return {**data, "format_version": FORMAT_VERSION, "domain": domain}
-
-
-def _swapped(found: Mapping[str, Any]) -> dict[str, Any]:
-    other = {"low": "high", "high": "low", "low_open": "high_open", "high_open": "low_open"}
-    ends = {key: found[name] for key, name in other.items() if name in found}
-    failed = found.get("failed")
-    if type(failed) is list:
-        failed = [
-            {**one, "end": other.get(str(one.get("end")), one.get("end"))}
-            if type(one) is dict
-            else one
-            for one in failed
-        ]
-    return {**found, **ends, "failed": failed}
 
 
 def _read_strip(value: Any, shape: tuple[int, int, int], name: str) -> list[NDArray | None]:

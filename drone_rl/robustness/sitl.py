@@ -1,4 +1,4 @@
-"""A policy that flies another's firmware, in the worlds in which it is evaluated."""
+"""Evaluate a policy with software in the loop: Betaflight between actions and rotors."""
 
 import contextlib
 import dataclasses
@@ -28,51 +28,50 @@ from drone_rl.utils.seeding import RootSeed, root_seed
 from drone_rl.utils.text import LOOPED, say, seed_line
 
 STARTS = 3
-"""Of a firmware, for one flight."""
+"""Attempts to start a firmware for one episode."""
 
 
 @dataclasses.dataclass(frozen=True)
 class LoopedFlight:
-    """One episode with a firmware on board."""
+    """One episode with software in the loop."""
 
     world: int
-    """Number of the world, as in evaluations."""
+    """Number of the environment, as in evaluations."""
     goals: int
-    """That were reached."""
+    """Number reached."""
     success: bool
-    """Whether all were."""
+    """Whether all were reached."""
     end: str
-    """Why it ended, a name of the task's ends."""
+    """Name of one of the task's ends."""
     steps: int
-    """Actions."""
     simulated_s: float
-    """From the first action to the end."""
+    """Simulated seconds from the first action to the end."""
     wall_s: float
-    """On the clock on the wall, arming and take-off included."""
+    """Wall-clock seconds, arming and take-off included."""
     missed: int
     """Ticks that the firmware did not answer in time."""
     path: tuple[tuple[float, float, float], ...]
-    """Places before the first action and after each, metres, world frame."""
+    """Positions before the first action and after each, metres, world frame."""
 
 
 @dataclasses.dataclass(frozen=True)
 class LoopedFlights:
-    """How a policy did with a firmware on board."""
+    """Episodes of a policy with software in the loop."""
 
     policy: str
     seed: RootSeed
     """Root of the environments' random streams."""
     flights: tuple[LoopedFlight, ...]
     figures: dict[str, Any] = dataclasses.field(repr=False)
-    """As of an evaluation, see `drone_rl.evaluation.metrics.summarise`."""
+    """See `drone_rl.evaluation.metrics.summarise`."""
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain values: the figures and each flight."""
+        """Return plain values: the figures and each episode."""
         flights = [dataclasses.asdict(f) for f in self.flights]
         return {**self.figures, **self.seed.as_dict(), "flights": flights}
 
     def __str__(self) -> str:
-        """A line a flight, and one of them all."""
+        """Return a line per episode and a summary."""
         lines = [
             f"world {f.world}: {f.goals} reached, {f.end.replace('_', ' ')}, {f.steps} steps, "
             f"{f.simulated_s:.1f} s"
@@ -97,21 +96,20 @@ def fly_in_the_loop(
     progress: Progress | None = None,
     drawn_seed: RootSeed | None = None,
 ) -> LoopedFlights:
-    """Flies a policy, greedily, with Betaflight between its actions and the rotors.
+    """Run a greedy policy with Betaflight between its actions and the rotors.
 
-    The worlds are the first in which evaluations and verdicts of the same seed fly. Each flight has
-    a firmware that has just been started, so that none inherits anything of another: it arms, takes
-    off, hovers where the episode begins, and goes on until the task says that it is over.
+    Initial states are the first ones of evaluations with the same seed. Each episode starts a new
+    firmware process, which arms, takes off and hovers where the episode begins.
 
     Args:
         policy: What `judge` takes. In computer-vision mode it flies AirSim's drone.
-        flights: How many, each at about the pace of real time at best.
+        flights: Number of episodes, each in about real time at best.
         seed: Root of the environments' random streams; a fresh one by default.
         firmware: See `drone_rl.flight.betaflight.build.find_firmware`.
         isolated: See `drone_rl.flight.betaflight.sitl.betaflight_drone`.
         outputs: See `load_policy`.
-        progress: Told of what is being flown; a bar by default.
-        drawn_seed: The seed of a larger analysis of which this is a part; takes precedence.
+        progress: Called with what is running; a progress bar by default.
+        drawn_seed: Seed of a larger analysis of which this is a part; takes precedence.
 
     Raises:
         InputError: The policy or a number is unusable, or no firmware was built.
@@ -136,10 +134,10 @@ def fly_in_the_loop(
 
 
 class _Flown(NamedTuple):
-    """One flight, before its task says what it was worth."""
+    """One episode, before its task scores it."""
 
     info: dict[str, Tensor]
-    """What was true at the end. Shapes: (1, *)."""
+    """Info of the last step. Shapes: (1, *)."""
     path: list[tuple[float, float, float]]
     simulated_s: float
     wall_s: float
@@ -147,10 +145,7 @@ class _Flown(NamedTuple):
 
 
 def _fly_or_restart(pilot: Pilot, world: int, *given: Any) -> _Flown:
-    """One episode; a firmware that doesn't get the drone to its beginning is started again.
-
-    That has nothing to do with the policy, which was not asked for anything yet.
-    """
+    """Run one episode; restart a firmware that fails before the policy acts."""
     for _ in range(STARTS - 1):
         with contextlib.suppress(NotReadyError):
             return _fly(pilot, world, *given)
@@ -161,7 +156,7 @@ def _fly_or_restart(pilot: Pilot, world: int, *given: Any) -> _Flown:
 def _fly(
     pilot: Pilot, world: int, seed: int, program: Path, folder: Path, isolated: bool
 ) -> _Flown:
-    """One episode, with a firmware of its own."""
+    """Run one episode with a new firmware process."""
     began = time.monotonic()
     settings = pilot.dynamics.replace(mode="simple_flight")
     with contextlib.ExitStack() as stack:

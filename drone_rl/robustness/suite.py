@@ -1,7 +1,4 @@
-"""Every axis at every strength: how often a policy succeeds, against itself where nothing differs.
-
-The worlds are the same at every strength, so that differences are paired.
-"""
+"""Measure success rates along every axis, paired with those without perturbation."""
 
 import base64
 import functools
@@ -22,80 +19,77 @@ from drone_rl.robustness.perturbations import Condition, Mode
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import mean_bounds, proportion
 
-Told = Callable[[str], None]
+Report = Callable[[str], None]
+STEP = 8
+"""Step whose image is shown: the first cube is near, and delays show."""
 
 
 class Suite:
-    """A policy's flights under all conditions."""
+    """Runs a policy and the oracle under all conditions."""
 
-    def __init__(self, bed: PairedEvaluator, modes: Sequence[Mode], possible_share: float) -> None:
-        """Flies where nothing is different.
+    def __init__(
+        self, evaluator: PairedEvaluator, modes: Sequence[Mode], possible_share: float
+    ) -> None:
+        """Run both without perturbation.
 
         Args:
-            bed: Where.
-            modes: When conditions hold; constantly among them.
-            possible_share: Who sees where everything is and surely succeeds less often than this
-                shows that a strength is impossible.
+            evaluator: Runs the episodes.
+            modes: When conditions are active; CONSTANT is one of them.
+            possible_share: Success rate of the oracle below which a strength is impossible.
         """
-        self._bed, self._modes, self._possible = bed, modes, possible_share
-        self.plain = bed.fly(Condition())
+        self._evaluator, self._modes, self._possible = evaluator, modes, possible_share
+        self.plain = evaluator.run(Condition())
         self._knows = has_oracle(self.plain.episodes.task)
         self.oracle = self._fly_oracle(Condition()) if self._knows else None
 
-    def run(self, axes: Sequence[Axis], numbers: Iterable[int], tell: Told) -> dict[str, Any]:
-        """All axes, one at a time, and all together.
+    def run(self, axes: Sequence[Axis], numbers: Iterable[int], tell: Report) -> dict[str, Any]:
+        """Measure all axes, one at a time and combined.
 
         Args:
             axes: Which.
             numbers: Which of their strengths, from 1.
-            tell: Called with what is being flown.
+            tell: Called with what is running.
 
         Returns:
-            Plain values: "plain", what it does where nothing is different, "axes" by name, and
-            "together", all at once at their third strength.
+            Plain values: "plain", without perturbation, "axes" by name, and "together", all at
+            once at their third strength.
         """
         found = {axis.name: self.along(axis, numbers, tell) for axis in axes}
         tell("all together")
-        parts = (axis.make(axis.strengths[TOGETHER - 1], self._bed.subject) for axis in axes)
+        parts = (axis.make(axis.strengths[TOGETHER - 1], self._evaluator.subject) for axis in axes)
         together = functools.reduce(lambda a, b: a | b, parts, Condition())
         plain = {"oracle": _success(self.oracle), **self._figures(self.plain)}
         return {"plain": plain, "axes": found, "together": self.level(together)}
 
-    def along(self, axis: Axis, numbers: Iterable[int], tell: Told) -> dict[str, Any]:
-        """One axis at some of its strengths."""
-        levels = []
+    def along(self, axis: Axis, numbers: Iterable[int], tell: Report) -> dict[str, Any]:
+        """Measure one axis at some of its strengths."""
+        levels, subject = [], self._evaluator.subject
         for number in numbers:
             strength = axis.strengths[number - 1]
             tell(f"{axis.name} {number}")
-            value = axis.value(strength, self._bed.subject)
-            condition = axis.make(strength, self._bed.subject)
-            levels.append(
-                {
-                    "number": number,
-                    "value": value,
-                    "position": axis.position(strength),
-                    **self.level(condition),
-                }
-            )
+            value = axis.value(strength, subject)
+            found = self.level(axis.make(strength, subject))
+            position = axis.position(strength)
+            levels.append({"number": number, "value": value, "position": position, **found})
         plain = float(self.plain.episodes.success.mean())
         return {
             "group": axis.group,
             "unit": axis.unit,
-            "neutral": finite(axis.value(axis.neutral, self._bed.subject)),
+            "neutral": finite(axis.value(axis.neutral, subject)),
             "areas": {mode.value: success_area(levels, plain, mode) for mode in self._modes},
             "levels": levels,
         }
 
     def level(self, condition: Condition) -> dict[str, Any]:
-        """What becomes of flights under one condition.
+        """Measure one condition.
 
         Returns:
-            "refused": why the task or camera can't be so, or None. Else "oracle": the success of
-            who sees where everything is, if the task has one; "impossible": whether that is surely
-            too little; "modes": figures by mode, those that it has.
+            "refused": the reason if task or camera do not allow it, or None. Otherwise "oracle":
+            its success rate, if the task has one; "impossible": whether that is too low; "modes":
+            figures by mode.
         """
         try:
-            self._bed.settings(condition)
+            self._evaluator.settings(condition)
         except InputError as error:
             return {"refused": str(error), "oracle": None, "impossible": None, "modes": {}}
         oracle = _success(self._fly_oracle(condition) if self._knows else None)
@@ -105,14 +99,14 @@ class Suite:
             "oracle": oracle,
             "impossible": None if oracle is None else oracle["upper95"] < self._possible,
             "modes": {
-                mode.value: self._figures(self._bed.fly(condition, mode))
+                mode.value: self._figures(self._evaluator.run(condition, mode))
                 for mode in self._modes
                 if drifts or mode is not Mode.DRIFTING
             },
         }
 
     def _fly_oracle(self, condition: Condition) -> ConditionResult:
-        """Who knows where all is that shows: light, colours and noise are all the same to it."""
+        """Run the oracle, which light, colours and noise do not affect."""
         faults = tuple(fault for fault in condition.faults if fault.hides)
         differs = (
             condition.task
@@ -123,7 +117,7 @@ class Suite:
         )
         if not (differs or faults) and hasattr(self, "oracle") and self.oracle is not None:
             return self.oracle
-        return self._bed.fly(condition, eyes=OracleAgent())
+        return self._evaluator.run(condition, agent=OracleAgent())
 
     def _figures(self, flown: ConditionResult) -> dict[str, Any]:
         episodes, plain = flown.episodes, self.plain.episodes
@@ -143,28 +137,69 @@ class Suite:
         }
 
 
+class FrameRecorder:
+    """Flies straight on and keeps the colour image of one step."""
+
+    knows_truth = False
+
+    def __init__(self) -> None:
+        self._step = 0
+        self.image: Tensor | None = None
+
+    def act(self, context: StepContext) -> tuple[Tensor, Tensor | None]:
+        """See `Agent`."""
+        images = context.render("rgb").movedim(-1, 1).float() / 255.0
+        images = context.apply_faults(images, context.active)
+        if self._step <= STEP:  # some episodes end before
+            self.image = (images[0] * 255).round().to(torch.uint8).movedim(0, -1)
+        self._step += 1
+        return torch.zeros_like(context.active), None
+
+
+def make_strip(evaluator: PairedEvaluator, axis: Axis) -> list[NDArray | None]:
+    """Record the camera without perturbation and at each strength of an axis.
+
+    Args:
+        evaluator: Of one environment.
+        axis: Which.
+
+    Returns:
+        Shapes: (H, W, 3), uint8; None where task or camera do not allow a strength.
+    """
+    conditions = (axis.make(strength, evaluator.subject) for strength in axis.strengths)
+    return [_record(evaluator, condition) for condition in (Condition(), *conditions)]
+
+
+def _record(evaluator: PairedEvaluator, condition: Condition) -> NDArray | None:
+    agent = FrameRecorder()
+    try:
+        evaluator.run(condition, agent=agent)
+    except InputError:
+        return None
+    return None if agent.image is None else agent.image.cpu().numpy()
+
+
 def finite(value: float) -> float | None:
-    """A value for a file; none for what is infinite, as the view without fog."""
+    """Return a value for a file, None if it is infinite, as the visibility without fog."""
     return value if math.isfinite(value) else None
 
 
 def mcnemar(before: Tensor, after: Tensor) -> dict[str, Any]:
-    """Exact test (McNemar) of whether the same worlds are flown as successfully.
+    """Return McNemar's exact test of paired successes.
 
     Args:
         before: 1 for success, else 0. Shape: (n,).
         after: The same.
 
     Returns:
-        "lost": worlds that succeeded only before, "gained": only after; "p": probability of a
-        difference at least as large if neither were likelier.
+        "lost": pairs with success only before, "gained": only after; "p": the p-value.
     """
     lost, gained = int((before > after).sum()), int((after > before).sum())
     return {"lost": lost, "gained": gained, "p": mcnemar_p(lost, gained)}
 
 
 def mcnemar_p(lost: int, gained: int) -> float:
-    """The probability of `mcnemar` from its counts."""
+    """Return the p-value of `mcnemar` from its counts."""
     from scipy.special import bdtr  # slow to import
 
     tail = float(bdtr(min(lost, gained), lost + gained, 0.5)) if lost + gained else 0.5
@@ -172,18 +207,13 @@ def mcnemar_p(lost: int, gained: int) -> float:
 
 
 def area(positions: Sequence[float], shares: Sequence[float]) -> float:
-    """Area under the curve through points, as a share of the range's width.
-
-    Args:
-        positions: Rising.
-        shares: From 0 to 1.
-    """
+    """Return the mean height of the curve through points of rising positions."""
     width = positions[-1] - positions[0]
     return float(np.trapezoid(shares, positions)) / width if width else float(shares[0])
 
 
 def success_area(levels: Iterable[dict[str, Any]], plain: float, mode: Mode) -> float | None:
-    """Area under success over strength, nothing different among them; None without another one."""
+    """Return the area under success rate over strength, None if there are no levels."""
     points = [(0.0, plain)] + [
         (level["position"], level["modes"][mode.value]["success"]["share"])
         for level in levels
@@ -202,68 +232,16 @@ def _success(flown: ConditionResult | None) -> dict[str, Any] | None:
     return proportion(int(success.sum()), len(success))
 
 
-STEP = 8
-"""The step whose picture is shown: the first cube is near, and late pictures show it late."""
-
-
-class FrameRecorder:
-    """Flies straight on and keeps one picture, in colour, as the camera gave it."""
-
-    knows_truth = False
-
-    def __init__(self) -> None:
-        """Has kept none yet."""
-        self._step = 0
-        self.picture: Tensor | None = None
-
-    def act(self, sight: StepContext) -> tuple[Tensor, Tensor | None]:
-        """See `Agent`."""
-        pictures = sight.draw("rgb").movedim(-1, 1).float() / 255.0
-        pictures = sight.spoil(pictures, sight.flying)
-        if self._step <= STEP:  # some flights end before
-            self.picture = (pictures[0] * 255).round().to(torch.uint8).movedim(0, -1)
-        self._step += 1
-        return torch.zeros_like(sight.flying), None
-
-
-def make_strip(bed: PairedEvaluator, axis: Axis) -> list[NDArray | None]:
-    """The policy's camera with nothing different, then at each strength; None where it can't be.
-
-    Args:
-        bed: Of one world.
-        axis: Which.
-
-    Returns:
-        Shapes: (H, W, 3), uint8.
-    """
-    made = (axis.make(strength, bed.subject) for strength in axis.strengths)
-    return [_picture(bed, condition) for condition in (Condition(), *made)]
-
-
-def _picture(bed: PairedEvaluator, condition: Condition) -> NDArray | None:
-    eyes = FrameRecorder()
-    try:
-        bed.fly(condition, eyes=eyes)
-    except InputError:
-        return None
-    return None if eyes.picture is None else eyes.picture.cpu().numpy()
-
-
-def packed(picture: NDArray) -> str:
-    """A picture as text for a file."""
-    return base64.b64encode(zlib.compress(picture.tobytes(), 9)).decode()
+def packed(image: NDArray) -> str:
+    """Encode an image as text."""
+    return base64.b64encode(zlib.compress(image.tobytes(), 9)).decode()
 
 
 def unpacked(text: str, shape: tuple[int, ...], where: str) -> NDArray:
-    """A picture out of such text.
-
-    Args:
-        text: From `packed`, perhaps.
-        shape: That it must have, as uint8.
-        where: Its name, for people.
+    """Decode an image of `packed`, uint8.
 
     Raises:
-        InputError: It is none, or of another shape.
+        InputError: It is none, or of another shape; the message says `where`.
     """
     size = math.prod(shape)
     try:

@@ -1,1 +1,1 @@
-"""Many trainings as one piece of work: started side by side, gone on with, reported."""
+"""Sweeps: many training runs in parallel, resumed, summarised and reported together."""

@@ -1,47 +1,137 @@
-"""Where the processes of a sweep run: this machine, a Slurm cluster, a Ray cluster.
+"""Executors of a sweep's runs: this machine, a Slurm cluster or a Ray cluster.
 
-Each gives back the runs with their exit status as they end, in any order.
+Each run is a process of its own.
 """
 
 import collections
+import json
+import os
 import re
+import signal
+import subprocess
+import sys
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
-from drone_rl.sweeps.process import POLL_S, RunProcess, finish_run, note_failure
-from drone_rl.sweeps.runs import Run
+from drone_rl.sweeps.runs import THREADS, Run, read_result
 from drone_rl.utils.errors import InputError, extra
+from drone_rl.utils.files import is_locked, read_tail, write_atomically
+from drone_rl.utils.limits import LOG_BYTES
 from drone_rl.utils.provenance import num_cores
+
+PROGRAM = (sys.executable, "-m", "drone_rl.cli.main")
+"""The program of a run."""
+POLL_S = 0.1
+"""Seconds between polls of a process."""
+
+
+class RunProcess:
+    """The process of one run: starts or resumes it, unless it has finished.
+
+    If a process of an interrupted sweep still works on the run, this waits for it.
+    """
+
+    def __init__(self, run: Run) -> None:
+        """Take a run; the first `poll` starts it."""
+        self.run = run
+        self._process: subprocess.Popen | None = None
+
+    def poll(self) -> int | None:
+        """Return the exit status, or None while the run is unfinished."""
+        if self._process is None:
+            if is_locked(self.run.folder):
+                return None
+            if read_result(self.run.folder) is not None:
+                return 0
+            self._process = self._start()
+        status = self._process.poll()
+        if not status:
+            return status
+        if is_locked(self.run.folder) or read_result(self.run.folder) is not None:
+            self._process = None  # a process of an earlier sweep finished it
+            return None
+        self._note_failure(status)
+        return status
+
+    def wait(self) -> int:
+        """Wait for the exit status."""
+        while (status := self.poll()) is None:
+            time.sleep(POLL_S)
+        return status
+
+    def stop(self) -> None:
+        """Ask the run to save its state and exit, and wait."""
+        if self._process is not None and self._process.poll() is None:
+            self._process.send_signal(signal.SIGTERM)
+            self._process.wait()
+
+    def _start(self) -> subprocess.Popen:
+        self.run.folder.mkdir(parents=True, exist_ok=True)
+        self.run.failure.unlink(missing_ok=True)
+        with self._log.open("ab") as log:
+            return subprocess.Popen(
+                [*PROGRAM, *self.run.arguments()],
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=subprocess.STDOUT,
+                env={**os.environ, **THREADS},
+                start_new_session=True,  # Ctrl-C goes to the sweep, which stops its runs
+            )
+
+    @property
+    def _log(self) -> Path:
+        return self.run.folder / "output.log"
+
+    def _note_failure(self, status: int) -> None:
+        tail = read_tail(self._log, LOG_BYTES).decode(errors="replace").splitlines()
+        note_failure(self.run, _error(tail, status))
+
+
+def note_failure(run: Run, error: str) -> None:
+    """Write the reason of a failure to the run's folder."""
+    run.folder.mkdir(parents=True, exist_ok=True)
+    write_atomically(run.failure, json.dumps({"error": error}, indent=2))
+
+
+def finish_run(run: Run) -> int:
+    """Run to the end and return the exit status."""
+    return RunProcess(run).wait()
+
+
+def _error(lines: list[str], status: int) -> str:
+    """Return the log line that gives the reason of a failure."""
+    if status < 0:
+        return f"ended by signal {signal.Signals(-status).name}"
+    reasons = [line.removeprefix("error: ") for line in lines if line.startswith("error: ")]
+    words = reasons or [line for line in lines if line.strip()]
+    return words[-1].strip() if words else f"ended with status {status}"
 
 
 class Executor(Protocol):
-    """Runs processes somewhere."""
+    """Executes runs."""
 
     def finish(self, runs: Sequence[Run]) -> Iterator[tuple[Run, int]]:
-        """Brings the runs to their end; yields each with its exit status."""
+        """Execute the runs; yield each with its exit status as it ends, in any order."""
         ...
 
 
 class LocalExecutor:
-    """Side by side on this machine."""
+    """Executes runs in parallel on this machine."""
 
     def __init__(self, num_jobs: int | None = None) -> None:
-        """Sets how many.
-
-        Args:
-            num_jobs: Runs at the same time; None for one a core.
+        """Take the number of parallel runs; None for one a core.
 
         Raises:
-            InputError: Fewer than one.
+            InputError: The number is less than one.
         """
         if num_jobs is not None and num_jobs < 1:
-            raise InputError(f"hydra.launcher.num_jobs={num_jobs} must be 1 or more, or null")
+            raise InputError(f"hydra.launcher.num_jobs={num_jobs} must be at least 1, or null")
         self.num_jobs = num_jobs or num_cores()
 
     def finish(self, runs: Sequence[Run]) -> Iterator[tuple[Run, int]]:
-        """See `Executor`. When it is interrupted, the runs save their state and end."""
+        """See `Executor`. When interrupted, the runs save their state and exit."""
         waiting = collections.deque(RunProcess(run) for run in runs)
         active: list[RunProcess] = []
         try:
@@ -60,32 +150,32 @@ class LocalExecutor:
 
 
 class SlurmExecutor:
-    """On a Slurm cluster by submitit, as one array of jobs."""
+    """Executes runs on a Slurm cluster through submitit, as one job array."""
 
     def __init__(self, folder: Path, *, cluster: str, num_jobs: int, **resources: Any) -> None:
-        """Prepares the jobs' resources.
+        """Configure the jobs.
 
         Args:
-            folder: Where submitit keeps its scripts and logs; on a disk that all nodes see.
-            cluster: "slurm", or "local" for processes of this machine.
-            num_jobs: Jobs of the array at the same time.
-            resources: What submitit's `update_parameters` takes.
+            folder: Folder of submitit's scripts and logs, on a disk that all nodes share.
+            cluster: "slurm", or "local" for processes on this machine.
+            num_jobs: Number of parallel jobs.
+            resources: Arguments of submitit's `update_parameters`.
 
         Raises:
-            InputError: submitit isn't installed, or there is no Slurm here.
+            InputError: submitit isn't installed, or this machine has no Slurm.
         """
         submitit = extra("submitit", "slurm", "hydra/launcher=slurm")
         try:
             self._executor = submitit.AutoExecutor(folder=folder, cluster=cluster)
         except RuntimeError as error:
             raise InputError(
-                f"hydra.launcher.cluster={cluster} is not to be had here ({error}); "
+                f"hydra.launcher.cluster={cluster} is not available here ({error}); "
                 "start the sweep on a node with sbatch"
             ) from error
         self._executor.update_parameters(slurm_array_parallelism=num_jobs, **resources)
 
     def finish(self, runs: Sequence[Run]) -> Iterator[tuple[Run, int]]:
-        """See `Executor`. Jobs that were submitted go on when the sweep itself is stopped."""
+        """See `Executor`. Submitted jobs continue when the sweep is stopped."""
         with self._executor.batch():
             jobs = [self._executor.submit(finish_run, run) for run in runs]
         left = dict(zip(runs, jobs, strict=True))
@@ -105,15 +195,15 @@ class SlurmExecutor:
 
 
 class RayExecutor:
-    """On a Ray cluster, one task a run; Ray starts anew what a lost node was busy with."""
+    """Executes runs as Ray tasks; Ray restarts the tasks of a lost node."""
 
     def __init__(self, *, address: str | None, num_cpus: float, num_gpus: float) -> None:
-        """Joins the cluster.
+        """Connect to the cluster.
 
         Args:
-            address: Of the cluster; None starts one on this machine.
-            num_cpus: Cores that one run takes.
-            num_gpus: GPUs that one run takes; a share is possible.
+            address: Address of the cluster; None starts one on this machine.
+            num_cpus: Cores per run.
+            num_gpus: GPUs per run, possibly a fraction.
 
         Raises:
             InputError: Ray isn't installed or the cluster can't be reached.
@@ -157,7 +247,7 @@ class RayExecutor:
 
 
 def _reason(error: BaseException) -> str:
-    """The line of a remote traceback that names the error."""
+    """Return the line of a remote traceback that names the error."""
     lines = str(error).strip().splitlines() or [type(error).__name__]
     return next(
         (line for line in reversed(lines) if re.match(r"\w+(Error|Exception):", line)), lines[-1]

@@ -1,4 +1,4 @@
-"""The pictures of a sweep's report, each as PNG bytes for a light and for a dark page."""
+"""The plots of a sweep's report, each as PNG bytes for a light and a dark page."""
 
 import dataclasses
 import io
@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 
 from drone_rl.evaluation.rule import KINDS
 from drone_rl.sim.vocabulary import SHOWN_MOVES
-from drone_rl.sweeps.groups import FAILED, Group
 from drone_rl.sweeps.rows import Row
-from drone_rl.sweeps.statistics import median_band, on_grid
+from drone_rl.sweeps.summary import FAILED, Group, median_band, on_grid
 
 FAVOURITE_AXIS = "optimiser.lr"
 COLORS = {
@@ -29,11 +28,11 @@ COLORS = {
 _OTHER_KIND = "tab:cyan"
 MAX_PANELS = 6
 LOG_FROM = 3.0
-"""Greatest to least value from which on the axis is logarithmic."""
+"""Ratio of the greatest to the least value from which the axis is logarithmic."""
 MOST_LABELS = 7
-"""Labels side by side that an axis has room for."""
+"""Greatest number of tick labels."""
 UNIFORM = float(np.log(len(SHOWN_MOVES.names)))
-"""Entropy of the chapter's actions where all are as probable, nats."""
+"""Entropy of the uniform distribution over the moves, nats."""
 _ROUNDING = 1e-4
 
 
@@ -44,21 +43,21 @@ def color_of(kind: str | None) -> str:
 
 @dataclasses.dataclass
 class Layout:
-    """Which setting lies along the axis, and what is drawn in which panel."""
+    """The setting on the x axis, and the groups of each panel."""
 
     axis: str | None
     """A swept setting; None if only seeds differ."""
     panels: dict[str, list[Group]]
-    """Groups by what they have in common beside that setting."""
+    """Groups by the values of the other settings."""
 
     @property
     def groups(self) -> list[Group]:
-        """Those of all panels."""
+        """The groups of all panels."""
         return [group for groups in self.panels.values() for group in groups]
 
 
 def lay_out(groups: Sequence[Group]) -> Layout:
-    """The learning rate, or else the first swept setting, along the axis; a panel for the rest."""
+    """Put the learning rate, or else the last swept setting, on the x axis."""
     keys = list(groups[0].choice) if groups else []
     axis = FAVOURITE_AXIS if FAVOURITE_AXIS in keys else (keys[-1] if keys else None)
     panels: dict[str, list[Group]] = {}
@@ -69,32 +68,32 @@ def lay_out(groups: Sequence[Group]) -> Layout:
 
 
 def draw_curves(layout: Layout) -> tuple[bytes, bytes]:
-    """Learning curves: the median over runs with its exact band, or of few runs each of them."""
+    """Plot learning curves: the median over runs with its exact band, or each of few runs."""
     return _draw(layout, _curves, height=3.6)
 
 
 def draw_verdicts(layout: Layout) -> tuple[bytes, bytes]:
-    """Share of each verdict against the axis, with exact intervals."""
+    """Plot the fraction of each verdict, with exact intervals."""
     return _draw(layout, _verdicts, height=3.4)
 
 
 def draw_sides(layout: Layout) -> tuple[bytes, bytes]:
-    """Cubes collected on the right minus on the left, of every run, against the axis."""
+    """Plot the fraction of cubes collected on the right minus on the left, per run."""
     return _draw(layout, _sides, height=3.2)
 
 
 def draw_entropies(layout: Layout) -> tuple[bytes, bytes]:
-    """Entropy of every run's policy at its end, against the axis."""
+    """Plot the final entropy of each run's policy."""
     return _draw(layout, _entropies, height=3.2)
 
 
 def draw_costs(layout: Layout) -> tuple[bytes, bytes]:
-    """Frames to solve of every run, or what those had that never were, against the axis."""
+    """Plot the frames to solve of each run, or the frames of unsolved runs."""
     return _draw(layout, _costs, height=3.2)
 
 
 def draw_outcome(layout: Layout) -> bytes:
-    """Verdicts, lost sides and entropies, as one picture for a light page."""
+    """Plot verdicts, sides and entropies as one image for a light page."""
     return _picture(layout, [_verdicts, _sides, _entropies], height=2.5)
 
 
@@ -112,7 +111,7 @@ def _draw(layout: Layout, draw: Draw, height: float) -> tuple[bytes, bytes]:
 def _picture(
     layout: Layout, draws: Sequence[Draw], height: float, transparent: bool = False
 ) -> bytes:
-    """One block of panels below the other, up to three panels side by side, else two."""
+    """Stack a block of panels per plot, with up to three panels a row, else two."""
     panels = list(layout.panels.items())
     columns = len(panels) if 0 < len(panels) <= 3 else min(2, len(panels) or 1)
     rows = max(1, -(-len(panels) // columns))
@@ -125,7 +124,7 @@ def _picture(
             axes.set_title(_literal(title), fontsize=10)
             draw(axes, layout, groups)
         for axes in block[:, 1:].flat:
-            axes.set_ylabel("")  # that of the first column, which shares its axis
+            axes.set_ylabel("")  # the first column labels the shared axis
         for axes in block.flat[len(panels) :]:
             axes.set_visible(False)
     file = io.BytesIO()
@@ -154,7 +153,7 @@ def _curves(axes: Axes, layout: Layout, groups: list[Group]) -> None:
 
 
 def _no_label(values: NDArray) -> list[str]:
-    """For all lines but the first; what begins so is left out of a legend."""
+    """Labels of all lines but the first; legends omit a leading underscore."""
     return ["_"] * (len(values) - 1)
 
 
@@ -191,7 +190,7 @@ def _entropies(axes: Axes, layout: Layout, groups: list[Group]) -> None:
 def _dots(
     axes: Axes, layout: Layout, groups: list[Group], value: Callable[[Row], float | None]
 ) -> None:
-    """A dot for every run that was judged, hollow if not certainly; like values side by side."""
+    """Plot a dot per judged run, hollow if uncertain; close values are shifted sideways."""
     places = _places(axes, layout, groups)
     for place, group in zip(places, groups, strict=True):
         judged = [(value(row), row) for row in group.finished if row.kind in KINDS]
@@ -208,7 +207,7 @@ def _dots(
 
 
 def _aside(axes: Axes, places: NDArray, shift: float, every: Sequence[float]) -> NDArray:
-    """Places moved along the axis a little, by a share of the way between the nearest two."""
+    """Shift positions by a fraction of the least distance between two of them."""
     is_log = axes.get_xscale() == "log"
     at = np.unique(np.log(every) if is_log else every)
     step = float(np.diff(at).min()) if len(at) > 1 else (np.log(3.0) if is_log else 1.0)
@@ -216,7 +215,7 @@ def _aside(axes: Axes, places: NDArray, shift: float, every: Sequence[float]) ->
 
 
 def _explain_colours(axes: Axes) -> None:
-    """One legend a picture, above it."""
+    """Add one legend above the image."""
     figure = axes.get_figure()
     if figure is None or figure.legends:
         return
@@ -242,12 +241,12 @@ def _costs(axes: Axes, layout: Layout, groups: list[Group]) -> None:
         )
         note.set_in_layout(False)
     frames = [row.frames for group in layout.groups for row in group.known]
-    top = max(frames, default=0.0) or 1.0  # of all panels, which share it
+    top = max(frames, default=0.0) or 1.0  # the panels share the axis
     axes.set(ylabel="frames to solve", ylim=(0, 1.2 * top))
 
 
 def _places(axes: Axes, layout: Layout, groups: list[Group]) -> list[float]:
-    """Where the groups lie along the axis: at their numbers, or side by side."""
+    """Set the ticks and return the x position of each group: its number, or its index."""
     names = [str(group.choice.get(layout.axis or "", "")) for group in groups]
     axes.set_xlabel(_literal(layout.axis or "all runs"))
     try:
@@ -265,7 +264,7 @@ def _places(axes: Axes, layout: Layout, groups: list[Group]) -> list[float]:
 
 
 def _labels(axes: Axes, places: Sequence[float], names: Sequence[str]) -> list[str]:
-    """A label for each place, empty where it would overlap the one before it."""
+    """Return tick labels; a label that would overlap the previous one is empty."""
     at = np.log(places) if axes.get_xscale() == "log" else np.asarray(places)
     room = np.ptp(at) / MOST_LABELS
     labels: list[str] = [""] * len(names)
@@ -277,5 +276,5 @@ def _labels(axes: Axes, places: Sequence[float], names: Sequence[str]) -> list[s
 
 
 def _literal(text: str) -> str:
-    """Text in which matplotlib sees no formula."""
+    """Escape dollar signs, which matplotlib reads as formulas."""
     return text.replace("$", r"\$")

@@ -1,7 +1,9 @@
-"""What a sweep consists of, kept in its folder, so that the same command goes on with it."""
+"""The manifest of a sweep (`sweep.json`), with which the same command resumes it."""
 
 import dataclasses
+import hashlib
 import json
+import re
 import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -18,7 +20,7 @@ from drone_rl.utils.schema import Maybe, Plain, Record, Several, Text, Whole, as
 
 FORMAT = "drone_rl sweep"
 MAY_CHANGE = ("resume", "logger", "paths", "trainer.checkpoint_interval_s", "renderer")
-"""Settings that may differ when a sweep is gone on with."""
+"""Settings that may differ when a sweep is resumed."""
 
 _RUN = Record(
     {
@@ -38,7 +40,7 @@ _SWEEP = Record(
         "machine": Plain(),
     }
 )
-"""Of `sweep.json`."""
+"""Schema of `sweep.json`."""
 
 
 @dataclasses.dataclass
@@ -46,16 +48,16 @@ class Sweep:
     """The content of `sweep.json`."""
 
     folder: Path
-    """Of the whole sweep."""
+    """Folder of the sweep."""
     command: str
-    """What the user typed first."""
+    """The command that began the sweep."""
     settings: dict[str, Any]
-    """What all runs have in common, references unresolved."""
+    """The common settings of all runs, with interpolations unresolved."""
     runs: list[Run]
-    """In the order of their numbers."""
+    """The runs in the order of their numbers."""
 
     def save(self) -> None:
-        """Writes `sweep.json`."""
+        """Write `sweep.json`."""
         runs = [
             {"number": r.number, "overrides": list(r.overrides), "folder": r.folder.name}
             for r in self.runs
@@ -71,7 +73,7 @@ class Sweep:
 
 
 def read_sweep(folder: Path) -> Sweep:
-    """Reads `sweep.json`.
+    """Read `sweep.json`.
 
     Raises:
         InputError: The folder holds no sweep, or the file is damaged.
@@ -94,9 +96,9 @@ def read_sweep(folder: Path) -> Sweep:
             for run in content["runs"]
         ]
         if len({run.number for run in runs}) < len(runs):
-            raise InputError("two runs have one number")
+            raise InputError("two runs have the same number")
         if len({run.folder for run in runs}) < len(runs):
-            raise InputError("two runs have one folder, so that one result would count twice")
+            raise InputError("two runs have the same folder, so that one result would count twice")
         settings = dict(as_mapping(content["settings"], "settings"))
         return Sweep(folder, content["command"], settings, runs)
     except InputError as error:
@@ -106,22 +108,22 @@ def read_sweep(folder: Path) -> Sweep:
 
 
 def _name(folder: str) -> str:
-    """The name of a run's folder, which lies in the sweep's."""
+    """Return the name of a run's folder, checked to be inside the sweep's folder."""
     if folder in ("", ".", "..") or "/" in folder:
-        raise InputError(f"a run's folder {shown(folder)} is not one in the sweep's")
+        raise InputError(f"a run's folder {shown(folder)} is not inside the sweep's folder")
     return folder
 
 
 def open_sweep(
     folder: Path, command: Sequence[str], settings: Mapping[str, Any], runs: Sequence[Run]
 ) -> Sweep:
-    """Begins a sweep in a new folder, or goes on with the same sweep in its folder.
+    """Begin a sweep in a new folder, or resume it in its folder.
 
     Args:
-        folder: Of the sweep; made if need be.
-        command: What the user typed.
-        settings: What all runs have in common.
-        runs: Known ones must be as they were; new ones are added, such as those of more seeds.
+        folder: Folder of the sweep, created if missing.
+        command: The command line.
+        settings: The common settings of all runs.
+        runs: Known runs must be unchanged; new ones, such as those of more seeds, are added.
 
     Raises:
         InputError: The folder holds another sweep.
@@ -142,11 +144,11 @@ def open_sweep(
 
 
 def _refuse_strangers(folder: Path) -> None:
-    """Runs with no sweep.json are someone else's."""
+    """Refuse a folder with runs but no sweep.json."""
     stranger = next(folder.glob("*/run.yaml"), None)
     if stranger is not None:
         raise InputError(
-            f"hydra.sweep.dir={folder} holds runs of something else ({stranger.parent.name}); "
+            f"hydra.sweep.dir={folder} holds other runs ({stranger.parent.name}); "
             "choose another folder"
         )
 
@@ -157,5 +159,29 @@ def _check_same_runs(sweep: Sweep, runs: Sequence[Run]) -> None:
         if before.get(run.number, run.overrides) != run.overrides:
             raise InputError(
                 f"hydra.sweep.dir={sweep.folder} holds another sweep, begun by: {sweep.command}; "
-                "choose another folder, or give that command to go on with it"
+                "choose another folder, or give that command to resume it"
             )
+
+
+_ELSEWHERE = ("hydra.", "hydra/", "paths.", "+hydra", "-")
+"""Prefixes of overrides that do not identify a sweep."""
+
+
+def is_sweep(overrides: Sequence[str]) -> bool:
+    """Return whether a command line starts several runs."""
+    flags = {"-m", "--multirun", "hydra.mode=MULTIRUN"}
+    alone = "hydra.mode=RUN" in overrides
+    return not alone and any(o in flags or o.startswith("sweep=") for o in overrides)
+
+
+def sweep_name(overrides: Sequence[str]) -> str:
+    """Return a folder name that two commands share if and only if they define the same runs.
+
+    It contains the file in conf/sweep, or else the swept settings, and a hash of the overrides.
+    """
+    what = sorted(o for o in overrides if not o.startswith(_ELSEWHERE))
+    files = [o.partition("=")[2] for o in what if o.startswith("sweep=")]
+    keys = [o.partition("=")[0] for o in what if "," in o or "range(" in o]
+    label = re.sub(r"[^\w.-]+", "-", "+".join(files or keys))[:60]
+    digest = hashlib.sha256("\n".join(what).encode()).hexdigest()[:8]
+    return f"{label}-{digest}" if label else digest

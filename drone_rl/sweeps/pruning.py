@@ -1,4 +1,4 @@
-"""Optuna's ear in a training: hopeless runs of a search are stopped early."""
+"""Early stopping of unpromising runs in an Optuna search."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -9,15 +9,10 @@ from drone_rl.training.progress import OngoingTraining
 
 
 class PruneCallback(Callback):
-    """Stops a run whose running mean lies below the median of the others at the same frames."""
+    """Stops a run whose running mean is below the median of the others at the same frames."""
 
     def __init__(self, folder: Path, number: int) -> None:
-        """Joins the study.
-
-        Args:
-            folder: Of the sweep.
-            number: Of the trial.
-        """
+        """Open the study in a sweep's folder; `number` is that of the trial."""
         study = open_study(folder)
         optuna = import_optuna()
         settings = study.user_attrs
@@ -28,7 +23,7 @@ class PruneCallback(Callback):
         self._reported = set(study.trials[number].intermediate_values)
 
     def on_update(self, training: OngoingTraining, metrics: Mapping[str, float]) -> None:
-        """Reports each time that so many frames have passed."""
+        """Report the running mean every `report_frames` frames."""
         step = training.progress.frames // self._frames
         if step == 0 or step in self._reported:
             return

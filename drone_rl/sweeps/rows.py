@@ -1,4 +1,4 @@
-"""The runs of a sweep as rows: what their files tell, whatever has become of them."""
+"""The table of runs: one row per run, read from its files whatever its state."""
 
 import contextlib
 import dataclasses
@@ -8,97 +8,98 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from drone_rl.evaluation.consistency import check_verdict
 from drone_rl.evaluation.rule import SIDES, Kind, Rule
 from drone_rl.sweeps.manifest import Sweep
 from drone_rl.sweeps.runs import Run, read_failure, read_result
-from drone_rl.sweeps.statistics import Array
 from drone_rl.utils.consistency import read_entry
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.limits import SWEEP_RESULTS_BYTES, Allowance
 from drone_rl.utils.readers import TablesAllowance, read_table
 from drone_rl.utils.schema import Real, Whole
 
+Array = NDArray[np.float64]
 _MOST = 1e15
-"""No figure of a run is as large."""
+"""Upper bound of every figure of a run."""
 _ROUNDING = 1e-6
 LAST_UPDATES = 20
-"""Updates at the end of a run over which the entropy is averaged."""
+"""Number of last updates over which the entropy is averaged."""
 NOT_OFFERED = "not offered"
-"""Stands for the share of cubes on a side where there were none."""
+"""Placeholder for the fraction of cubes on a side without cubes."""
 
 
 @dataclasses.dataclass
 class Row:
-    """What is known of one run."""
+    """One run."""
 
     run: Run
     choice: dict[str, str]
-    """The swept settings and their values, the seed included."""
+    """The swept settings and their values, including the seed."""
     state: str
     """"finished", "failed", "damaged" or "unfinished"."""
     error: str | None = None
-    """Why it failed or is damaged."""
+    """Reason of a failure or damage."""
     result: dict[str, Any] = dataclasses.field(default_factory=dict)
     """`result.json`."""
     curve: tuple[Array, Array] = (np.empty(0), np.empty(0))
-    """Frames, and the running mean as a share of the task's cubes; empty if the run failed, which
-    then counts as having learned nothing. Shape: (num_updates,) each."""
+    """Learning curve: frames, and running mean as a fraction of the greatest reward; empty if the
+    run failed, which counts as having learned nothing. Shape: (num_updates,) each."""
     frames: float = 0.0
-    """What it had until it ended or failed."""
+    """Frames until it ended or failed."""
     seconds: float = 0.0
-    """What it had until it ended or failed."""
+    """Training time until it ended or failed."""
     entropy: float | None = None
     """Mean entropy of the policy over the last updates, nats."""
 
     @property
     def is_solved(self) -> bool:
-        """Whether it reached the target, or was proved to do all that there is to do."""
+        """Whether it reached the target, or was proved to succeed in all cases."""
         return self.result.get("reason") in ("solved", "proved")
 
     @property
     def verdict(self) -> dict[str, Any] | None:
-        """What its last policy is, by the present rule; None if that was not judged."""
+        """Verdict on the last policy by the current rule, or None."""
         verdict = self.result.get("verdict")
         return verdict if verdict is not None and verdict["rule"] == Rule().text else None
 
     @property
     def kind(self) -> str | None:
-        """One of `KINDS`, in which sides don't matter; None without a verdict."""
+        """One of `KINDS`, without sides; None without a verdict."""
         return None if self.verdict is None else Kind(self.verdict["kind"]).family
 
     @property
     def is_certain(self) -> bool:
-        """Whether its verdict rests on enough episodes."""
+        """Whether the verdict is statistically certain."""
         return self.verdict is not None and self.verdict["certain"]
 
     @property
     def has_older_verdict(self) -> bool:
-        """Whether it was judged, but by a rule that no longer holds."""
+        """Whether the run was judged by an outdated rule only."""
         was_judged = "evaluation" in self.result or "verdict" in self.result
         return was_judged and self.verdict is None
 
     @property
     def lean(self) -> float | None:
-        """Share of the cubes on the right that it collected minus that on the left."""
+        """Fraction of the cubes collected on the right minus that on the left."""
         left, right = self.share("left"), self.share("right")
         return None if left is None or right is None else right - left
 
     @property
     def final_share(self) -> float:
-        """The running mean at the end, as a share of the greatest reward; nothing if it failed."""
+        """Final running mean as a fraction of the greatest reward; 0 if the run failed."""
         return self.result["running_reward"] / self.result["largest_reward"] if self.result else 0.0
 
     def share(self, of: str) -> float | None:
-        """Of the cubes "all", "left", "ahead" or "right", what its greedy policy collects.
+        """Return the fraction of cubes ("all", "left", "ahead", "right") of the greedy policy.
 
-        None without a verdict, and if there were no such cubes.
+        None without a verdict, or without such cubes.
         """
         return None if self.verdict is None else self.verdict["greedy"]["shares"][of]["mean"]
 
     def plain(self) -> dict[str, Any]:
-        """One row of the table."""
+        """Return the row as plain values."""
         verdict, judged = self.verdict, self.verdict is not None
         sides = {side: self.share(side) for side in SIDES}
         return {
@@ -125,10 +126,10 @@ class Row:
 
 
 def read_rows(sweep: Sweep) -> list[Row]:
-    """One row for every run, whatever has become of it.
+    """Read one row for each run.
 
     Raises:
-        InputError: The results of all runs together are too large.
+        InputError: The result files are too large in total.
     """
     _check_results_size(sweep)
     metrics = TablesAllowance()
@@ -147,7 +148,7 @@ def _choice(run: Run) -> dict[str, str]:
 
 
 def _check_results_size(sweep: Sweep) -> None:
-    """Bounds what is in memory at a time; each file is bounded by its reader."""
+    """Bound the total size; each reader bounds its file."""
     allowance = Allowance(SWEEP_RESULTS_BYTES)
     for run in sweep.runs:
         for path in (run.folder / "result.json", run.failure):
@@ -161,7 +162,7 @@ def _read_row(run: Run, choice: dict[str, str], metrics: TablesAllowance) -> Row
     if result is None:
         row = Row(run, choice, "unfinished" if error is None else "failed", error)
         with contextlib.suppress(ValueError, KeyError, TypeError):
-            if error is not None:  # before it failed it may have come some way, or none
+            if error is not None:  # a failed run may have metrics
                 _, (row.frames, row.seconds), row.entropy = _read_metrics(run.folder, 1, metrics)
         return row
     try:
@@ -187,7 +188,7 @@ _RESULT = {
     "largest_reward": Real(0.0, 1e6, is_above=True),
     "running_reward": Real(-1e6, 1e6),
 }
-"""Figures of `result.json` and what they may be."""
+"""Schema of the figures in `result.json`."""
 
 
 def _check_result(result: dict[str, Any]) -> None:
@@ -203,7 +204,7 @@ def _check_result(result: dict[str, Any]) -> None:
 
 
 def _check_curve(curve: tuple[Array, Array]) -> None:
-    """A learning curve of a run that came to its end."""
+    """Check the learning curve of a finished run."""
     frames, shares = curve
     if not (np.isfinite(frames).all() and (np.diff(frames, prepend=0.0) >= 0).all()):
         raise InputError("metrics.csv: frames decrease or are not finite")
@@ -214,7 +215,7 @@ def _check_curve(curve: tuple[Array, Array]) -> None:
 def _read_metrics(
     folder: Path, largest_reward: float, allowance: TablesAllowance
 ) -> tuple[tuple[Array, Array], tuple[float, float], float | None]:
-    """The learning curve, frames and seconds until its end, and the entropy there."""
+    """Return the learning curve, the final frames and seconds, and the final entropy."""
     rows = _metrics_columns(folder / "metrics.csv", allowance)
     frames, rewards, seconds, entropies = rows.T
     had = (float(frames[-1]), float(seconds[-1])) if len(rows) else (0.0, 0.0)
@@ -227,18 +228,18 @@ def _read_metrics(
 
 
 _EMPTY = math.inf
-"""Stands for an entropy that was not logged; one that is not a number makes the mean none."""
+"""Placeholder for an entropy that was not logged."""
 _COLUMNS = {
     "frames": None,
     "train/running_reward": None,
     "seconds": 0.0,
     "loss/entropy": _EMPTY,
 }
-"""Columns of `metrics.csv` that a report needs, and what stands for an empty cell, if it may."""
+"""Required columns of `metrics.csv`, with the value of an empty cell (None: not allowed)."""
 
 
 def _metrics_columns(path: Path, allowance: TablesAllowance) -> Array:
-    """The numbers of `_COLUMNS` at each update. Shape: (num_updates, 4)."""
+    """Return the `_COLUMNS` of each update. Shape: (num_updates, 4)."""
     rows = read_table(path, allowance)
     header = next(rows, [])
     needed = [header.index(name) if name in header else None for name in _COLUMNS]
@@ -252,7 +253,7 @@ def _metrics_columns(path: Path, allowance: TablesAllowance) -> Array:
 
 
 def _numbers(texts: Sequence[str], empty: float | None) -> Array:
-    """Numbers of a column; without a value for empty cells there may be none."""
+    """Parse a column; if `empty` is None, empty cells are an error."""
     if empty is None:
         return np.array([*map(float, texts)], np.float64)
     return np.array([float(text) if text else empty for text in texts], np.float64)

@@ -1,4 +1,4 @@
-"""One run of a sweep, as its folder tells of it."""
+"""One run of a sweep and the files in its folder."""
 
 import dataclasses
 import shlex
@@ -11,49 +11,48 @@ from drone_rl.utils.limits import RESULT_BYTES
 from drone_rl.utils.schema import Text, as_mapping
 
 THREADS = {"OMP_NUM_THREADS": "1", "OMP_WAIT_POLICY": "PASSIVE"}
-"""Environment of every run, in which those side by side don't fight for the cores.
+"""Environment of every run, so that parallel runs don't compete for the cores.
 
-A training sets the threads of torch itself, so that its result does not depend on this.
+Training sets torch's threads itself, so that its result does not depend on this.
 """
 
 
 @dataclasses.dataclass(frozen=True)
 class Run:
-    """One training: what it was told and where it works."""
+    """One training run."""
 
     number: int
-    """Place in the sweep, from 0."""
+    """Index in the sweep, from 0."""
     overrides: tuple[str, ...]
-    """Settings as on the command line."""
+    """Settings as command-line overrides."""
     folder: Path
-    """Where it leaves everything."""
+    """Output folder."""
 
     @property
     def checkpoint(self) -> Path:
-        """Its newest checkpoint."""
+        """Path of the newest checkpoint."""
         return self.folder / "checkpoints" / "last.pt"
 
     @property
     def failure(self) -> Path:
-        """Where the reason of a failure is kept."""
+        """Path of the failure's reason."""
         return self.folder / "failure.json"
 
     def arguments(self) -> list[str]:
-        """What to give to `drone-rl` to begin this run or to go on with it."""
+        """Return the arguments of `drone-rl` that begin or resume this run."""
         folder = quoted(str(self.folder))
         own = ["hydra.mode=RUN", f"hydra.run.dir={folder}"]
         resume = [f"resume={folder}"] if self.checkpoint.is_file() else []
         return ["train", *self.overrides, *own, *resume]
 
     def repeat_command(self) -> str:
-        """The shell command that trains the same once more."""
+        """Return the shell command that repeats this training."""
         settings = [o for o in self.overrides if not o.startswith("trial=")]
-        words = ["drone-rl", "train", *settings, "hydra.mode=RUN"]
-        return shlex.join(words)
+        return shlex.join(["drone-rl", "train", *settings, "hydra.mode=RUN"])
 
 
 def read_result(folder: Path) -> dict[str, Any] | None:
-    """`result.json` of a run that came to its own end; None of one that must go on."""
+    """Return `result.json` of a finished run, or None for an unfinished one."""
     try:
         content = read_bytes(folder / "result.json", RESULT_BYTES)
         result = dict(as_mapping(parse_json(content, "result", allow_nan=True), "result"))
@@ -64,7 +63,7 @@ def read_result(folder: Path) -> dict[str, Any] | None:
 
 
 def read_failure(run: Run) -> str | None:
-    """The error of a run that failed; None if it did not."""
+    """Return the error of a failed run, or None."""
     try:
         error = as_mapping(read_json(run.failure), "failure")["error"]
     except (InputError, KeyError):
@@ -73,6 +72,6 @@ def read_failure(run: Run) -> str | None:
 
 
 def quoted(value: str) -> str:
-    """A value that Hydra's command line takes literally."""
+    """Quote a value for Hydra's command line."""
     escaped = value.replace("\\", "\\\\").replace("'", "\\'")
     return f"'{escaped}'"

@@ -1,7 +1,7 @@
-"""Optuna's side of a search: a study in the sweep's folder, which its runs report to.
+"""The Optuna study of a hyperparameter search, in the sweep's folder.
 
-The study is a journal of its own in a file that all processes share, so it outlives every one of
-them: a search that was killed goes on with the trials that it had begun.
+The study is a journal file that all processes share, so that an interrupted search resumes with
+its unfinished trials.
 """
 
 from collections.abc import Mapping
@@ -15,13 +15,13 @@ from drone_rl.utils.schema import Whole, as_mapping
 
 NAME = "sweep"
 _OPERATIONS = Whole(0, 100)
-"""Optuna's numbers of what a line of its journal does."""
+"""Operation codes of a journal line."""
 _DAMAGE = (LookupError, TypeError, ValueError, AttributeError, AssertionError)
-"""What Optuna raises where the lines of a journal do not follow from each other."""
+"""Exceptions that Optuna raises for an inconsistent journal."""
 
 
 def import_optuna() -> Any:
-    """The module.
+    """Return the module.
 
     Raises:
         InputError: It isn't installed.
@@ -30,11 +30,11 @@ def import_optuna() -> Any:
 
 
 def open_study(folder: Path, **settings: Any) -> Any:
-    """The study in a sweep's folder; made if there is none and `direction` is given.
+    """Open the study in a sweep's folder; create it if `direction` is given.
 
     Args:
-        folder: Of the sweep.
-        settings: What `optuna.create_study` takes besides.
+        folder: Folder of the sweep.
+        settings: Further arguments of `optuna.create_study`.
 
     Returns:
         An `optuna.Study`.
@@ -61,10 +61,10 @@ def open_study(folder: Path, **settings: Any) -> Any:
 
 
 def _check_journal(path: Path) -> None:
-    """Refuses a journal that is too large, or whose lines are no operations.
+    """Check the journal's size and operation codes.
 
     Raises:
-        InputError: It is.
+        InputError: The journal is too large or damaged.
     """
     if not path.exists() or (path.is_file() and path.stat().st_size == 0):
         return
@@ -81,14 +81,13 @@ def _check_journal(path: Path) -> None:
 
 
 def next_trials(study: Any, space: Mapping[str, Any], count: int, seed: int) -> list[Any]:
-    """The trials that a killed search left unfinished, or else new ones.
+    """Return the unfinished trials of an interrupted search, or else new ones.
 
     Args:
         study: From `open_study`.
         space: Optuna's distributions by name.
-        count: How many new ones at most.
-        seed: Root of the draws; each batch has a seed of its own, so that a killed search draws
-            what it would have drawn.
+        count: Number of new trials.
+        seed: Root seed; each batch has its own seed, so that a resumed search samples the same.
 
     Returns:
         `optuna.trial.FrozenTrial`s with consecutive numbers.
@@ -106,7 +105,7 @@ def next_trials(study: Any, space: Mapping[str, Any], count: int, seed: int) -> 
 
 
 def note_outcome(study: Any, number: int, result: Mapping[str, Any] | None) -> None:
-    """Notes what became of a trial: its running mean of rewards, that it was pruned or failed."""
+    """Report the outcome of a trial: its running mean of rewards, pruned or failed."""
     optuna = import_optuna()
     if study.trials[number].state != optuna.trial.TrialState.RUNNING:
         return

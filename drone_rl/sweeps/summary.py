@@ -1,6 +1,7 @@
-"""All figures of a sweep as plain values; its page, its tables and its words are made of them."""
+"""Statistics of a sweep: groups of runs, medians and fractions with intervals, the summary."""
 
 import csv
+import dataclasses
 import io
 import os
 import re
@@ -9,25 +10,32 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from drone_rl.sweeps import text as words
-from drone_rl.sweeps.groups import Group, make_groups
+import numpy as np
+
+from drone_rl.evaluation.rule import KINDS
 from drone_rl.sweeps.manifest import Sweep
-from drone_rl.sweeps.rows import Row
+from drone_rl.sweeps.rows import Array, Row
 from drone_rl.sweeps.runs import quoted
+from drone_rl.sweeps.text import GROUP_SENTENCES, SENTENCES
+from drone_rl.utils.intervals import median_bounds, proportion
 from drone_rl.utils.text import said
 
 STATES = ("finished", "failed", "damaged", "unfinished")
+FAILED = "failed"
+"""Pseudo-verdict of a failed run, in addition to `KINDS`."""
+_SEED = "seed"
+_NEVER = float("inf")
 
 
 def summarise_sweep(sweep: Sweep, rows: Sequence[Row]) -> dict[str, Any]:
-    """All figures as plain values, and the sentences that they allow."""
+    """Return all figures of a sweep as plain values, and the sentences that they license."""
     states = [row.state for row in rows]
     judged = [row.verdict for row in rows if row.verdict is not None]
     older = sum(row.has_older_verdict for row in rows)
-    groups = make_groups(rows)
+    judge_arguments = (f"folder={_path_argument(sweep.folder)}", "judge=true")
     summary = {
         "command": sweep.command,
-        "judge_command": _command("sweep-report", f"folder={_literal(sweep.folder)}", "judge=true"),
+        "judge_command": shlex.join(["drone-rl", "sweep-report", *judge_arguments]),
         **{name: states.count(name) for name in STATES},
         "copies": count_copies(rows),
         "judged": len(judged),
@@ -38,17 +46,36 @@ def summarise_sweep(sweep: Sweep, rows: Sequence[Row]) -> dict[str, Any]:
         "episodes": sorted({verdict["greedy"]["episodes"] for verdict in judged}),
         "sides_not_offered": sum(row.lean is None for row in rows if row.verdict is not None),
         "best": _best(rows),
-        "groups": [_group(group) for group in groups],
+        "groups": [_group_figures(group) for group in make_groups(rows)],
         "runs": [row.plain() for row in rows],
     }
-    return {**summary, "sentences": said(words.SENTENCES, summary)}
+    return {**summary, "sentences": said(SENTENCES, summary)}
+
+
+def _group_figures(group: "Group") -> dict[str, Any]:
+    figures = group.plain()
+    return {**figures, "sentences": said(GROUP_SENTENCES, figures)}
+
+
+def _best(rows: Sequence[Row]) -> dict[str, Any] | None:
+    ranked = best_rows(rows)
+    if not ranked:
+        return None
+    best, verdict = ranked[0], ranked[0].verdict or {}
+    policy = f"policy={_path_argument(best.run.folder)}"
+    return {
+        **best.plain(),
+        "episodes": verdict["greedy"]["episodes"],
+        "equals": sum(row.share("all") == best.share("all") for row in ranked) - 1,
+        "command": best.run.repeat_command(),
+        "report_command": shlex.join(["drone-rl", "verdict", policy]),
+    }
 
 
 def best_rows(rows: Sequence[Row]) -> list[Row]:
-    """The runs that were judged, those first that collect the greatest share of their cubes.
+    """Rank the judged runs by the fraction of cubes collected, then by the fewest frames.
 
-    Of equals the ones that were trained with the fewest frames come first. Cubes are no measure:
-    a task with more of them would win.
+    Fractions make tasks with different numbers of cubes comparable.
     """
     judged = [row for row in rows if row.verdict is not None]
     return sorted(judged, key=lambda row: (-(row.share("all") or 0.0), row.frames))
@@ -65,7 +92,7 @@ def count_copies(rows: Sequence[Row]) -> int:
 
 
 def to_csv(rows: Sequence[Row]) -> str:
-    """The table of runs."""
+    """Return the table of runs as CSV."""
     text = io.StringIO()
     plain = [row.plain() for row in rows]
     writer = csv.DictWriter(text, fieldnames=list(plain[0]) if plain else [])
@@ -74,31 +101,163 @@ def to_csv(rows: Sequence[Row]) -> str:
     return text.getvalue()
 
 
-def _group(group: Group) -> dict[str, Any]:
-    figures = group.plain()
-    return {**figures, "sentences": said(words.GROUP_SENTENCES, figures)}
-
-
-def _best(rows: Sequence[Row]) -> dict[str, Any] | None:
-    ranked = best_rows(rows)
-    if not ranked:
-        return None
-    best, verdict = ranked[0], ranked[0].verdict or {}
-    return {
-        **best.plain(),
-        "episodes": verdict["greedy"]["episodes"],
-        "equals": sum(row.share("all") == best.share("all") for row in ranked) - 1,
-        "command": best.run.repeat_command(),
-        "report_command": _command("verdict", f"policy={_literal(best.run.folder)}"),
-    }
-
-
-def _command(*words: str) -> str:
-    return shlex.join(["drone-rl", *words])
-
-
-def _literal(path: Path) -> str:
-    """A path as Hydra's command line takes it, from here if it lies below."""
+def _path_argument(path: Path) -> str:
+    """Return a path for Hydra's command line, relative if it is below the current folder."""
     text = str(path.relative_to(Path.cwd())) if path.is_relative_to(Path.cwd()) else str(path)
     plain = re.fullmatch(rf"[\w.+:{re.escape(os.sep)}-]+", text)
     return text if plain else quoted(text)
+
+
+@dataclasses.dataclass
+class Group:
+    """Runs that differ in their seed only."""
+
+    choice: dict[str, str]
+    """Their values of the swept settings."""
+    rows: list[Row]
+    """The runs."""
+
+    @property
+    def finished(self) -> list[Row]:
+        """Runs with a result."""
+        return self.of_state("finished")
+
+    @property
+    def ended(self) -> list[Row]:
+        """Runs that are not unfinished: the denominator of fractions."""
+        return [row for row in self.rows if row.state != "unfinished"]
+
+    @property
+    def known(self) -> list[Row]:
+        """Runs with known progress: finished or failed."""
+        return [row for row in self.ended if row.state != "damaged"]
+
+    def of_state(self, state: str) -> list[Row]:
+        """Return the runs in one state."""
+        return [row for row in self.rows if row.state == state]
+
+    @property
+    def solved(self) -> dict[str, Any]:
+        """Fraction of the ended runs that reached their target; failed runs did not."""
+        hits = sum(row.is_solved for row in self.finished)
+        return share_of_runs(hits, len(self.ended) - len(self.known), len(self.ended))
+
+    @property
+    def verdicts(self) -> dict[str, dict[str, Any]]:
+        """Fraction of each of `KINDS`, and of failures, among the ended runs.
+
+        A run without a verdict may be of any kind, a damaged one may also be a failure. "certain"
+        counts the certain verdicts.
+        """
+        judged = [row for row in self.finished if row.kind is not None]
+        failed = self.of_state("failed")
+        unknown = len(self.ended) - len(judged) - len(failed)
+        shares = {}
+        for kind in KINDS:
+            rows = [row for row in judged if row.kind == kind]
+            shares[kind] = share_of_runs(len(rows), unknown, len(self.ended))
+            shares[kind]["certain"] = sum(row.is_certain for row in rows)
+        damaged = len(self.of_state("damaged"))
+        failures = share_of_runs(len(failed), damaged, len(self.ended))
+        return {**shares, FAILED: {**failures, "certain": len(failed)}}
+
+    def plain(self) -> dict[str, Any]:
+        """Return counts, fractions and medians with exact intervals."""
+        known, states = self.known, [row.state for row in self.rows]
+        return {
+            **self.choice,
+            "runs": len(self.rows),
+            "ended": len(self.ended),
+            **{name: states.count(name) for name in ("failed", "damaged", "unfinished")},
+            "judged": sum(row.kind is not None for row in self.finished),
+            "solved": self.solved,
+            "frames_to_solve": _to_solve(known, [row.frames for row in known]),
+            "seconds_to_solve": _to_solve(known, [row.seconds for row in known]),
+            "final_share": median_of_runs([row.final_share for row in known]),
+            "entropy": median_of_runs([r.entropy for r in self.finished if r.entropy is not None]),
+            "verdicts": self.verdicts,
+        }
+
+
+def make_groups(rows: Sequence[Row]) -> list[Group]:
+    """Group runs that differ in their seed only, in the order of their first run."""
+    groups: dict[tuple, Group] = {}
+    for row in rows:
+        choice = {key: value for key, value in row.choice.items() if key != _SEED}
+        groups.setdefault(tuple(choice.items()), Group(choice, [])).rows.append(row)
+    return list(groups.values())
+
+
+def _to_solve(rows: Sequence[Row], had: Sequence[float]) -> dict[str, Any]:
+    """Return the median cost to solve; an unsolved run needs more than it had (censored)."""
+    pairs = zip(rows, had, strict=True)
+    return median_of_runs([value if row.is_solved else _NEVER for row, value in pairs], had)
+
+
+def share_of_runs(successes: int, unknown: int, trials: int) -> dict[str, Any]:
+    """Return a fraction of runs with an interval that holds whatever the unknown runs are.
+
+    Args:
+        successes: Runs known to be successes.
+        unknown: Runs that may all be successes, or none.
+        trials: All runs, including the unknown ones.
+
+    Returns:
+        As `proportion`, with "unknown".
+    """
+    upper = proportion(successes + unknown, trials)["upper95"]
+    return {**proportion(successes, trials), "upper95": upper, "unknown": unknown}
+
+
+def median_of_runs(values: Sequence[float], had: Sequence[float] | None = None) -> dict[str, Any]:
+    """Return the median over runs with its exact interval, allowing for censored values.
+
+    Args:
+        values: One per run; infinite for a censored run, which ended without reaching its target.
+        had: What each run had at its end; a lower bound for a censored run.
+
+    Returns:
+        "median" (None of no runs, or if at least half are censored), "more_than" (then a lower
+        bound), "lower95" and "upper95" (None of fewer than six runs; "upper95" also if it is
+        unbounded) and "runs".
+    """
+    least = values if had is None else had
+    middle = float(np.median(values)) if len(values) else None
+    low, high = median_bounds(least), median_bounds(values)
+    return {
+        "median": middle if middle is not None and np.isfinite(middle) else None,
+        "more_than": float(np.median(least)) if middle == float("inf") else None,
+        "lower95": None if low is None else low[0],
+        "upper95": None if high is None or not np.isfinite(high[1]) else high[1],
+        "runs": len(values),
+    }
+
+
+def median_band(values: Array) -> tuple[Array, Array] | None:
+    """Return the pointwise exact interval of the median.
+
+    Args:
+        values: One row per run. Shape: (num_runs, num_points).
+
+    Returns:
+        Lower and upper bounds, of shape (num_points,) each; None of fewer than six runs.
+    """
+    bounds = [median_bounds(column) for column in np.asarray(values, float).T]
+    known = [pair for pair in bounds if pair is not None]
+    if not known:
+        return None
+    lower, upper = np.array(known).T
+    return lower, upper
+
+
+def on_grid(x: Array, y: Array, grid: Array) -> Array:
+    """Interpolate a curve; it is 0 before its first point and constant after its last.
+
+    Args:
+        x: Increasing positions; empty for a run without progress. Shape: (n,).
+        y: Values there. Shape: (n,).
+        grid: Positions of the result.
+    """
+    if len(x) == 0:
+        return np.zeros_like(grid)
+    return np.interp(grid, x, y, left=0.0)

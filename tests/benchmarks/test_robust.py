@@ -94,7 +94,7 @@ def test_a_quick_one_trains_one_seed_for_a_moment(called, monkeypatch, tmp_path)
 def test_policies_are_flown_in_worlds_of_minimal_look(monkeypatch, tmp_path):
     seen = {}
 
-    def compare(bed, subjects, axes, **how):
+    def compare(evaluator, subjects, axes, **how):
         seen.update(subjects)
         return {name: {PLAIN: 1.0} for name in subjects}
 

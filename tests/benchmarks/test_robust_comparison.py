@@ -4,7 +4,7 @@ import dataclasses
 
 import pytest
 
-from benchmarks.robust_comparison import changed, touched_axes, untouched_kinds
+from benchmarks.robust_comparison import TOUCHED_BY, changed, touched_axes, untouched_kinds
 from drone_rl.config import AppearanceSettings, CameraSettings, TaskSettings
 from drone_rl.config.training import TrainSettings
 from drone_rl.config.transforms import Blur, Fault, Gray, LateFrames, Noise, Shift, Standardize
@@ -52,7 +52,7 @@ def test_what_settings_touch(settings, axes):
 
 
 def test_no_look_and_no_fault_goes_unseen():
-    named = {name for axis in AXES.values() for name in axis.touched_by}
+    named = {name for names in TOUCHED_BY.values() for name in names}
     looks = {f"appearance.{field.name}" for field in dataclasses.fields(AppearanceSettings)}
     faults = {f"transforms.{snake_case(fault)}" for fault in (Blur, *Fault.variants())}
     assert looks | faults <= named
@@ -63,4 +63,4 @@ def test_settings_that_axes_name_exist():
     known |= {f"transforms.{snake_case(fault)}" for fault in (Blur, *Fault.variants())}
     known |= {f"task.{f.name}" for f in dataclasses.fields(TaskSettings)}
     known |= {"camera.horizontal_fov", "task.width", "task.pillar_color"}
-    assert {name for axis in AXES.values() for name in axis.touched_by} <= known
+    assert {name for names in TOUCHED_BY.values() for name in names} <= known

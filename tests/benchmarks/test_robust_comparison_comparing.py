@@ -14,22 +14,22 @@ AHEAD = TaskSettings(num_cubes=1, first_distance=8.0, front_margin=4.0, lateral_
 
 
 @pytest.fixture
-def bed():
+def evaluator():
     made = PairedEvaluator(subject(Blind(0), task=AHEAD), 3)
     yield made
     made.close()
 
 
-def test_who_flies_straight_on_minds_no_blur_and_who_turns_never_arrives(bed):
+def test_who_flies_straight_on_minds_no_blur_and_who_turns_never_arrives(evaluator):
     told = []
-    subjects = {"ahead": bed.subject, "left": subject(Blind(1), task=AHEAD)}
-    found = compare(bed, subjects, [AXES["blur"], AXES["object_size"]], tell=told.append)
+    subjects = {"ahead": evaluator.subject, "left": subject(Blind(1), task=AHEAD)}
+    found = compare(evaluator, subjects, [AXES["blur"], AXES["object_size"]], tell=told.append)
     assert found["ahead"] == {PLAIN: 1.0, "blur": 1.0, "object_size": 1.0}
     assert found["left"] == {PLAIN: 0.0, "blur": 0.0, "object_size": 0.0}
     assert told == ["blur", "object_size"]
 
 
-def test_impossible_strengths_are_left_out_for_all(bed):
+def test_impossible_strengths_are_left_out_for_all(evaluator):
     """No picture shows anything: not even who sees what the picture shows finds a cube."""
     dark = dataclasses.replace(AXES["dead_rows"], strengths=(5.0,) * 5)
     aside = AHEAD.replace(lateral_bound=6.0)
@@ -40,7 +40,7 @@ def test_impossible_strengths_are_left_out_for_all(bed):
         field.close()
     assert set(found["one"]) == {PLAIN}
     half = dataclasses.replace(dark, strengths=(5.0, 5.0, 5.0, 5.0, 0.0))
-    assert compare(bed, {"one": bed.subject}, [half])["one"]["dead_rows"] == 1.0
+    assert compare(evaluator, {"one": evaluator.subject}, [half])["one"]["dead_rows"] == 1.0
 
 
 def test_means_of_axes_and_of_kinds_by_hand():

@@ -36,8 +36,8 @@ def make_worlds():
 def test_a_policy_sees_what_its_transforms_make_of_spoilt_pictures():
     worlds, network = make_worlds(), Looking()
     flying = torch.tensor([0, 2])
-    eyes = PolicyAgent(network, [GrayPixels()], 3)
-    action, seen = eyes.act(sight(worlds, flying, lambda p, f, nothing=0.0: p / 2))
+    agent = PolicyAgent(network, [GrayPixels()], 3)
+    action, seen = agent.act(sight(worlds, flying, lambda p, f, nothing=0.0: p / 2))
     gray = GrayPixels()._apply_transform(worlds.render(worlds.state[flying]))
     worlds.close()
     assert action.tolist() == [1, 1]
@@ -54,14 +54,14 @@ def test_colours_are_drawn_for_who_sees_colours():
 
 def test_a_stack_of_frames_holds_those_of_the_worlds_that_still_fly():
     worlds, network = make_worlds(), Looking()
-    eyes = PolicyAgent(network, [GrayPixels(), CatFrames(N=2, dim=-3, in_keys=["pixels"])], 3)
+    agent = PolicyAgent(network, [GrayPixels(), CatFrames(N=2, dim=-3, in_keys=["pixels"])], 3)
     step = iter((0.25, 0.5))
 
     def mark(pictures, flying, nothing=0.0):
         return torch.zeros_like(pictures) + next(step) + flying[:, None, None, None]
 
-    eyes.act(sight(worlds, torch.arange(3), mark))
-    eyes.act(sight(worlds, torch.tensor([1, 2]), mark))
+    agent.act(sight(worlds, torch.arange(3), mark))
+    agent.act(sight(worlds, torch.tensor([1, 2]), mark))
     worlds.close()
     assert network.shown[0][:, :, 0, 0].tolist() == [[0.25] * 2, [1.25] * 2, [2.25] * 2]
     assert network.shown[1][:, :, 0, 0].tolist() == [[1.25, 1.5], [2.25, 2.5]]
@@ -81,10 +81,10 @@ def test_episodes_with_a_frame_on_which_rounding_decides_are_noted():
     worlds = make_worlds()
     bright = torch.tensor([1.0, 0.0, 0.0])
     for examines in (True, False):
-        eyes = PolicyAgent(Tied(), [GrayPixels()], 3, examines_rounding=examines)
+        agent = PolicyAgent(Tied(), [GrayPixels()], 3, examines_rounding=examines)
         for flying in (torch.arange(3), torch.tensor([1, 2])):
-            eyes.act(sight(worlds, flying, lambda p, f: 0 * p + bright[f, None, None, None]))
-        assert eyes.is_fragile.tolist() == [examines, False, False]
+            agent.act(sight(worlds, flying, lambda p, f: 0 * p + bright[f, None, None, None]))
+        assert agent.is_fragile.tolist() == [examines, False, False]
     worlds.close()
 
 
@@ -94,8 +94,8 @@ def test_who_looks_at_nothing_does_the_same_always_or_anything_alike():
     generator = torch.Generator().manual_seed(0)
     action, seen = BaselineAgent("right", MOVES, generator).act(where)
     assert (action.tolist(), seen) == ([2, 2, 2], None)
-    eyes = BaselineAgent("random", MOVES, generator)
-    drawn = torch.cat([eyes.act(where)[0] for _ in range(200)])
+    agent = BaselineAgent("random", MOVES, generator)
+    drawn = torch.cat([agent.act(where)[0] for _ in range(200)])
     worlds.close()
     assert (drawn.bincount() / 600 - 1 / 3).abs().max() < 0.08
 

@@ -12,7 +12,7 @@ from drone_rl.robustness import domain
 from drone_rl.robustness.agents import OracleAgent
 from drone_rl.robustness.axes import AXES, Axis
 from drone_rl.robustness.domain import Prober, is_surely_good
-from drone_rl.robustness.faults import DeadRows
+from drone_rl.robustness.faults import dead_rows
 from drone_rl.robustness.paired_evaluation import PairedEvaluator
 from drone_rl.robustness.perturbations import Condition
 from drone_rl.utils.intervals import mean_bounds
@@ -24,13 +24,15 @@ def make_prober():
     beds = []
 
     def make(of, episodes=300):
-        bed = PairedEvaluator(of, episodes)
-        beds.append(bed)
-        return Prober(bed, bed.fly(Condition(), eyes=OracleAgent(looks=False)).episodes, 0.9)
+        evaluator = PairedEvaluator(of, episodes)
+        beds.append(evaluator)
+        return Prober(
+            evaluator, evaluator.run(Condition(), agent=OracleAgent(looks=False)).episodes, 0.9
+        )
 
     yield make
-    for bed in beds:
-        bed.close()
+    for evaluator in beds:
+        evaluator.close()
 
 
 def good_at(prober, is_good, monkeypatch):
@@ -108,7 +110,7 @@ def test_another_seed_draws_other_strengths(make_prober, monkeypatch):
     drawn = []
     for seed in (0, 1):
         prober = make_prober(subject(), 1)
-        monkeypatch.setattr(prober._bed, "seed", seed)
+        monkeypatch.setattr(prober._evaluator, "seed", seed)
         asked = good_at(prober, lambda s: True, monkeypatch)
         prober.search(axis((1.0, 2.0, 3.0, 4.0, 5.0)))
         drawn.append([s for s, _ in asked if s % 1])
@@ -223,7 +225,7 @@ def test_good_is_what_is_surely_good_and_better_than_luck():
         "success": Quantity(0.1, 0.05, 0.15, (0.0,)),
         **{f"offered {s}": Quantity(0.5, 0.4, 0.6, (0.05,)) for s in rule.strata},
         **{f"collected {s}": Quantity(0.9, 0.8, 1.0, (0.3, 0.7)) for s in rule.strata},
-        **{f"above {name}": Quantity(0.5, 0.4, 0.6, (0.0,)) for name in rule.luck},
+        **{f"above {name}": Quantity(0.5, 0.4, 0.6, (0.0,)) for name in rule.blind_baselines},
     }
     assert is_surely_good(sure, rule)
     for name, lower in (("success", -0.01), ("collected right", 0.69), ("above forward", -0.01)):
@@ -239,16 +241,20 @@ def test_it_is_compared_with_who_knows_everything(make_prober):
 def test_baselines_fly_under_the_condition_once_for_each_task(make_prober, monkeypatch):
     """Blind policies meet the task as it is changed, whatever the camera shows."""
     prober = make_prober(subject(), 4)
-    flown, blindly = [], prober._bed.fly_blindly
+    flown, blindly = [], prober._evaluator.run_baselines
     monkeypatch.setattr(
-        prober._bed, "fly_blindly", lambda condition: flown.append(condition) or blindly(condition)
+        prober._evaluator,
+        "run_baselines",
+        lambda condition: flown.append(condition) or blindly(condition),
     )
     shorter = Condition(task={"step_length": 0.5})
     assert prober.probe(shorter, 1.0)["refused"] is None
-    prober.probe(dataclasses.replace(shorter, faults=(DeadRows(1),)), 1.0)
+    prober.probe(dataclasses.replace(shorter, faults=(dead_rows(1),)), 1.0)
     prober.probe(Condition(), 1.0)
     assert flown == [shorter]
-    lengths = [baselines["forward"].length.double().mean() for baselines in prober._luck.values()]
+    lengths = [
+        baselines["forward"].length.double().mean() for baselines in prober._baselines.values()
+    ]
     assert lengths[1] > 1.8 * lengths[0]  # nearly twice as many steps to the boundary
 
 
@@ -257,7 +263,7 @@ def test_impossible_is_what_the_oracle_surely_fails_at(make_prober):
     prober = make_prober(subject(), 60)
     found = prober.probe(Condition(), domain.WALKING)
     blind = dataclasses.replace(
-        AXES["dead_rows"], make=lambda s, _: Condition(faults=(DeadRows(5),))
+        AXES["dead_rows"], make=lambda s, _: Condition(faults=(dead_rows(5),))
     )
     seen = prober._explain(blind, 1.0, found)["oracle"]
     assert seen["lower95"] < seen["share"] < seen["upper95"] < 0.9
@@ -298,7 +304,7 @@ def test_what_nobody_can_do_is_called_so(make_prober):
     prober = make_prober(subject(), 60)
     found = prober.probe(Condition(), domain.WALKING)
     blind = dataclasses.replace(
-        AXES["dead_rows"], make=lambda s, _: Condition(faults=(DeadRows(5),))
+        AXES["dead_rows"], make=lambda s, _: Condition(faults=(dead_rows(5),))
     )
     told = prober._explain(blind, 1.0, found)
     assert told["impossible"] and told["oracle"]["share"] < 0.9

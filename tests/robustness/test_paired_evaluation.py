@@ -7,10 +7,10 @@ import drone_rl
 from drone_rl.config import DynamicsSettings, TaskSettings
 from drone_rl.evaluation.rollouts import run_episodes
 from drone_rl.robustness.axes import AXES
-from drone_rl.robustness.faults import Late
+from drone_rl.robustness.faults import late_frames
 from drone_rl.robustness.paired_evaluation import PairedEvaluator, PolicySpec
-from drone_rl.robustness.perturbations import ONSET_STEP, Condition, Mode, Whitened
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.robustness.perturbations import ONSET_STEP, Condition, Mode, whiten
+from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import Stream
@@ -26,17 +26,17 @@ def make_bed():
         return beds[-1]
 
     yield make
-    for bed in beds:
-        bed.close()
+    for evaluator in beds:
+        evaluator.close()
 
 
 def test_with_nothing_different_flights_are_those_of_the_environment(make_bed):
     policy = drone_rl.load_policy("poor")
     network, described = policy.make_network().eval(), policy.description
-    bed = make_bed(
+    evaluator = make_bed(
         PolicySpec(network, policy.task, described.camera, described.make_transforms()), 6
     )
-    flown = bed.fly(Condition()).episodes
+    flown = evaluator.run(Condition()).episodes
     with policy.flying(6, stream=Stream.SHIFTED) as (env, actor):
         expected = run_episodes(env, actor, 6)
     order = [expected.goals.world.tolist().index(world) for world in flown.goals.world.tolist()]
@@ -47,19 +47,19 @@ def test_with_nothing_different_flights_are_those_of_the_environment(make_bed):
 
 
 def test_flights_are_repeated_exactly(make_bed):
-    bed = make_bed(subject(), 5)
-    condition = AXES["slow_noise"].make(32.0, bed.subject) | AXES["object_color"].make(
-        0.3, bed.subject
+    evaluator = make_bed(subject(), 5)
+    condition = AXES["slow_noise"].make(32.0, evaluator.subject) | AXES["object_color"].make(
+        0.3, evaluator.subject
     )
     for mode in Mode:
-        one, two = bed.fly(condition, mode), bed.fly(condition, mode)
+        one, two = evaluator.run(condition, mode), evaluator.run(condition, mode)
         assert torch.equal(one.trace, two.trace)
         assert torch.equal(one.episodes.length, two.episodes.length)
 
 
 def test_who_flies_straight_on_ends_when_it_must(make_bed):
-    bed = make_bed(subject(Blind(0)), 20)
-    flown = bed.fly(Condition()).episodes
+    evaluator = make_bed(subject(Blind(0)), 20)
+    flown = evaluator.run(Condition()).episodes
     hit = flown.goals.world.reshape(20, 3)[:, 1].abs() <= 1.65
     assert torch.equal(flown.success.bool(), hit)
     # touches at x = 8 - 1.65, so after 7 moves; else the boundary at x > 12 ends it after 13
@@ -69,20 +69,22 @@ def test_who_flies_straight_on_ends_when_it_must(make_bed):
 
 
 def test_a_delayed_action_is_the_one_decided_so_many_steps_before(make_bed):
-    """Late pictures make the same flights as late actions, of who remembers nothing."""
-    bed = make_bed(subject(), 20)
-    late = bed.fly(Condition(faults=(Late(2),))).episodes
-    delayed = bed.fly(Condition(delay=2)).episodes
+    """late_frames pictures make the same flights as late actions, of who remembers nothing."""
+    evaluator = make_bed(subject(), 20)
+    late = evaluator.run(Condition(faults=(late_frames(2),))).episodes
+    delayed = evaluator.run(Condition(delay=2)).episodes
     assert torch.equal(late.length, delayed.length)
     assert torch.equal(late.end_reason, delayed.end_reason)
-    assert not torch.equal(delayed.length, bed.fly(Condition()).episodes.length)
+    assert not torch.equal(delayed.length, evaluator.run(Condition()).episodes.length)
 
 
 def test_an_onset_changes_nothing_before_it(make_bed):
-    white = Condition(looks=(Whitened((Meaning.TARGET,), 1.0),))
-    bed = make_bed(subject(task=TaskSettings(num_cubes=2, first_distance=15.0, spacing=9.0)), 12)
-    plain, onset = bed.fly(Condition()), bed.fly(white, Mode.ONSET)
-    constant = bed.fly(white)
+    white = Condition(looks=(whiten((SemanticClass.TARGET,), 1.0),))
+    evaluator = make_bed(
+        subject(task=TaskSettings(num_cubes=2, first_distance=15.0, spacing=9.0)), 12
+    )
+    plain, onset = evaluator.run(Condition()), evaluator.run(white, Mode.ONSET)
+    constant = evaluator.run(white)
     early = plain.episodes.length <= ONSET_STEP
     assert torch.equal(onset.trace[early], plain.trace[early])
     assert (onset.trace[~early] != plain.trace[~early]).all()
@@ -90,37 +92,37 @@ def test_an_onset_changes_nothing_before_it(make_bed):
 
 
 def test_luck_is_what_the_task_calls_so(make_bed):
-    bed = make_bed(subject(Blind(1)), 20)
-    luck = bed.fly_blindly(Condition())
-    assert [*luck] == ["random", "forward", "left", "right"]
-    assert torch.equal(luck["left"].length, bed.fly(Condition()).episodes.length)
-    assert torch.equal(luck["left"].goals.world, luck["random"].goals.world)
+    evaluator = make_bed(subject(Blind(1)), 20)
+    blind = evaluator.run_baselines(Condition())
+    assert [*blind] == ["random", "forward", "left", "right"]
+    assert torch.equal(blind["left"].length, evaluator.run(Condition()).episodes.length)
+    assert torch.equal(blind["left"].goals.world, blind["random"].goals.world)
 
 
 def test_a_size_that_cannot_be_is_refused(make_bed):
-    bed = make_bed(subject(), 1)
+    evaluator = make_bed(subject(), 1)
     with pytest.raises(InputError, match=r"task\.altitude=2\.5 sinks cubes"):
-        bed.settings(Condition(task={"cube_size": 9.0}))
+        evaluator.settings(Condition(task={"cube_size": 9.0}))
     with pytest.raises(InputError, match=r"camera\.horizontal_fov=175"):
-        bed.settings(Condition(camera={"horizontal_fov": 175.0}))
+        evaluator.settings(Condition(camera={"horizontal_fov": 175.0}))
 
 
 @pytest.mark.parametrize("axis", AXES.values(), ids=AXES)
 def test_at_its_strongest_every_axis_changes_what_is_seen_or_done(axis, make_bed):
-    bed = make_bed(subject(Blind(0)), 3)
-    plain = bed.fly(Condition())
+    evaluator = make_bed(subject(Blind(0)), 3)
+    plain = evaluator.run(Condition())
     if axis.name in ("action_delay",):  # who does the same always does the same later
-        bed = make_bed(subject(), 12)
-        plain = bed.fly(Condition())
-    flown = bed.fly(axis.make(axis.strengths[-1], bed.subject))
+        evaluator = make_bed(subject(), 12)
+        plain = evaluator.run(Condition())
+    flown = evaluator.run(axis.make(axis.strengths[-1], evaluator.subject))
     assert not torch.equal(flown.trace, plain.trace)
 
 
 def test_the_worlds_are_the_same_under_every_condition(make_bed):
-    bed = make_bed(subject(), 4)
-    plain = bed.fly(Condition()).episodes.goals.world
+    evaluator = make_bed(subject(), 4)
+    plain = evaluator.run(Condition()).episodes.goals.world
     for axis in (AXES["object_size"], AXES["step_length"], AXES["field_of_view"]):
-        flown = bed.fly(axis.make(axis.strengths[2], bed.subject)).episodes
+        flown = evaluator.run(axis.make(axis.strengths[2], evaluator.subject)).episodes
         assert torch.equal(flown.goals.world, plain)
     assert TASK.cube_size == 2.5
 
@@ -131,7 +133,7 @@ def test_flights_in_another_body_are_those_of_the_environment(make_bed):
     network, described = policy.make_network().eval(), policy.description
     pipeline = described.make_transforms()
     told = PolicySpec(network, policy.task, described.camera, pipeline, dynamics=gusty)
-    flown = make_bed(told, 3).fly(Condition()).episodes
+    flown = make_bed(told, 3).run(Condition()).episodes
     with policy.flying(3, stream=Stream.SHIFTED) as (env, actor):
         expected = run_episodes(env, actor, 3)
     order = [expected.goals.world.tolist().index(world) for world in flown.goals.world.tolist()]

@@ -5,20 +5,20 @@ import torch
 
 from drone_rl.config import MINIMAL
 from drone_rl.robustness.perturbations import (
-    Exposed,
-    Fogged,
-    SunAt,
-    Tinted,
-    Whitened,
     elevation,
-    look_of,
+    expose,
+    fog,
+    scene_appearance,
+    sun_at,
+    tint,
+    whiten,
 )
 from drone_rl.sim.rendering import Appearance
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.worlds import Worlds
 
 PLAIN = Appearance(
-    colors={Meaning.TARGET: (0.8, 0.1, 0.0), Meaning.SKY: (0.6, 0.7, 0.9)},
+    colors={SemanticClass.TARGET: (0.8, 0.1, 0.0), SemanticClass.SKY: (0.6, 0.7, 0.9)},
     ambient=(0.3, 0.3, 0.3),
     sun=(0.7, 0.7, 0.7),
     sun_direction=(3.0, -4.0, -12.0),
@@ -28,34 +28,34 @@ NONE = torch.zeros(2, 0)
 
 def test_each_world_is_tinted_in_its_own_way_and_no_farther_than_black_and_white():
     sway = torch.tensor([[1.0, -1.0, 1.0], [-0.5, 0.0, 1.0]], dtype=torch.float64)
-    made = Tinted((Meaning.TARGET, Meaning.OBSTACLE), 0.3)(PLAIN, sway)
+    made = tint((SemanticClass.TARGET, SemanticClass.OBSTACLE), 0.3).change(PLAIN, sway)
     expected = torch.tensor([[1.0, 0.0, 0.3], [0.65, 0.1, 0.3]], dtype=torch.float64)
-    torch.testing.assert_close(made.colors[Meaning.TARGET], expected)
-    assert made.colors[Meaning.SKY] == PLAIN.colors[Meaning.SKY]
-    assert Meaning.OBSTACLE not in made.colors
+    torch.testing.assert_close(made.colors[SemanticClass.TARGET], expected)
+    assert made.colors[SemanticClass.SKY] == PLAIN.colors[SemanticClass.SKY]
+    assert SemanticClass.OBSTACLE not in made.colors
 
 
 def test_white_is_mixed_in():
-    made = Whitened((Meaning.TARGET,), 0.5)(PLAIN, NONE)
-    assert made.colors[Meaning.TARGET].tolist() == pytest.approx([0.9, 0.55, 0.5])
+    made = whiten((SemanticClass.TARGET,), 0.5).change(PLAIN, NONE)
+    assert made.colors[SemanticClass.TARGET].tolist() == pytest.approx([0.9, 0.55, 0.5])
 
 
 def test_the_sun_sinks_where_it_stood():
-    made = SunAt(30.0)(PLAIN, NONE).sun_direction
+    made = sun_at(30.0).change(PLAIN, NONE).sun_direction
     assert made.tolist() == pytest.approx([0.6 * 3**0.5 / 2, -0.8 * 3**0.5 / 2, -0.5])
     assert elevation(made) == pytest.approx(30.0)
-    assert elevation(SunAt(0.0)(PLAIN, NONE).sun_direction) == pytest.approx(0.0)
+    assert elevation(sun_at(0.0).change(PLAIN, NONE).sun_direction) == pytest.approx(0.0)
 
 
 def test_exposure_multiplies_what_there_was_and_fog_is_as_told():
-    assert Exposed(2.0)(PLAIN, NONE).exposure == 2.0
-    assert Exposed(2.0)(dataclasses.replace(PLAIN, exposure=0.75), NONE).exposure == 1.5
-    assert Fogged(40.0)(PLAIN, NONE).fog == 40.0
+    assert expose(2.0).change(PLAIN, NONE).exposure == 2.0
+    assert expose(2.0).change(dataclasses.replace(PLAIN, exposure=0.75), NONE).exposure == 1.5
+    assert fog(40.0).change(PLAIN, NONE).fog == 40.0
 
 
 def test_the_look_of_a_scene_is_all_given_and_draws_the_same():
     worlds = Worlds(1, num_shards=1)
-    look = look_of(worlds.scene)
+    look = scene_appearance(worlds.scene)
     assert elevation(look.sun_direction) == pytest.approx(MINIMAL.sun_elevation, abs=0.05)
     drawn = worlds.render(worlds.state).clone()
     assert torch.equal(worlds.render(worlds.state, appearance=look), drawn)

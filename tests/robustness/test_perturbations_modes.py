@@ -3,12 +3,12 @@ import itertools
 import pytest
 import torch
 
-from drone_rl.robustness.perturbations import DRIFT, Mode, reflect, sways
+from drone_rl.robustness.perturbations import DRIFT, Mode, reflect, variations
 
 
 def first(mode, steps, count=1000, dimensions=(1, 2)):
     generator = torch.Generator().manual_seed(0)
-    return [*itertools.islice(sways(mode, dimensions, count, generator), steps)]
+    return [*itertools.islice(variations(mode, dimensions, count, generator), steps)]
 
 
 @pytest.mark.parametrize("mode", [Mode.CONSTANT, Mode.ONSET])

@@ -155,7 +155,7 @@ def test_a_strength_that_another_seed_draws_is_missed(read):
 
 
 def fog_of(good):
-    """Good down to 40 m of sight, in the present format and in the first one."""
+    """Good down to 40 m of visibility, and the same with low and high exchanged."""
     made = shifts_of(good, axes=("fog",))
     found = made["domain"]["ranges"]["fog"]
     assert (found["low"], found["high"]) == (40.0, None)
@@ -164,25 +164,22 @@ def fog_of(good):
     assert [failed["end"] for failed in found["failed"]] == ["low"]
     swapped = {"low": None, "high": 40.0, "low_open": None, "high_open": False}
     first = {f"domain.ranges.fog.{key}": value for key, value in swapped.items()}
-    return made, changed(
-        made, {**first, "format_version": 1, "domain.ranges.fog.failed.0.end": "high"}
-    )
+    return made, changed(made, {**first, "domain.ranges.fog.failed.0.end": "high"})
 
 
-def test_the_first_format_had_fog_the_other_way_round(good, tmp_path):
-    made, old = fog_of(good)
+def test_ends_of_an_inverse_axis_and_other_formats(good, tmp_path):
+    made, exchanged = fog_of(good)
     path = tmp_path / "shifts.json"
-    for data in (made, old):
-        path.write_text(json.dumps(data))
-        found = read_shifts(path, good.description, good.state["policy"])
-        assert found.numbers["domain"] == made["domain"]
-        assert found.numbers["format_version"] == 2
-    path.write_text(json.dumps({**old, "format_version": 2}))
+    path.write_text(json.dumps(made))
+    found = read_shifts(path, good.description, good.state["policy"])
+    assert found.numbers["domain"] == made["domain"]
+    path.write_text(json.dumps(exchanged))
     with pytest.raises(InputError, match="contradicts"):
         read_shifts(path, good.description, good.state["policy"])
-    path.write_text(json.dumps({**made, "format_version": 3}))
-    with pytest.raises(InputError, match="format_version=3"):
-        read_shifts(path, good.description, good.state["policy"])
+    for version in (1, 3):
+        path.write_text(json.dumps({**made, "format_version": version}))
+        with pytest.raises(InputError, match=f"format_version={version}"):
+            read_shifts(path, good.description, good.state["policy"])
 
 
 @pytest.mark.parametrize("broken", [3, {"ranges": 3}, {"ranges": {"fog": 3}}])

@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from drone_rl.robustness.axes import AXES
-from drone_rl.robustness.faults import DeadRows
+from drone_rl.robustness.faults import dead_rows
 from drone_rl.robustness.paired_evaluation import PairedEvaluator
 from drone_rl.robustness.perturbations import Condition, Mode
 from drone_rl.robustness.suite import Suite, area, mcnemar
@@ -17,9 +17,9 @@ def silent(text):
 
 @pytest.fixture(scope="module")
 def suite():
-    bed = PairedEvaluator(subject(Blind(0)), 20)
-    yield Suite(bed, [*Mode], 0.9)
-    bed.close()
+    evaluator = PairedEvaluator(subject(Blind(0)), 20)
+    yield Suite(evaluator, [*Mode], 0.9)
+    evaluator.close()
 
 
 def test_mcnemar_by_hand():
@@ -64,12 +64,12 @@ def test_what_changes_nothing_is_noticed(suite):
     level = suite.level(Condition())
     assert level["modes"]["constant"]["unchanged"]
     assert level["modes"]["constant"]["paired"] == {"lost": 0, "gained": 0, "p": 1.0}
-    tinted = suite.level(AXES["object_color"].make(0.3, suite._bed.subject))
+    tinted = suite.level(AXES["object_color"].make(0.3, suite._evaluator.subject))
     assert not tinted["modes"]["constant"]["unchanged"]
 
 
 def test_what_hides_all_is_impossible(suite):
-    level = suite.level(Condition(faults=(DeadRows(5),)))
+    level = suite.level(Condition(faults=(dead_rows(5),)))
     assert level["impossible"] and level["oracle"]["upper95"] < 0.9
 
 

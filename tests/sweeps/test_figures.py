@@ -7,8 +7,8 @@ import pytest
 from matplotlib.figure import Figure
 
 from drone_rl.sweeps import figures
-from drone_rl.sweeps.groups import make_groups
 from drone_rl.sweeps.rows import read_rows
+from drone_rl.sweeps.summary import make_groups
 
 
 def drawn(draw, sweep):

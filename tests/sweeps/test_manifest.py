@@ -42,7 +42,7 @@ def test_a_setting_that_has_changed_since_is_named(tmp_path, make_runs):
 def test_runs_of_something_else_are_refused(tmp_path, make_runs):
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "run.yaml").touch()
-    with pytest.raises(InputError, match="something else"):
+    with pytest.raises(InputError, match="holds other runs"):
         begin(tmp_path, make_runs("a=1"))
 
 
@@ -61,9 +61,9 @@ def test_no_sweep_and_a_damaged_one(tmp_path):
         ({"command": "drone-rl train; rm -rf ~"}, "no training command"),
         ({"settings": [1]}, "must be a mapping"),
         ({"plugins": []}, "'plugins' is unknown"),
-        ({"runs": [{"number": 0, "overrides": [], "folder": "../0"}]}, "not one in the sweep's"),
-        ({"runs": [{"number": 0, "overrides": [], "folder": "/tmp"}]}, "not one in the sweep's"),
-        ({"runs": [{"number": 0, "overrides": [], "folder": ".."}]}, "not one in the sweep's"),
+        ({"runs": [{"number": 0, "overrides": [], "folder": "../0"}]}, "not inside the sweep's"),
+        ({"runs": [{"number": 0, "overrides": [], "folder": "/tmp"}]}, "not inside the sweep's"),
+        ({"runs": [{"number": 0, "overrides": [], "folder": ".."}]}, "not inside the sweep's"),
         ({"runs": [{"number": -1, "overrides": [], "folder": "0"}]}, "number=-1"),
         ({"runs": [{"number": 0, "overrides": ["a._target_=b"], "folder": "0"}]}, "no plain"),
         ({"runs": [{"number": 0, "overrides": "a", "folder": "0"}]}, "overrides='a'"),

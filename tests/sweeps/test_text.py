@@ -41,19 +41,19 @@ SWEEP = {
 SAID = {
     "runs.counts": "6 runs: 6 finished, 0 failed, 0 damaged, 0 unfinished.",
     "runs.read": "All figures of 6 runs were read from files in their folders",
-    "verdicts.basis": "last policies of 6 runs, by 200 greedy episodes each in worlds to choose by",
-    "verdicts.certain": "error of at most 5%",
-    "best.chosen": "Run 3: good, with more than 99% of its cubes; chosen by 200 episodes in worlds",
-    "best.flattered": "best of 6",
-    "best.report": "`report`, which uses other worlds",
+    "verdicts.basis": "of 6 runs, by 200 greedy episodes each in selection environments",
+    "verdicts.certain": "error probability of at most 5%",
+    "best.chosen": "Run 3: good, with more than 99% of its cubes; selected by 200 episodes in",
+    "best.flattered": "best of 6 runs",
+    "best.report": "`report`, which uses other environments",
     "curves.band": "median over runs",
-    "curves.ends": "staying where it was",
+    "curves.ends": "extended by its last value",
     "shares.bars": "all 6 runs that ended",
     "sides.dots": "dot",
     "entropies.dots": "dot",
     "costs.dots": "reached its target",
     "costs.open": "needs more than that",
-    "settings.intervals": "Shares are of all runs that ended",
+    "settings.intervals": "Fractions are of all runs that ended",
 }
 """Part of each sentence that is said of this sweep."""
 
@@ -100,7 +100,7 @@ def test_nothing_else_is_said_of_a_sweep_where_all_went_well():
         ("curves.failed", changed(failed=1), "learned nothing"),
         ("sides.lost_left", with_run(verdict="one-sided (right)"), "1 run one-sided to the right"),
         ("sides.lost_right", with_run(verdict="one-sided (left)"), "1 run one-sided to the left"),
-        ("sides.not_offered", changed(sides_not_offered=1), "no cube was offered"),
+        ("sides.not_offered", changed(sides_not_offered=1), "one side had no cubes"),
         ("entropies.still", with_run(entropy=0.009), "1 run ended below 0.01 nats"),
     ],
 )

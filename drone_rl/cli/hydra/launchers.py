@@ -97,7 +97,7 @@ class SweepLauncher(Launcher):
 
     def _finish(self, sweep: Sweep, runs: Sequence[Run]) -> int:
         """Returns how many runs failed."""
-        from drone_rl.sweeps.page import (
+        from drone_rl.sweeps.report import (
             write_sweep_report,  # slow to import; no single run needs it
         )
 

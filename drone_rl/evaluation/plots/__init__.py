@@ -1,1 +1,1 @@
-"""Image and chart building blocks that reports, maps and films share."""
+"""Images and charts that reports, maps and videos share."""

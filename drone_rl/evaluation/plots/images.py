@@ -1,4 +1,4 @@
-"""Pictures made of the policy's own frames: tinted, heated, in rows, with the indicator."""
+"""Images of observations: tinted, with heat maps, in grids, with action probabilities."""
 
 from collections.abc import Mapping, Sequence
 
@@ -20,21 +20,21 @@ BOX: Color = (236, 238, 242)
 
 LEFT, UP, RIGHT = (-1.0, 0.0), (0.0, 1.0), (1.0, 0.0)
 HEIGHT = 84
-"""Pixels of the three arrows."""
+"""Height of the three arrows, pixels."""
 ROW = 18
-"""Pixels of one row, where actions point otherwise."""
+"""Height of one row otherwise, pixels."""
 
 
 def indicator(
     probabilities: Sequence[float], chosen: int, width: int, actions: ShownActions = SHOWN_MOVES
 ) -> Image.Image:
-    """One bar an action, as long as it is probable.
+    """Draw one bar per action, as long as it is probable.
 
     Args:
-        probabilities: By action number.
-        chosen: Its bar is red.
-        width: Pixels across.
-        actions: What they are called and where they point.
+        probabilities: By action.
+        chosen: Action whose bar is red.
+        width: Of the image, pixels.
+        actions: Names and arrows of the actions.
     """
     if sorted(actions.arrows) == sorted((LEFT, UP, RIGHT)):
         return _arrows(probabilities, chosen, width, actions)
@@ -44,7 +44,7 @@ def indicator(
 def _arrows(
     probabilities: Sequence[float], chosen: int, width: int, actions: ShownActions
 ) -> Image.Image:
-    """Left, up and right from the middle of the lower edge."""
+    """Bars to the left, up and to the right from the middle of the lower edge."""
     canvas, draw, font = _canvas(width, HEIGHT)
     middle, base, thick = width // 2, HEIGHT - 16, 10
     reach, up = width // 2 - 62, HEIGHT - 24
@@ -67,7 +67,7 @@ def _arrows(
 def _rows(
     probabilities: Sequence[float], chosen: int, width: int, actions: ShownActions
 ) -> Image.Image:
-    """A row for each action, those to the left first."""
+    """One row per action, those to the left first."""
     canvas, draw, font = _canvas(width, ROW * len(actions.names) + 4)
     start = width // 2
     for row, action in enumerate(actions.order):
@@ -87,19 +87,19 @@ def _canvas(
 
 
 SCALE = 5
-"""Screen pixels to one of the policy's in a single picture."""
+"""Enlargement of a single frame."""
 _CHANNELS = {"gray": 1, "rgb": 3, "chromaticity": 2}
-"""Of each frame that a policy gets."""
+"""Channels of each frame."""
 
 
 def tint(frame: NDArray, color: Color, strength: float = 0.4) -> NDArray:
-    """A frame washed with its action's colour. Shape: (H, W, 3), uint8."""
+    """Tint a frame with its action's colour. Shape: (H, W, 3), uint8."""
     wash = np.array(color, dtype=np.float64)
     return (frame * (1 - strength) + wash * strength).astype(np.uint8)
 
 
 def heated(frame: NDArray, heat: NDArray) -> NDArray:
-    """A frame in gray with a heat map over it, hot where it is bright. Shape: (H, W, 3), uint8."""
+    """Overlay a heat map on a frame in gray. Shape: (H, W, 3), uint8."""
     gray = np.repeat(frame.mean(-1, keepdims=True), 3, -1) * 0.75
     top = float(heat.max())
     share = heat.astype(np.float64) / top if top > 0 else np.zeros(heat.shape)
@@ -109,7 +109,7 @@ def heated(frame: NDArray, heat: NDArray) -> NDArray:
 
 
 def thumbnails(frames: NDArray, colors: Sequence[Color], cells: NDArray) -> Image.Image:
-    """Tinted frames on cells of a grid, none over another.
+    """Place tinted frames on the cells of a grid.
 
     Args:
         frames: Shape (N, H, W, 3).
@@ -133,7 +133,7 @@ def explained_frame(
     captions: tuple[str, str],
     actions: ShownActions = SHOWN_MOVES,
 ) -> Image.Image:
-    """A frame, its heat map, each under a caption, and the indicator, from top to bottom."""
+    """Stack a frame, its heat map, each under a caption, and the action probabilities."""
     plain, hot = enlarge(frame), enlarge(heated(frame, heat))
     bars = indicator(probabilities, chosen, plain.width, actions)
     return stacked([titled(plain, captions[0]), titled(hot, captions[1]), bars])
@@ -142,13 +142,13 @@ def explained_frame(
 def probed_frame(
     data: Mapping[str, NDArray], frame: int, caption: str, actions: ShownActions = SHOWN_MOVES
 ) -> Image.Image:
-    """A frame of the data set under a caption, with what the policy made of it.
+    """Stack a frame of the data set under a caption, and its action probabilities.
 
     Args:
         data: With "frames" (T, H, W, 3), "actions" (T,) and "probabilities" (T, num_actions).
-        frame: Which of the T.
-        caption: Over the picture.
-        actions: What they are.
+        frame: Index of the frame.
+        caption: Above the frame.
+        actions: Names and arrows of the actions.
     """
     plain = titled(enlarge(data["frames"][frame]), caption)
     chosen = int(data["actions"][frame])
@@ -157,13 +157,13 @@ def probed_frame(
 
 
 def enlarge(frame: NDArray, scale: int = SCALE) -> Image.Image:
-    """A frame with each pixel as a square."""
+    """Enlarge a frame without interpolation."""
     picture = Image.fromarray(frame)
     return picture.resize((picture.width * scale, picture.height * scale), Image.Resampling.NEAREST)
 
 
 def titled(picture: Image.Image, caption: str) -> Image.Image:
-    """A picture under a line of text."""
+    """Put a line of text above an image."""
     canvas = Image.new("RGB", (picture.width, picture.height + 22), BACKGROUND)
     ImageDraw.Draw(canvas).text((2, 2), caption, INK, ImageFont.load_default(14))
     canvas.paste(picture, (0, 22))
@@ -171,7 +171,7 @@ def titled(picture: Image.Image, caption: str) -> Image.Image:
 
 
 def stacked(pictures: Sequence[Image.Image], gap: int = 3) -> Image.Image:
-    """Pictures one under another."""
+    """Stack images from top to bottom."""
     width = max(p.width for p in pictures)
     height = sum(p.height for p in pictures) + gap * (len(pictures) - 1)
     canvas, y = Image.new("RGB", (width, height), BACKGROUND), 0
@@ -182,7 +182,7 @@ def stacked(pictures: Sequence[Image.Image], gap: int = 3) -> Image.Image:
 
 
 def gridded(pictures: Sequence[Image.Image], columns: int, gap: int = 12) -> Image.Image:
-    """Pictures of one size in rows."""
+    """Arrange images of one size in rows."""
     width, height = pictures[0].width, pictures[0].height
     rows = -(-len(pictures) // columns)
     size = (columns * (width + gap) - gap, rows * (height + gap) - gap)
@@ -193,17 +193,16 @@ def gridded(pictures: Sequence[Image.Image], columns: int, gap: int = 12) -> Ima
 
 
 def shown_picture(observation: NDArray, low: float, high: float, channels: str) -> NDArray:
-    """What a policy gets, as bytes: the newest frame's colors, or its gray.
+    """Convert the newest frame of an observation to an RGB image.
 
     Args:
         observation: Shape (C, H, W), of one frame or several.
-        low: Becomes black.
-        high: Becomes white.
-        channels: What they are: "gray", "rgb", or "chromaticity" of red and blue, to which green
-            is shown as what they leave.
+        low: Value shown as black.
+        high: Value shown as white.
+        channels: "gray", "rgb", or "chromaticity" of red and blue, with the remainder as green.
 
     Returns:
-        Shape: (H, W, 3).
+        Shape: (H, W, 3), uint8.
     """
     newest = observation[-_CHANNELS.get(channels, 1) :].astype(np.float64)
     share = ((newest - low) / max(high - low, 1e-12)).clip(0, 1)

@@ -1,4 +1,4 @@
-"""Regions of a plane as pictures: metres ahead upwards, metres to the left leftwards."""
+"""Maps of the action by the position of a cube, as a chart and as SVG."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -17,7 +17,7 @@ _LINE = 'fill="none" class="line"'
 
 
 def chart(numbers: Mapping[str, Any], arrays: Mapping[str, NDArray], names: ShownActions) -> Figure:
-    """The exact map as a chart.
+    """Draw the map as a chart.
 
     Args:
         numbers: "places" of an explanation.
@@ -57,7 +57,7 @@ def chart(numbers: Mapping[str, Any], arrays: Mapping[str, NDArray], names: Show
 
 
 def _mark(axis: Axes, numbers: Mapping[str, Any]) -> None:
-    """The camera, the lines beyond which a turn is called for, and where the logits are closest."""
+    """Mark the camera, the limits of flying straight on, and where the logits are closest."""
     touch = numbers["touch_distance"]
     for y in (-touch, touch):
         label = "beyond: flying straight on misses it" if y < 0 else None
@@ -75,13 +75,7 @@ def _mark(axis: Axes, numbers: Mapping[str, Any]) -> None:
 
 
 def svg(numbers: Mapping[str, Any], arrays: Mapping[str, NDArray], names: ShownActions) -> str:
-    """The exact map as an SVG element, which can be zoomed into without end.
-
-    Args:
-        numbers: "places" of an explanation.
-        arrays: "points", "ends" and "labels" of its outlines.
-        names: The actions.
-    """
+    """Draw the map as an SVG element; arguments as for `chart`."""
     window, touch = numbers["window"], numbers["touch_distance"]
     side, near, far = window["sideways"], window["nearest"], window["farthest"]
     unit = (side + far) / 60
@@ -115,7 +109,7 @@ def svg(numbers: Mapping[str, Any], arrays: Mapping[str, NDArray], names: ShownA
 
 
 def _scale(side: float, near: float, far: float, unit: float) -> list[str]:
-    """A frame and the numbers beside it."""
+    """Frame and tick labels."""
     frame = f"M{-side:g} {-near:g}H{side:g}V{-far:g}H{-side:g}Z"
     ahead = [y for y in _ticks(far) if y >= near]
     aside = [x for x in _ticks(side) if x]
@@ -130,7 +124,7 @@ def _scale(side: float, near: float, far: float, unit: float) -> list[str]:
 
 
 def _marks(numbers: Mapping[str, Any], unit: float) -> list[str]:
-    """The camera and where the logits are closest."""
+    """Mark the camera and where the logits are closest."""
     x, y = -numbers["least_gap_left"], -numbers["least_gap_ahead"]
     circle = f'<circle cx="{x:.6g}" cy="{y:.6g}" r="{unit / 2:g}" {_LINE}'
     camera = f"M0 {-unit:g}L{0.7 * unit:g} {0.6 * unit:g}H{-0.7 * unit:g}Z"
@@ -142,7 +136,7 @@ def _marks(numbers: Mapping[str, Any], unit: float) -> list[str]:
 
 
 def _key(names: ShownActions, side: float, unit: float) -> list[str]:
-    """What the colours are."""
+    """Legend."""
     parts, step = [], 2 * side / len(names.names)
     for place, action in enumerate(names.order):
         x, y = place * step - side, 2.2 * unit
@@ -156,14 +150,14 @@ def _key(names: ShownActions, side: float, unit: float) -> list[str]:
 
 
 def _ticks(most: float) -> list[float]:
-    """Round numbers from 0 up, four or so."""
+    """About four round numbers from 0 up."""
     size = 10.0 ** np.floor(np.log10(most / 5))
     step = next((size * k for k in (1, 2, 5) if most / (size * k) <= 5), size * 10)
     return (step * np.arange(int(most / step + 1e-9) + 1)).tolist()
 
 
 def _ways(arrays: Mapping[str, NDArray]) -> dict[int, list[NDArray]]:
-    """Closed ways by their labels."""
+    """Outlines by label."""
     ways: dict[int, list[NDArray]] = {}
     parts = np.split(arrays["points"], arrays["ends"][:-1])
     for label, way in zip(arrays["labels"].tolist(), parts, strict=True):
@@ -172,7 +166,7 @@ def _ways(arrays: Mapping[str, NDArray]) -> dict[int, list[NDArray]]:
 
 
 def _way(way: NDArray) -> str:
-    """A closed way in a path's words, to a tenth of a millimetre."""
+    """An outline as SVG path data, to a tenth of a millimetre."""
     whole = np.round(-1e4 * way[:, ::-1]).astype(int)
     steps: Sequence[Any] = np.diff(whole, axis=0).tolist()
     begin = f"M{_short(whole[0, 0])} {_short(whole[0, 1])}"

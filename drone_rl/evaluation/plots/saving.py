@@ -1,4 +1,4 @@
-"""Pictures, films, tables and numbers as files, and as data URIs for a page of one file."""
+"""Save images, videos, tables and numbers as files and data URIs."""
 
 import base64
 import csv
@@ -14,17 +14,17 @@ from numpy.typing import NDArray
 from PIL import Image
 
 Rows = Sequence[Sequence[Any]]
-"""A table, its heading first."""
+"""A table, heading first."""
 _DPI = 90
-"""Pixels to the inch of a chart."""
+"""Pixels per inch of a chart."""
 _MOST_PIXELS = 2**25
-"""Of a chart."""
+"""Largest size of a chart."""
 FRAMES_PER_SECOND = 8
-"""Of films."""
+"""Of videos."""
 
 
 def save_drawn(drawn: Image.Image | Figure | NDArray, path: Path) -> str:
-    """Saves a picture or chart as PNG, a film as MP4.
+    """Save an image or chart as PNG, a video as MP4.
 
     Args:
         drawn: See `report.part.Drawn`.
@@ -43,18 +43,18 @@ def save_drawn(drawn: Image.Image | Figure | NDArray, path: Path) -> str:
 
 
 def save_rows(rows: Rows, path: Path) -> None:
-    """Saves a table as CSV. The path is without suffix."""
+    """Save a table as CSV. The path is without suffix."""
     with open(path.with_name(path.name + ".csv"), "w", newline="", encoding="utf-8") as file:
         csv.writer(file).writerows(rows)
 
 
 def save_numbers(numbers: Any, path: Path) -> None:
-    """Saves plain values as JSON. The path is without suffix."""
+    """Save plain values as JSON. The path is without suffix."""
     path.with_name(path.name + ".json").write_text(json.dumps(numbers, indent=1))
 
 
 def to_png(picture: Image.Image | Figure) -> bytes:
-    """A picture or chart as the bytes of a PNG file."""
+    """Encode an image or chart as PNG."""
     buffer = io.BytesIO()
     if isinstance(picture, Figure):
         width, height = (_DPI * picture.get_size_inches()).tolist()
@@ -67,5 +67,5 @@ def to_png(picture: Image.Image | Figure) -> bytes:
 
 
 def to_uri(content: bytes, kind: str) -> str:
-    """Bytes of a media type, such as image/png, as a data URI."""
+    """Encode bytes of a media type, such as image/png, as a data URI."""
     return f"data:{kind};base64,{base64.b64encode(content).decode()}"

@@ -1,0 +1,264 @@
+"""The report of a sweep: a CSV and a JSON for programs, an HTML page, and lines for a terminal.
+
+It needs no torch unless the runs are judged again.
+"""
+
+import base64
+import json
+import logging
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from markupsafe import Markup, escape
+
+from drone_rl.sweeps import figures
+from drone_rl.sweeps.manifest import Sweep, read_sweep
+from drone_rl.sweeps.rows import read_rows
+from drone_rl.sweeps.runs import read_result
+from drone_rl.sweeps.summary import Group, make_groups, summarise_sweep, to_csv
+from drone_rl.utils.display import content_security_policy, page_environment, static_text
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.files import folder_lock, newest, write_atomically
+from drone_rl.utils.text import seed_line
+
+if TYPE_CHECKING:
+    from drone_rl.utils.seeding import RootSeed
+
+STYLES = ("style.css", "sweep.css")
+"""Style sheets of the page."""
+_log = logging.getLogger(__name__)
+
+
+def find_sweep(which: str | Path, outputs: str | Path = "outputs") -> Sweep:
+    """Return a sweep.
+
+    Args:
+        which: Its folder, or "latest" for the newest one.
+        outputs: Folder below which sweeps are stored.
+
+    Raises:
+        InputError: There is none.
+    """
+    if which != "latest":
+        return read_sweep(Path(which).absolute())
+    last = newest(Path(outputs).glob("train/multiruns/*/sweep.json"))
+    if last is None:
+        raise InputError(
+            f"folder=latest, but there is no sweep under {outputs}/train/multiruns; "
+            "run drone-rl train -m first or give the folder of a sweep"
+        )
+    return read_sweep(last.parent.absolute())
+
+
+def report_sweep(sweep: Sweep) -> tuple[Path, str]:
+    """Write a sweep's report; return its path and the lines for a terminal."""
+    page = write_sweep_report(sweep)
+    return page, terminal_lines(json.loads((sweep.folder / "summary.json").read_text()))
+
+
+def write_sweep_report(sweep: Sweep) -> Path:
+    """Write `summary.csv`, `summary.json` and `report.html` to the sweep's folder.
+
+    Returns:
+        The page.
+    """
+    rows = read_rows(sweep)
+    summary = summarise_sweep(sweep, rows)
+    write_atomically(sweep.folder / "summary.csv", to_csv(rows))
+    write_atomically(sweep.folder / "summary.json", json.dumps(summary, indent=2))
+    pictures = _plots(make_groups(rows), summary["sentences"])
+    page = sweep.folder / "report.html"
+    write_atomically(page, render_page(sweep.folder.name, summary, pictures))
+    return page
+
+
+def write_picture(sweep: Sweep, path: Path) -> None:
+    """Write a plot of verdicts, sides and entropies.
+
+    Args:
+        sweep: A sweep with judged runs.
+        path: Path of the PNG.
+
+    Raises:
+        InputError: No run of the sweep is finished and judged.
+    """
+    groups = make_groups(read_rows(sweep))
+    if not any(row.kind for group in groups for row in group.finished):
+        raise InputError(
+            f"picture={path}: no run of {sweep.folder} is finished and judged yet; "
+            "sweep with evaluate_after=200, or give judge=true"
+        )
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_atomically(path, figures.draw_outcome(figures.lay_out(groups)))
+
+
+def terminal_lines(summary: dict[str, Any]) -> str:
+    """Return the lines of a summary for a terminal."""
+    sentences = summary["sentences"]
+    lines = [text for name, text in sentences.items() if name.startswith(("runs.", "verdicts."))]
+    for group in summary["groups"]:
+        choice = ", ".join(f"{k}={v}" for k, v in group.items() if isinstance(v, str))
+        lines.append(f"{choice or 'all':44} {'; '.join(group['sentences'].values())}")
+    lines += [f"run {r['run']} {r['state']}: {r['error']}" for r in summary["runs"] if r["error"]]
+    best = _paragraph(sentences, "best.")
+    lines.append(f"best run: {best}" if summary["best"] else best)
+    if summary["best"]:
+        lines.append(f"to repeat it: {summary['best']['command']}")
+    return "\n".join(lines)
+
+
+def judge_sweep(sweep: Sweep, episodes: int, device: str) -> None:
+    """Judge the last policies of all finished runs again; log those that can't be judged.
+
+    Args:
+        sweep: The sweep.
+        episodes: Episodes per verdict, in selection environments.
+        device: Device of the rollouts.
+    """
+    from drone_rl.utils.seeding import root_seed  # imports torch
+
+    seed = root_seed(None)
+    _log.info("%s", seed_line(seed.as_dict()))
+    finished = [run for run in sweep.runs if read_result(run.folder) is not None]
+    for done, run in enumerate(finished, start=1):
+        try:
+            verdict = judge_run(run.folder, episodes, device, seed=seed)
+            _log.info("[%d/%d] %s: %s", done, len(finished), run.folder.name, verdict["kind"])
+        except InputError as error:
+            _log.warning("[%d/%d] %s not judged: %s", done, len(finished), run.folder.name, error)
+
+
+def judge_run(
+    folder: Path, episodes: int, device: str, *, seed: "RootSeed | None" = None
+) -> dict[str, Any]:
+    """Judge the last policy of a finished run and store the verdict in its result.json.
+
+    Args:
+        folder: Folder of the run.
+        episodes: Number of episodes.
+        device: Device of the rollouts.
+        seed: Root of the environments' random streams, the same for all runs that are compared; a
+            fresh one by default.
+
+    Returns:
+        The verdict.
+
+    Raises:
+        InputError: The run has no result, or its last checkpoint is unusable or does not belong to
+            the result.
+    """
+    from drone_rl.evaluation.judge import judge_for_selection  # imports torch
+
+    with folder_lock(folder):
+        result = read_result(folder)
+        if result is None:
+            raise InputError(f"{folder} has no result.json; give the sweep's command to finish it")
+        last = folder / "checkpoints" / "last.pt"
+        verdict, progress = judge_for_selection(last, episodes, device, seed=seed)
+        if progress["frames"] != result.get("frames"):
+            raise InputError(
+                f"{folder}/checkpoints/last.pt is of frame {progress['frames']}, result.json of "
+                f"frame {result.get('frames')}; resume with: drone-rl train resume={folder}"
+            )
+        write_atomically(
+            folder / "result.json", json.dumps({**result, "verdict": verdict}, indent=2)
+        )
+    return verdict
+
+
+def render_page(name: str, summary: dict[str, Any], pictures: list[dict[str, str]]) -> str:
+    """Return the HTML page of a sweep.
+
+    Args:
+        name: Name of the sweep.
+        summary: From `summarise_sweep`.
+        pictures: Each with "title", "text", and data URIs for a "light" and a "dark" page.
+    """
+    environment = page_environment("drone_rl.sweeps", "drone_rl.explanations.report")  # for styles
+    environment.filters |= {"figure": _figure, "code": _code}
+    style = static_text(environment, STYLES)
+    parts = ("runs", "verdicts", "best", "settings")
+    texts = {part: _paragraph(summary["sentences"], f"{part}.") for part in parts}
+    return environment.get_template("report.html").render(
+        name=name,
+        figures=summary,
+        pictures=pictures,
+        texts=texts,
+        policy=content_security_policy(style),
+        style=style,
+    )
+
+
+def _plots(groups: Sequence[Group], sentences: Mapping[str, str]) -> list[dict[str, str]]:
+    ended = [row for group in groups for row in group.known]
+    if not ended:
+        return []
+    layout = figures.lay_out(groups)
+    plots = [("Learning curves", "curves.", figures.draw_curves)]
+    if any(row.kind for row in ended):
+        plots += [
+            ("Verdicts", "shares.", figures.draw_verdicts),
+            ("Left and right", "sides.", figures.draw_sides),
+            ("Entropy at the end", "entropies.", figures.draw_entropies),
+        ]
+    plots += [("Frames to solve", "costs.", figures.draw_costs)]
+    return [_plot(title, _paragraph(sentences, part), draw(layout)) for title, part, draw in plots]
+
+
+def _plot(title: str, text: str, content: tuple[bytes, bytes]) -> dict[str, str]:
+    light, dark = (f"data:image/png;base64,{base64.b64encode(c).decode()}" for c in content)
+    return {"title": title, "text": text, "light": light, "dark": dark}
+
+
+def _paragraph(sentences: Mapping[str, str], part: str) -> str:
+    """Join the sentences whose names begin with `part`."""
+    return " ".join(text for name, text in sentences.items() if name.startswith(part))
+
+
+def _figure(value: object) -> str:
+    """Format a table cell; unknown values are empty."""
+    if isinstance(value, dict) and "more_than" in value:
+        return _median(value)
+    if isinstance(value, dict):
+        return "" if value["share"] is None else _share(value)
+    if value is None:
+        return ""
+    return _number(value) if isinstance(value, float) else str(value)
+
+
+def _share(value: Mapping[str, Any]) -> str:
+    """Format a fraction of the known runs, with the interval that allows for the unknown ones."""
+    unknown = value.get("unknown", 0)
+    if unknown == value["trials"]:
+        return "not known"
+    certain = value.get("certain", value["successes"])
+    few = "" if certain == value["successes"] else f", {certain} certain"
+    more = f", {unknown} not known" if unknown else ""
+    count = f"{value['successes']}/{value['trials'] - unknown}{few}{more}"
+    return f"{count} [{value['lower95']:.2f}, {value['upper95']:.2f}]"
+
+
+def _median(value: Mapping[str, Any]) -> str:
+    """Format a median or its lower bound, with the interval if there is one."""
+    middle, beyond = value["median"], value["more_than"]
+    if beyond is not None:
+        text = f">{_number(beyond)}"
+    elif middle is not None:
+        text = _number(middle)
+    else:
+        return ""
+    if value["lower95"] is None:
+        return text
+    upper = "more" if value["upper95"] is None else _number(value["upper95"])
+    return f"{text} [{_number(value['lower95'])}, {upper}]"
+
+
+def _number(value: float) -> str:
+    return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.4g}"
+
+
+def _code(text: str) -> Markup:
+    """Mark up `code` in a sentence and escape everything else."""
+    return Markup(re.sub(r"`([^`]*)`", r"<code>\1</code>", str(escape(text))))

@@ -1,0 +1,100 @@
+"""One run in a process of its own: begun, gone on with, waited for, stopped, given up."""
+
+import json
+import signal
+import sys
+import threading
+import time
+
+import pytest
+
+from drone_rl.sweeps import executors
+from drone_rl.sweeps.executors import RunProcess, finish_run, note_failure
+from drone_rl.sweeps.runs import read_failure, read_result
+from drone_rl.utils.files import folder_lock
+
+pytestmark = pytest.mark.usefixtures("fake_training")
+
+
+def test_a_run_that_was_stopped_is_not_finished(make_runs):
+    (run,) = make_runs("seed=0")
+    run.folder.mkdir()
+    (run.folder / "result.json").write_text(json.dumps({"reason": "SIGTERM"}))
+    assert read_result(run.folder) is None
+
+
+def test_a_failure_is_forgotten_when_the_run_succeeds(make_runs):
+    (run,) = make_runs("seed=0")
+    run.folder.mkdir()
+    run.failure.write_text(json.dumps({"error": "no space left"}))
+    assert finish_run(run) == 0
+    assert read_failure(run) is None
+
+
+def test_a_run_that_another_process_works_on_is_waited_for(make_runs):
+    (run,) = make_runs("seed=0")
+    run.folder.mkdir()
+    statuses = []
+    with folder_lock(run.folder):
+        thread = threading.Thread(target=lambda: statuses.append(finish_run(run)))
+        thread.start()
+        time.sleep(0.5)
+        assert not statuses
+        result = {"reason": "solved", "running_reward": 2.0}
+        (run.folder / "result.json").write_text(json.dumps(result))
+    thread.join(10)
+    assert statuses == [0]
+    assert not (run.folder / "starts").exists()
+
+
+def test_a_process_that_came_too_late_is_no_failure(make_runs):
+    (run,) = make_runs("fail=true")
+    process = RunProcess(run)
+    assert process.poll() is None
+    result = {"reason": "solved", "running_reward": 2.0}
+    (run.folder / "result.json").write_text(json.dumps(result))  # by an earlier sweep's process
+    assert process.wait() == 0
+    assert read_failure(run) is None
+
+
+@pytest.mark.parametrize(
+    ("program", "error"),
+    [
+        ("print('error: first'); print('note'); sys.exit('error: second')", "second"),
+        ("print('only words'); print(' '); sys.exit(3)", "only words"),
+        ("sys.exit(3)", "ended with status 3"),
+        ("os.kill(os.getpid(), signal.SIGKILL)", "ended by signal SIGKILL"),
+    ],
+)
+def test_the_line_that_says_why_a_run_failed_is_kept(make_runs, monkeypatch, program, error):
+    code = f"import os, signal, sys; {program}"
+    monkeypatch.setattr(executors, "PROGRAM", (sys.executable, "-u", "-c", code))
+    (run,) = make_runs("seed=0")
+    assert finish_run(run) != 0
+    assert read_failure(run) == error
+
+
+def test_a_run_that_is_stopped_ends_by_sigterm(make_runs):
+    (run,) = make_runs("sleep=60")
+    started = RunProcess(run)
+    started.stop()  # nothing to stop yet
+    assert started.poll() is None
+    while not (run.folder / "starts").exists():
+        time.sleep(0.02)
+    started.stop()
+    assert started.poll() == -signal.SIGTERM
+    assert read_result(run.folder) is None
+
+
+def test_a_run_has_one_thread_and_no_input(make_runs, monkeypatch):
+    code = "import os, sys; sys.exit('error: ' + os.environ['OMP_NUM_THREADS'] + sys.stdin.read())"
+    monkeypatch.setattr(executors, "PROGRAM", (sys.executable, "-c", code))
+    (run,) = make_runs("seed=0")
+    finish_run(run)
+    assert read_failure(run) == "1"
+
+
+def test_a_reason_is_kept_where_no_folder_was(make_runs):
+    (run,) = make_runs("seed=0")
+    note_failure(run, "lost")
+    assert json.loads(run.failure.read_text()) == {"error": "lost"}
