@@ -18,12 +18,12 @@ from drone_rl.explanations.rollouts import Step, rollout
 from drone_rl.explanations.scenes import DARK_GROUND, Region, Scenes
 from drone_rl.policies import PictureNetwork
 from drone_rl.sim.rendering import Appearance
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.tasks import State
 from drone_rl.utils.intervals import episode_means, mean_bounds
 
 OTHER_TARGETS = Appearance(
-    colors={Meaning.TARGET: (0.9, 0.85, 0.2), Meaning.OBSTACLE: (0.9, 0.85, 0.2)}
+    colors={SemanticClass.TARGET: (0.9, 0.85, 0.2), SemanticClass.OBSTACLE: (0.9, 0.85, 0.2)}
 )
 MOVED_METRES = 2.0
 FLIGHTS_AN_EPISODE = 2

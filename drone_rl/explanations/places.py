@@ -13,9 +13,9 @@ from drone_rl.sim.actions import MOVES
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import legacy_seed
-from drone_rl.verification.prover.action_map import Look, PlaceMap, map_places
+from drone_rl.verification.prover.action_map import ActionMap, RenderFaces, map_actions
 from drone_rl.verification.prover.arrangement import Window
-from drone_rl.verification.prover.cube_images import NOTHING, Eye, Seeing
+from drone_rl.verification.prover.cube_images import NOTHING, CameraModel, CubeImages
 from drone_rl.verification.prover.lattice import Lattice
 from drone_rl.verification.prover.policy_spec import check_task
 
@@ -26,7 +26,7 @@ _COMPARED = 1000
 def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
     """Return "places", or why it is "refused" if no exact map is known for this configuration.
 
-    Arrays: "places_..." of the outlines, see `PlaceMap.outlines`.
+    Arrays: "places_..." of the outlines, see `ActionMap.outlines`.
     """
     settings = PlacesSettings()
     try:
@@ -37,7 +37,7 @@ def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
     return {"places": found.summary(settings.logit_gap)}, arrays
 
 
-def _map(context: Context, settings: PlacesSettings) -> PlaceMap:
+def _map(context: Context, settings: PlacesSettings) -> ActionMap:
     scenes, network = context.scenes, context.network
     if not isinstance(scenes.task, CollectCubes):
         raise InputError("its task is not that of collecting cubes")
@@ -49,28 +49,28 @@ def _map(context: Context, settings: PlacesSettings) -> PlaceMap:
     check_task(task)
     if not network.has_weights:
         raise InputError("it is no torch module, so that nothing is known of its sums")
-    eye, lattice = Eye.of(task, scenes.worlds.camera), Lattice(task)
-    seeing = Seeing(scenes.worlds, lattice, eye)
-    seeing.check(_COMPARED, np.random.RandomState(legacy_seed(context.seed.value)))
+    camera, lattice = CameraModel.of(task, scenes.worlds.camera), Lattice(task)
+    images = CubeImages(scenes.worlds, lattice, camera)
+    images.check(_COMPARED, np.random.RandomState(legacy_seed(context.seed.value)))
     window = Window(max(settings.nearest, task.cube_size), settings.farthest, settings.sideways)
-    return map_places(
-        eye,
+    return map_actions(
+        camera,
         window,
-        _look(context, seeing),
+        _face_renderer(context, images),
         network.eval(),
         touch_distance=task.touch_distance,
         most_cells=settings.most_cells,
     )
 
 
-def _look(context: Context, seeing: Seeing) -> Look:
+def _face_renderer(context: Context, images: CubeImages) -> RenderFaces:
     """Return a function from the cube's face at each pixel to observations."""
 
-    def look(faces: NDArray[np.uint8]) -> torch.Tensor:
+    def render(faces: NDArray[np.uint8]) -> torch.Tensor:
         shown = torch.from_numpy(faces).long()
         is_open = (shown == NOTHING)[..., None]
         return context.scenes.transform(
-            torch.where(is_open, seeing.background, seeing.colors[shown])
+            torch.where(is_open, images.background, images.colors[shown])
         )
 
-    return look
+    return render

@@ -11,12 +11,14 @@ from torchrl.envs import CatFrames, Transform, TransformedEnv
 from drone_rl.envs import ChromaticityPixels, CropRows, RgbPixels, worlds_of
 from drone_rl.envs.pipeline import memory_of, see_film
 from drone_rl.sim.rendering import Appearance
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.tasks import State
 
-DARK_GROUND = Appearance(colors={Meaning.GROUND: (0.25, 0.25, 0.22)})
-DARK = Appearance(colors={**DARK_GROUND.colors, Meaning.SKY: (0.3, 0.36, 0.45)})
-BRIGHT = Appearance(colors={Meaning.GROUND: (0.75, 0.78, 0.7), Meaning.SKY: (0.9, 0.93, 0.97)})
+DARK_GROUND = Appearance(colors={SemanticClass.GROUND: (0.25, 0.25, 0.22)})
+DARK = Appearance(colors={**DARK_GROUND.colors, SemanticClass.SKY: (0.3, 0.36, 0.45)})
+BRIGHT = Appearance(
+    colors={SemanticClass.GROUND: (0.75, 0.78, 0.7), SemanticClass.SKY: (0.9, 0.93, 0.97)}
+)
 PLACEMENTS = 3
 """Random placements of all targets among the alternatives of a scene."""
 

@@ -6,8 +6,8 @@ import torch
 from torch import nn
 
 from drone_rl.collectors.speedups import accelerated_gradients
-from drone_rl.config.configuration import as_config, locate
-from drone_rl.config.learning import WithCritic
+from drone_rl.config.learning import A2c, Ppo, Reinforce, WithCritic
+from drone_rl.config.registry import learns
 from drone_rl.config.training import TrainSettings
 from drone_rl.policies import ActorCritic, make_actor
 from drone_rl.policies.zoo import describe
@@ -26,9 +26,10 @@ def build_learner(settings: TrainSettings, made: Collecting) -> Learner:
     Raises:
         InputError: A part does not exist, or does not take its settings.
     """
-    return locate(settings.objective.learner)(settings, made)
+    return settings.objective.learner(settings, made)
 
 
+@learns(Reinforce)
 def reinforce_learner(settings: TrainSettings, made: Collecting) -> ReinforceLearner:
     """One that needs no critic."""
     optimiser = settings.optimiser.make(made.network.parameters())
@@ -43,12 +44,13 @@ def reinforce_learner(settings: TrainSettings, made: Collecting) -> ReinforceLea
     )
 
 
+@learns(A2c, Ppo)
 def actor_critic_learner(settings: TrainSettings, made: Collecting) -> ActorCriticLearner:
     """One with a critic, on the policy's features or on a network of its own."""
     objective = settings.objective
     assert isinstance(objective, WithCritic)
     weights = torch_generator(settings.seed, Stream.CRITIC_INIT)
-    own = None if objective.shares_trunk else describe(as_config(settings)).build_critic(weights)
+    own = None if objective.shares_trunk else describe(settings).build_critic(weights)
     model = ActorCritic(made.network, own, weights).to(settings.device)
     optimiser = settings.optimiser.make(model.parameters())
     return ActorCriticLearner(

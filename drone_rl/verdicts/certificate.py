@@ -16,7 +16,7 @@ from drone_rl.policies.zoo import certificate_path
 from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import RootSeed, root_seed
-from drone_rl.verification.checker import Certificate, check_certificate, find, read_tried
+from drone_rl.verification.checker import Certificate, check_certificate, find, read_validated
 from drone_rl.verification.checker.sampling import ANYWHERE
 
 
@@ -27,7 +27,7 @@ class Claim:
     path: Path
     """Its file."""
     certificate: Certificate | None
-    """See `drone_rl.verification.checker.read_tried`; None if it was refused."""
+    """See `drone_rl.verification.checker.read_validated`; None if it was refused."""
     refused: str | None = None
     """The reason, in one line."""
     flights: int = 0
@@ -133,7 +133,7 @@ def find_claim(
     device: str = "cpu",
     renderer: str = "raytrace",
 ) -> Claim | None:
-    """Find and check the certificate of a policy; see `drone_rl.verification.checker.read_tried`.
+    """Find and check the certificate of a policy, see `checker.read_validated`.
 
     Args:
         policy: Which, in its task.
@@ -177,7 +177,7 @@ def _try(
     policy: Policy, path: Path, flights: int, *, seed: RootSeed | None, **flying: Any
 ) -> Claim:
     weights = policy.state["policy"]
-    certificate = read_tried(path, policy.description, weights)
+    certificate = read_validated(path, policy.description, weights)
     if not flights:
         return Claim(path, certificate)
     seed = seed or root_seed(None)

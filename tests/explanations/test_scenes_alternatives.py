@@ -11,7 +11,7 @@ from drone_rl.explanations.scenes import (
 )
 from drone_rl.sim.entities import FLOOR_COLOR, SKY_COLOR
 from drone_rl.sim.rendering import Appearance
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.scene import SemanticClass
 
 
 def test_what_the_simulator_draws_otherwise(scenes, world):
@@ -37,8 +37,8 @@ def test_what_the_simulator_draws_otherwise(scenes, world):
 
 
 def test_other_colours_are_darker_and_brighter_than_the_arenas():
-    assert DARK_GROUND.colors == {Meaning.GROUND: DARK.colors[Meaning.GROUND]}
-    for thing, color in ((Meaning.GROUND, FLOOR_COLOR), (Meaning.SKY, SKY_COLOR)):
+    assert DARK_GROUND.colors == {SemanticClass.GROUND: DARK.colors[SemanticClass.GROUND]}
+    for thing, color in ((SemanticClass.GROUND, FLOOR_COLOR), (SemanticClass.SKY, SKY_COLOR)):
         for low, middle, high in zip(DARK.colors[thing], color, BRIGHT.colors[thing], strict=True):
             assert 0.2 < low < middle < high < 1.0  # still grounds and skies, no black or white
 
@@ -59,7 +59,7 @@ def test_cubes_elsewhere_are_in_view(scenes):
 def test_only_the_named_colours_change(scenes):
     state = place_target(scenes, torch.tensor([6.0]), torch.tensor([2.0]))
     regions, before = scenes.regions(state), scenes.frames(state)
-    after = scenes.frames(state, Appearance(colors={Meaning.GROUND: (0.1, 0.1, 0.1)}))
+    after = scenes.frames(state, Appearance(colors={SemanticClass.GROUND: (0.1, 0.1, 0.1)}))
     changed = (before != after).any(-1)
     ground = (regions == Region.GROUND) | (regions == Region.HORIZON)
     assert changed[regions == Region.GROUND].all()

@@ -146,8 +146,8 @@ def test_conditions_are_shown_where_they_were_flown(explanations, tmp_path):
         np.savez_compressed(folder / "arrays.npz", **{**kept, **arrays})
     page = write_report([folder], tmp_path).read_text()
     part = page[page.index('<section id="shifts">') :].split("</section>")[0]
-    assert "the sun 21.1 to 60 degrees high" in part and part.count("data:image/png") == 2
-    assert "not measured again here" in part and "<td>height of the sun</td>" in part
+    assert "the sun at 21.1 to 60 degrees" in part and part.count("data:image/png") == 2
+    assert "not measured again here" in part and "<td>elevation of the sun</td>" in part
     assert "nothing here tests other colours or sizes" in page
 
 
