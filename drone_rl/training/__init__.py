@@ -5,6 +5,7 @@ from drone_rl.training.callbacks import (
     CheckpointCallback,
     CsvCallback,
     LoggerCallback,
+    Progress,
     ProgressCallback,
 )
 from drone_rl.training.learners import (
@@ -13,7 +14,6 @@ from drone_rl.training.learners import (
     NotANumberError,
     ReinforceLearner,
 )
-from drone_rl.training.progress import Progress
 from drone_rl.training.trainer import Collector, Trainer
 from drone_rl.utils.checkpoint import check_weights, load_checkpoint, save_checkpoint
 

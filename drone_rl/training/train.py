@@ -20,8 +20,8 @@ from drone_rl.sim.tasks import FailureReplayTask, as_task
 from drone_rl.training import Callback, CheckpointCallback, CsvCallback, NotANumberError, Trainer
 from drone_rl.training.build_collector import build_collector
 from drone_rl.training.build_learner import build_learner
+from drone_rl.training.callbacks import OngoingTraining
 from drone_rl.training.confirmation import Confirmation
-from drone_rl.training.progress import OngoingTraining
 from drone_rl.utils.display import picture, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock, remove_leftovers, write_atomically

@@ -25,7 +25,7 @@ from drone_rl.policies.zoo import read_checkpoint
 from drone_rl.sim.tasks import FailureReplayTask
 from drone_rl.sim.tasks.failure_replay import inflated
 from drone_rl.training import Callback
-from drone_rl.training.progress import OngoingTraining
+from drone_rl.training.callbacks import OngoingTraining
 from drone_rl.training.train import (
     MAY_CHANGE,
     Tell,

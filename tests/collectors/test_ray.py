@@ -9,7 +9,7 @@ from drone_rl.config import TaskSettings
 from drone_rl.config.learning import Ray, Threads
 from drone_rl.config.training import TrainSettings
 from drone_rl.training.build_collector import build_collector
-from drone_rl.training.metrics import episode_rewards
+from drone_rl.training.trainer import episode_rewards
 from drone_rl.utils.errors import InputError
 
 pytestmark = pytest.mark.slow

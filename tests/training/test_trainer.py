@@ -7,7 +7,7 @@ import torch
 
 from drone_rl.training import Callback, CheckpointCallback, NotANumberError
 from drone_rl.training import trainer as trainer_module
-from drone_rl.training.metrics import episode_rewards, running_mean
+from drone_rl.training.trainer import episode_rewards, running_mean
 from drone_rl.utils.checkpoint import load_checkpoint
 
 

@@ -13,8 +13,7 @@ from drone_rl.collectors import take_rows
 from drone_rl.objectives import Advantages
 from drone_rl.policies import ActorCritic
 from drone_rl.policies.critic import LOG_PROB, PIXELS, VALUE
-from drone_rl.training.learners.gradient import accumulate, descend
-from drone_rl.training.learners.learner import NotANumberError
+from drone_rl.training.learners.learner import NotANumberError, accumulate, descend
 from drone_rl.training.restore import check_fits, check_optimiser
 
 _TOLD = ("loss_objective", "loss_critic", "loss_entropy", "clip_fraction", "kl_approx")

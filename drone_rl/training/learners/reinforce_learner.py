@@ -8,8 +8,7 @@ from tensordict import TensorDictBase
 from torch import nn
 
 from drone_rl.objectives import ReinforceLoss, ReturnEstimator
-from drone_rl.training.learners.gradient import accumulate, descend
-from drone_rl.training.learners.learner import NotANumberError
+from drone_rl.training.learners.learner import NotANumberError, accumulate, descend
 from drone_rl.training.restore import check_fits, check_optimiser
 
 
