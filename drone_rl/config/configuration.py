@@ -257,8 +257,8 @@ def no_changes() -> Any:
 
 
 _MOVED = {
-    "drone_rl.cli.build.threaded_collector": "drone_rl.training.build_collector.threaded_collector",
-    "drone_rl.cli.build.ray_collector": "drone_rl.training.build_collector.ray_collector",
+    "drone_rl.cli.build.threaded_collector": "drone_rl.training.train.threaded_collector",
+    "drone_rl.cli.build.ray_collector": "drone_rl.training.ray_workers.ray_collector",
 }
 
 

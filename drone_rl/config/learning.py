@@ -130,14 +130,14 @@ class Episodes(Collector):
 class Threads(Episodes):
     """Batches of complete episodes from threads of this process."""
 
-    target: ClassVar[str] = "drone_rl.training.build_collector.threaded_collector"
+    target: ClassVar[str] = "drone_rl.training.train.threaded_collector"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Ray(Episodes):
     """Batches of complete episodes from workers on a Ray cluster."""
 
-    target: ClassVar[str] = "drone_rl.training.build_collector.ray_collector"
+    target: ClassVar[str] = "drone_rl.training.ray_workers.ray_collector"
     num_threads: Annotated[int, Whole(1, unit="workers")] = 2
     """Workers, each with its share of the worlds and a stream of actions of its own: this is part
     of what a seed means."""
@@ -156,7 +156,7 @@ class Rollouts(Collector):
     How many steps is the objective's business. Episodes go on from one batch to the next.
     """
 
-    target: ClassVar[str] = "drone_rl.training.build_collector.rollout_collector"
+    target: ClassVar[str] = "drone_rl.training.actor_critic.rollout_collector"
     num_envs: Annotated[int, Whole(1, unit="worlds")] = 64
     """Worlds."""
 
@@ -223,7 +223,7 @@ Weight = Annotated[float, Real(0.0)]
 class Objective(Variant):
     """Which loss, and with which values."""
 
-    learner: ClassVar[str] = "drone_rl.training.build_learner.reinforce_learner"
+    learner: ClassVar[str] = "drone_rl.training.train.reinforce_learner"
     """Where that which makes the learner is to be imported from."""
     needs: ClassVar[Mapping[str, Variant]] = {}
     """Other parts of a training that it can't do without, and brings unless they are given."""
@@ -244,7 +244,7 @@ class Reinforce(Objective):
 class WithCritic(Objective):
     """One that learns, besides, what a state is worth."""
 
-    learner: ClassVar[str] = "drone_rl.training.build_learner.actor_critic_learner"
+    learner: ClassVar[str] = "drone_rl.training.actor_critic.actor_critic_learner"
     needs: ClassVar[Mapping[str, Variant]] = {"returns": Gae(), "collector": Rollouts()}
     num_steps: Annotated[int, Whole(2, 4096)] = 32
     """Steps of each world in a batch."""

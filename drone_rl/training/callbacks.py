@@ -18,6 +18,7 @@ from drone_rl.utils.checkpoint import save_checkpoint
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import remove_leftovers, write_atomically
 from drone_rl.utils.former_names import FORMER_NAMES
+from drone_rl.utils.progress import Progress as Report
 from drone_rl.utils.readers import read_table
 from drone_rl.utils.schema import shown
 
@@ -266,3 +267,22 @@ class ProgressCallback(Callback):
     def _close(self) -> None:
         if self._bar is not None:
             self._bar.close()
+
+
+class ForwardProgress(Callback):
+    """Forwards the progress of a training to a `drone_rl.utils.progress.Progress`."""
+
+    def __init__(self, progress: Report) -> None:
+        """Sets the receiver."""
+        self.progress = progress
+
+    def on_update(self, training: OngoingTraining, metrics: Mapping[str, float]) -> None:
+        """Forwards the running mean and the frames."""
+        done = training.progress
+        text = f"running reward {done.running_reward:.2f}, {done.episodes} episodes"
+        self.progress(text, done.frames, training.total_frames)
+
+    def on_end(self, training: OngoingTraining, reason: str) -> None:
+        """Forwards the reason why it stopped."""
+        frames = training.progress.frames
+        self.progress(f"stopped: {reason}", frames, frames)

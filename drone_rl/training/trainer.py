@@ -14,6 +14,7 @@ import torch
 from tensordict import TensorDictBase
 from torch import Tensor
 
+from drone_rl.objectives import ReturnEstimator
 from drone_rl.training.callbacks import Callback, Progress
 from drone_rl.training.learners import Learner, NotANumberError, check_batch
 from drone_rl.training.restore import check_fits
@@ -222,6 +223,12 @@ class Trainer:
                 "it; lower optimiser.lr or set trainer.max_grad_norm"
             ) from None
 
+    @property
+    def _estimator(self) -> ReturnEstimator | None:
+        """The collector's return estimator, if it has one: its state is part of the training's."""
+        postproc = getattr(self.collector, "postproc", None)
+        return postproc if isinstance(postproc, ReturnEstimator) else None
+
     def _stop_reason(self) -> str:
         progress = self.progress
         if self.stop_signal is not None:
@@ -278,8 +285,10 @@ class Trainer:
 
     def state_dict(self) -> dict[str, Any]:
         """Everything that the next update depends on."""
+        estimator = self._estimator
         return {
             **self.learner.state_dict(),
+            **({} if estimator is None else {"estimator": estimator.state_dict()}),
             "collector": self.collector.state_dict(),
             "generators": {k: g.get_state() for k, g in self.generators.items()},
             "torch_rng": torch.get_rng_state(),
@@ -297,8 +306,9 @@ class Trainer:
             if key not in state:
                 raise InputError(f"the checkpoint has no {key}, so no training can go on from it")
         self.learner.check_state(state)
-        for key in ("collector", "generators", "torch_rng", "progress"):
-            check_fits(state[key], own[key], key)
+        for key in ("collector", "estimator", "generators", "torch_rng", "progress"):
+            if key in own:
+                check_fits(state[key], own[key], key)
         try:
             self._take_over(state)
         except (RuntimeError, ValueError, TypeError, LookupError, OverflowError) as error:
@@ -311,6 +321,8 @@ class Trainer:
     def _take_over(self, state: Mapping[str, Any]) -> None:
         self.learner.load_state_dict(state)
         self.collector.load_state_dict(state["collector"])
+        if self._estimator is not None:
+            self._estimator.load_state_dict(state["estimator"])
         for name, generator in self.generators.items():
             generator.set_state(state["generators"][name])
         torch.set_rng_state(state["torch_rng"])

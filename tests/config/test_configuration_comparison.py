@@ -29,7 +29,7 @@ NEW = {
     },
     "network": {"_target_": "drone_rl.policies.MLP", "hidden": [8]},
     "collector": {
-        "_target_": "drone_rl.training.build_collector.threaded_collector",
+        "_target_": "drone_rl.training.train.threaded_collector",
         "num_envs": 4,
         "compiled": False,
     },
@@ -43,8 +43,11 @@ def test_old_configurations_are_told_in_todays_words():
 
 
 def test_a_training_of_old_took_each_step_in_python():
-    for name, is_compiled in (("threaded_collector", False), ("rollout_collector", None)):
-        old = {"collector": {"_target_": f"drone_rl.training.build_collector.{name}"}}
+    for name, is_compiled in (
+        ("train.threaded_collector", False),
+        ("actor_critic.rollout_collector", None),
+    ):
+        old = {"collector": {"_target_": f"drone_rl.training.{name}"}}
         assert modern(old)["collector"].get("compiled") is is_compiled
         new = {"collector": {**old["collector"], "compiled": True}}
         assert modern(new) == new

@@ -134,8 +134,8 @@ def test_nan_stops_names_itself_and_keeps_the_last_good_checkpoint(make_trainer,
     def poison(trainer):
         good.append(parameters(trainer).clone())
         if where == "loss":
-            estimate = trainer.learner.estimator.forward
-            trainer.learner.estimator.forward = lambda b: estimate(b).set(
+            estimate = trainer.collector.postproc
+            trainer.collector.postproc = lambda b: estimate(b).set(
                 "return_to_go", torch.full_like(b["next", "reward"], float("nan"))
             )
         else:

@@ -63,18 +63,30 @@ class Learner(Protocol):
 
 
 def check_batch(batch: TensorDictBase, learner: Learner) -> None:
-    """Refuses a batch that lacks what a learner learns from.
+    """Refuse a batch that lacks an entry which a learner reads.
+
+    Raises:
+        InputError: An entry is missing; it is named.
+    """
+    check_entries(batch, learner.in_keys, type(learner).__name__)
+
+
+def check_entries(batch: TensorDictBase, keys: Sequence[NestedKey], reader: str) -> None:
+    """Refuse a batch that lacks an entry.
 
     Raises:
         InputError: An entry is missing; it is named.
     """
     held = batch.keys(include_nested=True)
-    for key in learner.in_keys:
+    for key in keys:
         if key not in held:
-            raise InputError(
-                f"a batch has no entry {key!r}, which {type(learner).__name__} learns from; use a "
-                "collector that keeps it, such as collector=rollouts"
+            is_return = key == "return_to_go"
+            remedy = (
+                "give the collector a return estimator, as in postproc=RewardToGo()"
+                if is_return
+                else "use a collector that keeps it, such as collector=rollouts"
             )
+            raise InputError(f"a batch has no entry {key!r}, which {reader} learns from; {remedy}")
 
 
 def check_finite(value: Tensor, name: str) -> None:
