@@ -9,8 +9,8 @@ import torch
 from torch import Tensor
 
 from benchmarks.liars import liars
+from benchmarks.planted import Planted, plant, reach
 from drone_rl.explanations.hooks import probabilities
-from drone_rl.explanations.planted import Planted, plant, reach
 from drone_rl.explanations.scenes import Scenes
 from drone_rl.explanations.trust import Pictures, Trial, check_maps, draw_pictures
 from drone_rl.policies import PictureNetwork, SmallCNN
@@ -101,7 +101,7 @@ def shipped(pictures: Pictures) -> dict[str, PictureNetwork]:
         exported = load_exported(policy_path(name))
         description = parse(exported["description"])
         is_of_moves = description.actions.kind == "moves"  # others' outputs are no three logits
-        if description.picture.shape != tuple(pictures.absent.shape) or not is_of_moves:
+        if description.input.shape != tuple(pictures.absent.shape) or not is_of_moves:
             continue
         parameters = exported["policy"]
         network = SmallCNN(pictures.absent.shape, 3, hidden=(128,))

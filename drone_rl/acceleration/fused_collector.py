@@ -22,9 +22,9 @@ from drone_rl.envs.direct_renderer import DirectRenderer, Entries, Reasons
 from drone_rl.envs.transforms import StandardizePixels
 from drone_rl.policies.actor import CategoricalActor
 from drone_rl.policies.finite import require_finite
-from drone_rl.sim.rendering.devices import Crew, loading
+from drone_rl.sim.rendering.devices import WorkerPool, load_kernels
 from drone_rl.sim.rendering.raytrace.renderer import Raytracer
-from drone_rl.sim.rendering.raytrace.structs_kernel import Pictures
+from drone_rl.sim.rendering.raytrace.structs_kernel import Images
 from drone_rl.sim.tasks.task import FusedRules
 
 _MAX_STEPS = 64
@@ -59,13 +59,13 @@ class FusedCollector:
         renderer = self._renderer = direct.renderer
         self._network, self._worlds = network, worlds
         count, view = renderer.worlds.num_worlds, renderer.view
-        self._crew = Crew(count, num_threads)
+        self._workers = WorkerPool(count, num_threads)
         raytracer: Any = renderer.worlds.renderer
-        tools = raytracer.tools(view, self._crew.size)
+        tools = raytracer.kernel_inputs(view, self._workers.size)
         eye = self._eye = rollout_kernel.CameraView()
-        eye.view, eye.geoms, eye.looks, eye.desk = tools
+        eye.view, eye.geoms, eye.materials, eye.scratch = tools
         eye.mean, eye.deviation = _mean_and_deviation(renderer)
-        self._rooms = wp.empty((self._crew.size, network.room), dtype=float, device="cpu")
+        self._rooms = wp.empty((self._workers.size, network.room), dtype=float, device="cpu")
         pixels = view.height * view.width
         self._length = max(1, min(_MAX_STEPS, _MAX_PIXELS // (count * pixels)))
         self._num_rows = rows = count * self._length
@@ -82,7 +82,7 @@ class FusedCollector:
         self._cache: ActivationCache | None = None
         self._logits = torch.empty(0, num_actions)
         self._owner = getattr(self._actor.network, "owner", "the policy")
-        loading(rollout_kernel)
+        load_kernels(rollout_kernel)
 
     @classmethod
     def try_create(cls, direct: DirectCollector, num_threads: int) -> Self | Reasons:
@@ -121,7 +121,7 @@ class FusedCollector:
         """
         if self._actor.exploration not in (ExplorationType.RANDOM, ExplorationType.DETERMINISTIC):
             return self._direct.collect(num_envs)
-        loading(rollout_kernel).result()
+        load_kernels(rollout_kernel).result()
         self._renderer.env.start()
         state: Any = self._renderer.worlds.state
         self._worlds.begin(state)
@@ -145,7 +145,7 @@ class FusedCollector:
 
     def close(self) -> None:
         """Ends the threads."""
-        self._crew.close()
+        self._workers.close()
 
     def _run(self, num_envs: int) -> tuple[Tensor, dict[str, Tensor]]:
         """Environments of the steps, episode after episode, and what the kernel wrote of each."""
@@ -169,7 +169,7 @@ class FusedCollector:
 
     def _open_log(self, part: int, kept: tuple[str, ...]) -> Any:
         """Return arrays that one launch writes, and of which the named ones are kept."""
-        log, pictures, room = rollout_kernel.RolloutLog(), Pictures(), self._buffer.open(part, kept)
+        log, pictures, room = rollout_kernel.RolloutLog(), Images(), self._buffer.open(part, kept)
         pictures.gray = wp.from_torch(room["pixels"].flatten(1))
         self._logits = room["logits"]
         log.pictures, log.logits = pictures, wp.from_torch(self._logits)
@@ -200,7 +200,7 @@ class FusedCollector:
             inputs = [first, last, member, *given]
             wp.launch(rollout_kernel.fly, 1, inputs=inputs, device="cpu")
 
-        self._crew.share_out(0, num_envs, work)
+        self._workers.map_spans(0, num_envs, work)
 
     def _written(self, lengths: Tensor) -> tuple[Tensor, Tensor]:
         """Return environment and row in the log of each step, environment after environment.

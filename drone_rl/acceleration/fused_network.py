@@ -23,7 +23,7 @@ from drone_rl.acceleration.packed_layers import (
 from drone_rl.envs.direct_renderer import Reasons
 from drone_rl.policies.cnn import PolicyNetwork
 from drone_rl.policies.network import PictureNetwork
-from drone_rl.sim.rendering.devices import Crew, loading
+from drone_rl.sim.rendering.devices import WorkerPool, load_kernels
 
 MAX_WEIGHTS = 2**20
 """Larger networks do not fit into a core's cache, and torch is as fast."""
@@ -104,7 +104,7 @@ class FusedNetwork(PictureNetwork):
         self._num_threads, self._of, self._cache = num_threads, of, cache
         self.in_keys = ("pixels",) if cache is None else ("pixels", ACTIVATIONS)
         self._work: _Work | None = None
-        loading(gradients_kernel)
+        load_kernels(gradients_kernel)
 
     @classmethod
     def try_create(
@@ -201,9 +201,9 @@ class _Work:
         *,
         is_fixed: bool,
     ) -> None:
-        loading(gradients_kernel).result()
+        load_kernels(gradients_kernel).result()
         self._layers, self._cache = layers, cache
-        self._crew = Crew(num_threads, num_threads)
+        self._workers = WorkerPool(num_threads, num_threads)
         self._order = order = Order(layers)
         self._weights = torch.zeros(order.weights_at[-1])
         self._back = torch.zeros(order.back_at[-1])
@@ -217,13 +217,13 @@ class _Work:
         params.num_convolutions = sum(layer.is_convolution for layer in layers)
         params.near = odd_lines(self._logits_at - made_at[params.num_convolutions - 1])
         self._params = params
-        self._rooms = torch.empty(self._crew.size, int(BLOCK) * self._size)
-        self._sides = torch.empty(self._crew.size, int(BLOCK) * params.near)
+        self._rooms = torch.empty(self._workers.size, int(BLOCK) * self._size)
+        self._sides = torch.empty(self._workers.size, int(BLOCK) * params.near)
         most = max(v.num_inputs * v.geometry[0] for v in layers if v.is_convolution)
-        self._patches = torch.empty(self._crew.size, most)
+        self._patches = torch.empty(self._workers.size, most)
         self._spare: Tensor | None = None
         """Outputs to overwrite; new memory takes longer than a layer."""
-        self._gradients = torch.empty(self._crew.size, *self._weights.shape)
+        self._gradients = torch.empty(self._workers.size, *self._weights.shape)
         self._is_fixed = is_fixed
         order.pack(self._weights, self._back)
 
@@ -250,7 +250,7 @@ class _Work:
             inputs = [first, last, *given]
             wp.launch(gradients_kernel.answer, 1, inputs=inputs, device="cpu")
 
-        self._crew.share_out(0, len(pixels), work)
+        self._workers.map_spans(0, len(pixels), work)
         return _Activations(made, torch.arange(len(pixels), dtype=torch.int32), None)
 
     def logits(self, made: _Activations) -> Tensor:
@@ -298,7 +298,7 @@ class _Work:
             inputs = [first, last, member, *given]
             wp.launch(gradients_kernel.learn, 1, inputs=inputs, device="cpu")
 
-        self._crew.share_out(0, len(pixels), work)
+        self._workers.map_spans(0, len(pixels), work)
         if made.generation is None:
             self._spare = made.outputs
 

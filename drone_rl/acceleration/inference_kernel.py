@@ -19,7 +19,7 @@ from drone_rl.acceleration.layers_kernel import Layers, decide, look
 from drone_rl.acceleration.packed_layers import PackedNetwork, unsupported
 from drone_rl.envs.direct_renderer import Reasons
 from drone_rl.policies.finite import require_finite
-from drone_rl.sim.rendering.devices import loading, start_warp
+from drone_rl.sim.rendering.devices import load_kernels, start_warp
 
 _TOGETHER = wp.constant(16)
 """Pictures whose linear layers are worked out together."""
@@ -60,7 +60,7 @@ class BatchedInference:
         self._packed = PackedNetwork(network, int(_TOGETHER))
         self._packed.update()
         self._own = threading.local()
-        loading(sys.modules[__name__]).result()
+        load_kernels(sys.modules[__name__]).result()
 
     @classmethod
     def try_create(cls, network: nn.Module) -> Self | Reasons:

@@ -17,9 +17,8 @@ once for all of them.
 import warp as wp
 
 from drone_rl.acceleration.layers_kernel import Layers, decide, keep, look
-from drone_rl.sim.rendering.raytrace.plain_kernel import Desk, draw_picture
-from drone_rl.sim.rendering.raytrace.structs_kernel import Geoms, Pictures, Poses, View
-from drone_rl.sim.rendering.raytrace.structs_kernel import Looks as SceneLooks
+from drone_rl.sim.rendering.raytrace.plain_kernel import Scratch, render_image
+from drone_rl.sim.rendering.raytrace.structs_kernel import Geoms, Images, Materials, Poses, View
 from drone_rl.sim.tasks.collect_cubes_kernel import Flights, move, place
 
 TOGETHER = wp.constant(16)
@@ -34,8 +33,8 @@ class CameraView:
 
     view: View
     geoms: Geoms
-    looks: SceneLooks
-    desk: Desk
+    materials: Materials
+    scratch: Scratch
     mean: float
     """Is taken away from each pixel."""
     deviation: float
@@ -46,7 +45,7 @@ class CameraView:
 class RolloutLog:
     """What is written down, a row a step; each world has as many rows as there may be steps."""
 
-    pictures: Pictures
+    pictures: Images
     """As the network saw them."""
     logits: wp.array2d[float]
     actions: wp.array[int]
@@ -113,8 +112,17 @@ def _see(
         if flights.end_reasons[world] == 0:
             row = world * steps + step
             place(flights, world, poses)
-            draw_picture(
-                eye.view, 0, eye.geoms, poses, world, eye.looks, eye.desk, member, log.pictures, row
+            render_image(
+                eye.view,
+                0,
+                eye.geoms,
+                poses,
+                world,
+                eye.materials,
+                eye.scratch,
+                member,
+                log.pictures,
+                row,
             )
             picture = log.pictures.gray[row]
             standardise(picture, picture.shape[0], eye.mean, eye.deviation)

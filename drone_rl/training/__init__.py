@@ -1,5 +1,6 @@
 """The loop that turns batches of episodes into a better policy, and what it leaves behind."""
 
+from drone_rl.training import actor_critic, ray_workers  # they connect parts with their settings
 from drone_rl.training.callbacks import (
     Callback,
     CheckpointCallback,
@@ -30,7 +31,9 @@ __all__ = [
     "ProgressCallback",
     "ReinforceLearner",
     "Trainer",
+    "actor_critic",
     "check_weights",
     "load_checkpoint",
+    "ray_workers",
     "save_checkpoint",
 ]

@@ -3,8 +3,8 @@
 import logging
 
 from drone_rl.collectors import RolloutCollector, ThreadedCollector
-from drone_rl.config.configuration import as_config
-from drone_rl.config.learning import WithCritic
+from drone_rl.config.learning import A2c, Ppo, Rollouts, WithCritic
+from drone_rl.config.registry import implements, learns
 from drone_rl.config.training import TrainSettings
 from drone_rl.policies import ActorCritic
 from drone_rl.policies.zoo import describe
@@ -17,6 +17,7 @@ from drone_rl.utils.seeding import Stream, torch_generator
 _log = logging.getLogger(__name__)
 
 
+@implements(Rollouts)
 def rollout_collector(
     settings: TrainSettings, replay: FailureReplayTask | None = None
 ) -> Components:
@@ -33,12 +34,13 @@ def rollout_collector(
     return joined(ThreadedCollector(collectors), groups)
 
 
+@learns(A2c, Ppo)
 def actor_critic_learner(settings: TrainSettings, parts: Components) -> ActorCriticLearner:
     """Make the learner with a critic, on the policy's features or with its own network."""
     objective = settings.objective
     assert isinstance(objective, WithCritic)
     weights = torch_generator(settings.seed, Stream.CRITIC_INIT)
-    own = None if objective.shares_trunk else describe(as_config(settings)).build_critic(weights)
+    own = None if objective.shares_trunk else describe(settings).build_critic(weights)
     model = ActorCritic(parts.network, own, weights).to(settings.device)
     optimizer = settings.optimiser.make(model.parameters())
     learner = ActorCriticLearner(

@@ -7,7 +7,6 @@ import torch
 from torchrl.envs import TransformedEnv
 
 from drone_rl.collectors.speedups import accelerated_gradients
-from drone_rl.config.configuration import locate
 from drone_rl.config.learning import Episodes, Ray
 from drone_rl.config.training import TrainSettings
 from drone_rl.policies import PolicyNetwork, make_actor
@@ -75,7 +74,7 @@ def make_collector(settings: TrainSettings, replay: FailureReplayTask | None = N
     Raises:
         InputError: There is no such device, or an extra isn't installed.
     """
-    return locate(settings.collector.target)(settings, replay)
+    return settings.collector.make(settings, replay)
 
 
 def make_learner(settings: TrainSettings, parts: Components) -> Learner:
@@ -84,7 +83,7 @@ def make_learner(settings: TrainSettings, parts: Components) -> Learner:
     Raises:
         InputError: A part does not exist, or does not take its settings.
     """
-    return locate(settings.objective.learner)(settings, parts)
+    return settings.objective.learner(settings, parts)
 
 
 def learning_actor(settings: TrainSettings, parts: Components) -> Any:

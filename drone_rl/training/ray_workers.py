@@ -8,6 +8,7 @@ import torch
 from drone_rl.collectors import EpisodeCollector
 from drone_rl.config.configuration import as_config, from_config
 from drone_rl.config.learning import Ray
+from drone_rl.config.registry import implements
 from drone_rl.config.training import TrainSettings
 from drone_rl.policies import PolicyNetwork
 from drone_rl.sim.tasks import FailureReplayTask
@@ -15,6 +16,7 @@ from drone_rl.training.components import Components, episode_options, group_size
 from drone_rl.training.train import make_groups
 
 
+@implements(Ray)
 def ray_collector(settings: TrainSettings, replay: FailureReplayTask | None = None) -> Components:
     """Make `collector=ray`: complete episodes, with returns, from workers on a Ray cluster."""
     from drone_rl.collectors.ray import RayEpisodeCollector  # slow to import, seldom needed

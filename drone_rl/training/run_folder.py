@@ -11,7 +11,7 @@ from typing import Any, Self
 
 import yaml
 
-from drone_rl.config.configuration import as_config, check_same_config, from_config, modern
+from drone_rl.config.configuration import as_config, check_same_config, from_config
 from drone_rl.config.training import TrainSettings
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import describe, read_checkpoint
@@ -109,7 +109,7 @@ class RunFolder:
     def checkpoints(self, settings: TrainSettings) -> CheckpointCallback:
         """Return the callback that writes checkpoints, with the settings and their origin."""
         config, origin = as_config(settings), provenance()
-        description = describe(config).as_dict()
+        description = describe(settings).as_dict()
         return CheckpointCallback(
             self.path / "checkpoints",
             interval_s=settings.trainer.checkpoint_interval_s,
@@ -198,7 +198,7 @@ def hand_on_signal(training: Training) -> Training:
 
 def _own(config: Mapping[str, Any]) -> dict[str, Any]:
     """Return a checkpoint's training settings under today's names."""
-    return {k: v for k, v in modern(config).items() if k in kinds_of(TrainSettings)}
+    return {k: v for k, v in config.items() if k in kinds_of(TrainSettings)}
 
 
 def settings_of(config: Mapping[str, Any]) -> TrainSettings:

@@ -1,8 +1,7 @@
 """The whole training: environment, policy, collector, returns, loss, optimizer, loop.
 
-`drone-rl train` and `drone_rl.train` run this file. `examples/train_with_torchrl.py` has the same
-components in a plain TorchRL script. A critic's parts are in `actor_critic.py`, the workers of a
-Ray cluster in `ray_workers.py`, everything about files in `run_folder.py`.
+`drone-rl train` and `drone_rl.train` run this file; `examples/train_with_torchrl.py` is a plain
+script of the same components. A critic's parts are in `actor_critic.py`, files in `run_folder.py`.
 """
 
 import logging
@@ -14,7 +13,8 @@ import torch
 from torchrl.envs import Compose, TransformedEnv
 
 from drone_rl.collectors import EpisodeCollector, ThreadedCollector
-from drone_rl.config.configuration import as_config
+from drone_rl.config.learning import Reinforce, Threads
+from drone_rl.config.registry import implements, learns
 from drone_rl.config.training import TrainSettings
 from drone_rl.envs import DroneEnv
 from drone_rl.policies import make_actor
@@ -31,6 +31,7 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock
 from drone_rl.utils.memory import bound_kernels
 from drone_rl.utils.progress import Bar, Progress
+from drone_rl.utils.provenance import num_cores
 from drone_rl.utils.seeding import Stream, torch_generator
 
 _log = logging.getLogger(__name__)
@@ -47,8 +48,7 @@ def train(
 ) -> Training:
     """Train one policy, or resume its training.
 
-    Ctrl-C and SIGTERM let the current update finish; its state is saved before they act. They are
-    not handled in other threads than the main one.
+    In the main thread, Ctrl-C and SIGTERM act after the current update, once its state is saved.
 
     Args:
         settings: All settings; by default those of the run if it is resumed.
@@ -98,7 +98,8 @@ def learn(
     Raises:
         InputError: The checkpoint is of another training, or learning broke down.
     """
-    run, limits, task = RunFolder(folder), settings.trainer, as_task(settings.task)
+    run, limits = RunFolder(folder), settings.trainer
+    largest_reward = as_task(settings.task).largest_reward
     run.prepare(settings, state)
     torch.set_num_threads(limits.num_threads)  # sums depend on it: equal on every machine
     bound_kernels()
@@ -111,7 +112,7 @@ def learn(
         learner=learner,
         callbacks=[CsvCallback(folder / "metrics.csv"), checkpoints, *callbacks],
         generators=parts.generators,
-        target=None if limits.target_share is None else limits.target_share * task.largest_reward,
+        target=limits.target_share and limits.target_share * largest_reward,
         confirm=confirmation,
         total_frames=limits.total_frames,
         total_episodes=limits.total_episodes,
@@ -127,9 +128,10 @@ def learn(
         parts.collector.shutdown()
         if confirmation is not None:
             confirmation.close()
-    return run_folder.result_of(reason, trainer, task.largest_reward, confirmation)
+    return run_folder.result_of(reason, trainer, largest_reward, confirmation)
 
 
+@implements(Threads)
 def threaded_collector(
     settings: TrainSettings, replay: FailureReplayTask | None = None
 ) -> Components:
@@ -157,7 +159,7 @@ def make_groups(
         replay: See `learn`.
         numbers: Which groups to make; all by default.
     """
-    description, seed, device = describe(as_config(settings)), settings.seed, settings.device
+    description, seed, device = describe(settings), settings.seed, settings.device
     network = description.build_network(torch_generator(seed, Stream.POLICY_INIT)).to(device)
     groups = []
     for number in range(len(sizes)) if numbers is None else numbers:
@@ -182,6 +184,7 @@ def make_groups(
     return groups
 
 
+@learns(Reinforce)
 def reinforce_learner(settings: TrainSettings, parts: Components) -> ReinforceLearner:
     """Make the learner without a critic: loss, optimizer and scheduler."""
     limits, actor = settings.trainer, components.learning_actor(settings, parts)

@@ -10,7 +10,7 @@ from drone_rl.robustness.axes import AXES
 from drone_rl.robustness.faults import late_frames
 from drone_rl.robustness.paired_evaluation import PairedEvaluator, PolicySpec
 from drone_rl.robustness.perturbations import ONSET_STEP, Condition, Mode, whiten
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import Stream
@@ -79,7 +79,7 @@ def test_a_delayed_action_is_the_one_decided_so_many_steps_before(make_bed):
 
 
 def test_an_onset_changes_nothing_before_it(make_bed):
-    white = Condition(looks=(whiten((Meaning.TARGET,), 1.0),))
+    white = Condition(looks=(whiten((SemanticClass.TARGET,), 1.0),))
     evaluator = make_bed(
         subject(task=TaskSettings(num_cubes=2, first_distance=15.0, spacing=9.0)), 12
     )
@@ -93,10 +93,10 @@ def test_an_onset_changes_nothing_before_it(make_bed):
 
 def test_luck_is_what_the_task_calls_so(make_bed):
     evaluator = make_bed(subject(Blind(1)), 20)
-    luck = evaluator.run_baselines(Condition())
-    assert [*luck] == ["random", "forward", "left", "right"]
-    assert torch.equal(luck["left"].length, evaluator.run(Condition()).episodes.length)
-    assert torch.equal(luck["left"].goals.world, luck["random"].goals.world)
+    blind = evaluator.run_baselines(Condition())
+    assert [*blind] == ["random", "forward", "left", "right"]
+    assert torch.equal(blind["left"].length, evaluator.run(Condition()).episodes.length)
+    assert torch.equal(blind["left"].goals.world, blind["random"].goals.world)
 
 
 def test_a_size_that_cannot_be_is_refused(make_bed):

@@ -18,7 +18,7 @@ from torch import Tensor
 from drone_rl.config import CameraSettings
 from drone_rl.sim.actions import Actions, Entry
 from drone_rl.sim.dynamics import BodyState, ComputerVision, Dynamics, Obstacles
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.vocabulary import TaskVocabulary
 from drone_rl.utils.batch import Batch
 from drone_rl.utils.errors import InputError
@@ -64,7 +64,7 @@ class EndReason(enum.IntEnum):
 class Prop(Protocol):
     """A dm_control entity that a task adds to the scene."""
 
-    meaning: Meaning
+    semantic_class: SemanticClass
 
     @property
     def mjcf_model(self) -> mjcf.RootElement:
@@ -172,7 +172,7 @@ class Task(abc.ABC, Generic[S]):
     """What reports call its goals and targets."""
     strata: tuple[str, ...] = ("anywhere",)
     """Where a goal can stand, from left to right: verdicts count each stratum separately."""
-    luck: tuple[str, ...] = ("random", "forward", "left", "right")
+    blind_baselines: tuple[str, ...] = ("random", "forward", "left", "right")
     """Baselines that see nothing: "random", and actions that are always taken, by name."""
     scored: tuple[str, ...] = ("drawn", "end_reason")
     """Entries of an episode's last information that `score` reads."""
