@@ -115,7 +115,8 @@ def register_learner(name: str) -> Callable[[F], F]:
     """Register a learner, selected by `objective=NAME`; a decorator of a class or function.
 
     It is called as `factory(settings, collecting, **own)`, with the training's settings and what
-    `drone_rl.training.components.make_collector` returned, and returns a `drone_rl.training.learners.Learner`.
+    `make_collector` of `drone_rl.training.components` returned, and returns a
+    `drone_rl.training.learners.Learner`.
 
     Args:
         name: Name in settings.

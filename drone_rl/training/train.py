@@ -104,12 +104,11 @@ def learn(
     torch.set_num_threads(limits.num_threads)  # sums depend on it: equal on every machine
     bound_kernels()
     parts = components.make_collector(settings, replay)
-    learner = components.make_learner(settings, parts)
     confirmation = Confirmation(settings, parts.network) if limits.confirm_episodes else None
     checkpoints = run.checkpoints(settings)
     trainer = Trainer(
         collector=parts.collector,
-        learner=learner,
+        learner=components.make_learner(settings, parts),
         callbacks=[CsvCallback(folder / "metrics.csv"), checkpoints, *callbacks],
         generators=parts.generators,
         target=limits.target_share and limits.target_share * largest_reward,
