@@ -4,12 +4,14 @@ import torch
 from torch import Tensor
 
 from drone_rl.config import transforms as settings
+from drone_rl.config.registry import implements
 from drone_rl.envs import faults
 from drone_rl.envs.camera_fault import CameraFault, Streams, normal, uniform
 from drone_rl.envs.transforms import PixelTransform
 from drone_rl.utils.errors import InputError
 
 
+@implements(settings.Blur)
 class Blur(PixelTransform):
     """Blurs pictures (*, C, H, W) by a Gaussian; a map from picture to picture.
 
@@ -17,7 +19,7 @@ class Blur(PixelTransform):
         InputError: The width is out of range, or the pictures are bytes.
     """
 
-    def __init__(self, width: float = 0.5) -> None:
+    def __init__(self, width: float = settings.Blur.width) -> None:
         """See `drone_rl.config.transforms.Blur`."""
         super().__init__()
         self.width = settings.Blur(width=width).width
@@ -31,6 +33,7 @@ class Blur(PixelTransform):
         return f"Blur(width={self.width:g})"
 
 
+@implements(settings.Noise)
 class Noise(CameraFault):
     """Adds noise to each pixel, white or correlated in time.
 
@@ -38,7 +41,11 @@ class Noise(CameraFault):
         InputError: A value is out of range.
     """
 
-    def __init__(self, strength: float = 0.02, correlation_time: float = 0.0) -> None:
+    def __init__(
+        self,
+        strength: float = settings.Noise.strength,
+        correlation_time: float = settings.Noise.correlation_time,
+    ) -> None:
         """See `drone_rl.config.transforms.Noise`."""
         super().__init__()
         told = settings.Noise(strength=strength, correlation_time=correlation_time)
@@ -61,6 +68,7 @@ class Noise(CameraFault):
         return f"Noise(strength={self.strength:g}, correlation_time={self.correlation_time:g})"
 
 
+@implements(settings.DeadRows)
 class DeadRows(CameraFault):
     """Rows of the sensor that show nothing: always the same, drawn for each episode, or both.
 
@@ -68,7 +76,12 @@ class DeadRows(CameraFault):
         InputError: A value is out of range, or the pictures have fewer rows.
     """
 
-    def __init__(self, count: int = 1, rows: tuple[int, ...] = (), level: float = 0.0) -> None:
+    def __init__(
+        self,
+        count: int = settings.DeadRows.count,
+        rows: tuple[int, ...] = settings.DeadRows.rows,
+        level: float = settings.DeadRows.level,
+    ) -> None:
         """See `drone_rl.config.transforms.DeadRows`."""
         super().__init__()
         told = settings.DeadRows(count=count, rows=rows, level=level)
@@ -95,6 +108,7 @@ class DeadRows(CameraFault):
         return f"DeadRows(count={self.count}, rows={self.rows}, level={self.level:g})"
 
 
+@implements(settings.FrozenFrames)
 class FrozenFrames(CameraFault):
     """Shows, by chance, the frame before once more.
 
@@ -102,7 +116,7 @@ class FrozenFrames(CameraFault):
         InputError: The share is out of range.
     """
 
-    def __init__(self, share: float = 0.05) -> None:
+    def __init__(self, share: float = settings.FrozenFrames.share) -> None:
         """See `drone_rl.config.transforms.FrozenFrames`."""
         super().__init__()
         self.share = settings.FrozenFrames(share=share).share
@@ -124,6 +138,7 @@ class FrozenFrames(CameraFault):
         return f"FrozenFrames(share={self.share:g})"
 
 
+@implements(settings.LateFrames)
 class LateFrames(CameraFault):
     """Shows each frame some frames late, and until then the first of the episode.
 
@@ -131,7 +146,7 @@ class LateFrames(CameraFault):
         InputError: The delay is out of range.
     """
 
-    def __init__(self, frames: int = 1) -> None:
+    def __init__(self, frames: int = settings.LateFrames.frames) -> None:
         """See `drone_rl.config.transforms.LateFrames`."""
         super().__init__()
         self.frames = settings.LateFrames(frames=frames).frames
@@ -152,6 +167,7 @@ class LateFrames(CameraFault):
         return f"LateFrames(frames={self.frames})"
 
 
+@implements(settings.Shift)
 class Shift(CameraFault):
     """Shows pictures aside, each episode by as much as is drawn for it.
 
@@ -159,7 +175,9 @@ class Shift(CameraFault):
         InputError: A shift is out of range.
     """
 
-    def __init__(self, down: int = 4, across: int = 6) -> None:
+    def __init__(
+        self, down: int = settings.Shift.down, across: int = settings.Shift.across
+    ) -> None:
         """See `drone_rl.config.transforms.Shift`."""
         super().__init__()
         told = settings.Shift(down=down, across=across)

@@ -8,6 +8,8 @@ from torch.nn import functional
 from torchrl.data import TensorSpec, Unbounded
 from torchrl.envs.transforms import ObservationTransform
 
+from drone_rl.config import transforms as settings
+from drone_rl.config.registry import implements
 from drone_rl.sim.rendering.view import to_gray
 from drone_rl.utils.errors import InputError
 
@@ -44,6 +46,7 @@ class PixelTransform(ObservationTransform):
         return observation_spec
 
 
+@implements(settings.Gray)
 class GrayPixels(PixelTransform):
     """RGB bytes (*, H, W, 3) to gray (*, 1, H, W), float32 in [0, 1], in one pass.
 
@@ -58,6 +61,7 @@ class GrayPixels(PixelTransform):
         return to_gray(obs).unsqueeze(-3)
 
 
+@implements(settings.Rgb)
 class RgbPixels(PixelTransform):
     """RGB bytes (*, H, W, 3) to floats (*, 3, H, W), float32 in [0, 1].
 
@@ -70,6 +74,7 @@ class RgbPixels(PixelTransform):
         return obs.movedim(-1, -3).float() / 255.0
 
 
+@implements(settings.Chromaticity)
 class ChromaticityPixels(PixelTransform):
     """Colors (*, 3, H, W) to shares of red and blue in each (*, 2, H, W), less a third.
 
@@ -83,7 +88,7 @@ class ChromaticityPixels(PixelTransform):
 
     def __init__(
         self,
-        floor: float = 0.15,
+        floor: float = settings.Chromaticity.floor,
         in_keys: list[NestedKey] | None = None,
         out_keys: list[NestedKey] | None = None,
     ) -> None:
@@ -105,6 +110,7 @@ class ChromaticityPixels(PixelTransform):
         return f"ChromaticityPixels(floor={self.floor:g})"
 
 
+@implements(settings.Crop)
 class CropRows(PixelTransform):
     """Keeps the rows `top` to `bottom` (exclusive) of frames (*, C, H, W).
 
@@ -136,6 +142,7 @@ class CropRows(PixelTransform):
         return f"CropRows(top={self.top}, bottom={self.bottom})"
 
 
+@implements(settings.Resize)
 class Resize(PixelTransform):
     """Resizes frames (*, C, H, W) by averaging over areas.
 
@@ -168,6 +175,7 @@ class Resize(PixelTransform):
         return f"Resize(height={self.height}, width={self.width})"
 
 
+@implements(settings.Standardize)
 class StandardizePixels(PixelTransform):
     """Shifts and scales pixels: (x - mean) / std. The defaults are the original study's.
 
@@ -177,8 +185,8 @@ class StandardizePixels(PixelTransform):
 
     def __init__(
         self,
-        mean: float = 0.53,
-        std: float = 0.21,
+        mean: float = settings.Standardize.mean,
+        std: float = settings.Standardize.std,
         in_keys: list[NestedKey] | None = None,
         out_keys: list[NestedKey] | None = None,
     ) -> None:
