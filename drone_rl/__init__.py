@@ -32,8 +32,7 @@ if TYPE_CHECKING:
         ProvableSettings,
         ProveSettings,
     )
-    from drone_rl.envs.gymnasium.world import DroneWorld
-    from drone_rl.envs.gymnasium.worlds import DroneWorlds
+    from drone_rl.envs.gymnasium.environments import DroneWorld, DroneWorlds
     from drone_rl.envs.sb3.worlds import Sb3Worlds
     from drone_rl.evaluation.evaluate import Evaluation, evaluate
     from drone_rl.explanations.explain import Explanations, explain
@@ -82,8 +81,7 @@ _PLACES = {
     "verification.prove": ("Proof", "load_proof", "prove"),
     "robustness.shifts": ("Shifts", "shifts"),
     "training.train": ("Training", "train"),
-    "envs.gymnasium.world": ("DroneWorld",),
-    "envs.gymnasium.worlds": ("DroneWorlds",),
+    "envs.gymnasium.environments": ("DroneWorld", "DroneWorlds"),
     "envs.sb3.worlds": ("Sb3Worlds",),
     "explanations.settings": ("ExplainSettings",),
     "flight.commands.command": ("FlightFuture", "PilotError"),

@@ -100,7 +100,7 @@ class StepCount(Transform):
 class Blur(Transform):
     """Blurred by a Gaussian, as out of focus."""
 
-    target: ClassVar[str] = "drone_rl.envs.fault_transforms.Blur"
+    target: ClassVar[str] = "drone_rl.envs.camera_faults.Blur"
     width: Annotated[float, Real(0.0, 16.0, unit="pixels")] = 0.5
     """Standard deviation of the Gaussian."""
 
@@ -114,7 +114,7 @@ class Fault(Transform):
 class Noise(Fault):
     """Noise of the sensor, which cuts off at black and white."""
 
-    target: ClassVar[str] = "drone_rl.envs.fault_transforms.Noise"
+    target: ClassVar[str] = "drone_rl.envs.camera_faults.Noise"
     strength: Annotated[float, Real(0.0, 1.0)] = 0.02
     """Standard deviation; from black to white is 1."""
     correlation_time: Annotated[float, Real(0.0, 10_000.0, unit="frames")] = 0.0
@@ -125,7 +125,7 @@ class Noise(Fault):
 class DeadRows(Fault):
     """Rows of the sensor that show nothing."""
 
-    target: ClassVar[str] = "drone_rl.envs.fault_transforms.DeadRows"
+    target: ClassVar[str] = "drone_rl.envs.camera_faults.DeadRows"
     count: Annotated[int, Whole(0, 1024, "rows")] = 1
     """Rows drawn anew for each episode, besides those that are always dead."""
     rows: Annotated[tuple[int, ...], Several(Whole(0, 1023, "rows"), 0, 1024)] = ()
@@ -159,7 +159,7 @@ class DeadRows(Fault):
 class FrozenFrames(Fault):
     """Frames that are, by chance, the one before."""
 
-    target: ClassVar[str] = "drone_rl.envs.fault_transforms.FrozenFrames"
+    target: ClassVar[str] = "drone_rl.envs.camera_faults.FrozenFrames"
     share: Annotated[float, Real(0.0, 1.0)] = 0.05
     """Probability of each."""
 
@@ -168,7 +168,7 @@ class FrozenFrames(Fault):
 class LateFrames(Fault):
     """Frames that are shown late; until then the episode's first."""
 
-    target: ClassVar[str] = "drone_rl.envs.fault_transforms.LateFrames"
+    target: ClassVar[str] = "drone_rl.envs.camera_faults.LateFrames"
     frames: Annotated[int, Whole(0, 16, "frames")] = 1
     """How late."""
 
@@ -177,7 +177,7 @@ class LateFrames(Fault):
 class Shift(Fault):
     """A picture that stands a little aside all through an episode, as of a camera fixed askew."""
 
-    target: ClassVar[str] = "drone_rl.envs.fault_transforms.Shift"
+    target: ClassVar[str] = "drone_rl.envs.camera_faults.Shift"
     down: Annotated[int, Whole(0, 1023, "pixels")] = 4
     """How far up or down at most; every shift is as likely."""
     across: Annotated[int, Whole(0, 1023, "pixels")] = 6
