@@ -49,9 +49,9 @@ docs: $(STAMP)
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 	@echo "site/index.html"
 
-# Lines of test for a line of code; modules without a test of their own name.
+# Size and shape of the package, phrases to rewrite, modules without a test of their own name, as JSON.
 count: $(STAMP)
-	@$(BIN)/python -m tools.mirror
+	@$(BIN)/python -m tools.size
 
 # Mutation testing of the whole package but benchmarks/: a sample of 1,000 mutants, about 45 minutes on two
 # idle cores, 15 of them for a run of all tests that records what each one runs. It goes on where it was

@@ -7,10 +7,10 @@ from typing import Any
 
 from benchmarks.commands import watch
 from benchmarks.parts import default_pipeline
-from drone_rl.explanations import tsne
+from drone_rl.explanations import embedding
 from drone_rl.explanations.hooks import feature_layer
-from drone_rl.explanations.recording import record
 from drone_rl.explanations.response import response_map
+from drone_rl.explanations.rollouts import record
 from drone_rl.explanations.scenes import Scenes
 
 
@@ -40,7 +40,7 @@ def _parts(many: int) -> dict[str, Any]:
     results = {}
     for count in (600, many):
         begin = time.perf_counter()
-        tsne.embed(features[:count])
+        embedding.embed(features[:count])
         results[f"tsne_{count}_s"] = time.perf_counter() - begin
     scenes = Scenes(env)
     response_map(scenes, network, num_lateral=3, num_forward=3)

@@ -18,10 +18,10 @@ from typing import Any
 
 from markupsafe import Markup
 
+from drone_rl.explanations.report import embedding
 from drone_rl.explanations.report.explanation import Explanation
 from drone_rl.explanations.report.page import Policy, render_page
 from drone_rl.explanations.report.part import Part
-from drone_rl.explanations.report.sections import embedding
 from drone_rl.sim.vocabulary import ShownActions, TaskVocabulary
 from drone_rl.sweeps.report import render_page as render_sweep
 from drone_rl.utils.display import page, paragraph, table
@@ -159,17 +159,17 @@ class _ForgedPolicy(Policy):
         """See `Policy`."""
         explanation = self.explanation
         extras = self.extras.get(part.title) or part.extras(explanation)
-        words = {name: say(may, explanation.numbers) for name, may in part.words.items()}
+        sentences = {name: say(may, explanation.numbers) for name, may in part.text.items()}
         if self.text:
             plain = json.loads(json.dumps({k: v for k, v in extras.items() if k != "svg"}))
             extras = {**extras, **_everywhere(plain, self.text)}
-            words = {name: f"{text} {self.text}" for name, text in words.items()}
+            sentences = {name: f"{text} {self.text}" for name, text in sentences.items()}
         return {
             "name": explanation.name,
             "numbers": explanation.numbers,
             "actions": explanation.actions,
             "pictures": _Drawn({} if extras.get("rows") == [] else {"shown": PIXEL}),
-            "words": words,
+            "text": sentences,
             "terms": explanation.terms,
             "extras": extras,
         }
@@ -196,7 +196,10 @@ def _sources() -> frozenset[str]:
     root = resources.files("drone_rl")
     files = [
         file
-        for folder in ("words", "report", "report/sections", "report/templates/sections")
+        for folder in (
+            *("evaluation", "robustness", "verification", "utils", "sim", "evaluation/plots"),
+            *("explanations/report", "explanations/report/templates/sections"),
+        )
         for file in root.joinpath(folder).iterdir()
         if file.is_file()
     ]

@@ -9,8 +9,8 @@ import torch
 from torch import Tensor
 
 from benchmarks.liars import liars
+from benchmarks.planted import Planted, plant, reach
 from drone_rl.explanations.hooks import probabilities
-from drone_rl.explanations.planted import Planted, plant, reach
 from drone_rl.explanations.scenes import Scenes
 from drone_rl.explanations.trust import Pictures, Trial, check_maps, draw_pictures
 from drone_rl.policies import PictureNetwork, SmallCNN

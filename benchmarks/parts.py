@@ -21,7 +21,7 @@ from drone_rl.config.training import TrainSettings
 from drone_rl.envs import DroneEnv
 from drone_rl.policies import PolicyNetwork, SmallCNN, make_actor
 from drone_rl.policies.environment import make_env
-from drone_rl.sim.rendering import MakeRenderer
+from drone_rl.sim.rendering import RendererFactory
 from drone_rl.training.build_collector import build_collector
 
 
@@ -57,7 +57,7 @@ def make_worlds(
     num_envs: int,
     device: str,
     num_cubes: int = 3,
-    renderer: str | MakeRenderer = "raytrace",
+    renderer: str | RendererFactory = "raytrace",
     camera: CameraSettings | None = None,
     appearance: AppearanceSettings | None = None,
 ) -> DroneEnv:

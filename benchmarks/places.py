@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from drone_rl.policies.policy import load_policy
 from drone_rl.utils.progress import silent
 from drone_rl.verification.places import places
-from drone_rl.verification.prover.cube_images import Seeing
-from drone_rl.verification.prover.policy_spec import make_subject
+from drone_rl.verification.prover.cube_images import CubeImages
+from drone_rl.verification.prover.policy_spec import make_policy_spec
 
 _BATCH = 2000
 
@@ -33,12 +33,12 @@ def bench_places(quick: bool) -> dict[str, Any]:
     wrong = compared = 0
     for cubes in (2, 3):
         policy = load_policy("good").in_task(num_cubes=cubes)
-        made = make_subject(policy.description, policy.make_network(), 0.0)
-        with closing(made) as subject:
+        made = make_policy_spec(policy.description, policy.make_network(), 0.0)
+        with closing(made) as spec:
             for begin in range(0, count // 2, _BATCH):
                 size = min(_BATCH, count // 2 - begin)
                 found = compare(
-                    subject.seeing, subject.lattice.task.front_bound, cubes, size, random_state
+                    spec.images, spec.lattice.task.front_bound, cubes, size, random_state
                 )
                 wrong, compared = wrong + found[0], compared + found[1]
     return {
@@ -51,7 +51,7 @@ def bench_places(quick: bool) -> dict[str, Any]:
 
 
 def compare(
-    seeing: Seeing,
+    images: CubeImages,
     farthest: float,
     num_cubes: int,
     count: int,
@@ -60,7 +60,7 @@ def compare(
     """Draws and works out pictures from places that are on no lattice.
 
     Args:
-        seeing: Of a task with moves of a metre.
+        images: Of a task with moves of a metre.
         farthest: x that the drone gets to at most, metres.
         num_cubes: Of the task.
         count: How many pictures.
@@ -71,6 +71,6 @@ def compare(
     """
     cubes = random_state.uniform(-8.0, 8.0, (count, num_cubes))
     where: NDArray[Any] = random_state.uniform([0.0, -8.0], [farthest, 8.0], (count, 2))
-    drawn, (made, is_clear) = seeing.draw(cubes, where), seeing.work_out(cubes, where)
+    drawn, (made, is_clear) = images.render(cubes, where), images.closed_form(cubes, where)
     differs = (drawn != made).flatten(1).any(-1).numpy()
     return int((differs & is_clear).sum()), int(is_clear.sum())

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drone_rl.sim.rendering import Scene
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.scene import SemanticClass
 
 CAMERA = "camera"
 NUDGED = ("left", "right", "up", "down")
@@ -89,7 +89,7 @@ class RandomScenes:
         model.geom_pos[1] = model.cam_pos[0] - np.exp(random.uniform(-3.5, 1.0)) * _normal(model, 1)
         if (model.cam_pos[0] - model.geom_pos[2]) @ _normal(model, 2) < 0:
             model.geom_quat[2] = model.geom_quat[2][[1, 0, 3, 2]] * [-1, 1, 1, -1]
-        return Scene(model, (Meaning.OBSTACLE,) * count, (-1,) * count, (0.0, 0.0, 0.0))
+        return Scene(model, (SemanticClass.OBSTACLE,) * count, (-1,) * count, (0.0, 0.0, 0.0))
 
 
 def _attitudes(random: np.random.RandomState, count: int) -> NDArray[np.float64]:

@@ -18,19 +18,8 @@ from benchmarks.evidence import (
 )
 from drone_rl.evaluation import evaluate as evaluation
 from drone_rl.evaluation import verdict_text as verdict
-from drone_rl.explanations.report import (
-    advice,
-)
-from drone_rl.explanations.report import (
-    source_text as source,
-)
-from drone_rl.explanations.report import (
-    text as report,
-)
-from drone_rl.explanations.report import (
-    truth_text as truth,
-)
-from drone_rl.robustness import domain_text as domain
+from drone_rl.explanations.report.page import PARTS
+from drone_rl.explanations.report.verdict import SOURCE
 from drone_rl.robustness import shifts_text as shifts
 from drone_rl.sweeps import text as sweep
 from drone_rl.utils import text as seeds
@@ -42,13 +31,7 @@ SPOKEN: dict[str, tuple[tuple[Sentence, ...], Mapping[str, Any]]] = {
     "verdict": (verdict.SENTENCES, VERDICT),
     "evaluation": (evaluation.EVALUATION, EVALUATION),
     "explanation": (
-        (
-            *source.SENTENCES,
-            *advice.SENTENCES,
-            *report.SENTENCES,
-            *truth.SENTENCES,
-            *domain.QUOTED,
-        ),
+        (*SOURCE, *(s for part in PARTS.values() for group in part.text.values() for s in group)),
         EXPLANATION,
     ),
     "card": (card.SENTENCES, CARD),

@@ -41,13 +41,13 @@ def geoms(*depths, numbers=(3,)):
 
 def poses():
     made = structs_kernel.Poses()
-    made.places = array([[[0.0, 0.0, 0.0]]], wp.vec3)
+    made.positions = array([[[0.0, 0.0, 0.0]]], wp.vec3)
     made.attitudes = array([[1.0, 0.0, 0.0, 0.0]], wp.vec4)
     return made
 
 
-def looks():
-    made = structs_kernel.Looks()
+def materials():
+    made = structs_kernel.Materials()
     made.colors = array([[[0.0] * 3] * 3 + [[1.0, 0.5, 0.0]]], wp.vec3)
     made.ambient = array([[[0.2, 0.2, 0.2]]], wp.vec3)
     made.diffuse = array([[[0.6, 0.6, 0.6]]], wp.vec3)
@@ -56,16 +56,16 @@ def looks():
     return made
 
 
-def pictures(**dtypes):
+def images(**dtypes):
     """Empty ones, by name."""
-    made = structs_kernel.Pictures()
+    made = structs_kernel.Images()
     for name, dtype in dtypes.items():
         setattr(made, name, wp.full((1, SIZE * SIZE), dtype(), dtype=dtype, device="cpu"))
     return made
 
 
-def drawn(painter, name, what, dtype, scene=None):
-    """One picture by a painter. Shape: (SIZE, SIZE, *)."""
-    out = pictures(**{name: dtype})
-    painter.paint(1, view(int(what)), scene or geoms(), poses(), looks(), out)
+def drawn(launcher, name, what, dtype, scene=None):
+    """One picture by a launcher. Shape: (SIZE, SIZE, *)."""
+    out = images(**{name: dtype})
+    launcher.launch(1, view(int(what)), scene or geoms(), poses(), materials(), out)
     return np.squeeze(getattr(out, name).numpy()).reshape(SIZE, SIZE, -1)

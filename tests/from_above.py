@@ -4,8 +4,8 @@ import mujoco
 import torch
 
 from drone_rl.sim.rendering import Poses, Raytracer, Scene, View
-from drone_rl.sim.rendering.raytrace.renderer import GpuPainter
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.raytrace.renderer import GpuLauncher
+from drone_rl.sim.rendering.scene import SemanticClass
 
 SIZE = 40
 XML = """<mujoco><statistic extent="1"/>
@@ -17,20 +17,20 @@ XML = """<mujoco><statistic extent="1"/>
 <camera name="down" pos="0 0 10" xyaxes="1 0 0 0 1 0" fovy="53.13010235"/>
 <camera name="ahead" pos="0 0 10" xyaxes="0 -1 0 0 0 1" fovy="90"/>
 </worldbody></mujoco>"""
-PAINTERS = ("cores", "pixels")
+LAUNCHERS = ("cores", "pixels")
 
 
-def tracer(painter="cores", kind="box", size=".5 .5 .5"):
+def tracer(launcher="cores", kind="box", size=".5 .5 .5"):
     model = mujoco.MjModel.from_xml_string(XML.format(kind=kind, size=size))
-    scene = Scene(model, (Meaning.GROUND, Meaning.TARGET), (-1, -1), (0.2, 0.4, 0.6))
+    scene = Scene(model, (SemanticClass.GROUND, SemanticClass.TARGET), (-1, -1), (0.2, 0.4, 0.6))
     made = Raytracer(scene, num_worlds=2, num_shards=2)
-    if painter == "pixels":
-        made._painter = GpuPainter("cpu")  # the kernels for GPUs run on a CPU, too
+    if launcher == "pixels":
+        made._launcher = GpuLauncher("cpu")  # the kernels for GPUs run on a CPU, too
     return made
 
 
 def seen(renderer, appearance=None, *, camera="down", modality="rgb", worlds=1):
-    """Pictures. Shape: (worlds, SIZE, SIZE, *)."""
+    """Images. Shape: (worlds, SIZE, SIZE, *)."""
     view = View(cameras=(camera,), height=SIZE, width=SIZE, modalities=(modality,))
     attitude = torch.tensor([[1.0, 0.0, 0.0, 0.0]]).repeat(worlds, 1)
     poses = Poses(torch.zeros(worlds, 3), attitude, torch.zeros(worlds, 0, 3))

@@ -13,7 +13,7 @@ from torch import Tensor
 
 from drone_rl.sim.actions import MOVES, Entry
 from drone_rl.sim.entities import Cube
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.tasks import Goals, Grid, OracleRule, State, Task
 from drone_rl.sim.vocabulary import TaskVocabulary
 
@@ -42,7 +42,7 @@ class PostsState(State):
 class Post(Cube):
     """A box that must not be touched."""
 
-    meaning = Meaning.OBSTACLE
+    semantic_class = SemanticClass.OBSTACLE
 
 
 class Posts(Task[PostsState]):

@@ -1,4 +1,4 @@
-"""`make count`: lines of test for a line of code, and modules without a test of their own name."""
+"""Modules without a test of their own name."""
 
 from pathlib import Path
 
@@ -9,11 +9,11 @@ PURE_DATA = {
         for name in ("networks", "transforms")
     },
 }
-"""Modules that need no test of their own, and why: what they hold is tried by others' tests."""
+"""Modules that need no test of their own, and which tests cover them."""
 
 
 def modules_without_test(root: Path = ROOT) -> list[str]:
-    """Modules of drone_rl, as "sim/rules", that no tests/sim/test_rules.py mirrors."""
+    """Return modules of drone_rl, such as "sim/rules", without a tests/sim/test_rules.py."""
     package = root / "drone_rl"
     names = [p.relative_to(package).with_suffix("") for p in sorted(package.rglob("*.py"))]
     return [
@@ -26,17 +26,5 @@ def modules_without_test(root: Path = ROOT) -> list[str]:
 
 
 def count_lines(folder: Path) -> int:
-    """Lines of all modules of a folder."""
+    """Return the number of lines of all modules below a folder."""
     return sum(len(path.read_text().splitlines()) for path in folder.rglob("*.py"))
-
-
-def main() -> None:
-    """Prints both."""
-    code, tests = count_lines(ROOT / "drone_rl"), count_lines(ROOT / "tests")
-    print(f"{tests:,} lines of test for {code:,} of code: {tests / code:.2f}")
-    missing = modules_without_test()
-    print(f"{len(missing)} modules without a test of their own name", *missing, sep="\n  ")
-
-
-if __name__ == "__main__":
-    main()

@@ -24,7 +24,7 @@ class Command(Settings):
 
 def run(settings: Command, folder: Path) -> tuple[int, str]:
     """Makes a report from explanations. Returns the exit status and the report's path."""
-    from drone_rl.explanations.reporting import find_explanations, report
+    from drone_rl.explanations.report.page import find_explanations, report
 
     made = report(find_explanations(settings.explanations, settings.paths.outputs), folder)
     _log.info("report: %s", made)

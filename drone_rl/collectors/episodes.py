@@ -1,35 +1,59 @@
-# pyright: reportIncompatibleMethodOverride=false
-# (TorchRL's collectors annotate states otherwise than they use them.)
-"""Complete episodes, each frame once: what REINFORCE learns from."""
+"""Collects complete episodes from a batch of environments."""
 
 from collections.abc import Iterable
-from typing import Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import torch
-from tensordict import TensorDict, TensorDictBase
+from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from tensordict.utils import NestedKey
-from torch import Tensor
 from torchrl.envs import EnvBase
 
-from drone_rl.collectors.flight import Flight
-from drone_rl.collectors.ways import StraightWay, find_way
-from drone_rl.collectors.worlds_collector import WorldsCollector
-from drone_rl.policies.known_outputs import KnownOutputs
+from drone_rl.collectors.batched_collector import BatchedCollector
+from drone_rl.collectors.speedups import Acceleration, accelerated_collector
+from drone_rl.collectors.stepping import SteppingCollector
+from drone_rl.envs.direct_renderer import Reasons
+
+if TYPE_CHECKING:
+    from drone_rl.acceleration import ActivationCache
 
 
-class EpisodeCollector(WorldsCollector):
-    """Iterates over batches of `env.batch_size[0]` complete episodes, one a world.
+class EpisodeSource(Protocol):
+    """Runs complete episodes: by TorchRL's collector, or accelerated."""
+
+    implementation: str
+    """What computes the actions: "fused kernel" or "PyTorch"."""
+
+    @property
+    def name(self) -> str:
+        """What it is, for the log, and why it is not faster."""
+        ...
+
+    def collect(self, num_envs: int) -> TensorDictBase:
+        """Run an episode in each of the first environments; trajectories count from 0."""
+        ...
+
+    def cache_activations(self) -> "ActivationCache | None":
+        """Keep the activations of acting from now on, for a `FusedNetwork`, if that is possible."""
+        ...
+
+    def close(self) -> None:
+        """Ends its threads."""
+        ...
+
+
+class EpisodeCollector(BatchedCollector):
+    """Iterates over batches of `env.batch_size[0]` complete episodes, one an environment.
 
     A batch is in the "cat" format of TorchRL's `Collector(trajs_per_batch=...)`: a flat TensorDict
-    of shape (T_total,), episode after episode without padding, marked by ("collector",
+    of shape (T_total,), episode after episode without padding, numbered by ("collector",
     "traj_ids"), each ending in ("next", "done"). Next observations are left out: no estimator
     without a critic needs them.
 
-    All worlds start a batch together under one policy and each is left alone once its episode
-    has ended, undrawn and free of cost. So a batch is strictly on-policy and has no bias towards
-    short episodes, no frame is dropped or used twice, and between two batches no episode is under
-    way: what is needed to resume is the worlds' random streams alone.
+    All environments reset at the start of a batch. An environment whose episode has ended is masked
+    until the batch ends and is not rendered. So a batch is on-policy and not biased towards short
+    episodes, no frame is dropped or used twice, and no episode is under way between two batches:
+    the state to resume from is the environments' random streams.
     """
 
     def __init__(
@@ -39,8 +63,8 @@ class EpisodeCollector(WorldsCollector):
         *,
         keep_observations: bool = True,
         noted: Iterable[NestedKey] = (),
-        is_compiled: bool = False,
-        num_cores: int = 1,
+        acceleration: Acceleration = "direct",
+        num_threads: int = 1,
         **kwargs: Any,
     ) -> None:
         """Connects an environment and a policy.
@@ -48,93 +72,46 @@ class EpisodeCollector(WorldsCollector):
         Args:
             env: A batched environment that honours TorchRL's "_step" masks.
             actor: Writes the action.
-            keep_observations: Whether to keep what the actor saw and made of it.
-            noted: What the actor writes and is kept besides its actions, if observations are not.
-            is_compiled: Whether a kernel may fly whole episodes, see `Flight`. It draws actions in
-                another order, and sums in the network may differ in the last place.
-            num_cores: That such a kernel takes; no result depends on it.
-            kwargs: See `WorldsCollector`.
+            keep_observations: Whether to keep what the actor reads and writes.
+            noted: Entries that the actor writes, kept even without observations.
+            acceleration: The fastest implementation that may be used, if it supports environment
+                and actor.
+            num_threads: Of the fused kernel; no result depends on it.
+            kwargs: See `BatchedCollector`.
 
         Raises:
-            InputError: The environment is not a batch of worlds.
+            InputError: The environment is not a batch of environments.
         """
         super().__init__(env, actor, **kwargs)
-        self._keep_observations, self._noted = keep_observations, tuple(noted)
-        self._way = find_way(env, self._observed, self._kept)
-        self._flight = None
-        if is_compiled and isinstance(self._way, StraightWay):
-            self._flight = Flight.find(self._way.sight, actor, num_cores)
-
-    @property
-    def implementation(self) -> str:
-        """What computes the actions: "fused kernel" or "PyTorch"."""
-        return "PyTorch" if self._flight is None else "fused kernel"
+        what = {"kept": self._kept, "extra": noted, "keep_observations": keep_observations}
+        found = accelerated_collector(env, actor, acceleration, num_threads=num_threads, **what)
+        self.source: EpisodeSource = (
+            SteppingCollector(env, actor, found, **what) if isinstance(found, Reasons) else found
+        )
+        """What runs the episodes."""
 
     @torch.no_grad()
-    def collect(self, num_worlds: int | None = None) -> TensorDictBase:
-        """Runs one episode in every world, or in the first `num_worlds`. Shape: (T_total,)."""
-        count = self.env.batch_size[0]
-        flying = count if num_worlds is None else min(num_worlds, count)
-        if self._flight is not None and self._flight.can_act():
-            batch = self._flight.fly(flying, self._keep_observations)
-        else:
-            batch = self._step_by_step(flying)
+    def collect(self, num_envs: int | None = None) -> TensorDictBase:
+        """Run an episode in every environment, or in the first `num_envs`. Shape: (T_total,)."""
+        size = self.env.batch_size[0]
+        count = size if num_envs is None else min(num_envs, size)
+        batch = self.source.collect(count)
         batch["collector", "traj_ids"] += self.episodes
-        return self._finish(batch, flying)
-
-    def _step_by_step(self, flying: int) -> TensorDictBase:
-        indices = torch.arange(flying, device=self.env.device)
-        worlds: list[Tensor] = []
-        steps: list[dict[NestedKey, Tensor]] = []
-        seen = self._way.begin(indices)
-        while len(indices):
-            acted = self.actor(seen)
-            keys = (self.env.action_key, *self._noted)
-            keys = acted.keys(True, True) if self._keep_observations else keys
-            step = {key: acted.get(key) for key in keys}
-            after, seen = self._way.step(indices, acted.get(self.env.action_key))
-            worlds.append(indices)
-            steps.append(step | after)
-            indices = indices[~after["next", "done"].flatten()]
-        return _join(steps, worlds, flying)
-
-    def keep_outputs(self) -> KnownOutputs | None:
-        """See `WorldsCollector`."""
-        return None if self._flight is None else self._flight.keep_outputs()
+        return self._finish(batch, count)
 
     def shutdown(
         self, timeout: float | None = None, close_env: bool = True, raise_on_error: bool = True
     ) -> None:
-        """See `WorldsCollector`."""
-        if self._flight is not None:
-            self._flight.close()
+        """See `BatchedCollector`."""
+        self.source.close()
         super().shutdown(timeout, close_env, raise_on_error)
 
-    def state_dict(self) -> dict:
-        """Counters and the environment's random streams, as they stand between two batches."""
-        worlds = self.worlds.state_dict()
+    def state_dict(self) -> dict[str, Any]:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """Counters and the environments' random streams between two batches."""
+        worlds = self.base_env.state_dict()
         return {"frames": self.frames, "episodes": self.episodes, "worlds": worlds}
 
-    def load_state_dict(self, state_dict: dict) -> None:
-        """Goes on from a `state_dict`."""
+    def load_state_dict(self, state_dict: dict[str, Any]) -> None:
+        """Resumes from a `state_dict`."""
         self.frames, self.episodes = state_dict["frames"], state_dict["episodes"]
-        self.worlds.load_state_dict(state_dict["worlds"])
-
-
-def _join(
-    steps: list[dict[NestedKey, Tensor]], worlds: list[Tensor], num_worlds: int
-) -> TensorDictBase:
-    """Time-major steps to episode after episode, copying each frame once. Shape: (T_total,)."""
-    worlds_of_steps = torch.cat(worlds)
-    lengths = worlds_of_steps.bincount(minlength=num_worlds)
-    first = lengths.cumsum(0) - lengths
-    rows = torch.cat([first[indices] + t for t, indices in enumerate(worlds)])
-    batch = TensorDict({}, [len(rows)], device=rows.device)
-    spans = rows.split([len(indices) for indices in worlds])
-    for key, value in steps[0].items():
-        joined = value.new_empty(len(batch), *value.shape[1:])
-        for indices, step in zip(spans, steps, strict=True):
-            joined.index_copy_(0, indices, step[key])
-        batch.set(key, joined)
-    traj_ids = torch.empty_like(worlds_of_steps).index_copy_(0, rows, worlds_of_steps)
-    return batch.set(("collector", "traj_ids"), traj_ids)
+        self.base_env.load_state_dict(state_dict["worlds"])

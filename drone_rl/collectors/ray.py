@@ -127,6 +127,9 @@ class RayEpisodeCollector:
         """Handles of the remote `RemoteEpisodes`."""
         return self._pool.remote_collectors
 
+    def cache_activations(self) -> None:
+        """Return None: activations do not travel between processes."""
+
     def __iter__(self) -> Iterator[TensorDictBase]:
         """Yields batches without end."""
         while True:

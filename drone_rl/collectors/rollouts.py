@@ -1,30 +1,29 @@
-# pyright: reportIncompatibleMethodOverride=false
-# (TorchRL's collectors annotate states otherwise than they use them.)
-"""Rollouts of fixed length, in worlds that go on from batch to batch: what critics learn from."""
+"""Collects rollouts of fixed length; episodes continue from batch to batch."""
 
-from typing import Any
+from collections.abc import Iterable, Mapping
+from typing import Any, Protocol
 
 import torch
 from tensordict import TensorDict, TensorDictBase
 from tensordict.nn import TensorDictModuleBase
+from tensordict.utils import NestedKey
+from torch import Tensor
 from torchrl.envs import EnvBase
 
-from drone_rl.collectors.sight import Entries
-from drone_rl.collectors.streams import find_stream
-from drone_rl.collectors.worlds_collector import WorldsCollector
+from drone_rl.collectors.batched_collector import BatchedCollector
+from drone_rl.collectors.speedups import accelerated_stream
+from drone_rl.envs.direct_renderer import Entries, Reasons
 from drone_rl.utils.errors import InputError
 
 
-class RolloutCollector(WorldsCollector):
-    """Iterates over batches of the next `num_steps` steps of every world. Shape: (num_envs, T).
+class RolloutCollector(BatchedCollector):
+    """Iterates over batches of the next `num_steps` steps of every environment: (num_envs, T).
 
-    A world whose episode ends begins another at once. Its row goes on with it, while
-    ("next", ...) holds what the actor would have seen of the old one: a critic can tell what a
-    state is worth where a row is cut, be it by the time limit or by the end of the batch.
-    ("next", "episode_reward") and ("next", "step_count"), which TorchRL's `RewardSum` and
-    `StepCounter` write, count from the start of an episode, in whichever batch that was.
-
-    Every batch is collected by one policy, so it is strictly on-policy.
+    An environment whose episode ends starts another at once. Its row continues with that one, while
+    ("next", ...) holds the last observation of the old one, so that a critic can bootstrap where a
+    row is cut by the time limit or by the end of the batch. ("next", "episode_reward") and
+    ("next", "step_count"), as TorchRL's `RewardSum` and `StepCounter` write them, count from the
+    start of an episode, even if that was in an earlier batch. A batch is on-policy.
     """
 
     def __init__(
@@ -35,23 +34,26 @@ class RolloutCollector(WorldsCollector):
         Args:
             env: A batched environment.
             actor: Writes the action.
-            num_steps: Of each world in a batch.
-            kwargs: See `WorldsCollector`.
+            num_steps: Of each environment in a batch.
+            kwargs: See `BatchedCollector`.
 
         Raises:
-            InputError: The environment is not a batch of worlds, or there are no steps.
+            InputError: The environment is not a batch of environments, or there are no steps.
         """
         if num_steps < 1:
             raise InputError(f"num_steps={num_steps} is out of range; give 1 or more")
         super().__init__(env, actor, **kwargs)
         self.num_steps = num_steps
-        self._way = find_stream(env, self._observed, self._kept)
+        found = accelerated_stream(env, self._observed, self._kept)
+        self._stream: Stream = (
+            TorchrlStream(env, self._observed, self._kept) if isinstance(found, Reasons) else found
+        )
         self._reward = torch.zeros(*env.batch_size, 1, device=env.device)
         self._steps = torch.zeros(*env.batch_size, 1, dtype=torch.int64, device=env.device)
 
     @torch.no_grad()
     def collect(self) -> TensorDictBase:
-        """Goes on in every world. Shape: (num_envs, T)."""
+        """Step every environment `num_steps` times. Shape: (num_envs, T)."""
         steps, episodes = Entries(), 0
         for t in range(self.num_steps):
             step = self._step()
@@ -62,7 +64,7 @@ class RolloutCollector(WorldsCollector):
             ended = step["next", "done"]
             if bool(ended.any()):
                 self._reward, self._steps = self._reward * ~ended, self._steps * ~ended
-                self._way.restart(ended)
+                self._stream.restart(ended)
                 episodes += int(ended.sum())
         batch = TensorDict({}, [*self.env.batch_size, self.num_steps], device=self.env.device)
         for key, value in steps.items():
@@ -70,34 +72,153 @@ class RolloutCollector(WorldsCollector):
         return self._finish(batch, episodes)
 
     def _step(self) -> Entries:
-        """Acts. Returns what is kept."""
-        acted = self.actor(self._way.seen())
+        """Take one step. Returns the kept entries."""
+        acted = self.actor(self._stream.observe())
         step: Entries = {key: acted.get(key) for key in acted.keys(True, True)}
-        step |= self._way.step(acted.get(self.env.action_key))
+        step |= self._stream.step(acted.get(self.env.action_key))
         self._reward = self._reward + step["next", self.env.reward_key]
         self._steps = self._steps + 1
-        told = {"episode_reward": self._reward, "step_count": self._steps}
-        return step | {("next", name): value for name, value in told.items()}
+        sums = {"episode_reward": self._reward, "step_count": self._steps}
+        return step | {("next", name): value for name, value in sums.items()}
 
     def set_seed(self, seed: int, static_seed: bool = False) -> int:
-        """See `WorldsCollector.set_seed`; all episodes begin anew."""
-        self._way.forget()
+        """See `BatchedCollector.set_seed`; all episodes restart."""
+        self._stream.forget()
         self._reward, self._steps = torch.zeros_like(self._reward), torch.zeros_like(self._steps)
         return super().set_seed(seed, static_seed=static_seed)
 
-    def state_dict(self) -> dict:
-        """All that is known of the episodes under way, but for the pictures."""
+    def state_dict(self) -> dict[str, Any]:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """Return the state of the episodes under way, without observations."""
         return {
             "frames": self.frames,
             "episodes": self.episodes,
-            **self._way.state_dict(),
+            **self._stream.state_dict(),
             "episode_reward": self._reward,
             "step_count": self._steps,
         }
 
-    def load_state_dict(self, state_dict: dict) -> None:
-        """Goes on within the episodes of a `state_dict`; pictures are drawn anew."""
+    def load_state_dict(self, state_dict: dict[str, Any]) -> None:
+        """Resume within the episodes of a `state_dict`; observations are rendered again."""
         self.frames, self.episodes = state_dict["frames"], state_dict["episodes"]
-        self._way.load_state_dict(state_dict)
+        self._stream.load_state_dict(state_dict)
         self._reward = state_dict["episode_reward"].to(self._reward, copy=True)
         self._steps = state_dict["step_count"].to(self._steps, copy=True)
+
+
+class Stream(Protocol):
+    """Steps all environments on and on; each restarts when its episode has ended."""
+
+    def observe(self) -> TensorDictBase:
+        """Return the observations; the first call starts all environments. Shape: (num_envs,)."""
+        ...
+
+    def step(self, action: Tensor) -> Entries:
+        """Step every environment.
+
+        Args:
+            action: Of each environment. Shape: (num_envs, *).
+
+        Returns:
+            The kept entries of the step, and the ("next", ...) observations.
+        """
+        ...
+
+    def restart(self, ended: Tensor) -> None:
+        """Start new episodes where old ones ended. Shape: (num_envs, 1), bool."""
+        ...
+
+    def forget(self) -> None:
+        """Start all episodes anew at the next call of `observe`."""
+        ...
+
+    def state_dict(self) -> dict[str, Any]:
+        """Return the state of the episodes under way, without observations."""
+        ...
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Resume within the episodes of a `state_dict`; observations are rendered again."""
+        ...
+
+
+class TorchrlStream:
+    """Steps any environment by `env.step`."""
+
+    def __init__(
+        self, env: EnvBase, observed: Iterable[NestedKey], kept: Iterable[NestedKey]
+    ) -> None:
+        """See `accelerated_stream`."""
+        self._env, self._observed, self._kept = env, tuple(observed), tuple(kept)
+        self._dropped = _unused_keys(env, self._observed)
+        self._state: TensorDictBase | None = None
+
+    @property
+    def _base_env(self) -> Any:
+        return getattr(self._env, "base_env", self._env)
+
+    def observe(self) -> TensorDictBase:
+        """See `Stream`."""
+        return self._begin().select(*self._observed)
+
+    def _begin(self) -> TensorDictBase:
+        if self._state is None:
+            self._state = self._without_unused(self._env.reset())
+        return self._state
+
+    def step(self, action: Tensor) -> Entries:
+        """See `Stream`."""
+        after = self._env.step(self._begin().set(self._env.action_key, action))
+        following = after.get("next")
+        entries: Entries = {key: after.get(key) for key in self._kept}
+        entries |= {("next", key): following.get(key) for key in self._observed}
+        self._state = self._without_unused(following)
+        return entries
+
+    def restart(self, ended: Tensor) -> None:
+        """See `Stream`.
+
+        TorchRL's `reset` would copy the observations of all environments, several times.
+        """
+        state = self._begin()
+        fresh = self._env._reset(TensorDict({"_reset": ended}, state.batch_size))
+        indices = ended.flatten().nonzero()[:, 0]
+        restarted = TensorDict({}, state.batch_size, device=state.device)
+        for key in state.keys(True, True):
+            rows = fresh.get(key).index_select(0, indices)
+            restarted.set(key, state.get(key).index_copy(0, indices, rows))
+        self._state = restarted
+
+    def _without_unused(self, state: TensorDictBase) -> TensorDictBase:
+        """Without entries that no step reads."""
+        return state.exclude(*self._dropped, *self._env.done_keys)
+
+    def forget(self) -> None:
+        """See `Stream`."""
+        self._state = None
+
+    def state_dict(self) -> dict[str, Any]:
+        """See `Stream`."""
+        carried = self._begin().exclude(*self._observed)
+        return {
+            "worlds": self._base_env.running_state(),
+            "transforms": self._memories(),
+            "carried": carried.to_dict(),
+        }
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """See `Stream`."""
+        self._begin()  # transforms allocate their memory at a reset
+        self._base_env.load_running_state(state["worlds"])
+        if self._env is not self._base_env:
+            self._env.load_state_dict(state["transforms"])
+        nowhere = torch.zeros(*self._env.batch_size, 1, dtype=torch.bool, device=self._env.device)
+        rendered = self._env._reset(TensorDict({"_reset": nowhere}, self._env.batch_size))
+        self._state = self._without_unused(rendered).update(state["carried"])
+
+    def _memories(self) -> dict:
+        """State of the transforms, such as earlier frames."""
+        return {} if self._env is self._base_env else dict(self._env.state_dict())
+
+
+def _unused_keys(env: EnvBase, observed: Iterable[NestedKey]) -> set[NestedKey]:
+    """Entries of a state that no step reads; copying them makes each step of TorchRL slower."""
+    return {env.reward_key, "info"} - {key if isinstance(key, str) else key[0] for key in observed}

@@ -1,40 +1,39 @@
-# pyright: reportArgumentType=false
-# pyright: reportIncompatibleMethodOverride=false
-# (torch.cat takes TensorDicts, which its annotation lacks.)
-"""Several collectors side by side on the threads of one process."""
+"""Runs several collectors in parallel threads of one process."""
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import torch
 from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torchrl.collectors import BaseCollector
 
-from drone_rl.collectors.worlds_collector import WorldsCollector
-from drone_rl.policies.known_outputs import KnownOutputs
+from drone_rl.collectors.batched_collector import BatchedCollector
+from drone_rl.collectors.episodes import EpisodeCollector
+
+if TYPE_CHECKING:
+    from drone_rl.acceleration import ActivationCache
 
 
 class ThreadedCollector(BaseCollector):
     """Joins the batches of collectors that run at the same time, each on a thread of its own.
 
-    Drawing lets go of the interpreter's lock, so while one collector's worlds are being drawn
-    another's policy acts: on a CPU that is the best use of its cores. Each collector has worlds
-    and a stream of actions of its own, and their batches are joined in order, so the result does
-    not depend on which thread is faster.
+    Rendering releases the interpreter's lock, so that one collector renders while the policy of
+    another acts. Each collector has its own environments and stream of actions, and batches are
+    joined in order, so the result does not depend on which thread is faster.
     """
 
     def __init__(
         self,
-        collectors: Sequence[WorldsCollector],
+        collectors: Sequence[BatchedCollector],
         *,
         postproc: Callable[[TensorDictBase], TensorDictBase] | None = None,
     ) -> None:
         """Takes over the collectors.
 
         Args:
-            collectors: Over disjoint worlds, each drawn by a single shard.
+            collectors: Over disjoint environments, each rendered by a single shard.
             postproc: Applied to each joined batch, such as a return estimator.
         """
         super().__init__()
@@ -50,53 +49,57 @@ class ThreadedCollector(BaseCollector):
         """The policy that learns."""
         return self.collectors[0].actor
 
-    def keep_outputs(self) -> KnownOutputs | None:
-        """See `WorldsCollector`; None where batches are joined, whose pictures are copies."""
-        return self.collectors[0].keep_outputs() if len(self.collectors) == 1 else None
+    def cache_activations(self) -> "ActivationCache | None":
+        """See `EpisodeSource`; None for several collectors, whose batches are joined."""
+        first, *others = self.collectors
+        if others or not isinstance(first, EpisodeCollector):
+            return None
+        return first.source.cache_activations()
 
     def iterator(self) -> Iterator[TensorDictBase]:
-        """Yields batches without end; what a `for` over the collector goes through."""
+        """Yields batches without end; a `for` over the collector calls it."""
         while True:
             yield self.collect()
 
     def collect(self) -> TensorDictBase:
-        """What the collectors give, one after the other along the first dimension."""
+        """Return the batches of the collectors, joined along the first dimension."""
         parts = list(self._pool.map(lambda collector: collector.collect(), self.collectors))
-        batch = parts[0] if len(parts) == 1 else torch.cat(parts)
+        joined: Any = torch.cat  # its annotation lacks TensorDicts
+        batch = parts[0] if len(parts) == 1 else joined(parts)
         return batch if self.postproc is None else self.postproc(batch)
 
-    def state_dict(self) -> dict:
-        """The collectors' states, as they stand between two batches."""
+    def state_dict(self) -> dict[str, Any]:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """Return the collectors' states between two batches."""
         return {"collectors": [collector.state_dict() for collector in self.collectors]}
 
-    def load_state_dict(self, state_dict: dict) -> None:
-        """Goes on from a `state_dict`."""
+    def load_state_dict(self, state_dict: dict[str, Any]) -> None:
+        """Resumes from a `state_dict`."""
         for collector, part in zip(self.collectors, state_dict["collectors"], strict=True):
             collector.load_state_dict(part)
 
     def set_seed(self, seed: int, static_seed: bool = False) -> int:
-        """Seeds all worlds, each of which has a stream of its own by its number.
+        """Seeds all environments, each of which has a stream of its own.
 
         Returns:
-            See `WorldsCollector.set_seed`.
+            See `BatchedCollector.set_seed`.
         """
         return [c.set_seed(seed, static_seed=static_seed) for c in self.collectors][-1]
 
     def shutdown(
         self, timeout: float | None = None, close_env: bool = True, raise_on_error: bool = True
     ) -> None:
-        """Ends the threads and closes the environments, unless they shall stay open."""
+        """Ends the threads and closes the environments, unless they are to stay open."""
         self._pool.shutdown()
         for collector in self.collectors:
             collector.shutdown(close_env=close_env)
 
     def __len__(self) -> int:
-        """There is no end of batches."""
+        """Raises TypeError: there is no end of batches."""
         raise TypeError("a ThreadedCollector has batches without end")
 
     def _maybe_fallback_update(
         self, policy_or_weights: Any = None, *, model_id: str | None = None
     ) -> None:
-        """What `update_policy_weights_` does, see `WorldsCollector`."""
+        """Implements `update_policy_weights_`, see `BatchedCollector`."""
         for collector in self.collectors:
             collector.update_policy_weights_(policy_or_weights)

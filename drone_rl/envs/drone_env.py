@@ -20,7 +20,7 @@ from drone_rl.config import (
 )
 from drone_rl.sim.actions import Entry
 from drone_rl.sim.dynamics import Dynamics
-from drone_rl.sim.rendering import MakeRenderer, check_device
+from drone_rl.sim.rendering import RendererFactory, check_device
 from drone_rl.sim.tasks import Task, as_task
 from drone_rl.sim.visual_randomization import Appearances
 from drone_rl.sim.worlds import Worlds
@@ -56,7 +56,7 @@ class DroneEnv(EnvBase):
         device: str = "cpu",
         dynamics: Dynamics | DynamicsSettings | None = None,
         actions: ActionSettings | None = None,
-        renderer: str | MakeRenderer = "raytrace",
+        renderer: str | RendererFactory = "raytrace",
         appearance: AppearanceSettings | None = None,
     ) -> None:
         """Create the environments.

@@ -1,29 +1,29 @@
-"""What a verdict quotes of a certificate. Evidence: `verdict.json`; old ones have no "proof"."""
+"""Sentences of a verdict about a certificate. Evidence: `verdict.json`."""
 
 from drone_rl.utils.text import Evidence, Sentence, all_cubes, exact
 
 MOST_WRONG = 0.01
-"""Fraction of placements about which a re-checked certificate may be wrong, with 95% confidence."""
+"""Largest fraction of placements with a wrong statement, with 95% confidence."""
 
 
 def is_quoted(evidence: Evidence) -> bool:
-    """Whether a verdict rests on a certificate, too."""
+    """Return whether a certificate is quoted."""
     proof = evidence.get("proof")
     return proof is not None and proof["refused"] is None
 
 
 def is_stated(evidence: Evidence) -> bool:
-    """Whether that certificate says that it succeeds from every placement."""
+    """Return whether it states success from every placement."""
     return is_quoted(evidence) and evidence["proof"]["every"]
 
 
 def is_proved(evidence: Evidence) -> bool:
-    """Whether it says so, and enough rollouts from fresh placements have re-checked it."""
+    """Return whether it does, and enough rollouts from fresh placements re-checked it."""
     return is_stated(evidence) and _is_checked(evidence)
 
 
 def _is_checked(evidence: Evidence) -> bool:
-    bound = evidence["proof"].get("wrong_at_most")  # files of before have none
+    bound = evidence["proof"].get("wrong_at_most")
     return bound is not None and bound <= MOST_WRONG
 
 
@@ -66,7 +66,7 @@ def _basis(evidence: Evidence) -> str:
 
 
 def _checked(proof: Evidence) -> str:
-    """By how many rollouts it was re-checked, and what these rule out."""
+    """The number of rollouts that re-checked it, and what they rule out."""
     bound = proof.get("wrong_at_most")
     if bound is None:
         return "It was read from its file and not re-checked, so it proves nothing here."
@@ -85,7 +85,7 @@ def _checked(proof: Evidence) -> str:
 PROOF = (
     Sentence(
         "proof.every",
-        "a certificate that holds together says so, and no flight speaks against it",
+        "a valid certificate states so, and no episode contradicts it",
         is_stated,
         _every_placement,
     ),
@@ -98,7 +98,7 @@ PROOF = (
     Sentence("proof.basis", "a certificate is quoted", is_quoted, _basis),
     Sentence(
         "proof.refused",
-        "there is a certificate, and something speaks against it",
+        "a certificate is refused",
         _is_refused,
         lambda e: f"A certificate is not quoted: {e['proof']['refused']}.",
     ),

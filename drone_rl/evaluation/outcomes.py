@@ -6,7 +6,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from drone_rl.collectors.sight import Sight
+from drone_rl.envs.direct_renderer import DirectRenderer
 from drone_rl.evaluation.metrics import Episodes
 from drone_rl.policies.rounding import Decide
 from drone_rl.sim.tasks import State
@@ -95,21 +95,21 @@ class Rounding:
 
 
 @torch.no_grad()
-def enumerate_outcomes(sight: Sight, decide: Decide, worlds: Tensor) -> Outcomes:
+def enumerate_outcomes(renderer: DirectRenderer, decide: Decide, worlds: Tensor) -> Outcomes:
     """Run episodes from their starts, with every possible action wherever there are several.
 
     Args:
-        sight: Renders an environment in the state at the start of the episodes.
+        renderer: Renders an environment in the state at the start of the episodes.
         decide: The policy, of discrete actions and without memory.
         worlds: Indices of the episodes. Shape: (k,).
     """
-    simulated, count = sight.worlds, len(worlds)
+    simulated, count = renderer.worlds, len(worlds)
     state: Any = simulated.state[worlds]
     owner = torch.arange(count, device=worlds.device)
     is_open = torch.zeros_like(owner, dtype=torch.bool)
     ends, owners = [], []
     while len(owner):
-        possible = decide(sight.look(state, worlds[owner]).get("pixels")).possible
+        possible = decide(renderer.look(state, worlds[owner]).get("pixels")).possible
         row, action = possible.nonzero().unbind(-1)
         state, owner = state[row], owner[row]
         state, _ = simulated.advance(state, action)

@@ -101,11 +101,11 @@ def episode_batches(
         keep=tuple(("next", "info", name) for name in keep),
         keep_observations=False,
         noted=noted,
-        is_compiled=is_compiled,
-        num_cores=num_cores(),
+        acceleration="fused" if is_compiled else "direct",
+        num_threads=num_cores(),
     )
     if log is not None:
-        log.implementation = collector.implementation
+        log.implementation = collector.source.implementation
     kind = ExplorationType.DETERMINISTIC if greedy else ExplorationType.RANDOM
     while (missing := num_episodes - collector.episodes) > 0:
         with set_exploration_type(kind):

@@ -10,8 +10,8 @@ from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 from torchrl.envs import EnvBase
 
-from drone_rl.collectors.sight import Sight
 from drone_rl.envs import worlds_of
+from drone_rl.envs.direct_renderer import DirectRenderer, Reasons
 from drone_rl.evaluation.metrics import Episodes
 from drone_rl.evaluation.outcomes import (
     MOST_FRAGILE_EPISODES,
@@ -273,7 +273,7 @@ def _run_checked(
     env: EnvBase, decide: Decide, network: PictureNetwork, episodes: int
 ) -> tuple[_Checked, list[Tensor]]:
     """Run episodes and check each frame. Returns also the actions of each episode."""
-    sight = Sight.find(env, ("pixels",), ())
+    renderer = DirectRenderer.try_create(env, ("pixels",), ())
     is_counted = isinstance(network.actions, DiscreteActions)
     fragile, followed, log, finals, first = [], [], StepLog(), [], 0
     before, actor = env_state(env), _CheckingActor(decide, network)
@@ -286,8 +286,8 @@ def _run_checked(
         if is_counted and len(worlds):
             if not is_few:
                 found = Outcomes(None, worlds[:0], torch.ones_like(worlds, dtype=torch.bool))
-            elif sight is not None:
-                found = enumerate_outcomes(sight, decide, worlds.to(env.device))
+            elif not isinstance(renderer, Reasons):
+                found = enumerate_outcomes(renderer, decide, worlds.to(env.device))
             else:
                 contrary = _CheckingActor(decide, network, is_contrary=True)
                 found = _run_second_best(env, contrary, before, fragile[first:], worlds)

@@ -1,4 +1,4 @@
-"""What a verdict says. Evidence: `verdict.json`."""
+"""Sentences of a verdict. Evidence: `verdict.json`."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -8,15 +8,13 @@ from drone_rl.sim.vocabulary import terms_of
 from drone_rl.utils.text import Evidence, Sentence, fixed_seed, percent
 
 FREQUENT = 0.02
-"""How an episode ends is worth a word if surely more than this share of episodes end so."""
+"""Fraction of episodes above which an end is mentioned."""
 _LUCK = {
     "random": "acting at random",
     "forward": "flying straight on",
     "left": "flying left",
     "right": "flying right",
 }
-_EXPECTED_END = "front_boundary"
-"""Of older files. Who has passed a cube flies on to there: no news."""
 
 
 def _success(flights: Evidence) -> str:
@@ -33,7 +31,7 @@ def _every(evidence: Evidence) -> str:
 
 
 def best_luck(evidence: Evidence) -> str:
-    """What sees nothing and collects most."""
+    """Return the random or constant baseline that collects most."""
     flown = evidence["baselines"]
     return max(_luck(evidence), key=lambda name: flown[name]["shares"]["all"]["mean"])
 
@@ -80,7 +78,7 @@ def _kind(evidence: Evidence) -> str:
     return {
         "good": f"This policy does its task: {every}.",
         "good, but trivial": _trivial(evidence),
-        "poor": f"This policy does not do its task: it is {_beside_luck(evidence)} luck.",
+        "poor": f"This policy does not do its task: it is {_no_better(evidence)}.",
         "none of these": f"This policy is {_looks(evidence)}: {every}.",
     }[evidence["kind"]]
 
@@ -94,15 +92,16 @@ def _trivial(evidence: Evidence) -> str:
 
 
 def _most_successful(evidence: Evidence) -> str:
-    """The baseline that ignores the observations and succeeds most often."""
+    """The random or constant baseline that succeeds most often."""
     flown = evidence["baselines"]
     return max(_luck(evidence), key=lambda name: flown[name]["success"]["share"])
 
 
-def _beside_luck(evidence: Evidence) -> str:
-    ours, theirs = evidence["greedy"], evidence["baselines"][best_luck(evidence)]
+def _no_better(evidence: Evidence) -> str:
+    ours, best = evidence["greedy"], best_luck(evidence)
+    theirs = evidence["baselines"][best]
     is_more = ours["shares"]["all"]["mean"] > theirs["shares"]["all"]["mean"]
-    return "hardly better than" if is_more else "no better than"
+    return f"{'hardly' if is_more else 'no'} better than {_acting(best)}"
 
 
 def _open(evidence: Evidence) -> str:
@@ -115,7 +114,7 @@ def _open(evidence: Evidence) -> str:
 
 
 def depends_on_rounding(evidence: Evidence) -> bool:
-    """Whether the episodes suffice, but rounding can change their kind. Old files do not say."""
+    """Return whether the episodes are enough, but rounding can change the kind."""
     return bool((evidence.get("rounding") or {}).get("decides"))
 
 
@@ -135,7 +134,7 @@ def _rounding(evidence: Evidence) -> str:
 
 def _arithmetic(evidence: Evidence) -> str:
     found = evidence["rounding"]
-    tried = "" if found.get("bound", True) else "; effects of rounding were tried out, not bounded"
+    tried = "" if found.get("bound", True) else "; effects of rounding were estimated, not bounded"
     return f"The verdict holds for {found['arithmetic']}{tried}."
 
 
@@ -153,8 +152,9 @@ def _shares(evidence: Evidence) -> str:
 def _baselines(evidence: Evidence) -> str:
     flown, luck, terms = evidence["baselines"], best_luck(evidence), terms_of(evidence)
     return (
-        f"In the same worlds it {terms.reaches} {_all(evidence['greedy'])} of all {terms.goals}, "
-        f"{_acting(luck)} {_all(flown[luck])} and the oracle {_all(flown['oracle'])}."
+        f"From the same initial states it {terms.reaches} {_all(evidence['greedy'])} of all "
+        f"{terms.goals}, {_acting(luck)} {_all(flown[luck])} and the oracle "
+        f"{_all(flown['oracle'])}."
     )
 
 
@@ -167,8 +167,8 @@ def _luck_suffices(evidence: Evidence) -> bool:
 def _pointless(evidence: Evidence) -> str:
     flown, luck = evidence["baselines"], _most_successful(evidence)
     return (
-        f"This task tells little, for luck is enough: {_acting(luck)} {_every(evidence)} in "
-        f"{_success(flown[luck])} of episodes."
+        f"This task is trivial: {_acting(luck)} {_every(evidence)} in {_success(flown[luck])} of "
+        "episodes."
     )
 
 
@@ -191,10 +191,12 @@ def _largest(evidence: Evidence) -> str:
 
 
 def _other_ends(evidence: Evidence) -> str:
-    """Ends by which many episodes fail, but for the usual one and what has just been said."""
+    """Ends by which many episodes fail, except the expected one and the one just named."""
     largest = evidence["failures"]["largest"]
-    expected = evidence["failures"].get("expected_end", _EXPECTED_END)
-    said = (expected, largest["value"] if largest["by"] == "end" else None)
+    said = (
+        evidence["failures"].get("expected_end"),
+        largest["value"] if largest["by"] == "end" else None,
+    )
     rows = [
         row
         for row in evidence["failures"]["rows"]
@@ -221,8 +223,8 @@ def _differs(evidence: Evidence) -> bool:
 def _drawing(evidence: Evidence) -> str:
     sampled, greedy = _success(evidence["sampled"]), _success(evidence["greedy"])
     return (
-        "That holds for its most probable actions: with actions drawn by their probabilities it "
-        f"{_every(evidence)} in {sampled} of episodes, not in {greedy}."
+        f"That is for its most probable actions: with sampled actions it {_every(evidence)} in "
+        f"{sampled} of episodes, not in {greedy}."
     )
 
 
@@ -231,12 +233,7 @@ def _misses_or_lacks(evidence: Evidence) -> bool:
 
 
 def quantity_label(name: str, evidence: Evidence) -> str:
-    """What people call a quantity of the rule.
-
-    Args:
-        name: One of `quantities`.
-        evidence: The verdict.
-    """
+    """Return the label of one of the rule's quantities, by name."""
     terms, share = terms_of(evidence), f"{100 * evidence['good_share']:g}%"
     kind, _, of = name.partition(" ")
     baseline = of.removeprefix("by ")
@@ -256,10 +253,10 @@ def quantity_label(name: str, evidence: Evidence) -> str:
 
 
 def unlike(evidence: Evidence) -> str:
-    """By what drones moved otherwise than those that a policy was made for."""
+    """Return how the dynamics differ from those that a policy was trained with."""
     changed = evidence["unlike"].items()
     parts = [f"{_set(name, of['flown'])} instead of {_said(of['own'])}" for name, of in changed]
-    return f"It was made for another way of moving: here it flew with {_list(parts)}."
+    return f"It was trained with other dynamics: here it flew with {_list(parts)}."
 
 
 def _set(name: str, value: Any) -> str:
@@ -282,29 +279,29 @@ SENTENCES = (
     ),
     Sentence(
         "rounding",
-        "the episodes suffice, but rounding can change the kind",
+        "the episodes are enough, but rounding can change the kind",
         lambda e: not e["certain"] and depends_on_rounding(e),
         _rounding,
     ),
     Sentence(
         "unlike",
-        "drones moved otherwise than those that the policy was made for",
+        "the dynamics are not those that the policy was trained with",
         lambda e: bool(e.get("unlike")),
         unlike,
     ),
     fixed_seed("fixed_seed"),
     *PROOF,
     Sentence("shares", "a goal was missed, or a side not offered", _misses_or_lacks, _shares),
-    Sentence("baselines", "luck is not enough", lambda e: not _luck_suffices(e), _baselines),
+    Sentence("baselines", "the task is not trivial", lambda e: not _luck_suffices(e), _baselines),
     Sentence(
         "pointless",
-        "luck succeeds as a good policy does, and the first sentence does not say so",
+        "a random or constant baseline is as good, and the first sentence does not say so",
         lambda e: _luck_suffices(e) and not (e["certain"] and e["kind"] == "good, but trivial"),
         _pointless,
     ),
     Sentence(
         "hopeless",
-        "the oracle surely fails in more than half of the episodes",
+        "the oracle certainly fails in more than half of the episodes",
         lambda e: e["baselines"]["oracle"]["success"]["upper95"] < 0.5,
         _hopeless,
     ),
@@ -322,13 +319,13 @@ SENTENCES = (
     ),
     Sentence(
         "drawing",
-        "greedy and sampled flights surely differ in how many succeed (paired, 95%)",
+        "success rates of greedy and sampled episodes differ (paired, 95%)",
         _differs,
         _drawing,
     ),
     Sentence(
         "arithmetic",
-        "rounding was examined",
+        "rounding was checked",
         lambda e: e.get("rounding") is not None,
         _arithmetic,
     ),

@@ -1,1 +1,15 @@
-"""What a policy sees, and whether to trust it: measures checked against the simulator's truth."""
+"""Analyses of policies, checked against the simulator's ground truth.
+
+`explain` makes an explanation: files with the results of all sections, and a report. A section is
+a function of a `Context`; `report/` displays it.
+
+Shared:
+
+- `settings`, `explain`, `context`: settings, entry points, what sections share.
+- `rollouts`, `scenes`, `hooks`: recorded episodes, rendered scenes, outputs of layers.
+- `heat_maps`, `patches`, `interventions`, `controls`, `trust`: attribution methods, the measured
+  effect of patches and of changes to a scene, placebo maps, and the tests of heat maps.
+
+Sections: `verdict` (with robustness), `behavior` (data set, contradictions, loops), `embedding`
+(t-SNE), `class_models`, `attribution`, `truth`, `response` (with asymmetry), `places`.
+"""

@@ -1,206 +1,102 @@
-"""Where in the picture a policy looks: Grad-CAM (section 5.3) and others, by Captum."""
+"""Where it looks: heat maps of all frames, and one flight as a film."""
 
-import dataclasses
-from collections.abc import Callable
-from typing import Literal
+from typing import Any
 
+import numpy as np
 import torch
-from captum.attr import IntegratedGradients, LayerGradCam, Saliency
-from torch import Tensor, nn
-from torch.nn import functional
+from numpy.typing import NDArray
+from torch import Tensor
 
-from drone_rl.explanations.hooks import actions_of, find_layer, probabilities, spatial_layers
-from drone_rl.explanations.patches import replaced
-from drone_rl.policies import PictureNetwork
-from drone_rl.policies.learning_network import LearningNetwork
-from drone_rl.utils.errors import InputError
+from drone_rl.explanations.context import FILMED, Context
+from drone_rl.explanations.rollouts import RolloutDataset
+from drone_rl.sim.tasks import Task
 
-Objective = Literal["probability", "logit"]
-BATCH = 256
-"""Pictures in one call, which bounds the memory."""
-INTEGRATION_STEPS = 64
-"""Of integrated gradients; 16 miss up to 0.7 of a change in probability of a steep softmax."""
-NO_GRADIENT = 1e-12
-"""Derivatives of the probability up to this are none: the softmax is saturated."""
-MapMethod = Callable[[Tensor, Tensor], Tensor]
-"""Pictures (T, C, H, W) and an action each (T,) to heat maps (T, H, W), 0 or more."""
+COUNT = 6
+"""Frames in a sequence, as in Figs. 13 to 15."""
 
 
-def grad_cam(activations: Tensor, gradients: Tensor) -> Tensor:
-    """Eqs. 19 and 20 as written.
+def key_frames(dataset: RolloutDataset, episode: int, task: Task[Any]) -> list[tuple[int, str]]:
+    """Six frames of an episode in order of time, each with why it was chosen.
+
+    The rule: the first frame; half way to the first goal (or to the end); the frame before
+    each goal is reached; the frame before one is missed, and the last one of an episode that
+    failed. What is still free goes to the frames furthest from those chosen.
 
     Args:
-        activations: Feature maps A. Shape: (T, K, h, w).
-        gradients: Derivative of what is explained by A. Shape: (T, K, h, w).
+        dataset: Whole flights.
+        episode: One of them.
+        task: What was flown.
 
     Returns:
-        ReLU of the feature maps' sum, weighted by their mean derivatives. Shape: (T, h, w).
+        Frame number and reason; fewer than six only where the episode is shorter.
     """
-    weights = gradients.mean((2, 3), keepdim=True)
-    return (weights * activations).sum(1).relu()
+    frames = np.flatnonzero(dataset.episode == episode)
+    chosen: dict[int, str] = {int(frames[0]): "start"}
+    reached, missed = (frames[dataset.event[frames] == event] for event in (1, -1))
+    half = frames[len(frames) // 2] if not len(reached) else (frames[0] + reached[0]) // 2
+    terms = task.vocabulary
+    events = [(int(t), f"{terms.reaches} a {terms.goal}") for t in reached]
+    events += [(int(t), f"misses a {terms.goal}") for t in missed]
+    end = int(dataset.end_reason[frames[-1]])
+    if end not in (0, task.success_end):
+        reason = task.ends(end).name.lower().replace("_", " ")
+        events.append((int(frames[-1]), f"fails: {reason}"))
+    for frame, why in [*events, (int(half), "approach")]:
+        if len(chosen) < COUNT:
+            chosen.setdefault(frame, why)
+    while len(chosen) < min(COUNT, len(frames)):
+        away = np.abs(frames[:, None] - np.array(list(chosen))[None]).min(1)
+        chosen[int(frames[away.argmax()])] = "in between"
+    return sorted(chosen.items())
 
 
-@dataclasses.dataclass
-class Explainer:
-    """Heat maps of one policy by several methods, all of the size of its pictures."""
-
-    network: PictureNetwork
-    absent: Tensor
-    """What stands for "nothing there": the scene without cubes. Shape: (C, H, W)."""
-    layer: str | None = None
-    """The layer that Grad-CAM looks at; the last convolution's nonlinearity by default."""
-
-    def __post_init__(self) -> None:
-        """Finds the layer.
-
-        Raises:
-            InputError: It isn't one with a feature map.
-        """
-        spatial = spatial_layers(self.network) if self.network.is_differentiable else []
-        if self.layer is None:
-            self.layer = spatial[-1] if spatial else None
-            return
-        find_layer(self.network, self.layer)
-        if self.layer not in spatial:
-            have = ", ".join(spatial) or "none, for the policy has no convolution"
-            raise InputError(f"layer={self.layer} has no feature map; those that do: {have}")
-
-    def methods(self) -> dict[str, MapMethod]:
-        """All methods that this policy allows, by name."""
-        maps: dict[str, MapMethod] = {}
-        if self.layer is not None:
-            maps["grad_cam"] = lambda x, a: self.grad_cam(x, a, "probability")
-            maps["grad_cam_logit"] = lambda x, a: self.grad_cam(x, a, "logit")
-        if self.network.is_differentiable:
-            maps["saliency"] = self.saliency
-            maps["integrated_gradients"] = self.integrated_gradients
-        maps["occlusion"] = self.occlusion
-        return maps
-
-    def grad_cam(
-        self, observations: Tensor, actions: Tensor, objective: Objective = "probability"
-    ) -> Tensor:
-        """Grad-CAM of the chosen actions, enlarged to the picture. Shape: (T, H, W).
-
-        Raises:
-            InputError: The policy has no convolution.
-        """
-        if self.layer is None:
-            raise InputError("Grad-CAM needs a convolution, and this policy has none")
-        method = LayerGradCam(self._forward(objective), find_layer(self.network, self.layer))
-
-        def attribute(x: Tensor, a: Tensor) -> Tensor:
-            coarse = method.attribute(x, target=a, relu_attributions=True)
-            assert isinstance(coarse, Tensor)  # a tuple of them only where x is one
-            return functional.interpolate(coarse, x.shape[-2:], mode="bilinear")
-
-        return _in_batches(attribute, observations, actions).sum(1)
-
-    def saliency(self, observations: Tensor, actions: Tensor) -> Tensor:
-        """Size of the probability's derivative by each pixel. Shape: (T, H, W)."""
-        method = Saliency(self._forward("probability"))
-        attributed = _in_batches(lambda x, a: method.attribute(x, target=a), observations, actions)
-        return attributed.abs().sum(1)
-
-    def integrated_gradients(self, observations: Tensor, actions: Tensor) -> Tensor:
-        """Size of the path integral from the empty scene to the picture. Shape: (T, H, W)."""
-        return self._integrated(observations, actions).sum(1).abs()
-
-    def completeness_error(self, observations: Tensor, actions: Tensor) -> Tensor:
-        """By how much integrated gradients miss what they must add up to. Shape: (T,).
-
-        The sum over all pixels is in theory the probability of the action on the picture less that
-        on the empty scene; steps of the integral that are too coarse miss it.
-        """
-        chosen = actions[:, None]
-        total = self._integrated(observations, actions).flatten(1).sum(1)
-        there = probabilities(self.network, observations).gather(1, chosen)[:, 0]
-        absent = probabilities(self.network, self.absent[None])[0][actions]
-        return (total - (there - absent)).abs()
-
-    def occlusion(self, observations: Tensor, actions: Tensor) -> Tensor:
-        """Size of the change when a patch becomes the empty scene. Shape: (T, H, W).
-
-        Patches overlap by half; a pixel's change is the mean over the patches that cover it.
-        """
-        height, width = observations.shape[-2:]
-        windows = _windows(height, width)
-        chosen = probabilities(self.network, observations).gather(1, actions[:, None])[:, 0]
-        change = chosen.new_zeros(len(chosen), len(windows))
-        absent = self.absent[None].expand_as(observations)
-        for frames, patches, after in replaced(self.network, observations, absent, windows):
-            change[frames, patches] = chosen[frames] - after[range(len(frames)), actions[frames]]
-        covered = windows.flatten(1).float()
-        mean = change @ covered / covered.sum(0).clamp_min(1)
-        return mean.view(-1, height, width).abs()
-
-    def maps_without_heat(self, observations: Tensor, actions: Tensor) -> dict[str, int]:
-        """Why Grad-CAM's maps are empty, if they are.
-
-        Returns:
-            Numbers of pictures: "logit", those on which no feature map counts for the action, so
-            that nothing is left of Eq. 19 above 0; "probability", those on which the probability's
-            map is empty; "saturated", those of them on which it has no derivative at all, for the
-            policy is too sure.
-        """
-        empty = {
-            objective: self.grad_cam(observations, actions, objective).flatten(1).amax(1) <= 0
-            for objective in ("probability", "logit")
-        }
-        flat = self.saliency(observations, actions).flatten(1).amax(1) <= NO_GRADIENT
-        return {
-            "logit": int(empty["logit"].sum()),
-            "probability": int(empty["probability"].sum()),
-            "saturated": int((empty["probability"] & flat).sum()),
-        }
-
-    def _integrated(self, observations: Tensor, actions: Tensor) -> Tensor:
-        """The path integral of each channel of each pixel. Shape: (T, C, H, W)."""
-        quick = LearningNetwork.find(self.network, of="pictures")
-        method = IntegratedGradients(self._forward("probability", quick))
-
-        def attribute(x: Tensor, a: Tensor) -> Tensor:
-            return method.attribute(
-                x,
-                self.absent[None],
-                target=a,
-                n_steps=INTEGRATION_STEPS,
-                method="riemann_middle",
-                internal_batch_size=BATCH,
-            )
-
-        return _in_batches(attribute, observations, actions)
-
-    def _forward(
-        self, objective: Objective, network: nn.Module | None = None
-    ) -> Callable[[Tensor], Tensor]:
-        if objective not in ("probability", "logit"):
-            raise InputError(f"objective={objective!r} is unknown; give probability or logit")
-        actions = actions_of(self.network)
-        make = actions.scores if objective == "logit" else actions.wish
-        answer = self.network if network is None else network
-        return lambda x: make(answer(x))
+SHOWN = ("grad_cam", "grad_cam_logit")
+"""Maps of the film: the second where the first has no heat at all."""
+INSTEAD = ("saliency", "occlusion")
+"""The first that there is, of a policy without Grad-CAM."""
 
 
-def _in_batches(
-    attribute: Callable[[Tensor, Tensor], Tensor], observations: Tensor, actions: Tensor
-) -> Tensor:
-    """Attributions of all pictures. Shape: (T, ...) as `attribute` gives them."""
-    maps = [
-        attribute(x.detach().clone().requires_grad_(), a).detach()
-        for x, a in zip(observations.split(BATCH), actions.split(BATCH), strict=True)
-    ]
-    return torch.cat(maps).float()
+def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
+    """Makes "attribution".
+
+    Arrays: "map_..." (T, H, W) of each method, each frame's peak 1; of the film's n steps
+    "film_frames" (n, H, W, 3), "film_heat" (n, H, W), "film_probabilities" and "film_actions".
+    """
+    arrays = {f"map_{name}": _peak(maps) for name, maps in context.frame_maps.items()}
+    flights, explainer, film = context.flights, context.explainer, context.film
+    first = int(np.flatnonzero(flights.episode == FILMED)[0])
+    methods = [name for name in SHOWN if name in context.maps]
+    methods = methods or [name for name in INSTEAD if name in context.maps][:1]
+    heat = torch.zeros(film.frames.shape[:-1])
+    by: list[str | None] = [None] * len(film)
+    for name in methods:
+        maps = explainer.methods()[name](film.tensor("observations"), film.tensor("actions"))
+        for step, one in enumerate(context.scenes.to_frame(maps)):
+            if by[step] is None and one.max() > 0:
+                heat[step], by[step] = one, name
+    arrays |= {
+        "film_frames": film.frames,
+        "film_heat": _peak(heat),
+        "film_probabilities": film.probabilities,
+        "film_actions": film.actions,
+    }
+    numbers = {
+        "layer": explainer.layer,
+        "methods": list(context.maps),
+        "shown": methods[0],
+        "film": {
+            "episode": FILMED,
+            "heat_by": by,
+            "key_steps": [
+                {"step": frame - first, "why": why}
+                for frame, why in key_frames(flights, FILMED, context.scenes.task)
+            ],
+        },
+    }
+    return {"attribution": numbers}, arrays
 
 
-def _windows(height: int, width: int) -> Tensor:
-    """The pixels of patches that overlap by half, to all edges. Shape: (N, height, width), bool."""
-    tall, wide = (min(n, max(3, n // part)) for n, part in ((height, 5), (width, 10)))
-    down, across = max(1, tall // 2), max(1, wide // 2)
-    tops = [*range(0, height - tall, down), height - tall]
-    lefts = [*range(0, width - wide, across), width - wide]
-    windows = torch.zeros(len(tops) * len(lefts), height, width, dtype=torch.bool)
-    for i, top in enumerate(tops):
-        for j, left in enumerate(lefts):
-            windows[i * len(lefts) + j, top : top + tall, left : left + wide] = True
-    return windows
+def _peak(maps: Tensor) -> NDArray:
+    """Each map with its greatest value 1, as halves."""
+    peak = maps.flatten(1).amax(1).clamp_min(1e-30)[:, None, None]
+    return (maps / peak).numpy().astype(np.float16)

@@ -1,13 +1,14 @@
-"""What the sections of an explanation share: one policy, its worlds, and what is made of them.
+"""What the sections of an explanation share: one policy, its environments, rollouts and heat maps.
 
-Each shared thing is made when it is first asked for, and is the same whoever asks first, so that
+Each shared value is computed when it is first needed and does not depend on who needs it first, so
 sections can run in any order.
 """
 
 import copy
 import functools
-from collections.abc import Mapping
-from typing import Any
+import threading
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,25 +16,23 @@ from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 from torchrl.envs import TransformedEnv
 
-from drone_rl.explanations.attribution import Explainer
-from drone_rl.explanations.dataset import RolloutDataset
+from drone_rl.explanations.heat_maps import Explainer
 from drone_rl.explanations.hooks import feature_layer, features
-from drone_rl.explanations.recording import draw, fly, spread
-from drone_rl.explanations.response import ResponseMap, response_map
+from drone_rl.explanations.rollouts import RolloutDataset, collect, render_frames, select_frames
 from drone_rl.explanations.scenes import Scenes, empty_scene
 from drone_rl.explanations.settings import ExplainSettings
-from drone_rl.explanations.threads import Once
 from drone_rl.policies import PictureNetwork, make_actor
 from drone_rl.robustness.shifts_file import SavedShifts
 from drone_rl.utils.seeding import RootSeed, Stream, torch_generator, with_seed
 from drone_rl.verdicts.certificate import Claim
 
+T = TypeVar("T")
 FILMED = 0
-"""The flight that is shown: the first, whatever it is like."""
+"""The episode shown as a film: always the first."""
 
 
 class LeftOutError(Exception):
-    """A section can't be made of this policy; the message says in sentences why, and the remedy."""
+    """A section can't be computed for this policy; the message says why and what to do."""
 
 
 class Context:
@@ -49,58 +48,65 @@ class Context:
         unlike: Mapping[str, Any] | None = None,
         seed: RootSeed | None = None,
     ) -> None:
-        """Takes the policy and its worlds.
+        """Store the policy and its environments.
 
         Args:
-            env: A batch of worlds that have not flown yet, with the policy's pipeline.
-            network: The policy's, on the CPU.
+            env: A batch of environments that have not been stepped, with the policy's transforms.
+            network: The policy's network, on the CPU.
             settings: What to compute.
-            claim: A certificate of it in the task of these worlds, if there is one.
-            measured: Its flights under other conditions, if there are any.
+            claim: A certificate of the policy in the task of these environments, if there is one.
+            measured: Its measured robustness, if there is any.
             unlike: See `drone_rl.evaluation.judge.judge_policy`.
             seed: Root of all random streams; that of the settings by default.
 
         Raises:
-            InputError: A setting doesn't fit the policy.
+            InputError: A setting does not fit the policy.
         """
         self.env, self.network, self.claim = env, network, claim
         self.settings, self.seed = with_seed(settings, seed)
         self.measured, self.unlike = measured, unlike
         self.scenes = Scenes(env)
         self.layer = settings.layer or feature_layer(network)
-        """Whose features are embedded; None of a policy of which no layers are known."""
+        """Layer whose features are embedded; None if the policy's layers are unknown."""
         self.absent = self.scenes.observe(empty_scene(self.scenes))[0]
-        """The scene without a cube, as the policy gets it. Shape: (C, h, w)."""
+        """Observation of the scene without targets. Shape: (C, h, w)."""
         self.explainer = Explainer(network, self.absent, settings.grad_cam_layer)
         if self.layer is not None:
-            features(network, self.absent[None], self.layer)  # refuses an unknown layer now
-        self._maps: Once[dict[str, Tensor]] = Once()
-        self._frame_maps: Once[dict[str, Tensor]] = Once()
+            features(network, self.absent[None], self.layer)  # refuse an unknown layer now
+        self._shared: dict[str, tuple[threading.Lock, list[Any]]] = {}
         self._start = env.base_env.state_dict()
 
     def restart(self) -> TensorDictModuleBase:
-        """Puts the worlds back to their first episodes; returns an actor with a fresh stream."""
+        """Return the environments to their first episodes; return an actor with a fresh stream."""
         self.env.base_env.load_state_dict(self._start)
         generator = torch_generator(self.seed.value, Stream.REPORT, device=self.device)
         return make_actor(self.network, self.env.action_spec, generator)
 
     def aside(self) -> "Context":
-        """The same for another thread, which may read the data set and must not move the worlds.
+        """Return a copy for another thread, which must not step the environments.
 
-        Its network is a copy: what hooks, or gathers gradients in, the one meets not the other.
-        Maps are made once, by whichever of the two asks first.
+        Its network is a copy, so hooks and gradients of the two threads don't mix. The data set,
+        the film and the heat maps are shared.
         """
-        _ = self.dataset, self.film  # made by the thread that has the worlds
+        _ = self.dataset, self.film  # computed by the thread that owns the environments
         twin = copy.copy(self)
         if self.network.is_differentiable:
             twin.network = copy.deepcopy(self.network)
             twin.explainer = Explainer(twin.network, self.absent, self.settings.grad_cam_layer)
         return twin
 
+    def shared(self, name: str, compute: Callable[[], T]) -> T:
+        """Return the value called `name`; the first thread computes it, others wait for it."""
+        lock, values = self._shared.setdefault(name, (threading.Lock(), []))
+        with lock:
+            if not values:
+                values.append(compute())
+            return values[0]
+
     @functools.cached_property
     def flights(self) -> RolloutDataset:
-        """Sampled flights, every step of them, without pictures but for what the policy got."""
-        return fly(
+        """Every step of sampled episodes, without rendered frames."""
+        return collect(
             self.env,
             self.restart(),
             num_episodes=self.settings.data_episodes,
@@ -110,51 +116,45 @@ class Context:
 
     @functools.cached_property
     def dataset(self) -> RolloutDataset:
-        """The frames that are analysed, spread over all flights."""
-        rows = spread(self.flights.episode, self.settings.frames)
+        """The frames that are analysed, spread over all episodes."""
+        rows = select_frames(self.flights.episode, self.settings.frames)
         layers = () if self.layer is None else (self.layer,)
-        return draw(self.flights, rows, self.scenes, self.network, layers)
+        return render_frames(self.flights, rows, self.scenes, self.network, layers)
 
     @functools.cached_property
     def film(self) -> RolloutDataset:
-        """Every step of the flight that is shown."""
+        """Every step of the episode shown as a film."""
         rows = np.flatnonzero(self.flights.episode == FILMED)
-        return draw(self.flights, rows, self.scenes, self.network)
+        return render_frames(self.flights, rows, self.scenes, self.network)
 
     @property
     def device(self) -> str:
-        """Where the worlds are."""
+        """Device of the environments."""
         return str(self.env.device)
 
     @property
     def episode(self) -> NDArray:
-        """The episode of each frame of the data set. Shape: (T,)."""
+        """Episode of each frame of the data set. Shape: (T,)."""
         return self.dataset.episode
 
     @property
     def observations(self) -> Tensor:
-        """What the policy got. Shape: (T, C, h, w)."""
+        """Observations of the data set. Shape: (T, C, h, w)."""
         return self.dataset.tensor("observations")
 
     @property
     def actions(self) -> Tensor:
-        """What it did. Shape: (T,)."""
+        """Actions taken. Shape: (T,)."""
         return self.dataset.tensor("actions")
 
     @property
     def maps(self) -> dict[str, Tensor]:
-        """Heat maps of the actions taken by each method, as the policy's pictures: (T, h, w)."""
-        seen = self.observations, self.actions
-        methods = self.explainer.methods()
-        return self._maps.get(lambda: {name: of(*seen) for name, of in methods.items()})
+        """Heat maps of the actions taken, by method, on the observations. Shape: (T, h, w)."""
+        inputs, methods = (self.observations, self.actions), self.explainer.methods()
+        return self.shared("maps", lambda: {name: of(*inputs) for name, of in methods.items()})
 
     @property
     def frame_maps(self) -> dict[str, Tensor]:
-        """The same, put back to where they are in the camera's frame: (T, H, W)."""
-        maps, back = self.maps, self.scenes.to_frame
-        return self._frame_maps.get(lambda: {name: back(one) for name, one in maps.items()})
-
-    @functools.cached_property
-    def response(self) -> ResponseMap:
-        """What it does about one cube at each place of a grid."""
-        return response_map(self.scenes, self.network, seed=self.seed.value)
+        """The same maps in the coordinates of the camera's frame. Shape: (T, H, W)."""
+        maps, to_frame = self.maps, self.scenes.to_frame
+        return self.shared("frame_maps", lambda: {name: to_frame(m) for name, m in maps.items()})

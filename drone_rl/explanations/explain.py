@@ -1,16 +1,38 @@
-"""Explanations of policies, side by side in one report."""
+"""Explain policies: compute all sections, write them as files, and make one report.
+
+The files of a policy, `explanation.json`, `arrays.npz` and `dataset.npz`, are all that a report is
+built from, so it can be built again without the policy.
+"""
 
 import dataclasses
-from collections.abc import Sequence
+import json
+import time
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
+from torchrl.envs import TransformedEnv
 
 from drone_rl.evaluation.rounding_sensitivity import require_function
+from drone_rl.explanations import (
+    attribution,
+    behavior,
+    class_models,
+    embedding,
+    places,
+    response,
+    truth,
+    verdict,
+)
+from drone_rl.explanations.context import Context, LeftOutError
 from drone_rl.explanations.report import write_report
 from drone_rl.explanations.settings import ExplainSettings
-from drone_rl.explanations.study import explain_policy
+from drone_rl.policies import PictureNetwork
 from drone_rl.policies.base_policy import Pilot
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_pilot
@@ -22,25 +44,47 @@ from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import RootSeed, with_seed
 from drone_rl.utils.text import seed_line
-from drone_rl.verdicts.certificate import find_claim
+from drone_rl.verdicts.certificate import Claim, find_claim
 from drone_rl.verdicts.coverage import find_domain
+
+FORMAT_VERSION = 3
+Given = str | Path | Pilot | Logits
+"""A policy or something that `as_pilot` converts to one."""
+Section = Callable[[Context], tuple[dict[str, Any], dict[str, NDArray]]]
+"""Returns entries of `explanation.json` and `arrays.npz`; writes nothing, runs at any time."""
+SECTIONS: dict[str, Section] = {
+    "asymmetry": response.asymmetry_section,
+    "attribution": attribution.section,
+    "class_models": class_models.section,
+    "dataset": behavior.dataset_section,
+    "embedding": embedding.section,
+    "evaluation": verdict.evaluation_section,
+    "flaws": behavior.flaws_section,
+    "places": places.section,
+    "response": response.response_section,
+    "shifts": verdict.shifts_section,
+    "truth": truth.section,
+}
+"""All sections by name. `report.page.PARTS` displays them."""
+ASIDE = frozenset({"attribution", "class_models", "embedding", "flaws"})
+"""Sections that run in a second thread: they step no environment and use a copy of the network."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Explanations:
-    """What policies see, whether to trust them, and the report that shows it."""
+    """Explanations of one or several policies, and the report that shows them."""
 
     folder: Path
     """Holds a folder for each policy and the report."""
     report: Path
-    """One HTML file that needs nothing else."""
+    """One self-contained HTML file."""
     numbers: dict[str, dict[str, Any]]
-    """As in `explanation.json`, by the names that were given."""
+    """Contents of `explanation.json`, by the policies' names."""
     seed: RootSeed
     """Root of all random streams."""
 
     def __str__(self) -> str:
-        """A line for each verdict, and the seed."""
+        """Return a line for each verdict, and the seed."""
         lines = []
         for name, numbers in self.numbers.items():
             verdict = numbers["verdict"]
@@ -50,10 +94,6 @@ class Explanations:
 
     def _repr_html_(self) -> str:
         return page(self.report.read_text(encoding="utf-8"))
-
-
-Given = str | Path | Pilot | Logits
-"""A policy, or what it is made of, see `as_pilot`."""
 
 
 def explain(
@@ -66,16 +106,16 @@ def explain(
     progress: Progress | None = None,
     **changes: Any,
 ) -> Explanations:
-    """Shows what policies see, and whether to trust them.
+    """Explain what policies respond to and whether they can be trusted.
 
     Args:
         policies: One or several: policies, what `load_policy` takes, or callables, see
             `policy_from`.
         settings: What to compute.
-        folder: Where explanations and report go.
-        num_envs: Worlds in one batch; bounds memory.
-        outputs: Where flights under other conditions are looked for, see `find_domain`.
-        progress: Told of what is being done; a bar by default.
+        folder: Folder of explanations and report.
+        num_envs: Environments in a batch; bounds memory.
+        outputs: Folder to search for measured robustness, see `find_domain`.
+        progress: Callback for progress; shows a bar by default.
         changes: Settings to change, as in `explain("good", frames=100)`.
 
     Raises:
@@ -86,10 +126,10 @@ def explain(
         raise InputError(f"num_envs={num_envs} is out of range; give 1 or more")
     chosen = _named(policies)
     folder, progress = Path(folder), progress or Bar()
+    folders = {n: folder / f"{i}_{to_file_name(n)}" for i, n in enumerate(chosen)}
     threads = torch.get_num_threads()
-    torch.set_num_threads(1)  # the same file on every machine; pictures this small gain nothing
+    torch.set_num_threads(1)  # the same file on every machine; small observations gain nothing
     try:
-        folders = {n: folder / f"{i}_{to_file_name(n)}" for i, n in enumerate(chosen)}
         numbers = {
             name: _explain(
                 policy,
@@ -111,7 +151,7 @@ def explain(
 
 
 def _named(policies: Given | Sequence[Given]) -> dict[str, Pilot]:
-    """The policies by their names or, where some share one, by their files."""
+    """Return the policies by name or, if some share a name, by file."""
     if isinstance(policies, str) or not isinstance(policies, Sequence):
         policies = [policies]
     loaded = [as_pilot(policy) for policy in policies]
@@ -151,3 +191,116 @@ def _explain(
         )
     finally:
         env.close()
+
+
+def explain_policy(
+    env: TransformedEnv,
+    network: PictureNetwork,
+    folder: Path,
+    settings: ExplainSettings,
+    *,
+    name: str,
+    provenance: dict[str, Any],
+    progress: Callable[[str], None] = lambda _: None,
+    sections: Mapping[str, Section] | None = None,
+    claim: Claim | None = None,
+    measured: SavedShifts | None = None,
+    unlike: Mapping[str, Any] | None = None,
+    seed: RootSeed | None = None,
+) -> dict[str, Any]:
+    """Compute all sections for one policy and write them to a folder.
+
+    Args:
+        env: A batch of held-out environments that have not been stepped, with the policy's
+            transforms.
+        network: The policy's network, on the CPU.
+        folder: Folder to write; created if needed.
+        settings: What to compute.
+        name: Name of the policy.
+        provenance: Origin of the policy, as plain values.
+        progress: Called with the title of each section.
+        sections: Sections to compute, `SECTIONS` by default. Their order changes no result.
+        claim: A certificate of the policy in the task of these environments, if there is one.
+        measured: The policy's measured robustness in that task, if there is any.
+        unlike: See `drone_rl.evaluation.judge.judge_policy`.
+        seed: Root of all random streams, those of `env` included; that of the settings by default.
+
+    Returns:
+        The contents of `explanation.json`; "left_out" gives the reason for each section that can't
+        be computed for this policy.
+
+    Raises:
+        InputError: The folder can't be written or a setting does not fit the policy.
+    """
+    settings, seed = with_seed(settings, seed)
+    context = Context(env, network, settings, claim, measured, unlike, seed)
+    results = _run(SECTIONS if sections is None else sections, context, progress)
+    left_out = {title: one.left_out for title, one in results.items() if one.left_out}
+    made = {title: one for title, one in results.items() if title not in left_out}
+    written = {
+        "format": "drone_rl explanation",
+        "format_version": FORMAT_VERSION,
+        "name": name,
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        "settings": dataclasses.asdict(settings),
+        **seed.as_dict(),
+        "seconds": {title: one.seconds for title, one in made.items()},
+        "actions": context.scenes.actions.as_dict(),
+        "terms": context.scenes.task.vocabulary.as_dict(),
+        **{key: value for one in made.values() for key, value in one.numbers.items()},
+        **({"left_out": left_out} if left_out else {}),
+        "provenance": provenance,
+    }
+    arrays = {key: value for one in made.values() for key, value in one.arrays.items()}
+    _write(folder, written, arrays, context)
+    return written
+
+
+@dataclasses.dataclass(frozen=True)
+class _Result:
+    numbers: dict[str, Any]
+    arrays: dict[str, NDArray]
+    seconds: float
+    left_out: str | None = None
+
+
+def _run(
+    sections: Mapping[str, Section], context: Context, progress: Callable[[str], None]
+) -> dict[str, _Result]:
+    """Run all sections, those in `ASIDE` in a second thread."""
+    results: dict[str, _Result] = {}
+    twin = context.aside()
+    with ThreadPoolExecutor(1) as pool:
+        waiting = {}
+        for title in (t for t in sections if t in ASIDE):
+            progress(f"{title} (aside)".replace("_", " "))
+            waiting[title] = pool.submit(_compute, sections[title], twin)
+        for title in (t for t in sections if t not in ASIDE):
+            progress(title.replace("_", " "))
+            results[title] = _compute(sections[title], context)
+        results |= {title: future.result() for title, future in waiting.items()}
+    return {title: results[title] for title in sections}
+
+
+def _compute(section: Section, context: Context) -> _Result:
+    began = time.perf_counter()
+    try:
+        numbers, arrays = section(context)
+    except LeftOutError as error:
+        return _Result({}, {}, 0.0, str(error))
+    return _Result(numbers, arrays, round(time.perf_counter() - began, 2))
+
+
+def _write(
+    folder: Path, numbers: dict[str, Any], arrays: dict[str, NDArray], context: Context
+) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        context.dataset.save(folder / "dataset.npz", context.flights)
+        # numpy's annotation takes any keyword to be allow_pickle
+        np.savez_compressed(folder / "arrays.npz", **arrays)  # pyright: ignore[reportArgumentType]
+        (folder / "explanation.json").write_text(json.dumps(numbers, indent=1))
+    except OSError as error:
+        raise InputError(
+            f"explanation {folder} can't be written ({error.strerror}); choose another folder"
+        ) from error

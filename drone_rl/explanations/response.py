@@ -4,16 +4,19 @@ import dataclasses
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from drone_rl.explanations.flying import fly_on
+from drone_rl.explanations.context import Context
 from drone_rl.explanations.hooks import probabilities
+from drone_rl.explanations.rollouts import fly_on
 from drone_rl.explanations.scenes import Scenes, empty_scene, place_target
 from drone_rl.policies import PictureNetwork
 from drone_rl.sim.actions import Actions
 from drone_rl.sim.tasks import Grid
+from drone_rl.utils.intervals import mean_interval
 from drone_rl.utils.seeding import Stream, torch_generator
 
 BLIND = 0.1
@@ -215,3 +218,79 @@ def _offsets(lateral: Tensor) -> Tensor:
     """Places level with the drone, so far to its left. (L,) to (L, 3)."""
     nothing = torch.zeros_like(lateral)
     return torch.stack([nothing, lateral, nothing], -1)
+
+
+def policy_response(context: Context) -> ResponseMap:
+    """Return the response map of the policy, computed once."""
+    scenes, network, seed = context.scenes, context.network, context.seed.value
+    return context.shared("response", lambda: response_map(scenes, network, seed=seed))
+
+
+def response_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
+    """Makes "response".
+
+    Arrays: "response_..." and "outcome_...", the fields of `ResponseMap` and `OutcomeMap`.
+    """
+    response = policy_response(context)
+    outcome = outcome_map(context.scenes, context.network, seed=context.seed.value)
+    arrays = {
+        f"{name}_{field.name}": getattr(one, field.name)
+        for name, one in (("response", response), ("outcome", outcome))
+        for field in dataclasses.fields(one)
+    }
+    return {"response": summarise(response, outcome, context.scenes.task.strata)}, arrays
+
+
+def asymmetry(
+    network: PictureNetwork, observations: Tensor, episode: NDArray, actions: Actions
+) -> dict[str, Any]:
+    """pi(left | x) against pi(right | mirrored x), over a data set.
+
+    Args:
+        network: The policy's.
+        observations: Shape (T, C, H, W).
+        episode: Shape (T,).
+        actions: What it can do.
+
+    Returns:
+        "signed": the mean of pi(left | x) - pi(right | mirrored x), below 0 if the policy prefers
+        right; "absolute": the mean distance between the policy and its mirror
+        image; "worst": frames in order of that distance, with it.
+    """
+    here = probabilities(network, observations)
+    there = actions.mirror(probabilities(network, observations.flip(-1)))
+    signed = (actions.leaning(here) - actions.leaning(there)).double().cpu().numpy()
+    distance = actions.distance(here, there).double().cpu().numpy()
+    worst = np.argsort(-distance, kind="stable")[:8]
+    return {
+        "signed": mean_interval(signed, episode, low=-1.0),
+        "absolute": mean_interval(distance, episode),
+        "worst": [{"frame": int(t), "distance": float(distance[t])} for t in worst],
+    }
+
+
+def grid_asymmetry(response: ResponseMap, actions: Actions) -> dict[str, Any]:
+    """The same over a response map, whose mirror image is itself read backwards."""
+    here, there = response.probabilities, actions.mirror(response.probabilities[:, :, ::-1])
+    signed, distance = actions.leaning(here) - actions.leaning(there), actions.distance(here, there)
+    at = np.unravel_index(distance.argmax(), distance.shape)
+    return {
+        "signed": float(signed.mean()),
+        "absolute": float(distance.mean()),
+        "worst": {
+            "distance": float(distance.max()),
+            "height": float(response.height[at[0]]),
+            "forward": float(response.forward[at[1]]),
+            "lateral": float(response.lateral[at[2]]),
+        },
+    }
+
+
+def asymmetry_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
+    """Makes "asymmetry": on the "dataset" and on the "grid" of the response map."""
+    actions = context.scenes.actions
+    numbers = {
+        "dataset": asymmetry(context.network, context.observations, context.episode, actions),
+        "grid": grid_asymmetry(policy_response(context), actions),
+    }
+    return {"asymmetry": numbers}, {}

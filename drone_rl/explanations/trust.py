@@ -28,18 +28,14 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from drone_rl.explanations import causal
-from drone_rl.explanations.alternatives import alternatives
-from drone_rl.explanations.attribution import Explainer
-from drone_rl.explanations.causal import spread
-from drone_rl.explanations.intervals import episode_means
-from drone_rl.explanations.patches import Grid, make_grid
-from drone_rl.explanations.placebos import placebo_maps
-from drone_rl.explanations.randomised import likeness, shuffled_networks
-from drone_rl.explanations.scenes import Scenes, empty_scene
+from drone_rl.explanations import patches
+from drone_rl.explanations.controls import likeness, placebo_maps, shuffled_networks
+from drone_rl.explanations.heat_maps import Explainer
+from drone_rl.explanations.patches import Grid, make_grid, sample_frames
+from drone_rl.explanations.scenes import Scenes, alternatives, empty_scene
 from drone_rl.policies import PictureNetwork
 from drone_rl.sim.tasks import State
-from drone_rl.utils.intervals import median_bounds
+from drone_rl.utils.intervals import episode_means, median_bounds
 
 MapOf = Callable[[PictureNetwork, Tensor, Tensor], Tensor]
 """A method: network, pictures (T, C, h, w) and an action each (T,) to maps (T, h, w), 0 or more."""
@@ -90,7 +86,7 @@ class Trial:
 
     def scores(self, maps: Tensor) -> NDArray:
         """The score of each map. Shape: (T, h, w) to (T,)."""
-        return causal.scores(self.grid.means(maps), self.effects)
+        return patches.scores(self.grid.means(maps), self.effects)
 
     def thinned(self) -> "Trial":
         """One picture an episode, its middle one: enough for many random weights."""
@@ -112,7 +108,7 @@ class Pictures:
     def trial(self, network: PictureNetwork, actions: Tensor) -> Trial:
         """Finds out which patches move a policy; `actions` (T,) are those to be explained."""
         grid = make_grid(*self.observations.shape[-2:])
-        effects = causal.patch_effects(network, self.observations, self.others, grid)
+        effects = patches.patch_effects(network, self.observations, self.others, grid)
         trial = Trial(
             network=network,
             observations=self.observations,
@@ -123,7 +119,7 @@ class Pictures:
             grid=grid,
             seed=self.seed,
         )
-        moved = causal.moving(effects)
+        moved = patches.moving(effects)
         return dataclasses.replace(trial[moved], still=int((~moved).sum()))
 
 
@@ -163,7 +159,7 @@ def make_trial(
         episode: Shape: (T,).
         seed: See `draw_pictures`.
     """
-    rows = spread(episode, FRAMES_AN_EPISODE)
+    rows = sample_frames(episode, FRAMES_AN_EPISODE)
     chosen = state[torch.from_numpy(rows)].to(scenes.worlds.device)
     pictures = draw_pictures(scenes, chosen, episode[rows], seed)
     return pictures.trial(network, actions[torch.from_numpy(rows)])
@@ -209,7 +205,7 @@ def check_maps(
         "trusted": max(trusted, key=lambda n: results[n]["score"]["lower95"]) if trusted else None,
         "methods": results,
         "placebos": {
-            name: causal.summarise_scores(trial.scores(maps), trial.episode)
+            name: patches.summarise_scores(trial.scores(maps), trial.episode)
             for name, maps in trial.placebos.items()
         },
         "frames": len(trial.episode),
@@ -236,9 +232,9 @@ def check_method(
         return {"trusted": False, "failed": ["nothing moves the policy"], "score": _no_score()}
     maps = trial.maps(method) if maps is None else maps
     heat, scores = trial.grid.means(maps), trial.scores(maps)
-    hit, chance = causal.pointing(heat, trial.effects)
+    hit, chance = patches.pointing(heat, trial.effects)
     result = {
-        "score": causal.summarise_scores(scores, trial.episode),
+        "score": patches.summarise_scores(scores, trial.episode),
         "placebos": {
             name: _typical(scores - trial.scores(placebo), trial.episode, level)
             for name, placebo in trial.placebos.items()
@@ -320,4 +316,4 @@ def _typical(values: NDArray, episode: NDArray, level: float) -> dict[str, float
 
 
 def _no_score() -> dict[str, Any]:
-    return causal.summarise_scores(np.zeros(0), np.zeros(0))
+    return patches.summarise_scores(np.zeros(0), np.zeros(0))

@@ -12,6 +12,7 @@ from torchrl.data import TensorSpec
 from torchrl.envs.utils import ExplorationType, exploration_type
 from torchrl.modules import ProbabilisticActor
 
+from drone_rl.policies.network import PictureNetwork
 from drone_rl.policies.random_source import RandomSource
 from drone_rl.policies.squashed_normal import SquashedNormal
 
@@ -77,7 +78,7 @@ class StraightActor(ProbabilisticActor):
         straight = how in (ExplorationType.RANDOM, ExplorationType.DETERMINISTIC)
         if tensordict_out is not None or kwargs or not straight:
             return super().forward(tensordict, tensordict_out, **kwargs)
-        logits = network.module(tensordict.get(network.in_keys[0]))
+        logits = network.module(*(tensordict.get(key) for key in network.in_keys))
         distribution = head.distribution_class(logits=logits, **head.distribution_kwargs)
         random = how == ExplorationType.RANDOM
         action = distribution.sample() if random else distribution.deterministic_sample
@@ -109,8 +110,9 @@ def make_actor(
     """
     kind = distribution_of(action_spec.dtype)
     make = CategoricalActor if kind is SeededCategorical else StraightActor
+    in_keys = network.in_keys if isinstance(network, PictureNetwork) else ("pixels",)
     return make(
-        TensorDictModule(network, in_keys=["pixels"], out_keys=["logits"]),
+        TensorDictModule(network, in_keys=list(in_keys), out_keys=["logits"]),
         in_keys=["logits"],
         spec=action_spec,
         default_interaction_type=InteractionType.RANDOM,

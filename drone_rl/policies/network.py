@@ -19,6 +19,8 @@ class PictureNetwork(nn.Module):
     """Whose it is, as error messages say."""
     is_differentiable: bool = True
     """Whether the logits have gradients by the pixels."""
+    in_keys: tuple[str, ...] = ("pixels",)
+    """Entries of a batch that `forward` takes."""
 
     @property
     def num_actions(self) -> int:

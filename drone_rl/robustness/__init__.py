@@ -1,1 +1,1 @@
-"""Under which conditions a policy is good: what is different, flights there, how far it goes."""
+"""Robustness: success rates under perturbations, and the operating domain."""

@@ -146,7 +146,7 @@ class OracleAgent:
         body = context.state.body
         for action in context.pending:
             body = worlds.dynamics.step(body, action)
-        info = worlds.info(dataclasses.replace(context.state, body=body))  # pyright: ignore[reportArgumentType] (a dataclass)
+        info = worlds.info(dataclasses.replace(context.state, body=body))
         if self._looks:
             info["next_cube"] = self._first_visible(context, info["next_cube"])
         return rule.decide([info[name] for name in rule.reads], worlds.dynamics.actions), None

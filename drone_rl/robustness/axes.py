@@ -23,7 +23,7 @@ from drone_rl.robustness.perturbations import (
     tint,
     whiten,
 )
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.utils.errors import InputError
 
 NUMBERS = (1, 2, 3, 4, 5)
@@ -108,7 +108,7 @@ class Axis:
 
 CORRELATION_TIME = -1.0 / math.log(0.95)
 """Frames; consecutive frames of noise correlate by 0.95."""
-_THINGS = (Meaning.TARGET, Meaning.OBSTACLE)
+_THINGS = (SemanticClass.TARGET, SemanticClass.OBSTACLE)
 _SIZES = {"collect_cubes": "cube_size", "pillars": "width"}
 _FACTORS = (0.9, 1.25, 0.75, 1.5, 0.5)
 _ANGLES = (1.0, 3.0, 9.0, 18.0, 27.0)
@@ -159,7 +159,7 @@ AXES: dict[str, Axis] = {
         ),
         Axis(
             *("floor_color", "color", "of each color", 0.0, (0.025, 0.05, 0.1, 0.2, 0.3)),
-            lambda s, _: Condition(looks=(tint((Meaning.GROUND,), s),)),
+            lambda s, _: Condition(looks=(tint((SemanticClass.GROUND,), s),)),
         ),
         Axis(
             *("camera_yaw", "camera angle", "degrees", 0.0, _ANGLES),

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from drone_rl.evaluation.plots.images import BACKGROUND, INK, MUTED, enlarge, titled
-from drone_rl.robustness.shifts_text import NAMES, told
+from drone_rl.robustness.shifts_text import NAMES
+from drone_rl.utils.text import percent
 
 _COLUMNS = 4
 _POLICY, _ORACLE, _GOOD = "#1f60c8", "#2ca02c", "#2ca02c"
@@ -59,14 +60,16 @@ def _curve(
     known = [(0.0, plain["oracle"]), *((v["position"], v["oracle"]) for v in levels)]
     if plain["oracle"] is not None:
         where, shares = zip(*sorted((x, o["share"]) for x, o in known), strict=True)
-        label = "oracle: knows where all is that it sees"
+        label = "oracle"
         place.plot(where, shares, color=_ORACLE, lw=1, label=label, zorder=1)
     for level in levels:
         if level["impossible"]:
             place.plot(level["position"], 0.03, "x", color="#d62728", label="impossible", ls="")
     if found is not None and found["positions"] is not None:
         low, high = found["positions"]
-        place.axvspan(low, high, color=_GOOD, alpha=0.13, lw=0, label="surely good in this range")
+        place.axvspan(
+            low, high, color=_GOOD, alpha=0.13, lw=0, label="certainly good in this range"
+        )
     ticks.sort(key=lambda tick: tick[0])
     place.set_xticks([x for x, _ in ticks], [_value(value) for _, value in ticks], fontsize=8)
     place.set(ylim=(-0.03, 1.05), yticks=[0, 0.5, 1], yticklabels=["0%", "50%", "100%"])
@@ -86,7 +89,7 @@ def _line(place: Axes, points: Sequence[tuple[float, Mapping[str, Any]]], mode: 
         return
     low, high = ([s[k] for s in success] for k in ("lower95", "upper95"))
     place.fill_between(where, low, high, color=_POLICY, alpha=0.2, lw=0, label="95% interval")
-    place.plot(where, shares, "o-", color=_POLICY, ms=3.5, label="success of the policy")
+    place.plot(where, shares, "o-", color=_POLICY, ms=3.5, label="success rate of the policy")
 
 
 def _value(value: float | None) -> str:
@@ -132,4 +135,4 @@ def _strip(name: str, along: Mapping[str, Any], pictures: Sequence[NDArray | Non
 
 def _caption(level: Mapping[str, Any], along: Mapping[str, Any]) -> str:
     success = level["modes"]["constant"]["success"]["share"]
-    return f"{level['value']:.3g}: succeeds in {told(success)}"
+    return f"{level['value']:.3g}: success rate {percent(success)}"

@@ -1,6 +1,6 @@
-"""What is quoted of a policy's flights under other conditions, beside a verdict or a need.
+"""Sentences that quote a robustness evaluation, and its comparison with requirements.
 
-Evidence: "shifts", as in `shifts.json`, or why they are "refused", and "verdict", as in
+Evidence: "shifts", as in `shifts.json` or with the reason why it is "refused", and "verdict", as in
 `verdict.json`.
 """
 
@@ -11,38 +11,38 @@ from drone_rl.robustness.shifts_text import MOST_NAMED, NAMES, SHIFTS, is_tested
 from drone_rl.utils.text import Evidence, Sentence, listed, percent, plural, say
 
 _OTHERS = {"color": "colours", "light": "light", "object size": "sizes"}
-"""What a verdict is told to say nothing of, by the kind of shift that does."""
+"""What a verdict does not cover, by the kind of shift that does."""
 NEARLY = 1e-9
-"""Rounding of a limit, relative."""
+"""Relative rounding of a limit."""
 
 
 def is_quoted(evidence: Evidence) -> bool:
-    """Whether there are such flights, and nothing speaks against them."""
+    """Return whether there is such an evaluation that is not refused."""
     return bool(evidence.get("shifts")) and why_not(evidence) is None
 
 
 def why_not(evidence: Evidence) -> str | None:
-    """What speaks against flights that are there; None if nothing does."""
+    """Return the reason why an evaluation is refused, or None."""
     shifts, verdict = evidence["shifts"], evidence["verdict"]
     if "refused" in shifts:
         return shifts["refused"]
     share = shifts["settings"]["good_share"]
     if share != verdict["good_share"]:
         return (
-            f"they call good who has a share of {share:g} of the oracle's success, this verdict "
-            f"one of {verdict['good_share']:g}"
+            f"it requires {share:g} of the oracle's success rate for a good policy, this verdict "
+            f"{verdict['good_share']:g}"
         )
     is_other = verdict["certain"] and verdict["kind"] != "good"
     if is_other and shifts["domain"] is not None and shifts["domain"]["plain"]["good"]:
-        return "they say that it is good where nothing is different, and this verdict's do not"
+        return "it states that the policy is good without perturbation, and this verdict does not"
     return None
 
 
 def untested(evidence: Evidence) -> list[str]:
-    """Of colours, light and sizes, those in which it was not flown."""
+    """Return which of colours, light and sizes were not evaluated."""
     axes = evidence["shifts"]["axes"].values() if is_quoted(evidence) else ()
     flown = {along["group"] for along in axes}
-    return [told for group, told in _OTHERS.items() if group not in flown]
+    return [name for group, name in _OTHERS.items() if group not in flown]
 
 
 def _quote(evidence: Evidence) -> str:
@@ -53,7 +53,7 @@ def _quote(evidence: Evidence) -> str:
     else:
         count = f"{settings['domain_episodes']:,} (ranges) and {settings['episodes']:,} (others)"
     basis = (
-        f"By drone-rl shifts, of this network, camera and task: {count} flights at each strength "
+        f"By drone-rl shifts, of this network, camera and task: {count} episodes at each strength "
         f"(seed {settings['seed']}) of {_axes(shifts)}."
     )
     file = shifts["file"]
@@ -70,26 +70,21 @@ def _axes(shifts: Evidence) -> str:
 QUOTED = (
     Sentence(
         "domain.quoted",
-        "flights under other conditions are of this network and task, and none speak against them",
+        "a robustness evaluation is of this network and task, and not refused",
         is_quoted,
         _quote,
     ),
     Sentence(
         "domain.refused",
-        "there are such flights, and something speaks against them",
+        "a robustness evaluation is refused",
         lambda e: bool(e.get("shifts")) and not is_quoted(e),
-        lambda e: f"Flights under other conditions are not quoted: {why_not(e)}.",
+        lambda e: f"A robustness evaluation is not quoted: {why_not(e)}.",
     ),
 )
 
 
 def needed_range(along: Evidence, need: Mapping[str, float | None]) -> tuple[float, float]:
-    """The ends of a range that is needed.
-
-    Args:
-        along: Of the axis, as in `shifts.json`.
-        need: See `lacking`.
-    """
+    """Return the ends of a required range on an axis, as in `shifts.json`; see `lacking`."""
     neutral = _number(along["neutral"])
     given = [end for end in (need["low"], need["high"]) if end is not None]
     low = min([neutral, *given]) if need["low"] is None else need["low"]
@@ -98,40 +93,40 @@ def needed_range(along: Evidence, need: Mapping[str, float | None]) -> tuple[flo
 
 
 def contradicted(name: str | None, value: float, unit: str, probed: Evidence) -> str:
-    """What new episodes say against a file.
+    """Return how new episodes contradict a file.
 
     Args:
-        name: Of the axis; None where nothing is different.
-        value: At which they were flown.
+        name: Of the axis; None without perturbation.
+        value: Of the axis.
         unit: Of the axis.
         probed: See `drone_rl.robustness.domain.Prober.probe`.
     """
-    where = "where nothing is different" if name is None else f"{NAMES[name]} at {value:.4g} {unit}"
+    where = "without perturbation" if name is None else f"{NAMES[name]} at {value:.4g} {unit}"
     if probed["refused"] is not None:
-        return f"{where}: the task can't be so ({probed['refused']})"
+        return f"{where}: the task does not allow it ({probed['refused']})"
     return (
-        f"{where}: new episodes succeed in {percent(probed['success'])}, so that it is surely not "
-        "good there; the file says that it is"
+        f"{where}: {percent(probed['success'])} of new episodes succeed, so the policy is "
+        "certainly not good there; the file states that it is"
     )
 
 
 def lacking(shifts: Evidence, name: str, need: Mapping[str, float | None]) -> str | None:
-    """What an operating domain lacks of a range that is needed; None if nothing.
+    """Return what an operating domain lacks of a required range, or None.
 
     Args:
         shifts: As in `shifts.json`, with ranges.
         name: Of the axis.
-        need: Its "low" and "high"; None for as far as no difference is, or as the other end.
+        need: Its "low" and "high"; None for the value without perturbation, or the other end.
     """
     found, along = shifts["domain"]["ranges"].get(name), shifts["axes"].get(name)
     if found is None or along is None:
-        return f"{NAMES[name]}: not flown; run drone-rl shifts with axes=[{name}] among others"
+        return f"{NAMES[name]}: not evaluated; run drone-rl shifts with axes=[{name}] among others"
     low, high = needed_range(along, need)
     needed = f"{NAMES[name]}: needed {_span(low, high, along['unit'])}"
     if found["positions"] is None:
-        return f"{needed}; it is not even surely good where nothing is different"
+        return f"{needed}; it is not certainly good even without perturbation"
     if not is_tested(shifts, name):
-        return f"{needed}; it notices nothing of it, so that nothing was tested"
+        return f"{needed}; not tested, because it had no effect"
     good = _number(found["low"]), _number(found["high"])
     short = {
         "low": good[0] > low + NEARLY * abs(low),
@@ -140,7 +135,7 @@ def lacking(shifts: Evidence, name: str, need: Mapping[str, float | None]) -> st
     if not any(short.values()):
         return None
     lost = [f for f in found["failed"] if f["impossible"] and short[f["end"]]]
-    more = "; further nobody can who knows no more than the camera shows" if lost else ""
+    more = "; more is impossible even for the oracle" if lost else ""
     return f"{needed}, good {_span(*good, along['unit'])}{more}"
 
 

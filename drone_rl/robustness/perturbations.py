@@ -12,9 +12,9 @@ from torch import Tensor
 from drone_rl.config import BaseTaskSettings
 from drone_rl.config.task import Things
 from drone_rl.envs.fault_models import FaultModel
-from drone_rl.sim.rendering import Appearance, Beside, Scene
-from drone_rl.sim.rendering.appearance import Several, moved, turned
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering import Appearance, Distractors, Scene
+from drone_rl.sim.rendering.appearance import Colors, moved, turned
+from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.rendering.view import LUMA
 from drone_rl.sim.visual_randomization import stand
 from drone_rl.utils.errors import InputError
@@ -121,20 +121,20 @@ def reflect(variation: Tensor) -> Tensor:
 
 def scene_appearance(scene: Scene) -> Appearance:
     """Return a scene's appearance with all of it given but for distractors."""
-    known = [m for m in scene.meanings if m is not Meaning.DISTRACTOR]
+    known = [m for m in scene.semantic_classes if m is not SemanticClass.DISTRACTOR]
     colors = {m: tuple(scene.colors[scene.geoms(m)[0], :3].tolist()) for m in known}
     model = scene.model
     lights = (model.light_ambient[0], model.light_diffuse[0], model.light_dir[0])
     ambient, sun, direction = (tuple(light.tolist()) for light in lights)
     return Appearance(
-        colors={**colors, Meaning.SKY: scene.sky},
+        colors={**colors, SemanticClass.SKY: scene.sky},
         ambient=ambient,
         sun=sun,
         sun_direction=direction,
     )
 
 
-def tint(classes: Sequence[Meaning], by: float) -> AppearanceChange:
+def tint(classes: Sequence[SemanticClass], by: float) -> AppearanceChange:
     """Shift red, green and blue of some classes by up to `by`, differently in each environment."""
 
     def change(appearance: Appearance, variation: Tensor) -> Appearance:
@@ -145,7 +145,7 @@ def tint(classes: Sequence[Meaning], by: float) -> AppearanceChange:
     return AppearanceChange(change, 3)
 
 
-def whiten(classes: Sequence[Meaning], fraction: float) -> AppearanceChange:
+def whiten(classes: Sequence[SemanticClass], fraction: float) -> AppearanceChange:
     """Mix this fraction of white into the colours of some classes."""
     return AppearanceChange(
         lambda look, _: _repaint(look, classes, lambda own: own + fraction * (1.0 - own))
@@ -201,7 +201,7 @@ def mount(
     return AppearanceChange(change, 1)
 
 
-def elevation(direction: Several) -> float:
+def elevation(direction: Colors) -> float:
     """Return the elevation of a sun that shines in this direction, degrees above the horizon."""
     x, y, z = _tensor(direction).tolist()
     return math.degrees(math.atan2(-z, math.hypot(x, y)))
@@ -251,22 +251,22 @@ def clutter(appearance: Appearance | None, things: Things, places: Tensor) -> Ap
         places: Metres, world frame. Shape: (num_worlds, count, 3).
     """
     color = torch.tensor(as_bright(things.color)).to(places)
-    more = Beside(
+    more = Distractors(
         places=places,
         sizes=torch.full_like(places[..., 0], things.size),
         colors=color.expand(places.shape),
     )
     appearance = appearance or Appearance()
-    own = appearance.beside
-    return dataclasses.replace(appearance, beside=more if own is None else own.and_more(more))
+    own = appearance.distractors
+    return dataclasses.replace(appearance, distractors=more if own is None else own.concat(more))
 
 
 def _repaint(
-    appearance: Appearance, classes: Sequence[Meaning], paint: Callable[[Tensor], Tensor]
+    appearance: Appearance, classes: Sequence[SemanticClass], paint: Callable[[Tensor], Tensor]
 ) -> Appearance:
     painted = {m: paint(_tensor(c)) for m, c in appearance.colors.items() if m in classes}
     return dataclasses.replace(appearance, colors={**appearance.colors, **painted})
 
 
-def _tensor(value: Several) -> Tensor:
+def _tensor(value: Colors) -> Tensor:
     return torch.as_tensor(value, dtype=torch.float64)

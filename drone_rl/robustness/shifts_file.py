@@ -86,6 +86,7 @@ def read_shifts(
             itself.
     """
     content = read_bytes(path, SHIFTS_BYTES)
+    policy: Any = described  # has what axes read of a PolicySpec
     try:
         data = dict(as_mapping(parse_json(content, "it"), "it"))
         pictures = as_mapping(data.pop("pictures", None), "pictures")
@@ -94,9 +95,9 @@ def read_shifts(
         _refuse_another(numbers, described, weights)
         terms_of(numbers)
         for name, along in numbers["axes"].items():
-            _check_axis(AXES[name].of(described), along, described, f"axes.{name}")
+            _check_axis(AXES[name].of(policy), along, policy, f"axes.{name}")
         check_counts(numbers, as_task(described.task))
-        _check_domain(numbers, described)
+        _check_domain(numbers, policy)
         shape = (described.camera.height, described.camera.width, 3)
         shown = {name: _read_strip(pictures.get(name), shape, name) for name in numbers["axes"]}
     except InputError as error:

@@ -1,4 +1,4 @@
-"""What is said of flights under other conditions, and of the conditions under which all is well."""
+"""Sentences and table of a robustness evaluation. Evidence: `shifts.json`."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -9,34 +9,32 @@ from drone_rl.utils.text import Evidence, Sentence, fixed_seed, listed, percent
 
 NAMES: Mapping[str, str] = {
     "object_color": "color of the objects",
-    "object_white": "objects whitened",
+    "object_white": "white in the objects",
     "floor_color": "color of the floor",
     "camera_yaw": "camera turned sideways",
     "camera_pitch": "camera tilted",
     "camera_roll": "camera rolled",
     "camera_height": "camera higher or lower",
-    "camera_sideways": "camera to one side",
+    "camera_sideways": "camera moved sideways",
     "field_of_view": "field of view",
-    "sun": "height of the sun",
+    "sun": "elevation of the sun",
     "brightness": "brightness",
     "fog": "fog",
     "object_size": "size of the objects",
-    "distractors": "distractors beside the way",
+    "distractors": "distractors",
     "noise": "noise",
-    "slow_noise": "noise that changes slowly",
+    "slow_noise": "correlated noise",
     "blur": "blur",
     "dead_rows": "dead rows",
-    "frozen_frames": "frozen pictures",
-    "late_frames": "late pictures",
-    "step_length": "length of a move",
-    "action_delay": "late actions",
+    "frozen_frames": "frozen frames",
+    "late_frames": "late frames",
+    "step_length": "step length",
+    "action_delay": "delayed actions",
 }
-"""Axes as people call them."""
-
-
+"""Axes by name, in reports."""
 RANGES: Mapping[str, str] = {
     "object_color": "{objects} whose red, green and blue differ by up to {high}",
-    "object_white": "{objects} with a share of white of up to {high}",
+    "object_white": "{objects} with up to {high} of white mixed in",
     "floor_color": "a floor whose red, green and blue differ by up to {high}",
     "camera_yaw": "the camera turned sideways by up to {high} degrees",
     "camera_pitch": "the camera tilted by up to {high} degrees",
@@ -44,46 +42,32 @@ RANGES: Mapping[str, str] = {
     "camera_height": "the camera up to {high} m higher or lower",
     "camera_sideways": "the camera up to {high} m to one side",
     "field_of_view": "a field of view of {low} to {high} degrees",
-    "sun": "the sun {low} to {high} degrees high",
+    "sun": "the sun at {low} to {high} degrees",
     "brightness": "{low} to {high} times the light",
-    "fog": "fog that leaves {low} m of sight or more",
+    "fog": "fog with a visibility of {low} m or more",
     "object_size": "{objects} of {low} to {high} m",
-    "distractors": "up to {high} distractors beside the way",
+    "distractors": "up to {high} distractors",
     "noise": "noise of up to {high} of 255",
-    "slow_noise": "slow noise of up to {high} of 255",
+    "slow_noise": "correlated noise of up to {high} of 255",
     "blur": "blur of up to {high} pixels",
     "dead_rows": "up to {high} dead rows",
-    "frozen_frames": "a share of frozen pictures of up to {high}",
-    "late_frames": "pictures up to {high} frames late",
-    "step_length": "moves of {low} to {high} m",
+    "frozen_frames": "up to {high} of all frames frozen",
+    "late_frames": "frames up to {high} steps late",
+    "step_length": "steps of {low} to {high} m",
     "action_delay": "actions up to {high} steps late",
 }
-"""What is said of a range; those without a lower end are of what is 0 otherwise, and that of fog
-has no upper one where the air of the training is clear."""
-_UP_TO: Mapping[str, str] = {"fog": "fog that leaves {low} to {high} m of sight"}
-"""The same where the upper end is finite."""
-
-
+"""Ranges; axes that are 0 without perturbation have no lower end, fog has no upper end if the air
+of the training is clear."""
+_UP_TO: Mapping[str, str] = {"fog": "fog with a visibility of {low} to {high} m"}
+"""Ranges with a finite upper end."""
 MOST_NAMED = 6
-"""Axes that a sentence names one by one."""
-
-
-def told(share: float) -> str:
-    """A share of flights, for people."""
-    return percent(share)
+"""Largest number of axes that a sentence names."""
 
 
 def rows(numbers: Evidence) -> list[list[str]]:
-    """Success at every strength as texts: names, then a row for each axis.
-
-    Args:
-        numbers: As in `shifts.json`.
-    """
+    """Return success rates at every strength as a table of texts, a row for each axis."""
     head = ["success, constant", "1", "2", "3", "4", "5", "area", ""]
-    return [
-        head,
-        *(_row(name, along) for name, along in numbers["axes"].items()),
-    ]
+    return [head, *(_row(name, along) for name, along in numbers["axes"].items())]
 
 
 def _row(name: str, along: Mapping[str, Any]) -> list[str]:
@@ -100,7 +84,7 @@ def _row(name: str, along: Mapping[str, Any]) -> list[str]:
 def _cell(level: Mapping[str, Any]) -> str:
     if level["refused"] is not None:
         return f"{level['value']:.3g}: -"
-    success = told(level["modes"]["constant"]["success"]["share"])
+    success = percent(level["modes"]["constant"]["success"]["share"])
     return f"{level['value']:.3g}: {success}{'*' if level['impossible'] else ''}"
 
 
@@ -109,13 +93,13 @@ def _ranges(e: Evidence) -> Mapping[str, Any]:
 
 
 def is_tested(e: Evidence, name: str) -> bool:
-    """Whether its strongest change was seen, or made flights go otherwise."""
+    """Return whether the strongest perturbation of an axis changed an image or an episode."""
     flown = [v["modes"]["constant"] for v in e["axes"][name]["levels"] if v["refused"] is None]
     return bool(flown) and not flown[-1]["unchanged"]
 
 
 def _wide(e: Evidence) -> Iterator[str]:
-    """Axes with a range in which it is good."""
+    """Axes with a range in which the policy is good."""
     for name, found in _ranges(e).items():
         has_width = found["positions"] is not None and found["positions"][0] < found["positions"][1]
         if has_width and is_tested(e, name):
@@ -123,11 +107,9 @@ def _wide(e: Evidence) -> Iterator[str]:
 
 
 def _shut(e: Evidence, is_sure: bool) -> list[str]:
-    """Axes without any, of a policy that is good where nothing differs.
+    """Axes without a range, of a policy that is good without perturbation.
 
-    Args:
-        e: As in `shifts.json`.
-        is_sure: Those on which it surely is not good, or those on which too few flights were made.
+    Either axes on which it is certainly not good, or those with too few episodes to be certain.
     """
     return [
         name
@@ -139,17 +121,12 @@ def _shut(e: Evidence, is_sure: bool) -> list[str]:
 
 
 def _own_failures(found: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """Those of the policy, where it could have done better."""
+    """Failures at strengths that are possible."""
     return [failure for failure in found["failed"] if not failure["impossible"]]
 
 
 def inward(value: float, up: bool) -> str:
-    """A limit in three digits, rounded to where it is surely good.
-
-    Args:
-        value: The limit.
-        up: Whether it is a lower one.
-    """
+    """Return a limit in three digits, rounded into the range; `up` for a lower limit."""
     if value == 0:
         return "0"
     unit = 10.0 ** (math.floor(math.log10(abs(value))) - 2)
@@ -171,7 +148,7 @@ def _range(e: Evidence, name: str) -> str:
 
 def _good(e: Evidence) -> str:
     ranges = listed([_range(e, name) for name in _wide(e)])
-    return f"Good, with 95% confidence for each range by itself, with {ranges}."
+    return f"Good with {ranges} (95% confidence for each range)."
 
 
 def _not(e: Evidence) -> str:
@@ -189,7 +166,7 @@ def _too_few(e: Evidence) -> str:
         for found in _own_failures(_ranges(e)[name])[:1]
     ]
     count = e["settings"]["domain_episodes"]
-    return f"Whether it is good with {listed(parts, 'or')} {count} flights do not tell."
+    return f"{count} episodes are too few to tell whether it is good with {listed(parts, 'or')}."
 
 
 def _at(e: Evidence, name: str, value: float) -> str:
@@ -197,12 +174,12 @@ def _at(e: Evidence, name: str, value: float) -> str:
 
 
 def _why(e: Evidence, found: Mapping[str, Any]) -> str:
-    """Where it fails."""
+    """How it fails."""
     if found["refused"] is not None:
-        return ", which the task can't have"
+        return ", which the task does not allow"
     worst = found["worst"]
     if worst is None:
-        return f": all {terms_of(e).goals} in {percent(found['success'])} of flights"
+        return f": all {terms_of(e).goals} in {percent(found['success'])} of episodes"
     return f": {terms_of(e).goals} {terms_of(e).side(worst['side'])} {percent(worst['share'])}"
 
 
@@ -211,7 +188,7 @@ def _objects(e: Evidence) -> str:
 
 
 def _impossible(e: Evidence) -> list[str]:
-    """Strengths of the table and ends of ranges, the flights of the former where both were made."""
+    """Impossible strengths and ends of ranges, with the oracle's success rate."""
     found = {
         _at(e, name, at["value"]): percent(at["oracle"]["share"])
         for name, along in e["axes"].items()
@@ -227,14 +204,10 @@ def _untested(e: Evidence) -> list[str]:
 
 def _together(e: Evidence) -> str:
     flown, oracle = e["together"]["modes"]["constant"], e["together"]["oracle"]
-    beside = (
-        ""
-        if oracle is None
-        else f"; who knows where all is that it sees, in {percent(oracle['share'])}"
-    )
+    other = "" if oracle is None else f", the oracle in {percent(oracle['share'])}"
     return (
         f"With {_every_axis(e)} at once, each at its third strength, it succeeds in "
-        f"{percent(flown['success']['share'])} of flights{beside}."
+        f"{percent(flown['success']['share'])} of episodes{other}."
     )
 
 
@@ -247,50 +220,46 @@ def _every_axis(e: Evidence) -> str:
 SHIFTS = (
     Sentence(
         "shifts.good",
-        "surely good where nothing differs and up to both ends of a range that was seen to differ",
+        "certainly good without perturbation and up to both ends of a range with an effect",
         lambda e: any(True for _ in _wide(e)),
         _good,
     ),
     Sentence(
         "shifts.not",
-        "surely good where nothing differs, surely not at the next strength of an axis",
+        "certainly good without perturbation, certainly not at the next strength of an axis",
         lambda e: bool(_shut(e, True)),
         _not,
     ),
     Sentence(
         "shifts.too_few",
-        "surely good where nothing differs, and nowhere else on an axis, but not surely bad",
+        "certainly good without perturbation, nowhere else on an axis, and not certainly bad",
         lambda e: bool(_shut(e, False)),
         _too_few,
     ),
     Sentence(
         "shifts.none",
-        "ranges were looked for, and it is not even surely good where nothing differs",
+        "ranges were searched, and the policy is not certainly good without perturbation",
         lambda e: e["domain"] is not None and not e["domain"]["plain"]["good"],
         lambda e: (
-            "It is not surely good where nothing is different from its training, so there is no "
-            "range in which it is."
+            "It is not certainly good even without perturbation, so there is no range in which it "
+            "is."
         ),
     ),
     Sentence(
         "shifts.untested",
-        "an axis changed neither what it saw nor how it flew",
+        "an axis changed neither images nor episodes",
         lambda e: bool(_untested(e)),
-        lambda e: f"Of {listed(_untested(e))} it notices nothing: that was no test.",
+        lambda e: f"Not tested, because without effect: {listed(_untested(e))}.",
     ),
     Sentence(
         "shifts.impossible",
-        "who knows where all is that the camera shows surely fails too often, at a strength of the "
-        "table or where a range ends",
+        "the oracle certainly fails too often at a strength of the table or where a range ends",
         lambda e: bool(_impossible(e)),
-        lambda e: (
-            "Impossible even for who knows where all is that the camera shows: "
-            f"{listed(_impossible(e))}."
-        ),
+        lambda e: f"Impossible even for the oracle: {listed(_impossible(e))}.",
     ),
     Sentence(
         "shifts.together",
-        "several axes were flown at once",
+        "several axes were perturbed at once",
         lambda e: e["together"]["refused"] is None and len(e["axes"]) > 1,
         _together,
     ),
@@ -299,9 +268,9 @@ SHIFTS = (
         "a range was found",
         lambda e: any(True for _ in _wide(e)),
         lambda e: (
-            "Within each range its limits, the strengths of the table and one drawn at random "
-            "between each two were flown at, always constantly different; nothing else was, nor "
-            "several axes at once but as said here."
+            "Tested within each range, with constant perturbations: its limits, the strengths of "
+            "the table and a random one between each two; not tested: other strengths, and "
+            "combinations of axes except those named here."
         ),
     ),
     fixed_seed("shifts.fixed_seed"),

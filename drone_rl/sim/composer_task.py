@@ -31,8 +31,8 @@ from drone_rl.sim.entities import (
 )
 from drone_rl.sim.mujoco_flight import MujocoFlight
 from drone_rl.sim.rendering import Appearance, opengl
-from drone_rl.sim.rendering.opengl import OpenGlLooks
-from drone_rl.sim.rendering.scene import Meaning, Scene
+from drone_rl.sim.rendering.opengl import OpenGlAppearance
+from drone_rl.sim.rendering.scene import Scene, SemanticClass
 from drone_rl.sim.tasks import State, Task, as_task
 from drone_rl.sim.visual_randomization import Appearances, things_of
 
@@ -71,7 +71,7 @@ class ComposerTask(composer.Task):
             pixels: Whether to observe the front-center camera, which needs OpenGL.
             distractors: Things that mean nothing, behind the task's own props; as many as the
                 appearance has where it is given.
-            appearance: How the world looks, see `OpenGlLooks`; as the task has it by default.
+            appearance: How the world looks, see `OpenGlAppearance`; as the task has it by default.
 
         Raises:
             InputError: A texture can't be read, there is no room for camera or distractors, or the
@@ -146,10 +146,10 @@ class ComposerTask(composer.Task):
         """The very model that dm_control simulates, with what its geoms mean."""
         physics = mjcf.Physics.from_mjcf_model(self._arena.mjcf_model)
         model = physics.model.ptr
-        meanings, props = [Meaning.GROUND] * model.ngeom, [-1] * model.ngeom
+        meanings, props = [SemanticClass.GROUND] * model.ngeom, [-1] * model.ngeom
         for number, entity in [(-1, self._drone), *enumerate(self._props)]:
             for geom in physics.bind(entity.mjcf_model.find_all("geom")).element_id:
-                meanings[geom], props[geom] = entity.meaning, number
+                meanings[geom], props[geom] = entity.semantic_class, number
         return Scene(model, tuple(meanings), tuple(props), SKY_COLOR)
 
     def initialize_episode(
@@ -252,8 +252,8 @@ class ComposerTask(composer.Task):
         if self._flight is None:
             self._drone.set_pose(physics, body.position[0].numpy(), self._shown(body)[0].numpy())
         places = self.rules.places(self._state)[0]
-        if self._look is not None and self._look.beside is not None:
-            places = torch.cat([places, self._look.beside.of(1).places[0]])
+        if self._look is not None and self._look.distractors is not None:
+            places = torch.cat([places, self._look.distractors.expand(1).places[0]])
         for frame, place in zip(self._frames, places, strict=True):
             physics.bind(frame).mocap_pos = place.numpy()
 
@@ -261,7 +261,7 @@ class ComposerTask(composer.Task):
         """What lets MuJoCo fly a quadrotor; before the model is compiled."""
         if not isinstance(self.dynamics, Quadrotor):
             return None
-        solid = [p.mjcf_model for p in self._props if p.meaning == Meaning.OBSTACLE]
+        solid = [p.mjcf_model for p in self._props if p.semantic_class == SemanticClass.OBSTACLE]
         return MujocoFlight(self.dynamics, self._arena, self._drone, solid)
 
     def _prepare(self) -> None:
@@ -276,8 +276,8 @@ class ComposerTask(composer.Task):
         if self._worn is None:
             things = things_of(self.rules)
             middle = 0.0 if things is None else (things.first + things.last) / 2
-            self._worn = OpenGlLooks(self.compile(), middle)
-        self._worn.wear(physics, look, self._pixels)
+            self._worn = OpenGlAppearance(self.compile(), middle)
+        self._worn.apply(physics, look, self._pixels)
         self._physics = physics
 
     def _in_fog(self, picture: np.ndarray, random_state: np.random.RandomState) -> np.ndarray:
@@ -291,7 +291,7 @@ class ComposerTask(composer.Task):
         option = hide_drone()
         depth = self._physics.render(height, width, number, depth=True, scene_option=option)
         fovy = float(model.cam_fovy[number])
-        return opengl.in_fog(picture, depth, self._look, fovy, _SKY)
+        return opengl.apply_fog(picture, depth, self._look, fovy, _SKY)
 
     def _read(self, name: str) -> np.ndarray:
         return self.rules.info(self._state)[name][0].numpy()

@@ -10,7 +10,7 @@ from dm_control.mujoco import engine
 
 from drone_rl.config import CameraSettings
 from drone_rl.config.camera import FRONT
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.utils.errors import InputError
 
 
@@ -76,7 +76,7 @@ DRAW_DISTANCE = 200.0
 class Field(composer.Arena):
     """A flat floor under an even sky, lit by one sun."""
 
-    meaning = Meaning.GROUND
+    semantic_class = SemanticClass.GROUND
 
     def _build(self, name: str = "field") -> None:
         super()._build(name=name)
@@ -107,7 +107,7 @@ class Field(composer.Arena):
 class Cube(composer.Entity):
     """A cube that is seen but never pushes: touching is a rule, not a contact."""
 
-    meaning = Meaning.TARGET
+    semantic_class = SemanticClass.TARGET
 
     def _build(self, size: float, color: tuple[float, float, float], name: str = "cube") -> None:
         """Makes the cube.
@@ -142,7 +142,7 @@ class Cube(composer.Entity):
 class Pillar(composer.Entity):
     """An upright box that is seen but never pushes back: touching it is a rule, not a contact."""
 
-    meaning = Meaning.OBSTACLE
+    semantic_class = SemanticClass.OBSTACLE
 
     def _build(
         self,
@@ -188,7 +188,7 @@ KINDS = ("box", "sphere", "cylinder")
 class Distractor(composer.Entity):
     """A box, a ball or a cylinder of 1 m, seen but never touched; worlds make it larger."""
 
-    meaning = Meaning.DISTRACTOR
+    semantic_class = SemanticClass.DISTRACTOR
 
     def _build(self, kind: str, name: str = "distractor") -> None:
         """Makes one.
@@ -259,7 +259,7 @@ class DroneObservables(composer.Observables):
 class Drone(composer.Entity):
     """A quadrotor's shape with AirSim's five cameras."""
 
-    meaning = Meaning.DRONE
+    semantic_class = SemanticClass.DRONE
 
     def _build(self, size: float, camera: CameraSettings, name: str = "drone") -> None:
         """Makes the drone.

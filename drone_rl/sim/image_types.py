@@ -45,7 +45,7 @@ def object_names(scene: Scene) -> list[str]:
 
     Geoms of one thing share its name, as do those that belong to none and mean the same.
     """
-    pairs = zip(scene.meanings, scene.props, strict=True)
+    pairs = zip(scene.semantic_classes, scene.props, strict=True)
     return [
         meaning.name.lower() if prop < 0 else f"{meaning.name.lower()}_{prop}"
         for meaning, prop in pairs

@@ -16,9 +16,9 @@ from torch import Tensor
 from drone_rl.config import AppearanceSettings, BaseTaskSettings, CameraSettings
 from drone_rl.config.appearance import NO_TEXTURE, Names, check_appearance
 from drone_rl.config.task import Things
-from drone_rl.sim.rendering import Appearance, Beside, Mounting, Texture, textures
-from drone_rl.sim.rendering.appearance import product, turned, zoom_of
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering import Appearance, Distractors, Mounting, Texture, textures
+from drone_rl.sim.rendering.appearance import product, turned, zoom_for_fov
+from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.tasks import Task, as_task
 from drone_rl.sim.tasks.common import HIDDEN_DEPTH
 
@@ -116,7 +116,7 @@ def _color(
     return torch.stack([_drawn(pair, source, ()) for pair in zip(*ends, strict=True)])
 
 
-_OBJECTS = (Meaning.TARGET, Meaning.OBSTACLE)
+_OBJECTS = (SemanticClass.TARGET, SemanticClass.OBSTACLE)
 _APART = 7919
 """Keeps the draws of an appearance apart from those of the task."""
 _STILL = (0.0, 0.0, 0.0)
@@ -179,7 +179,7 @@ class Appearances:
         """
         if not self.varies or not len(worlds):
             return
-        rows = [self._draw(_beside(state)) for state in random_states]
+        rows = [self._draw(_distractors(state)) for state in random_states]
         self.values = self.values.clone()
         self.values[worlds.cpu()] = torch.tensor(rows, dtype=torch.float64)
         self._now = None
@@ -224,11 +224,11 @@ class Appearances:
         shadows, horizon = number(), color()
         zenith, fog = color(), number()
         ground, objects, exposure = color(), color(), number()
-        colors = {Meaning.SKY: horizon, Meaning.GROUND: ground}
+        colors = {SemanticClass.SKY: horizon, SemanticClass.GROUND: ground}
         if settings.object_color is not None:
             colors |= dict.fromkeys(_OBJECTS, objects)
         covers = {
-            Meaning.GROUND: _cover(settings.ground_texture, number(), number()),
+            SemanticClass.GROUND: _cover(settings.ground_texture, number(), number()),
             **dict.fromkeys(_OBJECTS, _cover(settings.object_texture, number(), number())),
         }
         mounting = self._mounting(torch.stack([number() for _ in range(_OF_CAMERA)], -1))
@@ -245,7 +245,7 @@ class Appearances:
             exposure=None if settings.exposure == 1.0 else exposure,
             textures={meaning: cover for meaning, cover in covers.items() if cover is not None},
             camera=mounting,
-            beside=self._beside(list(columns)),
+            distractors=self._distractors(list(columns)),
         )
 
     def _mounting(self, values: Tensor) -> Mounting | None:
@@ -257,15 +257,15 @@ class Appearances:
         roll, pitch, yaw = values[..., 3:6].unbind(-1)
         turn = product(turned("yaw", yaw), product(turned("pitch", pitch), turned("roll", roll)))
         own = self._camera.horizontal_fov
-        zoom = None if s.camera_widening == 0.0 else zoom_of(own, own + values[..., 6])
+        zoom = None if s.camera_widening == 0.0 else zoom_for_fov(own, own + values[..., 6])
         return Mounting(offset=values[..., :3], turn=turn, zoom=zoom)
 
-    def _beside(self, columns: list[Tensor]) -> Beside | None:
+    def _distractors(self, columns: list[Tensor]) -> Distractors | None:
         """Of what `draw_distractors` draws."""
         if not columns:
             return None
         rows = torch.stack(columns, -1).unflatten(-1, (self.distractors, WIDTH))
-        return Beside(places=rows[..., :3], sizes=rows[..., 3], colors=rows[..., 4:])
+        return Distractors(places=rows[..., :3], sizes=rows[..., 3], colors=rows[..., 4:])
 
 
 def _draw(settings: AppearanceSettings, source: np.random.RandomState | None) -> list[float]:
@@ -315,7 +315,7 @@ def _pairs(value: Any) -> list[tuple[float, float]]:
     return [*zip(low, high, strict=True)]
 
 
-def _beside(random_state: np.random.RandomState) -> np.random.RandomState:
+def _distractors(random_state: np.random.RandomState) -> np.random.RandomState:
     """A stream that depends on where another is, which stays there."""
     ahead = copy.deepcopy(random_state)
     return np.random.RandomState([_APART, *ahead.randint(0, 2**32, 4, dtype=np.uint32)])
@@ -323,4 +323,4 @@ def _beside(random_state: np.random.RandomState) -> np.random.RandomState:
 
 def _cover(names: Names | None, choice: Tensor, tile: Tensor) -> Texture | None:
     known = tuple(name for name in names or () if name != NO_TEXTURE)
-    return Texture(pictures=known, size=tile, choice=choice) if known else None
+    return Texture(images=known, size=tile, choice=choice) if known else None

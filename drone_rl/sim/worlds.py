@@ -16,9 +16,9 @@ from drone_rl.sim.dynamics.state import heading_only
 from drone_rl.sim.entities import FRONT_CENTER
 from drone_rl.sim.rendering import (
     Appearance,
-    MakeRenderer,
     Poses,
     Renderer,
+    RendererFactory,
     Scene,
     View,
     find_renderer,
@@ -42,7 +42,7 @@ class Worlds:
         *,
         dynamics: Dynamics | DynamicsSettings | None = None,
         actions: ActionSettings | None = None,
-        renderer: str | MakeRenderer = "raytrace",
+        renderer: str | RendererFactory = "raytrace",
         device: str = "cpu",
         num_shards: int | None = None,
         appearance: Appearance | None = None,
@@ -59,7 +59,7 @@ class Worlds:
                 by default.
             renderer: Who draws, see `find_renderer`.
             device: "cpu", "cuda" or "cuda:N".
-            num_shards: See `MakeRenderer`.
+            num_shards: See `RendererFactory`.
             appearance: How all of them look, where nothing else is said; as the task has it by
                 default.
             distractors: How many there may be; appearances say where they stand.
@@ -253,16 +253,16 @@ class Worlds:
         """
         props = self.task.places(state)
         if self.distractors:
-            props = torch.cat([props, self._beside(appearance, len(props)).to(props)], 1)
+            props = torch.cat([props, self._distractors(appearance, len(props)).to(props)], 1)
         attitude = state.body.attitude
         if self.dynamics.mount == "gimbal":
             attitude = heading_only(attitude)
         return Poses(state.body.position, attitude, props)
 
-    def _beside(self, appearance: Appearance | None, count: int) -> Tensor:
-        beside = None if appearance is None else appearance.beside
+    def _distractors(self, appearance: Appearance | None, count: int) -> Tensor:
+        beside = None if appearance is None else appearance.distractors
         if beside is not None:
-            return beside.of(count).places
+            return beside.expand(count).places
         return torch.tensor([0.0, 0.0, -HIDDEN_DEPTH]).expand(count, self.distractors, 3)
 
     def prepare(self, view: View | None = None) -> None:

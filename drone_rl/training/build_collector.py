@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import torch
 
 from drone_rl.collectors import (
+    BatchedCollector,
     EpisodeCollector,
     RolloutCollector,
     ThreadedCollector,
-    WorldsCollector,
 )
 from drone_rl.config.configuration import as_config, from_config, locate
 from drone_rl.config.learning import Episodes, Ray, WithCritic
@@ -24,7 +24,7 @@ from drone_rl.utils.seeding import Stream, torch_generator
 if TYPE_CHECKING:
     from drone_rl.collectors.ray import RayEpisodeCollector
 
-C = TypeVar("C", bound=WorldsCollector)
+C = TypeVar("C", bound=BatchedCollector)
 
 
 class Collecting(NamedTuple):
@@ -73,7 +73,7 @@ def rollout_collector(
 def _threaded(
     settings: TrainSettings,
     practice: FailureReplayTask | None,
-    collect: Callable[..., WorldsCollector],
+    collect: Callable[..., BatchedCollector],
 ) -> Collecting:
     """The worlds shared out to threads, each with a collector made of worlds and an actor."""
     shares = _shares(settings)
@@ -161,8 +161,8 @@ def _remote_share(
 def _episodes(settings: TrainSettings, cores: int) -> Callable[..., EpisodeCollector]:
     """Makes collectors of complete episodes, each on so many cores."""
     asked = settings.collector
-    is_compiled = isinstance(asked, Episodes) and asked.compiled
-    return functools.partial(EpisodeCollector, is_compiled=is_compiled, num_cores=cores)
+    acceleration = "fused" if isinstance(asked, Episodes) and asked.compiled else "none"
+    return functools.partial(EpisodeCollector, acceleration=acceleration, num_threads=cores)
 
 
 def _num_workers(settings: TrainSettings) -> int:

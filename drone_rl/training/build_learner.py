@@ -5,12 +5,11 @@ from typing import Any
 import torch
 from torch import nn
 
-from drone_rl.collectors import ThreadedCollector
+from drone_rl.collectors.speedups import accelerated_gradients
 from drone_rl.config.configuration import as_config, locate
 from drone_rl.config.learning import WithCritic
 from drone_rl.config.training import TrainSettings
 from drone_rl.policies import ActorCritic, make_actor
-from drone_rl.policies.learning_network import LearningNetwork
 from drone_rl.policies.zoo import describe
 from drone_rl.training.build_collector import Collecting
 from drone_rl.training.learners import ActorCriticLearner, Learner, ReinforceLearner
@@ -67,13 +66,15 @@ def actor_critic_learner(settings: TrainSettings, made: Collecting) -> ActorCrit
 
 
 def _learning_actor(settings: TrainSettings, made: Collecting) -> nn.Module:
-    """The actor; its network by a kernel, if that is asked for and there is one that knows it."""
+    """The actor; with a fused network, if that is asked for and the kernel supports it."""
     actor, trainer = made.collector.actor, settings.trainer
-    network = LearningNetwork.find(made.network, trainer.num_threads) if trainer.compiled else None
-    if network is None:
+    if not trainer.compiled:
         return actor
-    if isinstance(made.collector, ThreadedCollector):  # in this process
-        network.known = made.collector.keep_outputs()
+    network = accelerated_gradients(
+        made.network, trainer.num_threads, cache=made.collector.cache_activations
+    )
+    if network is made.network:
+        return actor
     torch.set_num_threads(1)  # what is left to torch is small, and its threads wait in loops
     spec: Any = actor.spec  # torch's modules are annotated to hold anything
     return make_actor(network, spec["action"])

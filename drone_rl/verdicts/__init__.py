@@ -1,1 +1,1 @@
-"""Verdicts: what can be claimed of a policy, from episodes, certificates and measured domains."""
+"""Verdicts on policies from episodes, certificates and operating domains; export with a card."""

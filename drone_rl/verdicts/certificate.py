@@ -1,4 +1,4 @@
-"""A certificate beside a verdict: what it states of all placements, or why it is not quoted."""
+"""Find and check the certificate of a policy, and compare it with a verdict's episodes."""
 
 import dataclasses
 from pathlib import Path
@@ -16,53 +16,52 @@ from drone_rl.policies.zoo import certificate_path
 from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import RootSeed, root_seed
-from drone_rl.verification.checker import Certificate, check_certificate, find, read_tried
+from drone_rl.verification.checker import Certificate, check_certificate, find, read_validated
 from drone_rl.verification.checker.sampling import ANYWHERE
 
 
 @dataclasses.dataclass(frozen=True)
 class Claim:
-    """A certificate that was found, tried as far as that goes without this verdict's flights."""
+    """A certificate that was found and checked, or the reason why it is refused."""
 
     path: Path
     """Its file."""
     certificate: Certificate | None
-    """See `drone_rl.verification.checker.read_tried`; None if it was refused."""
+    """See `drone_rl.verification.checker.read_validated`; None if it was refused."""
     refused: str | None = None
-    """Why, in one line."""
+    """The reason, in one line."""
     flights: int = 0
     """Rollouts that re-checked it, all of which ended as it states; 0 if none were."""
     uniform: int = 0
-    """Those of them from placements that were drawn uniformly."""
+    """Those of them from uniformly sampled placements."""
     seed: int | None = None
-    """Of their placements."""
+    """Of the placements."""
     seed_is_fixed: bool = True
-    """Whether the seed was chosen beforehand, so that a certificate could be fitted to it."""
+    """Whether the seed was chosen, so that a certificate could have been fitted to it."""
 
     @property
     def wrong_at_most(self) -> float | None:
-        """The fraction of placements about which it may be wrong, with 95% confidence.
+        """Upper bound on the fraction of placements with a wrong statement, with 95% confidence.
 
         A certificate that is wrong about more passes so many uniform rollouts with a probability
-        of at most 5%. None if none were flown.
+        of at most 5%. None without rollouts.
         """
         return 1.0 - 0.05 ** (1.0 / self.uniform) if self.uniform else None
 
     def beside(self, greedy: Episodes, *, rounding: Rounding | None = None) -> dict[str, Any]:
-        """What a verdict may quote of it, which is nothing if a flight ended otherwise.
+        """Return what a verdict may quote: nothing if an episode contradicts the certificate.
 
         Args:
-            greedy: The verdict's episodes with the most probable actions, in the same task.
-            rounding: What rounding can change in these. If it can lead to an end that is not
-                stated, nothing is quoted, for a proof holds for any order of sums.
+            greedy: The verdict's greedy episodes, in the same task.
+            rounding: How rounding can change these. A proof holds for any order of sums, so nothing
+                is quoted if rounding can lead to an end that is not stated.
 
         Returns:
-            Plain values: "refused" (why, or None) and, unless it is, "every" (whether all is
-            collected from every placement), the shares of placements from which all is collected
-            ("share"), is not ("lost"), and of which nothing is stated ("undecided"), "finished",
-            "checked" (rollouts that re-checked it), "wrong_at_most" (see there), "seed" and
-            "seed_is_fixed" (of their placements) and "agreeing" (the verdict's own flights that
-            started where an end is stated, and ended so).
+            Plain values: "refused" (the reason or None) and, unless refused, "every" (whether all
+            cubes are collected from every placement), the fractions of placements from which all
+            are collected ("share"), are not ("lost"), and that are "undecided", "finished",
+            "checked" (number of rollouts), "wrong_at_most", "seed" and "seed_is_fixed" (of their
+            placements) and "agreeing" (the verdict's own episodes with a stated end).
         """
         stated = self.certificate
         if stated is None:
@@ -93,7 +92,7 @@ class Claim:
 
 
 def _can_end_otherwise(stated: Certificate, greedy: Episodes, rounding: Rounding) -> bool:
-    """Whether rounding can lead from a place of which an end is stated to another end."""
+    """Whether rounding can lead to another end than the stated one."""
     ends = rounding.outcomes
     is_stated = _outcomes_of(stated, greedy) < len(stated.outcomes)
     unknown = bool((ends.is_open.numpy() & is_stated).any())
@@ -102,14 +101,14 @@ def _can_end_otherwise(stated: Certificate, greedy: Episodes, rounding: Rounding
 
 
 def _outcomes_of(stated: Certificate, episodes: Episodes) -> NDArray[np.int64]:
-    """The number of each episode's outcome; as many as there are where nothing is stated."""
+    """Index of each episode's outcome; the number of outcomes where none is stated."""
     groups = stated.groups
     owner = np.repeat(np.arange(len(groups)), [len(boxes) for boxes in groups])
     return owner[find(np.concatenate(groups), _placements(episodes))]
 
 
 def _ends_as_stated(stated: Certificate, greedy: Episodes) -> list[bool]:
-    """Of each episode from a place of which an end is stated: whether it was that end."""
+    """For each episode with a stated end, whether it ended so."""
     outcome = _outcomes_of(stated, greedy)
     flown = zip(outcome, greedy.end_reason.tolist(), greedy.goals.reached.tolist(), strict=True)
     return [
@@ -120,7 +119,7 @@ def _ends_as_stated(stated: Certificate, greedy: Episodes) -> list[bool]:
 
 
 def _placements(episodes: Episodes) -> NDArray[np.float64]:
-    """Metres to the left of each cube. Shape: (n, cubes)."""
+    """Positions of the cubes, metres to the left. Shape: (n, cubes)."""
     places = episodes.goals.world.reshape(len(episodes), -1, 3)  # x, y, z of each cube
     return places[..., 1].double().numpy()
 
@@ -134,24 +133,23 @@ def find_claim(
     device: str = "cpu",
     renderer: str = "raytrace",
 ) -> Claim | None:
-    """Find and check the certificate of a policy; see `drone_rl.verification.checker.read_tried`.
+    """Find and check the certificate of a policy, see `checker.read_validated`.
 
     Args:
-        policy: Which, in the task that counts.
-        given: The certificate's file, or a folder that holds a certificate.json; by default the one
-            that lies with the policy, see `drone_rl.policies.zoo.certificate_path`.
+        policy: Which, in its task.
+        given: The certificate's file, or a folder with a certificate.json; by default the file next
+            to the policy, see `drone_rl.policies.zoo.certificate_path`.
         flights: Rollouts that re-check it from other placements; 0 for none.
         seed: Root of the random stream of these placements; a fresh one by default.
-        device: Where they are flown.
-        renderer: Who draws, see `drone_rl.sim.rendering.find_renderer`.
+        device: Where to run them.
+        renderer: Name of the renderer.
 
     Returns:
-        None if none is given and none lies there, as for a policy in no file. One that lies there
-        and can't be believed is returned as refused.
+        None if there is none. An invalid one next to the policy is returned as refused.
 
     Raises:
-        InputError: The one that is given can't be read, is of another network or task, contradicts
-            itself, or is refuted by a flight.
+        InputError: The given one is unreadable, of another network or task, contradicts itself, or
+            is refuted by a rollout.
     """
     if not isinstance(policy, Policy):
         if given is not None:
@@ -179,7 +177,7 @@ def _try(
     policy: Policy, path: Path, flights: int, *, seed: RootSeed | None, **flying: Any
 ) -> Claim:
     weights = policy.state["policy"]
-    certificate = read_tried(path, policy.description, weights)
+    certificate = read_validated(path, policy.description, weights)
     if not flights:
         return Claim(path, certificate)
     seed = seed or root_seed(None)

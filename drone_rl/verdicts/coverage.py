@@ -1,4 +1,4 @@
-"""Which flights under other conditions a verdict, a card or a report may quote of a policy."""
+"""Find a policy's operating domain, compare it with a required one, and re-run a sample of it."""
 
 import dataclasses
 from collections.abc import Iterator, Mapping
@@ -16,7 +16,7 @@ from drone_rl.policies.zoo import shifts_path
 from drone_rl.robustness.agents import OracleAgent
 from drone_rl.robustness.axes import Axis, find_axes
 from drone_rl.robustness.domain import Prober
-from drone_rl.robustness.domain_text import QUOTED, contradicted, lacking, needed_range, why_not
+from drone_rl.robustness.domain_text import contradicted, lacking, needed_range
 from drone_rl.robustness.paired_evaluation import PairedEvaluator, PolicySpec
 from drone_rl.robustness.perturbations import Condition
 from drone_rl.robustness.requirements import Need, read_requirements
@@ -24,36 +24,35 @@ from drone_rl.robustness.shifts_file import SavedShifts, read_shifts
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import mean_bounds
 from drone_rl.utils.seeding import RootSeed
-from drone_rl.utils.text import say
 
 RANDOM = 2
-"""Strengths that are drawn at random within each range, besides its ends."""
+"""Number of random strengths within each range, in addition to its ends."""
 
 
 @dataclasses.dataclass(frozen=True)
 class DomainRecheck:
-    """New rollouts under required conditions, held against what a file says of these."""
+    """New episodes under required conditions, compared with a file."""
 
     episodes: int
     """At each strength."""
     seed: int
     """Of the episodes and of the random strengths."""
     seed_is_fixed: bool
-    """Whether it was chosen beforehand, so that a policy could be fitted to it."""
+    """Whether it was chosen, so that a policy could have been fitted to it."""
     strengths: Mapping[str, tuple[float, ...]]
-    """By axis, the values that were flown."""
+    """By axis, the values that were run."""
     contradictions: tuple[str, ...]
-    """What speaks against the file, one line each."""
+    """What contradicts the file, one line each."""
     fewest: int
-    """Successes at a strength; with fewer it would have been contradicted."""
+    """Fewest successes at a strength that do not contradict the file."""
 
     @property
     def count(self) -> int:
-        """Strengths of all axes."""
+        """Number of strengths of all axes."""
         return sum(map(len, self.strengths.values()))
 
     def __str__(self) -> str:
-        """By how many episodes, and what these rule out."""
+        """Return the number of episodes, and what they rule out."""
         fitted = ", to which a policy could have been fitted" if self.seed_is_fixed else ""
         kind = "fixed" if self.seed_is_fixed else "fresh"
         return (
@@ -70,10 +69,10 @@ def recheck_domain(
     settings: JudgeSettings,
     seed: RootSeed,
 ) -> DomainRecheck:
-    """Fly new episodes at the ends of the required ranges and at random strengths within them.
+    """Run new episodes at the ends of the required ranges and at random strengths within them.
 
     Args:
-        policy: Which, in the task that counts.
+        policy: Which, in its task.
         needs: By axis, see `drone_rl.robustness.requirements.read_requirements`.
         numbers: As in `shifts.json`, with the axes.
         settings: `domain_flights`, `good_share`, device and renderer count.
@@ -117,7 +116,7 @@ def _strengths(
     numbers: Mapping[str, Any],
     rng: np.random.Generator,
 ) -> Iterator[float]:
-    """The ends that differ from no difference, and random strengths between them, each once."""
+    """The ends other than no perturbation, and random strengths between them, each once."""
     low, high = needed_range(numbers["axes"][axis.name], need)
     ends = sorted(axis.position(axis.strength(value, subject)) for value in (low, high))
     drawn = rng.uniform(ends[0], ends[1], RANDOM) if ends[0] < ends[1] else []
@@ -137,7 +136,7 @@ def _contradiction(
 
 
 def _fewest(episodes: int, rule: Rule) -> int:
-    """The fewest successes that do not contradict, next to an oracle that always succeeds."""
+    """Fewest successes that do not contradict, with an oracle that always succeeds."""
     least, most = 0, episodes
     while least < most:
         middle = (least + most) // 2
@@ -148,38 +147,38 @@ def _fewest(episodes: int, rule: Rule) -> int:
 
 
 MOST_LOOKED_AT = 100
-"""Results of `drone-rl shifts`, the newest ones."""
+"""Largest number of results of `drone-rl shifts` to read."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Coverage:
-    """What is needed beside what was found."""
+    """A required operating domain compared with a measured one."""
 
     needs: Mapping[str, Need]
     """By axis."""
     lacking: Mapping[str, str]
-    """By axis, what the operating domain lacks of it; nothing if all that is needed is covered."""
+    """By axis that is not covered, what the operating domain lacks."""
     against: str | None = None
-    """Why the operating domain is not believed; None if nothing speaks against it."""
+    """The reason why the operating domain is refused, if it is."""
     reflown: DomainRecheck | None = None
-    """New episodes at a sample of what is needed; None if none were flown."""
+    """New episodes at a sample of the requirements, if any were run."""
 
     @property
     def is_stated(self) -> bool:
-        """Whether the file says that it is good under all that is needed."""
+        """Whether the file states that the policy is good under all requirements."""
         return not self.lacking and self.against is None
 
     @property
     def is_covered(self) -> bool:
-        """Whether it says so, and new episodes were flown that do not contradict it."""
+        """Whether it states so, and new episodes do not contradict it."""
         return self.is_stated and self.reflown is not None and not self.reflown.contradictions
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain values."""
+        """Return plain values."""
         return dataclasses.asdict(self)
 
     def __str__(self) -> str:
-        """A line for each axis that is not covered, or one for all."""
+        """Return a line for each axis that is not covered, or one for all."""
         if self.is_covered:
             return f"covered: {', '.join(self.needs)}, each by itself, {self.reflown}"
         lines = [*self.lacking.values(), *filter(None, [self.against])]
@@ -195,21 +194,20 @@ class Coverage:
 def find_domain(
     policy: Pilot, given: str | Path | None = None, outputs: str | Path = "outputs"
 ) -> SavedShifts | None:
-    """A policy's flights under other conditions, in its task.
+    """Find the robustness evaluation of a policy in its task.
 
     Args:
-        policy: Which, in the task that counts.
-        given: Their file, or a folder that holds a shifts.json; by default what lies with the
-            policy (`drone_rl.policies.zoo.shifts_path`), else the newest file that
-            `drone-rl shifts` wrote for it, preferably one with ranges.
-        outputs: Folder under which commands leave what they make.
+        policy: Which, in its task.
+        given: The file, or a folder with a shifts.json; by default the file next to the policy
+            (`drone_rl.policies.zoo.shifts_path`), otherwise the newest that `drone-rl shifts`
+            wrote for it, preferably one with ranges.
+        outputs: Folder of all runs.
 
     Returns:
-        None if there are none. What lies with the policy and can't be believed is refused.
+        None if there is none. An invalid file next to the policy is returned as refused.
 
     Raises:
-        InputError: What is given can't be read, is of another network or task, or contradicts
-            itself.
+        InputError: The given file is unreadable, of another network or task, or contradicts itself.
     """
     if not isinstance(policy, Policy):
         if given is not None:
@@ -236,7 +234,7 @@ def find_domain(
 
 
 def require(policy: Pilot, needed: str | Path, measured: SavedShifts | None) -> Coverage:
-    """Compares what is needed with a policy's operating domain.
+    """Compare requirements with a policy's operating domain.
 
     Args:
         policy: Which.
@@ -260,21 +258,6 @@ def require(policy: Pilot, needed: str | Path, measured: SavedShifts | None) -> 
     return Coverage(needs, {name: line for name, line in lacks.items() if line is not None})
 
 
-def beside(coverage: Coverage, evidence: Mapping[str, Any]) -> Coverage:
-    """The same with what a verdict says against it.
-
-    Args:
-        coverage: From `require`.
-        evidence: "shifts" and "verdict", see `drone_rl.robustness.domain_text`.
-    """
-    return dataclasses.replace(coverage, against=why_not(evidence))
-
-
-def sentence(evidence: Mapping[str, Any]) -> str:
-    """What may be quoted, for a person."""
-    return say(QUOTED, evidence)
-
-
 def _given(policy: Pilot) -> str:
     return str(policy.path) if isinstance(policy, Policy) else policy.name
 
@@ -284,7 +267,7 @@ def _read(path: Path, policy: Policy) -> SavedShifts:
 
 
 def _made(policy: Policy, outputs: Path) -> Iterator[SavedShifts]:
-    """What `drone-rl shifts` left of this network and task, the newest first."""
+    """Evaluations of this network and task under `outputs`, newest first."""
     there = [
         *outputs.glob("shifts/runs/*/shifts.json"),
         *outputs.glob("shifts/multiruns/*/*/shifts.json"),

@@ -1,9 +1,9 @@
-"""The same policies in other bodies and other air, as an object that shows itself."""
+"""Judge policies under several vehicle dynamics: drones, wind, software in the loop."""
 
 import dataclasses
 import json
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -26,144 +26,39 @@ from drone_rl.utils.text import BODIES, Evidence, percent, say, seed_line
 from drone_rl.verdicts.judge import judge
 
 LOOPED = "software in the loop"
-"""Their column, and their key in the evidence."""
-
-
-def with_loops(table: list[list[str]], numbers: Evidence) -> list[list[str]]:
-    """A table with their column, if there are any.
-
-    Args:
-        table: Names, then a row for each policy.
-        numbers: The evidence.
-    """
-    if LOOPED not in numbers:
-        return table
-    cells = [LOOPED, *(looped(numbers[LOOPED][name]) for name in numbers["policies"])]
-    return [[*row, text] for row, text in zip(table, cells, strict=True)]
-
-
-def looped(flights: Evidence) -> str:
-    """What became of a policy's flights: no verdict, for which they are too few."""
-    if "left_out" in flights:
-        return "left out"
-    success = flights["success"]
-    ends = " to ".join(f"{100 * success[bound]:.0f}" for bound in ("lower95", "upper95"))
-    return f"no verdict: {success['successes']} of {success['trials']} ({ends})"
-
-
-def reasons(numbers: Evidence) -> list[str]:
-    """Why flights were left out, a line each."""
-    flown = numbers.get(LOOPED, {}).items()
-    return [f"{name}, {LOOPED}: {f['left_out']}" for name, f in flown if "left_out" in f]
-
-
-def rows(numbers: Evidence) -> list[list[str]]:
-    """Names of bodies, then a row for each policy."""
-    bodies = [str(body) for body in numbers["bodies"]]
-    cells = [
-        [name, *(cell(flown[body]) for body in bodies)]
-        for name, flown in numbers["policies"].items()
-    ]
-    return with_loops([["", *bodies], *cells], numbers)
-
-
-def cell(verdict: Evidence) -> str:
-    """A verdict in a few words: its kind and the share of successful episodes."""
-    success = verdict["greedy"]["success"]
-    unsure = "" if verdict["certain"] else "?"
-    ends = f"{_points(success['lower95'])} to {_points(success['upper95'])}"
-    return f"{verdict['kind']}{unsure} {percent(success['share'])} ({ends})"
-
-
-def failure(verdict: Evidence) -> str:
-    """Where most of its failures are; nothing if there is none."""
-    row: dict[str, Any] | None = verdict["failures"]["largest"]
-    return "" if row is None else terms_of(verdict).failing(row["by"], row["value"])
-
-
-def _points(share: float) -> str:
-    return f"{100 * share:.0f}"
-
-
-_COLORS = {"good": "#b9e0b0", "poor": "#f2b5ad", "one-sided": "#f7d7a0", "none": "#e3e6ea"} | {
-    "good, but trivial": "#dfe7bd"
+"""Name of its column, and key in the evidence."""
+GUSTS = 0.25
+"""Standard deviation of the wind along each axis, as a fraction of its mean."""
+_COLORS = {
+    "good": "#b9e0b0",
+    "good, but trivial": "#dfe7bd",
+    "poor": "#f2b5ad",
+    "one-sided": "#f7d7a0",
+    "none": "#e3e6ea",
 }
 _INK, _FAINT = "#1e2024", "#5b616b"
 _WIDTH, _HEIGHT = 1.75, 0.95
 """Inches of a cell."""
 
 
-def chart(numbers: Mapping[str, Any]) -> Figure:
-    """A row a policy, a column a body: verdict, share with 95% interval, what fails most.
-
-    Args:
-        numbers: As in `bodies.json`.
-    """
-    policies = numbers["policies"]
-    looped = numbers.get(LOOPED, {})
-    bodies = [*numbers["bodies"], *([LOOPED] if looped else [])]
-    size = (_WIDTH * (len(bodies) + 1), _HEIGHT * len(policies) + 0.6)
-    figure = Figure(figsize=size, layout="constrained")
-    axes = figure.subplots()
-    axes.set(xlim=(-1, len(bodies)), ylim=(len(policies), -0.55))
-    axes.axis("off")
-    for x, body in enumerate(bodies):
-        axes.text(x + 0.5, -0.25, body, ha="center", va="center", fontsize=10, color=_INK)
-    for y, (name, flown) in enumerate(policies.items()):
-        axes.text(-0.05, y + 0.5, name, ha="right", va="center", fontsize=11, color=_INK)
-        for x, body in enumerate(numbers["bodies"]):
-            _cell(axes, x, y, flown[body])
-        if looped:
-            _looped_cell(axes, len(bodies) - 1, y, looped[name])
-    return figure
-
-
-def _looped_cell(axes: Axes, x: int, y: int, flights: Mapping[str, Any]) -> None:
-    box = {"facecolor": _COLORS["none"], "edgecolor": "white", "linewidth": 2, "hatch": ".."}
-    axes.add_patch(Rectangle((x, y), 1, 1, **box))
-    text, ink = textwrap.fill(looped(flights), 22), _INK
-    axes.text(x + 0.5, y + 0.5, text, ha="center", va="center", fontsize=8.0, color=ink)
-
-
-def _cell(axes: Axes, x: int, y: int, verdict: Mapping[str, Any]) -> None:
-    kind = verdict["kind"]
-    color = _COLORS.get(kind) or _COLORS.get(kind.split()[0], _COLORS["none"])
-    box = {"facecolor": color, "edgecolor": "white", "linewidth": 2}
-    axes.add_patch(Rectangle((x, y), 1, 1, **box))
-    success, unsure = verdict["greedy"]["success"], "" if verdict["certain"] else " ?"
-    share = f"{100 * success['share']:.1f}%"
-    ends = f"{100 * success['lower95']:.0f} to {100 * success['upper95']:.0f}"
-    lines = (
-        (0.2, f"{verdict['kind']}{unsure}", 9.0, _INK),
-        (0.45, f"{share}  ({ends})", 9.5, _INK),
-        (0.77, textwrap.fill(failure(verdict), 26), 7.0, _FAINT),
-    )
-    for height, text, points, ink in lines:
-        axes.text(x + 0.5, y + height, text, ha="center", va="center", fontsize=points, color=ink)
-
-
-GUSTS = 0.25
-"""Standard deviation of the wind along each axis, as a share of its mean."""
-
-
 @dataclasses.dataclass(frozen=True)
 class Bodies:
-    """What becomes of verdicts when policies get a body."""
+    """Verdicts by policy and dynamics."""
 
     settings: BodiesSettings
     numbers: dict[str, Any] = dataclasses.field(repr=False)
-    """As in `bodies.json`: by policy and body the verdict's evidence, and by policy what became of
-    flights with software in the loop, if there were any."""
+    """As in `bodies.json`: by policy and dynamics the verdict's evidence, and by policy the
+    episodes with software in the loop, if any."""
 
     def save(self, folder: Path) -> None:
-        """Writes `bodies.json`, `bodies.png` and `bodies.svg`."""
+        """Write `bodies.json`, `bodies.png` and `bodies.svg`."""
         (folder / "bodies.json").write_text(json.dumps({**self.numbers, **provenance()}, indent=2))
         figure = chart(self.numbers)
         for kind in ("png", "svg"):
             figure.savefig(folder / f"bodies.{kind}", dpi=130)
 
     def __str__(self) -> str:
-        """The table: a policy a row, a body a column; and why flights were left out, if any."""
+        """Return the table, one row per policy, and notes."""
         return "\n".join([aligned(rows(self.numbers)), *self._notes()])
 
     def _repr_html_(self) -> str:
@@ -172,8 +67,8 @@ class Bodies:
         return table(head, lines) + notes + picture(chart(self.numbers))
 
     def _notes(self) -> list[str]:
-        """Why flights were left out, if any were, and the seed."""
-        notes = [*reasons(self.numbers), say(BODIES, self.numbers), seed_line(self.numbers)]
+        """Reasons for missing episodes, and the seed."""
+        notes = [*left_out(self.numbers), say(BODIES, self.numbers), seed_line(self.numbers)]
         return [*filter(None, notes)]
 
 
@@ -185,13 +80,13 @@ def bodies(
     progress: Progress | None = None,
     **changes: Any,
 ) -> Bodies:
-    """Judges policies in computer-vision mode, in flight, in wind, and with worse drones.
+    """Judge policies in computer-vision mode, in flight, in wind, and with worse drones.
 
     Args:
         policies: One or several of what `judge` takes; those of the settings by default.
-        settings: Which, and how.
+        settings: Policies, dynamics, number of episodes and so on.
         outputs: See `load_policy`.
-        progress: Told of what is being flown; a bar by default.
+        progress: Called with what is running; a progress bar by default.
         changes: Settings to change, as in `bodies("good", episodes=100)`.
 
     Raises:
@@ -211,21 +106,10 @@ def bodies(
         for body in settings.bodies:
             count = sum(map(len, found.values()))
             progress(f"{pilot.name}: {body}", count, steps)
-            changed = changes_of(body, pilot.dynamics)
-            done = judge(
-                pilot,
-                asked,
-                dynamics=changed,
-                outputs=outputs,
-                progress=silent,
-                drawn_seed=seed,
-            )
+            how = {"dynamics": changes_of(body, pilot.dynamics), "outputs": outputs}
+            done = judge(pilot, asked, **how, progress=silent, drawn_seed=seed)
             flown[body] = done.verdict.as_dict()
-    numbers: dict[str, Any] = {
-        "bodies": list(settings.bodies),
-        **seed.as_dict(),
-        "policies": found,
-    }
+    numbers: dict[str, Any] = {"bodies": [*settings.bodies], **seed.as_dict(), "policies": found}
     if settings.loop_flights:
         looped = numbers[LOOPED] = {}
         for pilot in pilots:
@@ -236,7 +120,7 @@ def bodies(
 
 
 def _looped(pilot: Pilot, settings: BodiesSettings, seed: RootSeed) -> dict[str, Any]:
-    """A policy's flights through a firmware, in still air; or why there are none."""
+    """Episodes with software in the loop, in still air, or the reason why there are none."""
     from drone_rl.robustness.sitl import fly_in_the_loop
 
     still = pilot.in_dynamics(**changes_of("simple flight", pilot.dynamics))
@@ -248,11 +132,7 @@ def _looped(pilot: Pilot, settings: BodiesSettings, seed: RootSeed) -> dict[str,
 
 
 def _check_names(names: list[str]) -> None:
-    """Refuses what no table can show.
-
-    Raises:
-        InputError: There is none, or two have the same.
-    """
+    """Refuse no names and duplicate names."""
     if not names:
         raise InputError("policies=[] names nobody; give a policy or more")
     for name in names:
@@ -261,10 +141,10 @@ def _check_names(names: list[str]) -> None:
 
 
 def changes_of(body: str, own: DynamicsSettings) -> Mapping[str, Any]:
-    """What a body of that name changes of the dynamics that a policy was made for.
+    """Return the settings in which named dynamics differ from a policy's own.
 
-    Wind blows from the right, with gusts of a quarter of its speed along each axis; else the air is
-    still. A policy's own drone keeps its own parameters.
+    Wind blows from the right, with gusts of a quarter of its speed along each axis; otherwise the
+    air is still.
     """
     still = {"wind": [0.0, 0.0, 0.0], "gusts": 0.0}
     if body == "computer vision":
@@ -276,3 +156,98 @@ def changes_of(body: str, own: DynamicsSettings) -> Mapping[str, Any]:
     if body == "motors twice as slow":
         return {**flying, "rotor_time_constant": 2.0 * own.rotor_time_constant}
     return {**flying, "camera_mount": "body"} if body == "camera on the body" else flying
+
+
+def rows(numbers: Evidence) -> list[list[str]]:
+    """Return a table of texts: names of dynamics, then a row for each policy."""
+    bodies, flown = [str(body) for body in numbers["bodies"]], numbers["policies"]
+    table = [["", *bodies]]
+    table += [[name, *(cell(found[body]) for body in bodies)] for name, found in flown.items()]
+    if LOOPED not in numbers:
+        return table
+    column = [LOOPED, *(sitl_cell(numbers[LOOPED][name]) for name in flown)]
+    return [[*row, text] for row, text in zip(table, column, strict=True)]
+
+
+def cell(verdict: Evidence) -> str:
+    """Return a verdict in a few words: its kind and the success rate."""
+    success = verdict["greedy"]["success"]
+    unsure = "" if verdict["certain"] else "?"
+    return f"{verdict['kind']}{unsure} {percent(success['share'])} ({_interval(success)})"
+
+
+def sitl_cell(flights: Evidence) -> str:
+    """Return the successes with software in the loop, which are too few for a verdict."""
+    if "left_out" in flights:
+        return "left out"
+    success = flights["success"]
+    return f"no verdict: {success['successes']} of {success['trials']} ({_interval(success)})"
+
+
+def left_out(numbers: Evidence) -> list[str]:
+    """Return the reasons why there are no episodes with software in the loop, a line each."""
+    flown = numbers.get(LOOPED, {}).items()
+    return [f"{name}, {LOOPED}: {f['left_out']}" for name, f in flown if "left_out" in f]
+
+
+def failure(verdict: Evidence) -> str:
+    """Return where most episodes fail, or nothing."""
+    row: dict[str, Any] | None = verdict["failures"]["largest"]
+    return "" if row is None else terms_of(verdict).failing(row["by"], row["value"])
+
+
+def _interval(success: Evidence) -> str:
+    return f"{100 * success['lower95']:.0f} to {100 * success['upper95']:.0f}"
+
+
+def chart(numbers: Mapping[str, Any]) -> Figure:
+    """Draw a coloured table: verdict, success rate with 95% interval, and largest failure.
+
+    Args:
+        numbers: As in `bodies.json`.
+    """
+    policies, looped = numbers["policies"], numbers.get(LOOPED, {})
+    bodies = [*numbers["bodies"], *([LOOPED] if looped else [])]
+    size = (_WIDTH * (len(bodies) + 1), _HEIGHT * len(policies) + 0.6)
+    figure = Figure(figsize=size, layout="constrained")
+    axes = figure.subplots()
+    axes.set(xlim=(-1, len(bodies)), ylim=(len(policies), -0.55))
+    axes.axis("off")
+    for x, body in enumerate(bodies):
+        axes.text(x + 0.5, -0.25, body, ha="center", va="center", fontsize=10, color=_INK)
+    for y, (name, flown) in enumerate(policies.items()):
+        axes.text(-0.05, y + 0.5, name, ha="right", va="center", fontsize=11, color=_INK)
+        for x, body in enumerate(numbers["bodies"]):
+            _draw_verdict(axes, x, y, flown[body])
+        if looped:
+            text = textwrap.fill(sitl_cell(looped[name]), 22)
+            lines = ((0.5, text, 8.0, _INK),)
+            _draw_cell(axes, len(bodies) - 1, y, _COLORS["none"], lines, hatch="..")
+    return figure
+
+
+def _draw_verdict(axes: Axes, x: int, y: int, verdict: Mapping[str, Any]) -> None:
+    kind = verdict["kind"]
+    color = _COLORS.get(kind) or _COLORS.get(kind.split()[0], _COLORS["none"])
+    success, unsure = verdict["greedy"]["success"], "" if verdict["certain"] else " ?"
+    lines = (
+        (0.2, f"{kind}{unsure}", 9.0, _INK),
+        (0.45, f"{100 * success['share']:.1f}%  ({_interval(success)})", 9.5, _INK),
+        (0.77, textwrap.fill(failure(verdict), 26), 7.0, _FAINT),
+    )
+    _draw_cell(axes, x, y, color, lines)
+
+
+def _draw_cell(
+    axes: Axes,
+    x: int,
+    y: int,
+    color: str,
+    lines: Sequence[tuple[float, str, float, str]],
+    hatch: str | None = None,
+) -> None:
+    """A rectangle with lines of text: height, text, points and colour of each."""
+    box = Rectangle((x, y), 1, 1, facecolor=color, edgecolor="white", linewidth=2, hatch=hatch)
+    axes.add_patch(box)
+    for height, text, points, ink in lines:
+        axes.text(x + 0.5, y + height, text, ha="center", va="center", fontsize=points, color=ink)

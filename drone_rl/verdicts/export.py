@@ -1,4 +1,4 @@
-"""Policies as files for others: with a card that tells all about them, or as ONNX models."""
+"""Export a policy as safetensors with a model card."""
 
 import hashlib
 import shlex
@@ -37,28 +37,27 @@ def export(
     shifts: str | Path | None = None,
     outputs: str | Path = "outputs",
 ) -> RootSeed:
-    """Judges a policy and writes it as safetensors, with a model card beside it.
+    """Judge a policy and write it as safetensors with a model card.
 
     Args:
         policy: Which.
-        target: Of the file, ending in .safetensors.
-        settings: Of the flights for the card's verdict.
-        command: That trained it; None names what its file or folder says.
-        certificate: A proof's file for the card to quote and for the policy to have beside it; by
-            default the one that lies with the policy already.
-        shifts: The same of a file of flights under other conditions, see `find_domain`.
+        target: The file, ending in .safetensors.
+        settings: Of the card's verdict.
+        command: That trained it; None takes it from its file or folder.
+        certificate: Certificate to quote and to copy; by default the one next to the policy.
+        shifts: The same of a robustness evaluation, see `find_domain`.
         outputs: See `find_domain`.
 
     Returns:
         Root of the random streams of the verdict's environments.
 
     Raises:
-        InputError: It can't be written, or a file that is given is unusable.
+        InputError: It can't be written, or a given file is unusable.
     """
     settings, seed = with_seed(settings)
     device = settings.device
     claim = find_claim(policy, certificate, seed=seed)
-    claim = None if claim is None or claim.refused else claim  # a card tells of what is
+    claim = None if claim is None or claim.refused else claim  # cards quote no refused certificate
     measured = find_domain(policy, shifts, outputs)
     with policy.flying(
         settings.num_worlds, seed=seed.value, device=device, renderer=settings.renderer
@@ -84,14 +83,14 @@ def export(
 
 
 def _as_carried(numbers: dict[str, Any] | None, target: Path) -> dict[str, Any] | None:
-    """What a card quotes, by the name of the file that travels with the policy."""
+    """Name the copied file, without its folder."""
     if numbers is None:
         return None
     return {**numbers, "file": {**numbers["file"], "path": shifts_path(target).name}}
 
 
 def origin_of(path: Path, state: dict[str, Any]) -> tuple[str, dict[str, Any] | None]:
-    """The command that trains the same once more, and the choice in a sweep, if it is of one."""
+    """Return the command that repeats the training, and the selection in a sweep, if any."""
     folder = path.absolute().parent.parent
     if path.suffix == ".pt" and (folder.parent / "sweep.json").is_file():
         rows = read_rows(read_sweep(folder.parent))
@@ -114,17 +113,17 @@ def export_policy(
     shifts: Mapping[str, Any] | None = None,
     carried: Mapping[Path, bytes] | None = None,
 ) -> None:
-    """Writes a checkpoint's policy and its model card beside it, all of it or nothing.
+    """Write a checkpoint's policy and its model card, both or neither.
 
     Args:
-        path: Where to, ending in .safetensors; the card ends in .md.
+        path: The file, ending in .safetensors; the card ends in .md.
         checkpoint: From `read_policy`.
         command: The training command.
-        verdict: As in verdict.json, from worlds to report on.
-        seed: Root of these worlds' random streams.
-        chosen: "runs" of the sweep in which it was made, and "episodes" by which it was judged
-            there, if it was; None if it was made in no sweep.
-        shifts: As in shifts.json, for the card; None if there are none.
+        verdict: As in verdict.json, from environments reserved for reports.
+        seed: Root of their random streams.
+        chosen: "runs" of the sweep that it is of, and "episodes" by which it was judged there;
+            None outside a sweep.
+        shifts: As in shifts.json, for the card.
         carried: Further files that the card quotes, by their paths.
 
     Raises:

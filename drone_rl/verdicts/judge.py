@@ -1,11 +1,11 @@
-"""Verdicts, as objects that show themselves."""
+"""Judge policies and baselines, with certificate and operating domain."""
 
 import dataclasses
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Protocol, TypeVar, cast, overload
+from typing import Any, cast, overload
 
 from tensordict.nn import TensorDictModuleBase
 from torchrl.envs import EnvBase
@@ -22,92 +22,39 @@ from drone_rl.evaluation.verdict_text import quantity_label
 from drone_rl.policies.base_policy import Pilot
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.external_policy import as_pilot
+from drone_rl.robustness.domain_text import QUOTED, why_not
 from drone_rl.robustness.shifts_file import SavedShifts
 from drone_rl.utils.display import aligned, interval, paragraph, table
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import RootSeed, Stream, root_seed, torch_generator, with_seed
-from drone_rl.utils.text import seed_line
+from drone_rl.utils.text import say, seed_line
 from drone_rl.verdicts.certificate import find_claim
 from drone_rl.verdicts.coverage import (
     Coverage,
-    beside,
     find_domain,
     recheck_domain,
     require,
-    sentence,
 )
-
-
-class _Judged(Protocol):
-    """A judgement, as far as the table shows it."""
-
-    @property
-    def name(self) -> str: ...
-
-    @property
-    def verdict(self) -> Verdict: ...
-
-
-T = TypeVar("T", bound=_Judged)
-
-
-@dataclasses.dataclass(frozen=True)
-class Judgements(Sequence[T]):
-    """Several judgements, in the order in which they were asked for."""
-
-    each: tuple[T, ...]
-
-    @overload
-    def __getitem__(self, index: int) -> T: ...
-
-    @overload
-    def __getitem__(self, index: slice) -> Sequence[T]: ...
-
-    def __getitem__(self, index: int | slice) -> T | Sequence[T]:
-        """One of them, or some."""
-        return self.each[index]
-
-    def __len__(self) -> int:
-        """How many."""
-        return len(self.each)
-
-    def rows(self) -> list[list[str]]:
-        """Names of columns, then a row for each policy."""
-        rows = [["policy", "verdict", "certain", "success rate (95% interval)"]]
-        for one in self.each:
-            verdict = one.verdict
-            success = interval(verdict.evidence["greedy"]["success"], "share")
-            certain = "yes" if verdict.certain else "no"
-            rows.append([one.name, verdict.kind.value, certain, success])
-        return rows
-
-    def __str__(self) -> str:
-        """The table for a terminal."""
-        return aligned(self.rows())
-
-    def _repr_html_(self) -> str:
-        head, *rows = self.rows()
-        return table(head, rows)
 
 
 @dataclasses.dataclass(frozen=True)
 class Judgement:
-    """A verdict, of whom, and by what."""
+    """A verdict on a policy, with certificate and operating domain."""
 
     name: str
     settings: JudgeSettings
     verdict: Verdict
     certificate: Path | None = None
-    """That lies with the policy or was given, whether it is quoted or not."""
+    """File next to the policy or given, whether it is quoted or not."""
     measured: SavedShifts | None = None
-    """Its flights under other conditions, if there are any."""
+    """Its robustness evaluation, if there is one."""
     coverage: Coverage | None = None
-    """What was required beside its operating domain, if something was."""
+    """The required operating domain compared with its own, if one is required."""
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain values, as in `verdict.json`."""
+        """Return plain values, as in `verdict.json`."""
         path = None if self.certificate is None else str(self.certificate)
         return {
             "policy": self.name,
@@ -121,15 +68,15 @@ class Judgement:
 
     @property
     def domain(self) -> str:
-        """Under which conditions it is good, for a person; nothing if that was not measured."""
-        return "" if self.measured is None else sentence(_told(self.measured, self.verdict))
+        """The operating domain as text; empty if it was not measured."""
+        return "" if self.measured is None else say(QUOTED, _quoted(self.measured, self.verdict))
 
     def status(self, require: str | None = None) -> int:
-        """The exit status of `drone-rl verdict`: the verdict's own, or that of what is required.
+        """Return the exit code of `drone-rl verdict`.
 
         Args:
             require: "proved" for a re-checked proof of every placement, "good" or None for the
-                verdict's own; a domain that was required has to be covered, too.
+                verdict's own code; a required domain has to be covered, too.
         """
         if require == "proved" and not self.verdict.is_proved:
             return NOT_PROVED
@@ -139,11 +86,11 @@ class Judgement:
         return 0 if is_proof_enough else self.verdict.exit_code
 
     def save(self, path: Path) -> None:
-        """Writes `verdict.json`."""
+        """Write `verdict.json`."""
         path.write_text(json.dumps(self.as_dict(), indent=2))
 
     def __str__(self) -> str:
-        """One line, and others of an operating domain, of what it does not cover, and the seed."""
+        """Return the verdict, the operating domain, what it does not cover, and the seed."""
         certainty = "" if self.verdict.certain else " (not certain)"
         line = f"{self.verdict.kind.value}{certainty}: {self.verdict.sentence}"
         required = "" if self.coverage is None else str(self.coverage)
@@ -153,7 +100,10 @@ class Judgement:
     def _repr_html_(self) -> str:
         evidence = self.verdict.evidence
         numbers = [
-            [quantity_label(name, evidence), *(_number(q[key]) for key in _ENDS)]
+            [
+                quantity_label(name, evidence),
+                *(_number(q[key]) for key in ("value", "lower", "upper")),
+            ]
             for name, q in evidence["quantities"].items()
         ]
         success = evidence["greedy"]["success"]
@@ -163,7 +113,43 @@ class Judgement:
         return lines + table(head, [["success rate (95% interval)", *rate], *numbers])
 
 
-_ENDS = ("value", "lower", "upper")
+@dataclasses.dataclass(frozen=True)
+class Judgements(Sequence[Judgement]):
+    """Several judgements, in the order of the policies."""
+
+    each: tuple[Judgement, ...]
+
+    @overload
+    def __getitem__(self, index: int) -> Judgement: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[Judgement]: ...
+
+    def __getitem__(self, index: int | slice) -> Judgement | Sequence[Judgement]:
+        """Return one of them, or some."""
+        return self.each[index]
+
+    def __len__(self) -> int:
+        """Return the number of judgements."""
+        return len(self.each)
+
+    def rows(self) -> list[list[str]]:
+        """Return a table of texts: a heading, then a row for each policy."""
+        rows = [["policy", "verdict", "certain", "success rate (95% interval)"]]
+        for one in self.each:
+            verdict = one.verdict
+            success = interval(verdict.evidence["greedy"]["success"], "share")
+            certain = "yes" if verdict.certain else "no"
+            rows.append([one.name, verdict.kind.value, certain, success])
+        return rows
+
+    def __str__(self) -> str:
+        """Return the table for a terminal."""
+        return aligned(self.rows())
+
+    def _repr_html_(self) -> str:
+        head, *rows = self.rows()
+        return table(head, rows)
 
 
 def _number(value: float | None) -> str:
@@ -181,19 +167,19 @@ def judge(
     policy: Sequence[str | Path | Pilot | Logits],
     settings: JudgeSettings | None = None,
     **how: Any,
-) -> Judgements[Judgement]: ...
+) -> Judgements: ...
 
 
 def judge(
     policy: str | Path | Pilot | Logits | Sequence[str | Path | Pilot | Logits],
     settings: JudgeSettings | None = None,
     **how: Any,
-) -> Judgement | Judgements[Judgement]:
-    """Judge one policy, or several one after the other; see `judge_one` for the arguments.
+) -> Judgement | Judgements:
+    """Judge one policy, or a list or tuple of policies in the same environments.
 
     Args:
-        policy: As `judge_one` takes it; of a list or tuple each is judged.
-        settings: How.
+        policy: One or several, each as `judge_one` takes it.
+        settings: See `judge_one`.
         how: The other arguments of `judge_one`.
 
     Returns:
@@ -229,33 +215,31 @@ def judge_one(
     drawn_seed: RootSeed | None = None,
     **changes: Any,
 ) -> Judgement:
-    """Good, poor, one-sided or none of these, and whether that is certain.
+    """Judge the kind of a policy, see `drone_rl.evaluation.rule`, and whether it is certain.
 
     Args:
         policy: The policy, what `load_policy` takes, a callable, see `policy_from`, a model of
             Stable-Baselines3, or a baseline: "random", "forward", "left", "right" or "oracle".
-        settings: How it is judged.
-        task: What to change of the policy's task or, for a baseline, of the default one.
-        dynamics: What to change of how its drone moves, likewise.
-        certificate: A proof's file to quote; by default the one that lies with the policy, see
-            `drone_rl.policies.zoo.certificate_path`, if it is of this task.
-        shifts: A file of its flights under other conditions to quote; by default what lies with the
-            policy or the newest under `outputs`, see `drone_rl.verdicts.coverage.find_domain`.
-        require_domain: A file that says under which conditions it has to be good, see
+        settings: Number of episodes, seed, device and so on.
+        task: Settings to change of the policy's task or, for a baseline, of the default one.
+        dynamics: Settings to change of the dynamics, likewise.
+        certificate: Certificate to quote; by default the one next to the policy, if it is of this
+            task, see `drone_rl.policies.zoo.certificate_path`.
+        shifts: Robustness evaluation to quote, see `drone_rl.verdicts.coverage.find_domain`.
+        require_domain: File of the required operating domain, see
             `drone_rl.robustness.requirements.read_requirements`.
-        outputs: Folder under which runs are kept.
-        progress: Told of what is being done; a bar by default.
-        drawn_seed: The seed of a larger analysis of which this is a part; that of the settings by
-            default.
+        outputs: Folder of all runs.
+        progress: Called with what is running; a progress bar by default.
+        drawn_seed: Seed of a larger analysis of which this is a part.
         changes: Settings to change, as in `judge("good", episodes=1000)`.
 
     Raises:
-        InputError: The policy, a setting or a file that is given is unusable, or a domain is
-            required of whom none was measured.
+        InputError: The policy, a setting or a file is unusable, or a domain is required and none
+            was measured.
     """
     settings, seed = with_seed((settings or JudgeSettings()).replace(**changes), drawn_seed)
     progress = progress or Bar()
-    progress("policy, luck and oracle", 0, 1)
+    progress("policy and baselines", 0, 1)
     pilot = None if policy in BASELINES else as_pilot(policy, outputs)
     name = str(policy) if pilot is None or isinstance(policy, str | Path) else pilot.name
     claim = measured = coverage = None
@@ -297,7 +281,8 @@ def judge_one(
     done = Judgement(name, settings, verdict, claim and claim.path, measured)
     if coverage is None or measured is None:
         return done
-    return dataclasses.replace(done, coverage=beside(coverage, _told(measured, verdict)))
+    against = why_not(_quoted(measured, verdict))
+    return dataclasses.replace(done, coverage=dataclasses.replace(coverage, against=against))
 
 
 def _reflown(
@@ -307,7 +292,7 @@ def _reflown(
     settings: JudgeSettings,
     seed: RootSeed,
 ) -> Coverage | None:
-    """The same with new episodes, if there is a claim for them to check."""
+    """Add new episodes, if the file states that the domain is covered."""
     numbers = None if measured is None else measured.numbers
     if coverage is None or numbers is None or not coverage.is_stated or not settings.domain_flights:
         return coverage
@@ -315,13 +300,13 @@ def _reflown(
     return dataclasses.replace(coverage, reflown=reflown)
 
 
-def _told(measured: SavedShifts, verdict: Verdict) -> dict[str, Any]:
-    """Evidence of what may be quoted."""
+def _quoted(measured: SavedShifts, verdict: Verdict) -> dict[str, Any]:
+    """Evidence of the sentences about the operating domain."""
     return {"shifts": measured.evidence, "verdict": verdict.evidence}
 
 
 def _refuse_files(name: str, **given: str | Path | None) -> None:
-    """A baseline has no network that a file could be of."""
+    """Refuse files of a network for a baseline."""
     for setting, path in given.items():
         if path is not None:
             raise InputError(
@@ -338,7 +323,7 @@ def _baseline(
     settings: FlightSettings,
     seed: RootSeed,
 ) -> Iterator[tuple[EnvBase, TensorDictModuleBase]]:
-    """The same worlds and one that sees no picture."""
+    """Environments without images, and a baseline."""
     env = DroneEnv(
         settings.num_worlds,
         task,

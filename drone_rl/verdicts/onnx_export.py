@@ -1,4 +1,4 @@
-"""Does another program do what a policy does? Asked about every picture of the policy's flights."""
+"""Export a policy as an ONNX model that agrees with it."""
 
 import dataclasses
 from collections.abc import Callable
@@ -20,21 +20,21 @@ from drone_rl.utils.seeding import root_seed
 from drone_rl.verdicts.export import origin_of
 
 MOST_DIFFERENCE = 1e-5
-"""Of a probability that an ONNX model gives, from PyTorch's."""
+"""Largest allowed difference of a probability from PyTorch's."""
 _WORLDS, _STEPS = 100, 100
-"""Of the flights on which it is compared: 10,000 pictures."""
+"""Of the comparison: 10,000 images."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Agreement:
-    """How far two programs agree on the probabilities of actions, or of their parts."""
+    """Differences of the action probabilities of two implementations."""
 
     frames: int
-    """Pictures that both were asked about."""
+    """Number of images that both evaluated."""
     difference: float
-    """The greatest in any probability; NaN if any is no number."""
+    """Largest difference of a probability; NaN if one is NaN."""
     actions_differ: int
-    """Pictures of which they call different actions, or parts, the most probable."""
+    """Number of images with different most probable actions, or components."""
 
 
 @torch.no_grad()
@@ -44,14 +44,14 @@ def agreement(
     other: Callable[[Tensor], Tensor],
     steps: int,
 ) -> Agreement:
-    """Flies a policy, with drawn actions, and compares another program with it at every step.
+    """Run a policy with sampled actions and compare another implementation at every step.
 
     Args:
-        env: Worlds of `DroneEnv` behind transforms.
+        env: Environments with transforms.
         actor: The policy; it writes "logits".
-        other: Takes RGB pictures (N, H, W, 3), uint8, and gives probabilities (N, A), see
+        other: Takes RGB images (N, H, W, 3), uint8, and returns probabilities (N, A), see
             `Actions.wish`; on the CPU.
-        steps: Of each world; those whose episode ends begin another.
+        steps: Of each environment; environments whose episode ends are reset.
     """
     base: Any = env.base_env
     actions = worlds_of(env).dynamics.actions
@@ -77,21 +77,20 @@ def export_onnx(
     command: str | None = None,
     seed: int | None = None,
 ) -> Agreement:
-    """Writes a policy as an ONNX model, if that does what the policy does: all of it on the CPU.
+    """Write a policy as an ONNX model, if that agrees with the policy on the CPU.
 
     Args:
         policy: The policy, or what `load_policy` takes.
-        target: Of the file, ending in .onnx; what is in it, see `drone_rl.policies.zoo.make_onnx`.
-        command: That trained it, for the model's metadata; None names what its file or folder says.
-        seed: Root of the random streams of the environments in which the two are compared; a fresh
-            one by default.
+        target: The file, ending in .onnx, see `drone_rl.policies.zoo.make_onnx`.
+        command: That trained it, for the metadata; None takes it from its file or folder.
+        seed: Root of the random streams of the comparison; a fresh one by default.
 
     Returns:
-        How far the model and PyTorch agree, on 10,000 pictures that the policy met.
+        Agreement of the model and PyTorch on 10,000 images of the policy's episodes.
 
     Raises:
-        InputError: It can't be an ONNX model, or not be written, or the model is another function
-            than the policy; then nothing is written.
+        InputError: It can't be converted or written, or the model does not agree; then nothing is
+            written.
     """
     policy = policy if isinstance(policy, Policy) else load_policy(policy)
     told = {"command": command or origin_of(policy.path, policy.state)[0]}

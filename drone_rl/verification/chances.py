@@ -1,4 +1,4 @@
-"""The exact chances of a policy that draws its moves, placement by placement."""
+"""Exact success probabilities of a policy that samples its actions, by placement."""
 
 import dataclasses
 import json
@@ -23,13 +23,13 @@ from drone_rl.utils.seeding import RootSeed, Stream, with_seed, world_random_sta
 from drone_rl.utils.text import CHANCES, say, seed_line
 from drone_rl.verification.prover.lattice import explore, shape_of
 from drone_rl.verification.prover.markov_chain import (
-    Bounded,
+    NodeEvaluator,
     Outcomes,
-    Sight,
+    SuccessBounds,
     bound_success,
-    follow_chances,
+    propagate,
 )
-from drone_rl.verification.prover.policy_spec import make_subject
+from drone_rl.verification.prover.policy_spec import make_policy_spec
 from drone_rl.verification.requirements import require_cubes, require_moves
 
 _BOUNDS = {
@@ -41,42 +41,42 @@ _BOUNDS = {
 CELLS_AT_A_TIME = 2**22
 """Bounds memory."""
 PLACEMENTS_AT_A_TIME = 20
-"""Between two words on progress."""
+"""Placements between two reports of progress."""
 
 
-_WHAT = "the chance of each placement"
+_WHAT = "exact probabilities"
 
 
 @dataclasses.dataclass(frozen=True)
 class Chances:
-    """How a policy's episodes end if it draws its moves: probabilities, not estimates."""
+    """How episodes with sampled actions end: exact probabilities, not estimates."""
 
     policy: Policy
     cubes: Tensor  # (P, C, 3) float64
     """Placements, metres, world frame, nearest cube first."""
     outcomes: Outcomes
-    """Of each placement."""
+    """For each placement."""
     pictures: int
-    """How many were drawn."""
+    """Number of images rendered."""
     within: float = 0.0
-    """Metres to either side of each cube for which the bounds are."""
-    bounded: tuple[Bounded, ...] = ()
-    """Bounds on the success of each placement, wherever within these metres the cubes stand."""
+    """Half-width of the boxes around each placement that the bounds cover, metres."""
+    bounded: tuple[SuccessBounds, ...] = ()
+    """Bounds on the success probability of each placement over its box."""
     seed: RootSeed | None = None
-    """Of held-out placements; None of given ones."""
+    """Root seed of held-out placements; None of given ones."""
 
     @property
     def success(self) -> float:
-        """Probability that all cubes are collected; the mean of the placements."""
+        """Mean probability over placements that all cubes are collected."""
         return float(self.outcomes.success.mean())
 
     @property
     def worst(self) -> Tensor:
-        """The placement in which that is least probable: metres to the left. Shape: (C,)."""
+        """The placement with the smallest success probability, metres to the left. Shape: (C,)."""
         return self.cubes[self.outcomes.failure.argmax(), :, 1]
 
     def rows(self) -> list[list[str]]:
-        """The figures as texts: names, then a row for each; mean, least and most of placements."""
+        """Return a table: a header, then mean, minimum and maximum over placements."""
         told = self.outcomes
         rows = [["", "mean", "least", "most"], _row("all cubes", told.success, _percent)]
         rows.append(_row("not all cubes", told.failure, _percent))
@@ -94,7 +94,7 @@ class Chances:
         return rows if len(self.cubes) > 1 else [["", "chance"], *(row[:2] for row in rows[1:])]
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain values, as in `chances.json`."""
+        """Return plain values, as in `chances.json`."""
         return {
             "policy": self.policy.name,
             "path": str(self.policy.path),
@@ -107,7 +107,7 @@ class Chances:
         }
 
     def save(self, path: Path) -> None:
-        """Writes `chances.json`."""
+        """Write `chances.json`."""
         path.write_text(json.dumps(self.as_dict(), indent=2))
 
     def __str__(self) -> str:
@@ -119,7 +119,7 @@ class Chances:
         return table(head, rows) + "".join(map(paragraph, self._notes()))
 
     def _notes(self) -> list[str]:
-        """Below the table."""
+        """Return the lines below the table."""
         if self.seed is None:
             return [self._about()]
         seed = self.seed.as_dict()
@@ -127,7 +127,6 @@ class Chances:
         return [*filter(None, notes)]
 
     def _about(self) -> str:
-        """Of what these are the figures."""
         if len(self.cubes) == 1:
             return f"cubes at {_places(self.cubes[0, :, 1])} metres to the left"
         least = f"least probable at cubes={_places(self.worst)}"
@@ -168,24 +167,23 @@ def chances(
     progress: Progress | None = None,
     **changes: Any,
 ) -> Chances:
-    """How probable each end of an episode is if a policy draws its moves, as in training.
+    """Compute the exact probability of each end of an episode with sampled actions, as in training.
 
-    Each place that the drone can come to is drawn once by the simulator's renderer, if that is not
-    all but impossible; the rest is arithmetic in float64. What was left out is told as undecided.
-    The policy's own network computes in float32.
+    Every lattice position that is not nearly unreachable is rendered once; the rest is arithmetic
+    in float64. The network computes in float32. Probability not followed is reported as undecided.
 
     Args:
-        policy: The policy, or what `load_policy` takes.
-        cubes: Where they stand, metres to the left, nearest first, in one placement or several;
-            held-out placements by default. Shape: (C,) or (P, C).
-        settings: Which placements, where none is given.
-        task: What to change of the policy's task.
-        outputs: Folder under which runs are kept.
-        progress: Told of what is being done; a bar by default.
-        changes: Settings to change, as in `chances("good", placements=20)`.
+        policy: The policy, or an argument of `load_policy`.
+        cubes: Positions of the cubes, metres to the left, nearest first, in one placement or
+            several; held-out placements by default. Shape: (C,) or (P, C).
+        settings: Which placements, if none are given.
+        task: Changes to the policy's task.
+        outputs: Folder of runs.
+        progress: Called with the progress; a bar by default.
+        changes: Changes to the settings, as in `chances("good", placements=20)`.
 
     Raises:
-        InputError: The policy, a setting or a place is unusable, the policy has a memory, or the
+        InputError: The policy, a setting or a placement is unusable, the policy has memory, or the
             task has too many nodes.
     """
     settings, seed = with_seed((settings or ChanceSettings()).replace(**changes))
@@ -199,11 +197,11 @@ def chances(
     parts = placed.split(min(at_a_time, PLACEMENTS_AT_A_TIME))
     env = policy.make_env(1, device=settings.device, renderer=settings.renderer)
     try:
-        sight, told = Sight(env, policy.make_network(settings.device)), []
+        sight, told = NodeEvaluator(env, policy.make_network(settings.device)), []
         for part in parts:
             progress("placements", sum(map(len, told)), len(placed))
             graph = explore(flown, part)
-            told.append(follow_chances(graph, sight.on(graph)))
+            told.append(propagate(graph, sight.on(graph)))
     finally:
         env.close()
     progress("placements", len(placed), len(placed))
@@ -215,30 +213,30 @@ def chances(
 
 def _bounded(
     policy: Policy, placed: Tensor, settings: ChanceSettings, progress: Progress
-) -> tuple[Bounded, ...]:
-    """Bounds around each placement, as far as cubes are placed at all."""
+) -> tuple[SuccessBounds, ...]:
+    """Return bounds around each placement, clipped to the positions where cubes may stand."""
     network, gap = policy.make_network(), ProveSettings().logit_gap
-    made = make_subject(policy.description, network, gap, settings.renderer)
-    found: list[Bounded] = []
-    with closing(made) as subject:
-        bound = subject.lattice.task.lateral_bound
+    made = make_policy_spec(policy.description, network, gap, settings.renderer)
+    found: list[SuccessBounds] = []
+    with closing(made) as spec:
+        bound = spec.lattice.task.lateral_bound
         for i, aside in enumerate(placed[..., 1].numpy()):
             progress("bounds", i, len(placed))
             box = np.stack([aside - settings.within, aside + settings.within], -1)
-            found.append(bound_success(subject, box.clip(-bound, bound), settings.parts))
+            found.append(bound_success(spec, box.clip(-bound, bound), settings.parts))
     progress("bounds", len(placed), len(placed))
     return tuple(found)
 
 
 def _drawn(task: TaskSettings, count: int, seed: RootSeed) -> Tensor:
-    """The first placement of each of so many held-out worlds."""
+    """Return the first placement of each of `count` held-out environments."""
     worlds = range(count)
     streams = (world_random_state(seed.value, world, Stream.REPORT) for world in worlds)
     return torch.stack([CollectCubes(task).draw(stream) for stream in streams])
 
 
 def _given(task: TaskSettings, cubes: Any) -> Tensor:
-    """Placements by their metres to the left, at the drone's altitude."""
+    """Return placements by metres to the left, at the drone's altitude."""
     try:
         aside = torch.atleast_2d(torch.as_tensor(cubes, dtype=torch.float64))
     except (TypeError, ValueError, RuntimeError):

@@ -1,4 +1,4 @@
-"""Checks of certificates, as objects that show themselves."""
+"""Check a certificate independently of the prover."""
 
 import dataclasses
 import functools
@@ -21,41 +21,41 @@ from drone_rl.verification.checker import (
     Certificate,
     Findings,
     check_certificate,
+    check_same_policy,
     read_certificate,
-    refuse_another,
 )
 
 REFUSED = 14
-"""Exit status for a certificate that doesn't hold."""
+"""Exit status for a refused certificate."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Check:
-    """Whether a certificate holds, whose it is, and what speaks against it."""
+    """The result of checking a certificate."""
 
     path: Path
-    """Of the certificate."""
+    """The certificate's file."""
     policy: Policy
-    """Whom it is of, in the task that it is of."""
+    """The policy, in the task of the certificate."""
     settings: CheckSettings
     certificate: Certificate = dataclasses.field(repr=False)
-    """What it states."""
+    """The statements."""
     findings: Findings
     seed: RootSeed
-    """Of the placements flown."""
+    """Root seed of the simulated placements."""
 
     @property
     def accepted(self) -> bool:
-        """Whether nothing speaks against it."""
+        """Whether nothing contradicts the certificate."""
         return self.findings.accepted
 
     @property
     def exit_code(self) -> int:
-        """Of a process that reports it."""
+        """Exit status of a process that reports it."""
         return 0 if self.accepted else REFUSED
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain values, as in `check.json`."""
+        """Return plain values, as in `check.json`."""
         return {
             "certificate": str(self.path),
             "policy": str(self.policy.path),
@@ -66,11 +66,11 @@ class Check:
         }
 
     def save(self, path: Path) -> None:
-        """Writes `check.json`."""
+        """Write `check.json`."""
         path.write_text(json.dumps(self.as_dict(), indent=2))
 
     def lines(self) -> list[str]:
-        """What it comes to, what was stated, then each finding in one line."""
+        """Return the result, the statements, and each finding in one line."""
         stated, flown = self.certificate, sum(self.findings.flights.values())
         kind = "accepted" if self.accepted else "refused"
         count = sum(map(len, stated.groups))
@@ -93,7 +93,7 @@ class Check:
         return table(head, rows)
 
     def _changes(self) -> str:
-        """What is other in the certificate's task than in the policy's own."""
+        """Return how the certificate's task differs from the policy's own."""
         own = self.policy.state["description"]["task"]
         changed = [f"{n}={v}" for n, v in self.policy.task.values().items() if own.get(n) != v]
         return f" with {', '.join(changed)}" if changed else ""
@@ -109,20 +109,20 @@ def check(
     progress: Progress | None = None,
     **changes: Any,
 ) -> Check:
-    """Checks a certificate with nothing of the prover: exact sums, and flights in the simulator.
+    """Check a certificate independently of the prover: exact sums, and simulated episodes.
 
     Args:
         certificate: The file, or "latest" for the newest one.
-        policy: Whom it is of, or what `load_policy` takes; by default the policy that the
-            certificate names, if that travels with the package.
-        settings: How it is checked.
-        task: Settings of the policy's task that the certificate must be of; any by default.
-        outputs: Folder under which runs are kept.
-        progress: Told of what is being done; a bar by default.
-        changes: Settings to change, as in `check("certificate.json", flights=10_000)`.
+        policy: The policy, or an argument of `load_policy`; by default the policy that the
+            certificate names, if it is shipped with the package.
+        settings: Settings of the check.
+        task: Settings of the task that the certificate must have; any by default.
+        outputs: Folder of runs.
+        progress: Called with the progress; a bar by default.
+        changes: Changes to the settings, as in `check("certificate.json", flights=10_000)`.
 
     Raises:
-        InputError: The certificate can't be read or is of another network or task, the policy or a
+        InputError: The certificate is unreadable or of another network or task, or the policy or a
             setting is unusable.
     """
     settings, seed = with_seed((settings or CheckSettings()).replace(**changes))
@@ -132,7 +132,7 @@ def check(
         policy = _named(stated.name)
     loaded = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
     weights, asked = loaded.state["policy"], loaded.in_task(**task).task if task else None
-    refuse_another(stated, loaded.description, weights, asked)
+    check_same_policy(stated, loaded.description, weights, asked)
     flown = dataclasses.replace(loaded, description=stated.description)
     findings = check_certificate(
         stated,
@@ -147,7 +147,6 @@ def check(
 
 
 def _find(certificate: str | Path, outputs: str | Path) -> Path:
-    """The file."""
     if certificate != "latest":
         return Path(certificate)
     path = newest(Path(outputs).glob("prove/**/certificate.json"))
@@ -160,7 +159,7 @@ def _find(certificate: str | Path, outputs: str | Path) -> Path:
 
 
 def _named(name: str) -> str:
-    """The policy that a certificate names, which must be one that travels with the package."""
+    """Return the policy that a certificate names, which must be a shipped one."""
     if name not in policy_names():
         raise InputError(
             f"the certificate is of policy {name!r}, which is none of "

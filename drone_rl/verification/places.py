@@ -1,4 +1,4 @@
-"""The exact map of what a policy does about one cube, as an object that shows itself."""
+"""The exact map of a greedy policy's action over all positions of one cube."""
 
 import dataclasses
 import json
@@ -22,36 +22,36 @@ from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import fresh_seed, legacy_seed
 from drone_rl.utils.text import say
-from drone_rl.verification.prover.action_map import Look, PlaceMap, map_places
+from drone_rl.verification.prover.action_map import ActionMap, RenderFaces, map_actions
 from drone_rl.verification.prover.arrangement import Window
-from drone_rl.verification.prover.bounds import Painter
-from drone_rl.verification.prover.policy_spec import make_subject, one_thread
+from drone_rl.verification.prover.bounds import Compositor
+from drone_rl.verification.prover.policy_spec import make_policy_spec, one_thread
 from drone_rl.verification.text import PLACES, rows
 
 
 @dataclasses.dataclass(frozen=True)
 class Places:
-    """What a greedy policy does about one cube, wherever that stands: areas, not samples."""
+    """The actions of a greedy policy over all positions of one cube: areas, not samples."""
 
     policy: Policy
     settings: PlacesSettings
-    places: PlaceMap = dataclasses.field(repr=False)
+    places: ActionMap = dataclasses.field(repr=False)
     """The cells."""
     numbers: dict[str, Any] = dataclasses.field(repr=False)
-    """What they come to, as in `places.json`."""
+    """Summary, as in `places.json`."""
 
     def at(self, ahead: float, left: float) -> str:
-        """What it does about a cube there.
+        """Return the action for a cube at a position.
 
         Args:
-            ahead: Metres from the camera to the cube's centre, straight ahead.
-            left: The same to the left.
+            ahead: Metres ahead of the camera to the cube's centre.
+            left: Metres to the left of the camera.
 
         Returns:
             The action's name.
 
         Raises:
-            InputError: The place is none of the map's.
+            InputError: The position is outside the map.
         """
         window = self.places.window
         if not (window.nearest < ahead < window.farthest and abs(left) < window.sideways):
@@ -62,7 +62,7 @@ class Places:
         return SHOWN_MOVES.names[self.places.at(np.array([[ahead, left]]))[0]]
 
     def save(self, folder: Path) -> None:
-        """Writes `places.json`, `places.png` and `places.svg`, which can be zoomed into."""
+        """Write `places.json`, `places.png` and the zoomable `places.svg`."""
         (folder / "places.json").write_text(json.dumps(self.numbers | provenance(), indent=2))
         ways = self.places.outlines()
         regions.chart(self.numbers, ways, SHOWN_MOVES).savefig(folder / "places.png", dpi=200)
@@ -71,7 +71,7 @@ class Places:
         (folder / "places.svg").write_text(head)
 
     def __str__(self) -> str:
-        """The table and what it comes to."""
+        """The table and a summary."""
         return f"{aligned(rows(self.numbers, SHOWN_MOVES.names))}\n{self._about()}"
 
     def _repr_html_(self) -> str:
@@ -92,40 +92,40 @@ def places(
     progress: Progress | None = None,
     **changes: Any,
 ) -> Places:
-    """Maps a greedy policy's action over the continuum of places of one cube, exactly.
+    """Map a greedy policy's action over all positions of one cube, exactly.
 
-    The picture of one cube changes only along straight lines of its places; all cells between them
-    are found, and the network is asked about each one's picture.
+    The image of one cube changes only along straight lines of its position. All cells between these
+    lines are found, and the network is evaluated on each cell's image.
 
     Args:
-        policy: The policy, or what `load_policy` takes.
-        settings: Which places.
-        task: What to change of the policy's task.
+        policy: The policy, or an argument of `load_policy`.
+        settings: Which positions.
+        task: Changes to the policy's task.
         outputs: See `load_policy`.
-        progress: Told of what is being done; a bar by default.
-        changes: Settings to change, as in `places("good", farthest=40)`.
+        progress: Called with the progress; a bar by default.
+        changes: Changes to the settings, as in `places("good", farthest=40)`.
 
     Raises:
-        InputError: The policy, its task or a setting is not for an exact map; the message says why.
+        InputError: The policy, its task or a setting is not supported; the message says why.
     """
     settings, progress = (settings or PlacesSettings()).replace(**changes), progress or Bar()
     policy = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
     policy = policy.in_task(**(task or {}))
     begin = time.perf_counter()
     network, gap = policy.make_network(), settings.logit_gap
-    made = make_subject(policy.description, network, gap, settings.renderer)
-    with one_thread(), closing(made) as subject:
+    made = make_policy_spec(policy.description, network, gap, settings.renderer)
+    with one_thread(), closing(made) as spec:
         progress("comparing the renderer's pictures")
-        compared = subject.seeing.check(
+        compared = spec.images.check(
             settings.compared, np.random.RandomState(legacy_seed(fresh_seed()))
         )
         progress("deciding the cells")
-        found = map_places(
-            subject.eye,
+        found = map_actions(
+            spec.camera,
             Window(settings.nearest, settings.farthest, settings.sideways),
-            _look(subject.painter),
+            _look(spec.compositor),
             network.eval(),
-            touch_distance=subject.lattice.task.touch_distance,
+            touch_distance=spec.lattice.task.touch_distance,
             most_cells=settings.most_cells,
         )
     progress("mapped", 1, 1)
@@ -141,11 +141,11 @@ def places(
     return Places(policy, settings, found, numbers)
 
 
-def _look(painter: Painter) -> Look:
-    """From what pixels show of a cube to what the network sees."""
+def _look(compositor: Compositor) -> RenderFaces:
+    """Return the map from faces to the network's input."""
     whole = (slice(None), slice(None))
 
     def look(faces: NDArray[np.uint8]) -> torch.Tensor:
-        return painter.see(painter.paint_one([(whole, torch.from_numpy(faces))], len(faces)))
+        return compositor.see(compositor.paint_one([(whole, torch.from_numpy(faces))], len(faces)))
 
     return look

@@ -1,7 +1,7 @@
-"""Training until nothing is left that the policy fails at, and that is proved.
+"""Train until a proof finds no placement at which the policy fails.
 
-A round: failures are searched for, first in flights, which are cheap, and where those find none by
-a proof, which misses none; then training goes on with a share of its episodes where they were.
+Each round searches for failures, first in episodes, which are fast, and where those find none by a
+proof, which misses none. Then training continues with a fraction of its episodes at the failures.
 """
 
 import dataclasses
@@ -49,7 +49,7 @@ from drone_rl.verification.prover.boxes import volumes
 from drone_rl.verification.requirements import require_cubes, require_moves
 
 HOW_MAY_CHANGE = ("rounds", "limit_s")
-"""What a resumed run may change of its rounds."""
+"""Settings of rounds that a resumed run may change."""
 _Count = Annotated[int, Whole(0, 2**62)]
 _Seconds = Annotated[float, Real(0.0, 1e12)]
 _Share = Annotated[float, Real(0.0, 1.0)]
@@ -57,36 +57,36 @@ _Share = Annotated[float, Real(0.0, 1.0)]
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Round(Settings):
-    """A search for failures, which are practised next."""
+    """The result of a search for failures, which are trained on next."""
 
     frames: _Count
-    """That training had collected."""
+    """Frames collected by training so far."""
     trained_s: _Seconds
-    """Seconds that it had spent."""
+    """Training time so far, seconds."""
     flights: _Count
-    """Greedy ones, each from a placement of its own."""
+    """Greedy episodes, each from its own placement."""
     failures: _Count
-    """Of these flights."""
+    """Failed episodes."""
     losing: _Share | None = None
-    """Share of all placements that is proved to fail; none where no proof was made."""
+    """Fraction of all placements proved to fail; None without a proof."""
     undecided: _Share | None = None
-    """Share of all placements of which the proof says nothing."""
+    """Fraction of all placements that the proof leaves open."""
     proof_s: _Seconds | None = None
-    """Seconds that the proof took."""
+    """Duration of the proof, seconds."""
     boxes: _Count
-    """Places of failures to practise."""
+    """Number of boxes of failures to train on."""
 
 
 @dataclasses.dataclass
 class Journal:
-    """The rounds of one training, in its folder."""
+    """The rounds of one training, saved in its folder."""
 
     folder: Path
     settings: TrainSettings
     how: ProvableSettings
     rounds: list[Round]
     is_noted: bool = dataclasses.field(default=True, compare=False)
-    """Whether its file says what this says."""
+    """Whether the file is up to date."""
 
     @classmethod
     def open(
@@ -97,19 +97,19 @@ class Journal:
         state: Mapping[str, Any] | None,
         changes: Mapping[str, Any],
     ) -> Self:
-        """Begins a journal, or goes on with the one that is in the folder.
+        """Start a journal, or continue the one in the folder.
 
-        Where there is a checkpoint, nothing is written before `note`.
+        With a checkpoint, nothing is written before `note`.
 
         Args:
-            folder: Of the training.
-            settings: Its own; None for those that it was begun with, or the defaults.
-            how: What a round is; None likewise.
-            state: Of the checkpoint to go on from, if any; of a usual training, too.
-            changes: Of the settings.
+            folder: Folder of the training.
+            settings: Settings of the training; None for the saved ones, or the defaults.
+            how: Settings of rounds; None likewise.
+            state: Checkpoint to resume, if any; may be of a usual training.
+            changes: Changes to the settings.
 
         Raises:
-            InputError: It is damaged, or was begun with other settings.
+            InputError: It is damaged, or has other settings.
         """
         path, rounds = folder / "provable.json", []
         saved = _JOURNAL.read(read_json(path), str(path)) if state and path.exists() else None
@@ -128,7 +128,7 @@ class Journal:
         return journal
 
     def note(self) -> None:
-        """Writes it, once the training has accepted the settings; forgets what lay there before."""
+        """Write the file once the training has accepted the settings."""
         if self.is_noted:
             return
         if not self.rounds:
@@ -137,20 +137,20 @@ class Journal:
 
     @property
     def task(self) -> TaskSettings:
-        """The task, of which something can be proved."""
-        told, what = self.settings, "training until it is proved"
+        """The task, if it can be proved."""
+        told, what = self.settings, "proofs"
         require_moves(told.dynamics, told.actions, what)
         return require_cubes(told.task, what)
 
     @property
     def is_proved(self) -> bool:
-        """Whether the last search was a proof that found nothing left."""
+        """Whether the last search was a proof that left nothing open."""
         last = self.rounds[-1] if self.rounds else None
         return last is not None and last.losing == last.undecided == last.boxes == 0
 
     @property
     def is_over(self) -> bool:
-        """Whether it is proved, or nothing is left of rounds or frames."""
+        """Whether it is proved, or the rounds or frames are used up."""
         if not self.rounds:
             return False
         is_spent = self.rounds[-1].frames >= self.settings.trainer.total_frames
@@ -158,22 +158,22 @@ class Journal:
 
     @property
     def certificate(self) -> Path | None:
-        """That of the last search, if it was a proof."""
+        """The certificate of the last search, if it was a proof."""
         path = self.folder / "rounds" / str(len(self.rounds) - 1) / "certificate.json"
         is_proof = bool(self.rounds) and self.rounds[-1].losing is not None
         return path if is_proof and path.exists() else None
 
     @property
     def next_folder(self) -> Path:
-        """For what the next search leaves."""
+        """Folder of the next search."""
         return self.folder / "rounds" / str(len(self.rounds))
 
     def add(self, done: Round, failures: NDArray[np.float64]) -> None:
-        """Notes a search.
+        """Record a search.
 
         Args:
-            done: What it found.
-            failures: Boxes to practise, metres. Shape: (boxes, num_cubes, 2).
+            done: Its result.
+            failures: Boxes to train on, metres. Shape: (boxes, num_cubes, 2).
         """
         buffer = io.BytesIO()
         np.save(buffer, failures)
@@ -183,10 +183,10 @@ class Journal:
         self._write()
 
     def failures(self) -> NDArray[np.float64]:
-        """Those of the last search. Shape: (boxes, num_cubes, 2), metres.
+        """Return those of the last search. Shape: (boxes, num_cubes, 2), metres.
 
         Raises:
-            InputError: They are damaged.
+            InputError: The file is damaged.
         """
         path = self.folder / "rounds" / str(len(self.rounds) - 1) / "failures.npy"
         cubes = self.task.num_cubes
@@ -216,7 +216,7 @@ _JOURNAL = Record({"settings": Plain(), "how": Plain(), "rounds": Several(Plain(
 
 
 WORLDS = 250
-"""That search at the same time; each search flies in others."""
+"""Environments of a search; each search uses other seeds."""
 
 
 def train_until_proved(
@@ -229,26 +229,25 @@ def train_until_proved(
     progress: Progress | None = None,
     **changes: Any,
 ) -> Training:
-    """Trains as usual, then in rounds, until the policy succeeds from every placement.
+    """Train as usual, then in rounds, until the policy succeeds from every placement.
 
-    The result's reason is "proved" if it does, and its "rounds" say what each search found. If the
-    last search was a proof, its certificate is `certificate.json` in the folder.
+    The result's reason is then "proved", and its "rounds" list what each search found. If the last
+    search was a proof, its certificate is `certificate.json` in the folder.
 
     Args:
-        settings: What is learned, how, and for how long in all.
-        how: How many rounds, and what is done in them; 10 by default.
+        settings: Settings of the training, for all rounds together.
+        how: Number of rounds and their settings; 10 rounds by default.
         folder: See `train`.
-        resume: Whether to go on with what is in the folder, in whichever round it was left: what
-            is learned is the same bit for bit, unless the clock stops a proof.
-        callbacks: Told of every update.
-        progress: Told how far each training and each proof is; a bar by default.
-        changes: Settings of the training to change.
+        resume: Whether to resume the training in the folder, in any round. The result is identical
+            bit for bit unless a time limit stops a proof.
+        callbacks: Called at every update.
+        progress: Called with the progress of training and proofs; a bar by default.
+        changes: Changes to the settings of the training.
 
     Raises:
-        InputError: A setting is unusable, nothing can be proved of such a policy, or learning broke
-            down.
-        KeyboardInterrupt: Ctrl-C stopped it, see `train`; a search for failures ends at once, and
-            is repeated by a resume.
+        InputError: A setting is unusable, such a policy cannot be proved, or training diverged.
+        KeyboardInterrupt: Ctrl-C stopped it, see `train`; a search for failures ends at once and is
+            repeated on resume.
         SystemExit: SIGTERM stopped it, see `train`.
     """
     folder = new_folder() if folder is None else Path(folder)
@@ -287,7 +286,7 @@ class _Note(Callback):
 def _learn(
     journal: Journal, state: Mapping[str, Any] | None, callbacks: Sequence[Callback]
 ) -> dict[str, Any]:
-    """Trains to the target at first, and then for a round's frames on its failures."""
+    """Train to the target at first, then for a round's frames on its failures."""
     settings, how, practice = journal.settings, journal.how, None
     if journal.rounds:
         more = 0 if journal.is_over else how.frames
@@ -299,7 +298,7 @@ def _learn(
 
 
 def _search(journal: Journal, progress: Progress) -> None:
-    """Looks for failures by flights, then by a proof, and notes them."""
+    """Search for failures in episodes, then by a proof, and record them."""
     how = journal.how
     policy = load_policy(last_of(journal.folder))
     progress(f"{how.flights} flights in search of failures", 0, how.flights)
@@ -329,7 +328,7 @@ def _search(journal: Journal, progress: Progress) -> None:
 
 
 def _fly(policy: Policy, journal: Journal) -> tuple[NDArray[np.float64], int]:
-    """See `find_failures`; in worlds of this search alone."""
+    """Search in environments that no other search uses, see `find_failures`."""
     settings, how = journal.settings, journal.how
     if not how.flights:
         return np.empty((0, journal.task.num_cubes)), 0
@@ -348,11 +347,11 @@ def _fly(policy: Policy, journal: Journal) -> tuple[NDArray[np.float64], int]:
 
 
 def _doubtful(proof: Proof) -> NDArray[np.float64]:
-    """What fails or may fail; where a proof was stopped, only what is known to fail."""
+    """Return what fails or may fail; if a proof was stopped, only what certainly fails."""
     is_whole = proof.certificate["finished"]
     return np.concatenate([proof.losing(), proof.open()]) if is_whole else proof.losing()
 
 
 def _largest(boxes: NDArray[np.float64], most: int) -> NDArray[np.float64]:
-    """So many boxes at most, by volume."""
+    """Return the largest boxes by volume."""
     return boxes[np.argsort(-volumes(boxes), kind="stable")[:most]]

@@ -1,4 +1,4 @@
-"""A proof of what a policy does, from its settings to its certificate."""
+"""Prove what a policy does over all placements of the cubes."""
 
 import dataclasses
 import json
@@ -20,59 +20,59 @@ from drone_rl.utils.progress import Bar, Progress
 from drone_rl.utils.provenance import provenance
 from drone_rl.utils.seeding import fresh_seed, legacy_seed
 from drone_rl.utils.text import plural
-from drone_rl.verification.prover.policy_spec import Subject, make_subject, one_thread
+from drone_rl.verification.prover.policy_spec import PolicySpec, make_policy_spec, one_thread
 from drone_rl.verification.prover.proof_files import certify, load, save, weights_hash
 from drone_rl.verification.prover.prover import Prover
-from drone_rl.verification.text import sentence, why_stopped
+from drone_rl.verification.text import describe_proof, why_stopped
 
 _BYTES_PER_SIDE = 64
-"""Of a state, for each cube of each box under way: two borders, kept up to four times."""
+"""Bytes of a saved state per cube and box: two borders, kept up to four times."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Proof:
-    """How all placements of the cubes end, exactly, as far as it is decided."""
+    """The exact outcome of every placement of the cubes, as far as it is decided."""
 
     certificate: dict[str, Any]
     """Plain data, see `drone_rl.verification.prover.proof_files`."""
     folder: Path | None = None
-    """Where it lies, as `certificate.json`."""
+    """Contains `certificate.json`."""
 
     @property
     def success(self) -> float:
-        """Share of all placements from which everything is collected, for certain."""
+        """Fraction of all placements from which all cubes are certainly collected."""
         done = (o["share"] for o in self.certificate["outcomes"] if o["end"] == "all_cubes")
         return sum(done)
 
     @property
     def lost(self) -> float:
-        """Share of all placements from which it is not, for certain."""
+        """Fraction of all placements from which they certainly are not."""
         return sum(o["share"] for o in self.certificate["outcomes"] if o["end"] != "all_cubes")
 
     @property
     def undecided(self) -> float:
-        """Share of the placements of which nothing is claimed."""
+        """Fraction of all placements without a claim."""
         return self.certificate["undecided"]["share"]
 
     @property
     def is_proved(self) -> bool:
-        """Whether it succeeds from every placement."""
+        """Whether the policy succeeds from every placement."""
         ends = {o["end"] for o in self.certificate["outcomes"]}
         return ends == {"all_cubes"} and not self.certificate["undecided"]["boxes"]
 
     def losing(self) -> np.ndarray:
-        """The boxes from which it does not succeed. Shape: (N, num_cubes, 2), metres."""
+        """Return the boxes of certain failure. Shape: (N, num_cubes, 2), metres."""
         lost = [o["boxes"] for o in self.certificate["outcomes"] if o["end"] != "all_cubes"]
         n = self.certificate["policy"]["description"]["task"]["num_cubes"]
         return np.concatenate([np.empty((0, n, 2)), *map(np.array, lost)])
 
     def open(self) -> np.ndarray:
-        """The boxes of which nothing is claimed. Shape: (N, num_cubes, 2), metres."""
+        """Return the undecided boxes. Shape: (N, num_cubes, 2), metres."""
         n = self.certificate["policy"]["description"]["task"]["num_cubes"]
         return np.array(self.certificate["undecided"]["boxes"], float).reshape(-1, n, 2)
 
     def rows(self) -> list[list[str]]:
-        """The outcomes as texts: names, then a row for each."""
+        """Return the outcomes as a table: a header, then one row each."""
         rows = [["ends", "collects", "share of placements", "boxes"]]
         for outcome in self.certificate["outcomes"]:
             end = "to and fro" if outcome["loops"] else outcome["end"].replace("_", " ")
@@ -82,12 +82,12 @@ class Proof:
         return [*rows, ["undecided", "", f"{left['share']:.9g}", str(len(left["boxes"]))]]
 
     def __str__(self) -> str:
-        """The table and what it comes to."""
-        return f"{aligned(self.rows())}\n{sentence(self.certificate)}"
+        """The table and a summary."""
+        return f"{aligned(self.rows())}\n{describe_proof(self.certificate)}"
 
     def _repr_html_(self) -> str:
         head, *rows = self.rows()
-        return table(head, rows) + paragraph(sentence(self.certificate))
+        return table(head, rows) + paragraph(describe_proof(self.certificate))
 
 
 def prove(
@@ -100,45 +100,45 @@ def prove(
     progress: Progress | None = None,
     **changes: Any,
 ) -> Proof:
-    """Follows all placements of the cubes at once through a policy's whole greedy flight.
+    """Verify a greedy policy exhaustively over all cube placements.
 
     Args:
-        policy: The policy, or what `load_policy` takes.
-        settings: How.
-        folder: Where the certificate is left, and the state to go on from if it is stopped: a
-            proof that is found half done there is gone on with. Nowhere by default.
-        task: What to change of the policy's task.
+        policy: The policy, or an argument of `load_policy`.
+        settings: Settings of the proof.
+        folder: Where to save the certificate, and the state if the proof is stopped; an unfinished
+            proof there is resumed. Nothing is saved by default.
+        task: Changes to the policy's task.
         outputs: See `load_policy`.
-        progress: Told how far it is; a bar by default.
-        changes: Settings to change, as in `prove("good", limit_s=60)`.
+        progress: Called with the progress; a bar by default.
+        changes: Changes to the settings, as in `prove("good", limit_s=60)`.
 
     Raises:
-        InputError: The policy, its task or a setting is not for a proof; the message says why.
+        InputError: The policy, its task or a setting is not supported; the message says why.
     """
     settings = (settings or ProveSettings()).replace(**changes)
     policy = policy if isinstance(policy, Policy) else load_policy(policy, outputs=outputs)
     policy = policy.in_task(**(task or {}))
     network, gap = policy.make_network(), settings.logit_gap
-    made = make_subject(policy.description, network, gap, settings.renderer)
-    with one_thread(), closing(made) as subject:
-        subject.seeing.check(settings.compared, np.random.RandomState(legacy_seed(fresh_seed())))
+    made = make_policy_spec(policy.description, network, gap, settings.renderer)
+    with one_thread(), closing(made) as spec:
+        spec.images.check(settings.compared, np.random.RandomState(legacy_seed(fresh_seed())))
         if folder is None:
-            return _prove(policy, subject, settings, None, progress or Bar())
+            return _prove(policy, spec, settings, None, progress or Bar())
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
         with folder_lock(folder):
-            return _prove(policy, subject, settings, folder, progress or Bar())
+            return _prove(policy, spec, settings, folder, progress or Bar())
 
 
 def _prove(
     policy: Policy,
-    subject: Subject,
+    spec: PolicySpec,
     settings: ProveSettings,
     folder: Path | None,
     progress: Progress,
 ) -> Proof:
     prover, weights = (
-        Prover(subject, settings.most_combinations),
+        Prover(spec, settings.most_combinations),
         weights_hash(policy.state["policy"]),
     )
     known = json.dumps([weights, policy.description.as_dict(), settings.logit_gap])
@@ -161,10 +161,9 @@ def _prove(
 def _go_on(
     prover: Prover, settings: ProveSettings, progress: Progress, state: Path | None, known: str
 ) -> str | None:
-    """Advances a proof until it is finished or must stop, and saves it now and then.
+    """Advance a proof until it is finished or must stop, saving it regularly.
 
-    Returns:
-        The setting that stopped it; None if it is finished.
+    Returns the setting that stopped it; None if it is finished.
     """
     task, last = prover.lattice.task, prover.lattice.last
     total = (2 * task.lateral_bound) ** task.num_cubes
@@ -188,14 +187,14 @@ def _go_on(
 
 
 def _reached(prover: Prover, settings: ProveSettings, begin: float) -> str | None:
-    """The setting because of which a proof stops, if there is one."""
+    """Return the setting that stops a proof now, if any."""
     if settings.limit_s is not None and time.monotonic() - begin > settings.limit_s:
         return "limit_s"
     return "most_boxes" if prover.boxes_under_way > settings.most_boxes else None
 
 
 def load_proof(path: str | Path) -> Proof:
-    """A proof out of its certificate.
+    """Load a proof from its certificate.
 
     Raises:
         InputError: There is none.

@@ -11,7 +11,7 @@ WHERE = {"left": "on its left", "ahead": "straight ahead", "right": "on its righ
 
 
 def exact_percent(share: float) -> str:
-    """A share that is known; never 0% or 100% of what is only nearly none or nearly all."""
+    """Format a known fraction; never 0% or 100% if it is only close to that."""
     if share in (0, 1):
         return f"{share:.0%}"
     text = f"{100 * share:.2f}%"
@@ -19,11 +19,11 @@ def exact_percent(share: float) -> str:
 
 
 def rows(places: Evidence, names: Sequence[str]) -> list[list[str]]:
-    """The figures as texts: names, then a row for each side and one for all.
+    """Return the figures as a table: a header, one row per side and one for all.
 
     Args:
         places: "places" of `explanation.json`, or `places.json`.
-        names: Of the actions.
+        names: Names of the actions.
     """
     head = ["one cube", "share of places", *names, "not seen", "blind"]
     every = {**{n: places[n] for n in ("actions", "unseen", "blind")}, "share": 1.0}
@@ -143,8 +143,8 @@ PLACES = (
 )
 
 
-def sentence(certificate: Mapping[str, Any]) -> str:
-    """Says no more than the certificate does.
+def describe_proof(certificate: Mapping[str, Any]) -> str:
+    """Summarise a certificate in one sentence that claims no more.
 
     Args:
         certificate: See `drone_rl.verification.prover.proof_files`.
@@ -167,10 +167,10 @@ def sentence(certificate: Mapping[str, Any]) -> str:
 
 
 def why_stopped(setting: str | None) -> str:
-    """Why a proof has not come to its end, and what helps.
+    """Return why a proof has not finished, and the remedy.
 
     Args:
-        setting: The one that stopped it, if it is known.
+        setting: The setting that stopped it, if known.
     """
     if setting != "most_boxes":
         return "the proof was stopped"
@@ -181,7 +181,7 @@ def why_stopped(setting: str | None) -> str:
 
 
 def found(search: Mapping[str, Any]) -> str:
-    """What a training found in one of its searches for failures.
+    """Describe one search for failures of a training.
 
     Args:
         search: A row of "rounds" in `result.json`, see `drone_rl.verification.provable.Round`.

@@ -4,8 +4,7 @@ import pytest
 
 from benchmarks import hostile_parts as made
 from benchmarks.evidence import changed
-from drone_rl.explanations.report.fitting import check_fit
-from drone_rl.explanations.report.shapes import check_sizes
+from drone_rl.explanations.report.validation import check_fit, check_sizes
 from drone_rl.sim.vocabulary import SHOWN_MOVES
 from drone_rl.utils.errors import InputError
 

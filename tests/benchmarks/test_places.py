@@ -8,10 +8,10 @@ from benchmarks.places import bench_places, compare
 @pytest.fixture
 def subject():
     import drone_rl
-    from drone_rl.verification.prover.policy_spec import make_subject
+    from drone_rl.verification.prover.policy_spec import make_policy_spec
 
     policy = drone_rl.load_policy("good").in_task(num_cubes=2)
-    made = make_subject(policy.description, policy.make_network(), 0.0)
+    made = make_policy_spec(policy.description, policy.make_network(), 0.0)
     yield made
     made.close()
 
@@ -26,7 +26,7 @@ def test_the_figures(monkeypatch):
 
 def test_a_closed_form_that_is_wrong_is_noticed(subject, monkeypatch):
     random_state = np.random.RandomState(0)
-    assert compare(subject.seeing, 35.0, 2, 20, random_state)[0] == 0
+    assert compare(subject.images, 35.0, 2, 20, random_state)[0] == 0
     monkeypatch.setattr("drone_rl.verification.prover.cube_images.camera_ahead", lambda: 0.9)
-    wrong, compared = compare(subject.seeing, 35.0, 2, 20, random_state)
+    wrong, compared = compare(subject.images, 35.0, 2, 20, random_state)
     assert 0 < wrong <= compared <= 20

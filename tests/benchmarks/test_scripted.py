@@ -25,7 +25,7 @@ WANTED = {
         "poor",
         CERTAIN,
         [
-            "hardly better than luck. It collects 54% of the cubes on its left, 51%",
+            "hardly better than acting at random. It collects 54% of the cubes on its left, 51%",
             f"collects 33% of all cubes, {LUCK}",
             "at the second cube: in all 400 episodes; 100% of all end outside the field",
         ],
@@ -70,8 +70,12 @@ WANTED = {
     "misses the last cube in one of ten": ("good", OPEN, ["third cube: in 32 of 400 episodes"]),
     "leaves at once, every other time": (NONE, OPEN, ["first cube", "50% of all end outside"]),
     "sure of nothing": ("good", CERTAIN, ["most probable actions", "in 17% of episodes, not in"]),
-    "turns the wrong way": ("poor", CERTAIN, ["no better than luck", "collects 0% of all cubes"]),
-    "finds one cube of ten beside it": ("poor", CERTAIN, ["hardly better than luck", LUCK]),
+    "turns the wrong way": (
+        "poor",
+        CERTAIN,
+        ["no better than acting at random", "collects 0% of all cubes"],
+    ),
+    "finds one cube of ten beside it": ("poor", CERTAIN, ["hardly better than acting", LUCK]),
     "finds one cube of three beside it": (NONE, CERTAIN, ["36% of the cubes on its left"]),
     "all of five cubes": ("good", CERTAIN, ["flying straight on 27%"]),
     "asleep at the fifth cube": (NONE, CERTAIN, ["fifth cube: in all 400", "at the step limit"]),
@@ -81,8 +85,16 @@ WANTED = {
         ["none were offered on its left or on its right", "Flying straight on does as well"],
     ),
     "straight on where none stand aside": (TRIVIAL, CERTAIN, ["Flying straight on does as well"]),
-    "straight on in a narrow field": ("poor", CERTAIN, ["no better than luck", "straight on 55%"]),
-    "straight on among large cubes": ("poor", CERTAIN, ["no better than luck", "straight on 49%"]),
+    "straight on in a narrow field": (
+        "poor",
+        CERTAIN,
+        ["no better than flying straight on", "straight on 55%"],
+    ),
+    "straight on among large cubes": (
+        "poor",
+        CERTAIN,
+        ["no better than flying straight on", "straight on 49%"],
+    ),
     "no time for all cubes": (
         NONE,
         OPEN,

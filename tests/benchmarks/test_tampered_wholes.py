@@ -5,7 +5,7 @@ import pytest
 
 from benchmarks.tampered_wholes import WHOLES
 from drone_rl.verification.checker.certificate import parse_certificate
-from drone_rl.verification.checker.consistency import find_lies
+from drone_rl.verification.checker.consistency import find_inconsistencies
 from tests.benchmarks.test_tampering import CERTIFICATE
 
 
@@ -13,7 +13,7 @@ from tests.benchmarks.test_tampering import CERTIFICATE
 def test_each_goes_together_so_that_only_flights_tell(name):
     lied = WHOLES[name](copy.deepcopy(CERTIFICATE))
     assert json.dumps(lied) != json.dumps(CERTIFICATE)
-    assert list(find_lies(parse_certificate(lied))) == []
+    assert list(find_inconsistencies(parse_certificate(lied))) == []
 
 
 def lied(name):

@@ -27,7 +27,7 @@ def test_one_cube(tmp_path):
 @pytest.mark.parametrize(
     ("setting", "message"),
     [
-        ("task.vertical_bound=0.5", "spreads cubes in height"),
+        ("task.vertical_bound=0.5", "vertical_bound=0.5 is not supported"),
         ("logit_gap=-1", "logit_gap"),
         ("policy=nobody", "policy=nobody does not exist"),
         ("task.num_cubes=6", "fewer cubes"),

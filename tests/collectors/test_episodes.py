@@ -226,16 +226,6 @@ def test_what_a_policy_reads_is_there_at_every_step_and_kept(seeing):
     assert after[~first.roll(-1)].max() < 2  # all cubes end an episode
 
 
-def test_a_policy_may_read_the_reward(make_pipeline):
-    env, actor = make_pipeline(2, task=SHORT)
-    env.reset = lambda reset=env.reset: reset().set("reward", torch.zeros(2, 1))
-    actor.in_keys = [*actor.in_keys, "reward"]
-    seen = []
-    actor.register_forward_pre_hook(lambda _, args: seen.append(args[0]["reward"].shape[0]))
-    batch = EpisodeCollector(env, actor).collect()
-    assert sum(seen) == len(batch)
-
-
 def test_stops_before_a_batch_once_there_are_enough_frames(seeing):
     def batches(total_frames):
         seeing.env.set_seed(0)
@@ -263,13 +253,14 @@ def test_episodes_of_one_step():
     assert batch["next", "done"].all()
 
 
-def test_a_step_is_masked_only_once_some_world_has_ended(seeing):
-    masked, step = [], seeing.env.step
-    seeing.env.step = lambda state: masked.append("_step" in state) or step(state)
+def test_steps_are_masked_once_an_episode_has_ended(seeing):
+    masked, step = [], seeing.env._step
+    seeing.env._step = lambda state: masked.append("_step" in state) or step(state)
     batch = seeing.collect()
-    shortest = int(batch["collector", "traj_ids"].bincount().min())
-    assert masked.index(True) == shortest
-    assert all(masked[shortest:])
+    lengths = batch["collector", "traj_ids"].bincount()
+    assert len(masked) == int(lengths.max())  # nothing is stepped after the last episode
+    assert masked.index(True) == int(lengths.min())
+    assert all(masked[int(lengths.min()) :])
 
 
 def test_shutdown_closes_the_worlds_and_may_come_twice(seeing):
@@ -286,7 +277,7 @@ def test_unbatched_environment_is_refused(make_pipeline):
     class Unbatched:
         batch_size = torch.Size([])
 
-    with pytest.raises(InputError, match="batch of worlds"):
+    with pytest.raises(InputError, match="batch of environments"):
         EpisodeCollector(Unbatched(), actor)
 
 

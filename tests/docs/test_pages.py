@@ -60,3 +60,11 @@ def test_files_that_it_links_are_there(page):
             titles = re.findall(r"^#+ (.+)$", target.read_text(), re.MULTILINE)
             slugs = {re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-") for title in titles}
             assert heading in slugs, f"{path}#{heading}"
+
+
+@pytest.mark.parametrize("name", ["design", "where"])
+def test_modules_and_folders_that_it_names_exist(name):
+    text = (ROOT / "docs" / f"{name}.md").read_text()
+    named = re.findall(r"`((?:drone_rl|benchmarks|conf)/[\w./]*)`", text)
+    assert len(named) > 10
+    assert [path for path in named if not (ROOT / path).exists()] == []

@@ -10,10 +10,9 @@ import jinja2
 import pytest
 import torch
 
-from drone_rl.explanations import sections, study
+import drone_rl.explanations
+from drone_rl.explanations import explain, report
 from drone_rl.explanations.report import page as report_page
-from drone_rl.explanations.report import sections as parts
-from drone_rl.explanations.sections import find_sections
 from drone_rl.policies.zoo.registry import NETWORKS
 from drone_rl.utils.settings import kinds_of, types_of
 from tests.docs.commands import check_commands
@@ -68,13 +67,14 @@ def workplace(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(str(tmp_path))
     inside = tmp_path / "drone_rl"
-    for package in (sections, parts):
+    for package in (drone_rl.explanations, report):
         folder = inside.joinpath(*package.__name__.split(".")[1:])
         monkeypatch.setattr(package, "__path__", [*package.__path__, str(folder)])
-    few = {name: find_sections()[name] for name in ("dataset", "evaluation")}
-    monkeypatch.setattr(study, "find_sections", lambda: few)  # all of them take a minute
+    few = {name: explain.SECTIONS[name] for name in ("dataset", "evaluation")}
+    monkeypatch.setattr(explain, "SECTIONS", few)  # all of them take a minute
+    monkeypatch.setattr(report_page, "PARTS", dict(report_page.PARTS))
     known, networks, threads = set(sys.modules), dict(NETWORKS), torch.get_num_threads()
-    templates = jinja2.FileSystemLoader(inside / "report" / "templates")
+    templates = jinja2.FileSystemLoader(inside / "explanations" / "report" / "templates")
     theirs = jinja2.PackageLoader("drone_rl.explanations.report")
     loader = jinja2.ChoiceLoader([theirs, templates])
     monkeypatch.setattr(jinja2, "PackageLoader", lambda _: loader)

@@ -9,8 +9,8 @@ from torchrl.envs import RewardSum, SerialEnv, StepCounter, TransformedEnv
 from torchrl.envs.utils import check_env_specs
 
 from drone_rl.collectors import EpisodeCollector, RolloutCollector
-from drone_rl.collectors.streams import TorchrlStream
-from drone_rl.collectors.ways import TorchrlWay
+from drone_rl.collectors.rollouts import TorchrlStream
+from drone_rl.collectors.stepping import SteppingCollector
 from drone_rl.config import CameraSettings, TaskSettings
 from drone_rl.envs import (
     Blur,
@@ -183,7 +183,7 @@ def collector(kind, how, seed=0):
     actor = make_actor(network, env.action_spec, generator)
     if how is RolloutCollector:
         return RolloutCollector(env, actor, 5), generator
-    return EpisodeCollector(env, actor, is_compiled=True), generator
+    return EpisodeCollector(env, actor, acceleration="fused"), generator
 
 
 @pytest.mark.parametrize("how", [EpisodeCollector, RolloutCollector])
@@ -207,8 +207,8 @@ def test_collecting_goes_on_bit_for_bit(how, kind, tmp_path):
 @pytest.mark.parametrize("kind", sorted(set(KINDS) - {"all"}))
 def test_no_fault_is_taken_for_a_map_from_picture_to_picture(kind):
     episodes, rollouts = (collector(kind, how)[0] for how in (EpisodeCollector, RolloutCollector))
-    assert isinstance(episodes._way, TorchrlWay) and episodes._flight is None
-    assert isinstance(rollouts._way, TorchrlStream)
+    assert isinstance(episodes.source, SteppingCollector)
+    assert isinstance(rollouts._stream, TorchrlStream)
 
 
 def test_a_saved_state_goes_on_within_an_episode():

@@ -1,7 +1,7 @@
 import torch
 
 import drone_rl
-from drone_rl.collectors.sight import Sight
+from drone_rl.envs.direct_renderer import DirectRenderer
 from drone_rl.evaluation.outcomes import MOST, enumerate_outcomes
 from drone_rl.policies.rounding import Decisions
 from drone_rl.sim.actions import Move
@@ -11,12 +11,12 @@ from drone_rl.sim.tasks.collect_cubes import EndReason
 def ends(possible):
     with drone_rl.load_policy("good").flying(3, seed=0) as (env, _):
         env.reset()
-        sight = Sight.find(env, ("pixels",), ())
+        renderer = DirectRenderer.try_create(env, ("pixels",), ())
 
         def decide(pixels):
             return Decisions(torch.zeros(len(pixels), 3), possible(pixels))
 
-        return enumerate_outcomes(sight, decide, torch.tensor([0, 2]))
+        return enumerate_outcomes(renderer, decide, torch.tensor([0, 2]))
 
 
 def test_one_possible_action_gives_one_end():

@@ -49,6 +49,7 @@ def evidence():
         "failures": {
             "rows": [largest, *ends],
             "largest": largest,
+            "expected_end": "front_boundary",
             "bound": {"share": 0.06, "upper95": 0.0921, "trials": 400},
         },
     }
@@ -64,8 +65,8 @@ def test_what_is_said_of_a_good_policy(evidence):
         "fixed_seed": "Fixed seed 0: a policy could have been fitted to these environments.",
         "shares": "It collects 90% of the cubes on its left, 100% of those ahead and 100% of those "
         "on its right.",
-        "baselines": "In the same worlds it collects 96% of all cubes, acting at random 28% and "
-        "the oracle 100%.",
+        "baselines": "From the same initial states it collects 96% of all cubes, acting at random "
+        "28% and the oracle 100%.",
         "failures.largest": "It fails most with cubes on its left: in 30 of 300 episodes that "
         "offered one (10%).",
     }
@@ -74,7 +75,7 @@ def test_what_is_said_of_a_good_policy(evidence):
 @pytest.mark.parametrize(
     ("kind", "part"),
     [
-        ("poor", "does not do its task: it is hardly better than luck."),
+        ("poor", "does not do its task: it is hardly better than acting at random."),
         ("one-sided (right)", "can't be trusted with cubes on its left: it collects every cube"),
         ("one-sided (left)", "can't be trusted with cubes on its right"),
         ("none of these", "is neither good nor poor nor one-sided: it collects"),
@@ -92,7 +93,7 @@ def test_kinds(evidence, kind, part):
 def test_poor_is_compared_with_luck(evidence):
     evidence["kind"] = "poor"
     evidence["greedy"]["shares"]["all"]["mean"] = 0.28
-    assert speak(evidence)["kind"].endswith("it is no better than luck.")
+    assert speak(evidence)["kind"].endswith("it is no better than acting at random.")
 
 
 def test_uncertain_says_how_many_episodes_would_do(evidence):
@@ -120,8 +121,7 @@ def test_luck_that_is_enough(evidence):
     evidence["baselines"]["forward"] = flights(0.9, None, 1.0, None, 1.0)
     found = speak(evidence)
     assert found["pointless"] == (
-        "This task tells little, for luck is enough: flying straight on collects every cube in "
-        "90% of episodes."
+        "This task is trivial: flying straight on collects every cube in 90% of episodes."
     )
     assert "baselines" not in found
     evidence["kind"] = "good, but trivial"
@@ -224,7 +224,7 @@ def test_another_way_of_moving_is_told(evidence):
     wind = {"own": [0.0, 0.0, 0.0], "flown": [5.0, 0.0, 0.0]}
     evidence["unlike"] = {"mode": mode, "wind": wind}
     assert speak(evidence)["unlike"] == (
-        "It was made for another way of moving: here it flew with dynamics.mode=simple_flight "
+        "It was trained with other dynamics: here it flew with dynamics.mode=simple_flight "
         "instead of computer_vision and dynamics.wind=[5, 0, 0] instead of [0, 0, 0]."
     )
     evidence["unlike"] = {}
@@ -233,6 +233,6 @@ def test_another_way_of_moving_is_told(evidence):
 
 def test_a_verdict_says_where_effects_of_rounding_have_no_bound(evidence):
     found = {"arithmetic": "float32 on cpu, PyTorch", "decides": False}
-    for bound, more in ((True, "."), (False, "; effects of rounding were tried out, not bounded.")):
+    for bound, more in ((True, "."), (False, "; effects of rounding were estimated, not bounded.")):
         text = speak({**evidence, "rounding": {**found, "bound": bound}})["arithmetic"]
         assert text == f"The verdict holds for float32 on cpu, PyTorch{more}"

@@ -10,7 +10,7 @@ from drone_rl.evaluation.video import level, render_chase
 from drone_rl.sim.entities import CHASE
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.rendering.appearance import product, rotate, turned
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.worlds import Worlds
 
 SIZE = {"height": 60, "width": 90}
@@ -40,7 +40,7 @@ def test_of_a_level_drone_it_is_the_same_in_flight():
 def test_a_drone_that_rolls_is_seen_tilted_before_a_level_horizon(mount):
     flying = worlds(mount=mount)
     view = flying.view(CHASE.name, "segmentation", **SIZE, show_drone=True)
-    drone = flying.scene.geoms(Meaning.DRONE)
+    drone = flying.scene.geoms(SemanticClass.DRONE)
     is_drone = torch.isin(flying.render(flying.state, view)[0], torch.tensor(drone))
     level_picture = render_chase(flying, None, **SIZE)[0]
     roll(flying, 30.0)
@@ -55,9 +55,9 @@ def test_a_drone_that_rolls_is_seen_tilted_before_a_level_horizon(mount):
 
 def test_how_all_worlds_look_and_how_these_do():
     flying = worlds()
-    flying.appearance = Appearance(colors={Meaning.GROUND: (1.0, 0.0, 0.0)})
+    flying.appearance = Appearance(colors={SemanticClass.GROUND: (1.0, 0.0, 0.0)})
     roll(flying, 10.0)
-    below = render_chase(flying, Appearance(colors={Meaning.SKY: (0.0, 0.0, 1.0)}), **SIZE)[0]
+    below = render_chase(flying, Appearance(colors={SemanticClass.SKY: (0.0, 0.0, 1.0)}), **SIZE)[0]
     assert below[0, 0].tolist() == [0, 0, 255]
     assert below[-1, 0, 1:].tolist() == [0, 0] and below[-1, 0, 0] > 100
 

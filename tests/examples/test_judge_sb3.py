@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from drone_rl.explanations import study
-from drone_rl.explanations.sections import find_sections
+from drone_rl.explanations import explain
+from drone_rl.explanations.explain import SECTIONS
 
 sb3 = pytest.importorskip("stable_baselines3", reason="Stable-Baselines3 is not installed")
 PATH = Path(__file__).parents[2] / "examples" / "judge_sb3.py"
@@ -14,8 +14,8 @@ PATH = Path(__file__).parents[2] / "examples" / "judge_sb3.py"
 @pytest.mark.slow
 def test_a_model_is_trained_saved_judged_and_explained(example, tmp_path, capsys, monkeypatch):
     kept = ("attribution", "dataset", "embedding", "evaluation")
-    few = {name: find_sections()[name] for name in kept}
-    monkeypatch.setattr(study, "find_sections", lambda: few)  # all of them take a minute
+    few = {name: SECTIONS[name] for name in kept}
+    monkeypatch.setattr(explain, "SECTIONS", few)  # all of them take a minute
     example.train(512, num_envs=32, steps=16).save(tmp_path / "ppo.zip")
     model = sb3.PPO.load(tmp_path / "ppo.zip")
     example.trust(model, str(tmp_path), frames=40, episodes=6, perplexity=5)

@@ -3,8 +3,12 @@
 import pytest
 import torch
 
-from drone_rl.explanations.recording import record
+from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, with_transforms
+from drone_rl.explanations.context import Context
+from drone_rl.explanations.rollouts import record
 from drone_rl.explanations.scenes import Scenes
+from drone_rl.explanations.settings import ExplainSettings
+from drone_rl.policies import SmallCNN
 
 
 @pytest.fixture
@@ -25,3 +29,16 @@ def scenes(world):
 def dataset(world):
     env, actor, network = world
     return record(env, actor, network, 60, layers=("relu1", "fc_relu1"), meta={"from": "a test"})
+
+
+@pytest.fixture(scope="package")
+def context():
+    """The context of a small untrained policy, shared by the sections as in the program."""
+    env = with_transforms(DroneEnv(8, seed=5), [GrayPixels(), StandardizePixels()])
+    generator = torch.Generator().manual_seed(0)
+    network = SmallCNN((1, 25, 64), 3, channels=(4,), hidden=(8,), generator=generator)
+    with torch.no_grad():  # a policy with opinions, or every map would be nearly flat
+        network.layers.logits.weight.mul_(300)
+    settings = ExplainSettings(frames=40, episodes=6, perplexity=5, good_share=0.7, seed=3)
+    yield Context(env, network, settings)
+    env.close()

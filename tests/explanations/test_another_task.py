@@ -6,8 +6,8 @@ import torch
 
 from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, with_transforms
 from drone_rl.explanations.context import Context
+from drone_rl.explanations.explain import explain_policy
 from drone_rl.explanations.settings import ExplainSettings
-from drone_rl.explanations.study import explain_policy
 from drone_rl.policies import MLP
 from tests.second_task import NUM_POSTS, Posts
 

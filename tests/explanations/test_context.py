@@ -1,3 +1,7 @@
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import torch
 
@@ -65,3 +69,16 @@ def test_what_has_no_gradients_is_shared_with_another_thread(make_pipeline):
     env, _ = make_pipeline(num_envs=30)
     network = ForeignNetwork(lambda x: x.detach().flatten(1)[:, :3], (1, 25, 64), MOVES)
     assert Context(env, network, SMALL).aside().network is network
+
+
+def test_the_first_thread_computes_a_shared_value_and_others_wait(context):
+    threads = []
+
+    def compute():
+        threads.append(threading.get_ident())
+        time.sleep(0.05)
+        return object()
+
+    with ThreadPoolExecutor(4) as pool:
+        got = list(pool.map(lambda _: context.shared("a test", compute), range(8)))
+    assert len(threads) == 1 and all(one is got[0] for one in got)

@@ -3,12 +3,11 @@ import pytest
 import torch
 
 from drone_rl.config import TaskSettings
-from drone_rl.explanations.alternatives import DARK_GROUND
 from drone_rl.explanations.hooks import probabilities
 from drone_rl.explanations.interventions import OTHER_TARGETS, _patches, intervene, to_the_middle
-from drone_rl.explanations.scenes import Region, empty_scene, place_target
+from drone_rl.explanations.scenes import DARK_GROUND, Region, empty_scene, place_target
 from drone_rl.sim.entities import FLOOR_COLOR
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.scene import SemanticClass
 
 
 def test_only_what_was_changed_changes(scenes, world):
@@ -77,7 +76,10 @@ def test_a_patch_of_ground_is_a_square_of_about_as_many_pixels():
 
 
 def test_other_colours_are_colours_unlike_the_cubes_and_the_grounds():
-    yellow, dark = OTHER_TARGETS.colors[Meaning.TARGET], DARK_GROUND.colors[Meaning.GROUND]
+    yellow, dark = (
+        OTHER_TARGETS.colors[SemanticClass.TARGET],
+        DARK_GROUND.colors[SemanticClass.GROUND],
+    )
     for other, usual in ((yellow, TaskSettings().cube_color), (dark, FLOOR_COLOR)):
         assert all(0.0 <= part <= 1.0 for part in other)
         assert max(abs(a - b) for a, b in zip(other, usual, strict=True)) > 0.2

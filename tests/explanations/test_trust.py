@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import torch
 
-from drone_rl.explanations import causal, trust
-from drone_rl.explanations.attribution import Explainer
+from drone_rl.explanations import patches, trust
+from drone_rl.explanations.controls import placebo_maps
+from drone_rl.explanations.heat_maps import Explainer
 from drone_rl.explanations.patches import Grid
-from drone_rl.explanations.placebos import placebo_maps
 from drone_rl.explanations.trust import (
     Pictures,
     Trial,
@@ -49,7 +49,7 @@ def make_trial(network, episodes=40, frames=3, seed=0):
         network=network,
         observations=x,
         actions=torch.arange(len(x)) % 3,
-        effects=causal.patch_effects(network, x, others, grid),
+        effects=patches.patch_effects(network, x, others, grid),
         placebos=placebo_maps(x, torch.zeros(1, *SIZE), others),
         episode=np.arange(len(x)) // frames,
         grid=grid,
@@ -239,7 +239,7 @@ def test_a_trial_of_a_policy_in_the_simulator(world, scenes, dataset):
     )
     assert made.seed == 0
     assert made.effects.shape == (len(made.episode), 40) == (len(made.observations), 40)
-    rows = causal.spread(dataset.episode, trust.FRAMES_AN_EPISODE)
+    rows = patches.sample_frames(dataset.episode, trust.FRAMES_AN_EPISODE)
     assert len(made.episode) + made.still == len(rows)
     torch.testing.assert_close(
         made.observations, dataset.tensor("observations")[rows][: len(made.episode)]

@@ -10,8 +10,8 @@ PICTURES = [np.full((25, 64, 3), 40 * i, np.uint8) for i in range(6)]
 def test_curves_go_through_what_was_measured():
     figure = chart(SHIFTS)
     sun = figure.axes[0]
-    assert sun.get_title() == "height of the sun" and sun.get_xlabel() == "degrees"
-    policy = next(line for line in sun.lines if line.get_label() == "success of the policy")
+    assert sun.get_title() == "elevation of the sun" and sun.get_xlabel() == "degrees"
+    policy = next(line for line in sun.lines if line.get_label() == "success rate of the policy")
     np.testing.assert_allclose(policy.get_xdata(), [-55, 0, 5])
     np.testing.assert_allclose(policy.get_ydata(), [0.1, 1.0, 0.995])
     oracle = next(line for line in sun.lines if str(line.get_label()).startswith("oracle"))
@@ -20,13 +20,13 @@ def test_curves_go_through_what_was_measured():
     crosses = [line for line in sun.lines if line.get_label() == "impossible"]
     assert [line.get_xdata()[0] for line in crosses] == [-55]
     legend = figure.axes[3].get_legend()
-    assert "surely good in this range" in [text.get_text() for text in legend.get_texts()]
+    assert "certainly good in this range" in [text.get_text() for text in legend.get_texts()]
 
 
 def test_nothing_is_called_good_without_a_search():
     figure = chart(changed(SHIFTS, {"domain": None}))
     labels = [label for axis in figure.axes for label in axis.get_legend_handles_labels()[1]]
-    assert "surely good in this range" not in labels
+    assert "certainly good in this range" not in labels
 
 
 def test_strips_show_what_was_flown():

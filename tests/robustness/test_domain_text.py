@@ -17,25 +17,25 @@ GOOD = {"verdict": {**VERDICT, "kind": "good", "certain": True}, "shifts": SHIFT
 def test_what_is_quoted_says_of_whom_and_by_what():
     text = said(QUOTED, GOOD)
     assert list(text) == ["domain.quoted"]
-    assert "the sun 21.1 to 60 degrees high" in text["domain.quoted"]
+    assert "the sun at 21.1 to 60 degrees" in text["domain.quoted"]
     quoted = text["domain.quoted"]
     assert quoted.startswith(
-        "Read from shifts.json, dated 2026-01-31 12:00, not measured again here: Good, with"
+        "Read from shifts.json, dated 2026-01-31 12:00, not measured again here: Good with"
     )
     assert quoted.endswith(
-        "400 (ranges) and 200 (others) flights at each strength (seed 0) of 3 axes (height of the "
-        "sun, blur and brightness)."
+        "400 (ranges) and 200 (others) episodes at each strength (seed 0) of 3 axes (elevation of "
+        "the sun, blur and brightness)."
     )
     few = said(QUOTED, changed(GOOD, {"shifts.domain": None}))["domain.quoted"]
-    assert "task: 200 flights at each strength" in few and "Good, with" not in few
+    assert "task: 200 episodes at each strength" in few and "Good with" not in few
 
 
 @pytest.mark.parametrize(
     ("changes", "why"),
     [
         ({"shifts": {"refused": "it is of another task"}}, "of another task"),
-        ({"verdict.good_share": 0.99}, "a share of 0.9 of the oracle's success, this verdict one"),
-        ({"verdict.kind": "poor"}, "this verdict's do not"),
+        ({"verdict.good_share": 0.99}, "requires 0.9 of the oracle's success rate"),
+        ({"verdict.kind": "poor"}, "this verdict does not"),
     ],
 )
 def test_what_speaks_against_them_is_said_instead(changes, why):
@@ -67,7 +67,7 @@ def test_what_was_not_flown_stays_untested():
         ("blur", None, 1.5, None),
         ("blur", None, 1.6, "needed 0 to 1.6 pixels, good 0 to 1.5 pixels"),
         ("brightness", 0.9, 1.0, "good 1 to 1 times"),
-        ("fog", 60.0, None, "fog: not flown; run drone-rl shifts with axes=[fog]"),
+        ("fog", 60.0, None, "fog: not evaluated; run drone-rl shifts with axes=[fog]"),
     ],
 )
 def test_what_is_lacking(name, low, high, words):
@@ -87,19 +87,21 @@ def test_fog_is_needed_up_to_none():
 def test_what_new_episodes_say_against_a_file():
     probed = {"refused": None, "success": 0.5}
     assert contradicted("blur", 1.0, "pixels", probed) == (
-        "blur at 1 pixels: new episodes succeed in 50%, so that it is surely not good there; the "
-        "file says that it is"
+        "blur at 1 pixels: 50% of new episodes succeed, so the policy is certainly not good there; "
+        "the file states that it is"
     )
-    assert contradicted(None, 0.0, "", probed).startswith("where nothing is different: new epis")
+    assert contradicted(None, 0.0, "", probed).startswith("without perturbation: 50% of new epis")
     refused = contradicted("blur", 1.0, "pixels", {"refused": "too large"})
-    assert refused == "blur at 1 pixels: the task can't be so (too large)"
+    assert refused == "blur at 1 pixels: the task does not allow it (too large)"
 
 
 def test_what_was_no_test_covers_nothing_and_what_nobody_can_is_said():
     need = {"low": None, "high": 1.0}
     same = {"axes.blur.levels.1.modes.constant.unchanged": True}
-    assert "notices nothing" in lacking(changed(SHIFTS, same), "blur", need)
+    assert "not tested" in lacking(changed(SHIFTS, same), "blur", need)
     nowhere = {"domain.ranges.blur.positions": None}
-    assert "where nothing is different" in lacking(changed(SHIFTS, nowhere), "blur", need)
+    assert "without perturbation" in lacking(changed(SHIFTS, nowhere), "blur", need)
     lost = {"domain.ranges.blur.failed": [{"end": "high", "impossible": True}]}
-    assert "nobody can" in lacking(changed(SHIFTS, lost), "blur", {"low": None, "high": 2.0})
+    assert "impossible even for the oracle" in lacking(
+        changed(SHIFTS, lost), "blur", {"low": None, "high": 2.0}
+    )

@@ -10,7 +10,7 @@ from drone_rl.evaluation.rollouts import run_episodes
 from drone_rl.robustness.axes import AXES
 from drone_rl.robustness.paired_evaluation import PairedEvaluator, PolicySpec
 from drone_rl.robustness.perturbations import ONSET_STEP, Condition, Mode, whiten
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import Stream
@@ -79,7 +79,7 @@ def test_a_delayed_action_is_the_one_decided_so_many_steps_before(make_bed):
 
 
 def test_an_onset_changes_nothing_before_it(make_bed):
-    white = Condition(looks=(whiten((Meaning.TARGET,), 1.0),))
+    white = Condition(looks=(whiten((SemanticClass.TARGET,), 1.0),))
     evaluator = make_bed(
         subject(task=TaskSettings(num_cubes=2, first_distance=15.0, spacing=9.0)), 12
     )

@@ -5,7 +5,7 @@ import torch
 
 from drone_rl.robustness.perturbations import mount
 from drone_rl.sim.rendering import Appearance
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.seeding import world_random_state
 
@@ -22,7 +22,7 @@ def test_each_world_has_its_share_of_it():
 
 
 def test_the_look_is_otherwise_the_same():
-    own = Appearance(colors={Meaning.GROUND: (0.1, 0.2, 0.3)}, fog=50.0)
+    own = Appearance(colors={SemanticClass.GROUND: (0.1, 0.2, 0.3)}, fog=50.0)
     look = mount(degrees=5.0).change(own, SWAY)
     assert (look.colors, look.fog) == (own.colors, 50.0)
 

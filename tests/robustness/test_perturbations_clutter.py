@@ -12,7 +12,7 @@ from drone_rl.robustness.perturbations import (
     sample_distractors,
     task_things,
 )
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 from tests.robustness.subjects import subject
@@ -44,16 +44,16 @@ def test_they_stand_beside_the_way():
 def test_they_are_as_large_as_what_matters_and_come_after_those_that_were_there():
     places = torch.arange(12.0).reshape(2, 2, 3)
     look = clutter(None, CUBES.things, places)
-    assert look.beside.sizes.tolist() == [[2.5, 2.5]] * 2
-    assert look.beside.colors[1, 0].tolist() == pytest.approx(as_bright(CUBES.cube_color))
+    assert look.distractors.sizes.tolist() == [[2.5, 2.5]] * 2
+    assert look.distractors.colors[1, 0].tolist() == pytest.approx(as_bright(CUBES.cube_color))
     both = clutter(look, CUBES.things, 1 + places[:, :1])
-    assert both.beside.places.tolist() == torch.cat([places, 1 + places[:, :1]], 1).tolist()
+    assert both.distractors.places.tolist() == torch.cat([places, 1 + places[:, :1]], 1).tolist()
 
 
 def test_they_are_behind_the_props_of_a_task():
     worlds = Worlds(2, CUBES, num_shards=1, distractors=4)
     scene = worlds.scene
-    assert len(scene.geoms(Meaning.DISTRACTOR)) == 4
+    assert len(scene.geoms(SemanticClass.DISTRACTOR)) == 4
     assert {*scene.props} == {-1, 0, 1, 2, 3, 4, 5, 6}
     hidden = worlds.poses(worlds.state).props
     assert hidden.shape == (2, 7, 3) and (hidden[:, 3:, 2] == -100.0).all()

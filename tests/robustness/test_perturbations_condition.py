@@ -1,6 +1,6 @@
 from drone_rl.envs.fault_models import late_frames, out_of_focus
 from drone_rl.robustness.perturbations import Condition, mount, sun_at, tint
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.scene import SemanticClass
 
 
 def test_nothing_is_different_by_default():
@@ -10,7 +10,7 @@ def test_nothing_is_different_by_default():
 
 def test_both_at_once():
     blurred, late = out_of_focus(1.0), late_frames(2)
-    tinted, sun, moved = tint((Meaning.GROUND,), 0.1), sun_at(5.0), mount(degrees=3.0)
+    tinted, sun, moved = tint((SemanticClass.GROUND,), 0.1), sun_at(5.0), mount(degrees=3.0)
     one = Condition(task={"cube_size": 2.0}, looks=(tinted,), faults=(blurred,), delay=3)
     two = Condition(
         task={"cube_size": 3.0, "step_length": 0.5},

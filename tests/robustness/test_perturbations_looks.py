@@ -14,11 +14,11 @@ from drone_rl.robustness.perturbations import (
     whiten,
 )
 from drone_rl.sim.rendering import Appearance
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.worlds import Worlds
 
 PLAIN = Appearance(
-    colors={Meaning.TARGET: (0.8, 0.1, 0.0), Meaning.SKY: (0.6, 0.7, 0.9)},
+    colors={SemanticClass.TARGET: (0.8, 0.1, 0.0), SemanticClass.SKY: (0.6, 0.7, 0.9)},
     ambient=(0.3, 0.3, 0.3),
     sun=(0.7, 0.7, 0.7),
     sun_direction=(3.0, -4.0, -12.0),
@@ -28,16 +28,16 @@ NONE = torch.zeros(2, 0)
 
 def test_each_world_is_tinted_in_its_own_way_and_no_farther_than_black_and_white():
     sway = torch.tensor([[1.0, -1.0, 1.0], [-0.5, 0.0, 1.0]], dtype=torch.float64)
-    made = tint((Meaning.TARGET, Meaning.OBSTACLE), 0.3).change(PLAIN, sway)
+    made = tint((SemanticClass.TARGET, SemanticClass.OBSTACLE), 0.3).change(PLAIN, sway)
     expected = torch.tensor([[1.0, 0.0, 0.3], [0.65, 0.1, 0.3]], dtype=torch.float64)
-    torch.testing.assert_close(made.colors[Meaning.TARGET], expected)
-    assert made.colors[Meaning.SKY] == PLAIN.colors[Meaning.SKY]
-    assert Meaning.OBSTACLE not in made.colors
+    torch.testing.assert_close(made.colors[SemanticClass.TARGET], expected)
+    assert made.colors[SemanticClass.SKY] == PLAIN.colors[SemanticClass.SKY]
+    assert SemanticClass.OBSTACLE not in made.colors
 
 
 def test_white_is_mixed_in():
-    made = whiten((Meaning.TARGET,), 0.5).change(PLAIN, NONE)
-    assert made.colors[Meaning.TARGET].tolist() == pytest.approx([0.9, 0.55, 0.5])
+    made = whiten((SemanticClass.TARGET,), 0.5).change(PLAIN, NONE)
+    assert made.colors[SemanticClass.TARGET].tolist() == pytest.approx([0.9, 0.55, 0.5])
 
 
 def test_the_sun_sinks_where_it_stood():

@@ -9,12 +9,12 @@ from drone_rl.utils.text import said
 def test_the_whole():
     text = said(SHIFTS, EVIDENCE)
     assert text["shifts.good"] == (
-        "Good, with 95% confidence for each range by itself, with the sun 21.1 to 60 degrees high "
-        "(no more was tried) and blur of up to 1.5 pixels."
+        "Good with the sun at 21.1 to 60 degrees (no more was tried) and blur of up to 1.5 pixels "
+        "(95% confidence for each range)."
     )
     assert text["shifts.not"] == "Not with brightness at 0.8 times: cubes on its right 47%."
-    assert text["shifts.impossible"].endswith("height of the sun at 0 degrees, 45%.")
-    assert "succeeds in 2% of flights" in text["shifts.together"]
+    assert text["shifts.impossible"].endswith("elevation of the sun at 0 degrees, 45%.")
+    assert "succeeds in 2% of episodes" in text["shifts.together"]
     assert text["shifts.fixed_seed"].startswith("Fixed seed 0: ")
     said_too = ("good", "not", "impossible", "together", "scope", "fixed_seed")
     assert set(text) == {f"shifts.{name}" for name in said_too}
@@ -50,14 +50,14 @@ def test_an_axis_that_changes_nothing_is_claimed_nowhere():
     same = {"axes.blur.levels.1.modes.constant.unchanged": True}
     text = said(SHIFTS, changed(EVIDENCE, same))
     assert "blur" not in text["shifts.good"]
-    assert text["shifts.untested"] == "Of blur it notices nothing: that was no test."
+    assert text["shifts.untested"] == "Not tested, because without effect: blur."
 
 
 def test_what_the_task_cannot_have():
     refused = {"bad": True, "good": False, "refused": "task.cube_size=9", "value": 9.0}
     refused |= {"end": "high", "oracle": None, "impossible": False}
     text = said(SHIFTS, changed(EVIDENCE, {"domain.ranges.brightness.failed": [refused]}))
-    assert text["shifts.not"] == "Not with brightness at 9 times, which the task can't have."
+    assert text["shifts.not"] == "Not with brightness at 9 times, which the task does not allow."
 
 
 def test_fog_is_good_from_the_least_sight_up():
@@ -65,17 +65,19 @@ def test_fog_is_good_from_the_least_sight_up():
     fog |= {"low_open": False, "high_open": None, "failed": []}
     changes = {"axes.fog": EVIDENCE["axes"]["blur"], "domain.ranges.fog": fog}
     assert (
-        "fog that leaves 85.1 m of sight or more."
+        "fog with a visibility of 85.1 m or more ("
         in said(SHIFTS, changed(EVIDENCE, changes))["shifts.good"]
     )
     between = {**fog, "high": 100.0, "positions": [-0.01, 0.01], "high_open": True}
     text = said(SHIFTS, changed(EVIDENCE, {**changes, "domain.ranges.fog": between}))
-    assert "fog that leaves 85.1 to 100 m of sight (no more was tried)" in text["shifts.good"]
+    assert "fog with a visibility of 85.1 to 100 m (no more was tried)" in text["shifts.good"]
 
 
 def test_all_at_once_names_the_axes():
     text = said(SHIFTS, EVIDENCE)["shifts.together"]
-    assert text.startswith("With height of the sun, blur and brightness at once, each at its third")
+    assert text.startswith(
+        "With elevation of the sun, blur and brightness at once, each at its third"
+    )
     many = {f"axes.{name}": EVIDENCE["axes"]["blur"] for name in list(NAMES)[:8]}
     several = said(SHIFTS, changed(EVIDENCE, many))["shifts.together"]
     assert several.startswith("With all 11 axes of the table at once")
@@ -85,7 +87,7 @@ def test_the_table():
     head, sun, *_ = rows(EVIDENCE)
     assert head == ["success, constant", "1", "2", "3", "4", "5", "area", ""]
     assert sun == [
-        "height of the sun",
+        "elevation of the sun",
         "60: more than 99%",
         "",
         "",

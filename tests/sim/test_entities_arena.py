@@ -2,13 +2,13 @@ import numpy as np
 from dm_control import mjcf
 
 from drone_rl.sim.entities import DRAW_DISTANCE, FLOOR_COLOR, SKY_COLOR, Field
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.scene import SemanticClass
 
 
 def test_the_field_is_a_floor_and_a_sun_without_shadows():
     field = Field()
     model = mjcf.Physics.from_mjcf_model(field.mjcf_model).model
-    assert (model.ngeom, model.nlight) == (1, 1) and field.meaning is Meaning.GROUND
+    assert (model.ngeom, model.nlight) == (1, 1) and field.semantic_class is SemanticClass.GROUND
     np.testing.assert_allclose(model.geom("floor").rgba[:3], FLOOR_COLOR, atol=1e-6)
     assert not model.light_castshadow[0] and model.light_dir[0, 2] < -0.5  # from above
     np.testing.assert_allclose(model.light_ambient[0] + 0.75, 1.1)  # full light is white

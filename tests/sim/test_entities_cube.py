@@ -2,7 +2,7 @@ import numpy as np
 from dm_control import mjcf
 
 from drone_rl.sim.entities import Cube
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.scene import SemanticClass
 
 
 def test_a_cube_is_a_box_of_that_size_and_colour_and_pushes_nothing():
@@ -11,5 +11,5 @@ def test_a_cube_is_a_box_of_that_size_and_colour_and_pushes_nothing():
     assert model.geom_size[0].tolist() == [1.25] * 3  # half edges
     np.testing.assert_allclose(model.geom_rgba[0, :3], (0.1, 0.2, 0.3), atol=1e-6)
     assert not model.geom_contype.any() and not model.geom_conaffinity.any()
-    assert cube.mjcf_model.model == "cube_7" and cube.meaning is Meaning.TARGET
+    assert cube.mjcf_model.model == "cube_7" and cube.semantic_class is SemanticClass.TARGET
     assert cube.geom is cube.mjcf_model.find("geom", "geom")

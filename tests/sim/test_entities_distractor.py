@@ -1,9 +1,9 @@
 from drone_rl.sim.entities import make_distractors
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.scene import SemanticClass
 
 
 def test_all_kinds_take_turns():
     made = make_distractors(4)
     assert [d.geom.type for d in made] == ["box", "sphere", "cylinder", "box"]
-    assert all(d.meaning is Meaning.DISTRACTOR and d.geom.size[0] == 0.5 for d in made)
+    assert all(d.semantic_class is SemanticClass.DISTRACTOR and d.geom.size[0] == 0.5 for d in made)
     assert len({d.mjcf_model.model for d in made}) == 4

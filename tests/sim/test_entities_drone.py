@@ -2,7 +2,7 @@ from dm_control import mjcf
 
 from drone_rl.config import CameraSettings
 from drone_rl.sim.entities import BODY_GROUP, CHASE, DRONE_CAMERAS, Drone, hide_drone
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.scene import SemanticClass
 
 
 def test_a_hull_four_rotors_and_six_cameras():
@@ -15,7 +15,10 @@ def test_a_hull_four_rotors_and_six_cameras():
     assert (model.geom_group == BODY_GROUP).all() and model.body_mass.sum() == 1.0
     found = [model.camera(i).name for i in range(model.ncam)]
     assert found == [spec.name for spec in (*DRONE_CAMERAS, CHASE)]
-    assert model.camera("front_center").fovy.round(6) == 90.0 and drone.meaning is Meaning.DRONE
+    assert (
+        model.camera("front_center").fovy.round(6) == 90.0
+        and drone.semantic_class is SemanticClass.DRONE
+    )
 
 
 def test_observables_are_off_until_a_task_enables_them():

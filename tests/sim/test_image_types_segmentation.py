@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from drone_rl.sim.image_types import check_ids, default_id, default_ids, object_names, palette
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 
@@ -32,7 +32,7 @@ def test_every_geom_has_a_name_and_the_number_of_it():
     names = object_names(scene)
     assert len(names) == scene.model.ngeom
     assert {"ground", "target_0", "target_1", "target_2", "drone"} <= set(names)
-    grounds = scene.geoms(Meaning.GROUND)
+    grounds = scene.geoms(SemanticClass.GROUND)
     assert default_ids(scene)[grounds].tolist() == [148] * len(grounds)
 
 

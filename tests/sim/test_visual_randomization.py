@@ -8,7 +8,7 @@ import torch
 from PIL import Image
 
 from drone_rl.config import MINIMAL, AppearanceSettings, PillarsSettings, TaskSettings
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.visual_randomization import Appearances
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
@@ -49,7 +49,7 @@ def test_a_fixed_look_is_one_for_all_worlds():
     assert look.sun_direction.tolist() == pytest.approx(wanted, abs=1e-9)
     assert look.sun.tolist() == [0.5] * 3 and look.ambient.tolist() == [0.35] * 3
     assert look.fog is None and look.zenith is None and look.is_plain
-    assert set(look.colors) == {Meaning.SKY, Meaning.GROUND}
+    assert set(look.colors) == {SemanticClass.SKY, SemanticClass.GROUND}
 
 
 def test_what_is_drawn_lies_in_its_range_and_fills_it():
@@ -58,17 +58,15 @@ def test_what_is_drawn_lies_in_its_range_and_fills_it():
     assert 160 < look.shadows.sum() < 240
     assert (look.zenith[:, 1:] == torch.tensor([0.5, 1.0])).all() and look.zenith[:, 0].std() > 0.2
     assert torch.allclose(look.sun_direction[:, 2], torch.tensor(-0.5, dtype=torch.float64))
-    ground = look.textures[Meaning.GROUND]
-    assert (
-        ground.pictures == ("grid", "bricks") and 2 <= ground.size.min() <= ground.size.max() <= 4
-    )
+    ground = look.textures[SemanticClass.GROUND]
+    assert ground.images == ("grid", "bricks") and 2 <= ground.size.min() <= ground.size.max() <= 4
     assert all(100 < (ground.choice == which).sum() < 170 for which in (-1, 0, 1))
 
 
 def test_imagined_worlds_look_as_in_the_middle():
     middle = Appearances(DRAWN, 2).middle
     assert middle.fog == 75.0 and middle.zenith.tolist() == [0.5, 0.5, 1.0]
-    assert middle.textures[Meaning.GROUND].choice == -1  # the first
+    assert middle.textures[SemanticClass.GROUND].choice == -1  # the first
 
 
 def test_each_world_draws_by_itself_and_leaves_its_stream_alone():
@@ -112,11 +110,11 @@ def test_camera_and_distractors_of_each_world():
     half = math.sqrt(0.5)
     assert look.camera.turn.tolist() == [pytest.approx([half, 0, 0, half])] * 50
     assert look.camera.zoom is None and looks.distractors == 3
-    assert look.beside.places.shape == (50, 3, 3)
+    assert look.distractors.places.shape == (50, 3, 3)
     part = looks.drawn(torch.tensor([4, 7]))
-    assert torch.equal(part.beside.places, look.beside.places[[4, 7]])
-    assert torch.equal(look[torch.tensor([4, 7])].beside.colors, part.beside.colors)
-    assert looks.middle.beside.of(2).sizes.shape == (2, 3)
+    assert torch.equal(part.distractors.places, look.distractors.places[[4, 7]])
+    assert torch.equal(look[torch.tensor([4, 7])].distractors.colors, part.distractors.colors)
+    assert looks.middle.distractors.expand(2).sizes.shape == (2, 3)
 
 
 def test_a_wider_camera_shows_things_smaller():

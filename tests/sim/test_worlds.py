@@ -7,7 +7,7 @@ from drone_rl.config import TaskSettings
 from drone_rl.sim.actions import Move
 from drone_rl.sim.composer_task import make_environment
 from drone_rl.sim.rendering import Appearance
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.seeding import world_random_state
@@ -49,13 +49,13 @@ def test_the_scene_is_the_dm_control_model_and_knows_what_its_geoms_mean():
     names = [model.geom(i).name for i in range(model.ngeom)]
     assert names == [physics.geom(i).name for i in range(physics.ngeom)]
     found = dict(
-        zip(names, zip(worlds.scene.meanings, worlds.scene.props, strict=True), strict=True)
+        zip(names, zip(worlds.scene.semantic_classes, worlds.scene.props, strict=True), strict=True)
     )
-    assert found.pop("floor") == (Meaning.GROUND, -1)
+    assert found.pop("floor") == (SemanticClass.GROUND, -1)
     for i in range(3):
-        assert found.pop(f"cube_{i}/geom") == (Meaning.TARGET, i)
-    assert found.pop("drone/hull") == (Meaning.DRONE, -1)
-    assert set(found.values()) == {(Meaning.DRONE, -1)} and len(found) == 4  # the rotors
+        assert found.pop(f"cube_{i}/geom") == (SemanticClass.TARGET, i)
+    assert found.pop("drone/hull") == (SemanticClass.DRONE, -1)
+    assert set(found.values()) == {(SemanticClass.DRONE, -1)} and len(found) == 4  # the rotors
 
 
 def test_only_all_worlds_in_their_order_are_stepped_as_a_whole():

@@ -2,7 +2,7 @@ from tools.mirror import PURE_DATA, ROOT, count_lines, modules_without_test
 
 
 def test_modules_and_their_tests_are_paired_by_name_and_folder(tmp_path):
-    for name in ("a", "b", "deep/a", "deep/c", "__init__", "config/training"):
+    for name in ("a", "b", "deep/a", "deep/c", "__init__", "config/networks"):
         path = tmp_path / "drone_rl" / f"{name}.py"
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text("1\n2\n")

@@ -78,7 +78,7 @@ def test_a_mutant_is_another_program():
 def test_the_whole_package_is_mutated():
     found = targets.modules(ROOT)
     assert "drone_rl/evaluation/metrics.py" in found
-    assert "drone_rl/policies/gradients_kernel.py" in found
+    assert "drone_rl/acceleration/gradients_kernel.py" in found
     packages = {path.parent.name for path in (ROOT / "drone_rl").glob("*/__init__.py")}
     assert {name.split("/")[1] for name in found if name.count("/") > 1} == packages
 

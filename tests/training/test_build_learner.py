@@ -10,14 +10,14 @@ from torchrl.collectors import Collector
 from torchrl.objectives.value import GAE
 
 import drone_rl
+from drone_rl.acceleration.fused_collector import FusedCollector
+from drone_rl.acceleration.fused_network import ActivationCache, FusedNetwork
 from drone_rl.config import TaskSettings
 from drone_rl.config.commands import FlightSettings
 from drone_rl.config.learning import A2c, Gae, Ppo, Rollouts, Sgd, Threads
 from drone_rl.config.networks import SmallCnn
 from drone_rl.config.training import TrainerSettings, TrainSettings
 from drone_rl.config.transforms import EpisodeReward, Gray, Stack
-from drone_rl.policies.known_outputs import KnownOutputs
-from drone_rl.policies.learning_network import LearningNetwork
 from drone_rl.training import ActorCriticLearner, ReinforceLearner
 from drone_rl.training.build_collector import build_collector
 from drone_rl.training.build_learner import build_learner
@@ -66,7 +66,7 @@ def test_gradients_by_the_kernel_teach_what_those_of_torch_do():
         made = build_collector(settings)
         learner = build_learner(settings, made)
         network = learner.loss.actor_network.module[0].module
-        assert isinstance(network, LearningNetwork) is is_compiled
+        assert isinstance(network, FusedNetwork) is is_compiled
         before = [p.detach().clone() for p in made.network.parameters()]
         batch = next(iter(made.collector))
         assert len(batch) > 2 * limits.minibatch_frames
@@ -95,24 +95,25 @@ def test_what_the_network_made_is_kept_where_it_is_learned_from(settings, is_kep
     settings = TrainSettings(task=TASK).replace(**settings)
     made = build_collector(settings)
     learner = build_learner(settings, made)
-    flights = [getattr(part, "_flight", None) for part in made.collector.collectors]
-    kept = [flight._known for flight in flights if flight is not None and flight._known is not None]
+    sources = [getattr(part, "source", None) for part in made.collector.collectors]
+    kept = [s._cache for s in sources if isinstance(s, FusedCollector) and s._cache is not None]
     assert (len(kept) == 1) is is_kept and bool(kept) is is_kept
+    assert ("activations" in learner.in_keys) is is_kept
     if is_kept:
-        assert kept[0] is learner.loss.actor_network.module[0].module.known
+        assert kept[0] is learner.loss.actor_network.module[0].module._cache
     made.collector.shutdown()
 
 
 def test_what_was_made_in_flight_is_taken_and_teaches_the_same(monkeypatch):
     learned, taken = [], []
     for is_known in (True, False):
-        find = KnownOutputs.find
+        find = ActivationCache.find
 
         def note(self, *given, find=find, is_known=is_known):
             taken.append(find(self, *given))
             return taken[-1] if is_known else None
 
-        monkeypatch.setattr(KnownOutputs, "find", note)
+        monkeypatch.setattr(ActivationCache, "find", note)
         settings = TrainSettings(task=TASK, trainer=TrainerSettings(minibatch_frames=40))
         made = build_collector(settings)
         learner, batches = build_learner(settings, made), iter(made.collector)

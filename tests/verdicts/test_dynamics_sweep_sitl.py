@@ -1,27 +1,29 @@
 from drone_rl.utils.intervals import proportion
-from drone_rl.verdicts.dynamics_sweep import LOOPED, looped, reasons, with_loops
+from drone_rl.verdicts.dynamics_sweep import LOOPED, cell, left_out, rows, sitl_cell
+from tests.verdicts.test_dynamics_sweep_text import BAD, GOOD
 
-TABLE = [["", "simple flight"], ["good", "good 99.0%"], ["poor", "poor 2.0%"]]
+FLIGHTS = {"good": {"success": proportion(4, 5)}, "poor": {"left_out": "no rotor turned"}}
 NUMBERS = {
-    "policies": {"good": {}, "poor": {}},
-    LOOPED: {"good": {"success": proportion(4, 5)}, "poor": {"left_out": "no rotor turned"}},
+    "bodies": ["simple flight"],
+    "policies": {"good": {"simple flight": GOOD}, "poor": {"simple flight": BAD}},
 }
 
 
-def test_a_share_is_no_verdict():
+def test_a_success_rate_is_no_verdict():
     """Of 4 of 5, exactly: 28% to 99%."""
-    assert looped({"success": proportion(4, 5)}) == "no verdict: 4 of 5 (28 to 99)"
+    assert sitl_cell({"success": proportion(4, 5)}) == "no verdict: 4 of 5 (28 to 99)"
 
 
-def test_a_column_where_there_were_flights():
-    assert with_loops(TABLE, {"policies": {}}) is TABLE
-    assert with_loops(TABLE, NUMBERS) == [
-        ["", "simple flight", "software in the loop"],
-        ["good", "good 99.0%", "no verdict: 4 of 5 (28 to 99)"],
-        ["poor", "poor 2.0%", "left out"],
+def test_a_column_for_episodes_with_software_in_the_loop():
+    head, good, poor = ["", "simple flight"], ["good", cell(GOOD)], ["poor", cell(BAD)]
+    assert rows(NUMBERS) == [head, good, poor]
+    assert rows({**NUMBERS, LOOPED: FLIGHTS}) == [
+        [*head, "software in the loop"],
+        [*good, "no verdict: 4 of 5 (28 to 99)"],
+        [*poor, "left out"],
     ]
 
 
-def test_reasons_are_told():
-    assert reasons({"policies": {}}) == []
-    assert reasons(NUMBERS) == ["poor, software in the loop: no rotor turned"]
+def test_reasons_for_missing_episodes():
+    assert left_out({"policies": {}}) == []
+    assert left_out({**NUMBERS, LOOPED: FLIGHTS}) == ["poor, software in the loop: no rotor turned"]

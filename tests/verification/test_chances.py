@@ -8,7 +8,7 @@ import torch
 import drone_rl
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
-from drone_rl.verification.prover.markov_chain import Bounded
+from drone_rl.verification.prover.markov_chain import SuccessBounds
 
 ONE = {"num_cubes": 1, "side_margin": 2.0}
 
@@ -56,7 +56,7 @@ def test_bounds_are_of_places_where_cubes_may_stand(good, monkeypatch):
 
     def bound(_, box, parts):
         boxes.append(box.tolist())
-        return Bounded(0.0, 1.0, 0.0, 1.0)
+        return SuccessBounds(0.0, 1.0, 0.0, 1.0)
 
     monkeypatch.setattr("drone_rl.verification.chances.bound_success", bound)
     drone_rl.chances(good, [[5.75], [-6.0], [1.0]], task=ONE, within=0.5, progress=silent)
@@ -115,7 +115,7 @@ def test_mistakes_are_told_in_a_line(good, cubes, change, message):
 
 
 def test_flights_have_no_places_that_could_be_counted(good):
-    with pytest.raises(InputError, match="chance of each placement is known of computer-vision"):
+    with pytest.raises(InputError, match="exact probabilities support only dynamics"):
         drone_rl.chances(good.in_dynamics(mode="simple_flight"), progress=silent)
 
 

@@ -124,6 +124,6 @@ def test_damaged_failures_are_refused(tmp_path):
 
 def test_nothing_is_begun_for_who_flies(tmp_path):
     for changes in ({"dynamics": FLIGHT}, {"actions": ActionSettings(kind="velocity")}):
-        with pytest.raises(InputError, match="training until it is proved is known of"):
+        with pytest.raises(InputError, match="proofs support only"):
             begin(tmp_path / "new", **changes)
     assert not (tmp_path / "new").exists()

@@ -69,7 +69,7 @@ def test_memory_is_bounded(tmp_path):
 
 def test_a_state_of_another_policy_is_refused(tmp_path):
     prove(folder=tmp_path, limit_s=0.0)
-    with pytest.raises(InputError, match="is of another proof"):
+    with pytest.raises(InputError, match="belongs to another proof"):
         prove("good", folder=tmp_path)
 
 
@@ -121,7 +121,7 @@ def test_a_policy_with_memory_is_refused(tmp_path):
         trainer=drone_rl.TrainerSettings(total_frames=1),
         progress=silent,
     )
-    with pytest.raises(InputError, match="sees a stack of frames"):
+    with pytest.raises(InputError, match="observes a stack of frames"):
         drone_rl.prove(tmp_path, task=ONE, progress=silent)
 
 

@@ -1,8 +1,8 @@
-"""The sentence of a certificate says what the certificate says."""
+"""The describe_proof of a certificate says what the certificate says."""
 
 import pytest
 
-from drone_rl.verification.text import found, sentence
+from drone_rl.verification.text import describe_proof, found
 
 
 def certificate(won=1.0, undecided=0.0, finished=True, cubes=3):
@@ -20,47 +20,48 @@ def certificate(won=1.0, undecided=0.0, finished=True, cubes=3):
 
 def test_all_placements():
     assert (
-        sentence(certificate()) == "Proved: greedy, it collects all 3 cubes from every placement."
+        describe_proof(certificate())
+        == "Proved: greedy, it collects all 3 cubes from every placement."
     )
-    assert "the cube from every" in sentence(certificate(cubes=1))
+    assert "the cube from every" in describe_proof(certificate(cubes=1))
 
 
 @pytest.mark.parametrize("undecided", [0.5, 1e-12])
 def test_what_is_undecided_is_never_proved(undecided):
-    text = sentence(certificate(won=1 - undecided, undecided=undecided))
+    text = describe_proof(certificate(won=1 - undecided, undecided=undecided))
     assert "every placement" not in text
     assert f"{undecided:.9g} are undecided" in text
 
 
 def test_shares():
-    text = sentence(certificate(won=0.75))
+    text = describe_proof(certificate(won=0.75))
     assert "from a share of 0.75 of all placements and does not from a share of 0.25." in text
 
 
 def test_a_proof_that_was_stopped():
-    text = sentence(certificate(won=0.25, undecided=0.75, finished=False))
+    text = describe_proof(certificate(won=0.25, undecided=0.75, finished=False))
     assert text.endswith("so far (the proof was stopped).")
 
 
 def test_what_helps_a_proof_of_too_many_boxes():
     stopped = certificate(won=0.25, undecided=0.75, finished=False)
     stopped["found"]["stopped_by"] = "most_boxes"
-    assert "more than most_boxes boxes" in sentence(stopped)
-    assert "with a smaller most_combinations" in sentence(stopped)
+    assert "more than most_boxes boxes" in describe_proof(stopped)
+    assert "with a smaller most_combinations" in describe_proof(stopped)
     stopped["found"]["stopped_by"] = "limit_s"
-    assert sentence(stopped).endswith("so far (the proof was stopped).")
+    assert describe_proof(stopped).endswith("so far (the proof was stopped).")
 
 
 def test_nearly_all_is_never_all_and_all_is():
-    nearly = sentence(certificate(won=1 - 1e-12, undecided=1e-12))
+    nearly = describe_proof(certificate(won=1 - 1e-12, undecided=1e-12))
     assert "from a share of more than 0.999999999 of all placements" in nearly
-    assert "does not from a share of 1." in sentence(certificate(won=0.0))
-    lost = sentence(certificate(won=1e-12))
+    assert "does not from a share of 1." in describe_proof(certificate(won=0.0))
+    lost = describe_proof(certificate(won=1e-12))
     assert "from a share of 1e-12 of all placements" in lost
     assert "does not from a share of more than 0.999999999." in lost
-    stopped = sentence(certificate(won=0.0, undecided=1.0, finished=False))
+    stopped = describe_proof(certificate(won=0.0, undecided=1.0, finished=False))
     assert "from a share of 0; a share of 1 are undecided so far" in stopped
-    begun = sentence(certificate(won=1e-12, undecided=1 - 1e-12, finished=False))
+    begun = describe_proof(certificate(won=1e-12, undecided=1 - 1e-12, finished=False))
     assert "a share of more than 0.999999999 are undecided so far" in begun
 
 

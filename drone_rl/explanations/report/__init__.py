@@ -1,4 +1,4 @@
-"""Explanations as something that a person opens and understands; reads files, runs no policy."""
+"""Render explanations as an HTML report; reads files and runs no policy."""
 
 from drone_rl.explanations.report.page import write_report
 

@@ -1,4 +1,4 @@
-"""An explanation's files, read back: plain numbers and arrays."""
+"""Read an explanation's files."""
 
 import dataclasses
 from pathlib import Path
@@ -7,8 +7,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from drone_rl.evaluation.consistency import check_verdict
-from drone_rl.explanations.report.fitting import check_fit
-from drone_rl.explanations.report.shapes import check_sizes
+from drone_rl.explanations.report.validation import check_fit, check_sizes
 from drone_rl.sim.vocabulary import ShownActions, TaskVocabulary, shown_actions, terms_of
 from drone_rl.utils.archives import read_arrays
 from drone_rl.utils.consistency import check_intervals
@@ -26,44 +25,44 @@ FRAME = frozenset(
         *("provenance", *SEED_KEYS),
     }
 )
-"""Entries of explanation.json that are no section's."""
+"""Entries of explanation.json that do not belong to a section."""
 
 
 @dataclasses.dataclass
 class Explanation:
-    """What `drone-rl explain` wrote about one policy."""
+    """The files that `drone-rl explain` wrote for one policy."""
 
     numbers: dict[str, Any]
-    """explanation.json"""
+    """Contents of explanation.json."""
     arrays: dict[str, NDArray]
-    """arrays.npz"""
+    """Arrays of arrays.npz."""
     data: dict[str, NDArray]
-    """The arrays of dataset.npz."""
+    """Arrays of dataset.npz."""
     source: str = "explanation.json"
-    """What the file of the numbers is called, for people."""
+    """Display name of the file of the numbers."""
 
     @property
     def name(self) -> str:
-        """Of the policy."""
+        """Name of the policy."""
         return str(self.numbers["name"])
 
     @property
     def actions(self) -> ShownActions:
-        """What the policy could do."""
+        """The policy's actions."""
         return shown_actions(self.numbers)
 
     @property
     def terms(self) -> TaskVocabulary:
-        """What its task calls things."""
+        """Vocabulary of its task."""
         return terms_of(self.numbers)
 
     @classmethod
     def load(cls, folder: Path, allowance: Allowance | None = None) -> "Explanation":
-        """Reads a folder.
+        """Read a folder.
 
         Args:
-            folder: Its own.
-            allowance: Bytes that the arrays of this explanation and others may have together.
+            folder: Folder of the explanation.
+            allowance: Most bytes of the arrays of all explanations of a report.
 
         Raises:
             InputError: A file is missing, damaged, too large, or of another version.
@@ -102,7 +101,7 @@ class Explanation:
 
 
 def _check_seed(numbers: dict[str, Any]) -> None:
-    """Refuses a seed that is none; files of version 0.1 have it among their settings alone."""
+    """Refuse an invalid seed; files of version 0.1 have it among their settings only."""
     older = as_mapping(numbers.get("settings", {}), "settings").get("seed")
     Maybe(Whole(0)).read(numbers.get("seed", older), "seed")
     Flag().read(numbers.get("seed_is_fixed", True), "seed_is_fixed")

@@ -1,4 +1,4 @@
-"""From explanations to one HTML file that needs nothing else."""
+"""Build a report from explanations: one self-contained HTML file, with its figures beside it."""
 
 import dataclasses
 import functools
@@ -11,27 +11,108 @@ import jinja2
 from markupsafe import Markup
 
 from drone_rl.evaluation.plots.saving import save_drawn, save_numbers, save_rows
+from drone_rl.explanations.report import (
+    attribution,
+    behavior,
+    class_models,
+    embedding,
+    places,
+    response,
+    truth,
+    verdict,
+)
 from drone_rl.explanations.report.explanation import FRAME, Explanation
 from drone_rl.explanations.report.part import Drawn, Part
-from drone_rl.explanations.report.sections import find_parts
-from drone_rl.explanations.report.source_text import SENTENCES as SOURCE
 from drone_rl.utils.display import content_security_policy, page_environment, static_text
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import to_file_name
+from drone_rl.utils.files import newest, to_file_name
 from drone_rl.utils.limits import ARRAYS_BYTES, Allowance
 from drone_rl.utils.text import percent, say
 
+PARTS: dict[str, Part] = {
+    "evaluation": verdict.EVALUATION_PART,
+    "shifts": verdict.SHIFTS_PART,
+    "dataset": behavior.DATASET_PART,
+    "embedding": embedding.PART,
+    "flaws": behavior.FLAWS_PART,
+    "class_models": class_models.PART,
+    "attribution": attribution.PART,
+    "truth": truth.PART,
+    "response": response.RESPONSE_PART,
+    "places": places.PART,
+    "asymmetry": response.ASYMMETRY_PART,
+    "left_out": verdict.LEFT_OUT_PART,
+}
+"""All parts in the order of the page, named like the sections in `explanations.explain.SECTIONS`.
+
+Entries of an explanation that no part shows are printed as JSON.
+"""
 STYLES = ("style.css", "report.css")
 """Files of the page's one style element."""
 SCRIPTS = ("map.js", "zoom.js")
-"""Files of the page's one script element; parts give them data in elements of type JSON."""
+"""Files of the page's one script element; their data are in elements of type JSON."""
+_INCOMPLETE = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError)
+"""Errors while rendering that a missing number or one of another type causes."""
+
+
+def report(folders: Sequence[Path], target: Path) -> Path:
+    """Build a report, see `write_report`.
+
+    Raises:
+        InputError: An explanation can't be read or is incomplete, or the report can't be written.
+    """
+    try:
+        return write_report(folders, target)
+    except InputError:
+        raise
+    except (*_INCOMPLETE, jinja2.TemplateError) as error:
+        names = ", ".join(map(str, folders))
+        raise InputError(
+            f"explanations={names} do not hold what a report needs "
+            f"({type(error).__name__}: {str(error)[:200]}); run drone-rl explain again"
+        ) from error
+
+
+def find_explanations(which: Sequence[str], outputs: str | Path = "outputs") -> list[Path]:
+    """Return folders of explanations.
+
+    Args:
+        which: Folders of explanations, folders that contain such folders, or "latest" alone.
+        outputs: Folder that contains explanations.
+
+    Raises:
+        InputError: There is none.
+    """
+    if tuple(which) != ("latest",):
+        return [folder for path in which for folder in _explanations(Path(path))]
+    made = Path(outputs).glob("explain/runs/*/*/explanation.json")
+    run = newest({path.parents[1] for path in made})
+    if run is None:
+        raise InputError(
+            f"explanations=latest, but there is none under {outputs}/explain; "
+            "run drone-rl explain first or give folders"
+        )
+    return _explanations(run)
+
+
+def _explanations(folder: Path) -> list[Path]:
+    """Return the folder itself or, if it is that of a whole command, all explanations in it."""
+    if (folder / "explanation.json").is_file():
+        return [folder]
+    found = sorted(path.parent for path in folder.glob("*/explanation.json"))
+    if not found:
+        raise InputError(
+            f"explanations={folder} holds no explanation.json; give a folder that drone-rl explain "
+            "wrote"
+        )
+    return found
 
 
 def write_report(folders: Sequence[Path], target: Path) -> Path:
-    """Writes report.html and, under figures/, each figure as PNG with its numbers beside it.
+    """Write report.html and, in figures/, each figure as PNG with its numbers.
 
     Args:
-        folders: Each with one explanation; several stand side by side.
+        folders: One explanation each; several are shown side by side.
         target: Folder of the report.
 
     Returns:
@@ -53,7 +134,7 @@ def write_report(folders: Sequence[Path], target: Path) -> Path:
         path = target / "report.html"
         path.write_text(render_page(policies), encoding="utf-8")
     except jinja2.TemplateNotFound:
-        raise  # an OSError too, of which the folder is not the cause
+        raise  # also an OSError, but not caused by the folder
     except OSError as error:
         raise InputError(
             f"report in {target} can't be written ({error.strerror}); choose another folder"
@@ -63,24 +144,24 @@ def write_report(folders: Sequence[Path], target: Path) -> Path:
 
 @dataclasses.dataclass(frozen=True)
 class Policy:
-    """One explanation on its way to the page."""
+    """One explanation and where its figures are saved."""
 
     explanation: Explanation
     folder: Path
-    """Of the figures."""
+    """Folder of the figures."""
     prefix: str
-    """Of the names of its files."""
+    """Start of their file names."""
 
     def check(self) -> None:
         """Make all sentences and tables once, so that a wrong number is found before rendering."""
-        for part in find_parts().values():
+        for part in PARTS.values():
             if part.fits(self.explanation):
                 part.tables(self.explanation)
-                for may in part.words.values():
-                    say(may, self.explanation.numbers)
+                for sentences in part.text.values():
+                    say(sentences, self.explanation.numbers)
 
     def show(self, part: Part) -> dict[str, Any]:
-        """Saves what a part makes of this policy; returns what the part's template needs."""
+        """Save the figures and numbers of a part; return what its template needs."""
         for name, rows in part.tables(self.explanation).items():
             save_rows(rows, self.folder / f"{self.prefix}_{name}")
         for name in part.needs:
@@ -90,7 +171,7 @@ class Policy:
             "numbers": self.explanation.numbers,
             "actions": self.explanation.actions,
             "pictures": _save(part.draw(self.explanation), self.folder, f"{self.prefix}_"),
-            "words": {n: say(may, self.explanation.numbers) for n, may in part.words.items()},
+            "text": {n: say(one, self.explanation.numbers) for n, one in part.text.items()},
             "terms": self.explanation.terms,
             "extras": part.extras(self.explanation),
         }
@@ -114,30 +195,28 @@ def render_page(policies: Sequence[Policy]) -> str:
 
 @functools.cache
 def _environment() -> jinja2.Environment:
-    """The templates of this page, compiled once."""
+    """Return the templates of this page, compiled once."""
     environment = page_environment("drone_rl.explanations.report")
-    environment.filters |= {"percent": _short, "json": _json}
+    environment.filters |= {"percent": _short_percent, "json": _json}
     return environment
 
 
 def _source(explanation: Explanation) -> str:
-    """Which file the figures of a policy were read from."""
-    return say(SOURCE, {**explanation.numbers, "source": explanation.source})
+    return say(verdict.SOURCE, {**explanation.numbers, "source": explanation.source})
 
 
 def _parts(environment: jinja2.Environment, policies: Sequence[Policy]) -> list[dict[str, Any]]:
-    """Everything that is in the explanations, in the order of the page."""
-    known = find_parts()
+    """Return the parts that some explanation fits, in the order of the page."""
     htmls = {
-        name: _part(environment.get_template(f"sections/{name}.html"), part, policies)
-        for name, part in sorted(known.items(), key=lambda item: item[1].is_slow)
+        name: _render(environment.get_template(f"sections/{name}.html"), part, policies)
+        for name, part in sorted(PARTS.items(), key=lambda item: item[1].is_slow)
     }
     parts = [
         {"id": name, "title": part.title, "label": part.label, "html": htmls[name]}
-        for name, part in known.items()
+        for name, part in PARTS.items()
         if htmls[name]
     ]
-    others = [(p.explanation, _others(p.explanation, known.values())) for p in policies]
+    others = [(p.explanation, _others(p.explanation, PARTS.values())) for p in policies]
     if any(keys for _, keys in others):
         html = Markup(environment.get_template("others.html").render(others=others))
         parts.append({"id": "others", "title": "Other numbers", "label": "Others", "html": html})
@@ -145,13 +224,13 @@ def _parts(environment: jinja2.Environment, policies: Sequence[Policy]) -> list[
 
 
 def _others(explanation: Explanation, parts: Iterable[Part]) -> list[str]:
-    """Entries that no part shows, such as those of a newer version."""
+    """Return entries that no part shows, such as those of a newer version."""
     shown = FRAME.union(*(part.needs for part in parts if part.fits(explanation)))
     return sorted(explanation.numbers.keys() - shown)
 
 
-def _part(template: jinja2.Template, part: Part, policies: Sequence[Policy]) -> Markup | None:
-    """One part with all policies that have it; None where none has."""
+def _render(template: jinja2.Template, part: Part, policies: Sequence[Policy]) -> Markup | None:
+    """Return one part with all policies that it fits; None if there is none."""
     fitting = [policy for policy in policies if part.fits(policy.explanation)]
     if not fitting:
         return None
@@ -164,9 +243,9 @@ def _save(drawn: Drawn, folder: Path, prefix: str) -> Mapping[str, str]:
     return {name: save_drawn(one, folder / f"{prefix}{name}") for name, one in drawn.items()}
 
 
-def _short(share: float) -> str:
-    """A share for a table."""
-    return percent(share).replace("less than ", "<").replace("more than ", ">")
+def _short_percent(fraction: float) -> str:
+    """Format a fraction for a table."""
+    return percent(fraction).replace("less than ", "<").replace("more than ", ">")
 
 
 def _json(value: Any) -> str:

@@ -25,7 +25,7 @@ from drone_rl.sim.sensors import (
     GpsReading,
     ImuReading,
     MagnetometerReading,
-    Senses,
+    SensorSuite,
 )
 
 COASTING = 0.06
@@ -55,7 +55,7 @@ class Sensors:
             settings: Rates, latencies and noise.
             seed: Seed of the noise.
         """
-        self._senses = Senses(settings, seed=seed)
+        self._senses = SensorSuite(settings, seed=seed)
         self._state = self._senses.start(body)
 
     @property

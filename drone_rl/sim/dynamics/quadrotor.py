@@ -15,7 +15,7 @@ from drone_rl.sim.dynamics import flight_kernel
 from drone_rl.sim.dynamics.control import Goals, make_steering, rotor_goals
 from drone_rl.sim.dynamics.rigid_body_kernel import make_airframe
 from drone_rl.sim.dynamics.state import CLIMB, BodyState, FlightState, Obstacles
-from drone_rl.sim.rendering.devices import Crew, on_torch_stream, start_warp
+from drone_rl.sim.rendering.devices import WorkerPool, on_torch_stream, start_warp
 
 _LEAST_WORK = 3000
 """Ticks of all drones together for which a second thread is worth its while."""
@@ -117,15 +117,15 @@ class Quadrotor:
             wp.launch(flight_kernel.fly, last - first, inputs=inputs, device=str(device))
 
         if device.type == "cpu" and count * ticks >= _LEAST_WORK:
-            self._crew.share_out(0, count, work)
+            self._workers.map_spans(0, count, work)
         else:
             with on_torch_stream(device):
                 work(0, 0, count)
         return FlightState(after)
 
     @functools.cached_property
-    def _crew(self) -> Crew:
-        return Crew(2**30)
+    def _workers(self) -> WorkerPool:
+        return WorkerPool(2**30)
 
 
 @functools.cache

@@ -1,4 +1,4 @@
-"""How things look: colours, light, textures and air, which may differ from world to world."""
+"""Appearance of a scene: colours, light, textures, fog and camera mounting, per environment."""
 
 import dataclasses
 import math
@@ -8,34 +8,39 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.scene import SemanticClass
 
+Color = tuple[float, float, float]
+"""Red, green, blue in [0, 1]."""
+Colors = Color | Tensor
+"""One for all environments, or one each: shape (num_worlds, 3)."""
+Scalars = float | Tensor
+"""One for all environments, or one each: shape (num_worlds,)."""
 AXES = {"roll": (1.0, 0.0, 0.0), "pitch": (0.0, 1.0, 0.0), "yaw": (0.0, 0.0, 1.0)}
-"""What a camera turns around, drone frame: x forward, y left, z up."""
-_LEVEL = (1.0, 0.0, 0.0, 0.0)
+"""Axes that a camera rotates about, drone frame: x forward, y left, z up."""
+_LIGHTS = ("ambient", "sun", "sun_direction")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Mounting:
-    """How one camera differs from the model's; each value is one for all worlds or one for each."""
+    """Changes of one camera's mounting; each value is one for all environments or one each."""
 
     camera: str = "drone/front_center"
-    """Its full name in the model; all others stay as they are."""
+    """Full name in the model; other cameras keep their mounting."""
     offset: tuple[float, ...] | Tensor = (0.0, 0.0, 0.0)
     """Metres, drone frame. Shape: (3,) or (num_worlds, 3)."""
-    turn: tuple[float, ...] | Tensor = _LEVEL
-    """About its own place, drone frame, a quaternion (w, x, y, z). Shape: (4,) or
+    turn: tuple[float, ...] | Tensor = (1.0, 0.0, 0.0, 0.0)
+    """Rotation about the camera's position, drone frame, quaternion (w, x, y, z). Shape: (4,) or
     (num_worlds, 4)."""
     zoom: float | Tensor | None = None
-    """How many times as large things look in the middle of the picture. Shape: () or
-    (num_worlds,)."""
+    """Magnification at the centre of the image. Shape: () or (num_worlds,)."""
 
 
 def moved(mounting: Mounting | None, offset: Tensor, turn: Tensor) -> Mounting:
-    """A camera that is moved, then turned about itself, both in the frame that it had before.
+    """Translate a camera, then rotate it about itself, both in the frame it had before.
 
     Args:
-        mounting: How it was mounted; as in the model by default.
+        mounting: The mounting before; the model's by default.
         offset: Metres. Shape: (num_worlds, 3).
         turn: Quaternions. Shape: (num_worlds, 4).
     """
@@ -48,24 +53,24 @@ def moved(mounting: Mounting | None, offset: Tensor, turn: Tensor) -> Mounting:
 
 
 def turned(axis: str, degrees: float | Tensor) -> Tensor:
-    """Quaternions of turns around one of `AXES`. Shape: (*, 4) of degrees of shape (*)."""
+    """Return quaternions of rotations about one of `AXES`. Shapes: (*) to (*, 4)."""
     half = torch.deg2rad(torch.as_tensor(degrees, dtype=torch.float64)) / 2
     around = half.new_tensor(AXES[axis])
     return torch.cat([half.cos()[..., None], half.sin()[..., None] * around], -1)
 
 
-def zoom_of(own: float, wanted: Tensor) -> Tensor:
-    """How much larger things look by another field of view.
+def zoom_for_fov(own: float, wanted: Tensor) -> Tensor:
+    """Return the `Mounting.zoom` that gives a field of view.
 
     Args:
-        own: Degrees.
+        own: The camera's field of view, degrees.
         wanted: Degrees. Shape: (*).
     """
     return math.tan(math.radians(own) / 2) / torch.tan(torch.deg2rad(wanted) / 2)
 
 
 def product(a: Tensor, b: Tensor) -> Tensor:
-    """Quaternions (w, x, y, z) one after the other: b in the frame that a makes. Shapes: (*, 4)."""
+    """Multiply quaternions (w, x, y, z): b in the frame of a. Shapes: (*, 4)."""
     a, b = torch.broadcast_tensors(a, b)
     scalar = a[..., :1] * b[..., :1] - (a[..., 1:] * b[..., 1:]).sum(-1, keepdim=True)
     cross = torch.linalg.cross(a[..., 1:], b[..., 1:])
@@ -73,153 +78,138 @@ def product(a: Tensor, b: Tensor) -> Tensor:
 
 
 def rotate(attitude: Tensor, vector: Tensor) -> Tensor:
-    """A vector in the frame in which an attitude is given. Shapes: (*, 4) and (*, 3)."""
+    """Rotate vectors by quaternions. Shapes: (*, 4) and (*, 3)."""
     axis, vector = torch.broadcast_tensors(attitude[..., 1:], vector)
     twice = 2 * torch.linalg.cross(axis, vector)
     return vector + attitude[..., :1] * twice + torch.linalg.cross(axis, twice)
 
 
-Color = tuple[float, float, float]
-"""Red, green, blue, from 0 to 1."""
-Several = Color | Tensor
-"""One for all worlds, or one for each: shape (num_worlds, 3)."""
-Numbers = float | Tensor
-"""One for all worlds, or one for each: shape (num_worlds,)."""
-_LIGHTS = ("ambient", "sun", "sun_direction")
-
-
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Texture:
-    """A picture that covers things, tile by tile; its colours are multiplied by theirs."""
+    """A tiled texture; its colours are multiplied by those of the geoms."""
 
-    pictures: tuple[str, ...]
-    """Names or files, see `textures.load`: all of those that worlds choose from."""
-    size: Numbers
+    images: tuple[str, ...]
+    """Names or files that environments choose from, see `textures.load`."""
+    size: Scalars
     """Edge of a tile, metres."""
-    choice: Numbers = 0
-    """Which of the pictures, a whole number; -1 for none."""
+    choice: Scalars = 0
+    """Index of the image, a whole number; -1 for none."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Beside:
-    """The distractors; those of one world for all, or of each."""
+class Distractors:
+    """Distractors, the same for all environments or one set each."""
 
     places: Tensor
-    """Metres, world frame. Shape: (num_worlds, count, 3) or (count, 3)."""
+    """Positions, metres, world frame. Shape: (num_worlds, count, 3) or (count, 3)."""
     sizes: Tensor
-    """Edges or diameters, metres: factors, for they are 1 m in the model.
-    Shape: (num_worlds, count) or (count,)."""
+    """Edges or diameters, metres; in the model they are 1 m. Shape: (num_worlds, count) or
+    (count,)."""
     colors: Tensor
     """Shape: as that of `places`."""
 
-    def of(self, num_worlds: int) -> "Beside":
-        """Those of so many worlds, each with its own."""
+    def expand(self, num_worlds: int) -> "Distractors":
+        """Return them with a first dimension of environments."""
         count = self.places.shape[-2]
-        return Beside(
+        return Distractors(
             places=self.places.expand(num_worlds, count, 3),
             sizes=self.sizes.expand(num_worlds, count),
             colors=self.colors.expand(num_worlds, count, 3),
         )
 
-    def and_more(self, other: "Beside") -> "Beside":
-        """These, then others of as many worlds."""
-        own = self.of(len(other.places))
-        return Beside(
-            places=torch.cat([own.places, other.places], 1),
-            sizes=torch.cat([own.sizes, other.sizes], 1),
-            colors=torch.cat([own.colors, other.colors], 1),
-        )
+    def concat(self, other: "Distractors") -> "Distractors":
+        """Append the distractors of another set with as many environments."""
+        own = vars(self.expand(len(other.places)))
+        both = {name: torch.cat([value, getattr(other, name)], 1) for name, value in own.items()}
+        return Distractors(**both)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Appearance:
-    """What looks otherwise than in the model; what is not given stays as it is there."""
+    """Changes to how a scene looks; what is not given stays as in the model."""
 
-    colors: Mapping[Meaning, Several] = dataclasses.field(default_factory=dict)
-    """Of all things with a meaning, the sky's among them."""
-    ambient: Several | None = None
-    """Light from everywhere."""
-    sun: Several | None = None
-    """Light of the sun."""
-    sun_direction: Several | None = None
-    """Where its light goes, world frame; need not be of length 1."""
-    zenith: Several | None = None
-    """Colour of the sky overhead; the sky's own is then that at the horizon, and between them it
-    goes with the sine of the elevation."""
-    fog: Numbers | None = None
-    """Visibility in metres: at this distance 95% of a thing's contrast to the horizon is lost
+    colors: Mapping[SemanticClass, Colors] = dataclasses.field(default_factory=dict)
+    """Of the geoms of a class, and of the sky."""
+    ambient: Colors | None = None
+    """Ambient light."""
+    sun: Colors | None = None
+    """Directional light."""
+    sun_direction: Colors | None = None
+    """Direction in which the sun's light travels, world frame; need not have length 1."""
+    zenith: Colors | None = None
+    """Colour of the sky overhead. The sky's own colour is then that at the horizon, and the two are
+    blended by the sine of the elevation."""
+    fog: Scalars | None = None
+    """Visibility in metres: the distance at which 95% of the contrast to the horizon is lost
     (meteorological optical range, WMO-No. 8). Infinite for clear air."""
-    shadows: Numbers | None = None
-    """Whether solids keep the sun from what is behind them: 1 or 0."""
-    exposure: Numbers | None = None
-    """The camera multiplies all colours by it before it cuts them off at white."""
-    textures: Mapping[Meaning, Texture] = dataclasses.field(default_factory=dict)
-    """Of things with a meaning, but for the sky."""
+    shadows: Scalars | None = None
+    """Whether solids cast shadows in sunlight: 1 or 0."""
+    exposure: Scalars | None = None
+    """Factor of all colours before they are clipped at white."""
+    textures: Mapping[SemanticClass, Texture] = dataclasses.field(default_factory=dict)
+    """Of the geoms of a class; the sky has none."""
     camera: Mounting | None = None
     """How a camera differs from the model's."""
-    beside: Beside | None = None
-    """The distractors: their colours and sizes are drawn so; who draws worlds puts their places
-    behind those of the task's props."""
+    distractors: Distractors | None = None
+    """A renderer uses their colours and sizes; the caller appends their positions to those of the
+    task's props."""
 
     @property
     def is_plain(self) -> bool:
-        """Whether every face of a thing, and the whole sky, has one colour."""
+        """Whether every face and the whole sky have one colour: no effects."""
         is_shaded = bool(torch.as_tensor(0 if self.shadows is None else self.shadows).any())
         return self.zenith is None and self.fog is None and not is_shaded and not self.textures
 
     def lights(self, num_worlds: int) -> dict[str, Tensor]:
-        """Those that are given, of each world, by name; directions have length 1.
-
-        Args:
-            num_worlds: As many as it has.
+        """Return the lights that are given, by name; directions have length 1.
 
         Returns:
             Shapes: (num_worlds, 3), float64.
         """
         given = {name: getattr(self, name) for name in _LIGHTS}
-        lights = {name: each(v, num_worlds) for name, v in given.items() if v is not None}
+        lights = {name: expand_color(v, num_worlds) for name, v in given.items() if v is not None}
         if "sun_direction" in lights:
             direction = lights["sun_direction"]
             lights["sun_direction"] = direction / direction.norm(dim=-1, keepdim=True)
         return lights
 
     def over(self, other: "Appearance | None") -> "Appearance":
-        """The same, with what it does not give taken from another."""
+        """Return this appearance, completed by another where this one gives nothing."""
         if other is None:
             return self
-        own = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
-        given = {name: value for name, value in own.items() if value is not None}
+        given = {name: value for name, value in vars(self).items() if value is not None}
         for name in ("colors", "textures"):
-            given[name] = {**getattr(other, name), **own[name]}
+            given[name] = {**getattr(other, name), **given[name]}
         return dataclasses.replace(other, **given)
 
     def __getitem__(self, worlds: slice | Tensor) -> "Appearance":
-        """Returns that of some worlds."""
-        return _cut(self, worlds)
+        """Return the appearance of some environments."""
+        return _select(self, worlds)
 
 
-def each(value: Several, num_worlds: int) -> Tensor:
-    """One value for each world. Shape: (num_worlds, 3), float64."""
+def expand_color(value: Colors, num_worlds: int) -> Tensor:
+    """Return one colour or direction per environment. Shape: (num_worlds, 3), float64."""
     return torch.as_tensor(value, dtype=torch.float64).expand(num_worlds, 3)
 
 
-def each_number(value: Numbers, num_worlds: int) -> Tensor:
-    """The same of numbers. Shape: (num_worlds,), float64."""
+def expand_scalar(value: Scalars, num_worlds: int) -> Tensor:
+    """Return one number per environment. Shape: (num_worlds,), float64."""
     return torch.as_tensor(value, dtype=torch.float64).expand(num_worlds)
 
 
-_NUMBERS = frozenset({"fog", "shadows", "exposure", "size", "choice", "zoom"})
-_OF_BESIDE = {"places": 2, "sizes": 1, "colors": 2}
-"""Dimensions of what is one for all worlds."""
+_SHARED_DIMENSIONS = {
+    **dict.fromkeys(("fog", "shadows", "exposure", "size", "choice", "zoom"), 0),
+    **{"places": 2, "sizes": 1},
+}
+"""Dimensions of a field's tensor that is shared by all environments; 1 where not listed."""
 
 
-def _cut(value: Any, worlds: slice | Tensor, shared: int = 1) -> Any:
-    """What some worlds have of anything; a tensor of at most so many dimensions is for all."""
+def _select(value: Any, worlds: slice | Tensor, shared: int = 1) -> Any:
+    """Select environments; a tensor of at most `shared` dimensions is kept whole."""
     if isinstance(value, Mapping):
-        return {meaning: _cut(of, worlds) for meaning, of in value.items()}
-    if isinstance(value, Beside):
-        return Beside(**{n: _cut(v, worlds, _OF_BESIDE[n]) for n, v in vars(value).items()})
-    if isinstance(value, Appearance | Texture | Mounting):
-        given = vars(value).items()
-        return type(value)(**{n: _cut(v, worlds, 0 if n in _NUMBERS else 1) for n, v in given})
+        return {semantic_class: _select(of, worlds) for semantic_class, of in value.items()}
+    if isinstance(value, Distractors | Appearance | Texture | Mounting):
+        shares = {**_SHARED_DIMENSIONS, "colors": 2 if isinstance(value, Distractors) else 1}
+        given = {n: _select(v, worlds, shares.get(n, 1)) for n, v in vars(value).items()}
+        return type(value)(**given)
     return value[worlds] if isinstance(value, Tensor) and value.dim() > shared else value

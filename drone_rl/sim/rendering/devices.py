@@ -1,4 +1,4 @@
-"""Where pictures are drawn, and Warp, which does it, started without a word."""
+"""Compute devices, Warp's start-up and kernel loading, and a worker pool for CPU kernels."""
 
 import functools
 import os
@@ -15,12 +15,15 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.imports import standard_error_closed
 from drone_rl.utils.provenance import num_cores
 
+_LOADING = threading.Lock()
+"""Two threads may both be the first to load kernels."""
+
 
 def check_device(device: str) -> None:
-    """Refuses a device that this machine lacks.
+    """Check that this machine has a device.
 
     Raises:
-        InputError: It is neither "cpu" nor a CUDA device that is there.
+        InputError: It is neither "cpu" nor an available CUDA device.
     """
     kind = device.split(":")[0]
     if kind not in ("cpu", "cuda"):
@@ -31,42 +34,35 @@ def check_device(device: str) -> None:
 
 @functools.cache
 def start_warp(device: str) -> None:
-    """Starts Warp, once; on a CPU it says nothing of the CUDA that is missing.
+    """Initialize Warp once; on a CPU, without its warnings about missing CUDA.
 
     Raises:
-        InputError: There is no such device.
+        InputError: This machine has no such device.
     """
     check_device(device)
     quiet = wp.LOG_ERROR if device == "cpu" else wp.LOG_WARNING
     wp.config.log_level = max(wp.config.log_level, quiet)
     with standard_error_closed() if device == "cpu" else nullcontext():
-        wp.init()  # its native part tells, whatever the level
+        wp.init()  # its native part ignores the log level
 
 
-def loading(kernels: ModuleType) -> Future[None]:
-    """Kernels for the CPU, compiled on a thread aside or taken from the cache, once a process.
+def load_kernels(kernels: ModuleType) -> Future[None]:
+    """Compile a module's CPU kernels, or load them from Warp's cache, in a thread.
 
-    The first time a compiler works for seconds at each module, and at several at once on as many
-    cores: so ask early, and wait for the result before the first launch.
-
-    Args:
-        kernels: The module that has them.
+    Compiling a module takes seconds, but several modules compile in parallel: call this early, and
+    wait for the result before the first launch. Later calls return the same future.
     """
     start_warp("cpu")
-    with _ONE_AT_A_TIME:
-        return _loading(kernels, os.getpid())
-
-
-_ONE_AT_A_TIME = threading.Lock()
-"""Asks: two threads that draw may both be the first."""
+    with _LOADING:
+        return _load_kernels(kernels, os.getpid())
 
 
 @functools.cache
-def _loading(kernels: ModuleType, process: int) -> Future[None]:
-    del process  # none of its threads goes on in a fork
-    aside = ThreadPoolExecutor(1, "compile")
-    loaded = aside.submit(_load, kernels)
-    aside.shutdown(wait=False)
+def _load_kernels(kernels: ModuleType, process: int) -> Future[None]:
+    del process  # a fork has none of its parent's threads
+    compiler = ThreadPoolExecutor(1, "compile")
+    loaded = compiler.submit(_load, kernels)
+    compiler.shutdown(wait=False)
     return loaded
 
 
@@ -75,45 +71,45 @@ def _load(kernels: ModuleType) -> None:
 
 
 def on_torch_stream(device: torch.device) -> AbstractContextManager:
-    """Puts Warp's launches in order with torch's on a GPU; a CPU has no streams."""
+    """Order Warp's launches with torch's on a GPU; a CPU has no streams."""
     if device.type == "cpu":
         return nullcontext()
     return wp.ScopedStream(wp.stream_from_torch(torch.cuda.current_stream(device)))
 
 
-class Crew:
-    """Shares rows of a batch out among threads; Warp's kernels let go of the interpreter's lock."""
+class WorkerPool:
+    """Threads that split a batch: a Warp CPU kernel runs on one core, without Python's lock."""
 
     def __init__(self, num_rows: int, size: int | None = None) -> None:
-        """Starts the threads.
+        """Start the threads.
 
         Args:
-            num_rows: About how many rows there will be; no more threads than that.
-            size: How many threads; the number of cores by default.
+            num_rows: Expected batch size; there are no more threads than rows.
+            size: Number of threads; the number of cores by default.
         """
         self.size = max(1, min(size or num_cores(), num_rows))
-        self._pool = None if self.size == 1 else ThreadPoolExecutor(self.size, "render")
+        self._executor = None if self.size == 1 else ThreadPoolExecutor(self.size, "render")
 
-    def share_out(self, first: int, last: int, work: Callable[[int, int, int], None]) -> None:
-        """Calls `work(member, first, last)` for each member's share of rows, and waits.
+    def map_spans(self, first: int, last: int, work: Callable[[int, int, int], None]) -> None:
+        """Call `work(worker, begin, end)` for each worker's span of rows, and wait.
 
         Args:
             first: The first row.
-            last: The one after the last.
-            work: What each member does with its rows.
+            last: One past the last row.
+            work: Processes rows from `begin` up to, not including, `end`.
         """
-        share = -(-(last - first) // self.size)
-        spans = [(i, min(i + share, last)) for i in range(first, last, max(share, 1))]
-        if self._pool is None or len(spans) < 2:
-            for member, span in enumerate(spans):
-                work(member, *span)
+        length = -(-(last - first) // self.size)
+        spans = [(i, min(i + length, last)) for i in range(first, last, max(length, 1))]
+        if self._executor is None or len(spans) < 2:
+            for worker, span in enumerate(spans):
+                work(worker, *span)
             return
-        others = [self._pool.submit(work, i, *span) for i, span in enumerate(spans[1:], 1)]
+        others = [self._executor.submit(work, i, *span) for i, span in enumerate(spans[1:], 1)]
         work(0, *spans[0])
         for other in others:
             other.result()
 
     def close(self) -> None:
-        """Ends the threads."""
-        if self._pool is not None:
-            self._pool.shutdown()
+        """Stop the threads."""
+        if self._executor is not None:
+            self._executor.shutdown()

@@ -1,4 +1,9 @@
-"""What a renderer must offer: pictures of worlds that it does not hold."""
+"""The renderer interface, and the choice of a renderer by name.
+
+`raytrace` (the default) is this project's ray tracer of simple solids, on CPU and GPU;
+`mujoco_warp` renders any MuJoCo model, about twenty times slower. A dm_control simulation renders
+with OpenGL instead (see `opengl`).
+"""
 
 import dataclasses
 import importlib
@@ -16,80 +21,79 @@ from drone_rl.utils.errors import InputError
 
 @dataclasses.dataclass
 class Poses(Batch):
-    """Where everything that moves is. Metres, world frame."""
+    """Poses of everything that moves. Metres, world frame."""
 
     position: Tensor  # (num_worlds, 3)
     """Of the drone."""
     attitude: Tensor  # (num_worlds, 4)
     """Of the drone, unit quaternion (w, x, y, z)."""
     props: Tensor  # (num_worlds, num_props, 3)
-    """Of the task's props, in its order."""
+    """Positions of the task's props, in its order."""
 
 
 class Renderer(Protocol):
-    """Draws worlds of one scene."""
+    """Renders a batch of environments that share one scene; it holds no simulation state."""
 
     def prepare(self, view: View) -> None:
-        """Makes ready what a view needs; kernels may be left to the first picture.
+        """Prepare a view; kernels may be loaded by the first `render`.
 
         Raises:
-            InputError: It can't draw such a view; the message says what it can draw.
+            InputError: The renderer does not support the view.
         """
         ...
 
     def render(
         self, view: View, poses: Poses, appearance: Appearance | None = None
     ) -> dict[Modality, Tensor]:
-        """Draws any number of worlds.
+        """Render any number of environments.
 
         Args:
-            view: What is asked for.
+            view: Cameras, image size and modalities.
             poses: Where everything is.
-            appearance: How it looks; as in the model by default.
+            appearance: Colours, light and effects; the model's own by default.
 
         Returns:
-            What is asked for, by name. Shapes: (num_worlds, num_cameras, H, W, *). "rgb": uint8,
-            3 numbers a pixel; "gray": float32, what the transform `GrayPixels` makes of these;
-            "depth", "distance": float32, metres along the camera's axis or along the pixel's own
-            ray, 0 where nothing is hit; "segmentation": int32, number of the geom, -1 where
-            nothing is hit; "normals": float32, 3 numbers a pixel, the direction of length 1 in
-            which the surface looks, world frame, all 0 where nothing is hit.
+            Images by modality. Shapes: (num_worlds, num_cameras, H, W, *). "rgb": uint8, 3 a pixel;
+            "gray": float32, equal to what the transform `GrayPixels` makes of RGB; "depth",
+            "distance": float32, metres along the camera's axis or along the pixel's ray, 0 where
+            nothing is hit; "segmentation": int32, geom index, -1 where nothing is hit; "normals":
+            float32, 3 a pixel, unit normal of the surface, world frame, 0 where nothing is hit.
 
         Raises:
-            InputError: It can't draw such a view.
+            InputError: The renderer does not support the view or the appearance.
         """
         ...
 
     def close(self) -> None:
-        """Ends what it has started."""
+        """Stop the worker threads."""
         ...
 
 
-class MakeRenderer(Protocol):
+class RendererFactory(Protocol):
     """Makes a renderer of a scene."""
 
     def __call__(
         self, scene: Scene, *, num_worlds: int, num_shards: int | None, device: str
     ) -> Renderer:
-        """Makes it.
+        """Make the renderer.
 
         Args:
-            scene: What will be drawn.
-            num_worlds: About how many worlds are drawn in a call.
-            num_shards: Shares of the batch, each on a thread; as it sees fit by default.
-            device: Where pictures are wanted: "cpu", "cuda" or "cuda:N".
+            scene: What to render.
+            num_worlds: About how many environments one call renders.
+            num_shards: Worker threads that split the batch; the renderer's choice by default.
+            device: Where images are wanted: "cpu", "cuda" or "cuda:N".
         """
         ...
 
 
-def find_renderer(which: str | MakeRenderer) -> MakeRenderer:
-    """What makes a renderer.
+def find_renderer(which: str | RendererFactory) -> RendererFactory:
+    """Return a renderer's factory.
 
     Args:
-        which: Its name, see `RENDERERS`, or what makes it itself.
+        which: A name of `RENDERERS`, or the factory itself.
 
     Raises:
-        InputError: There is none of that name.
+        InputError: No renderer has that name.
     """
     if not isinstance(which, str):
         return which

@@ -1,19 +1,20 @@
-# pyright: reportAttributeAccessIssue=false
-# (MuJoCo's compiled bindings are untyped.)
-"""A compiled model of a task's world, in which everything that is drawn has a meaning."""
+"""A compiled MuJoCo model of a task, with a semantic class for each geom."""
 
 import dataclasses
 import enum
+from typing import Any
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from drone_rl.utils.errors import InputError
 
+_UNSET = (0.5, 0.5, 0.5, 1.0)
+"""MuJoCo's colour of a geom that was given none."""
 
-class Meaning(enum.IntEnum):
-    """Of one thing. Which target is the next one is not told here: that is the state's business."""
+
+class SemanticClass(enum.IntEnum):
+    """What an object is to the drone. Which target comes next is part of the task's state."""
 
     SKY = 0
     GROUND = 1
@@ -23,40 +24,37 @@ class Meaning(enum.IntEnum):
     DISTRACTOR = 5
 
 
-_UNSET = (0.5, 0.5, 0.5, 1.0)
-"""Of a geom that was given none."""
-
-
 @dataclasses.dataclass(frozen=True)
 class Scene:
     """The model that all simulators and renderers share, and what its geoms are."""
 
-    model: mujoco.MjModel
-    meanings: tuple[Meaning, ...]
+    model: Any
+    """A `mujoco.MjModel`, whose bindings are untyped."""
+    semantic_classes: tuple[SemanticClass, ...]
     """Of each geom."""
     props: tuple[int, ...]
-    """The task's prop that each geom belongs to, by number; -1 for what belongs to none."""
+    """Index of the task's prop that each geom belongs to; -1 for none."""
     sky: tuple[float, float, float]
-    """Red, green, blue in [0, 1] where nothing else is."""
+    """Background colour: red, green, blue in [0, 1]."""
 
-    def geoms(self, meaning: Meaning) -> list[int]:
-        """Numbers of the geoms with a meaning."""
-        return [i for i, found in enumerate(self.meanings) if found is meaning]
+    def geoms(self, semantic_class: SemanticClass) -> list[int]:
+        """Return the indices of the geoms of a class."""
+        return [i for i, found in enumerate(self.semantic_classes) if found is semantic_class]
 
     def seen(self, show_drone: bool) -> list[int]:
-        """Numbers of the geoms that a view shows; none of those that nothing is to be seen of."""
-        of_things = zip(self.meanings, self.colors[:, 3], strict=True)
+        """Return the indices of the geoms that a view shows; invisible geoms are left out."""
+        geoms = zip(self.semantic_classes, self.colors[:, 3], strict=True)
         return [
             i
-            for i, (meaning, opacity) in enumerate(of_things)
-            if opacity > 0 and (show_drone or meaning is not Meaning.DRONE)
+            for i, (semantic_class, opacity) in enumerate(geoms)
+            if opacity > 0 and (show_drone or semantic_class is not SemanticClass.DRONE)
         ]
 
     @property
     def colors(self) -> NDArray[np.float32]:
-        """Red, green, blue and opacity of each geom.
+        """Red, green, blue and opacity of each geom, in [0, 1]. Shape: (num_geoms, 4).
 
-        As in MuJoCo, the material's where the geom has the colour that it has by default.
+        As in MuJoCo, a geom with the default colour has its material's.
         """
         model, colors = self.model, self.model.geom_rgba.copy()
         is_materials = (model.geom_matid >= 0) & (colors == _UNSET).all(1)
@@ -64,13 +62,15 @@ class Scene:
         return colors
 
     def camera(self, name: str) -> int:
-        """Number of a camera.
+        """Return the index of a camera.
 
         Raises:
-            InputError: There is none of that name.
+            InputError: The model has no camera of that name.
         """
-        number = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_CAMERA, name)
-        if number < 0:
+        try:
+            return self.model.camera(name).id
+        except KeyError as error:
             names = ", ".join(self.model.camera(i).name for i in range(self.model.ncam))
-            raise InputError(f"camera {name!r} is not in the model; choose from: {names}")
-        return number
+            raise InputError(
+                f"camera {name!r} is not in the model; choose from: {names}"
+            ) from error

@@ -1,7 +1,4 @@
-"""Pictures that cover things: made here by formula, or the user's own files.
-
-Those made here are gray, so that the colour of a thing is its material's.
-"""
+"""Texture images: procedural ones, which are gray, and the user's PNG or JPEG files."""
 
 import functools
 import math
@@ -16,20 +13,20 @@ from PIL import Image
 from drone_rl.utils.errors import InputError
 
 MOST_PIXELS = 4096
-"""Of a picture, each way."""
+"""Of an image, each way."""
 _FORMATS = ("PNG", "JPEG")
 _SIDE = 256
-"""Texels of those that are made here, each way."""
+"""Texels of procedural textures, each way."""
 
 
 def checker() -> NDArray[np.float64]:
-    """Two light and two dark squares."""
+    """Return two light and two dark squares."""
     half = np.arange(_SIDE) < _SIDE // 2
     return np.where(half[:, None] == half[None, :], 1.0, 0.55)
 
 
 def grid() -> NDArray[np.float64]:
-    """Fields with a dark frame, each of four by four fields with thin ones."""
+    """Return thick grid lines around 4 x 4 cells with thin ones."""
     at = np.arange(_SIDE)
     frame = np.minimum(at, _SIDE - 1 - at) < _SIDE // 64
     fine = np.minimum(at % 64, 63 - at % 64) < 1
@@ -38,7 +35,7 @@ def grid() -> NDArray[np.float64]:
 
 
 def bricks() -> NDArray[np.float64]:
-    """Eight courses of bricks, four a course, each of a brightness of its own."""
+    """Return eight courses of four bricks, each with its own brightness."""
     rows, columns = np.mgrid[:_SIDE, :_SIDE]
     course = rows // 32
     shifted = (columns + 32 * (course % 2)) % _SIDE
@@ -48,67 +45,66 @@ def bricks() -> NDArray[np.float64]:
 
 
 def noise() -> NDArray[np.float64]:
-    """Uneven ground: spots of all sizes."""
+    """Return uneven ground: smooth noise at seven scales."""
     source, spots = np.random.RandomState(0), np.zeros((_SIDE, _SIDE))
     for size in (4, 8, 16, 32, 64, 128, 256):
         spots += _stretched(source.uniform(-1.0, 1.0, (size, size))) / size**0.5
     return np.clip(0.78 + 0.22 * spots / spots.std() / 2, 0.0, 1.0)
 
 
-MADE: Mapping[str, Callable[[], NDArray[np.float64]]] = MappingProxyType(
-    {made.__name__: made for made in (checker, grid, bricks, noise)}
+PROCEDURAL: Mapping[str, Callable[[], NDArray[np.float64]]] = MappingProxyType(
+    {texture.__name__: texture for texture in (checker, grid, bricks, noise)}
 )
-"""Pictures by name. Values: from 0 to 1, shape (side, side)."""
+"""Textures by name. Values: in [0, 1], shape (side, side)."""
 
 
 @functools.cache
 def load(name: str) -> NDArray[np.uint8]:
-    """A texture.
+    """Load a texture.
 
     Args:
-        name: Of one that is made here, or a PNG or JPEG file; that is stretched to a square whose
+        name: A name of `PROCEDURAL`, or a PNG or JPEG file, which is stretched to a square whose
             side is a power of 2.
 
     Returns:
         Red, green, blue. Shape: (side, side, 3).
 
     Raises:
-        InputError: There is no such file, it is no picture, or it is too large.
+        InputError: The file does not exist, is not an image, or is too large.
     """
-    if name in MADE:
-        gray = np.round(MADE[name]() * 255.0).astype(np.uint8)
+    if name in PROCEDURAL:
+        gray = np.round(PROCEDURAL[name]() * 255.0).astype(np.uint8)
         return np.repeat(gray[..., None], 3, -1)
     path = Path(name).expanduser()
     try:
         if not path.is_file():
             raise FileNotFoundError(path)
-        with Image.open(path, formats=_FORMATS) as picture:
-            width, height = picture.size
+        with Image.open(path, formats=_FORMATS) as image:
+            width, height = image.size
             is_small = max(width, height) <= MOST_PIXELS
             side = 2 ** math.ceil(math.log2(max(width, height)))
-            square = picture.convert("RGB").resize((side, side)) if is_small else None
+            square = image.convert("RGB").resize((side, side)) if is_small else None
     except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
         raise InputError(
-            f"texture={name!r} is no picture that can be read; give a PNG or JPEG file, or one of: "
-            f"{', '.join(MADE)}"
+            f"texture={name!r} can't be read as an image; give a PNG or JPEG file, or one of: "
+            f"{', '.join(PROCEDURAL)}"
         ) from error
     if square is None:
         raise InputError(
-            f"texture={name!r} is a picture of {width}x{height} pixels; give one of at most "
+            f"texture={name!r} has {width}x{height} pixels; give an image of at most "
             f"{MOST_PIXELS} each way"
         )
     return np.asarray(square)
 
 
 def levels(texture: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """A texture and its mip levels, each the means of four texels of the one before.
+    """Return a texture and its mip levels, each the 2 x 2 means of the one before.
 
     Args:
         texture: Shape: (side, side, 3), the side a power of 2.
 
     Returns:
-        Texel after texel, from the finest level to the single texel of the coarsest.
-        Shape: (num_texels, 3).
+        All texels from the finest level to the coarsest, a single texel. Shape: (num_texels, 3).
     """
     level, rows = texture.astype(np.float32), [texture.reshape(-1, 3)]
     while len(level) > 1:
@@ -119,7 +115,7 @@ def levels(texture: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 
 def _stretched(spots: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Spots at the full size, smooth between them and over the edges."""
+    """Interpolate noise to the full size, periodic at the edges."""
     at = np.arange(_SIDE) * len(spots) / _SIDE
     first, share = at.astype(int), at % 1.0
     share = share * share * (3.0 - 2.0 * share)

@@ -1,4 +1,4 @@
-"""What is asked of a renderer: which cameras, how large, and what of it."""
+"""What a renderer is asked for: cameras, image size and modalities; RGB to grayscale."""
 
 import dataclasses
 from collections.abc import Container
@@ -10,8 +10,8 @@ from torch import Tensor
 from drone_rl.utils.errors import InputError
 
 Modality = Literal["rgb", "gray", "depth", "distance", "segmentation", "normals"]
-"""What a pixel says: colour, brightness, how far away (along the camera's axis, along the pixel's
-own ray), which geom, which way its surface looks."""
+"""What a pixel holds: colour, brightness, depth along the camera's axis, distance along the pixel's
+ray, geom index, surface normal."""
 MODALITIES: tuple[Modality, ...] = get_args(Modality)
 _KINDS: dict[Modality, tuple[torch.dtype, tuple[int, ...]]] = {
     "rgb": (torch.uint8, (3,)),
@@ -22,26 +22,31 @@ _KINDS: dict[Modality, tuple[torch.dtype, tuple[int, ...]]] = {
     "normals": (torch.float32, (3,)),
 }
 """Type and shape of a pixel."""
+LUMA = (0.299, 0.587, 0.114)
+"""Weights of red, green and blue in a gray pixel (ITU-R BT.601), as in the original study."""
+WEIGHTS = tuple((torch.tensor(LUMA) / 255.0).tolist())
+"""The same for bytes, rounded to float32, so that gray is in [0, 1]."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class View:
-    """Pictures of every world: what each of some cameras shows, all of one size.
+    """Cameras that a renderer renders for each environment, all at one image size.
 
     Raises:
-        InputError: The size is out of range, nothing is asked for, or a modality is unknown.
+        InputError: The size is out of range, nothing is requested, or a modality is unknown.
     """
 
     cameras: tuple[str, ...]
     """Full names of cameras in the model, such as "drone/front_center"."""
     height: int
+    """Pixels, 1 to 4096, as `width`."""
     width: int
     modalities: tuple[Modality, ...] = ("rgb",)
     show_drone: bool = False
-    """Whether the drone's own body is drawn; its own cameras leave it out."""
+    """Whether to render the drone's own body, which its own cameras leave out."""
 
     def __post_init__(self) -> None:
-        """Refuses what can't be drawn."""
+        """Validates the request."""
         if not self.cameras:
             raise InputError("cameras=() shows nothing; name a camera or more")
         if not self.modalities:
@@ -52,52 +57,42 @@ class View:
         if not (1 <= self.height <= 4096 and 1 <= self.width <= 4096):
             raise InputError(f"view of {self.height}x{self.width} pixels; give 1 to 4096 each way")
 
-    def check_modalities(self, renderer: object, drawn: Container[str]) -> None:
-        """Refuses a view that a renderer does not know.
-
-        Args:
-            renderer: The renderer.
-            drawn: Modalities that it knows.
+    def check_modalities(self, renderer: object, supported: Container[str]) -> None:
+        """Check that a renderer supports all modalities of this view.
 
         Raises:
-            InputError: One of this one's is none of them.
+            InputError: It does not support one of them.
         """
         for modality in self.modalities:
-            if modality not in drawn:
-                known = ", ".join(name for name in MODALITIES if name in drawn)
+            if modality not in supported:
+                known = ", ".join(name for name in MODALITIES if name in supported)
                 raise InputError(
                     f"view {modality!r} can't be drawn by {type(renderer).__name__}; "
                     f"ask for one of: {known}"
                 )
 
-    def new_pictures(
+    def new_images(
         self, num_worlds: int, device: torch.device | str = "cpu"
     ) -> dict[Modality, Tensor]:
-        """Pictures to be drawn into; see `Renderer.render` for their shapes."""
+        """Allocate uninitialized images; see `Renderer.render` for their shapes."""
         size = (num_worlds, len(self.cameras), self.height, self.width)
-        pictures: dict[Modality, Tensor] = {}
-        for modality in self.modalities:
-            dtype, pixel = _KINDS[modality]
-            pictures[modality] = torch.empty((*size, *pixel), dtype=dtype, device=device)
-        return pictures
-
-
-def _one_of(names: tuple[str, ...]) -> str:
-    return f"{', '.join(names[:-1])} or {names[-1]}"
-
-
-LUMA = (0.299, 0.587, 0.114)
-"""Weights of red, green and blue in a gray pixel (ITU-R BT.601), as in the original study."""
-WEIGHTS = tuple((torch.tensor(LUMA) / 255.0).tolist())
-"""The same for bytes, rounded to float32, so that gray is from 0 to 1."""
+        return {
+            modality: torch.empty((*size, *pixel), dtype=dtype, device=device)
+            for modality in self.modalities
+            for dtype, pixel in [_KINDS[modality]]
+        }
 
 
 def to_gray(rgb: Tensor) -> Tensor:
-    """RGB bytes to gray from 0 to 1. Shapes: (*, 3), uint8, to (*), float32.
+    """Convert RGB bytes to gray in [0, 1]. Shapes: (*, 3), uint8, to (*), float32.
 
-    Each sum is rounded as kernels round it, so that gray is the same on every machine: a product of
-    matrices would be rounded as its library likes.
+    Each sum is rounded as the kernels round it, so that gray is the same on every machine; a matrix
+    product would round as its library does.
     """
     red, green, blue = rgb.unbind(-1)
     two = (red * WEIGHTS[0]).double() + green.double() * WEIGHTS[1]
     return (two.float().double() + (blue * WEIGHTS[2]).double()).float()
+
+
+def _one_of(names: tuple[str, ...]) -> str:
+    return f"{', '.join(names[:-1])} or {names[-1]}"

@@ -2,7 +2,7 @@
 
 from drone_rl.sim.sensors.inertial import Imu, ImuReading, Magnetometer, MagnetometerReading
 from drone_rl.sim.sensors.position import Barometer, BarometerReading, Fix, Gps, GpsReading
-from drone_rl.sim.sensors.suite import CollisionState, Senses, SensesState
+from drone_rl.sim.sensors.suite import CollisionState, SensorSuite, SensorSuiteState
 
 __all__ = [
     "Barometer",
@@ -15,6 +15,6 @@ __all__ = [
     "ImuReading",
     "Magnetometer",
     "MagnetometerReading",
-    "Senses",
-    "SensesState",
+    "SensorSuite",
+    "SensorSuiteState",
 ]

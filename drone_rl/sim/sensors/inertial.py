@@ -10,7 +10,7 @@ from drone_rl.config.dynamics import GRAVITY
 from drone_rl.config.sensors import ImuSettings, MagnetometerSettings
 from drone_rl.sim.coordinates import HOME, GeoPoint, body_from_world, geo_from_world
 from drone_rl.sim.dynamics.state import BodyState
-from drone_rl.sim.sensors.sensor import Samples, Sampling, normal, walked
+from drone_rl.sim.sensors.sensor import Samples, Sampling, normal, random_walk_step
 from drone_rl.utils.batch import Batch
 
 STANDARD_GRAVITY = 9.80665
@@ -22,7 +22,7 @@ _DEGREES_PER_ROOT_HOUR = math.radians(1.0) / 60.0
 
 @dataclasses.dataclass
 class ImuReading(Batch):
-    """What the sensors of `num_worlds` drones tell. Body frame: x forward, y left, z up."""
+    """What the sensors of `num_worlds` drones read. Body frame: x forward, y left, z up."""
 
     time: Tensor  # (num_worlds,) float64
     """When it was taken, seconds; minus infinity before the first."""
@@ -119,8 +119,10 @@ class Imu:
         felt = felt + state.accel_bias + accel_noise * normal(felt, generator)
         gyro_step = own.noise * own.gyro_bias_stability * _DEGREES_PER_HOUR
         accel_step = own.noise * own.accel_bias_stability * _MICRO_G
-        gyro = walked(state.gyro_bias, gyro_step, own.gyro_bias_time, seconds, generator)
-        accel = walked(state.accel_bias, accel_step, own.accel_bias_time, seconds, generator)
+        gyro = random_walk_step(state.gyro_bias, gyro_step, own.gyro_bias_time, seconds, generator)
+        accel = random_walk_step(
+            state.accel_bias, accel_step, own.accel_bias_time, seconds, generator
+        )
         rows = torch.cat([felt, turning, body.attitude], 1)
         due = is_due[:, None]
         return ImuState(
@@ -132,8 +134,8 @@ class Imu:
         )
 
     def read(self, state: ImuState, time: Tensor) -> ImuReading:
-        """What the sensors tell at a time (seconds, shape (num_worlds,))."""
-        taken, rows = self.sampling.tell(state.samples, time)
+        """What the sensors read at a time (seconds, shape (num_worlds,))."""
+        taken, rows = self.sampling.read(state.samples, time)
         return ImuReading(taken, rows[:, :3], rows[:, 3:6], rows[:, 6:])
 
 
@@ -169,7 +171,7 @@ def dipole_field(place: Tensor) -> Tensor:
 
 @dataclasses.dataclass
 class MagnetometerReading(Batch):
-    """What the magnetometers of `num_worlds` drones tell."""
+    """What the magnetometers of `num_worlds` drones read."""
 
     time: Tensor  # (num_worlds,) float64
     """When it was taken, seconds; minus infinity before the first."""
@@ -233,8 +235,8 @@ class Magnetometer:
         return MagnetometerState(self.sampling.take(state.samples, time, rows), state.bias)
 
     def read(self, state: MagnetometerState, time: Tensor) -> MagnetometerReading:
-        """What the magnetometers tell at a time (seconds, shape (num_worlds,))."""
-        return MagnetometerReading(*self.sampling.tell(state.samples, time))
+        """What the magnetometers read at a time (seconds, shape (num_worlds,))."""
+        return MagnetometerReading(*self.sampling.read(state.samples, time))
 
     def field(self, position: Tensor) -> Tensor:
         """Earth's field at places of the world, gauss, world frame. Shape: (num_worlds, 3)."""

@@ -9,7 +9,7 @@ from torch import Tensor
 from drone_rl.config.sensors import BarometerSettings, GpsSettings
 from drone_rl.sim.coordinates import HOME, GeoPoint, geo_from_world
 from drone_rl.sim.dynamics.state import BodyState
-from drone_rl.sim.sensors.sensor import Samples, Sampling, forgotten, normal
+from drone_rl.sim.sensors.sensor import Samples, Sampling, gauss_markov_step, normal
 from drone_rl.utils.batch import Batch
 
 
@@ -24,7 +24,7 @@ class Fix(enum.IntEnum):
 
 @dataclasses.dataclass
 class GpsReading(Batch):
-    """What the receivers of `num_worlds` drones tell."""
+    """What the receivers of `num_worlds` drones read."""
 
     time: Tensor  # (num_worlds,) float64
     """When it was taken, seconds; minus infinity before the first."""
@@ -97,8 +97,8 @@ class Gps:
         return GpsState(self.sampling.take(state.samples, time, rows))
 
     def read(self, state: GpsState, time: Tensor) -> GpsReading:
-        """What the receivers tell at a time (seconds, shape (num_worlds,))."""
-        taken, rows = self.sampling.tell(state.samples, time)
+        """What the receivers read at a time (seconds, shape (num_worlds,))."""
+        taken, rows = self.sampling.read(state.samples, time)
         error, is_valid = rows[:, 6], taken.isfinite()
         fix = torch.full_like(taken, Fix.NONE, dtype=torch.int64)
         fix[is_valid & (error <= self.settings.error_2d)] = Fix.TWO_D
@@ -124,7 +124,7 @@ _TOP = 11_000.0
 """Height of the layer in which this holds, metres."""
 
 
-def pressure_share(altitude: Tensor) -> Tensor:
+def pressure_ratio(altitude: Tensor) -> Tensor:
     """Pressure at an altitude over that at the sea; from 11 km on, that at 11 km.
 
     Args:
@@ -134,7 +134,7 @@ def pressure_share(altitude: Tensor) -> Tensor:
     return (1 - _LAPSE * height / SEA_LEVEL_TEMPERATURE) ** _EXPONENT
 
 
-def altitude_of(share: Tensor) -> Tensor:
+def altitude_from_pressure_ratio(share: Tensor) -> Tensor:
     """The way back: metres above the sea. Shape: (*)."""
     height = SEA_LEVEL_TEMPERATURE / _LAPSE * (1 - share ** (1 / _EXPONENT))
     return _EARTH_RADIUS * height / (_EARTH_RADIUS - height)
@@ -142,7 +142,7 @@ def altitude_of(share: Tensor) -> Tensor:
 
 @dataclasses.dataclass
 class BarometerReading(Batch):
-    """What the barometers of `num_worlds` drones tell."""
+    """What the barometers of `num_worlds` drones read."""
 
     time: Tensor  # (num_worlds,) float64
     """When it was taken, seconds; minus infinity before the first."""
@@ -204,12 +204,16 @@ class Barometer:
         if not is_due.any():
             return state
         strength = own.noise * own.drift
-        drift = forgotten(state.drift, strength, own.drift_time, time - state.time, generator)
+        drift = gauss_markov_step(
+            state.drift, strength, own.drift_time, time - state.time, generator
+        )
         at_sea = 100.0 * own.sea_level_pressure
-        exact = at_sea * pressure_share(self.home.altitude + body.position[:, 2])
+        exact = at_sea * pressure_ratio(self.home.altitude + body.position[:, 2])
         noise = own.noise * own.white_noise * normal(exact, generator)
         pressure = exact * (1 + drift[:, 0]) + noise
-        rows = torch.stack([pressure, altitude_of(pressure.clamp(min=1.0) / at_sea)], 1)
+        rows = torch.stack(
+            [pressure, altitude_from_pressure_ratio(pressure.clamp(min=1.0) / at_sea)], 1
+        )
         return BarometerState(
             self.sampling.take(state.samples, time, rows),
             torch.where(is_due, time, state.time),
@@ -217,6 +221,6 @@ class Barometer:
         )
 
     def read(self, state: BarometerState, time: Tensor) -> BarometerReading:
-        """What the barometers tell at a time (seconds, shape (num_worlds,))."""
-        taken, rows = self.sampling.tell(state.samples, time)
+        """What the barometers read at a time (seconds, shape (num_worlds,))."""
+        taken, rows = self.sampling.read(state.samples, time)
         return BarometerReading(taken, rows[:, 0], rows[:, 1])

@@ -77,7 +77,7 @@ class Sampling:
             torch.where(is_due[..., None], taken, samples.rows),
         )
 
-    def tell(self, samples: Samples, time: Tensor) -> tuple[Tensor, Tensor]:
+    def read(self, samples: Samples, time: Tensor) -> tuple[Tensor, Tensor]:
         """The newest reading that is old enough to be told.
 
         Args:
@@ -109,7 +109,7 @@ def normal(like: Tensor, generator: torch.Generator) -> Tensor:
     return drawn.to(like.device)
 
 
-def walked(
+def random_walk_step(
     value: Tensor, strength: float, time: float, seconds: Tensor, generator: torch.Generator
 ) -> Tensor:
     """A random walk a step farther on.
@@ -125,7 +125,7 @@ def walked(
     return value + strength * share * normal(value, generator)
 
 
-def forgotten(
+def gauss_markov_step(
     value: Tensor, strength: float, time: float, seconds: Tensor, generator: torch.Generator
 ) -> Tensor:
     """A Gauss-Markov process a step farther on: it forgets itself, and stays within bounds.
@@ -133,7 +133,7 @@ def forgotten(
     Args:
         value: Before. Shape: (num_worlds, n).
         strength: Standard deviation after a long time, whatever the steps.
-        time: Seconds in which 63% of the value is forgotten.
+        time: Seconds in which 63% of the value is gauss_markov_step.
         seconds: Length of the step. Shape: (num_worlds,).
         generator: Of the noise.
     """

@@ -82,7 +82,7 @@ def read(
         worlds: Indices of the drones that are asked; all by default. Shape: (k,).
 
     Returns:
-        What to tell of the drones that were asked, and what all of them remember from now on.
+        What to read of the drones that were asked, and what all of them remember from now on.
     """
     worlds = torch.arange(len(state), device=state.position.device) if worlds is None else worlds
     flag = state.has_collided.clone()
@@ -107,7 +107,7 @@ def _where(condition: Tensor, chosen: Tensor, other: Tensor) -> Tensor:
 
 
 @dataclasses.dataclass
-class SensesState(Batch):
+class SensorSuiteState(Batch):
     """What the sensors of `num_worlds` drones hold."""
 
     time: Tensor  # (num_worlds,) float64
@@ -124,7 +124,7 @@ class SensesState(Batch):
     """What was touched."""
 
 
-class Senses:
+class SensorSuite:
     """All sensors of drones; each draws its noise from a stream of its own."""
 
     def __init__(
@@ -155,7 +155,7 @@ class Senses:
             torch_generator(seed, Stream.SENSORS, number=4 * number + i) for i in range(4)
         ]
 
-    def start(self, body: BodyState) -> SensesState:
+    def start(self, body: BodyState) -> SensorSuiteState:
         """Sensors that are turned on now; their time begins at 0.
 
         Args:
@@ -164,7 +164,7 @@ class Senses:
         """
         time = torch.zeros_like(body.position[:, 0])
         imu, barometer, magnetometer, gps = self._streams
-        state = SensesState(
+        state = SensorSuiteState(
             time,
             self.imu.start(body, time, imu),
             self.barometer.start(body, time, barometer),
@@ -174,7 +174,7 @@ class Senses:
         )
         return dataclasses.replace(state, collision=_touched(state.collision, body))
 
-    def update(self, state: SensesState, body: BodyState, seconds: float) -> SensesState:
+    def update(self, state: SensorSuiteState, body: BodyState, seconds: float) -> SensorSuiteState:
         """The same sensors later.
 
         Once a tick, no reading is late by more than that. Less often, the accelerometer tells means
@@ -187,7 +187,7 @@ class Senses:
         """
         time = state.time + seconds
         imu, barometer, magnetometer, gps = self._streams
-        return SensesState(
+        return SensorSuiteState(
             time,
             self.imu.update(state.imu, body, time, imu),
             self.barometer.update(state.barometer, body, time, barometer),
@@ -196,25 +196,25 @@ class Senses:
             _touched(state.collision, body),
         )
 
-    def read_imu(self, state: SensesState) -> ImuReading:
-        """What accelerometers and gyroscopes tell."""
+    def read_imu(self, state: SensorSuiteState) -> ImuReading:
+        """What accelerometers and gyroscopes read."""
         return self.imu.read(state.imu, state.time)
 
-    def read_barometer(self, state: SensesState) -> BarometerReading:
-        """What barometers tell."""
+    def read_barometer(self, state: SensorSuiteState) -> BarometerReading:
+        """What barometers read."""
         return self.barometer.read(state.barometer, state.time)
 
-    def read_magnetometer(self, state: SensesState) -> MagnetometerReading:
-        """What magnetometers tell."""
+    def read_magnetometer(self, state: SensorSuiteState) -> MagnetometerReading:
+        """What magnetometers read."""
         return self.magnetometer.read(state.magnetometer, state.time)
 
-    def read_gps(self, state: SensesState) -> GpsReading:
-        """What receivers tell."""
+    def read_gps(self, state: SensorSuiteState) -> GpsReading:
+        """What receivers read."""
         return self.gps.read(state.gps, state.time)
 
     def read_collision(
-        self, state: SensesState, worlds: Tensor | None = None
-    ) -> tuple[CollisionState, SensesState]:
+        self, state: SensorSuiteState, worlds: Tensor | None = None
+    ) -> tuple[CollisionState, SensorSuiteState]:
         """What drones were touched by, and the sensors after they have told it; see `read`.
 
         Args:

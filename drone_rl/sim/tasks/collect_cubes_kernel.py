@@ -84,14 +84,14 @@ def place(flights: Flights, world: int, poses: Poses) -> None:
         world: Which of them.
         poses: Of as many worlds.
     """
-    poses.places[world, DRONE_FRAME] = wp.vec3(flights.drones[world])
+    poses.positions[world, DRONE_FRAME] = wp.vec3(flights.drones[world])
     if is_flying(flights.fleet):
         poses.attitudes[world] = camera_attitude(flights.fleet, world)
     for cube in range(flights.cubes.shape[1]):
         at = flights.cubes[world, cube]
         if flights.fates[world, cube] != STANDS:
             at[2] = at[2] - _DEPTH
-        poses.places[world, DRONE_FRAME + 1 + cube] = wp.vec3(at)
+        poses.positions[world, DRONE_FRAME + 1 + cube] = wp.vec3(at)
 
 
 @wp.func
@@ -184,7 +184,7 @@ class FlyingCubes:
         self.flights.front_bound = settings.front_bound
         self.flights.side_bound = settings.side_bound
         self.flights.step_limit = settings.step_limit
-        self.poses.places = wp.from_torch(places, dtype=wp.vec3)
+        self.poses.positions = wp.from_torch(places, dtype=wp.vec3)
         self.poses.attitudes = wp.from_torch(attitudes, dtype=wp.vec4)
 
     @staticmethod

@@ -18,7 +18,7 @@ from torch import Tensor
 from drone_rl.config import CameraSettings
 from drone_rl.sim.actions import Actions, Entry
 from drone_rl.sim.dynamics import BodyState, ComputerVision, Dynamics, Obstacles
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.vocabulary import TaskVocabulary
 from drone_rl.utils.batch import Batch
 from drone_rl.utils.errors import InputError
@@ -64,7 +64,7 @@ class EndReason(enum.IntEnum):
 class Prop(Protocol):
     """A dm_control entity that a task adds to the scene."""
 
-    meaning: Meaning
+    semantic_class: SemanticClass
 
     @property
     def mjcf_model(self) -> mjcf.RootElement:

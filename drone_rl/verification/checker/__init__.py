@@ -1,17 +1,17 @@
-"""The second checker of certificates: slow, plain, and with nothing of the prover in it."""
+"""The independent checker of certificates: slow, plain, and without any code of the prover."""
 
 from drone_rl.verification.checker.certificate import (
     Certificate,
     Outcome,
+    check_same_policy,
     fingerprint,
     read_certificate,
-    refuse_another,
 )
 from drone_rl.verification.checker.checker import (
     Contradiction,
     Findings,
     check_certificate,
-    read_tried,
+    read_validated,
 )
 from drone_rl.verification.checker.sampling import find
 
@@ -21,9 +21,9 @@ __all__ = [
     "Findings",
     "Outcome",
     "check_certificate",
+    "check_same_policy",
     "find",
     "fingerprint",
     "read_certificate",
-    "read_tried",
-    "refuse_another",
+    "read_validated",
 ]

@@ -1,4 +1,4 @@
-"""A certificate out of a file: data of bounded size, read strictly and believed in nothing."""
+"""Read certificates: data of bounded size, parsed strictly, nothing in it trusted."""
 
 import dataclasses
 import hashlib
@@ -34,41 +34,32 @@ from drone_rl.verification.requirements import require_cubes, require_moves
 FORMAT = "drone_rl certificate"
 FORMAT_VERSION = 1
 MOST_BOXES = 2**17
-MOST_CORNERS = 2**20
-"""Of all boxes together."""
+MOST_CORNERS = 2**20  # corners of all boxes together
 MOST_CUBES = 8
 MOST_OUTCOMES = 2**11
-MOST_STEPS = 20_000
-"""Numbers of steps in all outcomes together."""
-LEAST_BORDER = 2.0**-100
-"""Metres from 0 to a border that is not 0: exact sums need as many bits as this has zeros."""
-MOST_BORDER = 2.0**20
-"""Metres from 0 to any border."""
+MOST_STEPS = 20_000  # step counts of all outcomes together
+LEAST_BORDER = 2.0**-100  # metres. Smallest nonzero |border|; bounds the bits of exact sums.
+MOST_BORDER = 2.0**20  # metres. Largest |border|
 _NO_ENDS = (EndReason.RUNNING, EndReason.LOST_CONTROL)
-"""Nobody loses control who flies in computer-vision mode."""
+"""Control cannot be lost in computer-vision mode."""
 _ENDS = tuple(end.name.lower() for end in EndReason if end not in _NO_ENDS)
 _DIGITS = len(str(10**5))
 
 
 @dataclasses.dataclass(frozen=True)
 class Outcome:
-    """One way in which flights end, and from where."""
+    """One way in which episodes end, and the placements from which they do."""
 
-    end: EndReason
-    """Why."""
-    collected: tuple[bool, ...]
-    """Which cubes were collected by then."""
-    loops: bool
-    """Whether the drone goes to and fro until the step limit."""
-    share: float
-    """Of the volume of all placements, as stated."""
-    steps: Mapping[int, float]
-    """The same by number of steps; what is missing is not certain."""
+    end: EndReason  # why
+    collected: tuple[bool, ...]  # whether each cube is collected by then
+    loops: bool  # whether the drone oscillates until the step limit
+    share: float  # stated fraction of the volume of all placements
+    steps: Mapping[int, float]  # fractions by number of steps; the rest is not stated
     boxes: NDArray[np.float64]
-    """From where: metres to the left of each cube, lowest and highest. Shape: (boxes, cubes, 2)."""
+    """Metres to the left of each cube, lowest and highest. Shape: (boxes, cubes, 2)."""
 
     def __str__(self) -> str:
-        """In few words."""
+        """A short description."""
         which = ", ".join(str(i + 1) for i, collected in enumerate(self.collected) if collected)
         loops = ", to and fro" if self.loops else ""
         return f"{self.end.name.lower()}{loops}, cubes collected: {which or 'none'}"
@@ -76,29 +67,24 @@ class Outcome:
 
 @dataclasses.dataclass(frozen=True)
 class Certificate:
-    """What is stated of a policy in a task."""
+    """The statements about a policy in a task."""
 
-    name: str
-    """Of the policy, for people."""
-    weights: str
-    """Of its network, see `drone_rl.verification.checker.fingerprint`."""
-    description: PolicyDescription
-    """The policy's, in the task that it is stated of."""
+    name: str  # the policy's name, for people
+    weights: str  # see `fingerprint`
+    description: PolicyDescription  # the policy's, in the task of the certificate
     outcomes: tuple[Outcome, ...]
     undecided_share: float
-    undecided: NDArray[np.float64]
-    """Boxes of which nothing is stated. Shape: (boxes, cubes, 2)."""
-    finished: bool
-    """Whether the proof came to its end."""
+    undecided: NDArray[np.float64]  # boxes without a statement. Shape: (boxes, cubes, 2)
+    finished: bool  # whether the proof was completed
 
     @property
     def task(self) -> TaskSettings:
-        """The task that it is stated of."""
-        return require_cubes(self.description.task, "what a certificate states")
+        """The task of the certificate."""
+        return require_cubes(self.description.task, "certificates")
 
     @property
     def bound(self) -> float:
-        """Metres to either side at which cubes are placed at most."""
+        """Largest |y| of cubes, metres."""
         return self.task.lateral_bound
 
     @property
@@ -108,10 +94,7 @@ class Certificate:
 
 
 def read_certificate(path: Path) -> Certificate:
-    """A certificate out of a file.
-
-    Args:
-        path: Of the JSON file.
+    """Read a certificate from a JSON file.
 
     Raises:
         InputError: It is missing, too large, damaged, or no certificate.
@@ -124,10 +107,10 @@ def read_certificate(path: Path) -> Certificate:
 
 
 def parse_certificate(data: Any) -> Certificate:
-    """A certificate out of plain data.
+    """Convert plain data to a certificate.
 
     Raises:
-        InputError: A key is missing or unknown, or a value of another type or out of bounds.
+        InputError: A key is missing or unknown, or a value has another type or is out of bounds.
     """
     read = _WHOLE.read(data, "certificate")
     described = read["policy"]["description"]
@@ -164,7 +147,7 @@ def parse_certificate(data: Any) -> Certificate:
 
 
 class _Anything:
-    """What is looked at later."""
+    """Accepts a value that is parsed later."""
 
     def read(self, value: Any, where: str) -> Any:
         """See `drone_rl.utils.schema.Kind`."""
@@ -172,7 +155,7 @@ class _Anything:
 
 
 class _Description:
-    """A policy's description."""
+    """Parses a policy's description."""
 
     def read(self, value: Any, where: str) -> PolicyDescription:
         """See `drone_rl.utils.schema.Kind`."""
@@ -223,7 +206,7 @@ def _read_outcome(read: Mapping[str, Any], where: str, cubes: int) -> Outcome:
 
 
 def _read_steps(value: Any, where: str) -> dict[int, float]:
-    """Shares by number of steps, which is written without zeros before it."""
+    """Return fractions by number of steps, written without leading zeros."""
     steps = {}
     for name, share in Plain(deepest=1).read(as_mapping(value, where), where).items():
         if not (name.isascii() and name.isdigit() and len(name) <= _DIGITS and name[0] != "0"):
@@ -233,7 +216,7 @@ def _read_steps(value: Any, where: str) -> dict[int, float]:
 
 
 def _read_boxes(value: Any, where: str, cubes: int) -> NDArray[np.float64]:
-    """Boxes, each a list of pairs of numbers, the first of a pair the lower."""
+    """Parse lists of boxes, each a list of [low, high] pairs."""
     shape = f"give a list of boxes, each of {cubes} pairs of finite numbers [low, high]"
     if type(value) is not list or not all(_is_list(box, cubes) for box in value):
         raise InputError(f"{where} is of another shape; {shape}")
@@ -262,11 +245,7 @@ def _is_list(value: Any, length: int) -> bool:
 
 
 def fingerprint(weights: Mapping[str, torch.Tensor]) -> str:
-    """The hash (SHA-256) of a network's weights, as certificates have it.
-
-    Args:
-        weights: A state dict; its order and device don't matter.
-    """
+    """Return the SHA-256 hash of a network's weights; order and device do not matter."""
     digest = hashlib.sha256()
     for name in sorted(weights):
         value = weights[name].detach().cpu().contiguous()
@@ -275,26 +254,26 @@ def fingerprint(weights: Mapping[str, torch.Tensor]) -> str:
     return digest.hexdigest()
 
 
-def refuse_another(
+def check_same_policy(
     certificate: Certificate,
     described: PolicyDescription,
     weights: Mapping[str, torch.Tensor],
     task: BaseTaskSettings | None = None,
 ) -> None:
-    """Makes sure that a certificate is of this policy, and that it can be.
+    """Check that a certificate is of this policy, and that the policy can have one.
 
     Args:
-        certificate: Which.
-        described: The policy's description; its task doesn't count.
-        weights: Of its network.
-        task: That it must be stated of; any by default.
+        certificate: The certificate.
+        described: The policy's description; its task does not count.
+        weights: State dict of its network.
+        task: The required task; any by default.
 
     Raises:
-        InputError: It is of another network, camera or task, or the policy remembers pictures, or
-            its camera goes wrong.
+        InputError: It is of another network, camera or task, or the policy has memory or camera
+            faults.
     """
     for of in (certificate.description, described):
-        require_moves(of.dynamics, of.actions, "what a certificate states")
+        require_moves(of.dynamics, of.actions, "certificates")
     if certificate.weights != (own := fingerprint(weights)):
         raise InputError(
             f"the certificate is of a network with the hash {certificate.weights[:12]}..., the "
@@ -315,11 +294,11 @@ def refuse_another(
         )
     if any(choice.name == "stack" for choice in described.transforms):
         raise InputError(
-            "the policy remembers pictures (transform stack); certificates are of policies that "
-            "act by the present picture alone"
+            "certificates support only policies that observe one frame; this one stacks frames "
+            "(transform stack)"
         )
     if described.faults:
         raise InputError(
-            f"the policy's camera goes wrong (transform {described.faults[0]}); certificates are "
-            "of pictures as they are drawn"
+            f"certificates support only cameras without faults; this policy's simulates faults "
+            f"(transform {described.faults[0]})"
         )

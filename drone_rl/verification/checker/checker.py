@@ -1,4 +1,4 @@
-"""The check of a certificate: what it says goes together, and flights end as it says."""
+"""Check a certificate: it must be consistent, and simulated episodes must end as stated."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -16,31 +16,30 @@ from drone_rl.utils.errors import InputError
 from drone_rl.verification.checker.certificate import (
     Certificate,
     Outcome,
+    check_same_policy,
     read_certificate,
-    refuse_another,
 )
-from drone_rl.verification.checker.consistency import find_lies, find_wrong_tallies, missing_steps
-from drone_rl.verification.checker.rollouts import Flown, Simulator, Tell
-from drone_rl.verification.checker.sampling import ANYWHERE, BORDER, INSIDE, draw_places
+from drone_rl.verification.checker.consistency import (
+    find_inconsistencies,
+    find_wrong_step_counts,
+    missing_steps,
+)
+from drone_rl.verification.checker.rollouts import ProgressCallback, Rollouts, Simulator
+from drone_rl.verification.checker.sampling import ANYWHERE, BORDER, INSIDE, sample_placements
 
-MOST_TOLD = 20
-"""Lines about flights that ended otherwise."""
-MOST_EXACT = 200
-"""Flights that are also flown with the network in float64, about."""
-MOST_KEPT = 1000
-"""Such flights that are kept."""
-_JUST_BEGUN = 2
-"""Repetitions up to which going to and fro may count as such or not: it began with the end."""
+MOST_TOLD = 20  # contradictions printed
+MOST_EXACT = 200  # episodes repeated with the network in float64, about
+MOST_KEPT = 1000  # contradictions kept
+_JUST_BEGUN = 2  # repetitions up to which a loop may count as one or not
 
 
 @dataclasses.dataclass(frozen=True)
 class Contradiction:
-    """A flight that ended otherwise than stated."""
+    """An episode that ended otherwise than stated."""
 
     where: str
-    """Why it was flown: "inside" a box, at a "border", or "anywhere"."""
-    placement: tuple[float, ...]
-    """Metres to the left of each cube."""
+    """Why it was simulated: "inside" a box, at a "border", or "anywhere"."""
+    placement: tuple[float, ...]  # metres to the left of each cube
     stated: str
     found: str
 
@@ -54,33 +53,30 @@ class Contradiction:
 
 @dataclasses.dataclass(frozen=True)
 class Findings:
-    """What came of a check."""
+    """The result of a check."""
 
-    lies: tuple[str, ...]
-    """What can't be or was refuted, besides single flights; one line each."""
-    contradictions: tuple[Contradiction, ...]
-    """The first of the flights that ended otherwise than stated."""
-    contradicted: int
-    """How many there were."""
-    flights: Mapping[str, int]
-    """Flown, by why."""
+    inconsistencies: tuple[str, ...]
+    """Impossible or refuted statements, one line each, without single episodes."""
+    contradictions: tuple[Contradiction, ...]  # the first episodes that ended otherwise than stated
+    contradicted: int  # number of such episodes
+    flights: Mapping[str, int]  # number of episodes, by why they were simulated
 
     @property
     def accepted(self) -> bool:
-        """Whether nothing speaks against the certificate."""
-        return not self.lies and not self.contradicted
+        """Whether nothing contradicts the certificate."""
+        return not self.inconsistencies and not self.contradicted
 
     def lines(self) -> list[str]:
-        """Each finding in one line."""
-        told = [*self.lies, *map(str, self.contradictions[:MOST_TOLD])]
+        """Return each finding in one line."""
+        lines = [*self.inconsistencies, *map(str, self.contradictions[:MOST_TOLD])]
         more = self.contradicted - min(len(self.contradictions), MOST_TOLD)
-        return [*told, f"and {more} flights more ended otherwise than stated"] if more else told
+        return [*lines, f"and {more} flights more ended otherwise than stated"] if more else lines
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain values, as in `check.json`."""
+        """Return plain values, as in `check.json`."""
         return {
             "accepted": self.accepted,
-            "findings": list(self.lies),
+            "findings": list(self.inconsistencies),
             "contradicted": self.contradicted,
             "contradictions": [dataclasses.asdict(c) for c in self.contradictions],
             "flights": dict(self.flights),
@@ -95,85 +91,75 @@ def check_certificate(
     seed: int = 0,
     device: str = "cpu",
     renderer: str = "raytrace",
-    tell: Tell = lambda done, total: None,
+    tell: ProgressCallback = lambda done, total: None,
 ) -> Findings:
-    """Checks a certificate that is of a policy with these weights, see `refuse_another`.
+    """Check a certificate of a policy with these weights, see `check_same_policy`.
 
-    What doesn't go together is refused without flights. For where these start see `draw_places`;
-    places of which nothing is stated are left out.
+    An inconsistent certificate is refused without simulation. Undecided placements are skipped.
 
     Args:
-        certificate: Which.
-        weights: Of its network.
-        flights: How many, at most.
-        seed: Of where they start.
-        device: Where they are flown.
-        renderer: Who draws, see `drone_rl.sim.rendering.find_renderer`.
-        tell: Told now and then how many were flown, and of how many.
+        certificate: The certificate.
+        weights: State dict of the network.
+        flights: Largest number of episodes.
+        seed: Seed of their placements, see `sample_placements`.
+        device: Device of the simulation.
+        renderer: Name, see `drone_rl.sim.rendering.find_renderer`.
+        tell: Called with the number of episodes done, and of all.
 
     Raises:
         InputError: There is no such device.
     """
-    lies = tuple(find_lies(certificate))
+    lies = tuple(find_inconsistencies(certificate))
     if lies:
         return Findings(lies, (), 0, {})
-    drawn = draw_places(certificate, flights, np.random.default_rng(seed))
+    drawn = sample_placements(certificate, flights, np.random.default_rng(seed))
     stated = drawn.outcome < len(certificate.outcomes)
-    simulator = Simulator(certificate.description, weights, device, renderer)
-    with closing(simulator):
-        flown = simulator.fly(drawn.points[stated], tell)
+    points, why = drawn.points[stated], drawn.why[stated]
+    with closing(Simulator(certificate.description, weights, device, renderer)) as simulator:
+        flown = simulator.fly(points, tell)
         some = np.arange(len(flown.end))[:: max(1, len(flown.end) // MOST_EXACT)]
         simulator.compute_in(torch.float64)
-        exact = simulator.fly(drawn.points[stated][some])
+        exact = simulator.fly(points[some])
     outcomes = [certificate.outcomes[i] for i in drawn.outcome[stated]]
-    points, why = drawn.points[stated], drawn.why[stated]
     wrong = [i for i, outcome in enumerate(outcomes) if not ends_as_stated(outcome, flown, i)]
-    lies = tuple(_depending_on_rounding([outcomes[i] for i in some], exact, np.isin(some, wrong)))
+    rounded = _rounding_errors([outcomes[i] for i in some], exact, np.isin(some, wrong))
     steps = np.zeros_like(drawn.outcome)
     steps[stated] = flown.steps
     anywhere = drawn.why == ANYWHERE
-    tallies = find_wrong_tallies(certificate.outcomes, drawn.outcome[anywhere], steps[anywhere])
+    counts = find_wrong_step_counts(certificate.outcomes, drawn.outcome[anywhere], steps[anywhere])
     kept = [
         Contradiction(
-            where=str(why[i]),
-            placement=tuple(points[i].tolist()),
-            stated=_stated(outcomes[i]),
-            found=_found(flown, i),
+            str(why[i]), tuple(points[i].tolist()), _stated(outcomes[i]), _found(flown, i)
         )
         for i in wrong[:MOST_KEPT]
     ]
     count = {kind: int((why == kind).sum()) for kind in (INSIDE, BORDER, ANYWHERE)}
-    return Findings((*lies, *tallies), tuple(kept), len(wrong), count)
+    return Findings((*rounded, *counts), tuple(kept), len(wrong), count)
 
 
-def _depending_on_rounding(
-    stated: Sequence[Outcome], exact: Flown, is_wrong: NDArray[np.bool_]
-) -> list[str]:
-    """What float64 refutes: a proof holds for any order of sums, so for exact ones, too.
-
-    Args:
-        stated: How flights must end.
-        exact: How they end with the network in float64.
-        is_wrong: Those that end otherwise in float32, too. Shape: (k,).
-    """
-    ended = [ends_as_stated(outcome, exact, i) for i, outcome in enumerate(stated)]
-    count = sum(not is_so for is_so, wrong in zip(ended, is_wrong, strict=True) if not wrong)
-    if not count:
-        return []
-    return [
-        f"{count} of {len(stated)} flights ended otherwise than stated with the network in float64 "
-        "alone, so that the policy's decisions depend on rounding"
-    ]
-
-
-def ends_as_stated(outcome: Outcome, flown: Flown, i: int) -> bool:
-    """Whether a flight ended as stated, and its number of steps is one of those stated.
+def read_validated(
+    path: Path, described: PolicyDescription, weights: Mapping[str, torch.Tensor]
+) -> Certificate:
+    """Read a certificate of this policy and task, and check its consistency without simulation.
 
     Args:
-        outcome: What is stated.
-        flown: Flights.
-        i: Which of them.
+        path: The file.
+        described: The policy's description, in the task that counts.
+        weights: State dict of its network.
+
+    Raises:
+        InputError: It can't be read, is of another policy or task, or is inconsistent.
     """
+    certificate = read_certificate(path)
+    check_same_policy(certificate, described, weights, described.task)
+    lie = next(find_inconsistencies(certificate), None)
+    if lie is not None:
+        raise InputError(f"certificate {path} contradicts itself: {lie}; prove the policy again")
+    return certificate
+
+
+def ends_as_stated(outcome: Outcome, flown: Rollouts, i: int) -> bool:
+    """Return whether episode i ended as stated, after a stated number of steps."""
     if flown.end[i] != outcome.end or tuple(flown.collected[i]) != outcome.collected:
         return False
     if outcome.end == EndReason.STEP_LIMIT:
@@ -183,36 +169,30 @@ def ends_as_stated(outcome: Outcome, flown: Flown, i: int) -> bool:
     return int(flown.steps[i]) in outcome.steps or missing_steps(outcome) > 0
 
 
+def _rounding_errors(
+    stated: Sequence[Outcome], exact: Rollouts, is_wrong: NDArray[np.bool_]
+) -> list[str]:
+    """Return what float64 alone refutes; a proof holds for any order of summation.
+
+    `is_wrong` marks the episodes that end otherwise in float32, too. Shape: (k,).
+    """
+    ended = [ends_as_stated(outcome, exact, i) for i, outcome in enumerate(stated)]
+    count = sum(not is_so for is_so, wrong in zip(ended, is_wrong, strict=True) if not wrong)
+    if not count:
+        return []
+    return [
+        f"{count} of {len(stated)} flights ended otherwise than stated with the network in float64 "
+        "alone, so the policy's decisions depend on rounding"
+    ]
+
+
 def _stated(outcome: Outcome) -> str:
     steps = ", ".join(map(str, sorted(outcome.steps)))
     return f"{outcome}" if missing_steps(outcome) else f"{outcome}, steps: {steps}"
 
 
-def _found(flown: Flown, i: int) -> str:
+def _found(flown: Rollouts, i: int) -> str:
     end, collected = EndReason(flown.end[i]), tuple(map(bool, flown.collected[i]))
     loops = end == EndReason.STEP_LIMIT and bool(flown.repeats[i])
     as_outcome = Outcome(end, collected, loops, 0.0, {}, np.zeros((0, len(collected), 2)))
     return f"{as_outcome}, steps: {flown.steps[i]}"
-
-
-def read_tried(
-    path: Path, described: PolicyDescription, weights: Mapping[str, torch.Tensor]
-) -> Certificate:
-    """A certificate of this very policy and task, whose boxes and shares go together exactly.
-
-    That flights end as it states is not looked at, see `check_certificate`.
-
-    Args:
-        path: Of the file.
-        described: The policy's description, in the task that counts.
-        weights: Of its network.
-
-    Raises:
-        InputError: It can't be read, is of another network, camera or task, or contradicts itself.
-    """
-    certificate = read_certificate(path)
-    refuse_another(certificate, described, weights, described.task)
-    lie = next(find_lies(certificate), None)
-    if lie is not None:
-        raise InputError(f"certificate {path} contradicts itself: {lie}; prove the policy again")
-    return certificate

@@ -1,4 +1,11 @@
-"""What a certificate says must go together, before any flight: shares, outcomes, the partition."""
+"""Consistency of a certificate: an exact partition, exact fractions, possible outcomes.
+
+Whether boxes partition a cube is decided without tolerance. The mixed derivative of a box's
+indicator function is a sum of deltas at its corners, with sign plus where an even number of edges
+are low ones. Functions that vanish far away are equal if and only if their derivatives are; so
+boxes cover each point of the cube exactly once, and none outside, if and only if their signed
+corners cancel except for those of the cube.
+"""
 
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
@@ -13,7 +20,7 @@ from drone_rl.verification.checker.certificate import Certificate, Outcome
 
 
 def volume(boxes: NDArray[np.float64]) -> Fraction:
-    """The exact sum of the boxes' volumes, metres to the power of n. Boxes: (boxes, n, 2)."""
+    """Return the exact total volume of boxes, metres^n. Shape: (boxes, n, 2)."""
     if not len(boxes):
         return Fraction(0)
     borders, rank = np.unique(boxes, return_inverse=True)
@@ -24,16 +31,12 @@ def volume(boxes: NDArray[np.float64]) -> Fraction:
     return Fraction(int(sizes.prod(1).sum()), unit ** boxes.shape[1])
 
 
-def find_misfit(boxes: NDArray[np.float64], bound: float) -> tuple[list[float], int] | None:
-    """A place at which boxes are no partition of the cube [-bound, bound]^n.
+def find_partition_error(
+    boxes: NDArray[np.float64], bound: float
+) -> tuple[list[float], int] | None:
+    """Return a point of [-bound, bound]^n not held by exactly one box, and by how many.
 
-    Args:
-        boxes: None of them empty. Shape: (boxes, n, 2).
-        bound: Half the edge of the cube, metres.
-
-    Returns:
-        The place, and how many boxes hold it: once is right in the cube, never outside; None if
-        the boxes are a partition.
+    None if nonempty boxes, shape (boxes, n, 2), are a partition.
     """
     n = boxes.shape[1]
     cube = np.full((1, n, 2), (-bound, bound))
@@ -47,7 +50,7 @@ def find_misfit(boxes: NDArray[np.float64], bound: float) -> tuple[list[float], 
 
 
 def _uncancelled(ranks: NDArray[np.intp]) -> NDArray[np.intp] | None:
-    """A corner that is left over; the first box counts as taken away. Ranks: (boxes, n, 2)."""
+    """Return a corner that does not cancel; the first box counts as negative."""
     n = ranks.shape[1]
     ends = np.array(list(product((0, 1), repeat=n)))  # (2^n, n)
     sign = 1 - 2 * (ends.sum(1) % 2)
@@ -67,7 +70,7 @@ def _uncancelled(ranks: NDArray[np.intp]) -> NDArray[np.intp] | None:
 def _around(
     corner: NDArray[np.intp], ranks: NDArray[np.intp], axes: Sequence[NDArray[np.float64]]
 ) -> Iterator[tuple[list[float], int]]:
-    """The places around a corner of which boxes tell wrongly; there is one at least."""
+    """Yield the points around a corner with a wrong number of boxes; there is at least one."""
     sides = [
         [c for c in (r - 1, r) if 0 <= c < len(axis) - 1]
         for r, axis in zip(corner, axes, strict=True)
@@ -81,20 +84,13 @@ def _around(
             yield place, count
 
 
-MOST_MISSING = 0.05
-"""Of the stated placements, those whose number of steps may be left open."""
-FEWEST_STATED = 1e-3
-"""Share of the placements from which on an outcome has to state a number of steps."""
-TOLERANCE = 1e-12
-"""Of a stated share, relative to the exact one: what adding up floats may lose."""
+MOST_MISSING = 0.05  # largest fraction of the stated placements without a stated number of steps
+FEWEST_STATED = 1e-3  # fraction of placements from which on an outcome must state a number of steps
+TOLERANCE = 1e-12  # relative error of a stated fraction from summing floats
 
 
-def find_lies(certificate: Certificate) -> Iterator[str]:
-    """What can't be, one line each.
-
-    Args:
-        certificate: Which.
-    """
+def find_inconsistencies(certificate: Certificate) -> Iterator[str]:
+    """Yield what is impossible, one line each."""
     whole = Fraction(2 * certificate.bound) ** certificate.task.num_cubes
     yield from _misfits(certificate, whole)
     seen: dict[tuple, int] = {}
@@ -115,13 +111,13 @@ def find_lies(certificate: Certificate) -> Iterator[str]:
 
 
 def missing_steps(outcome: Outcome) -> float:
-    """Share of the placements with this outcome whose number of steps is not stated; 0 for none."""
+    """Return the fraction of placements with this outcome but no stated number of steps."""
     missing = outcome.share - sum(outcome.steps.values())
     return missing if missing > TOLERANCE * outcome.share else 0.0
 
 
 def _missing(certificate: Certificate) -> Iterator[str]:
-    """Numbers of steps that are left open, which no check could hold against a rollout."""
+    """Yield missing numbers of steps, which no simulation could refute."""
     for i, outcome in enumerate(certificate.outcomes):
         if not outcome.steps and outcome.share > FEWEST_STATED:
             yield f"outcome {i} ({outcome}) states no number of steps"
@@ -132,9 +128,9 @@ def _missing(certificate: Certificate) -> Iterator[str]:
 
 
 def _misfits(certificate: Certificate, whole: Fraction) -> Iterator[str]:
-    """Whether the boxes are a partition of the placements; told twice, by corners and volumes."""
+    """Check twice that the boxes partition the placements: by corners and by volume."""
     boxes = np.concatenate(certificate.groups)
-    misfit = find_misfit(boxes, certificate.bound)
+    misfit = find_partition_error(boxes, certificate.bound)
     if misfit is not None:
         place, count = misfit
         yield (
@@ -146,7 +142,7 @@ def _misfits(certificate: Certificate, whole: Fraction) -> Iterator[str]:
 
 
 def _impossible(outcome: Outcome, step_limit: int) -> Iterator[str]:
-    """What the rules of the task don't allow."""
+    """Yield what the rules of the task exclude."""
     if (outcome.end == EndReason.ALL_CUBES) != all(outcome.collected):
         yield "can't be: a flight ends with all_cubes if and only if all are collected"
     if outcome.loops and outcome.end != EndReason.STEP_LIMIT:
@@ -164,20 +160,18 @@ def _wrong_share(stated: float, exact: Fraction) -> Iterator[str]:
         yield f"has a share of {stated!r}, but boxes of {float(exact)!r}"
 
 
-DOUBT = 1e-9
-"""Probability at which luck may refuse what is true, for each number of steps, and all others."""
+DOUBT = 1e-9  # probability of refusing a true statement by chance, per number of steps
 
 
-def find_wrong_tallies(
+def find_wrong_step_counts(
     outcomes: Sequence[Outcome], owner: NDArray[np.int64], steps: NDArray[np.int64]
 ) -> Iterator[str]:
-    """Shares of numbers of steps that random flights refute, one line each.
+    """Yield the fractions of step counts that random episodes refute, one line each.
 
     Args:
         outcomes: As stated.
-        owner: Outcome of each flight's placement, uniform over all placements; as many as there
-            are outcomes where nothing is stated. Shape: (flights,).
-        steps: How many each flight had. Shape: (flights,).
+        owner: Index of each episode's outcome; their number where nothing is stated. (flights,)
+        steps: Steps of each episode. Shape: (flights,).
     """
     for i, outcome in enumerate(outcomes):
         here, missing = steps[owner == i], missing_steps(outcome)

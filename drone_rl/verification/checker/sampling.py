@@ -1,4 +1,4 @@
-"""Where to fly: corners, centres and random points of boxes, both sides of borders, anywhere."""
+"""Sample placements inside boxes, on both sides of their borders, and anywhere."""
 
 import dataclasses
 from collections.abc import Iterator, Sequence
@@ -11,24 +11,19 @@ from drone_rl.verification.checker.certificate import Certificate
 
 Boxes = NDArray[np.float64]
 """Metres to the left of each cube, lowest and highest. Shape: (boxes, cubes, 2)."""
-Points = NDArray[np.float64]
-"""Metres to the left of each cube. Shape: (points, cubes)."""
-Indices = NDArray[np.intp]
-"""Shape: (points,) or (boxes,)."""
+Points = NDArray[np.float64]  # metres to the left of each cube. Shape: (points, cubes)
+Indices = NDArray[np.intp]  # shape: (points,) or (boxes,)
 
-HAIR = 1e-9
-"""Metres by which corners are moved inwards."""
-ASIDE = 1e-4
-"""Metres from a border to the places on both its sides."""
-_MOST_WORK = 2**31
-"""Numbers that are compared, at most, to look for borders."""
+CORNER_INSET = 1e-9  # metres by which corners are moved inwards
+BORDER_OFFSET = 1e-4  # metres from a border to the points on both sides
+_MOST_WORK = 2**31  # comparisons in the search for borders
 
 
-def draw_inside(boxes: Boxes, count: int, rng: np.random.Generator) -> Points:
-    """Centres, corners and random points of boxes, so many in all.
+def sample_inside(boxes: Boxes, count: int, rng: np.random.Generator) -> Points:
+    """Return `count` centres, corners and random points of boxes.
 
-    As many centres as there are boxes, but at most half; where there are more, of large boxes, of
-    thin ones and of any in turn. Then all corners of as many boxes as a half of the rest allows.
+    As many centres as there are boxes, at most half; if there are more, large, thin and random
+    boxes in turn. Then all corners of as many boxes as half of the rest allows.
     """
     chosen = boxes[_mixed(boxes, rng)]
     centres = chosen[: -(-count // 2)].mean(-1)
@@ -39,24 +34,17 @@ def draw_inside(boxes: Boxes, count: int, rng: np.random.Generator) -> Points:
     return np.concatenate([centres, corners, _random(chosen[rest], rng)])
 
 
-def draw_anywhere(boxes: Boxes, count: int, rng: np.random.Generator) -> tuple[Points, Indices]:
-    """Points that are uniform in the volume of all boxes together, and the box of each."""
+def sample_anywhere(boxes: Boxes, count: int, rng: np.random.Generator) -> tuple[Points, Indices]:
+    """Return points uniform in the union of disjoint boxes, and the box of each."""
     sizes = np.diff(boxes)[..., 0].prod(1)
     chosen = rng.choice(len(boxes), count, p=sizes / sizes.sum())
     return _random(boxes[chosen], rng), chosen
 
 
-def draw_borders(
+def sample_borders(
     groups: Sequence[Boxes], bound: float, count: int, rng: np.random.Generator
 ) -> Points:
-    """Points on both sides of faces where boxes of different groups meet, or nearly so.
-
-    Args:
-        groups: Boxes, a partition all together.
-        bound: Metres to either side at which cubes are placed at most.
-        count: Points, at most; fewer where few borders are found.
-        rng: Draws them.
-    """
+    """Return at most `count` points on both sides of faces between boxes of different groups."""
     boxes, sizes = np.concatenate(groups), np.array([len(group) for group in groups])
     tries = max(1, min(4 * count, _MOST_WORK // (4 * boxes.size)))
     some = rng.choice(np.flatnonzero(sizes), tries)
@@ -66,7 +54,7 @@ def draw_borders(
     on = _random(chosen, rng)
     on[row, axis] = chosen[row, axis, side]
     off = np.zeros_like(on)
-    off[row, axis] = ASIDE
+    off[row, axis] = BORDER_OFFSET
     pairs = np.stack([on - off, on + off], 1)  # (tries, 2, cubes)
     pairs = pairs[(abs(pairs) < bound).all((1, 2))]
     owner = np.repeat(np.arange(len(groups)), sizes)[find(boxes, pairs.reshape(-1, boxes.shape[1]))]
@@ -76,7 +64,7 @@ def draw_borders(
 
 
 def find(boxes: Boxes, points: Points) -> Indices:
-    """A box for each point that holds it, inside or on its border. Shape: (points,).
+    """Return a box that holds each point, inside or on its border. Shape: (points,).
 
     Raises:
         ValueError: There is none.
@@ -95,7 +83,7 @@ def find(boxes: Boxes, points: Points) -> Indices:
 
 
 def _mixed(boxes: Boxes, rng: np.random.Generator) -> Indices:
-    """All boxes, each once: the largest, the thinnest, any one, the next largest, and so on."""
+    """Return all boxes once: in turn the next largest, thinnest and random one."""
     sizes = np.diff(boxes)[..., 0]
     orders = (-sizes.prod(1)).argsort(), sizes.min(1).argsort(), rng.permutation(len(boxes))
     mixed = np.stack(orders, 1).ravel()
@@ -103,54 +91,45 @@ def _mixed(boxes: Boxes, rng: np.random.Generator) -> Indices:
 
 
 def _corners(boxes: Boxes) -> Points:
-    """All corners, a hair inside. Shape: (boxes * 2^cubes, cubes)."""
+    """Return all corners, slightly inside. Shape: (boxes * 2^cubes, cubes)."""
     low, high = boxes[..., 0], boxes[..., 1]
-    hair = np.minimum(HAIR, (high - low) / 4)
+    hair = np.minimum(CORNER_INSET, (high - low) / 4)
     ends = np.array(list(product((False, True), repeat=boxes.shape[1])))
     corners = np.where(ends, (high - hair)[:, None], (low + hair)[:, None])
     return corners.reshape(-1, boxes.shape[1])
 
 
 def _random(boxes: Boxes, rng: np.random.Generator) -> Points:
-    """A point in each box. Shape: (boxes, cubes)."""
+    """Return a random point in each box. Shape: (boxes, cubes)."""
     low, high = boxes[..., 0], boxes[..., 1]
     return low + rng.random(low.shape) * (high - low)
 
 
 INSIDE, BORDER, ANYWHERE = "inside", "border", "anywhere"
-_ROUNDS = 4
-"""How often as many flights as a box has corners, and two more, go to each box at most."""
+_ROUNDS = 4  # at most this many times 2^cubes + 2 episodes go to each box
 
 
 @dataclasses.dataclass(frozen=True)
-class Places:
+class Placements:
     """Placements; the first dimension counts them."""
 
-    points: Points
-    """Metres to the left of each cube. Shape: (k, cubes)."""
+    points: Points  # metres to the left of each cube. Shape: (k, cubes)
     outcome: NDArray[np.int64]  # (k,)
-    """Number of the one that is stated; as many as there are where nothing is."""
-    why: NDArray[np.str_]  # (k,)
-    """INSIDE a box, near a BORDER of an outcome, or ANYWHERE."""
+    """Index of the stated outcome; the number of outcomes where nothing is stated."""
+    why: NDArray[np.str_]  # (k,); INSIDE a box, near a BORDER of an outcome, or ANYWHERE
 
 
-def draw_places(certificate: Certificate, count: int, rng: np.random.Generator) -> Places:
-    """Draws places: up to a half in boxes of every outcome, a quarter at borders, others anywhere.
-
-    Args:
-        certificate: Whose boxes are a partition.
-        count: Places.
-        rng: Draws them.
-    """
+def sample_placements(certificate: Certificate, count: int, rng: np.random.Generator) -> Placements:
+    """Sample placements: half in boxes of each outcome, a quarter at borders, the rest anywhere."""
     groups = certificate.groups
     boxes = np.concatenate(groups)
     group = np.repeat(np.arange(len(groups)), [len(boxes) for boxes in groups])
     parts = [(p, np.full(len(p), i), INSIDE) for i, p in _inside(groups[:-1], count // 2, rng)]
-    border = draw_borders(groups, certificate.bound, count // 4, rng)
+    border = sample_borders(groups, certificate.bound, count // 4, rng)
     parts.append((border, group[find(boxes, border)], BORDER))
-    points, chosen = draw_anywhere(boxes, count - sum(len(p) for p, *_ in parts), rng)
+    points, chosen = sample_anywhere(boxes, count - sum(len(p) for p, *_ in parts), rng)
     parts.append((points, group[chosen], ANYWHERE))
-    return Places(
+    return Placements(
         np.concatenate([points for points, *_ in parts]),
         np.concatenate([outcome for _, outcome, _ in parts]),
         np.repeat([why for *_, why in parts], [len(points) for points, *_ in parts]),
@@ -160,10 +139,10 @@ def draw_places(certificate: Certificate, count: int, rng: np.random.Generator) 
 def _inside(
     groups: list[Boxes], count: int, rng: np.random.Generator
 ) -> Iterator[tuple[int, Points]]:
-    """As many points for each outcome, but that those of few boxes leave some to others."""
+    """Yield as many points for each outcome; outcomes of few boxes leave some to others."""
     order = sorted((len(boxes), i) for i, boxes in enumerate(groups) if len(boxes))
     for done, (num_boxes, i) in enumerate(order):
         enough = _ROUNDS * num_boxes * (2 ** groups[i].shape[1] + 2)
         share = min(enough, count // (len(order) - done))
         count -= share
-        yield i, draw_inside(groups[i], share, rng)
+        yield i, sample_inside(groups[i], share, rng)

@@ -1,4 +1,15 @@
-"""What a policy does about one cube, over the continuum of the places where that can stand."""
+"""The exact map of a greedy policy's action over all positions of one cube.
+
+Let D and Y be the cube's position ahead of and to the left of the camera, see `cube_images`, a the
+slope of a column's rays to the left, b that of a row's rays upwards, and h half a cube's edge. The
+image changes only along these lines:
+
+- fronts begin and end at Y = a (D - h) - h and Y = a (D - h) + h;
+- a side ends at Y = a (D + h) +- h, where a row sees its far edge;
+- or at Y = a h / |b| +- h, where the row leaves it by its upper or lower edge before;
+- a row sees nothing of a cube beyond D = h / |b| + h: a vertical border as long as the front is
+  wide.
+"""
 
 import dataclasses
 from collections.abc import Callable
@@ -14,149 +25,48 @@ from drone_rl.sim.actions import MOVES, Move
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.provenance import num_cores
 from drone_rl.verification.prover.arrangement import SAME, Arrangement, Pieces, Window, arrange
-from drone_rl.verification.prover.cube_images import NOTHING, UNIT, Eye
+from drone_rl.verification.prover.cube_images import NOTHING, UNIT, CameraModel
 
-_DIGITS = 14
-"""Of slopes: those of a row above and one below are rounded otherwise."""
+RenderFaces = Callable[[NDArray[np.uint8]], Tensor]
+"""Maps faces, see `CameraModel.faces`, to the network's input images (N, C, H, W)."""
 
-
-def find_borders(eye: Eye, window: Window) -> Pieces:
-    """All of them within a rectangle; no two on one line overlap.
-
-    Args:
-        eye: The camera.
-        window: Metres ahead of it, all more than half a cube's edge, and to its sides.
-    """
-    slopes, half = np.unique(eye.left), eye.half
-    with np.errstate(divide="ignore"):
-        leaves = half / np.unique(np.abs(eye.up).round(_DIGITS))
-    last = leaves.max()
-    aside = slopes[slopes != 0]
-    outer = half * np.sign(aside)
-    pieces = [
-        _lines(slopes, -slopes * half - half, last + half),
-        _lines(slopes, -slopes * half + half, last + half),
-        _lines(aside, aside * half + outer, last - half),
-        *_levels(aside, outer, leaves[np.isfinite(leaves)], half),
-    ]
-    slope, offset, begin, end = np.concatenate(pieces, 1)
-    upright = [
-        [leave + half, *span]
-        for leave in leaves[np.isfinite(leaves)]
-        for span in joined(np.stack([slopes * leave - half, slopes * leave + half], -1))
-    ]
-    return Pieces(slope, offset, begin, end, np.reshape(upright, (-1, 3))).clipped(window)
-
-
-def doubtful_area(eye: Eye, pieces: Pieces, window: Window) -> float:
-    """Square metres, at most, so near to a border that it may lie on its other side in float32.
-
-    See `Eye.borders` and `Eye.grazed` for how near that is.
-    """
-    farthest = max(eye.farthest, window.farthest + 1.0)
-    widest = max(eye.widest, window.sideways)
-
-    def error(x: NDArray) -> NDArray:
-        y = np.abs(pieces.slope * x + pieces.offset)
-        return 16 * (y + eye.half) + 3 * np.abs(pieces.slope) * farthest + 3 * widest
-
-    length = pieces.end - pieces.begin
-    bands = (length * (error(pieces.begin) + error(pieces.end))).sum()
-    _, low, high = pieces.upright.T
-    return UNIT * float(bands + 2 * 32 * farthest * (high - low).sum())
-
-
-def joined(spans: NDArray[np.float64]) -> list[list[float]]:
-    """Spans that overlap or touch as one. Shape: (N, 2)."""
-    found: list[list[float]] = []
-    for low, high in spans[np.argsort(spans[:, 0])].tolist():
-        if found and low <= found[-1][1] + SAME:
-            found[-1][1] = max(found[-1][1], high)
-        else:
-            found.append([low, high])
-    return found
-
-
-def _lines(slope: NDArray, offset: NDArray, end: float) -> NDArray:
-    """Lines from anywhere to x = end. Shape: (4, N)."""
-    return np.stack([slope, offset, np.full_like(slope, -np.inf), np.full_like(slope, end)])
-
-
-def _levels(aside: NDArray, outer: NDArray, leaves: NDArray, half: float) -> list[NDArray]:
-    """The level borders; those of several rows at the same height are joined. Each: (4, 1)."""
-    height = (aside[:, None] * leaves + outer[:, None]).reshape(-1)
-    spans = np.stack([leaves - half, leaves + half], -1)[None].repeat(len(aside), 0).reshape(-1, 2)
-    order = np.argsort(height)
-    height, spans = height[order], spans[order]
-    groups = np.split(np.arange(len(height)), np.flatnonzero(np.diff(height) > SAME) + 1)
-    return [
-        np.array([[0.0], [height[group[0]]], [begin], [end]])
-        for group in groups
-        if len(group)
-        for begin, end in joined(spans[group])
-    ]
-
-
-Look = Callable[[NDArray[np.uint8]], Tensor]
-"""From what pixels show, see `Eye.faces`, to pictures as the network sees them: (N, C, H, W)."""
-
-SIDES = ("left", "ahead", "right")
-"""Of a place: to its left or right, flying straight on misses the cube."""
-NEEDED = (Move.LEFT, Move.FORWARD, Move.RIGHT)
-"""What a cube calls for that stands to that side."""
+SIDES = ("left", "ahead", "right")  # flying straight on misses a cube to the left or right
+NEEDED = (Move.LEFT, Move.FORWARD, Move.RIGHT)  # the action that a cube on each side requires
 UNSEEN, BLIND = "unseen", "blind"
-_BATCH = 256
-"""Pictures that a thread decides in one go: always as many, so that sums are always the same."""
+_DIGITS = 14  # slopes of mirrored rows are rounded differently
+_BATCH = 256  # images per batch; constant, so that sums are reproducible
 
 
 @dataclasses.dataclass(frozen=True)
-class PlaceMap:
-    """Cells of places. In each, the cube's picture is the same everywhere."""
+class ActionMap:
+    """Cells of positions in which the image, and so the action, is constant."""
 
     window: Window
     arrangement: Arrangement
     places: NDArray[np.float64]
-    """One of each cell: metres ahead of the camera and to its left. Shape: (cells, 2)."""
-    areas: NDArray[np.float64]
-    """Square metres of each, by `SIDES`. Shape: (cells, 3)."""
-    action: NDArray[np.int64]
-    """Of the highest logit. Shape: (cells,)."""
-    gap: NDArray[np.float64]
-    """Between the two highest logits. Shape: (cells,)."""
-    is_unseen: NDArray[np.bool_]
-    """Whether no pixel shows the cube. Shape: (cells,)."""
-    alone: int
-    """The action with no cube in sight."""
-    touch_distance: float
-    """A cube farther aside than that calls for a turn, metres."""
+    """A point of each cell: metres ahead of the camera and to its left. Shape: (cells, 2)."""
+    areas: NDArray[np.float64]  # area of each cell, m^2, by `SIDES`. Shape: (cells, 3)
+    action: NDArray[np.int64]  # argmax action. Shape: (cells,)
+    gap: NDArray[np.float64]  # gap of the two highest logits. Shape: (cells,)
+    is_unseen: NDArray[np.bool_]  # whether no pixel shows the cube. Shape: (cells,)
+    alone: int  # the action without a visible cube
+    touch_distance: float  # metres; a cube further to the side requires a turn
     doubtful: float
-    """Square metres, at most, so near to a border that a renderer that computes in float32 may show
-    another cell's picture, or parts of both."""
+    """Bound on the area, m^2, near borders where float32 may show a neighbour's image."""
 
     @property
     def is_blind(self) -> NDArray[np.bool_]:
-        """Cells, by side, where it does what it does with no cube in sight, and not the turn.
-
-        Shape: (cells, 3).
-        """
+        """Cells, by side, that require a turn but get no reaction. Shape: (cells, 3)."""
         needed = np.array(NEEDED)
         turns = needed != Move.FORWARD
         return (self.action == self.alone)[:, None] & (self.action[:, None] != needed) & turns
 
     def at(self, places: NDArray[np.float64]) -> NDArray[np.int64]:
-        """The actions at places inside of the window.
-
-        Args:
-            places: Metres ahead of the camera and to its left. Shape: (N, 2).
-        """
+        """Return the actions at positions inside the window. Shape: (N, 2) to (N,)."""
         return self.action[self.arrangement.locate(places)]
 
     def summary(self, logit_gap: float) -> dict[str, Any]:
-        """Plain numbers; all shares are of areas.
-
-        Args:
-            logit_gap: Where the two highest logits are closer, the action is not certain.
-        """
+        """Return plain numbers; fractions are of areas. Logits closer than `logit_gap` may tie."""
         areas, total = self.areas, self.areas.sum()
         counts = [np.bincount(self.action, area, len(MOVES)) for area in areas.T]
         blind, unseen = areas * self.is_blind, areas * self.is_unseen[:, None]
@@ -192,11 +102,11 @@ class PlaceMap:
         }
 
     def outlines(self) -> dict[str, NDArray]:
-        """Closed ways around what is alike, for pictures.
+        """Return closed polygons around regions of equal action, for plots.
 
         Returns:
-            "points", the corners of all ways, shape (P, 2); "ends", where each way ends among them;
-            "labels", of each: an action's number, or one more than the last for what is unseen.
+            "points", the corners of all polygons, shape (P, 2); "ends", the end of each polygon
+            among them; "labels", the action of each, or one more than the last action if unseen.
         """
         ways = self.arrangement.outlines(self.action)
         unseen = self.arrangement.outlines(self.is_unseen.astype(np.int64))
@@ -208,48 +118,48 @@ class PlaceMap:
         }
 
 
-def map_places(
-    eye: Eye,
+def map_actions(
+    camera: CameraModel,
     window: Window,
-    look: Look,
+    look: RenderFaces,
     network: nn.Module,
     *,
     touch_distance: float,
     most_cells: int,
-) -> PlaceMap:
-    """Decides a policy's action at every place of one cube.
+) -> ActionMap:
+    """Compute a policy's action for every position of one cube.
 
     Args:
-        eye: The policy's camera.
-        window: The places.
-        look: Makes pictures.
-        network: Gives the logits of `MOVES`, shape (N, 3); on the CPU.
-        touch_distance: A cube farther aside than that calls for a turn, metres.
+        camera: The policy's camera.
+        window: The positions.
+        look: Maps faces to the network's input.
+        network: Maps images to the logits of `MOVES`, shape (N, 3); on the CPU.
+        touch_distance: Metres; a cube further to the side requires a turn.
         most_cells: See `arrange`.
 
     Raises:
         InputError: The window reaches into the cube, or there are more cells.
     """
-    if window.nearest <= eye.half:
+    if window.nearest <= camera.half:
         raise InputError(
-            f"nearest={window.nearest} puts the camera into a cube; give more than {eye.half} "
+            f"nearest={window.nearest} puts the camera into a cube; give more than {camera.half} "
             "(half of cube_size)"
         )
-    borders = find_borders(eye, window)
+    borders = find_borders(camera, window)
     cells = arrange(borders, window, most_cells)
     places = cells.inner_points()
-    (alone,), _ = _decide(look, network, _no_faces(eye))
+    (alone,), _ = _decide(look, network, _no_faces(camera))
     parts = np.split(places, range(_BATCH, len(places), _BATCH))
 
     def decide(part: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-        faces = eye.faces(*part.T)
+        faces = camera.faces(*part.T)
         return *_decide(look, network, faces), (faces == NOTHING).all((1, 2))
 
     with ThreadPoolExecutor(
         num_cores(), "places", initializer=torch.set_num_threads, initargs=(1,)
     ) as pool:
         action, gap, is_unseen = map(np.concatenate, zip(*pool.map(decide, parts), strict=True))
-    return PlaceMap(
+    return ActionMap(
         window=window,
         arrangement=cells,
         places=places,
@@ -259,25 +169,99 @@ def map_places(
         is_unseen=is_unseen,
         alone=int(alone),
         touch_distance=touch_distance,
-        doubtful=doubtful_area(eye, borders, window),
+        doubtful=doubtful_area(camera, borders, window),
     )
 
 
-def _no_faces(eye: Eye) -> NDArray[np.uint8]:
-    """What pixels show with no cube in sight. Shape: (1, H, W)."""
-    return np.full((1, len(eye.up), len(eye.left)), NOTHING, np.uint8)
+def find_borders(camera: CameraModel, window: Window) -> Pieces:
+    """Return all borders within a window whose x all exceed half a cube's edge; none overlap."""
+    slopes, half = np.unique(camera.left), camera.half
+    with np.errstate(divide="ignore"):
+        leaves = half / np.unique(np.abs(camera.up).round(_DIGITS))
+    last = leaves.max()
+    aside = slopes[slopes != 0]
+    outer = half * np.sign(aside)
+    pieces = [
+        _lines(slopes, -slopes * half - half, last + half),
+        _lines(slopes, -slopes * half + half, last + half),
+        _lines(aside, aside * half + outer, last - half),
+        *_levels(aside, outer, leaves[np.isfinite(leaves)], half),
+    ]
+    slope, offset, begin, end = np.concatenate(pieces, 1)
+    upright = [
+        [leave + half, *span]
+        for leave in leaves[np.isfinite(leaves)]
+        for span in joined(np.stack([slopes * leave - half, slopes * leave + half], -1))
+    ]
+    return Pieces(slope, offset, begin, end, np.reshape(upright, (-1, 3))).clipped(window)
+
+
+def doubtful_area(camera: CameraModel, pieces: Pieces, window: Window) -> float:
+    """Bound the area, m^2, so close to a border that float32 may confuse its sides.
+
+    See `CameraModel.borders` and `CameraModel.grazed` for the errors.
+    """
+    farthest = max(camera.farthest, window.farthest + 1.0)
+    widest = max(camera.widest, window.sideways)
+
+    def error(x: NDArray) -> NDArray:
+        y = np.abs(pieces.slope * x + pieces.offset)
+        return 16 * (y + camera.half) + 3 * np.abs(pieces.slope) * farthest + 3 * widest
+
+    length = pieces.end - pieces.begin
+    bands = (length * (error(pieces.begin) + error(pieces.end))).sum()
+    _, low, high = pieces.upright.T
+    return UNIT * float(bands + 2 * 32 * farthest * (high - low).sum())
+
+
+def joined(spans: NDArray[np.float64]) -> list[list[float]]:
+    """Merge intervals that overlap or touch. Shape: (N, 2)."""
+    found: list[list[float]] = []
+    for low, high in spans[np.argsort(spans[:, 0])].tolist():
+        if found and low <= found[-1][1] + SAME:
+            found[-1][1] = max(found[-1][1], high)
+        else:
+            found.append([low, high])
+    return found
+
+
+def _lines(slope: NDArray, offset: NDArray, end: float) -> NDArray:
+    """Return lines from -inf to x = end. Shape: (4, N)."""
+    return np.stack([slope, offset, np.full_like(slope, -np.inf), np.full_like(slope, end)])
+
+
+def _levels(aside: NDArray, outer: NDArray, leaves: NDArray, half: float) -> list[NDArray]:
+    """Return the horizontal borders, joined where several rows have the same. Each: (4, 1)."""
+    height = (aside[:, None] * leaves + outer[:, None]).reshape(-1)
+    spans = np.stack([leaves - half, leaves + half], -1)[None].repeat(len(aside), 0).reshape(-1, 2)
+    order = np.argsort(height)
+    height, spans = height[order], spans[order]
+    groups = np.split(np.arange(len(height)), np.flatnonzero(np.diff(height) > SAME) + 1)
+    return [
+        np.array([[0.0], [height[group[0]]], [begin], [end]])
+        for group in groups
+        if len(group)
+        for begin, end in joined(spans[group])
+    ]
+
+
+def _no_faces(camera: CameraModel) -> NDArray[np.uint8]:
+    """Return the faces without a visible cube. Shape: (1, H, W)."""
+    return np.full((1, len(camera.up), len(camera.left)), NOTHING, np.uint8)
 
 
 @torch.no_grad()
-def _decide(look: Look, network: nn.Module, faces: NDArray[np.uint8]) -> tuple[NDArray, NDArray]:
-    """Actions, and the gaps to the next best. Shapes: (N,)."""
+def _decide(
+    look: RenderFaces, network: nn.Module, faces: NDArray[np.uint8]
+) -> tuple[NDArray, NDArray]:
+    """Return the actions and the gaps to the second-highest logit. Shapes: (N,)."""
     highest = network(look(faces)).topk(2)
     gap = highest.values[:, 0] - highest.values[:, 1]
     return highest.indices[:, 0].numpy(), gap.double().numpy()
 
 
 def _areas_by_side(cells: Arrangement, touch_distance: float) -> NDArray[np.float64]:
-    """Square metres of each cell, by `SIDES`. Shape: (cells, 3)."""
+    """Return the area of each cell, m^2, by `SIDES`. Shape: (cells, 3)."""
     left = cells.areas(above=touch_distance)
     not_right = cells.areas(above=-touch_distance)
     sides = np.stack([left, not_right - left, cells.areas() - not_right], -1)
@@ -285,5 +269,5 @@ def _areas_by_side(cells: Arrangement, touch_distance: float) -> NDArray[np.floa
 
 
 def _share(area: float, total: float) -> float:
-    """To as many digits as sums of areas are good to."""
+    """Return a fraction to the digits that sums of areas are good to."""
     return round(float(area / total), 12)

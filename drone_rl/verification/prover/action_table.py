@@ -1,9 +1,8 @@
-"""What a policy may do at one x of the drone, wherever the cubes stand to its left or right.
+"""The possible actions at one x of the drone, for all lateral positions of the visible cubes.
 
-The places of each cube are cut into cells and bands (see `Cells`); the table says of each
-combination which actions are possible. It is filled where it is asked for: blocks of pictures are
-decided at once if bounds on all of them allow a single action, else cut in two. So most pictures
-are never looked at alone.
+The positions of each cube are cut into cells and bands (see `Cells`); the table holds the possible
+actions of each combination. It is filled on demand: a block of images is decided at once if bounds
+over all of them leave a single action, else it is halved. So most images are never evaluated alone.
 """
 
 import functools
@@ -16,75 +15,65 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from drone_rl.utils.provenance import num_cores
-from drone_rl.verification.prover.bounds import Bounds, Painter, Part, Ranges
+from drone_rl.verification.prover.bounds import Compositor, Crop, ImageRanges, NetworkBounds
 from drone_rl.verification.prover.boxes import Boxes, blocks, merge, ragged
 from drone_rl.verification.prover.cells import Cells
 from drone_rl.verification.prover.cube_images import NOTHING
 
 BATCH, CHUNK, ALONE = 4096, 256, 64
-"""Blocks that are tried in one go, by one thread at a time, and with no other thread."""
-SMALL = 1000
-"""Combinations of a span that are simply gone through."""
+"""Blocks tried at a time, by one thread at a time, and without threads."""
+SMALL = 1000  # combinations of a span that are enumerated
 FEW, PRICE = 8, 6.0
-"""Pictures of a block that are simply looked at; and what bounds on a block cost, in pictures."""
+"""Images of a block that are evaluated singly; cost of bounds on a block, in images."""
 
 
-class Outlook:
-    """The possible actions over all combinations of the places of the cubes in sight."""
+class ActionTable:
+    """The possible actions for all combinations of positions of the visible cubes."""
 
     def __init__(
-        self, bounds: Bounds, painter: Painter, cells: Sequence[Cells], record: NDArray[np.int64]
+        self,
+        bounds: NetworkBounds,
+        compositor: Compositor,
+        cells: Sequence[Cells],
+        record: NDArray[np.int64],
     ) -> None:
-        """Starts with nothing known.
+        """Start with nothing known.
 
         Args:
             bounds: Of the network.
-            painter: Of its pictures.
-            cells: Of each cube in sight, the nearest first.
-            record: By how many pixels are in doubt, in powers of two: blocks on which bounds were
-                tried, and those that they decided; all outlooks of a proof learn from it. Shape:
-                (32, 2).
+            compositor: Composes images.
+            cells: Cells of each visible cube, nearest first.
+            record: Bounds tried, and decisive, by log2 of the uncertain pixels; shared by all
+                tables of a proof. Shape: (32, 2).
         """
         self.cells = list(cells)
         self.table = np.zeros([len(c) for c in reversed(self.cells)], np.uint8)
-        """Bits of the possible actions, 0 where not yet known. The nearest cube is last."""
-        self.pictures = 0
-        """How many passes through the network there were."""
+        """Bits of the possible actions, 0 if unknown. The nearest cube is last."""
+        self.pictures = 0  # number of network evaluations
         self._gaps = [np.inf]
-        self._bounds, self._painter = bounds, painter
-        self._ranges = [Ranges(torch.from_numpy(c.pictures)) for c in self.cells]
+        self._bounds, self._painter = bounds, compositor
+        self._ranges = [ImageRanges(torch.from_numpy(c.pictures)) for c in self.cells]
         self._known = np.zeros([len(c.pictures) for c in reversed(self.cells)], np.uint8)
-        """The same of each combination of pictures."""
+        """The same for each combination of images."""
         self._record = record
         self._hidden = [
             [_alike(near, far, r.part) for near in self.cells[:k]]
             for k, (far, r) in enumerate(zip(self.cells, self._ranges, strict=True))
         ]
-        """Of each cube, by each nearer one: see `_alike`."""
+        """For each cube and each nearer one: see `_alike`."""
 
     @property
     def least_gap(self) -> float:
-        """Between the two highest logits of the pictures that were looked at alone."""
+        """Smallest gap of the two highest logits among images evaluated singly."""
         return min(self._gaps)
 
     def spans(self, boxes: Boxes) -> NDArray[np.int64]:
-        """First and last cell of each cube that boxes reach into.
-
-        Args:
-            boxes: Of the cubes in sight, the nearest first, metres to the left of the camera.
-
-        Returns:
-            Shape: (N, cubes, 2).
-        """
+        """Return the first and last cell of each cube that boxes intersect. (N, cubes, 2)."""
         ends = [c.span(boxes[:, k, 0], boxes[:, k, 1]) for k, c in enumerate(self.cells)]
         return np.stack([np.stack(pair, -1) for pair in ends], 1)
 
     def fill(self, spans: NDArray[np.int64]) -> None:
-        """Makes the table known.
-
-        Args:
-            spans: First and last cell of each cube. Shape: (N, cubes, 2).
-        """
+        """Compute the table within spans, shape (N, cubes, 2)."""
         unknown = _open(self.table, spans[self._is_unknown(spans)])
         tasks = _open(self._known, self._pictures_of(unknown))
         stack = [tasks] if len(tasks) else []
@@ -109,11 +98,11 @@ class Outlook:
             self._gather(block)
 
     def nothing_in_sight(self) -> int:
-        """Bits of the possible actions where there is no cube."""
+        """Return the bits of the possible actions without a visible cube."""
         return int(self._look(np.empty((1, 0), int))[0])
 
     def _is_unknown(self, spans: NDArray) -> NDArray[np.bool_]:
-        """Spans that have something unknown."""
+        """Return which spans have unknown entries."""
         counts = _counts(spans)
         small, is_unknown = counts <= SMALL, np.zeros(len(spans), bool)
         if small.any():
@@ -125,7 +114,7 @@ class Outlook:
         return is_unknown
 
     def _pictures_of(self, blocks: NDArray) -> NDArray:
-        """From cells and bands to the pictures that they may show."""
+        """Convert ranges of cells and bands to ranges of their images."""
         ends = [
             np.stack([c.first[blocks[:, k, 0]], c.last[blocks[:, k, 1]]], -1)
             for k, c in enumerate(self.cells)
@@ -133,7 +122,7 @@ class Outlook:
         return np.stack(ends, 1) if ends else blocks
 
     def _gather(self, block: NDArray) -> None:
-        """Takes what is known of pictures over to cells and bands."""
+        """Combine the actions of images into those of cells and bands."""
         (pictures,) = self._pictures_of(block[None])
         found = self._known[_slices(pictures)]
         for axis, (cells, span, seen) in enumerate(
@@ -149,7 +138,7 @@ class Outlook:
     def _share_out(
         self, work: Callable[[NDArray], NDArray[np.uint8]], blocks: NDArray
     ) -> NDArray[np.uint8]:
-        """Has several threads work on a part of the blocks each."""
+        """Evaluate parts of the blocks in several threads."""
         self.pictures += len(blocks)
         if len(blocks) <= ALONE:
             return work(blocks) if len(blocks) else np.zeros(0, np.uint8)
@@ -157,7 +146,7 @@ class Outlook:
         return np.concatenate(list(_workers().map(work, parts)))
 
     def _look_at(self, combinations: NDArray) -> None:
-        """Looks at the different pictures among some, if they were not looked at before."""
+        """Evaluate the distinct images among some combinations that are not known yet."""
         shown = combinations.copy()
         for k, nearer in enumerate(self._hidden):
             for i, alike in enumerate(nearer):
@@ -170,7 +159,7 @@ class Outlook:
         self._known[tuple(combinations.T[::-1])] = known[code]
 
     def _look(self, combinations: NDArray) -> NDArray[np.uint8]:
-        """Bits of the possible actions with single pictures, given by their numbers."""
+        """Return the possible actions of single images, given by their indices."""
         index = torch.from_numpy(combinations)
         shown = [(r.part, r.pictures[index[:, k]]) for k, r in enumerate(self._ranges)]
         pictures = self._painter.see(self._painter.paint_one(shown, len(index)))
@@ -179,7 +168,7 @@ class Outlook:
         return bits.numpy()
 
     def _bound(self, blocks: NDArray) -> NDArray[np.uint8]:
-        """The only possible action in whole blocks; 0 where bounds leave several."""
+        """Return the only possible action of each block; 0 where bounds leave several."""
         bits = self._bounds.possible(*self._paint(blocks))
         return (bits * (bits & (bits - 1) == 0)).numpy()
 
@@ -189,13 +178,13 @@ class Outlook:
         return self._painter.see(lower), self._painter.see(upper)
 
     def _doubts(self, blocks: NDArray) -> NDArray[np.int64]:
-        """How many pixels each cube puts in doubt. Shape: (N, cubes)."""
+        """Return the number of uncertain pixels per cube. Shape: (N, cubes)."""
         if not self._ranges:
             return np.zeros((len(blocks), 0), int)
         return np.stack([r.doubts(blocks[:, k]) for k, r in enumerate(self._ranges)], -1)
 
     def _is_worth(self, pixels: NDArray, counts: NDArray) -> NDArray[np.bool_]:
-        """Blocks of which bounds probably save more pictures than they take the time of."""
+        """Return which blocks bounds probably decide faster than single images would."""
         tries, hits = self._record[np.frexp(pixels)[1]].T
         return (hits + 1) * counts > PRICE * (tries + 1)
 
@@ -211,7 +200,7 @@ class Outlook:
 
 
 def _open(table: NDArray[np.uint8], spans: NDArray) -> NDArray[np.int64]:
-    """Disjoint blocks of all that is unknown in any of some spans; shapes as of spans."""
+    """Return disjoint blocks of all unknown entries within spans."""
     if not len(spans) or (len(spans) == 1 and not table[_slices(spans[0])].any()):
         return spans
     lowest, highest = spans[..., 0].min(0), spans[..., 1].max(0)
@@ -224,12 +213,12 @@ def _open(table: NDArray[np.uint8], spans: NDArray) -> NDArray[np.int64]:
 
 
 def _counts(blocks: NDArray) -> NDArray[np.int64]:
-    """How many combinations each block has."""
+    """Return the number of combinations of each block."""
     return (blocks[..., 1] - blocks[..., 0] + 1).prod(-1)
 
 
 def _combinations(blocks: NDArray) -> NDArray[np.int64]:
-    """The combinations of all blocks, one after the other. Shape: (total, cubes)."""
+    """Return the combinations of all blocks. Shape: (total, cubes)."""
     block, place = ragged(_counts(blocks))
     sizes = blocks[..., 1] - blocks[..., 0] + 1
     found = np.empty((len(block), blocks.shape[1]), np.int64)
@@ -240,7 +229,7 @@ def _combinations(blocks: NDArray) -> NDArray[np.int64]:
 
 
 def _halve(blocks: NDArray, doubts: NDArray) -> NDArray:
-    """Cuts each block across the cube that puts the most pixels in doubt."""
+    """Halve each block along the cube with the most uncertain pixels."""
     longer = blocks[..., 1] > blocks[..., 0]
     cube = np.where(longer, doubts + 1, 0).argmax(-1)
     row = np.arange(len(blocks))
@@ -253,23 +242,17 @@ def _halve(blocks: NDArray, doubts: NDArray) -> NDArray:
 
 @functools.cache
 def _workers() -> ThreadPoolExecutor:
-    """One thread a core; torch computes within each by itself."""
+    """Return one thread per core, each running torch with one thread."""
     return ThreadPoolExecutor(
         num_cores(), "prove", initializer=torch.set_num_threads, initargs=(1,)
     )
 
 
-def _alike(near: Cells, far: Cells, part: Part) -> NDArray[np.int64]:
-    """Which picture of a cube looks the same behind each picture of a nearer one.
+def _alike(near: Cells, far: Cells, part: Crop) -> NDArray[np.int64]:
+    """Return which image of a cube is indistinguishable behind each image of a nearer one.
 
-    Args:
-        near: The nearer cube's.
-        far: The other one's.
-        part: Rows and columns outside which nothing is ever seen of that.
-
-    Returns:
-        The first of the neighbours that differ only where the nearer cube stands. Shape: (pictures
-        of the nearer one, pictures of the other one).
+    `part` is the crop of the further cube. Returns the first of the neighbours that differ only
+    where the nearer cube is visible. Shape: (images of the nearer cube, images of the further one).
     """
     behind = far.pictures[:, *part].reshape(len(far.pictures), -1)
     changes = (behind[1:] != behind[:-1]).astype(np.float32)
@@ -284,26 +267,26 @@ def _slices(span: NDArray) -> tuple[slice, ...]:
     return tuple(slice(a, b + 1) for a, b in span[::-1])
 
 
-def runs(outlook: Outlook, spans: NDArray[np.int64], most: int) -> Iterator[tuple[NDArray, ...]]:
-    """Cuts blocks of the table into rows of one set of possible actions, along the nearest cube.
+def runs(table: ActionTable, spans: NDArray[np.int64], most: int) -> Iterator[tuple[NDArray, ...]]:
+    """Cut blocks of the table into runs with constant possible actions, along the nearest cube.
 
     Args:
-        outlook: Filled there.
+        table: Filled there.
         spans: First and last cell of each cube. Shape: (N, cubes, 2).
-        most: Rows to be cut in one go, about; bounds memory.
+        most: Approximate number of rows per batch; bounds memory.
 
     Yields:
-        Of each piece: its block; first and last cell of each cube, shape (cubes, 2); its bits.
+        For each piece: its block; first and last cell of each cube, shape (cubes, 2); its bits.
     """
     rows = (spans[:, 1:, 1] - spans[:, 1:, 0] + 1).prod(-1)
     if rows.sum() <= most:
         if len(spans):
-            yield _runs(outlook.table, spans, np.arange(len(spans)))
+            yield _runs(table.table, spans, np.arange(len(spans)))
         return
     parts = np.searchsorted(np.cumsum(rows), np.arange(most, rows.sum() + most, most))
     for part in np.split(np.arange(len(spans)), np.unique(parts)[:-1] + 1):
         if len(part):
-            yield _runs(outlook.table, spans, part)
+            yield _runs(table.table, spans, part)
 
 
 def _runs(table: NDArray, spans: NDArray, part: NDArray) -> tuple[NDArray, ...]:

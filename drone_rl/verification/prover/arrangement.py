@@ -1,8 +1,8 @@
-"""Straight pieces in a rectangle, and all the cells into which they cut it.
+"""Planar arrangements: the cells into which line segments cut a rectangle.
 
-The pieces, cut where they meet, are the edges of a plane graph; each edge is two half-edges, one
-for the cell on either side. Around a cell each half-edge is followed by the one that turns most to
-the left, so a cell is a cycle of half-edges, and none can be missed.
+The segments, cut where they meet, are the edges of a plane graph. Each edge is two half-edges, one
+per adjacent cell. A cell is a cycle of half-edges, each followed by the one that turns furthest
+left, so no cell is missed.
 """
 
 import dataclasses
@@ -14,41 +14,35 @@ from scipy.sparse.csgraph import connected_components
 
 from drone_rl.utils.errors import InputError
 
-SAME = 1e-11
-"""Metres: what is no farther apart in x and in y is one point, for these are rounded."""
+SAME = 1e-11  # metres. Points closer than this in x and y are one point, to allow for rounding
 
 
 @dataclasses.dataclass(frozen=True)
 class Window:
-    """A rectangle of places."""
+    """A rectangle of cube positions relative to the camera."""
 
-    nearest: float
-    """Least x, metres."""
-    farthest: float
-    """Largest x."""
-    sideways: float
-    """Largest |y|."""
+    nearest: float  # smallest x, metres
+    farthest: float  # largest x
+    sideways: float  # largest |y|
 
     @property
     def area(self) -> float:
-        """Square metres."""
+        """Area, square metres."""
         return 2 * self.sideways * (self.farthest - self.nearest)
 
 
 @dataclasses.dataclass(frozen=True)
 class Pieces:
-    """Pieces of straight lines: y = slope x + offset from x = begin to end; and upright ones."""
+    """Line segments: y = slope x + offset from x = begin to end, and vertical ones."""
 
     slope: NDArray[np.float64]
     offset: NDArray[np.float64]
     begin: NDArray[np.float64]
-    end: NDArray[np.float64]
-    """Shapes: (N,)."""
-    upright: NDArray[np.float64]
-    """x, lowest and highest y of each. Shape: (M, 3)."""
+    end: NDArray[np.float64]  # shapes: (N,)
+    upright: NDArray[np.float64]  # x, lowest and highest y of each vertical segment. Shape: (M, 3)
 
     def clipped(self, window: Window) -> "Pieces":
-        """What of them is inside."""
+        """Return the parts inside the window."""
         side, slope, offset = window.sideways, self.slope, self.offset
         with np.errstate(divide="ignore", invalid="ignore"):
             ends = np.stack([(-side - offset) / slope, (side - offset) / slope])
@@ -71,7 +65,7 @@ class Pieces:
         )
 
     def framed(self, window: Window) -> "Pieces":
-        """They and the rectangle's four sides."""
+        """Return the segments and the four sides of the window."""
         side, ends = window.sideways, (window.nearest, window.farthest)
         return Pieces(
             np.append(self.slope, [0.0, 0.0]),
@@ -84,32 +78,28 @@ class Pieces:
 
 @dataclasses.dataclass(frozen=True)
 class Arrangement:
-    """Cells and what is around them. The second half of the half-edges are the first's twins."""
+    """Cells as half-edges. The second half of the half-edges are the twins of the first half."""
 
-    points: NDArray[np.float64]
-    """Where pieces meet or end. Shape: (P, 2)."""
-    origin: NDArray[np.int64]
-    """The point that each half-edge starts from. Shape: (E,)."""
-    angle: NDArray[np.float64]
-    """Where it goes to, radians. Shape: (E,)."""
+    points: NDArray[np.float64]  # points where segments meet or end. Shape: (P, 2)
+    origin: NDArray[np.int64]  # index of the start point of each half-edge. Shape: (E,)
+    angle: NDArray[np.float64]  # direction of each half-edge, radians. Shape: (E,)
     following: NDArray[np.int64]
-    """The half-edge after it around its cell, which lies to its left. Shape: (E,)."""
-    cell: NDArray[np.int64]
-    """The cell; -1 outside of the rectangle. Shape: (E,)."""
+    """Next half-edge around the cell to the left of each half-edge. Shape: (E,)."""
+    cell: NDArray[np.int64]  # cell of each half-edge; -1 outside the window. Shape: (E,)
     num_cells: int
 
     @property
     def twin(self) -> NDArray[np.int64]:
-        """The same edge seen from its other side. Shape: (E,)."""
+        """The same edge in the opposite direction. Shape: (E,)."""
         return np.roll(np.arange(len(self.origin)), len(self.origin) // 2)
 
     def areas(self, above: float | None = None) -> NDArray[np.float64]:
-        """Square metres of each cell, or of what of it has a y above that. Shape: (num_cells,)."""
+        """Return the area, m^2, of each cell or its part above a y. Shape: (num_cells,)."""
         of = self.cell >= 0
         cell, after = self.cell[of], self.following[of]
         corner = np.empty(self.num_cells, np.int64)
         corner[cell] = self.origin[of]
-        base = self.points[corner[cell]]  # from here a small cell is reckoned without loss
+        base = self.points[corner[cell]]  # relative coordinates keep the precision of small cells
         x, y = (self.points[self.origin[of]] - base).T
         next_x, next_y = (self.points[self.origin[after]] - base).T
         mean = (y + next_y) / 2
@@ -122,11 +112,7 @@ class Arrangement:
         return np.bincount(cell, (x - next_x) * mean, self.num_cells).astype(np.float64)
 
     def locate(self, places: NDArray[np.float64]) -> NDArray[np.int64]:
-        """The cell of each place inside of the rectangle, on no border: above the next one below.
-
-        Args:
-            places: x and y. Shape: (N, 2).
-        """
+        """Return the cells of positions inside the window, on no border. (N, 2) to (N,)."""
         origin, end = self.points[self.origin], self.points[self.origin[self.twin]]
         goes_right = np.flatnonzero((end[:, 0] - origin[:, 0] > 0) & (self.cell >= 0))
         (x, y), (far_x, far_y) = origin[goes_right].T, end[goes_right].T
@@ -139,7 +125,7 @@ class Arrangement:
         return found
 
     def inner_points(self) -> NDArray[np.float64]:
-        """A place well inside of each cell. Shape: (num_cells, 2)."""
+        """Return a point well inside each cell. Shape: (num_cells, 2)."""
         of = self.cell >= 0
         cell = self.cell[of]
         corners = self.points[self.origin[of]]
@@ -152,14 +138,9 @@ class Arrangement:
         return found
 
     def outlines(self, labels: NDArray[np.int64]) -> list[tuple[int, NDArray[np.float64]]]:
-        """Borders between cells of different labels.
+        """Return the borders between cells with different labels (num_cells,).
 
-        Args:
-            labels: Of each cell, from 0. Shape: (num_cells,).
-
-        Returns:
-            A label and a closed way along its border, it to the left; several of each label. Shape
-            of a way: (corners, 2).
+        Each is a label and a closed polygon with that label on its left. Shape: (corners, 2).
         """
         label = np.append(labels, -1)[self.cell]
         twin = self.twin
@@ -181,7 +162,6 @@ class Arrangement:
         return ways
 
     def _around(self, cell: int) -> list[int]:
-        """A cell's half-edges in their order."""
         edge = first = int(np.flatnonzero(self.cell == cell)[0])
         around = [first]
         while (edge := int(self.following[edge])) != first:
@@ -190,16 +170,16 @@ class Arrangement:
 
 
 def arrange(pieces: Pieces, window: Window, most_cells: int) -> Arrangement:
-    """All cells into which pieces cut a rectangle.
+    """Compute all cells into which segments cut a window.
 
     Args:
-        pieces: Inside, see `Pieces.clipped`. Two that lie on one line don't overlap, and each hangs
-            together with the rectangle's sides by way of others.
+        pieces: Segments inside the window, see `Pieces.clipped`. Collinear segments must not
+            overlap, and each must connect to the sides of the window, directly or through others.
         window: The rectangle.
         most_cells: Bounds memory.
 
     Raises:
-        InputError: There are more cells than that.
+        InputError: There are more cells.
     """
     pieces = pieces.framed(window)
     points, piece = _meetings(pieces, most_cells)
@@ -220,12 +200,12 @@ def arrange(pieces: Pieces, window: Window, most_cells: int) -> Arrangement:
     number = np.where(is_outside, -1, np.cumsum(~is_outside) - 1)
     inside = areas[~is_outside]
     if abs(inside.sum() - window.area) > 1e-9 * window.area:
-        raise ArithmeticError(f"cells of {inside.sum()} m2 don't fill {window.area} m2")
+        raise ArithmeticError(f"cells of {inside.sum()} m2 do not fill {window.area} m2")
     return dataclasses.replace(found, cell=number[found.cell], num_cells=len(inside))
 
 
 def _meetings(pieces: Pieces, most: int) -> tuple[NDArray, NDArray]:
-    """Where pieces meet and end: points, and the piece on which each lies, upright ones last."""
+    """Return where segments meet and end, and the segment of each; vertical ones last."""
     slope, offset, begin, end = pieces.slope, pieces.offset, pieces.begin, pieces.end
     count = len(slope)
     index = np.arange(count)
@@ -255,24 +235,24 @@ def _meetings(pieces: Pieces, most: int) -> tuple[NDArray, NDArray]:
         total += len(meets)
     if total > 2 * most:
         raise InputError(
-            f"the pictures of one cube change at more than {most} cells of places (most_cells); "
-            "give a smaller window (farthest, sideways) or raise it"
+            f"the images of one cube have more than {most} cells (most_cells); give a smaller "
+            "window (farthest, sideways) or raise it"
         )
     return np.stack([np.concatenate(xs), np.concatenate(ys)], -1), np.concatenate(ons)
 
 
 def _merged(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """The different ones of points, and which of them each one is."""
+    """Return the distinct points, and the index of each point among them."""
     column = _groups(points[:, 0], np.zeros(len(points), np.int64))
     _, first = np.unique(column, return_index=True)
-    x = points[first[column], 0]  # the very same along an upright piece, whose points are sorted
+    x = points[first[column], 0]  # identical along a vertical segment, whose points are sorted
     group = _groups(points[:, 1], column)
     _, first = np.unique(group, return_index=True)
     return np.stack([x, points[:, 1]], -1)[first], group
 
 
 def _groups(values: NDArray[np.float64], within: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Numbers the groups of values that are the same, apart for each group that they are within."""
+    """Number the groups of equal values within each outer group."""
     order = np.lexsort((values, within))
     value, outer = values[order], within[order]
     is_new = np.append(False, (np.diff(value) > SAME) | (np.diff(outer) != 0))
@@ -282,7 +262,7 @@ def _groups(values: NDArray[np.float64], within: NDArray[np.int64]) -> NDArray[n
 
 
 def _following(origin: NDArray[np.int64], angle: NDArray[np.float64]) -> NDArray[np.int64]:
-    """The half-edge after each: at its end, the next one clockwise from its twin."""
+    """Return the next half-edge of each: at its end, the next one clockwise from its twin."""
     count = len(origin)
     order = np.lexsort((angle, origin))
     start = np.append(True, np.diff(origin[order]) != 0)
@@ -296,7 +276,7 @@ def _following(origin: NDArray[np.int64], angle: NDArray[np.float64]) -> NDArray
 
 
 def _inside(corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A place inside of any polygon without holes, whose corners turn to the left in all."""
+    """Return a point inside a counterclockwise polygon without holes."""
     at = int(np.lexsort(corners.T[::-1])[0])
     first, tip, last = corners[at - 1], corners[at], corners[(at + 1) % len(corners)]
     triangle = np.array([first, tip, last])

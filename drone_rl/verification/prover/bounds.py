@@ -1,9 +1,9 @@
-"""What a network may do with pictures that are known pixel by pixel between bounds.
+"""Bounds on images with uncertain faces, and on the network's logits over such images.
 
-Interval bound propagation (Gowal et al., 2018): the sum of an interval's ends goes through a linear
-layer as it is, their difference through the absolute values of the weights. Between two actions the
-last layer's weights are subtracted first, so that what they have in common cancels. ReLU, pooling
-and flattening commute with multiplication, so nothing is halved on the way: biases grow instead.
+Interval bound propagation (Gowal et al., 2018): the sum of an interval's ends passes through a
+linear layer as it is, their difference through the absolute weights. The last layer's weights are
+subtracted pairwise first, so that common terms cancel. ReLU, pooling and flattening are positively
+homogeneous, so biases are scaled instead of halving the sums.
 """
 
 from collections.abc import Callable, Sequence
@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional
 
+from drone_rl.collectors.speedups import accelerated_inference
 from drone_rl.policies import PolicyNetwork
-from drone_rl.policies.answering import Answers
 from drone_rl.policies.rounded_layers import SLACK, UNIT, Layer, layer_of
 from drone_rl.policies.rounding import PIXEL_UNITS, RoundingBound
 from drone_rl.sim.actions import MOVES
@@ -24,27 +24,28 @@ from drone_rl.utils.errors import InputError
 from drone_rl.verification.prover.cube_images import NOTHING
 
 
-class Bounds:
-    """A network's most probable actions, as far as bounds on its pictures tell."""
+class NetworkBounds:
+    """The possible argmax actions of a network over sets of images."""
 
     def __init__(self, network: PolicyNetwork, gap: float) -> None:
-        """Prepares the layers.
+        """Prepare the layers.
 
         Args:
-            network: Ends in a linear layer; before it may stand convolutions, linear layers, ReLU,
-                pooling by maxima and flattening.
-            gap: An action is the most probable one for certain only if its logit is higher by more
-                than this, and by more than the bound on rounding errors, see
-                `drone_rl.policies.rounding`.
+            network: Convolutions, linear layers, ReLU, max pooling and flattening; the last is
+                linear.
+            gap: An action is certain only if its logit leads by more than this and by more than the
+                bound on rounding errors, see `drone_rl.policies.rounding`.
 
         Raises:
-            InputError: A layer is of another kind.
+            InputError: A layer has another type.
         """
         *inner, last = network.layers
         if not isinstance(last, nn.Linear):
-            raise InputError("the network's last layer is not linear; prove a policy whose is")
+            raise InputError(
+                "the network's last layer is not linear; prove a policy that ends in a linear layer"
+            )
         self.gap = gap
-        self._answers = Answers(network)
+        self._answers = accelerated_inference(network)
         scale, self._steps = 2, []
         for layer in inner:
             self._steps.append((_step(layer, scale), scale))
@@ -63,15 +64,14 @@ class Bounds:
 
     @torch.no_grad()
     def possible(self, lower: Tensor, upper: Tensor) -> Tensor:
-        """Which actions may be the most probable ones.
+        """Return which actions may have the highest logit.
 
         Args:
-            lower: Pictures as the network sees them, none brighter than what there may be.
-            upper: None darker. Shape: (N, C, H, W).
+            lower: Lower bounds of the network's input images. Shape: (N, C, H, W).
+            upper: Upper bounds.
 
         Returns:
-            Bit a is set unless another action is certainly more probable than action a. Shape:
-            (N,), uint8.
+            Bit a is clear if another action certainly beats action a. Shape: (N,), uint8.
         """
         largest: list[Tensor] = []
         least = self._least(lower, upper, largest)
@@ -79,15 +79,7 @@ class Bounds:
 
     @torch.no_grad()
     def probabilities(self, lower: Tensor, upper: Tensor) -> tuple[Tensor, Tensor]:
-        """How probable each action may be if it is drawn.
-
-        Args:
-            lower: See `possible`.
-            upper: The same.
-
-        Returns:
-            At least, and at most. Shapes: (N, actions), float64.
-        """
+        """Return bounds of the probability of each sampled action. Shapes: (N, actions)."""
         largest: list[Tensor] = []
         least = self._least(lower, upper, largest).double() / self._scale
         least -= self._error(largest).clamp(min=self.gap)
@@ -97,12 +89,9 @@ class Bounds:
         return 1 / (-lead).exp().sum(-1), 1 / lead.transpose(1, 2).exp().sum(-1)
 
     def _least(self, lower: Tensor, upper: Tensor, largest: list[Tensor] | None = None) -> Tensor:
-        """By how much logits are higher than others, at least, times the scale. (N, pairs).
+        """Return the lower bound of each logit difference, times the scale. Shape: (N, pairs).
 
-        Args:
-            lower: See `possible`.
-            upper: The same.
-            largest: Takes the size of the largest input to each layer. Shapes: (1, *), float64.
+        `largest` receives the largest input magnitude of each layer. Shapes: (1, *), float64.
         """
         total, width = lower + upper, upper - lower
         for step, scale in self._steps:
@@ -116,30 +105,23 @@ class Bounds:
 
     @torch.no_grad()
     def decide(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
-        """The same of pictures that are known.
-
-        Args:
-            pictures: Shape (N, C, H, W).
-
-        Returns:
-            The bits, and the gap between the two highest logits. Shapes: (N,).
-        """
+        """Return the bits of the possible actions of images, and the gap of the top two logits."""
         logits = self._answers(pictures)
         first, second = torch.tensor(self._pairs).T
         highest = logits.topk(2).values
         lead = logits[:, first] - logits[:, second]
         bits = self._bits(lead > self._gap(pictures))
         rows = (bits & (bits - 1) != 0).nonzero()[:, 0]
-        if len(rows):  # their own bounds are closer than the one for all pictures
+        if len(rows):  # bounds of single images are tighter than the common one
             losers = ~self._rounding.decide(pictures[rows]).possible
             clear = losers[:, second] & (lead[rows] > self.gap)
             bits[rows] = self._bits(clear)
         return bits, highest[:, 0] - highest[:, 1]
 
     def _gap(self, pictures: Tensor) -> Tensor:
-        """By how much a logit must be higher than another one to be so whatever is summed first.
+        """Return the lead that is certain for any order of summation. Shape: (pairs,).
 
-        It is enough for all pictures that were seen so far. Shape: (pairs,).
+        It holds for all images seen so far.
         """
         lower, upper = pictures.amin(0, keepdim=True), pictures.amax(0, keepdim=True)
         hull = self._hull
@@ -153,11 +135,7 @@ class Bounds:
         return hull.gap
 
     def _error(self, largest: Sequence[Tensor]) -> Tensor:
-        """Twice the rounding error of the differences of logits. Shape: (pairs,), float64.
-
-        Args:
-            largest: From `_least`.
-        """
+        """Return twice the rounding error of logit differences. Shape: (pairs,), float64."""
         error = PIXEL_UNITS * UNIT * largest[0].amax().clamp(min=UNIT).expand_as(largest[0])
         for layer, size in zip(self._errors, largest, strict=True):
             error = layer.bound(size, error)
@@ -165,7 +143,7 @@ class Bounds:
         return 2 * SLACK * (error[0, first] + error[0, second]).nan_to_num(nan=torch.inf)
 
     def _bits(self, is_certain: Tensor) -> Tensor:
-        """From which action certainly beats which other one to what is left."""
+        """Convert certain wins of pairs to the bits of the actions left."""
         bits = torch.full((len(is_certain),), (1 << self.num_actions) - 1, dtype=torch.uint8)
         for (_, loser), beats in zip(self._pairs, is_certain.T, strict=True):
             bits &= torch.where(beats, 255 - (1 << loser), 255).to(torch.uint8)
@@ -173,7 +151,7 @@ class Bounds:
 
 
 class _Hull(NamedTuple):
-    """Bounds on all pictures that were seen so far, and the gap that is enough for them."""
+    """Bounds on all images seen so far, and the lead that is certain for them."""
 
     lower: Tensor
     upper: Tensor
@@ -184,25 +162,24 @@ def _errors_of(layer: nn.Module) -> Layer:
     found = layer_of(layer)
     if found is None:
         raise InputError(
-            f"the network has a layer {layer}, for which no bound on rounding errors is known; "
-            "prove a policy of convolutions without padding, linear layers, ReLU, MaxPool2d and "
-            "Flatten"
+            f"rounding errors of the network's layer {layer} have no known bound; prove a policy "
+            "of convolutions without padding, linear layers, ReLU, MaxPool2d and Flatten"
         )
     return found
 
 
 def _size(total: Tensor, width: Tensor) -> Tensor:
-    """The largest size of inputs by sums and differences of their bounds, times their scale."""
+    """Return the largest input magnitude, times the scale."""
     return (SLACK * (total.abs() + width).amax(0, keepdim=True)).double()
 
 
 _AFFINE = (nn.Conv2d, nn.Linear)
 Step = Callable[[Tensor, Tensor], tuple[Tensor, Tensor]]
-"""From sums and differences of the ends of intervals to those a layer farther on."""
+"""Maps sums and differences of interval ends through a layer."""
 
 
 def _step(layer: nn.Module, scale: int) -> Step:
-    """How intervals go through a layer; their sums are so many times their middles before it."""
+    """Return how intervals pass through a layer; `scale` is the factor of sums before it."""
     if isinstance(layer, nn.Conv2d):
         return _convolution(layer, scale)
     if isinstance(layer, nn.Linear):
@@ -210,8 +187,8 @@ def _step(layer: nn.Module, scale: int) -> Step:
     if isinstance(layer, nn.ReLU | nn.MaxPool2d | nn.Flatten):  # larger inputs, larger outputs
         return lambda total, width: _monotone(layer, total, width)
     raise InputError(
-        f"the network has a layer {type(layer).__name__}, for which no bounds are known; prove a "
-        "policy of convolutions, linear layers, ReLU, MaxPool2d and Flatten"
+        f"proofs do not support the network's layer {type(layer).__name__}; prove a policy of "
+        "convolutions, linear layers, ReLU, MaxPool2d and Flatten"
     )
 
 
@@ -226,7 +203,6 @@ def _convolution(layer: nn.Conv2d, scale: int) -> Step:
     bias = None if bias is None else scale * bias.detach()
 
     def step(total: Tensor, width: Tensor) -> tuple[Tensor, Tensor]:
-        # the layer's own way to convolve, with other weights
         return (
             layer._conv_forward(total, weight, bias),
             layer._conv_forward(width, weight.abs(), None),
@@ -246,22 +222,21 @@ def _linear(layer: nn.Linear, scale: int) -> Step:
 
 Transform = Callable[[Tensor], Tensor]
 
-Part = tuple[slice, slice]
-"""Rows and columns of a picture."""
+Crop = tuple[slice, slice]  # rows and columns of an image
 _FACES = 4
 
 
-class Painter:
-    """Paints cubes over each other, the nearer one in front, before an even background."""
+class Compositor:
+    """Composes images of cubes, nearer ones in front, before a uniform background."""
 
     def __init__(self, background: Tensor, faces: Tensor, rest: Transform | None = None) -> None:
-        """Notes the brightness of everything.
+        """Store the brightness of everything.
 
         Args:
-            background: Of what is seen where no cube is. Shape: (height, width), float32.
-            faces: Of a cube's front, left and right side. Shape: (3,), float32.
-            rest: What becomes of a picture (N, 1, height, width) before the network sees it;
-                brighter pixels must not make anything darker. Nothing by default.
+            background: Image without cubes. Shape: (height, width), float32.
+            faces: Brightness of a cube's front, left and right side. Shape: (3,), float32.
+            rest: Maps an image (N, 1, height, width) to the network's input; must be monotone.
+                Identity by default.
         """
         self._background = background
         self._rest = rest
@@ -272,21 +247,18 @@ class Painter:
         self._highest = torch.where(bits, faces, -inf).max(-1).values
         is_open = torch.arange(2**_FACES) >> NOTHING & 1 == 1
         self._shut = torch.where(is_open, 0.0, inf)
-        """Added to what stands behind: it counts where the cube may leave it open."""
+        """Added to the background, which counts only where the cube may leave it visible."""
 
     def paint(
-        self, cubes: Sequence[tuple[Part, Tensor, Tensor]], num_pictures: int
+        self, cubes: Sequence[tuple[Crop, Tensor, Tensor]], num_pictures: int
     ) -> tuple[Tensor, Tensor]:
-        """Bounds on pictures.
+        """Return lower and upper bounds of images. Shapes: (N, height, width).
 
         Args:
-            cubes: Of each, the nearest first: rows and columns outside which nothing is seen of
-                it; masks of what pixels may show there in different cases (bit f for face f),
-                shape (cases, rows, columns), uint8; which case each picture is, shape (N,).
+            cubes: For each cube, nearest first: the crop outside which it is never visible; bit
+                masks of the possible faces of each pixel in each case, shape (cases, rows,
+                columns), uint8; the case of each image, shape (N,).
             num_pictures: N.
-
-        Returns:
-            Lower and upper bounds. Shape: (N, height, width).
         """
         lower = self._background.repeat(num_pictures, 1, 1)
         upper = lower.clone()
@@ -298,16 +270,13 @@ class Painter:
             high.sub_(shut).clamp_min_(self._highest[index].index_select(0, case))
         return lower, upper
 
-    def paint_one(self, cubes: Sequence[tuple[Part, Tensor]], num_pictures: int) -> Tensor:
-        """Pictures of which everything is known.
+    def paint_one(self, cubes: Sequence[tuple[Crop, Tensor]], num_pictures: int) -> Tensor:
+        """Return known images. Shape: (N, height, width).
 
         Args:
-            cubes: Of each, the nearest first: rows and columns outside which nothing is seen of
-                it, and what pixels show there, shape (N, rows, columns), uint8.
+            cubes: For each cube, nearest first: the crop outside which it is never visible; its
+                faces there, shape (N, rows, columns), uint8.
             num_pictures: N.
-
-        Returns:
-            Shape: (N, height, width).
         """
         pictures = self._background.repeat(num_pictures, 1, 1)
         for part, faces in reversed(cubes):
@@ -317,26 +286,22 @@ class Painter:
         return pictures
 
     def see(self, pictures: Tensor) -> Tensor:
-        """What the network sees. Shape: (N, height, width) to (N, C, H, W)."""
+        """Return the network's input. Shape: (N, height, width) to (N, C, H, W)."""
         return pictures[:, None] if self._rest is None else self._rest(pictures[:, None])
 
 
-class Ranges:
-    """The pictures of one cube, one after the other, each range of them looked up in two steps."""
+class ImageRanges:
+    """The images of one cube in order; each range of them is looked up in two steps."""
 
     def __init__(self, pictures: Tensor) -> None:
-        """Notes them.
-
-        Args:
-            pictures: What each pixel shows. Shape: (pictures, height, width).
-        """
+        """Prepare masks of ranges of power-of-two length, from faces (images, height, width)."""
         shown = pictures.any(0)
         rows, columns = shown.any(1).nonzero(), shown.any(0).nonzero()
         self.part = (
             slice(int(rows.min()), int(rows.max()) + 1) if len(rows) else slice(0, 0),
             slice(int(columns.min()), int(columns.max()) + 1) if len(rows) else slice(0, 0),
         )
-        """Rows and columns outside which nothing is ever seen of the cube."""
+        """Crop outside which the cube is never visible."""
         self.pictures = pictures = pictures[:, *self.part].contiguous()
         masks = torch.bitwise_left_shift(torch.ones_like(pictures), pictures)
         self._levels = [masks]
@@ -344,15 +309,15 @@ class Ranges:
             masks = masks[:-reach] | masks[reach:]
             self._levels.append(masks)
         self._doubts = np.full((len(pictures), len(pictures)), -1, np.int32)
-        """Of each range, by its first and last picture; -1 where not yet counted."""
+        """By first and last image; -1 where not yet counted."""
 
     def of(self, ranges: NDArray) -> tuple[Tensor, Tensor]:
-        """Masks of the different ranges, within the part, and which of them each one is."""
+        """Return the masks of the distinct ranges, and the index of each range among them."""
         code, case = np.unique(self._code(ranges), return_inverse=True)
         return self._masks(code), torch.from_numpy(case)
 
     def doubts(self, ranges: NDArray) -> NDArray[np.int64]:
-        """How many pixels may show several things in each range."""
+        """Return the number of pixels with several possible faces in each range."""
         code, counts = self._code(ranges), self._doubts.reshape(-1)
         unknown = np.unique(code[counts[code] < 0])
         if len(unknown):
@@ -361,11 +326,11 @@ class Ranges:
         return counts[code].astype(np.int64)
 
     def _code(self, ranges: NDArray) -> NDArray[np.int64]:
-        """One number for each range."""
+        """Return a unique number for each range."""
         return ranges[:, 0] * len(self.pictures) + ranges[:, 1]
 
     def _masks(self, code: NDArray[np.int64]) -> Tensor:
-        """What pixels may show anywhere in ranges. Shape: (N, rows, columns)."""
+        """Return the possible faces of pixels over ranges. Shape: (N, rows, columns)."""
         first, last = np.divmod(code, len(self.pictures))
         levels = np.frexp(last - first + 1)[1] - 1
         masks = self._levels[0].new_empty(len(code), *self._levels[0].shape[1:])

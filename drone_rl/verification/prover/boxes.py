@@ -1,6 +1,6 @@
-"""Sets of placements as disjoint boxes: products of intervals, one for each cube.
+"""Sets of placements as disjoint boxes: products of intervals, one per cube.
 
-Boxes are arrays of shape (N, n, 2): N boxes, the lower and upper end for each of n cubes, metres.
+Boxes are arrays of shape (N, n, 2): the lower and upper end of N boxes for each of n cubes, metres.
 """
 
 import itertools
@@ -13,27 +13,26 @@ from numpy.typing import NDArray
 
 Boxes = NDArray[np.float64]
 _Number = TypeVar("_Number", np.float64, np.int64)
-Sides = Sequence[NDArray[np.float64]]
-"""Along each axis, where the cells of a grid begin and end."""
+E = TypeVar("E")
+Sides = Sequence[NDArray[np.float64]]  # borders of a grid's cells along each axis
 
-AT_ONCE = 1_000_000
-"""Cells of a grid, so that it takes little memory."""
-MOST_GRIDS = 1_000
-"""That are gone through, so that it takes half a minute at most."""
+AT_ONCE = 1_000_000  # cells of a grid; bounds memory
+MOST_GRIDS = 1_000  # bounds the time to about half a minute
+_MOST_PAIRS = 10_000_000  # pairs of boxes compared at a time; bounds memory
 
 
-def whole(bound: float, num_cubes: int) -> Boxes:
-    """All placements: every cube anywhere from -bound to bound."""
+def all_placements(bound: float, num_cubes: int) -> Boxes:
+    """Return the one box in which every cube stands anywhere from -bound to bound."""
     return np.broadcast_to([-bound, bound], (1, num_cubes, 2)).astype(np.float64)
 
 
 def volumes(boxes: Boxes) -> NDArray[np.float64]:
-    """Of each box. Shape: (N,)."""
+    """Return the volume of each box. Shape: (N,)."""
     return np.prod(boxes[..., 1] - boxes[..., 0], axis=-1)
 
 
 def cut(boxes: Boxes, cube: int, place: float) -> tuple[Boxes, Boxes]:
-    """Boxes in two: where a cube stands to the right of a place, and where to the left."""
+    """Cut boxes at one coordinate of a cube into the parts below and above it."""
     below = boxes[boxes[:, cube, 0] < place].copy()
     below[:, cube, 1] = np.minimum(below[:, cube, 1], place)
     above = boxes[boxes[:, cube, 1] > place].copy()
@@ -41,8 +40,26 @@ def cut(boxes: Boxes, cube: int, place: float) -> tuple[Boxes, Boxes]:
     return below, above
 
 
+def carve(boxes: Boxes, hole: Boxes) -> tuple[Boxes, Boxes]:
+    """Cut boxes into the parts inside and outside another box of shape (n, 2)."""
+    outside = []
+    for cube, (lower, upper) in enumerate(hole):
+        below, boxes = cut(boxes, cube, lower)
+        boxes, above = cut(boxes, cube, upper)
+        outside += [below, above]
+    return boxes, np.concatenate(outside)
+
+
+def intersect(boxes: Boxes, others: Boxes) -> Boxes:
+    """Return the nonempty intersections of all pairs of boxes."""
+    lower = np.maximum(boxes[:, None, :, 0], others[None, :, :, 0])
+    upper = np.minimum(boxes[:, None, :, 1], others[None, :, :, 1])
+    is_some = (lower < upper).all(-1)
+    return np.stack([lower[is_some], upper[is_some]], -1)
+
+
 def merge(boxes: NDArray[_Number]) -> NDArray[_Number]:
-    """The same set in fewer boxes: neighbours with a whole side in common become one."""
+    """Return the same set in fewer boxes: join boxes that share a whole side."""
     before = -1
     while len(boxes) not in (before, 0, 1):
         before = len(boxes)
@@ -51,13 +68,8 @@ def merge(boxes: NDArray[_Number]) -> NDArray[_Number]:
     return boxes
 
 
-def unite(boxes: Boxes, most: int = MOST_GRIDS) -> Boxes:
-    """The same set in disjoint boxes, where they overlap.
-
-    Args:
-        boxes: Any.
-        most: Grids, see `_grids`; where it takes more, boxes are left as they are.
-    """
+def union(boxes: Boxes, most: int = MOST_GRIDS) -> Boxes:
+    """Return the union of boxes as disjoint boxes; unchanged if it takes more than `most` grids."""
     if len(boxes) < 2:
         return boxes
     boxes = np.unique(boxes, axis=0)
@@ -68,16 +80,10 @@ def unite(boxes: Boxes, most: int = MOST_GRIDS) -> Boxes:
     return merge(np.concatenate([_of_grid(_covered(*grid), grid[1]) for grid in grids]))
 
 
-def beyond(boxes: Boxes, space: Boxes, most: int = MOST_GRIDS) -> Boxes | None:
-    """What some boxes leave of another one, in disjoint boxes.
+def complement(boxes: Boxes, space: Boxes, most: int = MOST_GRIDS) -> Boxes | None:
+    """Return the part of a space, shape (1, n, 2), outside all boxes, as disjoint boxes.
 
-    Args:
-        boxes: Any within the other one.
-        space: That one. Shape: (1, n, 2).
-        most: See `unite`.
-
-    Returns:
-        None if it would take more.
+    None if it takes more than `most` grids.
     """
     grids = _grids(boxes, space, most)
     if grids is None:
@@ -86,43 +92,72 @@ def beyond(boxes: Boxes, space: Boxes, most: int = MOST_GRIDS) -> Boxes | None:
 
 
 def blocks(mask: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Where a grid's cells are set, as disjoint boxes of whole cells; not the fewest.
-
-    Returns:
-        First cell along each axis, and the one after the last. Shape: (N, axes, 2).
-    """
+    """Return the set cells of a grid as blocks: first cell and end. Shape: (N, axes, 2)."""
     edges = np.diff(mask.view(np.int8), prepend=0, append=0, axis=-1)
     first, last = np.argwhere(edges > 0), np.argwhere(edges < 0)
-    beyond = first + 1
-    beyond[:, -1] = last[:, -1]
-    return np.stack([first, beyond], -1)
-
-
-def intersect(boxes: Boxes, others: Boxes) -> Boxes:
-    """What any of some boxes have in common with any of some others; empty pieces left out."""
-    lower = np.maximum(boxes[:, None, :, 0], others[None, :, :, 0])
-    upper = np.minimum(boxes[:, None, :, 1], others[None, :, :, 1])
-    is_some = (lower < upper).all(-1)
-    return np.stack([lower[is_some], upper[is_some]], -1)
+    after = first + 1
+    after[:, -1] = last[:, -1]
+    return np.stack([first, after], -1)
 
 
 def ragged(counts: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Numbers rows of different lengths: which row each entry belongs to, and its place there."""
+    """Return the row of each entry of rows of different lengths, and its index in the row."""
     row = np.repeat(np.arange(len(counts)), counts)
     return row, np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)
 
 
-def _grids(boxes: Boxes, space: Boxes, most: int) -> list[tuple[Boxes, Sides]] | None:
-    """A space in parts that are small enough: the boxes in each, and its sides and theirs.
+def resolve_forks(
+    forks: Sequence[Boxes], endings: Mapping[E, Boxes], unknown: Sequence[Boxes], num_cubes: int
+) -> tuple[dict[E, Boxes], Boxes]:
+    """Assign placements with several possible actions to the ending that all branches share.
 
     Args:
-        boxes: Any within the space.
-        space: One box.
-        most: Parts, so that time is bounded.
+        forks: Placements with more than one possible action, disjoint.
+        endings: Placements from which some branch has each ending; together they cover the forks.
+        unknown: Placements from which some branch has no known ending.
+        num_cubes: Number of intervals of a box.
 
     Returns:
-        None if there would be more.
+        The forks with exactly one possible ending, disjoint, by ending; and the rest.
     """
+    left = merge(np.concatenate([np.empty((0, num_cubes, 2)), *forks]))
+    if not endings:
+        return {}, left
+    usual = max(endings, key=lambda e: volumes(endings[e]).sum())
+    different = list(endings.values())
+    both = [intersect(a, b) for i, a in enumerate(different) for b in different[i + 1 :]]
+    holes = union(np.concatenate([left[:0], *unknown, *both]))
+    others = [boxes for ending, boxes in endings.items() if ending != usual]
+    is_special = _meets(left, np.concatenate([holes, *others]))
+    decided: dict[E, list[Boxes]] = {usual: [left[~is_special]]}
+    left = left[is_special]
+    undecided = []
+    for hole in holes:
+        inside, left = carve(left, hole)
+        undecided.append(inside)
+    for ending, boxes in endings.items():
+        for part in boxes:
+            inside, left = carve(left, part)
+            decided.setdefault(ending, []).append(inside)
+    return (
+        {ending: np.concatenate(parts) for ending, parts in decided.items()},
+        np.concatenate([left, *undecided]),
+    )
+
+
+def _meets(boxes: Boxes, others: Boxes) -> NDArray[np.bool_]:
+    """Return which boxes intersect any of the others."""
+    found = np.zeros(len(boxes), bool)
+    step = max(1, _MOST_PAIRS // max(1, len(others)))
+    for begin in range(0, len(boxes), step):
+        some = boxes[begin : begin + step, None]
+        is_apart = (some[..., 0] >= others[..., 1]) | (some[..., 1] <= others[..., 0])
+        found[begin : begin + step] = (~is_apart.any(-1)).any(-1)
+    return found
+
+
+def _grids(boxes: Boxes, space: Boxes, most: int) -> list[tuple[Boxes, Sides]] | None:
+    """Cut a space into at most `most` small grids: the boxes in each, and the grid's borders."""
     found: list[tuple[Boxes, Sides]] = []
     rest = [(boxes, space)]
     while rest:
@@ -141,7 +176,7 @@ def _grids(boxes: Boxes, space: Boxes, most: int) -> list[tuple[Boxes, Sides]] |
 
 
 def _covered(boxes: Boxes, sides: Sides) -> NDArray[np.bool_]:
-    """Which cells between the sides any box has."""
+    """Return which cells of a grid any box covers."""
     ends = np.stack([np.searchsorted(side, boxes[:, k]) for k, side in enumerate(sides)], 1)
     count = np.zeros([len(side) for side in sides], np.int32)
     for corner in itertools.product((0, 1), repeat=len(sides)):
@@ -153,13 +188,12 @@ def _covered(boxes: Boxes, sides: Sides) -> NDArray[np.bool_]:
 
 
 def _of_grid(mask: NDArray[np.bool_], sides: Sides) -> Boxes:
-    """The cells between the sides that are set."""
     ends = blocks(mask)
     return merge(np.stack([side[ends[:, k]] for k, side in enumerate(sides)], 1))
 
 
 def _join(boxes: NDArray[_Number], cube: int) -> NDArray[_Number]:
-    """Joins boxes that differ in one cube's interval alone and meet there."""
+    """Join boxes that differ only in one cube's interval and meet there."""
     if len(boxes) < 2:
         return boxes
     others = [k for k in range(boxes.shape[1]) if k != cube]
@@ -175,73 +209,3 @@ def _join(boxes: NDArray[_Number], cube: int) -> NDArray[_Number]:
     joined = boxes[first]
     joined[:, cube, 1] = boxes[last, cube, 1]
     return joined
-
-
-def carve(boxes: Boxes, hole: Boxes) -> tuple[Boxes, Boxes]:
-    """Boxes in two: what lies in another box, and what does not.
-
-    Args:
-        boxes: Any.
-        hole: The other one. Shape: (n, 2).
-    """
-    outside = []
-    for cube, (lower, upper) in enumerate(hole):
-        below, boxes = cut(boxes, cube, lower)
-        boxes, above = cut(boxes, cube, upper)
-        outside += [below, above]
-    return boxes, np.concatenate(outside)
-
-
-E = TypeVar("E")
-
-_AT_ONCE = 10_000_000
-"""Pairs of boxes that are compared at a time; bounds memory."""
-
-
-def settle(
-    forks: Sequence[Boxes], ways: Mapping[E, Boxes], unknown: Sequence[Boxes], num_cubes: int
-) -> tuple[dict[E, Boxes], Boxes]:
-    """Parts forks by how they end.
-
-    Args:
-        forks: Where there is more than one way, disjoint.
-        ways: Where a way may end so; together they cover the forks.
-        unknown: Where a way may end in another manner.
-        num_cubes: How many intervals a box has.
-
-    Returns:
-        The forks that can only end so, disjoint; and the rest.
-    """
-    left = merge(np.concatenate([np.empty((0, num_cubes, 2)), *forks]))
-    if not ways:
-        return {}, left
-    usual = max(ways, key=lambda e: volumes(ways[e]).sum())
-    different = list(ways.values())
-    both = [intersect(a, b) for i, a in enumerate(different) for b in different[i + 1 :]]
-    holes = unite(np.concatenate([left[:0], *unknown, *both]))
-    is_special = _meets(left, np.concatenate([holes, *(b for e, b in ways.items() if e != usual)]))
-    settled: dict[E, list[Boxes]] = {usual: [left[~is_special]]}
-    left = left[is_special]
-    undecided = []
-    for hole in holes:
-        inside, left = carve(left, hole)
-        undecided.append(inside)
-    for ending, boxes in ways.items():
-        for part in boxes:
-            inside, left = carve(left, part)
-            settled.setdefault(ending, []).append(inside)
-    return (
-        {ending: np.concatenate(parts) for ending, parts in settled.items()},
-        np.concatenate([left, *undecided]),
-    )
-
-
-def _meets(boxes: Boxes, others: Boxes) -> NDArray[np.bool_]:
-    """Which boxes have something in common with any of some others."""
-    found = np.zeros(len(boxes), bool)
-    step = max(1, _AT_ONCE // max(1, len(others)))
-    for begin in range(0, len(boxes), step):
-        some = boxes[begin : begin + step, None]
-        is_apart = (some[..., 0] >= others[..., 1]) | (some[..., 1] <= others[..., 0])
-        found[begin : begin + step] = (~is_apart.any(-1)).any(-1)
-    return found

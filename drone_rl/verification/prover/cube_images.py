@@ -1,15 +1,16 @@
-"""The picture of a cube in closed form: which face each pixel shows, and where that changes.
+"""Images of cubes: in closed form, and by the renderer.
 
-The camera looks ahead, level and at the height of the cubes' centres. Of a cube whose centre stands
-D metres ahead and Y metres to the left of the camera, a pixel whose ray goes a metres to the left
-and b metres up for each metre ahead shows
+The camera is level and at the height of the cubes' centres. Let a cube's centre be D metres ahead
+of the camera and Y metres to the left, h half its edge, and T = D - h the distance of its front. A
+pixel whose ray goes a metres left and b metres up per metre ahead shows
 
-- the front, where |Y - a T| <= h, with h half the cube's edge and T = D - h the distance of its
-  front, if that is ahead and the ray is not above or below it, |b| T <= h;
-- a side, where Y is farther out than that, up to a U + h, with U = min(D + h, h / |b|);
-- what stands behind, elsewhere.
+- the front, where |Y - a T| <= h, if the front is ahead and |b| T <= h;
+- a side, where Y is further out than that, up to a U + h, with U = min(D + h, h / |b|);
+- the background elsewhere.
 
-So for a fixed D a picture changes only where Y is a T - h, a T + h or a U + h of some pixel.
+So at a fixed D the image changes only where Y is a T - h, a T + h or a U + h for some pixel. The
+colours of faces, floor and sky come from the renderer; `CubeImages.check` compares the closed form
+with its images byte for byte.
 """
 
 import dataclasses
@@ -28,31 +29,26 @@ from drone_rl.utils.errors import InputError
 from drone_rl.verification.prover.lattice import Lattice
 
 NOTHING, FRONT, LEFT_SIDE, RIGHT_SIDE = range(4)
-"""What a pixel shows of a cube: its side is seen where the cube stands to that side."""
-UNIT = 2.0**-24
-"""Largest relative error of an operation in float32."""
+"""What a pixel shows of a cube; a side is visible where the cube stands on that side."""
+UNIT = 2.0**-24  # largest relative error of a float32 operation
 
 
 @dataclasses.dataclass(frozen=True)
-class Eye:
+class CameraModel:
     """The policy's camera among cubes of one size."""
 
     left: NDArray[np.float64]
-    """Of each column's rays: metres to the left for each ahead. Shape: (width,)."""
+    """Slope of each column's rays, metres left per metre ahead. Shape: (width,)."""
     up: NDArray[np.float64]
-    """Of each row's rays: metres up for each ahead. Shape: (height,)."""
-    half: float
-    """Half the edge of a cube, metres."""
-    farthest: float
-    """No x is larger, metres."""
-    widest: float
-    """No |y| is larger, metres."""
-    bound: float
-    """No cube's |y| is larger, metres."""
+    """Slope of each row's rays, metres up per metre ahead. Shape: (height,)."""
+    half: float  # half the edge of a cube, metres
+    farthest: float  # bound on every x, metres
+    widest: float  # bound on every |y|, metres
+    bound: float  # bound on the cubes' |y|, metres
 
     @classmethod
-    def of(cls, task: TaskSettings, camera: CameraSettings) -> "Eye":
-        """The eye of a policy."""
+    def of(cls, task: TaskSettings, camera: CameraSettings) -> "CameraModel":
+        """Build the model of a policy's camera."""
         wide = np.tan(np.radians(camera.horizontal_fov) / 2)
         high = wide * camera.height / camera.width
         return cls(
@@ -65,18 +61,17 @@ class Eye:
         )
 
     def borders(self, ahead: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Where the picture of a cube changes as it stands farther to the left.
+        """Return the lateral positions of a cube at which its image changes.
 
         Args:
             ahead: Metres from the camera to the cube's centre.
 
         Returns:
-            Metres to the left of the camera, in ascending order, and how far to either side of each
-            a renderer that computes in float32 may already, or still, show the other picture. Its
-            error, in units of 2^-24, is at most 16 for each metre of a ray's way to the left (the
-            slopes are good to 10, a division, a product and a sum add 4), 3 times the ray's slope
-            for each metre of x (which the places, the camera's and their difference are rounded
-            to) and 3 for each metre of y.
+            Metres to the left of the camera, ascending; and how far to either side of each a
+            float32 renderer may show the other image. Its error, in units of 2^-24, is at most 16
+            per metre of a ray's lateral offset (slopes are good to 10; a division, a product and a
+            sum add 4), 3 times the slope per metre of x (rounding of both positions and their
+            difference), and 3 per metre of y.
         """
         front, back = self._depths(ahead)
         shown = back >= front
@@ -96,10 +91,10 @@ class Eye:
     def faces(
         self, ahead: float | NDArray[np.float64], left: NDArray[np.float64]
     ) -> NDArray[np.uint8]:
-        """What each pixel shows of a cube.
+        """Compute what each pixel shows of a cube.
 
         Args:
-            ahead: Metres from the camera to the cube's centre; one for all, or of shape (N,).
+            ahead: Metres from the camera to the cube's centre; one for all, or shape (N,).
             left: The same to the left. Shape: (N,).
 
         Returns:
@@ -119,35 +114,29 @@ class Eye:
         return faces
 
     def rounding(self, left: NDArray[np.float64]) -> NDArray[np.float64]:
-        """By how much float32 may move a cube that stands so far to the left of the camera.
+        """Return how far float32 may move a cube that stands so far to the left of the camera.
 
-        Its y is rounded, which is at most `bound`, and so is the difference from the camera's; a
-        metre more covers errors of this sum itself. Where a drone is, is no matter of rounding.
+        Its y, at most `bound`, and its difference from the camera's are rounded; one metre more
+        covers the error of this sum. The drone's own position is exact.
         """
         return UNIT * (self.bound + np.abs(left) + 1)
 
     def grazed(self, ahead: float) -> NDArray[np.bool_]:
-        """Rows that end within rounding errors of a cube's upper or lower front edge.
-
-        Whether they show it can't be told. Shape: (height,).
-        """
+        """Return which rows end within rounding error of a front edge. Shape: (height,)."""
         front, back = self._depths(ahead)
         return np.abs(back - front) <= 32 * UNIT * self.farthest
 
     def _depths(
         self, ahead: float | NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Metres ahead of the camera where rays reach a cube's front, and leave it, by row.
-
-        Shapes: that of `ahead`, which is one number or (N, 1); and (height,) or (N, height).
-        """
+        """Return the distances where each row's rays meet a cube's front, and leave the cube."""
         with np.errstate(divide="ignore"):
             above = self.half / np.abs(self.up)
         return np.maximum(ahead - self.half, 0.0), np.minimum(ahead + self.half, above)
 
 
 def camera_ahead() -> float:
-    """Metres from the drone's centre to its policy's camera."""
+    """Return the metres from the drone's centre to the camera."""
     return FRONT_CENTER.pos[0]
 
 
@@ -155,60 +144,55 @@ def _middles(count: int) -> NDArray[np.float64]:
     return (np.arange(count) + 0.5) / count * 2 - 1
 
 
-ANYTHING = 255
-"""No face."""
+ANYTHING = 255  # no face
 
 
-class Seeing:
-    """The pictures of cubes that stand in given places, drawn and worked out."""
+class CubeImages:
+    """Images of cubes at given positions, rendered and in closed form."""
 
-    def __init__(self, worlds: Worlds, lattice: Lattice, eye: Eye) -> None:
-        """Takes the colours from the renderer.
-
-        Args:
-            worlds: Of the task, with the policy's camera.
-            lattice: The task's.
-            eye: The camera's.
+    def __init__(self, worlds: Worlds, lattice: Lattice, camera: CameraModel) -> None:
+        """Read the colours from the renderer.
 
         Raises:
-            InputError: A face, or what is behind it, is not of one even colour.
+            InputError: A face or the background has several colours, or two share one.
         """
-        self._worlds, self._lattice, self._eye = worlds, lattice, eye
+        self._worlds, self._lattice, self._camera = worlds, lattice, camera
         task = lattice.task
+        self.num_cubes = task.num_cubes
         nowhere = np.zeros((1, task.num_cubes))
-        self.background = self._draw(nowhere, np.zeros((1, 2)), nowhere == 0)[0]
+        self.background = self.render(nowhere, np.zeros((1, 2)), nowhere == 0)[0]
         self.colors = torch.zeros(4, 3, dtype=torch.uint8)
         near = task.first_distance - camera_ahead() - 2 * task.cube_size
         steps = max(0, int(near / task.step_length))
         left = np.array([0.0, 2 * task.cube_size, -2 * task.cube_size])
-        pictures = self._draw(
+        pictures = self.render(
             np.broadcast_to(left[:, None], (3, task.num_cubes)).copy(),
             np.array([[steps, 0]] * 3),
             np.arange(task.num_cubes) != 0,
         )
         ahead = self._lattice.cubes[0] - steps * task.step_length - camera_ahead()
-        faces = eye.faces(ahead, left)
+        faces = camera.faces(ahead, left)
         for face in (FRONT, LEFT_SIDE, RIGHT_SIDE):
             shown = pictures[torch.from_numpy(faces == face)]
             if not len(shown) or (shown != shown[0]).any():
                 raise InputError(
-                    "the faces of the cubes are not of one colour each, so that their pictures "
-                    "have no closed form; prove the policy in a world without textures and shadows"
+                    "a face of a cube has more than one colour, so its image has no closed form; "
+                    "prove the policy in an environment without textures and shadows"
                 )
             self.colors[face] = shown[0]
         behind = self.background.reshape(-1, 3).unique(dim=0)
         if len(torch.cat([behind, self.colors[FRONT:]]).unique(dim=0)) < len(behind) + 3:
             raise InputError(
-                f"task.cube_color={task.cube_color} makes a face look like another one, the floor "
-                "or the sky, so that none can be told from the other; give another colour"
+                f"task.cube_color={task.cube_color} gives a face the colour of another face, the "
+                "floor or the sky; give another colour"
             )
 
-    def of(self, cube: int, steps: int) -> "OneCube":
-        """What is seen of one cube by a drone that has gone so many steps ahead."""
-        return OneCube(self, cube, steps)
+    def of(self, cube: int, steps: int) -> "CubeView":
+        """Return the view of one cube after a number of steps ahead."""
+        return CubeView(self, cube, steps)
 
     def read(self, pictures: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """From a renderer's pictures of one cube to what each pixel shows, as `Eye.faces` says it.
+        """Convert rendered images of one cube to faces, as `CameraModel.faces` returns them.
 
         Raises:
             InputError: A pixel shows something else.
@@ -220,40 +204,37 @@ class Seeing:
             faces[packed == _packed(shown.numpy())] = face
         if (faces == ANYTHING).any():
             raise InputError(
-                "a pixel is of none of the colours of floor, sky and the cubes' faces, so nothing "
-                "can be proved of it; prove the policy in the default world"
+                "a pixel has none of the colours of floor, sky and the cubes' faces, so nothing "
+                "can be proved; prove the policy in the default environment"
             )
         return faces
 
-    def look(self, cube: int, steps: int, left: NDArray[np.float32]) -> NDArray[np.uint8]:
-        """Pictures of one cube alone, by the renderer; see `OneCube.look`."""
-        count, num_cubes = len(left), self._lattice.task.num_cubes
-        cubes = np.zeros((count, num_cubes))
-        cubes[:, cube] = left
-        hidden = np.broadcast_to(np.arange(num_cubes) != cube, cubes.shape)
-        return self._draw(cubes, np.array([[steps, 0]] * count), hidden).numpy()
-
-    def draw(self, cubes: NDArray[np.float64], places: NDArray[np.int64]) -> Tensor:
-        """Pictures by the renderer.
+    def render(
+        self, cubes: NDArray, places: NDArray, hidden: NDArray[np.bool_] | None = None
+    ) -> Tensor:
+        """Render images.
 
         Args:
             cubes: Metres to the left of the start. Shape: (N, num_cubes).
-            places: Of the drone, steps ahead and to the left. Shape: (N, 2).
+            places: Steps of the drone ahead and to the left. Shape: (N, 2).
+            hidden: Cubes to leave out; by default those that the drone has touched or passed.
 
         Returns:
-            RGB. Shape: (N, height, width, 3), uint8. Cubes that a drone there has touched or
-            passed are not seen.
+            RGB. Shape: (N, height, width, 3), uint8.
         """
-        return self._draw(cubes, places, self._gone(cubes, places))
+        task = self._lattice.task
+        hidden = self._gone(cubes, places) if hidden is None else hidden
+        x = np.broadcast_to(self._lattice.cubes, cubes.shape)
+        where = np.stack([x, cubes, np.full(cubes.shape, task.altitude)], -1)
+        state = cast(WorldState, self._worlds.start(torch.from_numpy(where)))
+        state.body.position[:, :2] = torch.from_numpy(places[:, :2] * task.step_length)
+        state.passed[:] = torch.from_numpy(hidden.copy())
+        return self._worlds.render(state)
 
-    def work_out(
+    def closed_form(
         self, cubes: NDArray[np.float64], places: NDArray[np.int64]
     ) -> tuple[Tensor, NDArray[np.bool_]]:
-        """The same pictures by the closed form.
-
-        Returns:
-            The pictures, and which of them are on no border, so that they must be the renderer's.
-        """
+        """Compute the same images in closed form, and which of them are on no border."""
         count = len(cubes)
         shown = np.full((count, *self.background.shape[:2]), NOTHING, np.uint8)
         is_clear = np.ones(count, bool)
@@ -266,26 +247,19 @@ class Seeing:
                 if not len(those):
                     continue
                 seen = distance - camera_ahead()
-                faces = self._eye.faces(seen, left[those])
+                faces = self._camera.faces(seen, left[those])
                 shown[those] = np.where(faces == NOTHING, shown[those], faces)
-                borders, errors = self._eye.borders(seen)
+                borders, errors = self._camera.borders(seen)
                 if len(borders):
                     near = np.abs(left[those, None] - borders) <= errors
                     is_clear[those] &= ~near.any(-1)
-                is_clear[those] &= not self._eye.grazed(seen).any()
+                is_clear[those] &= not self._camera.grazed(seen).any()
         colored = self.colors.numpy()[shown]
         pictures = np.where((shown == NOTHING)[..., None], self.background.numpy(), colored)
         return torch.from_numpy(pictures), is_clear
 
     def check(self, count: int, random_state: np.random.RandomState) -> int:
-        """Compares the two on random placements and places.
-
-        Args:
-            count: How many pictures.
-            random_state: Draws them.
-
-        Returns:
-            How many were compared: those on no border.
+        """Compare `count` random images with the closed form; return how many were on no border.
 
         Raises:
             InputError: They differ.
@@ -300,62 +274,48 @@ class Seeing:
             ahead = random_state.randint(0, farthest + 1, size)
             left = random_state.randint(-widest, widest + 1, size)
             places = np.stack([ahead, left], -1)
-            drawn, (made, is_clear) = self.draw(cubes, places), self.work_out(cubes, places)
+            drawn, (made, is_clear) = self.render(cubes, places), self.closed_form(cubes, places)
             is_wrong = (drawn != made).flatten(1).any(-1).numpy() & is_clear
             compared += int(is_clear.sum())
             if is_wrong.any():
                 worst = int(np.flatnonzero(is_wrong)[0])
                 raise InputError(
-                    f"the renderer's picture at {places[worst].tolist()} steps of cubes at "
-                    f"y={cubes[worst].tolist()} is not the closed form's, so nothing can be proved "
-                    "of it; prove the policy in the default world"
+                    f"the renderer's image at {places[worst].tolist()} steps of cubes at "
+                    f"y={cubes[worst].tolist()} differs from the closed form, so nothing can be "
+                    "proved; prove the policy in the default environment"
                 )
         return compared
 
     def _gone(self, cubes: NDArray[np.float64], places: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Cubes that are out of sight. Shape: (N, num_cubes)."""
+        """Return which cubes are out of sight. Shape: (N, num_cubes)."""
         task = self._lattice.task
         ahead = self._lattice.cubes - places[:, :1] * task.step_length
         left = cubes - places[:, 1:] * task.step_length
         return (ahead < 0) | (np.maximum(np.abs(ahead), np.abs(left)) <= task.touch_distance)
 
-    def _draw(self, cubes: NDArray, places: NDArray, hidden: NDArray[np.bool_]) -> Tensor:
-        """Draws all cubes but the hidden ones, wherever they stand."""
-        task = self._lattice.task
-        x = np.broadcast_to(self._lattice.cubes, cubes.shape)
-        where = np.stack([x, cubes, np.full(cubes.shape, task.altitude)], -1)
-        state = cast(WorldState, self._worlds.start(torch.from_numpy(where)))
-        steps = torch.from_numpy(places[:, :2] * task.step_length)
-        state.body.position[:, :2] = steps
-        state.passed[:] = torch.from_numpy(hidden.copy())
-        return self._worlds.render(state)
-
 
 def _packed(colors: NDArray[np.uint8]) -> NDArray[np.uint32]:
-    """One number for each colour. Shape: (*, 3) to (*)."""
+    """Pack each colour into one number. Shape: (*, 3) to (*)."""
     red, green, blue = (colors[..., k].astype(np.uint32) for k in range(3))
     return (red | green << 8 | blue << 16).astype(np.uint32)
 
 
 @dataclasses.dataclass(frozen=True)
-class OneCube:
-    """One cube at one distance, by the renderer."""
+class CubeView:
+    """The renderer's images of one cube at one distance."""
 
-    seeing: Seeing
+    images: CubeImages
     cube: int
     steps: int
 
     def look(self, left: NDArray[np.float32]) -> NDArray[np.uint8]:
-        """Its pictures, so many metres to the left of the camera.
-
-        Args:
-            left: Shape (N,).
-
-        Returns:
-            RGB. Shape: (N, height, width, 3).
-        """
-        return self.seeing.look(self.cube, self.steps, left)
+        """Render the cube, metres left of the camera (N,), as RGB (N, height, width, 3)."""
+        count = len(left)
+        cubes = np.zeros((count, self.images.num_cubes))
+        cubes[:, self.cube] = left
+        hidden = np.broadcast_to(np.arange(cubes.shape[1]) != self.cube, cubes.shape)
+        return self.images.render(cubes, np.array([[self.steps, 0]] * count), hidden).numpy()
 
     def read(self, pictures: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """What each pixel shows of it, see `Seeing.read`."""
-        return self.seeing.read(pictures)
+        """See `CubeImages.read`."""
+        return self.images.read(pictures)

@@ -1,7 +1,8 @@
-"""The places that a drone can be at, and what the rules of cube collection do there.
+"""The task's rules on the lattice of drone positions.
 
-In computer-vision mode a drone moves a step at a time, so it is always a whole number of steps from
-where it started: i ahead and j to the left.
+In computer-vision mode every move is one step forward, left or right, so the drone is always a
+whole number of steps from its start. `Lattice` moves boxes of placements; `explore` builds the
+graph of everything reachable past cubes at given positions, by the simulator's own rules.
 """
 
 import dataclasses
@@ -22,30 +23,23 @@ from drone_rl.utils.batch import Batch
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.prover.boxes import Boxes, cut
 
-AHEAD, LEFT, RIGHT = range(3)
-"""The actions."""
+AHEAD, LEFT, RIGHT = range(3)  # the actions
 
 
 @dataclasses.dataclass(frozen=True)
-class Place:
-    """Where a drone is, what it has, and how it came there."""
+class LatticeState:
+    """The drone's position, the cubes it has, and how it arrived."""
 
-    ahead: int
-    """Steps."""
-    left: int
-    """Steps."""
-    collected: int = 0
-    """Bit k is set for cube k."""
-    steps: int = 0
-    """Taken so far."""
-    came: int = AHEAD
-    """The last action, if it was sideways and collected nothing; else `AHEAD`."""
-    is_fork: bool = False
-    """Whether another way could have been taken instead, as far as is known."""
+    ahead: int  # steps
+    left: int  # steps
+    collected: int = 0  # bit k is set for cube k
+    steps: int = 0  # steps taken so far
+    came: int = AHEAD  # the last action if it was sideways and collected nothing; else `AHEAD`
+    is_fork: bool = False  # whether some earlier action was not certain
 
     @functools.cached_property
     def turn(self) -> tuple:
-        """Sorts places so that none comes before one that leads to it."""
+        """Sort key: no state precedes one that leads to it."""
         order = (0, self.left, -self.left)[self.came]
         return (self.ahead, self.collected.bit_count(), self.came, order, self.steps)
 
@@ -55,28 +49,22 @@ class Ending:
     """How an episode ends."""
 
     reason: EndReason
-    collected: int
-    """Bit k is set for cube k."""
-    loops: bool = False
-    """Whether the drone goes to and fro until the step limit."""
+    collected: int  # bit k is set for cube k
+    loops: bool = False  # whether the drone oscillates until the step limit
 
 
 class Lattice:
     """A task's rules on the lattice."""
 
     def __init__(self, task: TaskSettings) -> None:
-        """Notes where everything is.
-
-        Raises:
-            InputError: Rounding makes places depend on the way there.
-        """
+        """Raise InputError if rounding makes positions depend on the path."""
         self.task = task
         step, count = task.step_length, task.step_limit + 1
         multiples = np.arange(-count, count + 1) * step
         if not np.array_equal(multiples[1:], multiples[:-1] + step):
             raise InputError(
-                f"task.step_length={step} can't be added up without rounding, so that places "
-                "depend on the way there; give a multiple of a power of two, such as 0.5 or 1.25"
+                f"multiples of task.step_length={step} are rounded, so positions depend on the "
+                "path; give a multiple of a power of two, such as 0.5 or 1.25"
             )
         self.cubes = task.first_distance + task.spacing * np.arange(task.num_cubes)
         """x of each cube, metres."""
@@ -87,31 +75,24 @@ class Lattice:
         """Steps ahead after which every episode has ended."""
         return int(self.task.front_bound / self.task.step_length) + 1
 
-    def x(self, place: Place) -> float:
-        """Metres from the start."""
+    def x(self, place: LatticeState) -> float:
+        """Return the metres ahead of the start."""
         return place.ahead * self.task.step_length
 
-    def y(self, place: Place) -> float:
-        """Metres to the left of the start."""
+    def y(self, place: LatticeState) -> float:
+        """Return the metres to the left of the start."""
         return place.left * self.task.step_length
 
-    def standing(self, place: Place) -> list[int]:
-        """Cubes that are neither collected nor left behind, the nearest first."""
+    def standing(self, place: LatticeState) -> list[int]:
+        """Return the cubes neither collected nor passed, nearest first."""
         x = self.x(place)
         cubes = range(len(self.cubes))
         return [k for k in cubes if not place.collected >> k & 1 and x <= self.cubes[k]]
 
-    def move(self, place: Place, action: int, boxes: Boxes) -> Iterator[tuple[Place, Boxes]]:
-        """Where an action leads.
-
-        Args:
-            place: From where.
-            action: Which.
-            boxes: The cubes' places, metres.
-
-        Yields:
-            The next place, for each set of cubes that are then collected, and their places.
-        """
+    def move(
+        self, place: LatticeState, action: int, boxes: Boxes
+    ) -> Iterator[tuple[LatticeState, Boxes]]:
+        """Yield the next state and its part of the boxes, for each set of cubes then collected."""
         sideways = {AHEAD: 0, LEFT: 1, RIGHT: -1}[action]
         moved = dataclasses.replace(
             place,
@@ -125,8 +106,8 @@ class Lattice:
             came = AHEAD if is_new else action
             yield dataclasses.replace(moved, collected=collected, came=came), part
 
-    def ending(self, place: Place) -> Ending | None:
-        """How the episode has ended there, in the order of Algorithm 3; None if it goes on."""
+    def ending(self, place: LatticeState) -> Ending | None:
+        """Return how the episode has ended, in the order of Algorithm 3; None if it continues."""
         reason = None
         if place.steps >= self.task.step_limit:
             reason = EndReason.STEP_LIMIT
@@ -138,8 +119,10 @@ class Lattice:
             reason = EndReason.ALL_CUBES
         return None if reason is None else Ending(reason, place.collected)
 
-    def _touched(self, place: Place, stood: list[int], boxes: Boxes) -> Iterator[tuple[int, Boxes]]:
-        """Boxes by the cubes that the drone has at a place, of those that stood before."""
+    def _touched(
+        self, place: LatticeState, stood: list[int], boxes: Boxes
+    ) -> Iterator[tuple[int, Boxes]]:
+        """Split boxes by which of the cubes that stood the drone touches."""
         parts = [(place.collected, boxes)]
         reach, y = self.task.touch_distance, self.y(place)
         first, beyond = _least(y, reach), math.nextafter(-_least(-y, reach), math.inf)
@@ -156,7 +139,7 @@ class Lattice:
 
 
 def _least(y: float, reach: float) -> float:
-    """The least number at a distance of at most `reach` from y, as floats are subtracted."""
+    """Return the smallest float within `reach` of y, by float subtraction."""
     least = y - reach
     while abs(y - least) <= reach:
         least = math.nextafter(least, -math.inf)
@@ -165,26 +148,24 @@ def _least(y: float, reach: float) -> float:
     return least
 
 
-MOST_NODES = 2**24
-"""Of one placement, reachable or not; bounds memory."""
+MOST_NODES = 2**24  # reachable or not, per placement; bounds memory
 
 
 @dataclasses.dataclass
 class Nodes(Batch):
-    """Some nodes; `K` is how many."""
+    """Graph nodes, K in number: a position and the set of collected cubes.
 
-    placement: Tensor  # (K,) int64
-    """Which placement of the cubes."""
-    ahead: Tensor  # (K,) int64
-    """Steps forward from the origin."""
-    aside: Tensor  # (K,) int64
-    """Steps to the left of it; below 0 to the right."""
-    collected: Tensor  # (K,) int64
-    """Cubes collected on the way here; bit k says whether cube k is one of them."""
+    A node determines the image and the effect of each move, but not the number of steps.
+    """
+
+    placement: Tensor  # (K,) int64; index of the placement of the cubes
+    ahead: Tensor  # (K,) int64; steps forward from the origin
+    aside: Tensor  # (K,) int64; steps to the left of it; negative to the right
+    collected: Tensor  # (K,) int64; bit k is set if cube k is collected
 
 
 class Shape(NamedTuple):
-    """How many values each part of a node can have: those of `Nodes`, without the placement."""
+    """Number of values of each part of a node, without the placement."""
 
     ahead: int
     aside: int
@@ -192,39 +173,30 @@ class Shape(NamedTuple):
 
     @property
     def nodes(self) -> int:
-        """Of one placement."""
+        """Nodes per placement."""
         return self.ahead * self.aside * self.collected
 
 
 @dataclasses.dataclass
 class Graph:
-    """All nodes that can be reached by any moves, and what each move leads to; `A` moves."""
+    """All reachable nodes, and where each of the A moves leads.
+
+    It depends on the placement only through which moves touch which cubes.
+    """
 
     settings: TaskSettings
-    cubes: Tensor  # (P, C, 3) float64
-    """The placements, metres."""
-    nodes: Nodes
-    """The first P are where the episodes start, in the placements' order."""
-    target: Tensor  # (K, A) int64
-    """Number of the node that a move leads to; -1 where the episode ends."""
-    reason: Tensor  # (K, A) int64
-    """Why it ends, an `EndReason`; never for its length, of which nodes know nothing."""
-    collected: Tensor  # (K, A) int64
-    """Cubes collected after the move, as in `Nodes`."""
+    cubes: Tensor  # (P, C, 3) float64; placements, metres
+    nodes: Nodes  # the first P are the start nodes, in the order of the placements
+    target: Tensor  # (K, A) int64; node that a move leads to; -1 where the episode ends
+    reason: Tensor  # (K, A) int64; `EndReason`; never the step limit
+    collected: Tensor  # (K, A) int64; cubes collected after the move, as in `Nodes`
 
     def states(self) -> WorldState:
-        """The nodes as worlds that can be drawn."""
+        """Return the nodes as states that can be rendered."""
         return states(self.settings, self.cubes, self.nodes)
 
     def pictures(self) -> tuple[Tensor, Tensor]:
-        """Which nodes look different, by place and standing cubes.
-
-        Which of the cubes behind the drone were collected can't be seen.
-
-        Returns:
-            The number of a node that shows each picture, and of the picture that each node shows.
-            Shapes: (U,), (K,).
-        """
+        """Return one node per distinct image, (U,), and the image of each node, (K,)."""
         standing = dataclasses.replace(self.nodes, collected=_as_bits(self.states().present))
         keys, picture = _keys(shape_of(self.settings), standing).unique(return_inverse=True)
         node = torch.empty_like(keys)
@@ -233,10 +205,10 @@ class Graph:
 
 
 def explore(settings: TaskSettings, cubes: Tensor) -> Graph:
-    """Follows every move from the start of the episodes until no node is new.
+    """Follow every move from the start until no node is new.
 
     Args:
-        settings: The task's.
+        settings: The task.
         cubes: Placements, metres, world frame. Shape: (P, C, 3), float64.
 
     Raises:
@@ -270,11 +242,11 @@ def explore(settings: TaskSettings, cubes: Tensor) -> Graph:
 
 
 def follow(settings: TaskSettings, cubes: Tensor, nodes: Nodes) -> tuple[Nodes, Tensor]:
-    """What every move makes of some nodes, by `CollectCubes.judge`.
+    """Apply every move to some nodes, by `CollectCubes.judge`.
 
     Returns:
-        The nodes after each move, those of the first node first (K * A), and the `EndReason` of
-        each, which is never the step limit. Shape: (K, A).
+        The nodes after each move, those of the first node first (K * A); and the `EndReason` of
+        each, never the step limit. Shape: (K, A).
     """
     moves = torch.tensor(DIRECTIONS).long()
     each = torch.arange(len(nodes)).repeat_interleave(len(moves))
@@ -288,7 +260,7 @@ def follow(settings: TaskSettings, cubes: Tensor, nodes: Nodes) -> tuple[Nodes, 
 
 
 def states(settings: TaskSettings, cubes: Tensor, nodes: Nodes) -> WorldState:
-    """Nodes as worlds, one step short of having taken none: the step limit is never met."""
+    """Convert nodes to states; steps are -1, so that the step limit is never met."""
     body = BodyState.at_rest(_positions(settings, nodes))
     state = CollectCubes(settings).start(cubes[nodes.placement], body)
     bit = torch.arange(cubes.shape[1])
@@ -299,28 +271,24 @@ def states(settings: TaskSettings, cubes: Tensor, nodes: Nodes) -> WorldState:
 
 
 def shape_of(settings: TaskSettings) -> Shape:
-    """How many nodes there can be.
-
-    Raises:
-        InputError: Too many.
-    """
+    """Return the possible numbers of nodes; raise InputError if there are too many."""
     ahead = math.ceil(settings.front_bound / settings.step_length) + 2
     aside = 2 * (math.ceil(settings.side_bound / settings.step_length) + 1) + 1
     shape = Shape(ahead, aside, 2**settings.num_cubes)
     if shape.nodes > MOST_NODES:
         raise InputError(
-            f"num_cubes={settings.num_cubes} and step_length={settings.step_length} make "
-            f"{shape.nodes:.2g} nodes of each placement; give fewer cubes or longer steps, for at "
-            f"most {MOST_NODES:.2g}"
+            f"num_cubes={settings.num_cubes} and step_length={settings.step_length} give "
+            f"{shape.nodes:.2g} nodes per placement, more than {MOST_NODES:.2g}; give fewer cubes "
+            "or longer steps"
         )
     return shape
 
 
 def _positions(settings: TaskSettings, nodes: Nodes) -> Tensor:
-    """Metres, each the sum that as many steps straight on make, rounded alike. Shape: (K, 3).
+    """Return positions, metres, rounded like the simulator's repeated addition. Shape: (K, 3).
 
-    So x is the simulator's to the last bit, and y is if the drone came straight or if steps are
-    sums of halves, quarters and so on; otherwise the simulator's y hangs on the way by some 1e-15.
+    x equals the simulator's to the last bit. So does y if the drone came straight or steps are sums
+    of powers of two; otherwise the simulator's y depends on the path by about 1e-15.
     """
     farthest = max(int(nodes.ahead.max()), int(nodes.aside.abs().max()))
     steps = np.full(farthest + 1, settings.step_length)
@@ -331,19 +299,19 @@ def _positions(settings: TaskSettings, nodes: Nodes) -> Tensor:
 
 
 def _as_bits(flags: Tensor) -> Tensor:
-    """Truth values as one whole number. Shapes: (K, C), (K,)."""
+    """Pack flags into integers. Shapes: (K, C) to (K,)."""
     return (flags.long() << torch.arange(flags.shape[1])).sum(-1)
 
 
 def _keys(shape: Shape, nodes: Nodes) -> Tensor:
-    """A number for each node, of its own. Shape: (K,)."""
+    """Return a unique number for each node. Shape: (K,)."""
     row = nodes.placement * shape.ahead + nodes.ahead
     place = row * shape.aside + nodes.aside + shape.aside // 2
     return place * shape.collected + nodes.collected
 
 
 def _cells(shape: Shape, keys: Tensor) -> Nodes:
-    """The nodes of keys."""
+    """Return the nodes of keys."""
     place, collected = keys // shape.collected, keys % shape.collected
     row, column = place // shape.aside, place % shape.aside
     return Nodes(row // shape.ahead, row % shape.ahead, column - shape.aside // 2, collected)

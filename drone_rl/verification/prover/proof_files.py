@@ -1,4 +1,8 @@
-"""A proof on its way as one file of arrays, so that it goes on after whatever ended it."""
+"""Files of a proof: the certificate, and the state from which a stopped proof resumes.
+
+A certificate can be checked without this program: the boxes of all outcomes and the undecided ones
+partition the placements, and every episode from a box must end as stated.
+"""
 
 import dataclasses
 import hashlib
@@ -19,27 +23,82 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import write_atomically
 from drone_rl.utils.limits import ARRAYS_BYTES, check_indices
 from drone_rl.verification.prover.boxes import Boxes, volumes
-from drone_rl.verification.prover.lattice import Ending, Place
-from drone_rl.verification.prover.prover import Findings, Prover, together
+from drone_rl.verification.prover.lattice import Ending, LatticeState
+from drone_rl.verification.prover.prover import Findings, Prover, combine
 
+FORMAT = "drone_rl certificate"
+FORMAT_VERSION = 1
 _COUNTS = ("num_places", "pictures", "most_boxes", "least_gap", "largest_band", "decided")
 _SETS = ("waiting", "ended", "ways", "forked", "parts", "part", "done", "undecided")
 _DAMAGE = (*(ValueError, TypeError, LookupError, ArithmeticError, AttributeError),)
-"""What the reading of something else raises."""
-_MOST = 2**40
-"""Of any number by which places and endings are known."""
-_NOWHERE = (-1, 0, 0)
-"""Stands for what is not followed to its end."""
+"""Errors from reading a damaged file."""
+_MOST = 2**40  # bound on every integer in a row
+_NOWHERE = (-1, 0, 0)  # stands for an unknown ending
 
 
-def save(prover: Prover, path: Path, subject: str) -> None:
-    """Writes a proof's state.
+def weights_hash(weights: Mapping[str, Tensor]) -> str:
+    """Return the SHA-256 hash of a network's weights; order and device do not matter."""
+    digest = hashlib.sha256()
+    for name in sorted(weights):
+        value = weights[name].detach().cpu().float().contiguous()
+        digest.update(f"{name} {list(value.shape)}\n".encode())
+        digest.update(value.numpy().astype("<f4").tobytes())
+    return digest.hexdigest()
+
+
+def certify(
+    name: str,
+    description: PolicyDescription,
+    weights: str,
+    prover: Prover,
+    seconds: float,
+    stopped_by: str | None = None,
+) -> dict[str, Any]:
+    """Return the certificate of what is known so far, as plain data.
 
     Args:
-        prover: The proof, between two places.
-        path: The file; the old one stays until the new one is whole.
-        subject: Of what it is a proof, in one line.
+        name: The policy's name, for people.
+        description: The policy's, in the task of the proof.
+        weights: See `weights_hash`.
+        prover: The proof.
+        seconds: Duration.
+        stopped_by: The setting that stopped it early.
     """
+    findings = prover.findings()
+    task = prover.lattice.task
+    total = (2 * task.lateral_bound) ** task.num_cubes
+    return {
+        "format": FORMAT,
+        "format_version": FORMAT_VERSION,
+        "policy": {"name": name, "weights": weights, "description": description.as_dict()},
+        "outcomes": [
+            _outcome(ending, boxes, findings, task.num_cubes, total)
+            for ending, boxes in sorted(findings.endings.items())
+            if len(boxes)
+        ],
+        "undecided": {
+            "share": float(volumes(findings.undecided).sum()) / total,
+            "boxes": findings.undecided.tolist(),
+        },
+        "finished": prover.is_finished,
+        "stated": {
+            "logit_gap": prover.gap,
+            "largest_band": prover.largest_band,
+            "renderer": prover.renderer,
+        },
+        "found": {
+            "least_gap": prover.least_gap if prover.least_gap < float("inf") else None,
+            "pictures": prover.pictures,
+            "states": prover.num_places,
+            "most_boxes": prover.most_boxes,
+            "seconds": seconds,
+            "stopped_by": stopped_by,
+        },
+    }
+
+
+def save(prover: Prover, path: Path, proof_id: str) -> None:
+    """Write a proof's state atomically; `proof_id` identifies what is proved."""
     waiting = [
         ((*dataclasses.astuple(p), prover.longest.get(p, 0)), b)
         for p, boxes in prover.waiting.items()
@@ -49,7 +108,7 @@ def save(prover: Prover, path: Path, subject: str) -> None:
     ways = [(_row(e), b) for e, boxes in prover.fork_ends.items() for b in boxes]
     steps = [((*_row(e), s), v) for e, known in prover.done.steps.items() for s, v in known.items()]
     arrays = {
-        "subject": np.frombuffer(subject.encode(), np.uint8),
+        "subject": np.frombuffer(proof_id.encode(), np.uint8),
         "counts": np.array([getattr(prover, name) for name in _COUNTS], np.float64),
         **_packed("waiting", waiting),
         **_packed("ended", ended),
@@ -67,17 +126,11 @@ def save(prover: Prover, path: Path, subject: str) -> None:
     write_atomically(path, buffer.getvalue())
 
 
-def load(prover: Prover, path: Path, subject: str, most: int = ARRAYS_BYTES) -> None:
-    """Lets a fresh proof go on from a state.
-
-    Args:
-        prover: The proof; left as it is if the state is refused.
-        path: The file.
-        subject: As it was saved.
-        most: Bytes that the file may have.
+def load(prover: Prover, path: Path, proof_id: str, most: int = ARRAYS_BYTES) -> None:
+    """Resume a new proof from a saved state of at most `most` bytes.
 
     Raises:
-        InputError: The file is no such state, or one of another proof.
+        InputError: The file is damaged or of another proof; the proof is unchanged.
     """
     try:
         state = read_arrays(path, most=most)
@@ -95,11 +148,13 @@ def load(prover: Prover, path: Path, subject: str, most: int = ARRAYS_BYTES) -> 
         parts, part, left = (_only(sets[name]) for name in ("parts", "part", "undecided"))
         _check(part, waiting, [*ended, *ways, *forked])
         done = [Findings({_ending(row): b}, left[:0], {}) for row, b in sets["done"]]
-        done = together([Findings({}, left, _steps(state)), *done])
+        done = combine([Findings({}, left, _steps(state)), *done])
     except _DAMAGE as error:
-        raise InputError(f"{path} is no state of a proof ({error}); delete it to begin") from None
-    if saved != subject:
-        raise InputError(f"{path} is of another proof; delete it, or give another folder")
+        raise InputError(
+            f"{path} is not a saved proof state ({error}); delete it to start again"
+        ) from None
+    if saved != proof_id:
+        raise InputError(f"{path} belongs to another proof; delete it, or give another folder")
     prover.waiting.clear()
     prover.boxes_under_way = 0
     for place, longest, boxes in waiting:
@@ -115,9 +170,9 @@ def load(prover: Prover, path: Path, subject: str, most: int = ARRAYS_BYTES) -> 
         setattr(prover, name, count)
 
 
-def _place(row: tuple[int, ...]) -> Place:
+def _place(row: tuple[int, ...]) -> LatticeState:
     ahead, left, collected, steps, came, is_fork = row
-    return Place(ahead, left, collected, steps, came, bool(is_fork))
+    return LatticeState(ahead, left, collected, steps, came, bool(is_fork))
 
 
 def _row(ending: Ending | None) -> tuple[int, int, int]:
@@ -136,9 +191,9 @@ def _only(parts: Sequence[tuple[tuple[int, ...], Boxes]]) -> Boxes:
 
 
 def _check(part: Boxes, waiting: Sequence[tuple], known: Sequence) -> None:
-    """Something waits where a part is under way, and only there more can be known than is done."""
+    """Check that states are pending exactly where a part is in progress."""
     if len(part) != bool(waiting) or (known and not waiting):
-        raise ValueError(f"{len(part)} parts are under way at {len(waiting)} places")
+        raise ValueError(f"{len(part)} parts are in progress at {len(waiting)} states")
 
 
 def _steps(state: dict[str, NDArray]) -> dict[Ending, dict[int, float]]:
@@ -174,75 +229,6 @@ def _unpacked(
         raise ValueError(f"{name} are {boxes.dtype} of shape {boxes.shape}")
     parts = np.split(boxes, np.cumsum(counts)[:-1])
     return [(tuple(row), b) for row, b in zip(rows.tolist(), parts, strict=True)]
-
-
-FORMAT = "drone_rl certificate"
-FORMAT_VERSION = 1
-
-
-def weights_hash(weights: Mapping[str, Tensor]) -> str:
-    """SHA-256 of a network's weights, whatever file they come from.
-
-    Args:
-        weights: Its state, by name.
-    """
-    digest = hashlib.sha256()
-    for name in sorted(weights):
-        value = weights[name].detach().cpu().float().contiguous()
-        digest.update(f"{name} {list(value.shape)}\n".encode())
-        digest.update(value.numpy().astype("<f4").tobytes())
-    return digest.hexdigest()
-
-
-def certify(
-    name: str,
-    description: PolicyDescription,
-    weights: str,
-    prover: Prover,
-    seconds: float,
-    stopped_by: str | None = None,
-) -> dict[str, Any]:
-    """What is known by now, as plain data.
-
-    Args:
-        name: Of the policy, for people.
-        description: Of the policy, in the task of the proof.
-        weights: See `weights_hash`.
-        prover: The proof.
-        seconds: That it took.
-        stopped_by: The setting that stopped it before its end.
-    """
-    findings = prover.findings()
-    task = prover.lattice.task
-    total = (2 * task.lateral_bound) ** task.num_cubes
-    return {
-        "format": FORMAT,
-        "format_version": FORMAT_VERSION,
-        "policy": {"name": name, "weights": weights, "description": description.as_dict()},
-        "outcomes": [
-            _outcome(ending, boxes, findings, task.num_cubes, total)
-            for ending, boxes in sorted(findings.endings.items())
-            if len(boxes)
-        ],
-        "undecided": {
-            "share": float(volumes(findings.undecided).sum()) / total,
-            "boxes": findings.undecided.tolist(),
-        },
-        "finished": prover.is_finished,
-        "stated": {
-            "logit_gap": prover.gap,
-            "largest_band": prover.largest_band,
-            "renderer": prover.renderer,
-        },
-        "found": {
-            "least_gap": prover.least_gap if prover.least_gap < float("inf") else None,
-            "pictures": prover.pictures,
-            "states": prover.num_places,
-            "most_boxes": prover.most_boxes,
-            "seconds": seconds,
-            "stopped_by": stopped_by,
-        },
-    }
 
 
 def _outcome(

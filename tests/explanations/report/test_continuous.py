@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 import torch
 
+from drone_rl.explanations.explain import SECTIONS, explain_policy
 from drone_rl.explanations.report import write_report
-from drone_rl.explanations.sections import find_sections
 from drone_rl.explanations.settings import ExplainSettings
-from drone_rl.explanations.study import explain_policy
 from tests.continuous import make_policy, make_worlds
 
 NAMES = ["forward", "left", "right", "turn left", "turn right"]
@@ -25,7 +24,7 @@ def folder(tmp_path_factory):
         network.layers.logits.weight.mul_(20)
         network.layers.logits.bias.copy_(torch.tensor([1.0, 0.2, 0.0, 0.0, 0.0, 0.0]))
     settings = ExplainSettings(frames=40, episodes=6, perplexity=5)
-    sections = find_sections()
+    sections = SECTIONS
     explain_policy(env, network, folder, settings, name="fast", provenance={}, sections=sections)
     env.close()
     return folder

@@ -6,10 +6,9 @@ import pytest
 import torch
 
 from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, with_transforms
+from drone_rl.explanations.explain import SECTIONS, explain_policy
 from drone_rl.explanations.report import write_report
-from drone_rl.explanations.sections import find_sections
 from drone_rl.explanations.settings import ExplainSettings
-from drone_rl.explanations.study import explain_policy
 from drone_rl.policies import MLP
 from tests.second_dynamics import Turning
 
@@ -24,7 +23,7 @@ def folder(tmp_path_factory):
     with torch.no_grad():  # mostly onwards, or flights last for ever
         network.layers.logits.bias.copy_(torch.tensor([3.0, 0.0, 0.0, -2.0, 0.0]))
     settings = ExplainSettings(frames=40, episodes=6, perplexity=5)
-    sections = {name: s for name, s in find_sections().items() if name != "evaluation"}
+    sections = {name: s for name, s in SECTIONS.items() if name != "evaluation"}
     explain_policy(env, network, folder, settings, name="turning", provenance={}, sections=sections)
     env.close()
     return folder

@@ -13,7 +13,7 @@ import pytest
 from benchmarks.evidence import SHIFTS
 from benchmarks.evidence import changed as changed_copy
 from drone_rl.explanations.report import write_report
-from drone_rl.explanations.report.sections import find_parts
+from drone_rl.explanations.report.page import PARTS
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.intervals import proportion
 from tests.explanations.report.conftest import NASTY
@@ -68,7 +68,7 @@ def test_the_policy_allows_the_pages_own_style_and_script_alone(report):
 
 def test_every_part_is_there_in_order_with_a_link_to_it(report):
     page = report.read_text()
-    order = [name for name in (*find_parts(), "provenance") if name not in ("left_out", "shifts")]
+    order = [name for name in (*PARTS, "provenance") if name not in ("left_out", "shifts")]
     assert re.findall(r'<section id="([^"]+)">', page) == order
     assert re.findall(r'<a href="#([^"]+)">', page) == order
     assert order[0] == "evaluation"
@@ -146,8 +146,8 @@ def test_conditions_are_shown_where_they_were_flown(explanations, tmp_path):
         np.savez_compressed(folder / "arrays.npz", **{**kept, **arrays})
     page = write_report([folder], tmp_path).read_text()
     part = page[page.index('<section id="shifts">') :].split("</section>")[0]
-    assert "the sun 21.1 to 60 degrees high" in part and part.count("data:image/png") == 2
-    assert "not measured again here" in part and "<td>height of the sun</td>" in part
+    assert "the sun at 21.1 to 60 degrees" in part and part.count("data:image/png") == 2
+    assert "not measured again here" in part and "<td>elevation of the sun</td>" in part
     assert "nothing here tests other colours or sizes" in page
 
 

@@ -1,34 +1,25 @@
-"""A new part of the page is one module and its template."""
+"""Each section has a part, and each part a template."""
 
 from importlib import resources
 
 import pytest
 
-from drone_rl.explanations.report import sections
+from benchmarks.evidence import EXPLANATION
+from drone_rl.explanations.explain import SECTIONS
 from drone_rl.explanations.report.explanation import Explanation
+from drone_rl.explanations.report.page import PARTS
 from drone_rl.explanations.report.part import Part
-from drone_rl.explanations.report.sections import find_parts
-from drone_rl.explanations.sections import find_sections
+from drone_rl.utils.text import said
 
 
 def part(**kwargs):
-    return Part(**({"title": "Tides", "label": "tides", "place": 15, "needs": ("tides",)} | kwargs))
-
-
-def test_a_module_with_a_part_is_found_at_its_place(tmp_path, monkeypatch):
-    (tmp_path / "tides.py").write_text(
-        "from drone_rl.explanations.report.part import Part\n"
-        "PART = Part(title='Tides', label='tides', place=16, needs=('tides',))\n"
-    )
-    monkeypatch.setattr(sections, "__path__", [*sections.__path__, str(tmp_path)])
-    assert list(find_parts())[:4] == ["evaluation", "shifts", "tides", "dataset"]
+    return Part(**({"title": "Tides", "label": "tides", "needs": ("tides",)} | kwargs))
 
 
 def test_each_section_of_an_explanation_has_a_part_and_each_part_a_template():
-    assert find_parts().keys() - {"left_out"} == find_sections().keys()
+    assert PARTS.keys() - {"left_out"} == SECTIONS.keys()
     templates = resources.files("drone_rl.explanations.report") / "templates" / "sections"
-    assert {f"{name}.html" for name in find_parts()} == {t.name for t in templates.iterdir()}
-    assert len({p.place for p in find_parts().values()}) == len(find_parts())
+    assert {f"{name}.html" for name in PARTS} == {t.name for t in templates.iterdir()}
 
 
 @pytest.mark.parametrize(
@@ -46,3 +37,9 @@ def test_it_fits_what_holds_all_that_it_needs(numbers, fits):
 def test_what_a_part_does_not_make_is_nothing():
     empty = part()
     assert [f(None) for f in (empty.draw, empty.tables, empty.extras, empty.compare)] == [{}] * 4
+
+
+def test_each_paragraph_has_a_sentence_that_fits_some_explanation():
+    for name in PARTS.keys() - {"shifts"}:
+        for sentences in PARTS[name].text.values():
+            assert said(sentences, EXPLANATION), name

@@ -3,7 +3,7 @@
 import pytest
 
 from benchmarks.evidence import EXPLANATION, HIGHER, changed
-from drone_rl.explanations.report.response_text import ASYMMETRY, RESPONSE
+from drone_rl.explanations.report.response import ASYMMETRY, RESPONSE
 from drone_rl.utils.text import said
 
 
@@ -31,7 +31,7 @@ def test_places_that_are_not_there_are_not_told():
 def test_other_heights_are_told_where_cubes_stand_there():
     found = speak(response__rows=[*EXPLANATION["response"]["rows"], *HIGHER])
     assert found["response.heights"] == (
-        "Where the cube stands 1.2 m higher: from 50 of 72 places on its left, 72 of 72 places "
+        "With the cube 1.2 m higher: from 50 of 72 places on its left, 72 of 72 places "
         "ahead and 40 of 72 places on its right."
     )
     assert "64 of 72" in found["response.collected"]  # still those at its own height
@@ -73,6 +73,6 @@ def test_blindness_is_told_only_if_both_sides_call_for_a_turn(row, is_told):
 
 def test_how_far_it_is_from_its_mirror_image():
     assert speak()["asymmetry.differs"] == (
-        "On these frames it differs from its mirror image by 0.30 on average (0: perfectly "
-        "symmetric, 1: always opposite; 95%: 0.20 to 0.40), on the grid by 0.25."
+        "On these frames the policy differs from its mirror image by 0.30 on average (0: "
+        "perfectly symmetric, 1: always opposite; 95%: 0.20 to 0.40), on the grid by 0.25."
     )

@@ -6,7 +6,7 @@ import torch
 
 from drone_rl.sim.dynamics import FlightState, Mode
 from drone_rl.sim.dynamics.state import NUMBERS
-from drone_rl.sim.rendering.devices import Crew
+from drone_rl.sim.rendering.devices import WorkerPool
 from tests.flying import ANGLES, PLACES, SPEEDS, falling, numbers, quadrotor, still, told
 
 
@@ -25,9 +25,9 @@ def test_one_thread_or_two_alone_or_among_others():
     state, goals = crowd(drone)
     both = drone.fly(state, goals, 330).numbers
     alone = quadrotor(gusts=1.0, wind=(2.0, 0.0, 0.0))
-    vars(alone)["_crew"] = Crew(1, size=1)
+    vars(alone)["_workers"] = WorkerPool(1, size=1)
     assert torch.equal(alone.fly(state, goals, 330).numbers, both)
-    vars(alone)["_crew"] = Crew(96, size=3)
+    vars(alone)["_workers"] = WorkerPool(96, size=3)
     assert torch.equal(alone.fly(state, goals, 330).numbers, both)
     for world in (0, 17, 95):
         one = FlightState(state.numbers[world : world + 1].clone())

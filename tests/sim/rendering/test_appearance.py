@@ -1,8 +1,8 @@
 import torch
 
 from drone_rl.sim.rendering import Appearance, Texture
-from drone_rl.sim.rendering.appearance import each
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.appearance import expand_color
+from drone_rl.sim.rendering.scene import SemanticClass
 
 RED = (1.0, 0.0, 0.0)
 SEVERAL = torch.tensor([[0.1, 0.2, 0.3], [0.4, 0.5, 0.6], [0.7, 0.8, 0.9]])
@@ -10,23 +10,23 @@ SEVERAL = torch.tensor([[0.1, 0.2, 0.3], [0.4, 0.5, 0.6], [0.7, 0.8, 0.9]])
 
 def test_a_part_has_the_looks_of_its_worlds_and_what_all_share():
     appearance = Appearance(
-        colors={Meaning.SKY: RED, Meaning.TARGET: SEVERAL}, sun=SEVERAL, ambient=RED
+        colors={SemanticClass.SKY: RED, SemanticClass.TARGET: SEVERAL}, sun=SEVERAL, ambient=RED
     )
     part = appearance[1:3]
-    assert part.colors[Meaning.SKY] == RED and part.ambient == RED
-    assert torch.equal(part.colors[Meaning.TARGET], SEVERAL[1:3])
+    assert part.colors[SemanticClass.SKY] == RED and part.ambient == RED
+    assert torch.equal(part.colors[SemanticClass.TARGET], SEVERAL[1:3])
     assert torch.equal(part.sun, SEVERAL[1:3]) and part.sun_direction is None
     assert torch.equal(Appearance(ambient=torch.tensor(RED))[0:1].ambient, torch.tensor(RED))
 
 
 def test_one_value_stands_for_every_world():
-    assert each(RED, 2).tolist() == [[1, 0, 0], [1, 0, 0]]
-    assert torch.equal(each(SEVERAL, 3).float(), SEVERAL)
-    assert each(RED, 2).dtype == torch.float64
+    assert expand_color(RED, 2).tolist() == [[1, 0, 0], [1, 0, 0]]
+    assert torch.equal(expand_color(SEVERAL, 3).float(), SEVERAL)
+    assert expand_color(RED, 2).dtype == torch.float64
 
 
 def test_lights_that_are_given_are_those_of_each_world():
-    assert Appearance(colors={Meaning.SKY: RED}).lights(2) == {}
+    assert Appearance(colors={SemanticClass.SKY: RED}).lights(2) == {}
     lights = Appearance(sun=SEVERAL, sun_direction=(0.0, 3.0, -4.0)).lights(3)
     assert set(lights) == {"sun", "sun_direction"}
     assert torch.equal(lights["sun"].float(), SEVERAL)
@@ -34,27 +34,31 @@ def test_lights_that_are_given_are_those_of_each_world():
 
 
 def test_what_one_gives_is_over_what_another_does():
-    below = Appearance(colors={Meaning.SKY: RED, Meaning.GROUND: RED}, fog=50.0, shadows=1)
-    above = Appearance(colors={Meaning.SKY: (0.0, 0.0, 1.0)}, fog=10.0)
+    below = Appearance(
+        colors={SemanticClass.SKY: RED, SemanticClass.GROUND: RED}, fog=50.0, shadows=1
+    )
+    above = Appearance(colors={SemanticClass.SKY: (0.0, 0.0, 1.0)}, fog=10.0)
     both = above.over(below)
-    assert both.colors == {Meaning.SKY: (0.0, 0.0, 1.0), Meaning.GROUND: RED}
+    assert both.colors == {SemanticClass.SKY: (0.0, 0.0, 1.0), SemanticClass.GROUND: RED}
     assert (both.fog, both.shadows, both.sun) == (10.0, 1, None)
     assert above.over(None) is above
     assert Appearance(shadows=0).over(below).shadows == 0
 
 
 def test_numbers_and_textures_are_cut_too():
-    texture = Texture(pictures=("grid",), size=2.0, choice=torch.tensor([0, -1, 0]))
+    texture = Texture(images=("grid",), size=2.0, choice=torch.tensor([0, -1, 0]))
     appearance = Appearance(
-        fog=torch.tensor([1.0, 2.0, 3.0]), textures={Meaning.GROUND: texture}, exposure=2.0
+        fog=torch.tensor([1.0, 2.0, 3.0]), textures={SemanticClass.GROUND: texture}, exposure=2.0
     )
     part = appearance[1:]
     assert part.fog.tolist() == [2.0, 3.0] and part.exposure == 2.0
-    assert part.textures[Meaning.GROUND].choice.tolist() == [-1, 0]
-    assert part.textures[Meaning.GROUND].size == 2.0
+    assert part.textures[SemanticClass.GROUND].choice.tolist() == [-1, 0]
+    assert part.textures[SemanticClass.GROUND].size == 2.0
 
 
 def test_flat_colours_alone_are_plain():
-    assert Appearance(colors={Meaning.SKY: RED}, shadows=torch.zeros(3), exposure=2.0).is_plain
+    assert Appearance(
+        colors={SemanticClass.SKY: RED}, shadows=torch.zeros(3), exposure=2.0
+    ).is_plain
     assert not Appearance(shadows=torch.tensor([0, 1])).is_plain
     assert not Appearance(zenith=RED).is_plain and not Appearance(fog=1.0).is_plain

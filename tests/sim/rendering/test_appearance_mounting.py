@@ -5,7 +5,7 @@ import math
 import pytest
 import torch
 
-from drone_rl.sim.rendering.appearance import Mounting, moved, product, rotate, turned, zoom_of
+from drone_rl.sim.rendering.appearance import Mounting, moved, product, rotate, turned, zoom_for_fov
 
 AHEAD = torch.tensor([1.0, 0.0, 0.0], dtype=torch.float64)
 HERE = torch.zeros(1, 3, dtype=torch.float64)
@@ -43,4 +43,4 @@ def test_two_moves_one_after_the_other():
 
 
 def test_a_wider_field_of_view_shows_things_smaller():
-    assert zoom_of(90.0, torch.tensor([90.0, 120.0])).tolist() == pytest.approx([1.0, 3**-0.5])
+    assert zoom_for_fov(90.0, torch.tensor([90.0, 120.0])).tolist() == pytest.approx([1.0, 3**-0.5])

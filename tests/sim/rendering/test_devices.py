@@ -10,7 +10,7 @@ import pytest
 import torch
 
 from drone_rl.sim.rendering import devices
-from drone_rl.sim.rendering.devices import check_device, loading
+from drone_rl.sim.rendering.devices import check_device, load_kernels
 from drone_rl.utils.errors import InputError
 
 
@@ -35,8 +35,8 @@ def test_kernels_are_loaded_once_on_a_thread_aside(monkeypatch):
     loaded = []
     monkeypatch.setattr(devices.wp, "load_module", lambda *_, **__: loaded.append(get_ident()))
     kernels = types.ModuleType("kernels")
-    first = loading(kernels)
-    assert loading(kernels) is first
+    first = load_kernels(kernels)
+    assert load_kernels(kernels) is first
     assert first.result() is None
     assert len(loaded) == 1
     assert loaded[0] != get_ident()
@@ -48,26 +48,26 @@ def test_what_a_compiler_refuses_is_told_to_who_waits(monkeypatch):
 
     monkeypatch.setattr(devices.wp, "load_module", refuse)
     with pytest.raises(RuntimeError, match="no such kernel"):
-        loading(types.ModuleType("kernels")).result()
+        load_kernels(types.ModuleType("kernels")).result()
 
 
 def test_another_process_loads_kernels_anew(monkeypatch):
     monkeypatch.setattr(devices.wp, "load_module", lambda *_, **__: None)
     kernels = types.ModuleType("kernels")
-    here = loading(kernels)
+    here = load_kernels(kernels)
     monkeypatch.setattr(devices.os, "getpid", lambda: -1)  # as in a fork
-    assert loading(kernels) is not here
+    assert load_kernels(kernels) is not here
 
 
 def test_threads_that_ask_at_once_load_once(monkeypatch):
     loaded = []
     monkeypatch.setattr(devices.wp, "load_module", lambda *_, **__: loaded.append(get_ident()))
-    begin = devices._loading.__wrapped__
+    begin = devices._load_kernels.__wrapped__
     slow = functools.cache(lambda *key: time.sleep(0.05) or begin(*key))
-    monkeypatch.setattr(devices, "_loading", slow)
+    monkeypatch.setattr(devices, "_load_kernels", slow)
     kernels = types.ModuleType("kernels")
     with ThreadPoolExecutor(4) as pool:
-        asked = [f.result() for f in [pool.submit(loading, kernels) for _ in range(4)]]
+        asked = [f.result() for f in [pool.submit(load_kernels, kernels) for _ in range(4)]]
     assert len({id(future) for future in asked}) == 1
     assert asked[0].result() is None and len(loaded) == 1
 

@@ -2,18 +2,18 @@ import threading
 
 import pytest
 
-from drone_rl.sim.rendering.devices import Crew
+from drone_rl.sim.rendering.devices import WorkerPool
 
 
 def spans(crew, first, last):
     given = []
-    crew.share_out(first, last, lambda *span: given.append(span))
+    crew.map_spans(first, last, lambda *span: given.append(span))
     return sorted(given)
 
 
 @pytest.fixture
 def crew():
-    crew = Crew(100, 3)
+    crew = WorkerPool(100, 3)
     yield crew
     crew.close()
 
@@ -28,13 +28,13 @@ def test_fewer_rows_than_members_and_none(crew):
 
 
 def test_there_are_no_more_members_than_rows():
-    assert Crew(2, 8).size == 2
-    assert Crew(5, 1).size == 1
+    assert WorkerPool(2, 8).size == 2
+    assert WorkerPool(5, 1).size == 1
 
 
 def test_members_work_at_the_same_time(crew):
     together = threading.Barrier(3, timeout=30)
-    crew.share_out(0, 3, lambda *_: together.wait())
+    crew.map_spans(0, 3, lambda *_: together.wait())
 
 
 def test_what_a_member_raises_reaches_the_caller(crew):
@@ -43,4 +43,4 @@ def test_what_a_member_raises_reaches_the_caller(crew):
             raise KeyError(first)
 
     with pytest.raises(KeyError, match="2"):
-        crew.share_out(0, 3, fail)
+        crew.map_spans(0, 3, fail)

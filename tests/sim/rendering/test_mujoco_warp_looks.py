@@ -7,8 +7,8 @@ import torch
 import warp as wp
 
 from drone_rl.sim.rendering import Appearance, Scene
-from drone_rl.sim.rendering.mujoco_warp import Looks
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.mujoco_warp import ModelAppearance
+from drone_rl.sim.rendering.scene import SemanticClass
 
 XML = """<mujoco><worldbody><light directional="true" ambient=".1 .1 .1" diffuse=".5 .5 .5"/>
 <geom name="a" type="plane" size="1 1 1" rgba=".2 .4 .6 1"/>
@@ -17,12 +17,12 @@ XML = """<mujoco><worldbody><light directional="true" ambient=".1 .1 .1" diffuse
 
 @pytest.fixture
 def worn():
-    """Looks of three worlds, and their colours and lights as tensors."""
+    """ModelAppearance of three worlds, and their colours and lights as tensors."""
     model = mujoco.MjModel.from_xml_string(XML)
-    scene = Scene(model, (Meaning.GROUND, Meaning.TARGET), (-1, 0), (0.0, 0.0, 0.0))
+    scene = Scene(model, (SemanticClass.GROUND, SemanticClass.TARGET), (-1, 0), (0.0, 0.0, 0.0))
     with wp.ScopedDevice("cpu"):
         warped = mjw.put_model(model)
-        looks = Looks(scene, warped, 3)
+        looks = ModelAppearance(scene, warped, 3)
     return looks, lambda name: wp.to_torch(getattr(warped, name))
 
 
@@ -36,19 +36,21 @@ def test_each_world_has_a_place_of_its_own_that_looks_as_the_model(worn):
 def test_colours_are_written_where_their_meaning_is_and_taken_off(worn):
     looks, values = worn
     ground = torch.tensor([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-    looks.wear(Appearance(colors={Meaning.GROUND: ground, Meaning.SKY: (0.5, 0.5, 0.5)}), 2)
+    looks.apply(
+        Appearance(colors={SemanticClass.GROUND: ground, SemanticClass.SKY: (0.5, 0.5, 0.5)}), 2
+    )
     rgba = values("geom_rgba")
     assert rgba[:2, 0, :3].tolist() == ground.tolist() and (rgba[..., 3] == 1).all()
     torch.testing.assert_close(rgba[2, 0, :3], torch.tensor([0.2, 0.4, 0.6]))  # not asked for
     torch.testing.assert_close(rgba[:, 1, :3], torch.full((3, 3), 0.1))
-    looks.wear(None, 3)
+    looks.apply(None, 3)
     torch.testing.assert_close(rgba[:, 0, :3], torch.tensor([[0.2, 0.4, 0.6]] * 3))
 
 
 def test_one_appearance_does_not_shine_through_the_next(worn):
     looks, values = worn
-    looks.wear(Appearance(colors={Meaning.TARGET: (1.0, 1.0, 1.0)}, sun=(0.0, 0.0, 0.0)), 3)
-    looks.wear(Appearance(ambient=(0.9, 0.9, 0.9)), 3)
+    looks.apply(Appearance(colors={SemanticClass.TARGET: (1.0, 1.0, 1.0)}, sun=(0.0, 0.0, 0.0)), 3)
+    looks.apply(Appearance(ambient=(0.9, 0.9, 0.9)), 3)
     torch.testing.assert_close(values("geom_rgba")[:, 1, :3], torch.full((3, 3), 0.1))
     assert values("light_diffuse").flatten().tolist() == [0.5] * 9
     torch.testing.assert_close(values("light_ambient").flatten(), torch.full((9,), 0.9))
@@ -56,5 +58,5 @@ def test_one_appearance_does_not_shine_through_the_next(worn):
 
 def test_a_direction_has_length_one(worn):
     looks, values = worn
-    looks.wear(Appearance(sun_direction=(0.0, 3.0, -4.0)), 1)
+    looks.apply(Appearance(sun_direction=(0.0, 3.0, -4.0)), 1)
     torch.testing.assert_close(values("light_dir")[0, 0], torch.tensor([0.0, 0.6, -0.8]))

@@ -7,7 +7,7 @@ import warp as wp
 
 from drone_rl.sim.rendering import Appearance, Poses, View
 from drone_rl.sim.rendering.mujoco_warp import Shard
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.worlds import Worlds
 
 VIEW = View(cameras=("drone/front_center",), height=9, width=12)
@@ -40,7 +40,7 @@ def poses(*aside):
 
 def draw(shard, of, appearance=None):
     out = torch.empty(len(of), 9, 12, 3, dtype=torch.uint8)
-    shard.draw(of, appearance, out)
+    shard.render(of, appearance, out)
     return out
 
 
@@ -54,7 +54,7 @@ def test_what_is_drawn_beside_does_not_matter(shard):
 
 def test_pixels_without_a_geom_are_the_sky(shard):
     plain = draw(shard, poses(0.0))
-    blue = draw(shard, poses(0.0), Appearance(colors={Meaning.SKY: (0.0, 0.0, 1.0)}))
+    blue = draw(shard, poses(0.0), Appearance(colors={SemanticClass.SKY: (0.0, 0.0, 1.0)}))
     assert blue[0, 0, 0].tolist() == [0, 0, 255]
     sky = (blue != plain).any(-1)[0]
     assert sky[0].all() and not sky[-1].any()  # above, not below

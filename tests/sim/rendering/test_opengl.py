@@ -11,8 +11,8 @@ from drone_rl.config import AppearanceSettings, CameraSettings
 from drone_rl.envs import DroneEnv
 from drone_rl.sim.composer_task import make_environment
 from drone_rl.sim.rendering import Appearance
-from drone_rl.sim.rendering.opengl import in_fog
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.opengl import apply_fog
+from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.rendering.textures import load
 from drone_rl.utils.seeding import world_random_state
 
@@ -36,10 +36,10 @@ def test_its_model_has_what_was_drawn_for_the_same_stream():
         places = worlds.worlds.poses(worlds.worlds.state, look).props[0].numpy()
         np.testing.assert_allclose(env.physics.data.mocap_pos, places, atol=1e-9)
     assert look is not None
-    geoms = env.task.compile().geoms(Meaning.DISTRACTOR)
+    geoms = env.task.compile().geoms(SemanticClass.DISTRACTOR)
     sizes = model.geom_size[geoms, 0]
-    np.testing.assert_allclose(sizes, look.beside.sizes[0] / 2)
-    np.testing.assert_allclose(model.geom_rgba[geoms, :3], look.beside.colors[0], atol=1e-6)
+    np.testing.assert_allclose(sizes, look.distractors.sizes[0] / 2)
+    np.testing.assert_allclose(model.geom_rgba[geoms, :3], look.distractors.colors[0], atol=1e-6)
     np.testing.assert_allclose(model.light_dir[0], look.sun_direction[0], atol=1e-9)
     assert model.light_castshadow[0] and model.vis.headlight.ambient[0] == pytest.approx(0.42)
     camera = model.name2id("drone/front_center", "camera")
@@ -60,13 +60,13 @@ def test_the_minimal_look_leaves_the_model_as_it_is():
 
 
 def test_fog_by_hand():
-    look = Appearance(colors={Meaning.SKY: (1.0, 0.0, 0.0)}, fog=10.0)
+    look = Appearance(colors={SemanticClass.SKY: (1.0, 0.0, 0.0)}, fog=10.0)
     picture = np.full((1, 1, 3), 100, np.uint8)
     for depth, share in ((0.0, 0.0), (10.0, 0.95), (5.0, 1 - 0.05**0.5), (90.0, 0.0)):
-        fogged = in_fog(picture, np.full((1, 1), depth), look, 90.0, 80.0)
+        fogged = apply_fog(picture, np.full((1, 1), depth), look, 90.0, 80.0)
         wanted = 100 + share * (np.array([255, 0, 0]) - 100)
         assert np.abs(fogged[0, 0] - wanted).max() <= 1
-    assert in_fog(picture, np.ones((1, 1)), Appearance(), 90.0, 80.0) is picture
+    assert apply_fog(picture, np.ones((1, 1)), Appearance(), 90.0, 80.0) is picture
 
 
 def inner(mask):
@@ -101,11 +101,11 @@ def test_pictures_of_blocks_agree_with_ours(egl):
 
 def test_fog_grows_with_the_distance_along_each_ray():
     """Two rows of four pixels, 90 degrees high: rays through (+-1.5, +-0.5) and (+-0.5, +-0.5)."""
-    look = Appearance(colors={Meaning.SKY: (0.5, 0.5, 0.5)}, fog=10.0, exposure=2.0)
-    fogged = in_fog(np.zeros((2, 4, 3), np.uint8), np.full((2, 4), 5.0), look, 90.0, 80.0)
+    look = Appearance(colors={SemanticClass.SKY: (0.5, 0.5, 0.5)}, fog=10.0, exposure=2.0)
+    fogged = apply_fog(np.zeros((2, 4, 3), np.uint8), np.full((2, 4), 5.0), look, 90.0, 80.0)
     near, far = (int(255 * (1 - 0.05 ** (0.5 * d**0.5))) for d in (1.5, 3.5))
     assert fogged[..., 0].tolist() == [[far, near, near, far]] * 2
-    narrow = in_fog(np.zeros((2, 4, 3), np.uint8), np.full((2, 4), 5.0), look, 53.13010235, 80.0)
+    narrow = apply_fog(np.zeros((2, 4, 3), np.uint8), np.full((2, 4), 5.0), look, 53.13010235, 80.0)
     near, far = (int(255 * (1 - 0.05 ** (0.5 * (1 + d / 4) ** 0.5))) for d in (0.5, 2.5))
     assert np.abs(narrow[0, :2, 0] - np.array([far, near])).max() <= 1
 

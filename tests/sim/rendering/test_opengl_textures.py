@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from drone_rl.sim.rendering.opengl import _fitting, _points, box_sides, flat, sky_sides
+from drone_rl.sim.rendering.opengl import _mip_level, _points, box_sides, flat, sky_sides
 from drone_rl.sim.rendering.textures import levels
 
 QUARTERS = np.array([[[10] * 3, [20] * 3], [[30] * 3, [40] * 3]], np.uint8)
@@ -61,6 +61,6 @@ def test_where_texels_of_each_side_are():
 def test_the_level_that_fits_is_as_fine_as_asked_for():
     picture = np.arange(48, dtype=np.uint8).reshape(4, 4, 3)
     rows = levels(picture)
-    assert np.array_equal(_fitting(picture, 0.49), picture)
-    assert np.array_equal(_fitting(picture, 0.5), rows[16:20].reshape(2, 2, 3))
-    assert np.array_equal(_fitting(picture, 1.0), rows[20:21].reshape(1, 1, 3))
+    assert np.array_equal(_mip_level(picture, 0.49), picture)
+    assert np.array_equal(_mip_level(picture, 0.5), rows[16:20].reshape(2, 2, 3))
+    assert np.array_equal(_mip_level(picture, 1.0), rows[20:21].reshape(1, 1, 3))

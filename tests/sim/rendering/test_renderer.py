@@ -7,7 +7,7 @@ from torchrl.envs.utils import check_env_specs
 from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, with_transforms
 from drone_rl.explanations.scenes import Scenes, place_target
 from drone_rl.sim.rendering import Appearance
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 
@@ -26,9 +26,9 @@ class OneColour:
         self.prepare(view)
         color = self.scene.sky
         if appearance is not None:
-            color = appearance.colors.get(Meaning.SKY, color)
+            color = appearance.colors.get(SemanticClass.SKY, color)
         pixels = (torch.tensor(color) * 255).to(torch.uint8)
-        pictures = view.new_pictures(len(poses))
+        pictures = view.new_images(len(poses))
         pictures["rgb"][:] = pixels
         return pictures
 
@@ -41,7 +41,7 @@ def test_worlds_draw_by_it():
     pixels = worlds.render(worlds.state)
     assert pixels.shape == (2, 25, 64, 3)
     assert pixels.unique(dim=-2).flatten(0, -2).unique(dim=0).tolist() == [[158, 188, 234]]
-    red = worlds.render(worlds.state, appearance=Appearance(colors={Meaning.SKY: (1, 0, 0)}))
+    red = worlds.render(worlds.state, appearance=Appearance(colors={SemanticClass.SKY: (1, 0, 0)}))
     assert red[0, 0, 0].tolist() == [255, 0, 0]
 
 

@@ -10,7 +10,7 @@ from drone_rl.sim.composer_task import make_environment
 from drone_rl.sim.entities import CHASE, DRONE_CAMERAS, FLOOR_COLOR
 from drone_rl.sim.rendering import Appearance, Raytracer
 from drone_rl.sim.rendering.mujoco_warp import WarpRenderer
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import world_random_state
@@ -96,7 +96,7 @@ def test_cameras_and_modalities_of_one_call_are_those_of_calls_of_their_own(worl
 
 def test_gray_is_what_the_transform_makes_of_rgb_to_the_last_bit(worlds):
     draw = torch.Generator().manual_seed(0)
-    several = {m: torch.rand(60, 3, generator=draw) for m in Meaning}
+    several = {m: torch.rand(60, 3, generator=draw) for m in SemanticClass}
     states = worlds.state[torch.arange(60) % 3]
     view = worlds.view(modality=("rgb", "gray"))
     for appearance in (None, Appearance(colors=several)):
@@ -146,21 +146,29 @@ def ahead(worlds):
 def regions(worlds, state):
     """Whether each pixel shows the sky, the ground, a cube."""
     seen = worlds.render(state, worlds.view(modality="segmentation"))
-    meaning = torch.tensor([*worlds.scene.meanings, Meaning.SKY])[seen]
-    return [meaning == m for m in (Meaning.SKY, Meaning.GROUND, Meaning.TARGET)]
+    semantic_class = torch.tensor([*worlds.scene.semantic_classes, SemanticClass.SKY])[seen]
+    return [
+        semantic_class == m for m in (SemanticClass.SKY, SemanticClass.GROUND, SemanticClass.TARGET)
+    ]
 
 
 def test_an_appearance_colours_what_it_names_and_nothing_else(worlds, ahead):
     plain, areas = worlds.render(ahead), regions(worlds, ahead)
     assert all(area.any() for area in areas)
-    for meaning, area in zip((Meaning.SKY, Meaning.GROUND, Meaning.TARGET), areas, strict=True):
-        other = worlds.render(ahead, appearance=Appearance(colors={meaning: (0.1, 0.3, 0.05)}))
-        assert torch.equal((other != plain).any(-1), area), meaning
+    for semantic_class, area in zip(
+        (SemanticClass.SKY, SemanticClass.GROUND, SemanticClass.TARGET), areas, strict=True
+    ):
+        other = worlds.render(
+            ahead, appearance=Appearance(colors={semantic_class: (0.1, 0.3, 0.05)})
+        )
+        assert torch.equal((other != plain).any(-1), area), semantic_class
     assert torch.equal(worlds.render(ahead), plain)  # and the next picture is as ever
 
 
 def test_the_sky_has_just_the_colour_that_is_asked_for(worlds, ahead):
-    picture = worlds.render(ahead, appearance=Appearance(colors={Meaning.SKY: (0.2, 0.5, 1.0)}))
+    picture = worlds.render(
+        ahead, appearance=Appearance(colors={SemanticClass.SKY: (0.2, 0.5, 1.0)})
+    )
     assert picture[:, 0].unique(dim=1).tolist() == [[[51, 127, 255]]] * 2
 
 
@@ -171,10 +179,14 @@ def test_each_world_of_a_call_may_look_its_own_way(worlds, ahead):
     rows, first = torch.tensor([0, 1, 1, 0, 1]), ahead[torch.tensor([0])]
     alone = []
     for ground, sky in zip(grounds.tolist(), skies.tolist(), strict=True):
-        appearance = Appearance(colors={Meaning.GROUND: tuple(ground), Meaning.SKY: tuple(sky)})
+        appearance = Appearance(
+            colors={SemanticClass.GROUND: tuple(ground), SemanticClass.SKY: tuple(sky)}
+        )
         alone.append(worlds.render(first, appearance=appearance)[0])
     assert not torch.equal(*alone)
-    appearance = Appearance(colors={Meaning.GROUND: grounds[rows], Meaning.SKY: skies[rows]})
+    appearance = Appearance(
+        colors={SemanticClass.GROUND: grounds[rows], SemanticClass.SKY: skies[rows]}
+    )
     together = worlds.render(ahead[torch.zeros(5, dtype=torch.int64)], appearance=appearance)
     assert torch.equal(together, torch.stack(alone)[rows])
 

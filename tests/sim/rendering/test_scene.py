@@ -3,17 +3,22 @@ import numpy as np
 import pytest
 
 from drone_rl.sim.rendering import Scene
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.utils.errors import InputError
 
 
 def test_geoms_are_found_by_what_they_mean():
     geoms = '<geom size="1"/>' * 4
     model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{geoms}</worldbody></mujoco>")
-    meanings = (Meaning.GROUND, Meaning.TARGET, Meaning.DRONE, Meaning.TARGET)
-    scene = Scene(model, meanings, (-1, 0, -1, 1), (0.0, 0.0, 1.0))
-    assert scene.geoms(Meaning.TARGET) == [1, 3]
-    assert scene.geoms(Meaning.OBSTACLE) == []
+    semantic_classes = (
+        SemanticClass.GROUND,
+        SemanticClass.TARGET,
+        SemanticClass.DRONE,
+        SemanticClass.TARGET,
+    )
+    scene = Scene(model, semantic_classes, (-1, 0, -1, 1), (0.0, 0.0, 1.0))
+    assert scene.geoms(SemanticClass.TARGET) == [1, 3]
+    assert scene.geoms(SemanticClass.OBSTACLE) == []
     assert scene.seen(show_drone=True) == [0, 1, 2, 3]
     assert scene.seen(show_drone=False) == [0, 1, 3]
 
@@ -32,7 +37,7 @@ def test_colours_are_the_materials_where_a_geom_has_none_of_its_own():
     <geom size="1"/><geom size="1" material="m"/><geom size="1" material="m" rgba="1 0 0 1"/>
     <geom size="1" rgba="1 1 1 0"/></worldbody></mujoco>"""
     scene = Scene(
-        mujoco.MjModel.from_xml_string(xml), (Meaning.TARGET,) * 4, (-1,) * 4, (0.0, 0.0, 1.0)
+        mujoco.MjModel.from_xml_string(xml), (SemanticClass.TARGET,) * 4, (-1,) * 4, (0.0, 0.0, 1.0)
     )
     colors = [[0.5, 0.5, 0.5, 1], [0.1, 0.2, 0.3, 1], [1, 0, 0, 1], [1, 1, 1, 0]]
     np.testing.assert_allclose(scene.colors, colors, atol=1e-7)

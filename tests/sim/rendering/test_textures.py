@@ -5,11 +5,11 @@ import pytest
 from PIL import Image
 
 from drone_rl.sim.rendering import textures
-from drone_rl.sim.rendering.textures import MADE, levels, load
+from drone_rl.sim.rendering.textures import PROCEDURAL, levels, load
 from drone_rl.utils.errors import InputError
 
 
-@pytest.mark.parametrize("name", MADE)
+@pytest.mark.parametrize("name", PROCEDURAL)
 def test_those_made_here_are_gray_squares_of_a_power_of_two_and_not_even(name):
     texture = load(name)
     assert texture.shape == (256, 256, 3) and texture.dtype == np.uint8
@@ -17,7 +17,7 @@ def test_those_made_here_are_gray_squares_of_a_power_of_two_and_not_even(name):
     assert texture.std() > 5 and 150 < texture.mean() < 250
 
 
-@pytest.mark.parametrize("name", MADE)
+@pytest.mark.parametrize("name", PROCEDURAL)
 def test_they_go_on_over_their_edges(name):
     """What lies beside an edge is as like as what lies beside any other line."""
     gray = load(name)[..., 0].astype(float)
@@ -40,7 +40,12 @@ def test_a_file_is_stretched_to_a_power_of_two(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "content, words", [(None, "no picture"), (b"not a picture", "no picture"), (b"", "no picture")]
+    "content, words",
+    [
+        (None, "can't be read as an image"),
+        (b"not a picture", "can't be read as an image"),
+        (b"", "can't be read as an image"),
+    ],
 )
 def test_what_is_no_picture_is_refused_by_name(tmp_path, content, words):
     path = tmp_path / "ground.png"
@@ -52,7 +57,7 @@ def test_what_is_no_picture_is_refused_by_name(tmp_path, content, words):
 
 
 def test_a_folder_is_no_picture(tmp_path):
-    with pytest.raises(InputError, match="no picture"):
+    with pytest.raises(InputError, match="can't be read as an image"):
         load(str(tmp_path))
 
 
@@ -73,7 +78,7 @@ def test_each_level_is_the_mean_of_four_texels():
 
 
 def test_a_grids_lines_by_the_texel():
-    lines = MADE["grid"]()
+    lines = PROCEDURAL["grid"]()
     assert (lines == lines.T).all()
     row = lines[32]  # between lines
     dark, fine = [*range(4), *range(252, 256)], [63, 64, 127, 128, 191, 192]
@@ -83,7 +88,7 @@ def test_a_grids_lines_by_the_texel():
 
 
 def test_courses_of_bricks_by_the_texel():
-    bricks = MADE["bricks"]()
+    bricks = PROCEDURAL["bricks"]()
     bright = np.random.RandomState(0).uniform(0.75, 1.0, (8, 4))
     for course, shift in ((0, 0), (1, 32), (2, 0), (7, 32)):
         assert (bricks[32 * course : 32 * course + 3] == 0.55).all()
@@ -106,7 +111,7 @@ def test_spots_are_smooth_between_their_middles_and_over_the_edges():
 
 
 def test_noise_has_a_mean_and_a_deviation():
-    noise = MADE["noise"]()
+    noise = PROCEDURAL["noise"]()
     assert noise.mean() == pytest.approx(0.78, abs=0.02)
     assert noise.std() == pytest.approx(0.11, abs=0.01)
     assert 0.0 <= noise.min() < 0.5 and noise.max() == 1.0

@@ -47,7 +47,7 @@ def test_what_no_camera_shows_is_refused(change, message):
 )
 def test_pictures_have_the_shape_and_type_of_what_they_show(modality, shape, dtype):
     view = dataclasses.replace(VIEW, cameras=("a", "b"), modalities=(modality, "rgb"))
-    pictures = view.new_pictures(5)
+    pictures = view.new_images(5)
     assert set(pictures) == {modality, "rgb"}
     assert (tuple(pictures[modality].shape), pictures[modality].dtype) == (shape, dtype)
 

@@ -97,10 +97,10 @@ def test_biases_walk():
     """4.6 deg/h are 2.2301e-5 rad/s in 500 s; 36 ug are 3.5304e-4 m/s2 in 800 s: after 260 s."""
     settings = ImuSettings(rate=0.1)
     state, _ = hovering(settings, 5000, 25, 10.0)
-    walked = math.sqrt((250.0 + 10.0) / 500.0)
-    assert state.gyro_bias.std().item() == pytest.approx(2.2301e-5 * walked, rel=0.03)
-    walked = math.sqrt((250.0 + 10.0) / 800.0)
-    assert state.accel_bias.std().item() == pytest.approx(3.5304e-4 * walked, rel=0.03)
+    random_walk_step = math.sqrt((250.0 + 10.0) / 500.0)
+    assert state.gyro_bias.std().item() == pytest.approx(2.2301e-5 * random_walk_step, rel=0.03)
+    random_walk_step = math.sqrt((250.0 + 10.0) / 800.0)
+    assert state.accel_bias.std().item() == pytest.approx(3.5304e-4 * random_walk_step, rel=0.03)
 
 
 def test_sensors_are_turned_on_with_a_bias_that_stays():

@@ -6,7 +6,7 @@ import torch
 from drone_rl.config.sensors import BarometerSettings
 from drone_rl.sim.coordinates import HOME
 from drone_rl.sim.dynamics.state import BodyState
-from drone_rl.sim.sensors.position import Barometer, altitude_of, pressure_share
+from drone_rl.sim.sensors.position import Barometer, altitude_from_pressure_ratio, pressure_ratio
 
 TICK = 0.003
 
@@ -28,12 +28,12 @@ def at(heights):
 def test_the_standard_atmosphere():
     """Its tables: 1013.25 hPa at the sea, 898.76 at 1 km, 540.48 at 5 km, 227.00 at 11 km."""
     altitude = torch.tensor([0.0, 1000.0, 5000.0, 11_000.0], dtype=torch.float64)
-    found = 1013.25 * pressure_share(altitude)
+    found = 1013.25 * pressure_ratio(altitude)
     torch.testing.assert_close(
         found, torch.tensor([1013.25, 898.76, 540.48, 227.00]).double(), rtol=5e-5, atol=0.0
     )
-    torch.testing.assert_close(altitude_of(pressure_share(altitude)), altitude)
-    assert pressure_share(seconds(20_000.0)) == pressure_share(seconds(12_000.0))
+    torch.testing.assert_close(altitude_from_pressure_ratio(pressure_ratio(altitude)), altitude)
+    assert pressure_ratio(seconds(20_000.0)) == pressure_ratio(seconds(12_000.0))
 
 
 def test_a_perfect_barometer_tells_the_altitude():

@@ -21,7 +21,7 @@ def follow(sampling, ticks):
     samples = sampling.start(torch.zeros(1, dtype=torch.float64), 1)
     for time in clock(ticks):
         samples = sampling.take(samples, time, time[:, None])
-        taken, row = sampling.tell(samples, time)
+        taken, row = sampling.read(samples, time)
         yield time.item(), int(samples.count), taken.item(), row.item()
 
 
@@ -72,7 +72,7 @@ def test_a_time_on_the_mark_is_not_missed_for_its_rounding():
     for step in range(100):
         samples = sampling.take(samples, time, time[:, None])
         assert samples.count.item() == step + 1
-        assert sampling.tell(samples, time)[0].item() == pytest.approx(
+        assert sampling.read(samples, time)[0].item() == pytest.approx(
             (step - 1) * 0.1 if step else -math.inf
         )
         time = time + 0.1
@@ -89,6 +89,6 @@ def test_drones_have_clocks_of_their_own():
     before = samples.rows.clone()
     after = sampling.take(samples, later, later[:, None])
     assert torch.equal(samples.rows, before)
-    assert sampling.tell(after, later)[0].tolist() == [0.1, 5.0]
+    assert sampling.read(after, later)[0].tolist() == [0.1, 5.0]
     after[torch.tensor([0])] = sampling.start(torch.tensor([7.0], dtype=torch.float64), 1)
-    assert sampling.tell(after, torch.tensor([7.0, 5.05]).double())[0].tolist() == [-math.inf, 5.0]
+    assert sampling.read(after, torch.tensor([7.0, 5.05]).double())[0].tolist() == [-math.inf, 5.0]

@@ -1,7 +1,7 @@
 import pytest
 import torch
 
-from drone_rl.sim.sensors.sensor import forgotten, normal, walked
+from drone_rl.sim.sensors.sensor import gauss_markov_step, normal, random_walk_step
 
 
 def generator():
@@ -22,7 +22,7 @@ def test_a_walk_goes_as_far_in_many_steps_as_in_one(steps):
     value, stream = torch.zeros(20_000, 1, dtype=torch.float64), generator()
     seconds = torch.full((20_000,), 20.0 / steps, dtype=torch.float64)
     for _ in range(steps):
-        value = walked(value, 2.0, 5.0, seconds, stream)
+        value = random_walk_step(value, 2.0, 5.0, seconds, stream)
     assert value.std().item() == pytest.approx(4.0, rel=0.02)
 
 
@@ -32,7 +32,7 @@ def test_what_forgets_itself_stays_within_bounds_however_small_the_steps(steps):
     value, stream = torch.full((20_000, 1), 3.0, dtype=torch.float64), generator()
     seconds = torch.full((20_000,), 60.0 / steps, dtype=torch.float64)
     for _ in range(steps):
-        value = forgotten(value, 0.5, 60.0, seconds, stream)
+        value = gauss_markov_step(value, 0.5, 60.0, seconds, stream)
     assert value.mean().item() == pytest.approx(3.0 * 0.36788, abs=0.02)
     assert value.std().item() == pytest.approx(0.5 * 0.92987, rel=0.02)
 
@@ -40,5 +40,5 @@ def test_what_forgets_itself_stays_within_bounds_however_small_the_steps(steps):
 def test_no_time_changes_nothing():
     value = torch.tensor([[1.0], [2.0]], dtype=torch.float64)
     still = torch.zeros(2, dtype=torch.float64)
-    assert torch.equal(walked(value, 1.0, 1.0, still, generator()), value)
-    assert torch.equal(forgotten(value, 1.0, 1.0, still, generator()), value)
+    assert torch.equal(random_walk_step(value, 1.0, 1.0, still, generator()), value)
+    assert torch.equal(gauss_markov_step(value, 1.0, 1.0, still, generator()), value)

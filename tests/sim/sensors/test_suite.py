@@ -6,7 +6,7 @@ import torch
 
 from drone_rl.config.sensors import GpsSettings, SensorSettings
 from drone_rl.sim.dynamics.state import GROUND, THING, TIME, BodyState, FlightState
-from drone_rl.sim.sensors import Senses
+from drone_rl.sim.sensors import SensorSuite
 from drone_rl.utils.errors import InputError
 
 
@@ -36,7 +36,7 @@ def same(a, b):
 
 
 def test_perfect_senses_of_a_hovering_drone():
-    senses = Senses(SensorSettings(gps=GpsSettings(startup=0.0, latency=0.0)).perfect)
+    senses = SensorSuite(SensorSettings(gps=GpsSettings(startup=0.0, latency=0.0)).perfect)
     state = senses.start(resting(2))
     for _ in range(10):
         state = senses.update(state, resting(2), 0.003)
@@ -49,7 +49,7 @@ def test_perfect_senses_of_a_hovering_drone():
 
 
 def test_drones_in_flight_tell_what_they_touched():
-    senses = Senses()
+    senses = SensorSuite()
     state = senses.start(FlightState.at_rest(resting(1).position))
     assert not senses.read_collision(state)[0].has_collided.item()
     state = senses.update(state, touching(2, 0.003), 0.003)
@@ -63,7 +63,7 @@ def test_drones_in_flight_tell_what_they_touched():
 
 def test_nothing_is_a_view_of_the_drones_own_numbers():
     """Kernels write into these."""
-    senses, body = Senses(), touching(3, 0.5)
+    senses, body = SensorSuite(), touching(3, 0.5)
     state = senses.update(senses.start(body), body, 0.003)
     before = [part.clone() for part in tensors(state)]
     body.numbers[:] = 9.0
@@ -72,7 +72,7 @@ def test_nothing_is_a_view_of_the_drones_own_numbers():
 
 def test_the_seed_alone_decides_the_noise():
     def flown(**choice):
-        senses = Senses(**choice)
+        senses = SensorSuite(**choice)
         state = senses.start(resting(3))
         return senses.update(state, resting(3), 0.021)
 
@@ -80,12 +80,12 @@ def test_the_seed_alone_decides_the_noise():
     for other in ({"seed": 5}, {"seed": 4, "number": 1}):
         assert not same(flown(seed=4), flown(**other))
     with pytest.raises(InputError, match="whole number"):
-        Senses(seed=-1)
+        SensorSuite(seed=-1)
 
 
 def test_nothing_is_drawn_where_nothing_is_due():
     """Between the readings of sensors that take 50 a second."""
-    senses, others = Senses(), Senses()
+    senses, others = SensorSuite(), SensorSuite()
     one, two = senses.start(resting(2)), others.start(resting(2))
     for _ in range(6):
         one = senses.update(one, resting(2), 0.003)
@@ -98,9 +98,9 @@ def test_nothing_is_drawn_where_nothing_is_due():
 
 
 def test_sensors_draw_from_streams_of_their_own():
-    """A GPS of another rate changes nothing in what the others tell."""
+    """A GPS of another rate changes nothing in what the others read."""
     settings = SensorSettings(gps=GpsSettings(rate=10.0, startup=0.0))
-    first, second = Senses(), Senses(settings)
+    first, second = SensorSuite(), SensorSuite(settings)
     one, two = first.start(resting(2)), second.start(resting(2))
     for _ in range(20):
         one, two = first.update(one, resting(2), 0.01), second.update(two, resting(2), 0.01)
@@ -109,7 +109,7 @@ def test_sensors_draw_from_streams_of_their_own():
 
 
 def test_some_drones_begin_anew():
-    senses = Senses()
+    senses = SensorSuite()
     state = senses.start(resting(3))
     state = senses.update(state, resting(3), 2.0)
     state[torch.tensor([1])] = senses.start(resting(1))

@@ -51,7 +51,7 @@ def test_random_flights_go_as_the_rules_say(settings, ends):
     worlds.reset(torch.arange(WORLDS), [RandomState(i) for i in range(WORLDS)])
     flying = worlds.task.fused_rules(worlds.dynamics, WORLDS)
     flying.begin(worlds.state)
-    places = wp.to_torch(flying.poses.places)
+    places = wp.to_torch(flying.poses.positions)
     state, going, seen = worlds.state, torch.arange(WORLDS), set()
     rewards = torch.zeros(WORLDS)
     while len(going):

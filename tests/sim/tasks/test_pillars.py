@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from drone_rl.config import CameraSettings, PillarsSettings
 from drone_rl.sim.actions import Move
 from drone_rl.sim.dynamics import BodyState
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.tasks import Pillars, as_task
 from drone_rl.sim.tasks.common import Side, side_of
 from drone_rl.sim.tasks.pillars import EndReason, RowGoals
@@ -362,7 +362,7 @@ def test_what_verdicts_know_of_it():
 def test_there_is_a_prop_for_each_pillar(settings):
     task = Pillars(settings)
     props = task.make_props()
-    assert len(props) == 4 and {prop.meaning for prop in props} == {Meaning.OBSTACLE}
+    assert len(props) == 4 and {prop.semantic_class for prop in props} == {SemanticClass.OBSTACLE}
     assert len({prop.mjcf_model.model for prop in props}) == 4
 
 

@@ -9,7 +9,7 @@ from torchrl.envs.utils import check_env_specs
 from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv
 from drone_rl.sim.composer_task import make_environment
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.tasks import CollectCubes, EndReason, Task, as_task
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
@@ -55,8 +55,8 @@ def test_its_things_are_drawn_and_have_its_meanings():
     props = torch.tensor([*worlds.scene.props, -1])[seen.long()]
     columns = [(props == i).any(0).nonzero()[:, 0] for i in range(2)]
     assert columns[0].max() < 32 <= columns[1].min()  # the first to the left, the second right
-    assert [m.name for m in worlds.scene.meanings].count("OBSTACLE") == 2
-    assert not worlds.scene.geoms(Meaning.TARGET)
+    assert [m.name for m in worlds.scene.semantic_classes].count("OBSTACLE") == 2
+    assert not worlds.scene.geoms(SemanticClass.TARGET)
     worlds.close()
 
 

@@ -63,10 +63,10 @@ def test_every_prop_has_a_place_and_a_geom(worlds, task):
     for number, prop in enumerate(props):
         meanings = {
             meaning
-            for meaning, of in zip(worlds.scene.meanings, worlds.scene.props, strict=True)
+            for meaning, of in zip(worlds.scene.semantic_classes, worlds.scene.props, strict=True)
             if of == number
         }
-        assert meanings == {prop.meaning}
+        assert meanings == {prop.semantic_class}
 
 
 def test_episodes_end_by_a_reason_that_has_a_name(worlds, task):

@@ -7,7 +7,7 @@ import torch
 import drone_rl
 from drone_rl.policies.zoo import parse
 from drone_rl.utils.errors import InputError
-from drone_rl.verification.checker import fingerprint, refuse_another
+from drone_rl.verification.checker import check_same_policy, fingerprint
 from drone_rl.verification.checker.certificate import parse_certificate
 
 
@@ -27,16 +27,16 @@ def policy():
 
 def test_its_own_policy_is_accepted_in_any_task_or_the_one_asked_for(parsed, policy):
     weights = policy.state["policy"]
-    refuse_another(parsed, policy.description, weights)
-    refuse_another(parsed, policy.description, weights, policy.in_task(num_cubes=1).task)
+    check_same_policy(parsed, policy.description, weights)
+    check_same_policy(parsed, policy.description, weights, policy.in_task(num_cubes=1).task)
     with pytest.raises(InputError, match=r"another task: num_cubes=1, not 3; prove"):
-        refuse_another(parsed, policy.description, weights, policy.task)
+        check_same_policy(parsed, policy.description, weights, policy.task)
 
 
 def test_another_network_is_refused(parsed):
     other = drone_rl.load_policy("good")
     with pytest.raises(InputError, match=r"hash 38f68e02c181\.\.\., the policy's has 5eefc41fd425"):
-        refuse_another(parsed, other.description, other.state["policy"])
+        check_same_policy(parsed, other.description, other.state["policy"])
 
 
 def changed(one_sided, part, value):
@@ -54,26 +54,31 @@ def changed(one_sided, part, value):
 )
 def test_other_eyes_are_refused(one_sided, policy, part, value):
     with pytest.raises(InputError, match=f"differ in {part}"):
-        refuse_another(changed(one_sided, part, value), policy.description, policy.state["policy"])
+        check_same_policy(
+            changed(one_sided, part, value), policy.description, policy.state["policy"]
+        )
 
 
 def test_a_policy_that_remembers_is_refused(one_sided, policy):
     steps = [{"name": "gray"}, {"name": "stack", "N": 2}]
     certificate = changed(one_sided, "transforms", steps)
     described = parse({**policy.description.as_dict(), "transforms": steps})
-    with pytest.raises(InputError, match="remembers pictures"):
-        refuse_another(certificate, described, policy.state["policy"])
+    with pytest.raises(InputError, match="stacks frames"):
+        check_same_policy(certificate, described, policy.state["policy"])
 
 
 def test_a_policy_whose_camera_goes_wrong_is_refused(one_sided, policy):
     steps = [{"name": "gray"}, {"name": "late_frames", "frames": 1}]
     certificate = changed(one_sided, "transforms", steps)
     described = parse({**policy.description.as_dict(), "transforms": steps})
-    with pytest.raises(InputError, match=r"camera goes wrong \(transform late_frames\)"):
-        refuse_another(certificate, described, policy.state["policy"])
+    with pytest.raises(InputError, match=r"simulates faults \(transform late_frames\)"):
+        check_same_policy(certificate, described, policy.state["policy"])
 
 
 def test_a_policy_in_another_body_has_no_certificate(parsed, policy):
     moved = policy.in_dynamics(mode="simple_flight")
-    with pytest.raises(InputError, match=r"^dynamics\.mode=simple_flight: what a cert"):
-        refuse_another(parsed, moved.description, policy.state["policy"])
+    with pytest.raises(
+        InputError,
+        match=r"only dynamics=computer_vision, got .*simple_flight",
+    ):
+        check_same_policy(parsed, moved.description, policy.state["policy"])

@@ -6,7 +6,7 @@ from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.verification.checker import check_certificate
 from drone_rl.verification.checker.certificate import Outcome, parse_certificate
 from drone_rl.verification.checker.checker import Contradiction, Findings, ends_as_stated
-from drone_rl.verification.checker.rollouts import Flown
+from drone_rl.verification.checker.rollouts import Rollouts
 
 
 def findings(data, **settings):
@@ -93,7 +93,7 @@ LIMIT = EndReason.STEP_LIMIT
 )
 def test_ends_by_hand(end, collected, repeats, loops, steps, right):
     stated = Outcome(LIMIT, (False,), loops, 0.5, steps, np.zeros((0, 1, 2)))
-    flown = Flown(*map(np.array, ([int(end)], [[collected]], [300], [repeats])))
+    flown = Rollouts(*map(np.array, ([int(end)], [[collected]], [300], [repeats])))
     assert ends_as_stated(stated, flown, 0) is right
 
 

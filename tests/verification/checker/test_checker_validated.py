@@ -4,7 +4,7 @@ import pytest
 
 import drone_rl
 from drone_rl.utils.errors import InputError
-from drone_rl.verification.checker import read_tried
+from drone_rl.verification.checker import read_validated
 from tests.verification.checker.making import of_every_place
 
 
@@ -14,7 +14,7 @@ def good():
 
 
 def tried(path, policy):
-    return read_tried(path, policy.description, policy.state["policy"])
+    return read_validated(path, policy.description, policy.state["policy"])
 
 
 def test_a_certificate_that_goes_together_is_read(write, good):

@@ -2,11 +2,11 @@ import numpy as np
 import pytest
 
 from drone_rl.verification.checker.certificate import parse_certificate
-from drone_rl.verification.checker.consistency import find_lies, missing_steps
+from drone_rl.verification.checker.consistency import find_inconsistencies, missing_steps
 
 
 def lies(data):
-    return list(find_lies(parse_certificate(data)))
+    return list(find_inconsistencies(parse_certificate(data)))
 
 
 def test_true_certificates_go_together(one_sided, two_halves):

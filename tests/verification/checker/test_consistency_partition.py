@@ -5,7 +5,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from drone_rl.verification.checker.consistency import find_misfit, volume
+from drone_rl.verification.checker.consistency import find_partition_error, volume
 
 SQUARE = [
     [[-1.0, 0.0], [-1.0, 1.0]],
@@ -31,7 +31,7 @@ def random_partition(cubes, count, bound=6.0, seed=0):
 
 
 def test_a_partition_by_hand():
-    assert find_misfit(np.array(SQUARE), 1.0) is None
+    assert find_partition_error(np.array(SQUARE), 1.0) is None
     assert volume(np.array(SQUARE)) == 4
 
 
@@ -57,23 +57,25 @@ def test_volumes_are_exact():
     ],
 )
 def test_a_misfit_is_found_with_its_place(boxes, counts):
-    place, count = find_misfit(np.array(boxes), 1.0) or pytest.fail("taken for a partition")
+    place, count = find_partition_error(np.array(boxes), 1.0) or pytest.fail(
+        "taken for a partition"
+    )
     assert count in counts
     assert (np.abs(place).max() > 1) == (count == 1)
 
 
 def test_no_box_is_no_partition():
-    place, count = find_misfit(np.zeros((0, 3, 2)), 2.0) or ([], 1)
+    place, count = find_partition_error(np.zeros((0, 3, 2)), 2.0) or ([], 1)
     assert (place, count) == ([0.0, 0.0, 0.0], 0)
 
 
 @pytest.mark.parametrize(("cubes", "count"), [(1, 50), (2, 300), (3, 20_000), (5, 3000)])
 def test_random_partitions_and_those_off_by_one_bit(cubes, count):
     boxes = random_partition(cubes, count)
-    assert find_misfit(boxes, 6.0) is None
+    assert find_partition_error(boxes, 6.0) is None
     assert volume(boxes) == 12**cubes
     for change in (-1, 1):
         other = boxes.copy()
         other[7, 0, 0] = np.nextafter(other[7, 0, 0], change * np.inf)
-        assert find_misfit(other, 6.0) is not None
+        assert find_partition_error(other, 6.0) is not None
         assert volume(other) != 12**cubes

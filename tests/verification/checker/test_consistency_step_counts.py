@@ -3,7 +3,7 @@ import pytest
 
 from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.verification.checker.certificate import Outcome
-from drone_rl.verification.checker.consistency import find_wrong_tallies
+from drone_rl.verification.checker.consistency import find_wrong_step_counts
 
 OWNER = np.repeat([0, 1], [800, 200])
 STEPS = np.repeat([10, 11, 0], [600, 200, 200])
@@ -13,7 +13,7 @@ STEPS = np.repeat([10, 11, 0], [600, 200, 200])
 def wrong(steps, share=0.8):
     nowhere = np.zeros((0, 1, 2))
     outcome = Outcome(EndReason.ALL_CUBES, (True,), False, share, steps, nowhere)
-    return list(find_wrong_tallies([outcome], OWNER, STEPS))
+    return list(find_wrong_step_counts([outcome], OWNER, STEPS))
 
 
 @pytest.mark.parametrize("steps", [{10: 0.6, 11: 0.2}, {10: 0.62, 11: 0.18}, {10: 0.5}, {}])
@@ -37,7 +37,7 @@ def test_what_is_stated_of_all_and_of_none_is_accepted():
     steps, owner = np.full(1000, 10), np.zeros(1000, int)
     for stated in ({10: 1.0}, {10: 1.0, 12: 0.0}):
         outcome = Outcome(EndReason.ALL_CUBES, (True,), False, 1.0, stated, nowhere)
-        assert list(find_wrong_tallies([outcome], owner, steps)) == []
+        assert list(find_wrong_step_counts([outcome], owner, steps)) == []
 
 
 def test_what_is_open_may_be_of_any_number_and_no_more():
@@ -51,7 +51,7 @@ def test_numbers_that_are_not_stated_are_counted_together():
     nowhere = np.zeros((0, 1, 2))
     outcome = Outcome(EndReason.ALL_CUBES, (True,), False, 1.0, {10: 1.0 - 1e-6}, nowhere)
     steps = np.concatenate([np.full(960, 10), np.arange(20, 60)])
-    *_, line = find_wrong_tallies([outcome], np.zeros(1000, int), steps)
+    *_, line = find_wrong_step_counts([outcome], np.zeros(1000, int), steps)
     assert "other numbers of steps than those stated" in line and "40 of 1000" in line
     usual = np.concatenate([np.full(999, 10), [20]])
-    assert not list(find_wrong_tallies([outcome], np.zeros(1000, int), usual))
+    assert not list(find_wrong_step_counts([outcome], np.zeros(1000, int), usual))

@@ -7,7 +7,7 @@ import torch
 import drone_rl
 from drone_rl.evaluation.rollouts import run_episodes
 from drone_rl.sim.tasks.collect_cubes import EndReason
-from drone_rl.verification.checker.rollouts import Flown, Simulator
+from drone_rl.verification.checker.rollouts import Rollouts, Simulator
 
 
 @pytest.fixture
@@ -103,5 +103,5 @@ def test_large_pictures_come_in_small_batches():
 
 
 def test_joining_keeps_the_order():
-    part = Flown(np.array([1]), np.array([[True]]), np.array([3]), np.array([0]))
-    assert Flown.join([part, part]).steps.tolist() == [3, 3]
+    part = Rollouts(np.array([1]), np.array([[True]]), np.array([3]), np.array([0]))
+    assert Rollouts.join([part, part]).steps.tolist() == [3, 3]

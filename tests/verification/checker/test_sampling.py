@@ -2,12 +2,12 @@ import numpy as np
 import pytest
 
 from drone_rl.verification.checker.sampling import (
-    ASIDE,
-    HAIR,
-    draw_anywhere,
-    draw_borders,
-    draw_inside,
+    BORDER_OFFSET,
+    CORNER_INSET,
     find,
+    sample_anywhere,
+    sample_borders,
+    sample_inside,
 )
 
 LEFT, RIGHT = [[0.0, 2.0], [-1.0, 1.0]], [[2.0, 2.5], [-1.0, 1.0]]
@@ -20,10 +20,15 @@ def rng():
 
 
 def test_centres_then_corners_then_any(rng):
-    points = draw_inside(BOXES, 20, rng)
+    points = sample_inside(BOXES, 20, rng)
     assert points.shape == (20, 2)
     assert points[:2].tolist() == [[1.0, 0.0], [2.25, 0.0]]  # the largest, then the thinnest
-    corners = {(HAIR, HAIR - 1), (HAIR, 1 - HAIR), (2 - HAIR, HAIR - 1), (2 - HAIR, 1 - HAIR)}
+    corners = {
+        (CORNER_INSET, CORNER_INSET - 1),
+        (CORNER_INSET, 1 - CORNER_INSET),
+        (2 - CORNER_INSET, CORNER_INSET - 1),
+        (2 - CORNER_INSET, 1 - CORNER_INSET),
+    }
     assert corners <= {tuple(p) for p in points[2:10].tolist()}
     held = (BOXES[:, None, :, 0] < points) & (points < BOXES[:, None, :, 1])
     assert held.all(2).any(0).all()
@@ -33,38 +38,38 @@ def test_of_many_boxes_the_largest_and_the_thinnest_are_there(rng):
     low = np.arange(300.0)
     width = np.where(low == 123, 1e-12, np.where(low == 45, 0.9, 0.5))
     boxes = np.stack([low, low + width], 1)[:, None]
-    first = draw_inside(boxes, 10, rng)[:5, 0]
+    first = sample_inside(boxes, 10, rng)[:5, 0]
     assert first[0] == pytest.approx(45.45)
     assert 123 <= first[1] <= 123 + 1e-12
-    assert len(draw_inside(boxes, 0, rng)) == 0
+    assert len(sample_inside(boxes, 0, rng)) == 0
 
 
 def test_corners_of_thin_boxes_stay_in_them(rng):
     thin = np.array([[[1.0, 1.0 + 1e-10]]])
-    points = draw_inside(thin, 9, rng)
+    points = sample_inside(thin, 9, rng)
     assert (points > 1.0).all() and (points < 1 + 1e-10).all()
 
 
 def test_anywhere_is_uniform(rng):
-    points, chosen = draw_anywhere(BOXES, 4000, rng)
+    points, chosen = sample_anywhere(BOXES, 4000, rng)
     assert (chosen == 0).mean() == pytest.approx(0.8, abs=0.03)
     assert points.mean(0) == pytest.approx([1.25, 0.0], abs=0.06)
 
 
 def test_borders_are_met_on_both_sides(rng):
     won, lost = np.array([[[-1.0, 0.0], [-1.0, 1.0]]]), np.array([[[0.0, 1.0], [-1.0, 1.0]]])
-    points = draw_borders([won, lost], 1.0, 60, rng)
+    points = sample_borders([won, lost], 1.0, 60, rng)
     assert len(points) == 60
-    assert points[::2, 0] == pytest.approx(-ASIDE)
-    assert points[1::2, 0] == pytest.approx(ASIDE)
+    assert points[::2, 0] == pytest.approx(-BORDER_OFFSET)
+    assert points[1::2, 0] == pytest.approx(BORDER_OFFSET)
     assert (points[::2, 1] == points[1::2, 1]).all()
-    assert len(draw_borders([np.concatenate([won, lost])], 1.0, 60, rng)) == 0  # all of one group
+    assert len(sample_borders([np.concatenate([won, lost])], 1.0, 60, rng)) == 0  # all of one group
 
 
 def test_a_gap_of_less_than_the_distance_is_leapt(rng):
     won, lost = np.array([[[-1.0, -1e-5]]]), np.array([[[1e-5, 1.0]]])
     gap = np.array([[[-1e-5, 1e-5]]])
-    points = draw_borders([won, lost, gap], 1.0, 100, rng)
+    points = sample_borders([won, lost, gap], 1.0, 100, rng)
     assert points.min() < -5e-5 and points.max() > 5e-5
     assert 2 <= len(points) <= 8  # of one cube there are few
 

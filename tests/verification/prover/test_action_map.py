@@ -6,11 +6,13 @@ import torch
 
 from drone_rl.sim.actions import Move
 from drone_rl.utils.errors import InputError
-from drone_rl.verification.prover.action_map import BLIND, UNSEEN, map_places
+from drone_rl.verification.prover.action_map import BLIND, UNSEEN, map_actions
 from drone_rl.verification.prover.arrangement import Window
-from drone_rl.verification.prover.cube_images import NOTHING, Eye
+from drone_rl.verification.prover.cube_images import NOTHING, CameraModel
 
-EYE = Eye(np.array([1.0, -1.0]), np.array([0.0]), half=1.0, farthest=10.0, widest=10.0, bound=6.0)
+EYE = CameraModel(
+    np.array([1.0, -1.0]), np.array([0.0]), half=1.0, farthest=10.0, widest=10.0, bound=6.0
+)
 """A pixel sees half left, one half right: fronts at Y = +-(D - 2 to D), sides to +-(D + 2)."""
 WINDOW = Window(4.0, 5.0, 10.0)
 
@@ -30,7 +32,7 @@ class Turns(torch.nn.Module):
 
 @pytest.fixture(scope="module")
 def found():
-    return map_places(EYE, WINDOW, look, Turns(), touch_distance=3.0, most_cells=100)
+    return map_actions(EYE, WINDOW, look, Turns(), touch_distance=3.0, most_cells=100)
 
 
 def test_cells_areas_and_actions(found):
@@ -76,9 +78,9 @@ def test_outlines_are_those_of_actions_and_of_what_is_not_seen(found):
 def test_a_place_in_the_cube_is_refused():
     window = Window(1.0, 5.0, 10.0)
     with pytest.raises(InputError, match=r"nearest=1.0 .* more than 1.0"):
-        map_places(EYE, window, look, Turns(), touch_distance=3.0, most_cells=100)
+        map_actions(EYE, window, look, Turns(), touch_distance=3.0, most_cells=100)
 
 
 def test_too_many_cells_are_refused():
     with pytest.raises(InputError, match="most_cells"):
-        map_places(EYE, WINDOW, look, Turns(), touch_distance=3.0, most_cells=2)
+        map_actions(EYE, WINDOW, look, Turns(), touch_distance=3.0, most_cells=2)

@@ -10,48 +10,48 @@ from drone_rl.config import CameraSettings, TaskSettings
 from drone_rl.verification.prover import action_map
 from drone_rl.verification.prover.action_map import doubtful_area, find_borders, joined
 from drone_rl.verification.prover.arrangement import Pieces, Window, arrange
-from drone_rl.verification.prover.cube_images import FRONT, LEFT_SIDE, NOTHING, UNIT, Eye
+from drone_rl.verification.prover.cube_images import FRONT, LEFT_SIDE, NOTHING, UNIT, CameraModel
 
 
-def eye(left, up):
+def camera(left, up):
     """Cubes with an edge of 2 m."""
-    return Eye(
+    return CameraModel(
         np.array(left, float), np.array(up, float), half=1.0, farthest=10.0, widest=10.0, bound=6.0
     )
 
 
-def cells(eye, window):
+def cells(camera, window):
     """Area of what the only pixel shows, and how many cells there are."""
-    found = arrange(find_borders(eye, window), window, 10_000)
-    faces = eye.faces(*found.inner_points().T)[:, 0, 0]
+    found = arrange(find_borders(camera, window), window, 10_000)
+    faces = camera.faces(*found.inner_points().T)[:, 0, 0]
     areas = np.bincount(faces, found.areas(), 4)
     return {int(face): round(areas[face], 9) for face in np.unique(faces)}, found.num_cells
 
 
 def test_straight_ahead_a_cube_is_seen_until_it_is_too_small():
     """A ray that rises 0.5 m each metre passes above fronts beyond 2 m, of cubes beyond 3 m."""
-    found, count = cells(eye([0.0], [0.5]), Window(1.5, 5.0, 2.0))
+    found, count = cells(camera([0.0], [0.5]), Window(1.5, 5.0, 2.0))
     assert found == {FRONT: 2 * 1.5, NOTHING: 14 - 3}
     assert count == 2
 
 
 def test_a_level_ray_to_the_left_sees_the_front_and_beyond_it_the_side():
     """Front: D - 2 to D; side: to D + 2."""
-    found, count = cells(eye([1.0], [0.0]), Window(2.0, 3.0, 6.0))
+    found, count = cells(camera([1.0], [0.0]), Window(2.0, 3.0, 6.0))
     assert found == {NOTHING: 8.0, FRONT: 2.0, LEFT_SIDE: 2.0}
     assert count == 4
 
 
 def test_a_ray_that_leaves_by_the_upper_edge_sees_less_of_the_side():
     """It is above the cube from 2 m on: the side ends at Y = 3 for cubes at 1 to 3 m."""
-    found, count = cells(eye([1.0], [0.5]), Window(1.5, 4.0, 4.0))
+    found, count = cells(camera([1.0], [0.5]), Window(1.5, 4.0, 4.0))
     assert found == {FRONT: 3.0, LEFT_SIDE: 1.125, NOTHING: 20 - 4.125}
     assert count == 3
 
 
 def test_twelve_pixels():
     """3 columns 2/3 apart; 4 rows that rise 1/3 and 1, which see cubes as far as 5 and 2.5 m."""
-    seen = Eye.of(TaskSettings(), CameraSettings(width=3, height=4, horizontal_fov=90))
+    seen = CameraModel.of(TaskSettings(), CameraSettings(width=3, height=4, horizontal_fov=90))
     np.testing.assert_allclose(seen.left, [2 / 3, 0, -2 / 3], atol=1e-15)
     np.testing.assert_allclose(np.abs(seen.up), [1, 1 / 3, 1 / 3, 1])
     window = Window(2.0, 20.0, 30.0)
@@ -84,20 +84,22 @@ CAMERAS = [(7, 5, 100.0), (8, 2, 40.0), (9, 6, 90.0), (16, 7, 135.0), (12, 5, 60
 WINDOW = Window(1.4, 40.0, 9.0)
 
 
-def missed(eye, found, count=2000):
+def missed(camera, found, count=2000):
     """How many of random places have another picture than their cell."""
     cells = arrange(found, WINDOW, 100_000)
     random_state = np.random.RandomState(0)
     low, high = (WINDOW.nearest, -WINDOW.sideways), (WINDOW.farthest, WINDOW.sideways)
     places = random_state.uniform(low, high, (count, 2))
-    pictures = eye.faces(*cells.inner_points().T)[cells.locate(places)]
-    return int((pictures != eye.faces(*places.T)).any((1, 2)).sum())
+    pictures = camera.faces(*cells.inner_points().T)[cells.locate(places)]
+    return int((pictures != camera.faces(*places.T)).any((1, 2)).sum())
 
 
 @pytest.mark.parametrize("camera", CAMERAS)
 def test_every_place_has_the_picture_of_its_cell(camera):
     width, height, fov = camera
-    seen = Eye.of(TaskSettings(), CameraSettings(width=width, height=height, horizontal_fov=fov))
+    seen = CameraModel.of(
+        TaskSettings(), CameraSettings(width=width, height=height, horizontal_fov=fov)
+    )
     found = find_borders(seen, WINDOW)
     assert missed(seen, found) == 0
     cells = arrange(found, WINDOW, 100_000)
@@ -112,7 +114,7 @@ def test_every_place_has_the_picture_of_its_cell(camera):
 
 @pytest.mark.parametrize("family", ["near", "far", "side", "levels", "upright"])
 def test_no_family_of_borders_can_be_left_out(family, monkeypatch):
-    seen = Eye.of(TaskSettings(), CameraSettings(width=9, height=6, horizontal_fov=90))
+    seen = CameraModel.of(TaskSettings(), CameraSettings(width=9, height=6, horizontal_fov=90))
     calls = []
 
     def without(*args):
@@ -133,10 +135,10 @@ def test_no_family_of_borders_can_be_left_out(family, monkeypatch):
 
 
 def test_the_doubtful_area_is_a_band_along_each_border():
-    """A level border 3 m long at y = 2, an upright one of 4 m: see `Eye.borders`, `Eye.grazed`."""
+    """A level border 3 m long at y = 2, an upright one of 4 m."""
     window = Window(2.0, 8.0, 5.0)
     level, upright = np.array([[0.0, 2.0, 3.0, 6.0]]).T, np.array([[4.0, -2.0, 2.0]])
-    found = doubtful_area(eye([1.0], [0.5]), Pieces(*level, upright), window)
+    found = doubtful_area(camera([1.0], [0.5]), Pieces(*level, upright), window)
     band = 2 * (16 * (2 + 1) + 3 * 10) * 3
     assert found == pytest.approx((band + 2 * 32 * 10 * 4) * UNIT)
 
@@ -150,9 +152,11 @@ def test_the_band_along_a_slanting_border_grows_with_its_height():
     """From y = 2 at x = 2 to y = 4 at x = 6, with a slope of a half."""
     window = Window(2.0, 8.0, 5.0)
     line = np.array([[0.5, 1.0, 2.0, 6.0]]).T
-    found = doubtful_area(eye([1.0], [0.5]), Pieces(*line, np.empty((0, 3))), window)
+    found = doubtful_area(camera([1.0], [0.5]), Pieces(*line, np.empty((0, 3))), window)
     low, high = (16 * (y + 1) + 3 * 0.5 * 10 + 3 * 10 for y in (2, 4))
     assert found == pytest.approx(4 * (low + high) * UNIT)
-    far = doubtful_area(eye([1.0], [0.5]), Pieces(*line, np.empty((0, 3))), Window(2.0, 19.0, 12.0))
+    far = doubtful_area(
+        camera([1.0], [0.5]), Pieces(*line, np.empty((0, 3))), Window(2.0, 19.0, 12.0)
+    )
     low, high = (16 * (y + 1) + 3 * 0.5 * 20 + 3 * 12 for y in (2, 4))
     assert far == pytest.approx(4 * (low + high) * UNIT)

@@ -116,5 +116,5 @@ def test_too_many_cells():
 
 def test_pieces_that_hang_in_the_air_are_noticed():
     loop = [(0, -1, 1, 3), (0, 1, 1, 3)]
-    with pytest.raises(ArithmeticError, match="don't fill"):
+    with pytest.raises(ArithmeticError, match="do not fill"):
         cut(*loop, upright=[(1, -1, 1), (3, -1, 1)])

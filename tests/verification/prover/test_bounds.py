@@ -8,7 +8,7 @@ from torch import nn
 
 from drone_rl.policies import OriginalCNN, SmallCNN
 from drone_rl.utils.errors import InputError
-from drone_rl.verification.prover.bounds import Bounds
+from drone_rl.verification.prover.bounds import NetworkBounds
 
 
 class Linear(nn.Module):
@@ -32,21 +32,21 @@ def pictures(*pixels):
 
 def test_what_actions_have_in_common_cancels():
     """Both logits rise alike with the first pixel, so that it decides nothing."""
-    bounds = Bounds(Linear([[5.0, 1.0], [5.0, 0.0]], [0.0, 0.0]), gap=0.1)
+    bounds = NetworkBounds(Linear([[5.0, 1.0], [5.0, 0.0]], [0.0, 0.0]), gap=0.1)
     assert bounds.possible(pictures([-9, 0.2]), pictures([9, 1])).tolist() == [0b01]
     assert bounds.possible(pictures([-9, -1]), pictures([9, -0.2])).tolist() == [0b10]
     assert bounds.possible(pictures([-9, 0.05]), pictures([9, 1])).tolist() == [0b11]
 
 
 def test_known_pictures_and_their_gap():
-    bounds = Bounds(Linear([[1.0, 0.0], [0.0, 1.0]], [0.0, 0.0]), gap=0.5)
+    bounds = NetworkBounds(Linear([[1.0, 0.0], [0.0, 1.0]], [0.0, 0.0]), gap=0.5)
     bits, gaps = bounds.decide(pictures([3, 1], [1, 1.2], [0, 2]))
     assert bits.tolist() == [0b01, 0b11, 0b10]
     assert gaps.tolist() == pytest.approx([2.0, 0.2, 2.0])
 
 
 def test_a_third_action_is_left_out_where_another_beats_it():
-    bounds = Bounds(Linear([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]], [0.0, 0.0, -5.0]), gap=0.0)
+    bounds = NetworkBounds(Linear([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]], [0.0, 0.0, -5.0]), gap=0.0)
     assert bounds.possible(pictures([0.0, 0.0]), pictures([1.0, 1.0])).tolist() == [0b011]
 
 
@@ -58,7 +58,7 @@ def test_bounds_hold_for_all_that_they_are_about(make, doubt):
     with torch.no_grad():
         network.layers[-1].weight.mul_(100)
         network.layers[-1].bias.copy_(torch.tensor([-1000.0, 0.0, 1000.0]))  # beyond rounding
-    bounds = Bounds(network, gap=1e-4)
+    bounds = NetworkBounds(network, gap=1e-4)
     lower = torch.rand(40, 1, 25, 64, generator=generator)
     upper = lower.clone()
     upper[:, 0, 10, 30] += doubt
@@ -81,28 +81,28 @@ def test_without_doubt_bounds_decide_like_the_network():
         network.layers[-1].weight.mul_(100)
         network.layers[-1].bias.copy_(torch.tensor([-1000.0, 0.0, 1000.0]))  # beyond rounding
     seen = torch.rand(50, 1, 25, 64, generator=generator)
-    bounds = Bounds(network, gap=1e-4)
+    bounds = NetworkBounds(network, gap=1e-4)
     assert bounds.possible(seen.clone(), seen.clone()).tolist() == bounds.decide(seen)[0].tolist()
     assert bounds.decide(seen)[0].tolist() == (1 << network(seen).argmax(-1)).tolist()
 
 
 def test_other_layers_are_refused():
-    with pytest.raises(InputError, match="a layer Tanh, for which no bounds"):
-        Bounds(Linear([[1.0, 0.0]], [0.0], nn.Tanh()), gap=0.0)
+    with pytest.raises(InputError, match="do not support the network's layer Tanh"):
+        NetworkBounds(Linear([[1.0, 0.0]], [0.0], nn.Tanh()), gap=0.0)
     network = Linear([[1.0, 0.0]], [0.0])
     network.layers.append(nn.ReLU())
     with pytest.raises(InputError, match="last layer is not linear"):
-        Bounds(network, gap=0.0)
+        NetworkBounds(network, gap=0.0)
 
 
 def test_probabilities_of_drawn_actions_by_hand():
     """Logits 0 and x with x from 1 to 2: the second is drawn with 1 / (1 + exp(-x))."""
-    bounds = Bounds(Linear([[0.0, 0.0], [1.0, 0.0]], [0.0, 0.0]), gap=0.0)
+    bounds = NetworkBounds(Linear([[0.0, 0.0], [1.0, 0.0]], [0.0, 0.0]), gap=0.0)
     least, most = bounds.probabilities(pictures([1.0, 0.0]), pictures([2.0, 0.0]))
     one, two = (1 / (1 + torch.tensor([-1.0, -2.0]).double().exp())).tolist()
     assert least[0].tolist() == pytest.approx([1 - two, one], rel=1e-5)
     assert most[0].tolist() == pytest.approx([1 - one, two], rel=1e-5)
-    wider, _ = Bounds(Linear([[0.0, 0.0], [1.0, 0.0]], [0.0, 0.0]), gap=0.5).probabilities(
+    wider, _ = NetworkBounds(Linear([[0.0, 0.0], [1.0, 0.0]], [0.0, 0.0]), gap=0.5).probabilities(
         pictures([1.0, 0.0]), pictures([2.0, 0.0])
     )
     assert float(wider[0, 1]) == pytest.approx(1 / (1 + float(torch.tensor(-0.5).exp())))
@@ -115,9 +115,9 @@ def test_an_action_that_an_order_of_summation_decides_is_left_open():
         hidden.weight.copy_(torch.tensor([[2.0**24, -(2.0**24)], [0.0, 0.0]]))
         hidden.bias.copy_(torch.tensor([1.0, 0.0]))
     network = Linear([[1.0, 0.0], [0.0, 0.0]], [0.0, 0.5], nn.Flatten(), hidden, nn.ReLU())
-    bounds = Bounds(network, gap=0.0)
+    bounds = NetworkBounds(network, gap=0.0)
     seen = pictures([1.0, 1.0])
     assert bounds.decide(seen)[0].tolist() == [0b11]
     assert bounds.possible(seen.clone(), seen.clone()).tolist() == [0b11]
     plain = Linear([[1.0, 0.0], [0.0, 0.0]], [0.0, 0.5])
-    assert Bounds(plain, gap=0.0).decide(seen)[0].tolist() == [0b01]
+    assert NetworkBounds(plain, gap=0.0).decide(seen)[0].tolist() == [0b01]

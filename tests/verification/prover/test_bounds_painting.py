@@ -4,10 +4,10 @@ import itertools
 
 import torch
 
-from drone_rl.verification.prover.bounds import Painter
+from drone_rl.verification.prover.bounds import Compositor
 from drone_rl.verification.prover.cube_images import FRONT, LEFT_SIDE, NOTHING, RIGHT_SIDE
 
-PAINTER = Painter(torch.tensor([[0.5, 0.9]]), torch.tensor([0.3, 0.1, 0.7]))
+PAINTER = Compositor(torch.tensor([[0.5, 0.9]]), torch.tensor([0.3, 0.1, 0.7]))
 ALL = (slice(0, 1), slice(0, 2))
 
 
@@ -71,5 +71,5 @@ def test_a_cube_is_seen_in_its_part_alone():
 
 
 def test_what_follows_is_applied():
-    painter = Painter(torch.tensor([[0.5, 0.9]]), torch.zeros(3), lambda p: p[..., :1] * 2)
-    assert painter.see(torch.tensor([[[0.5, 0.9]]])).tolist() == [[[[1.0]]]]
+    compositor = Compositor(torch.tensor([[0.5, 0.9]]), torch.zeros(3), lambda p: p[..., :1] * 2)
+    assert compositor.see(torch.tensor([[[0.5, 0.9]]])).tolist() == [[[[1.0]]]]

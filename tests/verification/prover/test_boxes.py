@@ -5,16 +5,16 @@ import pytest
 
 from drone_rl.verification.prover import boxes as module
 from drone_rl.verification.prover.boxes import (
-    beyond,
+    all_placements,
     blocks,
     carve,
+    complement,
     cut,
     intersect,
     merge,
     ragged,
-    unite,
+    union,
     volumes,
-    whole,
 )
 
 
@@ -35,8 +35,8 @@ def random_boxes(random, count, n=3):
 
 
 def test_the_whole_and_its_volume():
-    assert whole(6.0, 2).tolist() == [[[-6.0, 6.0], [-6.0, 6.0]]]
-    assert volumes(whole(6.0, 2)).tolist() == [144.0]
+    assert all_placements(6.0, 2).tolist() == [[[-6.0, 6.0], [-6.0, 6.0]]]
+    assert volumes(all_placements(6.0, 2)).tolist() == [144.0]
 
 
 def test_a_cut_goes_through_what_it_meets():
@@ -76,7 +76,7 @@ def test_overlaps_are_united(cells, most, monkeypatch):
     monkeypatch.setattr(module, "AT_ONCE", cells)
     random = np.random.default_rng(1)
     some, points = random_boxes(random, 30), random.random((2000, 3)) * 7
-    united = unite(some, most)
+    united = union(some, most)
     counts = holds(united, points)
     assert ((counts > 0) == (holds(some, points) > 0)).all()
     assert (counts.max() == 1) == (cells * most > 20)
@@ -87,23 +87,23 @@ def test_what_boxes_leave_of_another(cells, monkeypatch):
     monkeypatch.setattr(module, "AT_ONCE", cells)
     random = np.random.default_rng(3)
     some, space = random_boxes(random, 10), boxes([[0, 7], [0, 7], [0, 7]])
-    left, points = beyond(some, space), random.random((2000, 3)) * 7
+    left, points = complement(some, space), random.random((2000, 3)) * 7
     assert left is not None
     assert (holds(left, points) == (holds(some, points) == 0)).all()
-    assert volumes(left).sum() + volumes(unite(some)).sum() == pytest.approx(343.0)
+    assert volumes(left).sum() + volumes(union(some)).sum() == pytest.approx(343.0)
 
 
 def test_what_would_take_too_long_is_left(monkeypatch):
     monkeypatch.setattr(module, "AT_ONCE", 20)
     some, space = random_boxes(np.random.default_rng(3), 10), boxes([[0, 7], [0, 7], [0, 7]])
-    assert beyond(some, space, most=2) is None
-    assert beyond(some[:0], space).tolist() == space.tolist()
+    assert complement(some, space, most=2) is None
+    assert complement(some[:0], space).tolist() == space.tolist()
 
 
 def test_united_volume_by_hand():
-    united = unite(boxes([[0, 2], [0, 2]], [[1, 3], [1, 3]], [[0, 2], [0, 2]]))
+    united = union(boxes([[0, 2], [0, 2]], [[1, 3], [1, 3]], [[0, 2], [0, 2]]))
     assert volumes(united).sum() == 7.0
-    assert unite(np.empty((0, 2, 2))).shape == (0, 2, 2)
+    assert union(np.empty((0, 2, 2))).shape == (0, 2, 2)
 
 
 def test_intersections_are_what_both_have():
@@ -113,7 +113,7 @@ def test_intersections_are_what_both_have():
 
 def test_carving_parts_the_inside_from_the_outside():
     random = np.random.default_rng(2)
-    some = unite(random_boxes(random, 10))
+    some = union(random_boxes(random, 10))
     hole = np.array([[1, 4], [2, 5], [0, 3]], float)
     inside, outside = carve(some, hole)
     points = random.random((2000, 3)) * 7

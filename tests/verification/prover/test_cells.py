@@ -5,9 +5,9 @@ import pytest
 
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.prover.cells import Cells
-from drone_rl.verification.prover.cube_images import Eye
+from drone_rl.verification.prover.cube_images import CameraModel
 
-TINY = Eye(
+TINY = CameraModel(
     left=np.array([1.0, -1.0]), up=np.array([0.0]), half=1.0, farthest=40.0, widest=20.0, bound=6.0
 )
 
@@ -59,7 +59,7 @@ def test_an_outermost_band_is_whole():
 
 def test_pictures_within_a_band_are_found():
     """The pixel on the right changes late: at its borders there is a picture of neither side."""
-    both = Eye(**{**vars(TINY), "left": np.array([1.0, 1.0])})
+    both = CameraModel(**{**vars(TINY), "left": np.array([1.0, 1.0])})
 
     class Late(Drawn):
         def look(self, left):
@@ -78,14 +78,14 @@ def test_a_renderer_that_is_a_little_off_gets_wider_bands():
 
 
 def test_a_renderer_that_is_far_off_is_refused():
-    with pytest.raises(InputError, match="another picture than the closed form"):
+    with pytest.raises(InputError, match="differs from the closed form"):
         Cells(TINY, 4.0, 1.0, 3.0, Drawn((1e-3, 1e-3)))
 
 
 def test_grazing_rows_are_refused():
-    eye = Eye(**{**vars(TINY), "up": np.array([0.5])})
-    with pytest.raises(InputError, match=r"3.0 m ahead a row of pixels just grazes"):
-        Cells(eye, 3.0, -5.0, 5.0)
+    camera = CameraModel(**{**vars(TINY), "up": np.array([0.5])})
+    with pytest.raises(InputError, match=r"at 3.0 m a row of pixels grazes"):
+        Cells(camera, 3.0, -5.0, 5.0)
 
 
 def test_a_part_of_a_row_shows_what_the_row_does_there():

@@ -12,14 +12,14 @@ from drone_rl.verification.prover.cube_images import (
     NOTHING,
     RIGHT_SIDE,
     UNIT,
-    Eye,
+    CameraModel,
 )
 
 
 @pytest.fixture
 def tiny():
     """Two columns with slopes 1 and -1, three rows with slopes 0.5, 0 and -0.5; cubes of 2 m."""
-    return Eye(
+    return CameraModel(
         left=np.array([1.0, -1.0]),
         up=np.array([0.5, 0.0, -0.5]),
         half=1.0,
@@ -30,12 +30,12 @@ def tiny():
 
 
 def test_slopes_of_the_default_camera():
-    eye = Eye.of(TaskSettings(), CameraSettings())
+    camera = CameraModel.of(TaskSettings(), CameraSettings())
     wide = np.tan(np.radians(67.5))
-    assert eye.left[0] == pytest.approx(63 / 64 * wide)
-    assert eye.left[-1] == -eye.left[0]
-    assert eye.up[12] == 0.0
-    assert eye.up[0] == pytest.approx(24 / 25 * wide * 25 / 64)
+    assert camera.left[0] == pytest.approx(63 / 64 * wide)
+    assert camera.left[-1] == -camera.left[0]
+    assert camera.up[12] == 0.0
+    assert camera.up[0] == pytest.approx(24 / 25 * wide * 25 / 64)
 
 
 def test_faces_by_hand(tiny):
@@ -79,13 +79,13 @@ def test_borders_are_where_faces_change(tiny):
 
 @pytest.mark.parametrize("ahead", [0.6, 1.6, 2.6, 5.6, 14.6, 32.6])
 def test_between_borders_nothing_changes(ahead):
-    eye = Eye.of(TaskSettings(), CameraSettings())
-    places, _ = eye.borders(ahead)
+    camera = CameraModel.of(TaskSettings(), CameraSettings())
+    places, _ = camera.borders(ahead)
     places = np.unique(places.round(12))
     low, high = places[:-1] + 1e-9, places[1:] - 1e-9
     wide = low < high
-    assert (eye.faces(ahead, low[wide]) == eye.faces(ahead, high[wide])).all()
-    beside = eye.faces(ahead, places - 1e-7), eye.faces(ahead, places + 1e-7)
+    assert (camera.faces(ahead, low[wide]) == camera.faces(ahead, high[wide])).all()
+    beside = camera.faces(ahead, places - 1e-7), camera.faces(ahead, places + 1e-7)
     changes = (beside[0] != beside[1]).any((1, 2))
     assert changes.mean() > 0.9  # and there it does, but where rows graze each other
 
@@ -96,11 +96,11 @@ def test_grazing_rows_are_told(tiny):
 
 
 def test_float32_moves_a_cube_by_no_more_than_is_allowed_for():
-    eye, random = Eye.of(TaskSettings(), CameraSettings()), np.random.RandomState(0)
-    cubes = random.uniform(-eye.bound, eye.bound, 200_000)
-    drone = random.randint(-int(eye.widest), int(eye.widest) + 1, len(cubes)).astype(float)
+    camera, random = CameraModel.of(TaskSettings(), CameraSettings()), np.random.RandomState(0)
+    cubes = random.uniform(-camera.bound, camera.bound, 200_000)
+    drone = random.randint(-int(camera.widest), int(camera.widest) + 1, len(cubes)).astype(float)
     seen = (cubes.astype(np.float32) - drone.astype(np.float32)).astype(float)
-    errors = np.abs(seen - (cubes - drone)) / eye.rounding(cubes - drone)
+    errors = np.abs(seen - (cubes - drone)) / camera.rounding(cubes - drone)
     assert 0.5 < errors.max() < 1  # and not for much more
 
 

@@ -7,22 +7,22 @@ import torch
 from drone_rl.config import CameraSettings, TaskSettings
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
-from drone_rl.verification.prover.cube_images import FRONT, NOTHING, Eye, Seeing
+from drone_rl.verification.prover.cube_images import FRONT, NOTHING, CameraModel, CubeImages
 from drone_rl.verification.prover.lattice import Lattice
 
 
 def make(task=None, camera=None):
     task, camera = task or TaskSettings(), camera or CameraSettings()
-    return Seeing(Worlds(64, task, camera), Lattice(task), Eye.of(task, camera))
+    return CubeImages(Worlds(64, task, camera), Lattice(task), CameraModel.of(task, camera))
 
 
 @pytest.fixture(scope="module")
-def seeing():
+def images():
     return make()
 
 
-def test_two_thousand_pictures(seeing):
-    assert seeing.check(2000, np.random.RandomState(1)) > 1900
+def test_two_thousand_pictures(images):
+    assert images.check(2000, np.random.RandomState(1)) > 1900
 
 
 def test_other_worlds_and_cameras():
@@ -31,46 +31,46 @@ def test_other_worlds_and_cameras():
     assert make(task, camera).check(500, np.random.RandomState(1)) > 450
 
 
-def test_colours_are_the_renderers(seeing):
-    assert seeing.colors[FRONT].tolist() == [117, 18, 12]
-    assert seeing.background.reshape(-1, 3).unique(dim=0).tolist() == [
+def test_colours_are_the_renderers(images):
+    assert images.colors[FRONT].tolist() == [117, 18, 12]
+    assert images.background.reshape(-1, 3).unique(dim=0).tolist() == [
         [123, 132, 118],
         [158, 188, 234],
     ]
 
 
-def test_a_picture_that_is_another_is_told(seeing, monkeypatch):
+def test_a_picture_that_is_another_is_told(images, monkeypatch):
     """One pixel of one picture, one step brighter."""
-    draw = seeing.draw
+    render = images.render
 
     def a_little_off(cubes, places):
-        pictures = draw(cubes, places).clone()
+        pictures = render(cubes, places).clone()
         pictures[7, 3, 4, 1] += 1
         return pictures
 
-    monkeypatch.setattr(seeing, "draw", a_little_off)
-    with pytest.raises(InputError, match="is not the closed form's, so nothing can be proved"):
-        seeing.check(100, np.random.RandomState(0))
+    monkeypatch.setattr(images, "render", a_little_off)
+    with pytest.raises(InputError, match="differs from the closed form, so nothing can be proved"):
+        images.check(100, np.random.RandomState(0))
 
 
-def test_one_cube_alone(seeing):
-    one = seeing.of(cube=1, steps=20)
+def test_one_cube_alone(images):
+    one = images.of(cube=1, steps=20)
     left = np.array([-1.0, 0.0, 30.0], np.float32)
     pictures = one.look(left)
     faces = one.read(pictures)
-    assert (faces == seeing._eye.faces(3.6, left.astype(float))).all()
+    assert (faces == images._camera.faces(3.6, left.astype(float))).all()
     assert faces[1, 12, 32] == FRONT and (faces[2] == NOTHING).all()
 
 
-def test_colours_of_nothing_that_is_known_are_refused(seeing):
+def test_colours_of_nothing_that_is_known_are_refused(images):
     with pytest.raises(InputError, match="none of the colours"):
-        seeing.read(np.zeros((1, 25, 64, 3), np.uint8))
+        images.read(np.zeros((1, 25, 64, 3), np.uint8))
 
 
-def test_cubes_that_are_touched_or_passed_are_not_drawn(seeing):
+def test_cubes_that_are_touched_or_passed_are_not_drawn(images):
     cubes = np.array([[0.0, 5.0, -5.0]])
-    before, after = (seeing.draw(cubes, np.array([[steps, 0]])) for steps in (13, 14))
-    assert (before != seeing.background).any(-1).sum() > 100
-    hidden = torch.from_numpy(seeing.work_out(cubes, np.array([[14, 0]]))[1])
+    before, after = (images.render(cubes, np.array([[steps, 0]])) for steps in (13, 14))
+    assert (before != images.background).any(-1).sum() > 100
+    hidden = torch.from_numpy(images.closed_form(cubes, np.array([[14, 0]]))[1])
     assert hidden.all()
-    assert (after != seeing.background).any(-1).sum() < 50
+    assert (after != images.background).any(-1).sum() < 50

@@ -17,14 +17,14 @@ from drone_rl.policies.zoo import parse, policy_path, read_policy
 from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.verification.prover import markov_chain
 from drone_rl.verification.prover.lattice import explore
-from drone_rl.verification.prover.markov_chain import NEGLIGIBLE, Outcomes, Sight, follow_chances
+from drone_rl.verification.prover.markov_chain import NEGLIGIBLE, NodeEvaluator, Outcomes, propagate
 
 
 def constant(settings, cubes, *wish):
     """The outcomes of a policy that sees nothing."""
     graph = explore(settings, cubes)
     wishes = torch.tensor(wish, dtype=torch.float64)
-    return follow_chances(graph, lambda nodes: wishes.expand(len(nodes), 3))
+    return propagate(graph, lambda nodes: wishes.expand(len(nodes), 3))
 
 
 def test_forward_alone_collects_what_stands_ahead(place):
@@ -61,7 +61,7 @@ def test_what_is_dropped_at_several_steps_adds_up(small, place, monkeypatch):
     The place on the right is dropped each time that it is reached: first with 0.1, then with 0.05
     of that (left and back), and so on: 0.1 / (1 - 0.05).
     """
-    monkeypatch.setattr(markov_chain, "FAINT", 0.2)
+    monkeypatch.setattr(markov_chain, "MIN_PROBABILITY", 0.2)
     done = constant(small, place(small, [0.0]), 0.4, 0.5, 0.1)
     assert float(done.undecided[0]) == pytest.approx(0.1 / 0.95, abs=1e-12)
     assert float(done.success[0]) == pytest.approx(0.4 * 1.5 / 0.95, abs=1e-12)
@@ -80,7 +80,7 @@ def test_the_step_limit_by_hand(small, place):
 def test_back_and_forth_for_ever_is_the_step_limit(small, place):
     graph = explore(small, place(small, [0.0]))
     wishes = torch.tensor([[0.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]).double()
-    done = follow_chances(graph, lambda nodes: wishes[nodes])
+    done = propagate(graph, lambda nodes: wishes[nodes])
     assert done.ends[0, EndReason.STEP_LIMIT, 0] == 1.0
     assert done.steps.tolist() == [300.0]
 
@@ -159,7 +159,7 @@ def test_flights_of_the_simulator_with_drawn_actions_agree(place, monkeypatch):
     task, flights = env.base_env.worlds.task, 2000
     cubes = place(task.settings, [4.0, -3.0])
     graph = explore(task.settings, cubes)
-    done = follow_chances(graph, Sight(env, network).on(graph))
+    done = propagate(graph, NodeEvaluator(env, network).on(graph))
     monkeypatch.setattr(task, "draw", lambda random_state: cubes[0])
     actor = make_actor(network, env.action_spec, torch.Generator().manual_seed(0))
     flown = run_episodes(env, actor, flights, greedy=False)
@@ -183,7 +183,7 @@ def test_greedy_flights_end_as_a_policy_does_that_is_sure_of_itself():
     settings = env.base_env.worlds.task.settings
     cubes = flown.goals.world.view(20, settings.num_cubes, 3).double()
     graph = explore(settings, cubes)
-    done = follow_chances(graph, Sight(env, network).on(graph))
+    done = propagate(graph, NodeEvaluator(env, network).on(graph))
     env.close()
     assert torch.equal(done.reasons.argmax(-1), flown.end_reason)
     assert torch.equal(done.collected, flown.goals.reached.double())
@@ -199,7 +199,7 @@ def test_what_is_all_but_impossible_is_not_asked_for_and_told_as_undecided(place
         asked.append(nodes)
         return torch.tensor([1.0 - 1e-10, 1e-10, 0.0], dtype=torch.float64).expand(len(nodes), 3)
 
-    done = follow_chances(graph, ask)
+    done = propagate(graph, ask)
     nodes = torch.cat(asked)
     assert (
         len(nodes) == len(nodes.unique()) == 2 * 14

@@ -6,15 +6,15 @@ import pytest
 import drone_rl
 from drone_rl.utils.progress import silent
 from drone_rl.verification.prover.markov_chain import _extreme, bound_success
-from drone_rl.verification.prover.policy_spec import make_subject
+from drone_rl.verification.prover.policy_spec import make_policy_spec
 
 
 def bounds_and_chances(name, box, most=1, points=12):
     """Bounds over a box, and the exact chances of random placements in it."""
     policy = drone_rl.load_policy(name).in_task(num_cubes=len(box))
-    subject = make_subject(policy.description, policy.make_network(), 1e-4)
-    found = bound_success(subject, np.array(box, float), most)
-    subject.close()
+    spec = make_policy_spec(policy.description, policy.make_network(), 1e-4)
+    found = bound_success(spec, np.array(box, float), most)
+    spec.close()
     low, high = np.array(box).T
     inside = low + np.random.RandomState(0).rand(points, len(box)) * (high - low)
     return found, drone_rl.chances(policy, inside.tolist(), progress=silent).outcomes.success

@@ -8,7 +8,7 @@ from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv, GrayPixels, LateFrames, with_transforms
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.prover.lattice import explore
-from drone_rl.verification.prover.markov_chain import Sight
+from drone_rl.verification.prover.markov_chain import NodeEvaluator
 
 
 def test_wishes_are_those_of_the_same_pictures_in_flight(make_pipeline):
@@ -17,7 +17,7 @@ def test_wishes_are_those_of_the_same_pictures_in_flight(make_pipeline):
     now = env.reset()
     task = env.base_env.worlds.task.settings
     cubes = env.base_env.worlds.state.cubes.clone()
-    graph, sight = explore(task, cubes), Sight(env, network)
+    graph, sight = explore(task, cubes), NodeEvaluator(env, network)
     ask, node = sight.on(graph), torch.arange(3)
     wishes = ask(torch.arange(len(graph.nodes)))
     assert sight.pictures == len(graph.pictures()[0])
@@ -40,15 +40,15 @@ def test_a_policy_with_a_memory_is_refused():
         DroneEnv(1, TaskSettings(num_cubes=1)),
         [GrayPixels(), CatFrames(N=2, dim=-3, in_keys=["pixels"])],
     )
-    with pytest.raises(InputError, match=r"stacks 2 frames.*give a policy that sees one picture"):
-        Sight(env, lambda pixels: pixels)
+    with pytest.raises(InputError, match=r"stacks 2 frames.*give a policy that observes one frame"):
+        NodeEvaluator(env, lambda pixels: pixels)
     env.close()
 
 
 def test_a_camera_that_goes_wrong_is_refused():
     env = with_transforms(DroneEnv(1, TaskSettings(num_cubes=1)), [GrayPixels(), LateFrames(1)])
     with pytest.raises(
-        InputError, match=r"goes wrong \(LateFrames\(frames=1\)\).*a policy without"
+        InputError, match=r"simulates faults \(LateFrames\(frames=1\)\).*a policy without"
     ):
-        Sight(env, lambda pixels: pixels)
+        NodeEvaluator(env, lambda pixels: pixels)
     env.close()

@@ -12,15 +12,15 @@ from drone_rl.config import ActionSettings, AppearanceSettings, DynamicsSettings
 from drone_rl.policies.zoo import parse
 from drone_rl.utils.errors import InputError
 from drone_rl.verification.prover.cells import Cells
-from drone_rl.verification.prover.policy_spec import check_task, make_painter, make_subject
+from drone_rl.verification.prover.policy_spec import check_task, make_compositor, make_policy_spec
 
 
 @pytest.fixture(scope="module")
-def subject():
+def spec():
     policy = drone_rl.load_policy("good")
-    subject = make_subject(policy.description, policy.make_network(), 1e-4)
-    yield subject
-    subject.close()
+    spec = make_policy_spec(policy.description, policy.make_network(), 1e-4)
+    yield spec
+    spec.close()
 
 
 def with_transforms(*names):
@@ -30,68 +30,70 @@ def with_transforms(*names):
     return parse(described)
 
 
-def test_pictures_are_what_the_network_sees(subject):
+def test_pictures_are_what_the_network_sees(spec):
     """Painted by hand and by the renderer and the real transforms."""
     policy = drone_rl.load_policy("good")
     env = policy.make_env(3)
     try:
         state = env.reset()
         seen = state["pixels"]
-        nothing = subject.painter.see(subject.painter.paint([], 1)[0])
+        nothing = spec.compositor.see(spec.compositor.paint([], 1)[0])
         assert seen.shape[1:] == nothing.shape[1:]
         assert torch.allclose(seen[:, :, 0], nothing[:, :, 0].expand_as(seen[:, :, 0]))
     finally:
         env.close()
 
 
-def test_transforms_after_the_shades_are_applied(subject):
+def test_transforms_after_the_shades_are_applied(spec):
     crop = {"name": "crop", "top": 2, "bottom": 22}
     description = with_transforms("gray", crop, {"name": "standardize", "mean": 0.5, "std": 0.25})
-    painter = make_painter(description, subject.seeing)
-    picture = painter.see(painter.paint([], 1)[0])
+    compositor = make_compositor(description, spec.images)
+    picture = compositor.see(compositor.paint([], 1)[0])
     assert picture.shape == (1, 1, 20, 64)
     sky = (0.299 * 158 + 0.587 * 188 + 0.114 * 234) / 255
     assert float(picture[0, 0, 0, 0]) == pytest.approx((sky - 0.5) / 0.25, abs=1e-5)
 
 
-def test_a_blurred_picture_is_bounded_by_its_blurred_bounds(subject):
+def test_a_blurred_picture_is_bounded_by_its_blurred_bounds(spec):
     blur = {"name": "blur", "width": 1.0}
-    painter = make_painter(with_transforms("gray", blur), subject.seeing)
-    nothing = painter.paint([], 1)[0]
+    compositor = make_compositor(with_transforms("gray", blur), spec.images)
+    nothing = compositor.paint([], 1)[0]
     brighter = nothing.clone()
     brighter[0, 12, 32] += 0.1
-    dark, bright = painter.see(nothing), painter.see(brighter)
+    dark, bright = compositor.see(nothing), compositor.see(brighter)
     assert (bright >= dark).all() and (bright > dark)[0, 0, 10:15, 30:35].all()
 
 
-def test_cells_are_those_of_a_cubes_distance(subject):
+def test_cells_are_those_of_a_cubes_distance(spec):
     """The second cube is 24 m ahead of the start, so 19.6 m of the camera after 4 steps."""
-    cells = subject.cells(1, 4, -3.0, 3.0)
-    expected = Cells(subject.eye, 24.0 - 4.0 - 0.4, -3.0, 3.0, subject.seeing.of(1, 4))
+    cells = spec.cells(1, 4, -3.0, 3.0)
+    expected = Cells(spec.camera, 24.0 - 4.0 - 0.4, -3.0, 3.0, spec.images.of(1, 4))
     assert np.array_equal(cells.limits, expected.limits)
     assert np.array_equal(cells.pictures, expected.pictures)
     assert len(cells) > 10 and cells.pictures.any()
 
 
-def test_memory_is_refused(subject):
+def test_memory_is_refused(spec):
     stack = {"name": "stack", "N": 2}
-    with pytest.raises(InputError, match="sees a stack of frames"):
-        make_painter(with_transforms("gray", stack), subject.seeing)
+    with pytest.raises(InputError, match="observes a stack of frames"):
+        make_compositor(with_transforms("gray", stack), spec.images)
 
 
 @pytest.mark.parametrize(
     "fault", [{"name": "late_frames", "frames": 1}, {"name": "frozen_frames", "share": 0.1}]
 )
-def test_a_camera_that_goes_wrong_is_refused(subject, fault):
-    with pytest.raises(InputError, match=rf"goes wrong \(transform {fault['name']}\).*prove one"):
-        make_painter(with_transforms("gray", fault), subject.seeing)
+def test_a_camera_that_goes_wrong_is_refused(spec, fault):
+    with pytest.raises(
+        InputError, match=rf"simulates faults \(transform {fault['name']}\).*prove one"
+    ):
+        make_compositor(with_transforms("gray", fault), spec.images)
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"vertical_bound": 0.5}, "vertical_bound=0.5 spreads cubes in height"),
-        ({"spacing": 2.0}, "spacing=2.0 puts cubes beside each other"),
+        ({"vertical_bound": 0.5}, "vertical_bound=0.5 is not supported"),
+        ({"spacing": 2.0}, "spacing=2.0 puts cubes next to each other"),
         ({"lateral_bound": 0.0}, "leaves a single placement"),
     ],
 )
@@ -104,14 +106,14 @@ def test_worlds_without_a_closed_form_are_refused(change, message):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"step_length": 0.3}, "can't be added up without rounding"),
-        ({"cube_color": (0.0, 0.0, 0.0)}, "makes a face look like another"),
+        ({"step_length": 0.3}, "are rounded"),
+        ({"cube_color": (0.0, 0.0, 0.0)}, "gives a face the colour of another"),
     ],
 )
 def test_what_the_parts_refuse_is_refused(change, message):
     policy = drone_rl.load_policy("good").in_task(**change)
     with pytest.raises(InputError, match=message):
-        make_subject(policy.description, policy.make_network(), 1e-4)
+        make_policy_spec(policy.description, policy.make_network(), 1e-4)
 
 
 def test_worlds_of_another_look_are_refused():
@@ -120,22 +122,22 @@ def test_worlds_of_another_look_are_refused():
         policy.description, appearance=AppearanceSettings(fog_visibility=50.0)
     )
     with pytest.raises(InputError, match="appearance=minimal"):
-        make_subject(foggy, policy.make_network(), 1e-4)
+        make_policy_spec(foggy, policy.make_network(), 1e-4)
 
 
 def test_the_networks_actions_must_be_moves():
     policy = drone_rl.load_policy("good")
     network = policy.make_network()
     network.actions = dataclasses.replace(network.actions)
-    with pytest.raises(InputError, match="does not choose among"):
-        make_subject(policy.description, network, 1e-4)
+    with pytest.raises(InputError, match="support only the actions"):
+        make_policy_spec(policy.description, network, 1e-4)
 
 
 @pytest.mark.parametrize(
     ("part", "settings", "message"),
     [
-        ("dynamics", DynamicsSettings(mode="simple_flight"), "known of computer-vision mode alone"),
-        ("actions", ActionSettings(kind="velocity"), "known of moves alone"),
+        ("dynamics", DynamicsSettings(mode="simple_flight"), "only dynamics=computer_vision"),
+        ("actions", ActionSettings(kind="velocity"), "only actions=moves"),
     ],
 )
 def test_what_is_proved_flies_by_moves_in_computer_vision_mode(part, settings, message):
@@ -144,4 +146,4 @@ def test_what_is_proved_flies_by_moves_in_computer_vision_mode(part, settings, m
     other = copy.copy(policy.description)
     object.__setattr__(other, part, settings)  # whatever its network is
     with pytest.raises(InputError, match=message):
-        make_subject(other, network, 1e-4)
+        make_policy_spec(other, network, 1e-4)

@@ -5,17 +5,17 @@ import pytest
 
 import drone_rl
 from drone_rl.utils.errors import InputError
-from drone_rl.verification.prover.policy_spec import make_subject
+from drone_rl.verification.prover.policy_spec import make_policy_spec
 from drone_rl.verification.prover.proof_files import load, save
 from drone_rl.verification.prover.prover import Prover
 
 
 @pytest.fixture(scope="module")
-def subject():
+def spec():
     policy = drone_rl.load_policy("right_and_forward").in_task(num_cubes=1)
-    subject = make_subject(policy.description, policy.make_network(), 1e-4)
-    yield subject
-    subject.close()
+    spec = make_policy_spec(policy.description, policy.make_network(), 1e-4)
+    yield spec
+    spec.close()
 
 
 def finish(prover):
@@ -27,23 +27,23 @@ def finish(prover):
 
 
 @pytest.mark.parametrize("places", [3, 40])
-def test_stopped_and_gone_on_with(subject, tmp_path, places):
+def test_stopped_and_gone_on_with(spec, tmp_path, places):
     path = tmp_path / "state.npz"
-    stopped = Prover(subject)
+    stopped = Prover(spec)
     for _ in range(places):
         stopped.advance()
     save(stopped, path, "this")
-    later = Prover(subject)
+    later = Prover(spec)
     load(later, path, "this")
     assert later.decided == stopped.decided
-    assert finish(later) == finish(Prover(subject))
+    assert finish(later) == finish(Prover(spec))
 
 
 @pytest.mark.parametrize("places", [5, None])
 def test_stopped_within_a_part_or_between_two(tmp_path, places):
     policy = drone_rl.load_policy("right_and_forward").in_task(num_cubes=1, lateral_bound=1.0)
-    subject = make_subject(policy.description, policy.make_network(), 1e-4)
-    path, stopped, later = tmp_path / "state.npz", *(Prover(subject, 100) for _ in range(2))
+    spec = make_policy_spec(policy.description, policy.make_network(), 1e-4)
+    path, stopped, later = tmp_path / "state.npz", *(Prover(spec, 100) for _ in range(2))
     assert len(stopped.parts) == 2
     stopped.advance()
     while stopped.waiting and stopped.num_places != places:
@@ -52,30 +52,30 @@ def test_stopped_within_a_part_or_between_two(tmp_path, places):
     save(stopped, path, "this")
     load(later, path, "this")
     assert len(later.parts) == 1 and later.boxes_under_way == stopped.boxes_under_way
-    assert finish(later) == finish(Prover(subject, 100))
-    subject.close()
+    assert finish(later) == finish(Prover(spec, 100))
+    spec.close()
 
 
-def test_another_proofs_state_is_refused(subject, tmp_path):
+def test_another_proofs_state_is_refused(spec, tmp_path):
     path = tmp_path / "state.npz"
-    save(Prover(subject), path, "this")
-    with pytest.raises(InputError, match="is of another proof; delete it"):
-        load(Prover(subject), path, "that")
+    save(Prover(spec), path, "this")
+    with pytest.raises(InputError, match="belongs to another proof; delete it"):
+        load(Prover(spec), path, "that")
 
 
 @pytest.mark.parametrize("content", [b"no archive", b"PK\x03\x04 cut short"])
-def test_a_broken_state_is_refused(subject, tmp_path, content):
+def test_a_broken_state_is_refused(spec, tmp_path, content):
     path = tmp_path / "state.npz"
     path.write_bytes(content)
-    with pytest.raises(InputError, match="is no state of a proof"):
-        load(Prover(subject), path, "this")
+    with pytest.raises(InputError, match="is not a saved proof state"):
+        load(Prover(spec), path, "this")
 
 
-def test_a_state_with_code_in_it_is_refused(subject, tmp_path):
+def test_a_state_with_code_in_it_is_refused(spec, tmp_path):
     path = tmp_path / "state.npz"
-    np.savez(path, subject=np.array([print], dtype=object))
-    with pytest.raises(InputError, match="is no state of a proof"):
-        load(Prover(subject), path, "this")
+    np.savez(path, spec=np.array([print], dtype=object))
+    with pytest.raises(InputError, match="is not a saved proof state"):
+        load(Prover(spec), path, "this")
 
 
 NOTHING = np.zeros(0, np.int64)
@@ -104,15 +104,15 @@ NOTHING = np.zeros(0, np.int64)
         {"counts": np.zeros(5)},
     ],
 )
-def test_a_state_that_makes_no_sense_is_refused_and_nothing_taken_over(subject, tmp_path, change):
-    path, fresh = tmp_path / "state.npz", Prover(subject)
-    begun = Prover(subject)
+def test_a_state_that_makes_no_sense_is_refused_and_nothing_taken_over(spec, tmp_path, change):
+    path, fresh = tmp_path / "state.npz", Prover(spec)
+    begun = Prover(spec)
     begun.advance()
     save(begun, path, "this")
     with np.load(path) as arrays:
         state = {**arrays, "ended_boxes": np.zeros((1, 1, 2)), "ways_boxes": np.zeros((0, 1, 2))}
     np.savez(path, **(state | change))
-    with pytest.raises(InputError, match="is no state of a proof"):
+    with pytest.raises(InputError, match="is not a saved proof state"):
         load(fresh, path, "this")
     assert not fresh.waiting and not fresh.ended and not fresh.fork_ends and not fresh.forked
     assert not len(fresh.part) and not fresh.done.endings and not fresh.done.steps

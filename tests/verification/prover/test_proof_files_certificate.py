@@ -8,7 +8,7 @@ import torch
 
 import drone_rl
 from drone_rl.utils.provenance import provenance
-from drone_rl.verification.prover.policy_spec import make_subject
+from drone_rl.verification.prover.policy_spec import make_policy_spec
 from drone_rl.verification.prover.proof_files import certify, weights_hash
 from drone_rl.verification.prover.prover import Prover
 
@@ -50,8 +50,8 @@ def test_what_is_stated_when_it_is_stopped_within_a_part_is_accepted(tmp_path):
     policy = drone_rl.load_policy("right_and_forward").in_task(num_cubes=1, lateral_bound=2.0)
     network = policy.make_network()
     path, found = tmp_path / "certificate.json", {}
-    with closing(make_subject(policy.description, network, 1e-4)) as subject:
-        prover = Prover(subject, 100)
+    with closing(make_policy_spec(policy.description, network, 1e-4)) as spec:
+        prover = Prover(spec, 100)
         while prover.parts.size:
             prover.advance()
         while not prover.ended:

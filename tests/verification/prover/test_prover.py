@@ -6,17 +6,17 @@ import pytest
 import drone_rl
 from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.verification.prover.boxes import volumes
-from drone_rl.verification.prover.policy_spec import make_subject
+from drone_rl.verification.prover.policy_spec import make_policy_spec
 from drone_rl.verification.prover.prover import Prover
 
 
 def prove(name, gap=1e-4, most=500_000_000, **task):
     policy = drone_rl.load_policy(name).in_task(num_cubes=1, **task)
-    subject = make_subject(policy.description, policy.make_network(), gap)
-    prover = Prover(subject, most)
+    spec = make_policy_spec(policy.description, policy.make_network(), gap)
+    prover = Prover(spec, most)
     while not prover.is_finished:
         prover.advance()
-    subject.close()
+    spec.close()
     return prover
 
 
@@ -42,11 +42,14 @@ def test_the_share_that_a_policy_collects(one_sided):
 
 
 def test_part_by_part_it_comes_to_the_same(one_sided):
-    in_parts = prove("right_and_forward", most=200)
-    assert in_parts.num_places > one_sided.num_places
-    (parts, undecided), (whole, left) = shares(in_parts.findings()), shares(one_sided.findings())
+    partition_placements = prove("right_and_forward", most=200)
+    assert partition_placements.num_places > one_sided.num_places
+    (parts, undecided), (whole, left) = (
+        shares(partition_placements.findings()),
+        shares(one_sided.findings()),
+    )
     assert parts == pytest.approx(whole, abs=1e-12) and undecided == pytest.approx(left, abs=1e-12)
-    assert in_parts.findings().steps.keys() == one_sided.findings().steps.keys()
+    assert partition_placements.findings().steps.keys() == one_sided.findings().steps.keys()
 
 
 def test_steps_are_counted(one_sided):
@@ -68,20 +71,20 @@ def test_it_says_what_flights_show(one_sided):
 
 def test_half_way_the_rest_is_undecided():
     policy = drone_rl.load_policy("right_and_forward").in_task(num_cubes=1)
-    subject = make_subject(policy.description, policy.make_network(), 1e-4)
-    prover = Prover(subject)
+    spec = make_policy_spec(policy.description, policy.make_network(), 1e-4)
+    prover = Prover(spec)
     for _ in range(5):
         prover.advance()
     parts, undecided = shares(prover.findings())
-    subject.close()
+    spec.close()
     assert not prover.is_finished and prover.boxes_under_way > 0
     assert parts == {} and undecided == 1.0
 
 
 def test_a_part_that_is_done_is_settled_and_how_it_came_is_forgotten():
     policy = drone_rl.load_policy("right_and_forward").in_task(num_cubes=1, lateral_bound=2.0)
-    subject = make_subject(policy.description, policy.make_network(), 1e-4)
-    prover, most = Prover(subject, 200), 0
+    spec = make_policy_spec(policy.description, policy.make_network(), 1e-4)
+    prover, most = Prover(spec, 200), 0
     while not prover.is_finished:
         prover.advance()
         most = max(most, len(prover.forked), len(prover.ended))
@@ -92,15 +95,15 @@ def test_a_part_that_is_done_is_settled_and_how_it_came_is_forgotten():
         assert sum(parts.values()) * 4.0 <= prover.decided + 1e-9
         counted = sum(sum(steps.values()) for steps in findings.steps.values())
         assert counted <= findings.decided + 1e-12
-    subject.close()
+    spec.close()
     assert most and not prover.ended and not prover.forked and not prover.fork_ends
     assert not len(prover.part) and prover.decided == pytest.approx(findings.decided)
 
 
 def test_parts_that_are_not_begun_with_are_undecided():
     policy = drone_rl.load_policy("right_and_forward").in_task(num_cubes=1, lateral_bound=2.0)
-    subject = make_subject(policy.description, policy.make_network(), 1e-4)
-    prover = Prover(subject, 200)
+    spec = make_policy_spec(policy.description, policy.make_network(), 1e-4)
+    prover = Prover(spec, 200)
     count = len(prover.parts)
     assert count > 2 and shares(prover.findings(), bound=2.0) == ({}, pytest.approx(1.0))
     prover.advance()
@@ -109,7 +112,7 @@ def test_parts_that_are_not_begun_with_are_undecided():
         assert prover.boxes_under_way == sum(waiting)
         prover.advance()
     assert prover.boxes_under_way == 0
-    subject.close()
+    spec.close()
     parts, undecided = shares(prover.findings(), bound=2.0)
     assert len(prover.parts) == count - 1 and not prover.is_finished
     assert parts == {("ALL_CUBES", 1): pytest.approx(1 / count, abs=1e-6)}
@@ -119,13 +122,13 @@ def test_parts_that_are_not_begun_with_are_undecided():
 def test_where_logits_are_close_nothing_is_claimed(one_sided, monkeypatch):
     """The larger the gap that is asked for, the more ways are followed, and nothing is wrong."""
     forked = []
-    settle = Prover._settle
+    resolve_forks = Prover._finish_part
 
     def noted(prover):
         forked.append(sum(volumes(b).sum() for b in prover.forked))
-        settle(prover)
+        resolve_forks(prover)
 
-    monkeypatch.setattr(Prover, "_settle", noted)
+    monkeypatch.setattr(Prover, "_finish_part", noted)
     prove("right_and_forward")
     careful = prove("right_and_forward", gap=3.0)
     assert forked[0] < 1e-3 < forked[1]
@@ -137,14 +140,14 @@ def test_where_logits_are_close_nothing_is_claimed(one_sided, monkeypatch):
 def test_to_and_fro_ends_at_the_step_limit(monkeypatch):
     """Whoever turns left where it came from the right, and back, goes on until the step limit."""
     policy = drone_rl.load_policy("good").in_task(num_cubes=1)
-    subject = make_subject(policy.description, policy.make_network(), 1e-4)
-    prover = Prover(subject)
+    spec = make_policy_spec(policy.description, policy.make_network(), 1e-4)
+    prover = Prover(spec)
     monkeypatch.setattr(
         prover, "_cut", lambda place, boxes: [(2 if place.left % 2 == 0 else 4, boxes)]
     )
     while not prover.is_finished:
         prover.advance()
-    subject.close()
+    spec.close()
     (ending,) = prover.findings().endings
     assert ending.loops and ending.reason is EndReason.STEP_LIMIT and ending.collected == 0
 
@@ -152,8 +155,8 @@ def test_to_and_fro_ends_at_the_step_limit(monkeypatch):
 def test_a_fork_is_decided_only_if_all_its_ways_end_alike(monkeypatch):
     """Straight on is won near the middle; to the left for ever is lost everywhere."""
     policy = drone_rl.load_policy("good").in_task(num_cubes=1)
-    subject = make_subject(policy.description, policy.make_network(), 1e-4)
-    prover = Prover(subject)
+    spec = make_policy_spec(policy.description, policy.make_network(), 1e-4)
+    prover = Prover(spec)
 
     def both_at_first(place, boxes):
         is_start = place.ahead == place.left == 0
@@ -162,7 +165,7 @@ def test_a_fork_is_decided_only_if_all_its_ways_end_alike(monkeypatch):
     monkeypatch.setattr(prover, "_cut", both_at_first)
     while not prover.is_finished:
         prover.advance()
-    subject.close()
+    spec.close()
     parts, undecided = shares(prover.findings())
     assert parts == {} and undecided == 1.0
 

@@ -7,10 +7,10 @@ from drone_rl.verification.prover import prover as module
 from drone_rl.verification.prover.boxes import volumes
 from drone_rl.verification.prover.prover import (
     Findings,
+    combine,
     ended,
     simplified,
     so_far,
-    together,
     undecided,
 )
 
@@ -33,7 +33,7 @@ def test_parts_put_together():
         Findings({"won": line([2, 4]), "lost": line()}, line(), {"won": {3: 2.0, 4: 0.5}}),
         undecided(line([4, 9])),
     ]
-    found = together(some)
+    found = combine(some)
     assert {e: b.tolist() for e, b in found.endings.items()} == {"won": [[[0, 1]], [[2, 4]]]}
     assert found.undecided.tolist() == [[[1, 2]], [[4, 9]]]
     assert found.steps == {"won": {3: 3.0, 4: 0.5}}
@@ -65,9 +65,11 @@ def test_the_largest_boxes_of_a_part_under_way(most, stated, monkeypatch):
 
 
 def test_of_a_part_whose_rest_would_take_too_long_less_is_stated(monkeypatch):
-    beyond = module.beyond
+    complement = module.complement
     monkeypatch.setattr(
-        module, "beyond", lambda boxes, space: None if len(boxes) > 1 else beyond(boxes, space)
+        module,
+        "complement",
+        lambda boxes, space: None if len(boxes) > 1 else complement(boxes, space),
     )
     found = so_far({("won", 7): [line([0, 1], [3, 6], [7, 9])]}, line([0, 12]))
     assert found.endings["won"].tolist() == [[[3, 6]]]

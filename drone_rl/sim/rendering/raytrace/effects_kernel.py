@@ -1,80 +1,104 @@
 # ruff: noqa: RUF046, UP018
-# pyright: reportIndexIssue=false
-# pyright: reportAssignmentType=false
-# pyright: reportReturnType=false
-# pyright: reportArgumentType=false
-# pyright: reportCallIssue=false
-# pyright: reportOperatorIssue=false
-# pyright: reportGeneralTypeIssues=false
-# pyright: reportAttributeAccessIssue=false
-# (Warp compiles this file; Python's types say nothing about it, and what a loop changes is
-# declared by its type.)
-"""The ray tracer on a CPU for worlds that look like something; see `raytrace_kernel`.
+# pyright: reportArgumentType=false, reportAssignmentType=false, reportAttributeAccessIssue=false
+# pyright: reportCallIssue=false, reportGeneralTypeIssues=false, reportIndexIssue=false
+# pyright: reportOperatorIssue=false, reportReturnType=false
+"""The ray tracer on a CPU with effects: sky gradient, fog, shadows and textures.
 
-What is where is found by the same functions; then solids cast shadows, each in the rectangle of
-pixels around it and its shadow alone; then each pixel is coloured by itself.
+`plain_kernel.find_visible` finds the visible surfaces; then solids cast shadows, each within the
+rectangle of pixels around it and its shadow; then each pixel is coloured. This is a separate module
+so that training without effects need not compile it.
 """
 
 import warp as wp
 
-from drone_rl.sim.rendering.raytrace.intersection_kernel import BOX, PLANE, ROUND, outward
-from drone_rl.sim.rendering.raytrace.plain_kernel import FACES, NOTHING, Desk, find
+from drone_rl.sim.rendering.raytrace.intersection_kernel import BOX, PLANE
+from drone_rl.sim.rendering.raytrace.plain_kernel import find_visible, span_end, span_normal
 from drone_rl.sim.rendering.raytrace.shading_kernel import (
-    Shown,
     color_geom,
     color_sky,
-    put_colors,
-    put_run,
+    write_colors,
+    write_span,
 )
 from drone_rl.sim.rendering.raytrace.shadows_kernel import (
-    MAYBE,
-    around_shadow,
+    CANDIDATE,
+    cast_box_shadow,
     find_ground,
-    hide_by_box,
-    is_behind,
-    mark_near,
+    is_shadowed,
+    mark_candidates,
     shadow_length,
+    shadow_rectangle,
 )
 from drone_rl.sim.rendering.raytrace.spans_kernel import fill_floats, fill_ints
 from drone_rl.sim.rendering.raytrace.structs_kernel import (
+    FACES,
     GRAY,
+    NO_GEOM,
     RGB,
+    Effects,
     Geoms,
-    Looks,
-    Pictures,
+    GeomView,
+    Images,
+    Materials,
+    PixelValue,
     Poses,
-    Scenery,
-    Sight,
+    Scratch,
     View,
 )
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 
+@wp.kernel
+def render_images_with_effects(
+    first: int,
+    last: int,
+    member: int,
+    view: View,
+    geoms: Geoms,
+    poses: Poses,
+    materials: Materials,
+    effects: Effects,
+    scratch: Scratch,
+    images: Images,
+) -> None:
+    """Render images one after the other, as one worker; see `plain_kernel.render_images`."""
+    for row in range(first, last):
+        world = row // view.count
+        number = row % view.cameras.shape[0]
+        find_visible(view, number, geoms, poses, world, scratch, member)
+        fill_ints(scratch.dark[member], 0, view.height * view.width, 0)
+        if effects.shadows[world % effects.shadows.shape[0]] != 0:
+            sun = materials.direction[world % materials.direction.shape[0], 0]
+            _cast_shadows(view, number, sun, scratch, member)
+        _shade(view, number, poses, materials, effects, world, row, scratch, member, images)
+
+
 @wp.func
-def _cast(view: View, number: int, sun: wp.vec3, desk: Desk, member: int) -> None:
-    """Marks the pixels of a camera that are in shadow."""
-    camera, rays, sights = view.cameras[number], view.rays[number], desk.sights[member]
-    nearest, owners, dark = desk.nearest[member], desk.owner[member], desk.dark[member]
-    ground = find_ground(view, sights, sun)
-    for geom in range(sights.shape[0]):
-        if sights[geom].kind != PLANE:
-            sight = sights[geom]
-            way = sun * shadow_length(view, sights, geom, ground, sun)
-            part = around_shadow(view, camera, sight, way)
-            shone = wp.transpose(sight.axes) @ sun
+def _cast_shadows(view: View, number: int, sun: wp.vec3, scratch: Scratch, member: int) -> None:
+    """Mark the pixels of a camera that are in shadow."""
+    camera, rays, geom_views = view.cameras[number], view.rays[number], scratch.geom_views[member]
+    nearest, owners, dark = scratch.nearest[member], scratch.owner[member], scratch.dark[member]
+    ground = find_ground(view, geom_views, sun)
+    for geom in range(geom_views.shape[0]):
+        if geom_views[geom].kind != PLANE:
+            caster = geom_views[geom]
+            way = sun * shadow_length(view, geom_views, geom, ground, sun)
+            part = shadow_rectangle(view, camera, caster, way)
+            light = wp.transpose(caster.axes) @ sun
             row = part[2]
             while row < part[3]:
                 first, last = row * view.width + part[0], row * view.width + part[1]
-                if sight.kind == BOX:
-                    hide_by_box(dark, first, last, rays, nearest, owners, FACES, geom, sight, shone)
+                if caster.kind == BOX:
+                    cast_box_shadow(
+                        dark, first, last, rays, nearest, owners, FACES, geom, caster, light
+                    )
                 else:
-                    _hide(dark, first, last, rays, nearest, owners, geom, sight, shone)
+                    _cast_shadow(dark, first, last, rays, nearest, owners, geom, caster, light)
                 row += 1
 
 
 @wp.func
-def _hide(
+def _cast_shadow(
     dark: wp.array[int],
     first: int,
     last: int,
@@ -82,55 +106,49 @@ def _hide(
     nearest: wp.array[float],
     owners: wp.array[int],
     geom: int,
-    sight: Sight,
-    sun: wp.vec3,
+    caster: GeomView,
+    light: wp.vec3,
 ) -> None:
-    """The same as `hide_by_box`, by any solid."""
-    mark_near(dark, first, last, rays, nearest, owners, FACES, geom, sight, sun, MAYBE)
+    """`cast_box_shadow` for any solid."""
+    mark_candidates(dark, first, last, rays, nearest, owners, FACES, geom, caster, light, CANDIDATE)
     pixel = first
     while pixel < last:
-        if dark[pixel] == MAYBE:
-            dark[pixel] = int(is_behind(sight, rays[pixel], nearest[pixel], sun))
+        if dark[pixel] == CANDIDATE:
+            dark[pixel] = int(is_shadowed(caster, rays[pixel], nearest[pixel], light))
         pixel += 1
 
 
 @wp.func
-def _show(
+def _shade(
     view: View,
     number: int,
     poses: Poses,
-    looks: Looks,
-    scenery: Scenery,
+    materials: Materials,
+    effects: Effects,
     world: int,
     row: int,
-    desk: Desk,
+    scratch: Scratch,
     member: int,
-    pictures: Pictures,
+    images: Images,
 ) -> None:
-    """Writes what each pixel shows."""
     camera, rays, cosines = view.cameras[number], view.rays[number], view.cosines[number]
-    nearest, owners, dark = desk.nearest[member], desk.owner[member], desk.dark[member]
-    colors = desk.colors[member]
+    nearest, owners, dark = scratch.nearest[member], scratch.owner[member], scratch.dark[member]
+    colors = scratch.colors[member]
     count = view.height * view.width
     first = int(0)
     while first < count:
         owner = owners[first]
-        last = first + 1
-        if owner == NOTHING or owner % FACES != ROUND:
-            while last < count and owners[last] == owner:
-                last += 1
-        shown = Shown()
-        shown.number = -1
-        if owner == NOTHING:
+        last = span_end(owners, first, count)
+        shown = PixelValue()
+        shown.number = NO_GEOM
+        if owner == NO_GEOM:
             fill_floats(nearest, first, last, 0.0)
-            color_sky(colors, first, last, rays, camera, poses, looks, scenery, world)
+            color_sky(colors, first, last, rays, camera, poses, materials, effects, world)
         else:
-            sight = desk.sights[member, owner // FACES]
-            face = owner % FACES
-            into = sight.into @ rays[first]
-            normal = outward(sight.kind, sight.size, face, sight.eye, into, nearest[first])
-            shown.number = sight.number
-            shown.normal = sight.axes @ normal
+            geom_view = scratch.geom_views[member, owner // FACES]
+            normal = span_normal(geom_view, owner, rays[first], nearest[first])
+            shown.number = geom_view.number
+            shown.normal = geom_view.axes @ normal
             color_geom(
                 colors,
                 first,
@@ -140,50 +158,13 @@ def _show(
                 dark,
                 view,
                 camera,
-                looks,
-                scenery,
+                materials,
+                effects,
                 world,
-                sight,
-                face,
+                geom_view,
+                owner % FACES,
                 normal,
             )
-        put_run(pictures, view.what & ~(RGB | GRAY), row, first, last, shown, nearest, cosines)
+        write_span(images, view.what & ~(RGB | GRAY), row, first, last, shown, nearest, cosines)
         first = last
-    put_colors(pictures, view.what, row, 0, count, colors)
-
-
-@wp.kernel
-def draw_scenic(
-    first: int,
-    last: int,
-    member: int,
-    view: View,
-    geoms: Geoms,
-    poses: Poses,
-    looks: Looks,
-    scenery: Scenery,
-    desk: Desk,
-    pictures: Pictures,
-) -> None:
-    """Draws pictures one after the other, by a single worker; see `raytrace_kernel.draw`.
-
-    Args:
-        first: The first picture.
-        last: The one after the last.
-        member: Which of the desk's places to work at.
-        view: What is asked for.
-        geoms: What is drawn.
-        poses: Where it is.
-        looks: Colours and light.
-        scenery: What there is besides.
-        desk: To work at.
-        pictures: To draw into.
-    """
-    for row in range(first, last):
-        world = row // view.count
-        number = row % view.cameras.shape[0]
-        find(view, number, geoms, poses, world, desk, member)
-        fill_ints(desk.dark[member], 0, view.height * view.width, 0)
-        if scenery.shadows[world % scenery.shadows.shape[0]] != 0:
-            _cast(view, number, looks.direction[world % looks.direction.shape[0], 0], desk, member)
-        _show(view, number, poses, looks, scenery, world, row, desk, member, pictures)
+    write_colors(images, view.what, row, 0, count, colors)

@@ -1,15 +1,8 @@
 # ruff: noqa: RUF046, UP018
-# pyright: reportIndexIssue=false
-# pyright: reportAssignmentType=false
-# pyright: reportReturnType=false
-# pyright: reportArgumentType=false
-# pyright: reportCallIssue=false
-# pyright: reportOperatorIssue=false
-# pyright: reportGeneralTypeIssues=false
-# pyright: reportAttributeAccessIssue=false
-# (Warp compiles this file; Python's types say nothing about it, and what a loop changes is
-# declared by its type.)
-"""The ray tracer on a GPU: all pixels at once, a thread each, by the same functions as on a CPU."""
+# pyright: reportArgumentType=false, reportAssignmentType=false, reportAttributeAccessIssue=false
+# pyright: reportCallIssue=false, reportGeneralTypeIssues=false, reportIndexIssue=false
+# pyright: reportOperatorIssue=false, reportReturnType=false
+"""The ray tracer on a GPU: one thread per pixel, with the same functions as on a CPU."""
 
 import warp as wp
 
@@ -17,32 +10,33 @@ from drone_rl.sim.rendering.raytrace.intersection_kernel import (
     FAR_AWAY,
     PLANE,
     UPPER,
-    enter,
+    intersect_plane,
+    intersect_solid,
     is_nearest,
-    meet_plane,
-    outward,
+    surface_normal,
 )
-from drone_rl.sim.rendering.raytrace.plain_kernel import Desk
-from drone_rl.sim.rendering.raytrace.projection_kernel import look_at, stand
+from drone_rl.sim.rendering.raytrace.projection_kernel import camera_pose, view_geom
 from drone_rl.sim.rendering.raytrace.shading_kernel import (
-    Shown,
     color_geom,
     color_sky,
-    put_colors,
-    put_pixel,
-    show_geom,
-    show_sky,
+    geom_pixel,
+    sky_pixel,
+    write_colors,
+    write_pixel,
 )
-from drone_rl.sim.rendering.raytrace.shadows_kernel import is_behind
+from drone_rl.sim.rendering.raytrace.shadows_kernel import is_shadowed
 from drone_rl.sim.rendering.raytrace.structs_kernel import (
     GRAY,
+    NO_GEOM,
     RGB,
+    Effects,
     Geoms,
-    Looks,
-    Pictures,
+    GeomView,
+    Images,
+    Materials,
+    PixelValue,
     Poses,
-    Scenery,
-    Sight,
+    Scratch,
     View,
 )
 
@@ -50,36 +44,29 @@ wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 
 @wp.kernel
-def aim(view: View, geoms: Geoms, poses: Poses, sights: wp.array2d[Sight]) -> None:
-    """Finds out where geoms are for cameras. Launch it with a dimension of pictures and of geoms.
-
-    Args:
-        view: What is asked for.
-        geoms: What is drawn.
-        poses: Where it is.
-        sights: Are written.
-    """
+def view_geoms(view: View, geoms: Geoms, poses: Poses, geom_views: wp.array2d[GeomView]) -> None:
+    """Compute all geoms relative to all cameras. Launch it with (num_images, num_geoms)."""
     row, geom = wp.tid()
     camera = view.cameras[row % view.cameras.shape[0]]
     world = row // view.count
-    sights[row, geom] = look_at(geoms, geom, poses, world, stand(camera, poses, world))
+    geom_views[row, geom] = view_geom(geoms, geom, poses, world, camera_pose(camera, poses, world))
 
 
 @wp.func
-def find_nearest(view: View, sights: wp.array[Sight], ray: wp.vec3) -> tuple[float, int, int]:
-    """What a ray meets first: how far along it, which geom, -1 for none, and which of its faces."""
+def cast_ray(view: View, geom_views: wp.array[GeomView], ray: wp.vec3) -> tuple[float, int, int]:
+    """Cast a ray: return the distance, the nearest geom, `NO_GEOM` for none, and its face."""
     nearest = float(FAR_AWAY)
-    owner = int(-1)
+    owner = int(NO_GEOM)
     face = int(0)
-    for geom in range(sights.shape[0]):
-        sight = sights[geom]
-        into = sight.into @ ray
+    for geom in range(geom_views.shape[0]):
+        geom_view = geom_views[geom]
+        into = geom_view.into @ ray
         along = float(-1.0)
         found = int(UPPER)
-        if sight.kind == PLANE:
-            along = meet_plane(sight.size, sight.eye, into)
+        if geom_view.kind == PLANE:
+            along = intersect_plane(geom_view.size, geom_view.eye, into)
         else:
-            along, found = enter(sight.kind, sight.size, sight.eye, into)
+            along, found = intersect_solid(geom_view.kind, geom_view.size, geom_view.eye, into)
         if is_nearest(along, nearest, -ray[2], view.far):
             nearest = along
             owner = geom
@@ -88,78 +75,62 @@ def find_nearest(view: View, sights: wp.array[Sight], ray: wp.vec3) -> tuple[flo
 
 
 @wp.kernel
-def draw_pixels(view: View, sights: wp.array2d[Sight], looks: Looks, pictures: Pictures) -> None:
-    """Draws pixels. Launch it with a dimension of pictures and of pixels.
-
-    Args:
-        view: What is asked for.
-        sights: Of each picture, from `aim`.
-        looks: Colours and light.
-        pictures: To draw into.
-    """
+def render_pixels(
+    view: View, geom_views: wp.array2d[GeomView], materials: Materials, images: Images
+) -> None:
+    """Render pixels without effects. Launch it with (num_images, num_pixels)."""
     row, pixel = wp.tid()
     world = row // view.count
     ray = view.rays[row % view.cameras.shape[0], pixel]
-    nearest, owner, face = find_nearest(view, sights[row], ray)
+    nearest, owner, face = cast_ray(view, geom_views[row], ray)
     if owner < 0:
-        put_pixel(pictures, view.what, row, pixel, show_sky(looks, world), 0.0, -ray[2])
+        write_pixel(images, view.what, row, pixel, sky_pixel(materials, world), 0.0, -ray[2])
     else:
-        sight = sights[row, owner]
-        normal = outward(sight.kind, sight.size, face, sight.eye, sight.into @ ray, nearest)
-        shown = show_geom(looks, world, sight.number, sight.axes @ normal)
-        put_pixel(pictures, view.what, row, pixel, shown, nearest, -ray[2])
-
-
-wp.set_module_options({"enable_backward": False, "fuse_fp": False})
+        geom_view = geom_views[row, owner]
+        kind, size, eye = geom_view.kind, geom_view.size, geom_view.eye
+        normal = surface_normal(kind, size, face, eye, geom_view.into @ ray, nearest)
+        shown = geom_pixel(materials, world, geom_view.number, geom_view.axes @ normal)
+        write_pixel(images, view.what, row, pixel, shown, nearest, -ray[2])
 
 
 @wp.kernel
-def draw_scenic_pixels(
+def render_pixels_with_effects(
     view: View,
     poses: Poses,
-    sights: wp.array2d[Sight],
-    looks: Looks,
-    scenery: Scenery,
-    desk: Desk,
-    pictures: Pictures,
+    geom_views: wp.array2d[GeomView],
+    materials: Materials,
+    effects: Effects,
+    scratch: Scratch,
+    images: Images,
 ) -> None:
-    """Draws pixels. Launch it with a dimension of pictures and of pixels.
-
-    Args:
-        view: What is asked for.
-        poses: Where everything is.
-        sights: Of each picture, from `raytrace_pixels.aim`.
-        looks: Colours and light.
-        scenery: What there is besides.
-        desk: With a place for each picture.
-        pictures: To draw into.
-    """
+    """Render pixels with effects, with one scratch buffer per image; see `render_pixels`."""
     row, pixel = wp.tid()
     world = row // view.count
     number = row % view.cameras.shape[0]
     camera, rays = view.cameras[number], view.rays[number]
-    nearest, dark, colors = desk.nearest[row], desk.dark[row], desk.colors[row]
+    nearest, dark, colors = scratch.nearest[row], scratch.dark[row], scratch.colors[row]
     ray, last = rays[pixel], pixel + 1
-    distance, owner, face = find_nearest(view, sights[row], ray)
-    shown = Shown()
-    shown.number = -1
+    distance, owner, face = cast_ray(view, geom_views[row], ray)
+    shown = PixelValue()
+    shown.number = NO_GEOM
     if owner < 0:
         distance = 0.0
-        color_sky(colors, pixel, last, rays, camera, poses, looks, scenery, world)
+        color_sky(colors, pixel, last, rays, camera, poses, materials, effects, world)
     else:
-        sight = sights[row, owner]
-        into = sight.into @ ray
-        normal = outward(sight.kind, sight.size, face, sight.eye, into, distance)
-        shown.number = sight.number
-        shown.normal = sight.axes @ normal
+        geom_view = geom_views[row, owner]
+        into = geom_view.into @ ray
+        normal = surface_normal(geom_view.kind, geom_view.size, face, geom_view.eye, into, distance)
+        shown.number = geom_view.number
+        shown.normal = geom_view.axes @ normal
         nearest[pixel] = distance
         dark[pixel] = 0
-        if scenery.shadows[world % scenery.shadows.shape[0]] != 0:
-            sun = looks.direction[world % looks.direction.shape[0], 0]
-            for geom in range(sights.shape[1]):
-                if geom != owner and sights[row, geom].kind != PLANE:
-                    shone = wp.transpose(sights[row, geom].axes) @ sun
-                    dark[pixel] |= int(is_behind(sights[row, geom], ray, distance, shone))
+        if effects.shadows[world % effects.shadows.shape[0]] != 0:
+            sun = materials.direction[world % materials.direction.shape[0], 0]
+            for geom in range(geom_views.shape[1]):
+                caster = geom_views[row, geom]
+                if geom != owner and caster.kind != PLANE:
+                    light = wp.transpose(caster.axes) @ sun
+                    dark[pixel] |= int(is_shadowed(caster, ray, distance, light))
         color_geom(
             colors,
             pixel,
@@ -169,12 +140,12 @@ def draw_scenic_pixels(
             dark,
             view,
             camera,
-            looks,
-            scenery,
+            materials,
+            effects,
             world,
-            sight,
+            geom_view,
             face,
             normal,
         )
-    put_pixel(pictures, view.what & ~(RGB | GRAY), row, pixel, shown, distance, -ray[2])
-    put_colors(pictures, view.what, row, pixel, last, colors)
+    write_pixel(images, view.what & ~(RGB | GRAY), row, pixel, shown, distance, -ray[2])
+    write_colors(images, view.what, row, pixel, last, colors)

@@ -1,18 +1,12 @@
 # ruff: noqa: RUF046, UP018
-# pyright: reportIndexIssue=false
+# pyright: reportArgumentType=false, reportAttributeAccessIssue=false, reportCallIssue=false
+# pyright: reportGeneralTypeIssues=false, reportIndexIssue=false, reportOperatorIssue=false
 # pyright: reportReturnType=false
-# pyright: reportArgumentType=false
-# pyright: reportCallIssue=false
-# pyright: reportOperatorIssue=false
-# pyright: reportGeneralTypeIssues=false
-# pyright: reportAttributeAccessIssue=false
-# (Warp compiles this file; Python's types say nothing about it, and what a loop changes is
-# declared by its type.)
-"""Where rays meet the solids and planes that a world is made of, each in its own frame.
+"""Ray casting: intersections of rays with solids and planes, each in its own frame.
 
-All solids are convex and closed, so a ray from outside enters each at most once; of a ray from
-inside nothing is told, for only outsides are drawn. MuJoCo's sizes: a box, an ellipsoid has half
-extents; a ball a radius; a capsule, a cylinder a radius and half a length, without the caps.
+All solids are convex and closed, so a ray from outside enters each at most once. Rays that start
+inside a solid miss it: only outsides are rendered. Sizes are MuJoCo's: half extents of boxes and
+ellipsoids, the radius of balls, radius and half length (without caps) of capsules and cylinders.
 """
 
 import mujoco
@@ -26,22 +20,21 @@ CYLINDER = wp.constant(int(mujoco.mjtGeom.mjGEOM_CYLINDER))
 BOX = wp.constant(int(mujoco.mjtGeom.mjGEOM_BOX))
 
 ROUND = wp.constant(6)
-"""Number of the round part of a surface; its flat ones have 0 to 5: those that look along -x, +x,
--y, +y, -z, +z."""
+"""Round part of a surface. Flat faces are 0 to 5, with normals along -x, +x, -y, +y, -z, +z."""
 UPPER = wp.constant(5)
-"""Number of the face of a plane that can be seen."""
+"""Face of a plane: its upper side is visible."""
 FAR_AWAY = wp.constant(1e10)
-"""Metres to where nothing is."""
+"""Distance in metres of a miss."""
 SAME = wp.constant(1e-6)
 """Relative distance within which the later of two geoms is in front, as in OpenGL."""
 
 _PARALLEL = wp.constant(1e-15)
-"""Component of a ray's direction below which it never meets a plane across it."""
+"""Component of a direction below which a ray counts as parallel to a plane."""
 
 
 @wp.func
 def _enter_box(size: wp.vec3, point: wp.vec3, ray: wp.vec3) -> tuple[float, int]:
-    """By one of the three faces at most that the point is in front of."""
+    """Test the faces, at most three, that the point is in front of."""
     nearest = -1.0
     face = int(0)
     for i in range(3):
@@ -70,7 +63,7 @@ def _flat(axis: int, side: float) -> int:
 
 @wp.func
 def _enter_ball(radius: float, point: wp.vec3, ray: wp.vec3) -> float:
-    """Distance to a ball around the origin; negative where the ray misses it or starts inside."""
+    """Distance to a ball around the origin; negative for a miss or a start inside."""
     a = wp.dot(ray, ray)
     b = wp.dot(ray, point)
     inside = b * b - a * (wp.dot(point, point) - radius * radius)
@@ -81,7 +74,7 @@ def _enter_ball(radius: float, point: wp.vec3, ray: wp.vec3) -> float:
 
 @wp.func
 def _enter_tube(radius: float, half: float, point: wp.vec3, ray: wp.vec3) -> tuple[float, int]:
-    """A cylinder with flat ends: what lies in an endless tube and between two planes."""
+    """A cylinder: the intersection of an infinite tube and two planes."""
     a = ray[0] * ray[0] + ray[1] * ray[1]
     b = ray[0] * point[0] + ray[1] * point[1]
     c = point[0] * point[0] + point[1] * point[1] - radius * radius
@@ -113,7 +106,7 @@ def _enter_tube(radius: float, half: float, point: wp.vec3, ray: wp.vec3) -> tup
 
 @wp.func
 def _enter_capsule(radius: float, half: float, point: wp.vec3, ray: wp.vec3) -> float:
-    """The nearest of its round side and its two balls; inside it, no ray enters."""
+    """The nearest of its round side and its two balls; no ray from inside enters."""
     inside = point - wp.vec3(0.0, 0.0, wp.clamp(point[2], -half, half))
     if wp.length_sq(inside) < radius * radius:
         return -1.0
@@ -136,8 +129,8 @@ def _enter_capsule(radius: float, half: float, point: wp.vec3, ray: wp.vec3) -> 
 
 
 @wp.func
-def enter(kind: int, size: wp.vec3, point: wp.vec3, ray: wp.vec3) -> tuple[float, int]:
-    """Where a ray enters a geom: how far along it, negative for nowhere, and by which face."""
+def intersect_solid(kind: int, size: wp.vec3, point: wp.vec3, ray: wp.vec3) -> tuple[float, int]:
+    """Return where a ray enters a solid: distance, negative for a miss, and face."""
     if kind == BOX:
         along, face = _enter_box(size, point, ray)
         return along, face
@@ -151,10 +144,10 @@ def enter(kind: int, size: wp.vec3, point: wp.vec3, ray: wp.vec3) -> tuple[float
 
 
 @wp.func
-def outward(
+def surface_normal(
     kind: int, size: wp.vec3, face: int, point: wp.vec3, ray: wp.vec3, along: float
 ) -> wp.vec3:
-    """The normal where a ray has entered a geom, in the geom's frame."""
+    """Return the normal where a ray has entered a geom, in the geom's frame."""
     if face != ROUND:
         normal = wp.vec3()
         normal[face // 2] = 2.0 * float(face % 2) - 1.0
@@ -177,8 +170,8 @@ def _radii(kind: int, size: wp.vec3) -> wp.vec3:
 
 
 @wp.func
-def meet_plane(size: wp.vec3, point: wp.vec3, ray: wp.vec3) -> float:
-    """Distance to a rectangle of the plane z = 0, seen from above; endless where its size is 0."""
+def intersect_plane(size: wp.vec3, point: wp.vec3, ray: wp.vec3) -> float:
+    """Return the distance to a rectangle of the plane z = 0 from above; size 0 is infinite."""
     if ray[2] >= -_PARALLEL:
         return -1.0
     along = -point[2] / ray[2]
@@ -191,12 +184,12 @@ def meet_plane(size: wp.vec3, point: wp.vec3, ray: wp.vec3) -> float:
 
 @wp.func
 def is_nearest(along: float, so_far: float, cosine: float, far: float) -> bool:
-    """Whether a hit is in front of the nearest before it.
+    """Return whether a hit is in front of the nearest one before it.
 
     Args:
-        along: How far along the ray it is; negative for none.
-        so_far: The same of the nearest before it.
+        along: Distance of the hit; negative for a miss.
+        so_far: Distance of the nearest hit before.
         cosine: Of the angle between the ray and the camera's axis.
-        far: Metres along the axis beyond which nothing is drawn.
+        far: Metres along the axis beyond which nothing is rendered.
     """
     return along >= 0.0 and along - so_far <= SAME * wp.max(so_far, 1.0) and along * cosine <= far

@@ -1,11 +1,7 @@
-# pyright: reportAttributeAccessIssue=false
-# pyright: reportGeneralTypeIssues=false
-# (MuJoCo's compiled bindings and Warp's structures are untyped.)
-"""Colours and lights for the ray tracer's kernels: the scene's, or each world's own."""
+"""Appearance for the ray tracer's kernels: colours, lights, sky, fog, shadows and textures."""
 
 import math
-from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import torch
@@ -14,107 +10,29 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from drone_rl.sim.rendering import textures
-from drone_rl.sim.rendering.appearance import Appearance, each, each_number
-from drone_rl.sim.rendering.raytrace import structs_kernel
-from drone_rl.sim.rendering.scene import Meaning, Scene
-
-_OPAQUE = math.log(20.0)
-"""Air through which 5% of a contrast is left, by its logarithm."""
-
-_KINDS = MappingProxyType({"zenith": wp.vec3})
-"""Types of values of several numbers."""
-_NONE = np.zeros((1, 3), np.uint8)
-"""So that there is one."""
-
-
-class Sceneries:
-    """Makes them; textures are read once."""
-
-    def __init__(self, scene: Scene, device: str) -> None:
-        """Notes for whom.
-
-        Args:
-            scene: Whose things are covered.
-            device: Where they are wanted.
-        """
-        self._scene, self._device = scene, device
-        self._banks: dict[tuple[str, ...], structs_kernel.Scenery] = {}
-
-    def of(self, appearance: Appearance, zenith: Tensor) -> structs_kernel.Scenery:
-        """What worlds look like besides colours and lights.
-
-        Args:
-            appearance: Theirs.
-            zenith: Colours of the sky overhead. Shape: (num_worlds, 3), from 0 to 1.
-
-        Raises:
-            InputError: A texture can't be read.
-        """
-        count = len(zenith)
-        names = tuple({n: 0 for t in appearance.textures.values() for n in t.pictures})
-        scenery = self._bank(names)
-        texture = torch.full((count, self._scene.model.ngeom), -1, dtype=torch.int32)
-        tiles = torch.zeros(texture.shape)
-        for meaning, cover in appearance.textures.items():
-            geoms = self._scene.geoms(meaning)
-            number = torch.tensor([names.index(name) for name in cover.pictures] + [-1])
-            chosen = each_number(cover.choice, count).long()
-            texture[:, geoms] = number[chosen][:, None].int()
-            tiles[:, geoms] = (1.0 / each_number(cover.size, count))[:, None].float()
-        fog = math.inf if appearance.fog is None else appearance.fog
-        shadows = 0 if appearance.shadows is None else appearance.shadows
-        values = {
-            "zenith": (zenith * 255).floor().float(),
-            "fog": (_OPAQUE / each_number(fog, count)).float(),
-            "shadows": each_number(shadows, count).int(),
-            "texture": texture,
-            "tiles": tiles,
-        }
-        for name, value in values.items():
-            there = value.to(self._device).contiguous()
-            setattr(scenery, name, wp.from_torch(there, dtype=_KINDS.get(name)))
-        return scenery
-
-    def _bank(self, names: tuple[str, ...]) -> structs_kernel.Scenery:
-        """One with textures alone, ready to be completed."""
-        if names not in self._banks:
-            pictures = [textures.load(name) for name in names]
-            rows = [textures.levels(picture) for picture in pictures]
-            starts = np.cumsum([0, *map(len, rows)])
-            made = structs_kernel.Scenery()
-            made.sides = self._array([len(picture) for picture in pictures], int)
-            made.starts = self._array(starts[:-1], int)
-            made.texels = self._array(_packed(np.concatenate([*rows, _NONE])), wp.uint32)
-            self._banks[names] = made
-        kept, made = self._banks[names], structs_kernel.Scenery()
-        made.sides, made.starts, made.texels = kept.sides, kept.starts, kept.texels
-        return made
-
-    def _array(self, values: object, dtype: type) -> wp.array:
-        return wp.array(np.array(values), dtype=dtype, device=self._device)
-
-
-def _packed(colors: NDArray[np.uint8]) -> NDArray[np.uint32]:
-    """Bytes of red, green and blue in one number each."""
-    return colors.astype(np.uint32) @ np.array([1, 1 << 8, 1 << 16], np.uint32)
-
+from drone_rl.sim.rendering.appearance import Appearance, expand_color, expand_scalar
+from drone_rl.sim.rendering.raytrace import structs_kernel as structs
+from drone_rl.sim.rendering.scene import Scene, SemanticClass
 
 _LIGHTS = {"ambient": "ambient", "sun": "diffuse", "sun_direction": "direction"}
-"""What an appearance's lights are called in the structs."""
+"""The kernels' names of an appearance's lights."""
+_EXTINCTION = math.log(20.0)
+"""Optical depth of air in which 5% of a contrast is left."""
+_NO_TEXTURE = np.zeros((1, 3), np.uint8)
+"""Keeps the array of texels from being empty."""
 
-_Made = tuple[structs_kernel.Looks, Any]
-"""Colours and lights; and a `Scenery`, or none."""
+_Encoded: TypeAlias = "tuple[structs.Materials, structs.Effects | None]"
 
 
-class Looks:
-    """How a scene looks, and how worlds look that differ from it."""
+class MaterialsEncoder:
+    """Encodes a scene's own colours and lights, and appearances that differ from them."""
 
     def __init__(self, scene: Scene, device: str) -> None:
-        """Notes the scene's colours and lights.
+        """Read the scene's colours and lights.
 
         Args:
-            scene: Whose.
-            device: Where they are wanted.
+            scene: What is rendered.
+            device: Of the kernels.
         """
         model = scene.model
         self._scene, self._device = scene, device
@@ -126,58 +44,125 @@ class Looks:
             "sky": scene.sky,
         }
         self._plain = {name: torch.tensor(v)[None].double() for name, v in stored.items()}
-        self._made = self._structure(self._plain)
-        self._sceneries = Sceneries(scene, device)
-        self._last: tuple[Appearance | None, int, _Made] = (None, 1, (self._made, None))
+        self._own = self._materials(self._plain)
+        self._effects = EffectsEncoder(scene, device)
+        self._last: tuple[Appearance | None, int, _Encoded] = (None, 1, (self._own, None))
 
-    def of(self, appearance: Appearance | None, num_worlds: int) -> _Made:
-        """What worlds look like, and what there is besides flat colours, if anything.
+    def encode(self, appearance: Appearance | None, num_worlds: int) -> _Encoded:
+        """Return materials, and effects if the appearance has any.
 
         Args:
-            appearance: As in the scene by default; one that was given before is not read again.
-            num_worlds: As many as the appearance has.
+            appearance: The scene's own by default; the last one is cached by identity.
+            num_worlds: Number of environments of the appearance.
 
         Raises:
             InputError: A texture can't be read.
         """
         if appearance is None:
-            return self._made, None
-        last, count, made = self._last
+            return self._own, None
+        last, count, encoded = self._last
         if last is not appearance or count != num_worlds:
-            made = self._make(appearance, num_worlds)
-            self._last = (appearance, num_worlds, made)
-        return made
+            encoded = self._encode(appearance, num_worlds)
+            self._last = (appearance, num_worlds, encoded)
+        return encoded
 
-    def _make(self, appearance: Appearance, num_worlds: int) -> _Made:
+    def _encode(self, appearance: Appearance, num_worlds: int) -> _Encoded:
         values = {
             name: v.repeat(num_worlds, *[1] * (v.dim() - 1)) for name, v in self._plain.items()
         }
-        for meaning, color in appearance.colors.items():
-            colored = each(color, num_worlds)
-            if meaning is Meaning.SKY:
+        for semantic_class, color in appearance.colors.items():
+            colored = expand_color(color, num_worlds)
+            if semantic_class is SemanticClass.SKY:
                 values["sky"][:] = colored
             else:
-                values["colors"][:, self._scene.geoms(meaning)] = colored[:, None]
-        if appearance.beside is not None:
-            beside = appearance.beside.of(num_worlds)
-            values["colors"][:, self._scene.geoms(Meaning.DISTRACTOR)] = beside.colors.double()
+                values["colors"][:, self._scene.geoms(semantic_class)] = colored[:, None]
+        if appearance.distractors is not None:
+            colors = appearance.distractors.expand(num_worlds).colors.double()
+            values["colors"][:, self._scene.geoms(SemanticClass.DISTRACTOR)] = colors
         for name, value in appearance.lights(num_worlds).items():
             values[_LIGHTS[name]][:] = value[:, None]
-        zenith = values["sky"] if appearance.zenith is None else each(appearance.zenith, num_worlds)
+        zenith = appearance.zenith
+        zenith = values["sky"] if zenith is None else expand_color(zenith, num_worlds)
         if appearance.exposure is not None:
-            exposure = each_number(appearance.exposure, num_worlds)
+            exposure = expand_scalar(appearance.exposure, num_worlds)
             for name in ("ambient", "diffuse"):
                 values[name] *= exposure[:, None, None]
             values["sky"] = (values["sky"] * exposure[:, None]).clamp(max=1.0)
             zenith = (zenith * exposure[:, None]).clamp(max=1.0)
-        plain = appearance.is_plain
-        scenery = None if plain else self._sceneries.of(appearance, zenith)
-        return self._structure(values), scenery
+        effects = None if appearance.is_plain else self._effects.encode(appearance, zenith)
+        return self._materials(values), effects
 
-    def _structure(self, values: dict[str, Tensor]) -> structs_kernel.Looks:
-        made = structs_kernel.Looks()
-        values = {**values, "sky": (values["sky"] * 255).to(torch.uint8)}
+    def _materials(self, values: dict[str, Tensor]) -> structs.Materials:
+        materials: Any = structs.Materials()
+        for name, value in {**values, "sky": (values["sky"] * 255).to(torch.uint8)}.items():
+            array = value.to(self._device, torch.float32).contiguous()
+            setattr(materials, name, wp.from_torch(array, dtype=wp.vec3))
+        return materials
+
+
+class EffectsEncoder:
+    """Encodes effects; each set of textures is read once."""
+
+    def __init__(self, scene: Scene, device: str) -> None:
+        """Keep the scene whose geoms are textured, and the kernels' device."""
+        self._scene, self._device = scene, device
+        self._textures: dict[tuple[str, ...], dict[str, Any]] = {}
+
+    def encode(self, appearance: Appearance, zenith: Tensor) -> structs.Effects:
+        """Return the effects of an appearance.
+
+        Args:
+            appearance: Of all environments.
+            zenith: Colours of the sky overhead, in [0, 1]. Shape: (num_worlds, 3).
+
+        Raises:
+            InputError: A texture can't be read.
+        """
+        count = len(zenith)
+        names = tuple({n: 0 for t in appearance.textures.values() for n in t.images})
+        texture = torch.full((count, self._scene.model.ngeom), -1, dtype=torch.int32)
+        tiles = torch.zeros(texture.shape)
+        for semantic_class, cover in appearance.textures.items():
+            geoms = self._scene.geoms(semantic_class)
+            number = torch.tensor([names.index(name) for name in cover.images] + [-1])
+            chosen = expand_scalar(cover.choice, count).long()
+            texture[:, geoms] = number[chosen][:, None].int()
+            tiles[:, geoms] = (1.0 / expand_scalar(cover.size, count))[:, None].float()
+        fog = math.inf if appearance.fog is None else appearance.fog
+        shadows = 0 if appearance.shadows is None else appearance.shadows
+        values = {
+            "zenith": (zenith * 255).floor().float(),
+            "fog": (_EXTINCTION / expand_scalar(fog, count)).float(),
+            "shadows": expand_scalar(shadows, count).int(),
+            "texture": texture,
+            "tiles": tiles,
+        }
+        effects: Any = structs.Effects()
+        for name, array in self._load(names).items():
+            setattr(effects, name, array)
         for name, value in values.items():
-            there = value.to(self._device, torch.float32).contiguous()
-            setattr(made, name, wp.from_torch(there, dtype=wp.vec3))
-        return made
+            array = value.to(self._device).contiguous()
+            dtype = wp.vec3 if name == "zenith" else None
+            setattr(effects, name, wp.from_torch(array, dtype=dtype))
+        return effects
+
+    def _load(self, names: tuple[str, ...]) -> dict[str, Any]:
+        """The arrays of `Effects` that hold textures."""
+        if names not in self._textures:
+            images = [textures.load(name) for name in names]
+            rows = [textures.levels(image) for image in images]
+            texels = _packed(np.concatenate([*rows, _NO_TEXTURE]))
+            self._textures[names] = {
+                "sides": self._array([len(image) for image in images], int),
+                "starts": self._array(np.cumsum([0, *map(len, rows)])[:-1], int),
+                "texels": self._array(texels, wp.uint32),
+            }
+        return self._textures[names]
+
+    def _array(self, values: object, dtype: type) -> Any:
+        return wp.array(np.array(values), dtype=dtype, device=self._device)
+
+
+def _packed(colors: NDArray[np.uint8]) -> NDArray[np.uint32]:
+    """Red, green and blue bytes in one number each."""
+    return colors.astype(np.uint32) @ np.array([1, 1 << 8, 1 << 16], np.uint32)

@@ -1,22 +1,14 @@
 # ruff: noqa: RUF046, UP018
-# pyright: reportIndexIssue=false
+# pyright: reportArgumentType=false, reportAttributeAccessIssue=false, reportCallIssue=false
+# pyright: reportGeneralTypeIssues=false, reportIndexIssue=false, reportOperatorIssue=false
 # pyright: reportReturnType=false
-# pyright: reportArgumentType=false
-# pyright: reportCallIssue=false
-# pyright: reportOperatorIssue=false
-# pyright: reportGeneralTypeIssues=false
-# pyright: reportAttributeAccessIssue=false
-# (Warp compiles this file; Python's types say nothing about it, and what a loop changes is
-# declared by its type.)
-"""The ray tracer on a CPU: one picture after the other, geom by geom, then pixel by pixel.
+"""The ray tracer on a CPU, for flat colours and light: one image at a time, geom by geom.
 
-First it finds out what is where. It takes the geoms in order and casts rays at each in the
-rectangle of pixels around its projection alone, in the geom's own frame; what is nearer than all
-before takes the pixel. All geoms are convex and closed, or planes seen from above, so a ray enters
-each at most once, and there is no other hit to look for. Then it writes what each pixel shows,
-which is worked out once for pixels in a row that show the same flat face.
+`find_visible` takes the geoms in order and casts rays at each, in the geom's own frame, within the
+rectangle of pixels around its projection; the nearest hit owns the pixel. Then pixels are shaded,
+once for a span of pixels in a row that show the same flat face.
 
-Pixels are counted by `while`: what Warp makes of `for` is several times as slow on a CPU.
+Pixels are counted by `while`: Warp's code of a `for` loop is several times as slow on a CPU.
 """
 
 import warp as wp
@@ -27,73 +19,167 @@ from drone_rl.sim.rendering.raytrace.intersection_kernel import (
     ROUND,
     SAME,
     UPPER,
-    enter,
+    intersect_plane,
+    intersect_solid,
     is_nearest,
-    meet_plane,
-    outward,
+    surface_normal,
 )
-from drone_rl.sim.rendering.raytrace.projection_kernel import around, look_at, stand
-from drone_rl.sim.rendering.raytrace.shading_kernel import put_run, show_geom, show_sky
-from drone_rl.sim.rendering.raytrace.spans_kernel import fill_floats, fill_ints, meet_level
+from drone_rl.sim.rendering.raytrace.projection_kernel import (
+    bounding_rectangle,
+    camera_pose,
+    view_geom,
+)
+from drone_rl.sim.rendering.raytrace.shading_kernel import geom_pixel, sky_pixel, write_span
+from drone_rl.sim.rendering.raytrace.spans_kernel import (
+    fill_floats,
+    fill_ints,
+    intersect_level_plane,
+)
 from drone_rl.sim.rendering.raytrace.structs_kernel import (
+    FACES,
+    NO_GEOM,
     Geoms,
-    Looks,
-    Pictures,
+    GeomView,
+    Images,
+    Materials,
     Poses,
-    Sight,
+    Scratch,
     View,
 )
-
-FACES = wp.constant(8)
-"""Room for the faces of a geom."""
-NOTHING = wp.constant(-1)
-"""Owner of the sky."""
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 
-@wp.struct
-class Desk:
-    """Room to work for one picture at a time; first dimension: workers."""
+@wp.kernel
+def render_images(
+    first: int,
+    last: int,
+    member: int,
+    view: View,
+    geoms: Geoms,
+    poses: Poses,
+    materials: Materials,
+    scratch: Scratch,
+    images: Images,
+) -> None:
+    """Render images one after the other, as one worker: launch it with a dimension of 1.
 
-    nearest: wp.array2d[float]
-    """How far along its ray the nearest surface is, one a pixel."""
-    owner: wp.array2d[int]
-    """Whose that is: `FACES` times the geom's place among those drawn, and the face."""
-    dark: wp.array2d[int]
-    """Whether that is in shadow, where there may be any."""
-    colors: wp.array2d[wp.vec3ub]
-    """What is seen, where it is not the same for many pixels."""
-    sights: wp.array2d[Sight]
-    """One a geom."""
+    Args:
+        first: The first image.
+        last: One past the last image.
+        member: Which of the scratch buffers to use.
+        view: What to render.
+        geoms: Of the scene.
+        poses: Of all environments.
+        materials: Colours and light.
+        scratch: Buffers of all workers.
+        images: Written.
+    """
+    for row in range(first, last):
+        world = row // view.count
+        camera = row % view.cameras.shape[0]
+        render_image(view, camera, geoms, poses, world, materials, scratch, member, images, row)
+
+
+@wp.func
+def render_image(
+    view: View,
+    camera: int,
+    geoms: Geoms,
+    poses: Poses,
+    world: int,
+    materials: Materials,
+    scratch: Scratch,
+    member: int,
+    images: Images,
+    row: int,
+) -> None:
+    """Render the image `row` of one camera of one environment; see `render_images`."""
+    find_visible(view, camera, geoms, poses, world, scratch, member)
+    nearest, owners, rays = scratch.nearest[member], scratch.owner[member], view.rays[camera]
+    count = view.height * view.width
+    start = int(0)
+    while start < count:
+        owner = owners[start]
+        end = span_end(owners, start, count)
+        shown = sky_pixel(materials, world)
+        if owner == NO_GEOM:
+            fill_floats(nearest, start, end, 0.0)
+        else:
+            geom_view = scratch.geom_views[member, owner // FACES]
+            normal = span_normal(geom_view, owner, rays[start], nearest[start])
+            shown = geom_pixel(materials, world, geom_view.number, geom_view.axes @ normal)
+        write_span(images, view.what, row, start, end, shown, nearest, view.cosines[camera])
+        start = end
+
+
+@wp.func
+def find_visible(
+    view: View, camera: int, geoms: Geoms, poses: Poses, world: int, scratch: Scratch, member: int
+) -> None:
+    """Find the nearest surface of each pixel, and leave it in `scratch`."""
+    nearest = scratch.nearest[member]
+    owner = scratch.owner[member]
+    geom_views = scratch.geom_views[member]
+    rays = view.rays[camera]
+    fill_floats(nearest, 0, view.height * view.width, FAR_AWAY)
+    fill_ints(owner, 0, view.height * view.width, NO_GEOM)
+    pose = camera_pose(view.cameras[camera], poses, world)
+    for geom in range(geoms.kind.shape[0]):
+        geom_view = view_geom(geoms, geom, poses, world, pose)
+        geom_views[geom] = geom_view
+        if geom_view.kind == PLANE:
+            _find_plane(view, rays, geom_view, geom, nearest, owner)
+        else:
+            part = bounding_rectangle(view, view.cameras[camera], geom_view)
+            _find_solid(view, part, rays, geom_view, geom, nearest, owner)
+
+
+@wp.func
+def span_end(owners: wp.array[int], start: int, count: int) -> int:
+    """Return the end of a span of one flat face or the sky; a round face's span is one pixel."""
+    owner = owners[start]
+    end = start + 1
+    if owner == NO_GEOM or owner % FACES != ROUND:
+        while end < count and owners[end] == owner:
+            end += 1
+    return end
+
+
+@wp.func
+def span_normal(geom_view: GeomView, owner: int, ray: wp.vec3, distance: float) -> wp.vec3:
+    """Return the normal of a span's first pixel, in the geom's frame."""
+    into = geom_view.into @ ray
+    kind, size, eye = geom_view.kind, geom_view.size, geom_view.eye
+    return surface_normal(kind, size, owner % FACES, eye, into, distance)
 
 
 @wp.func
 def _find_plane(
     view: View,
     rays: wp.array[wp.vec3],
-    sight: Sight,
+    geom_view: GeomView,
     geom: int,
     nearest: wp.array[float],
     owner: wp.array[int],
 ) -> None:
-    """In the rows that end below its horizon; what both ends of a row show lies between, too."""
+    """Only rows that end below its horizon; if both ends of a row hit, so does all between."""
     mark = geom * FACES + UPPER
     start = int(0)
     while start < view.height * view.width:
         end = start + view.width
-        left = sight.into @ rays[start]
-        right = sight.into @ rays[end - 1]
+        left = geom_view.into @ rays[start]
+        right = geom_view.into @ rays[end - 1]
         if left[2] < 0.0 or right[2] < 0.0:
             pixel = start
             leftmost, rightmost = rays[start], rays[end - 1]
-            if _is_seen(view, sight, leftmost, left) and _is_seen(view, sight, rightmost, right):
-                down, height = sight.into[2], -sight.eye[2]
-                meet_level(nearest, owner, start, end, rays, down, height, SAME, mark)
+            if _hits(view, geom_view, leftmost, left) and _hits(view, geom_view, rightmost, right):
+                down, height = geom_view.into[2], -geom_view.eye[2]
+                intersect_level_plane(nearest, owner, start, end, rays, down, height, SAME, mark)
                 pixel = end
             while pixel < end:
                 ray = rays[pixel]
-                along = meet_plane(sight.size, sight.eye, sight.into @ ray)
+                along = intersect_plane(geom_view.size, geom_view.eye, geom_view.into @ ray)
                 if is_nearest(along, nearest[pixel], -ray[2], view.far):
                     nearest[pixel] = along
                     owner[pixel] = mark
@@ -102,9 +188,8 @@ def _find_plane(
 
 
 @wp.func
-def _is_seen(view: View, sight: Sight, ray: wp.vec3, into: wp.vec3) -> bool:
-    """Whether a ray meets a plane."""
-    along = meet_plane(sight.size, sight.eye, into)
+def _hits(view: View, geom_view: GeomView, ray: wp.vec3, into: wp.vec3) -> bool:
+    along = intersect_plane(geom_view.size, geom_view.eye, into)
     return along >= 0.0 and along * -ray[2] <= view.far
 
 
@@ -113,142 +198,21 @@ def _find_solid(
     view: View,
     part: wp.vec4i,
     rays: wp.array[wp.vec3],
-    sight: Sight,
+    geom_view: GeomView,
     geom: int,
     nearest: wp.array[float],
     owner: wp.array[int],
 ) -> None:
-    """In a part of the picture."""
     row = part[2]
     while row < part[3]:
         pixel = row * view.width + part[0]
         end = row * view.width + part[1]
         while pixel < end:
             ray = rays[pixel]
-            along, face = enter(sight.kind, sight.size, sight.eye, sight.into @ ray)
+            into = geom_view.into @ ray
+            along, face = intersect_solid(geom_view.kind, geom_view.size, geom_view.eye, into)
             if is_nearest(along, nearest[pixel], -ray[2], view.far):
                 nearest[pixel] = along
                 owner[pixel] = geom * FACES + face
             pixel += 1
         row += 1
-
-
-@wp.func
-def _show(
-    view: View,
-    rays: wp.array[wp.vec3],
-    cosines: wp.array[float],
-    looks: Looks,
-    world: int,
-    row: int,
-    sights: wp.array[Sight],
-    nearest: wp.array[float],
-    owners: wp.array[int],
-    pictures: Pictures,
-) -> None:
-    """Writes what each pixel shows."""
-    count = view.height * view.width
-    start = int(0)
-    while start < count:
-        owner = owners[start]
-        end = start + 1
-        if owner == NOTHING or owner % FACES != ROUND:
-            while end < count and owners[end] == owner:
-                end += 1
-        shown = show_sky(looks, world)
-        if owner == NOTHING:
-            fill_floats(nearest, start, end, 0.0)
-        else:
-            sight = sights[owner // FACES]
-            into = sight.into @ rays[start]
-            face = owner % FACES
-            normal = outward(sight.kind, sight.size, face, sight.eye, into, nearest[start])
-            shown = show_geom(looks, world, sight.number, sight.axes @ normal)
-        put_run(pictures, view.what, row, start, end, shown, nearest, cosines)
-        start = end
-
-
-@wp.func
-def find(
-    view: View, camera: int, geoms: Geoms, poses: Poses, world: int, desk: Desk, member: int
-) -> None:
-    """Finds out what is where, and leaves it on the desk; see `draw_picture`."""
-    nearest = desk.nearest[member]
-    owner = desk.owner[member]
-    sights = desk.sights[member]
-    rays = view.rays[camera]
-    fill_floats(nearest, 0, view.height * view.width, FAR_AWAY)
-    fill_ints(owner, 0, view.height * view.width, NOTHING)
-    there = stand(view.cameras[camera], poses, world)
-    for geom in range(geoms.kind.shape[0]):
-        sight = look_at(geoms, geom, poses, world, there)
-        sights[geom] = sight
-        if sight.kind == PLANE:
-            _find_plane(view, rays, sight, geom, nearest, owner)
-        else:
-            part = around(view, view.cameras[camera], sight)
-            _find_solid(view, part, rays, sight, geom, nearest, owner)
-
-
-@wp.func
-def draw_picture(
-    view: View,
-    camera: int,
-    geoms: Geoms,
-    poses: Poses,
-    world: int,
-    looks: Looks,
-    desk: Desk,
-    member: int,
-    pictures: Pictures,
-    row: int,
-) -> None:
-    """Draws one camera's picture of a world.
-
-    Args:
-        view: What is asked for.
-        camera: Which of its cameras.
-        geoms: What is drawn.
-        poses: Where it is.
-        world: Which of these.
-        looks: Colours and light.
-        desk: To work at.
-        member: Which of its places to work at.
-        pictures: To draw into.
-        row: Which of these.
-    """
-    find(view, camera, geoms, poses, world, desk, member)
-    nearest, owner = desk.nearest[member], desk.owner[member]
-    rays, cosines = view.rays[camera], view.cosines[camera]
-    _show(view, rays, cosines, looks, world, row, desk.sights[member], nearest, owner, pictures)
-
-
-@wp.kernel
-def draw(
-    first: int,
-    last: int,
-    member: int,
-    view: View,
-    geoms: Geoms,
-    poses: Poses,
-    looks: Looks,
-    desk: Desk,
-    pictures: Pictures,
-) -> None:
-    """Draws pictures one after the other, by a single worker: launch it with a dimension of 1.
-
-    Args:
-        first: The first picture.
-        last: The one after the last.
-        member: Which of the desk's places to work at.
-        view: What is asked for.
-        geoms: What is drawn.
-        poses: Where it is.
-        looks: Colours and light.
-        desk: To work at.
-        pictures: To draw into.
-    """
-    for row in range(first, last):
-        world = row // view.count
-        camera = row % view.cameras.shape[0]
-        draw_picture(view, camera, geoms, poses, world, looks, desk, member, pictures, row)

@@ -1,14 +1,8 @@
 # ruff: noqa: RUF046, UP018
-# pyright: reportIndexIssue=false
+# pyright: reportArgumentType=false, reportAttributeAccessIssue=false, reportCallIssue=false
+# pyright: reportGeneralTypeIssues=false, reportIndexIssue=false, reportOperatorIssue=false
 # pyright: reportReturnType=false
-# pyright: reportArgumentType=false
-# pyright: reportCallIssue=false
-# pyright: reportOperatorIssue=false
-# pyright: reportGeneralTypeIssues=false
-# pyright: reportAttributeAccessIssue=false
-# (Warp compiles this file; Python's types say nothing about it, and what a loop changes is
-# declared by its type.)
-"""Where a geom is for a camera, and which pixels can show it."""
+"""Projection: poses of cameras and geoms, and the pixels that can show a geom."""
 
 import warp as wp
 
@@ -16,70 +10,62 @@ from drone_rl.sim.rendering.raytrace.intersection_kernel import FAR_AWAY
 from drone_rl.sim.rendering.raytrace.structs_kernel import (
     DRONE_FRAME,
     Camera,
+    CameraPose,
     Geoms,
+    GeomView,
     Poses,
-    Sight,
     View,
 )
 
 IN_FRONT = wp.constant(1e-3)
-"""Metres before the camera from which corners are projected."""
-
-
-@wp.struct
-class Stand:
-    """Where a camera is, world frame."""
-
-    eye: wp.vec3
-    looking: wp.mat33
-    """From the camera's frame."""
+"""Metres in front of the camera from which corners are projected."""
 
 
 @wp.func
-def stand(camera: Camera, poses: Poses, world: int) -> Stand:
-    """Where a camera of a world is."""
+def camera_pose(camera: Camera, poses: Poses, world: int) -> CameraPose:
+    """Return the world pose of a camera."""
     turned = _frame_attitude(camera.frame, poses.attitudes[world])
-    found = Stand()
-    found.eye = poses.places[world, camera.frame] + _rotation(turned) @ camera.position
+    found = CameraPose()
+    found.eye = poses.positions[world, camera.frame] + _rotation(turned) @ camera.position
     found.looking = _rotation(_product(turned, camera.attitude))
     return found
 
 
 @wp.func
-def look_at(geoms: Geoms, geom: int, poses: Poses, world: int, there: Stand) -> Sight:
-    """A geom of a world, seen by a camera."""
+def view_geom(geoms: Geoms, geom: int, poses: Poses, world: int, there: CameraPose) -> GeomView:
+    """Return a geom of an environment relative to a camera."""
     frame = geoms.frame[geom]
     turned = _frame_attitude(frame, poses.attitudes[world])
-    centre = poses.places[world, frame] + _rotation(turned) @ geoms.position[geom]
-    sight = Sight()
-    sight.kind = geoms.kind[geom]
-    sight.number = geoms.number[geom]
-    sight.size = geoms.size[geom]
-    sight.reach = geoms.reach[geom]
+    centre = poses.positions[world, frame] + _rotation(turned) @ geoms.position[geom]
+    geom_view = GeomView()
+    geom_view.kind = geoms.kind[geom]
+    geom_view.number = geoms.number[geom]
+    geom_view.size = geoms.size[geom]
+    geom_view.reach = geoms.reach[geom]
     if poses.scales:
-        sight.size *= poses.scales[world, frame]
-        sight.reach *= poses.scales[world, frame]
-    sight.axes = _rotation(_product(turned, geoms.attitude[geom]))
-    sight.eye = wp.transpose(sight.axes) @ (there.eye - centre)
-    sight.into = wp.transpose(sight.axes) @ there.looking
-    return sight
+        geom_view.size *= poses.scales[world, frame]
+        geom_view.reach *= poses.scales[world, frame]
+    geom_view.axes = _rotation(_product(turned, geoms.attitude[geom]))
+    geom_view.eye = wp.transpose(geom_view.axes) @ (there.eye - centre)
+    geom_view.into = wp.transpose(geom_view.axes) @ there.looking
+    return geom_view
 
 
 @wp.func
-def upward(camera: Camera, poses: Poses, world: int) -> wp.vec3:
-    """What a ray of a camera is multiplied by to find how far it goes up."""
+def up_in_camera(camera: Camera, poses: Poses, world: int) -> wp.vec3:
+    """Return the world's up axis in a camera's frame."""
     turned = _frame_attitude(camera.frame, poses.attitudes[world])
     return wp.transpose(_rotation(_product(turned, camera.attitude))) @ wp.vec3(0.0, 0.0, 1.0)
 
 
 @wp.func
-def around(view: View, camera: Camera, sight: Sight) -> wp.vec4i:
-    """Columns and rows, from and to, outside which no ray meets a geom."""
+def bounding_rectangle(view: View, camera: Camera, geom_view: GeomView) -> wp.vec4i:
+    """Return first and last+1 column, first and last+1 row outside which no ray meets a geom."""
     lowest = wp.vec2(FAR_AWAY, FAR_AWAY)
     highest = wp.vec2(-FAR_AWAY, -FAR_AWAY)
     behind = int(0)
     for corner in range(8):
-        at = _corner(sight, corner)
+        at = _corner(geom_view, corner)
         if -at[2] < IN_FRONT:
             behind += 1 << corner
         else:
@@ -89,37 +75,40 @@ def around(view: View, camera: Camera, sight: Sight) -> wp.vec4i:
     if behind == 255:
         return wp.vec4i(0, 0, 0, 0)
     if behind > 0:
-        for edge in range(24):  # where those that lead behind the camera leave the picture
+        for edge in range(24):  # clip edges that lead behind the camera
             one, other = edge // 3, (edge // 3) ^ (1 << (edge % 3))
             if ((behind >> one) & 1) == 0 and ((behind >> other) & 1) == 1:
-                at, back = _corner(sight, one), _corner(sight, other)
+                at, back = _corner(geom_view, one), _corner(geom_view, other)
                 at += (at[2] + IN_FRONT) / (at[2] - back[2]) * (back - at)
                 seen = wp.vec2(at[0], -at[1]) / IN_FRONT
                 lowest = wp.min(lowest, seen)
                 highest = wp.max(highest, seen)
-    return rectangle(view, camera, lowest, highest)
+    return pixel_rectangle(view, camera, lowest, highest)
 
 
 @wp.func
-def _corner(sight: Sight, corner: int) -> wp.vec3:
-    """Of the box around a geom, in the camera's frame."""
+def _corner(geom_view: GeomView, corner: int) -> wp.vec3:
+    """A corner of the bounding box, in the camera's frame."""
     sides = wp.vec3(
         float(corner & 1) * 2.0 - 1.0,
         float((corner >> 1) & 1) * 2.0 - 1.0,
         float((corner >> 2) & 1) * 2.0 - 1.0,
     )
-    return wp.transpose(sight.into) @ (wp.cw_mul(sides, sight.reach) - sight.eye)
+    return wp.transpose(geom_view.into) @ (wp.cw_mul(sides, geom_view.reach) - geom_view.eye)
 
 
 @wp.func
-def rectangle(view: View, camera: Camera, lowest: wp.vec2, highest: wp.vec2) -> wp.vec4i:
-    """Columns and rows, from and to, that can show what lies between two places.
+def pixel_rectangle(view: View, camera: Camera, lowest: wp.vec2, highest: wp.vec2) -> wp.vec4i:
+    """Return the pixels that can show anything between two points of the image plane.
 
     Args:
-        view: Whose pixels.
-        camera: Who looks.
-        lowest: To the right and downwards, at a distance of 1.
+        view: Image size.
+        camera: Field of view.
+        lowest: Right and down, on the image plane at distance 1.
         highest: The other end.
+
+    Returns:
+        First and last+1 column, first and last+1 row.
     """
     return wp.vec4i(
         _first_pixel(lowest[0], camera.half_width, view.width),
@@ -131,7 +120,7 @@ def rectangle(view: View, camera: Camera, lowest: wp.vec2, highest: wp.vec2) -> 
 
 @wp.func
 def _first_pixel(place: float, half: float, count: int) -> int:
-    """The first pixel that can show a place, given along an axis at a distance of 1."""
+    """First pixel along an axis that can show a coordinate of the image plane."""
     pixel = (place / half + 1.0) * 0.5 * float(count) - 1.5
     return int(wp.clamp(wp.floor(pixel), 0.0, float(count)))
 

@@ -1,33 +1,27 @@
-# pyright: reportGeneralTypeIssues=false
-# pyright: reportCallIssue=false
-# pyright: reportAttributeAccessIssue=false
-# (Warp's structures are untyped.)
-"""Pictures of many worlds at once, by a ray tracer of our own: no OpenGL, CPU and GPU alike.
+"""The renderer `raytrace`: a ray tracer of simple solids under distant lights, on CPU and GPU.
 
-MuJoCo Warp's ray tracer draws anything; this one draws what our worlds are made of, simple solids
-under distant lights: the same pictures, twenty times as fast.
+It renders the same images as `mujoco_warp`, about twenty times as fast, without OpenGL. Kernels by
+device and appearance: `plain_kernel` (CPU, flat colours), `effects_kernel` (CPU, with fog,
+shadows, textures or a sky gradient) and `gpu_kernel` (both, on a GPU).
 """
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import torch
 import warp as wp
 from torch import Tensor
 
 from drone_rl.sim.rendering.appearance import Appearance
-from drone_rl.sim.rendering.devices import Crew, loading, on_torch_stream, start_warp
-from drone_rl.sim.rendering.raytrace import effects_kernel as raytrace_scenic
-from drone_rl.sim.rendering.raytrace import gpu_kernel as raytrace_pixels
-from drone_rl.sim.rendering.raytrace import gpu_kernel as raytrace_scenic_pixels
-from drone_rl.sim.rendering.raytrace import plain_kernel as raytrace_kernel
-from drone_rl.sim.rendering.raytrace import structs_kernel
-from drone_rl.sim.rendering.raytrace.materials import Looks
+from drone_rl.sim.rendering.devices import WorkerPool, load_kernels, on_torch_stream, start_warp
+from drone_rl.sim.rendering.raytrace import effects_kernel, gpu_kernel, plain_kernel
+from drone_rl.sim.rendering.raytrace import structs_kernel as structs
+from drone_rl.sim.rendering.raytrace.materials import MaterialsEncoder
 from drone_rl.sim.rendering.raytrace.scene import (
     Cameras,
     Frames,
-    Places,
+    PoseBuffers,
     check_scene,
     make_geoms,
     make_view,
@@ -36,216 +30,220 @@ from drone_rl.sim.rendering.renderer import Poses
 from drone_rl.sim.rendering.scene import Scene
 from drone_rl.sim.rendering.view import Modality, View
 
-
-class CorePainter:
-    """Draws a picture at a time on each core."""
-
-    def __init__(self, num_worlds: int, num_shards: int | None) -> None:
-        """Starts the threads; see `Raytracer`."""
-        self._crew = Crew(num_worlds, num_shards)
-        self._desks: dict[tuple[int, int], raytrace_kernel.Desk] = {}
-
-    def paint(
-        self,
-        count: int,
-        view: structs_kernel.View,
-        geoms: structs_kernel.Geoms,
-        poses: structs_kernel.Poses,
-        looks: structs_kernel.Looks,
-        pictures: structs_kernel.Pictures,
-        scenery: "structs_kernel.Scenery | None" = None,
-    ) -> None:
-        """Draws pictures.
-
-        Args:
-            count: How many: one for each world and camera.
-            view: What is asked for.
-            geoms: What is drawn.
-            poses: Where it is.
-            looks: Colours and light.
-            pictures: To draw into.
-            scenery: What there is besides, if anything.
-        """
-        size = (view.height * view.width, len(geoms.kind))
-        if size not in self._desks:
-            self._desks[size] = make_desk(self._crew.size, *size)
-        desk = self._desks[size]
-        plain = scenery is None
-        loading(raytrace_kernel if plain else raytrace_scenic).result()
-        draw = raytrace_kernel.draw if plain else raytrace_scenic.draw_scenic
-        given = [view, geoms, poses, looks, *([] if plain else [scenery]), desk, pictures]
-
-        def work(member: int, first: int, last: int) -> None:
-            inputs = [first, last, member, *given]
-            wp.launch(draw, 1, inputs=inputs, device="cpu")
-
-        self._crew.share_out(0, count, work)
-
-    def close(self) -> None:
-        """Ends the threads."""
-        self._crew.close()
-
-
-class GpuPainter:
-    """Draws all pixels at once, a thread each."""
-
-    def __init__(self, device: str) -> None:
-        """Takes the GPU, "cuda" or "cuda:N"; a CPU does, too, but slowly."""
-        self._device = device
-
-    def paint(
-        self,
-        count: int,
-        view: structs_kernel.View,
-        geoms: structs_kernel.Geoms,
-        poses: structs_kernel.Poses,
-        looks: structs_kernel.Looks,
-        pictures: structs_kernel.Pictures,
-        scenery: "structs_kernel.Scenery | None" = None,
-    ) -> None:
-        """See `CorePainter`."""
-        pixels = view.height * view.width
-        sights = wp.empty((count, len(geoms.kind)), dtype=structs_kernel.Sight, device=self._device)
-        aimed = [view, geoms, poses, sights]
-        wp.launch(raytrace_pixels.aim, sights.shape, inputs=aimed, device=self._device)
-        if scenery is None:
-            draw, drawn = raytrace_pixels.draw_pixels, [view, sights, looks, pictures]
-        else:
-            desk = make_desk(count, pixels, 1, self._device)
-            draw = raytrace_scenic_pixels.draw_scenic_pixels
-            drawn = [view, poses, sights, looks, scenery, desk, pictures]
-        wp.launch(draw, (count, pixels), inputs=drawn, device=self._device)
-
-    def close(self) -> None:
-        """Ends nothing: there are no threads."""
-
-
-def make_desk(
-    num_workers: int, pixels: int, geoms: int, device: str = "cpu"
-) -> raytrace_kernel.Desk:
-    """Room to work.
-
-    Args:
-        num_workers: At the same time, a picture each.
-        pixels: Of a picture.
-        geoms: That are drawn.
-        device: Where.
-    """
-    desk, size = raytrace_kernel.Desk(), (num_workers, pixels)
-    desk.nearest = wp.empty(size, dtype=float, device=device)
-    desk.owner, desk.dark = (wp.empty(size, dtype=int, device=device) for _ in range(2))
-    desk.colors = wp.empty(size, dtype=wp.vec3ub, device=device)
-    desk.sights = wp.empty((num_workers, geoms), dtype=structs_kernel.Sight, device=device)
-    return desk
-
-
 _BITS: Mapping[Modality, int] = MappingProxyType(
     {
-        "rgb": structs_kernel.RGB,
-        "gray": structs_kernel.GRAY,
-        "depth": structs_kernel.DEPTH,
-        "distance": structs_kernel.DISTANCE,
-        "segmentation": structs_kernel.SEGMENTATION,
-        "normals": structs_kernel.NORMALS,
+        "rgb": structs.RGB,
+        "gray": structs.GRAY,
+        "depth": structs.DEPTH,
+        "distance": structs.DISTANCE,
+        "segmentation": structs.SEGMENTATION,
+        "normals": structs.NORMALS,
     }
 )
 """The kernels' bit of each modality."""
-_PIXELS = MappingProxyType({"rgb": wp.vec3ub, "normals": wp.vec3})
-"""Types of pixels of several numbers."""
+_VECTORS = MappingProxyType({"rgb": wp.vec3ub, "normals": wp.vec3})
+"""Warp types of modalities with several numbers per pixel."""
+
+
+class KernelInputs(NamedTuple):
+    """Arguments of `plain_kernel.render_image` for one view on a CPU."""
+
+    view: structs.View
+    geoms: structs.Geoms
+    materials: structs.Materials
+    scratch: structs.Scratch
 
 
 class Raytracer:
-    """Draws worlds of a scene of planes, boxes, balls, capsules, cylinders and ellipsoids."""
+    """Renders scenes of planes, boxes, balls, capsules, cylinders and ellipsoids."""
 
     def __init__(
         self, scene: Scene, *, num_worlds: int, num_shards: int | None = None, device: str = "cpu"
     ) -> None:
-        """Notes what will be drawn; kernels are loaded with the first picture.
+        """Prepare a scene; the first image loads the kernels.
 
         Args:
-            scene: What will be drawn.
-            num_worlds: About how many worlds are drawn in a call.
+            scene: What to render.
+            num_worlds: About how many environments one call renders.
             num_shards: Threads on a CPU; the number of cores by default.
             device: "cpu", "cuda" or "cuda:N".
 
         Raises:
-            InputError: It can't draw the scene, or there is no such device.
+            InputError: The scene has unsupported geoms or lights, or there is no such device.
         """
         start_warp(device)
         check_scene(scene)
         self.scene, self.device = scene, torch.device(device)
         is_cpu = self.device.type == "cpu"
-        self._painter = CorePainter(num_worlds, num_shards) if is_cpu else GpuPainter(device)
-        self._frames, self._looks = Frames(scene), Looks(scene, device)
-        self._views: dict[View, tuple[Cameras, structs_kernel.Geoms]] = {}
-        self._places = Places(self.device)
+        self._launcher = CpuLauncher(num_worlds, num_shards) if is_cpu else GpuLauncher(device)
+        self._frames, self._materials = Frames(scene), MaterialsEncoder(scene, device)
+        self._views: dict[View, tuple[Cameras, structs.Geoms]] = {}
+        self._poses = PoseBuffers(self.device)
 
     def prepare(self, view: View) -> None:
-        """Makes what kernels need for a view; kernels are loaded by the first picture.
+        """Build the kernels' structs of a view.
 
         Raises:
             InputError: The scene has no such camera, or a modality is unknown.
         """
         if view not in self._views:
-            made, geoms = self._make(view)
-            self._views[view] = Cameras(view, made, self.device), geoms
+            encoded, geoms = self._encode(view)
+            self._views[view] = Cameras(view, encoded, self.device), geoms
 
     def render(
         self, view: View, poses: Poses, appearance: Appearance | None = None
     ) -> dict[Modality, Tensor]:
-        """Draws worlds; see `Renderer.render`."""
+        """Render environments; see `Renderer.render`."""
         self.prepare(view)
         cameras, geoms = self._views[view]
-        pictures = view.new_pictures(len(poses), self.device)
+        images = view.new_images(len(poses), self.device)
+        look = appearance or Appearance()
         with on_torch_stream(self.device):
-            looks, scenery = self._looks.of(appearance, len(poses))
-            made = cameras.of(None if appearance is None else appearance.camera, len(poses))
-            count = len(poses) * len(view.cameras)
-            there = self._places.of(poses, None if appearance is None else appearance.beside)
-            drawn = _pictures(pictures)
-            self._painter.paint(count, made, geoms, there, looks, drawn, scenery)
-        return pictures
+            materials, effects = self._materials.encode(appearance, len(poses))
+            encoded = cameras.encode(look.camera, len(poses))
+            frames = self._poses.write(poses, look.distractors)
+            count, out = len(poses) * len(view.cameras), _images(images)
+            self._launcher.launch(count, encoded, geoms, frames, materials, out, effects)
+        return images
 
-    def tools(self, view: View, num_workers: int) -> "Tools":
-        """What a kernel of somebody else's draws with, as `raytrace_kernel.draw_picture` takes it.
+    def kernel_inputs(self, view: View, num_workers: int) -> KernelInputs:
+        """Return the arguments with which another kernel calls `plain_kernel.render_image`.
 
         Args:
-            view: That will be drawn, as the model looks.
-            num_workers: At the same time.
+            view: What to render, with the model's own appearance.
+            num_workers: Images that are rendered at the same time.
 
         Raises:
             InputError: See `prepare`.
         """
-        made, geoms = self._make(view)
-        desk = make_desk(num_workers, view.height * view.width, len(geoms.kind))
-        return Tools(made, geoms, self._looks.of(None, 1)[0], desk)
+        encoded, geoms = self._encode(view)
+        scratch = make_scratch(num_workers, view.height * view.width, len(geoms.kind))
+        return KernelInputs(encoded, geoms, self._materials.encode(None, 1)[0], scratch)
 
     def close(self) -> None:
-        """Ends the threads."""
-        self._painter.close()
+        """Stop the threads."""
+        self._launcher.close()
 
-    def _make(self, view: View) -> tuple[structs_kernel.View, structs_kernel.Geoms]:
+    def _encode(self, view: View) -> tuple[structs.View, structs.Geoms]:
         view.check_modalities(self, _BITS)
-        where = str(self.device)
+        device = str(self.device)
         with on_torch_stream(self.device):
-            made = make_view(self.scene, self._frames, view, where)
-            geoms = make_geoms(self.scene, self._frames, view.show_drone, where)
-        made.what = sum({_BITS[modality] for modality in view.modalities})
-        return made, geoms
+            encoded = make_view(self.scene, self._frames, view, device)
+            geoms = make_geoms(self.scene, self._frames, view.show_drone, device)
+        encoded.what = sum({_BITS[modality] for modality in view.modalities})
+        return encoded, geoms
 
 
-class Tools(NamedTuple):
-    """What draws one view on a CPU."""
+class CpuLauncher:
+    """Launches the CPU kernels; each core renders one image at a time."""
 
-    view: structs_kernel.View
-    geoms: structs_kernel.Geoms
-    looks: structs_kernel.Looks
-    desk: raytrace_kernel.Desk
+    def __init__(self, num_worlds: int, num_shards: int | None) -> None:
+        """Start the threads; see `Raytracer`."""
+        self._workers = WorkerPool(num_worlds, num_shards)
+        self._scratch: dict[tuple[int, int], structs.Scratch] = {}
+
+    def launch(
+        self,
+        count: int,
+        view: structs.View,
+        geoms: structs.Geoms,
+        poses: structs.Poses,
+        materials: structs.Materials,
+        images: structs.Images,
+        effects: "structs.Effects | None" = None,
+    ) -> None:
+        """Render images; kernels are loaded first, so that fused training need not load them.
+
+        Args:
+            count: Number of images: environments times cameras.
+            view: Cameras and modalities.
+            geoms: Of the scene.
+            poses: Of all environments.
+            materials: Colours and light.
+            images: Written.
+            effects: Chooses the kernels with effects, if given.
+        """
+        size = (view.height * view.width, len(geoms.kind))
+        if size not in self._scratch:
+            self._scratch[size] = make_scratch(self._workers.size, *size)
+        module = plain_kernel if effects is None else effects_kernel
+        load_kernels(module).result()
+        if effects is None:
+            kernel, inputs = plain_kernel.render_images, [view, geoms, poses, materials]
+        else:
+            kernel = effects_kernel.render_images_with_effects
+            inputs = [view, geoms, poses, materials, effects]
+
+        def work(worker: int, first: int, last: int) -> None:
+            own = [first, last, worker, *inputs, self._scratch[size], images]
+            wp.launch(kernel, 1, inputs=own, device="cpu")
+
+        self._workers.map_spans(0, count, work)
+
+    def close(self) -> None:
+        """Stop the threads."""
+        self._workers.close()
 
 
-def _pictures(pictures: Mapping[Modality, Tensor]) -> structs_kernel.Pictures:
-    made = structs_kernel.Pictures()
-    for modality, values in pictures.items():
+class GpuLauncher:
+    """Launches the GPU kernels, one thread per pixel; they also run, slowly, on a CPU."""
+
+    def __init__(self, device: str) -> None:
+        """Take a device, "cuda" or "cuda:N"."""
+        self._device = device
+
+    def launch(
+        self,
+        count: int,
+        view: structs.View,
+        geoms: structs.Geoms,
+        poses: structs.Poses,
+        materials: structs.Materials,
+        images: structs.Images,
+        effects: "structs.Effects | None" = None,
+    ) -> None:
+        """Render images; see `CpuLauncher.launch`."""
+        pixels = view.height * view.width
+        shape = (count, len(geoms.kind))
+        geom_views = _empty(shape, structs.GeomView, self._device)
+        inputs = [view, geoms, poses, geom_views]
+        wp.launch(gpu_kernel.view_geoms, shape, inputs=inputs, device=self._device)
+        if effects is None:
+            kernel, inputs = gpu_kernel.render_pixels, [view, geom_views, materials, images]
+        else:
+            scratch = make_scratch(count, pixels, 1, self._device)
+            kernel = gpu_kernel.render_pixels_with_effects
+            inputs = [view, poses, geom_views, materials, effects, scratch, images]
+        wp.launch(kernel, (count, pixels), inputs=inputs, device=self._device)
+
+    def close(self) -> None:
+        """Do nothing: there are no threads."""
+
+
+def make_scratch(num_workers: int, pixels: int, geoms: int, device: str = "cpu") -> structs.Scratch:
+    """Allocate scratch buffers.
+
+    Args:
+        num_workers: Images that are rendered at the same time.
+        pixels: Of an image.
+        geoms: Number of rendered geoms.
+        device: Of the kernels.
+    """
+    scratch: Any = structs.Scratch()
+    kinds = {"nearest": float, "owner": int, "dark": int, "colors": wp.vec3ub}
+    for name, kind in kinds.items():
+        setattr(scratch, name, _empty((num_workers, pixels), kind, device))
+    scratch.geom_views = _empty((num_workers, geoms), structs.GeomView, device)
+    return scratch
+
+
+def _empty(shape: tuple[int, int], kind: type, device: str) -> Any:
+    return wp.empty(shape, dtype=kind, device=device)
+
+
+def _images(images: Mapping[Modality, Tensor]) -> structs.Images:
+    encoded: Any = structs.Images()
+    for modality, values in images.items():
         rows = values.flatten(2, 3).flatten(0, 1)
-        setattr(made, modality, wp.from_torch(rows, dtype=_PIXELS.get(modality)))
-    return made
+        setattr(encoded, modality, wp.from_torch(rows, dtype=_VECTORS.get(modality)))
+    return encoded

@@ -1,19 +1,13 @@
-# pyright: reportIndexIssue=false
+# pyright: reportArgumentType=false, reportAttributeAccessIssue=false, reportCallIssue=false
+# pyright: reportGeneralTypeIssues=false, reportIndexIssue=false, reportOperatorIssue=false
 # pyright: reportReturnType=false
-# pyright: reportArgumentType=false
-# pyright: reportCallIssue=false
-# pyright: reportOperatorIssue=false
-# pyright: reportGeneralTypeIssues=false
-# pyright: reportAttributeAccessIssue=false
-# (Warp compiles this file; Python's types say nothing about it.)
-"""What a pixel shows of the surface that its ray has met."""
+"""Shading: the colour of a surface from light, shadow, texture and fog; writing of pixels."""
 
 import warp as wp
 
 from drone_rl.sim.rendering.raytrace.intersection_kernel import ROUND
-from drone_rl.sim.rendering.raytrace.projection_kernel import upward
+from drone_rl.sim.rendering.raytrace.projection_kernel import up_in_camera
 from drone_rl.sim.rendering.raytrace.spans_kernel import (
-    Cover,
     copy,
     copy_colors,
     fill_bytes,
@@ -22,9 +16,9 @@ from drone_rl.sim.rendering.raytrace.spans_kernel import (
     fill_vectors,
     mix_gray,
     multiply,
-    shade_covered,
-    shade_even,
+    shade_plain,
     shade_sky,
+    shade_textured,
 )
 from drone_rl.sim.rendering.raytrace.structs_kernel import (
     DEPTH,
@@ -34,11 +28,13 @@ from drone_rl.sim.rendering.raytrace.structs_kernel import (
     RGB,
     SEGMENTATION,
     Camera,
-    Looks,
-    Pictures,
+    Effects,
+    GeomView,
+    Images,
+    Materials,
+    PixelValue,
     Poses,
-    Scenery,
-    Sight,
+    TextureMap,
     View,
 )
 from drone_rl.sim.rendering.view import WEIGHTS
@@ -46,134 +42,110 @@ from drone_rl.sim.rendering.view import WEIGHTS
 _RED, _GREEN, _BLUE = (wp.constant(weight) for weight in WEIGHTS)
 
 
-@wp.struct
-class Shown:
-    """What is seen in a pixel, but for how far away it is."""
-
-    number: int
-    """Of the geom in the model; -1 for none."""
-    normal: wp.vec3
-    """World frame; zero for none."""
-    color: wp.vec3ub
-    gray: float
-    """From 0 to 1."""
-
-
 @wp.func
-def show_sky(looks: Looks, world: int) -> Shown:
-    """What is seen where nothing was met."""
-    shown = Shown()
+def sky_pixel(materials: Materials, world: int) -> PixelValue:
+    """Return what a pixel shows that hits nothing."""
+    shown = PixelValue()
     shown.number = -1
-    shown.color = _bytes(looks.sky[world % looks.sky.shape[0]])
+    shown.color = _bytes(materials.sky[world % materials.sky.shape[0]])
     shown.gray = _gray(shown.color)
     return shown
 
 
 @wp.func
-def show_geom(looks: Looks, world: int, number: int, normal: wp.vec3) -> Shown:
-    """What is seen where a geom was met. Normal: world frame."""
-    shown = Shown()
+def geom_pixel(materials: Materials, world: int, number: int, normal: wp.vec3) -> PixelValue:
+    """Return what a pixel shows of a geom. Normal: world frame."""
+    shown = PixelValue()
     shown.number = number
     shown.normal = normal
-    shown.color = _bytes(_shade(looks, world, number, normal))
+    shown.color = _bytes(_shade(materials, world, number, normal))
     shown.gray = _gray(shown.color)
     return shown
 
 
 @wp.func
-def put_pixel(
-    pictures: Pictures,
+def write_pixel(
+    images: Images,
     what: int,
     row: int,
     pixel: int,
-    shown: Shown,
+    shown: PixelValue,
     distance: float,
     cosine: float,
 ) -> None:
-    """Writes a pixel.
+    """Write a pixel.
 
     Args:
-        pictures: Into which.
-        what: What of it is asked for.
-        row: Which picture.
-        pixel: Which.
+        images: Written.
+        what: Requested modalities.
+        row: Which image.
+        pixel: Which pixel.
         shown: What it shows.
-        distance: How far along its ray that is; 0 for the sky.
+        distance: Along its ray; 0 for the sky.
         cosine: Of the angle between the ray and the camera's axis.
     """
     if (what & RGB) != 0:
-        pictures.rgb[row, pixel] = shown.color
+        images.rgb[row, pixel] = shown.color
     if (what & GRAY) != 0:
-        pictures.gray[row, pixel] = shown.gray
+        images.gray[row, pixel] = shown.gray
     if (what & DEPTH) != 0:
-        pictures.depth[row, pixel] = distance * cosine
+        images.depth[row, pixel] = distance * cosine
     if (what & DISTANCE) != 0:
-        pictures.distance[row, pixel] = distance
+        images.distance[row, pixel] = distance
     if (what & SEGMENTATION) != 0:
-        pictures.segmentation[row, pixel] = shown.number
+        images.segmentation[row, pixel] = shown.number
     if (what & NORMALS) != 0:
-        pictures.normals[row, pixel] = shown.normal
+        images.normals[row, pixel] = shown.normal
 
 
 @wp.func
-def put_run(
-    pictures: Pictures,
+def write_span(
+    images: Images,
     what: int,
     row: int,
     first: int,
     last: int,
-    shown: Shown,
+    shown: PixelValue,
     distances: wp.array[float],
     cosines: wp.array[float],
 ) -> None:
-    """The same of pixels in a row that show the same.
-
-    Args:
-        pictures: Into which.
-        what: What of it is asked for.
-        row: Which picture.
-        first: The first pixel.
-        last: The one after the last.
-        shown: What they show.
-        distances: How far along its ray that is, of each pixel of the picture; 0 for the sky.
-        cosines: Of each pixel of the picture.
-    """
+    """`write_pixel` for a span of pixels with one value; distances and cosines of all pixels."""
     if (what & RGB) != 0:
-        fill_bytes(pictures.rgb[row], first, last, shown.color)
+        fill_bytes(images.rgb[row], first, last, shown.color)
     if (what & GRAY) != 0:
-        fill_floats(pictures.gray[row], first, last, shown.gray)
+        fill_floats(images.gray[row], first, last, shown.gray)
     if (what & DEPTH) != 0:
-        multiply(pictures.depth[row], first, last, distances, cosines)
+        multiply(images.depth[row], first, last, distances, cosines)
     if (what & DISTANCE) != 0:
-        copy(pictures.distance[row], first, last, distances)
+        copy(images.distance[row], first, last, distances)
     if (what & SEGMENTATION) != 0:
-        fill_ints(pictures.segmentation[row], first, last, shown.number)
+        fill_ints(images.segmentation[row], first, last, shown.number)
     if (what & NORMALS) != 0:
-        fill_vectors(pictures.normals[row], first, last, shown.normal)
+        fill_vectors(images.normals[row], first, last, shown.normal)
 
 
 @wp.func
-def put_colors(
-    pictures: Pictures, what: int, row: int, first: int, last: int, colors: wp.array[wp.vec3ub]
+def write_colors(
+    images: Images, what: int, row: int, first: int, last: int, colors: wp.array[wp.vec3ub]
 ) -> None:
-    """Writes colours, each pixel its own; see `put_run`."""
+    """Write colours that differ from pixel to pixel; see `write_span`."""
     if (what & RGB) != 0:
-        copy_colors(pictures.rgb[row], first, last, colors)
+        copy_colors(images.rgb[row], first, last, colors)
     if (what & GRAY) != 0:
-        mix_gray(pictures.gray[row], first, last, colors, _RED, _GREEN, _BLUE)
+        mix_gray(images.gray[row], first, last, colors, _RED, _GREEN, _BLUE)
 
 
 @wp.func
-def _shade(looks: Looks, world: int, geom: int, normal: wp.vec3) -> wp.vec3:
-    """Lambert's law under distant lights, from 0 to 255. Normal: world frame."""
-    own = looks.colors[world % looks.colors.shape[0], geom]
-    row = world % looks.ambient.shape[0]
+def _shade(materials: Materials, world: int, geom: int, normal: wp.vec3) -> wp.vec3:
+    """Lambert's law under distant lights, 0 to 255. Normal: world frame."""
+    own = materials.colors[world % materials.colors.shape[0], geom]
+    row = world % materials.ambient.shape[0]
     color = wp.vec3()
-    for light in range(looks.ambient.shape[1]):
-        color += wp.cw_mul(own, looks.ambient[row, light])
-    for light in range(looks.ambient.shape[1]):
-        facing = wp.max(0.0, wp.dot(normal, -looks.direction[row, light]))
-        color += wp.cw_mul(own, looks.diffuse[row, light] * facing)
+    for light in range(materials.ambient.shape[1]):
+        color += wp.cw_mul(own, materials.ambient[row, light])
+    for light in range(materials.ambient.shape[1]):
+        facing = wp.max(0.0, wp.dot(normal, -materials.direction[row, light]))
+        color += wp.cw_mul(own, materials.diffuse[row, light] * facing)
     return 255.0 * wp.vec3(
         wp.clamp(color[0], 0.0, 1.0), wp.clamp(color[1], 0.0, 1.0), wp.clamp(color[2], 0.0, 1.0)
     )
@@ -186,7 +158,7 @@ def _bytes(color: wp.vec3) -> wp.vec3ub:
 
 @wp.func
 def _gray(color: wp.vec3ub) -> float:
-    """The product of a colour and `WEIGHTS`, each sum rounded as by torch on x86."""
+    """Gray by `WEIGHTS`; each sum is rounded as by torch on x86."""
     red, green, blue = float(color[0]), float(color[1]), float(color[2])
     two = float(wp.float64(red * _RED) + wp.float64(green) * wp.float64(_GREEN))
     return float(wp.float64(two) + wp.float64(blue * _BLUE))
@@ -200,26 +172,14 @@ def color_sky(
     rays: wp.array[wp.vec3],
     camera: Camera,
     poses: Poses,
-    looks: Looks,
-    scenery: Scenery,
+    materials: Materials,
+    effects: Effects,
     world: int,
 ) -> None:
-    """Colours pixels in a row that show the sky.
-
-    Args:
-        colors: Are written.
-        first: The first pixel.
-        last: The one after the last.
-        rays: Of the pixels.
-        camera: Who looks.
-        poses: Where everything is.
-        looks: The sky's colour at the horizon.
-        scenery: That overhead.
-        world: Whose.
-    """
-    horizon = looks.sky[world % looks.sky.shape[0]]
-    zenith = scenery.zenith[world % scenery.zenith.shape[0]]
-    shade_sky(colors, first, last, rays, upward(camera, poses, world), horizon, zenith)
+    """Colour a span of the sky: the horizon blended with the zenith."""
+    horizon = materials.sky[world % materials.sky.shape[0]]
+    zenith = effects.zenith[world % effects.zenith.shape[0]]
+    shade_sky(colors, first, last, rays, up_in_camera(camera, poses, world), horizon, zenith)
 
 
 @wp.func
@@ -232,78 +192,80 @@ def color_geom(
     dark: wp.array[int],
     view: View,
     camera: Camera,
-    looks: Looks,
-    scenery: Scenery,
+    materials: Materials,
+    effects: Effects,
     world: int,
-    sight: Sight,
+    geom_view: GeomView,
     face: int,
     normal: wp.vec3,
 ) -> None:
-    """Colours pixels in a row that show a flat face of a geom, or one that shows a round one.
+    """Colour a span of a flat face, or one pixel of a round one: light, shadow, texture, fog.
 
     Args:
-        colors: Are written.
-        first: The first pixel.
-        last: The one after the last.
+        colors: Written.
+        first: First pixel.
+        last: One past the last pixel.
         rays: Of the pixels.
-        nearest: How far along its ray the face is.
-        dark: Whether it is in shadow there.
-        view: Whose pixels.
-        camera: Who looks.
-        looks: Colours and light.
-        scenery: Textures and fog.
-        world: Whose.
-        sight: The geom.
+        nearest: Distance along each pixel's ray.
+        dark: Whether the surface is in shadow.
+        view: Image size.
+        camera: Field of view.
+        materials: Colours and light.
+        effects: Textures and fog.
+        world: Which environment.
+        geom_view: The geom.
         face: Which of its faces.
         normal: Of the face, in the geom's frame.
     """
-    own = 255.0 * looks.colors[world % looks.colors.shape[0], sight.number]
-    lit, shaded = light_on(looks, world, sight.axes @ normal)
+    own = 255.0 * materials.colors[world % materials.colors.shape[0], geom_view.number]
+    lit, shaded = light_surface(materials, world, geom_view.axes @ normal)
     lit, shaded = wp.cw_mul(own, lit), wp.cw_mul(own, shaded)
-    fog = scenery.fog[world % scenery.fog.shape[0]]
-    horizon = looks.sky[world % looks.sky.shape[0]]
-    row = world % scenery.texture.shape[0]
-    texture = scenery.texture[row, sight.number]
+    fog = effects.fog[world % effects.fog.shape[0]]
+    horizon = materials.sky[world % materials.sky.shape[0]]
+    row = world % effects.texture.shape[0]
+    texture = effects.texture[row, geom_view.number]
     if texture < 0:
-        shade_even(colors, first, last, nearest, dark, lit, shaded, fog, horizon)
+        shade_plain(colors, first, last, nearest, dark, lit, shaded, fog, horizon)
     else:
-        tiles = scenery.tiles[row, sight.number]
-        start, side = scenery.starts[texture], scenery.sides[texture]
-        cover = lay(start, side, tiles, sight, face, normal)
+        tiles = effects.tiles[row, geom_view.number]
+        start, side = effects.starts[texture], effects.sides[texture]
+        cover = map_texture(start, side, tiles, geom_view, face, normal)
         pixel = 2.0 * camera.half_height / float(view.height) * tiles * float(side)
         cover.area = pixel * pixel
-        texels = scenery.texels
-        shade_covered(
+        texels = effects.texels
+        shade_textured(
             colors, first, last, rays, nearest, dark, texels, cover, lit, shaded, fog, horizon
         )
 
 
 @wp.func
-def light_on(looks: Looks, world: int, normal: wp.vec3) -> tuple[wp.vec3, wp.vec3]:
-    """Light on a surface in the sun, and in its shadow. Normal: world frame."""
-    row = world % looks.ambient.shape[0]
+def light_surface(materials: Materials, world: int, normal: wp.vec3) -> tuple[wp.vec3, wp.vec3]:
+    """Return the light on a surface in the sun, and in shadow. Normal: world frame."""
+    row = world % materials.ambient.shape[0]
     dark = wp.vec3()
-    for light in range(looks.ambient.shape[1]):
-        dark += looks.ambient[row, light]
+    for light in range(materials.ambient.shape[1]):
+        dark += materials.ambient[row, light]
         if light > 0:
-            facing = wp.max(0.0, wp.dot(normal, -looks.direction[row, light]))
-            dark += looks.diffuse[row, light] * facing
-    facing = wp.max(0.0, wp.dot(normal, -looks.direction[row, 0]))
-    return dark + looks.diffuse[row, 0] * facing, dark
+            facing = wp.max(0.0, wp.dot(normal, -materials.direction[row, light]))
+            dark += materials.diffuse[row, light] * facing
+    facing = wp.max(0.0, wp.dot(normal, -materials.direction[row, 0]))
+    return dark + materials.diffuse[row, 0] * facing, dark
 
 
 @wp.func
-def lay(start: int, side: int, tiles: float, sight: Sight, face: int, normal: wp.vec3) -> Cover:
-    """Lays a texture on a face.
+def map_texture(
+    start: int, side: int, tiles: float, geom_view: GeomView, face: int, normal: wp.vec3
+) -> TextureMap:
+    """Project a texture onto a face.
 
-    A flat face shows two coordinates of the geom's own frame; what is round shows those of the side
-    of a box that looks most the same way.
+    A flat face shows two coordinates of the geom's frame; a round one shows those of the side of a
+    box with the most similar normal.
 
     Args:
-        start: Where its texels begin.
-        side: How many these are, each way.
-        tiles: In a metre.
-        sight: The geom.
+        start: First texel.
+        side: Texels each way.
+        tiles: Per metre.
+        geom_view: The geom.
         face: Which of its faces.
         normal: Of the face, in the geom's frame.
     """
@@ -315,11 +277,11 @@ def lay(start: int, side: int, tiles: float, sight: Sight, face: int, normal: wp
         right = 1
     if axis == 2:
         low = 1
-    cover = Cover()
+    cover = TextureMap()
     cover.start = start
     cover.side = side
-    cover.across = tiles * sight.into[right]
-    cover.down = -tiles * sight.into[low]
-    cover.corner = tiles * wp.vec2(sight.eye[right], -sight.eye[low])
-    cover.facing = -(wp.transpose(sight.into) @ normal)
+    cover.across = tiles * geom_view.into[right]
+    cover.down = -tiles * geom_view.into[low]
+    cover.corner = tiles * wp.vec2(geom_view.eye[right], -geom_view.eye[low])
+    cover.facing = -(wp.transpose(geom_view.into) @ normal)
     return cover

@@ -1,53 +1,46 @@
 # ruff: noqa: RUF046, UP018
-# pyright: reportIndexIssue=false
-# pyright: reportAssignmentType=false
-# pyright: reportReturnType=false
-# pyright: reportArgumentType=false
-# pyright: reportCallIssue=false
-# pyright: reportOperatorIssue=false
-# pyright: reportGeneralTypeIssues=false
-# pyright: reportAttributeAccessIssue=false
-# (Warp compiles this file; Python's types say nothing about it, and what a loop changes is
-# declared by its type.)
-"""Shadows of the sun: where solids stand in its way, and which pixels can show that.
+# pyright: reportArgumentType=false, reportAssignmentType=false, reportAttributeAccessIssue=false
+# pyright: reportCallIssue=false, reportGeneralTypeIssues=false, reportIndexIssue=false
+# pyright: reportOperatorIssue=false, reportReturnType=false
+"""Shadows: which points a solid keeps from the sun, and which pixels can show that.
 
-Planes cast none, as they are seen from one side alone. The sun is a scene's first light.
+The sun is the scene's first light. Planes cast no shadows, since they are visible from one side.
 """
 
 import warp as wp
 
-from drone_rl.sim.rendering.raytrace.intersection_kernel import FAR_AWAY, PLANE, enter
-from drone_rl.sim.rendering.raytrace.projection_kernel import IN_FRONT, rectangle
-from drone_rl.sim.rendering.raytrace.structs_kernel import Camera, Sight, View
+from drone_rl.sim.rendering.raytrace.intersection_kernel import FAR_AWAY, PLANE, intersect_solid
+from drone_rl.sim.rendering.raytrace.projection_kernel import IN_FRONT, pixel_rectangle
+from drone_rl.sim.rendering.raytrace.structs_kernel import Camera, GeomView, View
 
 
 @wp.func
-def is_behind(sight: Sight, ray: wp.vec3, distance: float, sun: wp.vec3) -> bool:
-    """Whether a geom keeps the sun from a place.
+def is_shadowed(geom_view: GeomView, ray: wp.vec3, distance: float, sun: wp.vec3) -> bool:
+    """Return whether a geom shadows a point.
 
     Args:
-        sight: The geom; not the one that the place is on.
-        ray: Of the camera, in the camera's frame, on which the place is.
-        distance: Along it.
-        sun: Where the sun's light goes, in the geom's frame.
+        geom_view: The geom; not the one that the point is on.
+        ray: Of the camera, in the camera's frame, on which the point is.
+        distance: Of the point along the ray.
+        sun: Direction of the sunlight, in the geom's frame.
     """
-    place = sight.eye + distance * (sight.into @ ray)
-    along, _face = enter(sight.kind, sight.size, place, -sun)
+    place = geom_view.eye + distance * (geom_view.into @ ray)
+    along, _face = intersect_solid(geom_view.kind, geom_view.size, place, -sun)
     return along >= 0.0
 
 
 _READ = """
-const float a = sight.into.data[0][0], b = sight.into.data[0][1], c = sight.into.data[0][2];
-const float d = sight.into.data[1][0], e = sight.into.data[1][1], f = sight.into.data[1][2];
-const float g = sight.into.data[2][0], h = sight.into.data[2][1], k = sight.into.data[2][2];
-const float x_eye = sight.eye[0], y_eye = sight.eye[1], z_eye = sight.eye[2];
+const float a = caster.into.data[0][0], b = caster.into.data[0][1], c = caster.into.data[0][2];
+const float d = caster.into.data[1][0], e = caster.into.data[1][1], f = caster.into.data[1][2];
+const float g = caster.into.data[2][0], h = caster.into.data[2][1], k = caster.into.data[2][2];
+const float x_eye = caster.eye[0], y_eye = caster.eye[1], z_eye = caster.eye[2];
 const wp::vec_t<3, float> *const seen = rays.data;
 const float *const far = nearest.data;
 const int *const owner = owners.data;
 int *const hidden = dark.data;
 const int own = geom * faces, next = own + faces;
 """
-"""Before anything is written, which C++ takes for possibly the same memory."""
+"""Loads everything before the first write, which C++ must assume to alias."""
 _PLACE = """
     const float u = seen[i][0], v = seen[i][1], w = seen[i][2];
     const float x = x_eye + far[i] * (a * u + b * v + c * w);
@@ -55,7 +48,7 @@ _PLACE = """
     const float z = z_eye + far[i] * (g * u + h * v + k * w);
     const bool is_other = (owner[i] >= 0) & ((owner[i] < own) | (owner[i] >= next));
 """
-"""Of a pixel, in the geom's frame, and whether somebody else is seen there."""
+"""Computes a pixel's surface point in the geom's frame, and whether it is another geom's."""
 
 
 @wp.func_native(f"""
@@ -63,9 +56,9 @@ _PLACE = """
 const float x_per = 1.0f / (wp::abs(sun[0]) < 1e-9f ? 1e-9f : sun[0]);
 const float y_per = 1.0f / (wp::abs(sun[1]) < 1e-9f ? 1e-9f : sun[1]);
 const float z_per = 1.0f / (wp::abs(sun[2]) < 1e-9f ? 1e-9f : sun[2]);
-const float x_half = wp::abs(x_per) * sight.size[0];
-const float y_half = wp::abs(y_per) * sight.size[1];
-const float z_half = wp::abs(z_per) * sight.size[2];
+const float x_half = wp::abs(x_per) * caster.size[0];
+const float y_half = wp::abs(y_per) * caster.size[1];
+const float z_half = wp::abs(z_per) * caster.size[2];
 for (int i = first; i < last; ++i) {{
     {_PLACE}
     const float x_at = x * x_per, y_at = y * y_per, z_at = z * z_per;
@@ -76,7 +69,7 @@ for (int i = first; i < last; ++i) {{
     leave = leave < z_at + z_half ? leave : z_at + z_half;
     hidden[i] |= (enter >= 0.0f) & (enter <= leave) & is_other;
 }}""")
-def hide_by_box(
+def cast_box_shadow(
     dark: wp.array[int],
     first: int,
     last: int,
@@ -85,42 +78,42 @@ def hide_by_box(
     owners: wp.array[int],
     faces: int,
     geom: int,
-    sight: Sight,
+    caster: GeomView,
     sun: wp.vec3,
 ) -> None:
-    """Marks the pixels in a row from which a box keeps the sun.
+    """Mark the pixels of a span that a box shadows.
 
     Args:
-        dark: Is written.
-        first: The first pixel.
-        last: The one after the last.
+        dark: Written: 1 in shadow.
+        first: First pixel.
+        last: One past the last pixel.
         rays: Of the pixels.
-        nearest: How far along its ray each surface is.
-        owners: Whose it is: so many times the geom, and the face; negative for the sky.
-        faces: How many times.
-        geom: The box, which is not in its own way.
-        sight: The same.
-        sun: Where the sun's light goes, in the box's frame.
+        nearest: Distance of each visible surface.
+        owners: Its owner: `faces` times the geom, plus the face; negative for the sky.
+        faces: See above.
+        geom: Index of the caster, which does not shadow itself.
+        caster: The box.
+        sun: Direction of the sunlight, in the box's frame.
     """
     ...
 
 
-MAYBE = wp.constant(2)
-"""What a pixel is marked with whose place may be in a geom's shadow."""
+CANDIDATE = wp.constant(2)
+"""Mark of a pixel that may be in shadow."""
 
 
 @wp.func_native(f"""
 {_READ}
 const float x_sun = sun[0], y_sun = sun[1], z_sun = sun[2];
 const float speed = x_sun * x_sun + y_sun * y_sun + z_sun * z_sun;
-const float reach = 1.001f * speed * wp::dot(sight.reach, sight.reach), loss = 1e-5f * speed;
+const float reach = 1.001f * speed * wp::dot(caster.reach, caster.reach), loss = 1e-5f * speed;
 for (int i = first; i < last; ++i) {{
     {_PLACE}
     const float p = y * z_sun - z * y_sun, q = z * x_sun - x * z_sun, r = x * y_sun - y * x_sun;
     const bool is_near = p * p + q * q + r * r <= reach + loss * (x * x + y * y + z * z);
     hidden[i] = ((hidden[i] == 0) & is_near & is_other) ? maybe : hidden[i];
 }}""")
-def mark_near(
+def mark_candidates(
     dark: wp.array[int],
     first: int,
     last: int,
@@ -129,49 +122,37 @@ def mark_near(
     owners: wp.array[int],
     faces: int,
     geom: int,
-    sight: Sight,
+    caster: GeomView,
     sun: wp.vec3,
     maybe: int,
 ) -> None:
-    """Marks the pixels in a row from which the sun's light passes the ball around a geom.
-
-    Args:
-        dark: Is written where it is 0; see `hide_by_box`, as what is not told here.
-        first: The first pixel.
-        last: The one after the last.
-        rays: Of the pixels.
-        nearest: How far along its ray each surface is.
-        owners: Whose it is.
-        faces: How many times.
-        geom: Whose ball.
-        sight: The same.
-        sun: Where the sun's light goes, in the geom's frame.
-        maybe: The mark.
-    """
+    """Mark pixels whose sunlight passes the bounding sphere of a solid; see `cast_box_shadow`."""
     ...
 
 
 @wp.func
-def find_ground(view: View, sights: wp.array[Sight], sun: wp.vec3) -> int:
-    """The plane on which all shadows end; -1 for none."""
+def find_ground(view: View, geom_views: wp.array[GeomView], sun: wp.vec3) -> int:
+    """Return the index of the plane on which all shadows end; -1 for none."""
     ground = int(-1)
-    for geom in range(sights.shape[0]):
-        if sights[geom].kind == PLANE:
-            sight = sights[geom]
-            is_wide = _is_wide(sight.size[0], view.far) and _is_wide(sight.size[1], view.far)
-            if is_wide and wp.dot(_upright(sight), sun) < 0.0:
+    for geom in range(geom_views.shape[0]):
+        if geom_views[geom].kind == PLANE:
+            geom_view = geom_views[geom]
+            is_wide = _is_wide(geom_view.size[0], view.far) and _is_wide(
+                geom_view.size[1], view.far
+            )
+            if is_wide and wp.dot(_upright(geom_view), sun) < 0.0:
                 ground = geom
     return ground
 
 
 @wp.func
 def shadow_length(
-    view: View, sights: wp.array[Sight], geom: int, ground: int, sun: wp.vec3
+    view: View, geom_views: wp.array[GeomView], geom: int, ground: int, sun: wp.vec3
 ) -> float:
-    """How far along the sun's light the shadow of a geom must be looked for, in metres."""
+    """Return how far a geom's shadow can reach along the sunlight, metres."""
     if ground < 0:
         return view.far
-    caster, plane = sights[geom], sights[ground]
+    caster, plane = geom_views[geom], geom_views[ground]
     up = _upright(plane)
     highest = plane.eye[2] - wp.dot(up, caster.axes @ caster.eye)
     along = wp.transpose(caster.axes) @ up
@@ -181,22 +162,25 @@ def shadow_length(
 
 
 @wp.func
-def around_shadow(view: View, camera: Camera, sight: Sight, way: wp.vec3) -> wp.vec4i:
-    """Columns and rows, from and to, outside which no ray meets a geom or its shadow.
+def shadow_rectangle(view: View, camera: Camera, geom_view: GeomView, way: wp.vec3) -> wp.vec4i:
+    """Return the pixels outside which no ray meets a geom or its shadow.
 
     Args:
-        view: Whose pixels.
-        camera: Who looks.
-        sight: The geom.
+        view: Image size.
+        camera: Field of view.
+        geom_view: The geom.
         way: From the geom to where its shadow ends, world frame.
+
+    Returns:
+        First and last+1 column, first and last+1 row.
     """
-    back = wp.transpose(sight.into)
-    centre = -(back @ sight.eye)
-    swept = back @ (wp.transpose(sight.axes) @ way)
+    back = wp.transpose(geom_view.into)
+    centre = -(back @ geom_view.eye)
+    swept = back @ (wp.transpose(geom_view.axes) @ way)
     sides = wp.matrix_from_cols(
-        back @ wp.vec3(sight.reach[0], 0.0, 0.0),
-        back @ wp.vec3(0.0, sight.reach[1], 0.0),
-        back @ wp.vec3(0.0, 0.0, sight.reach[2]),
+        back @ wp.vec3(geom_view.reach[0], 0.0, 0.0),
+        back @ wp.vec3(0.0, geom_view.reach[1], 0.0),
+        back @ wp.vec3(0.0, 0.0, geom_view.reach[2]),
     )
     lowest = wp.vec2(FAR_AWAY, FAR_AWAY)
     highest = wp.vec2(-FAR_AWAY, -FAR_AWAY)
@@ -212,7 +196,7 @@ def around_shadow(view: View, camera: Camera, sight: Sight, way: wp.vec3) -> wp.
     if behind == 65535:
         return wp.vec4i(0, 0, 0, 0)
     if behind > 0:
-        for edge in range(64):  # as in `around`, of a box that has been drawn out
+        for edge in range(64):  # as in `bounding_rectangle`, of a swept box
             one, other = edge // 4, (edge // 4) ^ (1 << (edge % 4))
             if ((behind >> one) & 1) == 0 and ((behind >> other) & 1) == 1:
                 at = _corner(one, centre, sides, swept)
@@ -221,12 +205,12 @@ def around_shadow(view: View, camera: Camera, sight: Sight, way: wp.vec3) -> wp.
                 seen = wp.vec2(at[0], -at[1]) / IN_FRONT
                 lowest = wp.min(lowest, seen)
                 highest = wp.max(highest, seen)
-    return rectangle(view, camera, lowest, highest)
+    return pixel_rectangle(view, camera, lowest, highest)
 
 
 @wp.func
 def _corner(corner: int, centre: wp.vec3, sides: wp.mat33, swept: wp.vec3) -> wp.vec3:
-    """Of a box, bits 0 to 2, here or where its shadow ends, bit 3; in the camera's frame."""
+    """A corner of a box (bits 0 to 2), moved to the shadow's end (bit 3), camera frame."""
     signs = wp.vec3(
         float(corner & 1) * 2.0 - 1.0,
         float((corner >> 1) & 1) * 2.0 - 1.0,
@@ -236,7 +220,7 @@ def _corner(corner: int, centre: wp.vec3, sides: wp.mat33, swept: wp.vec3) -> wp
 
 
 @wp.func
-def _upright(plane: Sight) -> wp.vec3:
+def _upright(plane: GeomView) -> wp.vec3:
     """A plane's normal, world frame."""
     return plane.axes @ wp.vec3(0.0, 0.0, 1.0)
 

@@ -1,29 +1,31 @@
-"""What is done alike to pixels that follow each other, in C++: many of them at a time.
+"""Vectorized loops in C++ over spans of pixels in a row; fog and textures are applied here.
 
-Warp lets an array have gaps and reads a pixel's place anew each time, so that its own loops take
-pixels one by one. These arrays have none.
+Warp's own loops allow for strided arrays and recompute each pixel's address, so they are not
+vectorized. These arrays are contiguous. A GPU calls the same functions for one pixel.
 """
 
 import warp as wp
+
+from drone_rl.sim.rendering.raytrace.structs_kernel import TextureMap
 
 _FILL = "for (int i = first; i < last; ++i) values.data[i] = value;"
 
 
 @wp.func_native(_FILL)
 def fill_floats(values: wp.array[float], first: int, last: int, value: float) -> None:
-    """Writes one number into pixels from the first to the one before the last."""
+    """Write one number to the pixels from `first` up to, not including, `last`."""
     ...
 
 
 @wp.func_native(_FILL)
 def fill_ints(values: wp.array[int], first: int, last: int, value: int) -> None:
-    """The same of whole numbers."""
+    """`fill_floats` for integers."""
     ...
 
 
 @wp.func_native(_FILL)
 def fill_bytes(values: wp.array[wp.vec3ub], first: int, last: int, value: wp.vec3ub) -> None:
-    """The same of colours."""
+    """`fill_floats` for colours."""
     ...
 
 
@@ -36,13 +38,13 @@ for (int i = first; i < last; ++i) {
     at[3 * i + 2] = z;
 }""")
 def fill_vectors(values: wp.array[wp.vec3], first: int, last: int, value: wp.vec3) -> None:
-    """The same of vectors."""
+    """`fill_floats` for vectors."""
     ...
 
 
 @wp.func_native("for (int i = first; i < last; ++i) values.data[i] = given.data[i];")
 def copy(values: wp.array[float], first: int, last: int, given: wp.array[float]) -> None:
-    """Writes the numbers of others."""
+    """Copy numbers."""
     ...
 
 
@@ -50,7 +52,7 @@ def copy(values: wp.array[float], first: int, last: int, given: wp.array[float])
 def multiply(
     values: wp.array[float], first: int, last: int, given: wp.array[float], by: wp.array[float]
 ) -> None:
-    """Writes the products of others."""
+    """Write the products of two arrays."""
     ...
 
 
@@ -63,7 +65,7 @@ for (int i = first; i < last; ++i) {
     nearest.data[i] = is_nearer ? along : so_far;
     owner.data[i] = is_nearer ? mark : owner.data[i];
 }""")
-def meet_level(
+def intersect_level_plane(
     nearest: wp.array[float],
     owner: wp.array[int],
     first: int,
@@ -74,18 +76,18 @@ def meet_level(
     same: float,
     mark: int,
 ) -> None:
-    """Marks the pixels in which a plane, which all of them meet, is the nearest.
+    """Intersect rays with a plane that all of them meet; mark the pixels in which it is nearest.
 
     Args:
-        nearest: How far away the nearest was before.
-        owner: Whose it is.
-        first: The first pixel.
-        last: The one after the last.
+        nearest: Distance of the nearest surface; updated.
+        owner: Its owner; updated.
+        first: First pixel.
+        last: One past the last pixel.
         rays: Of the pixels.
-        down: What a ray is multiplied by to find how fast it comes nearer to the plane.
-        height: Of the eye over the plane.
+        down: A ray's dot product with it is its speed towards the plane.
+        height: Of the eye above the plane.
         same: Relative distance within which the plane is in front.
-        mark: For the owner.
+        mark: The plane's owner number.
     """
     ...
 
@@ -106,7 +108,7 @@ def mix_gray(
     green: float,
     blue: float,
 ) -> None:
-    """Gray of colours by weights, each sum rounded as by torch on x86."""
+    """Write gray of colours by weights; each sum is rounded as by torch on x86."""
     ...
 
 
@@ -114,27 +116,8 @@ def mix_gray(
 def copy_colors(
     values: wp.array[wp.vec3ub], first: int, last: int, given: wp.array[wp.vec3ub]
 ) -> None:
-    """Writes the colours of others."""
+    """Copy colours."""
     ...
-
-
-@wp.struct
-class Cover:
-    """A texture as it lies on a face, for one camera."""
-
-    start: int
-    """The first texel; `levels` says what follows."""
-    side: int
-    """Texels each way: a power of 2."""
-    across: wp.vec3
-    """What the way along a ray is multiplied by to go across the texture, in tiles."""
-    down: wp.vec3
-    corner: wp.vec2
-    """Where the camera is, across and down."""
-    facing: wp.vec3
-    """Against the face, in the camera's frame."""
-    area: float
-    """Texels, of the finest, that a pixel at the middle of the picture covers in 1 m."""
 
 
 @wp.func_native("""
@@ -154,16 +137,16 @@ def shade_sky(
     horizon: wp.vec3,
     zenith: wp.vec3,
 ) -> None:
-    """Colours the sky.
+    """Colour the sky.
 
     Args:
-        colors: Are written.
-        first: The first pixel.
-        last: The one after the last.
+        colors: Written.
+        first: First pixel.
+        last: One past the last pixel.
         rays: Of the pixels.
-        up: What a ray is multiplied by to find the sine of its elevation.
-        horizon: Colour of the sky there and below, from 0 to 255.
-        zenith: The same overhead.
+        up: World's up axis in the camera's frame.
+        horizon: Colour at and below the horizon, 0 to 255.
+        zenith: Colour overhead.
     """
     ...
 
@@ -177,7 +160,7 @@ _FADE = """
     const float clear = two.number * (1.0f + part * (0.69314718f + part * (0.24022651f + part
         * (0.05550411f + part * (0.00961813f + part * 0.00133336f)))));
 """
-"""The share of a colour that fog leaves over."""
+"""Fog: the fraction `clear` of a colour that passes, e^(-fog distance), by a polynomial."""
 _WRITE = """
     for (int c = 0; c < 3; ++c) {
         const float full = color[c] < 255.0f ? color[c] : 255.0f;
@@ -196,7 +179,7 @@ for (int i = first; i < last; ++i) {{
         shaded[2] + in_sun * (lit[2] - shaded[2])}};
     {_WRITE}
 }}""")
-def shade_even(
+def shade_plain(
     colors: wp.array[wp.vec3ub],
     first: int,
     last: int,
@@ -207,17 +190,17 @@ def shade_even(
     fog: float,
     horizon: wp.vec3,
 ) -> None:
-    """Colours a flat face.
+    """Colour a flat face, with shadow and fog.
 
     Args:
-        colors: Are written.
-        first: The first pixel.
-        last: The one after the last.
-        nearest: How far along its ray it is.
-        dark: Whether it is in shadow there.
-        lit: Its colour in the sun, from 0 to 255 or more.
-        shaded: The same in shadow.
-        fog: See `Scenery.fog`.
+        colors: Written.
+        first: First pixel.
+        last: One past the last pixel.
+        nearest: Distance along each pixel's ray.
+        dark: Whether the surface is in shadow.
+        lit: Its colour in the sun, 0 to 255 or more.
+        shaded: Its colour in shadow.
+        fog: See `Effects.fog`.
         horizon: Colour of the fog.
     """
     ...
@@ -230,16 +213,17 @@ const int at_once = 1;
 const int at_once = 64;
 #endif
 """
-"""Pixels; where texels are read one by one between sums over all of these, both are faster."""
+"""Pixels of a block: separating the reads of texels from the arithmetic makes both faster."""
 
 
 @wp.func_native(f"""
 {_AT_ONCE}
-const float x_on = cover.across[0], y_on = cover.across[1], z_on = cover.across[2];
-const float x_down = cover.down[0], y_down = cover.down[1], z_down = cover.down[2];
-const float x_against = cover.facing[0], y_against = cover.facing[1], z_against = cover.facing[2];
-const float corner_x = cover.corner[0], corner_y = cover.corner[1], area = cover.area;
-const int begin = cover.start, whole_side = cover.side;
+const float x_on = texture.across[0], y_on = texture.across[1], z_on = texture.across[2];
+const float x_down = texture.down[0], y_down = texture.down[1], z_down = texture.down[2];
+const float x_against = texture.facing[0], y_against = texture.facing[1];
+const float z_against = texture.facing[2];
+const float corner_x = texture.corner[0], corner_y = texture.corner[1], area = texture.area;
+const int begin = texture.start, whole_side = texture.side;
 const unsigned *const stored = texels.data;
 const wp::vec_t<3, float> *const seen = rays.data;
 const float *const far = nearest.data;
@@ -298,7 +282,7 @@ for (int k = 0; k < count; ++k) {{
     {_WRITE}
 }}
 }}""")
-def shade_covered(
+def shade_textured(
     colors: wp.array[wp.vec3ub],
     first: int,
     last: int,
@@ -306,29 +290,29 @@ def shade_covered(
     nearest: wp.array[float],
     dark: wp.array[int],
     texels: wp.array[wp.uint32],
-    cover: Cover,
+    texture: TextureMap,
     lit: wp.vec3,
     shaded: wp.vec3,
     fog: float,
     horizon: wp.vec3,
 ) -> None:
-    """The same of a face with a texture, which is multiplied by its colour.
+    """Colour a textured face; other arguments as of `shade_plain`.
 
-    Of the four texels around a place each has a share; how much a pixel covers, in the mean of its
-    two sides, chooses the level.
+    Texels are interpolated bilinearly. The mip level follows from the number of texels that a pixel
+    covers, by the mean of its two sides.
 
     Args:
-        colors: See `shade_even`, as what is not told here.
-        first: The first pixel.
-        last: The one after the last.
+        colors: Written.
+        first: First pixel.
+        last: One past the last pixel.
         rays: Of the pixels.
-        nearest: How far along its ray it is.
-        dark: Whether it is in shadow there.
-        texels: Of all textures, see `Scenery`.
-        cover: The texture on this face.
-        lit: In the sun, of what is white in the texture.
+        nearest: Distance along each pixel's ray.
+        dark: Whether the surface is in shadow.
+        texels: Of all textures, see `Effects`.
+        texture: The texture on this face.
+        lit: Colour in the sun of a white texel.
         shaded: The same in shadow.
-        fog: See `Scenery.fog`.
+        fog: See `Effects.fog`.
         horizon: Colour of the fog.
     """
     ...

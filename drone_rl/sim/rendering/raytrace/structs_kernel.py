@@ -1,8 +1,15 @@
-# pyright: reportGeneralTypeIssues=false
-# (Warp's structures are untyped.)
-"""What the ray tracer's kernels are given, and the numbers that stand for things in them."""
+# pyright: reportGeneralTypeIssues=false, reportReturnType=false
+# (Warp compiles this file, which means more by it than Python's types.)
+"""Structs that the ray tracer's kernels share: cameras, geoms, poses, materials, images, scratch.
+
+A batch of images has one row per image: all cameras of the first environment, of the second, ...
+"""
+
+from typing import TypeVar
 
 import warp as wp
+
+_Struct = TypeVar("_Struct")
 
 RGB = wp.constant(1)
 GRAY = wp.constant(2)
@@ -10,77 +17,85 @@ DEPTH = wp.constant(4)
 DISTANCE = wp.constant(8)
 SEGMENTATION = wp.constant(16)
 NORMALS = wp.constant(32)
-"""What a picture shows, a bit each, so that a sum of them is what is drawn in one pass."""
+"""Modalities, one bit each: their sum is rendered in one pass."""
 
 DRONE_FRAME = wp.constant(1)
-"""The only frame that turns; 0 is the world's and the props' follow."""
+"""The only frame that rotates. Frame 0 is the world, and frames from 2 are the props."""
+NO_GEOM = wp.constant(-1)
+"""Owner of a pixel that shows the sky."""
+FACES = wp.constant(8)
+"""An owner is `FACES` times the index of a rendered geom, plus the face."""
 
 
-@wp.struct
+def struct(cls: type[_Struct]) -> type[_Struct]:
+    """Make a Warp struct of a class, and keep its type for type checkers."""
+    return wp.struct(cls)
+
+
+@struct
 class Camera:
     """One camera of a view."""
 
     frame: int
     position: wp.vec3
-    """In its frame, metres."""
+    """Metres, in its frame."""
     attitude: wp.vec4
-    """In its frame, (w, x, y, z); it looks along its own -z, with y up."""
+    """Quaternion (w, x, y, z) in its frame; the camera looks along its own -z, with y up."""
     half_width: float
-    """Of the picture at a distance of 1."""
+    """Of the image plane at distance 1."""
     half_height: float
 
 
-@wp.struct
+@struct
 class View:
-    """All cameras of a view, whose pictures are of one size."""
+    """All cameras of a view, which share one image size."""
 
     count: int
-    """Of cameras of a world."""
+    """Cameras per environment."""
     cameras: wp.array[Camera]
-    """Of all worlds alike, or those of the first world, of the second, ..."""
+    """Shared by all environments, or those of the first environment, of the second, ..."""
     rays: wp.array2d[wp.vec3]
-    """Directions of length 1 in each camera's frame, of all pixels, row by row."""
+    """Unit directions in each camera's frame, of all pixels, row by row."""
     cosines: wp.array2d[float]
-    """Of the angles between rays and their camera's axis."""
+    """Cosine of the angle between each ray and its camera's axis."""
     width: int
     height: int
     far: float
-    """Metres along the axis beyond which nothing is drawn."""
+    """Metres along the axis beyond which nothing is rendered."""
     what: int
-    """A sum of `RGB` and so on."""
+    """Sum of modalities."""
 
 
-@wp.struct
+@struct
 class Geoms:
-    """What is drawn, in the model's order."""
+    """The rendered geoms, in the model's order."""
 
     kind: wp.array[int]
     number: wp.array[int]
-    """In the model."""
+    """Index in the model."""
     frame: wp.array[int]
     position: wp.array[wp.vec3]
     attitude: wp.array[wp.vec4]
     size: wp.array[wp.vec3]
     reach: wp.array[wp.vec3]
-    """Half extents of the box around each, in its own frame."""
+    """Half extents of the bounding box in the geom's frame."""
 
 
-@wp.struct
+@struct
 class Poses:
-    """Where frames are in each world."""
+    """Poses of the frames."""
 
-    places: wp.array2d[wp.vec3]
-    """Shape: (num_worlds, num_frames)."""
+    positions: wp.array2d[wp.vec3]
+    """Metres. Shape: (num_worlds, num_frames)."""
     attitudes: wp.array[wp.vec4]
-    """Of the drones, quaternions (w, x, y, z) of length 1. Shape: (num_worlds,)."""
+    """Unit quaternions (w, x, y, z) of the drones. Shape: (num_worlds,)."""
     scales: wp.array2d[float]
-    """How many times as large as in the model what a frame carries is; none where nothing differs.
-    Shape: as that of `places`."""
+    """Size of a frame's geoms relative to the model, or no array. Shape: as `positions`."""
 
 
-@wp.struct
-class Looks:
-    """Colours and light; first dimension: one for all worlds or one for each."""
+@struct
+class Materials:
+    """Colours and lights; first dimension: one for all environments or one each."""
 
     colors: wp.array2d[wp.vec3]
     ambient: wp.array2d[wp.vec3]
@@ -90,31 +105,31 @@ class Looks:
     """Whole numbers from 0 to 255."""
 
 
-@wp.struct
-class Scenery:
-    """What makes a world look like something; first dimension as in `Looks`."""
+@struct
+class Effects:
+    """Sky gradient, fog, shadows and textures; first dimension as in `Materials`."""
 
     zenith: wp.array[wp.vec3]
-    """Of the sky overhead, from 0 to 255; at the horizon it has `Looks.sky`."""
+    """Of the sky overhead, 0 to 255; `Materials.sky` is at the horizon."""
     fog: wp.array[float]
-    """Share of the light that is lost in a metre, by its logarithm; 0 for none."""
+    """Extinction per metre; 0 for clear air."""
     shadows: wp.array[int]
-    """Whether the first light casts any."""
+    """Whether the first light casts shadows."""
     texture: wp.array2d[int]
     """Of each geom in the model; -1 for none."""
     tiles: wp.array2d[float]
-    """Of each geom, in a metre."""
+    """Tiles per metre of each geom."""
     sides: wp.array[int]
-    """Of each texture, texels: a power of 2."""
+    """Texels along the side of each texture: a power of 2."""
     starts: wp.array[int]
-    """Where the texels of each texture begin: its own, then those of half the side, down to 1."""
+    """First texel of each texture, whose mip levels follow each other."""
     texels: wp.array[wp.uint32]
     """Red in the lowest 8 bits, then green, then blue."""
 
 
-@wp.struct
-class Pictures:
-    """What is drawn into, a row a picture: all cameras of the first world, of the second, ..."""
+@struct
+class Images:
+    """Outputs. Shapes: (num_images, num_pixels)."""
 
     rgb: wp.array2d[wp.vec3ub]
     gray: wp.array2d[float]
@@ -124,17 +139,73 @@ class Pictures:
     normals: wp.array2d[wp.vec3]
 
 
-@wp.struct
-class Sight:
-    """One geom as one world's camera sees it."""
+@struct
+class GeomView:
+    """One geom relative to one camera of one environment."""
 
     kind: int
     number: int
     size: wp.vec3
     reach: wp.vec3
     eye: wp.vec3
-    """The camera's place in the geom's frame."""
+    """The camera's position in the geom's frame."""
     into: wp.mat33
-    """Turns directions from the camera's frame to the geom's."""
+    """Rotates directions from the camera's frame to the geom's."""
     axes: wp.mat33
-    """The same from the geom's to the world's."""
+    """Rotates directions from the geom's frame to the world's."""
+
+
+@struct
+class CameraPose:
+    """A camera in the world frame."""
+
+    eye: wp.vec3
+    looking: wp.mat33
+    """Rotates directions from the camera's frame to the world's."""
+
+
+@struct
+class PixelValue:
+    """Everything that a pixel shows except its distance."""
+
+    number: int
+    """Geom index in the model; -1 for the sky."""
+    normal: wp.vec3
+    """World frame; zero for the sky."""
+    color: wp.vec3ub
+    gray: float
+    """In [0, 1]."""
+
+
+@struct
+class TextureMap:
+    """A texture projected onto a face, for one camera."""
+
+    start: int
+    """The first texel."""
+    side: int
+    """Texels each way: a power of 2."""
+    across: wp.vec3
+    """Tiles across the texture per unit along a ray: dot product with the ray."""
+    down: wp.vec3
+    corner: wp.vec2
+    """The camera's position, tiles across and down."""
+    facing: wp.vec3
+    """Opposite of the face's normal, camera frame."""
+    area: float
+    """Texels of the finest level that the central pixel covers at 1 m."""
+
+
+@struct
+class Scratch:
+    """Working memory of one image at a time; first dimension: workers."""
+
+    nearest: wp.array2d[float]
+    """Distance along each pixel's ray to the nearest surface."""
+    owner: wp.array2d[int]
+    """Which surface that is: see `FACES` and `NO_GEOM`."""
+    dark: wp.array2d[int]
+    """Whether that surface is in shadow; used with shadows only."""
+    colors: wp.array2d[wp.vec3ub]
+    """Colours, where they differ from pixel to pixel."""
+    geom_views: wp.array2d[GeomView]

@@ -7,15 +7,15 @@ import pytest
 import torch
 
 from drone_rl.sim.rendering import Appearance, Texture
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.rendering.view import to_gray
-from tests.from_above import PAINTERS, SIZE, seen, tracer
+from tests.from_above import LAUNCHERS, SIZE, seen, tracer
 
 EVEN = {"ambient": (1.0, 1.0, 1.0), "sun": (0.0, 0.0, 0.0)}
-WHITE = {Meaning.GROUND: (1.0, 1.0, 1.0)}
+WHITE = {SemanticClass.GROUND: (1.0, 1.0, 1.0)}
 
 
-@pytest.fixture(scope="module", params=PAINTERS)
+@pytest.fixture(scope="module", params=LAUNCHERS)
 def made(request):
     renderer = tracer(request.param)
     yield renderer
@@ -42,7 +42,7 @@ def test_the_sky_goes_from_the_horizons_colour_to_the_zeniths(made):
 
 @pytest.mark.parametrize("visibility", [10.0, 20.0])
 def test_fog_leaves_a_twentieth_of_the_contrast_at_its_visibility(made, visibility):
-    colors = {**WHITE, Meaning.SKY: (0.0, 0.2, 0.4)}
+    colors = {**WHITE, SemanticClass.SKY: (0.0, 0.2, 0.4)}
     picture = seen(made, Appearance(colors=colors, fog=visibility, **EVEN))[0].double()
     aside = (2.5 + 0.125) / 10  # of the pixel whose colour is looked at, over its depth
     clear = 0.05 ** (10 * math.sqrt(1 + aside**2 + 0.0125**2) / visibility)
@@ -68,20 +68,20 @@ def test_a_box_keeps_the_sun_from_what_is_beyond_it(made):
     "kind, size", [("sphere", ".5"), ("cylinder", ".5 .5"), ("ellipsoid", ".5 .5 .5")]
 )
 def test_round_things_cast_shadows_too(kind, size):
-    pictures = []
-    for painter in PAINTERS:
-        renderer = tracer(painter, kind, size)
+    images = []
+    for launcher in LAUNCHERS:
+        renderer = tracer(launcher, kind, size)
         plain, shaded = (seen(renderer, Appearance(shadows=on))[0] for on in (0, 1))
         dark = (plain != shaded).any(-1)
         assert 8 <= dark.sum() <= 16 and dark[19:21, 23:25].all()
-        pictures.append(shaded)
+        images.append(shaded)
         renderer.close()
-    assert torch.equal(*pictures)
+    assert torch.equal(*images)
 
 
 def test_a_texture_repeats_at_its_size(made):
     """Tiles of 2.5 m, ten pixels, from the origin on: five light ones, five dark ones."""
-    tiled = {Meaning.GROUND: Texture(pictures=("checker",), size=2.5)}
+    tiled = {SemanticClass.GROUND: Texture(images=("checker",), size=2.5)}
     picture = seen(made, Appearance(colors=WHITE, textures=tiled, **EVEN))[0, ..., 0]
     row = picture[2, 20:].tolist()
     inner = [row[i] for i in (1, 2, 3, 6, 7, 8)]
@@ -92,8 +92,8 @@ def test_a_texture_repeats_at_its_size(made):
 
 
 def test_from_afar_a_texture_is_its_mean(made):
-    tiled = {Meaning.GROUND: Texture(pictures=("checker",), size=0.02)}
-    colors = {Meaning.GROUND: (1.0, 0.5, 0.0)}
+    tiled = {SemanticClass.GROUND: Texture(images=("checker",), size=0.02)}
+    colors = {SemanticClass.GROUND: (1.0, 0.5, 0.0)}
     picture = seen(made, Appearance(colors=colors, textures=tiled, **EVEN))[0].double()
     mean = (255 + 140) / 2
     assert (picture[:10] - torch.tensor([mean, mean / 2, 0.0])).abs().max() <= 1
@@ -104,8 +104,8 @@ def test_each_world_has_its_own(made):
         fog=torch.tensor([math.inf, 20.0, math.inf]),
         shadows=torch.tensor([0, 0, 1]),
         textures={
-            Meaning.GROUND: Texture(
-                pictures=("grid", "bricks"),
+            SemanticClass.GROUND: Texture(
+                images=("grid", "bricks"),
                 size=torch.tensor([1.0, 2.0, 3.0]),
                 choice=torch.tensor([-1, 0, 1]),
             )
@@ -120,7 +120,7 @@ def test_each_world_has_its_own(made):
 
 def test_gray_is_that_of_the_colours(made):
     appearance = Appearance(
-        fog=30.0, shadows=1, textures={Meaning.TARGET: Texture(pictures=("noise",), size=1.0)}
+        fog=30.0, shadows=1, textures={SemanticClass.TARGET: Texture(images=("noise",), size=1.0)}
     )
     rgb, gray = (seen(made, appearance, modality=of) for of in ("rgb", "gray"))
     assert torch.equal(gray, to_gray(rgb))

@@ -1,4 +1,4 @@
-"""The kernels for GPUs, tried on a CPU; their pictures are in test_raytrace_painters."""
+"""The kernels for GPUs, tried on a CPU; their images are in test_raytrace_painters."""
 
 import numpy as np
 import warp as wp
@@ -9,11 +9,11 @@ from tests.box_ahead import geoms, poses, view
 
 
 def test_every_geom_is_aimed_at():
-    sights = wp.zeros((1, 2), dtype=structs_kernel.Sight, device="cpu")
+    geom_views = wp.zeros((1, 2), dtype=structs_kernel.GeomView, device="cpu")
     scene = geoms(-6.0, -9.0, numbers=(1, 2))
-    given = [view(int(structs_kernel.DEPTH)), scene, poses(), sights]
-    wp.launch(kernels.aim, (1, 2), inputs=given, device="cpu")
-    found = sights.numpy()[0]
+    given = [view(int(structs_kernel.DEPTH)), scene, poses(), geom_views]
+    wp.launch(kernels.view_geoms, (1, 2), inputs=given, device="cpu")
+    found = geom_views.numpy()[0]
     assert found["number"].tolist() == [1, 2]
     np.testing.assert_allclose(found["eye"], [[0, 0, 6], [0, 0, 9]])
     np.testing.assert_allclose(found["into"], [np.eye(3)] * 2)

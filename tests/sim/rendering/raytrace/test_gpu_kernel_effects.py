@@ -4,9 +4,9 @@ import pytest
 import torch
 
 from drone_rl.sim.rendering import Appearance, Texture
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.scene import SemanticClass
 from tests.sim.rendering.raytrace.test_renderer import (
-    GpuPainter,
+    GpuLauncher,
     Raytracer,
     render,
     scattered,
@@ -19,8 +19,8 @@ APPEARANCE = Appearance(
     fog=60.0,
     shadows=1,
     textures={
-        Meaning.GROUND: Texture(pictures=("grid",), size=3.0),
-        Meaning.TARGET: Texture(pictures=("noise",), size=1.0),
+        SemanticClass.GROUND: Texture(images=("grid",), size=3.0),
+        SemanticClass.TARGET: Texture(images=("noise",), size=1.0),
     },
 )
 
@@ -28,7 +28,7 @@ APPEARANCE = Appearance(
 @pytest.mark.parametrize("modality", ["rgb", "depth", "segmentation"])
 def test_both_kernels_draw_the_same(modality):
     both = [Raytracer(scene(), num_worlds=32, num_shards=2) for _ in range(2)]
-    both[1]._painter = GpuPainter("cpu")
+    both[1]._launcher = GpuLauncher("cpu")
     poses = scattered(32, 0.4)
     ours, theirs = (render(r, view(modality), poses, APPEARANCE).double() for r in both)
     assert ((ours - theirs).abs() > 1e-3).double().mean() < 1e-3

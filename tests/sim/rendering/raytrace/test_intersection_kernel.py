@@ -13,10 +13,10 @@ from drone_rl.sim.rendering.raytrace.intersection_kernel import (
     CYLINDER,
     ELLIPSOID,
     SPHERE,
-    enter,
+    intersect_plane,
+    intersect_solid,
     is_nearest,
-    meet_plane,
-    outward,
+    surface_normal,
 )
 
 
@@ -29,14 +29,14 @@ def try_solid(
     along: wp.array[float],
     normal: wp.array[wp.vec3],
 ):
-    distance, face = enter(kind, size, point, ray)
+    distance, face = intersect_solid(kind, size, point, ray)
     along[0] = distance
-    normal[0] = outward(kind, size, face, point, ray, distance)
+    normal[0] = surface_normal(kind, size, face, point, ray, distance)
 
 
 @wp.kernel(enable_backward=False)
 def try_plane(size: wp.vec3, point: wp.vec3, ray: wp.vec3, along: wp.array[float]):
-    along[0] = meet_plane(size, point, ray)
+    along[0] = intersect_plane(size, point, ray)
 
 
 def entered(kind, size, point, ray):

@@ -7,8 +7,8 @@ import torch
 
 from drone_rl.sim.rendering import Appearance, Scene
 from drone_rl.sim.rendering.devices import start_warp
-from drone_rl.sim.rendering.raytrace.materials import Looks
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.raytrace.materials import MaterialsEncoder
+from drone_rl.sim.rendering.scene import SemanticClass
 
 XML = """<mujoco><worldbody><light directional="true" dir="0 0 -1" ambient=".1 .1 .1"
 diffuse=".5 .5 .5"/><geom name="a" type="plane" size="1 1 1" rgba=".2 .4 .6 1"/>
@@ -16,42 +16,44 @@ diffuse=".5 .5 .5"/><geom name="a" type="plane" size="1 1 1" rgba=".2 .4 .6 1"/>
 
 
 @pytest.fixture
-def looks():
+def materials():
     start_warp("cpu")
     model = mujoco.MjModel.from_xml_string(XML)
-    meanings = (Meaning.GROUND, Meaning.TARGET)
-    return Looks(Scene(model, meanings, (-1, 0), (0.2, 0.5, 1.0)), "cpu")
+    meanings = (SemanticClass.GROUND, SemanticClass.TARGET)
+    return MaterialsEncoder(Scene(model, meanings, (-1, 0), (0.2, 0.5, 1.0)), "cpu")
 
 
-def test_all_worlds_share_the_scenes(looks):
-    plain, _ = looks.of(None, 7)
+def test_all_worlds_share_the_scenes(materials):
+    plain, _ = materials.encode(None, 7)
     np.testing.assert_allclose(plain.colors.numpy(), [[[0.2, 0.4, 0.6], [0.1, 0.1, 0.1]]])
     np.testing.assert_allclose(plain.diffuse.numpy(), [[[0.5, 0.5, 0.5]]])
     assert plain.sky.numpy().tolist() == [[51, 127, 255]]  # whole numbers
 
 
-def test_worlds_may_differ_and_leave_no_trace(looks):
+def test_worlds_may_differ_and_leave_no_trace(materials):
     ground = torch.tensor([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
     appearance = Appearance(
-        colors={Meaning.GROUND: ground, Meaning.SKY: (0.0, 0.0, 1.0)},
+        colors={SemanticClass.GROUND: ground, SemanticClass.SKY: (0.0, 0.0, 1.0)},
         sun=(0.3, 0.2, 0.1),
         sun_direction=(0.0, 3.0, -4.0),
     )
-    worn, scenery = looks.of(appearance, 2)
-    assert scenery is None
+    worn, effects = materials.encode(appearance, 2)
+    assert effects is None
     assert worn.colors.numpy()[:, 0].tolist() == ground.tolist()
     np.testing.assert_allclose(worn.colors.numpy()[:, 1], [[0.1, 0.1, 0.1]] * 2)
     np.testing.assert_allclose(worn.diffuse.numpy(), [[[0.3, 0.2, 0.1]]] * 2)
     np.testing.assert_allclose(worn.direction.numpy(), [[[0.0, 0.6, -0.8]]] * 2, atol=1e-7)
     np.testing.assert_allclose(worn.ambient.numpy(), [[[0.1, 0.1, 0.1]]] * 2)
     assert worn.sky.numpy().tolist() == [[0, 0, 255]] * 2
-    np.testing.assert_allclose(looks.of(None, 2)[0].colors.numpy()[0, 0], [0.2, 0.4, 0.6])
+    np.testing.assert_allclose(materials.encode(None, 2)[0].colors.numpy()[0, 0], [0.2, 0.4, 0.6])
 
 
-def test_a_look_that_was_just_worn_is_kept_ready(looks):
-    red, blue = (Appearance(colors={Meaning.SKY: c}) for c in ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)))
-    worn, _ = looks.of(red, 2)
-    assert looks.of(red, 2)[0] is worn
-    assert looks.of(red, 3)[0].sky.numpy().tolist() == [[255, 0, 0]] * 3
-    assert looks.of(blue, 2)[0].sky.numpy().tolist() == [[0, 0, 255]] * 2
-    assert looks.of(None, 2)[0].sky.numpy().tolist() == [[51, 127, 255]]
+def test_a_look_that_was_just_worn_is_kept_ready(materials):
+    red, blue = (
+        Appearance(colors={SemanticClass.SKY: c}) for c in ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    )
+    worn, _ = materials.encode(red, 2)
+    assert materials.encode(red, 2)[0] is worn
+    assert materials.encode(red, 3)[0].sky.numpy().tolist() == [[255, 0, 0]] * 3
+    assert materials.encode(blue, 2)[0].sky.numpy().tolist() == [[0, 0, 255]] * 2
+    assert materials.encode(None, 2)[0].sky.numpy().tolist() == [[51, 127, 255]]

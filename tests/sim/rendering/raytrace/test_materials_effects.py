@@ -9,13 +9,13 @@ import torch
 
 from drone_rl.sim.rendering import Appearance, Scene, Texture
 from drone_rl.sim.rendering.devices import start_warp
-from drone_rl.sim.rendering.raytrace.materials import Sceneries
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.raytrace.materials import EffectsEncoder
+from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.rendering.textures import load
 
 XML = """<mujoco><worldbody><geom type="plane" size="1 1 1"/><geom size="1"/><geom size="2"/>
 </worldbody></mujoco>"""
-MEANINGS = (Meaning.GROUND, Meaning.TARGET, Meaning.OBSTACLE)
+MEANINGS = (SemanticClass.GROUND, SemanticClass.TARGET, SemanticClass.OBSTACLE)
 ZENITH = torch.tensor([[0.2, 0.5, 1.0], [0.0, 0.0, 0.0]])
 
 
@@ -23,26 +23,26 @@ ZENITH = torch.tensor([[0.2, 0.5, 1.0], [0.0, 0.0, 0.0]])
 def sceneries():
     start_warp("cpu")
     scene = Scene(mujoco.MjModel.from_xml_string(XML), MEANINGS, (-1, 0, 1), (0.0, 0.0, 0.0))
-    return Sceneries(scene, "cpu")
+    return EffectsEncoder(scene, "cpu")
 
 
 def test_what_is_not_given_is_not_there(sceneries):
-    made = sceneries.of(Appearance(), ZENITH)
+    made = sceneries.encode(Appearance(), ZENITH)
     assert made.zenith.numpy().tolist() == [[51, 127, 255], [0, 0, 0]]
     assert made.fog.numpy().tolist() == [0, 0] and made.shadows.numpy().tolist() == [0, 0]
     assert (made.texture.numpy() == -1).all() and len(made.sides) == 0
 
 
 def test_fog_is_told_by_what_is_lost_in_a_metre(sceneries):
-    made = sceneries.of(Appearance(fog=torch.tensor([100.0, math.inf])), ZENITH)
+    made = sceneries.encode(Appearance(fog=torch.tensor([100.0, math.inf])), ZENITH)
     assert made.fog.numpy().tolist() == pytest.approx([math.log(20) / 100, 0.0])
 
 
 def test_textures_are_stored_once_and_worn_by_world_and_thing(sceneries):
-    ground = Texture(pictures=("grid", "bricks"), size=4.0, choice=torch.tensor([1, -1]))
-    target = Texture(pictures=("bricks",), size=torch.tensor([0.5, 2.0]))
-    appearance = Appearance(textures={Meaning.GROUND: ground, Meaning.TARGET: target})
-    made = sceneries.of(appearance, ZENITH)
+    ground = Texture(images=("grid", "bricks"), size=4.0, choice=torch.tensor([1, -1]))
+    target = Texture(images=("bricks",), size=torch.tensor([0.5, 2.0]))
+    appearance = Appearance(textures={SemanticClass.GROUND: ground, SemanticClass.TARGET: target})
+    made = sceneries.encode(appearance, ZENITH)
     assert made.texture.numpy().tolist() == [[1, 1, -1], [-1, 1, -1]]
     assert made.tiles.numpy().tolist() == [[0.25, 2.0, 0.0], [0.25, 0.5, 0.0]]
     assert made.sides.numpy().tolist() == [256, 256]

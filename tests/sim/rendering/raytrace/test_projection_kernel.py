@@ -5,19 +5,25 @@ import pytest
 import warp as wp
 
 from drone_rl.sim.rendering.raytrace import structs_kernel
-from drone_rl.sim.rendering.raytrace.projection_kernel import around, look_at, stand
+from drone_rl.sim.rendering.raytrace.projection_kernel import (
+    bounding_rectangle,
+    camera_pose,
+    view_geom,
+)
 from tests.box_ahead import SIZE, geoms, poses, view
 
 
 @wp.kernel(enable_backward=False)
-def find(
+def find_visible(
     seen: structs_kernel.View,
     scene: structs_kernel.Geoms,
     placed: structs_kernel.Poses,
     part: wp.array[wp.vec4i],
 ):
     camera = seen.cameras[0]
-    part[0] = around(seen, camera, look_at(scene, 0, placed, 0, stand(camera, placed, 0)))
+    part[0] = bounding_rectangle(
+        seen, camera, view_geom(scene, 0, placed, 0, camera_pose(camera, placed, 0))
+    )
 
 
 def found(position, size=(1.0, 1.0, 1.0)):
@@ -27,7 +33,7 @@ def found(position, size=(1.0, 1.0, 1.0)):
     scene.reach = wp.array([size], dtype=wp.vec3, device="cpu")
     part = wp.zeros(1, dtype=wp.vec4i, device="cpu")
     given = [view(int(structs_kernel.DEPTH)), scene, poses(), part]
-    wp.launch(find, 1, inputs=given, device="cpu")
+    wp.launch(find_visible, 1, inputs=given, device="cpu")
     return part.numpy()[0].tolist()
 
 
@@ -59,7 +65,7 @@ def test_frames_carry_what_is_fixed_to_them():
     """A camera on the drone, which is turned to look along x; the box is the world's."""
     turned = poses()
     half = np.sqrt(0.5)
-    turned.places = wp.array([[[0, 0, 0], [1.0, 2.0, 3.0]]], dtype=wp.vec3, device="cpu")
+    turned.positions = wp.array([[[0, 0, 0], [1.0, 2.0, 3.0]]], dtype=wp.vec3, device="cpu")
     turned.attitudes = wp.array([[half, 0.0, -half, 0.0]], dtype=wp.vec4, device="cpu")
     seen = view(int(structs_kernel.DEPTH))
     camera = structs_kernel.Camera()
@@ -69,5 +75,5 @@ def test_frames_carry_what_is_fixed_to_them():
     scene = geoms(-6.0)
     scene.position = wp.array([[7.0, 2.0, 3.0]], dtype=wp.vec3, device="cpu")
     part = wp.zeros(1, dtype=wp.vec4i, device="cpu")
-    wp.launch(find, 1, inputs=[seen, scene, turned, part], device="cpu")
+    wp.launch(find_visible, 1, inputs=[seen, scene, turned, part], device="cpu")
     assert part.numpy()[0].tolist() == [14, 25, 14, 25]

@@ -7,8 +7,8 @@ import torch
 
 from drone_rl.sim.rendering import Appearance, Poses, Raytracer, Scene, View
 from drone_rl.sim.rendering.mujoco_warp import WarpRenderer
-from drone_rl.sim.rendering.raytrace.renderer import GpuPainter
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.raytrace.renderer import GpuLauncher
+from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.rendering.view import MODALITIES
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
@@ -40,7 +40,13 @@ XML = """<mujoco>
 <body mocap="true"><geom name="e" type="cylinder" size=".6 .5" pos=".3 .2 0" euler="70 10 0"
   rgba=".5 .9 .9 1"/></body>
 </worldbody></mujoco>"""
-MEANINGS = (Meaning.GROUND, Meaning.GROUND, Meaning.OBSTACLE, Meaning.DRONE, *[Meaning.TARGET] * 5)
+MEANINGS = (
+    SemanticClass.GROUND,
+    SemanticClass.GROUND,
+    SemanticClass.OBSTACLE,
+    SemanticClass.DRONE,
+    *[SemanticClass.TARGET] * 5,
+)
 PROPS = (-1, -1, -1, -1, 0, 1, 2, 3, 4)
 
 
@@ -112,7 +118,7 @@ def test_every_kind_of_geom_is_seen(both):
 def test_colours_and_lights_of_each_world_are_those_of_mujoco_warp(both):
     draw = torch.Generator().manual_seed(0)
     appearance = Appearance(
-        colors={m: torch.rand(64, 3, generator=draw) for m in set(MEANINGS) | {Meaning.SKY}},
+        colors={m: torch.rand(64, 3, generator=draw) for m in set(MEANINGS) | {SemanticClass.SKY}},
         ambient=torch.rand(64, 3, generator=draw) / 2,
         sun=torch.rand(64, 3, generator=draw),
         sun_direction=torch.rand(64, 3, generator=draw) - torch.tensor([0.5, 0.5, 1.5]),
@@ -124,7 +130,7 @@ def test_colours_and_lights_of_each_world_are_those_of_mujoco_warp(both):
 
 
 def test_from_inside_a_solid_it_is_not_there(both):
-    """As in MuJoCo's pictures, where only outsides are drawn."""
+    """As in MuJoCo's images, where only outsides are drawn."""
     poses = scattered(5, 0.0)
     eyes = poses.position + torch.tensor([0.4, 0.0, 0.0])
     for world, prop in enumerate(range(5)):
@@ -142,7 +148,9 @@ def ball():
     <geom type="box" size=".1 .1 .1"/>
     <camera name="front" xyaxes="0 -1 0 0 0 1" fovy="90"/></body>
     <body mocap="true"><geom type="sphere" size="1"/></body></worldbody></mujoco>"""
-    renderer = Raytracer(scene(xml, (Meaning.DRONE, Meaning.TARGET), (-1, 0)), num_worlds=1)
+    renderer = Raytracer(
+        scene(xml, (SemanticClass.DRONE, SemanticClass.TARGET), (-1, 0)), num_worlds=1
+    )
     poses = Poses(
         torch.zeros(1, 3), torch.tensor([[1.0, 0, 0, 0]]), torch.tensor([[[5.0, 0.0, 0.0]]])
     )
@@ -201,8 +209,8 @@ def test_a_plane_at_a_grazing_angle_is_as_far_as_geometry_has_it(both, height):
 def test_a_gpus_painter_draws_the_same(tilt, both):
     """Its kernels, tried on a CPU: the same functions, in another order."""
     alike = Raytracer(scene(), num_worlds=1)
-    alike._painter.close()
-    alike._painter = GpuPainter("cpu")
+    alike._launcher.close()
+    alike._launcher = GpuLauncher("cpu")
     asked = View(cameras=("front", "rear"), height=20, width=30, modalities=MODALITIES)
     expected = both[0].render(asked, scattered(16, tilt))
     for modality, picture in alike.render(asked, scattered(16, tilt)).items():
@@ -278,7 +286,7 @@ def test_models_of_others_are_refused_in_one_line_that_names_who_draws_them(geom
     <light directional="true" castshadow="false"/>{geom}</worldbody></mujoco>"""
     model = mujoco.MjModel.from_xml_string(xml)
     count = model.ngeom
-    strange = Scene(model, (Meaning.OBSTACLE,) * count, (-1,) * count, (0.0, 0.0, 0.0))
+    strange = Scene(model, (SemanticClass.OBSTACLE,) * count, (-1,) * count, (0.0, 0.0, 0.0))
     with pytest.raises(InputError, match=message) as refused:
         Raytracer(strange, num_worlds=1)
     assert str(refused.value).endswith("give renderer=mujoco_warp")
@@ -288,4 +296,4 @@ def test_models_of_others_are_refused_in_one_line_that_names_who_draws_them(geom
 def test_a_scene_without_light_is_refused():
     xml = "<mujoco><worldbody><geom size='1'/></worldbody></mujoco>"
     with pytest.raises(InputError, match="no light"):
-        Raytracer(scene(xml, (Meaning.TARGET,), (-1,)), num_worlds=1)
+        Raytracer(scene(xml, (SemanticClass.TARGET,), (-1,)), num_worlds=1)

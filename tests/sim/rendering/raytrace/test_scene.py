@@ -14,7 +14,7 @@ from drone_rl.sim.rendering.raytrace.scene import (
     make_rays,
     make_view,
 )
-from drone_rl.sim.rendering.scene import Meaning
+from drone_rl.sim.rendering.scene import SemanticClass
 
 XML = """<mujoco><statistic extent="2"/><visual><map zfar="10"/></visual><worldbody>
 <geom name="still" type="box" size="1 2 3" pos="1 2 3"/>
@@ -29,7 +29,12 @@ XML = """<mujoco><statistic extent="2"/><visual><map zfar="10"/></visual><worldb
 
 @pytest.fixture(scope="module")
 def scene():
-    meanings = (Meaning.OBSTACLE, Meaning.DRONE, Meaning.DRONE, Meaning.TARGET)
+    meanings = (
+        SemanticClass.OBSTACLE,
+        SemanticClass.DRONE,
+        SemanticClass.DRONE,
+        SemanticClass.TARGET,
+    )
     model = mujoco.MjModel.from_xml_string(XML)
     return Scene(model, meanings, (-1, -1, -1, 0), (0.0, 0.0, 0.0))
 

@@ -69,6 +69,6 @@ def test_a_look_that_came_before_is_not_read_again(worlds):
     look = of(0, 1, 2)
     worlds.render(worlds.state, appearance=look)
     cameras, _ = worlds.renderer._views[worlds.policy_view]
-    assert cameras.of(look.camera, 3) is cameras.of(look.camera, 3)
-    assert cameras.of(None, 3).cameras.shape == (1,)
-    assert cameras.of(look.camera, 3).cameras.shape == (3,)
+    assert cameras.encode(look.camera, 3) is cameras.encode(look.camera, 3)
+    assert cameras.encode(None, 3).cameras.shape == (1,)
+    assert cameras.encode(look.camera, 3).cameras.shape == (3,)

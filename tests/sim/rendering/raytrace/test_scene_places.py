@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from drone_rl.sim.rendering.devices import start_warp
-from drone_rl.sim.rendering.raytrace.scene import Places
+from drone_rl.sim.rendering.raytrace.scene import PoseBuffers
 from drone_rl.sim.rendering.renderer import Poses
 
 
@@ -22,11 +22,11 @@ def some(count, props=2):
 
 
 def test_whatever_number_of_worlds_comes_the_kernels_find_theirs():
-    places = Places(torch.device("cpu"))
+    places = PoseBuffers(torch.device("cpu"))
     for count, props in ((2, 2), (5, 2), (3, 2), (3, 1), (0, 1), (4, 0)):
         poses = some(count, props)
-        made = places.of(poses)
-        frames, attitudes = made.places.numpy()[:count], made.attitudes.numpy()[:count]
+        made = places.write(poses)
+        frames, attitudes = made.positions.numpy()[:count], made.attitudes.numpy()[:count]
         assert frames.shape == (count, 2 + props, 3) and (frames[:, 0] == 0).all()
         assert (frames[:, 1] == poses.position.float().numpy()).all()
         assert (frames[:, 2:] == poses.props.float().numpy()).all()
@@ -34,6 +34,6 @@ def test_whatever_number_of_worlds_comes_the_kernels_find_theirs():
 
 
 def test_fewer_worlds_are_drawn_from_the_same_arrays():
-    places = Places(torch.device("cpu"))
-    assert places.of(some(4)) is places.of(some(3))
-    assert places.of(some(3)) is not places.of(some(5))
+    places = PoseBuffers(torch.device("cpu"))
+    assert places.write(some(4)) is places.write(some(3))
+    assert places.write(some(3)) is not places.write(some(5))

@@ -5,8 +5,13 @@ import pytest
 import warp as wp
 
 from drone_rl.sim.rendering.raytrace import structs_kernel
-from drone_rl.sim.rendering.raytrace.shading_kernel import put_pixel, put_run, show_geom, show_sky
-from tests.box_ahead import SIZE, looks, pictures
+from drone_rl.sim.rendering.raytrace.shading_kernel import (
+    geom_pixel,
+    sky_pixel,
+    write_pixel,
+    write_span,
+)
+from tests.box_ahead import SIZE, images, materials
 
 KINDS = {
     "rgb": (structs_kernel.RGB, wp.vec3ub),
@@ -21,37 +26,37 @@ KINDS = {
 @wp.kernel(enable_backward=False)
 def put_singly(
     what: int,
-    worn: structs_kernel.Looks,
-    out: structs_kernel.Pictures,
+    worn: structs_kernel.Materials,
+    out: structs_kernel.Images,
     distances: wp.array[float],
     cosines: wp.array[float],
 ):
-    shown = show_geom(worn, 0, 3, wp.vec3(0.0, 0.0, 1.0))
+    shown = geom_pixel(worn, 0, 3, wp.vec3(0.0, 0.0, 1.0))
     for pixel in range(2, 5):
-        put_pixel(out, what, 0, pixel, shown, distances[pixel], cosines[pixel])
-    put_pixel(out, what, 0, 5, show_sky(worn, 0), 0.0, cosines[5])
+        write_pixel(out, what, 0, pixel, shown, distances[pixel], cosines[pixel])
+    write_pixel(out, what, 0, 5, sky_pixel(worn, 0), 0.0, cosines[5])
 
 
 @wp.kernel(enable_backward=False)
 def put_together(
     what: int,
-    worn: structs_kernel.Looks,
-    out: structs_kernel.Pictures,
+    worn: structs_kernel.Materials,
+    out: structs_kernel.Images,
     distances: wp.array[float],
     cosines: wp.array[float],
 ):
-    shown = show_geom(worn, 0, 3, wp.vec3(0.0, 0.0, 1.0))
-    put_run(out, what, 0, 2, 5, shown, distances, cosines)
-    put_run(out, what, 0, 5, 6, show_sky(worn, 0), distances, cosines)
+    shown = geom_pixel(worn, 0, 3, wp.vec3(0.0, 0.0, 1.0))
+    write_span(out, what, 0, 2, 5, shown, distances, cosines)
+    write_span(out, what, 0, 5, 6, sky_pixel(worn, 0), distances, cosines)
 
 
 def put(kernel, *names):
-    out = pictures(**{name: dtype for name, (_, dtype) in KINDS.items() if name in names})
+    out = images(**{name: dtype for name, (_, dtype) in KINDS.items() if name in names})
     distances, cosines = np.full(SIZE * SIZE, 1e10), np.ones(SIZE * SIZE)
     distances[2:6], cosines[2:6] = [4.0, 5.0, 6.0, 0.0], 0.5
     given = [wp.array(values, dtype=float, device="cpu") for values in (distances, cosines)]
     what = sum(int(KINDS[name][0]) for name in names)
-    wp.launch(kernel, 1, inputs=[what, looks(), out, *given], device="cpu")
+    wp.launch(kernel, 1, inputs=[what, materials(), out, *given], device="cpu")
     return {name: getattr(out, name).numpy()[0, 2:6].tolist() for name in names}
 
 

@@ -6,20 +6,20 @@ import warp as wp
 
 from drone_rl.sim.rendering.raytrace import structs_kernel
 from drone_rl.sim.rendering.raytrace.intersection_kernel import ROUND
-from drone_rl.sim.rendering.raytrace.shading_kernel import lay, light_on
-from drone_rl.sim.rendering.raytrace.spans_kernel import Cover
-from tests.box_ahead import array, looks
+from drone_rl.sim.rendering.raytrace.shading_kernel import light_surface, map_texture
+from drone_rl.sim.rendering.raytrace.structs_kernel import TextureMap
+from tests.box_ahead import array, materials
 
 
 @wp.kernel(enable_backward=False)
-def light(worn: structs_kernel.Looks, out: wp.array[wp.vec3]):
-    lit, dark = light_on(worn, 0, wp.vec3(0.0, 0.0, 1.0))
+def light(worn: structs_kernel.Materials, out: wp.array[wp.vec3]):
+    lit, dark = light_surface(worn, 0, wp.vec3(0.0, 0.0, 1.0))
     out[0] = lit
     out[1] = dark
 
 
 def test_the_first_light_alone_is_kept_away():
-    worn = looks()
+    worn = materials()
     worn.ambient = array([[[0.1] * 3, [0.05] * 3]], wp.vec3)
     worn.diffuse = array([[[0.5] * 3, [0.2, 0.0, 0.0]]], wp.vec3)
     worn.direction = array([[[0.0, -0.6, -0.8], [0.0, 0.0, -1.0]]], wp.vec3)
@@ -30,8 +30,10 @@ def test_the_first_light_alone_is_kept_away():
 
 
 @wp.kernel(enable_backward=False)
-def cover(sight: structs_kernel.Sight, face: int, normal: wp.vec3, out: wp.array[Cover]):
-    out[0] = lay(5, 8, 2.0, sight, face, normal)
+def cover(
+    geom_view: structs_kernel.GeomView, face: int, normal: wp.vec3, out: wp.array[TextureMap]
+):
+    out[0] = map_texture(5, 8, 2.0, geom_view, face, normal)
 
 
 @pytest.mark.parametrize(
@@ -45,10 +47,10 @@ def cover(sight: structs_kernel.Sight, face: int, normal: wp.vec3, out: wp.array
     ],
 )
 def test_a_face_shows_two_coordinates_of_the_geom(face, normal, corner):
-    sight = structs_kernel.Sight()
-    sight.eye, sight.into = wp.vec3(1.0, 2.0, 3.0), wp.mat33(*np.eye(3).flatten())
-    out = wp.zeros(1, dtype=Cover, device="cpu")
-    wp.launch(cover, 1, inputs=[sight, face, wp.vec3(*normal), out], device="cpu")
+    geom_view = structs_kernel.GeomView()
+    geom_view.eye, geom_view.into = wp.vec3(1.0, 2.0, 3.0), wp.mat33(*np.eye(3).flatten())
+    out = wp.zeros(1, dtype=TextureMap, device="cpu")
+    wp.launch(cover, 1, inputs=[geom_view, face, wp.vec3(*normal), out], device="cpu")
     laid = out.numpy()[0]
     assert (laid["start"], laid["side"]) == (5, 8)
     assert laid["corner"].tolist() == list(corner)

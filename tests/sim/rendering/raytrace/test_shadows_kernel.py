@@ -12,14 +12,14 @@ from drone_rl.sim.rendering.raytrace.intersection_kernel import (
     PLANE,
     SPHERE,
 )
-from drone_rl.sim.rendering.raytrace.projection_kernel import look_at, stand
+from drone_rl.sim.rendering.raytrace.projection_kernel import camera_pose, view_geom
 from drone_rl.sim.rendering.raytrace.shadows_kernel import (
-    around_shadow,
+    cast_box_shadow,
     find_ground,
-    hide_by_box,
-    is_behind,
-    mark_near,
+    is_shadowed,
+    mark_candidates,
     shadow_length,
+    shadow_rectangle,
 )
 from tests.box_ahead import SIZE, array, geoms, poses, view
 
@@ -30,28 +30,36 @@ def look(
     scene: structs_kernel.Geoms,
     placed: structs_kernel.Poses,
     sun: wp.vec3,
-    sights: wp.array[structs_kernel.Sight],
+    geom_views: wp.array[structs_kernel.GeomView],
     length: wp.array[float],
     parts: wp.array[wp.vec4i],
 ):
     camera = seen.cameras[0]
-    for geom in range(sights.shape[0]):
-        sights[geom] = look_at(scene, geom, placed, 0, stand(camera, placed, 0))
-    ground = find_ground(seen, sights, sun)
-    length[0] = shadow_length(seen, sights, 0, ground, sun)
-    parts[0] = around_shadow(seen, camera, sights[0], sun * length[0])
+    for geom in range(geom_views.shape[0]):
+        geom_views[geom] = view_geom(scene, geom, placed, 0, camera_pose(camera, placed, 0))
+    ground = find_ground(seen, geom_views, sun)
+    length[0] = shadow_length(seen, geom_views, 0, ground, sun)
+    parts[0] = shadow_rectangle(seen, camera, geom_views[0], sun * length[0])
 
 
 def looked(sun, box=(0.0, 0.0, -6.0), *, size=(0.0, 0.0, 1.0), floor=True):
-    """A box and a floor at z = -20, below the camera that looks down; its far end is at 50 m."""
+    """A box and a floor at z = -20, below a camera that looks down; it sees 50 m far."""
     scene = geoms(-6.0, -20.0, numbers=(0, 1)) if floor else geoms(-6.0)
     kinds, places = [int(BOX), int(PLANE)], [box, (0.0, 0.0, -20.0)]
     count = len(scene.kind)
     scene.kind, scene.position = array(kinds[:count], int), array(places[:count], wp.vec3)
     scene.size = array([(1.0, 1.0, 1.0), size][:count], wp.vec3)
-    sights = wp.zeros(count, dtype=structs_kernel.Sight, device="cpu")
+    geom_views = wp.zeros(count, dtype=structs_kernel.GeomView, device="cpu")
     length, parts = (wp.zeros(1, dtype=of, device="cpu") for of in (float, wp.vec4i))
-    given = [view(int(structs_kernel.DEPTH)), scene, poses(), wp.vec3(*sun), sights, length, parts]
+    given = [
+        view(int(structs_kernel.DEPTH)),
+        scene,
+        poses(),
+        wp.vec3(*sun),
+        geom_views,
+        length,
+        parts,
+    ]
     wp.launch(look, 1, inputs=given, device="cpu")
     return length.numpy()[0], parts.numpy()[0].tolist()
 
@@ -95,7 +103,7 @@ def test_what_stays_behind_the_camera_is_not():
 
 @wp.kernel(enable_backward=False)
 def hide(
-    sight: structs_kernel.Sight,
+    geom_view: structs_kernel.GeomView,
     rays: wp.array[wp.vec3],
     nearest: wp.array[float],
     owners: wp.array[int],
@@ -103,9 +111,9 @@ def hide(
     dark: wp.array[int],
     behind: wp.array[int],
 ):
-    hide_by_box(dark, 0, rays.shape[0], rays, nearest, owners, 8, 0, sight, sun)
+    cast_box_shadow(dark, 0, rays.shape[0], rays, nearest, owners, 8, 0, geom_view, sun)
     for i in range(rays.shape[0]):
-        behind[i] = int(is_behind(sight, rays[i], nearest[i], sun))
+        behind[i] = int(is_shadowed(geom_view, rays[i], nearest[i], sun))
 
 
 def test_a_box_hides_what_is_beyond_it_alone():
@@ -115,13 +123,13 @@ def test_a_box_hides_what_is_beyond_it_alone():
     rays /= np.linalg.norm(rays, axis=1, keepdims=True)
     nearest = source.uniform(0.0, 8.0, 20_000)
     owners = source.choice([-1, 5, 8, 16], 20_000)  # the sky, the box itself, two others
-    sight = structs_kernel.Sight()
-    sight.kind, sight.size = int(BOX), wp.vec3(1.0, 2.0, 0.5)
-    sight.eye, sight.into = wp.vec3(0.5, 1.0, 2.0), wp.mat33(*np.eye(3).flatten())
+    geom_view = structs_kernel.GeomView()
+    geom_view.kind, geom_view.size = int(BOX), wp.vec3(1.0, 2.0, 0.5)
+    geom_view.eye, geom_view.into = wp.vec3(0.5, 1.0, 2.0), wp.mat33(*np.eye(3).flatten())
     dark, behind = (wp.zeros(20_000, dtype=int, device="cpu") for _ in range(2))
     sun = np.array([0.0, 0.6, -0.8])
     given = [array(rays, wp.vec3), array(nearest, float), array(owners, int), wp.vec3(*sun)]
-    wp.launch(hide, 1, inputs=[sight, *given, dark, behind], device="cpu")
+    wp.launch(hide, 1, inputs=[geom_view, *given, dark, behind], device="cpu")
     others = owners >= 8
     assert np.array_equal(dark.numpy()[others], behind.numpy()[others])
     assert 50 < dark.numpy().sum() < 5000 and not dark.numpy()[~others].any()
@@ -133,7 +141,7 @@ def test_a_box_hides_what_is_beyond_it_alone():
 
 @wp.kernel(enable_backward=False)
 def near(
-    sight: structs_kernel.Sight,
+    geom_view: structs_kernel.GeomView,
     rays: wp.array[wp.vec3],
     nearest: wp.array[float],
     owners: wp.array[int],
@@ -141,9 +149,9 @@ def near(
     dark: wp.array[int],
     behind: wp.array[int],
 ):
-    mark_near(dark, 0, rays.shape[0], rays, nearest, owners, 8, 0, sight, sun, 2)
+    mark_candidates(dark, 0, rays.shape[0], rays, nearest, owners, 8, 0, geom_view, sun, 2)
     for i in range(rays.shape[0]):
-        behind[i] = int(is_behind(sight, rays[i], nearest[i], sun))
+        behind[i] = int(is_shadowed(geom_view, rays[i], nearest[i], sun))
 
 
 @pytest.mark.parametrize(
@@ -158,19 +166,19 @@ def test_what_may_be_in_the_shadow_is_all_that_is(kind, reach):
     nearest = source.uniform(0.0, 8.0, 20_000)
     owners = source.choice([-1, 5, 8, 16], 20_000)  # the sky, the geom itself, two others
     before = source.choice([0, 1], 20_000)
-    sight = structs_kernel.Sight()
-    sight.kind, sight.size, sight.reach = (
+    geom_view = structs_kernel.GeomView()
+    geom_view.kind, geom_view.size, geom_view.reach = (
         int(kind),
         wp.vec3(reach[0], reach[2], 0.0),
         wp.vec3(reach),
     )
     if kind == ELLIPSOID:
-        sight.size = wp.vec3(reach)
-    sight.eye, sight.into = wp.vec3(0.5, 1.0, 2.0), wp.mat33(*np.eye(3).flatten())
+        geom_view.size = wp.vec3(reach)
+    geom_view.eye, geom_view.into = wp.vec3(0.5, 1.0, 2.0), wp.mat33(*np.eye(3).flatten())
     dark, behind = array(before, int), wp.zeros(20_000, dtype=int, device="cpu")
     sun = np.array([0.0, 0.6, -0.8])
     given = [array(rays, wp.vec3), array(nearest, float), array(owners, int), wp.vec3(*sun)]
-    wp.launch(near, 1, inputs=[sight, *given, dark, behind], device="cpu")
+    wp.launch(near, 1, inputs=[geom_view, *given, dark, behind], device="cpu")
     marked = dark.numpy() == 2
     is_open = (owners >= 8) & (before == 0)
     assert (dark.numpy() == before)[~is_open].all()

@@ -30,7 +30,9 @@ def combine(
 
 @wp.kernel(enable_backward=False)
 def level(nearest: wp.array[float], owner: wp.array[int], rays: wp.array[wp.vec3]):
-    spans_kernel.meet_level(nearest, owner, 1, 5, rays, wp.vec3(0.0, 1.0, 0.0), -2.0, 1e-6, 9)
+    spans_kernel.intersect_level_plane(
+        nearest, owner, 1, 5, rays, wp.vec3(0.0, 1.0, 0.0), -2.0, 1e-6, 9
+    )
 
 
 def array(values, dtype):

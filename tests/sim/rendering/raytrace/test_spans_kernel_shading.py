@@ -1,10 +1,15 @@
-"""Colours of single pixels; whole pictures are in test_raytrace_scenic."""
+"""Colours of single pixels; whole images are in test_raytrace_scenic."""
 
 import numpy as np
 import pytest
 import warp as wp
 
-from drone_rl.sim.rendering.raytrace.spans_kernel import Cover, shade_covered, shade_even, shade_sky
+from drone_rl.sim.rendering.raytrace.spans_kernel import (
+    TextureMap,
+    shade_plain,
+    shade_sky,
+    shade_textured,
+)
 from drone_rl.sim.rendering.textures import levels
 from tests.box_ahead import array
 
@@ -18,7 +23,7 @@ def shade(
     nearest: wp.array[float],
     dark: wp.array[int],
     texels: wp.array[wp.uint32],
-    cover: Cover,
+    cover: TextureMap,
     fog: float,
     what: int,
 ):
@@ -26,9 +31,9 @@ def shade(
     if what == 0:
         shade_sky(colors, 0, count, rays, wp.vec3(0.0, 1.0, 0.0), HORIZON, LIT)
     if what == 1:
-        shade_even(colors, 0, count, nearest, dark, LIT, SHADED, fog, HORIZON)
+        shade_plain(colors, 0, count, nearest, dark, LIT, SHADED, fog, HORIZON)
     if what == 2:
-        shade_covered(
+        shade_textured(
             colors, 0, count, rays, nearest, dark, texels, cover, LIT, SHADED, fog, HORIZON
         )
 
@@ -37,7 +42,7 @@ def shaded(what, rays, nearest=None, dark=None, texels=(0,), cover=None, fog=0.0
     count = len(rays)
     colors = wp.zeros(count, dtype=wp.vec3ub, device="cpu")
     given = [array(rays, wp.vec3), array(nearest or [1.0] * count, float)]
-    given += [array(dark or [0] * count, int), array(texels, wp.uint32), cover or Cover()]
+    given += [array(dark or [0] * count, int), array(texels, wp.uint32), cover or TextureMap()]
     wp.launch(shade, 1, inputs=[colors, *given, fog, what], device="cpu")
     return colors.numpy().tolist()
 
@@ -64,7 +69,7 @@ def covered(place, metres=1.0, area=0.0):
     """A texture of 2 by 2 texels, black, red / green, blue, of which a tile is 1 m."""
     colors = np.array([[[0, 0, 0], [255, 0, 0]], [[0, 255, 0], [0, 0, 255]]], np.uint8)
     texels = levels(colors).astype(np.uint32) @ np.array([1, 256, 65536], np.uint32)
-    cover = Cover()
+    cover = TextureMap()
     cover.start, cover.side, cover.area = 1, 2, area
     cover.facing, cover.corner = wp.vec3(0.0, 0.0, -1.0), wp.vec2(*place)
     return shaded(2, [(0, 0, -1)], [metres], texels=[7, *texels], cover=cover)[0]

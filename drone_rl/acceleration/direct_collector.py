@@ -1,0 +1,142 @@
+"""Steps environments without TorchRL, where only maps of pixels lie between them and the actor."""
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import torch
+from tensordict import TensorDict, TensorDictBase
+from tensordict.nn import TensorDictModuleBase
+from tensordict.utils import NestedKey
+from torch import Tensor
+
+from drone_rl.acceleration.fused_network import ActivationCache
+from drone_rl.envs.direct_renderer import DirectRenderer, Entries, Reasons
+
+
+class DirectCollector:
+    """Collects complete episodes; gives the same as stepping by TorchRL, bit for bit.
+
+    An environment whose episode has ended is neither stepped nor rendered. The state that the
+    environment itself holds stays as it is at the start of the episodes.
+    """
+
+    implementation = "PyTorch"
+
+    def __init__(
+        self,
+        renderer: DirectRenderer,
+        actor: TensorDictModuleBase,
+        action_key: NestedKey,
+        *,
+        extra: Iterable[NestedKey] = (),
+        keep_observations: bool = True,
+    ) -> None:
+        """See `accelerate`."""
+        self.renderer, self.actor, self.action_key = renderer, actor, action_key
+        self.keep_observations = keep_observations
+        self.reasons = Reasons()
+        """Why the collector is not fused; empty if nobody asked."""
+        self._extra = tuple(extra)
+
+    @property
+    def name(self) -> str:
+        """For the log."""
+        return f"direct collector: {self.reasons}" if self.reasons else "direct collector"
+
+    def cache_activations(self) -> ActivationCache | None:
+        """Return None: torch keeps no activations of acting."""
+        return None
+
+    def collect(self, num_envs: int) -> TensorDictBase:
+        """Run an episode in each of the first environments; trajectories count from 0."""
+        renderer = self.renderer
+        renderer.env.start()
+        active = torch.arange(num_envs, device=renderer.env.device)
+        state: Any = renderer.worlds.state[active]
+        rows: list[Tensor] = []
+        steps: list[Entries] = []
+        while len(active):
+            acted = self.actor(renderer.look(state, active))
+            keys = (self.action_key, *self._extra)
+            keys = acted.keys(True, True) if self.keep_observations else keys
+            step: Entries = {key: acted.get(key) for key in keys}
+            state, reward = renderer.worlds.advance(state, acted.get(self.action_key))
+            entries, done = renderer.entries(state, reward)
+            rows.append(active)
+            steps.append(step | entries)
+            running = (~done[:, 0]).nonzero()[:, 0]
+            if len(running) < len(active):
+                state, active = state[running], active[running]
+        return _join(steps, rows, num_envs)
+
+    def close(self) -> None:
+        """Does nothing: there are no threads."""
+
+
+def _join(steps: list[Entries], rows: list[Tensor], num_envs: int) -> TensorDictBase:
+    """Copy time-major steps once into episode after episode. Shape: (T_total,)."""
+    env_of_step = torch.cat(rows)
+    lengths = env_of_step.bincount(minlength=num_envs)
+    first = lengths.cumsum(0) - lengths
+    targets = torch.cat([first[indices] + t for t, indices in enumerate(rows)])
+    batch = TensorDict({}, [len(targets)], device=targets.device)
+    spans = targets.split([len(indices) for indices in rows])
+    for key, value in steps[0].items():
+        joined = value.new_empty(len(batch), *value.shape[1:])
+        for indices, step in zip(spans, steps, strict=True):
+            joined.index_copy_(0, indices, step[key])
+        batch.set(key, joined)
+    traj_ids = torch.empty_like(env_of_step).index_copy_(0, targets, env_of_step)
+    return batch.set(("collector", "traj_ids"), traj_ids)
+
+
+class DirectStream:
+    """Steps all environments on and on; gives the same as `TorchrlStream`, bit for bit."""
+
+    def __init__(self, renderer: DirectRenderer) -> None:
+        """Takes over the environment's states."""
+        self._renderer = renderer
+        self._pixels: Tensor | None = None
+
+    def observe(self) -> TensorDictBase:
+        """See `Stream`."""
+        pixels = self._start()
+        return TensorDict({"pixels": pixels}, [len(pixels)], device=pixels.device)
+
+    def _start(self) -> Tensor:
+        if self._pixels is None:
+            self._renderer.env.start()
+            self._pixels = self._look()
+        return self._pixels
+
+    def _look(self) -> Tensor:
+        return self._renderer.look(self._renderer.worlds.state).get("pixels")
+
+    def step(self, action: Tensor) -> Entries:
+        """See `Stream`."""
+        worlds = self._renderer.worlds
+        worlds.state, reward = worlds.advance(worlds.state, action)
+        entries, _ = self._renderer.entries(worlds.state, reward)
+        self._pixels = self._look()
+        return entries | {("next", "pixels"): self._pixels}
+
+    def restart(self, ended: Tensor) -> None:
+        """See `Stream`."""
+        rows = ended.flatten().nonzero()[:, 0]
+        self._renderer.env.start(rows)
+        fresh = self._renderer.look(self._renderer.worlds.state[rows], rows).get("pixels")
+        self._pixels = self._start().index_copy(0, rows, fresh)
+
+    def forget(self) -> None:
+        """See `Stream`."""
+        self._pixels = None
+
+    def state_dict(self) -> dict[str, Any]:
+        """See `Stream`; only the environments have a state."""
+        self._start()
+        return {"worlds": self._renderer.env.running_state(), "transforms": {}, "carried": {}}
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """See `Stream`."""
+        self._renderer.env.load_running_state(state["worlds"])
+        self._pixels = self._look()

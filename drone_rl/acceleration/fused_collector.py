@@ -1,0 +1,264 @@
+"""Collects complete episodes in one fused kernel, without Python between their steps.
+
+Stepping in Python takes most of the time: a small network is evaluated on a frame in ten
+microseconds, and a frame is rendered in as many.
+"""
+
+from collections.abc import Mapping
+from typing import Any, Self
+
+import torch
+import warp as wp
+from tensordict import TensorDict, TensorDictBase
+from torch import Tensor
+from torchrl.envs.utils import ExplorationType
+
+from drone_rl.acceleration import rollout_kernel
+from drone_rl.acceleration.direct_collector import DirectCollector
+from drone_rl.acceleration.fused_network import ACTIVATIONS, ActivationCache
+from drone_rl.acceleration.packed_layers import PackedNetwork, unsupported
+from drone_rl.acceleration.rollout_buffer import RolloutBuffer
+from drone_rl.envs.direct_renderer import DirectRenderer, Entries, Reasons
+from drone_rl.envs.transforms import StandardizePixels
+from drone_rl.policies.actor import CategoricalActor
+from drone_rl.policies.finite import require_finite
+from drone_rl.sim.rendering.devices import WorkerPool, load_kernels
+from drone_rl.sim.rendering.raytrace.renderer import Raytracer
+from drone_rl.sim.rendering.raytrace.structs_kernel import Images
+from drone_rl.sim.tasks.task import FusedRules
+
+_MAX_STEPS = 64
+"""Steps of one launch of the kernel; most episodes end within them."""
+_MAX_PIXELS = 2**23
+"""Of the frames of one launch."""
+_MAX_ACTIVATIONS = 2**24
+"""Numbers that are cached: 64 MiB."""
+
+
+class FusedCollector:
+    """Collects complete episodes; renderer, network and task run in one kernel.
+
+    The state that the environment itself holds stays as it is at the start of the episodes.
+    """
+
+    implementation = "fused kernel"
+    name = "fused collector"
+    reasons = Reasons()
+
+    def __init__(
+        self,
+        direct: DirectCollector,
+        network: PackedNetwork,
+        worlds: FusedRules,
+        num_threads: int,
+    ) -> None:
+        """Allocates what the kernel needs; see `try_create`."""
+        self._direct, actor = direct, direct.actor
+        assert isinstance(actor, CategoricalActor)
+        self._actor = actor
+        renderer = self._renderer = direct.renderer
+        self._network, self._worlds = network, worlds
+        count, view = renderer.worlds.num_worlds, renderer.view
+        self._workers = WorkerPool(count, num_threads)
+        raytracer: Any = renderer.worlds.renderer
+        tools = raytracer.kernel_inputs(view, self._workers.size)
+        eye = self._eye = rollout_kernel.CameraView()
+        eye.view, eye.geoms, eye.materials, eye.scratch = tools
+        eye.mean, eye.deviation = _mean_and_deviation(renderer)
+        self._rooms = wp.empty((self._workers.size, network.room), dtype=float, device="cpu")
+        pixels = view.height * view.width
+        self._length = max(1, min(_MAX_STEPS, _MAX_PIXELS // (count * pixels)))
+        self._num_rows = rows = count * self._length
+        num_actions = renderer.worlds.dynamics.actions.num_outputs
+        self._buffer = RolloutBuffer(
+            {
+                "pixels": torch.empty(rows, 1, view.height, view.width),
+                "logits": torch.empty(rows, num_actions),
+                "action": torch.empty(rows, dtype=torch.int32),
+                "reward": torch.empty(rows),
+                "end_reason": torch.empty(rows, dtype=torch.int32),
+            }
+        )
+        self._cache: ActivationCache | None = None
+        self._logits = torch.empty(0, num_actions)
+        self._owner = getattr(self._actor.network, "owner", "the policy")
+        load_kernels(rollout_kernel)
+
+    @classmethod
+    def try_create(cls, direct: DirectCollector, num_threads: int) -> Self | Reasons:
+        """Return the fused collector, or the reasons why the kernel does not support it.
+
+        Args:
+            direct: The same collector, stepping in Python.
+            num_threads: Groups of environments; no result depends on it.
+        """
+        reasons = [*_not_fused(direct.renderer), *_not_fused_policy(direct)]
+        worlds = direct.renderer.worlds
+        flown = worlds.task.fused_rules(worlds.dynamics, worlds.num_worlds)
+        if flown is None:
+            names = f"{type(worlds.task).__name__} with {type(worlds.dynamics).__name__}"
+            reasons.append(f"task {names} is not fused")
+        if reasons or flown is None:
+            return Reasons(reasons)
+        actor: Any = direct.actor
+        network = PackedNetwork(actor.network, int(rollout_kernel.TOGETHER))
+        return cls(direct, network, flown, num_threads)
+
+    def cache_activations(self) -> ActivationCache | None:
+        """Keep the activations of all layers from now on, unless they are too many.
+
+        Batches get an entry "activations", which a `FusedNetwork` with this cache reads.
+        """
+        parts = _MAX_ACTIVATIONS // (self._num_rows * self._network.num_outputs)
+        if self._cache is None and parts:
+            self._cache = ActivationCache(parts * self._num_rows, self._network.num_outputs)
+        return self._cache
+
+    def collect(self, num_envs: int) -> TensorDictBase:
+        """Run an episode in each of the first environments; trajectories count from 0.
+
+        Shape: (T_total,), episode after episode.
+        """
+        if self._actor.exploration not in (ExplorationType.RANDOM, ExplorationType.DETERMINISTIC):
+            return self._direct.collect(num_envs)
+        load_kernels(rollout_kernel).result()
+        self._renderer.env.start()
+        state: Any = self._renderer.worlds.state
+        self._worlds.begin(state)
+        if self._cache is not None:
+            self._cache.clear()
+        self._network.update()
+        env_of_step, logged = self._run(num_envs)
+        for name in ("action", "end_reason"):
+            logged[name] = logged[name].long()
+        if self._renderer.needs_info:
+            entries = self._replay(env_of_step, logged)
+        else:
+            entries = self._renderer.flags(logged["reward"], logged["end_reason"])
+        batch = TensorDict({}, [len(env_of_step)])
+        for key in ("pixels", "logits", "action", ACTIVATIONS):
+            if key in logged:
+                batch.set(key, logged[key])
+        for key, value in entries.items():
+            batch.set(key, value)
+        return batch.set(("collector", "traj_ids"), env_of_step)
+
+    def close(self) -> None:
+        """Ends the threads."""
+        self._workers.close()
+
+    def _run(self, num_envs: int) -> tuple[Tensor, dict[str, Tensor]]:
+        """Environments of the steps, episode after episode, and what the kernel wrote of each."""
+        taken, reasons = self._worlds.steps[:num_envs], self._worlds.end_reasons[:num_envs]
+        is_observed = self._direct.keep_observations
+        seen = ("pixels", "logits") if is_observed else ()
+        names, parts = ("action", "reward", "end_reason", *seen), []
+        while not (parts and bool(reasons.all())):
+            before, first = taken.clone(), len(parts) * self._num_rows
+            self._launch(num_envs, self._open_log(len(parts), names))
+            envs, rows = self._written(taken - before)
+            require_finite(self._logits[rows], self._owner)
+            parts.append((envs, rows + first))
+        envs, rows = (torch.cat(column) for column in zip(*parts, strict=True))
+        order = envs.argsort(stable=True)
+        envs, rows = envs[order], rows[order]
+        logged = self._buffer.read(rows, names)
+        if self._cache is not None and is_observed:
+            logged[ACTIVATIONS] = self._cache.add(rows, self._network.weights)
+        return envs, logged
+
+    def _open_log(self, part: int, kept: tuple[str, ...]) -> Any:
+        """Return arrays that one launch writes, and of which the named ones are kept."""
+        log, pictures, room = rollout_kernel.RolloutLog(), Images(), self._buffer.open(part, kept)
+        pictures.gray = wp.from_torch(room["pixels"].flatten(1))
+        self._logits = room["logits"]
+        log.pictures, log.logits = pictures, wp.from_torch(self._logits)
+        log.actions, log.rewards = wp.from_torch(room["action"]), wp.from_torch(room["reward"])
+        log.end_reasons = wp.from_torch(room["end_reason"])
+        if self._cache is not None:
+            first, last = part * self._num_rows, (part + 1) * self._num_rows
+            # of no rows if there is no room
+            log.outputs = wp.from_torch(self._cache.outputs[first:last])
+        return log
+
+    def _launch(self, num_envs: int, log: Any) -> None:
+        draws = torch.full((num_envs, self._length), -1.0)
+        if self._actor.exploration == ExplorationType.RANDOM:
+            source: Any = self._actor.generator
+            draws.uniform_(generator=source)
+        given = [
+            self._eye,
+            self._network.layers,
+            self._rooms,
+            self._worlds.flights,
+            self._worlds.poses,
+            wp.from_torch(draws),
+            log,
+        ]
+
+        def work(member: int, first: int, last: int) -> None:
+            inputs = [first, last, member, *given]
+            wp.launch(rollout_kernel.fly, 1, inputs=inputs, device="cpu")
+
+        self._workers.map_spans(0, num_envs, work)
+
+    def _written(self, lengths: Tensor) -> tuple[Tensor, Tensor]:
+        """Return environment and row in the log of each step, environment after environment.
+
+        Args:
+            lengths: Steps of each environment. Shape: (num_envs,).
+        """
+        is_step = torch.arange(self._length) < lengths[:, None]
+        rows = is_step.flatten().nonzero()[:, 0]
+        return rows // self._length, rows
+
+    def _replay(self, env_of_step: Tensor, logged: Mapping[str, Tensor]) -> Entries:
+        """Compute the kept entries by the task's batched step; nothing is rendered again."""
+        worlds = self._renderer.worlds
+        lengths = env_of_step.bincount()
+        first = lengths.cumsum(0) - lengths
+        state, going, entries = worlds.state, torch.arange(len(lengths)), Entries()
+        state = state if len(state) == len(going) else state[going]
+        for step in range(int(lengths.max())):
+            is_running = lengths[going] > step
+            if not bool(is_running.all()):
+                state, going = state[is_running], going[is_running]
+            rows = first[going] + step
+            state, reward = worlds.advance(state, logged["action"][rows])
+            for key, value in self._renderer.entries(state, reward)[0].items():
+                if step == 0:
+                    entries[key] = value.new_empty(len(env_of_step), *value.shape[1:])
+                entries[key].index_copy_(0, rows, value)
+        return entries
+
+
+def _mean_and_deviation(renderer: DirectRenderer) -> tuple[float, float]:
+    """Return what the kernel subtracts from gray pixels, and then divides them by."""
+    for transform in renderer.after:
+        if type(transform) is StandardizePixels:
+            return transform.mean, transform.std
+    return 0.0, 1.0
+
+
+def _not_fused(renderer: DirectRenderer) -> list[str]:
+    """Reasons against fusing the renderer, the appearance or the transforms."""
+    worlds, reasons = renderer.worlds, []
+    if type(worlds.renderer) is not Raytracer or worlds.renderer.device.type != "cpu":
+        device = worlds.state.end_reason.device.type
+        reasons.append(f"renderer {type(worlds.renderer).__name__} on {device} is not fused")
+    if renderer.view.modalities != ("gray",):
+        reasons.append("frames that are not gray are not fused")
+    first, *others = [*renderer.after, None]
+    if first is not None and type(first) is not StandardizePixels:
+        others.insert(0, first)
+    reasons += [f"transform {type(t).__name__} is not fused" for t in others if t is not None]
+    if worlds.appearance is not None:
+        reasons.append("visual randomization is not fused")
+    return reasons
+
+
+def _not_fused_policy(direct: DirectCollector) -> list[str]:
+    """Reasons against fusing the actor."""
+    if type(direct.actor) is not CategoricalActor:
+        return [f"policy {type(direct.actor).__name__} is not fused"]
+    return unsupported(direct.actor.network)

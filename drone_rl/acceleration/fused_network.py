@@ -1,0 +1,307 @@
+"""Fused forward and backward pass of a small network, and the activations that it reuses."""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any, Literal, NamedTuple, Self
+
+import torch
+import warp as wp
+from torch import Tensor, nn
+from torch.autograd.function import once_differentiable
+
+from drone_rl.acceleration import gradients_kernel
+from drone_rl.acceleration.gradients_kernel import BLOCK, PackedParams
+from drone_rl.acceleration.layers_kernel import WIDTH
+from drone_rl.acceleration.packed_layers import (
+    Order,
+    PackedLayer,
+    odd_lines,
+    outputs_at,
+    packed_layers,
+    unsupported,
+)
+from drone_rl.envs.direct_renderer import Reasons
+from drone_rl.policies.cnn import PolicyNetwork
+from drone_rl.policies.network import PictureNetwork
+from drone_rl.sim.rendering.devices import WorkerPool, load_kernels
+
+MAX_WEIGHTS = 2**20
+"""Larger networks do not fit into a core's cache, and torch is as fast."""
+ACTIVATIONS = "activations"
+"""Entry of a batch: the handle of each step's activations in an `ActivationCache`."""
+GradientsOf = Literal["weights", "pixels"]
+
+
+class ActivationCache:
+    """Activations of all layers, kept by a fused collector for the learner's forward pass.
+
+    A handle names the activations of one observation: an entry of the batch carries it from the
+    collector to the network. Handles are valid until the collector's next batch. Whoever changes
+    the observations of a batch must remove the entry.
+    """
+
+    def __init__(self, num_rows: int, num_outputs: int) -> None:
+        """Allocates memory.
+
+        Args:
+            num_rows: Observations of one batch.
+            num_outputs: Numbers of an observation, see `outputs_at`.
+        """
+        self.outputs = torch.empty(num_rows, num_outputs)
+        """Written by the collector between `clear` and `add`."""
+        self.generation = 0
+        """Counts the calls of `clear`."""
+        self._weights = torch.empty(0)
+
+    def clear(self) -> None:
+        """Invalidate all handles, before the activations are overwritten."""
+        self.generation += 1
+
+    def add(self, rows: Tensor, weights: Tensor) -> Tensor:
+        """Return handles of activations: -1 for each if there was not room for all.
+
+        Args:
+            rows: Of `outputs`. Shape: (k,), int64.
+            weights: Packed weights that the activations were computed with.
+        """
+        self._weights = weights
+        if int(rows.max()) >= len(self.outputs):
+            return torch.full_like(rows, -1)
+        return rows + self.generation * len(self.outputs)
+
+    def find(self, handles: Tensor, weights: Tensor) -> Tensor | None:
+        """Return the rows of activations, or None unless all are there for these weights.
+
+        Args:
+            handles: As returned by `add`. Shape: (k,).
+            weights: Packed weights.
+        """
+        rows = handles - self.generation * len(self.outputs)
+        is_valid = (rows >= 0) & (rows < len(self.outputs))
+        if not (bool(is_valid.all()) and torch.equal(weights, self._weights)):
+            return None
+        return rows.int()
+
+
+class FusedNetwork(PictureNetwork):
+    """Computes the same logits and gradients as a network, faster than torch.
+
+    On a small network torch spends a third of its time between matrix products. The fused kernel
+    passes blocks of observations through all layers, so that their numbers stay in cache.
+    """
+
+    def __init__(
+        self,
+        network: PolicyNetwork,
+        num_threads: int = 1,
+        *,
+        of: GradientsOf = "weights",
+        cache: ActivationCache | None = None,
+    ) -> None:
+        """Wraps a network; see `try_create`."""
+        super().__init__()
+        self.network, self.in_shape, self.actions = network, network.in_shape, network.actions
+        self._num_threads, self._of, self._cache = num_threads, of, cache
+        self.in_keys = ("pixels",) if cache is None else ("pixels", ACTIVATIONS)
+        self._work: _Work | None = None
+        load_kernels(gradients_kernel)
+
+    @classmethod
+    def try_create(
+        cls,
+        network: nn.Module,
+        num_threads: int = 1,
+        *,
+        of: GradientsOf = "weights",
+        cache: Callable[[], ActivationCache | None] = lambda: None,
+    ) -> Self | Reasons:
+        """Return the fused network, or the reasons why the kernel does not support the network.
+
+        Args:
+            network: From pixels to logits.
+            num_threads: Threads that share the observations; sums over these depend on it.
+            of: What has gradients: the weights, or the pixels. For those of the pixels the weights
+                stay what they are at first.
+            cache: Called if the network is supported; returns the activations that a collector
+                keeps, such as `FusedCollector.cache_activations`.
+        """
+        reasons = unsupported(network)
+        if not reasons and of == "pixels" and not packed_layers(network)[0].has_way_back:
+            reasons.append(f"the first layer's inputs are not a multiple of {WIDTH}")
+        num_weights = sum(p.numel() for p in network.parameters())
+        if num_weights > MAX_WEIGHTS:
+            reasons.append(f"{num_weights} weights are more than {MAX_WEIGHTS}")
+        if reasons or not isinstance(network, PolicyNetwork):
+            return Reasons(reasons)
+        return cls(network, num_threads, of=of, cache=cache())
+
+    def forward(self, pixels: Tensor, activations: Tensor | None = None) -> Tensor:
+        """See `PictureNetwork`.
+
+        Args:
+            pixels: Shape: (*, C, H, W).
+            activations: Handle of each observation's activations in the cache. Shape: (*,).
+
+        Raises:
+            InputError: The observations have another shape than the network was built for.
+        """
+        if self._work is None:
+            layers, is_fixed = packed_layers(self.network), self._of == "pixels"
+            self._work = _Work(layers, self._num_threads, self._cache, is_fixed=is_fixed)
+        self.network.check(pixels)
+        flat = pixels.reshape(-1, math.prod(self.in_shape))
+        handles = None if activations is None else activations.reshape(-1)
+        learning = self._work.parameters if self._of == "weights" else ()
+        logits = _Logits.apply(self._work, flat, handles, *learning)
+        return logits.reshape(*pixels.shape[:-3], -1)
+
+
+class _Activations(NamedTuple):
+    """Outputs of all layers."""
+
+    outputs: Tensor
+    """One observation after the other; there may be room behind. Flat."""
+    rows: Tensor
+    """Row of each observation."""
+    generation: int | None
+    """Of the `ActivationCache`, if they are from there."""
+
+
+class _Logits(torch.autograd.Function):
+    """Forward and backward pass."""
+
+    @staticmethod
+    def forward(
+        ctx: Any, work: "_Work", pixels: Tensor, handles: Tensor | None, *parameters: Tensor
+    ) -> Tensor:
+        ctx.work, ctx.of = work, "weights" if parameters else "pixels"
+        ctx.pixels = pixels.detach()  # Warp asks arrays for gradients, which torch warns of
+        ctx.made = work.compute(ctx.pixels, handles)
+        return work.logits(ctx.made)
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, grad_output: Tensor) -> tuple[Tensor | None, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
+        if ctx.made is None:
+            raise RuntimeError("a second backward pass is impossible: activations were released")
+        made, ctx.made = ctx.made, None
+        if ctx.of == "pixels":
+            return None, ctx.work.pixel_gradient(ctx.pixels, made, grad_output), None
+        return None, None, None, *ctx.work.weight_gradients(ctx.pixels, made, grad_output)
+
+
+class _Work:
+    """Packed layers and the buffers of both passes."""
+
+    def __init__(
+        self,
+        layers: Sequence[PackedLayer],
+        num_threads: int,
+        cache: ActivationCache | None,
+        *,
+        is_fixed: bool,
+    ) -> None:
+        load_kernels(gradients_kernel).result()
+        self._layers, self._cache = layers, cache
+        self._workers = WorkerPool(num_threads, num_threads)
+        self._order = order = Order(layers)
+        self._weights = torch.zeros(order.weights_at[-1])
+        self._back = torch.zeros(order.back_at[-1])
+        made_at = outputs_at(layers)
+        self._logits_at, self._size = made_at[-2:]
+        params = PackedParams()
+        params.geometry = _ints([layer.geometry for layer in layers])
+        params.weights_at, params.back_at = _ints(order.weights_at), _ints(order.back_at)
+        params.weights, params.back = wp.from_torch(self._weights), wp.from_torch(self._back)
+        params.made_at = _ints(made_at)
+        params.num_convolutions = sum(layer.is_convolution for layer in layers)
+        params.near = odd_lines(self._logits_at - made_at[params.num_convolutions - 1])
+        self._params = params
+        self._rooms = torch.empty(self._workers.size, int(BLOCK) * self._size)
+        self._sides = torch.empty(self._workers.size, int(BLOCK) * params.near)
+        most = max(v.num_inputs * v.geometry[0] for v in layers if v.is_convolution)
+        self._patches = torch.empty(self._workers.size, most)
+        self._spare: Tensor | None = None
+        """Outputs to overwrite; new memory takes longer than a layer."""
+        self._gradients = torch.empty(self._workers.size, *self._weights.shape)
+        self._is_fixed = is_fixed
+        order.pack(self._weights, self._back)
+
+    @property
+    def parameters(self) -> list[Tensor]:
+        """Weight and bias of each layer."""
+        return [parameter for layer in self._layers for parameter in layer.parameters]
+
+    def compute(self, pixels: Tensor, handles: Tensor | None) -> _Activations:
+        """Return the outputs of all layers, from the cache if they are there."""
+        if not self._is_fixed:
+            self._order.pack(self._weights, self._back)
+        if self._cache is not None and handles is not None:
+            rows = self._cache.find(handles, self._weights)
+            if rows is not None:
+                outputs = self._cache.outputs.view(-1)
+                return _Activations(outputs, rows, self._cache.generation)
+        size, spare, self._spare = len(pixels) * self._size, self._spare, None
+        made = torch.empty(size) if spare is None or len(spare) < size else spare
+        given = [self._params, wp.from_torch(pixels), wp.from_torch(made)]
+
+        def work(member: int, first: int, last: int) -> None:
+            del member
+            inputs = [first, last, *given]
+            wp.launch(gradients_kernel.answer, 1, inputs=inputs, device="cpu")
+
+        self._workers.map_spans(0, len(pixels), work)
+        return _Activations(made, torch.arange(len(pixels), dtype=torch.int32), None)
+
+    def logits(self, made: _Activations) -> Tensor:
+        """Return the outputs of the last layer. Shape: (num_observations, num_actions)."""
+        last = self._logits_at + torch.arange(len(self._layers[-1].layer.weight))
+        return made.outputs.take(made.rows[:, None].long() * self._size + last)
+
+    def weight_gradients(
+        self, pixels: Tensor, made: _Activations, grad_output: Tensor
+    ) -> list[Tensor]:
+        """Return the gradients of the parameters; `made` may be overwritten afterwards."""
+        self._gradients.zero_()
+        self._backward(pixels, made, grad_output, self._gradients, torch.empty(0, 0))
+        return self._order.unpack(self._gradients.sum(0))
+
+    def pixel_gradient(self, pixels: Tensor, made: _Activations, grad_output: Tensor) -> Tensor:
+        """Return the gradient of the pixels; `made` may be overwritten afterwards."""
+        seen = torch.empty_like(pixels)
+        self._backward(pixels, made, grad_output, torch.empty(0, 0), seen)
+        return seen
+
+    def _backward(
+        self,
+        pixels: Tensor,
+        made: _Activations,
+        grad_output: Tensor,
+        gradients: Tensor,
+        seen: Tensor,
+    ) -> None:
+        if self._cache is not None and made.generation not in (None, self._cache.generation):
+            raise RuntimeError("a batch was collected between the forward and the backward pass")
+        rooms = (self._rooms, self._sides, self._patches)
+        arrays = (
+            pixels,
+            made.outputs,
+            made.rows,
+            grad_output.contiguous(),
+            *rooms,
+            gradients,
+            seen,
+        )
+        given = [self._params, *(wp.from_torch(array) for array in arrays)]
+
+        def work(member: int, first: int, last: int) -> None:
+            inputs = [first, last, member, *given]
+            wp.launch(gradients_kernel.learn, 1, inputs=inputs, device="cpu")
+
+        self._workers.map_spans(0, len(pixels), work)
+        if made.generation is None:
+            self._spare = made.outputs
+
+
+def _ints(values: Any) -> wp.array:
+    return wp.from_torch(torch.tensor(values, dtype=torch.int32))

@@ -1,0 +1,260 @@
+# pyright: reportAttributeAccessIssue=false
+# pyright: reportGeneralTypeIssues=false
+# (Warp's structures are untyped.)
+"""A network laid out for kernels, see `layers_kernel`."""
+
+from collections.abc import Sequence
+from itertools import accumulate
+from typing import NamedTuple
+
+import torch
+import warp as wp
+from torch import Tensor, nn
+
+from drone_rl.acceleration.layers_kernel import WIDTH, Layers
+from drone_rl.policies.cnn import PolicyNetwork, Weighted
+
+
+class PackedLayer(NamedTuple):
+    """One layer; a linear one is a convolution that takes in all there is."""
+
+    layer: Weighted
+    channels: int
+    """Of its input; those after them are 0."""
+    shape: tuple[int, int, int]
+    """Height, width and channels of its input."""
+    kernel: tuple[int, int]
+    stride: int
+
+    @property
+    def is_convolution(self) -> bool:
+        """Whether it looks at one picture at a time."""
+        return isinstance(self.layer, nn.Conv2d)
+
+    @property
+    def places(self) -> tuple[int, int]:
+        """Rows and columns of outputs."""
+        (height, width, _), (high, wide) = self.shape, self.kernel
+        return (height - high) // self.stride + 1, (width - wide) // self.stride + 1
+
+    @property
+    def num_outs(self) -> int:
+        """Of each place, those that fill up included."""
+        return -(-len(self.layer.weight) // WIDTH) * WIDTH
+
+    @property
+    def num_inputs(self) -> int:
+        """Numbers that an output is a sum of."""
+        return self.kernel[0] * self.kernel[1] * self.shape[2]
+
+    @property
+    def has_way_back(self) -> bool:
+        """Whether weights fit that lead from outputs to inputs, as after the first layer."""
+        return self.num_inputs % WIDTH == 0
+
+    @property
+    def num_made(self) -> int:
+        """Outputs for each picture."""
+        rows, columns = self.places
+        return rows * columns * self.num_outs
+
+    @property
+    def geometry(self) -> list[int]:
+        """What `layers_kernel.multiply` takes from `rows` to `num_outs`."""
+        _, width, channels = self.shape
+        high, wide = self.kernel
+        rows, columns = self.places
+        across, line = self.stride * channels, width * channels
+        is_all = self.kernel == self.shape[:2]
+        down = self.num_inputs if is_all else self.stride * line
+        patch = [1, self.num_inputs, 0] if is_all else [high, wide * channels, line]
+        return [rows * columns, columns, down, across, *patch, self.num_outs]
+
+    @property
+    def parameters(self) -> tuple[Tensor, Tensor]:
+        """Weight and bias."""
+        return self.layer.get_parameter("weight"), self.layer.get_parameter("bias")
+
+    def order(self, first: int) -> Tensor:
+        """Which number of which output stands where: 0 for those that fill up.
+
+        Args:
+            first: Number of the first weight; those of the biases follow.
+
+        Returns:
+            The biases, then by input, all of all outputs. Shape: (1 + num_inputs, num_outs).
+        """
+        weight, bias = self.parameters
+        outs, inner = len(weight), (self.channels, *self.kernel)
+        last = first + weight.numel()
+        order = torch.zeros(1 + self.num_inputs, self.num_outs, dtype=torch.int32)
+        order[0, :outs] = torch.arange(last, last + len(bias))
+        by_place = order[1:].view(*self.kernel, self.shape[2], self.num_outs)
+        numbers = torch.arange(first, last).view(outs, *inner)
+        by_place[:, :, : self.channels, :outs] = numbers.permute(2, 3, 1, 0)
+        return order
+
+
+class Order:
+    """Where the numbers of layers go, and come from: a way that is found once."""
+
+    def __init__(self, layers: Sequence[PackedLayer]) -> None:
+        """Finds it."""
+        self._layers = layers
+        first, there, back = 1, [], []
+        for layer in layers:
+            order = layer.order(first)
+            there.append(in_panels(order))
+            unbiased = torch.cat([order.new_zeros(1, layer.num_inputs), order[1:].T])
+            back.append(in_panels(unbiased) if layer.has_way_back else order[:0, 0])
+            first += sum(parameter.numel() for parameter in layer.parameters)
+        self._there, self._back = torch.cat(there), torch.cat(back)
+        self._home = torch.empty(first, dtype=torch.int32)
+        self._home[self._there.long()] = torch.arange(len(self._there), dtype=torch.int32)
+        self.weights_at = list(accumulate(map(len, there), initial=0))
+        """Where those of each layer begin, and where the last end."""
+        self.back_at = list(accumulate(map(len, back), initial=0))
+        """The same of the weights the other way."""
+
+    @torch.no_grad()
+    def pack(self, weights: Tensor, back: Tensor | None = None) -> None:
+        """Writes the weights.
+
+        Args:
+            weights: As `layers_kernel.multiply` reads them.
+            back: From outputs to inputs, without biases.
+        """
+        parameters = [p.flatten() for layer in self._layers for p in layer.parameters]
+        flat = torch.cat([weights.new_zeros(1), *parameters])
+        torch.index_select(flat, 0, self._there, out=weights)
+        if back is not None:
+            torch.index_select(flat, 0, self._back, out=back)
+
+    def unpack(self, gradients: Tensor) -> list[Tensor]:
+        """What was worked out for packed weights, for each weight and bias.
+
+        Args:
+            gradients: In the order of the weights.
+        """
+        flat = gradients.index_select(0, self._home[1:])
+        parameters = [p for layer in self._layers for p in layer.parameters]
+        parts = flat.split([p.numel() for p in parameters])
+        return [part.view(p.shape) for part, p in zip(parts, parameters, strict=True)]
+
+
+def outputs_at(layers: Sequence[PackedLayer]) -> list[int]:
+    """Where the outputs of each layer begin among those of a picture, and where these end."""
+    begins = list(accumulate((odd_lines(layer.num_made) for layer in layers), initial=0))
+    return [*begins[:-1], odd_lines(begins[-1])]
+
+
+def odd_lines(size: int) -> int:
+    """Room for so many numbers: an odd number of cache lines, or rows would push each other out."""
+    lines = -(-size // WIDTH)
+    return WIDTH * (lines + 1 - lines % 2)
+
+
+def in_panels(by_row: Tensor) -> Tensor:
+    """Numbers of `WIDTH` columns, row by row, after those of the columns before. Flat."""
+    return by_row.view(len(by_row), -1, WIDTH).transpose(0, 1).flatten()
+
+
+def unsupported(network: nn.Module) -> list[str]:
+    """Return why kernels do not support a network; empty if they do.
+
+    They support convolutions of gray frames and then linear layers, with ReLU in between, of
+    32-bit numbers on the CPU.
+    """
+    name = type(network).__name__
+    if not isinstance(network, PolicyNetwork):
+        return [f"network {name} is not fused"]
+    if network.in_shape[0] != 1:
+        return [f"a network of {network.in_shape[0]} channels is not fused"]
+    kinds = "".join(_letter(layer) for layer in network.layers)
+    convolutions, _, rest = kinds.partition("f")
+    is_known = convolutions == "cr" * (len(convolutions) // 2) != "" and (
+        rest == "lr" * (len(rest) // 2) + "l"
+    )
+    if not is_known:
+        return [f"network {name} is not fused"]
+    tensors = list(network.parameters())
+    if not all(p.dtype == torch.float32 and p.device.type == "cpu" for p in tensors):
+        return ["a network that is not float32 on the CPU is not fused"]
+    return []
+
+
+def packed_layers(network: nn.Module) -> list[PackedLayer]:
+    """Return the layers of a network that is supported."""
+    assert isinstance(network, PolicyNetwork)
+    channels, height, width = network.in_shape
+    padded, packed = channels, []
+    for layer in network.layers:
+        if isinstance(layer, Weighted):
+            is_convolution = isinstance(layer, nn.Conv2d)
+            shape = (height, width, padded)
+            high, wide = layer.weight.shape[2:] if is_convolution else (height, width)
+            stride = int(layer.stride[0]) if is_convolution else 1
+            one = PackedLayer(layer, channels, shape, (high, wide), stride)
+            packed.append(one)
+            (height, width), channels = one.places, len(layer.weight)
+            padded = one.num_outs
+    return packed
+
+
+def _letter(layer: nn.Module) -> str:
+    """Return the letter of a kind of layer."""
+    if isinstance(layer, nn.Conv2d):
+        is_square = layer.stride[0] == layer.stride[1]
+        plain = (layer.padding, layer.dilation, layer.groups) == ((0, 0), (1, 1), 1)
+        return "c" if is_square and plain and layer.bias is not None else "?"
+    if isinstance(layer, nn.Linear):
+        return "l" if layer.bias is not None else "?"
+    if isinstance(layer, nn.Flatten):
+        return "f" if (layer.start_dim, layer.end_dim) == (1, -1) else "?"
+    return "r" if isinstance(layer, nn.ReLU) else "?"
+
+
+class PackedNetwork:
+    """Convolutions of gray pictures, then linear layers, rectified in between."""
+
+    def __init__(self, network: nn.Module, num_pictures: int) -> None:
+        """Packs a network that is supported, see `unsupported`.
+
+        Args:
+            network: From frames to logits.
+            num_pictures: Frames whose linear layers are computed together.
+        """
+        packed = packed_layers(network)
+        self._order = Order(packed)
+        self.weights = torch.zeros(self._order.weights_at[-1])
+        """As they are laid out."""
+        steps, self.room = self._lay_out(packed, num_pictures)
+        made = Layers()
+        made.steps = wp.from_torch(torch.tensor(steps, dtype=torch.int32))
+        made.weights = wp.from_torch(self.weights)
+        made.num_convolutions = sum(layer.is_convolution for layer in packed)
+        made.picture_size = packed[made.num_convolutions].num_inputs
+        made.logits_at, made.num_outs = steps[-1][1], packed[-1].num_outs
+        *places, self.num_outputs = outputs_at(packed)
+        """Numbers that all layers make of a picture, and room between them."""
+        made.outputs_at = wp.from_torch(torch.tensor(places, dtype=torch.int32))
+        self.layers = made
+        """For kernels."""
+        self.num_actions = len(packed[-1].layer.weight)
+
+    def update(self) -> None:
+        """Takes over what the network has learned."""
+        self._order.pack(self.weights)
+
+    def _lay_out(
+        self, packed: Sequence[PackedLayer], num_pictures: int
+    ) -> tuple[list[list[int]], int]:
+        """Steps of the layers, and the numbers that the room to work must hold."""
+        steps, given_at, room = [], 0, 0
+        for i, (layer, weights_at) in enumerate(zip(packed, self._order.weights_at, strict=False)):
+            is_last = i == len(packed) - 1
+            steps.append([given_at, room, weights_at, *layer.geometry, int(not is_last)])
+            is_alone = not is_last and packed[i + 1].is_convolution
+            given_at = room
+            room += layer.num_made * (1 if is_alone else num_pictures)
+        return steps, room

@@ -1,0 +1,131 @@
+"""What the collectors of one batch of environments share."""
+
+import abc
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any, cast
+
+from tensordict import TensorDict, TensorDictBase
+from tensordict.nn import TensorDictModuleBase
+from tensordict.utils import NestedKey
+from torch import Tensor, nn
+from torchrl.collectors import BaseCollector
+from torchrl.envs import EnvBase
+
+from drone_rl.utils.errors import InputError
+
+
+class BatchedCollector(BaseCollector):
+    """Iterates over batches from a batched environment and an actor, in this process."""
+
+    def __init__(
+        self,
+        env: EnvBase,
+        actor: TensorDictModuleBase,
+        *,
+        total_frames: int = -1,
+        keep: Iterable[NestedKey] = (("next", "info", "end_reason"),),
+        postproc: Callable[[TensorDictBase], TensorDictBase] | None = None,
+    ) -> None:
+        """Connects an environment and a policy.
+
+        Args:
+            env: A batch of environments.
+            actor: Writes the action.
+            total_frames: Stop before a batch once this many frames were collected; -1 for never.
+            keep: Entries kept in addition to observations, what the actor writes, reward and end
+                flags, as far as the environment has them.
+            postproc: Applied to each batch, such as a return estimator.
+
+        Raises:
+            InputError: The environment is not a batch of environments.
+        """
+        if len(env.batch_size) != 1:
+            raise InputError(
+                f"env has batch size {list(env.batch_size)}; give a batch of environments"
+            )
+        super().__init__()
+        self.env = env
+        self.actor = actor
+        self.postproc = postproc
+        self.total_frames = total_frames
+        self.frames = 0
+        self.episodes = 0
+        self._observed = tuple(actor.in_keys)
+        flags = (env.reward_key, *env.done_keys)
+        observable = {("next", *_as_tuple(key)) for key in env.observation_spec.keys(True, True)}
+        self._kept = (*(("next", key) for key in flags), *(k for k in keep if k in observable))
+
+    @property
+    def base_env(self) -> Any:
+        """The environment without its transforms."""
+        return getattr(self.env, "base_env", self.env)
+
+    @abc.abstractmethod
+    def collect(self) -> TensorDictBase:
+        """Return the next batch."""
+
+    def iterator(self) -> Iterator[TensorDictBase]:
+        """Yields batches until `total_frames`; a `for` over the collector calls it."""
+        while self.total_frames < 0 or self.frames < self.total_frames:
+            yield self.collect()
+
+    def _finish(self, batch: TensorDictBase, episodes: int) -> TensorDictBase:
+        """Counts a batch and applies `postproc`."""
+        self.frames += batch.numel()
+        self.episodes += episodes
+        return batch if self.postproc is None else self.postproc(batch)
+
+    def set_seed(self, seed: int, static_seed: bool = False) -> int:
+        """Seeds the environments; whoever made the actor's generator seeds that.
+
+        Returns:
+            A seed for the next collector, or the same if it is static.
+        """
+        return cast(int, self.env.set_seed(seed, static_seed=static_seed))
+
+    def shutdown(
+        self, timeout: float | None = None, close_env: bool = True, raise_on_error: bool = True
+    ) -> None:
+        """Closes the environment, unless it is to stay open."""
+        if close_env and not self.env.is_closed:
+            self.env.close()
+
+    def __len__(self) -> int:
+        """Raises TypeError: the number of batches is not known."""
+        raise TypeError(f"the number of batches of {type(self).__name__} is not known beforehand")
+
+    def _maybe_fallback_update(
+        self, policy_or_weights: Any = None, *, model_id: str | None = None
+    ) -> None:
+        """Implements `update_policy_weights_`: nothing without weights, if the actor is shared."""
+        if policy_or_weights is not None:
+            copy_weights(policy_or_weights, self.actor)
+
+
+def copy_weights(source: Any, actor: TensorDictModuleBase) -> None:
+    """Copies parameters into an actor.
+
+    Args:
+        source: Another such actor, its `state_dict`, or a TensorDict of its parameters.
+        actor: Gets them.
+    """
+    if isinstance(source, TensorDictBase):
+        weights = cast(TensorDictBase, TensorDict.from_module(actor))
+        weights.data.update_(source.data)
+    else:
+        actor.load_state_dict(source.state_dict() if isinstance(source, nn.Module) else source)
+
+
+def take_rows(tensordict: TensorDictBase, rows: Tensor) -> TensorDictBase:
+    """Index the first dimension, faster than tensordict's own indexing.
+
+    Args:
+        tensordict: First dimension: rows.
+        rows: Indices. Shape: (k,).
+    """
+    taken = {key: tensordict.get(key).index_select(0, rows) for key in tensordict.keys(True, True)}
+    return TensorDict(taken, [len(rows)], device=tensordict.device)
+
+
+def _as_tuple(key: Any) -> tuple[str, ...]:
+    return (key,) if isinstance(key, str) else key

@@ -1,0 +1,94 @@
+"""Uses `drone_rl.acceleration` if it is installed and supports a configuration.
+
+This is the only module that imports that package. Whatever it does not support is left to TorchRL
+and torch.
+"""
+
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING, Any, Literal
+
+import torch
+from tensordict.nn import TensorDictModuleBase
+from tensordict.utils import NestedKey
+from torch import Tensor, nn
+from torchrl.envs import EnvBase
+
+from drone_rl.envs.direct_renderer import Reasons
+
+if TYPE_CHECKING:
+    from drone_rl.acceleration import (
+        ActivationCache,
+        DirectCollector,
+        DirectStream,
+        FusedCollector,
+    )
+
+Acceleration = Literal["none", "direct", "fused"]
+"""Of a collector: TorchRL's steps; steps without TorchRL, which give the same bit for bit; or one
+kernel for whole episodes, which samples and sums in another order."""
+MISSING = Reasons(["drone_rl.acceleration is not installed"])
+
+
+def accelerated_collector(
+    env: EnvBase, actor: TensorDictModuleBase, acceleration: Acceleration, **settings: Any
+) -> "FusedCollector | DirectCollector | Reasons":
+    """Return an accelerated collector of complete episodes, or the reasons why there is none.
+
+    Args:
+        env: A batch of environments.
+        actor: The policy.
+        acceleration: The fastest implementation that may be used.
+        settings: See `drone_rl.acceleration.accelerate`.
+    """
+    if acceleration == "none":
+        return Reasons(["collector.compiled is false"])
+    try:
+        from drone_rl.acceleration import accelerate
+    except ImportError:
+        return MISSING
+    return accelerate(env, actor, fused=acceleration == "fused", **settings)
+
+
+def accelerated_stream(
+    env: EnvBase, observed: Iterable[NestedKey], kept: Iterable[NestedKey]
+) -> "DirectStream | Reasons":
+    """Return what steps environments on and on without TorchRL, or the reasons why not."""
+    try:
+        from drone_rl.acceleration import accelerate_stream
+    except ImportError:
+        return MISSING
+    return accelerate_stream(env, observed, kept)
+
+
+def accelerated_gradients(
+    network: nn.Module,
+    num_threads: int = 1,
+    *,
+    of: Literal["weights", "pixels"] = "weights",
+    cache: "Callable[[], ActivationCache | None]" = lambda: None,
+) -> nn.Module:
+    """Return the network with fused forward and backward pass if that is possible, else itself.
+
+    Args:
+        network: From pixels to logits.
+        num_threads: Of the kernel; sums over observations depend on it.
+        of: What has gradients. Gradients of pixels take the weights as they are now.
+        cache: Makes the collector keep its activations, see `EpisodeSource.cache_activations`.
+    """
+    try:
+        from drone_rl.acceleration import accelerate_gradients
+    except ImportError:
+        return network
+    found = accelerate_gradients(network, num_threads, of=of, cache=cache)
+    return network if isinstance(found, Reasons) else found
+
+
+def accelerated_inference(network: nn.Module) -> Callable[[Tensor], Tensor]:
+    """Return a function from pixels to logits without gradients, safe to call from any thread."""
+    plain = torch.no_grad()(network.forward)
+    try:
+        from drone_rl.acceleration import accelerate_inference
+    except ImportError:
+        return plain
+    found = accelerate_inference(network)
+    return plain if isinstance(found, Reasons) else found

@@ -1,0 +1,130 @@
+"""Renders observations of given simulation states, without steps of TorchRL.
+
+A step of TorchRL copies every entry of every environment through each transform, whether or not its
+episode still runs. With few environments that takes longer than simulating, rendering and acting
+together. Where only maps from frame to frame lie between renderer and actor, it is not needed.
+"""
+
+from collections.abc import Iterable, Sequence
+from typing import Any, Self
+
+from tensordict import TensorDict, TensorDictBase
+from tensordict.utils import NestedKey
+from torch import Tensor
+from torchrl.envs import Compose, EnvBase, TransformedEnv
+
+from drone_rl.envs.drone_env import DroneEnv
+from drone_rl.envs.transforms import GrayPixels, PixelTransform, on_pixels
+from drone_rl.sim.tasks import State
+
+Entries = dict[NestedKey, Tensor]
+FLAGS = ("reward", "done", "terminated", "truncated")
+_END_REASON = ("next", "info", "end_reason")
+
+
+class Reasons(tuple[str, ...]):
+    """Why an implementation does not support a configuration: plain sentences, at least one."""
+
+    def __str__(self) -> str:
+        return "; ".join(self)
+
+
+class DirectRenderer:
+    """Renders what an actor observes of states, and computes the entries of a step.
+
+    If the first transform is `GrayPixels`, the renderer renders gray frames.
+    """
+
+    def __init__(
+        self, env: DroneEnv, transforms: Sequence[PixelTransform], kept: Iterable[NestedKey]
+    ) -> None:
+        """Takes over the environment's states; see `try_create`."""
+        self.env, self.worlds = env, env.worlds
+        is_gray = type(next(iter(transforms), None)) is GrayPixels
+        self.view = self.worlds.view(modality="gray") if is_gray else self.worlds.policy_view
+        self.after: Sequence[Any] = transforms[1:] if is_gray else transforms
+        """Transforms that are applied to rendered frames."""
+        self._transform = on_pixels(self.after)
+        self._kept = tuple(kept)
+        self._info = [
+            (key, str(key[2])) for key in self._kept if len(key) == 3 and key != _END_REASON
+        ]
+
+    @property
+    def needs_info(self) -> bool:
+        """Whether a step has other entries than reward, flags and end reason."""
+        return bool(self._info)
+
+    @classmethod
+    def try_create(
+        cls, env: EnvBase, observed: Iterable[NestedKey], kept: Iterable[NestedKey]
+    ) -> Self | Reasons:
+        """Return the renderer of an environment, or the reasons why there is none.
+
+        Args:
+            env: Any batch of environments.
+            observed: Entries that the actor reads.
+            kept: ("next", ...) entries to keep of each step.
+        """
+        base: Any = getattr(env, "base_env", None)
+        if type(env) is not TransformedEnv or type(base) is not DroneEnv:
+            return Reasons([f"environment {type(env).__name__} is no TransformedEnv of DroneEnv"])
+        one: Any = env.transform
+        transforms: list[Any] = list(one) if isinstance(one, Compose) else [one]
+        known = {("next", name) for name in FLAGS}
+        known |= {("next", "info", name) for name in base.worlds.entries}
+        reasons = [
+            f"transform {type(t).__name__} is not fused"
+            for t in transforms
+            if not (isinstance(t, PixelTransform) and t.is_in_place)
+        ]
+        if not base.pixels:
+            reasons.append("the environment renders no pixels")
+        elif tuple(observed) != ("pixels",):
+            reasons.append(f"the policy reads {', '.join(map(str, observed))} instead of pixels")
+        reasons += [f"entry {key} is not fused" for key in kept if key not in known]
+        return Reasons(reasons) if reasons else cls(base, transforms, kept)
+
+    def look(self, state: State, rows: Tensor | None = None) -> TensorDictBase:
+        """Render the observations of states. First dimension: the state's.
+
+        Args:
+            state: Of some environments.
+            rows: Indices of these environments; all by default. Shape: (k,).
+        """
+        frames = self.worlds.render(state, self.view, self.env.looks.drawn(rows))
+        if self.view.modalities == ("gray",):
+            frames = frames[:, None]
+        pixels = self._transform(frames)
+        return TensorDict({"pixels": pixels}, [len(pixels)], device=pixels.device)
+
+    def entries(self, state: State, reward: Tensor) -> tuple[Entries, Tensor]:
+        """Return the kept entries of a step, and whether it ended an episode.
+
+        Args:
+            state: After the step.
+            reward: Of the step. Shape: (num_envs,), float64.
+
+        Returns:
+            Each kept entry, and the done flag. Shapes: (num_envs, *).
+        """
+        entries = self.flags(reward, state.end_reason)
+        if self._info:
+            info = self.worlds.info(state)
+            entries.update((key, info[name]) for key, name in self._info)
+        return {key: entries[key] for key in self._kept}, entries["next", "done"]
+
+    def flags(self, reward: Tensor, end_reason: Tensor) -> Entries:
+        """Return the entries that every step has.
+
+        Args:
+            reward: Of the step. Shape: (num_envs,).
+            end_reason: After the step, 0 while the episode runs. Shape: (num_envs,).
+
+        Returns:
+            ("next", ...) "reward", float32, the flags and the end reason. Shapes: (num_envs, 1).
+        """
+        terminated, truncated = self.worlds.ends(end_reason)
+        values = (reward.float(), terminated | truncated, terminated, truncated, end_reason)
+        keys = (*(("next", name) for name in FLAGS), _END_REASON)
+        return {key: value[:, None] for key, value in zip(keys, values, strict=True)}

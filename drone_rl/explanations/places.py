@@ -1,0 +1,77 @@
+"""What it does about one cube at each and every place, exactly, where a closed form is known."""
+
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from drone_rl.config import TaskSettings
+from drone_rl.config.verification import PlacesSettings
+from drone_rl.explanations.context import Context
+from drone_rl.sim.actions import MOVES
+from drone_rl.sim.tasks import CollectCubes
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.seeding import legacy_seed
+from drone_rl.verification.prover.action_map import ActionMap, RenderFaces, map_actions
+from drone_rl.verification.prover.arrangement import Window
+from drone_rl.verification.prover.cube_images import NOTHING, CameraModel, CubeImages
+from drone_rl.verification.prover.lattice import Lattice
+from drone_rl.verification.prover.policy_spec import check_task
+
+_COMPARED = 1000
+"""Pictures of the renderer that must be the closed form's."""
+
+
+def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
+    """Makes "places".
+
+    It holds nothing but why it was "refused" where the world, the pictures or the actions are none
+    that an exact map is known of. Arrays: "places_..." of the outlines, see `ActionMap.outlines`.
+    """
+    settings = PlacesSettings()
+    try:
+        found = _map(context, settings)
+    except InputError as error:
+        return {"places": {"refused": str(error)}}, {}
+    arrays = {f"places_{name}": array for name, array in found.outlines().items()}
+    return {"places": found.summary(settings.logit_gap)}, arrays
+
+
+def _map(context: Context, settings: PlacesSettings) -> ActionMap:
+    scenes, network = context.scenes, context.network
+    if not isinstance(scenes.task, CollectCubes):
+        raise InputError("its task is not that of collecting cubes")
+    if scenes.actions != MOVES:
+        raise InputError(f"it does not choose among {', '.join(MOVES.names)}")
+    if scenes.memory:
+        raise InputError("it sees a stack of frames, so what it does depends on the past")
+    task: TaskSettings = scenes.task.settings
+    check_task(task)
+    if not network.has_weights:
+        raise InputError("it is no torch module, so that nothing is known of its sums")
+    camera, lattice = CameraModel.of(task, scenes.worlds.camera), Lattice(task)
+    images = CubeImages(scenes.worlds, lattice, camera)
+    images.check(_COMPARED, np.random.RandomState(legacy_seed(context.seed.value)))
+    window = Window(max(settings.nearest, task.cube_size), settings.farthest, settings.sideways)
+    return map_actions(
+        camera,
+        window,
+        _look(context, images),
+        network.eval(),
+        touch_distance=task.touch_distance,
+        most_cells=settings.most_cells,
+    )
+
+
+def _look(context: Context, images: CubeImages) -> RenderFaces:
+    """From what pixels show of a cube, by way of colours, to what the network sees."""
+
+    def look(faces: NDArray[np.uint8]) -> torch.Tensor:
+        shown = torch.from_numpy(faces).long()
+        is_open = (shown == NOTHING)[..., None]
+        return context.scenes.transform(
+            torch.where(is_open, images.background, images.colors[shown])
+        )
+
+    return look

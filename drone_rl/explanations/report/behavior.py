@@ -1,0 +1,171 @@
+"""Report sections "dataset" (recorded rollouts) and "flaws" (contradictions and loops)."""
+
+from PIL import Image
+
+from drone_rl.evaluation.plots import images
+from drone_rl.explanations.report.explanation import Explanation
+from drone_rl.explanations.report.part import Part
+from drone_rl.sim.vocabulary import shown_actions, terms_of
+from drone_rl.utils.text import Evidence, Sentence, among, bounds, listed, percent, plural
+
+KINDS = ("contradiction", "justified", "unknown")
+MOST_PAIRS = 4
+"""Pairs of each kind that are shown."""
+
+
+def _size(evidence: Evidence) -> str:
+    data = evidence["dataset"]
+    return (
+        f"{data['frames']} frames, spread evenly over {data['episodes']} whole episodes of "
+        f"{data['steps']:,} steps with sampled actions."
+    )
+
+
+def _actions(evidence: Evidence) -> str:
+    shares, names = evidence["dataset"]["action_shares"], shown_actions(evidence).names
+    parts = listed([f"{percent(s)} {a}" for s, a in zip(shares, names, strict=True)])
+    return f"Actions taken: {parts}."
+
+
+def _one_action(evidence: Evidence) -> str:
+    shares, names = evidence["dataset"]["action_shares"], shown_actions(evidence).names
+    return f"Every step took the same action, {names[shares.index(max(shares))]}."
+
+
+def _entropy(evidence: Evidence) -> str:
+    entropy = evidence["dataset"]["entropy"]
+    return (
+        f"The policy's mean entropy is {entropy['mean']:.2f}, where 0 is deterministic and 1 is "
+        f"uniform ({bounds(entropy)})."
+    )
+
+
+DATASET = (
+    Sentence("dataset.size", "frames were recorded", lambda e: e["dataset"]["frames"] > 0, _size),
+    Sentence(
+        "dataset.actions",
+        "more than one action was taken",
+        lambda e: max(e["dataset"]["action_shares"]) < 1,
+        _actions,
+    ),
+    Sentence(
+        "dataset.one_action",
+        "every step took the same action",
+        lambda e: max(e["dataset"]["action_shares"]) == 1,
+        _one_action,
+    ),
+    Sentence(
+        "dataset.entropy",
+        "the policy's probabilities were recorded",
+        lambda e: e["dataset"]["entropy"]["mean"] is not None,
+        _entropy,
+    ),
+    Sentence(
+        "dataset.none_reached",
+        "no step reached a goal",
+        lambda e: e["dataset"]["goals_reached"] == 0,
+        lambda e: f"No {terms_of(e).goal} was {terms_of(e).reached} in these episodes.",
+    ),
+)
+
+
+def _no_pair(evidence: Evidence) -> str:
+    found = evidence["contradictions"]
+    return f"Among these {found['frames']} frames, no two similar ones get opposite actions."
+
+
+def _pairs(evidence: Evidence) -> str:
+    found, target = evidence["contradictions"], terms_of(evidence).target
+    verb = "gets" if found["pairs"] == 1 else "get"
+    unknown = found["unknown"]
+    last = f", {unknown} unknown (a frame has no next {target})." if unknown else "."
+    return (
+        f"Among these {found['frames']} frames, {plural(found['pairs'], 'pair')} of similar ones "
+        f"{verb} opposite actions (each frame is in one pair at most): "
+        f"{plural(found['contradictions'], 'contradiction')} (the next {target} is at about the "
+        f"same place in both), {found['justified']} justified (it is elsewhere){last}"
+    )
+
+
+def _worst(evidence: Evidence) -> str:
+    worst = evidence["contradictions"]["worst_opposition"]
+    return f"In the worst contradiction, the probability of a turn changes sides by {worst:.2f}."
+
+
+CONTRADICTIONS = (
+    Sentence(
+        "contradictions.none",
+        "no pair was found among the analysed frames",
+        lambda e: e["contradictions"]["pairs"] == 0,
+        _no_pair,
+    ),
+    Sentence(
+        "contradictions.pairs",
+        "pairs were found; all are counted",
+        lambda e: e["contradictions"]["pairs"] > 0,
+        _pairs,
+    ),
+    Sentence(
+        "contradictions.worst",
+        "one of the pairs is a contradiction",
+        lambda e: e["contradictions"]["contradictions"] > 0,
+        _worst,
+    ),
+)
+
+
+def _no_loop(evidence: Evidence) -> str:
+    share = evidence["loops"]["episodes"]
+    return (
+        f"None of these {share['trials']} sampled episodes has a loop, in which the drone moves "
+        f"back and forth; up to {percent(share['upper95'])} of such episodes may have one (95%)."
+    )
+
+
+def _loops(evidence: Evidence) -> str:
+    found = evidence["loops"]
+    share = found["episodes"]
+    return (
+        f"In {among(share)} of these sampled episodes the drone moves back and forth in a loop "
+        f"({bounds(share, percent)}); the longest loop has {found['longest']} steps, and all loops "
+        f"together have {percent(found['frames_share'])} of the steps."
+    )
+
+
+LOOPS = (
+    Sentence("loops.none", "no episode has a loop", lambda e: not e["loops"]["loops"], _no_loop),
+    Sentence("loops.some", "episodes have loops", lambda e: e["loops"]["loops"] > 0, _loops),
+)
+
+
+def _draw_pairs(explanation: Explanation) -> dict[str, Image.Image]:
+    drawn = {kind: pairs(explanation, kind) for kind in KINDS}
+    return {f"pairs_{kind}": image for kind, image in drawn.items() if image is not None}
+
+
+def pairs(explanation: Explanation, kind: str) -> Image.Image | None:
+    """Return an image of the worst pairs of a kind; None if there is none."""
+    listed = explanation.numbers["contradictions"]["list"]
+    shown = [pair for pair in listed if pair["kind"] == kind][:MOST_PAIRS]
+    if not shown:
+        return None
+    tiles = [
+        images.probed_frame(
+            explanation.data, pair[side], f"frame {pair[side]}: more {side}", explanation.actions
+        )
+        for pair in shown
+        for side in ("left", "right")
+    ]
+    return images.gridded(tiles, 2)
+
+
+DATASET_PART = Part(
+    title="Recorded rollouts", label="Rollouts", needs=("dataset",), text={"dataset": DATASET}
+)
+FLAWS_PART = Part(
+    title="Contradictions and loops",
+    label="Contradictions and loops",
+    needs=("contradictions", "loops"),
+    text={"contradictions": CONTRADICTIONS, "loops": LOOPS},
+    draw=_draw_pairs,
+)

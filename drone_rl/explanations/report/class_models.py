@@ -1,0 +1,77 @@
+"""Report section "class_models": observations optimized for each action (Figs. 10 to 12)."""
+
+from collections.abc import Sequence
+
+from PIL import Image
+
+from drone_rl.evaluation.plots import images
+from drone_rl.explanations.report.explanation import Explanation
+from drone_rl.explanations.report.part import Part
+from drone_rl.sim.vocabulary import shown_actions
+from drone_rl.utils.text import Evidence, Sentence, listed
+
+_OBJECTIVES = ("probability", "logit")
+
+
+def _reached(evidence: Evidence) -> str:
+    reached = evidence["class_model"]["logit"]["probabilities"]
+    names = shown_actions(evidence).names
+    parts = listed([f"{a} {p:.3f}" for a, p in zip(names, reached, strict=True)])
+    return f"Probabilities of the actions on the observations optimized by logit: {parts}."
+
+
+def _unreached(evidence: Evidence) -> list[str]:
+    """Return actions that no attempt of either objective made more probable than not."""
+    found, names = evidence["class_model"], shown_actions(evidence).names
+    highest = [max(p) for p in zip(*(found[o]["highest"] for o in _OBJECTIVES), strict=True)]
+    return [action for action, p in zip(names, highest, strict=True) if p <= 0.5]
+
+
+def _not_reached(evidence: Evidence) -> str:
+    found = evidence["class_model"]
+    attempts = sum(found[o]["starts"] * found[o]["num_settings"] for o in _OBJECTIVES)
+    return (
+        f"None of the {attempts} attempts made {listed(_unreached(evidence), 'or')} more probable "
+        "than not; this does not show that no observation does."
+    )
+
+
+CLASS_MODEL = (
+    Sentence("class_model.reached", "always", lambda e: True, _reached),
+    Sentence(
+        "class_model.not_reached",
+        "no start under any setting gave an action a probability above one half",
+        lambda e: bool(_unreached(e)),
+        _not_reached,
+    ),
+)
+
+
+def grid(explanations: Sequence[Explanation]) -> Image.Image:
+    """Return images by action (columns), policy and objective (rows), with the probabilities."""
+    tiles = []
+    for explanation in explanations:
+        start = f"{explanation.name[:18]}: " if len(explanations) > 1 else ""
+        numbers = explanation.numbers["class_model"]
+        low, high = numbers["statistics"]["low"], numbers["statistics"]["high"]
+        # version 0.1 wrote "color" instead of "channels"
+        channels = numbers.get("channels", "rgb" if numbers.get("color") else "gray")
+        for objective in _OBJECTIVES:
+            reached = numbers[objective]["probabilities"]
+            shown = explanation.arrays[f"class_model_{objective}"]
+            for action in explanation.actions.order:
+                image = images.shown_picture(shown[action], low, high, channels)
+                name = explanation.actions.names[action]
+                caption = f"{start}{name} {reached[action]:.3f} (by {objective})"
+                tiles.append(images.titled(images.enlarge(image), caption))
+    return images.gridded(tiles, len(explanations[0].actions.names))
+
+
+PART = Part(
+    title="Observations that maximize each action (class models)",
+    label="Class models",
+    needs=("class_model",),
+    text={"class_model": CLASS_MODEL},
+    draw=lambda explanation: {"class_model": grid([explanation])},
+    compare=lambda explanations: {"class_models": grid(explanations)},
+)

@@ -1,0 +1,165 @@
+"""Report section "embedding": t-SNE maps of frames (Figs. 7 and 8)."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+from scipy.optimize import linear_sum_assignment
+from scipy.spatial.distance import cdist
+
+from drone_rl.evaluation.plots import images
+from drone_rl.evaluation.plots.saving import Rows, to_png, to_uri
+from drone_rl.explanations.report.explanation import Explanation
+from drone_rl.explanations.report.part import Part
+from drone_rl.utils.text import Evidence, Sentence, listed, percent
+
+MOST_THUMBNAILS = 900
+"""If there are more frames, an evenly spaced selection is shown."""
+CELLS_A_THUMBNAIL = 2.2
+"""Empty cells show where clusters end."""
+ASPECT = 1.5
+"""Width to height of a map of thumbnails."""
+TILES_ACROSS = 30
+"""Frames in a row of the sprite, as map.js cuts it."""
+MAPS = ("features", "pixels")
+
+
+def _faithful(evidence: Evidence) -> str:
+    one, two = evidence["tsne"]["features"], evidence["tsne"]["pixels"]
+    return (
+        f"Faithfulness of the maps: of the {one['neighbours']} nearest neighbours on a map, "
+        f"{percent(one['neighbours_kept'])} (features of layer {one['layer']}) and "
+        f"{percent(two['neighbours_kept'])} (pixels) are nearest neighbours in the original space "
+        f"(chance: {percent(one['neighbours_chance'])} and "
+        f"{percent(two['neighbours_chance'])}); trustworthiness "
+        f"{one['trustworthiness']:.3f} and {two['trustworthiness']:.3f} of 1."
+    )
+
+
+def _unfaithful(evidence: Evidence) -> list[str]:
+    return [n for n in MAPS if evidence["tsne"][n]["neighbours_kept"] < 0.5]
+
+
+TSNE = (
+    Sentence("tsne.faithful", "always", lambda e: True, _faithful),
+    Sentence(
+        "tsne.unfaithful",
+        "less than half of the neighbours on a map are neighbours in the original space",
+        lambda e: bool(_unfaithful(e)),
+        lambda e: (
+            f"Most neighbours on the map of {listed(_unfaithful(e))} are not neighbours in the "
+            "original space."
+        ),
+    ),
+)
+
+
+def tsne_map(explanation: Explanation, which: str) -> Image.Image:
+    """Return a map of thumbnails at their embedded positions, tinted by action."""
+    chosen = shown_frames(explanation)
+    return images.thumbnails(
+        explanation.data["frames"][chosen],
+        [explanation.actions.colors[a] for a in explanation.data["actions"][chosen]],
+        cells(explanation, which),
+    )
+
+
+def shown_frames(explanation: Explanation) -> NDArray:
+    """Return the frames that get a thumbnail. Shape: (N,)."""
+    count = len(explanation.data["actions"])
+    return np.unique(np.linspace(0, count - 1, min(count, MOST_THUMBNAILS)).astype(int))
+
+
+def cells(explanation: Explanation, which: str) -> NDArray:
+    """Return column and row of each shown frame. Shape: (N, 2)."""
+    frames = explanation.data["frames"]
+    chosen = shown_frames(explanation)
+    tile = frames.shape[2] / frames.shape[1]
+    rows = int(np.ceil(np.sqrt(CELLS_A_THUMBNAIL * len(chosen) * tile / ASPECT)))
+    columns = int(np.ceil(CELLS_A_THUMBNAIL * len(chosen) / rows))
+    return snap_to_grid(explanation.arrays[f"tsne_{which}"][chosen], columns, rows)
+
+
+def snap_to_grid(points: NDArray, columns: int, rows: int) -> NDArray:
+    """Assign each point a cell of its own; the total squared distance is minimal.
+
+    Args:
+        points: Shape (T, 2).
+        columns: Cells across.
+        rows: Cells down; rows times columns must be at least T.
+
+    Returns:
+        Column and row of each point. Shape: (T, 2), int.
+    """
+    low, high = points.min(0), points.max(0)
+    wanted = (points - low) / np.maximum(high - low, 1e-12) * (columns - 1, rows - 1)
+    cells = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), -1).reshape(-1, 2)
+    _, chosen = linear_sum_assignment(cdist(wanted, cells, "sqeuclidean"))
+    return cells[chosen]
+
+
+def sprite(explanation: Explanation) -> Image.Image:
+    """Return all shown frames in one image, for the interactive map."""
+    frames = explanation.data["frames"][shown_frames(explanation)]
+    height, width = frames.shape[1:3]
+    canvas = Image.new("RGB", (TILES_ACROSS * width, -(-len(frames) // TILES_ACROSS) * height))
+    for i, frame in enumerate(frames):
+        corner = (i % TILES_ACROSS * width, i // TILES_ACROSS * height)
+        canvas.paste(Image.fromarray(frame), corner)
+    return canvas.quantize(128, dither=Image.Dither.NONE)
+
+
+def points(explanation: Explanation) -> dict[str, Any]:
+    """Return the data of each shown frame that the interactive map uses."""
+    data, chosen = explanation.data, shown_frames(explanation)
+    height, width = data["frames"].shape[1:3]
+    last = np.bincount(data["flights/episode"]) - 1
+    return {
+        "tile": [width, height],
+        "cells": {which: cells(explanation, which).tolist() for which in MAPS},
+        "action": data["actions"][chosen].tolist(),
+        "probabilities": np.round(data["probabilities"][chosen].astype(float), 3).tolist(),
+        "episode": data["episode"][chosen].tolist(),
+        "step": data["step"][chosen].tolist(),
+        "event": [_event(explanation, int(event)) for event in data["event"][chosen]],
+        "last": last.tolist(),
+        "names": explanation.actions.names,
+        "order": explanation.actions.order,
+        "colors": explanation.actions.colors,
+        "sprite": to_uri(to_png(sprite(explanation)), "image/png"),
+    }
+
+
+def _event(explanation: Explanation, event: int) -> str:
+    terms = explanation.terms
+    return {1: f"{terms.reaches} a {terms.goal}", -1: f"misses a {terms.goal}"}.get(event, "")
+
+
+def _legend(explanation: Explanation) -> list[dict[str, str]]:
+    actions = explanation.actions
+    return [{"name": n, "color": actions.css(i)} for i, n in enumerate(actions.names)]
+
+
+def table(explanation: Explanation) -> Rows:
+    """Return the position of each frame on both maps."""
+    data, arrays = explanation.data, explanation.arrays
+    axes = [f"{axis}_{which}" for which in MAPS for axis in ("x", "y")]
+    both = np.hstack([arrays[f"tsne_{which}"] for which in MAPS]).round(4).tolist()
+    rows: list[list[Any]] = [["frame", "episode", "step", "action", *axes]]
+    for t, row in enumerate(both):
+        action = explanation.actions.names[int(data["actions"][t])]
+        rows.append([t, int(data["episode"][t]), int(data["step"][t]), action, *row])
+    return rows
+
+
+PART = Part(
+    title="Frames by similarity (t-SNE)",
+    label="t-SNE",
+    needs=("tsne",),
+    is_slow=True,
+    text={"tsne": TSNE},
+    draw=lambda explanation: {f"tsne_{which}": tsne_map(explanation, which) for which in MAPS},
+    tables=lambda explanation: {"tsne": table(explanation)},
+    extras=lambda explanation: {"actions": _legend(explanation), "points": points(explanation)},
+)

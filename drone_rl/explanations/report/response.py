@@ -1,0 +1,244 @@
+"""Report sections "response" (maps over the place of one target) and "asymmetry" (left, right)."""
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from numpy.typing import NDArray
+from PIL import Image
+
+from drone_rl.evaluation.plots import images
+from drone_rl.evaluation.plots.saving import Rows
+from drone_rl.explanations.report.explanation import Explanation
+from drone_rl.explanations.report.part import Part
+from drone_rl.sim.vocabulary import ShownActions, terms_of
+from drone_rl.utils.text import Evidence, Sentence, bounds, listed, percent
+
+_OUTCOMES = ("#d9d9de", "#4269d0")
+"""Colours of targets that are not handled, and of those that are."""
+
+
+def _level(evidence: Evidence, level: bool = True) -> list[Evidence]:
+    """Return rows of targets at the drone's height, or of all others."""
+    return [row for row in evidence["response"]["rows"] if (row["height"] == 0) == level]
+
+
+def _collected(evidence: Evidence, rows: Sequence[Evidence]) -> str:
+    terms = terms_of(evidence)
+    parts = [
+        f"{row['collected']} of {row['places']} places {terms.place(row['side'])}"
+        for row in rows
+        if row["places"]
+    ]
+    return listed(parts)
+
+
+def _outcomes(evidence: Evidence) -> str:
+    terms = terms_of(evidence)
+    return (
+        f"With one {terms.target} alone and its most probable actions, the policy {terms.handles} "
+        f"from {_collected(evidence, _level(evidence))}."
+    )
+
+
+def _heights(evidence: Evidence) -> str:
+    other = _level(evidence, level=False)
+    parts = []
+    for height in sorted({row["height"] for row in other}):
+        word = "higher" if height > 0 else "lower"
+        rows = [row for row in other if row["height"] == height]
+        parts.append(f"{abs(height):g} m {word}: from {_collected(evidence, rows)}")
+    return f"With the {terms_of(evidence).target} {'; '.join(parts)}."
+
+
+def _blind(evidence: Evidence) -> str:
+    rows = {row["side"]: row["blind"] for row in _level(evidence)}
+    terms = terms_of(evidence)
+    parts = [f"{percent(rows[s])} of the places {terms.place(s)}" for s in rows if s != "ahead"]
+    return (
+        f"It is blind at {listed(parts)}: a turn is needed, it makes none, and its probabilities "
+        f"differ by less than {evidence['response']['blind_below']:g} from those without a "
+        f"{terms.target}. It may still detect the {terms.target} farther on."
+    )
+
+
+RESPONSE = (
+    Sentence(
+        "response.collected",
+        "episodes were run from places of the grid",
+        lambda e: any(row["places"] for row in _level(e)),
+        _outcomes,
+    ),
+    Sentence(
+        "response.heights",
+        "the task has targets at other heights",
+        lambda e: bool(_level(e, level=False)),
+        _heights,
+    ),
+    Sentence(
+        "response.blind",
+        "places on both sides need a turn",
+        lambda e: all(r["blind"] is not None for r in _level(e) if r["side"] != "ahead"),
+        _blind,
+    ),
+)
+
+
+def _differs(evidence: Evidence) -> str:
+    found = evidence["asymmetry"]
+    absolute = found["dataset"]["absolute"]
+    return (
+        f"On these frames the policy differs from its mirror image by {absolute['mean']:.2f} on "
+        f"average (0: perfectly symmetric, 1: always opposite; {bounds(absolute)}), on the grid by "
+        f"{found['grid']['absolute']:.2f}."
+    )
+
+
+def _signed(evidence: Evidence) -> Evidence:
+    return evidence["asymmetry"]["dataset"]["signed"]
+
+
+def _prefers(evidence: Evidence) -> str:
+    signed = _signed(evidence)
+    side = "left" if signed["mean"] > 0 else "right"
+    ends = sorted(abs(signed[end]) for end in ("lower95", "upper95"))
+    size = {"lower95": ends[0], "upper95": ends[1]}
+    return f"It prefers the {side}, by {abs(signed['mean']):.2f} in probability ({bounds(size)})."
+
+
+def _is_sure(evidence: Evidence) -> bool:
+    signed = _signed(evidence)
+    return signed["lower95"] > 0 or signed["upper95"] < 0
+
+
+ASYMMETRY = (
+    Sentence("asymmetry.differs", "always", lambda e: True, _differs),
+    Sentence("asymmetry.prefers", "the interval of the preference excludes 0", _is_sure, _prefers),
+    Sentence(
+        "asymmetry.undecided",
+        "the interval of the preference contains 0",
+        lambda e: not _is_sure(e),
+        lambda e: (
+            "These episodes do not show whether it prefers a side "
+            f"({_signed(e)['mean']:+.2f}, {bounds(_signed(e))}; above 0: left)."
+        ),
+    ),
+)
+
+
+def response_chart(explanation: Explanation) -> Figure:
+    """Plot over the target's place: the actions' probabilities, the best action, the outcome.
+
+    There is a row for each height of targets, the highest on top.
+    """
+    arrays = explanation.arrays
+    heights = arrays["response_height"]
+    actions, count = explanation.actions, len(explanation.actions.names)
+    terms = explanation.terms
+    figure = Figure(figsize=(3.2 * (count + 2), 3.9 * len(heights)), layout="constrained")
+    axes = figure.subplots(len(heights), count + 2, squeeze=False, sharex=True, sharey=True)
+    for layer, row in zip(range(len(heights)), axes[::-1], strict=True):
+        _draw_row(row, arrays, layer, actions)
+        level = f", {terms.target} {heights[layer]:+g} m" if len(heights) > 1 else ""
+        row[0].set_ylabel(f"metres ahead{level}")
+    figure.colorbar(axes[0, 0].images[0], ax=axes[:, :count], shrink=0.8, label="probability")
+    for axis in axes[-1]:
+        axis.set_xlabel("metres to the left (+) or right (-)", fontsize=9)
+    named = ([actions.css(action) for action in range(count)], actions.names)
+    ends = (_OUTCOMES, [f"{terms.target} {what}" for what in (terms.unhandled, terms.handled)])
+    for axis, labels in ((axes[-1, -2], named), (axes[-1, -1], ends)):
+        handles = [Patch(color=c, label=n) for c, n in zip(*labels, strict=True)]
+        axis.legend(
+            handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3, fontsize=8,
+            frameon=False,
+        )  # fmt: skip
+    return figure
+
+
+def _draw_row(
+    axes: Sequence[Axes], arrays: dict[str, NDArray], layer: int, actions: ShownActions
+) -> None:
+    """Draw the maps of one height: one for each action, the best action, the outcome."""
+    forward, lateral = arrays["response_forward"], arrays["response_lateral"]
+    probabilities = arrays["response_probabilities"][layer]
+    extent = (lateral[0], lateral[-1], forward[0], forward[-1])
+    style: dict[str, Any] = {
+        "extent": extent, "origin": "lower", "aspect": "auto", "interpolation": "nearest",
+    }  # fmt: skip
+    *wishes, most, outcome = axes
+    for axis, action in zip(wishes, actions.order, strict=True):
+        axis.imshow(probabilities[..., action], vmin=0, vmax=1, cmap="viridis", **style)
+        axis.set_title(f"P({actions.names[action]})")
+    shades = ListedColormap([actions.css(action) for action in range(len(wishes))])
+    most.imshow(probabilities.argmax(-1), vmin=0, vmax=len(wishes) - 1, cmap=shades, **style)
+    most.set_title("most probable action\n(inside the white line: blind)", fontsize=10)
+    blind = arrays["response_blind"][layer]
+    if blind.any():
+        most.contour(
+            lateral, forward, blind.astype(float), levels=[0.5], colors="white", linewidths=2.5
+        )
+    ends = ListedColormap(_OUTCOMES)
+    outcome.imshow(arrays["outcome_collected"][layer], vmin=0, vmax=1, cmap=ends, **style)
+    outcome.set_title("outcome", fontsize=10)
+
+
+def response_tables(explanation: Explanation) -> dict[str, Rows]:
+    """Return the response and the outcome at each place."""
+    arrays = explanation.arrays
+    names = explanation.actions.names
+    place = ["metres_up", "metres_ahead", "metres_left"]
+    responses: list[list[Any]] = [[*place, *(f"p_{a}" for a in names), "needed", "blind"]]
+    for at, where in _grid(arrays, "response"):
+        shares = arrays["response_probabilities"][at].round(5).tolist()
+        action = int(arrays["response_oracle"][at[-1]])
+        needed = names[action] if action >= 0 else ""
+        responses.append([*where, *shares, needed, int(arrays["response_blind"][at])])
+    outcomes: list[list[Any]] = [[*place, "collected"]]
+    for at, where in _grid(arrays, "outcome"):
+        outcomes.append([*where, int(arrays["outcome_collected"][at])])
+    return {"response": responses, "outcomes": outcomes}
+
+
+def _grid(
+    arrays: dict[str, NDArray], name: str
+) -> Iterator[tuple[tuple[int, ...], tuple[float, ...]]]:
+    """Yield every index of a map with its place in metres: up, ahead, to the left."""
+    axes = [arrays[f"{name}_{axis}"] for axis in ("height", "forward", "lateral")]
+    for at in np.ndindex(*(len(axis) for axis in axes)):
+        yield at, tuple(round(float(axis[i]), 3) for axis, i in zip(axes, at, strict=True))
+
+
+def worst_frames(explanation: Explanation) -> Image.Image:
+    """Return the three frames on which the policy and its mirror image differ most."""
+    worst = explanation.numbers["asymmetry"]["dataset"]["worst"][:3]
+    tiles = [
+        images.probed_frame(
+            explanation.data,
+            entry["frame"],
+            f"differs by {entry['distance']:.2f}",
+            explanation.actions,
+        )
+        for entry in worst
+    ]
+    return images.gridded(tiles, 3)
+
+
+RESPONSE_PART = Part(
+    title="Response to one target by its place",
+    label="Response map",
+    needs=("response",),
+    text={"response": RESPONSE},
+    draw=lambda explanation: {"response": response_chart(explanation)},
+    tables=response_tables,
+)
+ASYMMETRY_PART = Part(
+    title="Left-right asymmetry",
+    label="Asymmetry",
+    needs=("asymmetry",),
+    text={"asymmetry": ASYMMETRY},
+    draw=lambda explanation: {"asymmetry": worst_frames(explanation)},
+)

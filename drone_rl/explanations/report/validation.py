@@ -1,0 +1,321 @@
+"""Check an explanation's files before rendering: sizes, types, and that they fit each other."""
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drone_rl.sim.vocabulary import ShownActions
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.limits import check_indices
+from drone_rl.utils.schema import Kind, Maybe, OneOf, Real, Several, Whole, as_mapping
+from drone_rl.verification.text import WHERE
+
+METHOD_NAMES = {
+    "grad_cam": "Grad-CAM",
+    "grad_cam_logit": "Grad-CAM (logit)",
+    "saliency": "saliency",
+    "integrated_gradients": "integrated gradients",
+    "occlusion": "occlusion",
+}
+"""Attribution methods and their display names."""
+_SIDE = 512
+"""Largest width and height of an image, pixels."""
+_ACTIONS = 16
+_MANY = 100_000
+_INTEGER, _FLOAT, _BOOL, _PIXEL = "iu", "f", "b", "u"
+_ARRAYS: Mapping[str, tuple[str, tuple[int, ...], int]] = {
+    "film_frames": (_PIXEL, (2000, _SIDE, _SIDE, 3), 2**23),
+    "film_heat": (_FLOAT, (2000, _SIDE, _SIDE), 2**23),
+    "film_probabilities": (_FLOAT, (2000, _ACTIONS), 2**20),
+    "film_actions": (_INTEGER, (2000,), 2**20),
+    "class_model_(probability|logit)": (_FLOAT, (_ACTIONS, 64, _SIDE, _SIDE), 2**25),
+    "tsne_(features|pixels)": (_FLOAT, (_MANY, 2), 2**21),
+    "places_points": (_FLOAT, (2**16, 2), 2**20),
+    "places_(ends|labels)": (_INTEGER, (2**13,), 2**17),
+    "response_height": (_FLOAT, (32,), 2**12),
+    "(response|outcome)_(forward|lateral)": (_FLOAT, (_SIDE,), 2**12),
+    "response_probabilities": (_FLOAT, (32, _SIDE, _SIDE, _ACTIONS), 2**20),
+    "response_blind": (_BOOL, (32, _SIDE, _SIDE), 2**18),
+    "response_without_target": (_FLOAT, (_ACTIONS,), 2**12),
+    "(response|outcome)_(oracle|stratum)": (_INTEGER, (_SIDE,), 2**12),
+    "outcome_height": (_FLOAT, (32,), 2**12),
+    "outcome_collected": (_BOOL, (32, _SIDE, _SIDE), 2**18),
+    "interventions": (_PIXEL, (32, _SIDE, _SIDE, 3), 2**23),
+    "patch_effects": (_FLOAT, (_SIDE, _SIDE), 2**20),
+    "shifts_[a-z_]+": (_PIXEL, (8, _SIDE, _SIDE, 3), 2**22),
+}
+"""Arrays of `arrays.npz`: kind of dtype, largest shape, most bytes."""
+_DATA: Mapping[str, tuple[str, tuple[int, ...], int]] = {
+    "frames": (_PIXEL, (_MANY, _SIDE, _SIDE, 3), 2**27),
+    "probabilities": (_FLOAT, (_MANY, _ACTIONS), 2**23),
+    "(actions|episode|step|event)": (_INTEGER, (_MANY,), 2**20),
+    "flights/episode": (_INTEGER, (10 * _MANY,), 2**23),
+}
+"""The same for `dataset.npz`."""
+_LENGTHS: Mapping[tuple[str, ...], int] = {
+    ("attribution", "film", "key_steps"): 12,
+    ("truth", "methods"): 16,
+    ("truth", "placebos"): 32,
+    ("truth", "heat"): 16,
+    ("truth", "curves"): 64,
+    ("truth", "interventions"): 32,
+    ("shifts", "axes"): 64,
+}
+"""Most entries of lists and mappings in `explanation.json` that figures show one by one."""
+_INDICES = {"actions": _ACTIONS, "film_actions": _ACTIONS, "episode": _MANY, "step": 10**7}
+"""Arrays used as indices, and their exclusive upper limits."""
+_FINITE = {
+    *("tsne_features", "tsne_pixels", "places_points", "response_height", "outcome_height"),
+    *("response_forward", "response_lateral", "outcome_forward", "outcome_lateral"),
+}
+"""Arrays of coordinates, which must be finite."""
+_LONGEST = 2000
+"""Most entries of any other list or mapping."""
+_DIMENSIONS: Mapping[str, tuple[str, ...]] = {
+    "film_frames": ("steps of the film", "", "", ""),
+    "film_heat": ("steps of the film", "", ""),
+    "film_probabilities": ("steps of the film", "actions"),
+    "film_actions": ("steps of the film",),
+    "frames": ("frames", "", "", ""),
+    "probabilities": ("frames", "actions"),
+    "actions": ("frames",),
+    "episode": ("frames",),
+    "step": ("frames",),
+    "event": ("frames",),
+    "tsne_features": ("frames", ""),
+    "tsne_pixels": ("frames", ""),
+    "class_model_probability": ("actions", "", "", ""),
+    "class_model_logit": ("actions", "", "", ""),
+    "places_ends": ("outlines",),
+    "places_labels": ("outlines",),
+    "response_height": ("heights",),
+    "response_forward": ("places ahead",),
+    "response_lateral": ("places to the side",),
+    "response_oracle": ("places to the side",),
+    "response_probabilities": ("heights", "places ahead", "places to the side", "actions"),
+    "response_blind": ("heights", "places ahead", "places to the side"),
+    "outcome_height": ("heights",),
+    "outcome_forward": ("starts ahead",),
+    "outcome_lateral": ("starts to the side",),
+    "outcome_collected": ("heights", "starts ahead", "starts to the side"),
+}
+"""What the dimensions of arrays count; dimensions with the same name must be equally long."""
+_METRES = Real(-1e4, 1e4)
+_SHARE = Real(0.0, 1.0)
+_PLACES: Mapping[str, Kind] = {
+    "touch_distance": Real(0.0, 1e3),
+    "least_gap": Real(0.0, 1e9),
+    "least_gap_ahead": _METRES,
+    "least_gap_left": _METRES,
+    "logit_gap": Real(0.0, 1e9),
+    **dict.fromkeys(("unseen", "blind", "close", "in_doubt"), _SHARE),
+}
+_WINDOW: Mapping[str, Kind] = {
+    "nearest": Real(0.0, 1e3),
+    "farthest": Real(0.0, 1e3, is_above=True),
+    "sideways": Real(0.0, 1e3, is_above=True),
+}
+_FARTHEST_RATIO = 20
+"""Largest ratio of the sides of the exact map."""
+
+
+def check_sizes(
+    numbers: Mapping[str, Any], arrays: Mapping[str, NDArray], data: Mapping[str, NDArray]
+) -> None:
+    """Refuse an explanation with a part that is too large to render or has another type.
+
+    Args:
+        numbers: `explanation.json`.
+        arrays: `arrays.npz`.
+        data: `dataset.npz`.
+
+    Raises:
+        InputError: There is one; the message names it.
+    """
+    _check_shown(numbers)
+    _check_lengths(numbers)
+    _check_arrays(arrays, _ARRAYS)
+    _check_arrays(data, _DATA)
+    known = {**arrays, **data}
+    for name in _FINITE & known.keys():
+        if not np.isfinite(known[name]).all():
+            raise InputError(f"{name} holds NaN or infinity")
+    if "places_ends" in arrays:
+        ends = arrays["places_ends"]
+        check_indices(ends, 1 + len(arrays.get("places_points", ())), "places_ends")
+        if (np.diff(ends) < 0).any():
+            raise InputError("places_ends go down")
+    flown = len(data.get("flights/episode", ()))  # each episode has at least one step
+    for name, most in {**_INDICES, "flights/episode": max(1, flown)}.items():
+        if name in known:
+            check_indices(known[name], most, name)
+
+
+def _check_shown(numbers: Mapping[str, Any]) -> None:
+    for keys, most in _LENGTHS.items():
+        part: Any = numbers
+        for key in keys:
+            part = part.get(key) if isinstance(part, Mapping) else None
+        if isinstance(part, list | Mapping) and len(part) > most:
+            raise InputError(f"{'.'.join(keys)} has {len(part)} entries; give at most {most}")
+
+
+def _check_lengths(value: Any) -> None:
+    level = [value]
+    while level:
+        for item in level:
+            if len(item) > _LONGEST:
+                raise InputError(f"it holds a list of {len(item)}; give at most {_LONGEST}")
+        inner = [v for item in level for v in (item.values() if isinstance(item, dict) else item)]
+        level = [v for v in inner if isinstance(v, dict | list)]
+
+
+def _check_arrays(
+    arrays: Mapping[str, NDArray], known: Mapping[str, tuple[str, tuple[int, ...], int]]
+) -> None:
+    if len(arrays) > _LONGEST:
+        raise InputError(f"it holds {len(arrays)} arrays; give at most {_LONGEST}")
+    for pattern, (kinds, most, size) in known.items():
+        for name, value in arrays.items():
+            if re.fullmatch(pattern, name):
+                _check_array(name, value, kinds, most, size)
+
+
+def _check_array(name: str, value: NDArray, kinds: str, most: tuple[int, ...], size: int) -> None:
+    is_small = len(value.shape) == len(most) and value.nbytes <= size
+    if value.dtype.kind not in kinds or not is_small or not np.less_equal(value.shape, most).all():
+        raise InputError(
+            f"{name} is {value.shape} of {value.dtype}, which can't be rendered; give at most "
+            f"{most} and {size} bytes"
+        )
+    if kinds == _PIXEL and value.dtype != np.uint8:
+        raise InputError(f"{name} is of {value.dtype}; images have uint8")
+
+
+def check_fit(
+    numbers: Mapping[str, Any],
+    arrays: Mapping[str, NDArray],
+    data: Mapping[str, NDArray],
+    actions: ShownActions,
+) -> None:
+    """Refuse an explanation whose arrays and numbers do not fit each other.
+
+    Args:
+        numbers: `explanation.json`.
+        arrays: `arrays.npz`.
+        data: `dataset.npz`.
+        actions: Actions of the policy.
+
+    Raises:
+        InputError: They do not; the message names the part.
+    """
+    known = {**data, **arrays}
+    lengths: dict[str, tuple[int, str]] = {"actions": (len(actions.names), "the list of actions")}
+    for name, dimensions in _DIMENSIONS.items():
+        if name in known:
+            _check_dimensions(name, known[name].shape, dimensions, lengths)
+    steps, frames = (lengths.get(what, (0, ""))[0] for what in ("steps of the film", "frames"))
+    for name in ("actions", "film_actions"):
+        if name in known:
+            check_indices(known[name], len(actions.names), name)
+    _check_film(numbers, steps)
+    for where, index in _frames_shown(numbers):
+        Whole(0, max(0, frames - 1)).read(index, where)
+    _check_places(numbers, arrays, len(actions.names))
+
+
+def _check_dimensions(
+    name: str,
+    shape: tuple[int, ...],
+    dimensions: tuple[str, ...],
+    lengths: dict[str, tuple[int, str]],
+) -> None:
+    if len(shape) != len(dimensions):
+        raise InputError(f"{name} has {len(shape)} dimensions, not {len(dimensions)}")
+    for length, what in zip(shape, dimensions, strict=True):
+        if length == 0:
+            raise InputError(f"{name} has the shape {shape}: it is empty")
+        before, where = lengths.setdefault(what, (length, name)) if what else (length, name)
+        if before != length:
+            raise InputError(f"{name} has {length} {what}, but {where} has {before}")
+
+
+def _check_film(numbers: Mapping[str, Any], steps: int) -> None:
+    film = _part(numbers, "attribution", "film")
+    if film is None:
+        return
+    heat = film.get("heat_by")
+    if isinstance(heat, list) and len(heat) != steps:
+        raise InputError(f"attribution.film.heat_by has {len(heat)} steps; the film has {steps}")
+    for i, method in enumerate(_list(heat)):
+        Maybe(OneOf(tuple(METHOD_NAMES))).read(method, f"attribution.film.heat_by[{i}]")
+    for i, entry in enumerate(_list(film.get("key_steps"))):
+        where = f"attribution.film.key_steps[{i}]"
+        step = as_mapping(entry, where).get("step")
+        Whole(0, max(0, steps - 1)).read(step, f"{where}.step")
+
+
+def _frames_shown(numbers: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Yield the name and value of each entry that is the number of a frame."""
+    worst = _part(numbers, "asymmetry", "dataset")
+    for i, entry in enumerate(_list((worst or {}).get("worst"))):
+        where = f"asymmetry.dataset.worst[{i}]"
+        yield f"{where}.frame", as_mapping(entry, where).get("frame")
+    for i, entry in enumerate(_list((_part(numbers, "contradictions") or {}).get("list"))):
+        where = f"contradictions.list[{i}]"
+        for side in ("left", "right"):
+            yield f"{where}.{side}", as_mapping(entry, where).get(side)
+
+
+def _check_places(numbers: Mapping[str, Any], arrays: Mapping[str, NDArray], count: int) -> None:
+    places = _part(numbers, "places")
+    if places is None or "refused" in places:
+        return
+    for key, kind in _PLACES.items():
+        kind.read(places.get(key), f"places.{key}")
+    Whole(0, count - 1).read(places.get("alone"), "places.alone")
+    window = as_mapping(places.get("window"), "places.window")
+    for key, kind in _WINDOW.items():
+        kind.read(window.get(key), f"places.window.{key}")
+    _check_window(window)
+    shares = Several(_SHARE, count, count)
+    shares.read(places.get("actions"), "places.actions")
+    for side, of in as_mapping(places.get("sides"), "places.sides").items():
+        if side not in WHERE:
+            raise InputError(f"places.sides.{side} is unknown; there are {', '.join(WHERE)}")
+        where = f"places.sides.{side}"
+        shares.read(as_mapping(of, where).get("actions"), f"{where}.actions")
+        for key in ("share", "unseen", "blind"):
+            Maybe(_SHARE).read(of.get(key), f"{where}.{key}")
+    points = arrays.get("places_points")
+    if points is not None and (np.abs(points) > _METRES.high).any():
+        raise InputError(f"places_points are up to {np.abs(points).max():g} m away")
+
+
+def _check_window(window: Mapping[str, Any]) -> None:
+    near, far, side = (window[key] for key in ("nearest", "farthest", "sideways"))
+    if not near < far:
+        raise InputError(f"places.window goes from {near:g} to {far:g} m ahead; it must go up")
+    if not 1 / _FARTHEST_RATIO <= far / (2 * side) <= _FARTHEST_RATIO:
+        raise InputError(
+            f"places.window is {far:g} m long and {2 * side:g} m wide; a map can be up to "
+            f"{_FARTHEST_RATIO} times as long as wide"
+        )
+
+
+def _part(numbers: Mapping[str, Any], *keys: str) -> Mapping[str, Any] | None:
+    """Return an inner mapping; None if it is missing."""
+    part: Any = numbers
+    for i, key in enumerate(keys):
+        part = part.get(key)
+        if part is None:
+            return None
+        part = as_mapping(part, ".".join(keys[: i + 1]))
+    return part
+
+
+def _list(value: Any) -> list[Any]:
+    return value if isinstance(value, list) else []

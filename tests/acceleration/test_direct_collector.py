@@ -1,0 +1,120 @@
+"""The direct collector equals TorchRL's collector bit for bit, where it is supported."""
+
+import pytest
+import torch
+from torchrl.envs import CatFrames, RewardSum
+
+from drone_rl.acceleration.direct_collector import DirectCollector
+from drone_rl.collectors import EpisodeCollector
+from drone_rl.collectors.stepping import SteppingCollector
+from drone_rl.config import AppearanceSettings, PillarsSettings, TaskSettings
+from drone_rl.envs import (
+    Blur,
+    CropRows,
+    DroneEnv,
+    GrayPixels,
+    LateFrames,
+    Noise,
+    StandardizePixels,
+    with_transforms,
+)
+from drone_rl.envs.direct_renderer import DirectRenderer, Reasons
+from drone_rl.policies import SmallCNN, make_actor
+from tests.continuous import make_policy, make_worlds
+
+SHORT = TaskSettings(num_cubes=2, first_distance=3.0, spacing=3.0, step_limit=12, front_margin=3.0)
+KEPT = [("next", name) for name in ("reward", "done", "terminated", "truncated")]
+LOOK = AppearanceSettings(fog_visibility=(5.0, 50.0), ground_texture=("none", "grid"), shadows=0.5)
+STACK = CatFrames(2, dim=-3, in_keys=["pixels"])
+REASON = ("next", "info", "end_reason")
+
+
+def make_env(*transforms, task=SHORT, **kwargs):
+    return with_transforms(DroneEnv(5, task, **kwargs), transforms)
+
+
+def collector(acceleration, task, keep=(REASON,), look=None):
+    env = make_env(GrayPixels(), StandardizePixels(), task=task, appearance=look)
+    generator = torch.Generator().manual_seed(0)
+    shape = tuple(env.observation_spec["pixels"].shape[1:])
+    network = SmallCNN(shape, 3, channels=(4,), hidden=(8,), generator=generator)
+    actor = make_actor(network, env.action_spec, generator)
+    made = EpisodeCollector(env, actor, keep=keep, acceleration=acceleration)
+    is_stepping = isinstance(made.source, SteppingCollector)
+    assert is_stepping is (acceleration == "none")
+    return made
+
+
+@pytest.mark.parametrize("task", [SHORT, PillarsSettings(num_rows=1)])
+@pytest.mark.parametrize("worlds", [None, 3])
+@pytest.mark.parametrize("look", [None, LOOK])
+def test_direct_and_stepping_batches_are_identical(task, worlds, look):
+    keep = (REASON, ("next", "info", "drone"))
+    collectors = [collector(how, task, keep, look) for how in ("direct", "none")]
+    lengths = set()
+    for _ in range(3):  # the streams of worlds and actions go on alike
+        one, other = (each.collect(worlds) for each in collectors)
+        assert set(one.keys(True, True)) == set(other.keys(True, True))
+        for key in one.keys(True, True):
+            assert torch.equal(one[key], other[key]), key
+        first = one["collector", "traj_ids"].min()
+        lengths |= {*torch.bincount(one["collector", "traj_ids"] - first).tolist()}
+    assert len(lengths) > 1 or task is not SHORT  # some went on alone
+
+
+def test_continuous_actions_of_direct_and_stepping_batches_are_identical():
+    collectors = []
+    for acceleration in ("fused", "none"):
+        env = make_worlds(5)
+        actor = make_policy(env)[1]
+        made = EpisodeCollector(env, actor, keep=(REASON,), acceleration=acceleration)
+        is_direct = isinstance(made.source, DirectCollector)
+        assert is_direct is (acceleration == "fused")
+        collectors.append(made)
+    for _ in range(2):
+        one, other = (each.collect() for each in collectors)
+        assert one["action"].shape == (len(one), 3) and one["action"].dtype == torch.float32
+        for key in ("action", REASON, ("next", "reward"), ("collector", "traj_ids")):
+            assert torch.equal(one[key], other[key]), key
+    for each in collectors:
+        each.shutdown()
+
+
+def reasons(env, observed, kept):
+    found = DirectRenderer.try_create(env, observed, kept)
+    env.close()
+    return str(found) if isinstance(found, Reasons) else ""
+
+
+@pytest.mark.parametrize(
+    ("transforms", "options", "observed", "kept", "reason"),
+    [
+        ([STACK], {}, ["pixels"], [], "transform CatFrames is not fused"),
+        ([RewardSum()], {}, ["pixels"], [], "transform RewardSum is not fused"),
+        ([Noise(), StandardizePixels()], {}, ["pixels"], [], "transform Noise is not fused"),
+        ([LateFrames()], {}, ["pixels"], [], "transform LateFrames is not fused"),
+        ([GrayPixels(out_keys=["gray"])], {}, ["gray"], [], "transform GrayPixels is not fused"),
+        ([], {}, ["pixels", ("info", "drone")], [], "the policy reads pixels, ('info', 'drone')"),
+        ([], {}, ["pixels"], [("next", "pixels")], "entry ('next', 'pixels') is not fused"),
+        (None, {"pixels": False}, [("info", "drone")], [], "the environment renders no pixels"),
+    ],
+)
+def test_what_needs_steps_of_torchrl(transforms, options, observed, kept, reason):
+    first = [] if transforms is None or "gray" in observed else [GrayPixels()]
+    env = make_env(*first, *(transforms or []), **options)
+    assert reason in reasons(env, observed, [*KEPT, *kept])
+
+
+def test_maps_of_pixels_need_no_steps_of_torchrl():
+    transforms = (GrayPixels(), CropRows(5, 25), Blur(), StandardizePixels())
+    assert not reasons(make_env(*transforms), ["pixels"], [*KEPT, REASON])
+    env = make_env(*transforms).base_env
+    assert "DroneEnv is no TransformedEnv" in reasons(env, ["pixels"], KEPT)
+
+
+def test_a_subclass_of_the_environment_is_stepped_by_torchrl():
+    class Windy(DroneEnv):
+        pass
+
+    env = with_transforms(Windy(2, SHORT), [GrayPixels()])
+    assert "is no TransformedEnv of DroneEnv" in reasons(env, ["pixels"], KEPT)

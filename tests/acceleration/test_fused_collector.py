@@ -1,0 +1,358 @@
+"""Episodes flown by the kernel are episodes: replayed step by step they are the same."""
+
+import threading
+
+import pytest
+import torch
+from torchrl.envs import RewardSum
+from torchrl.envs.utils import ExplorationType, set_exploration_type
+
+from drone_rl.acceleration import fused_collector
+from drone_rl.acceleration.direct_collector import DirectCollector
+from drone_rl.acceleration.fused_collector import FusedCollector
+from drone_rl.acceleration.fused_network import FusedNetwork
+from drone_rl.collectors import EpisodeCollector
+from drone_rl.collectors.stepping import SteppingCollector
+from drone_rl.config import AppearanceSettings, DynamicsSettings, PillarsSettings, TaskSettings
+from drone_rl.envs import (
+    CropRows,
+    DroneEnv,
+    GrayPixels,
+    RgbPixels,
+    StandardizePixels,
+    with_transforms,
+)
+from drone_rl.policies import MLP, SmallCNN, make_actor
+from drone_rl.sim.dynamics import Quadrotor
+from drone_rl.sim.dynamics.state import LOST
+from drone_rl.sim.tasks.collect_cubes import EndReason
+
+SHORT = TaskSettings(num_cubes=2, first_distance=3.0, spacing=3.0, step_limit=12, front_margin=3.0)
+REASON = ("next", "info", "end_reason")
+DETERMINISTIC = ExplorationType.DETERMINISTIC
+
+
+FLYING = DynamicsSettings(mode="simple_flight", wind=(0.5, -1.0, 0.2))
+
+
+def make(
+    task=SHORT,
+    transforms=(GrayPixels, StandardizePixels),
+    num_envs=5,
+    network=None,
+    dynamics=None,
+    **how,
+):
+    env = DroneEnv(num_envs, task, dynamics=dynamics)
+    env = with_transforms(env, [transform() for transform in transforms])
+    generator = torch.Generator().manual_seed(0)
+    if network is None:
+        shape = tuple(env.observation_spec["pixels"].shape[1:])
+        network = SmallCNN(shape, 3, channels=(4,), hidden=(8,), generator=generator)
+        with torch.no_grad():
+            network.layers.logits.weight.mul_(100)
+    actor = make_actor(network, env.action_spec, generator)
+    return EpisodeCollector(env, actor, **{"acceleration": "fused", **how})
+
+
+GIMBAL = FLYING.replace(camera_mount="gimbal")
+
+
+@pytest.mark.parametrize("dynamics", [None, Quadrotor(FLYING), Quadrotor(GIMBAL)])
+def test_replayed_by_torchrls_steps_they_are_the_same_bit_for_bit(dynamics):
+    kept = [REASON, ("next", "info", "collected"), ("next", "info", "drone")]
+    collector = make(keep=kept, dynamics=dynamics)
+    assert isinstance(collector.source, FusedCollector)
+    env = DroneEnv(5, SHORT, dynamics=dynamics)
+    env = with_transforms(env, [GrayPixels(), StandardizePixels()])
+    for _ in range(3):
+        batch, state = collector.collect(), env.reset()
+        ids = batch["collector", "traj_ids"]
+        episodes = [batch[ids == i] for i in ids.unique()]
+        assert len(episodes) == 5 and ids.tolist() == sorted(ids.tolist())
+        for t in range(max(map(len, episodes))):
+            is_on = torch.tensor([t < len(episode) for episode in episodes])
+            rows = [episode[t] for episode in episodes if t < len(episode)]
+            assert torch.equal(torch.stack([r["pixels"] for r in rows]), state["pixels"][is_on])
+            action = torch.zeros(5, dtype=torch.int64)
+            action[is_on] = torch.stack([row["action"] for row in rows])
+            state = env.step(state.set("action", action).set("_step", is_on))
+            for key in (("next", "reward"), ("next", "done"), ("next", "truncated"), REASON):
+                assert torch.equal(torch.stack([row[key] for row in rows]), state[key][is_on])
+            for name in ("collected", "drone"):
+                told = torch.stack([row["next", "info", name] for row in rows])
+                assert torch.equal(told, state["next", "info", name][is_on])
+            state = state["next"]
+        assert batch["next", "done"].sum() == 5
+        network = collector.actor.module[0].module
+        assert torch.allclose(network(batch["pixels"]), batch["logits"], atol=1e-5)
+    assert collector.episodes == 15 and collector.frames > 15
+
+
+def test_what_is_told_by_the_kernel_is_what_a_replay_tells():
+    brief, replayed = make(), make(keep=[REASON, ("next", "info", "drone")])
+    for _ in range(2):
+        one, other = brief.collect(), replayed.collect()
+        for key in one.keys(True, True):
+            assert torch.equal(one[key], other[key]) and one[key].dtype == other[key].dtype, key
+        assert {*other.keys(True, True)} == {*one.keys(True, True), ("next", "info", "drone")}
+
+
+def test_the_step_by_step_way_gives_entries_of_the_same_kinds():
+    one, other = make().collect(), make(acceleration="direct").collect()
+    assert {*one.keys(True, True)} == {*other.keys(True, True)}
+    for key in one.keys(True, True):
+        assert one[key].dtype == other[key].dtype and one[key].shape[1:] == other[key].shape[1:]
+
+
+@pytest.mark.parametrize("how", [{"num_threads": 2}, {"num_threads": 3}])
+def test_nothing_depends_on_how_many_cores_fly(how):
+    one, other = make(num_envs=35), make(num_envs=35, **how)
+    for _ in range(2):
+        first, second = one.collect(), other.collect()
+        assert all(torch.equal(first[key], second[key]) for key in first.keys(True, True))
+
+
+def test_in_parts_greedy_flights_are_the_same(monkeypatch):
+    with set_exploration_type(DETERMINISTIC):
+        whole = make()
+        monkeypatch.setattr(fused_collector, "_MAX_STEPS", 2)
+        parts = make()
+        assert parts.source._length == 2
+        for _ in range(2):
+            expected, found = whole.collect(), parts.collect()
+            assert torch.bincount(found["collector", "traj_ids"]).max() > 4
+            for key in expected.keys(True, True):
+                assert torch.equal(expected[key], found[key])
+
+
+def test_the_most_probable_actions_are_taken_when_asked_for():
+    with set_exploration_type(DETERMINISTIC):
+        batch = make().collect()
+    assert torch.equal(batch["logits"].argmax(-1), batch["action"])
+    drawn = make().collect()
+    assert not torch.equal(drawn["logits"].argmax(-1), drawn["action"])
+
+
+def test_actions_are_drawn_by_their_probabilities():
+    task = TaskSettings(num_cubes=1, step_limit=20)
+    network = SmallCNN((1, 25, 64), 3, channels=(4,), hidden=())
+    with torch.no_grad():
+        network.layers.logits.weight.zero_()
+        network.layers.logits.bias.copy_(torch.tensor([0.5, 0.3, 0.2]).log())
+    actions = make(task, num_envs=500, network=network).collect()["action"]
+    shares = actions.bincount(minlength=3) / len(actions)
+    # of about 10,000: four standard errors are 0.02
+    assert shares.tolist() == pytest.approx([0.5, 0.3, 0.2], abs=0.02)
+
+
+def test_what_has_been_learned_is_flown():
+    collector = make()
+    collector.collect()
+    with torch.no_grad():
+        collector.actor.module[0].module.layers.logits.bias.copy_(torch.tensor([0.0, 50.0, 0.0]))
+    assert (collector.collect()["action"] == 1).all()
+
+
+def test_fewer_worlds_than_there_are():
+    batch = make().collect(3)
+    assert batch["collector", "traj_ids"].unique().tolist() == [0, 1, 2]
+
+
+def test_observations_may_be_left_out():
+    batch = make(keep_observations=False).collect()
+    assert "pixels" not in batch and "logits" not in batch and "action" in batch
+
+
+def learned(network, by, batch, *handles):
+    """Logits of a batch, and the gradients of a sum of them."""
+    network.zero_grad()
+    logits = by(batch["pixels"], *handles)
+    (logits * torch.linspace(-1, 1, logits.numel()).view(logits.shape)).sum().backward()
+    return [logits.detach(), *(p.grad.clone() for p in network.parameters())]
+
+
+def cached(collector, num_threads=1):
+    """The collector's network, fused, and with the activations that the collector keeps."""
+    cache = collector.source.cache_activations()
+    return FusedNetwork(collector.actor.module[0].module, num_threads, cache=cache)
+
+
+@pytest.mark.parametrize("max_steps", [64, 2])
+@pytest.mark.parametrize("is_greedy", [True, False])
+def test_cached_activations_equal_computed_ones(max_steps, is_greedy, monkeypatch):
+    monkeypatch.setattr(fused_collector, "_MAX_STEPS", max_steps)
+    collector = make(num_envs=35, num_threads=2)
+    network = collector.actor.module[0].module
+    reusing, plain = cached(collector, 2), FusedNetwork(network, 2)
+    cache, weights = collector.source.cache_activations(), collector.source._network.weights
+    for _ in range(2):
+        kind = DETERMINISTIC if is_greedy else ExplorationType.RANDOM
+        with set_exploration_type(kind):
+            batch = collector.collect()
+        assert cache.find(batch["activations"], weights) is not None
+        half = batch[len(batch) // 2 :]
+        for part in (batch, half):
+            found = learned(network, reusing, part, part["activations"])
+            expected = learned(network, plain, part)
+            assert all(torch.equal(*pair) for pair in zip(found, expected, strict=True))
+            assert torch.equal(found[0], part["logits"])
+            reusing(torch.zeros_like(batch["pixels"]))  # computed in memory of its own
+        with torch.no_grad():
+            network.layers.fc1.weight.add_(0.1)  # other weights than the cached activations'
+        logits = plain(batch["pixels"])
+        assert torch.equal(reusing(batch["pixels"], batch["activations"]), logits)
+        assert not torch.equal(logits, batch["logits"])
+
+
+def test_the_next_batch_overwrites_cached_activations():
+    collector = make()
+    network = cached(collector)
+    batch = collector.collect()
+    logits = network(batch["pixels"], batch["activations"])
+    other = collector.collect()
+    with pytest.raises(RuntimeError, match="collected between the forward and the backward pass"):
+        logits.sum().backward()
+    again = network(batch["pixels"], batch["activations"])  # stale handles: computed
+    assert torch.allclose(again, batch["logits"], atol=1e-5)
+    again.sum().backward()
+    assert torch.equal(network(other["pixels"], other["activations"]), other["logits"])
+
+
+@pytest.mark.parametrize(("parts", "fits"), [(0, False), (2, False), (6, True)])
+def test_activations_are_cached_if_they_fit(parts, fits, monkeypatch):
+    size = make().source.cache_activations().outputs.shape[1]
+    monkeypatch.setattr(fused_collector, "_MAX_STEPS", 2)
+    monkeypatch.setattr(fused_collector, "_MAX_ACTIVATIONS", parts * 5 * 2 * size)
+    collector = make()
+    cache = collector.source.cache_activations()
+    batch = collector.collect()
+    assert 4 < batch["collector", "traj_ids"].bincount().max() <= 12
+    assert (cache is None) is (parts == 0)
+    if cache is not None:
+        rows = cache.find(batch["activations"], collector.source._network.weights)
+        assert (rows is not None) is fits
+        network = cached(collector)
+        assert torch.equal(network(batch["pixels"], batch["activations"]), batch["logits"])
+
+
+def test_no_activations_without_a_request_or_without_observations():
+    assert "activations" not in make().collect()
+    assert make(acceleration="direct").source.cache_activations() is None
+    collector = make(keep_observations=False)
+    cache = collector.source.cache_activations()
+    assert cache is not None and collector.source.cache_activations() is cache
+    assert not {"pixels", "activations"} & set(collector.collect().keys())
+
+
+@pytest.mark.parametrize(
+    ("how", "reason"),
+    [
+        ({"transforms": (GrayPixels, lambda: CropRows(2, 20))}, "transform CropRows is not fused"),
+        ({"transforms": (RgbPixels,)}, "frames that are not gray are not fused"),
+        ({"task": PillarsSettings(num_rows=1)}, "task Pillars with ComputerVision is not fused"),
+        ({"network": MLP((1, 25, 64), 3)}, "network MLP is not fused"),
+    ],
+)
+def test_the_log_says_why_a_collector_is_not_fused(how, reason):
+    collector = make(**how) if "network" in how or "task" in how else None
+    if collector is None:
+        channels = 3 if how["transforms"] == (RgbPixels,) else 1
+        collector = make(network=SmallCNN((channels, 18 if channels == 1 else 25, 64), 3), **how)
+    assert reason in collector.source.name and collector.source.name.startswith("direct collector")
+    stepping = make(transforms=(GrayPixels, StandardizePixels, RewardSum))
+    assert stepping.source.name == "stepping collector: transform RewardSum is not fused"
+    assert make().source.name == "fused collector"
+
+
+def test_goes_on_from_a_state_as_if_it_had_never_stopped():
+    collector, other = make(), make()
+    collector.collect()
+    state = collector.state_dict()
+    source = collector.actor.module[1].distribution_kwargs["source"].generator
+    actions = source.get_state()
+    expected = collector.collect()
+    other.load_state_dict(state)
+    other.actor.module[1].distribution_kwargs["source"].generator.set_state(actions)
+    found = other.collect()
+    assert all(torch.equal(found[key], expected[key]) for key in found.keys(True, True))
+
+
+@pytest.mark.parametrize(
+    "what",
+    [
+        {"acceleration": "direct"},
+        {"transforms": (GrayPixels, StandardizePixels, RewardSum)},
+        {"transforms": (GrayPixels, lambda: CropRows(2, 20))},
+        {"transforms": (GrayPixels, StandardizePixels, StandardizePixels)},
+        {"task": PillarsSettings(num_rows=1)},
+        {"network": MLP((1, 25, 64), 3)},
+    ],
+)
+def test_whatever_it_does_not_know_is_flown_step_by_step(what):
+    collector = make(**what)
+    assert isinstance(collector.source, DirectCollector | SteppingCollector)
+    assert len(collector.collect())
+
+
+def test_another_renderer_draws_step_by_step():
+    env = with_transforms(DroneEnv(2, SHORT, renderer="mujoco_warp"), [GrayPixels()])
+    actor = make_actor(SmallCNN((1, 25, 64), 3), env.action_spec)
+    source = EpisodeCollector(env, actor, acceleration="fused").source
+    assert isinstance(source, DirectCollector) and "WarpRenderer on cpu" in str(source.reasons)
+    env.close()
+
+
+def test_a_way_of_exploring_that_it_does_not_know_is_taken_step_by_step():
+    collector = make()
+    with set_exploration_type(ExplorationType.MODE):
+        assert len(collector.collect())
+
+
+def test_its_threads_end_with_the_collector():
+    before = {*threading.enumerate()}
+    collector = make(num_threads=3)
+    collector.collect()
+    begun = {*threading.enumerate()} - before
+    assert begun  # no more than it needs: one that is idle again takes the next part
+    collector.shutdown()
+    assert not any(thread.is_alive() for thread in begun)
+
+
+@pytest.mark.parametrize("visibility", [30.0, (10.0, 30.0)])
+def test_worlds_of_another_look_are_flown_step_by_step(visibility):
+    look = AppearanceSettings(fog_visibility=visibility)
+    env = with_transforms(DroneEnv(3, SHORT, appearance=look), [GrayPixels(), StandardizePixels()])
+    network = SmallCNN((1, 25, 64), 3, channels=(4,), hidden=(8,))
+    actor = make_actor(network, env.action_spec, torch.Generator().manual_seed(0))
+    collector = EpisodeCollector(env, actor, acceleration="fused")
+    assert isinstance(collector.source, DirectCollector | SteppingCollector)
+    batch, plain = collector.collect(), make(num_envs=3).collect()
+    assert batch["next", "done"].sum() == 3
+    assert batch["pixels"][0].mean() > plain["pixels"][0].mean()  # the fog is bright
+
+
+def test_a_lost_drone_ends_its_episode_in_the_kernel_too():
+    """Of five drones one is lost from the start."""
+    collector = make(dynamics=Quadrotor(FLYING))
+    begin = collector.source._worlds.begin
+
+    def lose(state):
+        state.body.numbers[2, LOST.first] = 1.0
+        begin(state)
+
+    collector.source._worlds.begin = lose
+    batch = collector.collect()
+    lengths = batch["collector", "traj_ids"].bincount()
+    assert lengths[2] == 1 and (lengths[[0, 1, 3, 4]] > 1).all()
+    assert batch[REASON].flatten().tolist().count(EndReason.LOST_CONTROL) == 1
+
+
+def test_pictures_that_are_not_standardised_are_as_they_are_drawn():
+    collector = make(transforms=(GrayPixels,))
+    assert isinstance(collector.source, FusedCollector)
+    batch = collector.collect()
+    first = torch.stack([batch[batch["collector", "traj_ids"] == i][0]["pixels"] for i in range(5)])
+    env = with_transforms(DroneEnv(5, SHORT), [GrayPixels()])
+    assert torch.equal(first, env.reset()["pixels"])
+    assert 0.0 <= first.min() < first.max() <= 1.0

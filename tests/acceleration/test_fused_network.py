@@ -1,0 +1,138 @@
+"""What it takes and refuses, and that there is no second way back."""
+
+import copy
+
+import pytest
+import torch
+
+from drone_rl.acceleration.fused_network import ActivationCache, FusedNetwork
+from drone_rl.envs.direct_renderer import Reasons
+from drone_rl.policies import MLP, OriginalCNN, SmallCNN
+from drone_rl.utils.errors import InputError
+from tests.policies.halves import draw_weights, halves, made, taught
+
+
+def test_patches_of_an_odd_size_have_no_way_back_to_pictures():
+    found = FusedNetwork.try_create(made((1, 26, 41), patch=5), of="pixels")
+    assert found == ("the first layer's inputs are not a multiple of 16",)
+    assert isinstance(FusedNetwork.try_create(made((1, 26, 41), patch=5)), FusedNetwork)
+
+
+def test_more_dimensions_and_no_gradient():
+    network = made()
+    learning = FusedNetwork.try_create(network, 2)
+    pictures = halves(2, 3, 1, 12, 20)
+    with torch.no_grad():
+        assert torch.allclose(learning(pictures), network(pictures), atol=1e-5)
+        assert learning(pictures).shape == (2, 3, 3)
+
+
+def test_the_same_every_time():
+    network, pictures, weights = made(), torch.randn(90, 1, 12, 20), torch.randn(90, 3)
+    learning = FusedNetwork.try_create(network, 2)
+    _, first = taught(network, learning, pictures, weights)
+    taught(network, learning, torch.randn(200, 1, 12, 20), torch.randn(200, 3))
+    _, again = taught(network, learning, pictures, weights)
+    assert all(torch.equal(one, other) for one, other in zip(first, again, strict=True))
+
+
+def test_there_is_no_second_way_back():
+    network, pictures = made(), torch.randn(5, 1, 12, 20)
+    learning = FusedNetwork.try_create(network, 1)
+    total = learning(pictures).sum()
+    total.backward(retain_graph=True)
+    learning(pictures)  # works where the first numbers were
+    with pytest.raises(RuntimeError, match="second backward pass"):
+        total.backward()
+
+
+def test_two_ways_at_a_time_do_not_meet():
+    network = made()
+    learning = FusedNetwork.try_create(network, 2)
+    batches = [halves(n, 1, 12, 20) for n in (40, 70)]
+    expected = [taught(network, network, b, torch.ones(len(b), 3))[1] for b in batches]
+    learning(halves(90, 1, 12, 20)).sum().backward()  # leaves numbers that only one may have
+    sums = [learning(batch).sum() for batch in batches]
+    for total, other in zip(sums, expected, strict=True):
+        network.zero_grad()
+        total.backward()
+        for p, gradient in zip(network.parameters(), other, strict=True):
+            assert torch.allclose(p.grad, gradient, rtol=1e-3, atol=1e-3)
+
+
+def test_a_copy_learns_by_itself():
+    network = made()
+    learning = FusedNetwork.try_create(network, 1)
+    other = copy.deepcopy(learning)
+    with torch.no_grad():
+        network.layers.logits.bias += 1.0
+    pictures = torch.randn(3, 1, 12, 20)
+    assert torch.allclose(learning(pictures) - other(pictures), torch.ones(3, 3), atol=1e-5)
+
+
+def test_pictures_of_another_shape_are_refused():
+    learning = FusedNetwork.try_create(made())
+    assert learning.in_shape == (1, 12, 20) and learning.num_actions == 3
+    with pytest.raises(InputError, match="built for pictures"):
+        learning(halves(5, 1, 12, 21))
+
+
+def test_pictures_meet_the_weights_that_were_there_at_first():
+    network, pictures = made(), halves(5, 1, 12, 20)
+    learning = FusedNetwork.try_create(network, of="pixels")
+    first = learning(pictures)
+    draw_weights(network)
+    assert torch.equal(learning(pictures), first)
+    assert not torch.equal(network(pictures), first)
+
+
+def test_reasons_against_networks_that_the_kernel_does_not_support():
+    for network, reason in (
+        (MLP((1, 25, 64), 3), "network MLP is not fused"),
+        (OriginalCNN((1, 25, 64), 3), "network OriginalCNN is not fused"),
+        (SmallCNN((2, 25, 64), 3), "a network of 2 channels is not fused"),
+        (SmallCNN((1, 25, 64), 3, hidden=(600,)), "1082515 weights are more than 1048576"),
+    ):
+        found = FusedNetwork.try_create(network, 1)
+        assert isinstance(found, Reasons) and found == (reason,)
+    assert isinstance(
+        FusedNetwork.try_create(SmallCNN((1, 25, 64), 3, hidden=(500,)), 1), FusedNetwork
+    )
+
+
+WEIGHTS = torch.tensor([1.0, -2.0])
+
+
+def filled(rows=(6, 0, 1, 7)):
+    cache = ActivationCache(8, 3)
+    cache.clear()
+    return cache, cache.add(torch.tensor(rows), WEIGHTS)
+
+
+def test_handles_find_the_rows_of_activations():
+    cache, handles = filled()
+    assert cache.outputs.shape == (8, 3)
+    assert cache.find(handles, WEIGHTS.clone()).tolist() == [6, 0, 1, 7]
+    assert cache.find(handles[1:3], WEIGHTS).tolist() == [0, 1]
+    assert cache.find(handles, WEIGHTS).dtype == torch.int32
+
+
+def test_handles_are_not_valid_for_other_weights():
+    cache, handles = filled()
+    assert cache.find(handles, torch.tensor([1.0, -2.0000002])) is None
+
+
+def test_handles_are_valid_until_the_cache_is_cleared():
+    cache, handles = filled()
+    cache.clear()
+    assert cache.find(handles, WEIGHTS) is None
+    other = cache.add(torch.tensor([6, 0]), WEIGHTS)
+    assert cache.find(other, WEIGHTS).tolist() == [6, 0]
+    assert cache.find(torch.cat([other, handles]), WEIGHTS) is None
+    assert ActivationCache(8, 3).find(handles, WEIGHTS) is None
+
+
+def test_no_handle_is_valid_if_the_activations_do_not_all_fit():
+    for last, fits in ((7, True), (8, False)):
+        cache, handles = filled((0, last))
+        assert (cache.find(handles, WEIGHTS) is not None) is fits

@@ -1,0 +1,143 @@
+"""The pieces of the way back give what torch's give, whatever their sizes."""
+
+import pytest
+import torch
+import warp as wp
+from torch.nn import functional
+
+from drone_rl.acceleration.layers_backward_kernel import accumulate, fold, rectify
+from drone_rl.acceleration.packed_layers import in_panels
+from drone_rl.sim.rendering.devices import start_warp
+
+start_warp("cpu")
+OFFSET = 3
+"""Where everything begins in its array, so that a function that forgets it is found out."""
+
+
+@wp.kernel(enable_backward=False)
+def add_up(
+    given: wp.array(dtype=float),
+    deltas: wp.array(dtype=float),
+    gradients: wp.array(dtype=float),
+    sizes: wp.array(dtype=int),
+) -> None:
+    accumulate(
+        given,
+        OFFSET,
+        deltas,
+        OFFSET,
+        gradients,
+        OFFSET,
+        sizes[0],
+        sizes[1],
+        sizes[2],
+        sizes[3],
+        sizes[4],
+        sizes[5],
+        sizes[6],
+        sizes[7],
+        sizes[8],
+    )
+
+
+@wp.kernel(enable_backward=False)
+def fold_up(
+    patches: wp.array(dtype=float), made: wp.array(dtype=float), sizes: wp.array(dtype=int)
+) -> None:
+    fold(
+        patches,
+        made,
+        OFFSET,
+        sizes[0],
+        sizes[1],
+        sizes[2],
+        sizes[3],
+        sizes[4],
+        sizes[5],
+        sizes[6],
+        sizes[7],
+    )
+
+
+@wp.kernel(enable_backward=False)
+def cut_off(deltas: wp.array(dtype=float), made: wp.array(dtype=float), size: int) -> None:
+    rectify(deltas, OFFSET, made, OFFSET - 1, size)
+
+
+def beside(values, fill=torch.inf):
+    """An array in which they begin later, with one more at the end."""
+    return functional.pad(values.flatten(), (OFFSET, 1), value=fill)
+
+
+def inside(values):
+    assert values[:OFFSET].isinf().all() and values[-1].isinf()  # nothing is written beside it
+    return values[OFFSET:-1]
+
+
+def accumulated(given, deltas, before, *sizes):
+    gradients = beside(in_panels(before))
+    arrays = [wp.from_torch(v) for v in (beside(given), beside(deltas), gradients)]
+    sizes = wp.array(sizes, dtype=int, device="cpu")
+    wp.launch(add_up, 1, inputs=[*arrays, sizes], device="cpu")
+    panels = inside(gradients).view(-1, len(before), 16)
+    return panels.transpose(0, 1).reshape(before.shape)
+
+
+def test_by_hand():
+    given = torch.tensor([[1.0, 2.0], [3.0, 5.0]])
+    deltas = torch.zeros(2, 16)
+    deltas[:, 0] = torch.tensor([10.0, 100.0])
+    before = torch.ones(3, 16)
+    # rows beside each other, two numbers apart
+    found = accumulated(given, deltas, before, 2, 2, 0, 2, 1, 2, 0, 16, 16)
+    assert found[:, 0].tolist() == [111.0, 311.0, 521.0]  # bias, first and second input
+    assert torch.equal(found[:, 1:], torch.ones(3, 15))
+
+
+@pytest.mark.parametrize("rows", [1, 5, 17])
+@pytest.mark.parametrize("num_outs", [16, 48])
+@pytest.mark.parametrize("length", [3, 8, 70, 131])
+def test_linear_layers(rows, num_outs, length):
+    given, deltas = torch.randn(rows, length), torch.randn(rows, num_outs)
+    before = torch.randn(1 + length, num_outs)
+    apart = functional.pad(deltas, (0, 7))
+    sizes = (rows, rows, 0, length, 1, length, 0, num_outs, num_outs + 7)
+    found = accumulated(given, apart, before, *sizes)
+    expected = before + torch.cat([deltas.sum(0, keepdim=True), given.T @ deltas])
+    assert torch.allclose(found, expected, atol=1e-4)
+
+
+@pytest.mark.parametrize(("kernel", "stride"), [((3, 3), 1), ((4, 4), 4), ((2, 5), 3)])
+def test_convolutions(kernel, stride):
+    channels, height, width, outs = 16, 11, 13, 32
+    picture = torch.randn(1, channels, height, width, requires_grad=True)
+    weight = torch.randn(outs, channels, *kernel, requires_grad=True)
+    bias = torch.randn(outs, requires_grad=True)
+    made = functional.conv2d(picture, weight, bias, stride)
+    deltas = torch.randn_like(made)
+    made.backward(deltas)
+    rows, columns = made.shape[2:]
+    line = width * channels
+    places = (rows * columns, columns, stride * line, stride * channels)
+    patch = (kernel[0], kernel[1] * channels, line)
+    by_place = deltas[0].permute(1, 2, 0).reshape(-1, outs)
+    before = torch.zeros(1 + channels * kernel[0] * kernel[1], outs)
+    given = picture.detach()[0].permute(1, 2, 0)
+    found = accumulated(given, by_place, before, *places, *patch, outs, outs)
+    expected = torch.cat([bias.grad[None], weight.grad.permute(2, 3, 1, 0).reshape(-1, outs)])
+    assert torch.allclose(found, expected, atol=1e-3)
+
+    patches = by_place @ weight.detach().permute(2, 3, 1, 0).reshape(-1, outs).T
+    folded = torch.full((OFFSET + given.numel() + 1,), torch.inf)
+    sizes = wp.array([given.numel(), *places, *patch], dtype=int, device="cpu")
+    inputs = [wp.from_torch(patches.flatten()), wp.from_torch(folded), sizes]
+    wp.launch(fold_up, 1, inputs=inputs, device="cpu")
+    expected = picture.grad[0].permute(1, 2, 0).flatten()
+    assert torch.allclose(inside(folded), expected, atol=1e-3)
+
+
+def test_nothing_goes_back_to_where_nothing_came_from():
+    deltas = beside(torch.tensor([1.0, 2.0, 3.0, 4.0]))
+    made = torch.tensor([0.0, 0.0, 0.5, 0.0, -1.0, 2.0])  # from the third on
+    wp.launch(cut_off, 1, inputs=[wp.from_torch(deltas), wp.from_torch(made), 4], device="cpu")
+    assert inside(deltas).tolist() == [1.0, 0.0, 0.0, 4.0]

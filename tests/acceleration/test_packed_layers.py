@@ -1,0 +1,105 @@
+"""A packed network gives the logits of the network, after it has learned, too."""
+
+from collections import OrderedDict
+
+import pytest
+import torch
+import warp as wp
+from torch import nn
+
+from drone_rl.acceleration.layers_kernel import Layers, decide, look
+from drone_rl.acceleration.packed_layers import PackedNetwork, unsupported
+from drone_rl.policies import MLP, OriginalCNN, SmallCNN
+from drone_rl.policies.cnn import PolicyNetwork
+from drone_rl.sim.rendering.devices import start_warp
+
+start_warp("cpu")
+
+
+@wp.kernel(enable_backward=False)
+def ask(
+    layers: Layers, pictures: wp.array2d(dtype=float), room: wp.array(dtype=float), count: int
+) -> None:
+    for row in range(count):
+        look(layers, pictures[row], room, row)
+    decide(layers, room, count)
+
+
+def asked(packed, pictures, num_actions):
+    room = torch.full((packed.room,), torch.nan)
+    count = len(pictures)
+    given = wp.from_torch(pictures.flatten(1).contiguous())
+    inputs = [packed.layers, given, wp.from_torch(room), count]
+    wp.launch(ask, 1, inputs=inputs, device="cpu")
+    outs = packed.layers.num_outs
+    logits = room[packed.layers.logits_at :][: count * outs].view(count, outs)
+    assert not logits[:, num_actions:].any()
+    return logits[:, :num_actions]
+
+
+@pytest.mark.parametrize(
+    ("shape", "options"),
+    [
+        ((1, 25, 64), {}),
+        ((1, 25, 64), {"channels": (8,), "hidden": ()}),
+        ((1, 26, 41), {"patch": 5, "channels": (3, 17, 40), "hidden": (33, 20)}),
+        ((1, 4, 4), {"channels": (5,), "hidden": (7,)}),  # one place is left
+        ((1, 12, 40), {"channels": (6, 9), "hidden": (16,)}),  # one row is left
+    ],
+)
+def test_logits_are_the_networks(shape, options):
+    network = SmallCNN(shape, 3, generator=torch.Generator().manual_seed(0), **options)
+    packed = PackedNetwork(network, 6)
+    optimiser = torch.optim.Adam(network.parameters(), lr=0.1)
+    for count in (6, 1, 5):
+        pictures = torch.randn(count, *shape)
+        packed.update()
+        logits = network(pictures)
+        given = asked(packed, pictures, 3)
+        assert logits.abs().max() > 1e-3 and torch.allclose(given, logits, rtol=1e-4, atol=1e-5)
+        logits.square().sum().backward()
+        optimiser.step()
+        assert not torch.allclose(given, network(pictures), rtol=1e-3)
+
+
+class Other(PolicyNetwork):
+    """A network of given layers."""
+
+    def __init__(self, *layers):
+        named = OrderedDict((f"layer{i}", layer) for i, layer in enumerate(layers))
+        super().__init__((1, 8, 8), named, lambda layer, is_last: None)
+
+
+@pytest.mark.parametrize(
+    ("layers", "is_known"),
+    [
+        ([nn.Conv2d(1, 2, 3), nn.ReLU(), nn.Flatten(), nn.Linear(72, 3)], True),
+        ([nn.Conv2d(1, 2, 3), nn.ReLU(), nn.Flatten(1), nn.Linear(72, 3)], True),
+        ([nn.Conv2d(1, 2, 3), nn.ReLU(), nn.Flatten(2), nn.Linear(36, 3)], False),
+        ([nn.Conv2d(1, 2, 3, padding=1), nn.ReLU(), nn.Flatten(), nn.Linear(128, 3)], False),
+        ([nn.Conv2d(1, 2, 3, dilation=2), nn.ReLU(), nn.Flatten(), nn.Linear(32, 3)], False),
+        ([nn.Conv2d(1, 2, 3, stride=(1, 2)), nn.ReLU(), nn.Flatten(), nn.Linear(36, 3)], False),
+        ([nn.Conv2d(1, 2, 3, bias=False), nn.ReLU(), nn.Flatten(), nn.Linear(72, 3)], False),
+        ([nn.Conv2d(1, 2, 3), nn.Tanh(), nn.Flatten(), nn.Linear(72, 3)], False),
+        ([nn.Conv2d(1, 2, 3), nn.Flatten(), nn.Linear(72, 3)], False),
+        ([nn.Conv2d(1, 2, 3), nn.ReLU(), nn.Flatten(), nn.Linear(72, 3), nn.ReLU()], False),
+        ([nn.Conv2d(1, 2, 3), nn.ReLU(), nn.MaxPool2d(2), nn.Flatten(), nn.Linear(18, 3)], False),
+        ([nn.Flatten(), nn.Linear(64, 3)], False),
+        ([nn.Conv2d(1, 2, 3), nn.ReLU(), nn.Flatten(), nn.Linear(72, 3, bias=False)], False),
+    ],
+)
+def test_only_layers_that_it_knows_are_packed(layers, is_known):
+    network = Other(*layers)
+    assert (not unsupported(network)) is is_known
+    if is_known:
+        packed = PackedNetwork(network, 2)
+        packed.update()
+        pictures = torch.randn(2, 1, 8, 8)
+        assert torch.allclose(asked(packed, pictures, 3), network(pictures), atol=1e-5)
+
+
+def test_other_networks_are_not_packed():
+    assert unsupported(MLP((1, 25, 64), 3))
+    assert unsupported(OriginalCNN((1, 25, 64), 3))
+    assert unsupported(SmallCNN((3, 25, 64), 3))
+    assert unsupported(SmallCNN((1, 25, 64), 3).double())

@@ -1,0 +1,80 @@
+"""Weights go where kernels read them, and gradients come back to where they belong."""
+
+import torch
+
+from drone_rl.acceleration.layers_kernel import WIDTH
+from drone_rl.acceleration.packed_layers import (
+    Order,
+    PackedLayer,
+    in_panels,
+    odd_lines,
+    outputs_at,
+    packed_layers,
+)
+from drone_rl.policies import SmallCNN
+
+
+def small():
+    network = SmallCNN((1, 8, 8), 3, patch=4, channels=(2,), hidden=(5,))
+    return network, packed_layers(network)
+
+
+def test_geometry_by_hand():
+    _, (conv, hidden, logits) = small()
+    # 4 places in lines of 2; a line of places begins 4 lines of 8 pixels farther, a place 4 pixels
+    assert conv.geometry == [4, 2, 32, 4, 4, 4, 8, 16]
+    # all of 2x2 places of 16 channels
+    assert hidden.geometry == [1, 1, 64, 16, 1, 64, 0, 16]
+    assert logits.geometry == [1, 1, 16, 16, 1, 16, 0, 16]
+    assert [layer.num_made for layer in (conv, hidden, logits)] == [64, 16, 16]
+    assert [layer.is_convolution for layer in (conv, hidden, logits)] == [True, False, False]
+
+
+def test_outputs_of_a_picture_and_of_a_layer_take_an_odd_number_of_cache_lines():
+    assert [odd_lines(n) for n in (1, 16, 17, 32, 33, 1792)] == [16, 16, 48, 48, 48, 1808]
+    _, layers = small()
+    assert outputs_at(layers) == [0, 80, 96, 112]  # five lines, one and one
+    assert outputs_at(layers[:2]) == [0, 80, 112]  # five and one, and one that is empty
+
+
+def test_order_by_hand():
+    layer = PackedLayer(torch.nn.Conv2d(2, 3, (1, 2)), 2, (1, 2, 2), (1, 2), 1)
+    order = layer.order(10)
+    assert order.shape == (1 + 4, WIDTH)
+    # 12 weights from 10 on, of output o, channel c and column w at 10 + 4 o + 2 c + w; 3 biases
+    assert order[0].tolist() == [22, 23, 24] + [0] * 13
+    assert order[1:, 0].tolist() == [10, 12, 11, 13] and order[1:, 2].tolist() == [18, 20, 19, 21]
+    assert not order[:, 3:].any()
+
+
+def test_panels_hold_sixteen_columns_each():
+    by_row = torch.arange(3 * 2 * WIDTH).view(3, -1)
+    panels = in_panels(by_row).view(2, 3, WIDTH)
+    assert torch.equal(panels[0], by_row[:, :WIDTH]) and torch.equal(panels[1], by_row[:, WIDTH:])
+
+
+def test_what_is_packed_comes_back_to_its_place():
+    network, layers = small()
+    order = Order(layers)
+    weights, back = torch.full((order.weights_at[-1],), 7.0), torch.full((order.back_at[-1],), 7.0)
+    order.pack(weights, back)
+    parameters = [p.detach() for layer in layers for p in layer.parameters]
+    assert {p.data_ptr() for p in parameters} == {p.data_ptr() for p in network.parameters()}
+    for unpacked, parameter in zip(order.unpack(weights), parameters, strict=True):
+        assert torch.equal(unpacked, parameter)
+    count = sum(p.numel() for p in parameters)
+    assert (weights != 0).sum() == sum(int((p != 0).sum()) for p in parameters) <= count
+
+
+def test_the_way_back_has_the_same_weights_turned():
+    _, layers = small()
+    order = Order(layers)
+    weights, back = torch.zeros(order.weights_at[-1]), torch.zeros(order.back_at[-1])
+    order.pack(weights, back)
+    for i, layer in list(enumerate(layers))[1:]:
+        there = weights[order.weights_at[i] : order.weights_at[i + 1]]
+        there = there.view(-1, 1 + layer.num_inputs, WIDTH)  # a panel
+        turned = back[order.back_at[i] : order.back_at[i + 1]].view(-1, 1 + layer.num_outs, WIDTH)
+        assert not turned[:, 0].any()
+        by_row = there.transpose(0, 1).reshape(1 + layer.num_inputs, -1)[1:]
+        assert torch.equal(turned[:, 1:].transpose(0, 1).reshape(layer.num_outs, -1), by_row.T)

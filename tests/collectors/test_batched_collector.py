@@ -1,0 +1,125 @@
+"""What both kinds of collectors do alike: TorchRL's contract, and rows of a batch."""
+
+import copy
+import itertools
+
+import pytest
+import torch
+from tensordict import TensorDict
+from tensordict.nn import TensorDictModule
+from torchrl.collectors import BaseCollector
+from torchrl.envs import RewardSum, TransformedEnv
+
+from drone_rl.collectors import EpisodeCollector, RolloutCollector, take_rows
+from drone_rl.config import TaskSettings
+from drone_rl.envs import DroneEnv
+from drone_rl.evaluation.baselines import Oracle
+from drone_rl.utils.errors import InputError
+
+TASK = TaskSettings(num_cubes=1, first_distance=3.0, step_limit=12, front_margin=3.0)
+KINDS = {
+    "episodes": EpisodeCollector,
+    "rollouts": lambda env, actor, **kwargs: RolloutCollector(env, actor, 5, **kwargs),
+}
+
+
+@pytest.fixture(params=KINDS.values(), ids=KINDS)
+def make(request):
+    """Collectors of either kind, whose worlds are not drawn."""
+
+    def build(actor=None, **kwargs):
+        return request.param(DroneEnv(3, TASK, pixels=False), actor or Oracle(TASK), **kwargs)
+
+    return build
+
+
+def test_it_is_one_of_torchrls_collectors(make):
+    collector = make()
+    assert isinstance(collector, BaseCollector)
+    assert torch.equal(collector.next()["action"], make().collect()["action"])
+    assert collector.pre_collect_hook is None and collector.post_collect_hook is None
+    with pytest.raises(TypeError, match="not known beforehand"):
+        len(collector)
+
+
+def test_batches_until_there_are_enough_frames(make):
+    frames = [batch.numel() for batch in itertools.islice(make(), 3)]
+    assert [batch.numel() for batch in make(total_frames=0)] == []
+    assert [batch.numel() for batch in make(total_frames=frames[0])] == frames[:1]
+    assert [batch.numel() for batch in make(total_frames=frames[0] + 1)] == frames[:2]
+
+
+def test_frames_and_episodes_are_counted(make):
+    collector = make()
+    batches = [collector.collect() for _ in range(4)]
+    assert collector.frames == sum(batch.numel() for batch in batches)
+    assert collector.episodes == sum(int(batch["next", "done"].sum()) for batch in batches)
+
+
+def test_postproc_is_given_each_batch(make):
+    for batch in make(postproc=lambda batch: batch.set("seen", batch["action"]), total_frames=20):
+        assert torch.equal(batch["seen"], batch["action"])
+
+
+def test_what_is_kept_is_what_the_environment_has(make):
+    keep = (("next", "info", "cubes"), ("next", "wind"))
+    batch = make(keep=keep).collect()
+    assert ("next", "info", "cubes") in batch.keys(True)
+    assert ("next", "wind") not in batch.keys(True)
+
+
+def test_seed_is_that_of_the_worlds(make):
+    collector = make()
+    first = collector.collect()["info", "cube_positions"]
+    assert collector.set_seed(0, static_seed=True) == 0
+    assert torch.equal(collector.collect()["info", "cube_positions"], first)
+    assert collector.set_seed(7) != 7  # a seed for the next collector
+    assert not torch.equal(collector.collect()["info", "cube_positions"][0], first[0])
+
+
+def test_weights_of_another_actor_its_state_or_a_tensordict(make):
+    layer = torch.nn.Linear(1, 1)
+    actor = TensorDictModule(layer, in_keys=["frame"], out_keys=["action"])
+    collector = make(actor)
+    before = layer.weight.detach().clone()
+    collector.update_policy_weights_()
+    assert torch.equal(layer.weight, before)
+    for value, kind in enumerate((lambda a: a, lambda a: a.state_dict(), TensorDict.from_module)):
+        other = copy.deepcopy(actor)
+        torch.nn.init.constant_(other.module.weight, value)
+        collector.update_policy_weights_(kind(other))
+        assert float(layer.weight.detach()) == value
+        assert layer.weight is collector.actor.module.weight  # in place, nothing is rebound
+
+
+def test_shutdown_may_leave_the_worlds_open(make):
+    collector = make()
+    collector.collect()
+    collector.shutdown(close_env=False)
+    assert not collector.env.is_closed
+    collector.shutdown()
+    assert collector.env.is_closed
+
+
+def test_the_worlds_are_those_behind_transforms():
+    env = DroneEnv(2, TASK, pixels=False)
+    assert EpisodeCollector(TransformedEnv(env, RewardSum()), Oracle(TASK)).base_env is env
+    assert EpisodeCollector(env, Oracle(TASK)).base_env is env
+
+
+def test_one_world_without_a_batch(make):
+    env = DroneEnv(1, TASK, pixels=False)
+    env.batch_size = torch.Size([])
+    for kind in KINDS.values():
+        with pytest.raises(InputError, match=r"batch size \[\]; give a batch of environments"):
+            kind(env, Oracle(TASK))
+
+
+def test_rows_are_what_indexing_gives():
+    part = TensorDict({"a": torch.arange(4.0), "b": {"c": torch.arange(8).view(4, 2)}}, [4])
+    rows = torch.tensor([3, 0, 3])
+    taken = take_rows(part, rows)
+    assert taken.shape == (3,)
+    assert (taken == part[rows]).all()
+    taken["a"][0] = 9.0
+    assert part["a"].tolist() == [0, 1, 2, 3]

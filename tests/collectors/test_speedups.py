@@ -1,0 +1,56 @@
+"""Without the package `drone_rl.acceleration` everything falls back to TorchRL and torch."""
+
+import sys
+
+import pytest
+import torch
+
+from drone_rl.collectors import speedups
+from drone_rl.collectors.episodes import EpisodeCollector
+from drone_rl.config import TaskSettings
+from drone_rl.envs import DroneEnv, GrayPixels, with_transforms
+from drone_rl.policies import MLP, SmallCNN, make_actor
+
+TASK = TaskSettings(num_cubes=1, first_distance=3.0, step_limit=5)
+
+
+@pytest.fixture
+def missing(monkeypatch):
+    monkeypatch.setitem(sys.modules, "drone_rl.acceleration", None)
+
+
+def test_collectors_step_by_torchrl_if_the_package_is_missing(missing):
+    env = with_transforms(DroneEnv(2, TASK), [GrayPixels()])
+    network = SmallCNN((1, 25, 64), 3)
+    for acceleration in ("fused", "direct"):
+        actor = make_actor(network, env.action_spec)
+        collector = EpisodeCollector(env, actor, acceleration=acceleration)
+        name = "stepping collector: drone_rl.acceleration is not installed"
+        assert collector.source.name == name
+        assert collector.collect()["next", "done"].sum() == 2
+    assert speedups.accelerated_stream(env, ["pixels"], []) == speedups.MISSING
+    env.close()
+
+
+def test_a_collector_that_may_not_be_accelerated_says_so():
+    env = with_transforms(DroneEnv(2, TASK), [GrayPixels()])
+    actor = make_actor(SmallCNN((1, 25, 64), 3), env.action_spec)
+    found = speedups.accelerated_collector(env, actor, "none")
+    assert found == ("collector.compiled is false",)
+    env.close()
+
+
+def test_networks_stay_as_they_are_if_the_package_is_missing(missing):
+    network = SmallCNN((1, 25, 64), 3)
+    assert speedups.accelerated_gradients(network) is network
+    pixels = torch.randn(2, 1, 25, 64)
+    logits = speedups.accelerated_inference(network)(pixels)
+    assert torch.equal(logits, network(pixels)) and not logits.requires_grad
+
+
+def test_networks_stay_as_they_are_if_they_are_not_supported():
+    network = MLP((1, 25, 64), 3)
+    assert speedups.accelerated_gradients(network) is network
+    pixels = torch.randn(2, 1, 25, 64)
+    logits = speedups.accelerated_inference(network)(pixels)
+    assert torch.equal(logits, network(pixels)) and not logits.requires_grad

@@ -1,0 +1,77 @@
+"""TorchRL's collector steps one episode of each environment."""
+
+import gc
+
+import pytest
+import torch
+from torchrl.collectors import Collector
+from torchrl.envs.utils import ExplorationType, set_exploration_type
+
+from drone_rl.collectors.stepping import SteppingCollector
+from drone_rl.config import TaskSettings
+from drone_rl.envs import DroneEnv, GrayPixels, with_transforms
+from drone_rl.envs.direct_renderer import Reasons
+from drone_rl.policies import SmallCNN, make_actor
+
+TASK = TaskSettings(num_cubes=2, first_distance=3.0, spacing=3.0, step_limit=12, front_margin=3.0)
+KEPT = [("next", name) for name in ("reward", "done", "terminated", "truncated")]
+
+
+def make(num_envs=5, **settings):
+    env = with_transforms(DroneEnv(num_envs, TASK), [GrayPixels()])
+    generator = torch.Generator().manual_seed(0)
+    network = SmallCNN((1, 25, 64), 3, channels=(4,), hidden=(8,), generator=generator)
+    actor = make_actor(network, env.action_spec, generator)
+    return SteppingCollector(env, actor, Reasons(["a reason"]), kept=KEPT, **settings), env
+
+
+def test_it_is_torchrls_collector_and_says_why():
+    collector, _ = make()
+    assert type(collector._collector) is Collector
+    assert collector.name == "stepping collector: a reason"
+    assert collector.cache_activations() is None
+    collector.close()
+
+
+def test_making_it_starts_no_episode():
+    env = DroneEnv(5, TASK)
+    assert torch.equal(make()[0].collect(5)["pixels"][0], GrayPixels()(env.reset())["pixels"][0])
+
+
+def test_the_environment_stays_open_when_the_collector_is_deleted():
+    collector, env = make()
+    collector.collect(5)
+    del collector
+    gc.collect()
+    assert not env.is_closed
+    env.reset()
+    env.close()
+
+
+@pytest.mark.parametrize("num_envs", [5, 2])
+def test_every_episode_is_complete_and_none_is_started_twice(num_envs):
+    collector, env = make()
+    started, start = [], env.base_env.start
+    env.base_env.start = lambda rows=None: started.append(len(rows)) or start(rows)
+    for _ in range(2):
+        batch = collector.collect(num_envs)
+        ids, done = batch["collector", "traj_ids"], batch["next", "done"][:, 0]
+        assert ids.unique().tolist() == list(range(num_envs))
+        assert torch.equal(done, ids != torch.cat([ids[1:], torch.tensor([-1])]))
+    assert started == [5, 5]
+
+
+def test_actions_are_those_of_the_exploration_type_outside():
+    collector, _ = make()
+    with set_exploration_type(ExplorationType.DETERMINISTIC):
+        batch = collector.collect(5)
+    assert torch.equal(batch["action"], batch["logits"].argmax(-1))
+    batch = collector.collect(5)
+    assert not torch.equal(batch["action"], batch["logits"].argmax(-1))
+
+
+def test_observations_are_left_out_and_extra_entries_kept():
+    collector, _ = make(keep_observations=False, extra=("logits",))
+    batch = collector.collect(5)
+    assert set(batch.keys()) == {"action", "logits", "next", "collector"}
+    assert len(batch["logits"]) == len(batch)

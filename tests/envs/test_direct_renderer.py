@@ -1,0 +1,45 @@
+"""What is seen without TorchRL's steps is what is seen with them."""
+
+import pytest
+import torch
+
+from drone_rl.config import TaskSettings
+from drone_rl.envs import CropRows, DroneEnv, GrayPixels, RgbPixels, with_transforms
+from drone_rl.envs.direct_renderer import FLAGS, DirectRenderer
+
+SHORT = TaskSettings(num_cubes=2, first_distance=3.0, spacing=3.0, step_limit=5)
+KEPT = [("next", name) for name in FLAGS]
+
+
+class Dark(GrayPixels):
+    """One of its own kind, which may make something else of pictures."""
+
+
+@pytest.mark.parametrize(
+    ("first", "modality"), [(GrayPixels(), "gray"), (RgbPixels(), "rgb"), (Dark(), "rgb")]
+)
+def test_gray_is_drawn_gray_and_the_same(first, modality):
+    env = with_transforms(DroneEnv(3, SHORT), [first, CropRows(5, 25)])
+    renderer = DirectRenderer.try_create(env, ["pixels"], KEPT)
+    assert renderer.view.modalities == (modality,)
+    seen = env.reset()["pixels"]
+    assert torch.equal(renderer.look(env.base_env.worlds.state)["pixels"], seen)
+    env.close()
+
+
+def test_a_step_is_told_as_torchrl_tells_it():
+    reason = ("next", "info", "end_reason")
+    env = with_transforms(DroneEnv(3, SHORT), [GrayPixels()])
+    renderer = DirectRenderer.try_create(env, ["pixels"], [*KEPT, reason])
+    state = env.reset()
+    action = torch.tensor([0, 1, 2])
+    for step in range(5):
+        moved, reward = renderer.worlds.advance(renderer.worlds.state, action)  # changes nothing
+        state = env.step(state.set("action", action))
+        told, done = renderer.entries(moved, reward)
+        assert set(told) == {*KEPT, reason}
+        assert not (told["next", "terminated"] & told["next", "truncated"]).any()
+        assert all(torch.equal(value, state[key]) for key, value in told.items())
+        assert torch.equal(done, state["next", "done"]) and bool(done.all()) is (step == 4)
+        state = state["next"]
+    env.close()

@@ -1,0 +1,46 @@
+"""Where explanations are found, and what becomes of those that lack something."""
+
+import os
+
+import pytest
+
+from drone_rl.explanations.report import page
+from drone_rl.explanations.report.page import find_explanations, report
+from drone_rl.utils.errors import InputError
+
+
+def explained(folder, *names):
+    for name in names:
+        (folder / name).mkdir(parents=True)
+        (folder / name / "explanation.json").write_text("{}")
+    return folder
+
+
+def test_a_folder_of_several_means_all_of_them(tmp_path):
+    run = explained(tmp_path / "run", "1_b", "0_a")
+    assert find_explanations([str(run)]) == [run / "0_a", run / "1_b"]
+    assert find_explanations([str(run / "1_b"), str(run / "0_a")]) == [run / "1_b", run / "0_a"]
+
+
+def test_the_latest_is_the_newest(tmp_path):
+    for number, name in enumerate(("b", "a")):
+        explained(tmp_path / "explain" / "runs" / name, "0_x")
+        os.utime(tmp_path / "explain" / "runs" / name, (number, number))
+    assert find_explanations(("latest",), tmp_path) == [tmp_path / "explain/runs/a/0_x"]
+
+
+def test_there_is_none(tmp_path):
+    with pytest.raises(InputError, match=r"explanations=latest, but .* drone-rl explain first"):
+        find_explanations(("latest",), tmp_path)
+    with pytest.raises(InputError, match=r"holds no explanation\.json"):
+        find_explanations([str(tmp_path)])
+
+
+@pytest.mark.parametrize("error", [KeyError("verdict"), TypeError("x"), ZeroDivisionError()])
+def test_what_lacks_something_is_a_mistake_of_the_file(monkeypatch, tmp_path, error):
+    def fail(*_):
+        raise error
+
+    monkeypatch.setattr(page, "write_report", fail)
+    with pytest.raises(InputError, match="do not hold what a report needs"):
+        report([tmp_path], tmp_path)

@@ -1,0 +1,91 @@
+import pytest
+
+from drone_rl.explanations.report.explanation import Explanation
+from drone_rl.explanations.report.truth_charts import heat_chart, truth_chart
+
+SCORE = {"mean": 0.5, "lower95": 0.4, "upper95": 0.6}
+UNKNOWN = {"mean": None, "lower95": None, "upper95": None}
+
+
+def beats(lower, upper, median):
+    return {"lower": lower, "upper": upper, "median": median}
+
+
+@pytest.fixture
+def truth():
+    return {
+        "methods": {
+            "grad_cam": {
+                "score": SCORE,
+                "placebos": {"ones": beats(0.3, 0.5, 0.4), "blob": beats(0.1, 0.9, 0.6)},
+                "pointing": beats(0.2, 0.4, 0.3),
+                "likeness": beats(0.6, 0.8, 0.7),
+            },
+            "saliency": {"score": UNKNOWN, "pointing": beats(None, None, None)},
+        },
+        "placebos": {"ones": {**SCORE, "mean": 0.1}, "blob": {**SCORE, "mean": 0.2}},
+        "heat": {
+            "grad_cam": {
+                region: {"share": {"mean": share}, "chance": {"mean": 0.2}}
+                for region, share in zip(
+                    ("next_cube", "other_cubes", "drone", "ground", "sky"),
+                    (0.5, 0.1, 0.1, 0.1, 0.2), strict=True,
+                )
+            }
+        },
+    }  # fmt: skip
+
+
+def draw(chart, truth):
+    return chart(Explanation({"name": "x", "truth": truth}, {}, {})).axes
+
+
+def test_scores_stand_with_the_strongest_placebo_below_the_methods(truth):
+    axis = draw(truth_chart, truth)[0]
+    labels = [label.get_text() for label in axis.get_yticklabels()]
+    assert labels == ["placebo: ones", "placebo: blob", "saliency", "Grad-CAM"]
+    assert [bar.get_width() for bar in axis.patches] == [0.1, 0.2, 0.5]  # saliency has none
+    assert "no patch affects the policy" in [text.get_text() for text in axis.texts]
+
+
+def test_the_placebo_that_is_beaten_least_surely_is_the_one_that_counts(truth):
+    axis = draw(truth_chart, truth)[1]
+    bounds, median = axis.lines[:2]
+    assert list(bounds.get_xdata()) == [0.1, 0.9]
+    assert list(median.get_xdata()) == [0.6]
+
+
+def test_what_has_too_few_flights_says_so(truth):
+    assert "too few episodes" in [text.get_text() for text in draw(truth_chart, truth)[2].texts]
+
+
+def test_shares_of_heat_stand_beside_shares_of_pixels_and_fill_the_line(truth):
+    (axis,) = draw(heat_chart, truth)
+    widths = [bar.get_width() for bar in axis.patches]
+    assert widths[:5] == pytest.approx([0.5, 0.1, 0.1, 0.1, 0.2])
+    assert widths[5:] == pytest.approx([0.2] * 5)
+    assert [t.get_text() for t in axis.get_yticklabels()] == ["the pixels", "Grad-CAM"]
+
+
+def test_a_line_spans_the_interval_of_each_score(truth):
+    truth["placebos"]["blob"] = {"mean": 0.2, "lower95": -0.1, "upper95": 0.3}
+    lines = [list(line.get_xdata()) for line in draw(truth_chart, truth)[0].lines]
+    assert lines[:3] == [[0.4, 0.6], [-0.1, 0.3], [0.4, 0.6]]  # placebos below, Grad-CAM on top
+
+
+def test_each_test_has_a_chart_of_its_own_with_its_bar(truth):
+    axes = draw(truth_chart, truth)
+    first = [axis.get_title().split("\n")[0] for axis in axes]
+    assert first[1:] == [
+        "score above its strongest placebo",
+        "hits above chance",
+        "similarity to maps of shuffled weights",
+    ]
+    assert [list(axis.lines[-1].get_xdata()) for axis in axes[1:]] == [[0, 0], [0, 0], [0.5, 0.5]]
+    assert list(axes[3].lines[0].get_xdata()) == [0.6, 0.8]
+
+
+def test_the_key_names_each_region_once(truth):
+    (axis,) = draw(heat_chart, truth)
+    texts = [text.get_text() for text in axis.get_legend().get_texts()]
+    assert texts == ["next cube", "other cubes", "drone", "ground", "sky"]

@@ -1,0 +1,25 @@
+import pytest
+
+from benchmarks.evidence import EXPLANATION, changed
+from drone_rl.explanations.report.verdict import ADVICE, SCOPE
+from drone_rl.utils.text import said, say
+
+
+@pytest.mark.parametrize(
+    ("verdict", "name", "part"),
+    [
+        ({"kind": "good", "certain": True, "exit_code": 0}, "use", "in no others"),
+        ({"kind": "poor", "certain": True, "exit_code": 10}, "refuse", "exit status 10"),
+        ({"kind": "good", "certain": False, "enough": 1600}, "more", "(episodes=1600)"),
+        ({"kind": "poor", "certain": False, "enough": None}, "more", "may stay open"),
+    ],
+)
+def test_one_thing_to_do(verdict, name, part):
+    evidence = changed(EXPLANATION, {f"verdict.{k}": v for k, v in verdict.items()})
+    found = said(ADVICE, evidence)
+    assert list(found) == [f"advice.{name}"]
+    assert part in found[f"advice.{name}"]
+
+
+def test_nothing_reads_as_if_other_looks_had_been_tested():
+    assert "nothing here tests other colours, light or sizes" in say(SCOPE, EXPLANATION)

@@ -1,0 +1,16 @@
+from drone_rl.explanations.report.verdict import SOURCE
+from drone_rl.utils.text import say
+
+
+def test_a_page_names_the_file_that_its_figures_were_read_from():
+    evidence = {
+        "source": "a/explanation.json",
+        "date": "2026-01-31T12:00:00+00:00",
+        "provenance": {"git_revision": "0123abc"},
+    }
+    assert say(SOURCE, evidence) == (
+        "This page repeats what a/explanation.json says (written 2026-01-31T12:00:00+00:00, "
+        "revision 0123abc). The figures were read from this file and not measured again."
+    )
+    older = say(SOURCE, {"source": "a/explanation.json"})
+    assert "written on an unknown date, revision unknown" in older

@@ -1,0 +1,195 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from drone_rl.explanations import embedding as module
+from drone_rl.explanations.embedding import embed, faithfulness
+from drone_rl.explanations.report.embedding import snap_to_grid
+from drone_rl.utils.errors import InputError
+
+
+@pytest.fixture(scope="module")
+def clusters():
+    rng = np.random.default_rng(0)
+    centres = rng.normal(0, 10, (3, 20))
+    return np.concatenate([c + rng.normal(0, 0.5, (40, 20)) for c in centres])
+
+
+@pytest.fixture(scope="module")
+def embedding(clusters):
+    return embed(clusters, perplexity=10, seed=1)
+
+
+def test_clusters_stay_together(embedding):
+    groups = embedding.points.reshape(3, 40, 2)
+    spread = max(group.std(0).max() for group in groups)
+    centres = groups.mean(1)
+    apart = min(np.linalg.norm(centres[i] - centres[j]) for i, j in ((0, 1), (0, 2), (1, 2)))
+    assert apart > 3 * spread
+    faithful = embedding.faithfulness
+    assert faithful.trustworthiness > 0.9
+    assert faithful.neighbours_kept > 3 * faithful.neighbours_chance
+    assert faithful.neighbours_chance == pytest.approx(10 / 119)
+
+
+def test_the_same_seed_gives_the_same_picture(clusters, embedding):
+    again = embed(clusters, perplexity=10, seed=1)
+    np.testing.assert_array_equal(again.points, embedding.points)
+
+
+def test_new_points_go_to_their_cluster_and_move_nothing(clusters, embedding):
+    before = embedding.points.copy()
+    placed = embedding.place(clusters[:2] + 0.01)
+    centres = embedding.points.reshape(3, 40, 2).mean(1)
+    assert (np.linalg.norm(placed[:, None] - centres, axis=-1).argmin(1) == 0).all()
+    np.testing.assert_array_equal(embedding.points, before)
+
+
+def test_faithfulness_of_a_perfect_and_of_a_reversed_order():
+    line = np.arange(9.0)[:, None]
+    perfect = faithfulness(line, np.hstack([line, line]), k=2)
+    assert (perfect.trustworthiness, perfect.neighbours_kept) == (1.0, 1.0)
+    shuffled = line[[0, 5, 1, 6, 2, 7, 3, 8, 4]]
+    found = faithfulness(line, np.hstack([shuffled, shuffled]), k=2)
+    assert found.trustworthiness < 0.75 and found.neighbours_kept < 0.2
+
+
+def test_faithfulness_by_hand():
+    """Points 0 1 3 7 15 are drawn at 0 10 1 13 15; k = 2, so every rank beyond 2 is a stranger's.
+
+    Ranks of the two drawn nearest: of 0, those of 3 and 1 (2, 1); of 1, those of 7 and 15 (3, 4);
+    of 3, those of 0 and 1 (2, 1); of 7, those of 15 and 1 (4, 2); of 15, those of 7 and 1 (1, 3).
+    (From 3, 0 and 1 and 7 are 3, 2 and 4 away; from 7, 3 is 4, 1 is 6, 0 is 7, 15 is 8 away.)
+    """
+    line = np.array([0.0, 1, 3, 7, 15])[:, None]
+    drawn = np.array([0.0, 10, 1, 13, 15])[:, None] * (1, 0)
+    found = faithfulness(line, drawn, k=2)
+    assert found.neighbours == 2 and found.neighbours_chance == pytest.approx(2 / 4)
+    assert found.neighbours_kept == pytest.approx(6 / 10)
+    # beyond 2: 1 + 2 of point 1, 2 of point 7, 1 of point 15; at worst 5 * 2 * (10 - 6 - 1) / 2
+    assert found.trustworthiness == pytest.approx(1 - 6 / 15)
+
+
+def test_few_points_have_few_neighbours():
+    """Of 9 points at most 4 are neighbours, whatever is asked for, and chance is of those."""
+    line = np.arange(9.0)[:, None] ** 2
+    found = faithfulness(line, np.hstack([line, line]))
+    assert (found.neighbours, found.neighbours_chance) == (4, 4 / 8)
+    assert found.trustworthiness == 1.0
+    assert faithfulness(line[:3], line[:3] * (1, 1)).neighbours == 1
+
+
+def test_points_that_are_all_alike_are_all_neighbours_by_chance_too():
+    """A dead layer: whatever is drawn is faithful, and so is a random placement."""
+    rng = np.random.default_rng(0)
+    found = faithfulness(np.full((50, 7), 0.1), rng.normal(size=(50, 2)))
+    assert (found.trustworthiness, found.neighbours_kept, found.neighbours_chance) == (1, 1, 1)
+
+
+def test_random_placement_keeps_what_chance_says():
+    rng = np.random.default_rng(0)
+    twins = np.repeat(rng.normal(size=(100, 5)), 4, 0)  # three equals each: ties at distance 0
+    found = faithfulness(twins, rng.normal(size=(400, 2)), k=2)
+    assert found.neighbours_chance == pytest.approx(3 / 399)
+    assert abs(found.neighbours_kept - 3 / 399) < 4 * (3 / 399 / 800) ** 0.5
+    assert abs(found.trustworthiness - 0.5) < 0.05
+
+
+def test_faithfulness_is_of_the_originals_not_of_their_components():
+    """In 200 dimensions of equal noise, 50 components are not the whole."""
+    noise = np.random.default_rng(0).normal(size=(150, 200))
+    found = embed(noise, perplexity=10)
+    assert found.faithfulness == faithfulness(noise - noise.mean(0), found.points)
+    components = module._principal_components(noise - noise.mean(0))
+    assert components.shape == (50, 200)
+    np.testing.assert_allclose(components @ components.T, np.eye(50), atol=1e-8)
+    reduced = faithfulness((noise - noise.mean(0)) @ components.T, found.points)
+    assert found.faithfulness != reduced
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(-100, 100), st.floats(0.01, 100))
+@settings(max_examples=25, deadline=None)
+def test_faithfulness_knows_no_place_and_no_unit(seed, shift, unit):
+    rng = np.random.default_rng(seed)
+    originals, points = rng.normal(size=(30, 3)), rng.normal(size=(30, 2))
+    plain = faithfulness(originals, points)
+    assert faithfulness(shift + unit * originals, shift - unit * points) == plain
+    assert 0 <= plain.trustworthiness <= 1
+
+
+def test_components_are_those_of_the_largest_variance():
+    """Few points of many dimensions and many of few take different ways to the same rows."""
+    rng = np.random.default_rng(0)
+    few = rng.normal(size=(60, 80)) * np.linspace(1, 9, 80)
+    few -= few.mean(0)
+    expected = np.linalg.svd(few, full_matrices=False)[2][:50]
+    for points in (few, np.vstack([few, few])):
+        found = module._principal_components(points)
+        np.testing.assert_allclose(np.abs((found * expected).sum(1)), 1.0, atol=1e-6)
+        assert (found[np.arange(50), np.abs(found).argmax(1)] > 0).all()
+    assert (module._principal_components(few[:, :50]) == np.eye(50)).all()
+
+
+@pytest.mark.parametrize("few", [True, False])
+def test_many_points_are_placed_by_approximate_methods(clusters, monkeypatch, few):
+    monkeypatch.setattr(module, "FEW", 120 if few else 119)
+    asked = {}
+
+    def build(**kwargs):
+        asked.update(kwargs)
+        raise NotImplementedError
+
+    monkeypatch.setattr(module.openTSNE, "TSNE", build)
+    with pytest.raises(NotImplementedError):
+        embed(clusters, perplexity=10, seed=1)
+    assert (asked["perplexity"], asked["random_state"], asked["initialization"]) == (10, 1, "pca")
+    methods = (asked["n_jobs"], asked["neighbors"], asked["negative_gradient_method"])
+    assert methods == ((1, "exact", "bh") if few else (module.num_cores(), "annoy", "fft"))
+
+
+def test_points_that_are_equal_are_moved_by_next_to_nothing():
+    points = np.repeat([[0.0, 4.0]], 200, 0)
+    moved = module._distinct(points, 0) - points
+    assert len(np.unique(moved)) == 400
+    assert moved.std() == pytest.approx(2e-6, rel=0.2)  # a millionth of the deviation, 2
+    assert module._distinct(np.zeros((200, 2)), 0).std() == pytest.approx(1e-12, rel=0.2)
+
+
+def test_smallest_and_largest_perplexity():
+    module.check_perplexity(1, 4)
+    module.check_perplexity(33, 100)
+    for perplexity, count in ((0.9, 100), (33.1, 100), (1, 3)):
+        with pytest.raises(InputError, match="does not fit"):
+            module.check_perplexity(perplexity, count)
+
+
+def test_features_that_are_not_finite_are_refused():
+    with pytest.raises(InputError, match="not finite"):
+        embed(np.full((40, 3), np.nan), perplexity=5)
+
+
+def test_identical_points_are_no_error():
+    assert np.isfinite(embed(np.zeros((30, 4)), perplexity=5).points).all()
+
+
+def test_perplexity_that_does_not_fit_is_refused(clusters):
+    with pytest.raises(InputError, match=r"perplexity=50 does not fit 120 points; give 1 to 39"):
+        embed(clusters, perplexity=50)
+
+
+def test_every_thumbnail_has_a_cell_of_its_own(embedding):
+    cells = snap_to_grid(embedding.points, columns=16, rows=10)
+    assert len(np.unique(cells, axis=0)) == 120
+    corner = snap_to_grid(np.array([[0.0, 0.0], [1.0, 1.0]]), columns=3, rows=2)
+    assert corner.tolist() == [[0, 0], [2, 1]]
+
+
+def test_cells_are_spread_over_all_rows_and_columns():
+    points = np.array([[0.0, 0.0], [0.0, 0.65], [1.0, 1.0]])
+    assert snap_to_grid(points, columns=2, rows=4).tolist() == [[0, 0], [0, 2], [1, 3]]
+    assert snap_to_grid(points[:, ::-1], columns=4, rows=2).tolist() == [
+        [0, 0],
+        [2, 0],
+        [3, 1],
+    ]

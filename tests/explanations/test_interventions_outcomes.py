@@ -1,0 +1,163 @@
+import dataclasses
+
+import numpy as np
+import pytest
+import torch
+from torch import nn
+
+from drone_rl.explanations.interventions import (
+    PATIENCE,
+    Flights,
+    _remember,
+    differ,
+    fly,
+    followed,
+    outcomes,
+)
+from drone_rl.explanations.scenes import empty_scene, place_target
+from drone_rl.sim.actions import Move
+
+
+class Follower(nn.Module):
+    """Turns to where the picture differs from the empty scene, and flies on when in the middle."""
+
+    def __init__(self, absent):
+        super().__init__()
+        self.absent = absent
+
+    def forward(self, x):
+        heat = (x - self.absent).abs().sum((1, 2))
+        columns = torch.arange(x.shape[-1]) - (x.shape[-1] - 1) / 2
+        middle = (heat * columns).sum(1) / heat.sum(1).clamp_min(1e-9)
+        logits = torch.zeros(len(x), 3)
+        logits[:, Move.LEFT], logits[:, Move.RIGHT] = -middle - 4, middle - 4
+        return logits
+
+
+class Always(nn.Module):
+    """Takes one action."""
+
+    def __init__(self, action):
+        super().__init__()
+        self.action = action
+
+    def forward(self, x):
+        return nn.functional.one_hot(torch.full((len(x),), int(self.action)), 3).float()
+
+
+@pytest.fixture
+def starts(scenes):
+    return place_target(scenes, torch.full((12,), 9.0), torch.linspace(-3, 3, 12))
+
+
+@pytest.fixture
+def follower(scenes):
+    return Follower(scenes.observe(empty_scene(scenes))[0])
+
+
+def test_a_policy_that_looks_follows_the_cube_and_gets_it(scenes, starts, follower):
+    found = outcomes(scenes, follower, starts, np.arange(12))
+    assert found["flights"] == 12
+    assert found["collected"]["as it was"]["mean"] > 0.8
+    assert found["collected"]["moved left"]["mean"] > 0.8
+    assert found["follows"]["mean"] > 0.8
+    assert found["path_changed"]["mean"] > 0.5
+    assert abs(found["missed_when_moved"]["mean"]) < 0.1
+
+
+@pytest.mark.parametrize("action", list(Move))
+def test_a_policy_that_does_not_look_follows_nothing(scenes, starts, action):
+    found = outcomes(scenes, Always(action), starts, np.arange(12))
+    assert found["follows"]["mean"] == 0.0
+    assert found["path_changed"]["mean"] == found["ground_changed"]["mean"] == 0.0
+    assert found["ground_changed"]["upper95"] < 0.5  # twelve flights show no more than that
+    # straight on gets what stands ahead; moved by 2 m, half of that leaves the way
+    if action is Move.FORWARD:
+        ahead = (starts.cubes[:, 0, 1].abs() <= scenes.worlds.task.settings.touch_distance).float()
+        assert found["collected"]["as it was"]["mean"] == pytest.approx(float(ahead.mean()))
+    else:
+        assert found["collected"]["as it was"]["mean"] < 0.5
+
+
+@pytest.mark.parametrize("fears_dark", [True, False])
+def test_a_policy_that_minds_the_ground_gets_another_outcome(scenes, starts, fears_dark):
+    class Afraid(Always):
+        def forward(self, x):
+            dark = x[:, 0, -1, 0] < self.level  # the corner
+            logits = super().forward(x)
+            logits[dark == fears_dark] = torch.tensor([0.0, 1.0, 0.0])
+            return logits
+
+    network = Afraid(Move.FORWARD)
+    network.level = float(scenes.observe(starts)[0, 0, -1, 0]) - 0.3
+    ahead = place_target(scenes, torch.full((6,), 9.0), torch.zeros(6))
+    found = outcomes(scenes, network, ahead, np.arange(6))
+    assert found["ground_changed"]["mean"] == 1.0
+    assert found["collected"]["as it was"]["mean"] == float(fears_dark)
+    assert set(found["collected"]) == {"as it was", "moved left", "moved right"}
+
+
+def test_flights_end_when_the_cube_is_decided(scenes):
+    state = place_target(scenes, torch.tensor([5.0, 5.0]), torch.tensor([0.0, 4.0]))
+    flown = fly(scenes, Always(Move.FORWARD), state, state.next_cube)
+    # touched at 5 - 1.65, that is after four steps; passed after six
+    assert (flown.collected.tolist(), flown.decided.tolist()) == ([True, False], [4, 6])
+    assert flown.actions.tolist() == [[0, 0, 0, 0, -1, -1], [0] * 6]
+    assert flown.lateral.shape == (2, 7) and (flown.lateral == 0).all()
+    dither = fly(scenes, Always(Move.LEFT), state, state.next_cube)
+    assert (dither.decided < PATIENCE).all() and not dither.collected.any()  # out at the side
+
+
+def test_patience_ends(scenes, monkeypatch):
+    monkeypatch.setattr("drone_rl.explanations.interventions.PATIENCE", 3)
+    state = place_target(scenes, torch.tensor([9.0]), torch.tensor([0.0]))
+    flown = fly(scenes, Always(Move.FORWARD), state, state.next_cube)
+    assert (flown.collected.tolist(), flown.decided.tolist()) == ([False], [3])
+
+
+def test_no_flights_have_no_steps(scenes):
+    state = empty_scene(scenes)[torch.arange(0)]
+    flown = fly(scenes, Always(Move.FORWARD), state, state.next_cube)
+    assert (flown.actions.shape, flown.lateral.shape) == ((0, 0), (0, 1))
+    assert (len(flown.collected), len(flown.decided)) == (0, 0)
+
+
+def test_the_last_pictures_of_those_that_fly_are_remembered():
+    first, second, third = (torch.full((2, 4, 5, 3), value) for value in (1, 2, 3))
+    assert _remember([], first, torch.tensor([0, 2]), 3, 0) == []
+    earlier = _remember([], first, torch.tensor([0, 2]), 3, 2)
+    assert [p[:, 0, 0, 0].tolist() for p in earlier] == [[1, 0, 1]]
+    earlier = _remember(earlier, second, torch.tensor([1, 2]), 3, 2)
+    earlier = _remember(earlier, third, torch.tensor([0, 1]), 3, 2)
+    assert [p[:, 0, 0, 0].tolist() for p in earlier] == [[0, 2, 2], [3, 3, 0]]
+
+
+def flights(decided, lateral, actions=((0,),)):
+    return Flights(np.array([True]), np.array([decided]), np.array([lateral]), np.array(actions))
+
+
+def test_flights_are_facts():
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        flights(1, [0.0, 1.0]).decided = 0
+
+
+def test_following_by_hand():
+    left, right = flights(2, [0.0, 1.0, 2.0, 2.0]), flights(3, [0.0, -1.0, -1.0, -3.0])
+    assert followed(left, right).tolist() == [3.0 / 4.0]  # both after two steps
+    assert followed(right, left).tolist() == [-3.0 / 4.0]
+    assert followed(left, left).tolist() == [0.0]
+    assert followed(flights(1, [0.0, 9.0]), flights(1, [0.0, 0.0])).tolist() == [1.0]
+
+
+def test_flights_differ_where_both_still_fly():
+    first, second = flights(2, [0], [[0, 1, -1]]), flights(3, [0], [[0, 1, 2]])
+    assert not differ(first, second).any()
+    assert differ(first, flights(2, [0], [[0, 2, -1]])).all()
+    assert differ(
+        first, flights(2, [0], [[1, 1, -1]])
+    ).all()  # also where one took the first action
+
+
+def test_without_a_cube_nothing_flies(scenes, follower):
+    found = outcomes(scenes, follower, empty_scene(scenes), np.zeros(1))
+    assert found["flights"] == 0 and found["follows"]["mean"] is None

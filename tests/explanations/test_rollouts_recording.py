@@ -1,0 +1,56 @@
+import numpy as np
+import pytest
+
+from drone_rl.explanations.rollouts import collect, record, render_frames, select_frames
+from drone_rl.explanations.scenes import Scenes
+from drone_rl.utils.errors import InputError
+
+
+@pytest.fixture
+def flights(world):
+    return collect(*world[:2], num_episodes=6, num_frames=1)
+
+
+def test_flights_are_whole_and_their_steps_belong_together(flights):
+    assert np.unique(flights.episode).tolist() == list(range(6))  # four worlds, then two of them
+    ends = np.append(flights.episode[1:] != flights.episode[:-1], True)
+    assert (flights.end_reason[ends] != 0).all() and (flights.end_reason[~ends] == 0).all()
+    same = ~ends[:-1]
+    step = np.where(flights.actions[:-1] == 0, 1.0, 0.0)  # forward moves the drone 1 m in x
+    moved = flights.drone[1:, 0] - flights.drone[:-1, 0]
+    np.testing.assert_allclose(moved[same], step[same])
+    assert (flights.step[1:][same] == flights.step[:-1][same] + 1).all()
+    assert flights.step[np.append(True, ends[:-1])].sum() == 0
+
+
+def test_as_many_frames_are_flown_as_are_asked_for(world):
+    assert len(collect(*world[:2], num_episodes=1, num_frames=400)) >= 400
+
+
+def test_every_episode_gives_as_many_frames_evenly_spaced():
+    episode = np.repeat([0, 1, 2], [100, 4, 10])
+    rows = select_frames(episode, 24)
+    # 8 each; the one of 4 has no more, so that its other 4 go to the rest: 10 and 10
+    assert np.bincount(episode[rows]).tolist() == [10, 4, 10]
+    assert rows[:10].tolist() == [5, 15, 25, 35, 45, 55, 65, 75, 85, 95]
+    assert rows[10:].tolist() == list(range(100, 114))
+
+
+def test_all_frames_are_taken_where_there_are_no_more():
+    episode = np.repeat([0, 1], [3, 2])
+    assert select_frames(episode, 9).tolist() == [0, 1, 2, 3, 4]
+    assert len(select_frames(episode, 3)) == 3
+
+
+def test_drawn_frames_are_those_that_were_asked_for(flights, world):
+    rows = np.array([3, 17])
+    seen = render_frames(flights, rows, Scenes(world[0]), world[2], ("relu1",))
+    np.testing.assert_array_equal(seen.step, flights.step[rows])
+    np.testing.assert_array_equal(seen.observations, flights.observations[rows])
+    assert len(seen.features["relu1"]) == len(seen.frames) == 2
+    np.testing.assert_allclose(seen.probabilities.sum(-1), 1, atol=1e-6)
+
+
+def test_no_frames_are_refused(world):
+    with pytest.raises(InputError, match="frames=0"):
+        record(*world, 0)

@@ -1,0 +1,94 @@
+"""Counts of a small package, by hand."""
+
+import json
+
+import pytest
+
+from tools.size import ROOT, find_importers, find_phrases, main, measure
+
+
+@pytest.fixture
+def checkout(tmp_path):
+    """Two packages, a benchmark and a test."""
+    files = {
+        "drone_rl/__init__.py": "",
+        "drone_rl/a/__init__.py": "",
+        "drone_rl/a/once.py": "# pyright: basic\nx = 1\n",
+        "drone_rl/a/twice.py": "from drone_rl.a import once\n",
+        "drone_rl/a/long.py": "x = 1\n" * 60,
+        "drone_rl/a/a_kernel.py": "# pyright: basic\n",
+        "drone_rl/b/user.py": '"""An image."""\nfrom ..a import long, twice\n',
+        "benchmarks/b.py": "import drone_rl.a.twice\n",
+        "tests/a/test_once.py": "1\n" * 5,
+        "README.md": "A picture\n",
+    }
+    for name, text in files.items():
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    return tmp_path
+
+
+def test_counts_by_hand(checkout):
+    found = measure(checkout)
+    assert found == {
+        "package_lines": 66,
+        "package_modules": 7,
+        "packages": 2,
+        "single_use_modules": 1,  # once: long has 60 lines, twice has two importers
+        "type_suppressions": 1,
+        "flagged_phrases": 1,
+        "readme_lines": 1,
+        "test_lines_per_line": 0.08,
+        "longest_module": [60, "drone_rl/a/long.py"],
+        "modules_without_test": ["a/a_kernel", "a/long", "a/twice", "b/user"],
+    }
+
+
+def test_importers_by_absolute_and_relative_imports(checkout):
+    found = find_importers(checkout)
+    assert found["drone_rl.a.once"] == {"drone_rl.a.twice"}
+    assert found["drone_rl.a.twice"] == {"drone_rl.b.user", "benchmarks.b"}
+    assert found["drone_rl.a.long"] == {"drone_rl.b.user"}
+
+
+def test_a_relative_import_in_a_package_is_of_that_package(checkout):
+    (checkout / "drone_rl/a/__init__.py").write_text("from .long import x\nfrom . import once\n")
+    found = find_importers(checkout)
+    assert "drone_rl.a" in found["drone_rl.a.long"] and "drone_rl.a" in found["drone_rl.a.once"]
+
+
+def test_only_comments_and_texts_of_python_are_prose(tmp_path):
+    path = tmp_path / "a.py"
+    path.write_text('picture = "picture"\nother = "a picture"\n# pictures are drawn anew\n')
+    found = list(find_phrases([path]))
+    assert [(p.line, p.text) for p in found] == [(2, "picture"), (3, "anew"), (3, "pictures")]
+    assert found[0].advice == "image, frame, observation"
+
+
+@pytest.mark.parametrize(
+    ("text", "count"),
+    [
+        ("It is told of that", 1),
+        ("Whoever flies, and one who draws", 2),
+        ("What is drawn", 1),
+        ("It says what is drawn", 0),
+        ("it stands alone", 2),  # both "stands alone" and "only"
+        ("the way there and back", 1),
+        ("nothing to rewrite here", 0),
+    ],
+)
+def test_phrases(tmp_path, text, count):
+    path = tmp_path / "a.md"
+    path.write_text(text)
+    assert len(list(find_phrases([tmp_path]))) == count
+
+
+def test_it_prints_counts_of_this_checkout_or_phrases(capsys, checkout):
+    main([])
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["package_modules"] == len([*(ROOT / "drone_rl").rglob("*.py")])
+    main([str(checkout / "README.md")])
+    assert capsys.readouterr().out.endswith(
+        "README.md:1: 'picture': write image, frame, observation\n"
+    )
