@@ -23,6 +23,13 @@ if TYPE_CHECKING:
         JudgeSettings,
         ShiftSettings,
     )
+    from drone_rl.config.registry import (
+        register_collector,
+        register_learner,
+        register_network,
+        register_returns,
+        register_transform,
+    )
     from drone_rl.config.sensors import SensorSettings
     from drone_rl.config.training import TrainerSettings, TrainSettings
     from drone_rl.config.verification import (
@@ -50,6 +57,7 @@ if TYPE_CHECKING:
     from drone_rl.policies.sb3.trunk import Sb3Trunk
     from drone_rl.robustness.shifts import Shifts, shifts
     from drone_rl.sim.image_types import ImageRequest, ImageType
+    from drone_rl.sim.tasks import register_task
     from drone_rl.training.train import Training, train
     from drone_rl.utils.errors import InputError
     from drone_rl.verdicts.coverage import Coverage
@@ -92,14 +100,22 @@ _PLACES = {
     "flight.commands.yaw": ("Drivetrain", "YawMode"),
     "policies.sb3.logits": ("Sb3Logits",),
     "policies.sb3.trunk": ("Sb3Trunk",),
-    "config.bodies": ("BodiesSettings",),
-    "config.chances": ("ChanceSettings",),
-    "config.checking": ("CheckSettings",),
-    "config.judging": ("EvaluateSettings", "JudgeSettings"),
-    "config.mapping": ("PlacesSettings",),
-    "config.provable": ("ProvableSettings",),
-    "config.proving": ("ProveSettings",),
-    "config.shifting": ("ShiftSettings",),
+    "config.commands": ("BodiesSettings", "EvaluateSettings", "JudgeSettings", "ShiftSettings"),
+    "config.verification": (
+        "ChanceSettings",
+        "CheckSettings",
+        "PlacesSettings",
+        "ProvableSettings",
+        "ProveSettings",
+    ),
+    "config.registry": (
+        "register_collector",
+        "register_learner",
+        "register_network",
+        "register_returns",
+        "register_transform",
+    ),
+    "sim.tasks": ("register_task",),
     "config.training": ("TrainSettings", "TrainerSettings"),
     "sim.image_types": ("ImageRequest", "ImageType"),
     "config": (
@@ -177,6 +193,12 @@ __all__ = [
     "places",
     "policy_from",
     "prove",
+    "register_collector",
+    "register_learner",
+    "register_network",
+    "register_returns",
+    "register_task",
+    "register_transform",
     "shifts",
     "train",
     "train_until_proved",

@@ -12,6 +12,7 @@ from torch import Tensor
 from torchrl.envs.transforms import ObservationTransform
 
 from drone_rl.config import transforms as settings
+from drone_rl.config.registry import implements
 from drone_rl.envs.drone_env import DroneEnv
 from drone_rl.envs.fault_models import (
     FaultModel,
@@ -156,19 +157,30 @@ class CameraFault(ObservationTransform):
         return _call_text(type(self).__name__, self.values)
 
 
+@implements(settings.Noise)
 class Noise(CameraFault):
     """Adds noise to each pixel, white or correlated in time."""
 
-    def __init__(self, strength: float = 0.02, correlation_time: float = 0.0) -> None:
+    def __init__(
+        self,
+        strength: float = settings.Noise.strength,
+        correlation_time: float = settings.Noise.correlation_time,
+    ) -> None:
         """See `drone_rl.config.transforms.Noise`."""
         values = settings.Noise(strength=strength, correlation_time=correlation_time)
         super().__init__(noise(values.strength, values.correlation_time), values)
 
 
+@implements(settings.DeadRows)
 class DeadRows(CameraFault):
     """Blanks rows of the image: fixed ones, ones sampled for each episode, or both."""
 
-    def __init__(self, count: int = 1, rows: tuple[int, ...] = (), level: float = 0.0) -> None:
+    def __init__(
+        self,
+        count: int = settings.DeadRows.count,
+        rows: tuple[int, ...] = settings.DeadRows.rows,
+        level: float = settings.DeadRows.level,
+    ) -> None:
         """See `drone_rl.config.transforms.DeadRows`."""
         values = settings.DeadRows(count=count, rows=rows, level=level)
         model = dead_rows(values.count, values.rows, values.level)
@@ -180,37 +192,43 @@ class DeadRows(CameraFault):
         super().__init__(dataclasses.replace(model, begin=begin), values)
 
 
+@implements(settings.FrozenFrames)
 class FrozenFrames(CameraFault):
     """Repeats the previous frame at random."""
 
-    def __init__(self, share: float = 0.05) -> None:
+    def __init__(self, share: float = settings.FrozenFrames.share) -> None:
         """See `drone_rl.config.transforms.FrozenFrames`."""
         values = settings.FrozenFrames(share=share)
         super().__init__(frozen_frames(values.share), values)
 
 
+@implements(settings.LateFrames)
 class LateFrames(CameraFault):
     """Delays frames; shows the episode's first frame until then."""
 
-    def __init__(self, frames: int = 1) -> None:
+    def __init__(self, frames: int = settings.LateFrames.frames) -> None:
         """See `drone_rl.config.transforms.LateFrames`."""
         values = settings.LateFrames(frames=frames)
         super().__init__(late_frames(values.frames), values)
 
 
+@implements(settings.Shift)
 class Shift(CameraFault):
     """Shifts the frames of an episode by a random offset."""
 
-    def __init__(self, down: int = 4, across: int = 6) -> None:
+    def __init__(
+        self, down: int = settings.Shift.down, across: int = settings.Shift.across
+    ) -> None:
         """See `drone_rl.config.transforms.Shift`."""
         values = settings.Shift(down=down, across=across)
         super().__init__(random_shift(values.down, values.across), values)
 
 
+@implements(settings.Blur)
 class Blur(PixelTransform):
     """Blurs images (*, C, H, W) by a Gaussian; it has no memory and samples nothing."""
 
-    def __init__(self, width: float = 0.5) -> None:
+    def __init__(self, width: float = settings.Blur.width) -> None:
         """See `drone_rl.config.transforms.Blur`."""
         super().__init__()
         self.values = settings.Blur(width=width)

@@ -11,6 +11,8 @@ from torchrl.data import TensorSpec, Unbounded
 from torchrl.envs import CatFrames, Compose, EnvBase, Transform, TransformedEnv
 from torchrl.envs.transforms import ObservationTransform
 
+from drone_rl.config import transforms as settings
+from drone_rl.config.registry import implements
 from drone_rl.sim.rendering.view import to_gray
 from drone_rl.utils.errors import InputError
 
@@ -45,6 +47,7 @@ class PixelTransform(ObservationTransform):
         return observation_spec
 
 
+@implements(settings.Gray)
 class GrayPixels(PixelTransform):
     """RGB bytes (*, H, W, 3) to gray (*, 1, H, W), float32 in [0, 1], in one pass.
 
@@ -59,6 +62,7 @@ class GrayPixels(PixelTransform):
         return to_gray(obs).unsqueeze(-3)
 
 
+@implements(settings.Rgb)
 class RgbPixels(PixelTransform):
     """RGB bytes (*, H, W, 3) to floats (*, 3, H, W), float32 in [0, 1].
 
@@ -71,6 +75,7 @@ class RgbPixels(PixelTransform):
         return obs.movedim(-1, -3).float() / 255.0
 
 
+@implements(settings.Chromaticity)
 class ChromaticityPixels(PixelTransform):
     """RGB floats (*, 3, H, W) to chromaticities of red and blue (*, 2, H, W), minus a third.
 
@@ -82,7 +87,12 @@ class ChromaticityPixels(PixelTransform):
         InputError: There are not three channels, or the floor is not above 0.
     """
 
-    def __init__(self, floor: float = 0.15, in_keys: Keys = None, out_keys: Keys = None) -> None:
+    def __init__(
+        self,
+        floor: float = settings.Chromaticity.floor,
+        in_keys: Keys = None,
+        out_keys: Keys = None,
+    ) -> None:
         super().__init__(in_keys, out_keys)
         if not floor > 0:
             raise InputError(f"ChromaticityPixels(floor={floor}): give a floor above 0")
@@ -101,6 +111,7 @@ class ChromaticityPixels(PixelTransform):
         return f"ChromaticityPixels(floor={self.floor:g})"
 
 
+@implements(settings.Crop)
 class CropRows(PixelTransform):
     """Keeps the rows `top` to `bottom` (exclusive) of frames (*, C, H, W).
 
@@ -126,6 +137,7 @@ class CropRows(PixelTransform):
         return f"CropRows(top={self.top}, bottom={self.bottom})"
 
 
+@implements(settings.Resize)
 class Resize(PixelTransform):
     """Resizes frames (*, C, H, W) by averaging over areas.
 
@@ -153,6 +165,7 @@ class Resize(PixelTransform):
         return f"Resize(height={self.height}, width={self.width})"
 
 
+@implements(settings.Standardize)
 class StandardizePixels(PixelTransform):
     """Standardizes pixels: (x - mean) / std. The defaults are the original study's.
 
@@ -161,7 +174,11 @@ class StandardizePixels(PixelTransform):
     """
 
     def __init__(
-        self, mean: float = 0.53, std: float = 0.21, in_keys: Keys = None, out_keys: Keys = None
+        self,
+        mean: float = settings.Standardize.mean,
+        std: float = settings.Standardize.std,
+        in_keys: Keys = None,
+        out_keys: Keys = None,
     ) -> None:
         super().__init__(in_keys, out_keys)
         if not std > 0:

@@ -143,7 +143,9 @@ def judge(
         ValueError: The initial states differ.
     """
     task = greedy.task
-    rule = dataclasses.replace(rule or Rule(), strata=task.strata, luck=task.luck)
+    rule = dataclasses.replace(
+        rule or Rule(), strata=task.strata, blind_baselines=task.blind_baselines
+    )
     _check_pairs(greedy, [*baselines.values(), *([] if sampled is None else [sampled])])
     found = measure(greedy, baselines, rule)
     kind = decide([quantity.level for quantity in found], len(rule.strata))
@@ -253,10 +255,10 @@ def _observe_each(greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rul
         share = torch.full_like(there, torch.nan, dtype=torch.float64)
         share[there] = greedy.stratum_share(stratum)
         observed.append(share)
-    for name in rule.luck:
-        luck = (1 - rule.luck_margin) * baselines[name].share
-        observed.append(greedy.share - luck - rule.luck_margin * oracle.share)
-    for name in rule.luck:
+    for name in rule.blind_baselines:
+        blind = (1 - rule.poor_margin) * baselines[name].share
+        observed.append(greedy.share - blind - rule.poor_margin * oracle.share)
+    for name in rule.blind_baselines:
         observed.append(rule.good_share * oracle.success - baselines[name].success)
     return [values.numpy() for values in observed]
 

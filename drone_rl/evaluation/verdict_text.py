@@ -9,7 +9,7 @@ from drone_rl.utils.text import Evidence, Sentence, fixed_seed, percent
 
 FREQUENT = 0.02
 """Fraction of episodes above which an end is mentioned."""
-_LUCK = {
+_ACTING = {
     "random": "acting at random",
     "forward": "flying straight on",
     "left": "flying left",
@@ -30,18 +30,18 @@ def _every(evidence: Evidence) -> str:
     return f"{terms.reaches} every {terms.goal}"
 
 
-def best_luck(evidence: Evidence) -> str:
+def best_baseline(evidence: Evidence) -> str:
     """Return the random or constant baseline that collects most."""
     flown = evidence["baselines"]
-    return max(_luck(evidence), key=lambda name: flown[name]["shares"]["all"]["mean"])
+    return max(_blind(evidence), key=lambda name: flown[name]["shares"]["all"]["mean"])
 
 
-def _luck(evidence: Evidence) -> list[str]:
+def _blind(evidence: Evidence) -> list[str]:
     return [name for name in evidence["baselines"] if name != "oracle"]
 
 
-def _acting(luck: str) -> str:
-    return _LUCK.get(luck, f"always choosing {luck}")
+def _acting(baseline: str) -> str:
+    return _ACTING.get(baseline, f"always choosing {baseline}")
 
 
 def _sides(evidence: Evidence) -> dict[str, str]:
@@ -94,11 +94,11 @@ def _trivial(evidence: Evidence) -> str:
 def _most_successful(evidence: Evidence) -> str:
     """The random or constant baseline that succeeds most often."""
     flown = evidence["baselines"]
-    return max(_luck(evidence), key=lambda name: flown[name]["success"]["share"])
+    return max(_blind(evidence), key=lambda name: flown[name]["success"]["share"])
 
 
 def _no_better(evidence: Evidence) -> str:
-    ours, best = evidence["greedy"], best_luck(evidence)
+    ours, best = evidence["greedy"], best_baseline(evidence)
     theirs = evidence["baselines"][best]
     is_more = ours["shares"]["all"]["mean"] > theirs["shares"]["all"]["mean"]
     return f"{'hardly' if is_more else 'no'} better than {_acting(best)}"
@@ -150,24 +150,24 @@ def _shares(evidence: Evidence) -> str:
 
 
 def _baselines(evidence: Evidence) -> str:
-    flown, luck, terms = evidence["baselines"], best_luck(evidence), terms_of(evidence)
+    flown, best, terms = evidence["baselines"], best_baseline(evidence), terms_of(evidence)
     return (
         f"From the same initial states it {terms.reaches} {_all(evidence['greedy'])} of all "
-        f"{terms.goals}, {_acting(luck)} {_all(flown[luck])} and the oracle "
+        f"{terms.goals}, {_acting(best)} {_all(flown[best])} and the oracle "
         f"{_all(flown['oracle'])}."
     )
 
 
-def _luck_suffices(evidence: Evidence) -> bool:
+def _is_trivial(evidence: Evidence) -> bool:
     flown = evidence["baselines"]
-    luck = max(flown[name]["success"]["share"] for name in _luck(evidence))
-    return luck > 0 and luck >= evidence["good_share"] * flown["oracle"]["success"]["share"]
+    best = max(flown[name]["success"]["share"] for name in _blind(evidence))
+    return best > 0 and best >= evidence["good_share"] * flown["oracle"]["success"]["share"]
 
 
 def _pointless(evidence: Evidence) -> str:
-    flown, luck = evidence["baselines"], _most_successful(evidence)
+    flown, best = evidence["baselines"], _most_successful(evidence)
     return (
-        f"This task is trivial: {_acting(luck)} {_every(evidence)} in {_success(flown[luck])} of "
+        f"This task is trivial: {_acting(best)} {_every(evidence)} in {_success(flown[best])} of "
         "episodes."
     )
 
@@ -292,11 +292,11 @@ SENTENCES = (
     fixed_seed("fixed_seed"),
     *PROOF,
     Sentence("shares", "a goal was missed, or a side not offered", _misses_or_lacks, _shares),
-    Sentence("baselines", "the task is not trivial", lambda e: not _luck_suffices(e), _baselines),
+    Sentence("baselines", "the task is not trivial", lambda e: not _is_trivial(e), _baselines),
     Sentence(
         "pointless",
         "a random or constant baseline is as good, and the first sentence does not say so",
-        lambda e: _luck_suffices(e) and not (e["certain"] and e["kind"] == "good, but trivial"),
+        lambda e: _is_trivial(e) and not (e["certain"] and e["kind"] == "good, but trivial"),
         _pointless,
     ),
     Sentence(

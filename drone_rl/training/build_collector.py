@@ -12,8 +12,9 @@ from drone_rl.collectors import (
     RolloutCollector,
     ThreadedCollector,
 )
-from drone_rl.config.configuration import as_config, from_config, locate
-from drone_rl.config.learning import Episodes, Ray, WithCritic
+from drone_rl.config.configuration import as_config, from_config
+from drone_rl.config.learning import Episodes, Ray, Rollouts, Threads, WithCritic
+from drone_rl.config.registry import implements
 from drone_rl.config.training import TrainSettings
 from drone_rl.policies import PolicyNetwork, make_actor
 from drone_rl.policies.zoo import describe
@@ -48,10 +49,10 @@ def build_collector(
     Raises:
         InputError: There is no such device, or an extra isn't installed.
     """
-    make = locate(settings.collector.target)
-    return make(settings) if practice is None else make(settings, practice)
+    return settings.collector.make(settings, practice)
 
 
+@implements(Threads)
 def threaded_collector(
     settings: TrainSettings, practice: FailureReplayTask | None = None
 ) -> Collecting:
@@ -60,6 +61,7 @@ def threaded_collector(
     return _threaded(settings, practice, _episodes(settings, cores))
 
 
+@implements(Rollouts)
 def rollout_collector(
     settings: TrainSettings, practice: FailureReplayTask | None = None
 ) -> Collecting:
@@ -88,6 +90,7 @@ def _threaded(
     return Collecting(ThreadedCollector(collectors), network, generators)
 
 
+@implements(Ray)
 def ray_collector(settings: TrainSettings, practice: FailureReplayTask | None = None) -> Collecting:
     """`Ray`: the workers are processes of a Ray cluster."""
     from drone_rl.collectors.ray import RayEpisodeCollector  # slow to import, seldom needed
@@ -131,7 +134,7 @@ def build_share(
         practice: Where episodes begin, if not anywhere.
         collect: Makes a collector of worlds and an actor.
     """
-    description, seed = describe(as_config(settings)), settings.seed
+    description, seed = describe(settings), settings.seed
     env = description.build_env(
         shares[number],
         seed=seed,

@@ -17,7 +17,6 @@ from drone_rl.training.progress import OngoingTraining
 from drone_rl.utils.checkpoint import save_checkpoint
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import remove_leftovers, write_atomically
-from drone_rl.utils.former_names import FORMER_NAMES
 from drone_rl.utils.readers import read_table
 from drone_rl.utils.schema import shown
 
@@ -127,8 +126,7 @@ class CsvCallback(Callback):
             return
         rows = [*read_table(self.path)] if self.path.stat().st_size else []
         whole = [r for r in rows[1:] if len(r) == len(rows[0])]  # the last may be cut short
-        header = [[FORMER_NAMES.get(name, name) for name in row] for row in rows[:1]]
-        kept = header + [r for r in whole if self._update_of(r) <= training.progress.updates]
+        kept = rows[:1] + [r for r in whole if self._update_of(r) <= training.progress.updates]
         text = io.StringIO(newline="")
         csv.writer(text).writerows(kept)
         write_atomically(self.path, text.getvalue())

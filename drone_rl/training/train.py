@@ -12,7 +12,7 @@ from typing import Any
 import torch
 import yaml
 
-from drone_rl.config.configuration import as_config, check_same_config, from_config, modern
+from drone_rl.config.configuration import as_config, check_same_config, from_config
 from drone_rl.config.training import TrainSettings
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.policies.zoo import describe, read_checkpoint
@@ -225,7 +225,7 @@ def _build(
     practice: FailureReplayTask | None,
 ) -> tuple[Trainer, CheckpointCallback, Confirmation | None]:
     config, origin = as_config(settings), provenance()
-    description = describe(config).as_dict()
+    description = describe(settings).as_dict()
     # sums depend on how many threads make them: on as many everywhere, whatever the machine has
     torch.set_num_threads(settings.trainer.num_threads)
     bound_kernels()
@@ -287,7 +287,7 @@ class Tell(Callback):
 
 def _own(config: Mapping[str, Any]) -> dict[str, Any]:
     """What a checkpoint's configuration says of the training itself, in today's words."""
-    return {k: v for k, v in modern(config).items() if k in kinds_of(TrainSettings)}
+    return {k: v for k, v in config.items() if k in kinds_of(TrainSettings)}
 
 
 def settings_of(config: Mapping[str, Any]) -> TrainSettings:

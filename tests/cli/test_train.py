@@ -75,7 +75,7 @@ def test_a_critic_is_chosen_stopped_and_gone_on_with(in_process, tmp_path, objec
     one, two = (
         load_checkpoint(tmp_path / name / "checkpoints" / "last.pt") for name in ("whole", "half")
     )
-    assert one["config"]["collector"]["_target_"].endswith("rollout_collector")
+    assert one["config"]["collector"]["_target_"] == "rollouts"
     assert one["progress"]["frames"] == two["progress"]["frames"] == 800
     for key in ("policy", "critic"):
         assert all(torch.equal(one[key][name], two[key][name]) for name in one[key])

@@ -9,11 +9,11 @@ from pathlib import Path
 import jinja2
 import pytest
 import torch
+from drone_rl.policies.zoo.registry import NETWORKS
 
 import drone_rl.explanations
 from drone_rl.explanations import explain, report
 from drone_rl.explanations.report import page as report_page
-from drone_rl.policies.zoo.registry import NETWORKS
 from drone_rl.utils.settings import kinds_of, types_of
 from tests.docs.commands import check_commands
 

@@ -127,7 +127,7 @@ def test_replay_buffer_masks_tails():
 
 def test_a_memory_is_told_of_a_batch_once():
     """A sample handed out again must not enter into the running mean."""
-    estimator = TimeBaseline(0.5, decay=0.5, max_steps=2)
+    estimator = TimeBaseline(0.5, decay=0.5, max_steps=2, scale=False)
     buffer = ReplayBuffer(storage=LazyTensorStorage(8), transform=estimator, batch_size=8)
     buffer.extend(rows([[1.0, 1.0]], [[0, 1]])[0])
     before = estimator.baseline.tolist()

@@ -93,10 +93,10 @@ def test_an_onset_changes_nothing_before_it(make_bed):
 
 def test_luck_is_what_the_task_calls_so(make_bed):
     evaluator = make_bed(subject(Blind(1)), 20)
-    luck = evaluator.run_baselines(Condition())
-    assert [*luck] == ["random", "forward", "left", "right"]
-    assert torch.equal(luck["left"].length, evaluator.run(Condition()).episodes.length)
-    assert torch.equal(luck["left"].goals.world, luck["random"].goals.world)
+    blind = evaluator.run_baselines(Condition())
+    assert [*blind] == ["random", "forward", "left", "right"]
+    assert torch.equal(blind["left"].length, evaluator.run(Condition()).episodes.length)
+    assert torch.equal(blind["left"].goals.world, blind["random"].goals.world)
 
 
 def test_a_size_that_cannot_be_is_refused(make_bed):

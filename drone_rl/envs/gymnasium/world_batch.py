@@ -16,9 +16,10 @@ from drone_rl.config import (
     CameraSettings,
     DynamicsSettings,
     TaskSettings,
+    settings_of,
 )
 from drone_rl.config.commands import GymnasiumSettings
-from drone_rl.config.configuration import Changes, locate
+from drone_rl.config.configuration import Changes
 from drone_rl.sim.actions import Actions, Entry
 from drone_rl.sim.composer_task import CONTROL_TIMESTEP_S
 from drone_rl.sim.entities import CHASE
@@ -208,7 +209,7 @@ class WorldBatch:
 
 
 def _make_task(task: Chosen, changes: Mapping[str, Any]) -> Task[Any]:
-    chosen: Any = locate(task)() if isinstance(task, str) else task or TaskSettings()
+    chosen: Any = settings_of(task, "task")() if isinstance(task, str) else task or TaskSettings()
     known = kinds_of(type(chosen)) if isinstance(chosen, Settings) else {}
     for name in changes:
         if name not in known:

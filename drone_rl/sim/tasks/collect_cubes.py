@@ -12,7 +12,13 @@ from drone_rl.config import CameraSettings, TaskSettings
 from drone_rl.sim.actions import MOVES, Entry, Move
 from drone_rl.sim.dynamics import BodyState, ComputerVision, Dynamics
 from drone_rl.sim.entities import Cube
-from drone_rl.sim.tasks.collect_cubes_kernel import EndReason, FlyingCubes
+from drone_rl.sim.tasks.collect_cubes_kernel import (
+    EndReason,
+    FlyingCubes,
+    judge_all,
+    launch,
+    start_all,
+)
 from drone_rl.sim.tasks.common import (
     SIDES,
     Side,
@@ -22,7 +28,6 @@ from drone_rl.sim.tasks.common import (
     number_classes,
     place_in_view,
     side_of,
-    unless_lost,
 )
 from drone_rl.sim.tasks.task import Goals, Grid, OracleRule, State, Task
 from drone_rl.sim.vocabulary import CUBES, some_cubes
@@ -153,53 +158,31 @@ class CollectCubes(Task[WorldState]):
             steps=no_cube[:, 0].long(),
             end_reason=no_cube[:, 0].long(),
         )
-        state.side, state.lateral = self._sightings(state)
+        launch(start_all, self.settings, state)
         return state
 
     def judge(self, state: WorldState, body: BodyState) -> tuple[WorldState, Tensor]:
-        """Apply Algorithms 1 and 3 after the drone has moved.
-
-        A touched cube is collected and worth 1; a cube left behind vanishes; the episode ends when
-        all cubes are collected, when the drone is out of bounds, or at the step limit, in this
-        order; a drone whose motion has diverged ends it before all these.
-        """
-        drone = body.position
-        away = (drone[:, None] - state.cubes).abs().amax(-1)  # (N, C)
-        touched = state.present & (away <= self.settings.touch_distance)
-        collected = state.collected | touched
-        passed = state.passed | (~collected & (drone[:, None, 0] > state.cubes[..., 0]))
-        new = dataclasses.replace(
-            state, body=body, collected=collected, passed=passed, steps=state.steps + 1
+        """Apply Algorithms 1 and 3, see `collect_cubes_kernel.judge`."""
+        new = WorldState(
+            body=body,
+            cubes=state.cubes,
+            collected=state.collected.clone(),
+            passed=state.passed.clone(),
+            side=state.side.clone(),
+            lateral=state.lateral.clone(),
+            steps=state.steps + 1,
+            end_reason=torch.empty_like(state.steps),
         )
-        new.side, new.lateral = self._sightings(new)
-        new.end_reason = self._end_reason(new)
-        return new, touched.sum(-1, dtype=torch.float64)
+        reward = torch.empty(len(state), dtype=torch.float64, device=new.steps.device)
+        others = (body.is_lost, new.steps, new.end_reason, reward)
+        launch(judge_all, self.settings, new, *others)
+        return new, reward
 
     def fused_rules(self, dynamics: Dynamics, num_envs: int) -> FlyingCubes | None:
         """See `Task.fused_rules`."""
         if type(self).judge is CollectCubes.judge and FlyingCubes.supports(dynamics):
             return FlyingCubes(self.settings, dynamics, num_envs)
         return None
-
-    def _sightings(self, state: WorldState) -> tuple[Tensor, Tensor]:
-        """Return side and lateral offset, recorded of each cube up to the next one. (N, C)."""
-        offset = state.cubes[..., 1] - state.drone[:, None, 1]
-        side = side_of(offset, self.settings.touch_distance)
-        index = torch.arange(state.side.shape[-1], device=side.device)
-        is_new = (state.side < 0) & (index <= state.next_cube[:, None])
-        return torch.where(is_new, side, state.side), torch.where(is_new, offset, state.lateral)
-
-    def _end_reason(self, state: WorldState) -> Tensor:
-        """Return the first reason that holds, in the order of Algorithm 3. Shape: (N,)."""
-        x, y, _ = state.drone.unbind(-1)
-        reason = (
-            torch.zeros_like(state.steps)
-            .masked_fill(state.steps >= self.settings.step_limit, EndReason.STEP_LIMIT)
-            .masked_fill(y.abs() > self.settings.side_bound, EndReason.SIDE_BOUNDARY)
-            .masked_fill(x > self.settings.front_bound, EndReason.FRONT_BOUNDARY)
-            .masked_fill(state.collected.all(-1), EndReason.ALL_CUBES)
-        )
-        return unless_lost(reason, state.body, EndReason.LOST_CONTROL)
 
     def places(self, state: WorldState) -> Tensor:
         """Return the cubes' positions; under the floor once vanished."""

@@ -3,16 +3,20 @@
 # pyright: reportAttributeAccessIssue=false, reportReturnType=false, reportArgumentType=false
 # pyright: reportCallIssue=false, reportAssignmentType=false
 # (Warp compiles this file: its types are not those of Python.)
-"""The rules of `collect_cubes` as Warp functions, for the fused episode kernel.
+"""The rules of cube collection, as Warp functions.
 
-They compute the same numbers as the rules in torch, bit for bit, in double precision.
+`judge` is the only statement of the rules. The batched step calls it from a kernel over
+environments, the fused episode kernel by `move`. Numbers are of double precision in both.
 """
 
 import enum
+import functools
+from types import SimpleNamespace
 from typing import Any
 
 import torch
 import warp as wp
+from torch import Tensor
 
 from drone_rl.config import TaskSettings
 from drone_rl.sim.dynamics import ComputerVision, Dynamics, FlightState, Quadrotor
@@ -25,8 +29,9 @@ from drone_rl.sim.dynamics.moves_kernel import (
     is_lost,
 )
 from drone_rl.sim.dynamics.state import LEVEL
+from drone_rl.sim.rendering.devices import on_torch_stream, start_warp
 from drone_rl.sim.rendering.raytrace.structs_kernel import DRONE_FRAME, Poses
-from drone_rl.sim.tasks.common import HIDDEN_DEPTH
+from drone_rl.sim.tasks.common import HIDDEN_DEPTH, Side
 
 
 class EndReason(enum.IntEnum):
@@ -47,112 +52,267 @@ _FRONT_BOUNDARY = wp.constant(int(EndReason.FRONT_BOUNDARY))
 _SIDE_BOUNDARY = wp.constant(int(EndReason.SIDE_BOUNDARY))
 _STEP_LIMIT = wp.constant(int(EndReason.STEP_LIMIT))
 _LOST_CONTROL = wp.constant(int(EndReason.LOST_CONTROL))
+_LEFT = wp.constant(wp.int64(Side.LEFT))
+_AHEAD = wp.constant(wp.int64(Side.AHEAD))
+_RIGHT = wp.constant(wp.int64(Side.RIGHT))
 _DEPTH = wp.constant(wp.float64(HIDDEN_DEPTH))
 
-STANDS = wp.constant(0)
-COLLECTED = wp.constant(1)
-PASSED = wp.constant(2)
-"""What has become of a cube."""
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 
 @wp.struct
-class Flights:
-    """Worlds and what holds in all of them, see `TaskSettings`. Metres, world frame."""
+class Bounds:
+    """Those of `TaskSettings`. Metres."""
 
-    drones: wp.array[wp.vec3d]
-    cubes: wp.array2d[wp.vec3d]
-    fates: wp.array2d[int]
-    """One of `STANDS` and so on for each cube."""
-    steps: wp.array[int]
-    end_reasons: wp.array[int]
-    moves: wp.array[wp.vec3d]
-    """One an action, in computer-vision mode."""
-    fleet: Fleet
-    """The drones, where they fly."""
     touch_distance: wp.float64
     front_bound: wp.float64
     side_bound: wp.float64
     step_limit: int
 
 
+@wp.struct
+class Cubes:
+    """Cubes of environments, as in `WorldState`. Metres."""
+
+    bounds: Bounds
+    places: wp.array2d[wp.vec3d]
+    collected: wp.array2d[wp.bool]
+    passed: wp.array2d[wp.bool]
+    side: wp.array2d[wp.int64]
+    lateral: wp.array2d[wp.float64]
+
+
+@wp.struct
+class Outcome:
+    """Result of a step."""
+
+    reward: wp.float64
+    end_reason: int
+
+
 @wp.func
-def place(flights: Flights, world: int, poses: Poses) -> None:
-    """Says where the drone and the cubes are drawn; its attitude changes in flight alone.
+def judge(cubes: Cubes, env: int, drone: wp.vec3d, steps: int, is_lost: bool) -> Outcome:
+    """Apply Algorithms 1 and 3 after a drone has moved.
+
+    A touched cube is collected and worth 1; a cube left behind vanishes; the episode ends when all
+    cubes are collected, when the drone is out of bounds, or at the step limit, in this order; a
+    drone whose motion has diverged ends it before all these.
 
     Args:
-        flights: The worlds.
+        cubes: Of all environments; is written.
+        env: Which environment.
+        drone: Where its drone is now.
+        steps: Taken in the episode, this one included.
+        is_lost: Whether its motion has diverged.
+    """
+    outcome = Outcome()
+    num_collected = int(0)
+    for cube in range(cubes.places.shape[1]):
+        if is_present(cubes, env, cube):
+            place = cubes.places[env, cube]
+            if wp.max(wp.abs(drone - place)) <= cubes.bounds.touch_distance:
+                cubes.collected[env, cube] = True
+                outcome.reward += wp.float64(1.0)
+            elif drone[0] > place[0]:
+                cubes.passed[env, cube] = True
+        if cubes.collected[env, cube]:
+            num_collected += 1
+    note_sides(cubes, env, drone)
+    outcome.end_reason = _end_reason(cubes, drone, num_collected, steps, is_lost)
+    return outcome
+
+
+@wp.func
+def is_present(cubes: Cubes, env: int, cube: int) -> bool:
+    """Return whether a cube still stands."""
+    return not (cubes.collected[env, cube] or cubes.passed[env, cube])
+
+
+@wp.func
+def note_sides(cubes: Cubes, env: int, drone: wp.vec3d) -> None:
+    """Record side and lateral offset of each cube up to the next one, once."""
+    is_next_found = bool(False)
+    for cube in range(cubes.places.shape[1]):
+        if not is_next_found and cubes.side[env, cube] < wp.int64(0):
+            lateral = cubes.places[env, cube][1] - drone[1]
+            side = _AHEAD
+            if lateral > cubes.bounds.touch_distance:
+                side = _LEFT
+            if lateral < -cubes.bounds.touch_distance:
+                side = _RIGHT
+            cubes.side[env, cube] = side
+            cubes.lateral[env, cube] = lateral
+        if is_present(cubes, env, cube):
+            is_next_found = True
+
+
+@wp.func
+def _end_reason(
+    cubes: Cubes, drone: wp.vec3d, num_collected: int, steps: int, is_lost: bool
+) -> int:
+    """Return the first reason that holds, in the order of Algorithm 3; a lost drone before all."""
+    if is_lost:
+        return _LOST_CONTROL
+    if num_collected == cubes.places.shape[1]:
+        return _ALL_CUBES
+    if drone[0] > cubes.bounds.front_bound:
+        return _FRONT_BOUNDARY
+    if wp.abs(drone[1]) > cubes.bounds.side_bound:
+        return _SIDE_BOUNDARY
+    if steps >= cubes.bounds.step_limit:
+        return _STEP_LIMIT
+    return _RUNNING
+
+
+@wp.func
+def cubes_of(
+    bounds: Bounds,
+    places: wp.array2d[wp.vec3d],
+    collected: wp.array2d[wp.bool],
+    passed: wp.array2d[wp.bool],
+    side: wp.array2d[wp.int64],
+    lateral: wp.array2d[wp.float64],
+) -> Cubes:
+    """Return arrays as one structure."""
+    cubes = Cubes()
+    cubes.bounds = bounds
+    cubes.places = places
+    cubes.collected = collected
+    cubes.passed = passed
+    cubes.side = side
+    cubes.lateral = lateral
+    return cubes
+
+
+@wp.kernel
+def judge_all(
+    bounds: Bounds,
+    drones: wp.array[wp.vec3d],
+    places: wp.array2d[wp.vec3d],
+    collected: wp.array2d[wp.bool],
+    passed: wp.array2d[wp.bool],
+    side: wp.array2d[wp.int64],
+    lateral: wp.array2d[wp.float64],
+    is_lost: wp.array[wp.bool],
+    steps: wp.array[wp.int64],
+    end_reasons: wp.array[wp.int64],
+    rewards: wp.array[wp.float64],
+) -> None:
+    """Apply the rules to environments, a thread each."""
+    env = wp.tid()
+    cubes = cubes_of(bounds, places, collected, passed, side, lateral)
+    outcome = judge(cubes, env, drones[env], int(steps[env]), is_lost[env])
+    end_reasons[env] = wp.int64(outcome.end_reason)
+    rewards[env] = outcome.reward
+
+
+@wp.kernel
+def start_all(
+    bounds: Bounds,
+    drones: wp.array[wp.vec3d],
+    places: wp.array2d[wp.vec3d],
+    collected: wp.array2d[wp.bool],
+    passed: wp.array2d[wp.bool],
+    side: wp.array2d[wp.int64],
+    lateral: wp.array2d[wp.float64],
+) -> None:
+    """Record the sides of cubes at the start of episodes, a thread each."""
+    env = wp.tid()
+    note_sides(cubes_of(bounds, places, collected, passed, side, lateral), env, drones[env])
+
+
+@functools.cache
+def make_bounds(settings: TaskSettings) -> Bounds:
+    """Return the bounds for kernels."""
+    bounds = Bounds()
+    for name in ("touch_distance", "front_bound", "side_bound", "step_limit"):
+        setattr(bounds, name, getattr(settings, name))
+    return bounds
+
+
+def launch(kernel: Any, settings: TaskSettings, state: Any, *others: Tensor) -> None:
+    """Run a kernel over environments.
+
+    Args:
+        kernel: `judge_all` or `start_all`.
+        settings: Of the task.
+        state: A `WorldState`, of which "collected", "passed", "side" and "lateral" are written.
+        others: The kernel's other arguments. Shape: (N,).
+    """
+    device = state.cubes.device
+    start_warp(str(device))
+    vectors = [
+        wp.from_torch(tensor.double().contiguous(), dtype=wp.vec3d, return_ctype=True)
+        for tensor in (state.drone, state.cubes)
+    ]
+    written = (state.collected, state.passed, state.side, state.lateral, *others)
+    arrays = [wp.from_torch(tensor, return_ctype=True) for tensor in written]
+    with on_torch_stream(device):
+        wp.launch(
+            kernel,
+            len(state),
+            inputs=[make_bounds(settings), *vectors, *arrays],
+            device=str(device),
+        )
+
+
+# The fused episode kernel
+
+
+@wp.struct
+class Flights:
+    """Environments of the fused episode kernel. Metres, world frame."""
+
+    drones: wp.array[wp.vec3d]
+    cubes: Cubes
+    steps: wp.array[int]
+    end_reasons: wp.array[int]
+    moves: wp.array[wp.vec3d]
+    """One an action, in computer-vision mode."""
+    fleet: Fleet
+    """The drones, where they fly."""
+
+
+@wp.func
+def place(flights: Flights, world: int, poses: Poses) -> None:
+    """Write where the drone and the cubes are rendered; attitudes change in flight alone.
+
+    Args:
+        flights: The environments.
         world: Which of them.
-        poses: Of as many worlds.
+        poses: Of as many environments.
     """
     poses.positions[world, DRONE_FRAME] = wp.vec3(flights.drones[world])
     if is_flying(flights.fleet):
         poses.attitudes[world] = camera_attitude(flights.fleet, world)
-    for cube in range(flights.cubes.shape[1]):
-        at = flights.cubes[world, cube]
-        if flights.fates[world, cube] != STANDS:
+    for cube in range(flights.cubes.places.shape[1]):
+        at = flights.cubes.places[world, cube]
+        if not is_present(flights.cubes, world, cube):
             at[2] = at[2] - _DEPTH
         poses.positions[world, DRONE_FRAME + 1 + cube] = wp.vec3(at)
 
 
 @wp.func
 def move(flights: Flights, world: int, action: int) -> float:
-    """Moves a drone, as its dynamics do, and applies the rules, as `CollectCubes.judge` does.
+    """Move a drone, as its dynamics do, and apply the rules. Returns the reward.
 
     Args:
-        flights: The worlds.
+        flights: The environments.
         world: Which of them.
         action: Of the drone.
-
-    Returns:
-        The reward.
     """
     drone = flights.drones[world]
+    lost = bool(False)
     if is_flying(flights.fleet):
         drone = fly_move(flights.fleet, world, action)
+        lost = is_lost(flights.fleet, world)
     else:
         drone = drone + flights.moves[action]
     flights.drones[world] = drone
     flights.steps[world] = flights.steps[world] + 1
-    reward = float(0.0)
-    collected = int(0)
-    for cube in range(flights.cubes.shape[1]):
-        fate = flights.fates[world, cube]
-        if fate == STANDS:
-            fate = _fate(flights, drone, flights.cubes[world, cube])
-            flights.fates[world, cube] = fate
-            if fate == COLLECTED:
-                reward += 1.0
-        if fate == COLLECTED:
-            collected += 1
-    flights.end_reasons[world] = _end_reason(flights, world, drone, collected)
-    return reward
-
-
-@wp.func
-def _fate(flights: Flights, drone: wp.vec3d, cube: wp.vec3d) -> int:
-    """What becomes of a cube that stood when the drone began to move."""
-    if wp.max(wp.abs(drone - cube)) <= flights.touch_distance:
-        return COLLECTED
-    if drone[0] > cube[0]:
-        return PASSED
-    return STANDS
-
-
-@wp.func
-def _end_reason(flights: Flights, world: int, drone: wp.vec3d, collected: int) -> int:
-    """The first reason that holds, in the order of Algorithm 3; a lost drone before all."""
-    if is_flying(flights.fleet):  # noqa: SIM102 (Warp evaluates both sides of "and")
-        if is_lost(flights.fleet, world):
-            return _LOST_CONTROL
-    if collected == flights.cubes.shape[1]:
-        return _ALL_CUBES
-    if drone[0] > flights.front_bound:
-        return _FRONT_BOUNDARY
-    if wp.abs(drone[1]) > flights.side_bound:
-        return _SIDE_BOUNDARY
-    if flights.steps[world] >= flights.step_limit:
-        return _STEP_LIMIT
-    return _RUNNING
+    outcome = judge(flights.cubes, world, drone, flights.steps[world], lost)
+    flights.end_reasons[world] = outcome.end_reason
+    return float(outcome.reward)
 
 
 class FlyingCubes:
@@ -160,30 +320,36 @@ class FlyingCubes:
 
     def __init__(self, settings: TaskSettings, dynamics: Dynamics, num_envs: int) -> None:
         """Allocate the arrays of at most `num_envs` environments; see `supports`."""
-        cubes = settings.num_cubes
+        num_cubes = settings.num_cubes
         self._drones = torch.zeros(num_envs, 3, dtype=torch.float64)
-        self._cubes = torch.zeros(num_envs, cubes, 3, dtype=torch.float64)
-        self._fates = torch.zeros(num_envs, cubes, dtype=torch.int32)
         self.steps = torch.zeros(num_envs, dtype=torch.int32)
         """Taken so far. Shape: (num_envs,)."""
         self.end_reasons = torch.zeros(num_envs, dtype=torch.int32)
         """Shape: (num_envs,)."""
-        places = torch.zeros(num_envs, 1 + DRONE_FRAME + cubes, 3)
+        self.state = SimpleNamespace(
+            cubes=torch.zeros(num_envs, num_cubes, 3, dtype=torch.float64),
+            collected=torch.zeros(num_envs, num_cubes, dtype=torch.bool),
+            passed=torch.zeros(num_envs, num_cubes, dtype=torch.bool),
+            side=torch.zeros(num_envs, num_cubes, dtype=torch.int64),
+            lateral=torch.zeros(num_envs, num_cubes, dtype=torch.float64),
+        )
+        """The cubes, named as in `WorldState`."""
+        places = torch.zeros(num_envs, 1 + DRONE_FRAME + num_cubes, 3)
         attitudes = torch.tensor(LEVEL).repeat(num_envs, 1)
         self.flights, self.poses = Flights(), Poses()
         self.flights.drones = wp.from_torch(self._drones, dtype=wp.vec3d)
-        self.flights.cubes = wp.from_torch(self._cubes, dtype=wp.vec3d)
-        self.flights.fates = wp.from_torch(self._fates)
+        cubes = Cubes()
+        cubes.bounds = make_bounds(settings)
+        cubes.places = wp.from_torch(self.state.cubes, dtype=wp.vec3d)
+        for name in ("collected", "passed", "side", "lateral"):
+            setattr(cubes, name, wp.from_torch(getattr(self.state, name)))
+        self.flights.cubes = cubes
         self.flights.steps = wp.from_torch(self.steps)
         self.flights.end_reasons = wp.from_torch(self.end_reasons)
         if isinstance(dynamics, ComputerVision):
             self.flights.moves = wp.from_torch(dynamics.moves.contiguous(), dtype=wp.vec3d)
         self._fleet = FlyingFleet(num_envs, dynamics if isinstance(dynamics, Quadrotor) else None)
         self.flights.fleet = self._fleet.fleet
-        self.flights.touch_distance = settings.touch_distance
-        self.flights.front_bound = settings.front_bound
-        self.flights.side_bound = settings.side_bound
-        self.flights.step_limit = settings.step_limit
         self.poses.positions = wp.from_torch(places, dtype=wp.vec3)
         self.poses.attitudes = wp.from_torch(attitudes, dtype=wp.vec4)
 
@@ -198,8 +364,9 @@ class FlyingCubes:
         """Copy states at the start of episodes."""
         count = len(state)
         self._drones[:count] = state.drone
-        self._cubes[:count] = state.cubes
+        for name, values in vars(self.state).items():
+            values[:count] = getattr(state, name)
         if isinstance(state.body, FlightState):
             self._fleet.begin(state.body)
-        for values in (self._fates, self.steps, self.end_reasons):
+        for values in (self.steps, self.end_reasons):
             values[:count] = 0

@@ -101,7 +101,7 @@ def test_they_are_drawn_from_behind_where_that_was_asked_for(make):
     env = make(2, render_mode="rgb_array")
     env.reset(seed=0)
     assert [frame.shape for frame in env.render()] == [(360, 640, 3)] * 2
-    with pytest.warns(UserWarning, match="render() needs render_mode='rgb_array'"):
+    with pytest.warns(UserWarning, match="render_mode='rgb_array'"):
         assert make(2).render() is None
 
 

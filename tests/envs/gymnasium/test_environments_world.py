@@ -135,7 +135,7 @@ def test_it_draws_the_drone_from_behind_where_that_was_asked_for(make):
     assert env.render().shape == (360, 640, 3)
     silent = make()
     silent.reset(seed=0)
-    with pytest.warns(UserWarning, match="render() needs render_mode='rgb_array'"):
+    with pytest.warns(UserWarning, match="render_mode='rgb_array'"):
         assert silent.unwrapped.render() is None
 
 

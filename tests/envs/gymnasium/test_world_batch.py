@@ -15,7 +15,7 @@ from tests.second_task import Posts
 pytest.importorskip("gymnasium", reason="Gymnasium is not installed")
 from drone_rl.envs.gymnasium.world_batch import WorldBatch
 
-TASK = "drone_rl.config.TaskSettings"
+TASK = "collect_cubes"
 
 
 def streams(*seeds):

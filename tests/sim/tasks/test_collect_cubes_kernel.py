@@ -1,4 +1,4 @@
-"""The kernel's rules are the rules, bit for bit; its arrays start from the environments' state."""
+"""The fused kernel and the batched step agree with rules stated in torch, bit for bit."""
 
 import pytest
 import torch
@@ -12,15 +12,13 @@ from drone_rl.sim.rendering.raytrace.structs_kernel import Poses
 from drone_rl.sim.tasks import CollectCubes, Pillars
 from drone_rl.sim.tasks.collect_cubes import EndReason
 from drone_rl.sim.tasks.collect_cubes_kernel import (
-    COLLECTED,
-    PASSED,
-    STANDS,
     Flights,
     FlyingCubes,
     move,
     place,
 )
 from drone_rl.sim.worlds import Worlds
+from tests.sim.tasks import reference_rules
 
 start_warp("cpu")
 WORLDS = 60
@@ -59,12 +57,17 @@ def test_random_flights_go_as_the_rules_say(settings, ends):
         actions = chances.multinomial(WORLDS, replacement=True, generator=draws)
         inputs = [wp.from_torch(actions.int()), wp.from_torch(rewards)]
         wp.launch(step, WORLDS, inputs=[flying.flights, flying.poses, *inputs], device="cpu")
+        before, moved = state, worlds.dynamics.step(state.body, actions[going])
         state, reward = worlds.advance(state, actions[going])
+        expected, earned = reference_rules.judge(task, before, moved)
+        assert torch.equal(reward, earned)
+        for name, value in expected.items():
+            torch.testing.assert_close(getattr(state, name), value, rtol=0, atol=0, equal_nan=True)
         assert torch.equal(rewards[going].double(), reward)
         assert torch.equal(wp.to_torch(flying.flights.drones)[going], state.drone)
-        fates = wp.to_torch(flying.flights.fates)[going]
-        assert torch.equal(fates == COLLECTED, state.collected)
-        assert torch.equal(fates == PASSED, state.passed)
+        for name in ("collected", "passed", "side", "lateral"):
+            found, expected = getattr(flying.state, name)[going], getattr(state, name)
+            torch.testing.assert_close(found, expected, rtol=0, atol=0, equal_nan=True)
         assert torch.equal(flying.steps[going].long(), state.steps)
         assert torch.equal(flying.end_reasons[going].long(), state.end_reason)
         assert torch.equal(places[going, 1], state.drone.float())
@@ -82,12 +85,12 @@ def test_begins_where_worlds_are_and_leaves_them_alone():
     cubes = torch.tensor([[[15.0, 1.0, 3.0], [24.0, -2.0, 3.5]], [[15.0, 0.0, 3.0]] * 2])
     worlds.state = worlds.start(cubes.double())
     flying = FlyingCubes(settings, worlds.dynamics, 3)
-    for values in (flying.steps, flying.end_reasons, wp.to_torch(flying.flights.fates)):
+    for values in (flying.steps, flying.end_reasons, flying.state.collected):
         values.fill_(1)  # of a batch before
     flying.begin(worlds.state)
     assert wp.to_torch(flying.flights.drones)[:2].tolist() == [[0.0, 0.0, 3.0]] * 2
-    assert torch.equal(wp.to_torch(flying.flights.cubes)[:2], cubes.double())
-    assert (wp.to_torch(flying.flights.fates)[:2] == STANDS).all()
+    assert torch.equal(flying.state.cubes[:2], cubes.double())
+    assert not flying.state.collected[:2].any() and flying.state.collected[2].all()
     assert flying.steps.tolist() == flying.end_reasons.tolist() == [0, 0, 1]
     wp.to_torch(flying.flights.drones).fill_(7.0)
     assert worlds.state.drone[0].tolist() == [0.0, 0.0, 3.0]
