@@ -58,7 +58,8 @@ if TYPE_CHECKING:
     from drone_rl.robustness.shifts import Shifts, shifts
     from drone_rl.sim.image_types import ImageRequest, ImageType
     from drone_rl.sim.tasks import register_task
-    from drone_rl.training.train import Training, train
+    from drone_rl.training.run_folder import Training
+    from drone_rl.training.train import train
     from drone_rl.utils.errors import InputError
     from drone_rl.verdicts.coverage import Coverage
     from drone_rl.verdicts.dynamics_sweep import Bodies, bodies
@@ -88,7 +89,8 @@ _PLACES = {
     "verification.provable": ("train_until_proved",),
     "verification.prove": ("Proof", "load_proof", "prove"),
     "robustness.shifts": ("Shifts", "shifts"),
-    "training.train": ("Training", "train"),
+    "training.run_folder": ("Training",),
+    "training.train": ("train",),
     "envs.gymnasium.environments": ("DroneWorld", "DroneWorlds"),
     "envs.sb3.worlds": ("Sb3Worlds",),
     "explanations.settings": ("ExplainSettings",),
