@@ -33,11 +33,8 @@ class CameraSettings(Settings):
         return math.degrees(2 * math.atan(half))
 
 
-RENDERERS = {
-    "raytrace": "drone_rl.sim.rendering.raytrace.renderer.Raytracer",
-    "mujoco_warp": "drone_rl.sim.rendering.mujoco_warp.WarpRenderer",
-}
-"""Where each is to be imported from: our own of simple solids, and MuJoCo Warp's of anything."""
+RENDERERS = ("raytrace", "mujoco_warp")
+"""Names of the renderers, see `drone_rl.sim.rendering.renderer`."""
 
-RendererName = Annotated[str, OneOf(tuple(RENDERERS))]
+RendererName = Annotated[str, OneOf(RENDERERS)]
 """A setting that chooses one."""

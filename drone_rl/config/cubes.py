@@ -8,11 +8,12 @@ import dataclasses
 import math
 from typing import Annotated, ClassVar
 
-from drone_rl.config.task import FIRST, BaseTaskSettings, Bound, Color, Length, Things
+from drone_rl.config.task import FIRST, BaseTaskSettings, Bound, Color, Length, Things, add_task
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Whole
 
 
+@add_task
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class TaskSettings(BaseTaskSettings):
     """The cubes, the drone's moves and the boundaries. Lengths in metres, world frame.

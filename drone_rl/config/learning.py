@@ -1,10 +1,10 @@
 """Settings of what learns: returns, loss, optimizer, scheduler and collector."""
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Annotated, Any, ClassVar
 
-from drone_rl.config.configuration import Variant, locate
+from drone_rl.config.configuration import Variant
 from drone_rl.utils.schema import OneOf, Real, Whole
 
 Rate = Annotated[float, Real(0.0, 1.0)]
@@ -28,35 +28,35 @@ class _Discounted(Returns):
 class TotalReward(Returns):
     """The whole episode's reward at every step (Eq. 12)."""
 
-    target: ClassVar[str] = "drone_rl.objectives.TotalReward"
+    target: ClassVar[str] = "total_reward"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class LinearRamp(Returns):
     """The episode's reward times a ramp over the episode (variant 1)."""
 
-    target: ClassVar[str] = "drone_rl.objectives.LinearRamp"
+    target: ClassVar[str] = "linear_ramp"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class RewardToGo(_Discounted):
     """Discounted return (Eq. 14; the original's variant 2)."""
 
-    target: ClassVar[str] = "drone_rl.objectives.RewardToGo"
+    target: ClassVar[str] = "reward_to_go"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Standardised(_Discounted):
     """Discounted return, standardised over each episode (Algorithm 4; variant 0)."""
 
-    target: ClassVar[str] = "drone_rl.objectives.Standardised"
+    target: ClassVar[str] = "standardised"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class SuccessScaled(_Discounted):
     """Discounted return scaled by exp(reward - max_reward) (variant 3)."""
 
-    target: ClassVar[str] = "drone_rl.objectives.SuccessScaled"
+    target: ClassVar[str] = "success_scaled"
     max_reward: Annotated[float, Real(0.0, 1e6)] = 3.0
     """Reward of a perfect episode: the task's cubes."""
 
@@ -65,7 +65,7 @@ class SuccessScaled(_Discounted):
 class TimeBaseline(_Discounted):
     """Discounted return minus a running mean for each time step (variant 4)."""
 
-    target: ClassVar[str] = "drone_rl.objectives.TimeBaseline"
+    target: ClassVar[str] = "time_baseline"
     scale: bool = True
     """Whether to divide a batch's returns by their root mean square."""
     decay: Annotated[float, Real(0.0, 1.0, is_below=True)] = 0.9
@@ -78,7 +78,7 @@ class TimeBaseline(_Discounted):
 class LeaveOneOut(_Discounted):
     """Discounted return minus the other episodes' mean at the same time step."""
 
-    target: ClassVar[str] = "drone_rl.objectives.LeaveOneOut"
+    target: ClassVar[str] = "leave_one_out"
     scale: bool = True
     """Whether to divide a batch's returns by their root mean square."""
     gamma: Rate = 0.95
@@ -89,14 +89,14 @@ class LeaveOneOut(_Discounted):
 class BatchNormalised(_Discounted):
     """Discounted return, normalised over the batch."""
 
-    target: ClassVar[str] = "drone_rl.objectives.BatchNormalised"
+    target: ClassVar[str] = "batch_normalised"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Gae(_Discounted):
     """Generalised advantage estimates, for objectives with a critic."""
 
-    target: ClassVar[str] = "drone_rl.objectives.Advantages"
+    target: ClassVar[str] = "gae"
     scale: bool = True
     """Whether to standardise a batch's advantages."""
     gamma: Rate = 0.95
@@ -112,8 +112,12 @@ class Collector(Variant):
     num_envs: Annotated[int, Whole(1, unit="worlds")] = 16
     """Worlds, each with one episode in a batch, or with as many steps as the others."""
     num_threads: Annotated[int, Whole(1, unit="threads")] = 1
-    """Groups of worlds collected at the same time, each on a thread or worker of its own. Each
-    draws its actions from its own stream: this is part of what a seed means."""
+    """Groups of environments that are collected in parallel, each by its own thread or worker. Each
+    samples actions from its own stream: results for a seed depend on it."""
+
+    def arguments(self) -> dict[str, Any]:
+        """Return nothing: the factory takes the settings of the whole training."""
+        return {}
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -130,14 +134,14 @@ class Episodes(Collector):
 class Threads(Episodes):
     """Batches of complete episodes from threads of this process."""
 
-    target: ClassVar[str] = "drone_rl.training.build_collector.threaded_collector"
+    target: ClassVar[str] = "threads"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Ray(Episodes):
     """Batches of complete episodes from workers on a Ray cluster."""
 
-    target: ClassVar[str] = "drone_rl.training.build_collector.ray_collector"
+    target: ClassVar[str] = "ray"
     num_threads: Annotated[int, Whole(1, unit="workers")] = 2
     """Workers, each with its share of the worlds and a stream of actions of its own: this is part
     of what a seed means."""
@@ -156,7 +160,7 @@ class Rollouts(Collector):
     How many steps is the objective's business. Episodes go on from one batch to the next.
     """
 
-    target: ClassVar[str] = "drone_rl.training.build_collector.rollout_collector"
+    target: ClassVar[str] = "rollouts"
     num_envs: Annotated[int, Whole(1, unit="worlds")] = 64
     """Worlds."""
 
@@ -223,8 +227,8 @@ Weight = Annotated[float, Real(0.0)]
 class Objective(Variant):
     """Which loss, and with which values."""
 
-    learner: ClassVar[str] = "drone_rl.training.build_learner.reinforce_learner"
-    """Where that which makes the learner is to be imported from."""
+    learner: ClassVar[Callable[..., Any]]
+    """Builds the learner from the training's settings and what it collects with."""
     needs: ClassVar[Mapping[str, Variant]] = {}
     """Other parts of a training that it can't do without, and brings unless they are given."""
 
@@ -233,7 +237,7 @@ class Objective(Variant):
 class Reinforce(Objective):
     """REINFORCE without a critic."""
 
-    target: ClassVar[str] = "drone_rl.objectives.ReinforceLoss"
+    target: ClassVar[str] = "reinforce"
     entropy_coeff: Weight = 0.01
     """Weight of the entropy bonus, which keeps a policy from giving up a side early; 0 for none."""
     reduction: Annotated[str, OneOf(("mean", "sum"))] = "mean"
@@ -244,7 +248,6 @@ class Reinforce(Objective):
 class WithCritic(Objective):
     """One that learns, besides, what a state is worth."""
 
-    learner: ClassVar[str] = "drone_rl.training.build_learner.actor_critic_learner"
     needs: ClassVar[Mapping[str, Variant]] = {"returns": Gae(), "collector": Rollouts()}
     num_steps: Annotated[int, Whole(2, 4096)] = 32
     """Steps of each world in a batch."""
@@ -260,11 +263,11 @@ class WithCritic(Objective):
         """How often and in which pieces a batch is gone through, by name; once, as a whole."""
         return {}
 
-    def make(self, *args: Any, **kwargs: Any) -> Any:
-        """See `Variant`; the loss is told what is the loss's."""
+    def arguments(self) -> dict[str, Any]:
+        """Return the settings of the loss."""
         others = {"num_steps", "shares_trunk", *self.passes}
         values = {name: value for name, value in self.values().items() if name not in others}
-        return locate(self.target)(*args, functional=False, **values, **kwargs)
+        return {"functional": False, **values}
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

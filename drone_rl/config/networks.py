@@ -19,7 +19,7 @@ class Network(Variant):
 class SmallCnn(Network):
     """For small pictures: learns as well as the original's at a tenth of the cost."""
 
-    target: ClassVar[str] = "drone_rl.policies.SmallCNN"
+    target: ClassVar[str] = "small_cnn"
     patch: Annotated[int, Whole(1, 64, "pixels")] = 4
     """Size and stride of the first convolution, pixels."""
     channels: Channels = (16, 32)
@@ -32,7 +32,7 @@ class SmallCnn(Network):
 class OriginalCnn(Network):
     """The original study's network."""
 
-    target: ClassVar[str] = "drone_rl.policies.OriginalCNN"
+    target: ClassVar[str] = "original_cnn"
     channels: Channels = (6, 16)
     """Output channels of the 5x5 convolutions, each followed by pooling."""
     hidden: Widths = (120, 84)
@@ -43,6 +43,6 @@ class OriginalCnn(Network):
 class Mlp(Network):
     """Linear layers on the flattened picture."""
 
-    target: ClassVar[str] = "drone_rl.policies.MLP"
+    target: ClassVar[str] = "mlp"
     hidden: Widths = (128, 64)
     """Widths of the linear layers before the logits."""

@@ -6,7 +6,7 @@ import random
 from collections.abc import Iterator
 from typing import Annotated, ClassVar
 
-from drone_rl.config.task import BaseTaskSettings, Color, Length, Things
+from drone_rl.config.task import BaseTaskSettings, Color, Length, Things, add_task
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Real, Whole
 
@@ -14,6 +14,7 @@ _TRIED, _LEAST_OPEN = 400, 20
 """Rows that are drawn to see whether a field can be crossed, and how many of them must be open."""
 
 
+@add_task
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class PillarsSettings(BaseTaskSettings):
     """Rows of pillars, the line beyond them, and the drone's moves. Metres, world frame.

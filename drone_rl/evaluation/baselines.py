@@ -11,7 +11,7 @@ from drone_rl.config import BaseTaskSettings
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation.metrics import Episodes
 from drone_rl.evaluation.rollouts import run_episodes
-from drone_rl.evaluation.rule import LUCK
+from drone_rl.evaluation.rule import BLIND_BASELINES
 from drone_rl.sim.actions import Actions
 from drone_rl.sim.dynamics import Dynamics
 from drone_rl.sim.tasks import Task, as_task
@@ -87,7 +87,7 @@ class ConstantPolicy(TensorDictModuleBase):
         return tensordict.set("action", action.to(tensordict["done"].device, copy=True))
 
 
-BASELINES = (*LUCK, "oracle")
+BASELINES = (*BLIND_BASELINES, "oracle")
 """Baselines of cube collection."""
 _RANDOM_ACTIONS = 5
 """Key of the random actions' stream, derived from that of the first environment."""
@@ -147,7 +147,7 @@ def run_baselines(
     source = env.side_streams(torch.tensor([0]), _RANDOM_ACTIONS)[0]
     generator = torch.Generator(env.device).manual_seed(int(source.integers(2**63)))
     flown = {}
-    for name in (*task.luck, "oracle"):
+    for name in (*task.blind_baselines, "oracle"):
         env.load_state_dict(worlds)
         flown[name] = run_episodes(env, make_baseline(name, task, generator, actions), episodes)
     env.close()

@@ -94,8 +94,8 @@ class _Waiting:
 
 
 ENVIRONMENTS = {
-    "drone_rl/CollectCubes-v0": "drone_rl.config.TaskSettings",
-    "drone_rl/Pillars-v0": "drone_rl.config.PillarsSettings",
+    "drone_rl/CollectCubes-v0": "collect_cubes",
+    "drone_rl/Pillars-v0": "pillars",
 }
 """By name, the class of the task's settings, which `gymnasium.make` takes as options."""
 

@@ -174,7 +174,7 @@ class Task(abc.ABC, Generic[S]):
     """What reports call its goals and targets."""
     strata: tuple[str, ...] = ("anywhere",)
     """Where a goal can stand, from left to right: verdicts count each stratum separately."""
-    luck: tuple[str, ...] = ("random", "forward", "left", "right")
+    blind_baselines: tuple[str, ...] = ("random", "forward", "left", "right")
     """Baselines that see nothing: "random", and actions that are always taken, by name."""
     scored: tuple[str, ...] = ("drawn", "end_reason")
     """Entries of an episode's last information that `score` reads."""
