@@ -14,13 +14,12 @@ from torchrl.envs import EnvBase
 
 from drone_rl.envs import worlds_of
 from drone_rl.evaluation.baselines import run_baselines
-from drone_rl.evaluation.certificate_text import is_proved
 from drone_rl.evaluation.metrics import Episodes, failure_table, summarise
 from drone_rl.evaluation.outcomes import Outcomes, Rounding
 from drone_rl.evaluation.rollouts import StepLog, run_episodes
 from drone_rl.evaluation.rounding_sensitivity import check_rounding
 from drone_rl.evaluation.rule import NOT_CERTAIN, Kind, Quantity, Rule, decide, kinds_within
-from drone_rl.evaluation.verdict_text import SENTENCES
+from drone_rl.evaluation.verdict_text import SENTENCES, is_proved
 from drone_rl.policies.policy import load_policy
 from drone_rl.utils.intervals import mean_bounds, proportion
 from drone_rl.utils.seeding import RootSeed, Stream, root_seed
@@ -33,7 +32,7 @@ MANY = (2, 3, 5, 10, 20, 50, 100)
 class Claim(Protocol):
     """A certificate of the policy; `drone_rl.verdicts.certificate` has the implementation."""
 
-    def beside(self, greedy: Episodes, *, rounding: Rounding | None = None) -> dict[str, Any]:
+    def as_evidence(self, greedy: Episodes, *, rounding: Rounding | None = None) -> dict[str, Any]:
         """Return what a verdict on these greedy episodes may quote of the certificate."""
         ...
 
@@ -165,7 +164,7 @@ def judge(
         "terms": task.vocabulary.as_dict(),
         "num_cubes": greedy.goals.reached.shape[-1],
         "rounding": None if rounding is None else {**rounding.as_dict(), "decides": depends},
-        "proof": None if claim is None else claim.beside(greedy, rounding=rounding),
+        "proof": None if claim is None else claim.as_evidence(greedy, rounding=rounding),
         "greedy": summarise(greedy),
         "sampled": None if sampled is None else summarise(sampled),
         "baselines": {name: summarise(flown) for name, flown in baselines.items()},

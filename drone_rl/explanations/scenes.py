@@ -9,7 +9,7 @@ from torch.nn import functional
 from torchrl.envs import CatFrames, Transform, TransformedEnv
 
 from drone_rl.envs import ChromaticityPixels, CropRows, RgbPixels, worlds_of
-from drone_rl.envs.pipeline import memory_of, see_film
+from drone_rl.envs.transforms import memory_of, see_film
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.tasks import State
