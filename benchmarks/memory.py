@@ -69,7 +69,7 @@ def main(folder: str, frames: str, device: str) -> None:
     import drone_rl
     from drone_rl.config.training import TrainerSettings
     from drone_rl.training import Callback
-    from drone_rl.training.progress import OngoingTraining
+    from drone_rl.training.callbacks import OngoingTraining
     from drone_rl.utils.memory import return_freed_memory
 
     samples: list[tuple[int, float]] = []

@@ -30,7 +30,7 @@ MUTABLE = {
     "sweeps.groups:Group",
     "sweeps.manifest:Sweep",
     "sweeps.rows:Row",
-    "training.progress:Progress",
+    "training.callbacks:Progress",
 }
 """Those that are not frozen, or not yet, below drone_rl; batches of tensors are none of them."""
 BY_NAME_ALONE = ("drone_rl.config.", "drone_rl.config.", "drone_rl.cli.")

@@ -115,7 +115,8 @@ def register_learner(name: str) -> Callable[[F], F]:
     """Register a learner, selected by `objective=NAME`; a decorator of a class or function.
 
     It is called as `factory(settings, collecting, **own)`, with the training's settings and what
-    `build_collector` returned, and returns a `drone_rl.training.learners.Learner`.
+    `make_collector` of `drone_rl.training.components` returned, and returns a
+    `drone_rl.training.learners.Learner`.
 
     Args:
         name: Name in settings.
@@ -142,7 +143,7 @@ def register_collector(name: str) -> Callable[[F], F]:
 
     It is called as `factory(settings, task, **own)`, with the training's settings and the task to
     collect from (None for the task of the settings), and returns a
-    `drone_rl.training.build_collector.Collecting`.
+    `drone_rl.training.components.Components`.
 
     Args:
         name: Name in settings.

@@ -14,13 +14,12 @@ from torchrl.envs import EnvBase
 
 from drone_rl.envs import worlds_of
 from drone_rl.evaluation.baselines import run_baselines
-from drone_rl.evaluation.certificate_text import is_proved
 from drone_rl.evaluation.metrics import Episodes, failure_table, summarise
 from drone_rl.evaluation.outcomes import Outcomes, Rounding
 from drone_rl.evaluation.rollouts import StepLog, run_episodes
 from drone_rl.evaluation.rounding_sensitivity import check_rounding
 from drone_rl.evaluation.rule import NOT_CERTAIN, Kind, Quantity, Rule, decide, kinds_within
-from drone_rl.evaluation.verdict_text import SENTENCES
+from drone_rl.evaluation.verdict_text import SENTENCES, is_proved
 from drone_rl.policies.policy import load_policy
 from drone_rl.utils.intervals import mean_bounds, proportion
 from drone_rl.utils.seeding import RootSeed, Stream, root_seed

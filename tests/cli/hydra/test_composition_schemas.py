@@ -12,7 +12,7 @@ from hydra.errors import HydraException
 
 from drone_rl.cli.hydra import composition
 from drone_rl.cli.hydra.composition import conf_dir
-from drone_rl.cli.usage import COMMANDS
+from drone_rl.cli.main import COMMANDS
 from drone_rl.config import CameraSettings, DynamicsSettings, PillarsSettings, TaskSettings
 from drone_rl.config.training import TrainSettings
 from drone_rl.policies.zoo import describe

@@ -19,8 +19,7 @@ from drone_rl.config.networks import SmallCnn
 from drone_rl.config.training import TrainerSettings, TrainSettings
 from drone_rl.config.transforms import EpisodeReward, Gray, Stack
 from drone_rl.training import ActorCriticLearner, ReinforceLearner
-from drone_rl.training.build_collector import build_collector
-from drone_rl.training.build_learner import build_learner
+from drone_rl.training.components import make_collector, make_learner
 from drone_rl.utils.checkpoint import load_checkpoint, save_checkpoint
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
@@ -51,8 +50,8 @@ def checkpoint(training):
 def test_every_objective_has_its_learner():
     for settings, kind in ((TINY, ActorCriticLearner), (TrainSettings(), ReinforceLearner)):
         settings = settings.replace(task=TASK)
-        made = build_collector(settings)
-        learner = build_learner(settings, made)
+        made = make_collector(settings)
+        learner = make_learner(settings, made)
         assert isinstance(learner, kind)
         assert learner.network is made.network
         made.collector.shutdown()
@@ -63,8 +62,8 @@ def test_gradients_by_the_kernel_teach_what_those_of_torch_do():
     for is_compiled in (True, False):
         limits = TrainerSettings(compiled=is_compiled, minibatch_frames=40)
         settings = TrainSettings(task=TASK, trainer=limits, optimiser=Sgd(lr=1.0))
-        made = build_collector(settings)
-        learner = build_learner(settings, made)
+        made = make_collector(settings)
+        learner = make_learner(settings, made)
         network = learner.loss.actor_network.module[0].module
         assert isinstance(network, FusedNetwork) is is_compiled
         before = [p.detach().clone() for p in made.network.parameters()]
@@ -93,8 +92,8 @@ def test_gradients_by_the_kernel_teach_what_those_of_torch_do():
 )
 def test_what_the_network_made_is_kept_where_it_is_learned_from(settings, is_kept):
     settings = TrainSettings(task=TASK).replace(**settings)
-    made = build_collector(settings)
-    learner = build_learner(settings, made)
+    made = make_collector(settings)
+    learner = make_learner(settings, made)
     sources = [getattr(part, "source", None) for part in made.collector.collectors]
     kept = [s._cache for s in sources if isinstance(s, FusedCollector) and s._cache is not None]
     assert (len(kept) == 1) is is_kept and bool(kept) is is_kept
@@ -115,8 +114,8 @@ def test_what_was_made_in_flight_is_taken_and_teaches_the_same(monkeypatch):
 
         monkeypatch.setattr(ActivationCache, "find", note)
         settings = TrainSettings(task=TASK, trainer=TrainerSettings(minibatch_frames=40))
-        made = build_collector(settings)
-        learner, batches = build_learner(settings, made), iter(made.collector)
+        made = make_collector(settings)
+        learner, batches = make_learner(settings, made), iter(made.collector)
         for _ in range(3):
             learner.update(next(batches))
         made.collector.shutdown()
@@ -131,15 +130,15 @@ def test_a_critic_begins_alike_for_a_seed_and_leaves_the_policy_as_it_is(shares)
     settings = TINY.replace(objective=Ppo(shares_trunk=shares))
     states = []
     for seed in (0, 0, 1):
-        made = build_collector(settings.replace(seed=seed))
-        states.append(copy.deepcopy(build_learner(settings.replace(seed=seed), made).state_dict()))
+        made = make_collector(settings.replace(seed=seed))
+        states.append(copy.deepcopy(make_learner(settings.replace(seed=seed), made).state_dict()))
         made.collector.shutdown()
     one, two, other = (state["critic"] for state in states)
     assert all(torch.equal(one[name], two[name]) for name in one)
     weights = [name for name in one if name.endswith("weight")]
     assert not any(torch.equal(one[name], other[name]) for name in weights)
     assert len(one) == (2 if shares else len(states[0]["policy"]))
-    alone = build_collector(TrainSettings(task=TASK))
+    alone = make_collector(TrainSettings(task=TASK))
     assert all(
         torch.equal(states[0]["policy"][name], value)
         for name, value in alone.network.state_dict().items()
@@ -246,8 +245,8 @@ def refused(trained, folder, state, message):
 @pytest.mark.parametrize("is_ours", [True, False])
 def test_advantages_are_torchrls_by_its_own_way_through_the_critic(is_ours):
     """TorchRL looks at every next picture, too; its own collector's batches will do as well."""
-    made = build_collector(TINY.replace(collector=Rollouts(num_envs=5, num_threads=1)))
-    learner, (ours,) = build_learner(TINY, made), made.collector.collectors
+    made = make_collector(TINY.replace(collector=Rollouts(num_envs=5, num_threads=1)))
+    learner, (ours,) = make_learner(TINY, made), made.collector.collectors
     torch.nn.init.normal_(learner.model.critic.module.weight)
     collector = Collector(
         ours.env,
@@ -258,16 +257,16 @@ def test_advantages_are_torchrls_by_its_own_way_through_the_critic(is_ours):
     )
     if is_ours:
         ours.num_steps = 80
-    batch = next(iter(made.collector if is_ours else collector))
+    batch = ours.collect() if is_ours else next(iter(collector))
     assert batch["next", "terminated"].any() and batch["next", "truncated"].any()
     both = TensorDictSequential(learner.model.trunk, learner.model.critic)
     rates = {"gamma": TINY.returns.gamma, "lmbda": TINY.returns.lmbda}
     gae = GAE(**rates, value_network=both, average_gae=True, deactivate_vmap=True)
-    found, _ = learner._estimated(batch)
-    wanted = gae(batch.select(*learner.in_keys))
+    found = learner.estimate(batch)
+    wanted = gae(batch.select(*learner._read))
     for key in ("advantage", "value_target"):
-        torch.testing.assert_close(found[key], wanted[key].reshape(-1, 1), rtol=1e-4, atol=1e-5)
-    assert learner.update(batch)["loss/grad_norm"] > 0
+        torch.testing.assert_close(found[key], wanted[key], rtol=1e-4, atol=1e-5)
+    assert learner.update(found)["loss/grad_norm"] > 0
     collector.shutdown()
 
 

@@ -1,7 +1,5 @@
 """A training's worlds shared out: the same worlds and actions however they are built."""
 
-import sys
-
 import pytest
 import torch
 
@@ -9,14 +7,13 @@ from drone_rl.collectors import ThreadedCollector
 from drone_rl.config import TaskSettings
 from drone_rl.config.learning import Ray, Threads
 from drone_rl.config.training import TrainSettings
-from drone_rl.training.build_collector import _shares, build_collector
-from drone_rl.utils.errors import InputError
+from drone_rl.training.components import group_sizes, make_collector
 
 TASK = TaskSettings(num_cubes=1, first_distance=8.0, step_limit=60)
 
 
 def collected(**settings):
-    made = build_collector(TrainSettings(task=TASK, **settings))
+    made = make_collector(TrainSettings(task=TASK, **settings))
     batch = made.collector.collect()
     made.collector.shutdown()
     return made, batch
@@ -33,7 +30,7 @@ def collected(**settings):
     ],
 )
 def test_worlds_are_shared_out_evenly(collector, device, shares):
-    assert _shares(TrainSettings(collector=collector, device=device)) == shares
+    assert group_sizes(TrainSettings(collector=collector, device=device)) == shares
 
 
 def test_threads_share_one_network_and_draw_from_streams_of_their_own():
@@ -52,9 +49,3 @@ def test_a_seed_means_the_same_network_and_the_same_batch():
     assert all(torch.equal(weights[name], same[name]) for name in weights)
     other = collected(collector=Threads(num_envs=3), seed=1)[0].network.state_dict()
     assert not any(torch.equal(weights[n], other[n]) for n in weights if n.endswith("weight"))
-
-
-def test_ray_that_is_not_installed(monkeypatch):
-    monkeypatch.setitem(sys.modules, "ray", None)
-    with pytest.raises(InputError, match=r"pip install 'drone-rl\[ray\]'"):
-        build_collector(TrainSettings(task=TASK, collector=Ray(num_envs=2)))

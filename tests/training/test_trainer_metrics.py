@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from tensordict import TensorDict
 
 from drone_rl.sim.tasks.collect_cubes import EndReason
-from drone_rl.training.metrics import batch_metrics, episode_rewards, running_mean
+from drone_rl.training.trainer import batch_metrics, episode_rewards, running_mean
 from drone_rl.utils.errors import InputError
 
 
