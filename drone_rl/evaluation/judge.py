@@ -32,7 +32,7 @@ MANY = (2, 3, 5, 10, 20, 50, 100)
 class Claim(Protocol):
     """A certificate of the policy; `drone_rl.verdicts.certificate` has the implementation."""
 
-    def beside(self, greedy: Episodes, *, rounding: Rounding | None = None) -> dict[str, Any]:
+    def as_evidence(self, greedy: Episodes, *, rounding: Rounding | None = None) -> dict[str, Any]:
         """Return what a verdict on these greedy episodes may quote of the certificate."""
         ...
 
@@ -164,7 +164,7 @@ def judge(
         "terms": task.vocabulary.as_dict(),
         "num_cubes": greedy.goals.reached.shape[-1],
         "rounding": None if rounding is None else {**rounding.as_dict(), "decides": depends},
-        "proof": None if claim is None else claim.beside(greedy, rounding=rounding),
+        "proof": None if claim is None else claim.as_evidence(greedy, rounding=rounding),
         "greedy": summarise(greedy),
         "sampled": None if sampled is None else summarise(sampled),
         "baselines": {name: summarise(flown) for name, flown in baselines.items()},

@@ -48,7 +48,7 @@ class Claim:
         """
         return 1.0 - 0.05 ** (1.0 / self.uniform) if self.uniform else None
 
-    def beside(self, greedy: Episodes, *, rounding: Rounding | None = None) -> dict[str, Any]:
+    def as_evidence(self, greedy: Episodes, *, rounding: Rounding | None = None) -> dict[str, Any]:
         """Return what a verdict may quote: nothing if an episode contradicts the certificate.
 
         Args:
