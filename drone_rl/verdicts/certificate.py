@@ -125,7 +125,9 @@ def find_claim(
                 "proved of it; leave the certificate out"
             )
         return None
-    path = certificate_path(policy.path) if given is None else _file(Path(given))
+    path = certificate_path(policy.path) if given is None else Path(given)
+    if given is not None and path.is_dir():
+        path = path / "certificate.json"
     if given is None and not path.is_file():
         return None
     try:
@@ -167,10 +169,6 @@ def _placements(episodes: Episodes) -> NDArray[np.float64]:
     """Positions of the cubes, metres to the left. Shape: (n, cubes)."""
     places = episodes.goals.world.reshape(len(episodes), -1, 3)  # x, y, z of each cube
     return places[..., 1].double().numpy()
-
-
-def _file(path: Path) -> Path:
-    return path / "certificate.json" if path.is_dir() else path
 
 
 def _try(

@@ -159,7 +159,8 @@ def require(policy: Pilot, needed: str | Path, measured: SavedShifts | None) -> 
         InputError: The file is unusable, or no operating domain was measured, or it is refused.
     """
     needs = read_requirements(Path(needed))
-    remedy = f"run drone-rl shifts policy={_given(policy)} first, in the same task"
+    given = policy.path if isinstance(policy, Policy) else policy.name
+    remedy = f"run drone-rl shifts policy={given} first, in the same task"
     if measured is None:
         raise InputError(f"require_domain={needed}, but no domain of it was measured; {remedy}")
     if measured.numbers is None:
@@ -254,10 +255,6 @@ def _fewest(episodes: int, rule: Rule) -> int:
         upper = mean_bounds(values, -rule.good_share, 1.0, rule.confidence)["upper95"]
         least, most = (least, middle) if upper > 0 else (middle + 1, most)
     return least
-
-
-def _given(policy: Pilot) -> str:
-    return str(policy.path) if isinstance(policy, Policy) else policy.name
 
 
 def _read(path: Path, policy: Policy) -> SavedShifts:
