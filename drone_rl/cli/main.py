@@ -6,8 +6,8 @@ import sys
 from typing import cast
 
 import drone_rl
-from drone_rl.utils.compiler import leave_compiler_unloaded
-from drone_rl.utils.memory import leave_garbage_to_the_system, look_for_garbage_rarely
+from drone_rl.utils.imports import leave_compiler_unloaded
+from drone_rl.utils.memory import look_for_garbage_rarely
 
 USAGE = """\
 drone-rl: a drone learns to fly from its camera, and you learn whether to trust it.
@@ -102,9 +102,7 @@ def _main(args: list[str]) -> int:
 
     leave_compiler_unloaded()
     steps = [("train", overrides), ("evaluate", []), ("explain", [])]
-    status = guarded(lambda: _run_all(steps if name == "demo" else [(name, overrides)]))
-    leave_garbage_to_the_system()
-    return status
+    return guarded(lambda: _run_all(steps if name == "demo" else [(name, overrides)]))
 
 
 def _run_all(steps: list[tuple[str, list[str]]]) -> int:

@@ -59,14 +59,6 @@ def test_every_setting_of_a_command_is_typed(command, config):
 PARTS = {**composition.PARTS, **composition.SEVERAL}
 
 
-@pytest.mark.parametrize(("group", "name"), files(*composition.PARTS))
-def test_every_choice_is_told_the_same_by_its_file_and_in_code(group, name, settings):
-    choice = f"{group}={name}"
-    chosen = getattr(settings("train", choice, *NEEDS.get(choice, ())), group)
-    assert chosen.is_known
-    assert chosen == type(chosen)()
-
-
 @pytest.mark.parametrize("part", PARTS.values(), ids=lambda part: part.__name__)
 def test_every_variant_has_a_file(part):
     text = "".join(path.read_text() for path in CONF.rglob("*.yaml"))
