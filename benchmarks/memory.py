@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.commands import memory_status
-from drone_rl.utils.compiler import leave_compiler_unloaded
+from drone_rl.utils.imports import leave_compiler_unloaded
 from drone_rl.utils.memory import look_for_garbage_rarely
 
 SETTLING_FRAMES = 100_000

@@ -39,8 +39,7 @@ if TYPE_CHECKING:
         ProvableSettings,
         ProveSettings,
     )
-    from drone_rl.envs.gymnasium.world import DroneWorld
-    from drone_rl.envs.gymnasium.worlds import DroneWorlds
+    from drone_rl.envs.gymnasium.environments import DroneWorld, DroneWorlds
     from drone_rl.envs.sb3.worlds import Sb3Worlds
     from drone_rl.evaluation.evaluate import Evaluation, evaluate
     from drone_rl.explanations.explain import Explanations, explain
@@ -91,8 +90,7 @@ _PLACES = {
     "robustness.shifts": ("Shifts", "shifts"),
     "training.run_folder": ("Training",),
     "training.train": ("train",),
-    "envs.gymnasium.world": ("DroneWorld",),
-    "envs.gymnasium.worlds": ("DroneWorlds",),
+    "envs.gymnasium.environments": ("DroneWorld", "DroneWorlds"),
     "envs.sb3.worlds": ("Sb3Worlds",),
     "explanations.settings": ("ExplainSettings",),
     "flight.commands.command": ("FlightFuture", "PilotError"),
@@ -102,14 +100,14 @@ _PLACES = {
     "flight.commands.state": ("PilotState", "Trajectory"),
     "flight.commands.yaw": ("Drivetrain", "YawMode"),
     "policies.sb3": ("Sb3Logits", "Sb3Trunk"),
-    "config.bodies": ("BodiesSettings",),
-    "config.chances": ("ChanceSettings",),
-    "config.checking": ("CheckSettings",),
-    "config.judging": ("EvaluateSettings", "JudgeSettings"),
-    "config.mapping": ("PlacesSettings",),
-    "config.provable": ("ProvableSettings",),
-    "config.proving": ("ProveSettings",),
-    "config.shifting": ("ShiftSettings",),
+    "config.commands": ("BodiesSettings", "EvaluateSettings", "JudgeSettings", "ShiftSettings"),
+    "config.verification": (
+        "ChanceSettings",
+        "CheckSettings",
+        "PlacesSettings",
+        "ProvableSettings",
+        "ProveSettings",
+    ),
     "config.registry": (
         "register_collector",
         "register_learner",

@@ -13,7 +13,7 @@ from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 
 from benchmarks.peers.outcome import DECAY, TARGET, PeerTraining
 from drone_rl.config.transforms import Gray, Standardize, Transform
-from drone_rl.envs.gymnasium.worlds import DroneWorlds
+from drone_rl.envs.gymnasium.environments import DroneWorlds
 from drone_rl.envs.sb3.worlds import Sb3Worlds
 from drone_rl.policies.external_policy import policy_from
 from drone_rl.policies.sb3 import Sb3Logits, Sb3Trunk
@@ -98,7 +98,7 @@ def train_sb3(
         **settings,
     )
     model.learn(max_frames, callback=solved)
-    stage = worlds.stage
+    stage = worlds.batch
     env.close()
     policy = policy_from(
         Sb3Logits(model),

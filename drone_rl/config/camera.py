@@ -13,11 +13,7 @@ FRONT = (0.4, 0.0, 0.0)
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class CameraSettings(Settings):
-    """The picture that the policy's camera takes.
-
-    Raises:
-        InputError: A value is out of range.
-    """
+    """The picture that the policy's camera takes."""
 
     width: Annotated[int, Whole(1, 1024, "pixels")] = 64
     """Pixels across."""
@@ -38,3 +34,19 @@ RENDERERS = ("raytrace", "mujoco_warp")
 
 RendererName = Annotated[str, OneOf(RENDERERS)]
 """A setting that chooses one."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Rendered(Settings):
+    """Settings of a command that renders images."""
+
+    renderer: RendererName = "raytrace"
+    """Renderer: raytrace, this package's ray tracer, or mujoco_warp, MuJoCo Warp's."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class OnDevice(Rendered):
+    """Settings of a command that renders images and evaluates policies."""
+
+    device: str = "cpu"
+    """Device of renderer and policy: cpu, cuda or cuda:N."""

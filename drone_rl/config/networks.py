@@ -1,4 +1,4 @@
-"""Networks of a policy, from picture to logits."""
+"""Settings of a policy's network."""
 
 import dataclasses
 from typing import Annotated, ClassVar
@@ -12,12 +12,12 @@ Widths = Annotated[tuple[int, ...], Several(Whole(1, 4096, "neurons"), 0, 8)]
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Network(Variant):
-    """Which network, and how large."""
+    """Settings of a network."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class SmallCnn(Network):
-    """For small pictures: learns as well as the original's at a tenth of the cost."""
+    """Network for small images: a tenth of the original's cost."""
 
     target: ClassVar[str] = "small_cnn"
     patch: Annotated[int, Whole(1, 64, "pixels")] = 4
@@ -41,7 +41,7 @@ class OriginalCnn(Network):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Mlp(Network):
-    """Linear layers on the flattened picture."""
+    """Linear layers on the flattened image."""
 
     target: ClassVar[str] = "mlp"
     hidden: Widths = (128, 64)

@@ -16,7 +16,7 @@ FIRST = "collect_cubes"
 
 
 class Things(NamedTuple):
-    """Where a task's targets and obstacles stand, for what is put beside them. Metres."""
+    """Where targets and obstacles are, so that distractors keep their distance. Metres."""
 
     size: float
     """Edge of one, seen from above."""
@@ -34,7 +34,7 @@ class Things(NamedTuple):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class BaseTaskSettings(Settings):
-    """What the settings of a task are; each task has a class of its own."""
+    """Base class of a task's settings."""
 
     name: ClassVar[str]
     """What files call the task."""

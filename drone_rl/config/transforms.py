@@ -70,7 +70,7 @@ class Rgb(Transform):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Chromaticity(Transform):
-    """Shares of red and blue in each color, less a third: 0 for every gray, however bright."""
+    """Fractions of red and blue in each pixel, minus a third: 0 for every gray level."""
 
     target: ClassVar[str] = "chromaticity"
     floor: Annotated[float, Real(0.0, 3.0, is_above=True)] = 0.15
@@ -167,7 +167,7 @@ class StepCount(Transform):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Blur(Transform):
-    """Blurred by a Gaussian, as out of focus."""
+    """Gaussian blur."""
 
     target: ClassVar[str] = "blur"
     width: Annotated[float, Real(0.0, 16.0, unit="pixels")] = 0.5
@@ -180,7 +180,7 @@ class Blur(Transform):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Fault(Transform):
-    """Something that goes wrong in a camera by chance or with memory: no map of pictures."""
+    """Camera fault that is random or has memory."""
 
     def output(self, frame: Frame) -> Frame:
         """See `Transform`."""
@@ -189,7 +189,7 @@ class Fault(Transform):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Noise(Fault):
-    """Noise of the sensor, which cuts off at black and white."""
+    """Sensor noise, clipped at black and white."""
 
     target: ClassVar[str] = "noise"
     strength: Annotated[float, Real(0.0, 1.0)] = 0.02
@@ -200,18 +200,18 @@ class Noise(Fault):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class DeadRows(Fault):
-    """Rows of the sensor that show nothing."""
+    """Dead rows of the sensor."""
 
     target: ClassVar[str] = "dead_rows"
     count: Annotated[int, Whole(0, 1024, "rows")] = 1
-    """Rows drawn anew for each episode, besides those that are always dead."""
+    """Rows sampled for each episode, in addition to `rows`."""
     rows: Annotated[tuple[int, ...], Several(Whole(0, 1023, "rows"), 0, 1024)] = ()
     """Rows that are always dead, from 0 at the top."""
     level: Annotated[float, Real(0.0, 1.0)] = 0.0
-    """What they show instead; 0 is black, 1 white."""
+    """Their level; 0 is black, 1 white."""
 
     def check(self) -> None:
-        """Refuses rows that are named twice."""
+        """Refuse duplicate rows."""
         if len(set(self.rows)) < len(self.rows):
             raise InputError(f"rows={list(self.rows)} names a row twice; name each once")
 
@@ -222,7 +222,7 @@ class DeadRows(Fault):
         return frame
 
     def check_height(self, height: int) -> None:
-        """Refuses more rows than pictures have.
+        """Refuse more rows than images have.
 
         Raises:
             InputError: There are not as many.
@@ -240,28 +240,28 @@ class DeadRows(Fault):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class FrozenFrames(Fault):
-    """Frames that are, by chance, the one before."""
+    """Frames that repeat the previous one at random."""
 
     target: ClassVar[str] = "frozen_frames"
     share: Annotated[float, Real(0.0, 1.0)] = 0.05
-    """Probability of each."""
+    """Probability of each frame to repeat."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class LateFrames(Fault):
-    """Frames that are shown late; until then the episode's first."""
+    """Delayed frames; until the first arrives, the episode's first frame."""
 
     target: ClassVar[str] = "late_frames"
     frames: Annotated[int, Whole(0, 16, "frames")] = 1
-    """How late."""
+    """Delay."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Shift(Fault):
-    """A picture that stands a little aside all through an episode, as of a camera fixed askew."""
+    """Image shifted by a constant of each episode, as by a misaligned camera."""
 
     target: ClassVar[str] = "shift"
     down: Annotated[int, Whole(0, 1023, "pixels")] = 4
-    """How far up or down at most; every shift is as likely."""
+    """Largest shift up or down; uniformly distributed."""
     across: Annotated[int, Whole(0, 1023, "pixels")] = 6
-    """How far to the left or right at most."""
+    """Largest shift to the left or right."""

@@ -211,7 +211,7 @@ def test_the_command_that_is_printed_goes_on_with_a_stopped_run(
         signal.signal(signal.SIGINT, before)
     assert stopped.returncode == 128 + number, stopped.stderr
     (folder,) = (tmp_path / "my runs" / "train" / "runs").iterdir()
-    hint = re.search("go on with: drone-rl (.*)", caplog.text)
+    hint = re.search("resume with: drone-rl (.*)", caplog.text)
     assert hint, caplog.text
     (tmp_path / "elsewhere").mkdir()
     done = in_process(*shlex.split(hint[1]), cwd=tmp_path / "elsewhere")

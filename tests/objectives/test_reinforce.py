@@ -7,10 +7,10 @@ from torchrl.data import Categorical
 from torchrl.modules import ProbabilisticActor
 
 from drone_rl.collectors import EpisodeCollector
-from drone_rl.envs.three_state import SUCCESS_PROBABILITY, ThreeStateEnv
 from drone_rl.objectives import ReinforceLoss, returns
 from drone_rl.policies.actor import RandomSource, SeededCategorical
 from drone_rl.utils.errors import InputError
+from tests.three_state import SUCCESS_PROBABILITY, ThreeStateEnv
 
 
 class Linear(nn.Module):

@@ -9,9 +9,9 @@ from torchrl.envs import Compose, Reward2GoTransform, TransformedEnv
 from torchrl.modules import RandomPolicy
 
 from drone_rl import objectives
-from drone_rl.envs.three_state import ThreeStateEnv
 from drone_rl.objectives import BatchNormalised, RewardToGo, TimeBaseline, TotalReward
 from drone_rl.utils.errors import InputError
+from tests.three_state import ThreeStateEnv
 
 OTHERS = ("Advantages", "ReinforceLoss", "ReturnEstimator")
 NAMES = [n for n in objectives.__all__ if n not in OTHERS]

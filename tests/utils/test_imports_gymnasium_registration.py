@@ -98,4 +98,7 @@ def test_without_gymnasium_one_line_tells_what_to_install():
 
 
 def test_the_names_of_modules_are_right():
-    assert import_module("drone_rl.envs.gymnasium.world").DroneWorld.metadata["render_fps"] == 10
+    assert (
+        import_module("drone_rl.envs.gymnasium.environments").DroneWorld.metadata["render_fps"]
+        == 10
+    )

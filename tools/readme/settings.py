@@ -13,7 +13,7 @@ from typing import Any
 import yaml
 
 from drone_rl.cli.hydra.composition import GROUPS, PARTS, SEVERAL
-from drone_rl.cli.usage import COMMANDS
+from drone_rl.cli.main import COMMANDS
 from drone_rl.config import TASKS, BaseTaskSettings
 from drone_rl.config.configuration import Changes, ChangesOfTask, Variant
 from drone_rl.utils.schema import Flag, Instance, Kind, Listed, Maybe, OneOf, Several, Span

@@ -192,7 +192,7 @@ def test_what_is_no_description(data):
 def test_reading_a_description_computes_nothing():
     """What is computed on no device loads torch's symbolic algebra: half a second a start."""
     code = """import sys
-from drone_rl.utils.compiler import leave_compiler_unloaded
+from drone_rl.utils.imports import leave_compiler_unloaded
 leave_compiler_unloaded()
 from drone_rl.config.configuration import as_config
 from drone_rl.config.training import TrainSettings

@@ -25,7 +25,8 @@ from drone_rl.envs import (
     StandardizePixels,
     with_transforms,
 )
-from drone_rl.envs.camera_fault import normal, uniform
+from drone_rl.envs.camera_faults import _sampler
+from drone_rl.envs.fault_models import FaultModel
 from drone_rl.policies import SmallCNN, make_actor
 from drone_rl.utils.errors import InputError
 
@@ -225,17 +226,19 @@ def test_a_state_of_another_number_of_worlds_is_refused():
     one, other = make_env("noise", 2), make_env("noise", 4)
     one.reset()
     other.reset()
-    with pytest.raises(InputError, match=r"Noise has 2 worlds, this one 4; set num_envs=2"):
+    with pytest.raises(InputError, match=r"Noise has 2 environments, this one 4; set num_envs=2"):
         other.load_state_dict(one.state_dict())
 
 
 def test_pictures_that_are_none_from_0_to_1_are_refused():
     base = DroneEnv(1, SHORT, SMALL)
     for kind in (Noise, DeadRows, FrozenFrames, LateFrames, Shift):
-        with pytest.raises(InputError, match=rf"{kind.__name__} got torch.uint8 .* gray or rgb"):
+        with pytest.raises(
+            InputError, match=rf"{kind.__name__} got torch.uint8 .* after gray or rgb"
+        ):
             with_transforms(base, [kind()]).reset()
         for standard in (StandardizePixels(1.0, 1.0), StandardizePixels(0.0, 0.5)):
-            with pytest.raises(InputError, match=r"got pictures from .* before standardize"):
+            with pytest.raises(InputError, match=r"got images from .* before standardize"):
                 with_transforms(base, [GrayPixels(), standard, kind()]).reset()
 
 
@@ -255,13 +258,13 @@ def test_it_may_go_to_other_worlds_and_copies_of_it_share_nothing():
 
 def test_a_step_before_any_reset_is_refused():
     env = with_transforms(DroneEnv(1, SHORT, SMALL), [GrayPixels(), Noise()])
-    with pytest.raises(InputError, match=r"a step before any reset; reset\(\)"):
+    with pytest.raises(InputError, match=r"a step before any reset; call reset\(\)"):
         env.step(TensorDict({"action": torch.zeros(1, dtype=torch.int64)}, [1]))
 
 
 def test_worlds_without_streams_are_refused_and_batches_of_batches_have_them_within():
     serial = SerialEnv(1, lambda: with_transforms(DroneEnv(1, SHORT, SMALL), [GrayPixels()]))
-    with pytest.raises(InputError, match=r"SerialEnv, whose worlds have no random streams"):
+    with pytest.raises(InputError, match=r"wraps SerialEnv, which has no random streams"):
         TransformedEnv(serial, Noise()).reset()
     env = SerialEnv(2, lambda: make_env("all", 2))
     check_env_specs(env, break_when_any_done="both")
@@ -281,25 +284,23 @@ def test_alone_it_is_a_pipeline_and_with_no_environment_nothing_goes_wrong():
 def test_numbers_are_drawn_of_each_stream_alone():
     env = DroneEnv(3, SHORT, pixels=False)
     every = torch.arange(3)
-    drawn = normal(env.side_streams(every, 7), (4,), torch.device("cpu"))
-    assert torch.equal(normal(env.side_streams(every[1:], 7), (4,), torch.device("cpu")), drawn[1:])
-    assert not torch.equal(normal(env.side_streams(every, 8), (4,), torch.device("cpu")), drawn)
-    many = uniform(env.side_streams(every, 7), (5000,), torch.device("cpu"))
+
+    def sample(worlds, key, *shape, **how):
+        return _sampler(env.side_streams(worlds, key), torch.device("cpu"))(*shape, **how)
+
+    drawn = sample(every, 7, 4, normal=True)
+    assert torch.equal(sample(every[1:], 7, 4, normal=True), drawn[1:])
+    assert not torch.equal(sample(every, 8, 4, normal=True), drawn)
+    many = sample(every, 7, 5000)
     assert many.min() >= 0 and many.max() < 1
     assert many.mean(1).tolist() == pytest.approx([0.5] * 3, abs=0.02)
 
 
 class Inverted(CameraFault):
-    """One that a user may write: nothing to remember."""
+    """A user's fault without memory."""
 
-    def begin(self, pictures, streams):
-        return pictures.new_zeros(len(pictures), 1)
-
-    def go_on(self, memory, pictures, streams):
-        return memory
-
-    def show(self, memory, pictures):
-        return 1 - pictures
+    def __init__(self):
+        super().__init__(FaultModel(lambda images, memory, blank: 1 - images))
 
 
 def test_a_fault_of_ones_own():

@@ -1,5 +1,3 @@
-# pyright: reportArgumentType=false
-# (TorchRL annotates shapes as torch.Size alone; it takes tuples.)
 """The three-state Markov decision process of Fig. 3, small enough to know its exact gradient."""
 
 from collections.abc import Sequence

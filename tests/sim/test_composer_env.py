@@ -3,9 +3,9 @@ import torch
 from torchrl.envs.utils import check_env_specs
 
 from drone_rl.config import TaskSettings
-from drone_rl.envs.composer_env import ComposerEnv
 from drone_rl.sim.composer_task import make_environment
 from drone_rl.sim.dynamics import Kinematic
+from tests.composer_env import ComposerEnv
 from tests.continuous import SETTINGS
 
 SHORT = TaskSettings(step_limit=32)

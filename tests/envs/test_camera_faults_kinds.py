@@ -13,7 +13,7 @@ from drone_rl.envs import (
     LateFrames,
     Noise,
     Shift,
-    faults,
+    fault_models,
     with_transforms,
 )
 from drone_rl.utils.errors import InputError
@@ -21,6 +21,11 @@ from drone_rl.utils.errors import InputError
 LONG = TaskSettings(num_cubes=30, first_distance=3.0, spacing=3.0, step_limit=90)
 SMALL = CameraSettings(width=16, height=8)
 N = 3
+
+
+def delayed(frames, count):
+    """A film that is shown late; until then it shows its first image."""
+    return frames[(torch.arange(len(frames)) - count).clamp(min=0)]
 
 
 def film(*transforms, steps=10, episodes=1):
@@ -41,13 +46,13 @@ def film(*transforms, steps=10, episodes=1):
 @pytest.mark.parametrize("frames", [0, 1, 3])
 def test_late_frames_are_late_by_so_many(frames):
     shown, clean = film(LateFrames(frames))
-    assert torch.equal(shown, faults.delay(clean, frames))
+    assert torch.equal(shown, delayed(clean, frames))
     assert all(not torch.equal(clean[t], clean[t + 1]) for t in range(9))  # or it would say nothing
 
 
 def test_late_frames_of_an_episode_are_none_of_the_one_before():
     shown, clean = film(LateFrames(2), steps=5, episodes=2)
-    assert torch.equal(shown[5:], faults.delay(clean[5:], 2))
+    assert torch.equal(shown[5:], delayed(clean[5:], 2))
 
 
 def test_a_share_of_frames_is_frozen_as_they_were_shown():
@@ -77,7 +82,7 @@ def test_rows_are_dead_for_an_episode_and_others_in_the_next():
             dead = (shown[t, world, 0] == 0.125).all(-1)
             assert dead.sum() == 2
             for later in range(t, t + 4):
-                expected = faults.kill_rows(clean[later, world], dead, 0.125)
+                expected = fault_models.kill_rows(clean[later, world], dead, 0.125)
                 assert torch.equal(shown[later, world], expected)
             drawn.add(tuple(dead.nonzero().flatten().tolist()))
     assert len(drawn) > 8  # of 18, out of 28 pairs
@@ -104,7 +109,7 @@ def test_noise_is_of_the_stated_strength_and_correlation():
 
 def test_blur_is_the_function():
     shown, clean = film(Blur(1.0))
-    assert torch.equal(shown, faults.blur(clean, 1.0))
+    assert torch.equal(shown, fault_models.blur(clean, 1.0))
 
 
 def test_a_shift_stays_for_an_episode_and_every_one_is_drawn():
@@ -117,7 +122,7 @@ def test_a_shift_stays_for_an_episode_and_every_one_is_drawn():
                 {
                     i
                     for i, way in enumerate(ways)
-                    if torch.equal(shown[step, world], faults.shift(clean[step, world], way))
+                    if torch.equal(shown[step, world], fault_models.shift(clean[step, world], way))
                 }
                 for step in (t, t + 1)
             ]
@@ -155,7 +160,7 @@ def test_parameters_are_shown():
         (lambda: film(DeadRows(0, (8,)), steps=1), r"^rows=\[8\] of a picture .* give at most 7"),
         (
             lambda: Blur()._apply_transform(torch.zeros(2, 2, 3, dtype=torch.uint8)),
-            "Blur got torch.uint8 pictures; let gray or rgb come first",
+            "Blur got torch.uint8 images; put it after gray or rgb",
         ),
     ],
 )

@@ -9,7 +9,7 @@ from drone_rl.envs import (
     on_pixels,
     with_transforms,
 )
-from drone_rl.envs.pipeline import memory_of, see_film
+from drone_rl.envs.transforms import memory_of, see_film
 
 
 def test_transforms_are_applied_in_the_order_given():

@@ -7,7 +7,7 @@ import pytest
 
 LOADED = "hasattr(sys.modules.get('torch._dynamo'), '__file__')"
 START = """import sys
-from drone_rl.utils.compiler import leave_compiler_unloaded
+from drone_rl.utils.imports import leave_compiler_unloaded
 leave_compiler_unloaded()
 """
 

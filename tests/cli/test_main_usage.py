@@ -1,7 +1,7 @@
 import importlib
 
 from drone_rl.cli.hydra.composition import conf_dir
-from drone_rl.cli.usage import COMMANDS, USAGE
+from drone_rl.cli.main import COMMANDS, USAGE
 
 
 def test_every_command_is_told_of_has_a_module_and_a_file():

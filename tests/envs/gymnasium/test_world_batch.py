@@ -13,7 +13,7 @@ from tests.fake_flight import FLIGHT, floating
 from tests.second_task import Posts
 
 pytest.importorskip("gymnasium", reason="Gymnasium is not installed")
-from drone_rl.envs.gymnasium.stage import Stage
+from drone_rl.envs.gymnasium.world_batch import WorldBatch
 
 TASK = "collect_cubes"
 
@@ -24,11 +24,11 @@ def streams(*seeds):
 
 @pytest.mark.parametrize("task", [TASK, TaskSettings(num_cubes=5), None])
 def test_settings_of_task_and_camera(task):
-    stage = Stage(2, task, {"num_cubes": 2, "camera": {"width": 9}, "device": "cpu"})
+    stage = WorldBatch(2, task, {"num_cubes": 2, "camera": {"width": 9}, "device": "cpu"})
     assert stage.worlds.task.settings == TaskSettings(num_cubes=2)
     assert stage.worlds.camera == CameraSettings(width=9)
     assert stage.observation_space.shape == (25, 9, 3)
-    whole = Stage(1, task, {"camera": CameraSettings(height=8), "render_mode": "rgb_array"})
+    whole = WorldBatch(1, task, {"camera": CameraSettings(height=8), "render_mode": "rgb_array"})
     assert whole.observation_space.shape == (8, 64, 3)
     assert whole.render_mode == "rgb_array"
 
@@ -49,17 +49,17 @@ def test_settings_of_task_and_camera(task):
 )
 def test_mistakes_name_the_option(options, message):
     with pytest.raises(InputError, match=f"^{message}"):
-        Stage(1, TASK, options)
+        WorldBatch(1, TASK, options)
 
 
 def test_a_task_without_settings_takes_none():
-    assert Stage(1, Posts(), {}).worlds.task.name == "posts"
+    assert WorldBatch(1, Posts(), {}).worlds.task.name == "posts"
     with pytest.raises(InputError, match=r"^num_cubes is unknown; .*: observations, .*, renderer$"):
-        Stage(1, Posts(), {"num_cubes": 2})
+        WorldBatch(1, Posts(), {"num_cubes": 2})
 
 
 def test_episodes_are_drawn_from_the_streams_alone():
-    stage, (one, two) = Stage(2, TASK, {"observations": "state"}), streams(3, 4)
+    stage, (one, two) = WorldBatch(2, TASK, {"observations": "state"}), streams(3, 4)
     stage.reset(torch.arange(2), [one, two])
     first = stage.info()["cube_positions"]
     again = streams(4)[0].uniform(-1, 1, (3, 2))[:, 0] * 6
@@ -70,7 +70,7 @@ def test_episodes_are_drawn_from_the_streams_alone():
 
 
 def test_the_state_is_the_truth_in_a_row():
-    stage = Stage(1, TASK, {"observations": "state", "num_cubes": 2})
+    stage = WorldBatch(1, TASK, {"observations": "state", "num_cubes": 2})
     stage.reset(torch.tensor([0]), streams(0))
     stage.worlds.state.cubes[0, :, 1] = torch.tensor([4.0, -5.0])
     stage.worlds.state.lateral[0] = torch.tensor([4.0, torch.nan])
@@ -97,7 +97,7 @@ def test_the_state_is_the_truth_in_a_row():
 
 
 def test_pixels_are_those_of_the_batched_environment():
-    stage, env = Stage(2, TASK, {}), drone_rl.make_env(2, transforms=())
+    stage, env = WorldBatch(2, TASK, {}), drone_rl.make_env(2, transforms=())
     env.reset()
     stage.worlds.state = env.base_env.worlds.state
     assert np.array_equal(stage.observe(), env.base_env.last_pixels.numpy())
@@ -106,7 +106,7 @@ def test_pixels_are_those_of_the_batched_environment():
 
 
 def test_the_end_is_told_from_being_cut_off():
-    stage = Stage(4, TASK, {})
+    stage = WorldBatch(4, TASK, {})
     ends = stage.worlds.task.ends
     stage.worlds.state.end_reason = torch.tensor(
         [ends.RUNNING, ends.ALL_CUBES, ends.SIDE_BOUNDARY, ends.STEP_LIMIT]
@@ -118,7 +118,7 @@ def test_the_end_is_told_from_being_cut_off():
 
 
 def test_films_show_the_drone_from_behind():
-    stage = Stage(2, TASK, {"observations": "state"})
+    stage = WorldBatch(2, TASK, {"observations": "state"})
     film = stage.film()
     assert (film.shape, film.dtype) == ((2, 360, 640, 3), np.uint8)
     assert film[0, :, 320].std() > 10  # sky, drone, ground
@@ -127,7 +127,7 @@ def test_films_show_the_drone_from_behind():
 def test_settings_of_dynamics_and_actions(monkeypatch):
     floating(monkeypatch)
     given = {"dynamics": {"mode": "simple_flight"}, "actions": {"move_speed": 1.0}}
-    made = Stage(1, TASK, given).worlds.dynamics
+    made = WorldBatch(1, TASK, given).worlds.dynamics
     assert (made.settings, made.asked.move_speed) == (FLIGHT, 1.0)
     for wrong, message in (
         ({"dynamics": {"mas": 1.0}}, r"dynamics\.mas is unknown"),
@@ -135,4 +135,4 @@ def test_settings_of_dynamics_and_actions(monkeypatch):
         ({"actions": {"kind": "x"}}, r"actions\.kind='x' is unknown"),
     ):
         with pytest.raises(InputError, match=f"^{message}"):
-            Stage(1, TASK, wrong)
+            WorldBatch(1, TASK, wrong)

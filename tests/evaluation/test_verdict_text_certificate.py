@@ -3,7 +3,7 @@
 import pytest
 
 from benchmarks.evidence import PROOF as QUOTED
-from drone_rl.evaluation.certificate_text import PROOF, is_proved, is_quoted
+from drone_rl.evaluation.verdict_text import PROOF, is_proved, is_quoted
 from drone_rl.utils.text import said
 
 

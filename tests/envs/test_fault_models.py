@@ -5,7 +5,7 @@ import math
 import pytest
 import torch
 
-from drone_rl.envs import faults
+from drone_rl.envs import fault_models
 
 
 def noises(correlation_time, steps=400, pixels=5000):
@@ -13,7 +13,7 @@ def noises(correlation_time, steps=400, pixels=5000):
     draw = torch.Generator().manual_seed(0)
     now, seen = torch.randn(pixels, generator=draw), []
     for _ in range(steps):
-        now = faults.correlate(now, torch.randn(pixels, generator=draw), correlation_time)
+        now = fault_models.correlate(now, torch.randn(pixels, generator=draw), correlation_time)
         seen.append(now)
     return torch.stack(seen)
 
@@ -31,25 +31,25 @@ def test_noise_has_the_variance_and_the_correlation_that_are_stated(correlation_
 
 
 def test_a_step_of_noise_by_hand():
-    kept = faults.correlate(torch.tensor([2.0]), torch.tensor([1.0]), 1 / math.log(2))
+    kept = fault_models.correlate(torch.tensor([2.0]), torch.tensor([1.0]), 1 / math.log(2))
     torch.testing.assert_close(kept, torch.tensor([2 * 0.5 + math.sqrt(0.75)]))
-    fresh = faults.correlate(torch.tensor([9.0]), torch.tensor([1.0]), 0.0)
+    fresh = fault_models.correlate(torch.tensor([9.0]), torch.tensor([1.0]), 0.0)
     assert fresh.tolist() == [1.0]
 
 
 def test_noise_is_cut_off_at_black_and_white():
     pictures = torch.tensor([0.1, 0.5, 0.9]).reshape(1, 1, 3)
     noise = torch.tensor([-1.0, 0.5, 1.0]).reshape(1, 1, 3)
-    noisy = faults.add_noise(pictures, 0.2, noise)
+    noisy = fault_models.add_noise(pictures, 0.2, noise)
     torch.testing.assert_close(noisy.flatten(), torch.tensor([0.0, 0.6, 1.0]))
-    assert torch.equal(faults.add_noise(pictures, 0.0, noise), pictures)
+    assert torch.equal(fault_models.add_noise(pictures, 0.0, noise), pictures)
 
 
 @pytest.mark.parametrize("width", [0.3, 0.5, 2.0])
 def test_a_bright_pixel_becomes_a_gaussian(width):
     picture = torch.zeros(1, 41, 51)
     picture[0, 20, 25] = 1.0
-    blurred = faults.blur(picture, width)[0]
+    blurred = fault_models.blur(picture, width)[0]
     down, across = torch.meshgrid(torch.arange(41) - 20, torch.arange(51) - 25, indexing="ij")
     falls = torch.exp(-(down**2 + across**2).double() / (2 * width**2))
     torch.testing.assert_close(blurred, (falls / falls.sum()).float(), atol=2e-5, rtol=0)
@@ -59,7 +59,7 @@ def test_a_bright_pixel_becomes_a_gaussian(width):
 
 def test_weights_by_hand():
     half = math.exp(-0.5)
-    weights = faults.gaussian(1.0)
+    weights = fault_models.gaussian(1.0)
     assert len(weights) == 9 and math.fsum(weights) == pytest.approx(1.0, abs=1e-15)
     assert weights[3] / weights[4] == pytest.approx(half)
     assert weights[2] / weights[4] == pytest.approx(half**4)
@@ -68,26 +68,26 @@ def test_weights_by_hand():
 @pytest.mark.parametrize("width", [0.0, 0.5, 3.0, 16.0])
 def test_a_constant_picture_stays_as_it_is(width):
     picture = torch.full((2, 1, 5, 7), 0.7)
-    torch.testing.assert_close(faults.blur(picture, width), picture)
+    torch.testing.assert_close(fault_models.blur(picture, width), picture)
 
 
 def test_beyond_an_edge_is_as_on_the_edge():
     picture = torch.tensor([1.0, 0.0, 0.0, 0.0, 0.0, 0.0]).reshape(1, 1, 6)
-    weights = faults.gaussian(0.5)  # two pixels to each side
+    weights = fault_models.gaussian(0.5)  # two pixels to each side
     expected = [weights[0] + weights[1] + weights[2], weights[1] + weights[0], weights[0], 0, 0, 0]
-    torch.testing.assert_close(faults.blur(picture, 0.5).flatten(), torch.tensor(expected))
+    torch.testing.assert_close(fault_models.blur(picture, 0.5).flatten(), torch.tensor(expected))
 
 
 def test_a_picture_is_blurred_the_same_in_a_batch_of_any_size():
     pictures = torch.rand(7, 2, 9, 11, generator=torch.Generator().manual_seed(0))
-    together = faults.blur(pictures, 1.3)
+    together = fault_models.blur(pictures, 1.3)
     for i in range(7):
-        assert torch.equal(faults.blur(pictures[i : i + 1], 1.3)[0], together[i])
+        assert torch.equal(fault_models.blur(pictures[i : i + 1], 1.3)[0], together[i])
 
 
 def test_more_dead_rows_include_fewer():
     numbers = torch.tensor([[0.4, 0.1, 0.9, 0.3], [0.2, 0.3, 0.1, 0.8]])
-    chosen = [faults.choose_rows(numbers, count).int().tolist() for count in range(5)]
+    chosen = [fault_models.choose_rows(numbers, count).int().tolist() for count in range(5)]
     assert chosen[0] == [[0, 0, 0, 0], [0, 0, 0, 0]]
     assert chosen[1] == [[0, 1, 0, 0], [0, 0, 1, 0]]
     assert chosen[2] == [[0, 1, 0, 1], [1, 0, 1, 0]]
@@ -97,15 +97,15 @@ def test_more_dead_rows_include_fewer():
 def test_dead_rows_show_nothing():
     pictures = torch.full((1, 2, 3, 2), 0.5)
     dead = torch.tensor([[False, True, False]])
-    killed = faults.kill_rows(pictures, dead, 0.25)
+    killed = fault_models.kill_rows(pictures, dead, 0.25)
     assert killed.dtype == torch.float32
     assert killed[0, :, :, 0].tolist() == [[0.5, 0.25, 0.5]] * 2
-    assert faults.kill_rows(pictures, dead)[0, 0, 1].tolist() == [0.0, 0.0]
+    assert fault_models.kill_rows(pictures, dead)[0, 0, 1].tolist() == [0.0, 0.0]
 
 
 def test_frozen_pictures_are_those_before():
     now, before = torch.ones(2, 1, 1, 2), torch.zeros(2, 1, 1, 2)
-    shown = faults.freeze(now, before, torch.tensor([True, False]))
+    shown = fault_models.freeze(now, before, torch.tensor([True, False]))
     assert shown.flatten().tolist() == [0.0, 0.0, 1.0, 1.0]
 
 
@@ -113,13 +113,19 @@ def test_frozen_pictures_are_those_before():
     ("frames", "shown"), [(0, [0, 1, 2, 3]), (2, [0, 0, 0, 1]), (9, [0, 0, 0, 0])]
 )
 def test_a_late_film_shows_its_first_picture_until_the_second_arrives(frames, shown):
-    assert faults.delay(torch.arange(4), frames).tolist() == shown
+    fault, images = fault_models.late_frames(frames), torch.arange(4.0).reshape(4, 1, 1, 1, 1)
+    memory = fault.begin(images[0], None)
+    seen = [fault.show(images[0], memory, 0.0).item()]
+    for image in images[1:]:
+        memory = fault.update(memory, image, None)
+        seen.append(fault.show(image, memory, 0.0).item())
+    assert seen == shown
 
 
 def test_a_shift_by_hand():
     picture = torch.arange(6.0).reshape(1, 1, 2, 3).repeat(3, 1, 1, 1)
     by = torch.tensor([[0, 0], [1, 0], [-1, 2]])  # down, to the right
-    stays, down, up_and_right = faults.shift(picture, by)[:, 0].tolist()
+    stays, down, up_and_right = fault_models.shift(picture, by)[:, 0].tolist()
     assert stays == [[0, 1, 2], [3, 4, 5]]
     assert down == [[0, 1, 2], [0, 1, 2]]
     assert up_and_right == [[3, 3, 3], [3, 3, 3]]

@@ -32,7 +32,7 @@ def make():
 
 def put(env, lateral):
     """Where the cubes of the running episode stand, metres to the left."""
-    env.unwrapped.stage.worlds.state.cubes[0, :, 1] = lateral
+    env.unwrapped.batch.worlds.state.cubes[0, :, 1] = lateral
 
 
 @pytest.mark.parametrize(
@@ -84,9 +84,9 @@ def test_an_episode_to_its_success(make):
     _, reward, terminated, truncated, info = env.step(0)  # 2 m: touches from 1.65 m away
     assert (reward, terminated, truncated) == (1.0, True, False)
     assert (info["is_success"], info["collected"].tolist()) == (True, [True])
-    ends = env.unwrapped.stage.worlds.task.ends
+    ends = env.unwrapped.batch.worlds.task.ends
     assert ends(info["end_reason"]) == ends.ALL_CUBES
-    with pytest.raises(InputError, match=r"no episode to go on with; call reset\(\) first"):
+    with pytest.raises(InputError, match=r"needs a running episode; call reset\(\) first"):
         env.step(0)
     env.reset()
     env.step(0)
@@ -135,7 +135,7 @@ def test_it_draws_the_drone_from_behind_where_that_was_asked_for(make):
     assert env.render().shape == (360, 640, 3)
     silent = make()
     silent.reset(seed=0)
-    with pytest.warns(UserWarning, match="make it with render_mode='rgb_array'"):
+    with pytest.warns(UserWarning, match="render_mode='rgb_array'"):
         assert silent.unwrapped.render() is None
 
 
@@ -169,7 +169,7 @@ def test_mistakes_while_flying(make):
     with pytest.raises(gymnasium.error.Error, match="greater or equal to zero, actual value: -1"):
         env.reset(seed=-1)
     env.reset(seed=0)
-    with pytest.raises(InputError, match="action=5 can't be flown; give one of: 0 forward"):
+    with pytest.raises(InputError, match="action=5 is invalid; give one of: 0 forward"):
         env.step(5)
     env.step(0)  # the episode goes on
 
