@@ -17,8 +17,15 @@ once for all of them.
 import warp as wp
 
 from drone_rl.acceleration.layers_kernel import Layers, decide, keep, look
-from drone_rl.sim.rendering.raytrace.plain_kernel import Scratch, render_image
-from drone_rl.sim.rendering.raytrace.structs_kernel import Geoms, Images, Materials, Poses, View
+from drone_rl.sim.rendering.raytrace.plain_kernel import render_image
+from drone_rl.sim.rendering.raytrace.structs_kernel import (
+    Geoms,
+    Images,
+    Materials,
+    Poses,
+    Scratch,
+    View,
+)
 from drone_rl.sim.tasks.collect_cubes_kernel import Flights, move, place
 
 TOGETHER = wp.constant(16)
