@@ -1,7 +1,6 @@
 """The card of an exported policy: its verdict, its figures, and where they come from."""
 
-from drone_rl.evaluation.certificate_text import is_quoted
-from drone_rl.evaluation.verdict_text import best_baseline
+from drone_rl.evaluation.verdict_text import best_baseline, is_quoted
 from drone_rl.robustness.domain_text import QUOTED, untested
 from drone_rl.robustness.domain_text import is_quoted as has_domain
 from drone_rl.sim.vocabulary import some_cubes, terms_of

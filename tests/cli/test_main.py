@@ -7,8 +7,7 @@ import sys
 import pytest
 
 import drone_rl as drone_rl_package
-from drone_rl.cli.main import main
-from drone_rl.cli.usage import DEMO_USAGE, USAGE
+from drone_rl.cli.main import DEMO_USAGE, USAGE, main
 from tests.cli.running import TINY, drone_rl, error_line
 
 
@@ -63,7 +62,7 @@ def test_what_is_printed_without_running_anything(monkeypatch, capsys, tmp_path,
         (["evaluate"], ["policy=latest", "drone-rl train"]),
         (["evaluate", "checkpoint=no.pt"], ["no.pt", "does not exist"]),
         (["train", "-m", "no_such=1,2"], ["no_such", "--help"]),
-        (["train", "-m", "seed=0,1", "hydra.launcher.num_jobs=0"], ["num_jobs=0", "1 or more"]),
+        (["train", "-m", "seed=0,1", "hydra.launcher.num_jobs=0"], ["num_jobs=0", "at least 1"]),
         (["train", "-m", "seed=0,1", "hydra/launcher=pbs"], ["pbs", "slurm"]),
         (["train", "-m", "seed=interval(0,1)"], ["INTERVAL", "hydra/sweeper=optuna"]),
         (["sweep-report"], ["folder=latest", "drone-rl train -m"]),

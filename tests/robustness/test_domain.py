@@ -7,12 +7,12 @@ import pytest
 import torch
 
 from drone_rl.config import TaskSettings
+from drone_rl.envs.fault_models import dead_rows
 from drone_rl.evaluation.rule import Quantity, Rule
 from drone_rl.robustness import domain
 from drone_rl.robustness.agents import OracleAgent
 from drone_rl.robustness.axes import AXES, Axis
 from drone_rl.robustness.domain import Prober, is_surely_good
-from drone_rl.robustness.faults import dead_rows
 from drone_rl.robustness.paired_evaluation import PairedEvaluator
 from drone_rl.robustness.perturbations import Condition
 from drone_rl.utils.intervals import mean_bounds

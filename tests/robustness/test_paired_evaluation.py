@@ -5,9 +5,9 @@ import torch
 
 import drone_rl
 from drone_rl.config import DynamicsSettings, TaskSettings
+from drone_rl.envs.fault_models import late_frames
 from drone_rl.evaluation.rollouts import run_episodes
 from drone_rl.robustness.axes import AXES
-from drone_rl.robustness.faults import late_frames
 from drone_rl.robustness.paired_evaluation import PairedEvaluator, PolicySpec
 from drone_rl.robustness.perturbations import ONSET_STEP, Condition, Mode, whiten
 from drone_rl.sim.rendering.scene import SemanticClass

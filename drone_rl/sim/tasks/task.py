@@ -129,8 +129,10 @@ class Grid(NamedTuple):
 class FusedRules(Protocol):
     """Arrays of environments on which the fused episode kernel runs the rules of a task."""
 
+    functions: tuple[Any, Any, Any]
+    """Warp structure of the states; functions that write poses and that step an environment."""
     flights: Any
-    """Warp structure of the states."""
+    """The states."""
     poses: Any
     """Warp structure of the poses that are rendered."""
     steps: Tensor
