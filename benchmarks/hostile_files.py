@@ -154,7 +154,7 @@ def _descriptions(folder: Path) -> dict[str, bytes]:
     """Policies that are described as none can be."""
     described = {
         "cubes": ("task.num_cubes", 10**9),
-        "steps": ("task.step_limit"),
+        "steps": ("task.step_limit", 0),
         "whole_number_as_float": ("task.num_cubes", 1.0),
         "true_as_number": ("task.num_cubes", True),
         "nan_in_task": ("task.spacing", float("nan")),
