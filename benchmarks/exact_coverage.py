@@ -17,7 +17,7 @@ from drone_rl.config.training import TrainerSettings
 from drone_rl.evaluation.judge import judge_policy
 from drone_rl.policies.policy import Policy, load_policy
 from drone_rl.training import Callback
-from drone_rl.training.progress import OngoingTraining
+from drone_rl.training.callbacks import OngoingTraining
 from drone_rl.training.train import train
 from drone_rl.utils.progress import silent
 from drone_rl.verification.prove import prove

@@ -19,7 +19,6 @@ from benchmarks.gamed_case import GamedCase
 from drone_rl.collectors import EpisodeCollector
 from drone_rl.config import TaskSettings
 from drone_rl.config.commands import FlightSettings
-from drone_rl.config.configuration import as_config
 from drone_rl.config.networks import Mlp
 from drone_rl.config.training import TrainSettings
 from drone_rl.evaluation.evaluate import evaluate
@@ -145,7 +144,7 @@ def write_memory(path: Path, *, stream: Stream = Stream.REPORT) -> Path:
     Returns:
         The path.
     """
-    described = describe(as_config(TrainSettings(task=TASK, network=Mlp(hidden=(WIDTH,)))))
+    described = describe(TrainSettings(task=TASK, network=Mlp(hidden=(WIDTH,))))
     known = record(EPISODES, stream=stream)
     other = record(COUNTEREXAMPLES, seed=KNOWN_SEED + 1, stream=stream)
     frames, actions = _examples(known, other)

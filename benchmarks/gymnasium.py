@@ -25,7 +25,7 @@ def bench_gymnasium(num_envs: int, device: str, quick: bool) -> dict[str, float]
         InputError: Gymnasium isn't installed.
     """
     extra("gymnasium", "gym", "drone-rl bench gymnasium")
-    from drone_rl.envs.gymnasium.worlds import DroneWorlds
+    from drone_rl.envs.gymnasium.environments import DroneWorlds
 
     worlds, env = DroneWorlds(num_envs, device=device), make_worlds(num_envs, device)
     draw = np.random.default_rng(0)

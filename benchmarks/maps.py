@@ -101,7 +101,7 @@ def shipped(pictures: Pictures) -> dict[str, PictureNetwork]:
         exported = load_exported(policy_path(name))
         description = parse(exported["description"])
         is_of_moves = description.actions.kind == "moves"  # others' outputs are no three logits
-        if description.picture.shape != tuple(pictures.absent.shape) or not is_of_moves:
+        if description.input.shape != tuple(pictures.absent.shape) or not is_of_moves:
             continue
         parameters = exported["policy"]
         network = SmallCNN(pictures.absent.shape, 3, hidden=(128,))

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.commands import memory_status
-from drone_rl.utils.compiler import leave_compiler_unloaded
+from drone_rl.utils.imports import leave_compiler_unloaded
 from drone_rl.utils.memory import look_for_garbage_rarely
 
 SETTLING_FRAMES = 100_000
@@ -69,7 +69,7 @@ def main(folder: str, frames: str, device: str) -> None:
     import drone_rl
     from drone_rl.config.training import TrainerSettings
     from drone_rl.training import Callback
-    from drone_rl.training.progress import OngoingTraining
+    from drone_rl.training.callbacks import OngoingTraining
     from drone_rl.utils.memory import return_freed_memory
 
     samples: list[tuple[int, float]] = []

@@ -22,7 +22,7 @@ from drone_rl.envs import DroneEnv
 from drone_rl.policies import PolicyNetwork, SmallCNN, make_actor
 from drone_rl.policies.environment import make_env
 from drone_rl.sim.rendering import RendererFactory
-from drone_rl.training.build_collector import build_collector
+from drone_rl.training.components import make_collector
 
 
 def default_collector(
@@ -30,7 +30,7 @@ def default_collector(
 ) -> ThreadedCollector:
     """The collector of `drone-rl train`, with a policy that has learned nothing yet."""
     settings = TrainSettings(collector=Threads(num_envs=num_envs), device=device, dynamics=dynamics)
-    collector = build_collector(settings).collector
+    collector = make_collector(settings).collector
     assert isinstance(collector, ThreadedCollector)
     return collector
 

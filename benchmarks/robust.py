@@ -20,7 +20,7 @@ from drone_rl.policies.zoo import read_checkpoint
 from drone_rl.robustness.axes import AXES, GROUPS, find_axes
 from drone_rl.robustness.paired_evaluation import PairedEvaluator, PolicySpec
 from drone_rl.robustness.shifts import make_policy_spec
-from drone_rl.training.train import last_of, settings_of
+from drone_rl.training.run_folder import last_of, settings_of
 
 DEFAULT, ALL = "default", "all"
 ALL_KINDS = "all_kinds"

@@ -198,7 +198,7 @@ def _observe(kind: Type, lucky: float) -> list[float]:
     flown["forward"] = _episode(sides, [int(is_solved)] * len(sides))
     observed = [float(v[0]) if len(v) else np.nan for v in observe(ours, flown, _RULE)]
     straight = _RULE.quantities.index("above forward")
-    observed[straight] -= (1 - _RULE.luck_margin) * lucky
+    observed[straight] -= (1 - _RULE.poor_margin) * lucky
     return observed
 
 

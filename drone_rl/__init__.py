@@ -23,6 +23,13 @@ if TYPE_CHECKING:
         JudgeSettings,
         ShiftSettings,
     )
+    from drone_rl.config.registry import (
+        register_collector,
+        register_learner,
+        register_network,
+        register_returns,
+        register_transform,
+    )
     from drone_rl.config.sensors import SensorSettings
     from drone_rl.config.training import TrainerSettings, TrainSettings
     from drone_rl.config.verification import (
@@ -32,8 +39,7 @@ if TYPE_CHECKING:
         ProvableSettings,
         ProveSettings,
     )
-    from drone_rl.envs.gymnasium.world import DroneWorld
-    from drone_rl.envs.gymnasium.worlds import DroneWorlds
+    from drone_rl.envs.gymnasium.environments import DroneWorld, DroneWorlds
     from drone_rl.envs.sb3.worlds import Sb3Worlds
     from drone_rl.evaluation.evaluate import Evaluation, evaluate
     from drone_rl.explanations.explain import Explanations, explain
@@ -51,7 +57,9 @@ if TYPE_CHECKING:
     from drone_rl.policies.sb3.trunk import Sb3Trunk
     from drone_rl.robustness.shifts import Shifts, shifts
     from drone_rl.sim.image_types import ImageRequest, ImageType
-    from drone_rl.training.train import Training, train
+    from drone_rl.sim.tasks import register_task
+    from drone_rl.training.run_folder import Training
+    from drone_rl.training.train import train
     from drone_rl.utils.errors import InputError
     from drone_rl.verdicts.coverage import Coverage
     from drone_rl.verdicts.dynamics_sweep import Bodies, bodies
@@ -81,9 +89,9 @@ _PLACES = {
     "verification.provable": ("train_until_proved",),
     "verification.prove": ("Proof", "load_proof", "prove"),
     "robustness.shifts": ("Shifts", "shifts"),
-    "training.train": ("Training", "train"),
-    "envs.gymnasium.world": ("DroneWorld",),
-    "envs.gymnasium.worlds": ("DroneWorlds",),
+    "training.run_folder": ("Training",),
+    "training.train": ("train",),
+    "envs.gymnasium.environments": ("DroneWorld", "DroneWorlds"),
     "envs.sb3.worlds": ("Sb3Worlds",),
     "explanations.settings": ("ExplainSettings",),
     "flight.commands.command": ("FlightFuture", "PilotError"),
@@ -94,14 +102,22 @@ _PLACES = {
     "flight.commands.yaw": ("Drivetrain", "YawMode"),
     "policies.sb3.logits": ("Sb3Logits",),
     "policies.sb3.trunk": ("Sb3Trunk",),
-    "config.bodies": ("BodiesSettings",),
-    "config.chances": ("ChanceSettings",),
-    "config.checking": ("CheckSettings",),
-    "config.judging": ("EvaluateSettings", "JudgeSettings"),
-    "config.mapping": ("PlacesSettings",),
-    "config.provable": ("ProvableSettings",),
-    "config.proving": ("ProveSettings",),
-    "config.shifting": ("ShiftSettings",),
+    "config.commands": ("BodiesSettings", "EvaluateSettings", "JudgeSettings", "ShiftSettings"),
+    "config.verification": (
+        "ChanceSettings",
+        "CheckSettings",
+        "PlacesSettings",
+        "ProvableSettings",
+        "ProveSettings",
+    ),
+    "config.registry": (
+        "register_collector",
+        "register_learner",
+        "register_network",
+        "register_returns",
+        "register_transform",
+    ),
+    "sim.tasks": ("register_task",),
     "config.training": ("TrainSettings", "TrainerSettings"),
     "sim.image_types": ("ImageRequest", "ImageType"),
     "config": (
@@ -179,6 +195,12 @@ __all__ = [
     "places",
     "policy_from",
     "prove",
+    "register_collector",
+    "register_learner",
+    "register_network",
+    "register_returns",
+    "register_task",
+    "register_transform",
     "shifts",
     "train",
     "train_until_proved",

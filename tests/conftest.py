@@ -51,3 +51,12 @@ def make_pipeline():
     yield build
     for env in envs:
         env.close(raise_if_closed=False)
+
+
+@pytest.fixture
+def registered():
+    """Remembers registered parts and removes them after the test."""
+    parts = []
+    yield lambda part: parts.append(part) or part
+    for part in parts:
+        del part.Settings.target

@@ -66,7 +66,7 @@ class Posts(Task[PostsState]):
         tested="two posts",
     )
     strata = ("left", "right")
-    luck = ("random", "forward")
+    blind_baselines = ("random", "forward")
     scored = ("passed", "sides")
     remembered = types.MappingProxyType(
         {"posts": "positions of the posts (T, 2, 3)", "next_target": "number of the next post (T,)"}

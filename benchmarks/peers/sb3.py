@@ -13,12 +13,12 @@ from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 
 from benchmarks.peers.outcome import DECAY, TARGET, PeerTraining
 from drone_rl.config.transforms import Gray, Standardize, Transform
-from drone_rl.envs.gymnasium.worlds import DroneWorlds
+from drone_rl.envs.gymnasium.environments import DroneWorlds
 from drone_rl.envs.sb3.worlds import Sb3Worlds
 from drone_rl.policies.external_policy import policy_from
 from drone_rl.policies.sb3.logits import Sb3Logits
 from drone_rl.policies.sb3.trunk import Sb3Trunk
-from drone_rl.training.metrics import running_mean
+from drone_rl.training.trainer import running_mean
 from drone_rl.utils.errors import InputError
 
 ALGORITHMS: Mapping[str, type[OnPolicyAlgorithm]] = MappingProxyType({"ppo": PPO, "a2c": A2C})
@@ -99,7 +99,7 @@ def train_sb3(
         **settings,
     )
     model.learn(max_frames, callback=solved)
-    stage = worlds.stage
+    stage = worlds.batch
     env.close()
     policy = policy_from(
         Sb3Logits(model),

@@ -93,6 +93,8 @@ def _join(steps: list[Entries], rows: list[Tensor], num_envs: int) -> TensorDict
 class DirectStream:
     """Steps all environments on and on; gives the same as `TorchrlStream`, bit for bit."""
 
+    name = "direct collector"
+
     def __init__(self, renderer: DirectRenderer) -> None:
         """Takes over the environment's states."""
         self._renderer = renderer

@@ -82,7 +82,8 @@ class FusedCollector:
         self._cache: ActivationCache | None = None
         self._logits = torch.empty(0, num_actions)
         self._owner = getattr(self._actor.network, "owner", "the policy")
-        load_kernels(rollout_kernel)
+        self._kernel = rollout_kernel.make_kernel(*worlds.functions)
+        load_kernels(self._kernel.module)
 
     @classmethod
     def try_create(cls, direct: DirectCollector, num_threads: int) -> Self | Reasons:
@@ -121,7 +122,7 @@ class FusedCollector:
         """
         if self._actor.exploration not in (ExplorationType.RANDOM, ExplorationType.DETERMINISTIC):
             return self._direct.collect(num_envs)
-        load_kernels(rollout_kernel).result()
+        load_kernels(self._kernel.module).result()
         self._renderer.env.start()
         state: Any = self._renderer.worlds.state
         self._worlds.begin(state)
@@ -198,7 +199,7 @@ class FusedCollector:
 
         def work(member: int, first: int, last: int) -> None:
             inputs = [first, last, member, *given]
-            wp.launch(rollout_kernel.fly, 1, inputs=inputs, device="cpu")
+            wp.launch(self._kernel, 1, inputs=inputs, device="cpu")
 
         self._workers.map_spans(0, num_envs, work)
 

@@ -8,22 +8,20 @@ from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
 
-from drone_rl.config.commands import BenchSettings, PathsSettings
+from drone_rl.cli.settings import CommandSettings
+from drone_rl.config.commands import BenchSettings
 from drone_rl.utils.errors import InputError
 
 _log = logging.getLogger(__name__)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Command(BenchSettings):
-    """What `drone-rl bench` can be told."""
-
-    paths: PathsSettings = PathsSettings()
-    """Folders."""
+class Command(CommandSettings, BenchSettings):
+    """Settings of `drone-rl bench`."""
 
 
 def _benchmarks() -> ModuleType:
-    """Import the registry of benchmarks, which a checkout has and an installed wheel has not.
+    """Import the registry of benchmarks, which is in a checkout but not in an installed wheel.
 
     Raises:
         InputError: It is missing.
@@ -40,7 +38,7 @@ def _benchmarks() -> ModuleType:
 
 
 def prepare(overrides: Sequence[str]) -> list[str]:
-    """Makes `drone-rl bench collector --quick` mean `only=[collector] quick=true`."""
+    """Translate `drone-rl bench collector --quick` to `only=[collector] quick=true`."""
     find_benchmarks = _benchmarks().find_benchmarks
     words = [o for o in overrides if "=" not in o and not o.startswith("-")]
     names = find_benchmarks(words)
@@ -54,10 +52,10 @@ def prepare(overrides: Sequence[str]) -> list[str]:
 
 
 def run(settings: Command, output_dir: Path) -> tuple[int, None]:
-    """Runs benchmarks; each adds to results.json when it is done.
+    """Run benchmarks; each adds its results to results.json.
 
     Raises:
-        InputError: One failed; those after it were run all the same.
+        InputError: Some failed; the others were run all the same.
     """
     del output_dir
     registry = _benchmarks()

@@ -5,21 +5,19 @@ import logging
 from pathlib import Path
 
 import drone_rl
-from drone_rl.config.commands import BodiesSettings, PathsSettings
+from drone_rl.cli.settings import CommandSettings
+from drone_rl.config.commands import BodiesSettings
 
 _log = logging.getLogger(__name__)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Command(BodiesSettings):
-    """What `drone-rl bodies` can be told."""
-
-    paths: PathsSettings = PathsSettings()
-    """Folders."""
+class Command(CommandSettings, BodiesSettings):
+    """Settings of `drone-rl bodies`."""
 
 
 def run(settings: Command, folder: Path) -> tuple[int, int]:
-    """Flies policies in several bodies. Returns the exit status and how many verdicts there are."""
+    """Judge policies with several vehicles; return the exit status and the number of verdicts."""
     from drone_rl.utils.progress import silent
 
     asked = settings.narrowed(BodiesSettings)

@@ -6,9 +6,8 @@ from pathlib import Path
 from typing import Annotated
 
 import drone_rl
-from drone_rl.cli.hydra.resuming import policies as prepare  # noqa: F401 -- of what was typed
-from drone_rl.config.commands import PathsSettings
-from drone_rl.config.configuration import TaskChanges, no_changes
+from drone_rl.cli.hydra.resuming import policies as prepare  # noqa: F401
+from drone_rl.cli.settings import PolicyCommandSettings
 from drone_rl.config.verification import ChanceSettings
 from drone_rl.utils.schema import Real, Several
 
@@ -16,22 +15,16 @@ _log = logging.getLogger(__name__)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Command(ChanceSettings):
-    """What `drone-rl chain` can be told."""
+class Command(PolicyCommandSettings, ChanceSettings):
+    """Settings of `drone-rl chain`."""
 
-    policy: str = "latest"
-    """Whose chances, see `drone_rl.load_policy`."""
     cubes: Annotated[tuple[float, ...], Several(Real(-10_000.0, 10_000.0, unit="m"), 0, 100)] = ()
-    """Where the cubes of one placement stand, metres to the left, nearest first; none: held-out
-    placements."""
-    task: TaskChanges = no_changes()
-    """What to change of the policy's task."""
-    paths: PathsSettings = PathsSettings()
-    """Folders."""
+    """Lateral positions of the cubes of one placement, metres to the left, nearest first; none:
+    held-out placements."""
 
 
 def run(settings: Command, folder: Path) -> tuple[int, float]:
-    """Tells one policy's chances. Returns the exit status and the probability of success."""
+    """Compute the outcome probabilities; return the exit status and the success probability."""
     from drone_rl.utils.progress import silent
 
     done = drone_rl.chances(

@@ -5,8 +5,8 @@ import logging
 from pathlib import Path
 
 import drone_rl
-from drone_rl.cli.hydra.resuming import policies as prepare  # noqa: F401 -- of what was typed
-from drone_rl.config.commands import PathsSettings
+from drone_rl.cli.hydra.resuming import policies as prepare  # noqa: F401
+from drone_rl.cli.settings import CommandSettings
 from drone_rl.config.configuration import TaskChanges, no_changes
 from drone_rl.config.verification import CheckSettings
 
@@ -14,21 +14,19 @@ _log = logging.getLogger(__name__)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Command(CheckSettings):
-    """What `drone-rl check` can be told."""
+class Command(CommandSettings, CheckSettings):
+    """Settings of `drone-rl check`."""
 
     certificate: str = "latest"
-    """Which, see `drone_rl.check`."""
+    """The certificate, see `drone_rl.check`."""
     policy: str | None = None
-    """Whom it is of; none takes the policy of the package that it names."""
+    """Its policy; none takes the policy of the package that it names."""
     task: TaskChanges = no_changes()
-    """Settings of the task that it must be of; none accepts any."""
-    paths: PathsSettings = PathsSettings()
-    """Folders."""
+    """Required settings of its task; none accepts any."""
 
 
 def run(settings: Command, folder: Path) -> tuple[int, bool]:
-    """Checks a certificate. Returns the exit status and whether it is accepted."""
+    """Check a certificate; return the exit status and whether it is accepted."""
     from drone_rl.utils.progress import silent
 
     done = drone_rl.check(

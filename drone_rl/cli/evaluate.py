@@ -7,34 +7,26 @@ from pathlib import Path
 from typing import Annotated
 
 import drone_rl
-from drone_rl.cli.hydra.resuming import policies as prepare  # noqa: F401 -- of what was typed
-from drone_rl.config.commands import EvaluateSettings, PathsSettings
-from drone_rl.config.configuration import DynamicsChanges, TaskChanges, no_changes
+from drone_rl.cli.hydra.resuming import policies as prepare  # noqa: F401
+from drone_rl.cli.settings import RolloutCommandSettings
+from drone_rl.config.commands import EvaluateSettings
 from drone_rl.utils.schema import Whole
 
 _log = logging.getLogger(__name__)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Command(EvaluateSettings):
-    """What `drone-rl evaluate` can be told."""
+class Command(RolloutCommandSettings, EvaluateSettings):
+    """Settings of `drone-rl evaluate`."""
 
-    policy: str = "latest"
-    """What to evaluate, see `drone_rl.load_policy`."""
     videos: Annotated[int, Whole(0, unit="episodes")] = 2
-    """Episodes filmed as MP4 and GIF; 0 for none."""
+    """Episodes recorded as MP4 and GIF; 0 for none."""
     greedy: bool = True
-    """Whether the films show the most probable actions instead of drawn ones."""
-    task: TaskChanges = no_changes()
-    """What to change of the policy's task."""
-    dynamics: DynamicsChanges = no_changes()
-    """What to change of how the policy's drone moves."""
-    paths: PathsSettings = PathsSettings()
-    """Folders."""
+    """Whether the videos show the most probable actions instead of sampled ones."""
 
 
 def run(settings: Command, folder: Path) -> tuple[int, float]:
-    """Evaluates one policy. Returns the exit status and the share of complete episodes."""
+    """Evaluate one policy; return the exit status and the success rate."""
     from drone_rl.utils.progress import log
 
     policy = drone_rl.load_policy(settings.policy, outputs=settings.paths.outputs)

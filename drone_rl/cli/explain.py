@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import drone_rl
-from drone_rl.cli.hydra.resuming import policies as prepare  # noqa: F401 -- of what was typed
-from drone_rl.config.commands import PathsSettings
+from drone_rl.cli.hydra.resuming import policies as prepare  # noqa: F401
+from drone_rl.cli.settings import CommandSettings
 from drone_rl.config.configuration import DynamicsChanges, TaskChanges, no_changes
 from drone_rl.evaluation.rule import Kind
 from drone_rl.explanations.settings import ExplainSettings
@@ -17,25 +17,23 @@ _log = logging.getLogger(__name__)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Command(ExplainSettings):
-    """What `drone-rl explain` can be told."""
+class Command(CommandSettings, ExplainSettings):
+    """Settings of `drone-rl explain`."""
 
     policy: Annotated[Any, Listed("policy")] = ("latest",)
-    """Whom to explain, one or several, see `drone_rl.load_policy`."""
+    """One or several policies, see `drone_rl.load_policy`."""
     num_envs: Annotated[int, Whole(1, unit="worlds")] = 128
-    """Worlds in one batch; bounds memory."""
+    """Environments in one batch; bounds memory."""
     require: Annotated[str, OneOf(tuple(Kind))] | None = None
     """Refuse (exit status 10 to 13, or 18) a policy whose verdict is not this; none accepts all."""
     task: TaskChanges = no_changes()
-    """What to change of the policy's task."""
+    """Changes of the policy's task."""
     dynamics: DynamicsChanges = no_changes()
-    """What to change of how the policy's drone moves."""
-    paths: PathsSettings = PathsSettings()
-    """Folders."""
+    """Changes of the policy's vehicle dynamics."""
 
 
 def run(settings: Command, folder: Path) -> tuple[int, str]:
-    """Explains policies and reports on them. Returns the exit status and the report's path."""
+    """Explain policies in a report; return the exit status and the report's path."""
     from drone_rl.utils.progress import log
 
     loaded = [drone_rl.load_policy(p, outputs=settings.paths.outputs) for p in settings.policy]
@@ -55,6 +53,6 @@ def run(settings: Command, folder: Path) -> tuple[int, str]:
 
 
 def _refused(verdicts: list[dict[str, Any]], required: str) -> list[int]:
-    """Exit statuses of the verdicts that are another kind, or are not certain."""
+    """Return the exit statuses of verdicts of another kind, or that are not certain."""
     other = [v for v in verdicts if not (v["certain"] and v["kind"] == required)]
     return [verdict["exit_code"] or Kind.NONE.exit_code for verdict in other]

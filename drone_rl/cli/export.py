@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import Annotated
 
 import drone_rl
-from drone_rl.cli.hydra.resuming import policies as prepare  # noqa: F401 -- of what was typed
-from drone_rl.config.commands import FlightSettings, PathsSettings
+from drone_rl.cli.hydra.resuming import policies as prepare  # noqa: F401
+from drone_rl.cli.settings import CommandSettings
+from drone_rl.config.commands import FlightSettings
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.overrides import COMMAND
 from drone_rl.utils.schema import FileName, OneOf
@@ -17,26 +18,24 @@ _log = logging.getLogger(__name__)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Command(FlightSettings):
-    """What `drone-rl export` can be told."""
+class Command(CommandSettings, FlightSettings):
+    """Settings of `drone-rl export`."""
 
     policy: str = "latest"
-    """Which policy, see `drone_rl.load_policy`."""
+    """The policy, see `drone_rl.load_policy`."""
     name: Annotated[str, FileName()] = "policy"
     """Name of the files."""
     format: Annotated[str, OneOf(("safetensors", "onnx"))] = "safetensors"
-    """What is written: safetensors with a model card for this program, an ONNX model for any."""
+    """safetensors with a model card for this program, or an ONNX model for any."""
     command: Annotated[str, COMMAND] | None = None
     """The command that trained it, for the card; none names the run's own settings."""
     certificate: str | None = None
-    """A proof's file for the card to quote; none takes the one that lies with the policy."""
+    """Certificate for the card; none takes the one next to the policy."""
     shifts: str | None = None
-    """A file of drone-rl shifts for the card; none takes the policy's, or the newest of its own."""
-    paths: PathsSettings = PathsSettings()
-    """Folders."""
+    """Result of drone-rl shifts for the card; none takes the policy's, or its newest."""
 
     def check(self) -> None:
-        """Proofs and flights are quoted on a card, and beside an ONNX model lies none."""
+        """Refuse quotes for the card with an ONNX model, which has no card."""
         for name, given in (("certificate", self.certificate), ("shifts", self.shifts)):
             if self.format == "onnx" and given is not None:
                 raise InputError(
@@ -46,7 +45,7 @@ class Command(FlightSettings):
 
 
 def run(settings: Command, folder: Path) -> tuple[int, str]:
-    """Exports one policy. Returns the exit status and the file's path."""
+    """Export one policy; return the exit status and the file's path."""
     from drone_rl.utils.seeding import root_seed  # imports torch
     from drone_rl.verdicts.export import export
     from drone_rl.verdicts.onnx_export import export_onnx
@@ -56,7 +55,7 @@ def run(settings: Command, folder: Path) -> tuple[int, str]:
     if settings.format == "onnx":
         seed = root_seed(settings.seed)
         found = export_onnx(policy, target, command=settings.command, seed=seed.value)
-        difference = f"{found.difference:.1e} in {found.frames:,} pictures"
+        difference = f"{found.difference:.1e} in {found.frames:,} images"
         _log.info("written: %s, which differs from PyTorch by at most %s", target, difference)
         _log.info("%s", seed_line(seed.as_dict()))
         return 0, str(target)

@@ -1,4 +1,4 @@
-"""`drone-rl <command> [setting=value ...]`: finds the command and runs it."""
+"""`drone-rl <command> [setting=value ...]`: find the command and run it."""
 
 import importlib
 import os
@@ -6,12 +6,61 @@ import sys
 from typing import cast
 
 import drone_rl
-from drone_rl.cli.usage import COMMANDS, DEMO_USAGE, USAGE
-from drone_rl.utils.compiler import leave_compiler_unloaded
-from drone_rl.utils.memory import leave_garbage_to_the_system, look_for_garbage_rarely
+from drone_rl.utils.imports import leave_compiler_unloaded
+from drone_rl.utils.memory import look_for_garbage_rarely
+
+USAGE = """\
+drone-rl: a drone learns to fly from its camera, and you learn whether to trust it.
+
+usage: drone-rl COMMAND [setting=value ...]
+
+commands
+  demo       train with the defaults, then evaluate, film and explain the result
+  train      learn a policy; writes checkpoints and logs under outputs/train
+  evaluate   test a policy on unseen worlds: table, JSON, videos
+  play       film a policy, or watch it in dm_control's viewer
+  explain    see what a policy sees, and whether to trust it: one HTML report
+  report     make the report of explanations again, or of several side by side
+  verdict    good, poor or one-sided? proved? as JSON and as an exit status
+  prove      how does it end from every placement of the cubes? exactly, as a certificate
+  check      does a certificate hold? flown anew; as JSON and as an exit status
+  places     what does it do about one cube, wherever that stands? exactly, as a map
+  shifts     under which other conditions is it good? light, camera, sizes, faults, motion
+  bodies     what becomes of its verdict when its drone gets a body? wind, motors, cameras
+  chain      how probable each end of an episode is, exactly, if moves are drawn
+  export     write a policy as safetensors with a model card, or as an ONNX model
+  sweep-report  compare the runs of a sweep: CSV, JSON, one HTML page
+  bench      measure every figure that the README quotes
+
+examples
+  drone-rl train                       train with the defaults
+  drone-rl train seed=1 device=cuda    change settings
+  drone-rl train -m seed=0,1,2         one run for each value, side by side
+  drone-rl train resume=RUN_FOLDER     go on with an interrupted run
+  drone-rl evaluate                    test the newest policy
+  drone-rl explain policy=good         explain a policy that travels with the package
+  drone-rl COMMAND --help              every setting of a command
+  drone-rl --version                   the version
+"""
+DEMO_USAGE = """\
+drone-rl demo [setting=value ...]
+
+Runs three commands, each into a folder of its own under outputs/:
+  drone-rl train [setting=value ...]   with the settings that you give
+  drone-rl evaluate                    the policy that came out
+  drone-rl explain                     the same policy
+
+The settings are those of drone-rl train; drone-rl train --help lists them.
+"""
+COMMANDS = (
+    *("train", "evaluate", "play", "explain", "report", "verdict"),
+    *("prove", "check", "places", "shifts", "bodies", "chain", "export", "sweep-report", "bench"),
+)
+"""Commands with a module in `drone_rl.cli` and a file in conf/; `demo` runs three of them."""
+
 
 CLOSED = 128 + 13
-"""Exit status if nobody reads standard output any more, as of a program that SIGPIPE ends."""
+"""Exit status when standard output is closed, as of a program that SIGPIPE ends."""
 
 
 def main() -> None:
@@ -30,12 +79,12 @@ def main() -> None:
 
 
 def _let_output_go() -> None:
-    """What is left in the buffer goes nowhere, or the interpreter would try once more."""
+    """Discard buffered output, which the interpreter would write at exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _main(args: list[str]) -> int:
-    """Runs what was typed. Returns the exit status."""
+    """Run a command line; return the exit status."""
     if not args or args[0] in ("-h", "--help", "help"):
         print(USAGE)
         return 0
@@ -49,17 +98,15 @@ def _main(args: list[str]) -> int:
         print(DEMO_USAGE)
         return 0
     look_for_garbage_rarely()
-    from drone_rl.cli.hydra.messages import guarded  # usage and typing errors don't wait for Hydra
+    from drone_rl.cli.hydra.messages import guarded  # slow: imports Hydra
 
     leave_compiler_unloaded()
     steps = [("train", overrides), ("evaluate", []), ("explain", [])]
-    status = guarded(lambda: _run_all(steps if name == "demo" else [(name, overrides)]))
-    leave_garbage_to_the_system()
-    return status
+    return guarded(lambda: _run_all(steps if name == "demo" else [(name, overrides)]))
 
 
 def _run_all(steps: list[tuple[str, list[str]]]) -> int:
-    """One command after the other, until one fails."""
+    """Run commands one after the other until one fails."""
     from drone_rl.cli.hydra.composition import Command, run_command
 
     for name, overrides in steps:

@@ -5,28 +5,20 @@ import logging
 from pathlib import Path
 
 import drone_rl
-from drone_rl.cli.hydra.resuming import policies as prepare  # noqa: F401 -- of what was typed
-from drone_rl.config.commands import PathsSettings
-from drone_rl.config.configuration import TaskChanges, no_changes
+from drone_rl.cli.hydra.resuming import policies as prepare  # noqa: F401
+from drone_rl.cli.settings import PolicyCommandSettings
 from drone_rl.config.verification import PlacesSettings
 
 _log = logging.getLogger(__name__)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Command(PlacesSettings):
-    """What `drone-rl places` can be told."""
-
-    policy: str = "latest"
-    """Of whom, see `drone_rl.load_policy`."""
-    task: TaskChanges = no_changes()
-    """What to change of the policy's task."""
-    paths: PathsSettings = PathsSettings()
-    """Folders."""
+class Command(PolicyCommandSettings, PlacesSettings):
+    """Settings of `drone-rl places`."""
 
 
 def run(settings: Command, folder: Path) -> tuple[int, float]:
-    """Maps one policy's places. Returns the exit status and the share of blind ones."""
+    """Map the outcome by cube position; return the exit status and the blind fraction."""
     from drone_rl.utils.progress import silent
 
     done = drone_rl.places(

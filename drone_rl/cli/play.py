@@ -5,46 +5,36 @@ from pathlib import Path
 from typing import Annotated
 
 import drone_rl
-from drone_rl.cli.hydra.resuming import policies as prepare  # noqa: F401 -- of what was typed
+from drone_rl.cli.hydra.resuming import policies as prepare  # noqa: F401
+from drone_rl.cli.settings import RolloutCommandSettings
 from drone_rl.config import AppearanceSettings, RendererName
-from drone_rl.config.commands import PathsSettings
-from drone_rl.config.configuration import DynamicsChanges, TaskChanges, no_changes
 from drone_rl.utils.schema import Whole
-from drone_rl.utils.settings import Settings
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Command(Settings):
-    """What `drone-rl play` can be told."""
+class Command(RolloutCommandSettings):
+    """Settings of `drone-rl play`."""
 
-    policy: str = "latest"
-    """Who flies, see `drone_rl.load_policy`."""
     episodes: Annotated[int, Whole(1, unit="episodes")] = 3
-    """Episodes to film, one file each."""
+    """Episodes to record, one file each."""
     greedy: bool = True
-    """Whether to take the most probable action instead of drawing one."""
+    """Whether to take the most probable action instead of sampling."""
     seed: Annotated[int, Whole(0)] = 0
-    """Root of the worlds' random streams."""
+    """Root of the environments' random streams."""
     viewer: bool = False
-    """Whether to open dm_control's viewer, which needs a display, instead of filming."""
+    """Whether to open dm_control's viewer, which needs a display, instead of recording."""
     device: str = "cpu"
-    """Where worlds are drawn and the policy runs: cpu, cuda or cuda:N."""
+    """Device of rendering and policy: cpu, cuda or cuda:N."""
     renderer: RendererName = "raytrace"
-    """Who draws: raytrace, our own, or mujoco_warp, MuJoCo Warp's."""
+    """Renderer: raytrace (built in) or mujoco_warp (MuJoCo Warp)."""
     appearance: AppearanceSettings | None = None
-    """How worlds look; none for as in the policy's training."""
-    task: TaskChanges = no_changes()
-    """What to change of the policy's task."""
-    dynamics: DynamicsChanges = no_changes()
-    """What to change of how the policy's drone moves."""
-    paths: PathsSettings = PathsSettings()
-    """Folders."""
+    """Visual appearance; none for that of the policy's training."""
 
 
 def run(settings: Command, folder: Path) -> tuple[int, None]:
-    """Films a policy. Returns the exit status."""
+    """Record videos of a policy; return the exit status."""
     policy = drone_rl.load_policy(settings.policy, outputs=settings.paths.outputs)
-    from drone_rl.evaluation.video import film, view  # after what is slow to import
+    from drone_rl.evaluation.video import film, view  # slow to import
 
     policy = policy.in_task(**settings.task)
     policy = policy.in_dynamics(**settings.dynamics) if settings.dynamics else policy

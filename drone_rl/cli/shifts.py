@@ -5,29 +5,20 @@ import logging
 from pathlib import Path
 
 import drone_rl
-from drone_rl.cli.hydra.resuming import policies as prepare  # noqa: F401 -- of what was typed
-from drone_rl.config.commands import PathsSettings, ShiftSettings
-from drone_rl.config.configuration import DynamicsChanges, TaskChanges, no_changes
+from drone_rl.cli.hydra.resuming import policies as prepare  # noqa: F401
+from drone_rl.cli.settings import RolloutCommandSettings
+from drone_rl.config.commands import ShiftSettings
 
 _log = logging.getLogger(__name__)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Command(ShiftSettings):
-    """What `drone-rl shifts` can be told."""
-
-    policy: str = "latest"
-    """Of whom, see `drone_rl.load_policy`."""
-    task: TaskChanges = no_changes()
-    """What to change of the policy's task."""
-    dynamics: DynamicsChanges = no_changes()
-    """What to change of how the policy's drone moves."""
-    paths: PathsSettings = PathsSettings()
-    """Folders."""
+class Command(RolloutCommandSettings, ShiftSettings):
+    """Settings of `drone-rl shifts`."""
 
 
 def run(settings: Command, folder: Path) -> tuple[int, float]:
-    """Flies one policy. Returns the exit status and the mean area under success over strength."""
+    """Measure robustness; return the exit status and the mean area under success over strength."""
     from drone_rl.utils.progress import log
 
     done = drone_rl.shifts(

@@ -6,33 +6,30 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
-from drone_rl.config.commands import PathsSettings
+from drone_rl.cli.settings import CommandSettings
 from drone_rl.utils.schema import Whole
-from drone_rl.utils.settings import Settings
 
 _log = logging.getLogger(__name__)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Command(Settings):
-    """What `drone-rl sweep-report` can be told."""
+class Command(CommandSettings):
+    """Settings of `drone-rl sweep-report`."""
 
     folder: str = "latest"
     """Folder of the sweep, or latest for the newest one."""
     picture: str | None = None
-    """PNG to write, too, of what policies came out, lost sides and entropies; none for none."""
+    """PNG of verdicts, sides and entropies to write as well; none for none."""
     judge: bool = False
-    """Whether to judge the last.pt of every finished run again, by the present rule."""
+    """Whether to judge the last.pt of every finished run again, by the current rule."""
     episodes: Annotated[int, Whole(1, unit="episodes")] = 200
-    """Episodes of such a verdict, in worlds to choose by."""
+    """Episodes of such a verdict, in selection environments."""
     device: str = "cpu"
-    """Where these are flown: cpu, cuda or cuda:N."""
-    paths: PathsSettings = PathsSettings()
-    """Folders."""
+    """Device of these episodes: cpu, cuda or cuda:N."""
 
 
 def prepare(overrides: Sequence[str]) -> list[str]:
-    """Makes `drone-rl sweep-report FOLDER` mean `folder=FOLDER`."""
+    """Translate `drone-rl sweep-report FOLDER` to `folder=FOLDER`."""
     from drone_rl.sweeps.runs import quoted
 
     return [
@@ -42,7 +39,7 @@ def prepare(overrides: Sequence[str]) -> list[str]:
 
 
 def run(settings: Command, folder: Path) -> tuple[int, None]:
-    """Reports on a sweep, finished or not. Returns the exit status."""
+    """Report on a sweep, finished or not; return the exit status."""
     from drone_rl.sweeps.report import find_sweep, judge_sweep, report_sweep, write_picture
 
     del folder

@@ -1,4 +1,4 @@
-"""`drone-rl train`: one run, or the sweep of many, which needs none of the heavy libraries."""
+"""`drone-rl train`: one run, or a sweep, whose own process imports no heavy libraries."""
 
 import dataclasses
 import functools
@@ -17,7 +17,7 @@ from drone_rl.cli.hydra.launchers import (
     SlurmLauncher,
     register_plugins,
 )
-from drone_rl.config.commands import PathsSettings
+from drone_rl.cli.settings import CommandSettings
 from drone_rl.config.training import Logger, Tensorboard, TrainSettings
 from drone_rl.config.verification import ProvableSettings
 from drone_rl.utils.schema import Instance, Several, Whole
@@ -28,40 +28,38 @@ if TYPE_CHECKING:
 
 _log = logging.getLogger(__name__)
 prepare = resuming.complete
-"""What `drone_rl.cli.hydra.composition` does with what was typed."""
+"""Preprocessing of the command line, see `drone_rl.cli.hydra.composition`."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Command(TrainSettings):
-    """What `drone-rl train` can be told."""
+class Command(CommandSettings, TrainSettings):
+    """Settings of `drone-rl train`."""
 
     logger: Annotated[tuple[Logger, ...], Several(Instance(Logger), 0, 16)] = (Tensorboard(),)
-    """Where metrics go besides metrics.csv."""
-    paths: PathsSettings = PathsSettings()
-    """Folders."""
+    """Loggers in addition to metrics.csv."""
     resume: str | None = None
-    """Folder of a run to go on with (its own settings are taken over); none starts a new one."""
+    """Folder of a run to resume with its own settings; none starts a new one."""
     provable: ProvableSettings = ProvableSettings()
-    """How training goes on until nothing is left that the policy fails at."""
+    """Training until the policy is verified."""
     trial: Annotated[int, Whole(0)] | None = None
-    """Number of this run in the search of hydra/sweeper=optuna, which sets it; none for none."""
+    """Number of this run in a search, set by hydra/sweeper=optuna; none for none."""
 
 
 def _training(provable: ProvableSettings) -> Callable[..., Any]:
-    """What trains: as usual, or until it is proved."""
+    """Return the training function."""
     if not provable.rounds:
         return drone_rl.train
     return functools.partial(drone_rl.train_until_proved, how=provable)
 
 
 def register() -> None:
-    """Tells Hydra of the launchers and the sweeper."""
+    """Register the launchers and the sweeper with Hydra."""
     register_plugins(LocalLauncher, SlurmLauncher, RayLauncher, OptunaSweeper)
 
 
 def run(settings: Command, folder: Path) -> tuple[int, float]:
-    """Trains one policy. Returns the exit status and the running mean of rewards."""
-    train = _training(settings.provable)  # slow to import; a sweep leaves it to its runs
+    """Train one policy; return the exit status and the running mean of rewards."""
+    train = _training(settings.provable)  # slow to import; not needed by a sweep
     from drone_rl.utils.progress import silent
 
     try:
@@ -81,17 +79,17 @@ def run(settings: Command, folder: Path) -> tuple[int, float]:
         _log.info(found(row))
     if not done.reason.startswith("SIG"):
         return 0, done.running_reward
-    _log.info("go on with: %s", resuming.resume_command(folder))
+    _log.info("resume with: %s", resuming.resume_command(folder))
     return 128 + signal.Signals[done.reason].value, done.running_reward
 
 
 def _callbacks(settings: Command, folder: Path) -> list["Callback"]:
-    """What is done besides learning. A run that is resumed is left as it is until it goes on."""
+    """Return the callbacks. A resumed run's files stay unchanged until its state is accepted."""
     from drone_rl.sweeps.pruning import PruneCallback
     from drone_rl.training import Callback, LoggerCallback, ProgressCallback
 
     class Note(Callback):
-        """Notes the settings of a resumed run once its state has been accepted."""
+        """Writes the settings of a resumed run once its state has been accepted."""
 
         def on_start(self, training: object) -> None:
             resuming.note_settings(folder)

@@ -100,6 +100,7 @@ class RayEpisodeCollector:
         num_cpus: float = 1.0,
         max_lost_workers: int = 10,
         device: torch.device | str = "cpu",
+        postproc: Callable[[TensorDictBase], TensorDictBase] | None = None,
     ) -> None:
         """Starts the workers.
 
@@ -111,11 +112,12 @@ class RayEpisodeCollector:
             num_cpus: Cores of a worker.
             max_lost_workers: How many may be replaced before the training stops.
             device: Where the batches go.
+            postproc: Applied to each joined batch, such as a return estimator.
 
         Raises:
             InputError: Ray isn't installed, or the cluster is out of reach or too small.
         """
-        self.actor = actor
+        self.actor, self.postproc = actor, postproc
         self._network, self._device = network, device
         self._ray, self._pool = _start(makers, address, num_cpus)
         self._makers, self._num_cpus = list(makers), num_cpus
@@ -148,7 +150,8 @@ class RayEpisodeCollector:
         answers = [self._answer(i, tasks[i], shared) for i in numbers]
         self._states = [state for _, state in answers]
         batches = [_to_tensordict(arrays) for arrays, _ in answers]
-        return torch.cat(batches).to(self._device)
+        batch = torch.cat(batches).to(self._device)
+        return batch if self.postproc is None else self.postproc(batch)
 
     def state_dict(self) -> dict:
         """The workers' states, as they stand between two batches."""

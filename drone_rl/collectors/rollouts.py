@@ -46,10 +46,17 @@ class RolloutCollector(BatchedCollector):
         self.num_steps = num_steps
         found = accelerated_stream(env, self._observed, self._kept)
         self._stream: Stream = (
-            TorchrlStream(env, self._observed, self._kept) if isinstance(found, Reasons) else found
+            TorchrlStream(env, self._observed, self._kept, found)
+            if isinstance(found, Reasons)
+            else found
         )
         self._reward = torch.zeros(*env.batch_size, 1, device=env.device)
         self._steps = torch.zeros(*env.batch_size, 1, dtype=torch.int64, device=env.device)
+
+    @property
+    def name(self) -> str:
+        """What steps the environments, for the log."""
+        return self._stream.name
 
     @torch.no_grad()
     def collect(self) -> TensorDictBase:
@@ -108,6 +115,9 @@ class RolloutCollector(BatchedCollector):
 class Stream(Protocol):
     """Steps all environments on and on; each restarts when its episode has ended."""
 
+    name: str
+    """What it is, for the log."""
+
     def observe(self) -> TensorDictBase:
         """Return the observations; the first call starts all environments. Shape: (num_envs,)."""
         ...
@@ -144,9 +154,14 @@ class TorchrlStream:
     """Steps any environment by `env.step`."""
 
     def __init__(
-        self, env: EnvBase, observed: Iterable[NestedKey], kept: Iterable[NestedKey]
+        self,
+        env: EnvBase,
+        observed: Iterable[NestedKey],
+        kept: Iterable[NestedKey],
+        reasons: Reasons,
     ) -> None:
-        """See `accelerated_stream`."""
+        """See `accelerated_stream`; the reasons are why there is no faster stream."""
+        self.name = f"stepping collector: {reasons}"
         self._env, self._observed, self._kept = env, tuple(observed), tuple(kept)
         self._dropped = _unused_keys(env, self._observed)
         self._state: TensorDictBase | None = None

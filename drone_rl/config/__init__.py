@@ -1,4 +1,4 @@
-"""What can be chosen about tasks and the camera; known without what they are made of."""
+"""Settings of tasks, cameras, appearance, dynamics and sensors; imports nothing heavy."""
 
 from drone_rl.config.appearance import MINIMAL, AppearanceSettings
 from drone_rl.config.camera import RENDERERS, CameraSettings, RendererName
@@ -10,9 +10,14 @@ from drone_rl.config.dynamics import (
     DynamicsSettings,
 )
 from drone_rl.config.pillars import PillarsSettings
-from drone_rl.config.registry import TASKS, named_settings, read_task, settings_of
 from drone_rl.config.sensors import SensorSettings
-from drone_rl.config.task import BaseTaskSettings
+from drone_rl.config.task import (
+    TASKS,
+    BaseTaskSettings,
+    named_settings,
+    read_task,
+    settings_of,
+)
 
 __all__ = [
     "COMPUTER_VISION",

@@ -1,4 +1,4 @@
-"""What can be chosen about how worlds look; each value is fixed, or drawn anew at every reset."""
+"""Settings of appearance; each value is fixed, or a range that is sampled at every reset."""
 
 import dataclasses
 from typing import Annotated, Any
@@ -31,12 +31,9 @@ _Turn = Span(Several(Real(-90.0, 90.0, unit="degrees"), 3, 3))
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class AppearanceSettings(Settings):
-    """Sun, sky, air, colours, textures, things beside the way, and the policy's camera.
+    """Sun, sky, fog, colours, textures, distractors, and the mounting of the policy's camera.
 
-    The defaults are the look of the tasks themselves.
-
-    Raises:
-        InputError: A value is out of range, or a range begins above its end.
+    The defaults are the tasks' own appearance.
     """
 
     sun_elevation: Annotated[Number, Span(Real(1.0, 90.0, unit="degrees"))] = 55.2
@@ -50,7 +47,7 @@ class AppearanceSettings(Settings):
     ambient_strength: Annotated[Number, _Light] = 0.35
     """Light from everywhere."""
     shadows: Annotated[float, Real(0.0, 1.0)] = 0.0
-    """Share of episodes in which the sun casts shadows: 0 for none, 1 for all."""
+    """Fraction of episodes in which the sun casts shadows."""
     sky_horizon: Annotated[Tint, _Tint] = (0.62, 0.74, 0.92)
     """Colour of the sky at the horizon, and of fog."""
     sky_zenith: Annotated[Tint, _Tint] | None = None
@@ -64,8 +61,8 @@ class AppearanceSettings(Settings):
     object_color: Annotated[Tint, _Tint] | None = None
     """Colour of targets and obstacles; none for the task's own."""
     ground_texture: Annotated[Names, _Textures] | None = None
-    """Texture of the ground: checker, grid, bricks, noise, a picture's file, or a list of these and
-    none, of which each is as likely."""
+    """Texture of the ground: checker, grid, bricks, noise, an image file, or a list of these and
+    none, each equally likely."""
     ground_tile: Annotated[Number, _Tile] = 4.0
     """Edge of a tile of it, in metres."""
     object_texture: Annotated[Names, _Textures] | None = None
@@ -73,7 +70,7 @@ class AppearanceSettings(Settings):
     object_tile: Annotated[Number, _Tile] = 2.0
     """Edge of a tile of it, in metres."""
     distractors: Annotated[int | tuple[int, int], Span(Whole(0, 64, "distractors"))] = 0
-    """Boxes, balls and cylinders beside the way, which mean nothing."""
+    """Number of distractors: boxes, balls and cylinders to the sides."""
     distractor_size: Annotated[Number, Span(Real(0.1, 50.0, unit="m"))] = (1.0, 4.0)
     """Edge or diameter of each, in metres."""
     distractor_color: Annotated[Tint, _Tint] | None = None
@@ -81,8 +78,7 @@ class AppearanceSettings(Settings):
     distractor_distance: Annotated[Number, Span(Real(0.1, 200.0, unit="m"))] = (2.0, 14.0)
     """How far each is from where targets and obstacles may stand, to the side, in metres."""
     camera_offset: Annotated[Triples, _Place] = (0.0, 0.0, 0.0)
-    """Where the policy's camera sits beside its place on the drone: forward, to the left and up, in
-    metres."""
+    """Offset of the policy's camera from its default place: forward, left, up, in metres."""
     camera_turn: Annotated[Triples, _Turn] = (0.0, 0.0, 0.0)
     """How it is turned there: roll (to the right), pitch (down) and yaw (to the left), degrees."""
     camera_widening: Annotated[Number, Span(Real(-160.0, 160.0, unit="degrees"))] = 0.0
@@ -93,12 +89,12 @@ class AppearanceSettings(Settings):
 
     @property
     def is_minimal(self) -> bool:
-        """Whether worlds look as the tasks themselves have it."""
+        """Whether this is the default appearance."""
         return self == MINIMAL
 
 
 MINIMAL = AppearanceSettings()
-"""The look of the tasks themselves."""
+"""The default appearance."""
 
 
 _LEAST_HEIGHT = 0.05

@@ -13,11 +13,7 @@ FRONT = (0.4, 0.0, 0.0)
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class CameraSettings(Settings):
-    """The picture that the policy's camera takes.
-
-    Raises:
-        InputError: A value is out of range.
-    """
+    """The picture that the policy's camera takes."""
 
     width: Annotated[int, Whole(1, 1024, "pixels")] = 64
     """Pixels across."""
@@ -33,11 +29,24 @@ class CameraSettings(Settings):
         return math.degrees(2 * math.atan(half))
 
 
-RENDERERS = {
-    "raytrace": "drone_rl.sim.rendering.raytrace.renderer.Raytracer",
-    "mujoco_warp": "drone_rl.sim.rendering.mujoco_warp.WarpRenderer",
-}
-"""Where each is to be imported from: our own of simple solids, and MuJoCo Warp's of anything."""
+RENDERERS = ("raytrace", "mujoco_warp")
+"""Names of the renderers, see `drone_rl.sim.rendering.renderer`."""
 
-RendererName = Annotated[str, OneOf(tuple(RENDERERS))]
+RendererName = Annotated[str, OneOf(RENDERERS)]
 """A setting that chooses one."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Rendered(Settings):
+    """Settings of a command that renders images."""
+
+    renderer: RendererName = "raytrace"
+    """Renderer: raytrace, this package's ray tracer, or mujoco_warp, MuJoCo Warp's."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class OnDevice(Rendered):
+    """Settings of a command that renders images and evaluates policies."""
+
+    device: str = "cpu"
+    """Device of renderer and policy: cpu, cuda or cuda:N."""

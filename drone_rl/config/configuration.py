@@ -1,16 +1,15 @@
 """Settings as nested plain data and back, as in checkpoints and in what Hydra composes."""
 
 import dataclasses
+import functools
 import importlib
 import types
 import typing
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from importlib import metadata
 from typing import Annotated, Any, ClassVar, Self, TypeVar
 
 from drone_rl.config import (
-    COMPUTER_VISION,
-    MINIMAL,
-    MOVES_SETTINGS,
     TASKS,
     BaseTaskSettings,
     DynamicsSettings,
@@ -29,51 +28,103 @@ from drone_rl.utils.settings import (
     types_of,
 )
 
+ENTRY_POINTS = "drone_rl.policies"
+"""Entry point group of modules that register parts."""
+
+S = TypeVar("S", bound=Settings)
+
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Variant(Settings):
-    """Settings of one way to make a part.
+    """Settings of one variant of a part of a training.
 
-    Subclasses of a part's own class are its variants, which differ in what they make and need.
+    Each subclass of a part's class, such as `Network`, is a variant of it. `implements` in
+    `drone_rl.config.registry` connects a variant with the class or function that builds it.
     """
 
     target: ClassVar[str]
-    """Where that which makes it is to be imported from."""
+    """The registered name, or the dotted name of a class of another package."""
+    factory: ClassVar[Callable[..., Any] | None] = None
+    """Builds the part; None for a class of another package, which is imported when needed."""
     is_known: ClassVar[bool] = True
-    """Whether its settings are known here, and not to the user alone."""
+    """Whether the class declares all settings, so that files may contain them."""
 
     def make(self, *args: Any, **kwargs: Any) -> Any:
-        """Makes the part.
+        """Build the part.
 
         Args:
-            args: What is not known before there are other parts.
-            kwargs: The same, by name.
+            args: Objects that the part is built from, such as parameters.
+            kwargs: The same by name.
 
         Raises:
-            InputError: It doesn't exist, or does not take these settings.
+            InputError: The class can't be imported, or does not accept these settings.
         """
-        return locate(self.target)(*args, **self.values(), **kwargs)
+        factory = type(self).factory or locate(self.target)
+        return factory(*args, **self.arguments(), **kwargs)
+
+    def arguments(self) -> dict[str, Any]:
+        """Return the settings that are passed to the factory."""
+        return self.values()
+
+    @classmethod
+    def registered_name(cls) -> str:
+        """Return the name of the variant in policy files and Hydra's schemas."""
+        is_own = "target" in vars(cls) and "." not in cls.target
+        return cls.target if is_own else snake_case(cls)
 
     @property
     def name(self) -> str:
-        """What files in conf/ call it."""
-        return snake_case(type(self))
+        """The name of the variant."""
+        return self.registered_name()
 
     @classmethod
     def variants(cls) -> tuple[type[Self], ...]:
-        """All subclasses that make something."""
+        """Return all variants of this part."""
         found = []
         for sub in cls.__subclasses__():
             found += [sub] if "target" in vars(sub) and sub.is_known else []
             found += sub.variants()
         return tuple(found)
 
+    @classmethod
+    def named(cls, name: object, where: str) -> type[Self]:
+        """Return the variant with a registered name.
+
+        Args:
+            name: The name.
+            where: Name of the setting, for messages.
+
+        Raises:
+            InputError: No part of that name is registered.
+        """
+        for load in (lambda: None, load_entry_points):
+            load()
+            variants = {variant.registered_name(): variant for variant in cls.variants()}
+            if isinstance(name, str) and name in variants:
+                return variants[name]
+        raise InputError(
+            f"{where}={shown(name)} is not registered; there are: {', '.join(variants)}; if it is "
+            f"a part of your own, give plugins=[MODULE] with the module that registers it"
+        )
+
+    @classmethod
+    def from_name(cls, name: str, where: str) -> Self:
+        """Return a variant with its default settings; see `named`."""
+        return cls.named(name, where)()
+
+
+@functools.cache
+def load_entry_points() -> None:
+    """Import the modules that installed packages name in the entry point group, once."""
+    for point in metadata.entry_points(group=ENTRY_POINTS):
+        point.load()
+
 
 def locate(target: str) -> Any:
-    """What a dotted name stands for.
+    """Import an object by its dotted name.
 
     Raises:
-        InputError: There is no such thing.
+        InputError: There is no such object.
     """
     module, _, name = target.rpartition(".")
     try:
@@ -82,13 +133,11 @@ def locate(target: str) -> Any:
         raise InputError(f"_target_={target} can't be imported ({error}); give another") from error
 
 
-S = TypeVar("S", bound=Settings)
-
-
 def as_config(settings: Settings) -> dict[str, Any]:
-    """Settings as plain data; a variant says by "_target_" what makes it, several are named.
+    """Return settings as plain data.
 
-    A task says by "name" which it is, see `BaseTaskSettings.values`.
+    A variant has its target as "_target_", several variants are named, and a task other than the
+    first has its name, see `BaseTaskSettings.values`.
     """
     if isinstance(settings, BaseTaskSettings):
         return settings.values()
@@ -100,15 +149,15 @@ def as_config(settings: Settings) -> dict[str, Any]:
 
 
 def from_config(cls: type[S], config: Any, where: str = "") -> S:
-    """Settings out of plain data; what is not given keeps its default.
+    """Read settings from plain data; fields that are left out keep their defaults.
 
     Args:
-        cls: What they are.
-        config: A mapping, with further ones of the settings in settings.
-        where: Its name, for people; empty at the root.
+        cls: Class of the settings.
+        config: A mapping; nested settings are mappings, too.
+        where: Its name, for messages; empty at the root.
 
     Raises:
-        InputError: A name is unknown or a value unusable; the message begins with its place.
+        InputError: A name is unknown or a value invalid; the message begins with its place.
     """
     given = as_mapping(config, where or "settings")
     prefix = f"{where}." if where else ""
@@ -121,29 +170,31 @@ def from_config(cls: type[S], config: Any, where: str = "") -> S:
 
 
 def variant_of(part: type[Variant], config: Any, where: str) -> Variant:
-    """A variant out of plain data.
+    """Read a variant from plain data; nothing is imported before it is built.
 
     Args:
-        part: What it is a variant of.
+        part: Class of the part.
         config: "_target_" and values.
-        where: Its name, for people.
+        where: Its name, for messages.
 
     Returns:
-        One of the part's own variants; for another target or further values one that checks what
-        is known and passes on the rest. Nothing is imported before it is made.
+        A registered variant. For the dotted name of another class, or for further values, a variant
+        that checks the fields of the part and passes all values on.
 
     Raises:
-        InputError: A value is unusable.
+        InputError: A value is invalid.
     """
     values = dict(as_mapping(config, where))
     target = values.pop("_target_", None)
     if not isinstance(target, str):
         raise InputError(f"{where}._target_={shown(target)} names nothing; give what makes it")
     known = next((v for v in part.variants() if v.target == target), part)
+    if known is part and "." not in target:
+        known = part.named(target, f"{where}._target_")
     if known is not part and values.keys() <= kinds_of(known).keys():
         return from_config(known, values, where)
     with below(where):
-        return _another(known, target, values)
+        return _unregistered(known, target, values)
 
 
 def _as_config(hint: Any, value: Any) -> Any:
@@ -155,7 +206,7 @@ def _as_config(hint: Any, value: Any) -> Any:
 
 
 def _named(variants: tuple[Variant, ...]) -> dict[str, Any]:
-    """Several variants, each by a name of its own, in order."""
+    """Several variants in order, each under a unique name."""
     named: dict[str, Any] = {}
     for variant in variants:
         name = variant.name if variant.name not in named else f"{variant.name}_{len(named)}"
@@ -172,13 +223,18 @@ def _several(hint: Any) -> type[Variant] | None:
 
 
 def _read(hint: Any, value: Any, where: str) -> Any:
-    """A field's value: settings are made of mappings, all else is left to the field's kind."""
+    """Read nested settings from mappings; the field's kind reads all other values."""
     part = _several(hint)
-    if part is not None and not isinstance(value, tuple):
+    if part is not None and isinstance(value, Mapping):
         items = as_mapping(value, where).items()
-        return tuple(variant_of(part, v, f"{where}.{k}") for k, v in items if v is not None)
-    hint = _given(hint) if value is not None else hint
-    if not isinstance(hint, type) or not issubclass(hint, Settings) or isinstance(value, Settings):
+        return tuple(
+            variant_of(part, _with_target(part, k, v), f"{where}.{k}")
+            for k, v in items
+            if v is not None
+        )
+    hint = _without_none(hint) if value is not None else hint
+    is_read = isinstance(value, Settings | str)
+    if not isinstance(hint, type) or not issubclass(hint, Settings) or is_read:
         return value
     if issubclass(hint, Variant):
         return variant_of(hint, value, where)
@@ -187,30 +243,39 @@ def _read(hint: Any, value: Any, where: str) -> Any:
     return from_config(hint, value, where)
 
 
-def _given(hint: Any) -> Any:
-    """The settings themselves, where there may be none."""
+def _with_target(part: type[Variant], name: str, value: Any) -> Any:
+    """The values of a step; a step named like a registered part needs no "_target_"."""
+    if not isinstance(value, Mapping) or "_target_" in value:
+        return value
+    known = next((v for v in part.variants() if v.registered_name() == name), None)
+    return value if known is None else {"_target_": known.target, **value}
+
+
+def _without_none(hint: Any) -> Any:
+    """The class of the settings in an optional field."""
     inner = [of for of in typing.get_args(hint) if of is not types.NoneType]
     is_settings = len(inner) == 1 and isinstance(inner[0], type) and issubclass(inner[0], Settings)
     return inner[0] if is_settings else hint
 
 
-def _another(part: type[Variant], target: str, given: Mapping[str, Any]) -> Variant:
-    """A variant of the user's own; of its settings only those of its part are known here."""
+def _unregistered(part: type[Variant], target: str, given: Mapping[str, Any]) -> Variant:
+    """A variant of which only the fields of its part are checked."""
 
     @dataclasses.dataclass(frozen=True, kw_only=True)
-    class Another(part):
+    class Unregistered(part):
         is_known: ClassVar[bool] = False
 
         def values(self) -> dict[str, Any]:
             return dict(given)
 
-    Another.target = target
-    return Another(**{name: value for name, value in given.items() if name in kinds_of(part)})
+    Unregistered.target = target
+    Unregistered.factory = part.factory if target == getattr(part, "target", None) else None
+    return Unregistered(**{name: value for name, value in given.items() if name in kinds_of(part)})
 
 
 @dataclasses.dataclass(frozen=True)
 class Changes:
-    """The kind of value that gives some settings of a class; none keeps what there is."""
+    """The kind of a mapping with some settings of a class; the others keep their values."""
 
     of: type[Settings]
 
@@ -225,14 +290,11 @@ class Changes:
 
 @dataclasses.dataclass(frozen=True)
 class ChangesOfTask:
-    """The kind of value that gives some settings of any task; none keeps what there is.
-
-    Their values are read when it is known which task it is.
-    """
+    """The kind of a mapping with some settings of any task; values are read once it is known."""
 
     @property
     def types(self) -> dict[str, Any]:
-        """The plain type of every setting that some task has."""
+        """The plain type of each setting of all tasks."""
         return {
             name: hint for settings in TASKS.values() for name, hint in types_of(settings).items()
         }
@@ -252,62 +314,25 @@ DynamicsChanges = Annotated[Mapping[str, Any], Changes(DynamicsSettings)]
 
 
 def no_changes() -> Any:
-    """A field without any."""
+    """Return a dataclass field whose default is no changes."""
     return dataclasses.field(default_factory=dict)
-
-
-_MOVED = {
-    "drone_rl.cli.build.threaded_collector": "drone_rl.training.build_collector.threaded_collector",
-    "drone_rl.cli.build.ray_collector": "drone_rl.training.build_collector.ray_collector",
-}
-
-
-def modern(config: Mapping[str, Any]) -> dict[str, Any]:
-    """A training's configuration in today's words.
-
-    Until version 0.1 the group of networks was called policy, the collector's maker stood under
-    "make", and settings told Hydra how to make things (`_partial_`, and `_target_` of task and
-    camera). Until 0.2 a training learned on as many threads as it collected on, took its running
-    mean at its word, and took every step and gradient in Python; worlds had one look,
-    and drones moved in computer-vision mode alone.
-
-    Args:
-        config: Of any version, as it stands in a checkpoint or a sweep's folder.
-    """
-    groups = {name: _without(group, "_partial_") for name, group in config.items()}
-    if "policy" in groups:
-        groups["network"] = groups.pop("policy")
-    changes = {
-        "task": lambda task: _without(task, "_target_"),
-        "camera": lambda camera: _without(camera, "_target_"),
-        "collector": _collector,
-        "transforms": _transforms,
-    }
-    groups = {name: changes.get(name, lambda group: group)(group) for name, group in groups.items()}
-    if {"trainer", "collector"} <= groups.keys():
-        groups["trainer"] = _trainer(groups["trainer"], groups["collector"])
-    if "task" in groups:
-        groups.setdefault("appearance", MINIMAL.values())
-        groups.setdefault("dynamics", COMPUTER_VISION.values())
-        groups.setdefault("actions", MOVES_SETTINGS.values())
-    return groups
 
 
 def check_same_config(
     saved: Mapping[str, Any], now: Mapping[str, Any], may_change: Iterable[str]
 ) -> None:
-    """Refuses to go on under another configuration.
+    """Refuse to resume with other settings.
 
     Args:
-        saved: The configuration that it was begun with, of any version.
-        now: The one asked for.
+        saved: Configuration that the run or sweep began with.
+        now: Configuration of this command.
         may_change: Dotted keys, and groups of them, that don't change what is learned.
 
     Raises:
-        InputError: A setting differs; it is named with both values.
+        InputError: A setting differs; the message has both values.
     """
     allowed = tuple(may_change)
-    before, after = _flatten(modern(saved)), _flatten(modern(now))
+    before, after = _flatten(saved), _flatten(now)
     for key in sorted(before.keys() | after.keys()):
         if any(key == name or key.startswith(f"{name}.") for name in allowed):
             continue
@@ -317,42 +342,6 @@ def check_same_config(
                 f"can't resume with {key}={new}: the run was started with {key}={old}; "
                 "leave it as it was or start a new run"
             )
-
-
-def _without(group: Any, *names: str) -> Any:
-    if not isinstance(group, Mapping):
-        return group
-    return {name: value for name, value in group.items() if name not in names}
-
-
-def _collector(group: Any) -> Any:
-    if not isinstance(group, Mapping):
-        return group
-    maker = group.get("make", group.get("_target_"))
-    target = _MOVED.get(maker, maker) if isinstance(maker, str) else maker
-    made = {**_without(group, "make"), **({} if target is None else {"_target_": target})}
-    return {"compiled": False, **made} if target in _MOVED.values() else made
-
-
-def _trainer(group: Any, collector: Any) -> Any:
-    if not (isinstance(group, Mapping) and isinstance(collector, Mapping)):
-        return group
-    flights = {"confirm_episodes": 0, "confirm_share": 1.0}
-    learning = {"num_threads": collector.get("num_threads", 1), "compiled": False}
-    return {**learning, **flights, **group}
-
-
-def _transforms(group: Any) -> Any:
-    """Stacked frames had arguments that are always the same."""
-    if not isinstance(group, Mapping):
-        return group
-    stacks = {name for name, step in group.items() if _makes(step, "CatFrames")}
-    return {n: _without(s, "dim", "in_keys") if n in stacks else s for n, s in group.items()}
-
-
-def _makes(step: Any, name: str) -> bool:
-    target = step.get("_target_") if isinstance(step, Mapping) else None
-    return isinstance(target, str) and target.endswith(f".{name}")
 
 
 def _flatten(config: Any, prefix: str = "") -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""What can be chosen about cube collection, checked before anything is built.
+"""Settings of cube collection.
 
 The defaults are the original study's; the sizes of the cube and the drone, which it leaves out, are
 chosen so that a uniformly random policy collects about as much as it did there (0.84 cubes).
@@ -8,19 +8,17 @@ import dataclasses
 import math
 from typing import Annotated, ClassVar
 
-from drone_rl.config.task import FIRST, BaseTaskSettings, Bound, Color, Length, Things
+from drone_rl.config.task import FIRST, BaseTaskSettings, Bound, Color, Length, Things, add_task
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Whole
 
 
+@add_task
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class TaskSettings(BaseTaskSettings):
     """The cubes, the drone's moves and the boundaries. Lengths in metres, world frame.
 
     The world frame has x forward, y left and z up; the drone starts at x = y = 0.
-
-    Raises:
-        InputError: A value is out of range, or the settings together can't be met.
     """
 
     name: ClassVar[str] = FIRST
@@ -84,7 +82,7 @@ class TaskSettings(BaseTaskSettings):
         )
 
     def check(self) -> None:
-        """Refuses what could not be simulated or never be solved."""
+        """Refuse tasks that can't be simulated or solved."""
         if self.vertical_bound > self.touch_distance:
             raise InputError(
                 f"vertical_bound={self.vertical_bound} puts cubes where a drone that keeps "

@@ -31,9 +31,6 @@ class DynamicsSettings(Settings):
     The defaults are AirSim's generic X frame and its controller's gains. Body frame: x forward, y
     left, z up; triples are along, or about, these axes. In computer-vision mode (Table 1) none but
     the mode counts: there, actions set poses.
-
-    Raises:
-        InputError: A value is out of range, or no such drone could fly.
     """
 
     mode: Annotated[str, OneOf(MODES)] = "computer_vision"
@@ -52,49 +49,49 @@ class DynamicsSettings(Settings):
     gust_length: Annotated[float, Real(0.1, 10_000.0, unit="m")] = 50.0
     """Length scale of gusts (Dryden's), in metres."""
     air_density: Annotated[float, Real(0.0, 100.0, unit="kg/m3")] = 1.225
-    """In kilograms a cubic metre; 0 for none: rotors push as hard without, but nothing drags."""
+    """Density of the air in kg/m3; 0 for no drag (rotor thrust does not change)."""
 
     mass: Annotated[float, Real(0.0, 1000.0, is_above=True, unit="kg")] = 1.0
-    """In kilograms."""
+    """Mass in kilograms."""
     inertia: Annotated[Triple, Several(_Positive, 3, 3)] = (0.00672, 0.00804, 0.01428)
-    """Moments about the body's axes, in kilograms times square metres."""
+    """Moments of inertia about the body axes, in kg m2."""
     arm_length: Annotated[float, Real(0.0, 10.0, is_above=True, unit="m")] = 0.2275
-    """From the middle to each rotor, in metres; arms stand at 45 degrees to x."""
+    """Distance from the centre to each rotor, in metres; arms are at 45 degrees to x."""
     radius: Annotated[float, Real(0.0, 10.0, is_above=True, unit="m")] = 0.3
-    """Of the ball that touches ground and obstacles, in metres."""
+    """Radius of the sphere that collides with ground and obstacles, in metres."""
     rotor_thrust: Annotated[float, Real(0.0, 10_000.0, is_above=True, unit="N")] = 4.179446268
-    """The most that one rotor gives, in newtons."""
+    """Maximum thrust of one rotor, in newtons."""
     rotor_torque: Annotated[float, Real(0.0, 1000.0, is_above=True, unit="N m")] = 0.055562
-    """That the air puts on one rotor then, in newton metres."""
+    """Drag torque of one rotor at maximum thrust, in newton metres."""
     rotor_time_constant: Annotated[float, Real(0.0, 10.0, unit="s")] = 0.005
-    """Of a rotor's first-order answer, in seconds; 0 for none."""
+    """Time constant of a rotor's first-order response, in seconds; 0 for none."""
     drag_area: Annotated[Triple, Several(Real(0.0, 100.0), 3, 3)] = (0.00538, 0.00611, 0.02989)
     """Half the drag coefficient times the area that faces each axis, in square metres."""
     restitution: Annotated[float, Real(0.0, 1.0)] = 0.55
-    """Share of the speed into a contact that comes back."""
+    """Coefficient of restitution of a contact."""
     friction: Annotated[float, Real(0.0, 10.0)] = 0.5
-    """Of a contact, over its normal force."""
+    """Coefficient of friction of a contact."""
 
     rate_gain: Gains = (0.25, 0.25, 0.25)
-    """Control of roll, pitch and yaw for each radian a second that is missing."""
+    """Gain of the rate controller: control per rad/s of error."""
     rate_limit: Gains = (2.5, 2.5, 2.5)
-    """The greatest rates that the attitude controller asks for, in radians a second."""
+    """Limits of the attitude controller's rate commands, in rad/s."""
     angle_gain: Gains = (2.5, 2.5, 2.5)
-    """Shares of the greatest rate for each radian that is missing."""
+    """Gain of the attitude controller: fractions of the rate limit per radian of error."""
     angle_limit: Annotated[float, Real(0.0, 1.5, is_above=True, unit="radians")] = math.pi / 5.5
-    """The greatest roll and pitch that the velocity controller asks for, in radians."""
+    """Limit of the velocity controller's roll and pitch commands, in radians."""
     velocity_gain: Gain = 0.2
-    """Shares of the greatest angle for each metre a second that is missing."""
+    """Gain of the velocity controller: fraction of the angle limit per m/s of error."""
     velocity_limit: Annotated[float, Real(0.0, 100.0, is_above=True, unit="m/s")] = 6.0
-    """The greatest horizontal speed that the position controller asks for, in metres a second."""
+    """Limit of the position controller's horizontal velocity commands, in m/s."""
     climb_gain: Gain = 2.0
-    """Control of thrust (-1 for none, 1 for all) for each metre a second of climb missing."""
+    """Gain of the climb controller: thrust (-1 to 1) per m/s of error."""
     climb_integral: Gain = 2.0
-    """The same for each metre a second, second after second."""
+    """Integral gain of the climb controller."""
     climb_limit: Annotated[float, Real(0.0, 100.0, is_above=True, unit="m/s")] = 4.0
-    """The greatest rate of climb and descent that the position controller asks for."""
+    """Limit of the position controller's climb rate commands, in m/s."""
     position_gain: Gain = 0.25
-    """Shares of the greatest speed for each metre that is missing."""
+    """Gain of the position controller: fraction of the velocity limit per metre of error."""
 
     @property
     def is_computer_vision(self) -> bool:
@@ -112,7 +109,7 @@ class DynamicsSettings(Settings):
         return self.mass * GRAVITY / (4.0 * self.rotor_thrust)
 
     def check(self) -> None:
-        """Refuses bodies that nothing can have, and drones that can't fly."""
+        """Refuse impossible inertia and drones that can't hover."""
         largest, others = max(self.inertia), sum(self.inertia) - max(self.inertia)
         if largest > others * (1.0 + 1e-9):
             raise InputError(
@@ -142,7 +139,7 @@ class DynamicsSettings(Settings):
 
 
 COMPUTER_VISION = DynamicsSettings()
-"""Actions set poses: what files mean that say nothing else."""
+"""Computer-vision mode, the default of files without dynamics."""
 
 
 ACTION_KINDS = ("moves", "velocity")
@@ -151,32 +148,28 @@ Speed = Annotated[float, Real(0.0, 50.0, is_above=True, unit="m/s")]
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class ActionSettings(Settings):
-    """The actions between which a policy chooses, one at each control step.
-
-    Raises:
-        InputError: A value is out of range.
-    """
+    """Settings of the actions, one at each control step."""
 
     kind: Annotated[str, OneOf(ACTION_KINDS)] = "moves"
-    """moves, the chapter's three of equal length without turning, or velocity: forward speed, speed
-    to the left and yaw rate, any of these at once."""
+    """moves, three discrete moves of equal length, or velocity: forward speed, lateral speed and
+    yaw rate, all continuous."""
     move_speed: Speed = 4.0
-    """At which a move in flight shifts the place where the drone is wanted, in metres a second; in
-    computer-vision mode a move is the task's step."""
+    """Speed of the position setpoint during a move, in m/s; in computer-vision mode a move is the
+    task's step."""
     move_lead: Annotated[float, Real(0.01, 100.0, unit="m")] = 0.5
-    """How far ahead of the drone that place may be, in metres."""
+    """Largest distance from the drone to the position setpoint, in metres."""
     forward_speed: Speed = 4.0
-    """The greatest speed forward that can be asked for, in metres a second; none is backward."""
+    """Largest forward speed command, in m/s; there is no backward command."""
     sideways_speed: Speed = 3.0
-    """The greatest speed to either side, in metres a second."""
+    """Largest lateral speed command, in m/s."""
     yaw_rate: Annotated[float, Real(0.0, 720.0, unit="degrees/s")] = 45.0
-    """The greatest rate of turning to either side, in degrees a second; 0 for none."""
+    """Largest yaw rate command, in degrees/s; 0 for none."""
 
     @property
     def is_first(self) -> bool:
-        """Whether these are the actions of files that name none."""
+        """Whether these are the default actions."""
         return self == MOVES_SETTINGS
 
 
 MOVES_SETTINGS = ActionSettings()
-"""The chapter's three moves."""
+"""The default actions: three moves."""

@@ -1,10 +1,10 @@
 """Settings of what learns: returns, loss, optimizer, scheduler and collector."""
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Annotated, Any, ClassVar
 
-from drone_rl.config.configuration import Variant, locate
+from drone_rl.config.configuration import Variant
 from drone_rl.utils.schema import OneOf, Real, Whole
 
 Rate = Annotated[float, Real(0.0, 1.0)]
@@ -12,7 +12,7 @@ Rate = Annotated[float, Real(0.0, 1.0)]
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Returns(Variant):
-    """Which estimator, and with which values."""
+    """Settings of a return estimator."""
 
     scale: bool = False
     """Whether to divide a batch's returns by their root mean square."""
@@ -28,35 +28,35 @@ class _Discounted(Returns):
 class TotalReward(Returns):
     """The whole episode's reward at every step (Eq. 12)."""
 
-    target: ClassVar[str] = "drone_rl.objectives.TotalReward"
+    target: ClassVar[str] = "total_reward"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class LinearRamp(Returns):
     """The episode's reward times a ramp over the episode (variant 1)."""
 
-    target: ClassVar[str] = "drone_rl.objectives.LinearRamp"
+    target: ClassVar[str] = "linear_ramp"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class RewardToGo(_Discounted):
     """Discounted return (Eq. 14; the original's variant 2)."""
 
-    target: ClassVar[str] = "drone_rl.objectives.RewardToGo"
+    target: ClassVar[str] = "reward_to_go"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Standardised(_Discounted):
     """Discounted return, standardised over each episode (Algorithm 4; variant 0)."""
 
-    target: ClassVar[str] = "drone_rl.objectives.Standardised"
+    target: ClassVar[str] = "standardised"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class SuccessScaled(_Discounted):
     """Discounted return scaled by exp(reward - max_reward) (variant 3)."""
 
-    target: ClassVar[str] = "drone_rl.objectives.SuccessScaled"
+    target: ClassVar[str] = "success_scaled"
     max_reward: Annotated[float, Real(0.0, 1e6)] = 3.0
     """Reward of a perfect episode: the task's cubes."""
 
@@ -65,11 +65,11 @@ class SuccessScaled(_Discounted):
 class TimeBaseline(_Discounted):
     """Discounted return minus a running mean for each time step (variant 4)."""
 
-    target: ClassVar[str] = "drone_rl.objectives.TimeBaseline"
+    target: ClassVar[str] = "time_baseline"
     scale: bool = True
     """Whether to divide a batch's returns by their root mean square."""
     decay: Annotated[float, Real(0.0, 1.0, is_below=True)] = 0.9
-    """Share of the old mean that is kept at each batch, 0 to below 1."""
+    """Weight of the old mean at each batch, 0 to below 1."""
     max_steps: Annotated[int, Whole(1, 100_000, "steps")] = 300
     """Time steps that have a mean of their own: the task's limit."""
 
@@ -78,7 +78,7 @@ class TimeBaseline(_Discounted):
 class LeaveOneOut(_Discounted):
     """Discounted return minus the other episodes' mean at the same time step."""
 
-    target: ClassVar[str] = "drone_rl.objectives.LeaveOneOut"
+    target: ClassVar[str] = "leave_one_out"
     scale: bool = True
     """Whether to divide a batch's returns by their root mean square."""
     gamma: Rate = 0.95
@@ -89,31 +89,35 @@ class LeaveOneOut(_Discounted):
 class BatchNormalised(_Discounted):
     """Discounted return, normalised over the batch."""
 
-    target: ClassVar[str] = "drone_rl.objectives.BatchNormalised"
+    target: ClassVar[str] = "batch_normalised"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Gae(_Discounted):
     """Generalised advantage estimates, for objectives with a critic."""
 
-    target: ClassVar[str] = "drone_rl.objectives.Advantages"
+    target: ClassVar[str] = "gae"
     scale: bool = True
     """Whether to standardise a batch's advantages."""
     gamma: Rate = 0.95
     """Discount rate, 0 to 1."""
     lmbda: Rate = 0.95
-    """Weight of estimates that look one step farther, 0 to 1; 0 looks one step."""
+    """GAE's lambda, 0 to 1; 0 looks one step ahead."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Collector(Variant):
-    """Which workers, and how many."""
+    """Settings of a collector."""
 
     num_envs: Annotated[int, Whole(1, unit="worlds")] = 16
-    """Worlds, each with one episode in a batch, or with as many steps as the others."""
+    """Environments, each with one episode or with as many steps as the others in a batch."""
     num_threads: Annotated[int, Whole(1, unit="threads")] = 1
-    """Groups of worlds collected at the same time, each on a thread or worker of its own. Each
-    draws its actions from its own stream: this is part of what a seed means."""
+    """Groups of environments that are collected in parallel, each by its own thread or worker. Each
+    samples actions from its own stream: results for a seed depend on it."""
+
+    def arguments(self) -> dict[str, Any]:
+        """Return nothing: the factory takes the settings of the whole training."""
+        return {}
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -121,28 +125,27 @@ class Episodes(Collector):
     """Batches of complete episodes."""
 
     compiled: bool = True
-    """Whether whole episodes are flown by one compiled kernel, where task, pictures and network are
-    such as it knows: many times as fast on a CPU. It draws its actions in another order, so this is
-    part of what a seed means."""
+    """Run whole episodes in one fused kernel if it supports task, camera and network, which is much
+    faster on a CPU. It samples actions in another order: results for a seed depend on it."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Threads(Episodes):
     """Batches of complete episodes from threads of this process."""
 
-    target: ClassVar[str] = "drone_rl.training.build_collector.threaded_collector"
+    target: ClassVar[str] = "threads"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Ray(Episodes):
     """Batches of complete episodes from workers on a Ray cluster."""
 
-    target: ClassVar[str] = "drone_rl.training.build_collector.ray_collector"
+    target: ClassVar[str] = "ray"
     num_threads: Annotated[int, Whole(1, unit="workers")] = 2
-    """Workers, each with its share of the worlds and a stream of actions of its own: this is part
-    of what a seed means."""
+    """Workers, each with its part of the environments and its own stream of actions: results for a
+    seed depend on it."""
     address: str | None = None
-    """Of the cluster, such as auto or ray://host:10001; none starts one on this machine."""
+    """Address of the cluster, such as auto or ray://host:10001; none starts one on this machine."""
     num_cpus: Annotated[float, Real(0.0, is_above=True, unit="cores")] = 1.0
     """Cores that a worker takes of the cluster."""
     max_lost_workers: Annotated[int, Whole(0, unit="workers")] = 10
@@ -151,14 +154,14 @@ class Ray(Episodes):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Rollouts(Collector):
-    """Batches of the next steps of each world, with what was seen after them, from threads.
+    """Batches of a fixed number of steps of each environment, from threads.
 
-    How many steps is the objective's business. Episodes go on from one batch to the next.
+    The objective sets the number of steps. Episodes continue in the next batch.
     """
 
-    target: ClassVar[str] = "drone_rl.training.build_collector.rollout_collector"
+    target: ClassVar[str] = "rollouts"
     num_envs: Annotated[int, Whole(1, unit="worlds")] = 64
-    """Worlds."""
+    """Environments."""
 
 
 LearningRate = Annotated[float, Real(0.0, 1e30, is_above=True)]
@@ -168,12 +171,12 @@ above that torch fails with an error of its own. Which rates make sense is for t
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Optimiser(Variant):
-    """Which optimiser, and with which values."""
+    """Settings of an optimizer."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Adam(Optimiser):
-    """Steps as long as the gradient is sure of itself."""
+    """Adam."""
 
     target: ClassVar[str] = "torch.optim.Adam"
     lr: LearningRate = 1e-3
@@ -191,12 +194,12 @@ class Sgd(Optimiser):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Scheduler(Variant):
-    """Which schedule of the learning rate, and with which values."""
+    """Settings of a learning-rate schedule."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Constant(Scheduler):
-    """The learning rate stays as it is."""
+    """Constant learning rate."""
 
     target: ClassVar[str] = "torch.optim.lr_scheduler.ConstantLR"
     factor: Annotated[float, Real(0.0, 1.0)] = 1.0
@@ -221,35 +224,34 @@ Weight = Annotated[float, Real(0.0)]
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Objective(Variant):
-    """Which loss, and with which values."""
+    """Settings of a loss and its learner."""
 
-    learner: ClassVar[str] = "drone_rl.training.build_learner.reinforce_learner"
-    """Where that which makes the learner is to be imported from."""
+    learner: ClassVar[Callable[..., Any]]
+    """Builds the learner from the training's settings and what it collects with."""
     needs: ClassVar[Mapping[str, Variant]] = {}
-    """Other parts of a training that it can't do without, and brings unless they are given."""
+    """Other parts that the objective requires, and selects unless they are given."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Reinforce(Objective):
     """REINFORCE without a critic."""
 
-    target: ClassVar[str] = "drone_rl.objectives.ReinforceLoss"
+    target: ClassVar[str] = "reinforce"
     entropy_coeff: Weight = 0.01
-    """Weight of the entropy bonus, which keeps a policy from giving up a side early; 0 for none."""
+    """Weight of the entropy bonus, which keeps a policy exploring; 0 for none."""
     reduction: Annotated[str, OneOf(("mean", "sum"))] = "mean"
-    """Over a batch's steps: mean, or sum as in Algorithm 4."""
+    """Reduction over a batch's steps: mean, or sum as in Algorithm 4."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class WithCritic(Objective):
-    """One that learns, besides, what a state is worth."""
+    """Objective with a critic."""
 
-    learner: ClassVar[str] = "drone_rl.training.build_learner.actor_critic_learner"
     needs: ClassVar[Mapping[str, Variant]] = {"returns": Gae(), "collector": Rollouts()}
     num_steps: Annotated[int, Whole(2, 4096)] = 32
-    """Steps of each world in a batch."""
+    """Steps of each environment in a batch."""
     shares_trunk: bool = True
-    """Whether the critic sees the features that the policy makes; else it has its own network."""
+    """Whether the critic shares the policy's features; otherwise it has its own network."""
     critic_coeff: Annotated[float, Real(0.0, is_above=True)] = 1.0
     """Weight of the critic's loss."""
     entropy_coeff: Weight = 0.0
@@ -257,14 +259,14 @@ class WithCritic(Objective):
 
     @property
     def passes(self) -> dict[str, int]:
-        """How often and in which pieces a batch is gone through, by name; once, as a whole."""
+        """Passes over a batch and size of minibatches; empty for one pass over the whole batch."""
         return {}
 
-    def make(self, *args: Any, **kwargs: Any) -> Any:
-        """See `Variant`; the loss is told what is the loss's."""
+    def arguments(self) -> dict[str, Any]:
+        """Return the settings of the loss."""
         others = {"num_steps", "shares_trunk", *self.passes}
         values = {name: value for name, value in self.values().items() if name not in others}
-        return locate(self.target)(*args, functional=False, **values, **kwargs)
+        return {"functional": False, **values}
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -273,7 +275,7 @@ class A2c(WithCritic):
 
     target: ClassVar[str] = "torchrl.objectives.A2CLoss"
     num_steps: Annotated[int, Whole(2, 4096)] = 16
-    """Steps of each world in a batch."""
+    """Steps of each environment in a batch."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -282,11 +284,11 @@ class Ppo(WithCritic):
 
     target: ClassVar[str] = "torchrl.objectives.ClipPPOLoss"
     clip_epsilon: Annotated[float, Real(0.0, 1.0, is_above=True)] = 0.2
-    """How far the probability of an action may change, as a share, before it counts no more."""
+    """Clipping range of the probability ratio."""
     epochs: Annotated[int, Whole(1)] = 2
     """Passes over a batch."""
     minibatch_size: Annotated[int, Whole(1)] = 512
-    """About how many steps of a batch make one step of the optimiser."""
+    """Approximate number of steps in a minibatch."""
 
     @property
     def passes(self) -> dict[str, int]:

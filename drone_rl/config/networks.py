@@ -1,4 +1,4 @@
-"""Networks of a policy, from picture to logits."""
+"""Settings of a policy's network."""
 
 import dataclasses
 from typing import Annotated, ClassVar
@@ -12,14 +12,14 @@ Widths = Annotated[tuple[int, ...], Several(Whole(1, 4096, "neurons"), 0, 8)]
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Network(Variant):
-    """Which network, and how large."""
+    """Settings of a network."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class SmallCnn(Network):
-    """For small pictures: learns as well as the original's at a tenth of the cost."""
+    """Network for small images: a tenth of the original's cost."""
 
-    target: ClassVar[str] = "drone_rl.policies.SmallCNN"
+    target: ClassVar[str] = "small_cnn"
     patch: Annotated[int, Whole(1, 64, "pixels")] = 4
     """Size and stride of the first convolution, pixels."""
     channels: Channels = (16, 32)
@@ -32,7 +32,7 @@ class SmallCnn(Network):
 class OriginalCnn(Network):
     """The original study's network."""
 
-    target: ClassVar[str] = "drone_rl.policies.OriginalCNN"
+    target: ClassVar[str] = "original_cnn"
     channels: Channels = (6, 16)
     """Output channels of the 5x5 convolutions, each followed by pooling."""
     hidden: Widths = (120, 84)
@@ -41,8 +41,8 @@ class OriginalCnn(Network):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Mlp(Network):
-    """Linear layers on the flattened picture."""
+    """Linear layers on the flattened image."""
 
-    target: ClassVar[str] = "drone_rl.policies.MLP"
+    target: ClassVar[str] = "mlp"
     hidden: Widths = (128, 64)
     """Widths of the linear layers before the logits."""

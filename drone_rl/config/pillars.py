@@ -1,4 +1,4 @@
-"""What can be chosen about the field of pillars, checked before anything is built."""
+"""Settings of the field of pillars."""
 
 import dataclasses
 import math
@@ -6,7 +6,7 @@ import random
 from collections.abc import Iterator
 from typing import Annotated, ClassVar
 
-from drone_rl.config.task import BaseTaskSettings, Color, Length, Things
+from drone_rl.config.task import BaseTaskSettings, Color, Length, Things, add_task
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Real, Whole
 
@@ -14,14 +14,12 @@ _TRIED, _LEAST_OPEN = 400, 20
 """Rows that are drawn to see whether a field can be crossed, and how many of them must be open."""
 
 
+@add_task
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class PillarsSettings(BaseTaskSettings):
     """Rows of pillars, the line beyond them, and the drone's moves. Metres, world frame.
 
     The world frame has x forward, y left and z up; the drone starts at x = y = 0.
-
-    Raises:
-        InputError: A value is out of range, or the settings together can't be met.
     """
 
     name: ClassVar[str] = "pillars"
@@ -38,13 +36,13 @@ class PillarsSettings(BaseTaskSettings):
     spread: Length = 8.0
     """Pillars stand uniformly with |y| at most this; who leaves that range is out of bounds."""
     height: Length = 6.0
-    """Of a pillar."""
+    """Height of a pillar."""
     pillar_color: Color = (0.25, 0.16, 0.12)
     """Red, green, blue in [0, 1]."""
     finish_margin: Length = 4.0
     """How far behind the last row the line is that the drone must cross."""
     collision_penalty: Annotated[float, Real(0.0, 1000.0)] = 0.5
-    """What touching a pillar costs; the way to the line is worth 1."""
+    """Penalty of a collision; reaching the line is worth 1."""
     drone_size: Length = 0.8
     """Edge of the box around the drone that must touch no pillar."""
     altitude: Length = 2.5
@@ -61,7 +59,7 @@ class PillarsSettings(BaseTaskSettings):
 
     @property
     def num_pillars(self) -> int:
-        """Of the whole field."""
+        """Pillars of the whole field."""
         return self.num_rows * self.row_size
 
     @property
@@ -92,7 +90,7 @@ class PillarsSettings(BaseTaskSettings):
         )
 
     def check(self) -> None:
-        """Refuses what could not be simulated or never be crossed."""
+        """Refuse fields that can't be simulated or crossed."""
         needed = 2.0 * (self.touch_distance + self.step_length)
         for name, least in (
             ("spacing", needed),

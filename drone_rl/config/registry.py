@@ -1,58 +1,239 @@
-"""The tasks that there are, by name: what files and the command line can ask for."""
+"""Registry of parts: networks, transforms, return estimators, learners and collectors.
 
-from collections.abc import Mapping
-from typing import Any
+A module of the user's registers a part by a decorator, `drone-rl train plugins=[my_module]` imports
+the module, and `network=my_name` selects the part. Its settings are the parameters of its signature
+with their types and defaults. Policy files contain the registered name and the values only.
 
-from drone_rl.config.cubes import TaskSettings
-from drone_rl.config.pillars import PillarsSettings
-from drone_rl.config.task import FIRST, BaseTaskSettings
+    @drone_rl.register_network("cells")
+    class CellNetwork(PolicyNetwork):
+        def __init__(self, in_shape, num_actions, *, rows: int = 5, generator=None): ...
+
+Built-in parts have settings classes in this package, and `implements` connects them with the
+classes and functions in higher layers.
+"""
+
+import dataclasses
+import inspect
+import math
+import re
+import types
+import typing
+from collections.abc import Callable, Set
+from typing import Annotated, Any, ClassVar, TypeVar
+
+from drone_rl.config.configuration import Variant
+from drone_rl.config.learning import Collector, Objective, Returns
+from drone_rl.config.networks import Network
+from drone_rl.config.transforms import Frame, Transform
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import as_mapping, shown
+from drone_rl.utils.schema import Flag, Kind, Maybe, OneOf, Real, Several, Text, Whole
 
-TASKS: dict[str, type[BaseTaskSettings]] = {
-    settings.name: settings for settings in (TaskSettings, PillarsSettings)
+F = TypeVar("F", bound=Callable[..., Any])
+
+_KEYS = {"in_keys", "out_keys"}
+_NAME = re.compile(r"[a-z][a-z0-9_]{0,60}")
+_KINDS: dict[Any, Kind] = {
+    int: Whole(-(2**63), 2**63 - 1),
+    float: Real(-math.inf),
+    bool: Flag(),
+    str: Text(),
 }
-"""The class of a task's settings; more are added by `drone_rl.sim.tasks.register_task`."""
 
 
-def settings_of(name: object, where: str = "task.name") -> type[BaseTaskSettings]:
-    """The class of a task's settings.
+def implements(*variants: type[Variant]) -> Callable[[F], F]:
+    """Make a class or function the factory of built-in variants; a decorator."""
 
-    Args:
-        name: The task's.
-        where: Its place, for people.
+    def connect(factory: F) -> F:
+        for variant in variants:
+            variant.factory = staticmethod(factory)
+        if isinstance(factory, type):
+            vars_of: Any = factory
+            vars_of.Settings = variants[0]
+        return factory
 
-    Raises:
-        InputError: There is none of that name.
-    """
-    if not isinstance(name, str) or name not in TASKS:
-        raise InputError(f"{where}={shown(name)} is unknown; there are: {', '.join(TASKS)}")
-    return TASKS[name]
-
-
-def named_settings(data: Any, where: str) -> tuple[type[BaseTaskSettings], Mapping[str, Any]]:
-    """The class of a task's settings, and what else is given of them.
-
-    Args:
-        data: A mapping; without a name it is of the first task.
-        where: Its name, for people.
-
-    Raises:
-        InputError: There is no such task.
-    """
-    given = dict(as_mapping(data, where))
-    return settings_of(given.pop("name", FIRST), f"{where}.name"), given
+    return connect
 
 
-def read_task(data: Any, where: str) -> BaseTaskSettings:
-    """Settings of a task out of plain data that has every field and no other.
+def learns(*objectives: type[Objective]) -> Callable[[F], F]:
+    """Make a function the one that builds the learner of built-in objectives; a decorator."""
+
+    def connect(build: F) -> F:
+        for objective in objectives:
+            objective.learner = staticmethod(build)
+        return build
+
+    return connect
+
+
+def register_network(name: str) -> Callable[[F], F]:
+    """Register a network; a decorator of its class.
+
+    The class is called as `cls(in_shape, num_actions, *, generator, **settings)` and derives from
+    `drone_rl.policies.PolicyNetwork`. Its settings class is `cls.Settings`.
 
     Args:
-        data: See `named_settings`.
-        where: Its name, for people.
+        name: Name in settings and policy files.
 
     Raises:
-        InputError: See `Settings.read`.
+        InputError: The name is invalid or taken, or a parameter has no default or no plain type.
     """
-    cls, given = named_settings(data, where)
-    return cls.read(given, where)
+    return lambda factory: _register(Network, name, factory, 2, {"generator"})
+
+
+def register_transform(
+    name: str, *, output: Callable[[Frame, Any], Frame] | None = None
+) -> Callable[[F], F]:
+    """Register a transform of images; a decorator of a class derived from TorchRL's `Transform`.
+
+    Args:
+        name: Name in settings and policy files.
+        output: Returns the shape of the transformed image from that of its input and the settings.
+            By default the transform is called with zeros.
+
+    Raises:
+        InputError: See `register_network`.
+    """
+    own = {"output": lambda self, frame: output(frame, self) if output else None}
+    return lambda factory: _register(Transform, name, factory, 0, _KEYS, own)
+
+
+def register_returns(name: str) -> Callable[[F], F]:
+    """Register a return estimator; a decorator of a class derived from `ReturnEstimator`.
+
+    The class accepts `scale`, for example by passing keyword arguments on to `ReturnEstimator`.
+
+    Args:
+        name: Name in settings.
+
+    Raises:
+        InputError: See `register_network`.
+    """
+    return lambda factory: _register(Returns, name, factory, 0)
+
+
+def register_learner(name: str) -> Callable[[F], F]:
+    """Register a learner, selected by `objective=NAME`; a decorator of a class or function.
+
+    It is called as `factory(settings, collecting, **own)`, with the training's settings and what
+    `make_collector` of `drone_rl.training.components` returned, and returns a
+    `drone_rl.training.learners.Learner`.
+
+    Args:
+        name: Name in settings.
+
+    Raises:
+        InputError: See `register_network`.
+    """
+
+    def register(factory: F) -> F:
+        _register(Objective, name, factory, 2)
+        settings: Any = vars(factory)["Settings"]
+        settings.learner = staticmethod(
+            lambda training, collecting: factory(
+                training, collecting, **training.objective.arguments()
+            )
+        )
+        return factory
+
+    return register
+
+
+def register_collector(name: str) -> Callable[[F], F]:
+    """Register a collector; a decorator of a class or function.
+
+    It is called as `factory(settings, task, **own)`, with the training's settings and the task to
+    collect from (None for the task of the settings), and returns a
+    `drone_rl.training.components.Components`.
+
+    Args:
+        name: Name in settings.
+
+    Raises:
+        InputError: See `register_network`.
+    """
+    return lambda factory: _register(Collector, name, factory, 2)
+
+
+def _register(
+    part: type[Variant],
+    name: str,
+    factory: F,
+    positional: int,
+    skipped: Set[str] = frozenset(),
+    own: dict[str, Any] | None = None,
+) -> F:
+    """Create the settings class of a part and connect it with its factory."""
+    if not _NAME.fullmatch(name):
+        raise InputError(f"name={name!r} is invalid; give lower-case letters, digits and _")
+    for variant in part.variants():
+        if variant.registered_name() == name:
+            if variant.__module__.startswith("drone_rl."):
+                raise InputError(f"{part.__name__.lower()}={name} is built in; give another name")
+            del variant.target  # a module was imported again: the newer one counts
+    fields = _fields(name, factory, positional, skipped)
+    inherited = part.__dataclass_fields__.keys() if part is Returns else set()
+    names = {*(field for field, _, _ in fields), *inherited}
+    settings = dataclasses.make_dataclass(
+        name.title().replace("_", ""),
+        [(n, h, dataclasses.field(default=d)) for n, h, d in fields],
+        bases=(part,),
+        frozen=True,
+        kw_only=True,
+        namespace={
+            **(own or {}),
+            "__doc__": (inspect.getdoc(factory) or name).split("\n")[0],
+            "__module__": factory.__module__,
+            "target": name,
+            "factory": staticmethod(factory),
+            "arguments": lambda self: {n: v for n, v in self.values().items() if n in names},
+        },
+    )
+    settings.__annotations__["target"] = ClassVar[str]
+    vars_of: Any = factory
+    vars_of.Settings = settings
+    return factory
+
+
+def _fields(
+    name: str, factory: Callable[..., Any], positional: int, skipped: Set[str]
+) -> list[tuple[str, Any, Any]]:
+    """Name, annotation and default of each setting, from a signature."""
+    source: Any = factory.__init__ if isinstance(factory, type) else factory
+    hints = typing.get_type_hints(source, include_extras=True)
+    parameters = list(inspect.signature(factory).parameters.values())[positional:]
+    found = []
+    for parameter in parameters:
+        is_star = parameter.kind in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD)
+        if is_star or parameter.name in skipped:
+            continue
+        if parameter.default is parameter.empty or parameter.name not in hints:
+            raise InputError(
+                f"{name}: the parameter {parameter.name} needs a type and a default, as in "
+                f"{parameter.name}: int = 1"
+            )
+        hint = _annotated(hints[parameter.name], f"{name}: the parameter {parameter.name}")
+        default = parameter.default
+        found.append((parameter.name, hint, tuple(default) if type(default) is list else default))
+    return found
+
+
+def _annotated(hint: Any, where: str) -> Any:
+    """The type of a parameter with the kind of its values."""
+    if typing.get_origin(hint) is Annotated:
+        return hint
+    if typing.get_origin(hint) is typing.Literal:
+        return Annotated[str, OneOf(typing.get_args(hint))]
+    if typing.get_origin(hint) in (typing.Union, types.UnionType):
+        inner = [of for of in typing.get_args(hint) if of is not types.NoneType]
+        if len(inner) == 1 and inner[0] in _KINDS:
+            return Annotated[hint, Maybe(_KINDS[inner[0]])]
+    if typing.get_origin(hint) in (tuple, list, typing.get_origin(typing.Sequence[int])):
+        of = typing.get_args(hint)[0]
+        if of in _KINDS:
+            return Annotated[tuple[of, ...], Several(_KINDS[of], 0, 1000)]
+    if hint in _KINDS:
+        return Annotated[hint, _KINDS[hint]]
+    raise InputError(
+        f"{where} is of type {hint}; give int, float, bool, str, a tuple of one of these, Literal, "
+        "or Annotated with a kind of drone_rl.utils.schema"
+    )

@@ -1,4 +1,4 @@
-"""What can be chosen about what a drone senses: rates, latencies, and how strong noise is.
+"""Settings of sensors: rates, latencies and noise.
 
 The defaults are AirSim's where it has one. Each sensor has a factor on all of its noise, 0 for a
 perfect one.
@@ -20,11 +20,7 @@ Metres = Annotated[float, Real(0.0, 10_000.0, unit="m")]
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class ImuSettings(Settings):
-    """Accelerometer and gyroscope; the defaults are an MPU-6000's.
-
-    Raises:
-        InputError: A value is out of range.
-    """
+    """Accelerometer and gyroscope; the defaults are an MPU-6000's."""
 
     rate: Rate = 1000.0
     """Readings a second; one a tick where ticks are longer."""
@@ -50,16 +46,12 @@ class ImuSettings(Settings):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class BarometerSettings(Settings):
-    """Pressure of the standard atmosphere.
-
-    Raises:
-        InputError: A value is out of range.
-    """
+    """Pressure of the standard atmosphere."""
 
     rate: Rate = 50.0
     """Readings a second."""
     latency: Latency = 0.0
-    """Age of a reading when it is told, in seconds."""
+    """Age of a reading when it is reported, in seconds."""
     sea_level_pressure: Annotated[float, Real(100.0, 2000.0, unit="hPa")] = 1013.25
     """The day's, known to the altimeter (QNH), in hectopascals."""
     noise: Share = 1.0
@@ -74,16 +66,12 @@ class BarometerSettings(Settings):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class MagnetometerSettings(Settings):
-    """Earth's field along the body's axes.
-
-    Raises:
-        InputError: A value is out of range.
-    """
+    """Earth's field along the body's axes."""
 
     rate: Rate = 50.0
     """Readings a second."""
     latency: Latency = 0.0
-    """Age of a reading when it is told, in seconds."""
+    """Age of a reading when it is reported, in seconds."""
     field: Annotated[str, OneOf(FIELDS)] = "dipole"
     """dipole, a bar magnet's in the middle of Earth, or constant, that of Seattle."""
     scale: Share = 1.0
@@ -98,16 +86,12 @@ class MagnetometerSettings(Settings):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class GpsSettings(Settings):
-    """A receiver that finds its satellites after a while and tells where it was.
-
-    Raises:
-        InputError: A value is out of range.
-    """
+    """A receiver that finds its satellites after a while and tells where it was."""
 
     rate: Rate = 50.0
     """Readings a second; those of real receivers come at 5 to 10."""
     latency: Latency = 0.2
-    """Age of a reading when it is told, in seconds."""
+    """Age of a reading when it is reported, in seconds."""
     startup: Latency = 1.0
     """Until the first reading is taken, in seconds."""
     first_error: Metres = 100.0
@@ -132,11 +116,7 @@ class GpsSettings(Settings):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class SensorSettings(Settings):
-    """All that a drone senses beside what its cameras show.
-
-    Raises:
-        InputError: A value is out of range.
-    """
+    """All sensors of a drone but its cameras."""
 
     imu: ImuSettings = ImuSettings()
     """Accelerometer and gyroscope."""

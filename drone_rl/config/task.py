@@ -1,9 +1,11 @@
-"""What the settings of every task have in common."""
+"""What the settings of every task have in common, and the tasks by name."""
 
 import dataclasses
-from typing import Annotated, Any, ClassVar, NamedTuple
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, NamedTuple, TypeVar
 
-from drone_rl.utils.schema import Real, Several
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.schema import Real, Several, as_mapping, shown
 from drone_rl.utils.settings import Settings
 
 Length = Annotated[float, Real(0.001, 10_000.0, unit="m")]
@@ -14,7 +16,7 @@ FIRST = "collect_cubes"
 
 
 class Things(NamedTuple):
-    """Where a task's targets and obstacles stand, for what is put beside them. Metres."""
+    """Where targets and obstacles are, so that distractors keep their distance. Metres."""
 
     size: float
     """Edge of one, seen from above."""
@@ -32,7 +34,7 @@ class Things(NamedTuple):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class BaseTaskSettings(Settings):
-    """What the settings of a task are; each task has a class of its own."""
+    """Base class of a task's settings."""
 
     name: ClassVar[str]
     """What files call the task."""
@@ -46,3 +48,58 @@ class BaseTaskSettings(Settings):
         """See `Settings.values`; the task is named, but for the first that there was."""
         named = {} if self.name == FIRST else {"name": self.name}
         return {**named, **super().values()}
+
+
+S = TypeVar("S", bound=type[BaseTaskSettings])
+
+TASKS: dict[str, type[BaseTaskSettings]] = {}
+"""Settings of each task by its name; `drone_rl.sim.tasks.register_task` adds further ones."""
+
+
+def add_task(settings: S) -> S:
+    """Add the settings of a task to `TASKS`; a class decorator."""
+    TASKS[settings.name] = settings
+    return settings
+
+
+def settings_of(name: object, where: str = "task.name") -> type[BaseTaskSettings]:
+    """Return the class of a task's settings.
+
+    Args:
+        name: Name of the task.
+        where: Name of the setting, for messages.
+
+    Raises:
+        InputError: There is no such task.
+    """
+    if not isinstance(name, str) or name not in TASKS:
+        raise InputError(f"{where}={shown(name)} is unknown; there are: {', '.join(TASKS)}")
+    return TASKS[name]
+
+
+def named_settings(data: Any, where: str) -> tuple[type[BaseTaskSettings], Mapping[str, Any]]:
+    """Return the class of a task's settings and the values without the name.
+
+    Args:
+        data: A mapping; without "name" it describes the first task.
+        where: Name of the mapping, for messages.
+
+    Raises:
+        InputError: There is no such task.
+    """
+    given = dict(as_mapping(data, where))
+    return settings_of(given.pop("name", FIRST), f"{where}.name"), given
+
+
+def read_task(data: Any, where: str) -> BaseTaskSettings:
+    """Read settings of a task from plain data that has every field and no other.
+
+    Args:
+        data: See `named_settings`.
+        where: Name of the mapping, for messages.
+
+    Raises:
+        InputError: See `Settings.read`.
+    """
+    cls, given = named_settings(data, where)
+    return cls.read(given, where)

@@ -40,7 +40,7 @@ MOST_TRANSFORMS = 16
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class TrainerSettings(Settings):
-    """How long to train and when to stop."""
+    """Settings of the length of a training."""
 
     total_frames: Annotated[int, Whole(1, unit="frames")] = 2_000_000
     """Stop once this many frames were collected."""
@@ -49,68 +49,68 @@ class TrainerSettings(Settings):
     target_share: Annotated[float, Real(0.0, 1.0, is_above=True)] | None = 0.99
     """Stop once the running mean reaches this share of the greatest reward; none for never."""
     confirm_episodes: Annotated[int, Whole(0, unit="episodes")] = 200
-    """Flights by the most probable actions, in other worlds, that must confirm a policy which has
-    reached the target before training stops; 0 for none."""
+    """Greedy episodes in other scenes that must confirm a policy at the target before training
+    stops; 0 for none."""
     confirm_share: Annotated[float, Real(0.0, 1.0)] = 1.0
-    """Share of them that must reach every goal."""
+    """Fraction of these episodes that must reach every goal."""
     running_decay: Annotated[float, Real(0.0, 1.0, is_below=True)] = 0.99
-    """Weight of the old value in the running mean, per episode: 0.99 looks back about 100."""
+    """Weight of the old value in the running mean, per episode: 0.99 averages about 100."""
     max_grad_norm: Annotated[float, Real(0.0, is_above=True)] | None = None
     """Clip the gradient to this norm; none for no clipping."""
     minibatch_frames: Annotated[int, Whole(1, unit="frames")] = 1024
     """Frames in one forward and backward pass; bounds memory. Sums are rounded by it."""
     compiled: bool = True
-    """Whether a compiled kernel works out gradients, where it knows the network: sooner than
-    torch on a CPU. It adds in another order, so this is part of what a seed means."""
+    """Compute gradients in a fused kernel if it supports the network, which is faster on a CPU.
+    Sums have another order: results for a seed depend on it."""
     num_threads: Annotated[int, Whole(1, unit="threads")] = 2
-    """Threads that learn, wherever this runs; sums depend on how many there are."""
+    """Threads of the learner; results depend on their number through rounding."""
     checkpoint_interval_s: Annotated[float, Real(0.0, unit="s")] = 15.0
     """Seconds between two checkpoints."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class TrainSettings(Settings):
-    """One training: what is learned, how, and for how long."""
+    """Settings of a training."""
 
     task: BaseTaskSettings = TaskSettings()
-    """What the drone has to do."""
+    """Task."""
     appearance: AppearanceSettings = AppearanceSettings()
-    """How its worlds look."""
+    """Appearance of the scenes."""
     dynamics: DynamicsSettings = DynamicsSettings()
-    """How it moves."""
+    """Vehicle dynamics."""
     actions: ActionSettings = ActionSettings()
-    """What the policy can ask for."""
+    """Actions of the policy."""
     camera: CameraSettings = CameraSettings()
-    """The picture that the drone takes."""
+    """Camera of the policy."""
     transforms: Annotated[
         tuple[Transform, ...], Several(Instance(Transform), 0, MOST_TRANSFORMS)
     ] = (Gray(), Standardize())
-    """What becomes of the picture, in this order."""
+    """Transforms of the image, in this order."""
     network: Network = SmallCnn()
-    """From picture to logits."""
+    """Network of the policy."""
     returns: Returns = LeaveOneOut()
-    """What a step is worth."""
+    """Return estimator."""
     objective: Objective = Reinforce()
-    """What is made smaller, and what learns."""
+    """Loss and learner."""
     optimiser: Optimiser = Adam()
-    """How."""
+    """Optimizer."""
     scheduler: Scheduler = Constant()
-    """The course of the learning rate."""
+    """Learning-rate schedule."""
     collector: Collector = Threads()
-    """Where batches come from."""
+    """Collector."""
     trainer: TrainerSettings = TrainerSettings()
-    """How long, and when to stop."""
+    """Length of the training."""
     seed: Annotated[int, Whole(0)] = 0
-    """Root of every random stream: worlds, actions, initial weights."""
+    """Root of all random streams: scenes, actions, initial weights."""
     device: str = "cpu"
-    """Where worlds are drawn and policies run: cpu, cuda or cuda:N."""
+    """Device of renderer and networks: cpu, cuda or cuda:N."""
     renderer: RendererName = "raytrace"
-    """Who draws: raytrace, our own, or mujoco_warp, MuJoCo Warp's."""
+    """Renderer: raytrace, this package's ray tracer, or mujoco_warp, MuJoCo Warp's."""
     evaluate_after: Annotated[int, Whole(0, unit="episodes")] = 0
     """Episodes, in worlds to choose by, of the verdict at the end; 0 for none."""
 
     def check(self) -> None:
-        """Refuses parts that can't work together."""
+        """Refuse parts that don't work together."""
         if self.renderer != "raytrace" and not self.appearance.is_minimal:
             raise InputError(
                 f"renderer={self.renderer} draws the minimal appearance alone; give "
@@ -150,7 +150,7 @@ _NEEDS = re.compile(r"([a-z][\w.-]*) (?:could not be imported|is not installed|i
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Logger(Variant):
-    """Which of TorchRL's loggers, and with which values."""
+    """Settings of a TorchRL logger."""
 
     def make(self, *args: Any, **kwargs: Any) -> Any:
         """Make the logger.

@@ -1,72 +1,137 @@
-"""Steps from the camera's frame to what a network sees."""
+"""Settings of transforms, from the camera's frame to the network's input."""
 
 import dataclasses
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 from drone_rl.config.configuration import Variant
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Real, Several, Whole
+from drone_rl.utils.settings import below
+
+
+class Frame(NamedTuple):
+    """Shape and type of an image."""
+
+    shape: tuple[int, ...]
+    """(H, W, 3) for RGB bytes, (C, H, W) for floats."""
+    is_float: bool = False
+    """Whether the values are float32, as networks need them."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Transform(Variant):
-    """Which step, and with which values."""
+    """Settings of a transform."""
+
+    def output(self, frame: Frame) -> Frame | None:
+        """Return shape and type of the transformed image; None if only a call can tell.
+
+        Args:
+            frame: Shape and type of the input.
+
+        Raises:
+            InputError: The transform can't process such images.
+        """
+        return frame
+
+    def _of_bytes(self, frame: Frame, channels: int) -> Frame:
+        if frame.is_float or frame.shape[-1] != 3:
+            raise InputError(
+                f"the transform {self.name} needs the camera's own RGB; let it come first"
+            )
+        return Frame((channels, *frame.shape[:2]), True)
+
+    def _of_floats(self, frame: Frame) -> Frame:
+        if not frame.is_float:
+            raise InputError(f"the transform {self.name} needs floats; let gray come first")
+        return frame
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Gray(Transform):
     """RGB bytes to gray from 0 to 1."""
 
-    target: ClassVar[str] = "drone_rl.envs.transforms.GrayPixels"
+    target: ClassVar[str] = "gray"
+
+    def output(self, frame: Frame) -> Frame:
+        """See `Transform`."""
+        return self._of_bytes(frame, 1)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Rgb(Transform):
     """RGB bytes to colours from 0 to 1."""
 
-    target: ClassVar[str] = "drone_rl.envs.transforms.RgbPixels"
+    target: ClassVar[str] = "rgb"
+
+    def output(self, frame: Frame) -> Frame:
+        """See `Transform`."""
+        return self._of_bytes(frame, 3)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Chromaticity(Transform):
-    """Shares of red and blue in each color, less a third: 0 for every gray, however bright."""
+    """Fractions of red and blue in each pixel, minus a third: 0 for every gray level."""
 
-    target: ClassVar[str] = "drone_rl.envs.transforms.ChromaticityPixels"
+    target: ClassVar[str] = "chromaticity"
     floor: Annotated[float, Real(0.0, 3.0, is_above=True)] = 0.15
     """Added to the sum of red, green and blue, so that the dark is gray."""
+
+    def output(self, frame: Frame) -> Frame:
+        """See `Transform`."""
+        if not frame.is_float or frame.shape[0] != 3:
+            raise InputError("the transform chromaticity needs three colors; let rgb come before")
+        return Frame((2, *frame.shape[1:]), True)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Standardize(Transform):
     """Shifted and scaled: (x - mean) / std."""
 
-    target: ClassVar[str] = "drone_rl.envs.transforms.StandardizePixels"
+    target: ClassVar[str] = "standardize"
     mean: Annotated[float, Real(-1000.0, 1000.0)] = 0.53
     """Gray level that becomes 0."""
     std: Annotated[float, Real(1e-6, 1000.0)] = 0.21
     """Deviation that becomes 1."""
+
+    def output(self, frame: Frame) -> Frame:
+        """See `Transform`."""
+        return Frame(frame.shape, True)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Crop(Transform):
     """The rows that are kept, from top (included) to bottom (excluded)."""
 
-    target: ClassVar[str] = "drone_rl.envs.transforms.CropRows"
+    target: ClassVar[str] = "crop"
     top: Annotated[int, Whole(0, 1023, "pixels")] = 5
     """First row."""
     bottom: Annotated[int, Whole(1, 1024, "pixels")] = 30
     """First row that is not kept."""
+
+    def output(self, frame: Frame) -> Frame:
+        """See `Transform`."""
+        rows = frame.shape[-2]
+        if not self.top < self.bottom <= rows:
+            raise InputError(
+                f"the transform crop keeps rows {self.top} to {self.bottom} of {rows}; give top < "
+                f"bottom and at most {rows}"
+            )
+        return Frame((*frame.shape[:-2], self.bottom - self.top, frame.shape[-1]), frame.is_float)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Resize(Transform):
     """Averaging over areas."""
 
-    target: ClassVar[str] = "drone_rl.envs.transforms.Resize"
+    target: ClassVar[str] = "resize"
     height: Annotated[int, Whole(1, 1024, "pixels")] = 25
     """Pixels down."""
     width: Annotated[int, Whole(1, 1024, "pixels")] = 64
     """Pixels across."""
+
+    def output(self, frame: Frame) -> Frame:
+        """See `Transform`."""
+        return Frame((self._of_floats(frame).shape[0], self.height, self.width), True)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -77,9 +142,13 @@ class Stack(Transform):
     N: Annotated[int, Whole(1, 16, "frames")] = 2
     """Frames."""
 
-    def make(self, *args: Any, **kwargs: Any) -> Any:
-        """See `Variant`; the dimension is that of channels."""
-        return super().make(*args, dim=-3, in_keys=["pixels"], **kwargs)
+    def arguments(self) -> dict[str, Any]:
+        """Return the arguments of TorchRL's transform; the dimension is that of channels."""
+        return {**self.values(), "dim": -3, "in_keys": ["pixels"]}
+
+    def output(self, frame: Frame) -> Frame:
+        """See `Transform`."""
+        return Frame((frame.shape[0] * self.N, *frame.shape[1:]), frame.is_float)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -98,23 +167,31 @@ class StepCount(Transform):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Blur(Transform):
-    """Blurred by a Gaussian, as out of focus."""
+    """Gaussian blur."""
 
-    target: ClassVar[str] = "drone_rl.envs.fault_transforms.Blur"
+    target: ClassVar[str] = "blur"
     width: Annotated[float, Real(0.0, 16.0, unit="pixels")] = 0.5
     """Standard deviation of the Gaussian."""
+
+    def output(self, frame: Frame) -> Frame:
+        """See `Transform`."""
+        return self._of_floats(frame)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Fault(Transform):
-    """Something that goes wrong in a camera by chance or with memory: no map of pictures."""
+    """Camera fault that is random or has memory."""
+
+    def output(self, frame: Frame) -> Frame:
+        """See `Transform`."""
+        return self._of_floats(frame)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Noise(Fault):
-    """Noise of the sensor, which cuts off at black and white."""
+    """Sensor noise, clipped at black and white."""
 
-    target: ClassVar[str] = "drone_rl.envs.fault_transforms.Noise"
+    target: ClassVar[str] = "noise"
     strength: Annotated[float, Real(0.0, 1.0)] = 0.02
     """Standard deviation; from black to white is 1."""
     correlation_time: Annotated[float, Real(0.0, 10_000.0, unit="frames")] = 0.0
@@ -123,23 +200,29 @@ class Noise(Fault):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class DeadRows(Fault):
-    """Rows of the sensor that show nothing."""
+    """Dead rows of the sensor."""
 
-    target: ClassVar[str] = "drone_rl.envs.fault_transforms.DeadRows"
+    target: ClassVar[str] = "dead_rows"
     count: Annotated[int, Whole(0, 1024, "rows")] = 1
-    """Rows drawn anew for each episode, besides those that are always dead."""
+    """Rows sampled for each episode, in addition to `rows`."""
     rows: Annotated[tuple[int, ...], Several(Whole(0, 1023, "rows"), 0, 1024)] = ()
     """Rows that are always dead, from 0 at the top."""
     level: Annotated[float, Real(0.0, 1.0)] = 0.0
-    """What they show instead; 0 is black, 1 white."""
+    """Their level; 0 is black, 1 white."""
 
     def check(self) -> None:
-        """Refuses rows that are named twice."""
+        """Refuse duplicate rows."""
         if len(set(self.rows)) < len(self.rows):
             raise InputError(f"rows={list(self.rows)} names a row twice; name each once")
 
+    def output(self, frame: Frame) -> Frame:
+        """See `Transform`."""
+        with below(f"transforms.{self.name}"):
+            self.check_height(self._of_floats(frame).shape[-2])
+        return frame
+
     def check_height(self, height: int) -> None:
-        """Refuses more rows than pictures have.
+        """Refuse more rows than images have.
 
         Raises:
             InputError: There are not as many.
@@ -157,28 +240,28 @@ class DeadRows(Fault):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class FrozenFrames(Fault):
-    """Frames that are, by chance, the one before."""
+    """Frames that repeat the previous one at random."""
 
-    target: ClassVar[str] = "drone_rl.envs.fault_transforms.FrozenFrames"
+    target: ClassVar[str] = "frozen_frames"
     share: Annotated[float, Real(0.0, 1.0)] = 0.05
-    """Probability of each."""
+    """Probability of each frame to repeat."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class LateFrames(Fault):
-    """Frames that are shown late; until then the episode's first."""
+    """Delayed frames; until the first arrives, the episode's first frame."""
 
-    target: ClassVar[str] = "drone_rl.envs.fault_transforms.LateFrames"
+    target: ClassVar[str] = "late_frames"
     frames: Annotated[int, Whole(0, 16, "frames")] = 1
-    """How late."""
+    """Delay."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Shift(Fault):
-    """A picture that stands a little aside all through an episode, as of a camera fixed askew."""
+    """Image shifted by a constant of each episode, as by a misaligned camera."""
 
-    target: ClassVar[str] = "drone_rl.envs.fault_transforms.Shift"
+    target: ClassVar[str] = "shift"
     down: Annotated[int, Whole(0, 1023, "pixels")] = 4
-    """How far up or down at most; every shift is as likely."""
+    """Largest shift up or down; uniformly distributed."""
     across: Annotated[int, Whole(0, 1023, "pixels")] = 6
-    """How far to the left or right at most."""
+    """Largest shift to the left or right."""

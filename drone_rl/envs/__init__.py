@@ -1,9 +1,15 @@
-"""The worlds as TorchRL environments, and the pixel pipeline behind them."""
+"""The TorchRL environment and its image transforms; Gymnasium and SB3 versions."""
 
-from drone_rl.envs.camera_fault import CameraFault
+from drone_rl.envs.camera_faults import (
+    Blur,
+    CameraFault,
+    DeadRows,
+    FrozenFrames,
+    LateFrames,
+    Noise,
+    Shift,
+)
 from drone_rl.envs.drone_env import DroneEnv, worlds_of
-from drone_rl.envs.fault_transforms import Blur, DeadRows, FrozenFrames, LateFrames, Noise, Shift
-from drone_rl.envs.pipeline import on_pixels, with_transforms
 from drone_rl.envs.transforms import (
     ChromaticityPixels,
     CropRows,
@@ -11,6 +17,8 @@ from drone_rl.envs.transforms import (
     Resize,
     RgbPixels,
     StandardizePixels,
+    on_pixels,
+    with_transforms,
 )
 
 __all__ = [

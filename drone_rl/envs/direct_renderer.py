@@ -14,8 +14,7 @@ from torch import Tensor
 from torchrl.envs import Compose, EnvBase, TransformedEnv
 
 from drone_rl.envs.drone_env import DroneEnv
-from drone_rl.envs.pipeline import on_pixels
-from drone_rl.envs.transforms import GrayPixels, PixelTransform
+from drone_rl.envs.transforms import GrayPixels, PixelTransform, on_pixels
 from drone_rl.sim.tasks import State
 
 Entries = dict[NestedKey, Tensor]

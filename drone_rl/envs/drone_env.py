@@ -1,8 +1,4 @@
-# pyright: reportArgumentType=false
-# pyright: reportAttributeAccessIssue=false
-# pyright: reportIncompatibleMethodOverride=false
-# (TorchRL's specs take more than their annotations say: tuples as shapes, bounds.)
-"""Many worlds of a task as one TorchRL environment."""
+"""The batched TorchRL environment."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -33,17 +29,17 @@ from drone_rl.utils.seeding import Stream, get_state, set_state, side_stream, wo
 
 
 class DroneEnv(EnvBase):
-    """`num_envs` drones, each in a world of its own, stepped and drawn as one batch.
+    """`num_envs` independent drones, stepped and rendered as one batch.
 
-    Observation "pixels": uint8, shape (num_envs, height, width, 3). Action: one of
-    the dynamics'. The nested "info" holds the truth, see `Worlds.entries`.
+    Observation "pixels": uint8, shape (num_envs, height, width, 3). The action space is that of the
+    dynamics. The nested "info" is the ground truth, see `Worlds.entries`.
 
-    Only what is asked for is computed: a reset draws only the worlds that are reset, and worlds
-    outside a step's "_step" mask (TorchRL's partial steps) are neither moved nor drawn; their rows
-    repeat what they last showed.
+    A partial reset renders only the environments that are reset. Environments outside a step's
+    "_step" mask (TorchRL's partial steps) are neither stepped nor rendered and repeat their last
+    image.
 
-    World i draws its episodes from a stream of its own, so that the first k worlds of a batch are
-    the same whatever the size of the batch.
+    Environment i samples its episodes from its own random stream, so that the first k environments
+    do not depend on the batch size.
     """
 
     def __init__(
@@ -63,27 +59,27 @@ class DroneEnv(EnvBase):
         renderer: str | RendererFactory = "raytrace",
         appearance: AppearanceSettings | None = None,
     ) -> None:
-        """Builds the worlds.
+        """Create the environments.
 
         Args:
-            num_envs: How many.
-            task: What there is to do: its settings, its name or itself; cube collection by
-                default.
+            num_envs: Batch size.
+            task: A task, its settings or its name; cube collection by default.
             camera: The policy's camera.
-            seed: Root of all the worlds' random streams.
-            stream: What the worlds are for; training and evaluation never share one.
-            first_world: Number of the first world, so that two workers never share one.
-            num_shards: Threads that draw; the number of cores by default.
-            pixels: Whether to draw and observe; policies that read the truth don't need it.
+            seed: Root of the environments' random streams.
+            stream: Purpose of the environments; training and evaluation use different streams.
+            first_world: Number of the first environment, so that workers use different streams.
+            num_shards: Rendering threads; the number of cores by default.
+            pixels: Whether to render; policies that read the ground truth don't need it.
             device: "cpu", "cuda" or "cuda:N".
-            dynamics: How the drones move; the task's own choice by default.
-            actions: What they can be asked for, where dynamics are settings; moves by default.
-            renderer: Who draws, see `drone_rl.sim.rendering.find_renderer`.
-            appearance: How worlds look; what it leaves open is drawn at every reset.
+            dynamics: Vehicle dynamics; the task's default if None.
+            actions: Action space, if `dynamics` are settings; the moves by default.
+            renderer: See `drone_rl.sim.rendering.find_renderer`.
+            appearance: Visual appearance; ranges are sampled at every reset.
 
         Raises:
             InputError: A setting is out of range, a texture can't be read, there is no room for
-                the camera or for distractors, or the dynamics bring actions of their own.
+                the camera or for distractors, or `actions` are given with dynamics that have their
+                own.
         """
         if not (isinstance(num_envs, int) and num_envs >= 1):
             raise InputError(f"num_envs={num_envs} is out of range; give a whole number from 1")
@@ -111,34 +107,36 @@ class DroneEnv(EnvBase):
         self._make_specs()
         self._pixels = self._pixel_spec().zero()
         self.set_seed(seed)
-        self.is_closed = False  # TorchRL takes every environment for closed until it is told
+        self.is_closed = False  # TorchRL's default is True
 
     def state_dict(self, *args: object, **kwargs: object) -> dict:
-        """The worlds' random streams; enough to go on where every world is about to be reset."""
+        """Return the random streams, which suffice if every environment is reset next."""
         return {"random_states": [get_state(r) for r in self._random_states]}
 
-    def load_state_dict(self, state_dict: dict, strict: bool = True, assign: bool = False) -> None:
-        """Goes on with the streams of `state_dict`.
+    def load_state_dict(  # pyright: ignore[reportIncompatibleMethodOverride] (as EnvBase)
+        self, state_dict: dict, strict: bool = True, assign: bool = False
+    ) -> None:
+        """Restore a `state_dict`.
 
         Raises:
-            InputError: It was saved by another number of worlds.
+            InputError: It is from another number of environments.
         """
         states = state_dict["random_states"]
         if len(states) != len(self._random_states):
             raise InputError(
-                f"the saved environment has {len(states)} worlds, this one "
+                f"the saved state has {len(states)} environments, this batch "
                 f"{len(self._random_states)}; set num_envs={len(states)}"
             )
         for random_state, state in zip(self._random_states, states, strict=True):
             set_state(random_state, state)
 
     def running_state(self) -> dict[str, Any]:
-        """The worlds themselves and their streams: enough to go on within episodes."""
+        """Return the full state, which suffices to resume within episodes."""
         looks = {"looks": self.looks.values} if self.looks.varies else {}
         return {**self.state_dict(), "worlds": self.worlds.state.tensors(), **looks}
 
     def load_running_state(self, state: Mapping[str, Any]) -> None:
-        """Goes on within the episodes of a `running_state`, whose pictures are drawn anew.
+        """Restore a `running_state` and render it.
 
         Raises:
             InputError: See `load_state_dict`.
@@ -147,24 +145,26 @@ class DroneEnv(EnvBase):
         self.worlds.state = self.worlds.state.with_tensors(state["worlds"])
         if self.looks.varies:
             self.looks.load(state["looks"])
-        self._draw(self._indices(None))
+        self._render(self._indices(None))
 
     def side_streams(self, worlds: Tensor, *key: int) -> list[np.random.Generator]:
-        """Random streams for what is drawn beside the task's own, in episodes that have just begun.
+        """Return further random streams of episodes that have just begun.
+
+        They leave the task's own streams unchanged.
 
         Args:
             worlds: Indices. Shape: (k,).
-            key: Tells apart what they are for.
+            key: Distinguishes the purposes.
         """
         return [side_stream(self._random_states[i], *key) for i in worlds.tolist()]
 
     @property
     def last_pixels(self) -> Tensor:
-        """What the cameras last saw. Shape: (num_envs, H, W, 3), uint8."""
+        """The last images. Shape: (num_envs, H, W, 3), uint8."""
         return self._pixels
 
     def close(self, *, raise_if_closed: bool = True) -> None:
-        """Ends the rendering threads."""
+        """Stop the rendering threads."""
         if not self.is_closed:
             self.worlds.close()
         super().close(raise_if_closed=raise_if_closed)
@@ -176,18 +176,18 @@ class DroneEnv(EnvBase):
         observed = {"pixels": self._pixel_spec(), "info": info} if self.pixels else {"info": info}
         self.observation_spec = Composite(observed, shape=(n,)).to(self.device)
         self.action_spec = _action_spec(self.worlds.dynamics.actions.entry, n).to(self.device)
-        self.reward_spec = Unbounded((n, 1)).to(self.device)
-        done = {name: Binary(1, (n, 1), dtype=torch.bool) for name in _DONE_KEYS}
-        self.full_done_spec = Composite(**done, shape=(n,)).to(self.device)
+        self.reward_spec = Unbounded(torch.Size((n, 1))).to(self.device)
+        done = {name: Binary(1, torch.Size((n, 1)), dtype=torch.bool) for name in _DONE_KEYS}
+        self.full_done_spec = Composite(done, shape=(n,)).to(self.device)
 
     def _pixel_spec(self) -> Bounded:
         camera = self.worlds.camera
-        shape = (self.batch_size[0], camera.height, camera.width, 3)
+        shape = torch.Size((self.batch_size[0], camera.height, camera.width, 3))
         return Bounded(0, 255, shape, dtype=torch.uint8, device=self.device)
 
     def _set_seed(self, seed: int | None) -> None:
         if seed is None:
-            raise InputError("seed=None can't be repeated; give a whole number, 0 or more")
+            raise InputError("seed=None is not reproducible; give a whole number, 0 or more")
         first, n = self.first_world, self.batch_size[0]
         self._random_states = [world_random_state(seed, first + i, self.stream) for i in range(n)]
 
@@ -195,11 +195,11 @@ class DroneEnv(EnvBase):
         mask = None if tensordict is None else tensordict.get("_reset", None)
         worlds = self._indices(mask)
         self.start(worlds)
-        self._draw(worlds)
+        self._render(worlds)
         return self._observe({name: self._false() for name in _DONE_KEYS})
 
     def start(self, worlds: Tensor | None = None) -> None:
-        """Starts an episode in worlds, each out of its own stream; draws nothing.
+        """Start episodes without rendering.
 
         Args:
             worlds: Indices; all by default. Shape: (k,).
@@ -214,13 +214,13 @@ class DroneEnv(EnvBase):
         reward = torch.zeros(*self.batch_size, 1, device=self.device)
         action = tensordict.get(self.action_key)
         reward[worlds, 0] = self.worlds.step(worlds, action[worlds]).float()
-        self._draw(worlds)
+        self._render(worlds)
         terminated, truncated = (flag[:, None] for flag in self.worlds.ends())
         done = terminated | truncated
         flags = {"done": done, "terminated": terminated, "truncated": truncated}
         return self._observe({"reward": reward, **flags})
 
-    def _draw(self, worlds: Tensor) -> None:
+    def _render(self, worlds: Tensor) -> None:
         if not self.pixels:
             return
         is_whole = len(worlds) == len(self._pixels)
@@ -250,21 +250,23 @@ _DONE_KEYS = ("done", "terminated", "truncated")
 
 
 def worlds_of(env: EnvBase) -> Worlds:
-    """The worlds behind an environment, whatever transforms stand before them."""
+    """Return the worlds of an environment, with or without transforms."""
     base: Any = getattr(env, "base_env", env)
     return base.worlds
 
 
 def _action_spec(entry: Entry, num_envs: int) -> TensorSpec:
-    """The same of an action: whole numbers are indices of discrete ones."""
+    """Return the batched spec of an action; whole numbers are indices of discrete actions."""
     if entry.dtype == torch.int64 and entry.high is not None:
-        return Categorical(int(entry.high) + 1, shape=(num_envs, *entry.shape), dtype=torch.int64)
+        return Categorical(
+            int(entry.high) + 1, shape=torch.Size((num_envs, *entry.shape)), dtype=torch.int64
+        )
     return _spec(entry, num_envs)
 
 
 def _spec(entry: Entry, num_envs: int) -> TensorSpec:
-    """What is known of an entry, for a batch."""
-    shape = (num_envs, *entry.shape)
+    """Return the batched spec of an entry."""
+    shape = torch.Size((num_envs, *entry.shape))
     if entry.dtype == torch.bool:
         return Binary(shape[-1], shape, dtype=torch.bool)
     if entry.low is None or entry.high is None:

@@ -1,4 +1,6 @@
-"""From camera frames to what a network sees, in TorchRL transforms that need no torchvision."""
+"""Image transforms from camera frames to network inputs; they need no torchvision."""
+
+from collections.abc import Callable, Iterable, Sequence
 
 import torch
 from tensordict import TensorDictBase
@@ -6,26 +8,27 @@ from tensordict.utils import NestedKey
 from torch import Tensor
 from torch.nn import functional
 from torchrl.data import TensorSpec, Unbounded
+from torchrl.envs import CatFrames, Compose, EnvBase, Transform, TransformedEnv
 from torchrl.envs.transforms import ObservationTransform
 
+from drone_rl.config import transforms as settings
+from drone_rl.config.registry import implements
 from drone_rl.sim.rendering.view import to_gray
 from drone_rl.utils.errors import InputError
 
+Keys = list[NestedKey] | None
+
 
 class PixelTransform(ObservationTransform):
-    """A map from pixels to pixels, applied alike at reset and at every step."""
+    """A stateless transform of images, applied at reset and at every step."""
 
-    def __init__(
-        self,
-        in_keys: list[NestedKey] | None = None,
-        out_keys: list[NestedKey] | None = None,
-    ) -> None:
+    def __init__(self, in_keys: Keys = None, out_keys: Keys = None) -> None:
         in_keys = in_keys if in_keys is not None else ["pixels"]
         super().__init__(in_keys=in_keys, out_keys=out_keys or list(in_keys))
 
     @property
     def is_in_place(self) -> bool:
-        """Whether it takes "pixels" and puts what it makes of them in their place."""
+        """Whether it reads and writes "pixels"."""
         return list(self.in_keys) == list(self.out_keys) == ["pixels"]
 
     def _reset(
@@ -34,7 +37,7 @@ class PixelTransform(ObservationTransform):
         return self._call(tensordict_reset)
 
     def transform_observation_spec(self, observation_spec: TensorSpec) -> TensorSpec:
-        """Declares the shape that the transform makes of each pixel entry."""
+        """Return the spec with the transformed shape of each image entry."""
         for in_key, out_key in zip(self.in_keys, self.out_keys, strict=True):
             before = observation_spec[in_key]  # pyright: ignore[reportIndexIssue] (a composite)
             after = self._apply_transform(before.zero())
@@ -44,6 +47,7 @@ class PixelTransform(ObservationTransform):
         return observation_spec
 
 
+@implements(settings.Gray)
 class GrayPixels(PixelTransform):
     """RGB bytes (*, H, W, 3) to gray (*, 1, H, W), float32 in [0, 1], in one pass.
 
@@ -58,6 +62,7 @@ class GrayPixels(PixelTransform):
         return to_gray(obs).unsqueeze(-3)
 
 
+@implements(settings.Rgb)
 class RgbPixels(PixelTransform):
     """RGB bytes (*, H, W, 3) to floats (*, 3, H, W), float32 in [0, 1].
 
@@ -70,12 +75,13 @@ class RgbPixels(PixelTransform):
         return obs.movedim(-1, -3).float() / 255.0
 
 
+@implements(settings.Chromaticity)
 class ChromaticityPixels(PixelTransform):
-    """Colors (*, 3, H, W) to shares of red and blue in each (*, 2, H, W), less a third.
+    """RGB floats (*, 3, H, W) to chromaticities of red and blue (*, 2, H, W), minus a third.
 
-    Light, shadow and exposure change brightness and not these; every gray becomes 0. Shares are of
-    the sum of red, green and blue, and of `floor`, or else the noise of a dark pixel would look
-    like a color. From -1/3 to 2/3.
+    Lighting, shadows and exposure change the brightness, not the chromaticity; every gray becomes
+    0. Red and blue are divided by the sum of the channels and `floor`, which suppresses the color
+    noise of dark pixels. Range: -1/3 to 2/3.
 
     Raises:
         InputError: There are not three channels, or the floor is not above 0.
@@ -83,9 +89,9 @@ class ChromaticityPixels(PixelTransform):
 
     def __init__(
         self,
-        floor: float = 0.15,
-        in_keys: list[NestedKey] | None = None,
-        out_keys: list[NestedKey] | None = None,
+        floor: float = settings.Chromaticity.floor,
+        in_keys: Keys = None,
+        out_keys: Keys = None,
     ) -> None:
         super().__init__(in_keys, out_keys)
         if not floor > 0:
@@ -95,7 +101,7 @@ class ChromaticityPixels(PixelTransform):
     def _apply_transform(self, obs: Tensor) -> Tensor:
         if obs.shape[-3] != 3:
             raise InputError(
-                f"ChromaticityPixels got pictures of shape {tuple(obs.shape)}; let rgb come before"
+                f"ChromaticityPixels got images of shape {tuple(obs.shape)}; put it after rgb"
             )
         total = obs.sum(-3, keepdim=True)
         red_and_blue = torch.stack((obs[..., 0, :, :], obs[..., 2, :, :]), -3)
@@ -105,6 +111,7 @@ class ChromaticityPixels(PixelTransform):
         return f"ChromaticityPixels(floor={self.floor:g})"
 
 
+@implements(settings.Crop)
 class CropRows(PixelTransform):
     """Keeps the rows `top` to `bottom` (exclusive) of frames (*, C, H, W).
 
@@ -112,13 +119,7 @@ class CropRows(PixelTransform):
         InputError: The rows are not in the frame.
     """
 
-    def __init__(
-        self,
-        top: int,
-        bottom: int,
-        in_keys: list[NestedKey] | None = None,
-        out_keys: list[NestedKey] | None = None,
-    ) -> None:
+    def __init__(self, top: int, bottom: int, in_keys: Keys = None, out_keys: Keys = None) -> None:
         super().__init__(in_keys, out_keys)
         if not 0 <= top < bottom:
             raise InputError(f"CropRows({top}, {bottom}) keeps no row; give 0 <= top < bottom")
@@ -136,6 +137,7 @@ class CropRows(PixelTransform):
         return f"CropRows(top={self.top}, bottom={self.bottom})"
 
 
+@implements(settings.Resize)
 class Resize(PixelTransform):
     """Resizes frames (*, C, H, W) by averaging over areas.
 
@@ -144,12 +146,7 @@ class Resize(PixelTransform):
     """
 
     def __init__(
-        self,
-        *,
-        height: int,
-        width: int,
-        in_keys: list[NestedKey] | None = None,
-        out_keys: list[NestedKey] | None = None,
+        self, *, height: int, width: int, in_keys: Keys = None, out_keys: Keys = None
     ) -> None:
         super().__init__(in_keys, out_keys)
         if height < 1 or width < 1:
@@ -168,8 +165,9 @@ class Resize(PixelTransform):
         return f"Resize(height={self.height}, width={self.width})"
 
 
+@implements(settings.Standardize)
 class StandardizePixels(PixelTransform):
-    """Shifts and scales pixels: (x - mean) / std. The defaults are the original study's.
+    """Standardizes pixels: (x - mean) / std. The defaults are the original study's.
 
     Raises:
         InputError: The deviation is not above 0.
@@ -177,10 +175,10 @@ class StandardizePixels(PixelTransform):
 
     def __init__(
         self,
-        mean: float = 0.53,
-        std: float = 0.21,
-        in_keys: list[NestedKey] | None = None,
-        out_keys: list[NestedKey] | None = None,
+        mean: float = settings.Standardize.mean,
+        std: float = settings.Standardize.std,
+        in_keys: Keys = None,
+        out_keys: Keys = None,
     ) -> None:
         super().__init__(in_keys, out_keys)
         if not std > 0:
@@ -200,3 +198,47 @@ def _check_bytes(transform: PixelTransform, obs: Tensor) -> None:
             f"{type(transform).__name__} got {obs.dtype} frames of shape {tuple(obs.shape)}; "
             "give uint8 of shape (..., height, width, 3)"
         )
+
+
+def with_transforms(env: EnvBase, transforms: Sequence[Transform] = ()) -> TransformedEnv:
+    """Wrap an environment with transforms, in the order in which they are applied."""
+    # TorchRL annotates the star of its arguments as a list
+    return TransformedEnv(env, Compose(*transforms))  # pyright: ignore[reportArgumentType]
+
+
+def on_pixels(transforms: Iterable[Transform]) -> Callable[[Tensor], Tensor]:
+    """Return a function that applies transforms to images without an environment.
+
+    Args:
+        transforms: In order; those that don't read "pixels" are left out.
+    """
+    of_images = [transform for transform in transforms if "pixels" in (transform.in_keys or [])]
+
+    def apply(images: Tensor) -> Tensor:
+        for transform in of_images:
+            images = transform._apply_transform(images)
+        return images
+
+    return apply
+
+
+def memory_of(transforms: Iterable[Transform]) -> int:
+    """Return the number of previous frames in an observation (frame stacking), else 0."""
+    return max((t.N for t in transforms if isinstance(t, CatFrames)), default=1) - 1
+
+
+def see_film(transforms: Iterable[Transform], film: Sequence[Tensor]) -> Tensor:
+    """Apply transforms to the last of consecutive images, with frame stacking.
+
+    Args:
+        transforms: Image transforms, in order.
+        film: Consecutive images; the first is repeated if a stack needs more.
+    """
+    for transform in transforms:
+        if isinstance(transform, CatFrames):
+            shown = film[-transform.N :]
+            shown = [*shown[:1]] * (transform.N - len(shown)) + [*shown]
+            film = [torch.cat(shown, dim=transform.dim)]
+        else:
+            film = [transform._apply_transform(pixels) for pixels in film]
+    return film[-1]

@@ -11,11 +11,16 @@ from drone_rl.config import BaseTaskSettings
 from drone_rl.envs import DroneEnv
 from drone_rl.evaluation.metrics import Episodes
 from drone_rl.evaluation.rollouts import run_episodes
-from drone_rl.evaluation.rule import LUCK
+from drone_rl.evaluation.rule import BLIND_BASELINES
 from drone_rl.sim.actions import Actions
 from drone_rl.sim.dynamics import Dynamics
 from drone_rl.sim.tasks import Task, as_task
 from drone_rl.utils.errors import InputError
+
+BASELINES = (*BLIND_BASELINES, "oracle")
+"""Baselines of cube collection."""
+_RANDOM_ACTIONS = 5
+"""Key of the random actions' stream, derived from that of the first environment."""
 
 
 class Oracle(TensorDictModuleBase):
@@ -87,12 +92,6 @@ class ConstantPolicy(TensorDictModuleBase):
         return tensordict.set("action", action.to(tensordict["done"].device, copy=True))
 
 
-BASELINES = (*LUCK, "oracle")
-"""Baselines of cube collection."""
-_RANDOM_ACTIONS = 5
-"""Key of the random actions' stream, derived from that of the first environment."""
-
-
 def make_baseline(
     name: str,
     task: BaseTaskSettings | Task[Any],
@@ -147,7 +146,7 @@ def run_baselines(
     source = env.side_streams(torch.tensor([0]), _RANDOM_ACTIONS)[0]
     generator = torch.Generator(env.device).manual_seed(int(source.integers(2**63)))
     flown = {}
-    for name in (*task.luck, "oracle"):
+    for name in (*task.blind_baselines, "oracle"):
         env.load_state_dict(worlds)
         flown[name] = run_episodes(env, make_baseline(name, task, generator, actions), episodes)
     env.close()

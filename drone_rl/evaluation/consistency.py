@@ -53,14 +53,16 @@ def _rule(verdict: Mapping[str, Any]) -> Rule:
     if set(strata) == set(SIDES):
         strata = list(SIDES)
     flown = as_mapping(verdict.get("baselines"), "baselines")
-    luck = [name for name in flown if name != "oracle"]
-    if not 0 < len(strata) <= 8 or not 0 < len(luck) <= 32 or len(luck) == len(flown):
-        raise InputError(f"verdict has {len(strata)} strata and {len(luck)} baselines; judge again")
+    blind = [name for name in flown if name != "oracle"]
+    if not 0 < len(strata) <= 8 or not 0 < len(blind) <= 32 or len(blind) == len(flown):
+        raise InputError(
+            f"verdict has {len(strata)} strata and {len(blind)} baselines; judge again"
+        )
     rule = Rule(
         error_rate=Real(0.0, 1.0).read(error_rate, "verdict.error_rate"),
         good_share=Real(0.0, 1.0).read(good_share, "verdict.good_share"),
         strata=tuple(strata),
-        luck=tuple(luck),
+        blind_baselines=tuple(blind),
     )
     if verdict.get("rule") != rule.text:
         raise InputError("verdict.rule is not the rule of this version; judge the policy again")
@@ -148,8 +150,8 @@ def _expected(
         stratum = greedy["shares"][what]
         return stratum["mean"], (0.0, 1.0), stratum["count"]
     if name.startswith("above "):
-        luck = flown[what]["shares"]["all"]["mean"]
-        share = every - (1 - rule.luck_margin) * luck - rule.luck_margin * most
+        blind = flown[what]["shares"]["all"]["mean"]
+        share = every - (1 - rule.poor_margin) * blind - rule.poor_margin * most
         return share, (-1.0, 1.0), episodes
     return good * best - flown[what]["success"]["share"], (-1.0, good), episodes
 

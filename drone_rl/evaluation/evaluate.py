@@ -144,10 +144,6 @@ def held_out_environments(
     )
 
 
-def _computed(evidence: Evidence) -> str:
-    return f"Computed in {evidence['rounding']['arithmetic']}."
-
-
 def _same(evidence: Evidence) -> str:
     found = evidence["rounding"]
     return (
@@ -162,11 +158,6 @@ def _other(evidence: Evidence) -> str:
         f"Other actions in {found['differing']:,} of the first {found['compared_episodes']:,} "
         f"greedy episodes when computed again ({found['compared']}): decisions depend on rounding."
     )
-
-
-def _is_fragile(evidence: Evidence) -> bool:
-    found = evidence.get("rounding")
-    return bool(found) and bool(found.get("excessive")) and found["fragile"] > 0
 
 
 def _fragile(evidence: Evidence) -> str:
@@ -184,7 +175,7 @@ EVALUATION = (
         "computed",
         "the implementation that computed the actions is known",
         lambda e: bool(e.get("rounding")),
-        _computed,
+        lambda e: f"Computed in {e['rounding']['arithmetic']}.",
     ),
     Sentence(
         "computed.same",
@@ -201,7 +192,9 @@ EVALUATION = (
     Sentence(
         "computed.fragile",
         "rounding can change the action in more frames or episodes than a verdict allows",
-        _is_fragile,
+        lambda e: bool(
+            (found := e.get("rounding")) and found.get("excessive") and found["fragile"] > 0
+        ),
         _fragile,
     ),
 )

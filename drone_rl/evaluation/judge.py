@@ -14,13 +14,12 @@ from torchrl.envs import EnvBase
 
 from drone_rl.envs import worlds_of
 from drone_rl.evaluation.baselines import run_baselines
-from drone_rl.evaluation.certificate_text import is_proved
 from drone_rl.evaluation.metrics import Episodes, failure_table, summarise
 from drone_rl.evaluation.outcomes import Outcomes, Rounding
 from drone_rl.evaluation.rollouts import StepLog, run_episodes
 from drone_rl.evaluation.rounding_sensitivity import check_rounding
 from drone_rl.evaluation.rule import NOT_CERTAIN, Kind, Quantity, Rule, decide, kinds_within
-from drone_rl.evaluation.verdict_text import SENTENCES
+from drone_rl.evaluation.verdict_text import SENTENCES, is_proved
 from drone_rl.policies.policy import load_policy
 from drone_rl.utils.intervals import mean_bounds, proportion
 from drone_rl.utils.seeding import RootSeed, Stream, root_seed
@@ -33,7 +32,7 @@ MANY = (2, 3, 5, 10, 20, 50, 100)
 class Claim(Protocol):
     """A certificate of the policy; `drone_rl.verdicts.certificate` has the implementation."""
 
-    def beside(self, greedy: Episodes, *, rounding: Rounding | None = None) -> dict[str, Any]:
+    def as_evidence(self, greedy: Episodes, *, rounding: Rounding | None = None) -> dict[str, Any]:
         """Return what a verdict on these greedy episodes may quote of the certificate."""
         ...
 
@@ -116,6 +115,39 @@ def judge_policy(
     )
 
 
+def judge_for_selection(
+    path: Path,
+    episodes: int,
+    device: str,
+    renderer: str = "raytrace",
+    *,
+    seed: RootSeed | None = None,
+) -> tuple[dict[str, Any], dict]:
+    """Judge a checkpoint in environments reserved for selection, of which no report shows figures.
+
+    Args:
+        path: The checkpoint.
+        episodes: How many.
+        device: Where to run.
+        renderer: Name of the renderer.
+        seed: Root of the random streams; a fresh one by default.
+
+    Returns:
+        The verdict, as in verdict.json, and the checkpoint's progress.
+
+    Raises:
+        InputError: The checkpoint is unusable.
+    """
+    policy = load_policy(path)
+    count, seed = min(episodes, 250), seed or root_seed(None)
+    worlds = policy.flying(
+        count, seed=seed.value, stream=Stream.CHOICE, device=device, renderer=renderer
+    )
+    with worlds as (env, actor):
+        verdict = judge_policy(env, actor, episodes, seed=seed)
+        return verdict.as_dict(), policy.state["progress"]
+
+
 def judge(
     greedy: Episodes,
     baselines: Mapping[str, Episodes],
@@ -143,7 +175,9 @@ def judge(
         ValueError: The initial states differ.
     """
     task = greedy.task
-    rule = dataclasses.replace(rule or Rule(), strata=task.strata, luck=task.luck)
+    rule = dataclasses.replace(
+        rule or Rule(), strata=task.strata, blind_baselines=task.blind_baselines
+    )
     _check_pairs(greedy, [*baselines.values(), *([] if sampled is None else [sampled])])
     found = measure(greedy, baselines, rule)
     kind = decide([quantity.level for quantity in found], len(rule.strata))
@@ -163,7 +197,7 @@ def judge(
         "terms": task.vocabulary.as_dict(),
         "num_cubes": greedy.goals.reached.shape[-1],
         "rounding": None if rounding is None else {**rounding.as_dict(), "decides": depends},
-        "proof": None if claim is None else claim.beside(greedy, rounding=rounding),
+        "proof": None if claim is None else claim.as_evidence(greedy, rounding=rounding),
         "greedy": summarise(greedy),
         "sampled": None if sampled is None else summarise(sampled),
         "baselines": {name: summarise(flown) for name, flown in baselines.items()},
@@ -243,24 +277,6 @@ def observe(greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule) -> 
     return [values[~np.isnan(values)] for values in each]
 
 
-def _observe_each(greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule) -> list[NDArray]:
-    """The same for all episodes, NaN where there is no value. Shapes: (n,), float64."""
-    oracle = baselines["oracle"]
-    observed = [greedy.success - rule.good_share * oracle.success]
-    offered = [greedy.offered(stratum) for stratum in range(len(rule.strata))]
-    observed += [there.double() for there in offered]
-    for stratum, there in enumerate(offered):
-        share = torch.full_like(there, torch.nan, dtype=torch.float64)
-        share[there] = greedy.stratum_share(stratum)
-        observed.append(share)
-    for name in rule.luck:
-        luck = (1 - rule.luck_margin) * baselines[name].share
-        observed.append(greedy.share - luck - rule.luck_margin * oracle.share)
-    for name in rule.luck:
-        observed.append(rule.good_share * oracle.success - baselines[name].success)
-    return [values.numpy() for values in observed]
-
-
 def estimate(quantity: int, values: NDArray, rule: Rule) -> Quantity:
     """Estimate one of the rule's quantities from its values, as `observe` returns them.
 
@@ -275,6 +291,24 @@ def estimate(quantity: int, values: NDArray, rule: Rule) -> Quantity:
         return Quantity(share["share"], share["lower95"], share["upper95"], thresholds)
     mean = mean_bounds(values, *rule.ranges[quantity], rule.confidence)
     return Quantity(mean["mean"], mean["lower95"], mean["upper95"], thresholds)
+
+
+def _observe_each(greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule) -> list[NDArray]:
+    """The same for all episodes, NaN where there is no value. Shapes: (n,), float64."""
+    oracle = baselines["oracle"]
+    observed = [greedy.success - rule.good_share * oracle.success]
+    offered = [greedy.offered(stratum) for stratum in range(len(rule.strata))]
+    observed += [there.double() for there in offered]
+    for stratum, there in enumerate(offered):
+        share = torch.full_like(there, torch.nan, dtype=torch.float64)
+        share[there] = greedy.stratum_share(stratum)
+        observed.append(share)
+    for name in rule.blind_baselines:
+        blind = (1 - rule.poor_margin) * baselines[name].share
+        observed.append(greedy.share - blind - rule.poor_margin * oracle.share)
+    for name in rule.blind_baselines:
+        observed.append(rule.good_share * oracle.success - baselines[name].success)
+    return [values.numpy() for values in observed]
 
 
 def _is_certain(found: tuple[Quantity, ...], rule: Rule) -> bool:
@@ -299,36 +333,3 @@ def _check_pairs(greedy: Episodes, others: list[Episodes]) -> None:
     for other in others:
         if not torch.equal(other.goals.world, greedy.goals.world):
             raise ValueError("policy and baselines have different initial states; pair them")
-
-
-def judge_for_selection(
-    path: Path,
-    episodes: int,
-    device: str,
-    renderer: str = "raytrace",
-    *,
-    seed: RootSeed | None = None,
-) -> tuple[dict[str, Any], dict]:
-    """Judge a checkpoint in environments reserved for selection, of which no report shows figures.
-
-    Args:
-        path: The checkpoint.
-        episodes: How many.
-        device: Where to run.
-        renderer: Name of the renderer.
-        seed: Root of the random streams; a fresh one by default.
-
-    Returns:
-        The verdict, as in verdict.json, and the checkpoint's progress.
-
-    Raises:
-        InputError: The checkpoint is unusable.
-    """
-    policy = load_policy(path)
-    count, seed = min(episodes, 250), seed or root_seed(None)
-    worlds = policy.flying(
-        count, seed=seed.value, stream=Stream.CHOICE, device=device, renderer=renderer
-    )
-    with worlds as (env, actor):
-        verdict = judge_policy(env, actor, episodes, seed=seed)
-        return verdict.as_dict(), policy.state["progress"]

@@ -59,7 +59,7 @@ KINDS = ("good", "good, but trivial", "one-sided", "poor", "none of these")
 
 SIDES = ("left", "ahead", "right")
 """Strata of cube collection."""
-LUCK = ("random", "forward", "left", "right")
+BLIND_BASELINES = ("random", "forward", "left", "right")
 """Its random and constant baselines."""
 TOLERANCE = 1e-9
 """Rounding of a mean: a value that exceeds a threshold by less counts as equal to it."""
@@ -81,14 +81,14 @@ class Rule:
     """Fraction of goals that a one-sided policy does not exceed on the other side."""
     offered_share: float = 0.05
     """Fraction of episodes that must offer a goal on a side for the side to count."""
-    luck_margin: float = 1 / 6
+    poor_margin: float = 1 / 6
     """Fraction of the way from the best random or constant baseline to the oracle up to which a
     policy is poor."""
     error_rate: float = 0.05
     """Largest probability of a certain and wrong verdict."""
     strata: tuple[str, ...] = SIDES
     """Of the task, from left to right; one-sided policies differ between first and last."""
-    luck: tuple[str, ...] = LUCK
+    blind_baselines: tuple[str, ...] = BLIND_BASELINES
     """Random and constant baselines of the task."""
 
     def __post_init__(self) -> None:
@@ -114,8 +114,8 @@ class Rule:
             "success",
             *(f"offered {stratum}" for stratum in self.strata),
             *(f"collected {stratum}" for stratum in self.strata),
-            *(f"above {name}" for name in self.luck),
-            *(f"unsolved by {name}" for name in self.luck),
+            *(f"above {name}" for name in self.blind_baselines),
+            *(f"unsolved by {name}" for name in self.blind_baselines),
         )
 
     @property
@@ -123,14 +123,14 @@ class Rule:
         """Thresholds of each of `quantities`, in rising order."""
         shares = [(self.other_share, self.side_share)] * len(self.strata)
         offered = [(self.offered_share,)] * len(self.strata)
-        return ((0.0,), *offered, *shares, *[(0.0,)] * (2 * len(self.luck)))
+        return ((0.0,), *offered, *shares, *[(0.0,)] * (2 * len(self.blind_baselines)))
 
     @property
     def ranges(self) -> tuple[tuple[float, float], ...]:
         """Least and greatest value of each of `quantities` in an episode."""
         count = len(self.strata)
-        above = [(-1.0, 1.0)] * len(self.luck)
-        unsolved = [(-1.0, self.good_share)] * len(self.luck)
+        above = [(-1.0, 1.0)] * len(self.blind_baselines)
+        unsolved = [(-1.0, self.good_share)] * len(self.blind_baselines)
         return ((-self.good_share, 1.0), *[(0.0, 1.0)] * (2 * count), *above, *unsolved)
 
     @property
@@ -148,7 +148,7 @@ are collected, wherever more than {self.offered_share:.0%} of episodes offer one
 trivial: the same, but random actions or one action always succeed in at least \
 {self.good_share:.0%} of the oracle's episodes, too. one-sided: more \
 than {self.side_share:.0%} of the cubes on one side and no more than {self.other_share:.0%} on \
-the other, both offered. poor: neither, and no farther than {self.luck_margin:.0%} of the way from \
+the other, both offered. poor: neither, and no farther than {self.poor_margin:.0%} of the way from \
 luck to the oracle, in cubes; luck is the best of random actions and of each action always, flown \
 in the same worlds. none of these: anything else. Every episode counts once: a share is a mean \
 over episodes. The verdict is certain if the kind is the same wherever the quantities lie within \
@@ -191,8 +191,8 @@ def decide(levels: Sequence[int], num_strata: int = len(SIDES)) -> Kind:
     """
     success, *rest = levels
     offered, shares = rest[:num_strata], rest[num_strata : 2 * num_strata]
-    luck = rest[2 * num_strata :]
-    above_luck, unsolved = luck[: len(luck) // 2], luck[len(luck) // 2 :]
+    blind = rest[2 * num_strata :]
+    above, unsolved = blind[: len(blind) // 2], blind[len(blind) // 2 :]
     if success and all(
         share == 2 or not there for there, share in zip(offered, shares, strict=True)
     ):
@@ -202,7 +202,7 @@ def decide(levels: Sequence[int], num_strata: int = len(SIDES)) -> Kind:
             return Kind.ONE_SIDED_RIGHT
         if (shares[0], shares[-1]) == (2, 0):
             return Kind.ONE_SIDED_LEFT
-    return Kind.NONE if all(above_luck) else Kind.POOR
+    return Kind.NONE if all(above) else Kind.POOR
 
 
 @functools.lru_cache(maxsize=4096)
@@ -213,8 +213,8 @@ def kinds_within(box: tuple[tuple[int, int], ...], num_strata: int = len(SIDES))
         box: Least and greatest level of each of `Rule.quantities`.
         num_strata: Number of strata among them.
     """
-    luck = box[1 + 2 * num_strata :]
-    halves = luck[: len(luck) // 2], luck[len(luck) // 2 :]
+    blind = box[1 + 2 * num_strata :]
+    halves = blind[: len(blind) // 2], blind[len(blind) // 2 :]
     # `decide` uses only whether all levels of a half are above 0, so the least one is enough
     least = [
         (min(low for low, _ in half), min(high for _, high in half)) for half in halves if half

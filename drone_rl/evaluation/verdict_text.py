@@ -1,20 +1,103 @@
 """Sentences of a verdict. Evidence: `verdict.json`."""
 
-from collections.abc import Sequence
 from typing import Any
 
-from drone_rl.evaluation.certificate_text import PROOF
 from drone_rl.sim.vocabulary import terms_of
-from drone_rl.utils.text import Evidence, Sentence, fixed_seed, percent
+from drone_rl.utils.text import Evidence, Sentence, all_cubes, exact, fixed_seed, listed, percent
 
+MOST_WRONG = 0.01
+"""Largest fraction of placements with a wrong statement, with 95% confidence."""
 FREQUENT = 0.02
 """Fraction of episodes above which an end is mentioned."""
-_LUCK = {
+_ACTING = {
     "random": "acting at random",
     "forward": "flying straight on",
     "left": "flying left",
     "right": "flying right",
 }
+
+
+def is_quoted(evidence: Evidence) -> bool:
+    """Return whether a certificate is quoted."""
+    proof = evidence.get("proof")
+    return proof is not None and proof["refused"] is None
+
+
+def is_stated(evidence: Evidence) -> bool:
+    """Return whether it states success from every placement."""
+    return is_quoted(evidence) and evidence["proof"]["every"]
+
+
+def is_proved(evidence: Evidence) -> bool:
+    """Return whether it does, and enough rollouts from fresh placements re-checked it."""
+    bound = evidence["proof"].get("wrong_at_most") if is_stated(evidence) else None
+    return bound is not None and bound <= MOST_WRONG
+
+
+def _fraction(evidence: Evidence) -> str:
+    proof, cubes = evidence["proof"], all_cubes(evidence["num_cubes"])
+    share, lost, undecided = (proof[name] for name in ("share", "lost", "undecided"))
+    so_far = "" if proof["finished"] else " so far, for the proof was stopped"
+    text = (
+        f"A certificate states{so_far}: with its most probable actions it collects {cubes} from a "
+        f"share of {exact(share)} of all placements; from "
+        f"{exact(lost, is_all=share == undecided == 0)} it does not"
+    )
+    if undecided:
+        text += f", and {exact(undecided, is_all=share == lost == 0)} is undecided"
+    return f"{text}."
+
+
+def _basis(evidence: Evidence) -> str:
+    agreeing = evidence["proof"]["agreeing"]
+    own = f" All {agreeing:,} greedy episodes of this verdict whose end it states ended so."
+    return (
+        "The certificate is of this network and task, and its boxes are a partition of the "
+        f"placements. {_checked(evidence['proof'])}{own if agreeing else ''}"
+    )
+
+
+def _checked(proof: Evidence) -> str:
+    """The number of rollouts that re-checked it, and what they rule out."""
+    bound = proof.get("wrong_at_most")
+    if bound is None:
+        return "It was read from its file and not re-checked, so it proves nothing here."
+    fitted = ", to which a certificate could have been fitted" if proof["seed_is_fixed"] else ""
+    start = "placements of the fixed" if proof["seed_is_fixed"] else "fresh placements,"
+    text = (
+        f"It was re-checked by {proof['checked']:,} rollouts from {start} seed {proof['seed']}"
+        f"{fitted}: all ended as it states, so that with 95% confidence it is wrong about at most "
+        f"{100 * bound:.2g}% of the placements"
+    )
+    if bound > MOST_WRONG:
+        return f"{text}, which is too much for a proof."
+    return f"{text} (to prove it again, run drone-rl prove)."
+
+
+PROOF = (
+    Sentence(
+        "proof.every",
+        "a valid certificate states so, and no episode contradicts it",
+        is_stated,
+        lambda e: (
+            "A certificate states for every placement: with its most probable actions it collects "
+            f"{all_cubes(e['num_cubes'])} from all places where they may stand."
+        ),
+    ),
+    Sentence(
+        "proof.share",
+        "the same, but some placements are lost or undecided",
+        lambda e: is_quoted(e) and not e["proof"]["every"],
+        _fraction,
+    ),
+    Sentence("proof.basis", "a certificate is quoted", is_quoted, _basis),
+    Sentence(
+        "proof.refused",
+        "a certificate is refused",
+        lambda e: e.get("proof") is not None and not is_quoted(e),
+        lambda e: f"A certificate is not quoted: {e['proof']['refused']}.",
+    ),
+)
 
 
 def _success(flights: Evidence) -> str:
@@ -30,18 +113,18 @@ def _every(evidence: Evidence) -> str:
     return f"{terms.reaches} every {terms.goal}"
 
 
-def best_luck(evidence: Evidence) -> str:
+def best_baseline(evidence: Evidence) -> str:
     """Return the random or constant baseline that collects most."""
     flown = evidence["baselines"]
-    return max(_luck(evidence), key=lambda name: flown[name]["shares"]["all"]["mean"])
+    return max(_blind(evidence), key=lambda name: flown[name]["shares"]["all"]["mean"])
 
 
-def _luck(evidence: Evidence) -> list[str]:
+def _blind(evidence: Evidence) -> list[str]:
     return [name for name in evidence["baselines"] if name != "oracle"]
 
 
-def _acting(luck: str) -> str:
-    return _LUCK.get(luck, f"always choosing {luck}")
+def _acting(baseline: str) -> str:
+    return _ACTING.get(baseline, f"always choosing {baseline}")
 
 
 def _sides(evidence: Evidence) -> dict[str, str]:
@@ -67,10 +150,6 @@ def _looks(evidence: Evidence) -> str:
     return others.get(str(evidence["kind"]), str(evidence["kind"]))
 
 
-def _list(parts: Sequence[str], last: str = "and") -> str:
-    return f" {last} ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else parts)
-
-
 def _kind(evidence: Evidence) -> str:
     every = f"it {_every(evidence)} in {_success(evidence['greedy'])} of episodes"
     if lost := _lost_side(evidence):
@@ -94,11 +173,11 @@ def _trivial(evidence: Evidence) -> str:
 def _most_successful(evidence: Evidence) -> str:
     """The random or constant baseline that succeeds most often."""
     flown = evidence["baselines"]
-    return max(_luck(evidence), key=lambda name: flown[name]["success"]["share"])
+    return max(_blind(evidence), key=lambda name: flown[name]["success"]["share"])
 
 
 def _no_better(evidence: Evidence) -> str:
-    ours, best = evidence["greedy"], best_luck(evidence)
+    ours, best = evidence["greedy"], best_baseline(evidence)
     theirs = evidence["baselines"][best]
     is_more = ours["shares"]["all"]["mean"] > theirs["shares"]["all"]["mean"]
     return f"{'hardly' if is_more else 'no'} better than {_acting(best)}"
@@ -145,68 +224,56 @@ def _shares(evidence: Evidence) -> str:
     terms = terms_of(evidence)
     goals = f"the {terms.goals}"
     parts = [f"{p} of {'those' if i else goals} {v}" for i, (p, v) in enumerate(met)]
-    text = f"It {terms.reaches} {_list(parts)}"
-    return text + (f"; none were offered {_list(none, 'or')}." if none else ".")
+    text = f"It {terms.reaches} {listed(parts)}"
+    return text + (f"; none were offered {listed(none, 'or')}." if none else ".")
 
 
 def _baselines(evidence: Evidence) -> str:
-    flown, luck, terms = evidence["baselines"], best_luck(evidence), terms_of(evidence)
+    flown, best, terms = evidence["baselines"], best_baseline(evidence), terms_of(evidence)
     return (
         f"From the same initial states it {terms.reaches} {_all(evidence['greedy'])} of all "
-        f"{terms.goals}, {_acting(luck)} {_all(flown[luck])} and the oracle "
+        f"{terms.goals}, {_acting(best)} {_all(flown[best])} and the oracle "
         f"{_all(flown['oracle'])}."
     )
 
 
-def _luck_suffices(evidence: Evidence) -> bool:
+def _is_trivial(evidence: Evidence) -> bool:
     flown = evidence["baselines"]
-    luck = max(flown[name]["success"]["share"] for name in _luck(evidence))
-    return luck > 0 and luck >= evidence["good_share"] * flown["oracle"]["success"]["share"]
+    best = max(flown[name]["success"]["share"] for name in _blind(evidence))
+    return best > 0 and best >= evidence["good_share"] * flown["oracle"]["success"]["share"]
 
 
 def _pointless(evidence: Evidence) -> str:
-    flown, luck = evidence["baselines"], _most_successful(evidence)
-    return (
-        f"This task is trivial: {_acting(luck)} {_every(evidence)} in {_success(flown[luck])} of "
-        "episodes."
-    )
-
-
-def _hopeless(evidence: Evidence) -> str:
-    oracle = evidence["baselines"]["oracle"]
-    return f"Even the oracle {_every(evidence)} in only {_success(oracle)} of episodes."
+    best = _most_successful(evidence)
+    rate = _success(evidence["baselines"][best])
+    return f"This task is trivial: {_acting(best)} {_every(evidence)} in {rate} of episodes."
 
 
 def _largest(evidence: Evidence) -> str:
     row: dict[str, Any] = evidence["failures"]["largest"]
     by, terms = row["by"], terms_of(evidence)
-    where = terms.failing(by, row["value"])
     whole = row["failed"] == row["episodes"]
     count = f"all {row['episodes']:,}" if whole else f"{row['failed']:,} of {row['episodes']:,}"
     offered = {terms.goal: " that got so far", "end": ""}.get(by, " that offered one")
     if row["episodes"] == evidence["greedy"]["episodes"]:
         offered = ""
-    share = "" if whole else f" ({percent(row['share'])})"
-    return f"It fails most {where}: in {count} episodes{offered}{share}{_other_ends(evidence)}."
+    count += f" episodes{offered}" + ("" if whole else f" ({percent(row['share'])})")
+    return f"It fails most {terms.failing(by, row['value'])}: in {count}{_other_ends(evidence)}."
 
 
 def _other_ends(evidence: Evidence) -> str:
     """Ends by which many episodes fail, except the expected one and the one just named."""
     largest = evidence["failures"]["largest"]
-    said = (
-        evidence["failures"].get("expected_end"),
-        largest["value"] if largest["by"] == "end" else None,
-    )
+    named = largest["value"] if largest["by"] == "end" else None
+    said = (evidence["failures"].get("expected_end"), named)
     rows = [
         row
         for row in evidence["failures"]["rows"]
         if row["by"] == "end" and row["lower95"] > FREQUENT and row["value"] not in said
     ]
-    ends = [
-        f"{percent(row['share'])} of all end {terms_of(evidence).ending(row['value'])}"
-        for row in rows
-    ]
-    return f"; {_list(ends)}" if ends else ""
+    terms = terms_of(evidence)
+    ends = [f"{percent(row['share'])} of all end {terms.ending(row['value'])}" for row in rows]
+    return f"; {listed(ends)}" if ends else ""
 
 
 def _never(evidence: Evidence) -> str:
@@ -215,21 +282,12 @@ def _never(evidence: Evidence) -> str:
     return f"It failed in none of {bound['trials']:,} episodes, so it fails in at most {upper}."
 
 
-def _differs(evidence: Evidence) -> bool:
-    difference = evidence["drawing"]
-    return difference is not None and (difference["lower95"] > 0 or difference["upper95"] < 0)
-
-
 def _drawing(evidence: Evidence) -> str:
     sampled, greedy = _success(evidence["sampled"]), _success(evidence["greedy"])
     return (
         f"That is for its most probable actions: with sampled actions it {_every(evidence)} in "
         f"{sampled} of episodes, not in {greedy}."
     )
-
-
-def _misses_or_lacks(evidence: Evidence) -> bool:
-    return any(evidence["greedy"]["shares"][side]["mean"] != 1.0 for side in _sides(evidence))
 
 
 def quantity_label(name: str, evidence: Evidence) -> str:
@@ -254,13 +312,11 @@ def quantity_label(name: str, evidence: Evidence) -> str:
 
 def unlike(evidence: Evidence) -> str:
     """Return how the dynamics differ from those that a policy was trained with."""
-    changed = evidence["unlike"].items()
-    parts = [f"{_set(name, of['flown'])} instead of {_said(of['own'])}" for name, of in changed]
-    return f"It was trained with other dynamics: here it flew with {_list(parts)}."
-
-
-def _set(name: str, value: Any) -> str:
-    return f"dynamics.{name}={_said(value)}"
+    parts = [
+        f"dynamics.{name}={_said(of['flown'])} instead of {_said(of['own'])}"
+        for name, of in evidence["unlike"].items()
+    ]
+    return f"It was trained with other dynamics: here it flew with {listed(parts)}."
 
 
 def _said(value: Any) -> str:
@@ -291,19 +347,26 @@ SENTENCES = (
     ),
     fixed_seed("fixed_seed"),
     *PROOF,
-    Sentence("shares", "a goal was missed, or a side not offered", _misses_or_lacks, _shares),
-    Sentence("baselines", "the task is not trivial", lambda e: not _luck_suffices(e), _baselines),
+    Sentence(
+        "shares",
+        "a goal was missed, or a side not offered",
+        lambda e: any(e["greedy"]["shares"][side]["mean"] != 1.0 for side in _sides(e)),
+        _shares,
+    ),
+    Sentence("baselines", "the task is not trivial", lambda e: not _is_trivial(e), _baselines),
     Sentence(
         "pointless",
         "a random or constant baseline is as good, and the first sentence does not say so",
-        lambda e: _luck_suffices(e) and not (e["certain"] and e["kind"] == "good, but trivial"),
+        lambda e: _is_trivial(e) and not (e["certain"] and e["kind"] == "good, but trivial"),
         _pointless,
     ),
     Sentence(
         "hopeless",
         "the oracle certainly fails in more than half of the episodes",
         lambda e: e["baselines"]["oracle"]["success"]["upper95"] < 0.5,
-        _hopeless,
+        lambda e: (
+            f"Even the oracle {_every(e)} in only {_success(e['baselines']['oracle'])} of episodes."
+        ),
     ),
     Sentence(
         "failures.largest",
@@ -320,7 +383,9 @@ SENTENCES = (
     Sentence(
         "drawing",
         "success rates of greedy and sampled episodes differ (paired, 95%)",
-        _differs,
+        lambda e: (
+            bool(e["drawing"]) and not e["drawing"]["lower95"] <= 0 <= e["drawing"]["upper95"]
+        ),
         _drawing,
     ),
     Sentence(

@@ -1,4 +1,4 @@
-"""Where it looks: heat maps of all frames, and one flight as a film."""
+"""Section "attribution": heat maps of all frames, and of one episode as a film."""
 
 from typing import Any
 
@@ -11,24 +11,72 @@ from drone_rl.explanations.context import FILMED, Context
 from drone_rl.explanations.rollouts import RolloutDataset
 from drone_rl.sim.tasks import Task
 
+SHOWN = ("grad_cam", "grad_cam_logit")
+"""Maps of the film; the second is shown where the first has no heat."""
+INSTEAD = ("saliency", "occlusion")
+"""Without Grad-CAM, the first of these that the policy allows is shown."""
 COUNT = 6
-"""Frames in a sequence, as in Figs. 13 to 15."""
+"""Key frames of an episode, as in Figs. 13 to 15."""
+
+
+def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
+    """Return "attribution".
+
+    Arrays: "map_..." (T, H, W) of each method, each frame's maximum 1; of the film's n steps
+    "film_frames" (n, H, W, 3), "film_heat" (n, H, W), "film_probabilities" and "film_actions".
+    """
+    arrays = {f"map_{name}": _normalized(maps) for name, maps in context.frame_maps.items()}
+    flights, explainer, film = context.flights, context.explainer, context.film
+    first = int(np.flatnonzero(flights.episode == FILMED)[0])
+    methods = [name for name in SHOWN if name in context.maps]
+    methods = methods or [name for name in INSTEAD if name in context.maps][:1]
+    heat = torch.zeros(film.frames.shape[:-1])
+    by: list[str | None] = [None] * len(film)
+    for name in methods:
+        maps = explainer.methods()[name](film.tensor("observations"), film.tensor("actions"))
+        for step, one in enumerate(context.scenes.to_frame(maps)):
+            if by[step] is None and one.max() > 0:
+                heat[step], by[step] = one, name
+    arrays |= {
+        "film_frames": film.frames,
+        "film_heat": _normalized(heat),
+        "film_probabilities": film.probabilities,
+        "film_actions": film.actions,
+    }
+    frames = key_frames(flights, FILMED, context.scenes.task)
+    numbers = {
+        "layer": explainer.layer,
+        "methods": list(context.maps),
+        "shown": methods[0],
+        "film": {
+            "episode": FILMED,
+            "heat_by": by,
+            "key_steps": [{"step": frame - first, "why": why} for frame, why in frames],
+        },
+    }
+    return {"attribution": numbers}, arrays
+
+
+def _normalized(maps: Tensor) -> NDArray:
+    """Return each map divided by its maximum, as float16."""
+    peak = maps.flatten(1).amax(1).clamp_min(1e-30)[:, None, None]
+    return (maps / peak).numpy().astype(np.float16)
 
 
 def key_frames(dataset: RolloutDataset, episode: int, task: Task[Any]) -> list[tuple[int, str]]:
-    """Six frames of an episode in order of time, each with why it was chosen.
+    """Select six frames of an episode.
 
-    The rule: the first frame; half way to the first goal (or to the end); the frame before
-    each goal is reached; the frame before one is missed, and the last one of an episode that
-    failed. What is still free goes to the frames furthest from those chosen.
+    They are: the first frame; the frame half way to the first goal (or to the end); the frame
+    before each goal is reached; the frame before one is missed, and the last one of an episode that
+    failed. Remaining places go to the frames furthest from those selected.
 
     Args:
-        dataset: Whole flights.
+        dataset: Whole episodes.
         episode: One of them.
-        task: What was flown.
+        task: Its task.
 
     Returns:
-        Frame number and reason; fewer than six only where the episode is shorter.
+        Frame number and reason, in order of time; fewer than six only if the episode is shorter.
     """
     frames = np.flatnonzero(dataset.episode == episode)
     chosen: dict[int, str] = {int(frames[0]): "start"}
@@ -48,55 +96,3 @@ def key_frames(dataset: RolloutDataset, episode: int, task: Task[Any]) -> list[t
         away = np.abs(frames[:, None] - np.array(list(chosen))[None]).min(1)
         chosen[int(frames[away.argmax()])] = "in between"
     return sorted(chosen.items())
-
-
-SHOWN = ("grad_cam", "grad_cam_logit")
-"""Maps of the film: the second where the first has no heat at all."""
-INSTEAD = ("saliency", "occlusion")
-"""The first that there is, of a policy without Grad-CAM."""
-
-
-def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
-    """Makes "attribution".
-
-    Arrays: "map_..." (T, H, W) of each method, each frame's peak 1; of the film's n steps
-    "film_frames" (n, H, W, 3), "film_heat" (n, H, W), "film_probabilities" and "film_actions".
-    """
-    arrays = {f"map_{name}": _peak(maps) for name, maps in context.frame_maps.items()}
-    flights, explainer, film = context.flights, context.explainer, context.film
-    first = int(np.flatnonzero(flights.episode == FILMED)[0])
-    methods = [name for name in SHOWN if name in context.maps]
-    methods = methods or [name for name in INSTEAD if name in context.maps][:1]
-    heat = torch.zeros(film.frames.shape[:-1])
-    by: list[str | None] = [None] * len(film)
-    for name in methods:
-        maps = explainer.methods()[name](film.tensor("observations"), film.tensor("actions"))
-        for step, one in enumerate(context.scenes.to_frame(maps)):
-            if by[step] is None and one.max() > 0:
-                heat[step], by[step] = one, name
-    arrays |= {
-        "film_frames": film.frames,
-        "film_heat": _peak(heat),
-        "film_probabilities": film.probabilities,
-        "film_actions": film.actions,
-    }
-    numbers = {
-        "layer": explainer.layer,
-        "methods": list(context.maps),
-        "shown": methods[0],
-        "film": {
-            "episode": FILMED,
-            "heat_by": by,
-            "key_steps": [
-                {"step": frame - first, "why": why}
-                for frame, why in key_frames(flights, FILMED, context.scenes.task)
-            ],
-        },
-    }
-    return {"attribution": numbers}, arrays
-
-
-def _peak(maps: Tensor) -> NDArray:
-    """Each map with its greatest value 1, as halves."""
-    peak = maps.flatten(1).amax(1).clamp_min(1e-30)[:, None, None]
-    return (maps / peak).numpy().astype(np.float16)

@@ -1,4 +1,8 @@
-"""The flaw of Fig. 9, found by program: alike pictures, opposite actions."""
+"""Sections "dataset" (statistics of the rollouts) and "flaws" (contradictions and loops).
+
+A contradiction (the flaw of Fig. 9) is a pair of similar observations with opposite actions. A loop
+is a stretch of an episode in which the drone moves back and forth.
+"""
 
 import dataclasses
 import enum
@@ -14,62 +18,91 @@ from drone_rl.sim.actions import Actions
 from drone_rl.utils.intervals import mean_interval, proportion
 
 ALIKE_METRES = 1.0
-"""Next cubes stand alike if their places seen from the drone differ by at most this."""
+"""Next targets at places that differ by at most this, relative to the drone, count as equal."""
 MIN_OPPOSITION = 0.2
-"""Pairs less opposed than this are not worth a look."""
+"""Pairs with a smaller opposition are ignored."""
 LISTED = 50
-"""Pairs that are listed; all are counted."""
+"""Number of pairs that are listed; all are counted."""
+
+
+def dataset_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
+    """Return "dataset"."""
+    data, flights = context.dataset, context.flights
+    probs = data.probabilities.astype(np.float64)
+    entropy = -(probs * np.log(np.maximum(probs, 1e-12))).sum(-1) / np.log(probs.shape[-1])
+    counts = np.bincount(flights.actions, minlength=probs.shape[-1])
+    numbers = {
+        "frames": len(data),
+        "episodes": len(np.unique(flights.episode)),
+        "steps": len(flights),
+        "action_shares": (counts / counts.sum()).tolist(),
+        "entropy": mean_interval(entropy.clip(0.0, 1.0), data.episode),
+        "goals_reached": int((flights.event > 0).sum()),
+    }
+    return {"dataset": numbers}, {}
+
+
+def flaws_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
+    """Return "contradictions" of the analysed frames, and "loops" of the whole episodes."""
+    data, flights, scenes = context.dataset, context.flights, context.scenes
+    alike = one_move(flights)
+    pairs = find_pairs(data, alike, scenes.actions, data.offset(scenes.task))
+    numbers = {
+        "contradictions": summarise_pairs(pairs, data, alike),
+        "loops": summarise_loops(flights, find_loops(flights, scenes.actions)),
+    }
+    return numbers, {}
 
 
 class Kind(enum.StrEnum):
-    """What the simulator says of a pair."""
+    """Kind of a pair of frames, by the simulator's ground truth."""
 
     CONTRADICTION = "contradiction"
-    """The next cube stands alike in both, so that nothing justifies the difference."""
+    """The next target is at about the same place in both."""
     JUSTIFIED = "justified"
-    """It stands elsewhere."""
+    """The next target is elsewhere."""
     UNKNOWN = "unknown"
-    """One of the frames has no next cube."""
+    """One of the frames has no next target."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Pair:
-    """Two frames that look alike and on which the policy wants opposite things."""
+    """Two similar frames with opposite actions."""
 
     left: int
-    """The frame on which it wants to go left more."""
+    """The frame with the higher probability of left."""
     right: int
-    """The frame on which it wants to go right more."""
+    """The frame with the higher probability of right."""
     distance: float
-    """Root mean square difference of the pictures; see `picture_distance`."""
+    """Root mean square difference of the observations."""
     opposition: float
-    """0 to 1: what pulls left on the one frame and right on the other; see `opposition`."""
+    """From 0 to 1; see `Actions.opposition`."""
     kind: Kind
 
 
 def one_move(flights: RolloutDataset) -> float:
-    """How much one move changes a picture: the median over successive frames.
+    """Return the median root mean square difference of successive observations.
 
-    Pictures that differ by no more are called alike. In what the policy gets, root mean square.
+    Observations that differ by no more count as similar.
     """
-    pictures = flights.observations
+    seen = flights.observations
     follows = np.flatnonzero(flights.episode[1:] == flights.episode[:-1])
     if not len(follows):
         return 0.0
-    changes = [float(np.sqrt(np.mean((pictures[t + 1] - pictures[t]) ** 2))) for t in follows]
+    changes = [float(np.sqrt(np.mean((seen[t + 1] - seen[t]) ** 2))) for t in follows]
     return float(np.median(changes))
 
 
 def find_pairs(
     dataset: RolloutDataset, alike: float, actions: Actions, offset: NDArray
 ) -> list[Pair]:
-    """Alike frames with opposite actions, the most opposed first; each frame in at most one pair.
+    """Find similar frames with opposite actions, most opposed first; a frame is in one pair only.
 
     Args:
         dataset: Rollouts.
-        alike: Root mean square difference up to which two pictures are alike.
-        actions: What the policy can do.
-        offset: Metres ahead and to the left of the next cube, NaN where there is none. (T, 2)
+        alike: Root mean square difference up to which observations are similar.
+        actions: Actions of the policy.
+        offset: Metres ahead and to the left of the next target, NaN without one. Shape: (T, 2).
     """
     flat = dataset.observations.reshape(len(dataset), -1).astype(np.float64)
     probs = dataset.probabilities
@@ -83,11 +116,24 @@ def find_pairs(
             kind = _kind(offset[left], offset[right])
             found.append(Pair(left, right, float(distance[i, j]), float(swing[i, j]), kind))
     found.sort(key=lambda pair: (-pair.opposition, pair.distance))
-    return _apart(found)
+    used: set[int] = set()
+    kept = []
+    for pair in found:
+        if not used & {pair.left, pair.right}:
+            used |= {pair.left, pair.right}
+            kept.append(pair)
+    return kept
+
+
+def _kind(offset: NDArray, other: NDArray) -> Kind:
+    away = np.abs(offset - other).max()
+    if np.isnan(away):
+        return Kind.UNKNOWN
+    return Kind.CONTRADICTION if away <= ALIKE_METRES else Kind.JUSTIFIED
 
 
 def summarise_pairs(pairs: list[Pair], dataset: RolloutDataset, alike: float) -> dict[str, Any]:
-    """Counts for people and programs, and the pairs that are listed."""
+    """Return counts by kind, and the first pairs."""
     worst = [pair.opposition for pair in pairs if pair.kind == Kind.CONTRADICTION]
     return {
         "frames": len(dataset),
@@ -104,43 +150,25 @@ def summarise_pairs(pairs: list[Pair], dataset: RolloutDataset, alike: float) ->
     }
 
 
-def _kind(offset: NDArray, other: NDArray) -> Kind:
-    """Of a pair whose next cubes stand there, seen from the drone; NaN where there is none."""
-    away = np.abs(offset - other).max()
-    if np.isnan(away):
-        return Kind.UNKNOWN
-    return Kind.CONTRADICTION if away <= ALIKE_METRES else Kind.JUSTIFIED
-
-
-def _apart(pairs: list[Pair]) -> list[Pair]:
-    seen: set[int] = set()
-    kept = []
-    for pair in pairs:
-        if not seen & {pair.left, pair.right}:
-            seen |= {pair.left, pair.right}
-            kept.append(pair)
-    return kept
-
-
 @dataclasses.dataclass(frozen=True)
 class Loop:
-    """A stretch of an episode in which the drone moves back and forth and gets nowhere."""
+    """A stretch of an episode in which the drone moves back and forth."""
 
     first: int
-    """Its first frame."""
+    """First frame."""
     length: int
-    """Frames."""
+    """Number of frames."""
     reversals: int
     """Moves that undo the one before."""
 
 
 def find_loops(dataset: RolloutDataset, actions: Actions, min_reversals: int = 2) -> list[Loop]:
-    """Runs of moves that can be undone, no other among them, that turn round at least so often.
+    """Find runs of reversible moves with at least so many reversals.
 
     Args:
-        dataset: Whole flights.
-        actions: What can be done in them; forward is a move that nothing undoes.
-        min_reversals: Two turns: back where it was, and away again.
+        dataset: Whole episodes.
+        actions: Their actions; no move undoes forward.
+        min_reversals: With two, the drone is back where it was, and away again.
     """
     moves, episode = dataset.tensor("actions"), dataset.episode
     sways = actions.sways({name: dataset.tensor(name) for name in actions.fields()})
@@ -159,7 +187,7 @@ def find_loops(dataset: RolloutDataset, actions: Actions, min_reversals: int = 2
 
 
 def summarise_loops(flights: RolloutDataset, loops: list[Loop]) -> dict[str, Any]:
-    """Counts for people and programs; "episodes" is the share of flights with a loop."""
+    """Return counts; "episodes" is the fraction of episodes with a loop."""
     looping = len({int(flights.episode[loop.first]) for loop in loops})
     return {
         "loops": len(loops),
@@ -168,33 +196,3 @@ def summarise_loops(flights: RolloutDataset, loops: list[Loop]) -> dict[str, Any
         "episodes": proportion(looping, len(np.unique(flights.episode))),
         "list": [dataclasses.asdict(loop) for loop in loops],
     }
-
-
-def flaws_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
-    """Makes "contradictions", of the frames analysed, and "loops", of the whole flights."""
-    data, flights = context.dataset, context.flights
-    alike = one_move(flights)
-    scenes = context.scenes
-    pairs = find_pairs(data, alike, scenes.actions, data.offset(scenes.task))
-    numbers = {
-        "contradictions": summarise_pairs(pairs, data, alike),
-        "loops": summarise_loops(flights, find_loops(flights, scenes.actions)),
-    }
-    return numbers, {}
-
-
-def dataset_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
-    """Makes "dataset"."""
-    data, flights = context.dataset, context.flights
-    probs = data.probabilities.astype(np.float64)
-    entropy = -(probs * np.log(np.maximum(probs, 1e-12))).sum(-1) / np.log(probs.shape[-1])
-    counts = np.bincount(flights.actions, minlength=probs.shape[-1])
-    numbers = {
-        "frames": len(data),
-        "episodes": len(np.unique(flights.episode)),
-        "steps": len(flights),
-        "action_shares": (counts / counts.sum()).tolist(),
-        "entropy": mean_interval(entropy.clip(0.0, 1.0), data.episode),
-        "goals_reached": int((flights.event > 0).sum()),
-    }
-    return {"dataset": numbers}, {}

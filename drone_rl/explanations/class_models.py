@@ -1,4 +1,4 @@
-"""Class model visualization (section 5.2, Eq. 18): the picture that an action is waiting for."""
+"""Section "class_models": observations optimized for each action (section 5.2, Eq. 18)."""
 
 import copy
 import dataclasses
@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import torch
 from numpy.typing import NDArray
-from torch import Tensor
+from torch import Tensor, nn
 from torch.nn import functional
 
 from drone_rl.collectors.speedups import accelerated_gradients
@@ -18,40 +18,67 @@ from drone_rl.explanations.hooks import actions_of
 from drone_rl.policies import PictureNetwork
 from drone_rl.utils.errors import InputError
 
+OBJECTIVES: tuple[Objective, ...] = ("probability", "logit")
 AS_PROBABLE = 0.01
-"""Difference in probability below which the smoother of two pictures is the better one."""
+"""Of two observations whose probabilities differ by less, the smoother one is better."""
+
+
+def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
+    """Return "class_model"; arrays "class_model_probability", "class_model_logit" (A, C, h, w)."""
+    if not context.network.is_differentiable:
+        raise LeftOutError(
+            "Class models need gradients of the logits with respect to the pixels, and this policy "
+            "has none; give it as a torch function of floats, which the transform rgb makes."
+        )
+    statistics = PictureStatistics.of(context.observations)
+    numbers: dict[str, Any] = {
+        "statistics": dataclasses.asdict(statistics),
+        "channels": context.scenes.channels,
+    }
+    arrays = {}
+
+    def optimize(objective: Objective) -> ClassModel:
+        network = copy.deepcopy(context.network)  # it accumulates gradients
+        return search(network, statistics, objective, seed=context.seed.value)
+
+    with ThreadPoolExecutor(len(OBJECTIVES)) as pool:  # a small batch uses one core
+        found = dict(zip(OBJECTIVES, pool.map(optimize, OBJECTIVES), strict=True))
+    for objective, model in found.items():
+        arrays[f"class_model_{objective}"] = model.pictures.numpy()
+        numbers[objective] = model.summary()
+    return {"class_model": numbers}, arrays
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class ClassModelSettings:
-    """How the picture is sought; the defaults are those that a search starts from.
+    """Settings of the optimization.
 
     Raises:
         InputError: A value is out of range.
     """
 
-    objective: Literal["probability", "logit"] = "logit"
-    """What is driven up: the action's probability (Eq. 18), or its logit less the others' mean."""
+    objective: Objective = "logit"
+    """What is maximized: the action's probability (Eq. 18), or its logit minus the logits' mean."""
     parameterisation: Literal["pixel", "fourier"] = "pixel"
-    """Steps on the pixels, or on their Fourier coefficients, low frequencies first."""
+    """What is optimized: pixels, or their Fourier coefficients scaled by 1 / frequency."""
     steps: int = 64
     """Steps of gradient ascent."""
     lr: float = 20.0
-    """Length of a step; of the whole picture (pixel) or Adam's rate times 400 (fourier)."""
+    """Length of a step (pixel), or Adam's learning rate times 400 (fourier)."""
     normalise: bool = True
-    """Give the picture the data set's mean and deviation between steps (as the chapter does)."""
+    """Whether to restore the data set's mean and standard deviation after each step."""
     blur: float = 0.6
-    """Deviation of a Gaussian blur between steps, pixels; 0 for none."""
+    """Standard deviation of a Gaussian blur after each step, pixels; 0 for none."""
     jitter: int = 1
-    """Shift the picture by up to so many pixels before each gradient; 0 for none."""
+    """Largest random shift before each gradient, pixels; 0 for none."""
     total_variation: float = 0.0
     """Weight of the penalty on differences between neighbouring pixels."""
     starts: int = 8
-    """Random starts, of which the best is shown."""
+    """Number of random starts."""
 
     def __post_init__(self) -> None:
-        """Refuses what can't be run."""
-        if self.objective not in ("probability", "logit"):
+        """Check the values."""
+        if self.objective not in OBJECTIVES:
             raise InputError(f"objective={self.objective!r} is unknown; give probability or logit")
         if self.parameterisation not in ("pixel", "fourier"):
             raise InputError(
@@ -70,43 +97,42 @@ class ClassModelSettings:
 
 @dataclasses.dataclass
 class Attempts:
-    """What one setting made of each random start, for each action."""
+    """Results of one setting from each random start, for each action."""
 
     pictures: Tensor  # (num_actions, starts, C, H, W)
-    """As the policy would get them."""
+    """Optimized observations."""
     probabilities: Tensor  # (num_actions, starts)
-    """The policy's probability of the action on each picture."""
+    """The policy's probability of the action on each of them."""
     roughness: Tensor  # (num_actions, starts)
-    """Mean difference of neighbouring pixels over that of the data set's pictures."""
+    """Mean difference of neighbouring pixels, relative to the data set's."""
     settings: ClassModelSettings
 
 
 @dataclasses.dataclass
 class ClassModel:
-    """For each action the best of all pictures that were made, and all that was tried."""
+    """The best optimized observation of each action, and all attempts."""
 
     tried: list[Attempts]
-    """With the same number of starts each."""
+    """Attempts of each setting, with the same number of starts."""
     chosen: list[tuple[int, int]]
-    """The setting and the start of each action's picture; see `best_start`."""
+    """Setting and start of each action's best observation; see `best_start`."""
 
     @property
     def pictures(self) -> Tensor:
-        """Shape: (num_actions, C, H, W)."""
+        """The best observation of each action. Shape: (num_actions, C, H, W)."""
         return torch.stack([self.tried[i].pictures[a, j] for a, (i, j) in enumerate(self.chosen)])
 
     @property
     def probabilities(self) -> list[float]:
-        """The policy's probability of each action on the very picture shown."""
+        """The policy's probability of each action on its best observation."""
         return [float(self.tried[i].probabilities[a, j]) for a, (i, j) in enumerate(self.chosen)]
 
     def summary(self) -> dict[str, Any]:
-        """Plain values; lists are by action.
+        """Return plain values; lists are by action.
 
-        "highest" is the highest probability that any of the `starts` random starts reached under
-        any of the `num_settings` settings, "starts_above_half" in how many of all these attempts
-        it was above one half. Of an action with "highest" below x it may be said that none of the
-        starts under these settings reached x; that no picture does can't be known.
+        "highest" is the highest probability of all attempts (`starts` times `num_settings`),
+        "starts_above_half" the number of attempts above one half. A low "highest" does not show
+        that no observation has a high probability.
         """
         every = torch.cat([attempts.probabilities for attempts in self.tried], 1)
         return {
@@ -137,7 +163,7 @@ class ClassModel:
 
 @dataclasses.dataclass(frozen=True)
 class PictureStatistics:
-    """What the data set's pictures are like; the searched-for ones are kept like them."""
+    """Statistics of the data set's observations, which optimized ones keep."""
 
     mean: float
     std: float
@@ -147,7 +173,7 @@ class PictureStatistics:
 
     @classmethod
     def of(cls, observations: Tensor) -> "PictureStatistics":
-        """Of pictures (T, C, H, W)."""
+        """Return the statistics of observations (T, C, H, W)."""
         return cls(
             mean=float(observations.mean()),
             std=float(observations.std()),
@@ -158,10 +184,10 @@ class PictureStatistics:
 
 
 def best_start(probabilities: Tensor, roughness: Tensor) -> int:
-    """The start whose picture is most probable; of those about as probable, the smoothest.
+    """Return the start with the highest probability; among similar ones, the smoothest.
 
     Args:
-        probabilities: The policy's of the action. Shape: (starts,).
+        probabilities: The policy's probabilities of the action. Shape: (starts,).
         roughness: Shape: (starts,).
     """
     as_probable = probabilities >= probabilities.max() - AS_PROBABLE
@@ -175,13 +201,13 @@ def visualise(
     *,
     seed: int = 0,
 ) -> Attempts:
-    """Seeks, from each start, the picture that makes each action most probable.
+    """Optimize observations for each action from random starts.
 
     Args:
-        network: The policy's; it is left as it is.
-        statistics: Of the pictures on which the policy acts.
-        settings: How to seek.
-        seed: Of the starts and the jitter.
+        network: The policy's network; it is not changed.
+        statistics: Statistics of the data set.
+        settings: Settings of the optimization.
+        seed: Seed of the starts and of the jitter.
     """
     generator = torch.Generator().manual_seed(seed)
     shape = network.in_shape
@@ -207,14 +233,11 @@ def visualise(
 def search(
     network: PictureNetwork,
     statistics: PictureStatistics,
-    objective: Literal["probability", "logit"] = "logit",
+    objective: Objective = "logit",
     *,
     seed: int = 0,
 ) -> ClassModel:
-    """Tries a few settings and keeps, for each action, the best picture of all starts.
-
-    Choosing settings is "an art" by the chapter's own word; this is a small search in its place.
-    """
+    """Try a few settings, and keep each action's best observation of all starts."""
     tried = []
     for parameterisation, blur in itertools.product(("pixel", "fourier"), (0.5, 0.9, 1.4)):
         settings = ClassModelSettings(
@@ -231,9 +254,9 @@ def search(
 
 
 def _objective(
-    network: PictureNetwork, pictures: Tensor, action: Tensor, settings: ClassModelSettings
+    network: nn.Module, pictures: Tensor, action: Tensor, settings: ClassModelSettings
 ) -> Tensor:
-    """What each picture should have more of. Shape: (N,)."""
+    """Return what is maximized. Shape: (N,)."""
     actions, outputs = actions_of(network), network(pictures)
     if settings.objective == "probability":
         value = actions.wish(outputs).gather(1, action[:, None])[:, 0]
@@ -244,14 +267,14 @@ def _objective(
 
 
 def _ascend_pixels(
-    network: PictureNetwork,
+    network: nn.Module,
     pictures: Tensor,
     action: Tensor,
     statistics: PictureStatistics,
     settings: ClassModelSettings,
     generator: torch.Generator,
 ) -> Tensor:
-    """Steps of a fixed length along the gradient, refined between steps."""
+    """Take steps of a fixed length along the gradient."""
     for _ in range(settings.steps):
         pictures = pictures.detach().requires_grad_()
         value = _objective(network, _jitter(pictures, settings, generator), action, settings)
@@ -263,14 +286,14 @@ def _ascend_pixels(
 
 
 def _ascend_fourier(
-    network: PictureNetwork,
+    network: nn.Module,
     pictures: Tensor,
     action: Tensor,
     statistics: PictureStatistics,
     settings: ClassModelSettings,
     generator: torch.Generator,
 ) -> Tensor:
-    """Adam on Fourier coefficients scaled by 1 / frequency, so that broad shapes come first."""
+    """Run Adam on Fourier coefficients scaled by 1 / frequency, so that large shapes come first."""
     height, width = pictures.shape[-2:]
     rows = torch.fft.fftfreq(height)[:, None]
     columns = torch.fft.rfftfreq(width)[None]
@@ -294,7 +317,7 @@ def _ascend_fourier(
 def _refine(
     pictures: Tensor, statistics: PictureStatistics, settings: ClassModelSettings
 ) -> Tensor:
-    """Blurred, given the data set's mean and deviation, and kept within its range."""
+    """Blur, restore the data set's mean and standard deviation, and clip to its range."""
     if settings.blur:
         pictures = gaussian_blur(pictures, settings.blur)
     if settings.normalise:
@@ -305,7 +328,7 @@ def _refine(
 
 
 def gaussian_blur(pictures: Tensor, sigma: float) -> Tensor:
-    """Blurs pictures (N, C, H, W), with their edges repeated outwards."""
+    """Blur images (N, C, H, W) with replicated edges."""
     radius = max(1, round(3 * sigma))
     x = torch.arange(-radius, radius + 1, dtype=pictures.dtype)
     kernel = torch.exp(-(x**2) / (2 * sigma**2))
@@ -332,37 +355,7 @@ def _jitter(pictures: Tensor, settings: ClassModelSettings, generator: torch.Gen
 
 
 def _differences(pictures: Tensor) -> Tensor:
-    """Mean absolute difference of neighbouring pixels. Shape: (N,)."""
+    """Return the mean absolute difference of neighbouring pixels. Shape: (N,)."""
     down = (pictures[..., 1:, :] - pictures[..., :-1, :]).abs().mean((1, 2, 3))
     across = (pictures[..., 1:] - pictures[..., :-1]).abs().mean((1, 2, 3))
     return down + across
-
-
-OBJECTIVES: tuple[Objective, ...] = ("probability", "logit")
-"""Of which an action shall have more."""
-
-
-def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
-    """Makes "class_model"; arrays "class_model_probability" and "..._logit" (3, C, h, w)."""
-    if not context.network.is_differentiable:
-        raise LeftOutError(
-            "Class models are sought along gradients, and the logits of this policy have none by "
-            "the pixels; give it as a torch function of floats, which the transform rgb makes."
-        )
-    statistics = PictureStatistics.of(context.observations)
-    numbers: dict[str, Any] = {
-        "statistics": dataclasses.asdict(statistics),
-        "channels": context.scenes.channels,
-    }
-    arrays = {}
-
-    def seek(objective: Objective) -> ClassModel:
-        network = copy.deepcopy(context.network)  # gradients are gathered in it
-        return search(network, statistics, objective, seed=context.seed.value)
-
-    with ThreadPoolExecutor(len(OBJECTIVES)) as pool:  # steps of small pictures take one core
-        found = dict(zip(OBJECTIVES, pool.map(seek, OBJECTIVES), strict=True))
-    for objective, model in found.items():
-        arrays[f"class_model_{objective}"] = model.pictures.numpy()
-        numbers[objective] = model.summary()
-    return {"class_model": numbers}, arrays

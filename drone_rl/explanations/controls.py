@@ -1,4 +1,4 @@
-"""Maps that know nothing of the policy: what a map must beat to have said anything about it."""
+"""Controls for heat maps: placebo maps, and maps of policies with shuffled weights."""
 
 import copy
 from collections.abc import Iterator, Sequence
@@ -12,22 +12,27 @@ from torch.nn import functional
 from drone_rl.explanations.patches import rank_correlation
 from drone_rl.policies import PictureNetwork
 
+NO_HEAT = 1e-6
+"""Heat up to this fraction of the map's maximum counts as none."""
+NO_CHANGE = 1e-9
+"""A logit with a smaller standard deviation over observations is constant."""
+
 
 def placebo_maps(
     observations: Tensor, absent: Tensor, others: Sequence[Tensor], seed: int = 0
 ) -> dict[str, Tensor]:
-    """Maps made of pictures alone, or of nothing at all.
+    """Return maps that do not use the policy; a method must beat all of them.
 
     Args:
         observations: Shape (T, C, h, w).
-        absent: The scene without cubes. Shape: (C, h, w).
-        others: What each picture might have been; see `alternatives`. Shape: (T, C, h, w) each.
-        seed: Of the noise.
+        absent: Observation of the scene without targets. Shape: (C, h, w).
+        others: Alternatives of shape (T, C, h, w) each; see `scenes.alternatives`.
+        seed: Seed of the noise.
 
     Returns:
-        By name, shape (T, h, w), 0 or more: ones; noise, another in each picture; a blob in the
-        middle; a band along the horizon; how far the picture differs from the empty scene, the
-        same smoothed, and how far it differs from what it might have been.
+        By name, shape (T, h, w), 0 or more: ones; noise for each frame; a blob in the middle; a
+        band along the horizon; the difference from the empty scene, as it is and smoothed; the
+        mean difference from the alternatives.
     """
     count, _, height, width = observations.shape
     generator = torch.Generator().manual_seed(seed)
@@ -44,19 +49,19 @@ def placebo_maps(
 
 
 def difference(observations: Tensor, absent: Tensor) -> Tensor:
-    """How far each pixel is from the empty scene's. Shape: (T, h, w)."""
+    """Return each pixel's difference from the empty scene. Shape: (T, h, w)."""
     return (observations - absent).abs().sum(1)
 
 
 def blob(height: int, width: int, down: float, across: float, size: float = 0.2) -> Tensor:
-    """A Gaussian hill.
+    """Return a Gaussian.
 
     Args:
         height: Of the map, pixels.
         width: Of the map, pixels.
-        down: Place of its top, as a share of the height.
-        across: Place of its top, as a share of the width.
-        size: Its deviation, as a share of height and width.
+        down: Place of its maximum, as a fraction of the height.
+        across: Place of its maximum, as a fraction of the width.
+        size: Its standard deviation, as a fraction of height and width.
     """
     y = (torch.arange(height) + 0.5) / height
     x = (torch.arange(width) + 0.5) / width
@@ -64,19 +69,18 @@ def blob(height: int, width: int, down: float, across: float, size: float = 0.2)
 
 
 def band(height: int, width: int, row: float, size: float = 0.1) -> Tensor:
-    """A horizontal band about a row of pixels; `size` is a share of the height."""
+    """Return a horizontal band around a row of pixels; `size` is a fraction of the height."""
     away = (torch.arange(height) - row) / (size * height)
     return torch.exp(-(away[:, None] ** 2) / 2).expand(height, width)
 
 
 def horizon_row(absent: Tensor) -> float:
-    """The row of pixels at which the empty scene changes most from top to bottom."""
-    steps = absent.diff(dim=1).abs().mean((0, 2))
-    return float(steps.argmax()) + 0.5
+    """Return the row of pixels with the largest vertical change of the empty scene."""
+    return float(absent.diff(dim=1).abs().mean((0, 2)).argmax()) + 0.5
 
 
 def smoothed(maps: Tensor, passes: int = 2) -> Tensor:
-    """Maps blurred by a box of a tenth of the width, some times over. Shape kept: (T, h, w)."""
+    """Blur maps by a box of a tenth of the width, repeatedly. Shape kept: (T, h, w)."""
     box = 2 * max(1, maps.shape[-1] // 20) + 1
     for _ in range(passes):
         padded = functional.pad(maps[:, None], [box // 2] * 4, mode="replicate")
@@ -84,25 +88,19 @@ def smoothed(maps: Tensor, passes: int = 2) -> Tensor:
     return maps
 
 
-NO_HEAT = 1e-6
-"""Share of a map's greatest heat up to which a pixel has none."""
-NO_CHANGE = 1e-9
-"""Deviation of a logit over pictures up to which no picture changes it."""
-
-
 def shuffled_networks(
     network: PictureNetwork, observations: Tensor, count: int, seed: int = 0
 ) -> Iterator[PictureNetwork]:
-    """Copies of a policy whose weights, and whose biases, were shuffled within each layer.
+    """Yield copies of a policy with weights and biases shuffled within each layer.
 
-    Shuffled weights are often dead, and a map could tell them by that alone. So each copy's logits
-    are given the mean and the deviation that the policy's have.
+    Networks with shuffled weights are often nearly constant, which alone would distinguish their
+    maps. Therefore each copy's logits are rescaled to the policy's mean and standard deviation.
 
     Args:
-        network: Stays as it is.
-        observations: Over which mean and deviation are taken. Shape: (T, C, h, w).
-        count: How many.
-        seed: Of the shuffling; the first of many copies are those of few.
+        network: It is not changed.
+        observations: Inputs for mean and standard deviation. Shape: (T, C, h, w).
+        count: Number of copies.
+        seed: Seed of the shuffling; the first copies do not depend on `count`.
     """
     generator = torch.Generator().manual_seed(seed)
     with torch.no_grad():
@@ -111,7 +109,7 @@ def shuffled_networks(
         other = copy.deepcopy(network)
         for parameter in other.parameters():
             _shuffle(parameter, generator)
-        _enliven(other, observations, logits)
+        _rescale(other, observations, logits)
         yield other
 
 
@@ -122,8 +120,8 @@ def _shuffle(parameter: Tensor, generator: torch.Generator) -> None:
 
 
 @torch.no_grad()
-def _enliven(network: PictureNetwork, observations: Tensor, wanted: Tensor) -> None:
-    """Gives logits the mean and deviation of others; what is the same on all pictures stays so."""
+def _rescale(network: PictureNetwork, observations: Tensor, wanted: Tensor) -> None:
+    """Give logits the mean and deviation of `wanted`; constant ones keep their deviation of 0."""
     deviation, mean = torch.std_mean(network(observations), 0, correction=0)
     wanted_deviation, wanted_mean = torch.std_mean(wanted, 0, correction=0)
     factor = torch.where(deviation > NO_CHANGE, wanted_deviation / deviation, 1.0)
@@ -131,17 +129,16 @@ def _enliven(network: PictureNetwork, observations: Tensor, wanted: Tensor) -> N
 
 
 def likeness(first: Tensor, second: Tensor) -> NDArray:
-    """Rank correlation of maps over the pixels on which not both are without heat.
+    """Return the rank correlation of maps over the pixels on which one of them has heat.
 
-    What both leave out (where a picture equals the baseline, say) would make any two maps alike.
+    Pixels without heat in both (such as those equal to the baseline) would make any maps similar.
 
     Args:
         first: Shape (T, h, w), 0 or more.
         second: Shape (T, h, w).
 
     Returns:
-        Shape: (T,); 1 where both are the same everywhere, or one has no heat at all: that shows no
-        dependence on anything.
+        Shape: (T,); 1 where both are constant or one has no heat, which shows no dependence.
     """
     likeness = np.ones(len(first))
     pairs = zip(first.flatten(1).double().numpy(), second.flatten(1).double().numpy(), strict=True)

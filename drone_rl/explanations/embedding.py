@@ -1,4 +1,4 @@
-"""t-SNE of what the policy makes of its pictures, and of the raw pictures."""
+"""Section "embedding": t-SNE of the policy's features and of raw pixels (section 5.1)."""
 
 import dataclasses
 import logging
@@ -14,66 +14,71 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.provenance import num_cores
 from drone_rl.utils.seeding import legacy_seed
 
-logging.getLogger("openTSNE").setLevel(logging.ERROR)  # its remarks are not for our users
+logging.getLogger("openTSNE").setLevel(logging.ERROR)  # its messages are not for users
 COMPONENTS = 50
-"""Principal components to which high-dimensional points are reduced first, as is usual."""
+"""Principal components to which points are reduced first."""
 NEIGHBOURS = 10
-"""Neighbours over which faithfulness is measured."""
+"""Neighbours by which faithfulness is measured."""
 QUERIES = 1000
-"""Points whose neighbourhoods are compared; more change the measures little."""
+"""Most points whose neighbourhoods are compared."""
 FEW = 2000
-"""Up to so many points the exact methods, on one thread, are the fastest."""
+"""Up to so many points, exact methods on one thread are the fastest."""
+
+
+def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
+    """Return "tsne"; arrays "tsne_features" and "tsne_pixels" (T, 2)."""
+    if context.layer is None:
+        raise LeftOutError(
+            "t-SNE needs the features of a layer, and no layers of this policy are known; give it "
+            "as a torch module made of layers."
+        )
+    data, settings = context.dataset, context.settings
+    seed = legacy_seed(context.seed.value)
+    numbers, arrays = {}, {}
+    for name, originals in (
+        ("features", data.features[context.layer]),
+        ("pixels", data.observations),
+    ):
+        embedding = embed(originals, perplexity=settings.perplexity, seed=seed)
+        arrays[f"tsne_{name}"] = embedding.points
+        numbers[name] = {
+            "layer": context.layer if name == "features" else None,
+            "perplexity": settings.perplexity,
+            **dataclasses.asdict(embedding.faithfulness),
+        }
+    return {"tsne": numbers}, arrays
 
 
 @dataclasses.dataclass(frozen=True)
 class Faithfulness:
-    """How well a picture keeps neighbourhoods; see `faithfulness`."""
+    """How well an embedding keeps neighbourhoods; see `faithfulness`."""
 
     neighbours: int
-    """Size k of a neighbourhood; less than what was asked for where there are few points."""
+    """Size k of a neighbourhood; smaller than requested if there are few points."""
     trustworthiness: float
-    """1 where no neighbour in the plane is a stranger in truth (Venna and Kaski, 2001)."""
+    """1 if all neighbours in the plane are neighbours originally (Venna and Kaski, 2001)."""
     neighbours_kept: float
-    """Share of the k nearest in the plane that are among the k nearest in truth."""
+    """Fraction of the k nearest in the plane that are among the k nearest originally."""
     neighbours_chance: float
-    """The same share for a random placement."""
+    """The same fraction for a random embedding."""
 
 
 @dataclasses.dataclass
 class Embedding:
-    """Points in the plane that lie near each other where the originals do (Eqs. 16 and 17)."""
+    """Points in the plane that keep neighbourhoods (Eqs. 16 and 17)."""
 
     points: NDArray  # (T, 2)
-    """Where each original came to lie."""
     faithfulness: Faithfulness
-    """Against the originals themselves, not against the components that t-SNE works on."""
-    _mean: NDArray
-    _components: NDArray
-    _model: openTSNE.TSNEEmbedding
-
-    def place(self, originals: NDArray) -> NDArray:
-        """Puts new points into the existing picture, which stays as it is.
-
-        Args:
-            originals: Shape (N, D), of the same kind as the embedded ones.
-
-        Returns:
-            Shape: (N, 2).
-        """
-        flat = originals.reshape(len(originals), -1).astype(np.float64)
-        reduced = np.ascontiguousarray((flat - self._mean) @ self._components.T)
-        placed = np.asarray(self._model.transform(reduced))
-        # the library may have shifted its whole picture meanwhile; ours stays where it is
-        return placed - (np.asarray(self._model) - self.points).mean(0)
+    """With respect to the originals, not to their principal components."""
 
 
 def embed(originals: NDArray, *, perplexity: float = 30.0, seed: int = 0) -> Embedding:
-    """Embeds points in the plane; the same points and seed give the same picture.
+    """Embed points in the plane; the same points and seed give the same result.
 
     Args:
         originals: One row a point. Shape: (T, *).
-        perplexity: Number of neighbours that each point looks to.
-        seed: Of the optimisation; below 2**32.
+        perplexity: Effective number of neighbours of a point.
+        seed: Seed of the optimization; below 2**32.
 
     Raises:
         InputError: There are too few points for the perplexity, or one is not finite.
@@ -82,10 +87,8 @@ def embed(originals: NDArray, *, perplexity: float = 30.0, seed: int = 0) -> Emb
     check_perplexity(perplexity, len(flat))
     if not np.isfinite(flat).all():
         raise InputError("features hold a value that is not finite; the policy's weights are bad")
-    mean = flat.mean(0)
-    centred = flat - mean
-    components = _principal_components(centred)
-    reduced = np.ascontiguousarray(centred @ components.T)
+    centred = flat - flat.mean(0)
+    reduced = np.ascontiguousarray(centred @ _principal_components(centred).T)
     few = len(flat) <= FEW
     model = openTSNE.TSNE(
         perplexity=perplexity,  # pyright: ignore[reportArgumentType] (takes fractions, too)
@@ -96,19 +99,18 @@ def embed(originals: NDArray, *, perplexity: float = 30.0, seed: int = 0) -> Emb
         negative_gradient_method="bh" if few else "fft",
     ).fit(_distinct(reduced, seed))
     points = np.array(model)
-    return Embedding(points, faithfulness(centred, points), mean, components, model)
+    return Embedding(points, faithfulness(centred, points))
 
 
 def faithfulness(originals: NDArray, points: NDArray, k: int = NEIGHBOURS) -> Faithfulness:
-    """How well a picture keeps neighbourhoods.
+    """Measure how well an embedding keeps neighbourhoods.
 
-    Originals that are equally far are equally near neighbours: the k-th and all that are as near
-    count as among the nearest, in the picture as in the figure for chance.
+    With ties, all points as near as the k-th count as nearest, also in the figure for chance.
 
     Args:
         originals: Three points or more. Shape: (T, D).
         points: Shape (T, 2).
-        k: Size of a neighbourhood; less where there are few points.
+        k: Size of a neighbourhood; smaller if there are few points.
     """
     count = len(originals)
     k = min(k, (count - 1) // 2)
@@ -131,7 +133,7 @@ def faithfulness(originals: NDArray, points: NDArray, k: int = NEIGHBOURS) -> Fa
 
 
 def _principal_components(centred: NDArray) -> NDArray:
-    """Rows that span most of the variance, with signs that don't depend on the library."""
+    """Return principal axes as rows, with signs that don't depend on the library."""
     if centred.shape[1] <= COMPONENTS:
         return np.eye(centred.shape[1])
     if len(centred) < centred.shape[1]:  # the smaller of the two equivalent problems
@@ -146,15 +148,15 @@ def _principal_components(centred: NDArray) -> NDArray:
 
 
 def _distinct(points: NDArray, seed: int) -> NDArray:
-    """Moves points apart by next to nothing: identical ones have no defined neighbourhood."""
+    """Add tiny noise: identical points have no defined neighbourhood."""
     scale = max(points.std(), 1e-6) * 1e-6
     return points + np.random.default_rng(seed).normal(0, scale, points.shape)
 
 
 def _distances(points: NDArray, queries: NDArray) -> NDArray:
-    """Squared distance of each query to all points; to itself -1. Shape: (queries, T).
+    """Return squared distances of each query to all points; to itself -1. Shape: (queries, T).
 
-    In units of their mean, and rounded, so that what is equally far is so despite rounding errors.
+    They are divided by their mean and rounded, so that equal distances are exactly equal.
     """
     centred = points - points.mean(0)
     square = (centred**2).sum(1)
@@ -162,27 +164,3 @@ def _distances(points: NDArray, queries: NDArray) -> NDArray:
     distance = (distance / max(distance.mean(), 1e-300)).round(9)
     distance[np.arange(len(queries)), queries] = -1
     return distance
-
-
-def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
-    """Makes "tsne"; arrays "tsne_features" and "tsne_pixels" (T, 2)."""
-    if context.layer is None:
-        raise LeftOutError(
-            "Frames are laid out by likeness of what a layer makes of them (t-SNE), and no layers "
-            "of this policy are known; give it as a torch module made of layers."
-        )
-    data, settings = context.dataset, context.settings
-    seed = legacy_seed(context.seed.value)
-    numbers, arrays = {}, {}
-    for name, originals in (
-        ("features", data.features[context.layer]),
-        ("pixels", data.observations),
-    ):
-        embedding = embed(originals, perplexity=settings.perplexity, seed=seed)
-        arrays[f"tsne_{name}"] = embedding.points
-        numbers[name] = {
-            "layer": context.layer if name == "features" else None,
-            "perplexity": settings.perplexity,
-            **dataclasses.asdict(embedding.faithfulness),
-        }
-    return {"tsne": numbers}, arrays

@@ -1,4 +1,4 @@
-"""Where in the picture a policy looks: Grad-CAM (section 5.3) and others, by Captum."""
+"""Heat maps of a policy's observations: Grad-CAM (section 5.3) and other methods, by Captum."""
 
 import dataclasses
 from collections.abc import Callable
@@ -17,44 +17,30 @@ from drone_rl.utils.errors import InputError
 
 Objective = Literal["probability", "logit"]
 BATCH = 256
-"""Pictures in one call, which bounds the memory."""
+"""Observations in one call, which bounds memory."""
 INTEGRATION_STEPS = 64
-"""Of integrated gradients; 16 miss up to 0.7 of a change in probability of a steep softmax."""
+"""Steps of integrated gradients; with 16, errors of up to 0.7 occur on a steep softmax."""
 NO_GRADIENT = 1e-12
-"""Derivatives of the probability up to this are none: the softmax is saturated."""
+"""Derivatives of the probability up to this count as zero: the softmax is saturated."""
 MapMethod = Callable[[Tensor, Tensor], Tensor]
-"""Pictures (T, C, H, W) and an action each (T,) to heat maps (T, H, W), 0 or more."""
-
-
-def grad_cam(activations: Tensor, gradients: Tensor) -> Tensor:
-    """Eqs. 19 and 20 as written.
-
-    Args:
-        activations: Feature maps A. Shape: (T, K, h, w).
-        gradients: Derivative of what is explained by A. Shape: (T, K, h, w).
-
-    Returns:
-        ReLU of the feature maps' sum, weighted by their mean derivatives. Shape: (T, h, w).
-    """
-    weights = gradients.mean((2, 3), keepdim=True)
-    return (weights * activations).sum(1).relu()
+"""Observations (T, C, H, W) and actions (T,) to heat maps (T, H, W), 0 or more."""
 
 
 @dataclasses.dataclass
 class Explainer:
-    """Heat maps of one policy by several methods, all of the size of its pictures."""
+    """Computes heat maps of one policy by several methods, all of the size of its observations."""
 
     network: PictureNetwork
     absent: Tensor
-    """What stands for "nothing there": the scene without cubes. Shape: (C, H, W)."""
+    """Baseline: the observation of the scene without targets. Shape: (C, H, W)."""
     layer: str | None = None
-    """The layer that Grad-CAM looks at; the last convolution's nonlinearity by default."""
+    """Layer of Grad-CAM; the last convolution's nonlinearity by default."""
 
     def __post_init__(self) -> None:
-        """Finds the layer.
+        """Find the layer.
 
         Raises:
-            InputError: It isn't one with a feature map.
+            InputError: It has no feature map.
         """
         spatial = spatial_layers(self.network) if self.network.is_differentiable else []
         if self.layer is None:
@@ -66,7 +52,7 @@ class Explainer:
             raise InputError(f"layer={self.layer} has no feature map; those that do: {have}")
 
     def methods(self) -> dict[str, MapMethod]:
-        """All methods that this policy allows, by name."""
+        """Return all methods that this policy allows, by name."""
         maps: dict[str, MapMethod] = {}
         if self.layer is not None:
             maps["grad_cam"] = lambda x, a: self.grad_cam(x, a, "probability")
@@ -80,7 +66,7 @@ class Explainer:
     def grad_cam(
         self, observations: Tensor, actions: Tensor, objective: Objective = "probability"
     ) -> Tensor:
-        """Grad-CAM of the chosen actions, enlarged to the picture. Shape: (T, H, W).
+        """Return Grad-CAM of the actions, enlarged to the observation. Shape: (T, H, W).
 
         Raises:
             InputError: The policy has no convolution.
@@ -91,26 +77,26 @@ class Explainer:
 
         def attribute(x: Tensor, a: Tensor) -> Tensor:
             coarse = method.attribute(x, target=a, relu_attributions=True)
-            assert isinstance(coarse, Tensor)  # a tuple of them only where x is one
+            assert isinstance(coarse, Tensor)  # a tuple only if x is one
             return functional.interpolate(coarse, x.shape[-2:], mode="bilinear")
 
         return _in_batches(attribute, observations, actions).sum(1)
 
     def saliency(self, observations: Tensor, actions: Tensor) -> Tensor:
-        """Size of the probability's derivative by each pixel. Shape: (T, H, W)."""
+        """Return the absolute gradient of the probability. Shape: (T, H, W)."""
         method = Saliency(self._forward("probability"))
         attributed = _in_batches(lambda x, a: method.attribute(x, target=a), observations, actions)
         return attributed.abs().sum(1)
 
     def integrated_gradients(self, observations: Tensor, actions: Tensor) -> Tensor:
-        """Size of the path integral from the empty scene to the picture. Shape: (T, H, W)."""
+        """Return the absolute path integral from the baseline. Shape: (T, H, W)."""
         return self._integrated(observations, actions).sum(1).abs()
 
     def completeness_error(self, observations: Tensor, actions: Tensor) -> Tensor:
-        """By how much integrated gradients miss what they must add up to. Shape: (T,).
+        """Return the absolute error of the sum of integrated gradients. Shape: (T,).
 
-        The sum over all pixels is in theory the probability of the action on the picture less that
-        on the empty scene; steps of the integral that are too coarse miss it.
+        The exact integral sums to the action's probability on the observation minus that on the
+        baseline; an integral with too few steps does not.
         """
         chosen = actions[:, None]
         total = self._integrated(observations, actions).flatten(1).sum(1)
@@ -119,9 +105,9 @@ class Explainer:
         return (total - (there - absent)).abs()
 
     def occlusion(self, observations: Tensor, actions: Tensor) -> Tensor:
-        """Size of the change when a patch becomes the empty scene. Shape: (T, H, W).
+        """Return the absolute change if a patch is replaced by the baseline. Shape: (T, H, W).
 
-        Patches overlap by half; a pixel's change is the mean over the patches that cover it.
+        Patches overlap by half; a pixel gets the mean over the patches that cover it.
         """
         height, width = observations.shape[-2:]
         windows = _windows(height, width)
@@ -135,13 +121,11 @@ class Explainer:
         return mean.view(-1, height, width).abs()
 
     def maps_without_heat(self, observations: Tensor, actions: Tensor) -> dict[str, int]:
-        """Why Grad-CAM's maps are empty, if they are.
+        """Count observations on which Grad-CAM is zero everywhere.
 
         Returns:
-            Numbers of pictures: "logit", those on which no feature map counts for the action, so
-            that nothing is left of Eq. 19 above 0; "probability", those on which the probability's
-            map is empty; "saturated", those of them on which it has no derivative at all, for the
-            policy is too sure.
+            "logit" and "probability": counts by objective; "saturated": those of "probability" on
+            which the probability's gradient is zero, because the policy is too certain.
         """
         empty = {
             objective: self.grad_cam(observations, actions, objective).flatten(1).amax(1) <= 0
@@ -155,7 +139,7 @@ class Explainer:
         }
 
     def _integrated(self, observations: Tensor, actions: Tensor) -> Tensor:
-        """The path integral of each channel of each pixel. Shape: (T, C, H, W)."""
+        """Return the path integral. Shape: (T, C, H, W)."""
         quick = accelerated_gradients(self.network, of="pixels")
         method = IntegratedGradients(self._forward("probability", quick))
 
@@ -178,14 +162,14 @@ class Explainer:
             raise InputError(f"objective={objective!r} is unknown; give probability or logit")
         actions = actions_of(self.network)
         make = actions.scores if objective == "logit" else actions.wish
-        answer = self.network if network is None else network
-        return lambda x: make(answer(x))
+        evaluated = self.network if network is None else network
+        return lambda x: make(evaluated(x))
 
 
 def _in_batches(
     attribute: Callable[[Tensor, Tensor], Tensor], observations: Tensor, actions: Tensor
 ) -> Tensor:
-    """Attributions of all pictures. Shape: (T, ...) as `attribute` gives them."""
+    """Return attributions of all observations. Shape: (T, ...), that of `attribute`."""
     maps = [
         attribute(x.detach().clone().requires_grad_(), a).detach()
         for x, a in zip(observations.split(BATCH), actions.split(BATCH), strict=True)
@@ -194,7 +178,7 @@ def _in_batches(
 
 
 def _windows(height: int, width: int) -> Tensor:
-    """The pixels of patches that overlap by half, to all edges. Shape: (N, height, width), bool."""
+    """Return patches that overlap by half and reach all edges. Shape: (N, height, width), bool."""
     tall, wide = (min(n, max(3, n // part)) for n, part in ((height, 5), (width, 10)))
     down, across = max(1, tall // 2), max(1, wide // 2)
     tops = [*range(0, height - tall, down), height - tall]

@@ -1,4 +1,4 @@
-"""Layers by name, and what comes out of them. No hook survives a call."""
+"""Layers of a network by name, and their outputs. No hook remains after a call."""
 
 import collections
 from typing import Any
@@ -11,23 +11,23 @@ from drone_rl.sim.actions import MOVES, Actions
 from drone_rl.utils.errors import InputError
 
 BATCH = 512
-"""Pictures in one forward pass, which bounds the memory."""
+"""Observations in one forward pass, which bounds memory."""
 _TRIED = 2
-"""Pictures by which layers are found."""
+"""Observations in the forward pass that finds the layers."""
 
 
 @torch.no_grad()
-def _acting(network: PictureNetwork) -> dict[str, tuple[nn.Module, tuple[int, ...]]]:
-    """Layers in the order in which they act on pictures, with the shape of what each makes.
+def _layers(network: PictureNetwork) -> dict[str, tuple[nn.Module, tuple[int, ...]]]:
+    """Return layers in the order of the forward pass, with the shapes of their outputs.
 
-    A layer has no layers within, acts once, and makes one tensor.
+    A layer has no submodules, runs once, and returns one tensor.
     """
     names = {part: name for name, part in network.parts.named_modules() if name}
-    acted: list[tuple[nn.Module, tuple[int, ...]]] = []
+    ran: list[tuple[nn.Module, tuple[int, ...]]] = []
 
     def note(layer: nn.Module, _: Any, out: Any) -> None:
-        whole = isinstance(out, Tensor) and out.shape[:1] == (_TRIED,)
-        acted.append((layer, tuple(out.shape[1:]) if whole else ()))
+        is_whole = isinstance(out, Tensor) and out.shape[:1] == (_TRIED,)
+        ran.append((layer, tuple(out.shape[1:]) if is_whole else ()))
 
     leaves = [p for p in names if not [*p.children()] and not isinstance(p, nn.Sequential)]
     handles = [leaf.register_forward_hook(note) for leaf in leaves]
@@ -37,20 +37,20 @@ def _acting(network: PictureNetwork) -> dict[str, tuple[nn.Module, tuple[int, ..
     finally:
         for handle in handles:
             handle.remove()
-    times = collections.Counter(layer for layer, _ in acted)
-    return {names[layer]: (layer, made) for layer, made in acted if made and times[layer] == 1}
+    times = collections.Counter(layer for layer, _ in ran)
+    return {names[layer]: (layer, shape) for layer, shape in ran if shape and times[layer] == 1}
 
 
 def layer_names(network: PictureNetwork) -> list[str]:
-    """Names of the layers, in order; none of a callable that is no torch module."""
-    return [*_acting(network)]
+    """Return the names of the layers, in order; none if it is not a torch module."""
+    return [*_layers(network)]
 
 
 def find_layer(network: PictureNetwork, name: str) -> nn.Module:
-    """The layer of that name.
+    """Return the layer of that name.
 
     Raises:
-        InputError: There is none; those that exist are listed.
+        InputError: There is none; the message lists those that exist.
     """
     found = dict(network.parts.named_modules()).get(name) if name else None
     if found is None or [*found.children()]:
@@ -60,34 +60,34 @@ def find_layer(network: PictureNetwork, name: str) -> nn.Module:
 
 
 def spatial_layers(network: PictureNetwork) -> list[str]:
-    """Layers whose output is a feature map, in order; none in an MLP.
+    """Return layers with a feature map, in order; none in an MLP.
 
-    Each is what comes right after a convolution and keeps its shape, its nonlinearity as a rule, or
-    else the convolution itself.
+    Each is the layer after a convolution if it keeps the shape, usually a nonlinearity, or else the
+    convolution itself.
     """
-    acting = [*_acting(network).items()]
+    layers = [*_layers(network).items()]
     found = []
-    for i, (name, (layer, made)) in enumerate(acting):
+    for i, (name, (layer, shape)) in enumerate(layers):
         if isinstance(layer, nn.Conv2d):
-            after, (_, then) = acting[i + 1] if i + 1 < len(acting) else ("", (None, ()))
-            found.append(after if then == made else name)
+            after, (_, then) = layers[i + 1] if i + 1 < len(layers) else ("", (None, ()))
+            found.append(after if then == shape else name)
     return found
 
 
 def feature_layer(network: PictureNetwork) -> str | None:
-    """The last layer before the logits: what the policy knows of a picture; None if it has none."""
+    """Return the last layer before the logits; None if there is none."""
     names = layer_names(network)
     return names[-2] if len(names) > 1 else None
 
 
 @torch.no_grad()
 def features(network: PictureNetwork, observations: Tensor, layer: str) -> Tensor:
-    """What a layer makes of pictures.
+    """Return a layer's output.
 
     Args:
-        network: The policy's.
-        observations: Pictures (T, C, H, W) as the policy gets them.
-        layer: Its name.
+        network: The policy's network.
+        observations: Shape (T, C, h, w).
+        layer: Name of the layer.
 
     Returns:
         Shape: (T, *), the layer's own.
@@ -95,29 +95,28 @@ def features(network: PictureNetwork, observations: Tensor, layer: str) -> Tenso
     Raises:
         InputError: There is no such layer.
     """
-    outputs: list[Tensor] = []
+    found: list[Tensor] = []
     module = find_layer(network, layer)
-    handle = module.register_forward_hook(lambda _, __, out: outputs.append(out.detach().clone()))
+    handle = module.register_forward_hook(lambda _, __, out: found.append(out.detach().clone()))
     try:
-        for part in observations.split(BATCH):
-            network(part)
+        outputs(network, observations)
     finally:
         handle.remove()
-    return torch.cat(outputs)
+    return torch.cat(found)
 
 
 @torch.no_grad()
 def outputs(network: PictureNetwork, observations: Tensor) -> Tensor:
-    """What the network gives. Shape: (T, C, H, W) to (T, number of outputs)."""
+    """Evaluate the network in batches. Shape: (T, C, h, w) to (T, number of outputs)."""
     return torch.cat([network(part) for part in observations.split(BATCH)])
 
 
 @torch.no_grad()
 def probabilities(network: PictureNetwork, observations: Tensor) -> Tensor:
-    """What the policy wishes for (Eq. 9). Shape: (T, C, H, W) to (T, number of parts)."""
+    """Return action probabilities (Eq. 9). Shape: (T, C, h, w) to (T, number of parts)."""
     return actions_of(network).wish(outputs(network, observations))
 
 
 def actions_of(network: nn.Module) -> Actions:
-    """What a network's outputs ask for: the chapter's moves where it is none of ours."""
+    """Return the actions that a network's outputs stand for; the three moves if unknown."""
     return network.actions if isinstance(network, PictureNetwork) else MOVES

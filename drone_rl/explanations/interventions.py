@@ -1,4 +1,8 @@
-"""What only a simulator allows: change one thing, draw the scene again, and ask the policy."""
+"""Effects of changes to a scene: on the policy's probabilities at once, and on whole rollouts.
+
+That an action's probability changes does not show that the outcome changes, so rollouts with and
+without a change are compared, each with those from the same frame.
+"""
 
 import dataclasses
 from typing import Any
@@ -8,8 +12,9 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from drone_rl.explanations.hooks import outputs, probabilities
+from drone_rl.explanations.hooks import probabilities
 from drone_rl.explanations.patches import sample_frames
+from drone_rl.explanations.rollouts import Step, rollout
 from drone_rl.explanations.scenes import DARK_GROUND, Region, Scenes
 from drone_rl.policies import PictureNetwork
 from drone_rl.sim.rendering import Appearance
@@ -21,34 +26,36 @@ OTHER_TARGETS = Appearance(
     colors={SemanticClass.TARGET: (0.9, 0.85, 0.2), SemanticClass.OBSTACLE: (0.9, 0.85, 0.2)}
 )
 MOVED_METRES = 2.0
+FLIGHTS_AN_EPISODE = 2
+"""Frames of an episode from which rollouts start, evenly spaced."""
+PATIENCE = 80
+"""Steps after which a target that is neither reached nor passed counts as missed."""
 
 
 @dataclasses.dataclass
 class Intervention:
-    """One change to many scenes, and what it did to the policy."""
+    """One change to many scenes and its effect on the policy."""
 
     name: str
     area: Tensor  # (T, H, W) bool
-    """Pixels that the change touched."""
+    """Changed pixels."""
     effect: NDArray  # (T,)
-    """Distance of the wishes before and after; NaN where there was nothing to change."""
+    """Distance of the action probabilities; NaN where there was nothing to change."""
     frames: Tensor  # (T, H, W, 3) uint8
-    """The pictures after the change."""
+    """Frames after the change."""
 
 
 def intervene(
     scenes: Scenes, network: PictureNetwork, state: State, regions: Tensor, seed: int = 0
 ) -> list[Intervention]:
-    """Takes the next cube away, moves it, recolours it; changes a patch of ground.
-
-    The ground means nothing: what that patch does is what any change does.
+    """Remove, move and recolour the next target; as a control, change a patch of ground.
 
     Args:
-        scenes: Where they are drawn.
-        network: The policy's.
+        scenes: Renders the frames.
+        network: The policy's network.
         state: The scenes.
         regions: `Region` of each pixel. Shape: (T, H, W).
-        seed: Of the patches' places.
+        seed: Seed of the patches' places.
     """
     before = scenes.frames(state)
     base = probabilities(network, scenes.transform(before))
@@ -74,18 +81,18 @@ def _effect(
 ) -> NDArray:
     after = probabilities(network, scenes.transform(frames))
     change = scenes.actions.distance(after, base)
-    touched = area.flatten(1).any(1)
-    return torch.where(touched, change, torch.nan).double().cpu().numpy()
+    changed = area.flatten(1).any(1)
+    return torch.where(changed, change, torch.nan).double().cpu().numpy()
 
 
 def to_the_middle(scenes: Scenes, state: State) -> State:
-    """The next cube moved sideways towards the middle of the picture, and no farther than there."""
+    """Move the next target sideways by up to `MOVED_METRES` towards the middle of the frame."""
     lateral = scenes.task.next_offset(state)[:, 1].nan_to_num()
     return scenes.task.next_moved(state, -lateral.clamp(-MOVED_METRES, MOVED_METRES))
 
 
 def _patches(ground: Tensor, size: Tensor, seed: int) -> Tensor:
-    """A square of ground in each picture, of about as many pixels as the cube has. (T, H, W)."""
+    """Return a square of ground in each frame, of about `size` pixels. Shape: (T, H, W)."""
     rng = np.random.default_rng(seed)
     patches = torch.zeros_like(ground)
     for t, free in enumerate(ground):
@@ -100,22 +107,16 @@ def _patches(ground: Tensor, size: Tensor, seed: int) -> Tensor:
     return patches
 
 
-FLIGHTS_AN_EPISODE = 2
-"""Frames of an episode from which flights go on, evenly spread."""
-PATIENCE = 80
-"""Steps after which a cube that is neither collected nor passed counts as missed."""
-
-
 @dataclasses.dataclass(frozen=True)
-class Flights:
-    """How flights went on, until one cube of each was collected or passed."""
+class TargetRollouts:
+    """N rollouts, each until one target was reached or passed."""
 
     collected: NDArray
-    """Whether that cube was. Shape: (N,), bool."""
+    """Whether the target was reached. Shape: (N,), bool."""
     decided: NDArray
-    """Steps until then, or until the flight ended. Shape: (N,)."""
+    """Steps until then, or until the episode ended. Shape: (N,)."""
     lateral: NDArray
-    """The drone's y after each step, metres; its last one once decided. Shape: (N, steps + 1)."""
+    """The drone's y after each step, metres; constant once decided. Shape: (N, steps + 1)."""
     actions: NDArray
     """-1 once decided. Shape: (N, steps)."""
 
@@ -123,21 +124,21 @@ class Flights:
 def outcomes(
     scenes: Scenes, network: PictureNetwork, state: State, episode: NDArray
 ) -> dict[str, Any]:
-    """What becomes of flights when the next cube stands elsewhere, and of the ground repainted.
+    """Compare rollouts with the next target moved or removed, and with another ground colour.
 
     Args:
-        scenes: Where they are drawn.
-        network: The policy's; it takes the most probable action.
-        state: Worlds of the data set. T of them.
+        scenes: Renders and steps the environments.
+        network: The policy's network; it takes the most probable action.
+        state: Environments of the data set. T of them.
         episode: Shape: (T,).
 
     Returns:
         Means over episodes with intervals: "collected", by variant ("as it was", "moved left",
-        "moved right"); "follows": metres that the drone went sideways with the cube, a metre, 0 of
-        a policy that does not look at it, 1 of one that always goes there; "missed_when_moved":
-        how much less often it is collected then; "path_changed": share of flights that differ at
-        all when the cube is taken away; "ground_changed": share of flights whose outcome differs
-        when the ground is repainted, at most its "upper95". "flights": how many each.
+        "moved right"); "follows": metres that the drone moves sideways with the target per metre, 0
+        if it ignores it, 1 if it always goes there; "missed_when_moved": how much less often a
+        moved target is reached; "path_changed": fraction of rollouts with another action when the
+        target is removed; "ground_changed": fraction whose outcome differs with another ground.
+        "flights": number of rollouts of each variant.
     """
     rows = _starts(scenes, state, episode)
     start, group = state[torch.from_numpy(rows)].to(scenes.worlds.device), episode[rows]
@@ -149,9 +150,9 @@ def outcomes(
         "moved right": task.next_moved(start, -MOVED_METRES),
         "taken away": task.without_next(start),
     }
-    flown = {name: fly(scenes, network, s, target) for name, s in variants.items()}
-    repainted = fly(scenes, network, start, target, DARK_GROUND)
-    was, left, right = (flown[n] for n in ("as it was", "moved left", "moved right"))
+    runs = {name: run_to_target(scenes, network, s, target) for name, s in variants.items()}
+    repainted = run_to_target(scenes, network, start, target, DARK_GROUND)
+    was, left, right = (runs[n] for n in ("as it was", "moved left", "moved right"))
     moved = (left.collected.astype(float) + right.collected) / 2
 
     def mean(values: NDArray, low: float = 0.0) -> dict[str, Any]:
@@ -159,93 +160,76 @@ def outcomes(
 
     return {
         "flights": len(rows),
-        "collected": {n: mean(f.collected) for n, f in flown.items() if n != "taken away"},
+        "collected": {n: mean(r.collected) for n, r in runs.items() if n != "taken away"},
         "follows": mean(followed(left, right), -1.0),
         "missed_when_moved": mean(was.collected - moved, -1.0),
-        "path_changed": mean(differ(was, flown["taken away"])),
+        "path_changed": mean(differ(was, runs["taken away"])),
         "ground_changed": mean(was.collected != repainted.collected),
     }
 
 
-@torch.no_grad()
-def fly(
+def run_to_target(
     scenes: Scenes,
     network: PictureNetwork,
     state: State,
     target: Tensor,
     appearance: Appearance | None = None,
-) -> Flights:
-    """Flies on, taking the most probable action, until one cube of each world is decided.
+) -> TargetRollouts:
+    """Step until one target of each environment is reached or passed; see `rollout`.
 
     Args:
-        scenes: Where they are drawn.
-        network: The policy's.
-        state: Where the flights begin; a policy with a memory remembers the first picture alone.
-        target: The cube of each world. Shape: (N,).
-        appearance: How the worlds look; as the task has it by default.
+        scenes: Renders and steps the environments.
+        network: The policy's network.
+        state: Initial states.
+        target: The target of each environment. Shape: (N,).
+        appearance: Appearance of the scenes; the task's by default.
     """
     task = scenes.task
-    world = torch.arange(len(target), device=target.device)
-    now, on = state[world], torch.ones_like(target, dtype=torch.bool)
-    decided, lateral, actions = torch.zeros_like(target), [now.body.position[:, 1]], []
-    earlier: list[Tensor] = []
-    for _ in range(PATIENCE):
-        if not on.any():
-            break
-        flying = on.nonzero()[:, 0]
-        seen = scenes.frames(now[flying], appearance)
-        past = [pictures[flying] for pictures in earlier]
-        action = torch.full_like(target, -1)
-        given = scenes.actions.greedy(outputs(network, scenes.transform(seen, past)))
-        action[flying] = scenes.actions.part(given)
-        now[flying] = scenes.worlds.advance(now[flying], given.to(target.device))[0]
-        decided[flying] += 1
-        actions.append(action)
-        lateral.append(now.body.position[:, 1].clone())
-        on = ~task.is_behind(now, target) & ~task.is_reached(now, target) & (now.end_reason == 0)
-        earlier = _remember(earlier, seen, flying, len(target), scenes.memory)
-    return Flights(
-        task.is_reached(now, target).cpu().numpy(),
+    decided = torch.zeros_like(target)
+    lateral, actions = [state.body.position[:, 1].clone()], []
+
+    def stays_active(step: Step) -> Tensor:
+        after, goal = step.after, target[step.rows]
+        decided[step.rows] += 1
+        actions.append(torch.full_like(target, -1))
+        actions[-1][step.rows] = scenes.actions.part(step.action)
+        lateral.append(lateral[-1].clone())
+        lateral[-1][step.rows] = after.body.position[:, 1]
+        is_over = task.is_behind(after, goal) | task.is_reached(after, goal)
+        return ~is_over & (after.end_reason == 0) & (len(actions) < PATIENCE)
+
+    end = rollout(scenes, network, state, stays_active, appearance)
+    return TargetRollouts(
+        task.is_reached(end, target).cpu().numpy(),
         decided.cpu().numpy(),
         torch.stack(lateral, 1).cpu().numpy(),
         torch.stack(actions, 1).cpu().numpy() if actions else np.zeros((len(target), 0), int),
     )
 
 
-def followed(left: Flights, right: Flights) -> NDArray:
-    """How far the drone went with a cube, a metre that the cube was moved; cut to [-1, 1].
+def followed(left: TargetRollouts, right: TargetRollouts) -> NDArray:
+    """Return how far the drone moved with a target, per metre that it was moved; in [-1, 1].
 
-    Both flights are looked at when the first of them has got to its cube, so that a flight which
-    merely lasts longer follows nothing.
+    Both rollouts are compared at the step at which the first of them ends, so that a longer rollout
+    does not count as following.
 
     Args:
-        left: With the cube moved to the left.
-        right: With the cube moved to the right.
+        left: With the target moved to the left.
+        right: With the target moved to the right.
     """
     when = np.minimum(left.decided, right.decided)
-    ends = [f.lateral[np.arange(len(when)), when] for f in (left, right)]
+    ends = [r.lateral[np.arange(len(when)), when] for r in (left, right)]
     return ((ends[0] - ends[1]) / (2 * MOVED_METRES)).clip(-1.0, 1.0)
 
 
-def differ(first: Flights, second: Flights) -> NDArray:
-    """Whether two flights took another action at any step that both took. Shape: (N,), bool."""
+def differ(first: TargetRollouts, second: TargetRollouts) -> NDArray:
+    """Return whether two rollouts differ in the action of a common step. Shape: (N,), bool."""
     steps = min(first.actions.shape[1], second.actions.shape[1])
     one, two = first.actions[:, :steps], second.actions[:, :steps]
     return ((one != two) & (one >= 0) & (two >= 0)).any(1)
 
 
 def _starts(scenes: Scenes, state: State, episode: NDArray) -> NDArray:
-    """Frames with a next cube ahead, a few an episode."""
+    """Return a few frames of each episode with a next target ahead."""
     there = (~scenes.task.next_offset(state)[:, 0].isnan()).nonzero()[:, 0].cpu().numpy()
     return there[sample_frames(episode[there], FLIGHTS_AN_EPISODE)]
-
-
-def _remember(
-    earlier: list[Tensor], seen: Tensor, flying: Tensor, count: int, memory: int
-) -> list[Tensor]:
-    """The last pictures of all worlds, of which those that still fly have just seen one more."""
-    if not memory:
-        return []
-    newest = seen.new_zeros(count, *seen.shape[1:])
-    newest[flying] = seen
-    return [*earlier, newest][-memory:]

@@ -1,4 +1,8 @@
-"""Parts of pictures: patches of one size, and what a policy does when some are replaced."""
+"""Patches of frames: their effect on the policy, and how well a heat map agrees with it.
+
+All patches of a frame have one size, so neither the size of a target nor the sharpness of a map
+matters: an uninformative map has a mean score of 0 with any policy.
+"""
 
 import dataclasses
 from collections.abc import Iterable, Iterator
@@ -15,17 +19,23 @@ from drone_rl.policies import PictureNetwork
 from drone_rl.utils.intervals import episode_means, mean_bounds
 
 PATCHES = 40
-"""About so many in a picture."""
+"""Approximate number of patches of a frame."""
+UNMOVED = 1e-4
+"""Frames on which every patch has a smaller effect are left out of tests of maps."""
+TOP = 0.1
+"""Fraction of the patches that count as those with the largest effect."""
+_EQUAL = 1e-6
+"""Differences below this are ties: of effects, and of heat relative to the map's maximum."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Grid:
-    """Patches of one size on a picture; rows and columns that don't fit are left out evenly."""
+    """Patches of one size; remaining rows and columns of pixels are left out on both sides."""
 
     height: int
-    """Pixels down a patch."""
+    """Height of a patch, pixels."""
     width: int
-    """Pixels across a patch."""
+    """Width of a patch, pixels."""
     rows: int
     columns: int
     top: int = 0
@@ -38,13 +48,13 @@ class Grid:
         return self.rows * self.columns
 
     def span(self, patch: int) -> tuple[slice, slice]:
-        """Rows and columns of pixels of a patch; patches are counted row by row."""
+        """Return rows and columns of pixels of a patch; patches are numbered row by row."""
         row, column = divmod(patch, self.columns)
         top, left = self.top + row * self.height, self.left + column * self.width
         return slice(top, top + self.height), slice(left, left + self.width)
 
     def masks(self, size: tuple[int, ...]) -> Tensor:
-        """The pixels of each patch in a picture of that size. Shape: (count, h, w), bool."""
+        """Return the pixels of each patch in a frame of that size. Shape: (count, h, w), bool."""
         masks = torch.zeros(self.count, *size, dtype=torch.bool)
         for i in range(self.count):
             rows, columns = self.span(i)
@@ -52,18 +62,18 @@ class Grid:
         return masks
 
     def means(self, maps: Tensor) -> NDArray:
-        """Mean heat of each patch. Shape: (T, h, w) to (T, count), float64."""
+        """Return the mean heat of each patch. Shape: (T, h, w) to (T, count), float64."""
         spans = [self.span(i) for i in range(self.count)]
         heat = [maps[:, rows, columns].double().mean((1, 2)) for rows, columns in spans]
         return torch.stack(heat, 1).cpu().numpy()
 
 
 def make_grid(height: int, width: int, patches: int = PATCHES) -> Grid:
-    """About so many patches, rather square, that leave out as little of a picture as can be.
+    """Return about so many patches, nearly square, that leave out few pixels.
 
     Args:
-        height: Of the picture, pixels.
-        width: Of the picture, pixels.
+        height: Height of the frame, pixels.
+        width: Width of the frame, pixels.
         patches: Wanted number.
     """
     best, cost = Grid(1, 1, height, width), np.inf
@@ -71,10 +81,10 @@ def make_grid(height: int, width: int, patches: int = PATCHES) -> Grid:
         for columns in range(1, min(width, 2 * patches // rows) + 1):
             down, across = height // rows, width // columns
             lost = 1 - rows * down * columns * across / (height * width)
-            crowd = abs(np.log(rows * columns / patches))
-            long = abs(np.log(across / down))
-            if 4 * lost + crowd + 0.5 * long < cost:
-                cost = 4 * lost + crowd + 0.5 * long
+            number = abs(np.log(rows * columns / patches))
+            shape = abs(np.log(across / down))
+            if 4 * lost + number + 0.5 * shape < cost:
+                cost = 4 * lost + number + 0.5 * shape
                 top, left = (height - rows * down) // 2, (width - columns * across) // 2
                 best = Grid(down, across, rows, columns, top, left)
     return best
@@ -84,17 +94,17 @@ def make_grid(height: int, width: int, patches: int = PATCHES) -> Grid:
 def replaced(
     network: PictureNetwork, observations: Tensor, other: Tensor, masks: Tensor
 ) -> Iterator[tuple[Tensor, Tensor, Tensor]]:
-    """Asks the policy about pictures of which one part was replaced, for all parts that differ.
+    """Evaluate the policy with one part of an observation replaced, for all parts that differ.
 
     Args:
-        network: The policy's.
+        network: The policy's network.
         observations: Shape (T, C, h, w).
-        other: What takes their place. Shape: (T, C, h, w).
+        other: Replacements. Shape: (T, C, h, w).
         masks: The parts. Shape: (P, h, w), bool.
 
     Yields:
-        In batches: the picture's number (n,), the part's number (n,) and the probabilities of the
-        actions then (n, num_actions). Parts that look the same in both are left out.
+        In batches: indices of observations (n,) and of parts (n,), and the action probabilities
+        (n, num_actions). Parts that are equal in both are left out.
     """
     masks = masks.to(observations.device)
     pixels = (observations != other).any(1).flatten(1).float()
@@ -104,27 +114,19 @@ def replaced(
         yield frames, parts, actions_of(network).wish(network(changed))
 
 
-UNMOVED = 1e-4
-"""A picture on which no patch changes the probabilities by more says nothing about maps."""
-TOP = 0.1
-"""Share of the patches that count as those which move the policy most."""
-_EQUAL = 1e-6
-"""Heat, as a share of the map's greatest, and effects that differ by less are ties."""
-
-
 def patch_effects(
     network: PictureNetwork, observations: Tensor, others: Iterable[Tensor], grid: Grid
 ) -> NDArray:
-    """How far each patch moves the policy when it alone becomes what it might have been.
+    """Return the effect on the policy of replacing each patch alone.
 
     Args:
-        network: The policy's.
+        network: The policy's network.
         observations: Shape (T, C, h, w).
-        others: Alternative pictures, each of shape (T, C, h, w); see `alternatives`.
+        others: Alternatives, each of shape (T, C, h, w); see `scenes.alternatives`.
         grid: The patches.
 
     Returns:
-        Distance of the wishes before and after, its mean over the alternatives. Shape: (T, count).
+        Distance of the action probabilities, averaged over the alternatives. Shape: (T, count).
     """
     base = probabilities(network, observations)
     masks, effects = grid.masks(observations.shape[-2:]), []
@@ -138,35 +140,33 @@ def patch_effects(
 
 
 def moving(effects: NDArray) -> NDArray:
-    """Pictures in which some patch moves the policy; the others say nothing. Shape: (T,)."""
+    """Return the frames in which some patch affects the policy. Shape: (T,)."""
     return effects.max(1) >= UNMOVED
 
 
 def scores(heat: NDArray, effects: NDArray) -> NDArray:
-    """How well each map tells which patches move the policy.
+    """Return how well each map agrees with the effects of the patches.
 
     Args:
         heat: Mean heat of each patch. Shape: (T, count).
         effects: From `patch_effects`. Shape: (T, count).
 
     Returns:
-        Spearman's rank correlation within each picture, -1 to 1; 0 where either is the same
-        everywhere. Shape: (T,).
+        Spearman's rank correlation within each frame; 0 where either is constant. Shape: (T,).
     """
     return rank_correlation(_levels(heat), np.round(effects / _EQUAL))
 
 
 def pointing(heat: NDArray, effects: NDArray) -> tuple[NDArray, NDArray]:
-    """Is the hottest patch one of those that move the policy most?
+    """Return whether the hottest patch is one of those with the largest effect.
 
     Args:
         heat: Shape (T, count).
         effects: Shape (T, count).
 
     Returns:
-        Whether it is (of several hottest ones, the share that is), and chance: the share of all
-        patches that count as moving it most (a tenth; more if they move it equally, fewer if the
-        others don't move it at all). Both (T,).
+        The fraction of the hottest patches that are, and the fraction of all patches that are
+        (chance): a tenth, more if effects tie, fewer if other patches have none. Both (T,).
     """
     levels, moved = _levels(heat), np.round(effects / _EQUAL)
     number = max(1, round(TOP * effects.shape[1]))
@@ -177,7 +177,7 @@ def pointing(heat: NDArray, effects: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def rank_correlation(first: NDArray, second: NDArray) -> NDArray:
-    """Spearman's correlation of each row of two arrays; 0 where one is constant. Shape: (T,)."""
+    """Return Spearman's correlation of corresponding rows; 0 where one is constant. Shape: (T,)."""
     a, b = rankdata(first, axis=1), rankdata(second, axis=1)
     a, b = a - a.mean(1, keepdims=True), b - b.mean(1, keepdims=True)
     norm = np.sqrt((a**2).sum(1) * (b**2).sum(1))
@@ -185,7 +185,7 @@ def rank_correlation(first: NDArray, second: NDArray) -> NDArray:
 
 
 def sample_frames(episode: NDArray, most: int) -> NDArray:
-    """Indices of at most so many frames of each episode, evenly spread. Shape: (N,)."""
+    """Return indices of at most `most` frames of each episode, evenly spaced. Shape: (N,)."""
     found = [np.zeros(0, np.int64)]
     for number in np.unique(episode):
         rows = np.flatnonzero(episode == number)
@@ -194,11 +194,11 @@ def sample_frames(episode: NDArray, most: int) -> NDArray:
 
 
 def summarise_scores(values: NDArray, episode: NDArray) -> dict[str, Any]:
-    """The mean of scores over episodes with its interval; see `mean_bounds`."""
+    """Return the mean of scores over episodes with its interval; see `mean_bounds`."""
     return mean_bounds(episode_means(values, episode).clip(-1, 1), -1.0, 1.0)
 
 
 def _levels(heat: NDArray) -> NDArray:
-    """Heat in steps so fine that only rounding errors become ties. Shape kept."""
+    """Round heat so that differences from floating-point errors become ties. Shape kept."""
     peak = np.abs(heat).max(1, keepdims=True)
     return np.round(heat / np.where(peak > 0, peak, 1.0) / _EQUAL)

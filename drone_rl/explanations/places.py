@@ -1,4 +1,4 @@
-"""What it does about one cube at each and every place, exactly, where a closed form is known."""
+"""Section "places": the exact map of the action for each place of one cube."""
 
 from typing import Any
 
@@ -20,14 +20,13 @@ from drone_rl.verification.prover.lattice import Lattice
 from drone_rl.verification.prover.policy_spec import check_task
 
 _COMPARED = 1000
-"""Pictures of the renderer that must be the closed form's."""
+"""Rendered frames that are compared with the closed form."""
 
 
 def section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
-    """Makes "places".
+    """Return "places", or why it is "refused" if no exact map is known for this configuration.
 
-    It holds nothing but why it was "refused" where the world, the pictures or the actions are none
-    that an exact map is known of. Arrays: "places_..." of the outlines, see `ActionMap.outlines`.
+    Arrays: "places_..." of the outlines, see `ActionMap.outlines`.
     """
     settings = PlacesSettings()
     try:
@@ -57,21 +56,21 @@ def _map(context: Context, settings: PlacesSettings) -> ActionMap:
     return map_actions(
         camera,
         window,
-        _look(context, images),
+        _face_renderer(context, images),
         network.eval(),
         touch_distance=task.touch_distance,
         most_cells=settings.most_cells,
     )
 
 
-def _look(context: Context, images: CubeImages) -> RenderFaces:
-    """From what pixels show of a cube, by way of colours, to what the network sees."""
+def _face_renderer(context: Context, images: CubeImages) -> RenderFaces:
+    """Return a function from the cube's face at each pixel to observations."""
 
-    def look(faces: NDArray[np.uint8]) -> torch.Tensor:
+    def render(faces: NDArray[np.uint8]) -> torch.Tensor:
         shown = torch.from_numpy(faces).long()
         is_open = (shown == NOTHING)[..., None]
         return context.scenes.transform(
             torch.where(is_open, images.background, images.colors[shown])
         )
 
-    return look
+    return render

@@ -1,4 +1,4 @@
-"""The response map: what a policy does about one cube wherever it stands, and what comes of it."""
+"""Sections "response" (maps over the place of one target) and "asymmetry" (left against right)."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ from torch import Tensor
 
 from drone_rl.explanations.context import Context
 from drone_rl.explanations.hooks import probabilities
-from drone_rl.explanations.rollouts import fly_on
+from drone_rl.explanations.rollouts import run_to_end
 from drone_rl.explanations.scenes import Scenes, empty_scene, place_target
 from drone_rl.policies import PictureNetwork
 from drone_rl.sim.actions import Actions
@@ -20,14 +20,45 @@ from drone_rl.utils.intervals import mean_interval
 from drone_rl.utils.seeding import Stream, torch_generator
 
 BLIND = 0.1
-"""A policy is blind to a cube that changes its action probabilities by less than this."""
+"""A policy is blind to a target that changes its action probabilities by less than this."""
 _RESPONSE, _OUTCOME = 0, 1
 """Numbers of the maps' grids."""
 
 
+def policy_response(context: Context) -> "ResponseMap":
+    """Return the response map of the policy, computed once."""
+    scenes, network, seed = context.scenes, context.network, context.seed.value
+    return context.shared("response", lambda: response_map(scenes, network, seed=seed))
+
+
+def response_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
+    """Return "response".
+
+    Arrays: "response_..." and "outcome_...", the fields of `ResponseMap` and `OutcomeMap`.
+    """
+    response = policy_response(context)
+    outcome = outcome_map(context.scenes, context.network, seed=context.seed.value)
+    arrays = {
+        f"{name}_{field.name}": getattr(one, field.name)
+        for name, one in (("response", response), ("outcome", outcome))
+        for field in dataclasses.fields(one)
+    }
+    return {"response": summarise(response, outcome, context.scenes.task.strata)}, arrays
+
+
+def asymmetry_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
+    """Return "asymmetry": on the "dataset" and on the "grid" of the response map."""
+    actions = context.scenes.actions
+    numbers = {
+        "dataset": asymmetry(context.network, context.observations, context.episode, actions),
+        "grid": grid_asymmetry(policy_response(context), actions),
+    }
+    return {"asymmetry": numbers}, {}
+
+
 @dataclasses.dataclass
 class ResponseMap:
-    """Move probabilities for one cube at every place of a grid: Z up, F ahead, L sideways."""
+    """Action probabilities for one target at each place of a grid: Z up, F ahead, L sideways."""
 
     height: NDArray  # (Z,)
     """Metres above the drone."""
@@ -36,25 +67,23 @@ class ResponseMap:
     lateral: NDArray  # (L,)
     """Metres to its left."""
     probabilities: NDArray  # (Z, F, L, A)
-    """Of each action."""
     without_target: NDArray  # (A,)
-    """The same for the scene without a cube."""
+    """Action probabilities without a target."""
     oracle: NDArray  # (L,)
-    """What must be done: a turn where flying straight on would miss."""
+    """The needed action: a turn where flying straight on would miss."""
     stratum: NDArray  # (L,)
-    """The task's stratum of a cube there: its side."""
+    """The task's stratum of a target there: its side."""
     blind: NDArray  # (Z, F, L) bool
-    """Where the cube calls for a turn and the policy doesn't notice it."""
+    """See `find_blind`."""
 
 
 @dataclasses.dataclass
 class OutcomeMap:
-    """Whether the policy, flying on greedily, collects a cube that stands there."""
+    """Whether greedy rollouts reach a target at each place; fields as in `ResponseMap`."""
 
     height: NDArray  # (Z,)
     forward: NDArray  # (f,)
     lateral: NDArray  # (l,)
-    """As in `ResponseMap`."""
     collected: NDArray  # (Z, f, l) bool
     oracle: NDArray  # (l,)
     stratum: NDArray  # (l,)
@@ -68,14 +97,14 @@ def response_map(
     num_forward: int = 31,
     seed: int | None = None,
 ) -> ResponseMap:
-    """Draws one cube at every place of a grid and asks the policy about each.
+    """Evaluate the policy with one target at each place of a grid.
 
     Args:
-        scenes: Where they are drawn.
-        network: The policy's.
+        scenes: Renders the frames.
+        network: The policy's network.
         num_lateral: Places sideways; see `Task.grid`.
         num_forward: Places ahead.
-        seed: Of the places, see `shrink`; without it they are always the same.
+        seed: Seed of the places, see `shrink`; fixed places by default.
     """
     grid = scenes.task.grid(num_forward, num_lateral)
     height, forward, lateral = grid if seed is None else shrink(grid, seed, _RESPONSE)
@@ -84,18 +113,18 @@ def response_map(
     for up in height.tolist():
         observed = scenes.observe(place_target(scenes, ahead.flatten(), aside.flatten(), up))
         layers.append(probabilities(network, observed).view(num_forward, num_lateral, -1))
-    wishes = torch.stack(layers)
+    every = torch.stack(layers)
     alone = probabilities(network, scenes.observe(empty_scene(scenes)))[0]
-    needed = scenes.needed(_offsets(lateral)).to(wishes.device)
+    needed = scenes.needed(_offsets(lateral)).to(every.device)
     return ResponseMap(
         height=height.numpy(),
         forward=forward.numpy(),
         lateral=lateral.numpy(),
-        probabilities=wishes.cpu().numpy(),
+        probabilities=every.cpu().numpy(),
         without_target=alone.cpu().numpy(),
         oracle=needed.cpu().numpy(),
         stratum=scenes.task.stratum_at(_offsets(lateral)).numpy(),
-        blind=find_blind(scenes.actions, wishes, alone, needed).cpu().numpy(),
+        blind=find_blind(scenes.actions, every, alone, needed).cpu().numpy(),
     )
 
 
@@ -122,7 +151,7 @@ def shrink(grid: Grid, seed: int, number: int = 0) -> Grid:
 
 
 def _between(places: Tensor, first: float, last: float) -> Tensor:
-    """Evenly spaced places from one step's fraction after the first to one before the last."""
+    """Return evenly spaced places; the ends move inwards by fractions of a step."""
     if len(places) < 2:
         return places
     steps = torch.linspace(first, len(places) - 1 - last, len(places), dtype=torch.float64)
@@ -131,20 +160,20 @@ def _between(places: Tensor, first: float, last: float) -> Tensor:
 
 
 def find_blind(actions: Actions, wishes: Tensor, alone: Tensor, needed: Tensor) -> Tensor:
-    """Where a cube calls for a turn and the policy doesn't notice it.
+    """Return where a turn is needed, not chosen, and the target has almost no effect.
 
     Args:
-        actions: What there is to do.
-        wishes: The policy's with a cube there. Shape: (Z, F, L, A).
-        alone: Without any cube. Shape: (A,).
-        needed: The action that is called for, -1 where nobody knows. Shape: (L,).
+        actions: Actions of the policy.
+        wishes: Action probabilities with a target there. Shape: (Z, F, L, A).
+        alone: Action probabilities without a target. Shape: (A,).
+        needed: The needed action, -1 where it is unknown. Shape: (L,).
 
     Returns:
         Shape: (Z, F, L), bool.
     """
     unmoved = actions.distance(wishes, alone) < BLIND
-    calls = (needed >= 0) & actions.turns(needed)
-    return unmoved & calls & ~actions.agrees(actions.chosen(wishes), needed)
+    needs_turn = (needed >= 0) & actions.turns(needed)
+    return unmoved & needs_turn & ~actions.agrees(actions.chosen(wishes), needed)
 
 
 def outcome_map(
@@ -155,11 +184,11 @@ def outcome_map(
     num_forward: int = 8,
     seed: int | None = None,
 ) -> OutcomeMap:
-    """Flies on from every place of a coarser grid, and sees whether the cube is collected.
+    """Run greedy rollouts from each place of a coarser grid.
 
     Args:
-        scenes: Where the flights are drawn.
-        network: The policy's.
+        scenes: Renders and steps the environments.
+        network: The policy's network.
         num_lateral: Places sideways; see `Task.grid`.
         num_forward: Places ahead.
         seed: See `response_map`.
@@ -171,7 +200,7 @@ def outcome_map(
     layers = []
     for up in height.tolist():
         starts = place_target(scenes, ahead.flatten(), aside.flatten(), up)
-        ends = fly_on(scenes, network, starts)
+        ends = run_to_end(scenes, network, starts)
         layers.append(scenes.task.is_reached(ends, only).view(num_forward, num_lateral))
     return OutcomeMap(
         height=height.numpy(),
@@ -184,18 +213,17 @@ def outcome_map(
 
 
 def summarise(response: ResponseMap, outcome: OutcomeMap, strata: Sequence[str]) -> dict[str, Any]:
-    """Counts for people and programs.
+    """Return counts by height and side.
 
     Args:
-        response: What it wishes for.
-        outcome: What comes of it.
-        strata: Names of the task's, such as sides.
+        response: Response map.
+        outcome: Outcome map.
+        strata: Names of the task's strata, such as sides.
 
     Returns:
         "without_target"; "rows": for each height and side ("left", "ahead" where flying straight on
-        is enough, "right") the share of "places" at which the policy is "blind" (of the response
-        map) and from which the cube is "collected" (of the outcome map); None where no place of
-        the grid lies on that side.
+        is enough, "right") the fraction of places at which the policy is "blind" (None if the grid
+        has none on that side), and the number of "places" and of those "collected".
     """
     rows = []
     for layer, height in enumerate(response.height.tolist()):
@@ -215,47 +243,26 @@ def summarise(response: ResponseMap, outcome: OutcomeMap, strata: Sequence[str])
 
 
 def _offsets(lateral: Tensor) -> Tensor:
-    """Places level with the drone, so far to its left. (L,) to (L, 3)."""
+    """Return places beside the drone, at its height. Shape: (L,) to (L, 3)."""
     nothing = torch.zeros_like(lateral)
     return torch.stack([nothing, lateral, nothing], -1)
-
-
-def policy_response(context: Context) -> ResponseMap:
-    """Return the response map of the policy, computed once."""
-    scenes, network, seed = context.scenes, context.network, context.seed.value
-    return context.shared("response", lambda: response_map(scenes, network, seed=seed))
-
-
-def response_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
-    """Makes "response".
-
-    Arrays: "response_..." and "outcome_...", the fields of `ResponseMap` and `OutcomeMap`.
-    """
-    response = policy_response(context)
-    outcome = outcome_map(context.scenes, context.network, seed=context.seed.value)
-    arrays = {
-        f"{name}_{field.name}": getattr(one, field.name)
-        for name, one in (("response", response), ("outcome", outcome))
-        for field in dataclasses.fields(one)
-    }
-    return {"response": summarise(response, outcome, context.scenes.task.strata)}, arrays
 
 
 def asymmetry(
     network: PictureNetwork, observations: Tensor, episode: NDArray, actions: Actions
 ) -> dict[str, Any]:
-    """pi(left | x) against pi(right | mirrored x), over a data set.
+    """Compare pi(left | x) with pi(right | mirrored x) over a data set.
 
     Args:
-        network: The policy's.
+        network: The policy's network.
         observations: Shape (T, C, H, W).
         episode: Shape (T,).
-        actions: What it can do.
+        actions: Actions of the policy.
 
     Returns:
-        "signed": the mean of pi(left | x) - pi(right | mirrored x), below 0 if the policy prefers
-        right; "absolute": the mean distance between the policy and its mirror
-        image; "worst": frames in order of that distance, with it.
+        "signed": mean of pi(left | x) - pi(right | mirrored x), below 0 if the policy prefers
+        right; "absolute": mean distance between the policy and its mirror image; "worst": frames
+        with the largest distances.
     """
     here = probabilities(network, observations)
     there = actions.mirror(probabilities(network, observations.flip(-1)))
@@ -270,7 +277,7 @@ def asymmetry(
 
 
 def grid_asymmetry(response: ResponseMap, actions: Actions) -> dict[str, Any]:
-    """The same over a response map, whose mirror image is itself read backwards."""
+    """Compare a response map with its mirror image, which is the map read backwards."""
     here, there = response.probabilities, actions.mirror(response.probabilities[:, :, ::-1])
     signed, distance = actions.leaning(here) - actions.leaning(there), actions.distance(here, there)
     at = np.unravel_index(distance.argmax(), distance.shape)
@@ -284,13 +291,3 @@ def grid_asymmetry(response: ResponseMap, actions: Actions) -> dict[str, Any]:
             "lateral": float(response.lateral[at[2]]),
         },
     }
-
-
-def asymmetry_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
-    """Makes "asymmetry": on the "dataset" and on the "grid" of the response map."""
-    actions = context.scenes.actions
-    numbers = {
-        "dataset": asymmetry(context.network, context.observations, context.episode, actions),
-        "grid": grid_asymmetry(policy_response(context), actions),
-    }
-    return {"asymmetry": numbers}, {}

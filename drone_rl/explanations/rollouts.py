@@ -1,19 +1,20 @@
-"""Rollouts of a policy with all that the simulator knows about them, in one file of plain arrays.
+"""Recorded rollouts of a policy with the simulator's ground truth, and rollouts from given states.
 
-The file is an ordinary compressed `.npz`: `numpy.load(file)` gives the arrays, and the entry
-"meta", a JSON text, describes them under "fields", so that no program of ours is needed to read it.
+A data set is an ordinary compressed `.npz`: `numpy.load(file)` gives its arrays, and the entry
+"meta", a JSON text, describes them under "fields". It has whole episodes; only some frames of each
+are rendered and analysed, evenly spread, so that a long episode counts no more than a short one.
 """
 
 import dataclasses
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from tensordict import TensorDict, TensorDictBase
+from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModuleBase
 from torch import Tensor
 from torchrl.envs import TransformedEnv
@@ -26,15 +27,10 @@ from drone_rl.explanations.scenes import Region, Scenes
 from drone_rl.policies import PictureNetwork
 from drone_rl.sim.actions import Actions
 from drone_rl.sim.dynamics import BodyState, Dynamics
+from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.tasks import State, Task
-from drone_rl.utils.archives import read_arrays
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import parse_json
-from drone_rl.utils.limits import check_indices
-from drone_rl.utils.schema import as_mapping
 
-MOST_STEPS = 10**7
-"""Numbers of steps or episodes in a data set: arrays are counted by them."""
 SEEN = {
     "observations": "what the policy's network got, float32 (T, C, h, w)",
     "probabilities": "the policy's probability of each action, float32 (T, number of actions)",
@@ -42,11 +38,14 @@ SEEN = {
     "regions": "what each pixel shows: " + ", ".join(f"{r.value} {r.name.lower()}" for r in Region),
     "depth": "metres along the optical axis, 0 for the sky, float16 (T, H, W)",
 }
-"""What is known besides of those frames that are analysed."""
+"""Fields of rendered frames only."""
+_POSE = ("drone", "attitude")
+_SAME = 1e-9
+"""Poses (metres, quaternion) that differ by less are equal up to rounding."""
 
 
 def flown_fields(task: Task[Any], actions: Actions) -> dict[str, str]:
-    """What is known of each frame; in the file also of every step flown, as "flights/..."."""
+    """Return the fields of each step; in the file also of every step flown, as "flights/..."."""
     ends = ", ".join(f"{end.value} {end.name.lower()}" for end in task.ends)
     return {
         **actions.fields(),
@@ -63,33 +62,30 @@ def flown_fields(task: Task[Any], actions: Actions) -> dict[str, str]:
 
 @dataclasses.dataclass
 class RolloutDataset:
-    """Frames of flights, in order of time; see `flown_fields` and `SEEN`.
-
-    Flights that are not drawn lack most of what is seen.
-    """
+    """Frames of episodes in order of time; see `flown_fields` and `SEEN`."""
 
     arrays: dict[str, NDArray]
     features: dict[str, NDArray]
-    """What each recorded layer made of the frames, by layer name. Shape: (T, *)."""
+    """Output of each recorded layer, by name. Shape: (T, *)."""
     meta: dict[str, Any]
-    """Where it comes from; its "fields" describe the arrays."""
+    """Origin; its "fields" describe the arrays."""
 
     def __len__(self) -> int:
-        """Returns the number of frames."""
+        """Return the number of frames."""
         return len(self.arrays["actions"])
 
     def __getattr__(self, name: str) -> NDArray:
-        """Returns an array by name."""
+        """Return an array by name."""
         if name in (arrays := vars(self).get("arrays", {})):
             return arrays[name]
         raise AttributeError(name)
 
     def tensor(self, name: str) -> Tensor:
-        """An array as a tensor."""
+        """Return an array as a tensor."""
         return torch.from_numpy(self.arrays[name])
 
     def offset(self, task: Task[Any]) -> NDArray:
-        """The next target's place seen from the drone: metres ahead and to the left.
+        """Return the next target's place relative to the drone: metres ahead and to the left.
 
         Returns:
             Shape: (T, 2); NaN where no target is left.
@@ -97,16 +93,15 @@ class RolloutDataset:
         return task.next_offset(self.state(task))[:, :2].numpy()
 
     def state(self, task: Task[Any], dynamics: Dynamics | None = None) -> State:
-        """The worlds as they stood, the drones at rest, ready to be changed and drawn again.
+        """Return the environments' states, with the drones at rest.
 
         Args:
-            task: What was flown.
-            dynamics: By which it goes on; drones that have more than a pose, such as rotors, have
-                it then as at the start of an episode. None if it doesn't.
+            task: The task of the episodes.
+            dynamics: Dynamics by which to go on, if any; what their state has beyond a pose, such
+                as rotor speeds, is as at the start of an episode.
         """
         kept = {name: self.tensor(name) for name in (*task.remembered, "step")}
-        attitude = self.tensor("attitude").double() if "attitude" in self.arrays else None
-        place = self.tensor("drone").double()
+        attitude, place = self.tensor("attitude").double(), self.tensor("drone").double()
         body = BodyState.at_rest(place, attitude)
         begun = body if dynamics is None else dynamics.start(place)
         if type(begun) is not BodyState:
@@ -114,11 +109,11 @@ class RolloutDataset:
         return task.recall(kept, body)
 
     def save(self, path: str | Path, flights: "RolloutDataset | None" = None) -> None:
-        """Writes the file.
+        """Write the file.
 
         Args:
-            path: Where to.
-            flights: The whole episodes that the frames are from.
+            path: File to write.
+            flights: All steps of the episodes.
 
         Raises:
             InputError: It can't be written.
@@ -129,63 +124,12 @@ class RolloutDataset:
             whole = flights.arrays.items()
             more |= {f"flights/{name}": value for name, value in whole if name not in SEEN}
         try:
-            arrays: dict[str, Any] = {**self.arrays, **more}  # or numpy's allow_pickle is in doubt
+            arrays: dict[str, Any] = {**self.arrays, **more}  # Any: numpy's allow_pickle
             np.savez_compressed(path, meta=json.dumps(described), **arrays)
         except OSError as error:
             raise InputError(
                 f"data set {path} can't be written ({error.strerror}); choose another folder"
             ) from error
-
-    @classmethod
-    def load(cls, path: str | Path) -> "RolloutDataset":
-        """Reads the file.
-
-        Raises:
-            InputError: It is missing, damaged or something else.
-        """
-        try:
-            entries = read_arrays(Path(path))
-            meta = parse_json(str(entries.pop("meta")), f"{path}: meta")
-            names = as_mapping(as_mapping(meta, "meta").get("fields"), "meta.fields")
-            arrays = {name: entries.pop(name) for name in names}
-            layers = {k: v for k, v in entries.items() if k.startswith("features/")}
-            for name in ("episode", "step"):
-                if name in arrays:
-                    check_indices(arrays[name], MOST_STEPS, name)
-            if len({value.shape[:1] for value in arrays.values()}) > 1:
-                raise InputError("its arrays are not of one length")
-        except (InputError, KeyError) as error:
-            raise InputError(
-                f"data set {path} can't be read ({error}); record it again with drone-rl explain"
-            ) from None
-        return cls(arrays, {k.removeprefix("features/"): v for k, v in layers.items()}, meta)
-
-
-_POSE = ("drone", "attitude")
-
-
-def record(
-    env: TransformedEnv,
-    actor: TensorDictModuleBase,
-    network: PictureNetwork,
-    num_frames: int,
-    *,
-    num_episodes: int = 1,
-    layers: tuple[str, ...] = (),
-    greedy: bool = False,
-    meta: dict[str, Any] | None = None,
-) -> RolloutDataset:
-    """Collect episodes and render some frames; see `collect`, `select_frames`, `render_frames`.
-
-    Raises:
-        InputError: No frames are asked for, or a layer doesn't exist.
-    """
-    flights = collect(
-        env, actor, num_episodes=num_episodes, num_frames=num_frames, greedy=greedy, meta=meta
-    )
-    return render_frames(
-        flights, select_frames(flights.episode, num_frames), Scenes(env), network, layers
-    )
 
 
 def collect(
@@ -194,59 +138,56 @@ def collect(
     *,
     num_episodes: int,
     num_frames: int = 1,
-    greedy: bool = False,
     meta: dict[str, Any] | None = None,
 ) -> RolloutDataset:
-    """Flies whole episodes and draws nothing but what the policy looks at.
+    """Collect whole episodes with sampled actions; only observations are rendered.
 
     Args:
-        env: A batch of worlds.
+        env: A batch of environments.
         actor: The policy.
-        num_episodes: At least so many.
-        num_frames: And at least so many frames.
-        greedy: Whether to take the most probable action instead of drawing one.
-        meta: Where the policy comes from.
+        num_episodes: Least number of episodes.
+        num_frames: Least number of steps.
+        meta: Origin of the policy.
 
     Returns:
-        All frames, with `flown_fields` and "observations".
+        All steps, with `flown_fields` and "observations".
 
     Raises:
-        InputError: No frames are asked for.
+        InputError: num_frames is below 1.
     """
     if num_frames < 1:
         raise InputError(f"frames={num_frames} records nothing; give 1 or more")
     worlds = worlds_of(env)
     keep = (("next", "info", "end_reason"),)
     collector = EpisodeCollector(env, _WithTruth(actor, (*worlds.task.entries, *_POSE)), keep=keep)
-    kind = ExplorationType.DETERMINISTIC if greedy else ExplorationType.RANDOM
     batches = []
-    with set_exploration_type(kind):
+    with set_exploration_type(ExplorationType.RANDOM):
         while collector.episodes < num_episodes or collector.frames < num_frames:
             missing = num_episodes - collector.episodes
             batches.append(collector.collect(missing if missing > 0 else None))
     fields = flown_fields(worlds.task, worlds.dynamics.actions)
     described = {**fields, "observations": SEEN["observations"]}
-    about = {"greedy": greedy, **(meta or {}), "fields": described}
-    arrays = _arrays(torch.cat(batches), worlds.task, worlds.dynamics.actions)
-    return RolloutDataset(arrays, {}, about)
+    about = {"greedy": False, **(meta or {}), "fields": described}
+    batch = cast(TensorDictBase, torch.cat(batches))
+    return RolloutDataset(_arrays(batch, worlds.task, worlds.dynamics.actions), {}, about)
 
 
 def select_frames(episode: NDArray, num_frames: int) -> NDArray:
-    """Chooses frames: of each episode as many, as far as it has them, evenly spaced in time.
+    """Select the same number of frames of each episode, evenly spaced in time.
 
     Args:
-        episode: The episode of each frame, from 0, in order. Shape: (T,).
-        num_frames: How many; all if there are fewer.
+        episode: Episode of each frame, from 0, in order. Shape: (T,).
+        num_frames: Number to select; all if there are fewer.
 
     Returns:
-        Their numbers, in order. Shape: (num_frames,).
+        Indices, in order. Shape: (num_frames,).
     """
     lengths = np.bincount(episode)
     quota = np.zeros_like(lengths)
     while (left := min(num_frames, len(episode)) - quota.sum()) > 0:
-        hungry = np.flatnonzero(quota < lengths)[:left]
-        more = max(1, left // len(hungry))
-        quota[hungry] = np.minimum(lengths[hungry], quota[hungry] + more)
+        short = np.flatnonzero(quota < lengths)[:left]
+        more = max(1, left // len(short))
+        quota[short] = np.minimum(lengths[short], quota[short] + more)
     firsts = lengths.cumsum() - lengths
     return np.concatenate(
         [
@@ -263,13 +204,13 @@ def render_frames(
     network: PictureNetwork,
     layers: tuple[str, ...] = (),
 ) -> RolloutDataset:
-    """Some frames of flights, with all that can be known about them.
+    """Return some steps with rendered frames, ground truth, probabilities and features.
 
     Args:
         flights: From `collect`.
-        rows: Frames. Shape: (T,).
-        scenes: Where they are drawn.
-        network: The policy's.
+        rows: Indices of the steps. Shape: (T,).
+        scenes: Renders the frames.
+        network: The policy's network.
         layers: Layers whose output is recorded.
 
     Raises:
@@ -291,34 +232,37 @@ def render_frames(
 
 
 class _WithTruth(TensorDictModuleBase):
-    """An actor that also lets the simulator's truth through, so that it is recorded."""
+    """An actor that also reads entries of "info", so that the collector keeps them."""
 
     def __init__(self, actor: TensorDictModuleBase, names: tuple[str, ...]) -> None:
         super().__init__()
         self.actor = actor
-        self.in_keys = [*actor.in_keys, *(("info", name) for name in names)]
-        self.out_keys = actor.out_keys
+        keys = [*actor.in_keys, *(("info", name) for name in names)]
+        self.in_keys = keys
+        self.out_keys = actor.out_keys  # pyright: ignore[reportAttributeAccessIssue]
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
-        """Acts."""
+        """Write an action."""
         return self.actor(tensordict)
 
 
 def _arrays(batch: TensorDictBase, task: Task[Any], actions: Actions) -> dict[str, NDArray]:
-    info: TensorDict = batch["info"]
-    episode = batch["collector", "traj_ids"]
+    info = cast(Mapping[str, Tensor], batch["info"])
+    episode = cast(Tensor, batch["collector", "traj_ids"])
+    reward = cast(Tensor, batch["next", "reward"])[:, 0]
+    end_reason = cast(Tensor, batch["next", "info", "end_reason"])[:, 0]
     starts = torch.cat([episode.new_ones(1, dtype=torch.bool), episode[1:] != episode[:-1]])
     first = starts.nonzero()[:, 0][starts.cumsum(0) - 1]
     arrays = {
-        "observations": batch["pixels"],
-        **actions.kept(batch["action"]),
-        "rewards": batch["next", "reward"][:, 0],
-        "event": _events(task, info, starts, batch["next", "info", "end_reason"][:, 0]),
+        "observations": cast(Tensor, batch["pixels"]),
+        **actions.kept(cast(Tensor, batch["action"])),
+        "rewards": reward,
+        "event": _events(task, info, starts, end_reason),
         **{name: info[name] for name in _POSE},
         **task.remember(info),
         "episode": starts.cumsum(0) - 1,
         "step": torch.arange(len(batch), device=episode.device) - first,
-        "end_reason": batch["next", "info", "end_reason"][:, 0],
+        "end_reason": end_reason,
     }
     return {name: value.cpu().numpy() for name, value in arrays.items()}
 
@@ -326,7 +270,7 @@ def _arrays(batch: TensorDictBase, task: Task[Any], actions: Actions) -> dict[st
 def _events(
     task: Task[Any], info: Mapping[str, Tensor], starts: Tensor, end_reason: Tensor
 ) -> Tensor:
-    """What actions do: 1 where a goal is reached, -1 where one is missed, else 0. Shape: (T,)."""
+    """Return 1 where an action reaches a goal, -1 where it misses one, else 0. Shape: (T,)."""
     is_last = torch.cat([starts[1:], starts.new_ones(1)])
     reached, missed = (
         torch.where(is_last, 0, torch.diff(count, append=count[-1:])) for count in task.tally(info)
@@ -335,47 +279,84 @@ def _events(
     return torch.where(is_reached, 1, -(missed > 0).long()).to(torch.int8)
 
 
-_SAME = 1e-9
-"""Metres, and parts of a quaternion: those of a move there and back differ by rounding."""
+@dataclasses.dataclass(frozen=True)
+class Step:
+    """One step of the active environments of a `rollout`; n of them."""
+
+    rows: Tensor
+    """Indices of the active environments. Shape: (n,)."""
+    before: State
+    after: State
+    action: Tensor
+    """Shape: (n, *)."""
+    reward: Tensor
+    """Shape: (n,)."""
 
 
 @torch.no_grad()
-def fly_on(scenes: Scenes, network: PictureNetwork, state: State) -> State:
-    """Flies until it is settled which targets are reached.
-
-    That is when the flight ends, when no target is left, or when a policy that remembers nothing
-    is back where it was two steps before: it would go back and forth, or stay, to the step limit.
+def rollout(
+    scenes: Scenes,
+    network: PictureNetwork,
+    state: State,
+    stays_active: Callable[[Step], Tensor],
+    appearance: Appearance | None = None,
+) -> State:
+    """Step all environments with the policy's most probable actions until none is active.
 
     Args:
-        scenes: Where the flights are drawn.
-        network: The policy's.
-        state: Where they start; a policy that sees several frames has seen this one only.
+        scenes: Renders and steps the environments.
+        network: The policy's network.
+        state: Initial states; a policy that stacks frames has seen only this one.
+        stays_active: Returns which environments stay active after a step, shape (n,), bool; it may
+            change the states after the step.
+        appearance: Appearance of the scenes; the task's by default.
 
     Returns:
-        How they ended; `end_reason` is 0 where no target was left. Shape: that of `state`.
+        Final states. Shape: that of `state`.
     """
-    task, actions, device = scenes.task, scenes.actions, state.body.position.device
-    flying = torch.arange(len(state), device=device)
-    done, now, earlier = state[flying], state, []
-    before: Tensor | None = None
-    is_new = torch.ones_like(flying, dtype=torch.bool)
-    while len(flying):
-        frames = scenes.frames(now)
-        action = actions.greedy(outputs(network, scenes.transform(frames, earlier))).to(device)
-        here = _pose(now)
-        now, reward = scenes.worlds.advance(now, action)
-        if before is not None and not scenes.memory:
-            is_back = ((_pose(now) - before).abs() < _SAME).all(-1)
-            now.end_reason[is_back & ~is_new] = task.truncation
-        done[flying] = now
-        on = (now.end_reason == 0) & ~task.next_offset(now)[:, 0].isnan()
+    device = state.body.position.device
+    rows = torch.arange(len(state), device=device)
+    done, now, earlier = state[rows], state, []
+    while len(rows):
+        frames = scenes.frames(now, appearance)
+        observations = scenes.transform(frames, earlier)
+        action = scenes.actions.greedy(outputs(network, observations)).to(device)
+        before, (now, reward) = now, scenes.worlds.advance(now, action)
+        active = stays_active(Step(rows, before, now, action, reward))
+        done[rows] = now
         earlier = [*earlier, frames][-scenes.memory :] if scenes.memory else []
-        earlier = [pictures[on] for pictures in earlier]
-        is_new = (reward != 0)[on]  # a target less is another scene
-        now, flying, before = now[on], flying[on], here[on]
+        earlier = [one[active] for one in earlier]
+        now, rows = now[active], rows[active]
     return done
 
 
+def run_to_end(scenes: Scenes, network: PictureNetwork, state: State) -> State:
+    """Step until the episode ends, no target is left, or the policy is in a loop.
+
+    A policy without memory is in a loop if it is back at its pose of two steps before. Such
+    episodes end with the task's truncation.
+
+    Returns:
+        Final states; `end_reason` is 0 where no target was left. Shape: that of `state`.
+    """
+    task = scenes.task
+    previous: Tensor | None = None
+    is_new = torch.ones(len(state), dtype=torch.bool, device=state.body.position.device)
+
+    def stays_active(step: Step) -> Tensor:
+        nonlocal previous, is_new
+        after = step.after
+        if previous is not None and not scenes.memory:
+            is_back = ((_pose(after) - previous).abs() < _SAME).all(-1)
+            after.end_reason[is_back & ~is_new] = task.truncation
+        active = (after.end_reason == 0) & ~task.next_offset(after)[:, 0].isnan()
+        is_new = (step.reward != 0)[active]  # with one target less, the scene is a new one
+        previous = _pose(step.before)[active]
+        return active
+
+    return rollout(scenes, network, state, stays_active)
+
+
 def _pose(state: State) -> Tensor:
-    """Where drones are and how they are turned. Shape: (n, 7)."""
+    """Return positions and attitudes. Shape: (n, 7)."""
     return torch.cat([state.body.position, state.body.attitude], -1)

@@ -1,4 +1,4 @@
-"""Scenes that were met or imagined: drawn, shown to the policy, and taken apart into objects."""
+"""Render any state as the policy observes it, and label the region of each pixel."""
 
 import enum
 from collections.abc import Iterable, Sequence
@@ -9,10 +9,18 @@ from torch.nn import functional
 from torchrl.envs import CatFrames, Transform, TransformedEnv
 
 from drone_rl.envs import ChromaticityPixels, CropRows, RgbPixels, worlds_of
-from drone_rl.envs.pipeline import memory_of, see_film
+from drone_rl.envs.transforms import memory_of, see_film
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.tasks import State
+
+DARK_GROUND = Appearance(colors={SemanticClass.GROUND: (0.25, 0.25, 0.22)})
+DARK = Appearance(colors={**DARK_GROUND.colors, SemanticClass.SKY: (0.3, 0.36, 0.45)})
+BRIGHT = Appearance(
+    colors={SemanticClass.GROUND: (0.75, 0.78, 0.7), SemanticClass.SKY: (0.9, 0.93, 0.97)}
+)
+PLACEMENTS = 3
+"""Random placements of all targets among the alternatives of a scene."""
 
 
 class Region(enum.IntEnum):
@@ -25,60 +33,56 @@ class Region(enum.IntEnum):
     SKY = 4
 
 
-def _channels(transforms: Iterable[Transform]) -> str:
-    kinds = {type(transform) for transform in transforms}
-    if ChromaticityPixels in kinds:
-        return "chromaticity"
-    return "rgb" if RgbPixels in kinds else "gray"
-
-
 class Scenes:
-    """Draws any `State` as the policy's camera sees it, or would.
+    """Renders any `State` with the camera and the transforms of an environment.
 
-    A scene is a still: where the policy's pipeline stacks frames, it gets the same one N times, as
-    it does at the start of an episode.
+    Where the transforms stack frames, a single frame is repeated, as at the start of an episode.
     """
 
     def __init__(self, env: TransformedEnv) -> None:
-        """Borrows the worlds and the transforms of an environment."""
+        """Use the simulated environments and the transforms of `env`."""
         self.worlds = worlds_of(env)
         self.task = self.worlds.task
         self.actions = self.worlds.dynamics.actions
         pipeline: Iterable[Transform] = env.transform  # type: ignore[assignment]
         self._transforms = [t for t in pipeline if "pixels" in (t.in_keys or [])]
         self.channels: str = _channels(self._transforms)
-        """Of what the policy gets: "gray", "rgb", or "chromaticity" (of red and blue)."""
+        """Channels of an observation: "gray", "rgb", or "chromaticity" (of red and blue)."""
         self.memory: int = memory_of(self._transforms)
-        """Pictures before the present one that the policy gets."""
+        """Number of earlier frames in an observation."""
 
     def frames(self, state: State, appearance: Appearance | None = None) -> Tensor:
-        """RGB pictures. Shape: (T, H, W, 3), uint8."""
+        """Render RGB frames. Shape: (T, H, W, 3), uint8."""
         return self.worlds.render(state, appearance=appearance)
 
     def depth(self, state: State) -> Tensor:
-        """Metres along the optical axis, 0 for the sky. Shape: (T, H, W)."""
+        """Render metres along the optical axis, 0 for the sky. Shape: (T, H, W)."""
         return self.worlds.render(state, self.worlds.view(modality="depth"))
 
+    def observe(self, state: State) -> Tensor:
+        """Return the observations of scenes. Shape: (T, C, h, w)."""
+        return self.transform(self.frames(state))
+
     def transform(self, frames: Tensor, earlier: Sequence[Tensor] = ()) -> Tensor:
-        """RGB pictures as the policy gets them.
+        """Apply the transforms to RGB frames.
 
         Args:
             frames: Shape (T, H, W, 3).
-            earlier: Those of the steps before, oldest first; the oldest repeats what is missing.
+            earlier: Frames of earlier steps, oldest first; the oldest one replaces missing ones.
 
         Returns:
-            Shape: (T, C, h, w).
+            Observations. Shape: (T, C, h, w).
         """
         return see_film(self._transforms, [*earlier, frames])
 
     def to_frame(self, maps: Tensor) -> Tensor:
-        """Heat maps over what the policy gets, put back to where that is in the camera's frame.
+        """Transform heat maps back to the coordinates of the camera's frame.
 
         Args:
             maps: Shape (T, h, w).
 
         Returns:
-            Shape: (T, H, W); 0 where the pipeline cropped the frame.
+            Shape: (T, H, W); 0 where a transform cropped the frame.
         """
         camera = self.worlds.camera
         pixels = torch.zeros(1, camera.height, camera.width, 3, dtype=torch.uint8)
@@ -97,10 +101,10 @@ class Scenes:
         return maps
 
     def needed(self, offset: Tensor) -> Tensor:
-        """The action that a target calls for which stands there; -1 where nobody knows.
+        """Return the action that a target at a place calls for; -1 if unknown.
 
-        A task tells what to do with the actions of its own choice of dynamics; among others it is
-        the part that is called the same.
+        The task knows it for the actions of its default dynamics; for other actions it is the one
+        with the same name.
 
         Args:
             offset: Metres from the drone, world frame. Shape: (N, 3).
@@ -111,39 +115,42 @@ class Scenes:
         same = torch.tensor([*(names.index(name) for name in known), -1], device=offset.device)
         return same[self.task.needed(offset)]  # -1 reads the last entry
 
-    def observe(self, state: State) -> Tensor:
-        """Scenes as the policy gets them. Shape: (T, C, h, w)."""
-        return self.transform(self.frames(state))
-
     def regions(self, state: State) -> Tensor:
-        """What each pixel shows, a `Region`. Shape: (T, H, W), uint8.
+        """Return the `Region` of each pixel. Shape: (T, H, W), uint8.
 
         The horizon is the lowest row of sky and the highest of ground, where they meet.
         """
         geoms = self.worlds.render(state, self.worlds.view(modality="segmentation")).long()
         props = torch.tensor([*self.worlds.scene.props, -1], device=geoms.device)
-        cube = props[geoms]  # geom -1 (the sky) reads the last entry
-        next_cube = self.task.next_target(state)[:, None, None]
-        regions = torch.full_like(cube, Region.GROUND)
+        target = props[geoms]  # geom -1 (the sky) reads the last entry
+        next_target = self.task.next_target(state)[:, None, None]
+        regions = torch.full_like(target, Region.GROUND)
         sky = geoms < 0
         regions[sky] = Region.SKY
-        regions[_border(sky, ~sky & (cube < 0))] = Region.HORIZON
-        regions[cube >= 0] = Region.OTHER_TARGET
-        regions[(cube >= 0) & (cube == next_cube)] = Region.NEXT_TARGET
+        regions[_border(sky, ~sky & (target < 0))] = Region.HORIZON
+        regions[target >= 0] = Region.OTHER_TARGET
+        regions[(target >= 0) & (target == next_target)] = Region.NEXT_TARGET
         return regions.to(torch.uint8)
 
 
+def _channels(transforms: Iterable[Transform]) -> str:
+    kinds = {type(transform) for transform in transforms}
+    if ChromaticityPixels in kinds:
+        return "chromaticity"
+    return "rgb" if RgbPixels in kinds else "gray"
+
+
 def _border(sky: Tensor, ground: Tensor) -> Tensor:
-    """Pixels of sky right above ground, and of ground right below sky. Shape: (T, H, W)."""
+    """Return pixels of sky above ground, and of ground below sky. Shape: (T, H, W)."""
     meets = sky[:, :-1] & ground[:, 1:]
     return functional.pad(meets, (0, 0, 0, 1)) | functional.pad(meets, (0, 0, 1, 0))
 
 
 def place_target(scenes: Scenes, forward: Tensor, lateral: Tensor, height: float = 0.0) -> State:
-    """Scenes with one target at each place and the drone at its origin.
+    """Return scenes with one target each and the drone at its origin.
 
     Args:
-        scenes: Where they will be drawn.
+        scenes: Renders the frames.
         forward: Metres ahead of the drone. Shape: (T,).
         lateral: Metres to its left. Shape: (T,).
         height: Metres above it.
@@ -155,30 +162,24 @@ def place_target(scenes: Scenes, forward: Tensor, lateral: Tensor, height: float
 
 
 def empty_scene(scenes: Scenes) -> State:
-    """One scene with no target at all."""
+    """Return one scene without targets."""
     return scenes.task.without_targets(place_target(scenes, torch.ones(1), torch.zeros(1)))
 
 
-DARK_GROUND = Appearance(colors={SemanticClass.GROUND: (0.25, 0.25, 0.22)})
-DARK = Appearance(colors={**DARK_GROUND.colors, SemanticClass.SKY: (0.3, 0.36, 0.45)})
-BRIGHT = Appearance(
-    colors={SemanticClass.GROUND: (0.75, 0.78, 0.7), SemanticClass.SKY: (0.9, 0.93, 0.97)}
-)
-PLACEMENTS = 3
-"""Random placements of all the cubes."""
-
-
 def alternatives(scenes: Scenes, state: State, seed: int = 0) -> dict[str, Tensor]:
-    """Other pictures from where each drone is.
+    """Return observations from the same places with other contents.
+
+    Patches of an observation are replaced by patches of these. Unlike a gray box, they are similar
+    to observations that the policy was trained on.
 
     Args:
-        scenes: Where they are drawn.
-        state: The scenes as they were.
-        seed: Of the cubes' random places.
+        scenes: Renders the frames.
+        state: The scenes.
+        seed: Seed of the targets' random places.
 
     Returns:
-        By name, pictures as the policy gets them, shape (T, C, h, w): no cubes; targets elsewhere,
-        `PLACEMENTS` times; ground and sky darker, and brighter.
+        By name, shape (T, C, h, w): no targets; targets elsewhere, `PLACEMENTS` times; ground and
+        sky darker, and brighter.
     """
     generator = torch.Generator().manual_seed(seed)
     found = {"no targets": scenes.observe(scenes.task.without_targets(state))}

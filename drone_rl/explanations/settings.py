@@ -1,4 +1,4 @@
-"""What an explanation computes, checked before anything is computed."""
+"""Settings of an explanation."""
 
 import dataclasses
 from typing import Annotated
@@ -9,12 +9,12 @@ from drone_rl.utils.schema import Real, Whole
 from drone_rl.utils.settings import Settings
 
 MIN_EPISODES = 30
-"""Fewer flights than this tell next to nothing of others."""
+"""Intervals from fewer episodes are too wide to be useful."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class ExplainSettings(Settings):
-    """What to compute.
+    """Settings of an explanation.
 
     Raises:
         InputError: A value is out of range.
@@ -41,7 +41,7 @@ class ExplainSettings(Settings):
     """Who draws: raytrace, our own, or mujoco_warp, MuJoCo Warp's."""
 
     def check(self) -> None:
-        """Refuses what shows nothing."""
+        """Check that each episode has a frame, and the perplexity."""
         if self.frames < self.data_episodes:
             raise InputError(
                 f"frames={self.frames} is less than one of each flight; give "
@@ -51,7 +51,7 @@ class ExplainSettings(Settings):
 
 
 def check_perplexity(perplexity: float, count: int) -> None:
-    """Refuses a perplexity that so few points can't have.
+    """Check that a perplexity is possible for `count` points.
 
     Raises:
         InputError: It is out of range.

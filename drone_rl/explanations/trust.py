@@ -1,21 +1,21 @@
-"""Which heat map of a policy is to be trusted, if any: four tests, all of which it must pass.
+"""Tests of heat maps: which method can be trusted on a policy, if any.
 
-- "placebos": it tells better than every placebo which patches of a picture move the policy.
-- "random weights": it does so better than its own maps of policies whose weights were shuffled. A
-  permutation test: a map that hides what it knows of pictures behind whatever it makes of the
-  weights does as well with any weights, hence no better than all of them but with the probability
-  of the level. Shuffled policies are as lively as the policy, or one that draws a lucky guess where
-  a policy is alive, and noise where it is not, would pass.
-- "pointing": its hottest patch is one of those that move the policy most, more often than chance.
-- "likeness": it changes when the weights do.
+A method is trusted if it passes four tests:
 
-A method fails with its first test, so that each may be made at the full level; the level is shared
-out to the methods, so that the best of them is not luck. What is said holds for the typical
-episode: the median of the episodes' means, whose order statistics are exact for any distribution
-and any dependence within episodes. A mean of differences would need some hundred episodes.
+- "placebos": its maps agree better with the effects of patches than every placebo map.
+- "random weights": they do so better than its maps of policies with shuffled weights. This is a
+  permutation test: the maps of a method that ignores the weights score as well with any weights, so
+  they beat all shuffled policies with a probability of at most the level.
+- "pointing": its hottest patch is one of those with the largest effect, more often than chance.
+- "likeness": its maps change when the weights do.
 
-For those who plug it in: `make_trial` from scenes and rollouts, `check_maps` with
-`method_maps(explainer)` (or any functions of that kind); the result is plain data, ready for JSON.
+A method must pass all tests, so each is made at the full level; the level is divided by the number
+of methods, so that the best one is not a chance find. Bounds are for the median of the episodes'
+means: its order statistics are exact for any distribution and any dependence within episodes, while
+means of differences would need some hundred episodes.
+
+To test methods of your own: `make_trial` from scenes and rollouts, then `check_maps`; the result is
+plain data.
 """
 
 import dataclasses
@@ -38,36 +38,36 @@ from drone_rl.sim.tasks import State
 from drone_rl.utils.intervals import episode_means, median_bounds
 
 MapOf = Callable[[PictureNetwork, Tensor, Tensor], Tensor]
-"""A method: network, pictures (T, C, h, w) and an action each (T,) to maps (T, h, w), 0 or more."""
+"""A method: network, observations (T, C, h, w) and actions (T,) to maps (T, h, w), 0 or more."""
 ERROR_RATE = 0.05
-"""Probability that anything is trusted that knows nothing of the policy, all methods together."""
+"""Probability that any method is trusted whose maps do not depend on the policy."""
 FRAMES_AN_EPISODE = 10
-"""Pictures of an episode that are put to the test, evenly spread."""
+"""Frames of an episode that are tested, evenly spaced."""
 WEIGHT_SEEDS = 5
-"""Shuffled policies whose maps are compared with the policy's own, pixel by pixel."""
+"""Shuffled policies whose maps are compared with the policy's, pixel by pixel."""
 MOST_ALIKE = 0.5
-"""Rank correlation with maps of shuffled weights from which on a map does not depend on them."""
+"""From this rank correlation with maps of shuffled weights on, a map does not depend on them."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Trial:
-    """What maps of one policy are held against. All pictures are such that some patch moves it."""
+    """What maps of one policy are tested against, on frames in which some patch affects it."""
 
     network: PictureNetwork
     observations: Tensor  # (T, C, h, w)
     actions: Tensor  # (T,)
-    """The actions whose maps are asked for."""
+    """Actions to explain."""
     effects: NDArray  # (T, patches)
-    """What each patch does to the policy; see `patch_effects`."""
+    """Effect of each patch; see `patch_effects`."""
     placebos: dict[str, Tensor]  # (T, h, w) each
     episode: NDArray  # (T,)
     grid: Grid
     still: int = 0
-    """Pictures left out because no patch moves the policy."""
+    """Frames left out because no patch affects the policy."""
     seed: int = 0
 
     def __getitem__(self, rows: NDArray) -> "Trial":
-        """Returns the trial on some of its pictures, given as indices or as a mask."""
+        """Return the trial on some of its frames, given as indices or as a mask."""
         index = torch.from_numpy(rows)
         return dataclasses.replace(
             self,
@@ -79,34 +79,34 @@ class Trial:
         )
 
     def maps(self, method: MapOf, network: PictureNetwork | None = None) -> Tensor:
-        """A method's maps of the trial's pictures. Shape: (T, h, w)."""
+        """Return a method's maps of the trial's frames. Shape: (T, h, w)."""
         if not len(self.observations):
             return self.observations.new_zeros(0, *self.observations.shape[-2:])
         return method(network or self.network, self.observations, self.actions)
 
     def scores(self, maps: Tensor) -> NDArray:
-        """The score of each map. Shape: (T, h, w) to (T,)."""
+        """Return the score of each map. Shape: (T, h, w) to (T,)."""
         return patches.scores(self.grid.means(maps), self.effects)
 
     def thinned(self) -> "Trial":
-        """One picture an episode, its middle one: enough for many random weights."""
+        """Return the trial on the middle frame of each episode."""
         rows = [np.flatnonzero(self.episode == e) for e in np.unique(self.episode)]
         return self[np.array([r[len(r) // 2] for r in rows], np.int64)]
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Pictures:
-    """Pictures and what they might have been: all of a trial but the policy."""
+    """The part of a trial that does not depend on the policy."""
 
     observations: Tensor  # (T, C, h, w)
     others: list[Tensor]  # (T, C, h, w) each
     absent: Tensor  # (C, h, w)
-    """The scene without cubes."""
+    """Observation of the scene without targets."""
     episode: NDArray  # (T,)
     seed: int = 0
 
     def trial(self, network: PictureNetwork, actions: Tensor) -> Trial:
-        """Finds out which patches move a policy; `actions` (T,) are those to be explained."""
+        """Measure which patches affect a policy; `actions` (T,) are those to explain."""
         grid = make_grid(*self.observations.shape[-2:])
         effects = patches.patch_effects(network, self.observations, self.others, grid)
         trial = Trial(
@@ -124,13 +124,13 @@ class Pictures:
 
 
 def draw_pictures(scenes: Scenes, state: State, episode: NDArray, seed: int = 0) -> Pictures:
-    """Draws scenes and what they might have been.
+    """Render scenes and their alternatives.
 
     Args:
-        scenes: Where they are drawn.
-        state: T of them.
+        scenes: Renders the frames.
+        state: T scenes.
         episode: Shape: (T,).
-        seed: Of the cubes' random places, of noise and of random weights.
+        seed: Seed of the targets' random places, of noise and of shuffled weights.
     """
     return Pictures(
         observations=scenes.observe(state),
@@ -149,13 +149,13 @@ def make_trial(
     episode: NDArray,
     seed: int = 0,
 ) -> Trial:
-    """Finds out what moves a policy, patch by patch, on pictures of its flights.
+    """Measure which patches affect a policy on frames of its rollouts.
 
     Args:
-        scenes: Where they are drawn.
-        network: The policy's.
-        state: The worlds as they stood; `RolloutDataset.state()`. T of them.
-        actions: Taken there. Shape: (T,).
+        scenes: Renders the frames.
+        network: The policy's network.
+        state: T states of the environments, from `RolloutDataset.state()`.
+        actions: Actions taken there. Shape: (T,).
         episode: Shape: (T,).
         seed: See `draw_pictures`.
     """
@@ -166,7 +166,7 @@ def make_trial(
 
 
 def method_maps(explainer: Explainer) -> dict[str, MapOf]:
-    """An explainer's methods, as functions of any network of the same shape."""
+    """Return an explainer's methods as functions of any network of the same shape."""
 
     def make(name: str) -> MapOf:
         return lambda network, x, a: dataclasses.replace(explainer, network=network).methods()[
@@ -183,19 +183,19 @@ def check_maps(
     *,
     num_methods: int | None = None,
 ) -> dict[str, Any]:
-    """Puts methods to the four tests.
+    """Test methods.
 
     Args:
-        trial: What moves the policy.
+        trial: Effects of patches on the policy.
         methods: By name.
-        maps: `trial.maps` of each, if they have been made already.
-        num_methods: To how many methods the error rate is shared out; as many as there are.
+        maps: `trial.maps` of each method, if already computed.
+        num_methods: Number of methods that share the error rate; that of `methods` by default.
 
     Returns:
-        "trusted": the name of the best method that passed all, None if none did; "methods", by
-        name, see `check_method`; "placebos": their "score"s; "frames", "episodes" and
-        "frames_unmoved"; "level": the error rate of each method; "confidence": of each bound but
-        the scores'.
+        "trusted": name of the best method that passed all tests, None if none did; "methods", by
+        name, see `check_method`; "placebos": their scores; "frames", "episodes" and
+        "frames_unmoved"; "level": error rate of each method; "confidence": of each bound but the
+        scores'.
     """
     level = ERROR_RATE / (num_methods or max(1, len(methods)))
     maps = maps or {name: trial.maps(method) for name, method in methods.items()}
@@ -219,32 +219,33 @@ def check_maps(
 def check_method(
     trial: Trial, method: MapOf, level: float, maps: Tensor | None = None
 ) -> dict[str, Any]:
-    """One method's evidence; see `check_maps`.
+    """Test one method; see `check_maps`.
 
     Returns:
-        "trusted", and "failed": names of the tests that it failed; "score": mean over episodes
-        with its interval; "placebos": by name, how much more it scores; "pointing": how much more
-        often than "chance" it hits, and the mean "hit"; "likeness" with maps of shuffled weights;
-        "random_weights"; "maps_without_heat". Where there are bounds, "median", "lower" and
-        "upper", of which each holds with probability 1 - level; None of too few episodes.
+        "trusted", and "failed": names of the failed tests; "score": mean over episodes with its
+        interval; "placebos": by name, how much more it scores; "pointing": how much more often than
+        "chance" it hits, and the mean "hit"; "likeness" to maps of shuffled weights;
+        "random_weights"; "maps_without_heat". With bounds: "median", "lower" and "upper", each of
+        which holds with probability 1 - level; None for too few episodes.
     """
     if not len(trial.episode):
-        return {"trusted": False, "failed": ["nothing moves the policy"], "score": _no_score()}
+        none = patches.summarise_scores(np.zeros(0), np.zeros(0))
+        return {"trusted": False, "failed": ["nothing moves the policy"], "score": none}
     maps = trial.maps(method) if maps is None else maps
     heat, scores = trial.grid.means(maps), trial.scores(maps)
     hit, chance = patches.pointing(heat, trial.effects)
     result = {
         "score": patches.summarise_scores(scores, trial.episode),
         "placebos": {
-            name: _typical(scores - trial.scores(placebo), trial.episode, level)
+            name: _median(scores - trial.scores(placebo), trial.episode, level)
             for name, placebo in trial.placebos.items()
         },
         "pointing": {
-            **_typical(hit - chance, trial.episode, level),
+            **_median(hit - chance, trial.episode, level),
             "hit": float(hit.mean()),
             "chance": float(chance.mean()),
         },
-        "likeness": _alike(trial, method, level),
+        "likeness": _likeness(trial, method, level),
         "maps_without_heat": int((maps.flatten(1).amax(1) <= 0).sum()),
     }
     failed = [name for name, is_passed in _tests(result).items() if not is_passed]
@@ -255,13 +256,13 @@ def check_method(
 
 
 def random_weights(trial: Trial, method: MapOf, level: float) -> dict[str, Any]:
-    """Does the method do better on the policy than on all policies of shuffled weights?
+    """Compare the method's score on the policy with its scores on policies with shuffled weights.
 
-    It stops at the first on which it does as well.
+    It stops at the first policy on which the method scores as much.
 
     Returns:
-        "score" on one picture an episode, "best" and "mean" of the others' scores, "tried": how
-        many there were, "as_good": how many of them scored as much.
+        "score" on one frame of each episode; "best" and "mean" of the other scores; "tried": number
+        of shuffled policies; "as_good": how many of them scored as much.
     """
     few = trial.thinned()
     own = float(few.scores(few.maps(method)).mean())
@@ -281,7 +282,7 @@ def random_weights(trial: Trial, method: MapOf, level: float) -> dict[str, Any]:
 
 
 def _tests(result: dict[str, Any]) -> dict[str, bool]:
-    """Whether each test but that of random weights is passed."""
+    """Return whether each test but "random weights" is passed."""
     alike = result["likeness"]
     return {
         "placebos": all(_above(b["lower"], 0.0) for b in result["placebos"].values()),
@@ -296,24 +297,20 @@ def _above(value: float | None, bar: float) -> bool:
     return value is not None and value > bar
 
 
-def _alike(trial: Trial, method: MapOf, level: float) -> dict[str, Any]:
-    """How like a policy's maps are to those of shuffled weights, all seeds together and each."""
+def _likeness(trial: Trial, method: MapOf, level: float) -> dict[str, Any]:
+    """Compare a policy's maps with those of shuffled weights, all seeds together and each."""
     few = trial.thinned()
     own = few.maps(method)
     networks = shuffled_networks(trial.network, trial.observations, WEIGHT_SEEDS, trial.seed)
     seeds = np.stack([likeness(own, few.maps(method, network)) for network in networks])
     return {
-        **_typical(seeds.mean(0), few.episode, level),
+        **_median(seeds.mean(0), few.episode, level),
         "seeds": np.median(seeds, axis=1).tolist(),
     }
 
 
-def _typical(values: NDArray, episode: NDArray, level: float) -> dict[str, float | None]:
-    """The median of the episodes' means; each bound alone holds with probability 1 - level."""
+def _median(values: NDArray, episode: NDArray, level: float) -> dict[str, float | None]:
+    """Return the median of the episodes' means; each bound holds with probability 1 - level."""
     means = episode_means(values, episode)
     lower, upper = median_bounds(means, 1.0 - 2 * level) or (None, None)
     return {"median": float(np.median(means)), "lower": lower, "upper": upper}
-
-
-def _no_score() -> dict[str, Any]:
-    return patches.summarise_scores(np.zeros(0), np.zeros(0))

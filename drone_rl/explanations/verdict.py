@@ -1,4 +1,4 @@
-"""How good it is: the verdict, on held-out episodes."""
+"""Sections "evaluation" (the verdict) and "shifts" (robustness, measured by `drone-rl shifts`)."""
 
 from typing import Any
 
@@ -11,15 +11,13 @@ from drone_rl.explanations.context import Context
 
 
 def evaluation_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
-    """Makes "verdict"."""
-    episodes, rule = context.settings.episodes, Rule(good_share=context.settings.good_share)
-    actor, claim = context.restart(), context.claim
+    """Return "verdict", on held-out episodes."""
     verdict = judge_policy(
         context.env,
-        actor,
-        episodes,
-        rule=rule,
-        claim=claim,
+        context.restart(),
+        context.settings.episodes,
+        rule=Rule(good_share=context.settings.good_share),
+        claim=context.claim,
         unlike=context.unlike,
         seed=context.seed,
     )
@@ -27,10 +25,10 @@ def evaluation_section(context: Context) -> tuple[dict[str, Any], dict[str, NDAr
 
 
 def shifts_section(context: Context) -> tuple[dict[str, Any], dict[str, NDArray]]:
-    """Makes "shifts", as in `shifts.json`, or why it is "refused"; nothing where there is none.
+    """Return "shifts", as in `shifts.json`, or why it is "refused"; nothing without such a file.
 
-    Arrays: "shifts_..." of each axis, what the camera shows with nothing different and at the five
-    strengths, black where the task can't be so. Shapes: (6, H, W, 3).
+    Arrays: "shifts_..." of each axis, frames without a shift and at the five strengths, black where
+    the task can't be changed so. Shapes: (6, H, W, 3).
     """
     measured = context.measured
     if measured is None:

@@ -2,7 +2,11 @@
 
 from torchrl.objectives.value import GAE
 
+from drone_rl.config.learning import Gae
+from drone_rl.config.registry import implements
 
+
+@implements(Gae)
 class Advantages(GAE):
     """Generalised advantage estimates, as `GAE` makes them of values that a batch holds.
 
@@ -11,7 +15,9 @@ class Advantages(GAE):
     `terminated` the value of what follows counts, be the row cut there or not.
     """
 
-    def __init__(self, gamma: float = 0.99, lmbda: float = 0.95, scale: bool = False) -> None:
+    def __init__(
+        self, gamma: float = Gae.gamma, lmbda: float = Gae.lmbda, scale: bool = Gae.scale
+    ) -> None:
         """Sets the rates.
 
         Args:

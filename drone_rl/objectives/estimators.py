@@ -5,13 +5,15 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from drone_rl.config import learning as settings
+from drone_rl.config.registry import implements
 from drone_rl.objectives import returns
 from drone_rl.objectives.return_estimator import ReturnEstimator
 from drone_rl.utils.errors import InputError
 
 
 class _Discounted(ReturnEstimator):
-    def __init__(self, gamma: float = 0.99, **kwargs: Any) -> None:
+    def __init__(self, gamma: float | None = None, **kwargs: Any) -> None:
         """Sets the discount rate.
 
         Args:
@@ -22,11 +24,14 @@ class _Discounted(ReturnEstimator):
             InputError: gamma is out of range.
         """
         super().__init__(**kwargs)
+        own: Any = self.Settings
+        gamma = own.gamma if gamma is None else gamma
         if not 0.0 <= gamma <= 1.0:
             raise InputError(f"gamma={gamma} is out of range; give a rate from 0 to 1")
         self.gamma = gamma
 
 
+@implements(settings.TotalReward)
 class TotalReward(ReturnEstimator):
     """The whole episode's reward at every step (Eq. 12)."""
 
@@ -35,6 +40,7 @@ class TotalReward(ReturnEstimator):
         return returns.total_reward(reward, done)
 
 
+@implements(settings.RewardToGo)
 class RewardToGo(_Discounted):
     """Discounted return (Eq. 14)."""
 
@@ -43,6 +49,7 @@ class RewardToGo(_Discounted):
         return returns.reward_to_go(reward, done, self.gamma)
 
 
+@implements(settings.Standardised)
 class Standardised(_Discounted):
     """Discounted return, standardised over each episode (Algorithm 4)."""
 
@@ -51,6 +58,7 @@ class Standardised(_Discounted):
         return returns.standardised(reward, done, self.gamma)
 
 
+@implements(settings.LinearRamp)
 class LinearRamp(ReturnEstimator):
     """The episode's reward times a ramp over the episode."""
 
@@ -59,10 +67,16 @@ class LinearRamp(ReturnEstimator):
         return returns.linear_ramp(reward, done)
 
 
+@implements(settings.SuccessScaled)
 class SuccessScaled(_Discounted):
     """Discounted return scaled by exp(reward - max_reward)."""
 
-    def __init__(self, gamma: float = 0.99, max_reward: float = 3.0, **kwargs: Any) -> None:
+    def __init__(
+        self,
+        gamma: float | None = None,
+        max_reward: float = settings.SuccessScaled.max_reward,
+        **kwargs: Any,
+    ) -> None:
         """Sets the scale.
 
         Args:
@@ -78,6 +92,7 @@ class SuccessScaled(_Discounted):
         return returns.success_scaled(reward, done, self.gamma, self.max_reward)
 
 
+@implements(settings.TimeBaseline)
 class TimeBaseline(_Discounted):
     """Discounted return minus a running mean, over earlier episodes, for each time step."""
 
@@ -87,7 +102,11 @@ class TimeBaseline(_Discounted):
     """Which steps have one. Shape: (max_steps,)."""
 
     def __init__(
-        self, gamma: float = 0.99, decay: float = 0.9, max_steps: int = 300, **kwargs: Any
+        self,
+        gamma: float | None = None,
+        decay: float = settings.TimeBaseline.decay,
+        max_steps: int = settings.TimeBaseline.max_steps,
+        **kwargs: Any,
     ) -> None:
         """Sets the memory.
 
@@ -119,6 +138,7 @@ class TimeBaseline(_Discounted):
         return values
 
 
+@implements(settings.LeaveOneOut)
 class LeaveOneOut(_Discounted):
     """Discounted return minus the other episodes' mean at the same time step."""
 
@@ -127,6 +147,7 @@ class LeaveOneOut(_Discounted):
         return returns.leave_one_out(reward, done, self.gamma)
 
 
+@implements(settings.BatchNormalised)
 class BatchNormalised(_Discounted):
     """Discounted return, normalised over the batch."""
 

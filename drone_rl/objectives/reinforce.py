@@ -12,9 +12,12 @@ from tensordict.nn import ProbabilisticTensorDictSequential, dispatch
 from tensordict.utils import NestedKey
 from torchrl.objectives import LossModule
 
+from drone_rl.config.learning import Reinforce
+from drone_rl.config.registry import implements
 from drone_rl.utils.errors import InputError
 
 
+@implements(Reinforce)
 class ReinforceLoss(LossModule):
     """-sum_t g_t log pi(a_t | s_t), reduced over the batch (chapter, Eq. 15).
 
@@ -55,8 +58,8 @@ class ReinforceLoss(LossModule):
         self,
         actor_network: ProbabilisticTensorDictSequential,
         *,
-        entropy_coeff: float = 0.0,
-        reduction: str = "mean",
+        entropy_coeff: float = Reinforce.entropy_coeff,
+        reduction: str = Reinforce.reduction,
     ) -> None:
         """Wraps the policy.
 

@@ -1,6 +1,7 @@
 """What all return estimators are: a TorchRL transform for whatever holds whole episodes."""
 
 import abc
+from typing import ClassVar
 
 import torch
 from tensordict import TensorDictBase
@@ -8,6 +9,7 @@ from tensordict.utils import NestedKey
 from torch import Tensor
 from torchrl.envs import EnvBase, Transform
 
+from drone_rl.config.learning import Returns
 from drone_rl.objectives import returns
 from drone_rl.utils.errors import InputError
 
@@ -33,10 +35,13 @@ class ReturnEstimator(Transform, abc.ABC):
         >>> RewardToGo(0.95)(batch)["return_to_go"]
     """
 
+    Settings: ClassVar[type[Returns]] = Returns
+    """Where the defaults of the parameters are defined."""
+
     def __init__(
         self,
         *,
-        scale: bool = False,
+        scale: bool | None = None,
         reward_key: NestedKey = ("next", "reward"),
         done_key: NestedKey = ("next", "done"),
         out_key: NestedKey = "return_to_go",
@@ -45,14 +50,14 @@ class ReturnEstimator(Transform, abc.ABC):
 
         Args:
             scale: Whether to divide the batch's returns by their root mean square; biased, see
-                `returns.scale_to_unit`.
+                `returns.scale_to_unit`. By default as in the settings of this estimator.
             reward_key: Entry with the rewards.
             done_key: Entry with the end flags.
             out_key: Entry that is written.
         """
         read, written = [reward_key, done_key], [out_key]
         super().__init__(in_keys=read, out_keys=written, in_keys_inv=read, out_keys_inv=written)
-        self.scale = scale
+        self.scale = self.Settings.scale if scale is None else scale
         self._is_contained = False
 
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:

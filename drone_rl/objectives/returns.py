@@ -13,7 +13,7 @@ from.
 Unbiased means: with the loss summed over steps and divided by the number of episodes, the expected
 gradient is that of the expected reward (undiscounted), or that of Eq. 15 with discounted returns.
 What is said of bias here is measured by adding up all outcomes of small batches on the process of
-Fig. 3 (`envs.three_state`), two steps long, with even odds of both actions, gamma 0.95; angles are
+Fig. 3 (`tests.three_state`), two steps long, with even odds of both actions, gamma 0.95; angles are
 those between the expected update and the exact gradient. Discounting alone turns it by 1.4 degrees
 away from the gradient of the expected reward, in batches of any size.
 """

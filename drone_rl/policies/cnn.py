@@ -6,6 +6,8 @@ from collections.abc import Callable, Sequence
 import torch
 from torch import Tensor, nn
 
+from drone_rl.config.networks import OriginalCnn, SmallCnn
+from drone_rl.config.registry import implements
 from drone_rl.policies.finite import require_finite
 from drone_rl.policies.network import PictureNetwork
 from drone_rl.utils.errors import InputError
@@ -82,6 +84,7 @@ class PolicyNetwork(PictureNetwork):
         return logits.reshape(*pixels.shape[:-3], logits.shape[-1])
 
 
+@implements(OriginalCnn)
 class OriginalCNN(PolicyNetwork):
     """The original study's network: two convolutions with pooling and three linear layers."""
 
@@ -90,8 +93,8 @@ class OriginalCNN(PolicyNetwork):
         in_shape: Sequence[int],
         num_actions: int,
         *,
-        channels: Sequence[int] = (6, 16),
-        hidden: Sequence[int] = (120, 84),
+        channels: Sequence[int] = OriginalCnn.channels,
+        hidden: Sequence[int] = OriginalCnn.hidden,
         generator: torch.Generator | None = None,
     ) -> None:
         """Builds and initialises it (He-normal convolutions, Xavier-normal linear layers).
@@ -127,6 +130,7 @@ class OriginalCNN(PolicyNetwork):
         super().__init__(in_shape, layers, initialise)
 
 
+@implements(SmallCnn)
 class SmallCNN(PolicyNetwork):
     """Patches, one convolution and two linear layers: learns as well at a tenth of the cost."""
 
@@ -135,9 +139,9 @@ class SmallCNN(PolicyNetwork):
         in_shape: Sequence[int],
         num_actions: int,
         *,
-        patch: int = 4,
-        channels: Sequence[int] = (16, 32),
-        hidden: Sequence[int] = (64,),
+        patch: int = SmallCnn.patch,
+        channels: Sequence[int] = SmallCnn.channels,
+        hidden: Sequence[int] = SmallCnn.hidden,
         generator: torch.Generator | None = None,
     ) -> None:
         """Builds and initialises it: orthogonal, the logits near zero (a uniform first policy).

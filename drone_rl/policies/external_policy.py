@@ -19,13 +19,13 @@ from drone_rl.config import (
     TaskSettings,
 )
 from drone_rl.config.configuration import Changes
-from drone_rl.config.transforms import Gray, Rgb, Standardize, Transform
+from drone_rl.config.transforms import Frame, Gray, Rgb, Standardize, Transform
 from drone_rl.policies import ForeignNetwork
 from drone_rl.policies.base_policy import Pilot
 from drone_rl.policies.environment import make_env
 from drone_rl.policies.external_network import Logits
 from drone_rl.policies.policy import load_policy
-from drone_rl.policies.zoo.registry import TRANSFORMS, Picture, find_part
+from drone_rl.policies.zoo.description import output_of
 from drone_rl.sim.dynamics import make_dynamics
 from drone_rl.sim.tasks import Task, as_task
 from drone_rl.utils.display import table
@@ -119,13 +119,12 @@ class ForeignPolicy(Pilot):
         Raises:
             InputError: It takes no such pictures, or its logits are not one an action.
         """
-        picture = Picture((self.camera.height, self.camera.width, 3))
+        frame = Frame((self.camera.height, self.camera.width, 3))
         for transform in self.transforms or (Rgb(),):
-            part = find_part(TRANSFORMS, transform.name, "transforms")
-            picture = part.change(picture, transform.values())
+            frame = output_of(transform, frame)
         network = ForeignNetwork(
             self.logits,
-            picture.shape,
+            frame.shape,
             make_dynamics(as_task(self.own_task), self.dynamics, self.actions).actions,
             takes_bytes=not self.transforms,
             device=device,

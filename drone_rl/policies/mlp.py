@@ -7,9 +7,12 @@ from collections.abc import Sequence
 import torch
 from torch import nn
 
+from drone_rl.config.networks import Mlp
+from drone_rl.config.registry import implements
 from drone_rl.policies.cnn import PolicyNetwork, orthogonal
 
 
+@implements(Mlp)
 class MLP(PolicyNetwork):
     """Linear layers on the flattened picture."""
 
@@ -18,7 +21,7 @@ class MLP(PolicyNetwork):
         in_shape: Sequence[int],
         num_actions: int,
         *,
-        hidden: Sequence[int] = (128, 64),
+        hidden: Sequence[int] = Mlp.hidden,
         generator: torch.Generator | None = None,
     ) -> None:
         """Builds and initialises it: orthogonal, the logits near zero (a uniform first policy).

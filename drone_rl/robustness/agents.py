@@ -9,7 +9,7 @@ from torch import Tensor
 from torchrl.envs import Transform
 
 from drone_rl.envs import GrayPixels
-from drone_rl.envs.pipeline import memory_of, see_film
+from drone_rl.envs.transforms import memory_of, see_film
 from drone_rl.policies import PictureNetwork
 from drone_rl.policies.rounding import decider
 from drone_rl.sim.actions import Actions

@@ -10,7 +10,8 @@ import math
 from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
-from drone_rl.robustness.faults import blur, dead_rows, frozen_frames, late_frames, noise
+from drone_rl.envs.fault_models import dead_rows, late_frames, noise, out_of_focus
+from drone_rl.robustness.faults import frozen_frames
 from drone_rl.robustness.paired_evaluation import PolicySpec
 from drone_rl.robustness.perturbations import (
     Condition,
@@ -222,7 +223,7 @@ AXES: dict[str, Axis] = {
         ),
         Axis(
             *("blur", "sensor", "pixels", 0.0, (0.5, 0.75, 1.0, 1.5, 2.0)),
-            lambda s, _: Condition(faults=(blur(s),)),
+            lambda s, _: Condition(faults=(out_of_focus(s),)),
         ),
         Axis(
             *("dead_rows", "sensor", "rows", 0.0, (1.0, 2.0, 4.0, 8.0, 12.0)),

@@ -108,8 +108,10 @@ class Prober:
         """
         task = oracle.task
         self._evaluator, self._oracle, self._possible = evaluator, oracle, possible_share
-        self._rule = Rule(good_share=good_share, strata=task.strata, luck=task.luck)
-        self._luck: dict[Any, dict[str, Episodes]] = {}
+        self._rule = Rule(
+            good_share=good_share, strata=task.strata, blind_baselines=task.blind_baselines
+        )
+        self._baselines: dict[Any, dict[str, Episodes]] = {}
         self.plain = self.probe(Condition(), plain_part)
 
     def rule_at(self, part: float) -> Rule:
@@ -137,10 +139,10 @@ class Prober:
         except InputError as error:
             return {"good": False, "bad": True, "refused": str(error)}
         flown, is_fragile = self._fly(condition)
-        if key not in self._luck:  # appearance does not affect these baselines
-            self._luck[key] = self._evaluator.run_baselines(condition)
+        if key not in self._baselines:  # appearance does not affect these baselines
+            self._baselines[key] = self._evaluator.run_baselines(condition)
         rule = self.rule_at(part)
-        baselines = {**self._luck[key], "oracle": self._oracle}
+        baselines = {**self._baselines[key], "oracle": self._oracle}
         found = dict(
             zip(rule.quantities, _measure(flown, baselines, rule, is_fragile), strict=True)
         )
@@ -232,7 +234,7 @@ def is_surely_good(found: Mapping[str, Quantity], rule: Rule) -> bool:
         found: The rule's quantities by name, in its order.
         rule: With the probability of error.
     """
-    sees = all(found[f"above {name}"].levels[0] > 0 for name in rule.luck)
+    sees = all(found[f"above {name}"].levels[0] > 0 for name in rule.blind_baselines)
     return sees and _kinds(found, rule) == {Kind.GOOD}
 
 

@@ -1,106 +1,35 @@
 """Camera faults of the robustness evaluation.
 
-Unlike the transforms in `drone_rl.envs.fault_transforms` they sample the same random numbers at
+Unlike the transforms in `drone_rl.envs.camera_faults` they sample the same random numbers at
 every strength, so that episodes at two strengths are paired.
 """
 
 import dataclasses
-from collections.abc import Callable, Sequence
-from typing import Protocol
+from collections.abc import Sequence
 
 import torch
 from torch import Tensor
 
-from drone_rl.envs import faults as camera
+from drone_rl.envs import fault_models
+from drone_rl.envs.fault_models import FaultModel, Sample
 from drone_rl.utils.seeding import Stream, torch_generator
 
 
-class Sample(Protocol):
-    """Random numbers of the active environments."""
-
-    def __call__(self, *shape: int, normal: bool = False) -> Tensor:
-        """Sample normal numbers, or from 0 to 1. Shape: (number of environments, *shape)."""
-        ...
-
-
-def _no_memory(images: Tensor, sample: Sample) -> Tensor:
-    return images[:, :0]
-
-
-def _keep(memory: Tensor, images: Tensor, sample: Sample) -> Tensor:
-    return memory
-
-
-@dataclasses.dataclass(frozen=True)
-class Fault:
-    """A camera fault; images are floats from 0 to 1 of shape (n, C, H, W)."""
-
-    show: Callable[[Tensor, Tensor, float], Tensor] = lambda images, memory, nothing: images
-    """The faulty images, from images, memory and the value of a pixel that shows nothing."""
-    begin: Callable[[Tensor, Sample], Tensor] = _no_memory
-    """The memory at the first images. Shape: (n, *)."""
-    update: Callable[[Tensor, Tensor, Sample], Tensor] = _keep
-    """The memory at the next images."""
-    hides: bool = False
-    """Whether it can hide objects, and so affects an oracle."""
-
-
-def noise(strength: float, correlation_time: float = 0.0) -> Fault:
-    """Noise in each pixel, white or correlated in time; see `drone_rl.envs.faults`."""
-
-    def begin(images: Tensor, sample: Sample) -> Tensor:
-        return sample(*images.shape[1:], normal=True)
-
-    def update(memory: Tensor, images: Tensor, sample: Sample) -> Tensor:
-        return camera.correlate(memory, begin(images, sample), correlation_time)
-
-    return Fault(
-        lambda images, memory, _: camera.add_noise(images, strength, memory), begin, update
-    )
-
-
-def blur(width: float) -> Fault:
-    """Images out of focus, by a Gaussian of this width in pixels."""
-    return Fault(lambda images, memory, _: camera.blur(images, width))
-
-
-def dead_rows(count: int) -> Fault:
-    """Rows that show nothing, the same ones for a whole episode."""
-
-    def begin(images: Tensor, sample: Sample) -> Tensor:
-        return camera.choose_rows(sample(images.shape[-2]), count)
-
-    return Fault(camera.kill_rows, begin, hides=True)
-
-
-def frozen_frames(rate: float) -> Fault:
+def frozen_frames(rate: float) -> FaultModel:
     """The previous image shown again, with this probability at each step."""
 
     def begin(images: Tensor, sample: Sample) -> Tensor:
-        sample(1)
+        sample(1)  # one number a step, the first included
         return images
 
-    def update(memory: Tensor, images: Tensor, sample: Sample) -> Tensor:
-        return camera.freeze(images, memory, sample(1)[:, 0] < rate)
-
-    return Fault(lambda images, memory, _: memory, begin, update, hides=True)
-
-
-def late_frames(frames: int) -> Fault:
-    """Images that arrive this many steps late; the first one until then."""
-    return Fault(
-        lambda images, memory, _: memory[:, 0],
-        lambda images, _: torch.stack([images] * (frames + 1), 1),
-        lambda memory, images, _: torch.cat([memory[:, 1:], images[:, None]], 1),
-        hides=True,
-    )
+    return dataclasses.replace(fault_models.frozen_frames(rate), begin=begin)
 
 
 class FaultPipeline:
     """Applies faults in a batch of environments, of which fewer and fewer are active."""
 
     def __init__(
-        self, faults: Sequence[Fault], num_worlds: int, seed: int, *, hiding_only: bool = False
+        self, faults: Sequence[FaultModel], num_worlds: int, seed: int, *, hiding_only: bool = False
     ) -> None:
         """Take the faults.
 

@@ -170,7 +170,7 @@ class PairedEvaluator:
         """Return the episodes of the task's random and constant baselines, by name."""
         worlds = self.worlds(condition)
         episodes = {}
-        for name in worlds.task.luck:
+        for name in worlds.task.blind_baselines:
             generator = torch_generator(self.seed, Stream.ACTIONS)
             agent = BaselineAgent(name, worlds.dynamics.actions, generator)
             episodes[name] = self.run(condition, agent=agent).episodes

@@ -11,7 +11,7 @@ from torch import Tensor
 
 from drone_rl.config import BaseTaskSettings
 from drone_rl.config.task import Things
-from drone_rl.robustness.faults import Fault
+from drone_rl.envs.fault_models import FaultModel
 from drone_rl.sim.rendering import Appearance, Distractors, Scene
 from drone_rl.sim.rendering.appearance import Colors, moved, turned
 from drone_rl.sim.rendering.scene import SemanticClass
@@ -63,7 +63,7 @@ class Condition:
     """Changes of colours and light; they need an appearance in which all is given."""
     mounts: tuple[AppearanceChange, ...] = ()
     """Changes of the camera's pose."""
-    faults: tuple[Fault, ...] = ()
+    faults: tuple[FaultModel, ...] = ()
     """Camera faults, in order."""
     delay: int = 0
     """Steps by which actions are late."""

@@ -32,7 +32,7 @@ STARTS = 3
 
 
 @dataclasses.dataclass(frozen=True)
-class LoopedFlight:
+class SitlEpisode:
     """One episode with software in the loop."""
 
     world: int
@@ -55,13 +55,13 @@ class LoopedFlight:
 
 
 @dataclasses.dataclass(frozen=True)
-class LoopedFlights:
+class SitlEvaluation:
     """Episodes of a policy with software in the loop."""
 
     policy: str
     seed: RootSeed
     """Root of the environments' random streams."""
-    flights: tuple[LoopedFlight, ...]
+    flights: tuple[SitlEpisode, ...]
     figures: dict[str, Any] = dataclasses.field(repr=False)
     """See `drone_rl.evaluation.metrics.summarise`."""
 
@@ -85,7 +85,7 @@ class LoopedFlights:
         return "\n".join([*lines, *filter(None, notes)])
 
 
-def fly_in_the_loop(
+def evaluate_in_the_loop(
     policy: str | Path | Pilot | Logits,
     flights: int = 5,
     seed: int | None = None,
@@ -95,7 +95,7 @@ def fly_in_the_loop(
     outputs: str | Path = "outputs",
     progress: Progress | None = None,
     drawn_seed: RootSeed | None = None,
-) -> LoopedFlights:
+) -> SitlEvaluation:
     """Run a greedy policy with Betaflight between its actions and the rotors.
 
     Initial states are the first ones of evaluations with the same seed. Each episode starts a new
@@ -129,8 +129,8 @@ def fly_in_the_loop(
     info = {name: torch.cat([one.info[name] for one in flown]) for name in flown[0].info}
     lengths = torch.tensor([len(one.path) - 1 for one in flown])
     episodes = Episodes.ended(as_task(pilot.task), info, lengths)
-    told = tuple(_told(one, world, episodes) for world, one in enumerate(flown))
-    return LoopedFlights(pilot.name, root, told, summarise(episodes))
+    told = tuple(_as_episode(one, world, episodes) for world, one in enumerate(flown))
+    return SitlEvaluation(pilot.name, root, told, summarise(episodes))
 
 
 class _Flown(NamedTuple):
@@ -184,9 +184,9 @@ def _fly(
         return _Flown(info, path, drone.time - left, time.monotonic() - began, missed)
 
 
-def _told(flown: _Flown, world: int, episodes: Episodes) -> LoopedFlight:
+def _as_episode(flown: _Flown, world: int, episodes: Episodes) -> SitlEpisode:
     reached = episodes.goals.reached[world]
-    return LoopedFlight(
+    return SitlEpisode(
         world=world,
         goals=int(reached.sum()),
         success=bool(reached.all()),

@@ -1,8 +1,10 @@
-# pyright: reportReturnType=false
-# (dm_control's models of XML are untyped.)
-"""The drone's five cameras, by AirSim's names, and the chase camera that films it."""
+"""Entities of a scene, for dm_control: arena, cube, pillar, distractors, drone and cameras.
 
-from typing import NamedTuple
+Each has a semantic class. Only the drone moves by physics; the others are visual, because touching
+them is a rule of the task and not a contact.
+"""
+
+from typing import Any, NamedTuple
 
 from dm_control import composer, mjcf
 from dm_control.composer.observation import observable
@@ -13,9 +15,23 @@ from drone_rl.config.camera import FRONT
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.utils.errors import InputError
 
+SKY_COLOR = (0.62, 0.74, 0.92)
+"""Red, green, blue of the background."""
+FLOOR_COLOR = (0.5, 0.54, 0.48)
+FLOOR_SIZE = (300.0, 300.0, 100.0)
+"""Half extents in metres, and the spacing of OpenGL's grid: coarse is 20 times faster there."""
+DRAW_DISTANCE = 200.0
+"""Metres beyond which nothing is rendered."""
+KINDS = ("box", "sphere", "cylinder")
+"""Shapes of distractors, in turn."""
+BODY_GROUP = 1
+"""Geom group of the drone's body: the chase camera shows it, the drone's own cameras do not."""
+_DARK, _LIGHT = (0.12, 0.13, 0.16, 1.0), (0.85, 0.86, 0.9, 1.0)
+_MASS_KG = 1.0
+
 
 class CameraSpec(NamedTuple):
-    """Where a camera sits on the drone. Metres, drone frame: x forward, y left, z up."""
+    """Mounting of a camera on the drone. Metres, drone frame: x forward, y left, z up."""
 
     name: str
     pos: tuple[float, float, float]
@@ -31,18 +47,17 @@ BOTTOM_CENTER = CameraSpec("bottom_center", (0, 0, -0.1), (0, -1, 0, 1, 0, 0))
 BACK_CENTER = CameraSpec("back_center", (-0.4, 0, 0), (0, 1, 0, 0, 0, 1))
 DRONE_CAMERAS = (FRONT_CENTER, FRONT_RIGHT, FRONT_LEFT, BOTTOM_CENTER, BACK_CENTER)
 """In the order of AirSim's camera numbers 0 to 4."""
-
 CHASE = CameraSpec("chase", (-7.0, 0, 3.5), (0, -1, 0, 0.34, 0, 0.94))
 
 
 def find_camera(name: str | int) -> CameraSpec:
-    """A camera by AirSim's name or number.
+    """Return a camera by AirSim's name or number.
 
     Args:
-        name: Such as "back_center", "4" or 4; "" and "fpv" are the one in front.
+        name: Such as "back_center", "4" or 4; "" and "fpv" mean the front camera.
 
     Raises:
-        InputError: There is none.
+        InputError: There is no such camera.
     """
     if name in ("", "fpv"):
         return FRONT_CENTER
@@ -53,34 +68,19 @@ def find_camera(name: str | int) -> CameraSpec:
     raise InputError(f"camera {name!r} is unknown; choose from: {names}")
 
 
-def add_camera(body: mjcf.Element, spec: CameraSpec, vertical_fov: float) -> mjcf.Element:
-    """Adds a camera to a body.
-
-    Args:
-        body: The MJCF body that carries it.
-        spec: Its name and place.
-        vertical_fov: Vertical field of view in degrees.
-    """
+def add_camera(body: Any, spec: CameraSpec, vertical_fov: float) -> Any:
+    """Add a camera to an MJCF body; the vertical field of view is in degrees."""
     return body.add("camera", **spec._asdict(), fovy=vertical_fov)
 
 
-SKY_COLOR = (0.62, 0.74, 0.92)
-"""Red, green, blue of everything that is neither floor, cube nor drone."""
-FLOOR_COLOR = (0.5, 0.54, 0.48)
-FLOOR_SIZE = (300.0, 300.0, 100.0)
-"""Half extents in metres and the spacing of OpenGL's grid: coarse is 20 times faster there."""
-DRAW_DISTANCE = 200.0
-"""Metres beyond which nothing is drawn."""
-
-
 class Field(composer.Arena):
-    """A flat floor under an even sky, lit by one sun."""
+    """A flat floor under a uniform sky and one sun. Its boundaries are rules of the task."""
 
     semantic_class = SemanticClass.GROUND
 
     def _build(self, name: str = "field") -> None:
         super()._build(name=name)
-        root = self._mjcf_root
+        root: Any = self._mjcf_root
         root.statistic.extent = 1.0
         root.visual.map.set_attributes(znear=0.05, zfar=DRAW_DISTANCE)
         root.visual.headlight.active = 0
@@ -104,135 +104,80 @@ class Field(composer.Arena):
         )
 
 
-class Cube(composer.Entity):
-    """A cube that is seen but never pushes: touching is a rule, not a contact."""
+class VisualEntity(composer.Entity):
+    """One geom without contacts; `_build` of a subclass adds it."""
+
+    semantic_class: SemanticClass
+
+    def _add_geom(
+        self,
+        kind: str,
+        size: tuple[float, ...],
+        color: tuple[float, float, float],
+        name: str,
+    ) -> None:
+        """Make the geom.
+
+        Args:
+            kind: MuJoCo's type of the geom.
+            size: MuJoCo's size, metres.
+            color: Red, green, blue in [0, 1].
+            name: Prefix of its elements in the arena's model.
+        """
+        self._mjcf_root: Any = mjcf.RootElement(model=name)
+        shape = {"type": kind, "size": size, "rgba": (*color, 1.0)}
+        self._geom = self._mjcf_root.worldbody.add(
+            "geom", name="geom", contype=0, conaffinity=0, **shape
+        )
+
+    @property
+    def mjcf_model(self) -> Any:
+        """The `mjcf.RootElement`."""
+        return self._mjcf_root
+
+    @property
+    def geom(self) -> Any:
+        """The geom's `mjcf.Element`."""
+        return self._geom
+
+
+class Cube(VisualEntity):
+    """A cube to collect, with an edge in metres."""
 
     semantic_class = SemanticClass.TARGET
 
     def _build(self, size: float, color: tuple[float, float, float], name: str = "cube") -> None:
-        """Makes the cube.
-
-        Args:
-            size: Edge in metres.
-            color: Red, green, blue in [0, 1].
-            name: Prefix of its elements in the arena's model.
-        """
-        self._mjcf_root = mjcf.RootElement(model=name)
-        self._geom = self._mjcf_root.worldbody.add(
-            "geom",
-            name="geom",
-            type="box",
-            size=(size / 2,) * 3,
-            rgba=(*color, 1.0),
-            contype=0,
-            conaffinity=0,
-        )
-
-    @property
-    def mjcf_model(self) -> mjcf.RootElement:
-        """The cube's MJCF root."""
-        return self._mjcf_root
-
-    @property
-    def geom(self) -> mjcf.Element:
-        """The visible box."""
-        return self._geom
+        self._add_geom("box", (size / 2,) * 3, color, name)
 
 
-class Pillar(composer.Entity):
-    """An upright box that is seen but never pushes back: touching it is a rule, not a contact."""
+class Pillar(VisualEntity):
+    """An upright box to avoid, with a square cross-section; its frame is at its centre. Metres."""
 
     semantic_class = SemanticClass.OBSTACLE
 
     def _build(
-        self,
-        width: float,
-        height: float,
-        color: tuple[float, float, float],
-        name: str = "pillar",
+        self, width: float, height: float, color: tuple[float, float, float], name: str = "pillar"
     ) -> None:
-        """Makes the pillar; its frame is in its middle.
-
-        Args:
-            width: Edge of its square cross-section, metres.
-            height: Metres.
-            color: Red, green, blue in [0, 1].
-            name: Prefix of its elements in the arena's model.
-        """
-        self._mjcf_root = mjcf.RootElement(model=name)
-        self._geom = self._mjcf_root.worldbody.add(
-            "geom",
-            name="geom",
-            type="box",
-            size=(width / 2, width / 2, height / 2),
-            rgba=(*color, 1.0),
-            contype=0,
-            conaffinity=0,
-        )
-
-    @property
-    def mjcf_model(self) -> mjcf.RootElement:
-        """The pillar's MJCF root."""
-        return self._mjcf_root
-
-    @property
-    def geom(self) -> mjcf.Element:
-        """The visible box."""
-        return self._geom
+        self._add_geom("box", (width / 2, width / 2, height / 2), color, name)
 
 
-KINDS = ("box", "sphere", "cylinder")
-"""Of all that there are in a world, in turn."""
-
-
-class Distractor(composer.Entity):
-    """A box, a ball or a cylinder of 1 m, seen but never touched; worlds make it larger."""
+class Distractor(VisualEntity):
+    """A box, ball or cylinder of 1 m, which appearances scale and colour; one of `KINDS`."""
 
     semantic_class = SemanticClass.DISTRACTOR
 
     def _build(self, kind: str, name: str = "distractor") -> None:
-        """Makes one.
-
-        Args:
-            kind: One of `KINDS`.
-            name: Prefix of its elements in the arena's model.
-        """
-        self._mjcf_root = mjcf.RootElement(model=name)
-        self._geom = self._mjcf_root.worldbody.add(
-            "geom",
-            name="geom",
-            type=kind,
-            size=(0.5,) * 3,
-            rgba=(0.6, 0.6, 0.6, 1.0),
-            contype=0,
-            conaffinity=0,
-        )
-
-    @property
-    def mjcf_model(self) -> mjcf.RootElement:
-        """Its MJCF root."""
-        return self._mjcf_root
-
-    @property
-    def geom(self) -> mjcf.Element:
-        """What is seen of it."""
-        return self._geom
+        self._add_geom(kind, (0.5,) * 3, (0.6, 0.6, 0.6), name)
 
 
 def make_distractors(count: int) -> list[Distractor]:
-    """So many, of all kinds in turn."""
+    """Return distractors of all kinds in turn."""
     kinds = (KINDS[i % len(KINDS)] for i in range(count))
     return [Distractor(kind, name=f"distractor_{i}") for i, kind in enumerate(kinds)]
 
 
-BODY_GROUP = 1
-"""Geom group of the drone's own body: filmed by the chase camera, unseen by its own cameras."""
-_DARK, _LIGHT = (0.12, 0.13, 0.16, 1.0), (0.85, 0.86, 0.9, 1.0)
-_MASS_KG = 1.0
-
-
 class DroneObservables(composer.Observables):
-    """What the drone can observe. All are disabled until a task enables them."""
+    """What the drone can observe; a task enables what it needs."""
 
     @composer.observable
     def position(self) -> observable.MJCFFeature:
@@ -246,7 +191,7 @@ class DroneObservables(composer.Observables):
 
     @composer.observable
     def front_center(self) -> observable.MJCFCamera:
-        """RGB picture of the policy's camera. Shape: (height, width, 3), uint8."""
+        """RGB image of the policy's camera. Shape: (height, width, 3), uint8."""
         camera = self._entity.camera_settings
         return observable.MJCFCamera(
             self._entity.front_center,
@@ -257,20 +202,20 @@ class DroneObservables(composer.Observables):
 
 
 class Drone(composer.Entity):
-    """A quadrotor's shape with AirSim's five cameras."""
+    """A quadrotor's shape with AirSim's five cameras and a chase camera; dynamics move it."""
 
     semantic_class = SemanticClass.DRONE
 
     def _build(self, size: float, camera: CameraSettings, name: str = "drone") -> None:
-        """Makes the drone.
+        """Make the drone.
 
         Args:
-            size: Edge in metres of the box around it.
-            camera: Field of view and picture size of its cameras.
+            size: Edge of its bounding box, metres.
+            camera: Field of view and image size of its cameras.
             name: Prefix of its elements in the arena's model.
         """
         self.camera_settings = camera
-        self._mjcf_root = mjcf.RootElement(model=name)
+        self._mjcf_root: Any = mjcf.RootElement(model=name)
         self._body = self._mjcf_root.worldbody.add("body", name="body")
         visual = {"group": BODY_GROUP, "contype": 0, "conaffinity": 0, "mass": 0.0}
         hull = (size * 0.3, size * 0.18, size * 0.1)
@@ -296,23 +241,23 @@ class Drone(composer.Entity):
         return DroneObservables(self)
 
     @property
-    def mjcf_model(self) -> mjcf.RootElement:
-        """The drone's MJCF root."""
+    def mjcf_model(self) -> Any:
+        """The `mjcf.RootElement`."""
         return self._mjcf_root
 
     @property
-    def body(self) -> mjcf.Element:
-        """The rigid body."""
+    def body(self) -> Any:
+        """The rigid body's `mjcf.Element`."""
         return self._body
 
     @property
-    def front_center(self) -> mjcf.Element:
-        """The policy's camera."""
+    def front_center(self) -> Any:
+        """The policy's camera, an `mjcf.Element`."""
         return self._mjcf_root.find("camera", FRONT_CENTER.name)
 
 
 def hide_drone() -> engine.wrapper.MjvOption:
-    """Scene options of the drone's own cameras: its body is left out, as in AirSim's CV mode."""
-    option = engine.wrapper.MjvOption()
+    """Return scene options that hide the drone's body, as in AirSim's computer-vision mode."""
+    option: Any = engine.wrapper.MjvOption()
     option.geomgroup[BODY_GROUP] = 0
     return option

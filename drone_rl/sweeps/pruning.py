@@ -5,7 +5,7 @@ from pathlib import Path
 
 from drone_rl.sweeps.search import import_optuna, open_study
 from drone_rl.training import Callback
-from drone_rl.training.progress import OngoingTraining
+from drone_rl.training.callbacks import OngoingTraining
 
 
 class PruneCallback(Callback):

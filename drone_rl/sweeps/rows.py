@@ -16,7 +16,6 @@ from drone_rl.sweeps.manifest import Sweep
 from drone_rl.sweeps.runs import Run, read_failure, read_result
 from drone_rl.utils.consistency import read_entry
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.former_names import FORMER_NAMES
 from drone_rl.utils.limits import SWEEP_RESULTS_BYTES, Allowance
 from drone_rl.utils.readers import TablesAllowance, read_table
 from drone_rl.utils.schema import Real, Whole
@@ -242,7 +241,7 @@ _COLUMNS = {
 def _metrics_columns(path: Path, allowance: TablesAllowance) -> Array:
     """Return the `_COLUMNS` of each update. Shape: (num_updates, 4)."""
     rows = read_table(path, allowance)
-    header = [FORMER_NAMES.get(name, name) for name in next(rows, [])]
+    header = next(rows, [])
     needed = [header.index(name) if name in header else None for name in _COLUMNS]
     width = 1 + max((place for place in needed if place is not None), default=-1)
     kept = [row if len(row) >= width else row + [""] * (width - len(row)) for row in rows]

@@ -7,7 +7,6 @@ from typing import Any
 
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import parse_json, read_bytes, read_json
-from drone_rl.utils.former_names import with_present_names
 from drone_rl.utils.limits import RESULT_BYTES
 from drone_rl.utils.schema import Text, as_mapping
 
@@ -60,7 +59,7 @@ def read_result(folder: Path) -> dict[str, Any] | None:
         reason = Text(100).read(result.get("reason"), "reason")
     except InputError:
         return None
-    return None if reason.startswith("SIG") else with_present_names(result)
+    return None if reason.startswith("SIG") else result
 
 
 def read_failure(run: Run) -> str | None:

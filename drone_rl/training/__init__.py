@@ -1,10 +1,12 @@
 """The loop that turns batches of episodes into a better policy, and what it leaves behind."""
 
+from drone_rl.training import actor_critic, ray_workers  # they connect parts with their settings
 from drone_rl.training.callbacks import (
     Callback,
     CheckpointCallback,
     CsvCallback,
     LoggerCallback,
+    Progress,
     ProgressCallback,
 )
 from drone_rl.training.learners import (
@@ -13,7 +15,6 @@ from drone_rl.training.learners import (
     NotANumberError,
     ReinforceLearner,
 )
-from drone_rl.training.progress import Progress
 from drone_rl.training.trainer import Collector, Trainer
 from drone_rl.utils.checkpoint import check_weights, load_checkpoint, save_checkpoint
 
@@ -30,7 +31,9 @@ __all__ = [
     "ProgressCallback",
     "ReinforceLearner",
     "Trainer",
+    "actor_critic",
     "check_weights",
     "load_checkpoint",
+    "ray_workers",
     "save_checkpoint",
 ]

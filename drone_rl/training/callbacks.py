@@ -2,24 +2,52 @@
 
 import copy
 import csv
+import dataclasses
 import io
 import logging
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from torchrl.record.loggers import Logger
 from tqdm import tqdm
 
-from drone_rl.training.progress import OngoingTraining
 from drone_rl.utils.checkpoint import save_checkpoint
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import remove_leftovers, write_atomically
-from drone_rl.utils.former_names import FORMER_NAMES
+from drone_rl.utils.progress import Progress as Report
 from drone_rl.utils.readers import read_table
 from drone_rl.utils.schema import shown
+
+
+@dataclasses.dataclass
+class Progress:
+    """How far a training is."""
+
+    frames: int = 0
+    episodes: int = 0
+    updates: int = 0
+    seconds: float = 0.0
+    """Time spent, over all resumptions."""
+    running_reward: float = 0.0
+    """Running mean of the episodes' rewards, from 0, as in the original study."""
+
+
+class OngoingTraining(Protocol):
+    """What a callback sees of a training, and may ask of it."""
+
+    progress: Progress
+    total_frames: int
+    """After how many it stops."""
+    stop_request: str
+    """Why a callback wants training to stop after this update; empty to go on."""
+
+    def state_dict(self) -> dict[str, Any]:
+        """Everything that the next update depends on."""
+        ...
+
 
 _DIGITS = 20
 """Of the number of an update."""
@@ -127,8 +155,7 @@ class CsvCallback(Callback):
             return
         rows = [*read_table(self.path)] if self.path.stat().st_size else []
         whole = [r for r in rows[1:] if len(r) == len(rows[0])]  # the last may be cut short
-        header = [[FORMER_NAMES.get(name, name) for name in row] for row in rows[:1]]
-        kept = header + [r for r in whole if self._update_of(r) <= training.progress.updates]
+        kept = rows[:1] + [r for r in whole if self._update_of(r) <= training.progress.updates]
         text = io.StringIO(newline="")
         csv.writer(text).writerows(kept)
         write_atomically(self.path, text.getvalue())
@@ -238,3 +265,22 @@ class ProgressCallback(Callback):
     def _close(self) -> None:
         if self._bar is not None:
             self._bar.close()
+
+
+class ForwardProgress(Callback):
+    """Forwards the progress of a training to a `drone_rl.utils.progress.Progress`."""
+
+    def __init__(self, progress: Report) -> None:
+        """Sets the receiver."""
+        self.progress = progress
+
+    def on_update(self, training: OngoingTraining, metrics: Mapping[str, float]) -> None:
+        """Forwards the running mean and the frames."""
+        done = training.progress
+        text = f"running reward {done.running_reward:.2f}, {done.episodes} episodes"
+        self.progress(text, done.frames, training.total_frames)
+
+    def on_end(self, training: OngoingTraining, reason: str) -> None:
+        """Forwards the reason why it stopped."""
+        frames = training.progress.frames
+        self.progress(f"stopped: {reason}", frames, frames)

@@ -7,7 +7,6 @@ from typing import Any
 from torch import nn
 from torchrl.envs import TransformedEnv
 
-from drone_rl.config.configuration import as_config
 from drone_rl.config.training import TrainSettings
 from drone_rl.evaluation.rollouts import run_episodes
 from drone_rl.policies import make_actor
@@ -34,7 +33,7 @@ class Confirmation:
             network: The policy's, as it learns.
         """
         self._settings, self._network = settings, network
-        self._description = describe(as_config(settings))
+        self._description = describe(settings)
         self.flights = 0
         """So far."""
         self.succeeded = 0

@@ -8,18 +8,77 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from types import FrameType
-from typing import Any, Protocol
+from typing import Any, Protocol, cast
 
 import torch
 from tensordict import TensorDictBase
+from torch import Tensor
 
-from drone_rl.training.callbacks import Callback
+from drone_rl.objectives import ReturnEstimator
+from drone_rl.training.callbacks import Callback, Progress
 from drone_rl.training.learners import Learner, NotANumberError, check_batch
-from drone_rl.training.metrics import batch_metrics, episode_rewards, running_mean
-from drone_rl.training.progress import Progress
 from drone_rl.training.restore import check_fits
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.memory import return_freed_memory
+
+
+def episode_rewards(batch: TensorDictBase) -> Tensor:
+    """Reward of each episode that ends in a batch, in the batch's order. Shape: (num_episodes,).
+
+    Args:
+        batch: Rows of complete episodes; or pieces of fixed length with ("next",
+            "episode_reward"), which `RolloutCollector` and TorchRL's transform `RewardSum` write,
+            since the first part of an episode may lie in an earlier batch. Shape: (*batch, T).
+
+    Raises:
+        InputError: An episode is not complete and its reward so far not known.
+    """
+    done, reward = (cast(Tensor, batch["next", name]) for name in ("done", "reward"))
+    totals = batch.get(("next", "episode_reward"), None)
+    if totals is not None:
+        return totals[done].double()
+    if not bool(done[..., -1, :].all()):
+        raise InputError(
+            "a batch ends within an episode, whose reward is not known; collect complete episodes, "
+            "or by collector=rollouts, or put TorchRL's RewardSum behind the environment"
+        )
+    ends = done.flatten().nonzero()[:, 0]
+    cumulative = reward.flatten().double().cumsum(0)[ends]
+    return torch.diff(cumulative, prepend=cumulative.new_zeros(1))
+
+
+def running_mean(old: float, values: Tensor, decay: float) -> float:
+    """Takes values in one by one: m <- decay * m + (1 - decay) * value."""
+    for value in values.tolist():
+        old = decay * old + (1 - decay) * value
+    return old
+
+
+def batch_metrics(batch: TensorDictBase, ends: Iterable[enum.IntEnum] = ()) -> dict[str, float]:
+    """Means over the episodes that end in a batch, and the shares of the reasons why.
+
+    Args:
+        batch: See `episode_rewards`.
+        ends: What ("next", "info", "end_reason") may be (`Task.ends`); 0 is none.
+
+    Returns:
+        By name; NaN where no episode ends.
+    """
+    rewards = episode_rewards(batch)
+    done, lengths = batch["next", "done"], batch.get(("next", "step_count"), None)
+    metrics = {"train/reward": float(rewards.mean())}
+    if lengths is not None:
+        metrics["train/length"] = float(lengths[done].double().mean())
+    else:
+        metrics["train/length"] = batch.numel() / len(rewards) if len(rewards) else float("nan")
+    named = [end for end in ends if end]
+    if named:
+        reasons = cast(Tensor, batch["next", "info", "end_reason"])
+        final = reasons[cast(Tensor, done)]
+        for end in named:
+            metrics[f"end/{end.name.lower()}"] = float((final == end).float().mean())
+    return metrics
+
 
 TRIMMED_EVERY = 16
 """Updates after which memory is given back, which makes the next one a tenth slower."""
@@ -164,6 +223,12 @@ class Trainer:
                 "it; lower optimiser.lr or set trainer.max_grad_norm"
             ) from None
 
+    @property
+    def _estimator(self) -> ReturnEstimator | None:
+        """The collector's return estimator, if it has one: its state is part of the training's."""
+        postproc = getattr(self.collector, "postproc", None)
+        return postproc if isinstance(postproc, ReturnEstimator) else None
+
     def _stop_reason(self) -> str:
         progress = self.progress
         if self.stop_signal is not None:
@@ -220,8 +285,10 @@ class Trainer:
 
     def state_dict(self) -> dict[str, Any]:
         """Everything that the next update depends on."""
+        estimator = self._estimator
         return {
             **self.learner.state_dict(),
+            **({} if estimator is None else {"estimator": estimator.state_dict()}),
             "collector": self.collector.state_dict(),
             "generators": {k: g.get_state() for k, g in self.generators.items()},
             "torch_rng": torch.get_rng_state(),
@@ -239,8 +306,9 @@ class Trainer:
             if key not in state:
                 raise InputError(f"the checkpoint has no {key}, so no training can go on from it")
         self.learner.check_state(state)
-        for key in ("collector", "generators", "torch_rng", "progress"):
-            check_fits(state[key], own[key], key)
+        for key in ("collector", "estimator", "generators", "torch_rng", "progress"):
+            if key in own:
+                check_fits(state[key], own[key], key)
         try:
             self._take_over(state)
         except (RuntimeError, ValueError, TypeError, LookupError, OverflowError) as error:
@@ -253,6 +321,8 @@ class Trainer:
     def _take_over(self, state: Mapping[str, Any]) -> None:
         self.learner.load_state_dict(state)
         self.collector.load_state_dict(state["collector"])
+        if self._estimator is not None:
+            self._estimator.load_state_dict(state["estimator"])
         for name, generator in self.generators.items():
             generator.set_state(state["generators"][name])
         torch.set_rng_state(state["torch_rng"])

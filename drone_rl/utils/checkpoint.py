@@ -22,7 +22,6 @@ from torch import Tensor
 from drone_rl.utils.archives import read_members
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import read_bytes, temporary_of
-from drone_rl.utils.former_names import with_present_names
 from drone_rl.utils.limits import CHECKPOINT_BYTES, DIMENSIONS, PICKLED_BYTES
 from drone_rl.utils.schema import as_mapping, shown
 
@@ -192,8 +191,6 @@ def _tensor(content: bytes, dtype: torch.dtype) -> Tensor:
 
 FORMAT = "drone_rl checkpoint"
 FORMAT_VERSION = 2
-"""With a description of the policy; version 1 has the training's settings alone."""
-READABLE = (1, FORMAT_VERSION)
 
 
 def save_checkpoint(path: str | Path, state: Mapping[str, Any]) -> None:
@@ -261,13 +258,11 @@ def load_checkpoint(path: str | Path) -> dict[str, Any]:
     if not isinstance(state, dict) or state.get("format") != FORMAT:
         raise InputError(f"{path} is not a drone_rl checkpoint; use one that drone-rl train wrote")
     version = state.get("format_version")
-    if type(version) is not int or version not in READABLE:
+    if type(version) is not int or version != FORMAT_VERSION:
         raise InputError(
             f"checkpoint {path} has format version {shown(version)}, this program reads "
-            f"{' and '.join(map(str, READABLE))}; use the version of drone_rl that wrote it"
+            f"{FORMAT_VERSION}; use the version of drone_rl that wrote it"
         )
-    if isinstance(state.get("progress"), Mapping):
-        state["progress"] = with_present_names(state["progress"])
     return state
 
 

@@ -1,101 +1,85 @@
 """Actions when other packages are imported, and filters of what those packages print."""
 
 import contextlib
+import functools
+import importlib
 import os
 import sys
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from importlib.machinery import ModuleSpec, PathFinder
-from types import ModuleType
+from types import FunctionType, MethodType, ModuleType
 from typing import Any
 
 
 def when_imported(name: str, do: Callable[[], None]) -> None:
-    """Does something now if a package is imported already, else right after it is.
+    """Call a function right after a package is imported, or now if it is imported already.
 
     Args:
-        name: The package's, without dots.
-        do: What to do; it must import nothing that imports that package.
+        name: Name of the package, without dots.
+        do: The function; it must import nothing that imports that package.
     """
-    if sys.modules.get(name) is not None:  # None forbids it
+    if sys.modules.get(name) is not None:  # None forbids the import
         do()
-    else:
-        sys.meta_path.insert(0, _Waiting(name, do))
+        return
+
+    def execute_and_do(module: ModuleType, execute: Callable[[ModuleType], None]) -> None:
+        execute(module)
+        if hook in sys.meta_path:
+            sys.meta_path.remove(hook)
+            do()
+
+    hook = _Hook(name, execute_and_do)
+    sys.meta_path.insert(0, hook)
 
 
 def import_quietly(name: str, category: str, words: str) -> None:
-    """Hides a warning that a module of another package gives while it is imported.
-
-    Nothing is hidden after the import, nor of other modules, categories or messages.
+    """Hide one warning that a module of another package gives while it is imported.
 
     Args:
-        name: The module's, dotted.
-        category: Name of the warning's class, which may be defined in a package not yet imported.
-        words: Which the warning contains.
+        name: Dotted name of the module.
+        category: Name of the warning's class, which a package not yet imported may define.
+        words: Text that the warning contains.
     """
-    sys.meta_path.insert(0, _Quiet(name, category, words))
 
+    def execute_quietly(module: ModuleType, execute: Callable[[ModuleType], None]) -> None:
+        with warnings.catch_warnings():
+            # a filter suffices for -W error, but glfw inserts its own before it
+            warnings.filterwarnings("ignore", f".*{words}", DeprecationWarning)
+            show = warnings.showwarning
 
-class _Quiet:
-    """A finder of one module, which it leaves as it is but for a warning."""
+            def show_others(message: Warning | str, kind: type, *rest: Any) -> None:
+                if kind.__name__ != category or words not in str(message):
+                    show(message, kind, *rest)
 
-    def __init__(self, name: str, category: str, words: str) -> None:
-        self.name, self.category, self.words = name, category, words
-
-    def find_spec(
-        self, name: str, path: Sequence[str] | None = None, target: ModuleType | None = None
-    ) -> ModuleSpec | None:
-        """Finds the module where Python would, and nothing else."""
-        spec = PathFinder.find_spec(name, path, target) if name == self.name else None
-        if spec is None or spec.loader is None:
-            return None
-        execute = spec.loader.exec_module
-
-        def execute_quietly(module: ModuleType) -> None:
-            with warnings.catch_warnings():
-                # a filter does for -W error, but glfw puts its own before it, so not for all
-                warnings.filterwarnings("ignore", f".*{self.words}", DeprecationWarning)
-                show = warnings.showwarning
-
-                def show_the_rest(message: Warning | str, kind: type, *rest: Any) -> None:
-                    if kind.__name__ != self.category or self.words not in str(message):
-                        show(message, kind, *rest)
-
-                warnings.showwarning = show_the_rest
-                execute(module)
-
-        spec.loader.exec_module = execute_quietly
-        return spec
-
-
-class _Waiting:
-    """A finder of one package, which it leaves as it is."""
-
-    def __init__(self, name: str, do: Callable[[], None]) -> None:
-        self.name, self.do = name, do
-
-    def find_spec(
-        self, name: str, path: Sequence[str] | None = None, target: ModuleType | None = None
-    ) -> ModuleSpec | None:
-        """Finds the package where Python would, and nothing else."""
-        spec = PathFinder.find_spec(name, path, target) if name == self.name else None
-        if spec is None or spec.loader is None:
-            return None
-        execute = spec.loader.exec_module
-
-        def execute_and_do(module: ModuleType) -> None:
+            warnings.showwarning = show_others
             execute(module)
-            if self in sys.meta_path:
-                sys.meta_path.remove(self)
-                self.do()
 
-        spec.loader.exec_module = execute_and_do
+    sys.meta_path.insert(0, _Hook(name, execute_quietly))
+
+
+class _Hook:
+    """A finder of one module that wraps the module's execution."""
+
+    def __init__(
+        self, name: str, execute: Callable[[ModuleType, Callable[[ModuleType], None]], None]
+    ) -> None:
+        self.name, self.execute = name, execute
+
+    def find_spec(
+        self, name: str, path: Sequence[str] | None = None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        """Find the module as Python does; no other module is found."""
+        spec = PathFinder.find_spec(name, path, target) if name == self.name else None
+        if spec is None or spec.loader is None:
+            return None
+        spec.loader.exec_module = functools.partial(self.execute, execute=spec.loader.exec_module)
         return spec
 
 
 ENVIRONMENTS = {
-    "drone_rl/CollectCubes-v0": "drone_rl.config.TaskSettings",
-    "drone_rl/Pillars-v0": "drone_rl.config.PillarsSettings",
+    "drone_rl/CollectCubes-v0": "collect_cubes",
+    "drone_rl/Pillars-v0": "pillars",
 }
 """By name, the class of the task's settings, which `gymnasium.make` takes as options."""
 
@@ -156,3 +140,64 @@ def standard_error_closed() -> Iterator[None]:
         os.dup2(kept, 2)
         os.close(kept)
         os.close(nowhere)
+
+
+NAME = "torch._dynamo"
+
+
+def leave_compiler_unloaded() -> None:
+    """Stands in for `torch._dynamo` in this process; for programs, not for libraries."""
+    sys.modules.setdefault(NAME, _Unloaded())
+
+
+class _Unloaded(ModuleType):
+    """Takes down what libraries say of their functions."""
+
+    def __init__(self) -> None:
+        super().__init__(NAME)
+        self._allowed: list[Any] = []
+
+    def allow_in_graph(self, function: Any) -> Any:
+        """Notes a function, or several, and returns it."""
+        self._allowed.append(function)
+        return function
+
+    def assume_constant_result(self, function: Any) -> Any:
+        """Marks a function, as the compiler itself does."""
+        function._dynamo_marked_constant = True
+        return function
+
+    def graph_break(self, *args: Any, **kwargs: Any) -> None:
+        """Does nothing, as ever outside of what is compiled."""
+
+    def disable(self, function: Any = None, recursive: bool = True, **options: Any) -> Any:
+        """Returns the function as one that is not compiled, once there is anything that could."""
+        if function is None:
+            return functools.partial(self.disable, recursive=recursive, **options)
+        if not isinstance(function, FunctionType | MethodType):
+            return self._load().disable(function, recursive, **options)
+
+        @functools.cache
+        def disabled() -> Callable[..., Any]:
+            return sys.modules[NAME].disable(function, recursive, **options)
+
+        @functools.wraps(function)
+        def call(*args: Any, **kwargs: Any) -> Any:
+            is_unloaded = sys.modules.get(NAME) is self
+            return (function if is_unloaded else disabled())(*args, **kwargs)
+
+        return call
+
+    def __getattr__(self, name: str) -> Any:
+        """Loads the compiler for everything else."""
+        if name.startswith("__") and name != "__path__":  # what inspection asks of every module
+            raise AttributeError(name)
+        return getattr(self._load(), name)
+
+    def _load(self) -> ModuleType:
+        if sys.modules.get(NAME) is self:
+            del sys.modules[NAME]
+            real = importlib.import_module(NAME)
+            for function in self._allowed:
+                real.allow_in_graph(function)
+        return sys.modules[NAME]

@@ -63,11 +63,3 @@ def _from_now_on(phase: str, info: dict[str, int]) -> None:
     gc.callbacks.remove(_from_now_on)
     gc.freeze()
     gc.set_threshold(50_000, 50, 100)
-
-
-def leave_garbage_to_the_system() -> None:
-    """Spares the interpreter its last search for garbage, which takes a second with torch.
-
-    For programs that are about to end, not for libraries: what is garbage now stays in memory.
-    """
-    gc.freeze()

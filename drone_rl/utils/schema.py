@@ -128,7 +128,9 @@ class Instance:
     of: type
 
     def read(self, value: Any, where: str) -> Any:
-        """See `Kind`."""
+        """See `Kind`; a class may offer instances by name."""
+        if isinstance(value, str) and hasattr(self.of, "from_name"):
+            return self.of.from_name(value, where)
         if not isinstance(value, self.of):
             raise InputError(f"{where}={shown(value)} is no {self.of.__name__}; give one")
         return value

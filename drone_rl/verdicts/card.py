@@ -1,7 +1,6 @@
 """The card of an exported policy: its verdict, its figures, and where they come from."""
 
-from drone_rl.evaluation.certificate_text import is_quoted
-from drone_rl.evaluation.verdict_text import best_luck
+from drone_rl.evaluation.verdict_text import best_baseline, is_quoted
 from drone_rl.robustness.domain_text import QUOTED, untested
 from drone_rl.robustness.domain_text import is_quoted as has_domain
 from drone_rl.sim.vocabulary import some_cubes, terms_of
@@ -44,11 +43,11 @@ the file's metadata.
 
 def _flights(verdict: Evidence) -> str:
     """Table of greedy and sampled actions, the best random or constant baseline, and the oracle."""
-    luck = best_luck(verdict)
+    best = best_baseline(verdict)
     flown = {
         "most probable actions": verdict["greedy"],
-        "drawn actions": verdict["sampled"],
-        f"best luck ({luck})": verdict["baselines"][luck],
+        "sampled actions": verdict["sampled"],
+        f"best blind baseline ({best})": verdict["baselines"][best],
         "oracle": verdict["baselines"]["oracle"],
     }
     flown = {name: flights for name, flights in flown.items() if flights is not None}
@@ -180,9 +179,9 @@ SENTENCES = (
     ),
     Sentence(
         "card.greedy_only",
-        "no flights with drawn actions were made",
+        "no episodes with sampled actions were run",
         lambda c: c["verdict"]["sampled"] is None,
-        lambda c: "Flights with actions drawn by their probabilities were not made.",
+        lambda c: "No episodes with sampled actions were run.",
     ),
     Sentence(
         "card.use",

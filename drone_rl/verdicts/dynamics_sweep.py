@@ -121,12 +121,12 @@ def bodies(
 
 def _looped(pilot: Pilot, settings: BodiesSettings, seed: RootSeed) -> dict[str, Any]:
     """Episodes with software in the loop, in still air, or the reason why there are none."""
-    from drone_rl.robustness.sitl import fly_in_the_loop
+    from drone_rl.robustness.sitl import evaluate_in_the_loop
 
     still = pilot.in_dynamics(**changes_of("simple flight", pilot.dynamics))
     count = settings.loop_flights
     try:
-        return fly_in_the_loop(still, count, drawn_seed=seed, progress=silent).as_dict()
+        return evaluate_in_the_loop(still, count, drawn_seed=seed, progress=silent).as_dict()
     except (InputError, FlightControllerError) as error:
         return {"left_out": str(error)}
 

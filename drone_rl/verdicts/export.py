@@ -9,8 +9,8 @@ from typing import Any
 from safetensors import SafetensorError
 
 from drone_rl.config.commands import FlightSettings
-from drone_rl.evaluation.certificate_text import is_quoted
 from drone_rl.evaluation.judge import judge_policy
+from drone_rl.evaluation.verdict_text import is_quoted
 from drone_rl.policies.policy import Policy
 from drone_rl.policies.zoo import certificate_path, shifts_path
 from drone_rl.policies.zoo.files import exported_bytes

@@ -25,18 +25,17 @@ from drone_rl.policies.zoo import read_checkpoint
 from drone_rl.sim.tasks import FailureReplayTask
 from drone_rl.sim.tasks.failure_replay import inflated
 from drone_rl.training import Callback
-from drone_rl.training.progress import OngoingTraining
-from drone_rl.training.train import (
+from drone_rl.training.callbacks import ForwardProgress, OngoingTraining
+from drone_rl.training.run_folder import (
     MAY_CHANGE,
-    Tell,
     Training,
     finish,
     hand_on_signal,
     last_of,
-    learn,
     new_folder,
     settings_of,
 )
+from drone_rl.training.train import learn
 from drone_rl.utils.archives import read_array
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import folder_lock, read_json, write_atomically
@@ -256,7 +255,7 @@ def train_until_proved(
     progress = progress or Bar()
     with folder_lock(folder):
         journal = Journal.open(folder, settings, how, state, changes)
-        callbacks = [_Note(journal), *callbacks, Tell(progress)]
+        callbacks = [_Note(journal), *callbacks, ForwardProgress(progress)]
         result = _learn(journal, state, callbacks)
         while not (journal.is_over or result["reason"].startswith("SIG")):
             _search(journal, progress)

@@ -12,7 +12,7 @@ from drone_rl.collectors.rollouts import TorchrlStream
 from drone_rl.collectors.speedups import accelerated_stream
 from drone_rl.config import AppearanceSettings, PillarsSettings, TaskSettings
 from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, with_transforms
-from drone_rl.envs.direct_renderer import FLAGS
+from drone_rl.envs.direct_renderer import FLAGS, Reasons
 from drone_rl.policies import SmallCNN, make_actor
 
 SHORT = TaskSettings(num_cubes=2, first_distance=3.0, spacing=3.0, step_limit=12, front_margin=3.0)
@@ -28,7 +28,7 @@ def collector(is_direct, task, keep=(("next", "info", "end_reason"),), look=None
     made = RolloutCollector(env, actor, 9, keep=keep)
     assert isinstance(made._stream, DirectStream)
     if not is_direct:
-        made._stream = TorchrlStream(env, made._observed, made._kept)
+        made._stream = TorchrlStream(env, made._observed, made._kept, Reasons(["a test"]))
     return made, generator
 
 

@@ -6,10 +6,16 @@ import pytest
 import torch
 import warp as wp
 
+from drone_rl.acceleration.fused_collector import FusedCollector
 from drone_rl.acceleration.rollout_kernel import choose, standardise
-from drone_rl.envs import StandardizePixels
+from drone_rl.collectors import EpisodeCollector
+from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, with_transforms
+from drone_rl.policies import SmallCNN, make_actor
 from drone_rl.sim.rendering.devices import start_warp
+from drone_rl.sim.tasks import CollectCubes
+from drone_rl.sim.tasks.collect_cubes_kernel import Flights, FlyingCubes, move, place
 
+INFO = ("next", "info", "collected")
 start_warp("cpu")
 
 
@@ -54,3 +60,39 @@ def test_standardised_as_the_transform_does_bit_for_bit():
     inputs = [wp.from_torch(values), 0.53, 0.21]
     wp.launch(standardised, 1, inputs=inputs, device="cpu")
     assert torch.equal(values, expected)
+
+
+@wp.func
+def half_move(flights: Flights, world: int, action: int) -> float:
+    return move(flights, world, action) * 0.5
+
+
+class HalfFlying(FlyingCubes):
+    functions = (Flights, place, half_move)
+
+
+class Half(CollectCubes):
+    def judge(self, state, body):
+        new, reward = super().judge(state, body)
+        return new, 0.5 * reward
+
+    def fused_rules(self, dynamics, num_envs):
+        return HalfFlying(self.settings, dynamics, num_envs)
+
+
+@pytest.mark.parametrize("task", [CollectCubes, Half])
+def test_the_kernel_runs_the_rules_that_a_task_supplies(task):
+    env = with_transforms(DroneEnv(4, task()), [GrayPixels(), StandardizePixels()])
+    shape = tuple(env.observation_spec["pixels"].shape[1:])
+    generator = torch.Generator().manual_seed(0)
+    network = SmallCNN(shape, 3, channels=(4,), hidden=(8,), generator=generator)
+    actor = make_actor(network, env.action_spec, generator)
+    collector = EpisodeCollector(env, actor, acceleration="fused", keep=[INFO])
+    assert isinstance(collector.source, FusedCollector)
+    for _ in range(3):
+        batch = collector.collect()
+        first = torch.cat([torch.tensor([True]), batch["next", "done"][:-1, 0]])
+        before = batch[INFO].sum(-1).roll(1).masked_fill(first, 0)
+        worth = 0.5 if task is Half else 1.0
+        assert torch.equal(batch["next", "reward"][:, 0], worth * (batch[INFO].sum(-1) - before))
+    assert float(batch["next", "reward"].max()) == worth

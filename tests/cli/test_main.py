@@ -7,8 +7,7 @@ import sys
 import pytest
 
 import drone_rl as drone_rl_package
-from drone_rl.cli.main import main
-from drone_rl.cli.usage import DEMO_USAGE, USAGE
+from drone_rl.cli.main import DEMO_USAGE, USAGE, main
 from tests.cli.running import TINY, drone_rl, error_line
 
 

@@ -75,7 +75,7 @@ def test_a_critic_is_chosen_stopped_and_gone_on_with(in_process, tmp_path, objec
     one, two = (
         load_checkpoint(tmp_path / name / "checkpoints" / "last.pt") for name in ("whole", "half")
     )
-    assert one["config"]["collector"]["_target_"].endswith("rollout_collector")
+    assert one["config"]["collector"]["_target_"] == "rollouts"
     assert one["progress"]["frames"] == two["progress"]["frames"] == 800
     for key in ("policy", "critic"):
         assert all(torch.equal(one[key][name], two[key][name]) for name in one[key])
@@ -211,7 +211,7 @@ def test_the_command_that_is_printed_goes_on_with_a_stopped_run(
         signal.signal(signal.SIGINT, before)
     assert stopped.returncode == 128 + number, stopped.stderr
     (folder,) = (tmp_path / "my runs" / "train" / "runs").iterdir()
-    hint = re.search("go on with: drone-rl (.*)", caplog.text)
+    hint = re.search("resume with: drone-rl (.*)", caplog.text)
     assert hint, caplog.text
     (tmp_path / "elsewhere").mkdir()
     done = in_process(*shlex.split(hint[1]), cwd=tmp_path / "elsewhere")

@@ -8,8 +8,8 @@ import torch
 from drone_rl.config import TaskSettings
 from drone_rl.config.learning import Ray, Threads
 from drone_rl.config.training import TrainSettings
-from drone_rl.training.build_collector import build_collector
-from drone_rl.training.metrics import episode_rewards
+from drone_rl.training.components import make_collector
+from drone_rl.training.trainer import episode_rewards
 from drone_rl.utils.errors import InputError
 
 pytestmark = pytest.mark.slow
@@ -26,7 +26,7 @@ def cluster():
 
 
 def build(collector):
-    return build_collector(TrainSettings(task=TASK, collector=collector)).collector
+    return make_collector(TrainSettings(task=TASK, collector=collector)).collector
 
 
 @pytest.fixture

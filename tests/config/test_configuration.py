@@ -25,7 +25,7 @@ def test_a_training_comes_back_as_it_was():
     )
     config = as_config(told)
     assert list(config["transforms"]) == ["gray", "crop", "crop_2"]
-    assert config["network"] == {"_target_": "drone_rl.policies.MLP", "hidden": []}
+    assert config["network"] == {"_target_": "mlp", "hidden": []}
     assert from_config(TrainSettings, config) == told
     assert from_config(TrainSettings, as_config(told.replace(transforms=()))).transforms == ()
 
@@ -41,7 +41,7 @@ def test_a_training_comes_back_as_it_was():
         ({"optimiser": {"lr": 1.0}}, "optimiser._target_=None names nothing"),
         ({"optimiser": {"_target_": Adam.target, "lr": 0}}, "optimiser.lr=0 is out of range"),
         ({"transforms": {"a": {"_target_": Crop.target, "top": -1}}}, r"transforms\.a\.top=-1"),
-        ({"collector": {"_target_": "theirs", "num_envs": 0}}, "collector.num_envs=0"),
+        ({"collector": {"_target_": "their.Own", "num_envs": 0}}, "collector.num_envs=0"),
         ([], "settings="),
     ],
 )

@@ -1,24 +1,164 @@
+"""Parts of the user's own: their settings come from their signatures."""
+
+from typing import Annotated, Literal
+
 import pytest
+import torch
 
-from drone_rl.config import PillarsSettings, TaskSettings, read_task, settings_of
+from drone_rl.config.configuration import as_config, from_config
+from drone_rl.config.learning import Collector, LeaveOneOut, Objective, Returns
+from drone_rl.config.networks import Network, SmallCnn
+from drone_rl.config.registry import (
+    register_collector,
+    register_learner,
+    register_network,
+    register_returns,
+    register_transform,
+)
+from drone_rl.config.training import TrainSettings
+from drone_rl.config.transforms import Frame, Transform
+from drone_rl.envs.transforms import PixelTransform
+from drone_rl.objectives import LeaveOneOut as LeaveOneOutEstimator
+from drone_rl.objectives import ReturnEstimator
+from drone_rl.policies import MLP, SmallCNN
+from drone_rl.policies.zoo import describe, parse
 from drone_rl.utils.errors import InputError
+from drone_rl.utils.schema import Whole
 
 
-def test_plain_data_names_its_task_or_is_cube_collection():
-    for settings in (TaskSettings(num_cubes=2), PillarsSettings(num_rows=3)):
-        assert read_task(settings.values(), "task") == settings
-    assert "name" not in TaskSettings().values()
-    with pytest.raises(
-        InputError, match=r"task\.name='walls' is unknown; there are: collect_cubes"
+class Wide(MLP):
+    """A wide network.
+
+    More about it.
+    """
+
+    def __init__(
+        self,
+        in_shape,
+        num_actions,
+        *,
+        width: Annotated[int, Whole(1, 64)] = 8,
+        mode: Literal["slow", "fast"] = "fast",
+        sizes: tuple[int, ...] = (1, 2),
+        rate: float | None = None,
+        generator: torch.Generator | None = None,
     ):
-        read_task({"name": "walls"}, "task")
-    with pytest.raises(InputError, match=r"task\.'num_cubes' is unknown"):
-        read_task({**PillarsSettings().values(), "num_cubes": 3}, "task")
-    with pytest.raises(InputError, match=r"task\.num_rows is missing"):
-        read_task({"name": "pillars"}, "task")
+        self.told = (width, mode, tuple(sizes), rate)
+        super().__init__(in_shape, num_actions, hidden=(width,), generator=generator)
 
 
-@pytest.mark.parametrize("name", [3, None, ["pillars"], "pillars\n"])
-def test_a_name_is_a_known_text(name):
-    with pytest.raises(InputError, match="is unknown; there are"):
-        settings_of(name)
+class Mirror(PixelTransform):
+    def _apply_transform(self, obs):
+        return obs.flip(-1)[..., ::2]
+
+
+def test_the_settings_of_a_network_are_those_of_its_signature(registered):
+    settings = registered(register_network("wide")(Wide)).Settings
+    assert settings.__doc__ == "A wide network."
+    assert settings().values() == {"width": 8, "mode": "fast", "sizes": [1, 2], "rate": None}
+    assert settings(width=9).make((1, 2, 2), 3, generator=None).told == (9, "fast", (1, 2), None)
+    for wrong in ({"width": 65}, {"mode": "no"}, {"sizes": (1.5,)}, {"rate": "x"}):
+        with pytest.raises(InputError, match=next(iter(wrong))):
+            settings(**wrong)
+
+
+def test_a_network_is_selected_by_name_and_described_by_name_and_values(registered):
+    registered(register_network("wide")(Wide))
+    training = TrainSettings(network="wide")
+    assert training == from_config(TrainSettings, as_config(training))
+    assert as_config(training)["network"]["_target_"] == "wide"
+    described = describe(training)
+    assert described.as_dict()["network"]["name"] == "wide"
+    assert parse(described.as_dict()) == described
+    assert described.build_network().told == (8, "fast", (1, 2), None)
+
+
+def test_a_transform_is_selected_by_its_key_and_measured_by_a_call(registered):
+    registered(register_transform("mirror")(Mirror))
+    training = from_config(
+        TrainSettings, {"transforms": {"gray": {}, "mirror": {}, "standardize": {"mean": 0.5}}}
+    )
+    assert [step.name for step in training.transforms] == ["gray", "mirror", "standardize"]
+    assert describe(training).input == Frame((1, 25, 32), True)
+
+
+def test_a_transform_may_state_its_output(registered):
+    def output(frame, settings):
+        return Frame((*frame.shape[:-1], 7), True)
+
+    registered(register_transform("mirror", output=output)(Mirror))
+    assert Transform.from_name("mirror", "x").output(Frame((1, 2, 3))) == Frame((1, 2, 7), True)
+
+
+def test_a_return_estimator(registered):
+    class Twice(ReturnEstimator):
+        def __init__(self, factor: float = 2.0, **kwargs):
+            super().__init__(**kwargs)
+            self.factor = factor
+
+        def estimate(self, reward, done):
+            return self.factor * reward
+
+    settings = registered(register_returns("twice")(Twice)).Settings
+    assert settings(factor=3, scale=True).make().factor == 3.0
+    assert settings(scale=True).make().scale is True
+    assert Returns.from_name("twice", "returns") == settings()
+
+
+def test_a_learner_and_a_collector_get_the_settings_of_the_training(registered):
+    @register_learner("mine")
+    def learner(settings, collecting, *, alpha: float = 0.5):
+        return settings, collecting, alpha
+
+    @register_collector("theirs")
+    def collector(settings, task, *, patience: int = 3):
+        return settings, task, patience
+
+    registered(learner), registered(collector)
+    training = TrainSettings(
+        objective=Objective.named("mine", "x")(alpha=0.1),
+        collector=Collector.named("theirs", "x")(num_envs=5),
+    )
+    assert training.objective.learner(training, "made") == (training, "made", 0.1)
+    assert training.collector.make(training, None) == (training, None, 3)
+
+
+def test_a_name_that_is_not_registered():
+    with pytest.raises(InputError, match=r"network='x' is not registered.*small_cnn.*plugins="):
+        TrainSettings(network="x")
+
+
+@pytest.mark.parametrize("name", ["small_cnn", "No", "a-b", ""])
+def test_names_that_cannot_be_registered(name):
+    with pytest.raises(InputError, match=r"is built in|is invalid"):
+        register_network(name)(Wide)
+
+
+def test_a_module_that_is_imported_again_replaces_its_parts(registered):
+    first = register_network("wide")(Wide).Settings
+    second = registered(register_network("wide")(Wide)).Settings
+    assert first is not second
+    assert Network.named("wide", "x") is second
+
+
+def test_parameters_without_a_default_or_of_another_type_are_refused():
+    def no_default(in_shape, num_actions, *, width: int):
+        return None
+
+    def no_type(in_shape, num_actions, *, width=3):
+        return None
+
+    def another(in_shape, num_actions, *, width: dict = {}):  # noqa: B006
+        return None
+
+    for factory in (no_default, no_type):
+        with pytest.raises(InputError, match="width needs a type and a default"):
+            register_network("odd")(factory)
+    with pytest.raises(InputError, match="width is of type"):
+        register_network("odd")(another)
+
+
+def test_defaults_of_classes_are_those_of_their_settings():
+    assert SmallCNN((1, 25, 64), 3).layers.fc1.out_features == SmallCnn().hidden[0]
+    made = LeaveOneOutEstimator()
+    assert (made.gamma, made.scale) == (LeaveOneOut().gamma, LeaveOneOut().scale)

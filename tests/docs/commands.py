@@ -8,7 +8,7 @@ from hydra import compose, initialize_config_dir
 from hydra.core.global_hydra import GlobalHydra
 
 from drone_rl.cli.hydra.composition import conf_dir, read_settings, register_schemas
-from drone_rl.cli.usage import COMMANDS
+from drone_rl.cli.main import COMMANDS
 
 COMMAND = re.compile(r"^(?:[A-Z]+=\S+ )?drone-rl ([a-z-]+)(.*)$", re.MULTILINE)
 _SWEPT = re.compile(r"=(?:range\((\d+)\)|([^\[\]{},]+),.*)$")

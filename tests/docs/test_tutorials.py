@@ -13,7 +13,6 @@ import torch
 import drone_rl.explanations
 from drone_rl.explanations import explain, report
 from drone_rl.explanations.report import page as report_page
-from drone_rl.policies.zoo.registry import NETWORKS
 from drone_rl.utils.settings import kinds_of, types_of
 from tests.docs.commands import check_commands
 
@@ -73,7 +72,7 @@ def workplace(tmp_path, monkeypatch):
     few = {name: explain.SECTIONS[name] for name in ("dataset", "evaluation")}
     monkeypatch.setattr(explain, "SECTIONS", few)  # all of them take a minute
     monkeypatch.setattr(report_page, "PARTS", dict(report_page.PARTS))
-    known, networks, threads = set(sys.modules), dict(NETWORKS), torch.get_num_threads()
+    known, threads = set(sys.modules), torch.get_num_threads()
     templates = jinja2.FileSystemLoader(inside / "explanations" / "report" / "templates")
     theirs = jinja2.PackageLoader("drone_rl.explanations.report")
     loader = jinja2.ChoiceLoader([theirs, templates])
@@ -82,8 +81,6 @@ def workplace(tmp_path, monkeypatch):
     yield tmp_path
     report_page._environment.cache_clear()
     torch.set_num_threads(threads)
-    NETWORKS.clear()
-    NETWORKS.update(networks)
     for name in set(sys.modules) - known:
         if str(tmp_path) in str(getattr(sys.modules[name], "__file__", "")):
             del sys.modules[name]

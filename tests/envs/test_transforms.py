@@ -143,7 +143,7 @@ def test_chromaticity_of_the_dark_is_that_of_gray():
 
 
 def test_chromaticity_of_what_is_no_color_is_refused():
-    with pytest.raises(InputError, match=r"shape \(1, 4, 4\); let rgb come before"):
+    with pytest.raises(InputError, match=r"shape \(1, 4, 4\); put it after rgb"):
         ChromaticityPixels()._apply_transform(torch.zeros(1, 4, 4))
     for floor in (0.0, -1.0, float("nan")):
         with pytest.raises(InputError, match="give a floor above 0"):

@@ -4,7 +4,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drone_rl.evaluation.rule import LUCK, SIDES, Kind, Quantity, Rule, decide, kinds_within, level
+from drone_rl.evaluation.rule import (
+    BLIND_BASELINES,
+    SIDES,
+    Kind,
+    Quantity,
+    Rule,
+    decide,
+    kinds_within,
+    level,
+)
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.utils.errors import InputError
 
@@ -63,8 +72,8 @@ def test_thresholds_of_every_quantity():
     assert thresholds["success"] == (0.0,)
     assert thresholds["offered ahead"] == (0.05,)
     assert thresholds["collected left"] == (0.3, 0.7)
-    assert [thresholds[f"above {name}"] for name in LUCK] == [(0.0,)] * 4
-    assert [thresholds[f"unsolved by {name}"] for name in LUCK] == [(0.0,)] * 4
+    assert [thresholds[f"above {name}"] for name in BLIND_BASELINES] == [(0.0,)] * 4
+    assert [thresholds[f"unsolved by {name}"] for name in BLIND_BASELINES] == [(0.0,)] * 4
     assert RULE.confidence == pytest.approx(1 - 0.05 / 15)
 
 
@@ -132,7 +141,7 @@ def test_the_rule_in_words_has_its_numbers():
 
 def test_the_text_says_every_number():
     shares = {"good_share": 0.81, "side_share": 0.62, "other_share": 0.23, "offered_share": 0.14}
-    text = Rule(**shares, luck_margin=0.35, error_rate=0.06).text
+    text = Rule(**shares, poor_margin=0.35, error_rate=0.06).text
     for share in ("81% of the oracle's", "than 62% of", "23% on", "14% of episodes", "35% of the"):
         assert share in text
     assert "94% probability" in text
@@ -147,8 +156,8 @@ def test_no_share_is_refused_by_its_name(value):
 
 
 def test_the_strata_and_luck_of_the_rule_are_those_of_cube_collection():
-    assert CollectCubes.strata == SIDES and CollectCubes.luck == LUCK
-    assert (RULE.strata, RULE.luck) == (SIDES, LUCK)
+    assert CollectCubes.strata == SIDES and CollectCubes.blind_baselines == BLIND_BASELINES
+    assert (RULE.strata, RULE.blind_baselines) == (SIDES, BLIND_BASELINES)
 
 
 @pytest.mark.parametrize(
@@ -166,7 +175,7 @@ def test_a_task_may_have_two_strata_and_one_luck(levels, kind):
     """Success, two offered, two reached, above one baseline, unsolved by it."""
     assert decide(levels, 2) is kind
     assert kinds_within(tuple((level, level) for level in levels), 2) == {kind}
-    rule = Rule(strata=("left", "right"), luck=("random",))
+    rule = Rule(strata=("left", "right"), blind_baselines=("random",))
     assert rule.quantities == (
         "success", "offered left", "offered right", "collected left", "collected right",
         "above random", "unsolved by random",

@@ -7,12 +7,11 @@ from torch import nn
 
 from drone_rl.explanations.interventions import (
     PATIENCE,
-    Flights,
-    _remember,
+    TargetRollouts,
     differ,
-    fly,
     followed,
     outcomes,
+    run_to_target,
 )
 from drone_rl.explanations.scenes import empty_scene, place_target
 from drone_rl.sim.actions import Move
@@ -99,41 +98,33 @@ def test_a_policy_that_minds_the_ground_gets_another_outcome(scenes, starts, fea
 
 def test_flights_end_when_the_cube_is_decided(scenes):
     state = place_target(scenes, torch.tensor([5.0, 5.0]), torch.tensor([0.0, 4.0]))
-    flown = fly(scenes, Always(Move.FORWARD), state, state.next_cube)
+    flown = run_to_target(scenes, Always(Move.FORWARD), state, state.next_cube)
     # touched at 5 - 1.65, that is after four steps; passed after six
     assert (flown.collected.tolist(), flown.decided.tolist()) == ([True, False], [4, 6])
     assert flown.actions.tolist() == [[0, 0, 0, 0, -1, -1], [0] * 6]
     assert flown.lateral.shape == (2, 7) and (flown.lateral == 0).all()
-    dither = fly(scenes, Always(Move.LEFT), state, state.next_cube)
+    dither = run_to_target(scenes, Always(Move.LEFT), state, state.next_cube)
     assert (dither.decided < PATIENCE).all() and not dither.collected.any()  # out at the side
 
 
 def test_patience_ends(scenes, monkeypatch):
     monkeypatch.setattr("drone_rl.explanations.interventions.PATIENCE", 3)
     state = place_target(scenes, torch.tensor([9.0]), torch.tensor([0.0]))
-    flown = fly(scenes, Always(Move.FORWARD), state, state.next_cube)
+    flown = run_to_target(scenes, Always(Move.FORWARD), state, state.next_cube)
     assert (flown.collected.tolist(), flown.decided.tolist()) == ([False], [3])
 
 
 def test_no_flights_have_no_steps(scenes):
     state = empty_scene(scenes)[torch.arange(0)]
-    flown = fly(scenes, Always(Move.FORWARD), state, state.next_cube)
+    flown = run_to_target(scenes, Always(Move.FORWARD), state, state.next_cube)
     assert (flown.actions.shape, flown.lateral.shape) == ((0, 0), (0, 1))
     assert (len(flown.collected), len(flown.decided)) == (0, 0)
 
 
-def test_the_last_pictures_of_those_that_fly_are_remembered():
-    first, second, third = (torch.full((2, 4, 5, 3), value) for value in (1, 2, 3))
-    assert _remember([], first, torch.tensor([0, 2]), 3, 0) == []
-    earlier = _remember([], first, torch.tensor([0, 2]), 3, 2)
-    assert [p[:, 0, 0, 0].tolist() for p in earlier] == [[1, 0, 1]]
-    earlier = _remember(earlier, second, torch.tensor([1, 2]), 3, 2)
-    earlier = _remember(earlier, third, torch.tensor([0, 1]), 3, 2)
-    assert [p[:, 0, 0, 0].tolist() for p in earlier] == [[0, 2, 2], [3, 3, 0]]
-
-
 def flights(decided, lateral, actions=((0,),)):
-    return Flights(np.array([True]), np.array([decided]), np.array([lateral]), np.array(actions))
+    return TargetRollouts(
+        np.array([True]), np.array([decided]), np.array([lateral]), np.array(actions)
+    )
 
 
 def test_flights_are_facts():

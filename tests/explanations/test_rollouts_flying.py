@@ -5,7 +5,7 @@ from torchrl.envs import CatFrames
 
 from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv, GrayPixels, with_transforms
-from drone_rl.explanations.rollouts import fly_on
+from drone_rl.explanations.rollouts import run_to_end
 from drone_rl.explanations.scenes import Scenes, place_target
 from drone_rl.sim.actions import Move
 from drone_rl.sim.tasks.collect_cubes import EndReason
@@ -37,7 +37,7 @@ def test_straight_on_collects_what_it_touches(scenes):
         scenes, torch.tensor([5.0, 5.0, 5.0]), torch.tensor([0, reach, reach + 0.1])
     )
     network = Always(F)
-    ends = fly_on(scenes, network, starts)
+    ends = run_to_end(scenes, network, starts)
     assert ends.collected[:, 0].tolist() == [True, True, False]
     assert ends.steps.tolist() == [4, 4, 6]  # touches at 3.35 m, and has passed at 6 m
     assert [len(seen) for seen in network.seen] == [3, 3, 3, 3, 1, 1]  # what is settled rests
@@ -46,13 +46,15 @@ def test_straight_on_collects_what_it_touches(scenes):
 
 def test_one_that_turns_back_is_in_a_loop_for_ever(scenes):
     network = Always(F, L, R, F)
-    ends = fly_on(scenes, network, place_target(scenes, torch.tensor([9.0]), torch.tensor([0.0])))
+    ends = run_to_end(
+        scenes, network, place_target(scenes, torch.tensor([9.0]), torch.tensor([0.0]))
+    )
     assert ends.end_reason.tolist() == [EndReason.STEP_LIMIT] and not ends.collected.any()
     assert len(network.seen) == 3
 
 
 def test_turning_the_same_way_is_no_loop(scenes):
-    ends = fly_on(
+    ends = run_to_end(
         scenes, Always(L, L, L, F), place_target(scenes, torch.tensor([4.0]), torch.tensor([4.0]))
     )
     assert ends.collected[0, 0]
@@ -62,12 +64,12 @@ def test_turning_back_after_a_cube_is_no_loop(scenes):
     starts = place_target(scenes, torch.tensor([1.0]), torch.tensor([2.0]))
     starts.passed[:, 1] = False  # a second cube, 9 m on
     starts.cubes[:, 1, :2] = torch.tensor([10.0, 0.0])
-    ends = fly_on(scenes, Always(L, R, F), starts)  # the first step left touches the first cube
+    ends = run_to_end(scenes, Always(L, R, F), starts)  # the first step left touches the first cube
     assert ends.collected[0, :2].tolist() == [True, True]
 
 
 def test_leaving_the_field_ends_a_flight(scenes):
-    ends = fly_on(
+    ends = run_to_end(
         scenes, Always(L), place_target(scenes, torch.tensor([9.0]), torch.tensor([-3.0]))
     )
     assert ends.end_reason.tolist() == [EndReason.SIDE_BOUNDARY]
@@ -80,7 +82,7 @@ def test_a_policy_that_remembers_sees_the_frames_before_and_may_turn_back():
     env = with_transforms(DroneEnv(1, task), [GrayPixels(), stack])
     scenes, network = Scenes(env), Always(F, L, R, F)
     starts = place_target(scenes, torch.tensor([9.0]), torch.tensor([0.0]))
-    ends = fly_on(scenes, network, starts)
+    ends = run_to_end(scenes, network, starts)
     env.close()
     assert scenes.memory == 1 and ends.collected[0, 0]
     first, second = network.seen[:2]

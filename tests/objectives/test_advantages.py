@@ -35,7 +35,7 @@ def test_where_a_row_goes_on_ends_and_is_cut():
         done=[0, 1, 1, 0, 0],
         terminated=[0, 1, 0, 0, 0],
     )
-    found = Advantages(GAMMA, LMBDA)(batch)
+    found = Advantages(GAMMA, LMBDA, scale=False)(batch)
     assert found["advantage"].flatten().tolist() == pytest.approx([0.6, -2.0, 2.0, 0.7, 1.0])
     wanted = [1.6, 2.0, 3.0, 2.7, 4.0]  # advantage and value
     assert found["value_target"].flatten().tolist() == pytest.approx(wanted)
@@ -44,8 +44,8 @@ def test_where_a_row_goes_on_ends_and_is_cut():
 def test_rows_are_apart():
     one = row([1.0, 2.0], [2.0, 3.0], [0.0, 1.0], [0, 0], [0, 0])
     two = row([5.0, 4.0], [4.0, 0.0], [1.0, 0.0], [0, 1], [0, 1])
-    both = Advantages(GAMMA, LMBDA)(torch.cat([one, two]))["advantage"]
-    alone = [Advantages(GAMMA, LMBDA)(r)["advantage"] for r in (one, two)]
+    both = Advantages(GAMMA, LMBDA, scale=False)(torch.cat([one, two]))["advantage"]
+    alone = [Advantages(GAMMA, LMBDA, scale=False)(r)["advantage"] for r in (one, two)]
     torch.testing.assert_close(both, torch.cat(alone))
 
 

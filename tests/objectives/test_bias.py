@@ -17,7 +17,6 @@ from torch import nn
 from torchrl.data import Categorical
 from torchrl.modules import ProbabilisticActor
 
-from drone_rl.envs.three_state import SUCCESS_PROBABILITY, exact_gradient, outcomes
 from drone_rl.objectives import (
     BatchNormalised,
     LeaveOneOut,
@@ -30,6 +29,7 @@ from drone_rl.objectives import (
     TotalReward,
     returns,
 )
+from tests.three_state import SUCCESS_PROBABILITY, exact_gradient, outcomes
 
 EVEN = (0.5, 0.5)
 SKEWED = (0.7, 0.2, 0.4)
@@ -117,7 +117,7 @@ def angle(one, other):
 
 def known_baseline():
     """The running means of earlier batches, whatever they were."""
-    estimator = TimeBaseline(1.0, max_steps=3)
+    estimator = TimeBaseline(1.0, max_steps=3, scale=False)
     estimator.baseline += torch.tensor([0.7, -0.3, 0.2])
     estimator.estimate = lambda r, d: returns.time_baseline(r, d, 1.0, estimator.baseline)
     return estimator
@@ -125,7 +125,8 @@ def known_baseline():
 
 @pytest.mark.parametrize(("leaving", "episodes"), [(EVEN, 3), (SKEWED, 2)])
 @pytest.mark.parametrize(
-    "make", [TotalReward, lambda: RewardToGo(1.0), lambda: LeaveOneOut(1.0), known_baseline]
+    "make",
+    [TotalReward, lambda: RewardToGo(1.0), lambda: LeaveOneOut(1.0, scale=False), known_baseline],
 )
 def test_unscaled_and_summed_these_are_exactly_unbiased(make, leaving, episodes):
     found = expected_update(leaving, make(), episodes)
@@ -135,7 +136,9 @@ def test_unscaled_and_summed_these_are_exactly_unbiased(make, leaving, episodes)
 @pytest.mark.parametrize("leaving", [EVEN, SKEWED])
 def test_discounted_returns_climb_the_discounted_gradient(leaving):
     exact = exact_gradient(leaving, 0.95).numpy()
-    np.testing.assert_allclose(expected_update(leaving, LeaveOneOut(0.95), 2), exact, atol=1e-6)
+    np.testing.assert_allclose(
+        expected_update(leaving, LeaveOneOut(0.95, scale=False), 2), exact, atol=1e-6
+    )
     np.testing.assert_allclose(expected_update(leaving, RewardToGo(0.95), 1), exact, atol=1e-6)
 
 

@@ -36,7 +36,7 @@ def test_scale():
 
 
 def test_time_baseline_never_contains_the_episode_it_is_subtracted_from():
-    estimator = TimeBaseline(0.5, decay=0.9, max_steps=4)
+    estimator = TimeBaseline(0.5, decay=0.9, max_steps=4, scale=False)
     data = batch([0.0, 2.0], [0, 1])
     assert estimator(data)["return_to_go"].flatten().tolist() == [1.0, 2.0]  # baseline was 0
     assert estimator.baseline.tolist() == [1.0, 2.0, 0.0, 0.0]  # first sight: the mean itself
@@ -48,16 +48,16 @@ def test_time_baseline_never_contains_the_episode_it_is_subtracted_from():
 
 
 def test_time_baseline_resumes_from_its_state():
-    first = TimeBaseline(0.5, max_steps=4)
+    first = TimeBaseline(0.5, max_steps=4, scale=False)
     first(batch([0.0, 2.0], [0, 1]))
-    second = TimeBaseline(0.5, max_steps=4)
+    second = TimeBaseline(0.5, max_steps=4, scale=False)
     second.load_state_dict(first.state_dict())
     data = batch([1.0, 1.0], [0, 1])
     assert torch.equal(first(data.clone())["return_to_go"], second(data.clone())["return_to_go"])
 
 
 def test_time_baseline_of_episodes_longer_than_its_memory():
-    estimator = TimeBaseline(0.5, decay=0.5, max_steps=2)
+    estimator = TimeBaseline(0.5, decay=0.5, max_steps=2, scale=False)
     long = batch([0.0, 0.0, 4.0], [0, 0, 1])  # returns 1, 2, 4
     assert estimator(long)["return_to_go"].flatten().tolist() == [1.0, 2.0, 4.0]
     assert estimator.baseline.tolist() == [1.0, 2.0] and estimator.seen.tolist() == [True, True]
@@ -65,7 +65,7 @@ def test_time_baseline_of_episodes_longer_than_its_memory():
 
 
 def test_time_baseline_remembers_the_mean_over_episodes():
-    estimator = TimeBaseline(0.5, max_steps=3)
+    estimator = TimeBaseline(0.5, max_steps=3, scale=False)
     estimator(batch([0.0, 2.0, 3.0], [0, 1, 1]))  # returns 1, 2 and 3: means 2 and 2
     assert estimator.baseline.tolist() == [2.0, 2.0, 0.0]
     assert estimator.seen.tolist() == [True, True, False]
@@ -123,7 +123,7 @@ def test_bad_decay_is_refused(decay):
 
 
 def test_little_memory_by_hand():
-    estimator = TimeBaseline(0.5, decay=0.25, max_steps=1)
+    estimator = TimeBaseline(0.5, decay=0.25, max_steps=1, scale=False)
     for reward in (4.0, 8.0):
         estimator(batch([reward], [1]))
     assert estimator.baseline.tolist() == [0.25 * 4 + 0.75 * 8]

@@ -7,10 +7,10 @@ from torchrl.data import Categorical
 from torchrl.modules import ProbabilisticActor
 
 from drone_rl.collectors import EpisodeCollector
-from drone_rl.envs.three_state import SUCCESS_PROBABILITY, ThreeStateEnv
 from drone_rl.objectives import ReinforceLoss, returns
 from drone_rl.policies.actor import RandomSource, SeededCategorical
 from drone_rl.utils.errors import InputError
+from tests.three_state import SUCCESS_PROBABILITY, ThreeStateEnv
 
 
 class Linear(nn.Module):
@@ -67,7 +67,9 @@ def test_gradient_is_the_analytic_one_of_a_linear_policy():
     chosen = nn.functional.one_hot(batch["action"], 2)
     weighted = (chosen - probabilities) * batch["return_to_go"]
     expected = -(batch["observation"].T @ weighted) / len(batch)
-    torch.testing.assert_close(gradient(ReinforceLoss(actor), network, batch), expected)
+    torch.testing.assert_close(
+        gradient(ReinforceLoss(actor, entropy_coeff=0.0), network, batch), expected
+    )
 
 
 @pytest.mark.parametrize("reduction", ["mean", "sum"])
@@ -104,7 +106,7 @@ def test_algorithm_4_by_hand():
         [3],
     )
     optimiser = torch.optim.SGD(network.parameters(), lr=0.1)
-    gradient(ReinforceLoss(actor, reduction="sum"), network, batch)
+    gradient(ReinforceLoss(actor, reduction="sum", entropy_coeff=0.0), network, batch)
     optimiser.step()
     step = 0.1 * 0.5 * (-4 - 1 - 5) / root
     torch.testing.assert_close(network.theta.detach(), torch.tensor([[step, -step]]))
@@ -124,7 +126,7 @@ def test_mean_gradient_is_the_exact_one_on_the_process_of_fig_3(kind):
     p = float(network.theta[0].detach().softmax(-1)[1])
     slope = SUCCESS_PROBABILITY * horizon * (1 - p) ** (horizon - 1) * p * (1 - p)
     collector = EpisodeCollector(ThreeStateEnv(episodes, horizon=horizon), actor, keep=())
-    loss = ReinforceLoss(actor, reduction="sum")
+    loss = ReinforceLoss(actor, reduction="sum", entropy_coeff=0.0)
     estimates = []
     for _ in range(repeats):
         batch = collector.collect()
@@ -145,7 +147,7 @@ def test_constant_added_to_returns_leaves_the_expected_gradient_alone():
         network.theta.copy_(torch.tensor([[0.3, -0.2], [0.1, 0.4]]))
     observation = torch.tensor([[1.0, -2.0]])
     probabilities = (observation @ network.theta.detach()).softmax(-1)[0]
-    loss = ReinforceLoss(actor, reduction="sum")
+    loss = ReinforceLoss(actor, reduction="sum", entropy_coeff=0.0)
 
     def expected(shift):
         total = torch.zeros(2, 2)
@@ -176,28 +178,31 @@ def test_values_by_hand():
     each = loss(reduction="none", entropy_coeff=0.5)
     assert each["loss_actor"].tolist() == pytest.approx([log2, 2 * log2, 3 * log2])
     assert each["loss_entropy"].tolist() == pytest.approx([-0.5 * log2] * 3)
-    assert float(loss()["loss_entropy"].detach()) == 0.0
+    assert float(loss(entropy_coeff=0.0)["loss_entropy"].detach()) == 0.0
     assert float(loss()["entropy"]) == pytest.approx(log2)
 
 
 def test_returns_are_constants_to_the_gradient():
     network, actor = make()
     batch = make_batch()
-    plain = gradient(ReinforceLoss(actor), network, batch)
+    plain = gradient(ReinforceLoss(actor, entropy_coeff=0.0), network, batch)
     batch["return_to_go"] = batch["return_to_go"].clone().requires_grad_()
-    assert torch.equal(gradient(ReinforceLoss(actor), network, batch), plain)
+    assert torch.equal(gradient(ReinforceLoss(actor, entropy_coeff=0.0), network, batch), plain)
     assert batch["return_to_go"].grad is None
 
 
 def test_stored_action_is_scored():
     _, actor = make()
     batch = make_batch()
-    first = ReinforceLoss(actor)(batch)["loss_actor"]
-    assert torch.equal(first, ReinforceLoss(actor)(batch)["loss_actor"])
+    first = ReinforceLoss(actor, entropy_coeff=0.0)(batch)["loss_actor"]
+    assert torch.equal(first, ReinforceLoss(actor, entropy_coeff=0.0)(batch)["loss_actor"])
     flipped = batch.clone().set("action", 1 - batch["action"])
     with torch.no_grad():
         actor.module[0].module.theta.copy_(torch.tensor([[1.0, 0.0], [0.0, 1.0]]))
-    assert ReinforceLoss(actor)(flipped)["loss_actor"] != ReinforceLoss(actor)(batch)["loss_actor"]
+    assert (
+        ReinforceLoss(actor, entropy_coeff=0.0)(flipped)["loss_actor"]
+        != ReinforceLoss(actor)(batch)["loss_actor"]
+    )
 
 
 def test_masked_equals_sliced():
@@ -205,7 +210,7 @@ def test_masked_equals_sliced():
     batch = make_batch()
     mask = torch.tensor([True, True, False, True, False, True])
     masked = batch.clone().set(("collector", "mask"), mask)
-    loss = ReinforceLoss(actor)
+    loss = ReinforceLoss(actor, entropy_coeff=0.0)
     torch.testing.assert_close(
         gradient(loss, network, masked), gradient(loss, network, batch[mask])
     )
@@ -214,7 +219,7 @@ def test_masked_equals_sliced():
 def test_dispatch_equals_tensordict():
     _, actor = make()
     batch = make_batch()
-    loss = ReinforceLoss(actor)
+    loss = ReinforceLoss(actor, entropy_coeff=0.0)
     named = loss(
         action=batch["action"],
         return_to_go=batch["return_to_go"],
@@ -228,7 +233,7 @@ def test_input_is_left_alone():
     _, actor = make()
     batch = make_batch()
     before = batch.clone()
-    ReinforceLoss(actor)(batch)
+    ReinforceLoss(actor, entropy_coeff=0.0)(batch)
     assert set(batch.keys(True, True)) == set(before.keys(True, True))
     assert (batch == before).all()
 
@@ -244,7 +249,7 @@ def test_diagnostics_are_detached_and_losses_add_up():
 def test_keys_can_be_set_and_nested():
     _, actor = make()
     batch = make_batch()
-    loss = ReinforceLoss(actor)
+    loss = ReinforceLoss(actor, entropy_coeff=0.0)
     expected = loss(batch)["loss_actor"]
     loss.set_keys(action=("agent", "move"), return_to_go=("agent", "credit"))
     moved = batch.exclude("action", "return_to_go")
@@ -256,13 +261,13 @@ def test_keys_can_be_set_and_nested():
 def test_unknown_key_is_refused():
     _, actor = make()
     with pytest.raises(ValueError, match="advantage"):
-        ReinforceLoss(actor).set_keys(advantage="a")
+        ReinforceLoss(actor, entropy_coeff=0.0).set_keys(advantage="a")
 
 
 def test_missing_returns_name_the_remedy():
     _, actor = make()
     with pytest.raises(InputError, match="return estimator first"):
-        ReinforceLoss(actor)(make_batch().exclude("return_to_go"))
+        ReinforceLoss(actor, entropy_coeff=0.0)(make_batch().exclude("return_to_go"))
 
 
 def test_bad_arguments_are_refused():

@@ -9,9 +9,9 @@ from torchrl.envs import Compose, Reward2GoTransform, TransformedEnv
 from torchrl.modules import RandomPolicy
 
 from drone_rl import objectives
-from drone_rl.envs.three_state import ThreeStateEnv
 from drone_rl.objectives import BatchNormalised, RewardToGo, TimeBaseline, TotalReward
 from drone_rl.utils.errors import InputError
+from tests.three_state import ThreeStateEnv
 
 OTHERS = ("Advantages", "ReinforceLoss", "ReturnEstimator")
 NAMES = [n for n in objectives.__all__ if n not in OTHERS]
@@ -127,7 +127,7 @@ def test_replay_buffer_masks_tails():
 
 def test_a_memory_is_told_of_a_batch_once():
     """A sample handed out again must not enter into the running mean."""
-    estimator = TimeBaseline(0.5, decay=0.5, max_steps=2)
+    estimator = TimeBaseline(0.5, decay=0.5, max_steps=2, scale=False)
     buffer = ReplayBuffer(storage=LazyTensorStorage(8), transform=estimator, batch_size=8)
     buffer.extend(rows([[1.0, 1.0]], [[0, 1]])[0])
     before = estimator.baseline.tolist()

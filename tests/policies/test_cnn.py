@@ -87,6 +87,6 @@ def test_widths_by_default():
     assert shapes == {
         "conv1.weight": (16, 1, 4, 4),
         "conv2.weight": (32, 16, 3, 3),
-        "fc1.weight": (64, 32 * 4 * 14),
-        "logits.weight": (3, 64),
+        "fc1.weight": (128, 32 * 4 * 14),
+        "logits.weight": (3, 128),
     }

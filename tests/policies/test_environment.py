@@ -9,7 +9,7 @@ from drone_rl.policies.zoo import certificate_path, policy_path
 from drone_rl.sim import worlds as worlds_module
 from drone_rl.sim.rendering import Raytracer
 from drone_rl.sim.tasks import Pillars
-from drone_rl.training.build_collector import build_collector
+from drone_rl.training.components import make_collector
 from drone_rl.utils.errors import InputError
 from tests.fake_flight import floating
 from tests.second_dynamics import Turning
@@ -81,7 +81,7 @@ def test_whoever_is_asked_for_draws(asked, tmp_path):
     chosen = {"renderer": "mujoco_warp"}
     drone_rl.make_env(1, **chosen).close()
     assert asked == ["mujoco_warp"]
-    build_collector(drone_rl.TrainSettings(**chosen)).collector.shutdown()
+    make_collector(drone_rl.TrainSettings(**chosen)).collector.shutdown()
     assert set(asked) == {"mujoco_warp"}
     asked.clear()
     drone_rl.evaluate("good", episodes=1, baselines=False, **chosen)

@@ -4,8 +4,8 @@ import pytest
 import torch
 
 from drone_rl.config import CameraSettings, PillarsSettings, TaskSettings
+from drone_rl.envs.fault_models import dead_rows, noise
 from drone_rl.robustness.agents import OracleAgent, has_oracle
-from drone_rl.robustness.faults import dead_rows, noise
 from drone_rl.robustness.paired_evaluation import PairedEvaluator
 from drone_rl.robustness.perturbations import Condition
 from drone_rl.sim.tasks import as_task

@@ -7,12 +7,12 @@ import pytest
 import torch
 
 from drone_rl.config import TaskSettings
+from drone_rl.envs.fault_models import dead_rows
 from drone_rl.evaluation.rule import Quantity, Rule
 from drone_rl.robustness import domain
 from drone_rl.robustness.agents import OracleAgent
 from drone_rl.robustness.axes import AXES, Axis
 from drone_rl.robustness.domain import Prober, is_surely_good
-from drone_rl.robustness.faults import dead_rows
 from drone_rl.robustness.paired_evaluation import PairedEvaluator
 from drone_rl.robustness.perturbations import Condition
 from drone_rl.utils.intervals import mean_bounds
@@ -225,7 +225,7 @@ def test_good_is_what_is_surely_good_and_better_than_luck():
         "success": Quantity(0.1, 0.05, 0.15, (0.0,)),
         **{f"offered {s}": Quantity(0.5, 0.4, 0.6, (0.05,)) for s in rule.strata},
         **{f"collected {s}": Quantity(0.9, 0.8, 1.0, (0.3, 0.7)) for s in rule.strata},
-        **{f"above {name}": Quantity(0.5, 0.4, 0.6, (0.0,)) for name in rule.luck},
+        **{f"above {name}": Quantity(0.5, 0.4, 0.6, (0.0,)) for name in rule.blind_baselines},
     }
     assert is_surely_good(sure, rule)
     for name, lower in (("success", -0.01), ("collected right", 0.69), ("above forward", -0.01)):
@@ -252,7 +252,9 @@ def test_baselines_fly_under_the_condition_once_for_each_task(make_prober, monke
     prober.probe(dataclasses.replace(shorter, faults=(dead_rows(1),)), 1.0)
     prober.probe(Condition(), 1.0)
     assert flown == [shorter]
-    lengths = [baselines["forward"].length.double().mean() for baselines in prober._luck.values()]
+    lengths = [
+        baselines["forward"].length.double().mean() for baselines in prober._baselines.values()
+    ]
     assert lengths[1] > 1.8 * lengths[0]  # nearly twice as many steps to the boundary
 
 

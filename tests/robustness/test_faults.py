@@ -1,15 +1,8 @@
 import pytest
 import torch
 
-from drone_rl.robustness.faults import (
-    Fault,
-    FaultPipeline,
-    blur,
-    dead_rows,
-    frozen_frames,
-    late_frames,
-    noise,
-)
+from drone_rl.envs.fault_models import FaultModel, dead_rows, late_frames, noise, out_of_focus
+from drone_rl.robustness.faults import FaultPipeline, frozen_frames
 
 
 def picture(*values):
@@ -71,12 +64,12 @@ def test_slow_noise_stays_nearly_the_same():
 def test_a_blurred_edge_is_no_edge():
     edge = torch.zeros(1, 1, 4, 6)
     edge[..., 3:] = 1.0
-    seen = FaultPipeline([blur(1.0)], 1, seed=0)(edge, torch.arange(1))
+    seen = FaultPipeline([out_of_focus(1.0)], 1, seed=0)(edge, torch.arange(1))
     assert 0 < seen[0, 0, 0, 2] < 0.5 < seen[0, 0, 0, 3] < 1
 
 
 def test_who_knows_the_truth_minds_only_what_hides_it():
-    faults = [noise(0.5), dead_rows(2), blur(2.0)]
+    faults = [noise(0.5), dead_rows(2), out_of_focus(2.0)]
     sharp = picture(1.0, 1.0)
     seen = FaultPipeline(faults, 2, seed=5, hiding_only=True)(sharp, ALL)
     rows = FaultPipeline([noise(0.0), dead_rows(2)], 2, seed=5)(sharp, ALL)
@@ -86,5 +79,5 @@ def test_who_knows_the_truth_minds_only_what_hides_it():
 
 def test_nothing_goes_wrong_by_itself():
     assert torch.equal(
-        FaultPipeline([Fault()], 2, seed=0)(picture(0.3, 0.6), ALL), picture(0.3, 0.6)
+        FaultPipeline([FaultModel()], 2, seed=0)(picture(0.3, 0.6), ALL), picture(0.3, 0.6)
     )

@@ -5,9 +5,9 @@ import torch
 
 import drone_rl
 from drone_rl.config import DynamicsSettings, TaskSettings
+from drone_rl.envs.fault_models import late_frames
 from drone_rl.evaluation.rollouts import run_episodes
 from drone_rl.robustness.axes import AXES
-from drone_rl.robustness.faults import late_frames
 from drone_rl.robustness.paired_evaluation import PairedEvaluator, PolicySpec
 from drone_rl.robustness.perturbations import ONSET_STEP, Condition, Mode, whiten
 from drone_rl.sim.rendering.scene import SemanticClass
@@ -93,10 +93,10 @@ def test_an_onset_changes_nothing_before_it(make_bed):
 
 def test_luck_is_what_the_task_calls_so(make_bed):
     evaluator = make_bed(subject(Blind(1)), 20)
-    luck = evaluator.run_baselines(Condition())
-    assert [*luck] == ["random", "forward", "left", "right"]
-    assert torch.equal(luck["left"].length, evaluator.run(Condition()).episodes.length)
-    assert torch.equal(luck["left"].goals.world, luck["random"].goals.world)
+    blind = evaluator.run_baselines(Condition())
+    assert [*blind] == ["random", "forward", "left", "right"]
+    assert torch.equal(blind["left"].length, evaluator.run(Condition()).episodes.length)
+    assert torch.equal(blind["left"].goals.world, blind["random"].goals.world)
 
 
 def test_a_size_that_cannot_be_is_refused(make_bed):

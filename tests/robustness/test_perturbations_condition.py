@@ -1,4 +1,4 @@
-from drone_rl.robustness.faults import blur, late_frames
+from drone_rl.envs.fault_models import late_frames, out_of_focus
 from drone_rl.robustness.perturbations import Condition, mount, sun_at, tint
 from drone_rl.sim.rendering.scene import SemanticClass
 
@@ -9,7 +9,7 @@ def test_nothing_is_different_by_default():
 
 
 def test_both_at_once():
-    blurred, late = blur(1.0), late_frames(2)
+    blurred, late = out_of_focus(1.0), late_frames(2)
     tinted, sun, moved = tint((SemanticClass.GROUND,), 0.1), sun_at(5.0), mount(degrees=3.0)
     one = Condition(task={"cube_size": 2.0}, looks=(tinted,), faults=(blurred,), delay=3)
     two = Condition(

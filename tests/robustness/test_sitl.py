@@ -12,7 +12,7 @@ from drone_rl.envs import worlds_of
 from drone_rl.flight.betaflight.process import FirmwareProcess
 from drone_rl.flight.in_the_loop.drone import FlightControllerError, NotReadyError
 from drone_rl.robustness import sitl as looped
-from drone_rl.robustness.sitl import fly_in_the_loop
+from drone_rl.robustness.sitl import evaluate_in_the_loop
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 from drone_rl.verdicts.dynamics_sweep import chart
@@ -40,7 +40,7 @@ def near():
 
 def test_it_flies_the_first_worlds_of_evaluations(program):
     policy = near()
-    done = fly_in_the_loop(policy, 2, seed=3, firmware=program, progress=silent)
+    done = evaluate_in_the_loop(policy, 2, seed=3, firmware=program, progress=silent)
     assert [(f.world, f.success, f.end) for f in done.flights] == [
         (0, True, "all_cubes"),
         (1, True, "all_cubes"),
@@ -81,15 +81,15 @@ def test_a_flight_that_has_not_begun_begins_anew(program, monkeypatch):
 
     monkeypatch.setattr(looped, "_fly", fly)
     with pytest.raises(FlightControllerError, match="refuses to arm"):
-        fly_in_the_loop(near(), 2, firmware=program, progress=silent)
+        evaluate_in_the_loop(near(), 2, firmware=program, progress=silent)
     assert tried == [0, 0, 0]
 
 
 def test_what_is_refused(tmp_path):
     with pytest.raises(InputError, match="flights=0 is out of range"):
-        fly_in_the_loop("good", 0)
+        evaluate_in_the_loop("good", 0)
     with pytest.raises(InputError, match=r"doesn't exist; install it with"):
-        fly_in_the_loop("good", 1, firmware=tmp_path / "none")
+        evaluate_in_the_loop("good", 1, firmware=tmp_path / "none")
 
 
 def test_a_column_of_bodies(program, monkeypatch):

@@ -3,8 +3,8 @@
 import pytest
 import torch
 
+from drone_rl.envs.fault_models import dead_rows
 from drone_rl.robustness.axes import AXES
-from drone_rl.robustness.faults import dead_rows
 from drone_rl.robustness.paired_evaluation import PairedEvaluator
 from drone_rl.robustness.perturbations import Condition, Mode
 from drone_rl.robustness.suite import Suite, area, mcnemar

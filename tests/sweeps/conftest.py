@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from drone_rl.evaluation.consistency import _expected
-from drone_rl.evaluation.rule import LUCK, Kind, Rule
+from drone_rl.evaluation.rule import BLIND_BASELINES, Kind, Rule
 from drone_rl.sweeps import executors
 from drone_rl.sweeps.manifest import open_sweep
 from drone_rl.sweeps.runs import Run
@@ -50,9 +50,9 @@ def make_verdict():
 def _verdict(kind="good", left=1.0, ahead=1.0, right=1.0, *, whole=1.0, certain=True, **others):
     shares = {"all": whole, "left": left, "ahead": ahead, "right": right}
     greedy = _flights(shares, success=round(EPISODES * (whole or 0)))
-    luck = {name: _flights(dict.fromkeys(shares, 0.0), success=0) for name in LUCK}
-    if kind == "poor":  # nearly as many cubes as luck, which gets as many as the policy
-        luck["forward"] = _flights(shares, success=round(EPISODES * (whole or 0)))
+    blind = {name: _flights(dict.fromkeys(shares, 0.0), success=0) for name in BLIND_BASELINES}
+    if kind == "poor":  # nearly as many cubes as blind, which gets as many as the policy
+        blind["forward"] = _flights(shares, success=round(EPISODES * (whole or 0)))
     oracle = _flights(dict.fromkeys(shares, 1.0), success=EPISODES)
     evidence = {
         "kind": kind,
@@ -63,7 +63,7 @@ def _verdict(kind="good", left=1.0, ahead=1.0, right=1.0, *, whole=1.0, certain=
         "good_share": 0.9,
         "num_cubes": 3,
         "greedy": greedy,
-        "baselines": {**luck, "oracle": oracle},
+        "baselines": {**blind, "oracle": oracle},
     }
     return {**evidence, "quantities": _quantities(evidence), **others}
 

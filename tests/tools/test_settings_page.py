@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar
 import pytest
 
 from drone_rl.cli.hydra.composition import GROUPS, PARTS, SEVERAL
-from drone_rl.cli.usage import COMMANDS
+from drone_rl.cli.main import COMMANDS
 from drone_rl.config import DynamicsSettings
 from drone_rl.config.networks import SmallCnn
 from drone_rl.config.transforms import Crop

@@ -14,8 +14,8 @@ from drone_rl.training import ReinforceLearner, Trainer
 class Bandit:
     """A collector: action 1 is worth 1. All its randomness is in two generators."""
 
-    def __init__(self, actor, episodes=8, seed=0):
-        self.actor, self.episodes = actor, episodes
+    def __init__(self, actor, episodes=8, seed=0, postproc=None):
+        self.actor, self.episodes, self.postproc = actor, episodes, postproc
         self.generator = torch.Generator().manual_seed(seed)
         self.is_open = True
 
@@ -33,7 +33,7 @@ class Bandit:
         done = torch.zeros(steps, 1, dtype=torch.bool)
         done[torch.tensor(lengths).cumsum(0) - 1] = True
         batch["next"] = {"reward": batch["action"][:, None].float(), "done": done}
-        return batch
+        return batch if self.postproc is None else self.postproc(batch)
 
     def state_dict(self):
         return {"generator": self.generator.get_state()}
@@ -58,10 +58,9 @@ def make_trainer():
         optimiser = torch.optim.Adam(network.parameters(), lr=0.05)
         settings = {"target": None, "total_frames": 200, **kwargs}
         return Trainer(
-            collector=Bandit(actor, seed=seed),
+            collector=Bandit(actor, seed=seed, postproc=TimeBaseline(0.9, max_steps=4)),
             learner=ReinforceLearner(
                 network=network,
-                estimator=TimeBaseline(0.9, max_steps=4),
                 loss=ReinforceLoss(actor),
                 optimiser=optimiser,
                 scheduler=torch.optim.lr_scheduler.StepLR(optimiser, 2, 0.9),

@@ -85,16 +85,6 @@ def test_resumed_run_repeats_no_row_and_loses_none(make_trainer, tmp_path):
     assert updates == list(range(1, resumed.progress.updates + 1))
 
 
-def test_columns_of_an_older_run_are_named_anew(make_trainer, tmp_path):
-    path = tmp_path / "metrics.csv"
-    first = make_trainer(callbacks=[CsvCallback(path)], total_frames=100)
-    first.run()
-    present = path.read_text()
-    path.write_text(present.replace("running_reward", "running_cubes").replace("/reward", "/cubes"))
-    CsvCallback(path).on_start(first)
-    assert path.read_text().splitlines() == present.splitlines()
-
-
 def test_any_torchrl_logger(make_trainer, tmp_path):
     logger = CSVLogger("run", log_dir=str(tmp_path))
     make_trainer(callbacks=[LoggerCallback([logger])]).run()

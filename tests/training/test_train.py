@@ -6,7 +6,6 @@ import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import pytest
 import torch
@@ -17,11 +16,9 @@ from drone_rl.config import DynamicsSettings, TaskSettings
 from drone_rl.config.learning import Threads
 from drone_rl.config.training import TrainerSettings, TrainSettings
 from drone_rl.training import Callback
-from drone_rl.training.train import _read_best
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.progress import silent
 
-OLD = Path(__file__).parents[1] / "data" / "old_checkpoint.pt"
 TINY = TrainSettings(
     task=TaskSettings(num_cubes=1, first_distance=8.0, step_limit=60),
     collector=Threads(num_envs=4),
@@ -78,17 +75,6 @@ def test_stopped_and_resumed_is_the_uninterrupted(trained, tmp_path):
     assert all(torch.equal(one[name], two[name]) for name in one)
 
 
-def test_a_run_of_version_0_1_goes_on(tmp_path):
-    (tmp_path / "checkpoints").mkdir()
-    shutil.copy(OLD, tmp_path / "checkpoints" / "last.pt")
-    before = drone_rl.load_policy(tmp_path).state["progress"]
-    was = {"num_threads": 1, "compiled": False, "minibatch_frames": 512}
-    more = TrainerSettings(total_frames=before["frames"] + 50, **was)
-    done = drone_rl.train(folder=tmp_path, resume=True, trainer=more, progress=silent)
-    assert done.result["updates"] > before["updates"]
-    assert done.result["frames"] >= before["frames"] + 50
-
-
 def test_a_run_goes_on_that_was_killed_before_its_first_update(trained, tmp_path):
     class Killed(BaseException):
         pass
@@ -102,12 +88,6 @@ def test_a_run_goes_on_that_was_killed_before_its_first_update(trained, tmp_path
     done = drone_rl.train(folder=tmp_path, resume=True, progress=silent)
     there, whole = weights(done.folder), weights(trained[0].folder)
     assert all(torch.equal(there[name], whole[name]) for name in whole)
-
-
-@pytest.mark.parametrize("best", [float("nan"), float("inf"), 1e9, "high", None])
-def test_the_best_mean_of_a_checkpoint_is_a_number(best):
-    with pytest.raises(InputError, match=r"^the checkpoint's best="):
-        _read_best(best)
 
 
 def test_a_resumed_run_learns_as_it_did(trained):

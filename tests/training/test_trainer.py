@@ -7,7 +7,7 @@ import torch
 
 from drone_rl.training import Callback, CheckpointCallback, NotANumberError
 from drone_rl.training import trainer as trainer_module
-from drone_rl.training.metrics import episode_rewards, running_mean
+from drone_rl.training.trainer import episode_rewards, running_mean
 from drone_rl.utils.checkpoint import load_checkpoint
 
 
@@ -134,8 +134,8 @@ def test_nan_stops_names_itself_and_keeps_the_last_good_checkpoint(make_trainer,
     def poison(trainer):
         good.append(parameters(trainer).clone())
         if where == "loss":
-            estimate = trainer.learner.estimator.forward
-            trainer.learner.estimator.forward = lambda b: estimate(b).set(
+            estimate = trainer.collector.postproc
+            trainer.collector.postproc = lambda b: estimate(b).set(
                 "return_to_go", torch.full_like(b["next", "reward"], float("nan"))
             )
         else:

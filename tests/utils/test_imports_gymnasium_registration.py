@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 
-from drone_rl.config.configuration import locate
 from drone_rl.sim.tasks import as_task
 from drone_rl.utils.imports import ENVIRONMENTS, register
 
@@ -43,7 +42,7 @@ def test_each_is_made_of_a_task_with_settings(name):
     spec = gymnasium.spec(name)
     assert spec.kwargs == {"task": ENVIRONMENTS[name]}
     assert spec.max_episode_steps is None  # the task's own limit counts, once
-    assert as_task(locate(spec.kwargs["task"])()).largest_reward > 0
+    assert as_task(spec.kwargs["task"]).largest_reward > 0
 
 
 PAGES = (ROOT / "README.md", *ROOT.glob("docs/**/*.md"), *ROOT.glob("examples/*.py"))
@@ -99,4 +98,7 @@ def test_without_gymnasium_one_line_tells_what_to_install():
 
 
 def test_the_names_of_modules_are_right():
-    assert import_module("drone_rl.envs.gymnasium.world").DroneWorld.metadata["render_fps"] == 10
+    assert (
+        import_module("drone_rl.envs.gymnasium.environments").DroneWorld.metadata["render_fps"]
+        == 10
+    )

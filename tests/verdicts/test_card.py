@@ -19,7 +19,7 @@ def test_a_card_names_policy_verdict_origin_and_digest():
 
 def test_flights_stand_side_by_side_with_the_best_luck_and_the_oracle():
     found = lines()
-    head = "|  | most probable actions | drawn actions | best luck (forward) | oracle |"
+    head = "|  | most probable actions | sampled actions | best blind baseline (forward) | oracle |"
     assert head in found
     row = found[found.index(head) + 3]
     assert row.startswith("| cubes collected | 0.900 (0.800 to 1.000) | 0.600 (")
@@ -32,7 +32,7 @@ def test_a_side_without_cubes_is_not_offered():
 
 
 def test_greedy_flights_alone_have_no_column_of_drawn_ones():
-    assert "drawn actions" not in "\n".join(lines(verdict={**VERDICT, "sampled": None})[4:6])
+    assert "sampled actions" not in "\n".join(lines(verdict={**VERDICT, "sampled": None})[4:6])
 
 
 def test_the_largest_failure_comes_first_and_those_that_never_happened_are_left_out():

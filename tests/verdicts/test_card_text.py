@@ -78,7 +78,7 @@ def test_what_is_always_said():
         ("card.chosen", {"chosen": {"runs": 201, "episodes": 200}}, "201 runs of a sweep, which"),
         ("card.chosen", {"chosen": {"runs": 3, "episodes": None}}, "it was not judged"),
         ("card.tested", {"task": {**TASK, "num_cubes": 7}}, "7 cubes"),
-        ("card.greedy_only", {"verdict": {**VERDICT, "sampled": None}}, "were not made"),
+        ("card.greedy_only", {"verdict": {**VERDICT, "sampled": None}}, "were run"),
     ],
 )
 def test_evidence_changes_a_sentence(name, evidence, part):

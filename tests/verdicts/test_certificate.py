@@ -46,7 +46,7 @@ ALL, BEHIND = EndReason.ALL_CUBES.value, EndReason.FRONT_BOUNDARY.value
 
 
 def test_every_placement(good):
-    found = claim(good).beside(flown([[0.0, 1.0], [-6.0, 5.0], [2.0, 2.0]], [ALL] * 3))
+    found = claim(good).as_evidence(flown([[0.0, 1.0], [-6.0, 5.0], [2.0, 2.0]], [ALL] * 3))
     assert found == {
         "refused": None,
         "every": True,
@@ -63,7 +63,7 @@ def test_every_placement(good):
 
 
 def test_what_is_undecided_is_not_proved_and_no_flight_speaks_against_it(good):
-    some = claim(good, undecided=True).beside(flown([[0.0, 1.0], [4.0, 5.0]], [ALL, BEHIND]))
+    some = claim(good, undecided=True).as_evidence(flown([[0.0, 1.0], [4.0, 5.0]], [ALL, BEHIND]))
     assert (some["every"], some["share"], some["undecided"]) == (False, 0.75, 0.25)
     assert some["agreeing"] == 1
 
@@ -81,39 +81,39 @@ def test_a_proof_holds_for_any_order_of_sums(good):
     greedy, refused = flown(places, [ALL] * 5), "decisions of the policy depend on rounding"
     for end, expected in ((ALL, None), (BEHIND, refused)):
         found = rounded(5, [1], flown(places[1:2] * 2, [ALL, end]), (1, 1))
-        assert claim(good).beside(greedy, rounding=found)["refused"] == expected
+        assert claim(good).as_evidence(greedy, rounding=found)["refused"] == expected
     opened = rounded(5, [4], is_open=[4])
-    assert claim(good).beside(greedy, rounding=opened)["refused"] == refused
-    assert claim(good, undecided=True).beside(greedy, rounding=opened)["refused"] is None
+    assert claim(good).as_evidence(greedy, rounding=opened)["refused"] == refused
+    assert claim(good, undecided=True).as_evidence(greedy, rounding=opened)["refused"] is None
     excessive = rounded(5, [0, 1])
     assert excessive.is_excessive
-    assert claim(good).beside(greedy, rounding=excessive)["refused"] == refused
+    assert claim(good).as_evidence(greedy, rounding=excessive)["refused"] == refused
 
 
 def test_lost_placements(good):
-    found = claim(good, end="front_boundary").beside(flown([[0.0, 1.0]], [BEHIND]))
+    found = claim(good, end="front_boundary").as_evidence(flown([[0.0, 1.0]], [BEHIND]))
     assert (found["every"], found["share"], found["lost"]) == (False, 0, 1.0)
 
 
 def test_one_flight_that_ends_otherwise_is_enough(good):
     places = [[0.0, 1.0], [1.0, 5.0], [2.0, 2.0]]
-    found = claim(good).beside(flown(places, [ALL, BEHIND, ALL]))
+    found = claim(good).as_evidence(flown(places, [ALL, BEHIND, ALL]))
     assert found == {
         "refused": "1 of 3 greedy flights of this verdict ended otherwise than it states"
     }
     side = EndReason.SIDE_BOUNDARY.value
-    lost = claim(good, end="front_boundary").beside(flown(places[:1], [side]))
+    lost = claim(good, end="front_boundary").as_evidence(flown(places[:1], [side]))
     assert lost["refused"] is not None
 
 
 def test_other_cubes_than_stated_are_another_end(good):
     episodes = flown([[0.0, 1.0]], [BEHIND])
     episodes.goals.reached = torch.tensor([[True, False]])
-    assert claim(good, end="front_boundary").beside(episodes)["refused"] is not None
+    assert claim(good, end="front_boundary").as_evidence(episodes)["refused"] is not None
 
 
 def test_what_was_refused_before_stays_so(good):
-    assert Claim(PATH, None, "it is damaged").beside(flown([[0.0, 1.0]], [ALL])) == {
+    assert Claim(PATH, None, "it is damaged").as_evidence(flown([[0.0, 1.0]], [ALL])) == {
         "refused": "it is damaged"
     }
 
@@ -122,7 +122,7 @@ def test_flights_anew_are_told(good):
     checked = Claim(
         PATH, claim(good).certificate, flights=7, uniform=5, seed=3, seed_is_fixed=False
     )
-    told = checked.beside(flown([[0.0, 1.0]], [ALL]))
+    told = checked.as_evidence(flown([[0.0, 1.0]], [ALL]))
     assert (told["checked"], told["seed"], told["seed_is_fixed"]) == (7, 3, False)
     assert told["wrong_at_most"] == pytest.approx(0.4507, abs=1e-4)  # 0.5493 ** 5 is 0.05
 

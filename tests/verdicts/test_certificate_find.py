@@ -96,7 +96,7 @@ def test_no_tampered_file_makes_a_poor_policy_proved(poor, truth, tmp_path):
     path, believed, count = tmp_path / "mine.certificate.json", [], 0
     for name, content in tampered(truth):
         path.write_bytes(content)
-        quoted = find_claim(poor, flights=20).beside(flown)
+        quoted = find_claim(poor, flights=20).as_evidence(flown)
         count += 1
         if quoted["refused"] is None and (quoted["every"] or quoted["lost"] < 1):
             believed.append(name)

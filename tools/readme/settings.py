@@ -13,11 +13,11 @@ from typing import Any
 import yaml
 
 from drone_rl.cli.hydra.composition import GROUPS, PARTS, SEVERAL
-from drone_rl.cli.usage import COMMANDS
+from drone_rl.cli.main import COMMANDS
 from drone_rl.config import TASKS, BaseTaskSettings
 from drone_rl.config.configuration import Changes, ChangesOfTask, Variant
 from drone_rl.utils.schema import Flag, Instance, Kind, Listed, Maybe, OneOf, Several, Span
-from drone_rl.utils.settings import Settings, kinds_of, plain, snake_case
+from drone_rl.utils.settings import Settings, kinds_of, plain
 
 BAR = "&#124;"
 """A bar within a cell."""
@@ -102,7 +102,7 @@ def first_comment(path: Path) -> str:
 def _part(group: str, part: type[Variant]) -> str:
     lines = [f"### {group}", _about(part)]
     for variant in part.variants():
-        name = snake_case(variant)
+        name = variant.registered_name()
         lines.append(f"**`{name}`** {_about(variant)}")
         if kinds_of(variant):
             inside = f"{name}." if group in SEVERAL else ""

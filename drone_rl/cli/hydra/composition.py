@@ -3,6 +3,8 @@
 import contextlib
 import dataclasses
 import functools
+import importlib
+import os
 import re
 import sys
 import types
@@ -38,7 +40,7 @@ from drone_rl.config.training import Logger, TrainerSettings
 from drone_rl.config.transforms import Transform
 from drone_rl.config.verification import ProvableSettings
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.settings import Settings, kinds_of, snake_case, types_of
+from drone_rl.utils.settings import Settings, kinds_of, plain, types_of
 
 GROUPS: dict[str, type[Settings]] = {
     "appearance": AppearanceSettings,
@@ -65,33 +67,89 @@ PARTS: dict[str, type[Variant]] = {
 SEVERAL: dict[str, type[Variant]] = {"transforms": Transform, "logger": Logger}
 """Groups whose files name several variants, each by `schema@<name>: <the variant's name>`."""
 
+_PLUGINS = (("plugins", list[str], dataclasses.field(default_factory=list)),)
+"""Modules that register parts; `import_plugins` imports them before Hydra composes."""
+
 
 def register_schemas(**commands: type[Settings]) -> None:
-    """Tells Hydra the schemas; called before it composes.
+    """Register the schemas with Hydra; called before it composes.
+
+    Parts and tasks of plug-ins, which have no file in conf/, become choices of their groups.
 
     Args:
         commands: The settings of each command, by the name of its file.
     """
     store = ConfigStore.instance()
     for task in TASKS.values():
-        name = "base_task" if task is TaskSettings else f"base_{task.name}"
-        store.store(group="task", name=name, node=schema_of(task))
+        _store("task", "task" if task is TaskSettings else task.name, task)
     for group, settings in GROUPS.items():
-        store.store(group=group, name=f"base_{group}", node=schema_of(settings))
+        _store(group, group, settings)
     for group, part in PARTS.items():
         for variant in part.variants():
-            store.store(group=group, name=f"base_{snake_case(variant)}", node=schema_of(variant))
+            _store(group, variant.registered_name(), variant)
     for group, part in SEVERAL.items():
         for variant in part.variants():
-            name = snake_case(variant)
+            name = variant.registered_name()
             store.store(group=f"{group}/schema", name=name, node=schema_of(variant))
     for command, settings in commands.items():
-        store.store(name=f"base_{command}", node=schema_of(settings))
+        store.store(name=f"base_{command}", node=schema_of(settings, _PLUGINS))
 
 
-def schema_of(cls: type[Settings]) -> type:
-    """A dataclass of the same fields with no defaults, for those are in conf/."""
-    fields = [(name, *_field(cls, name)) for name in types_of(cls)]
+def _store(group: str, name: str, settings: type[Settings]) -> None:
+    """Register the schema of a group's file; settings of a plug-in are a choice themselves."""
+    store = ConfigStore.instance()
+    store.store(group=group, name=f"base_{name}", node=schema_of(settings))
+    if not settings.__module__.startswith("drone_rl."):
+        store.store(group=group, name=name, node=_choice_of(settings))
+
+
+def _choice_of(cls: type[Settings]) -> type:
+    """A schema with the default of each field."""
+    values = cls().values()
+    fields = [
+        (
+            name,
+            _simple(hint),
+            dataclasses.field(default_factory=functools.partial(plain, values[name])),
+        )
+        for name, hint in types_of(cls).items()
+    ]
+    return dataclasses.make_dataclass(f"{cls.__name__}Choice", [*_named(cls), *fields])
+
+
+def import_plugins(overrides: Sequence[str]) -> None:
+    """Import the modules that `plugins=[MODULE, ...]` names on a command line.
+
+    Only what a user types is imported, nothing that a file contains.
+
+    Args:
+        overrides: The command line.
+
+    Raises:
+        InputError: There is no such module.
+    """
+    typed = [o.partition("=")[2] for o in overrides if re.match(r"\+{0,2}plugins=", o)]
+    names = re.findall(r"[^\[\]\s,'\"]+", typed[-1]) if typed else []
+    if names and os.getcwd() not in sys.path:
+        sys.path.insert(0, os.getcwd())
+    for name in names:
+        try:
+            importlib.import_module(name)
+        except ModuleNotFoundError as error:
+            raise InputError(
+                f"plugins={name} can't be imported ({error}); give a module in this folder or on "
+                "PYTHONPATH"
+            ) from error
+
+
+def schema_of(cls: type[Settings], further: Sequence[tuple[str, Any, Any]] = ()) -> type:
+    """Return a dataclass with the same fields but no defaults, which are in conf/.
+
+    Args:
+        cls: The settings.
+        further: Name, type and default of further fields.
+    """
+    fields = [*((name, *_field(cls, name)) for name in types_of(cls)), *further]
     bases = (_changes_of(cls),) if cls in _CHANGED else ()
     return dataclasses.make_dataclass(f"{cls.__name__}Schema", [*_named(cls), *fields], bases=bases)
 
@@ -174,6 +232,7 @@ def run_command(name: str, command: Command, overrides: Sequence[str]) -> int:
     """
     overrides = getattr(command, "prepare", list)(overrides)
     check_choices(overrides, conf_dir())
+    import_plugins(overrides)
     register_schemas(**{name: command.Command})
     getattr(command, "register", lambda: None)()
     if {"--help", "-h"} & set(overrides):
@@ -232,7 +291,9 @@ def _named_in_errors() -> Iterator[None]:
 
 def read_settings(cls: type[Settings], config: DictConfig) -> Any:
     """Composed settings, every reference resolved, as those of a command."""
-    return from_config(cls, OmegaConf.to_container(config, resolve=True))
+    values: Any = OmegaConf.to_container(config, resolve=True)
+    values.pop("plugins", None)
+    return from_config(cls, values)
 
 
 def _job(command: Command, statuses: list[int]) -> Callable[[DictConfig], object]:

@@ -75,7 +75,7 @@ def comments(command: str, conf: Path, chosen: dict[str, str | None]) -> dict[st
         conf: That folder.
         chosen: The file of each group.
     """
-    found: dict[str, str] = {}
+    found = {"plugins": "Modules that register parts of your own: networks, transforms and so on."}
     moved = read_comments(conf / "dynamics" / "computer_vision.yaml")
     found |= {f"dynamics.{key}": text for key, text in moved.items()}
     tasks = conf / "task"

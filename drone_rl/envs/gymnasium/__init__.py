@@ -1,4 +1,4 @@
-"""The worlds as Gymnasium knows environments: one, or many as a vector environment."""
+"""The environments as Gymnasium environments: single and vector."""
 
 from drone_rl.utils.errors import extra
 

@@ -1,4 +1,4 @@
-"""The worlds as Stable-Baselines3 knows environments."""
+"""The environments as vector environments of Stable-Baselines3."""
 
 from drone_rl.utils.errors import extra
 

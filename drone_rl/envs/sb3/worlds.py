@@ -1,7 +1,6 @@
-"""A Gymnasium vector environment as a vector environment of Stable-Baselines3's own kind.
+"""A Gymnasium vector environment as a Stable-Baselines3 `VecEnv`.
 
-Stable-Baselines3 takes a single Gymnasium environment, and vectorises it by itself, one world after
-the other; it takes no vector environment of Gymnasium's.
+Stable-Baselines3 accepts single Gymnasium environments only, which it steps one after the other.
 """
 
 from collections.abc import Iterable, Sequence
@@ -16,39 +15,39 @@ from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvStepReturn
 
 from drone_rl.config.transforms import Fault, Stack, Transform
-from drone_rl.envs.pipeline import on_pixels
+from drone_rl.envs.transforms import on_pixels
 from drone_rl.utils.errors import InputError
 
 
 class Sb3Worlds(VecEnv):
     """`Sb3Worlds(gymnasium.make_vec(name, num_envs=64, autoreset_mode="SameStep"))`.
 
-    The information that each step gives is of those worlds alone whose episode has just ended.
+    A step returns infos only for environments whose episode has just ended.
     """
 
     def __init__(self, env: VectorEnv, transforms: Sequence[Transform] = ()) -> None:
-        """Takes the worlds over.
+        """Wrap a vector environment.
 
         Args:
-            env: Worlds that begin anew in the step in which they end.
-            transforms: What becomes of its pictures, RGB bytes (H, W, 3), in this order; without
-                any, Stable-Baselines3 puts the channels first, and networks get them from 0 to 1.
+            env: An environment with autoreset mode "SameStep".
+            transforms: Transforms of its images, RGB bytes (H, W, 3), in order; without any,
+                Stable-Baselines3 moves the channels first and scales to 0 to 1.
 
         Raises:
-            InputError: It begins anew otherwise, or a transform doesn't fit.
+            InputError: The autoreset mode is different, or a transform is unsuitable.
         """
         mode = env.metadata.get("autoreset_mode")
         if mode is not AutoresetMode.SAME_STEP:
             name = getattr(mode, "value", mode)
             raise InputError(
-                f"autoreset_mode={name}, but Stable-Baselines3 expects new episodes at once; give "
+                f"autoreset_mode={name}, but Stable-Baselines3 needs SameStep; give "
                 "gymnasium.make_vec(..., autoreset_mode='SameStep')"
             )
         if any(isinstance(transform, Stack) for transform in transforms):
             raise InputError("transforms stack frames; use Stable-Baselines3's VecFrameStack")
         if strange := [t.name for t in transforms if isinstance(t, Fault)]:
             raise InputError(
-                f"the transform {strange[0]} is for TorchRL's environments; leave it out here"
+                f"the transform {strange[0]} needs a TorchRL environment; leave it out here"
             )
         self.env = env
         self._look = on_pixels([transform.make() for transform in transforms])
@@ -60,9 +59,9 @@ class Sb3Worlds(VecEnv):
         super().__init__(env.num_envs, space, env.single_action_space)
 
     def reset(self) -> NDArray[Any]:
-        """Starts episodes, with the seeds of `seed` where it was called; Shape: (num_envs, *)."""
+        """Start episodes, with the seeds of `seed`, if any. Shape: (num_envs, *)."""
         if any(self._options):
-            raise InputError("options are unknown to reset; set none")
+            raise InputError("reset takes no options; set none")
         seen, info = self.env.reset(seed=self._seeds)  # pyright: ignore[reportArgumentType] (one a world, as SyncVectorEnv)
         everywhere = range(self.num_envs)
         self.reset_infos = [_of_world(info, i) for i in everywhere]
@@ -70,14 +69,14 @@ class Sb3Worlds(VecEnv):
         return self._seen(seen)
 
     def step_async(self, actions: NDArray[Any]) -> None:
-        """Notes what the drones shall do."""
+        """Store the actions."""
         self._actions = actions
 
     def step_wait(self) -> VecEnvStepReturn:
-        """Lets them do it.
+        """Apply the stored actions.
 
         Returns:
-            What is seen, rewards, which episodes ended, and of these the information, with
+            Observations, rewards, dones, and the infos of finished episodes with
             "terminal_observation" and "TimeLimit.truncated".
         """
         seen, rewards, terminated, truncated, info = self.env.step(self._actions)
@@ -95,31 +94,31 @@ class Sb3Worlds(VecEnv):
         return self._seen(seen), rewards.astype(np.float32), done, infos
 
     def close(self) -> None:
-        """Ends the renderer."""
+        """Close the renderer."""
         self.env.close()
 
     def get_images(self) -> Sequence[Any]:
-        """What `render` draws of each world."""
+        """Return the image of `render` of each environment."""
         return self.env.render() or [None] * self.num_envs
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
-        """An attribute of the vector environment, once a world."""
+        """Return an attribute of the vector environment, repeated for each environment."""
         return [getattr(self.env, attr_name) for _ in self._worlds(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
-        """Can't be: worlds have no attributes of their own."""
-        raise InputError(f"{attr_name} can't be set of worlds apart; set it of .env")
+        """Raise an error: the environments have no own attributes."""
+        raise InputError(f"{attr_name} can't be set per environment; set it on .env")
 
     def env_method(
         self, method_name: str, *args: Any, indices: VecEnvIndices = None, **kwargs: Any
     ) -> list[Any]:
-        """Can't be: worlds have no methods of their own."""
-        raise InputError(f"{method_name} can't be called of worlds apart; call it of .env")
+        """Raise an error: the environments have no own methods."""
+        raise InputError(f"{method_name} can't be called per environment; call it on .env")
 
     def env_is_wrapped(
         self, wrapper_class: type[Wrapper], indices: VecEnvIndices = None
     ) -> list[bool]:
-        """No world is."""
+        """Return False for each environment."""
         return [False for _ in self._worlds(indices)]
 
     def _worlds(self, indices: VecEnvIndices) -> Iterable[int]:
@@ -130,5 +129,5 @@ class Sb3Worlds(VecEnv):
 
 
 def _of_world(info: dict[str, Any], world: int) -> dict[str, Any]:
-    """What a vector environment's information says of one world."""
+    """Return one environment's part of a vector environment's info."""
     return {name: value[world] for name, value in info.items() if not name.startswith("_")}

@@ -1,6 +1,6 @@
-"""Policies as plain data, in files; some travel with the package, each with a model card."""
+"""Descriptions and files of policies; the package contains some, each with a model card."""
 
-from drone_rl.policies.zoo.description import PolicyDescription, parse
+from drone_rl.policies.zoo.description import PolicyDescription, describe, parse
 from drone_rl.policies.zoo.files import (
     card_path,
     certificate_path,
@@ -11,9 +11,7 @@ from drone_rl.policies.zoo.files import (
     read_policy,
     shifts_path,
 )
-from drone_rl.policies.zoo.migration import describe
 from drone_rl.policies.zoo.onnx_model import make_onnx, open_onnx
-from drone_rl.policies.zoo.registry import register_network, register_transform
 
 __all__ = [
     "PolicyDescription",
@@ -28,7 +26,5 @@ __all__ = [
     "policy_path",
     "read_checkpoint",
     "read_policy",
-    "register_network",
-    "register_transform",
     "shifts_path",
 ]

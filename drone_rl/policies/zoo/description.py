@@ -1,7 +1,7 @@
-"""A policy as plain data: its worlds, camera, transforms and network, by names and values.
+"""Description of a policy: its task, camera, transforms and network, by names and values.
 
-The same description stands in checkpoints, exported files and run folders. It is all that is needed
-to build a policy, and all that a file can ask for.
+Checkpoints, exported files and run folders contain the same description. It is all that is needed
+to build a policy, and all that a file can request.
 """
 
 import dataclasses
@@ -10,7 +10,8 @@ from collections.abc import Mapping
 from typing import Any
 
 import torch
-from torchrl.envs import Transform, TransformedEnv
+from torchrl.envs import Transform as TorchrlTransform
+from torchrl.envs import TransformedEnv
 
 from drone_rl.config import (
     COMPUTER_VISION,
@@ -23,15 +24,18 @@ from drone_rl.config import (
     DynamicsSettings,
     read_task,
 )
+from drone_rl.config.configuration import Variant
+from drone_rl.config.networks import Network
+from drone_rl.config.training import MOST_TRANSFORMS, TrainSettings
+from drone_rl.config.transforms import Fault, Frame, Stack, Transform
 from drone_rl.envs import DroneEnv, with_transforms
 from drone_rl.policies import PolicyNetwork
-from drone_rl.policies.zoo.registry import NETWORKS, TRANSFORMS, Part, Picture, find_part
 from drone_rl.sim.actions import Actions
 from drone_rl.sim.dynamics import Dynamics, make_dynamics
 from drone_rl.sim.tasks import Task, as_task
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.schema import Record, Several, as_mapping, shown
-from drone_rl.utils.settings import Settings, plain
+from drone_rl.utils.schema import Several, as_mapping, shown
+from drone_rl.utils.settings import Settings
 
 FORMAT = "drone_rl policy"
 FORMAT_VERSION = 2
@@ -41,7 +45,6 @@ MOST_PIXELS = 2**18
 """Of a camera's frame."""
 MOST_NUMBERS = 2**20
 """Of one picture after any transform."""
-MOST_TRANSFORMS = 16
 _KEYS = ("format", "format_version", "task", "camera", "transforms", "network")
 _OPTIONAL: dict[str, tuple[type[Settings], Settings]] = {
     "appearance": (AppearanceSettings, MINIMAL),
@@ -49,23 +52,6 @@ _OPTIONAL: dict[str, tuple[type[Settings], Settings]] = {
     "actions": (ActionSettings, MOVES_SETTINGS),
 }
 """The keys that may be missing, with what they then mean."""
-
-
-@dataclasses.dataclass(frozen=True)
-class Choice:
-    """A registered part and the values of its parameters."""
-
-    name: str
-    values: Mapping[str, Any]
-
-    def as_dict(self) -> dict[str, Any]:
-        """As in files."""
-        return {"name": self.name, **{k: plain(v) for k, v in self.values.items()}}
-
-    def make_transform(self) -> Transform:
-        """The transform that it stands for."""
-        part = TRANSFORMS[self.name]
-        return part.make(**self.values, **part.fixed)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -78,9 +64,9 @@ class PolicyDescription:
 
     task: BaseTaskSettings
     camera: CameraSettings
-    transforms: tuple[Choice, ...]
+    transforms: tuple[Transform, ...]
     """In the order in which they are applied."""
-    network: Choice
+    network: Network
     appearance: AppearanceSettings = MINIMAL
     """How the worlds look; files without it mean the minimal one."""
     dynamics: DynamicsSettings = COMPUTER_VISION
@@ -94,7 +80,7 @@ class PolicyDescription:
         pixels = self.camera.width * self.camera.height
         if pixels > MOST_PIXELS:
             raise InputError(f"camera has {pixels} pixels; give at most {MOST_PIXELS}")
-        if not self.picture.is_float:
+        if not self.input.is_float:
             raise InputError("the network needs floats; add a transform such as gray")
         expected = self.expected_weights()
         count = sum(value.numel() for value in expected.values())
@@ -105,31 +91,31 @@ class PolicyDescription:
             )
 
     @property
-    def picture(self) -> Picture:
-        """What the network sees."""
-        picture = Picture((self.camera.height, self.camera.width, 3))
-        for choice in self.transforms:
-            picture = TRANSFORMS[choice.name].change(picture, choice.values)
-            if math.prod(picture.shape) > MOST_NUMBERS:
+    def input(self) -> Frame:
+        """Shape and type of the network's input."""
+        frame = Frame((self.camera.height, self.camera.width, 3))
+        for transform in self.transforms:
+            frame = output_of(transform, frame)
+            if math.prod(frame.shape) > MOST_NUMBERS:
                 raise InputError(
-                    f"the transform {choice.name} makes pictures of shape {picture.shape}; give "
+                    f"the transform {transform.name} makes pictures of shape {frame.shape}; give "
                     f"sizes that make at most {MOST_NUMBERS} numbers"
                 )
-        return picture
+        return frame
 
     @property
     def frames(self) -> int:
-        """How many frames the network sees at once."""
-        return math.prod(c.values["N"] for c in self.transforms if c.name == "stack")
+        """Number of frames that the network gets at once."""
+        return math.prod(t.N for t in self.transforms if isinstance(t, Stack))
 
     @property
     def faults(self) -> tuple[str, ...]:
-        """Names of the transforms by which the camera goes wrong, by chance or with memory."""
-        return tuple(c.name for c in self.transforms if TRANSFORMS[c.name].is_fault)
+        """Names of the transforms that simulate camera faults."""
+        return tuple(t.name for t in self.transforms if isinstance(t, Fault))
 
     def without_faults(self) -> "PolicyDescription":
-        """The same behind a camera of which none is known."""
-        sound = tuple(c for c in self.transforms if not TRANSFORMS[c.name].is_fault)
+        """Return the same description without camera faults."""
+        sound = tuple(t for t in self.transforms if not isinstance(t, Fault))
         return dataclasses.replace(self, transforms=sound)
 
     def as_dict(self) -> dict[str, Any]:
@@ -141,8 +127,8 @@ class PolicyDescription:
             "format_version": FORMAT_VERSION,
             "task": self.task.values(),
             "camera": self.camera.values(),
-            "transforms": [choice.as_dict() for choice in self.transforms],
-            "network": self.network.as_dict(),
+            "transforms": [_as_dict(transform) for transform in self.transforms],
+            "network": _as_dict(self.network),
             **special,
         }
 
@@ -188,9 +174,9 @@ class PolicyDescription:
         """How the drone moves."""
         return make_dynamics(as_task(self.task), self.dynamics, self.actions)
 
-    def make_transforms(self) -> list[Transform]:
-        """The described transforms, in their order."""
-        return [choice.make_transform() for choice in self.transforms]
+    def make_transforms(self) -> list[TorchrlTransform]:
+        """Build the transforms in order."""
+        return [transform.make() for transform in self.transforms]
 
     def build_network(self, generator: torch.Generator | None = None) -> PolicyNetwork:
         """The described network with fresh weights.
@@ -233,8 +219,54 @@ class PolicyDescription:
         return network
 
     def _layers(self, outputs: int, generator: torch.Generator | None) -> PolicyNetwork:
-        make = NETWORKS[self.network.name].make
-        return make(self.picture.shape, outputs, generator=generator, **self.network.values)
+        return self.network.make(self.input.shape, outputs, generator=generator)
+
+
+def describe(settings: TrainSettings) -> PolicyDescription:
+    """Return the description of the policy that a training creates.
+
+    Args:
+        settings: Settings of the training.
+
+    Raises:
+        InputError: A part isn't registered, or a value is out of bounds.
+    """
+    for where, part in (
+        ("network", settings.network),
+        *(("transforms", t) for t in settings.transforms),
+    ):
+        if not part.is_known:
+            kind = "network" if where == "network" else "transform"
+            raise InputError(
+                f"{where}._target_={part.target} is not registered, so no file could describe it; "
+                f"register it with drone_rl.register_{kind} and give plugins=[MODULE]"
+            )
+    return PolicyDescription(
+        settings.task,
+        settings.camera,
+        settings.transforms,
+        settings.network,
+        **{name: getattr(settings, name) for name in _OPTIONAL},
+    )
+
+
+def output_of(transform: Transform, frame: Frame) -> Frame:
+    """Return shape and type of an image after a transform.
+
+    Args:
+        transform: Settings of the transform.
+        frame: Shape and type of its input.
+
+    Raises:
+        InputError: The transform can't process such images.
+    """
+    stated = transform.output(frame)
+    if stated is not None:
+        return stated
+    made: Any = transform.make()
+    zeros = torch.zeros(1, *frame.shape, dtype=torch.float32 if frame.is_float else torch.uint8)
+    after: torch.Tensor = made._apply_transform(zeros)
+    return Frame(tuple(after.shape[1:]), after.is_floating_point())
 
 
 def parse(data: Any) -> PolicyDescription:
@@ -259,30 +291,30 @@ def parse(data: Any) -> PolicyDescription:
         raise InputError(
             f"the policy's description has exactly {', '.join(_KEYS)}; not so: {names}"
         )
-    chosen = Several(_ChoiceOf(TRANSFORMS), 0, MOST_TRANSFORMS).read(
-        data["transforms"], "transforms"
-    )
     special: dict[str, Any] = {
         name: of.read(data[name], name) for name, (of, _) in _OPTIONAL.items() if name in data
     }
+    transforms = Several(_Registered(Transform), 0, MOST_TRANSFORMS)
     return PolicyDescription(
         read_task(data["task"], "task"),
         CameraSettings.read(data["camera"], "camera"),
-        chosen,
-        _ChoiceOf(NETWORKS).read(data["network"], "network"),
+        transforms.read(data["transforms"], "transforms"),
+        _Registered(Network).read(data["network"], "network"),
         **special,
     )
 
 
 @dataclasses.dataclass(frozen=True)
-class _ChoiceOf:
-    """The kind of value that names a part and gives its parameters."""
+class _Registered:
+    """The kind of a mapping with the name of a registered part and its settings."""
 
-    parts: Mapping[str, Part]
+    part: type[Variant]
 
-    def read(self, value: Any, where: str) -> Choice:
+    def read(self, value: Any, where: str) -> Any:
         """See `drone_rl.utils.schema.Kind`."""
         given = dict(as_mapping(value, where))
-        name = given.pop("name", None)
-        parameters: Record = find_part(self.parts, name, f"{where}.name").parameters
-        return Choice(str(name), parameters.read(given, where))
+        return self.part.named(given.pop("name", None), f"{where}.name").read(given, where)
+
+
+def _as_dict(part: Variant) -> dict[str, Any]:
+    return {"name": part.name, **part.values()}

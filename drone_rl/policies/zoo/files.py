@@ -10,11 +10,9 @@ from safetensors import SafetensorError
 from safetensors.torch import load, save
 
 from drone_rl.policies.zoo.description import FORMAT, MOST_PARAMETERS, parse
-from drone_rl.policies.zoo.migration import describe
 from drone_rl.utils.checkpoint import check_weights, load_checkpoint
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import parse_json, read_bytes
-from drone_rl.utils.former_names import with_present_names
 from drone_rl.utils.overrides import COMMAND
 from drone_rl.utils.schema import Kind, Maybe, Plain, Real, Record, Text, Whole, as_mapping, shown
 
@@ -24,6 +22,7 @@ _ENTRY = {"dtype", "shape", "data_offsets"}
 """What a file of safetensors states of each tensor."""
 _FOLDER = Path(__file__).resolve().parent
 _COUNT = Whole(0, 2**62)
+_NAMES_OF_0_1 = {"running_cubes": "running_reward"}
 _PROGRESS = Record(
     {
         "frames": _COUNT,
@@ -133,12 +132,11 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
             if key not in state:
                 raise InputError(f"it has no {key}")
         state["config"] = Plain().read(as_mapping(state["config"], "config"), "config")
-        is_old = state["format_version"] == 1
-        description = describe(state["config"]) if is_old else parse(state.get("description"))
+        description = parse(state.get("description"))
         checked = {
             "description": description.as_dict(),
             "policy": check_weights(state["policy"], description.expected_weights()),
-            "progress": _PROGRESS.read(state["progress"], "progress"),
+            "progress": _PROGRESS.read(_progress_of(state["progress"]), "progress"),
             "provenance": _PROVENANCE.read(state["provenance"], "provenance"),
         }
     except InputError as error:
@@ -182,13 +180,10 @@ def _exported(content: bytes) -> dict[str, Any]:
             raise InputError(f"the weights {shown(name)} do not state {', '.join(sorted(_ENTRY))}")
         if entry["dtype"] != "F32":
             raise InputError(f"the weights {shown(name)} are not float32")
-    is_old = "description" not in metadata
     about = dict(as_mapping(_inner(metadata, "about"), "about"))
     if "progress" in about:
-        about["progress"] = with_present_names(as_mapping(about["progress"], "progress"))
-    description = (
-        describe(about.pop("config", None)) if is_old else parse(_inner(metadata, "description"))
-    )
+        about["progress"] = _progress_of(about["progress"])
+    description = parse(_inner(metadata, "description"))
     try:
         weights = load(content)
     except (SafetensorError, ValueError, KeyError, TypeError, RuntimeError) as error:
@@ -205,3 +200,9 @@ def _inner(metadata: Mapping[str, Any], key: str) -> Any:
     if not isinstance(text, str):
         raise InputError(f"its {key} is missing")
     return parse_json(text, f"its {key}")
+
+
+def _progress_of(progress: Any) -> dict[str, Any]:
+    """The progress of a file; version 0.1 wrote "running_cubes" for "running_reward"."""
+    given = as_mapping(progress, "progress")
+    return {_NAMES_OF_0_1.get(name, name): value for name, value in given.items()}

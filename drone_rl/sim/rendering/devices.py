@@ -46,7 +46,7 @@ def start_warp(device: str) -> None:
         wp.init()  # its native part ignores the log level
 
 
-def load_kernels(kernels: ModuleType) -> Future[None]:
+def load_kernels(kernels: ModuleType | wp.Module) -> Future[None]:
     """Compile a module's CPU kernels, or load them from Warp's cache, in a thread.
 
     Compiling a module takes seconds, but several modules compile in parallel: call this early, and
@@ -58,7 +58,7 @@ def load_kernels(kernels: ModuleType) -> Future[None]:
 
 
 @functools.cache
-def _load_kernels(kernels: ModuleType, process: int) -> Future[None]:
+def _load_kernels(kernels: ModuleType | wp.Module, process: int) -> Future[None]:
     del process  # a fork has none of its parent's threads
     compiler = ThreadPoolExecutor(1, "compile")
     loaded = compiler.submit(_load, kernels)
@@ -66,7 +66,7 @@ def _load_kernels(kernels: ModuleType, process: int) -> Future[None]:
     return loaded
 
 
-def _load(kernels: ModuleType) -> None:
+def _load(kernels: ModuleType | wp.Module) -> None:
     wp.load_module(kernels, device="cpu")
 
 

@@ -86,6 +86,13 @@ class RendererFactory(Protocol):
         ...
 
 
+_CLASSES = {
+    "raytrace": "drone_rl.sim.rendering.raytrace.renderer.Raytracer",
+    "mujoco_warp": "drone_rl.sim.rendering.mujoco_warp.WarpRenderer",
+}
+"""The class of each renderer, imported when it is needed."""
+
+
 def find_renderer(which: str | RendererFactory) -> RendererFactory:
     """Return a renderer's factory.
 
@@ -99,5 +106,5 @@ def find_renderer(which: str | RendererFactory) -> RendererFactory:
         return which
     if which not in RENDERERS:
         raise InputError(f"renderer={which!r} is unknown; give one of: {', '.join(RENDERERS)}")
-    module, _, name = RENDERERS[which].rpartition(".")
+    module, _, name = _CLASSES[which].rpartition(".")
     return getattr(importlib.import_module(module), name)

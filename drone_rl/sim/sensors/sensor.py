@@ -1,15 +1,18 @@
-"""Readings at a rate, told late, and held until the next one."""
+"""What sensors share: sampling at a rate with latency, noise processes, and the base class."""
 
+import abc
 import dataclasses
 import math
+from typing import Generic, Protocol, TypeVar
 
 import torch
 from torch import Tensor
 
+from drone_rl.sim.dynamics.state import BodyState
 from drone_rl.utils.batch import Batch
 
 _ROUNDING = 1e-6
-"""Share of a period by which a time that is summed up tick by tick may miss its mark."""
+"""Fraction of a period by which a time that is summed tick by tick may miss its mark."""
 
 
 @dataclasses.dataclass
@@ -17,37 +20,37 @@ class Samples(Batch):
     """The latest readings of one sensor of `num_worlds` drones, the newest last."""
 
     began: Tensor  # (num_worlds,) float64
-    """When the sensor was turned on, seconds."""
+    """When the sensor was switched on, seconds."""
     count: Tensor  # (num_worlds,) int64
     """Readings that were due since then."""
     times: Tensor  # (num_worlds, slots) float64
-    """When each was taken, seconds; minus infinity where there is none."""
+    """When each was taken, seconds; minus infinity for none."""
     rows: Tensor  # (num_worlds, slots, width) float64
-    """What each says."""
+    """Values of each."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Sampling:
-    """When readings are taken, and when they are told.
+    """When readings are taken and delivered.
 
-    The k-th is due `startup + k / rate` seconds after the start, k from 0, and is taken at the
-    first time asked for from then on: so their mean rate is `rate` whatever the ticks. Where
-    several are due at once, one is taken.
+    Reading k = 0, 1, ... is due `startup + k / rate` seconds after the start, and is taken at the
+    first update from then on, so the mean rate is `rate` at any tick length. If several are due at
+    once, one is taken.
     """
 
     rate: float
-    """Readings a second."""
+    """Readings per second."""
     latency: float = 0.0
-    """Seconds from taking a reading to telling it."""
+    """Seconds from taking a reading to delivering it."""
     startup: float = 0.0
     """Seconds until the first is taken."""
 
     def start(self, time: Tensor, width: int) -> Samples:
-        """Sensors that are turned on and have taken nothing yet.
+        """Return sensors that are switched on and have taken nothing yet.
 
         Args:
             time: Seconds. Shape: (num_worlds,), float64.
-            width: Numbers that a reading has.
+            width: Numbers in a reading.
         """
         slots = math.ceil(self.latency * self.rate) + 2
         times = time.new_full((len(time), slots), -math.inf)
@@ -55,55 +58,122 @@ class Sampling:
         return Samples(time.clone(), torch.zeros_like(time, dtype=torch.int64), times, rows)
 
     def due(self, samples: Samples, time: Tensor) -> Tensor:
-        """Whose next reading is due. Shape: (num_worlds,), bool."""
+        """Return where the next reading is due. Shape: (num_worlds,), bool."""
         return self._count(samples, time) > samples.count
 
     def take(self, samples: Samples, time: Tensor, rows: Tensor) -> Samples:
-        """The same with a reading more, of those whose next one is due.
+        """Append a reading where one is due.
 
         Args:
-            samples: Before; they stay as they are.
+            samples: Before; not changed.
             time: Now, seconds. Shape: (num_worlds,), float64.
-            rows: What a reading would say now. Shape: (num_worlds, width), float64.
+            rows: Values of a reading now. Shape: (num_worlds, width), float64.
         """
         count = self._count(samples, time)
-        is_due = (count > samples.count)[:, None]
+        is_due = count > samples.count
         times = torch.cat([samples.times[:, 1:], time[:, None]], 1)
         taken = torch.cat([samples.rows[:, 1:], rows[:, None]], 1)
         return Samples(
             samples.began,
             torch.maximum(count, samples.count),
-            torch.where(is_due, times, samples.times),
-            torch.where(is_due[..., None], taken, samples.rows),
+            select(is_due, times, samples.times),
+            select(is_due, taken, samples.rows),
         )
 
     def read(self, samples: Samples, time: Tensor) -> tuple[Tensor, Tensor]:
-        """The newest reading that is old enough to be told.
+        """Return the newest reading that is old enough to be delivered.
 
         Args:
             samples: Those taken until now.
             time: Now, seconds. Shape: (num_worlds,), float64.
 
         Returns:
-            When it was taken, seconds, minus infinity where there is none yet. Shape:
-            (num_worlds,). What it says, zeros where there is none. Shape: (num_worlds, width).
+            When it was taken, seconds, minus infinity for none, shape (num_worlds,), and its
+            values, zeros for none, shape (num_worlds, width).
         """
         latest = (time - self.latency + _ROUNDING / self.rate)[:, None]
         newest = ((samples.times <= latest).sum(1) - 1).clamp(min=0)
         worlds = torch.arange(len(time), device=time.device)
-        is_told = samples.times[worlds, newest] <= latest[:, 0]
-        taken = torch.where(is_told, samples.times[worlds, newest], -math.inf)
-        return taken, torch.where(is_told[:, None], samples.rows[worlds, newest], 0.0)
+        is_delivered = samples.times[worlds, newest] <= latest[:, 0]
+        taken = torch.where(is_delivered, samples.times[worlds, newest], -math.inf)
+        return taken, torch.where(is_delivered[:, None], samples.rows[worlds, newest], 0.0)
 
     def _count(self, samples: Samples, time: Tensor) -> Tensor:
         periods = (time - samples.began - self.startup) * self.rate
         return (torch.floor(periods + _ROUNDING) + 1).clamp(min=0).long()
 
 
-def normal(like: Tensor, generator: torch.Generator) -> Tensor:
-    """Normal numbers of mean 0 and deviation 1, of the shape, type and device of a tensor.
+class _Sampled(Protocol):
+    samples: Samples
 
-    They are drawn where the generator is: one of the CPU gives the same numbers on every device.
+
+State = TypeVar("State", bound=_Sampled)
+Reading = TypeVar("Reading")
+
+
+class Sensor(abc.ABC, Generic[State, Reading]):
+    """A sensor of a batch of drones; its settings are AirSim's by default.
+
+    States are immutable. Noise comes from the caller's generator; it is drawn for all drones where
+    a reading of any is due.
+    """
+
+    sampling: Sampling
+
+    def start(self, body: BodyState, time: Tensor, generator: torch.Generator) -> State:
+        """Switch the sensors on; those without start-up time take a reading.
+
+        Args:
+            body: The drones.
+            time: Now, seconds. Shape: (num_worlds,), float64.
+            generator: Of the noise.
+        """
+        return self.update(self._initial(body, time, generator), body, time, generator)
+
+    def update(
+        self, state: State, body: BodyState, time: Tensor, generator: torch.Generator
+    ) -> State:
+        """Return the sensors at a later time; a reading is taken where one is due.
+
+        Args:
+            state: Before; not changed.
+            body: The drones now.
+            time: Now, seconds. Shape: (num_worlds,), float64.
+            generator: Of the noise.
+        """
+        is_due = self.sampling.due(state.samples, time)
+        return self._sample(state, body, time, generator, is_due) if is_due.any() else state
+
+    def read(self, state: State, time: Tensor) -> Reading:
+        """Return the readings that are delivered at a time (seconds, shape (num_worlds,))."""
+        return self._reading(*self.sampling.read(state.samples, time))
+
+    @abc.abstractmethod
+    def _initial(self, body: BodyState, time: Tensor, generator: torch.Generator) -> State: ...
+
+    @abc.abstractmethod
+    def _sample(
+        self,
+        state: State,
+        body: BodyState,
+        time: Tensor,
+        generator: torch.Generator,
+        is_due: Tensor,
+    ) -> State: ...
+
+    @abc.abstractmethod
+    def _reading(self, time: Tensor, rows: Tensor) -> Reading: ...
+
+
+def select(condition: Tensor, chosen: Tensor, other: Tensor) -> Tensor:
+    """Choose rows of two tensors. Shapes: (num_worlds,) and (num_worlds, *)."""
+    return torch.where(condition.view(-1, *[1] * (chosen.ndim - 1)), chosen, other)
+
+
+def normal(like: Tensor, generator: torch.Generator) -> Tensor:
+    """Draw standard normal numbers of the shape, type and device of a tensor.
+
+    They are drawn on the generator's device: a CPU generator gives the same on every device.
     """
     drawn = torch.randn(like.shape, dtype=like.dtype, generator=generator, device=generator.device)
     return drawn.to(like.device)
@@ -112,28 +182,28 @@ def normal(like: Tensor, generator: torch.Generator) -> Tensor:
 def random_walk_step(
     value: Tensor, strength: float, time: float, seconds: Tensor, generator: torch.Generator
 ) -> Tensor:
-    """A random walk a step farther on.
+    """Advance a random walk by one step.
 
     Args:
         value: Before. Shape: (num_worlds, n).
-        strength: Standard deviation of what is added in `time`.
+        strength: Standard deviation of the increment over `time`.
         time: Seconds.
         seconds: Length of the step. Shape: (num_worlds,).
         generator: Of the noise.
     """
-    share = (seconds / time).clamp(min=0.0).sqrt()[:, None]
-    return value + strength * share * normal(value, generator)
+    scale = (seconds / time).clamp(min=0.0).sqrt()[:, None]
+    return value + strength * scale * normal(value, generator)
 
 
 def gauss_markov_step(
     value: Tensor, strength: float, time: float, seconds: Tensor, generator: torch.Generator
 ) -> Tensor:
-    """A Gauss-Markov process a step farther on: it forgets itself, and stays within bounds.
+    """Advance a first-order Gauss-Markov process by one step.
 
     Args:
         value: Before. Shape: (num_worlds, n).
-        strength: Standard deviation after a long time, whatever the steps.
-        time: Seconds in which 63% of the value is gauss_markov_step.
+        strength: Stationary standard deviation.
+        time: Time constant, seconds.
         seconds: Length of the step. Shape: (num_worlds,).
         generator: Of the noise.
     """

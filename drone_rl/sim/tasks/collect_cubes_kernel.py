@@ -318,6 +318,9 @@ def move(flights: Flights, world: int, action: int) -> float:
 class FlyingCubes:
     """Arrays of environments, rewritten for each batch of episodes."""
 
+    functions = (Flights, place, move)
+    """See `FusedRules`."""
+
     def __init__(self, settings: TaskSettings, dynamics: Dynamics, num_envs: int) -> None:
         """Allocate the arrays of at most `num_envs` environments; see `supports`."""
         num_cubes = settings.num_cubes

@@ -129,8 +129,10 @@ class Grid(NamedTuple):
 class FusedRules(Protocol):
     """Arrays of environments on which the fused episode kernel runs the rules of a task."""
 
+    functions: tuple[Any, Any, Any]
+    """Warp structure of the states; functions that write poses and that step an environment."""
     flights: Any
-    """Warp structure of the states."""
+    """The states."""
     poses: Any
     """Warp structure of the poses that are rendered."""
     steps: Tensor
@@ -172,7 +174,7 @@ class Task(abc.ABC, Generic[S]):
     """What reports call its goals and targets."""
     strata: tuple[str, ...] = ("anywhere",)
     """Where a goal can stand, from left to right: verdicts count each stratum separately."""
-    luck: tuple[str, ...] = ("random", "forward", "left", "right")
+    blind_baselines: tuple[str, ...] = ("random", "forward", "left", "right")
     """Baselines that see nothing: "random", and actions that are always taken, by name."""
     scored: tuple[str, ...] = ("drawn", "end_reason")
     """Entries of an episode's last information that `score` reads."""

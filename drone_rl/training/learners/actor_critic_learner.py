@@ -13,10 +13,15 @@ from drone_rl.collectors import take_rows
 from drone_rl.objectives import Advantages
 from drone_rl.policies import ActorCritic
 from drone_rl.policies.critic import LOG_PROB, PIXELS, VALUE
-from drone_rl.training.learners.gradient import accumulate, descend
-from drone_rl.training.learners.learner import NotANumberError
+from drone_rl.training.learners.learner import (
+    NotANumberError,
+    accumulate,
+    check_entries,
+    descend,
+)
 from drone_rl.training.restore import check_fits, check_optimiser
 
+ADVANTAGE, TARGET, ENTROPY = "advantage", "value_target", "entropy"
 _TOLD = ("loss_objective", "loss_critic", "loss_entropy", "clip_fraction", "kl_approx")
 """What is told of a loss, as far as it has it."""
 
@@ -71,13 +76,14 @@ class ActorCriticLearner:
         self.max_grad_norm = max_grad_norm
         self.chunk_frames = chunk_frames
         following = (PIXELS, "reward", "done", "terminated")
-        self.in_keys = [PIXELS, "action", *(("next", key) for key in following)]
+        self._read = [PIXELS, "action", *(("next", key) for key in following)]
+        self.in_keys = [PIXELS, "action", LOG_PROB, VALUE, ADVANTAGE, TARGET, ENTROPY]
 
     def update(self, batch: TensorDictBase) -> dict[str, float]:
         """Learns from a rollout.
 
         Args:
-            batch: Rows of steps, with what was seen after each. Shape: (num_envs, T).
+            batch: As returned by `estimate`. Shape: (num_envs, T).
 
         Returns:
             Means over the minibatches: the terms of the loss, how far the policy went from where it
@@ -89,7 +95,8 @@ class ActorCriticLearner:
         """
         before = copy.deepcopy(self.state_dict())
         try:
-            steps, entropy = self._estimated(batch)
+            steps = batch.select(*self.in_keys).reshape(-1)
+            entropy = float(steps.pop(ENTROPY).mean())
             told = list(self._descend(steps))
         except NotANumberError:
             self.load_state_dict(before)
@@ -102,19 +109,31 @@ class ActorCriticLearner:
         return {**means, "loss/entropy": entropy, "train/learning_rate": rate}
 
     @torch.no_grad()
-    def _estimated(self, batch: TensorDictBase) -> tuple[TensorDictBase, float]:
-        """The steps one after the other, with advantages, and the policy's mean entropy."""
-        steps = batch.select(PIXELS, "action").reshape(-1)
-        seen = self._look(steps.get(PIXELS))
-        chances = self.model.actor.get_dist(seen)
-        steps.set(LOG_PROB, chances.log_prob(steps.get("action")))
+    def estimate(self, batch: TensorDictBase) -> TensorDictBase:
+        """Add the entries that the loss reads; the collector's `postproc`.
+
+        Args:
+            batch: Rows of steps, with the next observation of each. Shape: (num_envs, T).
+
+        Returns:
+            The batch, with log-probability, entropy and value of the policy that collected it, with
+            "advantage" and "value_target".
+
+        Raises:
+            InputError: An entry is missing.
+        """
+        check_entries(batch, self._read, type(self).__name__)
+        seen = self._look(batch.get(PIXELS).flatten(0, batch.ndim - 1))
+        policy = self.model.actor.get_dist(seen)
         value = seen.get(VALUE).reshape(*batch.shape, 1)
         after = batch.get("next").select("reward", "done", "terminated")
         after.set(VALUE, self._after(batch, value))
         estimated = self.estimator(TensorDict({VALUE: value, "next": after}, batch.shape))
-        for key in (VALUE, "advantage", "value_target"):
-            steps.set(key, estimated.get(key).reshape(-1, 1))
-        return steps, float(chances.entropy().mean())
+        for key in (VALUE, ADVANTAGE, TARGET):
+            batch.set(key, estimated.get(key))
+        log_prob = policy.log_prob(batch.get("action").flatten(0, batch.ndim - 1))
+        batch.set(LOG_PROB, log_prob.reshape(batch.shape))
+        return batch.set(ENTROPY, policy.entropy().reshape(batch.shape))
 
     def _after(self, batch: TensorDictBase, value: Tensor) -> Tensor:
         """What the state after each step is worth; anything after a terminal one. Shape: kept."""

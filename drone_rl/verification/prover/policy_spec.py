@@ -129,7 +129,7 @@ def make_compositor(description: PolicyDescription, images: CubeImages) -> Compo
     if names[:1] != ["gray"]:
         raise InputError("the policy observes colours; prove one whose first transform is gray")
     count = next((i for i, n in enumerate(names) if n not in _SHADES), len(names))
-    made = [choice.make_transform() for choice in chosen]
+    made = [choice.make() for choice in chosen]
     shade, rest = on_pixels(made[:count]), on_pixels(made[count:])
     background = shade(images.background[None])[0, 0]
     faces = shade(images.colors[None, None, FRONT:])[0, 0, 0]

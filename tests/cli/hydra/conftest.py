@@ -6,7 +6,7 @@ import pytest
 from hydra import compose, initialize_config_dir
 
 from drone_rl.cli.hydra.composition import conf_dir, read_settings, register_schemas
-from drone_rl.cli.usage import COMMANDS
+from drone_rl.cli.main import COMMANDS
 
 MODULES = {c.replace("-", "_"): None for c in COMMANDS}
 

@@ -12,9 +12,8 @@ from hydra.errors import HydraException
 
 from drone_rl.cli.hydra import composition
 from drone_rl.cli.hydra.composition import conf_dir
-from drone_rl.cli.usage import COMMANDS
+from drone_rl.cli.main import COMMANDS
 from drone_rl.config import CameraSettings, DynamicsSettings, PillarsSettings, TaskSettings
-from drone_rl.config.configuration import as_config
 from drone_rl.config.training import TrainSettings
 from drone_rl.policies.zoo import describe
 from drone_rl.utils.errors import InputError
@@ -50,7 +49,7 @@ def test_a_command_is_told_the_same_by_its_file_and_in_code(command, settings):
 def test_every_setting_of_a_command_is_typed(command, config):
     composed = config(command)
     types = types_of(commands()[command])
-    assert set(composed) == set(types)
+    assert set(composed) == {*types, "plugins"}
     numbers = [name for name, hint in types.items() if hint in (int, float)]
     for name in numbers:
         with pytest.raises(HydraException):
@@ -58,14 +57,6 @@ def test_every_setting_of_a_command_is_typed(command, config):
 
 
 PARTS = {**composition.PARTS, **composition.SEVERAL}
-
-
-@pytest.mark.parametrize(("group", "name"), files(*composition.PARTS))
-def test_every_choice_is_told_the_same_by_its_file_and_in_code(group, name, settings):
-    choice = f"{group}={name}"
-    chosen = getattr(settings("train", choice, *NEEDS.get(choice, ())), group)
-    assert chosen.is_known
-    assert chosen == type(chosen)()
 
 
 @pytest.mark.parametrize("part", PARTS.values(), ids=lambda part: part.__name__)
@@ -90,7 +81,7 @@ def test_every_setting_of_every_choice_is_typed(group, name, config):
 def test_every_choice_of_what_a_policy_is_builds(group, name, settings):
     frame = ["camera=frame"] if name == "original" else []  # whose rows are of that frame
     told = settings("train", f"{group}={name}", *frame).narrowed(TrainSettings)
-    described = describe(as_config(told))
+    described = describe(told)
     env = described.build_env(1, seed=0, device="cpu")
     network = described.build_network(torch.Generator().manual_seed(0))
     assert network(env.reset()["pixels"]).shape == (1, 3)
@@ -123,7 +114,7 @@ def test_every_optimiser_and_schedule_builds_and_steps(group, name, settings):
 @pytest.mark.parametrize(("group", "name"), files("experiment", "sweep"))
 def test_every_experiment_and_sweep_composes_and_describes_a_policy(group, name, settings):
     told = settings("train", f"{group}={name}").narrowed(TrainSettings)
-    assert describe(as_config(told)).network.name
+    assert describe(told).network.name
 
 
 @pytest.mark.parametrize("name", [name for _, name in files("sweep")])
@@ -180,7 +171,7 @@ def test_an_objective_brings_what_it_needs_unless_that_is_given(objective, setti
     told = settings("train", "returns.lmbda=0.5", f"objective={objective}", "collector.num_envs=8")
     assert (told.returns.lmbda, told.collector.num_envs) == (0.5, 8)
     composed = config("train", [f"objective={objective}", "collector=episodes"])
-    assert composed.collector._target_.endswith("threaded_collector")
+    assert composed.collector._target_ == "threads"
 
 
 def test_a_pipeline_keeps_its_order(settings):
@@ -222,7 +213,7 @@ def test_typos_in_dynamics_die_when_composing(override, config):
 def test_a_training_in_another_body_composes_and_describes_a_policy(settings):
     told = settings("train", "dynamics=quadrotor", "dynamics.wind=[5,0,0]", "actions.move_speed=2")
     assert told.dynamics == DynamicsSettings(mode="simple_flight", wind=(5.0, 0.0, 0.0))
-    described = describe(as_config(told.narrowed(TrainSettings)))
+    described = describe(told.narrowed(TrainSettings))
     assert (described.dynamics, described.actions.move_speed) == (told.dynamics, 2.0)
     assert settings("train", "dynamics=quadrotor", "dynamics.mode=computer_vision") == settings(
         "train"

@@ -25,7 +25,7 @@ def test_a_file_says_what_the_files_do_that_it_starts_from():
     found = comments("train", CONF, {"transforms": "original", "task": "collect_one"})
     assert found["transforms.gray"] == "RGB bytes to gray from 0 to 1."
     assert found["transforms.crop.top"] == "First row."
-    assert found["task.spacing"] == "Distance in x from one cube to the next, metres."
+    assert found["task.spacing"] == "Distance in x from one cube to the next."
     assert found["seed"].startswith("Root of every random stream")
 
 

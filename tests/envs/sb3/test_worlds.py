@@ -127,7 +127,7 @@ def test_what_can_be_asked_of_worlds(make):
 
 
 def test_mistakes_are_told_in_a_line(make):
-    with pytest.raises(InputError, match=r"^autoreset_mode=NextStep, but Stable-Baselines3 exp"):
+    with pytest.raises(InputError, match=r"^autoreset_mode=NextStep, but Stable-Baselines3 needs"):
         drone_rl.Sb3Worlds(gymnasium.make_vec(NAME, num_envs=2))
     with pytest.raises(InputError, match=r"^transforms stack frames; use .* VecFrameStack$"):
         make([Gray(), Stack()])
@@ -136,12 +136,12 @@ def test_mistakes_are_told_in_a_line(make):
     with pytest.raises(InputError, match=r"^GrayPixels got torch.float32 frames"):
         make([Gray()], observations="state")
     env = make(num_envs=2)
-    with pytest.raises(InputError, match=r"^wind can't be set of worlds apart"):
+    with pytest.raises(InputError, match=r"^wind can't be set per environment"):
         env.set_attr("wind", 1)
-    with pytest.raises(InputError, match=r"^blow can't be called of worlds apart"):
+    with pytest.raises(InputError, match=r"^blow can't be called per environment"):
         env.env_method("blow")
     env.set_options({"start": 1})
-    with pytest.raises(InputError, match=r"^options are unknown to reset"):
+    with pytest.raises(InputError, match=r"^reset takes no options"):
         env.reset()
 
 

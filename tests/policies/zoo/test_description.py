@@ -94,7 +94,7 @@ def test_pictures_are_of_the_foretold_shape(camera, transforms, shape):
     data = {**DEFAULT, "transforms": transforms}
     data["camera"] = {"height": camera[0], "width": camera[1], "horizontal_fov": 90.0}
     described = parse(data)
-    assert described.picture.shape == shape
+    assert described.input.shape == shape
     env = described.build_env(1, seed=0, device="cpu")
     assert tuple(env.reset()["pixels"].shape[1:]) == shape
     env.close()
@@ -147,16 +147,16 @@ def test_pictures_are_of_the_foretold_shape(camera, transforms, shape):
         (
             "transforms",
             [GRAY, {**DEAD, "rows": [3, 3]}],
-            r"^transforms\.dead_rows\.rows=\[3, 3\] names a row twice",
+            r"^transforms\[1\]\.rows=\[3, 3\] names a row twice",
         ),
         ("transforms", [GRAY, {**STACK, "N": 17}], "N=17"),
         ("transforms", [GRAY, {**STACK, "N": 16}, {**STACK, "N": 16}, {**STACK, "N": 16}], "shape"),
         ("transforms.1.std", 0.0, r"transforms\[1\]\.std=0\.0"),
-        ("transforms.0.name", "exec", r"transforms\[0\]\.name='exec' is unknown"),
+        ("transforms.0.name", "exec", r"transforms\[0\]\.name='exec' is not registered"),
         ("transforms.0._target_", "os.system", "'_target_' is unknown"),
-        ("network.name", "os.system", "network.name='os.system' is unknown"),
-        ("network.name", ["mlp"], r"network.name=\(list\) is unknown"),
-        ("network.name", ..., "network.name=None is unknown"),
+        ("network.name", "os.system", "network.name='os.system' is not registered"),
+        ("network.name", ["mlp"], r"network.name=\(list\) is not registered"),
+        ("network.name", ..., "network.name=None is not registered"),
         ("network.hidden", [128] * 9, "0 to 8 values"),
         ("network.hidden", [4097], r"hidden\[0\]=4097"),
         ("network.hidden", [4096] * 3, "parameters"),
@@ -192,12 +192,12 @@ def test_what_is_no_description(data):
 def test_reading_a_description_computes_nothing():
     """What is computed on no device loads torch's symbolic algebra: half a second a start."""
     code = """import sys
-from drone_rl.utils.compiler import leave_compiler_unloaded
+from drone_rl.utils.imports import leave_compiler_unloaded
 leave_compiler_unloaded()
 from drone_rl.config.configuration import as_config
 from drone_rl.config.training import TrainSettings
 from drone_rl.policies.zoo import describe
-describe(as_config(TrainSettings())).expected_weights()
+describe(TrainSettings()).expected_weights()
 print("sympy" in sys.modules)"""
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "False\n"

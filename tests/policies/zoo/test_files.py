@@ -24,7 +24,6 @@ from drone_rl.verdicts.export import export_policy
 from tests.policies.zoo.test_description import DEFAULT
 from tests.verdicts.test_card_text import VERDICT
 
-DATA = Path(__file__).parents[2] / "data"
 DESCRIPTION = {
     **DEFAULT,
     "network": {"name": "small_cnn", "patch": 4, "channels": [2], "hidden": []},
@@ -97,22 +96,11 @@ def test_a_checkpoint_is_read_by_its_description_alone(tmp_path):
     torch.testing.assert_close(found["policy"], WEIGHTS)
 
 
-@pytest.mark.parametrize("name", ["old_policy.safetensors", "old_checkpoint.pt"])
-def test_files_from_before_descriptions_are_translated(name):
-    found = read_policy(DATA / name)
-    assert "running_reward" in found["progress"]
-    assert found["description"]["task"]["num_cubes"] == 1
-    assert found["description"]["camera"]["width"] == 32
-    assert [t["name"] for t in found["description"]["transforms"]] == ["gray", "standardize"]
-    assert found["description"]["network"] == {
-        "name": "small_cnn",
-        "patch": 4,
-        "channels": [2, 3],
-        "hidden": [4],
-    }
-    assert found["policy"]["layers.fc1.weight"].shape == (4, 18)
-    network = parse(found["description"]).build_network()
-    network.load_state_dict(found["policy"])
+def test_version_0_1_wrote_another_name_of_the_running_reward(tmp_path):
+    older = {**PROGRESS, "running_cubes": PROGRESS["running_reward"]}
+    del older["running_reward"]
+    save_checkpoint(tmp_path / "a.pt", {**CHECKPOINT, "progress": older})
+    assert read_policy(tmp_path / "a.pt")["progress"] == PROGRESS
 
 
 @pytest.mark.parametrize(

@@ -10,10 +10,10 @@ import onnxruntime
 import pytest
 import torch
 
+from drone_rl.config.registry import register_network
 from drone_rl.envs import on_pixels
 from drone_rl.policies import MLP, make_actor
-from drone_rl.policies.zoo import make_onnx, open_onnx, parse, register_network
-from drone_rl.policies.zoo.registry import NETWORKS
+from drone_rl.policies.zoo import make_onnx, open_onnx, parse
 from drone_rl.sim.continuous_actions import ContinuousActions
 from drone_rl.utils.errors import InputError
 from drone_rl.verdicts.onnx_export import agreement
@@ -156,10 +156,9 @@ class Torn(MLP):
         return super().forward(pixels if pixels.sum() > 0 else -pixels)
 
 
-def test_what_onnx_cant_say_is_one_line(monkeypatch):
-    monkeypatch.setitem(NETWORKS, "torn", None)  # and gone again afterwards
-    register_network("torn", Torn, {})
-    description = described(5, 6, [GRAY], {"name": "torn"})
+def test_what_onnx_cant_say_is_one_line(registered):
+    registered(register_network("torn")(Torn))
+    description = described(5, 6, [GRAY], {"name": "torn", "hidden": []})
     with pytest.raises(InputError, match=r"can't be written as an ONNX model \(.*safeten") as told:
         make_onnx(description, built(description), {})
     assert "\n" not in str(told.value)

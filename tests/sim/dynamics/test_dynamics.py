@@ -6,12 +6,12 @@ from torchrl.envs.utils import check_env_specs
 
 from drone_rl.config import MOVES_SETTINGS
 from drone_rl.envs import DroneEnv
-from drone_rl.envs.composer_env import ComposerEnv
 from drone_rl.sim.composer_task import make_environment
 from drone_rl.sim.dynamics import Dynamics
 from drone_rl.sim.tasks import CollectCubes
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.seeding import world_random_state
+from tests.composer_env import ComposerEnv
 from tests.fake_flight import FLIGHT, Floating, floating
 from tests.second_dynamics import TURN, Turning
 

@@ -18,15 +18,15 @@ def place(x):
 
 
 def test_a_touch_is_remembered_until_it_is_read():
-    state = suite.start(place(0))
+    state = suite.start_collisions(place(0))
     assert state.has_collided.tolist() == [False, False]
-    state = suite.update(state, contact([NOTHING] * 2, [0.0] * 2), place(1))
+    state = suite.update_collisions(state, contact([NOTHING] * 2, [0.0] * 2), place(1))
     assert state.has_collided.tolist() == [False, False]
     touched = contact([NOTHING, 3], [0.0, 0.5])
-    state = suite.update(state, touched, place(2))
-    state = suite.update(state, touched, place(3))
+    state = suite.update_collisions(state, touched, place(2))
+    state = suite.update_collisions(state, touched, place(3))
     assert state.has_collided.tolist() == [False, True]
-    told, state = suite.read(state)
+    told, state = suite.read_collisions(state)
     assert told.has_collided.tolist() == [False, True]
     assert told.contact.thing.tolist() == [NOTHING, 3]
     assert told.contact.normal[1].tolist() == [0.0, 0.0, 1.0]
@@ -34,31 +34,28 @@ def test_a_touch_is_remembered_until_it_is_read():
     assert told.contact.depth[1].item() == 0.02
     assert told.contact.time[1].item() == 0.5
     assert told.position[1].tolist() == [2.0, 2.0, 2.0]
-    again, state = suite.read(state)
+    again, state = suite.read_collisions(state)
     assert again.has_collided.tolist() == [False, False]
     assert again.contact.thing.tolist() == [NOTHING, 3]
-    state = suite.update(state, touched, place(4))
+    state = suite.update_collisions(state, touched, place(4))
     assert state.has_collided.tolist() == [False, False]
 
 
 def test_a_later_touch_of_the_same_thing_is_another():
-    state = suite.update(suite.start(place(0)), contact([GROUND] * 2, [0.0] * 2), place(1))
-    _, state = suite.read(state)
-    state = suite.update(state, contact([GROUND] * 2, [0.0, 0.003]), place(2))
+    state = suite.update_collisions(
+        suite.start_collisions(place(0)), contact([GROUND] * 2, [0.0] * 2), place(1)
+    )
+    _, state = suite.read_collisions(state)
+    state = suite.update_collisions(state, contact([GROUND] * 2, [0.0, 0.003]), place(2))
     assert state.has_collided.tolist() == [False, True]
     assert state.position[:, 0].tolist() == [1.0, 2.0]
 
 
 def test_one_drone_is_read_alone():
-    state = suite.update(suite.start(place(0)), contact([1, 2], [0.1] * 2), place(1))
-    told, after = suite.read(state, torch.tensor([1]))
+    state = suite.update_collisions(
+        suite.start_collisions(place(0)), contact([1, 2], [0.1] * 2), place(1)
+    )
+    told, after = suite.read_collisions(state, torch.tensor([1]))
     assert told.contact.thing.tolist() == [2]
     assert after.has_collided.tolist() == [True, False]
     assert state.has_collided.tolist() == [True, True]
-
-
-def test_things_have_names():
-    assert suite.thing_name(NOTHING) == ""
-    assert suite.thing_name(GROUND) == "ground"
-    assert suite.thing_name(4) == "obstacle_4"
-    assert suite.thing_name(0, "target") == "target_0"

@@ -18,7 +18,7 @@ from drone_rl.sim.tasks.collect_cubes_kernel import (
     place,
 )
 from drone_rl.sim.worlds import Worlds
-from tests.sim.tasks import reference_rules
+from tests.sim.tasks.reference_rules import judge as reference_judge
 
 start_warp("cpu")
 WORLDS = 60
@@ -59,7 +59,7 @@ def test_random_flights_go_as_the_rules_say(settings, ends):
         wp.launch(step, WORLDS, inputs=[flying.flights, flying.poses, *inputs], device="cpu")
         before, moved = state, worlds.dynamics.step(state.body, actions[going])
         state, reward = worlds.advance(state, actions[going])
-        expected, earned = reference_rules.judge(task, before, moved)
+        expected, earned = reference_judge(task, before, moved)
         assert torch.equal(reward, earned)
         for name, value in expected.items():
             torch.testing.assert_close(getattr(state, name), value, rtol=0, atol=0, equal_nan=True)

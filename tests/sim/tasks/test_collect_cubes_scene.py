@@ -117,7 +117,7 @@ def test_names_are_those_of_verdicts():
     task = CollectCubes()
     assert (task.name, task.vocabulary.goal) == ("collect_cubes", "cube")
     assert task.strata == ("left", "ahead", "right")
-    assert task.luck == ("random", *MOVES.names)
+    assert task.blind_baselines == ("random", *MOVES.names)
     assert task.ends(task.success_end) is EndReason.ALL_CUBES
     assert task.ends(task.expected_end) is EndReason.FRONT_BOUNDARY
 

@@ -355,7 +355,7 @@ def test_what_verdicts_know_of_it():
     assert task.expected_end == EndReason.PILLAR_TOUCHED
     assert task.strata == ("left", "ahead", "right")
     assert task.oracle.reads == ("drone", "rows", "next_row")
-    assert set(task.luck) - {"random"} == set(task.make_dynamics().actions.names)
+    assert set(task.blind_baselines) - {"random"} == set(task.make_dynamics().actions.names)
     assert set(task.scored) <= set(task.entries)
 
 

@@ -8,13 +8,13 @@ from torchrl.envs.utils import check_env_specs
 
 from drone_rl.config import TaskSettings
 from drone_rl.envs import DroneEnv
-from drone_rl.envs.composer_env import ComposerEnv
 from drone_rl.sim.composer_task import make_environment
 from drone_rl.sim.rendering.scene import SemanticClass
 from drone_rl.sim.tasks import CollectCubes, EndReason, Task, as_task
 from drone_rl.sim.worlds import Worlds
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.seeding import world_random_state
+from tests.composer_env import ComposerEnv
 from tests.second_task import End, Posts
 
 

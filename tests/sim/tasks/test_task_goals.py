@@ -45,5 +45,5 @@ def test_the_oracle_reads_what_there_is_and_reaches_every_goal(worlds, task):
 
 
 def test_luck_is_chance_and_actions_that_can_be_taken(worlds, task):
-    assert set(task.luck) - {"random"} <= set(worlds.dynamics.actions.names)
-    assert "oracle" not in task.luck and task.expected_end != task.success_end
+    assert set(task.blind_baselines) - {"random"} <= set(worlds.dynamics.actions.names)
+    assert "oracle" not in task.blind_baselines and task.expected_end != task.success_end

@@ -135,12 +135,12 @@ def test_a_step_that_earns_most_at_one_action_leads_there(policy, kind):
     if kind is None:
         optimiser = torch.optim.Adam(network.parameters(), lr=0.02)
         loss = ReinforceLoss(actor)
-        learner = ReinforceLearner(
-            network=network, estimator=LeaveOneOut(1.0), loss=loss, optimiser=optimiser
-        )
+        learner = ReinforceLearner(network=network, loss=loss, optimiser=optimiser)
+        estimate = LeaveOneOut(1.0)
     else:
         model = ActorCritic(network, None, generator())
         learner = learner_of(network, model, kind, epochs=2)
+        estimate = learner.estimate
     told = {}
     for _ in range(120):
         batch = actor(TensorDict({"pixels": torch.ones(128, *SHAPE)}, [128]))
@@ -148,7 +148,7 @@ def test_a_step_that_earns_most_at_one_action_leads_there(policy, kind):
         ends = torch.ones(128, 1, dtype=torch.bool)
         after = {"pixels": batch["pixels"], "reward": reward, "done": ends, "terminated": ends}
         batch = batch.exclude("logits").set("next", TensorDict(after, [128]))
-        told = learner.update(batch if kind is None else batch.unsqueeze(1))
+        told = learner.update(estimate(batch if kind is None else batch.unsqueeze(1)))
     with torch.no_grad():
         outputs = network(torch.ones(1, *SHAPE))
         assert (ACTIONS.greedy(outputs)[0] - target).abs().max() < 0.12
@@ -168,14 +168,12 @@ def test_a_policy_learns_to_fly_to_a_cube(kind):
     if kind == "reinforce":
         optimiser = torch.optim.Adam(network.parameters(), lr=3e-3)
         loss, estimator = ReinforceLoss(actor, entropy_coeff=0.01), LeaveOneOut(0.98)
-        learner = ReinforceLearner(
-            network=network, estimator=estimator, loss=loss, optimiser=optimiser
-        )
-        collector, updates = EpisodeCollector(env, actor), 30
+        learner = ReinforceLearner(network=network, loss=loss, optimiser=optimiser)
+        collector, updates = EpisodeCollector(env, actor, postproc=estimator), 30
     else:
         model = ActorCritic(network, None, generator(2))
         learner = learner_of(network, model, ClipPPOLoss, 3e-3, epochs=4, minibatch_size=256)
-        collector, updates = RolloutCollector(env, actor, 32), 12
+        collector, updates = RolloutCollector(env, actor, 32, postproc=learner.estimate), 12
     for _ in range(updates):
         batch = collector.collect()
         learner.update(batch)

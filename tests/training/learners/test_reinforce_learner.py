@@ -6,6 +6,7 @@ import pytest
 import torch
 from tensordict import TensorDict
 
+from drone_rl.objectives import TimeBaseline
 from drone_rl.training import NotANumberError
 from drone_rl.utils.errors import InputError
 
@@ -25,10 +26,10 @@ def test_minibatches_add_up_to_the_whole_batch(make_trainer, reduction):
 
 @pytest.mark.parametrize("size", [1, 3, 7, 10_000])
 def test_every_frame_is_learned_from_once(make_trainer, size):
-    """The estimator sees whole episodes, the loss every frame of them once, in order."""
+    """The loss reads every frame of the batch once, in order."""
     trainer = make_trainer(minibatch_frames=size)
     learner, batch = trainer.learner, trainer.collector.collect()
-    estimated, learned = [], []
+    learned = []
 
     def spy(seen, function):
         def call(*args):
@@ -38,10 +39,8 @@ def test_every_frame_is_learned_from_once(make_trainer, size):
 
         return call
 
-    learner.estimator = spy(estimated, learner.estimator)
     learner.loss.forward = spy(learned, learner.loss.forward)
     learner.update(batch)
-    assert len(estimated) == 1 and torch.equal(estimated[0], batch["pixels"])
     assert torch.equal(torch.cat(learned), batch["pixels"])
     assert max(len(chunk) for chunk in learned) <= size
 
@@ -66,9 +65,8 @@ def test_gradient_is_clipped_to_the_norm(make_trainer):
 
 
 def test_what_a_batch_must_hold(make_trainer):
-    """What the loss reads and the estimator does not write."""
-    wanted = {("next", "reward"), ("next", "done"), "action", "pixels"}
-    assert set(make_trainer().learner.in_keys) == wanted
+    """What the loss reads, including the returns that the collector's estimator writes."""
+    assert set(make_trainer().learner.in_keys) == {"return_to_go", "action", "pixels"}
 
 
 def test_a_step_by_hand(make_trainer):
@@ -81,7 +79,7 @@ def test_a_step_by_hand(make_trainer):
     p = learner.network(frame).softmax(-1)[0].detach()
     batch = make_trainer().collector.collect()[:1]
     batch.update({"pixels": frame, "action": torch.tensor([1])})
-    batch["next"] = {"reward": torch.tensor([[2.0]]), "done": torch.tensor([[True]])}
+    batch["return_to_go"] = torch.tensor([[2.0]])
     metrics = learner.update(batch)
     step = -0.5 * 2 * (p - torch.tensor([0.0, 1.0]))
     torch.testing.assert_close(learner.network.bias.detach() - before, step)
@@ -112,7 +110,6 @@ def test_not_a_number_changes_nothing(make_trainer):
     ("part", "value", "message"),
     [
         ("policy", {"weight": torch.zeros(2, 4)}, "policy has other names"),
-        ("estimator", {"baseline": torch.zeros(4), "seen": torch.zeros(4)}, r"estimator\.seen"),
         ("optimiser", {}, "optimiser has other names"),
         ("scheduler", None, "scheduler has other names"),
     ],
@@ -140,6 +137,7 @@ def test_steps_of_unknown_return_change_nothing(make_trainer):
             },
             [6],
         )
-        learner.update(batch.reshape(2, 3) if pieces else batch[:4])
+        estimator = TimeBaseline(0.9, max_steps=4)
+        learner.update(estimator(batch.reshape(2, 3) if pieces else batch[:4]))
         weights.append(learner.network.weight.detach().clone())
     assert torch.equal(*weights)

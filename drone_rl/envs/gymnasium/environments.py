@@ -1,0 +1,287 @@
+"""The Gymnasium environments: `DroneWorld`, and `DroneWorlds` stepped and rendered as a batch."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import gymnasium
+import numpy as np
+import torch
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from drone_rl.envs.gymnasium.world_batch import METADATA, Chosen, WorldBatch, read_action
+from drone_rl.utils.errors import InputError
+
+Info = dict[str, Any]
+Mask = NDArray[np.bool_]
+
+
+class DroneWorlds(VectorEnv[NDArray[Any], Any, NDArray[Any]]):
+    """`gymnasium.make_vec("drone_rl/CollectCubes-v0", num_envs=64)`; see `DroneWorld`.
+
+    It behaves like Gymnasium's `SyncVectorEnv` of `DroneWorld`s: after `reset(seed=7)` environment
+    i samples the same episodes as a single one after `reset(seed=7 + i)`.
+    """
+
+    metadata = {**METADATA, "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012 (Gymnasium's)
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        task: Chosen = None,
+        *,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        **options: Any,
+    ) -> None:
+        """Create the environments.
+
+        Args:
+            num_envs: Batch size.
+            task: The task.
+            autoreset_mode: When finished environments are reset: in the next step ("NextStep"), in
+                the same step ("SameStep"), or by `reset(options={"reset_mask": mask})`
+                ("Disabled").
+            options: See `DroneWorld`.
+
+        Raises:
+            InputError: An option is unknown or out of range.
+        """
+        if not (isinstance(num_envs, int) and num_envs >= 1):
+            raise InputError(f"num_envs={num_envs} is out of range; give a whole number from 1")
+        self.mode = _mode(autoreset_mode)
+        self.metadata = {**self.metadata, "autoreset_mode": self.mode}
+        self.batch = WorldBatch(num_envs, task, options)
+        self.num_envs = num_envs
+        self.render_mode = self.batch.render_mode
+        self.single_observation_space = self.batch.observation_space
+        self.single_action_space = self.batch.action_space
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._generators: list[np.random.Generator | None] = [None] * num_envs
+        self._seeds: list[int | None] = [None] * num_envs
+        self._ended: Mask | None = None  # none is running before the first reset
+
+    @property
+    def np_random(self) -> tuple[np.random.Generator, ...]:  # pyright: ignore[reportIncompatibleMethodOverride] (as SyncVectorEnv's)
+        """The random generators of the environments."""
+        return tuple(map(self._generator, range(self.num_envs)))
+
+    @property
+    def np_random_seed(self) -> tuple[int | None, ...]:  # pyright: ignore[reportIncompatibleMethodOverride] (as SyncVectorEnv's)
+        """The seeds of the environments."""
+        return tuple(self._seeds)
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: Mapping[str, Any] | None = None,
+    ) -> tuple[NDArray[Any], Info]:
+        """Start episodes.
+
+        Args:
+            seed: Seed of the first environment, incremented for each following one; or one seed
+                each; None continues the random streams.
+            options: "reset_mask", bool (num_envs,): the environments to reset; all by default.
+
+        Raises:
+            InputError: The number of seeds is wrong, or an option is unknown.
+        """
+        mask = self._read_mask(dict(options or {}))
+        for i, own in enumerate(self._read_seeds(seed)):
+            if mask[i] and own is not None:
+                self._generators[i], self._seeds[i] = seeding.np_random(own)
+        self._start(mask)
+        self._ended = ~mask if self._ended is None else self._ended & ~mask
+        return self.batch.observe(), _masked(self.batch.info(), mask)
+
+    def step(self, actions: Any) -> tuple[NDArray[Any], NDArray[Any], Mask, Mask, Info]:
+        """Step the environments; reset those that finished in the previous step.
+
+        Args:
+            actions: One of `single_action_space` for each environment.
+
+        Raises:
+            InputError: An action is invalid, or environments must be reset first.
+        """
+        if self._ended is None:
+            raise InputError("step() needs a running episode; call reset() first")
+        given = read_action(actions, self.batch.worlds.dynamics.actions, (self.num_envs,))
+        if self.mode is AutoresetMode.DISABLED and self._ended.any():
+            raise InputError(
+                f"worlds {np.flatnonzero(self._ended).tolist()} have ended; reset them by "
+                "reset(options={'reset_mask': mask}), or choose another autoreset_mode"
+            )
+        rewards = np.where(self._ended, 0.0, self.batch.step(given))
+        self._start(self._ended)
+        flags = self.batch.flags()
+        self._ended = flags[0] | flags[1]
+        final = {}
+        if self.mode is AutoresetMode.SAME_STEP and self._ended.any():
+            final = self._finish(self._ended)
+        everywhere = np.ones(self.num_envs, bool)
+        info = {**_masked(self.batch.info(), everywhere), **final}
+        return self.batch.observe(), rewards, *flags, info
+
+    def render(self) -> tuple[NDArray[np.uint8], ...] | None:
+        """Render each drone from behind, (360, 640, 3), if `render_mode` is set."""
+        if self.render_mode is None:
+            gymnasium.logger.warn("render() needs render_mode='rgb_array' at creation")
+            return None
+        return tuple(self.batch.film())
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Close the renderer."""
+        self.batch.worlds.close()
+
+    def _finish(self, ended: Mask) -> Info:
+        """Reset environments that have just finished; return their final information."""
+        state = self.batch.worlds.state[torch.from_numpy(ended).nonzero()[:, 0]]
+        last = np.full(self.num_envs, None, object)
+        for i, seen in zip(np.flatnonzero(ended), self.batch.observe(state), strict=True):
+            last[i] = seen
+        info = {}
+        for name, value in self.batch.info(state).items():
+            info[name] = np.zeros((self.num_envs, *value.shape[1:]), value.dtype)
+            info[name][ended] = value
+        self._start(ended)
+        self._ended = np.zeros_like(ended)
+        return _masked({"final_obs": last, "final_info": _masked(info, ended)}, ended)
+
+    def _start(self, mask: Mask) -> None:
+        worlds = np.flatnonzero(mask)
+        self.batch.reset(torch.from_numpy(worlds), [self._generator(i) for i in worlds.tolist()])
+
+    def _generator(self, world: int) -> np.random.Generator:
+        found = self._generators[world]
+        if found is None:
+            found, self._seeds[world] = seeding.np_random()
+            self._generators[world] = found
+        return found
+
+    def _read_seeds(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
+        if seed is None:
+            return [None] * self.num_envs
+        if isinstance(seed, int):
+            return [seed + i for i in range(self.num_envs)]
+        if len(seed) != self.num_envs:
+            raise InputError(f"seed has {len(seed)} values; give one, or {self.num_envs}")
+        return seed
+
+    def _read_mask(self, options: Info) -> Mask:
+        mask = options.pop("reset_mask", np.ones(self.num_envs, bool))
+        if options:
+            raise InputError(f"options={list(options)} are unknown to reset; give reset_mask")
+        mask = np.asarray(mask)
+        if mask.dtype != np.bool_ or mask.shape != (self.num_envs,):
+            raise InputError(
+                f"reset_mask is of {mask.dtype} and shape {mask.shape}; give bool of shape "
+                f"({self.num_envs},)"
+            )
+        return mask
+
+
+def _masked(info: Info, mask: Mask) -> Info:
+    """Add to each entry the mask of its environments; set the others to 0."""
+    told = {}
+    for name, value in info.items():
+        if isinstance(value, np.ndarray) and value.dtype != object and not mask.all():
+            value = np.where(mask.reshape(-1, *[1] * (value.ndim - 1)), value, value.dtype.type(0))
+        told |= {name: value, f"_{name}": mask.copy()}
+    return told
+
+
+def _mode(given: AutoresetMode | str) -> AutoresetMode:
+    try:
+        return AutoresetMode(given)
+    except ValueError:
+        known = ", ".join(mode.value for mode in AutoresetMode)
+        raise InputError(f"autoreset_mode={given!r} is unknown; give one of: {known}") from None
+
+
+_ONLY = torch.zeros(1, dtype=torch.int64)
+
+
+class DroneWorld(gymnasium.Env[NDArray[Any], Any]):
+    """A drone with a task: `gymnasium.make("drone_rl/CollectCubes-v0", num_cubes=2)`.
+
+    `import drone_rl` registers the name; `"drone_rl:drone_rl/CollectCubes-v0"` needs no import.
+
+    Observations are camera images, RGB bytes (height, width, 3), or, with `observations="state"`,
+    the ground truth as a float32 vector: the entries of `info` except "end_reason" and
+    "is_success", in order. For `info` see `WorldBatch.info`. The task's step limit truncates.
+
+    Episodes are sampled from `np_random` only, so that `reset(seed=7)` starts the same episode in
+    any environment, single or vector.
+    """
+
+    metadata = METADATA
+
+    def __init__(self, task: Chosen = None, **options: Any) -> None:
+        """Create the environment.
+
+        Args:
+            task: The task.
+            options: `drone_rl.config.commands.GymnasiumSettings`, and settings of the task.
+
+        Raises:
+            InputError: An option is unknown or out of range.
+        """
+        self.batch = WorldBatch(1, task, options)
+        self.render_mode = self.batch.render_mode
+        self.observation_space = self.batch.observation_space
+        self.action_space = self.batch.action_space
+        self._is_running = False
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray[Any], dict[str, Any]]:
+        """Start an episode.
+
+        Args:
+            seed: Seed of this episode and the following ones; None continues the random stream.
+            options: Must be empty.
+
+        Raises:
+            InputError: There are options.
+        """
+        super().reset(seed=seed)
+        if options:
+            raise InputError(f"options={list(options)} are unknown to reset; give none")
+        self.batch.reset(_ONLY, [self.np_random])
+        self._is_running = True
+        return self.batch.observe()[0], self._info()
+
+    def step(self, action: Any) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
+        """Step the environment.
+
+        Args:
+            action: One of `action_space`.
+
+        Raises:
+            InputError: The action is invalid, or no episode is running.
+        """
+        if not self._is_running:
+            raise InputError("step() needs a running episode; call reset() first")
+        actions = read_action(action, self.batch.worlds.dynamics.actions)
+        reward = self.batch.step(actions[None])
+        terminated, truncated = (bool(flag) for (flag,) in self.batch.flags())
+        self._is_running = not (terminated or truncated)
+        return self.batch.observe()[0], float(reward[0]), terminated, truncated, self._info()
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """Render the drone from behind, (360, 640, 3), if `render_mode` is set."""
+        if self.render_mode is None:
+            gymnasium.logger.warn("render() needs render_mode='rgb_array' at creation")
+            return None
+        return self.batch.film()[0]
+
+    def close(self) -> None:
+        """Close the renderer."""
+        self.batch.worlds.close()
+
+    def _info(self) -> dict[str, Any]:
+        info = {name: value[0] for name, value in self.batch.info().items()}
+        return {k: v if isinstance(v, np.ndarray) else v.item() for k, v in info.items()}

@@ -1,0 +1,219 @@
+"""A batch of worlds with NumPy arrays and Gymnasium spaces, for both environment classes."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import torch
+from gymnasium import spaces
+from numpy.typing import NDArray
+from torch import Tensor
+
+from drone_rl.config import (
+    ActionSettings,
+    BaseTaskSettings,
+    CameraSettings,
+    DynamicsSettings,
+    TaskSettings,
+    settings_of,
+)
+from drone_rl.config.commands import GymnasiumSettings
+from drone_rl.config.configuration import Changes
+from drone_rl.sim.actions import Actions, Entry
+from drone_rl.sim.composer_task import CONTROL_TIMESTEP_S
+from drone_rl.sim.entities import CHASE
+from drone_rl.sim.rendering import check_device
+from drone_rl.sim.tasks import State, Task, as_task
+from drone_rl.sim.worlds import Worlds
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.settings import Settings, kinds_of
+
+_MOST = float(np.finfo(np.float32).max)
+"""Bound of unbounded numbers: Gymnasium's checker requires finite ones."""
+
+
+def picture_space(camera: CameraSettings) -> spaces.Box:
+    """Return the space of RGB images. Shape: (height, width, 3)."""
+    return spaces.Box(0, 255, (camera.height, camera.width, 3), np.uint8)
+
+
+def vector_space(entries: Mapping[str, Entry]) -> spaces.Box:
+    """Return the space of concatenated entries, as float32."""
+    bounds = [np.tile(_finite_bounds(e), (math.prod(e.shape), 1)) for e in entries.values()]
+    low, high = np.concatenate(bounds).T.astype(np.float32)
+    return spaces.Box(low, high)
+
+
+def action_space(entry: Entry) -> spaces.Space[Any]:
+    """Return the space of an action: discrete for whole numbers, else a box."""
+    low, high = _finite_bounds(entry)
+    if entry.dtype != torch.int64:
+        return spaces.Box(low, high, entry.shape)
+    count = int(high) + 1
+    return spaces.MultiDiscrete(np.full(entry.shape, count)) if entry.shape else _counted(count)
+
+
+def read_action(given: Any, actions: Actions, batch: tuple[int, ...] = ()) -> Tensor:
+    """Check and convert an action, or one per world.
+
+    Args:
+        given: The user's action.
+        actions: The action space.
+        batch: Batch shape; () for a single world.
+
+    Returns:
+        Shape: (*batch, *), with the shape of `actions.entry`.
+
+    Raises:
+        InputError: The action or its shape is invalid.
+    """
+    entry, (low, high) = actions.entry, _finite_bounds(actions.entry)
+    is_whole = entry.dtype == torch.int64
+    try:
+        array = np.asarray(given)
+    except ValueError:  # a ragged list
+        array = np.empty(0, object)
+    shape = (*batch, *entry.shape)
+    fits = array.shape == shape and array.dtype.kind in ("iu" if is_whole else "iuf")
+    if not fits or not ((array >= low) & (array <= high)).all():
+        numbers = ", ".join(f"{i} {name}" for i, name in enumerate(actions.names))
+        numbers = numbers if is_whole else f"numbers from {low:g} to {high:g}"
+        many = f"an array of shape {shape} of" if shape else "one of"
+        text = " ".join(repr(given).split())[:80]
+        raise InputError(f"action={text} is invalid; give {many}: {numbers}")
+    return torch.as_tensor(array, dtype=entry.dtype)
+
+
+def _counted(count: int) -> spaces.Space[Any]:
+    return spaces.Discrete(count)
+
+
+def _finite_bounds(entry: Entry) -> tuple[float, float]:
+    if entry.dtype == torch.bool:
+        return 0.0, 1.0
+    low = -_MOST if entry.low is None else float(entry.low)
+    return low, _MOST if entry.high is None else float(entry.high)
+
+
+METADATA: dict[str, Any] = {
+    "render_modes": ["rgb_array"],
+    "render_fps": round(1 / CONTROL_TIMESTEP_S),
+}
+"""Metadata of every environment."""
+_PARTS: dict[str, type[Settings]] = {
+    "camera": CameraSettings,
+    "dynamics": DynamicsSettings,
+    "actions": ActionSettings,
+}
+"""Options that may be mappings of some of their settings."""
+FILM_HEIGHT, FILM_WIDTH = 360, 640
+"""Size in pixels of the images of `render`, which show the drone from behind."""
+END = "end_reason"
+Chosen = str | BaseTaskSettings | Task[Any] | None
+"""A task, its settings, or the import path of their class; cube collection by default."""
+
+
+class WorldBatch:
+    """Worlds, their observations and their spaces."""
+
+    def __init__(self, num_worlds: int, task: Chosen, given: Mapping[str, Any]) -> None:
+        """Create the worlds.
+
+        Args:
+            num_worlds: Batch size.
+            task: The task.
+            given: `GymnasiumSettings` (camera, dynamics and actions also as mappings of some
+                settings) and settings of the task.
+
+        Raises:
+            InputError: An option or setting is unknown or out of range.
+        """
+        own = kinds_of(GymnasiumSettings)
+        options = {name: value for name, value in given.items() if name in own}
+        for name, kind in _PARTS.items():
+            if isinstance(options.get(name), Mapping):
+                options[name] = kind(**Changes(kind).read(options[name], name))
+        options = GymnasiumSettings(**options)
+        options.dynamics.check_air()
+        changes = {name: value for name, value in given.items() if name not in own}
+        check_device(options.device)
+        self.worlds = Worlds(
+            num_worlds,
+            _make_task(task, changes),
+            options.camera,
+            dynamics=options.dynamics,
+            actions=options.actions,
+            renderer=options.renderer,
+            device=options.device,
+        )
+        self._every = torch.arange(num_worlds, device=self.worlds.device)
+        self.render_mode = options.render_mode
+        self.has_images = options.observations == "pixels"
+        self.names = tuple(name for name in self.worlds.entries if name != END)
+        """Entries of `info` that make up the state vector, in order."""
+        self.observation_space: spaces.Box = (
+            picture_space(options.camera)
+            if self.has_images
+            else vector_space({name: self.worlds.entries[name] for name in self.names})
+        )
+        self.action_space = action_space(self.worlds.dynamics.actions.entry)
+
+    def reset(self, worlds: Tensor, generators: Sequence[np.random.Generator]) -> None:
+        """Start new episodes.
+
+        Args:
+            worlds: Indices. Shape: (k,).
+            generators: Random generator of each of these worlds.
+        """
+        # both objects share one bit generator
+        streams = [np.random.RandomState(generator.bit_generator) for generator in generators]
+        self.worlds.reset(worlds, streams)
+
+    def step(self, actions: Tensor) -> NDArray[np.float64]:
+        """Step all worlds; return their rewards. Shapes: (num_worlds, *) to (num_worlds,)."""
+        actions = actions.to(self.worlds.device)
+        return self.worlds.step(self._every, actions).cpu().numpy()
+
+    def observe(self, state: State | None = None) -> NDArray[Any]:
+        """Return the observations of all worlds, or of those in `state`, as a new array."""
+        state = self.worlds.state if state is None else state
+        if self.has_images:
+            return self.worlds.render(state).cpu().numpy()
+        info = self.worlds.info(state)
+        flat = [info[name].flatten(1).float().nan_to_num() for name in self.names]
+        return torch.cat(flat, 1).cpu().numpy()
+
+    def flags(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Return the terminated and truncated flags. Shapes: (num_worlds,)."""
+        terminated, truncated = self.worlds.ends()
+        return terminated.cpu().numpy(), truncated.cpu().numpy()
+
+    def info(self, state: State | None = None) -> dict[str, NDArray[Any]]:
+        """Return the ground truth of all worlds, or of those in `state`.
+
+        It has the entries of `Worlds.entries`, with "end_reason" as one number per world, and
+        "is_success". Unknown values are 0, since Gymnasium's checker rejects NaN.
+        Shapes: (num_worlds, *).
+        """
+        truth = self.worlds.info(state)
+        info = {name: value.nan_to_num().cpu().numpy() for name, value in truth.items()}
+        info[END] = info[END][:, 0]
+        return {**info, "is_success": info[END] == self.worlds.task.success_end}
+
+    def film(self) -> NDArray[np.uint8]:
+        """Render the drones from behind. Shape: (num_worlds, FILM_HEIGHT, FILM_WIDTH, 3)."""
+        worlds = self.worlds
+        view = worlds.view(CHASE.name, height=FILM_HEIGHT, width=FILM_WIDTH, show_drone=True)
+        return worlds.render(worlds.state, view).cpu().numpy()
+
+
+def _make_task(task: Chosen, changes: Mapping[str, Any]) -> Task[Any]:
+    chosen: Any = settings_of(task, "task")() if isinstance(task, str) else task or TaskSettings()
+    known = kinds_of(type(chosen)) if isinstance(chosen, Settings) else {}
+    for name in changes:
+        if name not in known:
+            there = ", ".join((*kinds_of(GymnasiumSettings), *known))
+            raise InputError(f"{name} is unknown; there are: {there}")
+    made: Any = chosen.replace(**changes) if changes else chosen
+    return as_task(made)

@@ -1,0 +1,96 @@
+"""What a training consists of, between its collector and its learner."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import torch
+from torchrl.envs import TransformedEnv
+
+from drone_rl.collectors.speedups import accelerated_gradients
+from drone_rl.config.learning import Episodes, Ray
+from drone_rl.config.training import TrainSettings
+from drone_rl.policies import PolicyNetwork, make_actor
+from drone_rl.sim.tasks import FailureReplayTask
+from drone_rl.training.learners import Learner
+
+
+class Group(NamedTuple):
+    """The environments of one thread or worker, with the policy."""
+
+    env: TransformedEnv
+    actor: Any
+    network: PolicyNetwork
+    """All groups share it."""
+    generator: torch.Generator
+    """Random stream of the actions."""
+
+
+class Components(NamedTuple):
+    """What collects batches with returns, and the network that learns from them."""
+
+    collector: Any
+    """Has `actor`, `postproc` and `cache_activations`, besides what a trainer needs."""
+    network: PolicyNetwork
+    generators: dict[str, torch.Generator]
+    """Random streams of this process, by name."""
+
+
+def joined(collector: Any, groups: Sequence[Group]) -> Components:
+    """Return the components of a training whose groups are in this process."""
+    generators = {f"actions_{i}": group.generator for i, group in enumerate(groups)}
+    return Components(collector, groups[0].network, generators)
+
+
+def group_sizes(settings: TrainSettings) -> list[int]:
+    """Return the number of environments of each thread or worker.
+
+    On a GPU there is one group: several threads would only wait for each other.
+    """
+    asked = settings.collector
+    is_one = settings.device.startswith("cuda") and not isinstance(asked, Ray)
+    groups = 1 if is_one else min(asked.num_envs, asked.num_threads)
+    return [asked.num_envs // groups + (i < asked.num_envs % groups) for i in range(groups)]
+
+
+def episode_options(settings: TrainSettings, num_threads: int) -> dict[str, Any]:
+    """Return the arguments of `EpisodeCollector` that settings choose.
+
+    Args:
+        settings: The training's.
+        num_threads: Of a fused kernel.
+    """
+    asked = settings.collector
+    fused = isinstance(asked, Episodes) and asked.compiled
+    return {"acceleration": "fused" if fused else "none", "num_threads": num_threads}
+
+
+def make_collector(settings: TrainSettings, replay: FailureReplayTask | None = None) -> Components:
+    """Make the collector that the settings choose, with environments and an untrained network.
+
+    Args:
+        settings: The training's.
+        replay: Where episodes start, unless anywhere.
+
+    Raises:
+        InputError: There is no such device, or an extra isn't installed.
+    """
+    return settings.collector.make(settings, replay)
+
+
+def make_learner(settings: TrainSettings, parts: Components) -> Learner:
+    """Make the learner that the settings choose.
+
+    Raises:
+        InputError: A part does not exist, or does not take its settings.
+    """
+    return settings.objective.learner(settings, parts)
+
+
+def learning_actor(settings: TrainSettings, parts: Components) -> Any:
+    """Return the actor that the loss evaluates: with a fused network, if that is possible."""
+    actor, threads = parts.collector.actor, settings.trainer.num_threads
+    if not settings.trainer.compiled:
+        return actor
+    cache = parts.collector.cache_activations
+    fused = accelerated_gradients(parts.network, threads, cache=cache)
+    return actor if fused is parts.network else make_actor(fused, actor.spec["action"])

@@ -1,0 +1,240 @@
+"""A run's folder: what a training reads from it, writes to it and returns."""
+
+import dataclasses
+import enum
+import json
+import signal
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Self
+
+import yaml
+
+from drone_rl.config.configuration import as_config, check_same_config, from_config
+from drone_rl.config.training import TrainSettings
+from drone_rl.policies.policy import Policy, load_policy
+from drone_rl.policies.zoo import describe, read_checkpoint
+from drone_rl.sim.tasks import as_task
+from drone_rl.training.callbacks import CheckpointCallback
+from drone_rl.training.confirmation import Confirmation
+from drone_rl.training.trainer import Trainer
+from drone_rl.utils.display import picture, table
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.files import remove_leftovers, write_atomically
+from drone_rl.utils.provenance import provenance
+from drone_rl.utils.readers import read_table
+from drone_rl.utils.schema import Real
+from drone_rl.utils.settings import kinds_of
+
+MAY_CHANGE = (
+    "trainer.total_frames",
+    "trainer.total_episodes",
+    "trainer.target_share",
+    "trainer.confirm_episodes",
+    "trainer.confirm_share",
+    "trainer.checkpoint_interval_s",
+    "evaluate_after",
+    "renderer",
+)
+"""Settings that a resumed run may change: they don't enter into what is learned."""
+_WRITTEN = ("metrics.csv", "result.json", "run.yaml", "provable.json")
+"""Files in a run's folder that are replaced when they are complete."""
+_NONE_YET = float("-inf")
+"""The best running mean before the first update."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Training:
+    """Result of a training."""
+
+    folder: Path
+    reason: str
+    """Why it stopped: "solved", "frames", "episodes" or a signal's name."""
+    result: dict[str, Any]
+    """Plain values, as in `result.json`."""
+
+    @property
+    def running_reward(self) -> float:
+        """Running mean of the episodes' rewards at the end."""
+        return self.result["running_reward"]
+
+    @property
+    def policy(self) -> Policy:
+        """The last policy."""
+        return load_policy(self.folder)
+
+    def metrics(self) -> dict[str, list[float]]:
+        """Return the columns of `metrics.csv`: one value for each update."""
+        head, *rows = read_table(self.folder / "metrics.csv")
+        columns = zip(head, zip(*rows, strict=True), strict=True)
+        return {name: [float(value) for value in column] for name, column in columns}
+
+    def _repr_html_(self) -> str:
+        from matplotlib.figure import Figure  # slow to import; only a notebook needs it
+
+        columns = self.metrics()
+        figure = Figure(figsize=(6, 3), layout="constrained")
+        axes = figure.add_subplot(xlabel="frames", ylabel="running mean of rewards")
+        axes.plot(columns["frames"], columns["train/running_reward"])
+        values = {k: v for k, v in self.result.items() if not isinstance(v, dict)}
+        rows = [[k, f"{v:.4g}" if isinstance(v, float) else str(v)] for k, v in values.items()]
+        return table(["training", str(self.folder)], rows) + picture(figure)
+
+
+class RunFolder:
+    """The folder of one run; `drone_rl.training.train.learn` shows the order of the calls."""
+
+    def __init__(self, path: Path) -> None:
+        """Takes an existing folder."""
+        self.path = path
+
+    @classmethod
+    def open(cls, path: str | Path | None, resume: bool) -> tuple[Self, dict[str, Any] | None]:
+        """Return the folder and, to resume, the state of its newest checkpoint."""
+        folder = new_folder() if path is None else Path(path)
+        state = read_checkpoint(last_of(folder)) if resume else None
+        return cls(folder), state
+
+    def prepare(self, settings: TrainSettings, state: Mapping[str, Any] | None) -> None:
+        """Delete half-written files.
+
+        Raises:
+            InputError: The checkpoint was made with other settings.
+        """
+        if state is not None:
+            check_same_config(_own(state["config"]), as_config(settings), MAY_CHANGE)
+        remove_leftovers(self.path, *_WRITTEN)
+
+    def checkpoints(self, settings: TrainSettings) -> CheckpointCallback:
+        """Return the callback that writes checkpoints, with the settings and their origin."""
+        config, origin = as_config(settings), provenance()
+        description = describe(settings).as_dict()
+        return CheckpointCallback(
+            self.path / "checkpoints",
+            interval_s=settings.trainer.checkpoint_interval_s,
+            extra={"config": config, "description": description, "provenance": origin},
+        )
+
+    def resume(
+        self, trainer: Trainer, checkpoints: CheckpointCallback, state: Mapping[str, Any] | None
+    ) -> None:
+        """Load the state, if there is one, and write `run.yaml`.
+
+        Raises:
+            InputError: The checkpoint does not fit.
+        """
+        if state is not None:
+            trainer.load_state_dict(state)
+            checkpoints.best = _read_best(state.get("best"))
+        extra = checkpoints.extra
+        noted = {"config": extra["config"], "description": extra["description"]}
+        text = yaml.safe_dump({**noted, **extra["provenance"]}, sort_keys=False)
+        write_atomically(self.path / "run.yaml", text)
+
+
+def possible_ends(settings: TrainSettings) -> list[enum.IntEnum]:
+    """Return why episodes may end; in computer-vision mode no drone loses control."""
+    is_calm = settings.dynamics.is_computer_vision
+    ends = as_task(settings.task).ends
+    return [end for end in ends if not (is_calm and end.name == "LOST_CONTROL")]
+
+
+def result_of(
+    reason: str, trainer: Trainer, largest_reward: float, confirmation: Confirmation | None
+) -> dict[str, Any]:
+    """Return the values of `result.json`."""
+    confirmed = {} if confirmation is None else confirmation.told
+    progress = dataclasses.asdict(trainer.progress)
+    return {"reason": reason, **progress, "largest_reward": largest_reward, **confirmed}
+
+
+def finish(settings: TrainSettings, folder: Path, result: dict[str, Any]) -> Training:
+    """Judge the last policy if settings ask for it and no signal stopped it; write `result.json`.
+
+    Args:
+        settings: Of the training.
+        folder: Its own.
+        result: Goes into `result.json`.
+    """
+    if settings.evaluate_after and not result["reason"].startswith("SIG"):
+        from drone_rl.evaluation.judge import judge_for_selection  # slow to import, and few need it
+
+        last, episodes = last_of(folder), settings.evaluate_after
+        given = (settings.device, settings.renderer)
+        result["verdict"], _ = judge_for_selection(last, episodes, *given)
+    write_atomically(folder / "result.json", json.dumps(result, indent=2))
+    return Training(folder, result["reason"], result)
+
+
+def hand_on_signal(training: Training) -> Training:
+    """Let a signal that stopped a training act, now that its state is saved.
+
+    Args:
+        training: Its result, which is returned if no signal stopped it, or if the caller's own
+            handler of that signal returns.
+
+    Raises:
+        KeyboardInterrupt: Ctrl-C stopped it. Not a subclass: Python ends itself by SIGINT, which
+            shells want to see, only for this very class.
+        SystemExit: SIGTERM stopped it.
+    """
+    if not training.reason.startswith("SIG"):
+        return training
+    number = signal.Signals[training.reason]
+    handler = signal.getsignal(number)
+    if callable(handler) and handler is not signal.default_int_handler:
+        signal.raise_signal(number)
+        return training
+    remedy = f"drone_rl.train(folder={str(training.folder)!r}, resume=True)"
+    stop = (
+        KeyboardInterrupt(f"training stopped, its state is saved; go on with {remedy}")
+        if number == signal.SIGINT
+        else SystemExit(128 + number)
+    )
+    vars(stop)["training"] = training
+    raise stop
+
+
+def _own(config: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a checkpoint's training settings under today's names."""
+    return {k: v for k, v in config.items() if k in kinds_of(TrainSettings)}
+
+
+def settings_of(config: Mapping[str, Any]) -> TrainSettings:
+    """Return the settings of a checkpoint; they may name built-in parts only.
+
+    Raises:
+        InputError: It names another part.
+    """
+    settings = from_config(TrainSettings, _own(config))
+    parts = (settings.network, settings.returns, settings.objective, settings.optimiser)
+    for part in (*parts, settings.scheduler, settings.collector, *settings.transforms):
+        if not part.is_known:
+            raise InputError(
+                f"the checkpoint names {part.target}, which a file may not; give the settings, too"
+            )
+    return settings
+
+
+def _read_best(value: Any) -> float:
+    """Return the best running mean of a checkpoint.
+
+    Raises:
+        InputError: It is not a number.
+    """
+    if type(value) is float and value == _NONE_YET:
+        return value
+    return Real(-1e6, 1e6).read(value, "the checkpoint's best")
+
+
+def last_of(folder: Path) -> Path:
+    """Return the path of a run's newest checkpoint."""
+    return folder / "checkpoints" / "last.pt"
+
+
+def new_folder() -> Path:
+    """Return a path named by the present time, as `drone-rl train` does."""
+    now = time.time()
+    stamp = time.strftime("%Y-%m-%d_%H-%M-%S", time.localtime(now))
+    return Path("outputs/train/runs") / f"{stamp}-{int(now % 1 * 1e6):06d}"

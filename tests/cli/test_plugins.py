@@ -1,0 +1,106 @@
+"""Parts of the user's own on the command line, from training to evaluation."""
+
+import json
+
+import pytest
+from safetensors import safe_open
+
+from tests.cli.running import TINY, drone_rl, error_line
+
+PARTS = '''
+"""A network, a transform, a return estimator and a task."""
+
+from collections import OrderedDict
+
+import torch
+from torch import nn
+
+import drone_rl
+from drone_rl.envs.transforms import PixelTransform
+from drone_rl.objectives import ReturnEstimator, returns
+from drone_rl.policies import PolicyNetwork
+from drone_rl.policies.cnn import orthogonal
+
+
+@drone_rl.register_network("cells")
+class CellNetwork(PolicyNetwork):
+    def __init__(
+        self, in_shape, num_actions, *, rows: int = 5, generator: torch.Generator | None = None
+    ):
+        layers = OrderedDict(
+            cells=nn.AdaptiveAvgPool2d((rows, 8)),
+            flatten=nn.Flatten(),
+            logits=nn.Linear(in_shape[0] * rows * 8, num_actions),
+        )
+        super().__init__(in_shape, layers, orthogonal(generator))
+
+
+@drone_rl.register_transform("mirror")
+class Mirror(PixelTransform):
+    def __init__(self, every: int = 1):
+        super().__init__()
+        self.every = every
+
+    def _apply_transform(self, obs):
+        return obs.flip(-1)[..., :: self.every]
+
+
+@drone_rl.register_returns("centred")
+class Centred(ReturnEstimator):
+    def __init__(self, gamma: float = 0.95, **kwargs):
+        super().__init__(**kwargs)
+        self.gamma = gamma
+
+    def estimate(self, reward, done):
+        values = returns.reward_to_go(reward, done, self.gamma)
+        return values - values.mean()
+'''
+CHOSEN = ["network=cells", "network.rows=3", "+transforms.mirror.every=2", "returns=centred"]
+FEW = ["episodes=2", "num_envs=2", "baselines=false", "videos=0"]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder with a plug-in and a run of it."""
+    path = tmp_path_factory.mktemp("plugins")
+    (path / "my_parts.py").write_text(PARTS)
+    done = drone_rl("train", *TINY, "plugins=[my_parts]", *CHOSEN, "hydra.run.dir=run", cwd=path)
+    assert done.returncode == 0, done.stderr
+    return path
+
+
+def test_a_policy_of_registered_parts_is_evaluated_where_they_are_registered(folder):
+    done = drone_rl("evaluate", "policy=run", "plugins=[my_parts]", *FEW, cwd=folder)
+    assert done.returncode == 0, done.stderr
+
+
+def test_without_the_plug_in_one_line_names_the_part_and_the_remedy(folder):
+    line = error_line(drone_rl("evaluate", "policy=run", *FEW, cwd=folder))
+    assert "transforms[2].name='mirror' is not registered" in line
+    assert "plugins=[MODULE]" in line
+
+
+def test_an_exported_file_has_names_and_values_only(folder):
+    given = ["policy=run", "plugins=[my_parts]", "episodes=2", "num_envs=2", "name=mine"]
+    done = drone_rl("export", *given, cwd=folder)
+    assert done.returncode == 0, done.stderr
+    (path,) = folder.rglob("mine.safetensors")
+    with safe_open(path, "pt") as file:
+        described = json.loads(file.metadata()["description"])
+    assert described["network"] == {"name": "cells", "rows": 3}
+    assert described["transforms"][-1] == {"name": "mirror", "every": 2}
+
+
+def test_mistakes_are_one_line(folder):
+    for given, told in (
+        (["plugins=[nowhere]"], "plugins=nowhere can't be imported"),
+        (["plugins=[my_parts]", "network=cells", "network.row=3"], "network.row"),
+        (["plugins=[my_parts]", "network=cells", "network.rows=many"], "network.rows"),
+        (["network=cells"], "could not find network/cells"),
+    ):
+        assert told in error_line(drone_rl("train", *TINY, *given, cwd=folder))
+
+
+def test_a_run_is_resumed_only_with_the_plug_in_typed(folder):
+    line = error_line(drone_rl("train", "resume=run", "trainer.total_frames=500", cwd=folder))
+    assert "plugins=[my_parts]" in line and "give it on the command line" in line

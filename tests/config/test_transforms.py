@@ -1,0 +1,47 @@
+"""Shapes and types of transformed images."""
+
+import pytest
+
+from drone_rl.config.transforms import Fault, Frame, Transform
+from drone_rl.envs import CameraFault
+from drone_rl.utils.errors import InputError
+
+RGB, GRAY = Frame((25, 64, 3)), Frame((1, 25, 64), True)
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "picture", "after"),
+    [
+        ("gray", {}, RGB, Frame((1, 25, 64), True)),
+        ("rgb", {}, RGB, Frame((3, 25, 64), True)),
+        ("chromaticity", {"floor": 0.1}, Frame((3, 25, 64), True), Frame((2, 25, 64), True)),
+        ("standardize", {}, Frame((1, 25, 64)), Frame((1, 25, 64), True)),
+        ("crop", {"top": 5, "bottom": 20}, Frame((1, 25, 64), True), Frame((1, 15, 64), True)),
+        ("resize", {"height": 4, "width": 9}, Frame((2, 5, 5), True), Frame((2, 4, 9), True)),
+        ("stack", {"N": 3}, Frame((2, 5, 5), True), Frame((6, 5, 5), True)),
+        ("step_count", {}, RGB, RGB),
+        ("blur", {"width": 1.0}, GRAY, GRAY),
+        ("noise", {"strength": 0.1, "correlation_time": 0.0}, GRAY, GRAY),
+        ("dead_rows", {"count": 23, "rows": (0, 24), "level": 0.0}, GRAY, GRAY),
+        ("frozen_frames", {"share": 0.5}, GRAY, GRAY),
+        ("late_frames", {"frames": 2}, GRAY, GRAY),
+        ("shift", {"down": 1, "across": 2}, GRAY, GRAY),
+    ],
+)
+def test_what_becomes_of_a_picture(name, values, picture, after):
+    assert Transform.named(name, "x")(**values).output(picture) == after
+
+
+_OF_FLOATS = ["blur", "noise", "dead_rows", "frozen_frames", "late_frames", "shift"]
+
+
+@pytest.mark.parametrize("name", _OF_FLOATS)
+def test_what_goes_wrong_in_a_camera_goes_wrong_with_floats(name):
+    with pytest.raises(InputError, match=f"{name} needs floats; let gray come first"):
+        Transform.named(name, "x")().output(RGB)
+
+
+def test_faults_are_those_by_chance_or_with_memory():
+    faults = {variant.registered_name() for variant in Fault.variants()}
+    assert faults == {"noise", "dead_rows", "frozen_frames", "late_frames", "shift"}
+    assert all(issubclass(variant.factory, CameraFault) for variant in Fault.variants())

@@ -1,0 +1,163 @@
+"""Many worlds at once are as many single ones: Gymnasium's own `SyncVectorEnv` is the yardstick."""
+
+import numpy as np
+import pytest
+
+import drone_rl
+from drone_rl.utils.errors import InputError
+
+gymnasium = pytest.importorskip("gymnasium", minversion="1.1", reason="Gymnasium is not installed")
+from gymnasium.vector import AutoresetMode  # noqa: E402 (after the skip)
+
+NAME = "drone_rl/CollectCubes-v0"
+SHORT = {"num_cubes": 1, "first_distance": 3.0, "step_limit": 5, "front_margin": 3.0}
+COUNT = 5
+
+
+@pytest.fixture
+def make():
+    envs = []
+
+    def build(num_envs=COUNT, **options):
+        envs.append(gymnasium.make_vec(NAME, num_envs=num_envs, **options))
+        return envs[-1]
+
+    yield build
+    for env in envs:
+        env.close()
+
+
+def assert_same(ours, theirs, where=""):
+    """The same keys, types, shapes and values, however deep."""
+    assert type(ours) is type(theirs), where
+    if isinstance(ours, dict):
+        assert ours.keys() == theirs.keys(), where
+        for key in ours:
+            assert_same(ours[key], theirs[key], f"{where}.{key}")
+    elif isinstance(ours, tuple) or ours.dtype == object:
+        for i, (one, other) in enumerate(zip(ours, theirs, strict=True)):
+            if one is not None or other is not None:
+                assert_same(one, other, f"{where}[{i}]")
+    else:
+        assert (ours.dtype, ours.shape) == (theirs.dtype, theirs.shape), where
+        assert np.array_equal(ours, theirs), where
+
+
+@pytest.mark.parametrize("observations", ["pixels", "state"])
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
+def test_they_are_as_many_single_worlds(make, mode, observations):
+    options = {**SHORT, "observations": observations}
+    ours = make(autoreset_mode=mode, **options)
+    sync = {"vectorization_mode": "sync", "vector_kwargs": {"autoreset_mode": mode}}
+    theirs = make(**sync, **options)
+    assert ours.observation_space == theirs.observation_space
+    assert ours.action_space == theirs.action_space
+    assert ours.metadata == theirs.metadata
+    assert_same(ours.reset(seed=3), theirs.reset(seed=3), "reset")
+    moves = np.random.default_rng(0)
+    ends = np.zeros(2, int)
+    for t in range(25):
+        actions = moves.integers(0, 3, COUNT)
+        step = ours.step(actions)
+        assert_same(step, theirs.step(actions), f"step {t}")
+        ends += [step[2].sum(), step[3].sum()]
+        assert step[0] in ours.observation_space
+    assert (ends >= 2).all()  # by the rules, and by the limit
+    assert_same(ours.reset(), theirs.reset(), "reset without a seed")
+    seeds = [9, None, 9, 1, None]
+    assert_same(ours.reset(seed=seeds)[0][:1], theirs.reset(seed=seeds)[0][:1], "seeds")
+    assert ours.np_random_seed == theirs.np_random_seed
+    for one, other in zip(ours.np_random, theirs.np_random, strict=True):
+        assert one.bit_generator.state == other.bit_generator.state
+
+
+def test_worlds_that_wait_to_be_told(make):
+    ours = make(autoreset_mode=AutoresetMode.DISABLED, **SHORT)
+    sync = {"vectorization_mode": "sync", "vector_kwargs": {"autoreset_mode": "Disabled"}}
+    theirs = make(**sync, **SHORT)
+    assert_same(ours.reset(seed=0), theirs.reset(seed=0))
+    moves, ended = np.random.default_rng(1), np.zeros(COUNT, bool)
+    for _ in range(15):
+        if ended.any():
+            with pytest.raises(InputError, match=r"worlds \[.*\] have ended; reset them by reset"):
+                ours.step(np.zeros(COUNT, int))
+            told = [env.reset(options={"reset_mask": ended}) for env in (ours, theirs)]
+            assert_same(*told, "partial reset")
+        actions = moves.integers(0, 3, COUNT)
+        step = ours.step(actions)
+        assert_same(step, theirs.step(actions))
+        ended = step[2] | step[3]
+
+
+def test_the_first_worlds_are_the_same_whatever_their_number(make):
+    one, many = make(1), make(3)
+    assert np.array_equal(one.reset(seed=4)[0][0], many.reset(seed=4)[0][0])
+    alone = gymnasium.make(NAME)
+    assert np.array_equal(many.reset(seed=4)[0][2], alone.reset(seed=6)[0])
+    alone.close()
+
+
+def test_they_are_drawn_from_behind_where_that_was_asked_for(make):
+    env = make(2, render_mode="rgb_array")
+    env.reset(seed=0)
+    assert [frame.shape for frame in env.render()] == [(360, 640, 3)] * 2
+    with pytest.warns(UserWarning, match="render_mode='rgb_array'"):
+        assert make(2).render() is None
+
+
+def test_gymnasiums_wrappers_go_around_them(make):
+    env = gymnasium.wrappers.vector.RecordEpisodeStatistics(
+        make(**SHORT, autoreset_mode="SameStep")
+    )
+    env.reset(seed=0)
+    lengths = []
+    for _ in range(12):
+        *_, info = env.step(np.zeros(COUNT, int))
+        lengths += info["episode"]["l"][info["_episode"]].tolist() if "episode" in info else []
+    assert lengths and set(lengths) <= {2, 4, 5}
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"num_envs": 0}, "num_envs=0 is out of range; give a whole number from 1"),
+        ({"num_envs": 1.5}, "num_envs=1.5 is out of range"),
+        ({"autoreset_mode": "Later"}, "autoreset_mode='Later' is unknown; give one of: NextStep"),
+        ({"wind": 1}, "wind is unknown; there are: observations"),
+        ({"render_mode": "human"}, "render_mode='human' is unknown; give rgb_array"),
+    ],
+)
+def test_mistakes_are_told_in_a_line(make, options, message):
+    with pytest.raises(InputError, match=f"^{message}"):
+        make(**options)
+
+
+def test_mistakes_while_flying(make):
+    env = make(2)
+    with pytest.raises(InputError, match=r"needs a running episode; call reset\(\) first"):
+        env.step([0, 0])
+    with pytest.raises(InputError, match="seed has 3 values; give one, or 2"):
+        env.reset(seed=[1, 2, 3])
+    with pytest.raises(InputError, match=r"options=\['start'\] are unknown to reset"):
+        env.reset(options={"start": 1})
+    for mask in ([True], [1, 0], "all"):
+        with pytest.raises(InputError, match=r"reset_mask is of .*; give bool of shape \(2,\)"):
+            env.reset(options={"reset_mask": mask})
+    env.reset(seed=0)
+    with pytest.raises(InputError, match=r"action=\[0, 7\] is invalid; give an array of sha"):
+        env.step([0, 7])
+    env.close()
+    env.close()
+
+
+def test_worlds_that_were_never_told_to_start_do_so_in_their_turn(make):
+    env = make(2, observations="state", **SHORT)
+    env.reset(seed=0, options={"reset_mask": np.array([True, False])})
+    *_, info = env.step([0, 0])
+    assert info["drone"][:, 0].tolist() == [1.0, 0.0]
+
+
+def test_the_class_takes_settings_too():
+    env = drone_rl.DroneWorlds(2, drone_rl.TaskSettings(num_cubes=2), step_limit=100)
+    assert env.reset(seed=0)[1]["collected"].shape == (2, 2)
+    env.close()

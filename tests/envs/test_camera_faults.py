@@ -1,0 +1,325 @@
+"""Seeds, batches, resets, partial steps and saved states of faults, each as its world's own."""
+
+import copy
+
+import pytest
+import torch
+from tensordict import TensorDict
+from torchrl.envs import RewardSum, SerialEnv, StepCounter, TransformedEnv
+from torchrl.envs.utils import check_env_specs
+
+from drone_rl.collectors import EpisodeCollector, RolloutCollector
+from drone_rl.collectors.rollouts import TorchrlStream
+from drone_rl.collectors.stepping import SteppingCollector
+from drone_rl.config import CameraSettings, TaskSettings
+from drone_rl.envs import (
+    Blur,
+    CameraFault,
+    DeadRows,
+    DroneEnv,
+    FrozenFrames,
+    GrayPixels,
+    LateFrames,
+    Noise,
+    Shift,
+    StandardizePixels,
+    with_transforms,
+)
+from drone_rl.envs.camera_faults import _sampler
+from drone_rl.envs.fault_models import FaultModel
+from drone_rl.policies import SmallCNN, make_actor
+from drone_rl.utils.errors import InputError
+
+SHORT = TaskSettings(num_cubes=2, first_distance=3.0, spacing=3.0, step_limit=12, front_margin=3.0)
+SMALL = CameraSettings(width=16, height=8)
+KINDS = {
+    "noise": lambda: [Noise(0.1)],
+    "correlated": lambda: [Noise(0.1, 5.0)],
+    "dead": lambda: [DeadRows(2, rows=(0,), level=0.5)],
+    "frozen": lambda: [FrozenFrames(0.5)],
+    "late": lambda: [LateFrames(2)],
+    "all": lambda: [Blur(), Noise(), Noise(0.1, 3.0), DeadRows(), FrozenFrames(0.3), LateFrames()],
+    "shift": lambda: [Shift()],
+}
+
+
+def make_env(kind="all", num_envs=4, **options):
+    base = DroneEnv(num_envs, SHORT, SMALL, **options)
+    return with_transforms(base, [GrayPixels(), *KINDS[kind](), StandardizePixels()])
+
+
+def fly(env, steps=6, worlds=4):
+    """Pictures of every step of all worlds, begun anew where they end. Shape: (N, T, C, H, W)."""
+    moves = torch.arange(steps)[None] + torch.arange(worlds)[:, None]  # each world on its own way
+    state, seen = env.reset(), []
+    for t in range(steps):
+        seen.append(state["pixels"])
+        state = env.step_and_maybe_reset(state.set("action", moves[:, t] % 3))[1]
+    return torch.stack(seen, 1)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_specs_agree_with_data(kind):
+    env = make_env(kind, 2)
+    check_env_specs(env, break_when_any_done="both")
+    env.close()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_seed_repeats_all_and_another_differs(kind):
+    first, second = fly(make_env(kind, seed=3), 20), fly(make_env(kind, seed=3), 20)
+    assert torch.equal(first, second)
+    env = make_env(kind, seed=5)
+    assert not torch.equal(first, fly(env, 20))
+    env.set_seed(3)
+    assert torch.equal(first, fly(env, 20))
+    assert not torch.equal(first, fly(env, 20))  # the streams have gone on
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_first_worlds_are_the_same_in_a_batch_of_any_size(kind):
+    whole = fly(make_env(kind, 4, seed=1), 20)
+    assert torch.equal(fly(make_env(kind, 2, seed=1), 20, 2), whole[:2])
+    env = make_env(kind, 2, seed=1, first_world=2)
+    moves = torch.arange(20)[None] + torch.arange(2, 4)[:, None]
+    state, seen = env.reset(), []
+    for t in range(20):
+        seen.append(state["pixels"])
+        state = env.step_and_maybe_reset(state.set("action", moves[:, t] % 3))[1]
+    assert torch.equal(torch.stack(seen, 1), whole[2:])
+
+
+class OtherNoise(Noise):
+    """The same, but another kind."""
+
+
+def test_faults_worlds_and_episodes_differ_and_so_do_kinds():
+    pipeline = [GrayPixels(), Noise(1.0), Noise(1.0), OtherNoise(1.0)]
+    env, memories = with_transforms(DroneEnv(2, SHORT, SMALL), pipeline), []
+    for _ in range(2):
+        env.reset()
+        memories += [fault._memory[w] for fault in pipeline[1:] for w in (0, 1)]
+    for i in range(len(memories)):
+        for j in range(i):
+            both = torch.stack([memories[i].flatten(), memories[j].flatten()])
+            assert both.corrcoef()[0, 1].abs() < 0.4  # of 128 pixels
+
+
+def test_the_same_episodes_are_flown_with_a_fault_and_without():
+    clean = with_transforms(DroneEnv(4, SHORT, SMALL, seed=2), [GrayPixels()])
+    faulty = make_env(seed=2)
+    for _ in range(3):
+        cubes = [env.reset()["info", "cube_positions"] for env in (clean, faulty)]
+        assert torch.equal(*cubes)
+
+
+def test_the_same_numbers_are_drawn_at_any_strength():
+    shown = []
+    for strength in (0.01, 0.02):
+        env = with_transforms(DroneEnv(2, SHORT, SMALL), [GrayPixels(), Noise(strength)])
+        clean = GrayPixels()._apply_transform(env.base_env.last_pixels)
+        pixels = env.reset()["pixels"]
+        clean = GrayPixels()._apply_transform(env.base_env.last_pixels)
+        shown.append(pixels - clean)
+    inside = (shown[1] + clean > 0) & (shown[1] + clean < 1)
+    assert inside.float().mean() > 0.5
+    torch.testing.assert_close(2 * shown[0][inside], shown[1][inside], atol=1e-6, rtol=1e-3)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_world_begins_anew_alone(kind):
+    env, moves = make_env(kind, seed=1), torch.tensor([0, 1, 2, 0])
+    state = env.reset()
+    for _ in range(3):
+        state = env.step(state.set("action", moves))["next"]
+    other = make_env(kind, seed=1)  # in which nobody begins anew
+    goes_on = other.reset()
+    for _ in range(3):
+        goes_on = other.step(goes_on.set("action", moves))["next"]
+    mask = torch.tensor([[False], [True], [False], [False]])
+    begun = env.reset(state.clone().set("_reset", mask))
+    stayed = torch.tensor([0, 2, 3])
+    assert torch.equal(begun["pixels"][stayed], goes_on["pixels"][stayed])
+    step = env.step(begun.set("action", moves))["next"]["pixels"]
+    expected = other.step(goes_on.set("action", moves))["next"]["pixels"]
+    assert torch.equal(step[stayed], expected[stayed])
+    fresh = make_env(kind, seed=1)
+    fresh.reset()
+    assert torch.equal(fresh.reset()["pixels"][1], begun["pixels"][1])  # its second episode
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_worlds_outside_a_step_stand_still_and_meet_later_what_they_would_have_met(kind):
+    env, moves = make_env(kind, seed=1), torch.zeros(4, dtype=torch.int64)
+    state = env.step(env.reset().set("action", moves))["next"]
+    shown = state["pixels"]
+    going = torch.tensor([True, False, True, False])
+    after = env.step(state.set("action", moves).set("_step", going))["next"]
+    assert torch.equal(after["pixels"][~going], shown[~going])
+    whole = make_env(kind, seed=1)
+    expected = whole.step(whole.reset().set("action", moves))["next"]
+    expected = whole.step(expected.set("action", moves))["next"]["pixels"]
+    assert torch.equal(after["pixels"][going], expected[going])
+    now = env.step(after.set("action", moves).set("_step", ~going))["next"]["pixels"]
+    assert torch.equal(now, expected)
+
+
+@pytest.mark.parametrize("fault", [Noise(), DeadRows(), FrozenFrames(0.5), LateFrames(2), Shift()])
+def test_pictures_once_shown_stay_as_they_were(fault):
+    env = with_transforms(DroneEnv(3, SHORT, SMALL), [GrayPixels(), fault])
+    state, shown = env.reset(), []
+    for t in range(6):
+        shown.append((state["pixels"], state["pixels"].clone()))
+        going = torch.arange(3) != t % 3
+        state = env.step(state.set("action", torch.zeros(3).long()).set("_step", going))["next"]
+    for pictures, before in shown:
+        assert torch.equal(pictures, before)
+
+
+def collector(kind, how, seed=0):
+    env = make_env(kind, seed=seed)
+    generator = torch.Generator().manual_seed(0)
+    network = SmallCNN((1, 8, 16), 3, channels=(4,), hidden=(8,), generator=generator)
+    actor = make_actor(network, env.action_spec, generator)
+    if how is RolloutCollector:
+        return RolloutCollector(env, actor, 5), generator
+    return EpisodeCollector(env, actor, acceleration="fused"), generator
+
+
+@pytest.mark.parametrize("how", [EpisodeCollector, RolloutCollector])
+@pytest.mark.parametrize("kind", ["correlated", "all"])
+def test_collecting_goes_on_bit_for_bit(how, kind, tmp_path):
+    first, drawn = collector(kind, how)
+    for _ in range(2):
+        first.collect()
+    torch.save({"collector": first.state_dict(), "drawn": drawn.get_state()}, tmp_path / "state")
+    expected = [first.collect() for _ in range(2)]
+    saved = torch.load(tmp_path / "state", weights_only=True)
+    second, drawn = collector(kind, how)
+    second.load_state_dict(saved["collector"])
+    drawn.set_state(saved["drawn"])
+    for one in expected:
+        other = second.collect()
+        for key in one.keys(True, True):
+            assert torch.equal(one[key], other[key]), key
+
+
+@pytest.mark.parametrize("kind", sorted(set(KINDS) - {"all"}))
+def test_no_fault_is_taken_for_a_map_from_picture_to_picture(kind):
+    episodes, rollouts = (collector(kind, how)[0] for how in (EpisodeCollector, RolloutCollector))
+    assert isinstance(episodes.source, SteppingCollector)
+    assert isinstance(rollouts._stream, TorchrlStream)
+
+
+def test_a_saved_state_goes_on_within_an_episode():
+    env, moves = make_env(), torch.zeros(4, dtype=torch.int64)
+    state = env.step(env.reset().set("action", moves))["next"]
+    saved = copy.deepcopy({"env": env.state_dict(), "worlds": env.base_env.running_state()})
+    expected = env.step(state.clone().set("action", moves))["next"]["pixels"]
+    other = make_env(seed=9)
+    other.load_state_dict(saved["env"])
+    other.base_env.load_running_state(saved["worlds"])
+    assert torch.equal(other.step(state.set("action", moves))["next"]["pixels"], expected)
+
+
+def test_a_state_of_another_number_of_worlds_is_refused():
+    one, other = make_env("noise", 2), make_env("noise", 4)
+    one.reset()
+    other.reset()
+    with pytest.raises(InputError, match=r"Noise has 2 environments, this one 4; set num_envs=2"):
+        other.load_state_dict(one.state_dict())
+
+
+def test_pictures_that_are_none_from_0_to_1_are_refused():
+    base = DroneEnv(1, SHORT, SMALL)
+    for kind in (Noise, DeadRows, FrozenFrames, LateFrames, Shift):
+        with pytest.raises(
+            InputError, match=rf"{kind.__name__} got torch.uint8 .* after gray or rgb"
+        ):
+            with_transforms(base, [kind()]).reset()
+        for standard in (StandardizePixels(1.0, 1.0), StandardizePixels(0.0, 0.5)):
+            with pytest.raises(InputError, match=r"got images from .* before standardize"):
+                with_transforms(base, [GrayPixels(), standard, kind()]).reset()
+
+
+def test_it_may_go_to_other_worlds_and_copies_of_it_share_nothing():
+    fault = Noise(0.1, 5.0)
+    with_transforms(DroneEnv(4, SHORT, SMALL), [GrayPixels(), fault]).reset()
+    fault.reset_parent()
+    env = with_transforms(DroneEnv(2, SHORT, SMALL), [GrayPixels(), fault])
+    fresh = with_transforms(DroneEnv(2, SHORT, SMALL), [GrayPixels(), Noise(0.1, 5.0)])
+    state = env.reset()
+    assert torch.equal(state["pixels"], fresh.reset()["pixels"])
+    another = with_transforms(DroneEnv(2, SHORT, SMALL, seed=3), list(env.transform.clone()))
+    another.reset()
+    steps = [e.step(state.clone().set("action", torch.zeros(2).long())) for e in (env, fresh)]
+    assert torch.equal(steps[0]["next", "pixels"], steps[1]["next", "pixels"])
+
+
+def test_a_step_before_any_reset_is_refused():
+    env = with_transforms(DroneEnv(1, SHORT, SMALL), [GrayPixels(), Noise()])
+    with pytest.raises(InputError, match=r"a step before any reset; call reset\(\)"):
+        env.step(TensorDict({"action": torch.zeros(1, dtype=torch.int64)}, [1]))
+
+
+def test_worlds_without_streams_are_refused_and_batches_of_batches_have_them_within():
+    serial = SerialEnv(1, lambda: with_transforms(DroneEnv(1, SHORT, SMALL), [GrayPixels()]))
+    with pytest.raises(InputError, match=r"wraps SerialEnv, which has no random streams"):
+        TransformedEnv(serial, Noise()).reset()
+    env = SerialEnv(2, lambda: make_env("all", 2))
+    check_env_specs(env, break_when_any_done="both")
+    env.close()
+
+
+def test_alone_it_is_a_pipeline_and_with_no_environment_nothing_goes_wrong():
+    env = TransformedEnv(DroneEnv(2, SHORT, SMALL), GrayPixels())
+    env.append_transform(LateFrames())
+    env.append_transform(RewardSum())
+    env.append_transform(StepCounter())
+    check_env_specs(env, break_when_any_done="both")
+    pictures = torch.rand(2, 1, 4, 4)
+    assert Noise(1.0)._apply_transform(pictures) is pictures
+
+
+def test_numbers_are_drawn_of_each_stream_alone():
+    env = DroneEnv(3, SHORT, pixels=False)
+    every = torch.arange(3)
+
+    def sample(worlds, key, *shape, **how):
+        return _sampler(env.side_streams(worlds, key), torch.device("cpu"))(*shape, **how)
+
+    drawn = sample(every, 7, 4, normal=True)
+    assert torch.equal(sample(every[1:], 7, 4, normal=True), drawn[1:])
+    assert not torch.equal(sample(every, 8, 4, normal=True), drawn)
+    many = sample(every, 7, 5000)
+    assert many.min() >= 0 and many.max() < 1
+    assert many.mean(1).tolist() == pytest.approx([0.5] * 3, abs=0.02)
+
+
+class Inverted(CameraFault):
+    """A user's fault without memory."""
+
+    def __init__(self):
+        super().__init__(FaultModel(lambda images, memory, blank: 1 - images))
+
+
+def test_a_fault_of_ones_own():
+    env = with_transforms(DroneEnv(2, SHORT, SMALL), [GrayPixels(), Inverted()])
+    pixels = env.reset()["pixels"]
+    gray = GrayPixels()._apply_transform(env.base_env.last_pixels)
+    assert torch.equal(pixels, 1 - gray)
+
+
+@pytest.mark.gpu
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a CUDA GPU")
+def test_on_a_gpu_the_same_numbers_are_drawn_and_what_a_cpu_left_goes_on():
+    one, other = make_env(num_envs=2), make_env(num_envs=2, device="cuda")
+    for env in (one, other):
+        env.reset()
+    memories = [env.transform[3]._memory for env in (one, other)]
+    assert memories[1].is_cuda and torch.equal(memories[0], memories[1].cpu())
+    check_env_specs(other, break_when_any_done="both")
+    state = other.reset()
+    other.load_state_dict(one.state_dict())
+    action = torch.zeros(2, dtype=torch.int64, device="cuda")
+    assert other.step(state.set("action", action))["next", "pixels"].is_cuda

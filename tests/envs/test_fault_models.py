@@ -1,0 +1,131 @@
+"""What goes wrong in a camera, against closed forms and numbers by hand."""
+
+import math
+
+import pytest
+import torch
+
+from drone_rl.envs import fault_models
+
+
+def noises(correlation_time, steps=400, pixels=5000):
+    """An AR(1) process. Shape: (steps, pixels)."""
+    draw = torch.Generator().manual_seed(0)
+    now, seen = torch.randn(pixels, generator=draw), []
+    for _ in range(steps):
+        now = fault_models.correlate(now, torch.randn(pixels, generator=draw), correlation_time)
+        seen.append(now)
+    return torch.stack(seen)
+
+
+@pytest.mark.parametrize("correlation_time", [0.0, 1.0, 19.5])
+def test_noise_has_the_variance_and_the_correlation_that_are_stated(correlation_time):
+    noise = noises(correlation_time)
+    assert noise.mean().abs() < 0.02
+    assert noise[0].var() == pytest.approx(1.0, abs=0.06)  # from the first frame on
+    assert noise.var() == pytest.approx(1.0, abs=0.03)
+    for lag in (1, 5):
+        expected = math.exp(-lag / correlation_time) if correlation_time else 0.0
+        assert (noise[lag:] * noise[:-lag]).mean() == pytest.approx(expected, abs=0.03)
+    assert (noise[:, 1:] * noise[:, :-1]).mean().abs() < 0.01  # from pixel to pixel there is none
+
+
+def test_a_step_of_noise_by_hand():
+    kept = fault_models.correlate(torch.tensor([2.0]), torch.tensor([1.0]), 1 / math.log(2))
+    torch.testing.assert_close(kept, torch.tensor([2 * 0.5 + math.sqrt(0.75)]))
+    fresh = fault_models.correlate(torch.tensor([9.0]), torch.tensor([1.0]), 0.0)
+    assert fresh.tolist() == [1.0]
+
+
+def test_noise_is_cut_off_at_black_and_white():
+    pictures = torch.tensor([0.1, 0.5, 0.9]).reshape(1, 1, 3)
+    noise = torch.tensor([-1.0, 0.5, 1.0]).reshape(1, 1, 3)
+    noisy = fault_models.add_noise(pictures, 0.2, noise)
+    torch.testing.assert_close(noisy.flatten(), torch.tensor([0.0, 0.6, 1.0]))
+    assert torch.equal(fault_models.add_noise(pictures, 0.0, noise), pictures)
+
+
+@pytest.mark.parametrize("width", [0.3, 0.5, 2.0])
+def test_a_bright_pixel_becomes_a_gaussian(width):
+    picture = torch.zeros(1, 41, 51)
+    picture[0, 20, 25] = 1.0
+    blurred = fault_models.blur(picture, width)[0]
+    down, across = torch.meshgrid(torch.arange(41) - 20, torch.arange(51) - 25, indexing="ij")
+    falls = torch.exp(-(down**2 + across**2).double() / (2 * width**2))
+    torch.testing.assert_close(blurred, (falls / falls.sum()).float(), atol=2e-5, rtol=0)
+    if width == 2.0:
+        assert float((blurred * down**2).sum()) == pytest.approx(4.0, rel=0.01)
+
+
+def test_weights_by_hand():
+    half = math.exp(-0.5)
+    weights = fault_models.gaussian(1.0)
+    assert len(weights) == 9 and math.fsum(weights) == pytest.approx(1.0, abs=1e-15)
+    assert weights[3] / weights[4] == pytest.approx(half)
+    assert weights[2] / weights[4] == pytest.approx(half**4)
+
+
+@pytest.mark.parametrize("width", [0.0, 0.5, 3.0, 16.0])
+def test_a_constant_picture_stays_as_it_is(width):
+    picture = torch.full((2, 1, 5, 7), 0.7)
+    torch.testing.assert_close(fault_models.blur(picture, width), picture)
+
+
+def test_beyond_an_edge_is_as_on_the_edge():
+    picture = torch.tensor([1.0, 0.0, 0.0, 0.0, 0.0, 0.0]).reshape(1, 1, 6)
+    weights = fault_models.gaussian(0.5)  # two pixels to each side
+    expected = [weights[0] + weights[1] + weights[2], weights[1] + weights[0], weights[0], 0, 0, 0]
+    torch.testing.assert_close(fault_models.blur(picture, 0.5).flatten(), torch.tensor(expected))
+
+
+def test_a_picture_is_blurred_the_same_in_a_batch_of_any_size():
+    pictures = torch.rand(7, 2, 9, 11, generator=torch.Generator().manual_seed(0))
+    together = fault_models.blur(pictures, 1.3)
+    for i in range(7):
+        assert torch.equal(fault_models.blur(pictures[i : i + 1], 1.3)[0], together[i])
+
+
+def test_more_dead_rows_include_fewer():
+    numbers = torch.tensor([[0.4, 0.1, 0.9, 0.3], [0.2, 0.3, 0.1, 0.8]])
+    chosen = [fault_models.choose_rows(numbers, count).int().tolist() for count in range(5)]
+    assert chosen[0] == [[0, 0, 0, 0], [0, 0, 0, 0]]
+    assert chosen[1] == [[0, 1, 0, 0], [0, 0, 1, 0]]
+    assert chosen[2] == [[0, 1, 0, 1], [1, 0, 1, 0]]
+    assert chosen[4] == [[1, 1, 1, 1], [1, 1, 1, 1]]
+
+
+def test_dead_rows_show_nothing():
+    pictures = torch.full((1, 2, 3, 2), 0.5)
+    dead = torch.tensor([[False, True, False]])
+    killed = fault_models.kill_rows(pictures, dead, 0.25)
+    assert killed.dtype == torch.float32
+    assert killed[0, :, :, 0].tolist() == [[0.5, 0.25, 0.5]] * 2
+    assert fault_models.kill_rows(pictures, dead)[0, 0, 1].tolist() == [0.0, 0.0]
+
+
+def test_frozen_pictures_are_those_before():
+    now, before = torch.ones(2, 1, 1, 2), torch.zeros(2, 1, 1, 2)
+    shown = fault_models.freeze(now, before, torch.tensor([True, False]))
+    assert shown.flatten().tolist() == [0.0, 0.0, 1.0, 1.0]
+
+
+@pytest.mark.parametrize(
+    ("frames", "shown"), [(0, [0, 1, 2, 3]), (2, [0, 0, 0, 1]), (9, [0, 0, 0, 0])]
+)
+def test_a_late_film_shows_its_first_picture_until_the_second_arrives(frames, shown):
+    fault, images = fault_models.late_frames(frames), torch.arange(4.0).reshape(4, 1, 1, 1, 1)
+    memory = fault.begin(images[0], None)
+    seen = [fault.show(images[0], memory, 0.0).item()]
+    for image in images[1:]:
+        memory = fault.update(memory, image, None)
+        seen.append(fault.show(image, memory, 0.0).item())
+    assert seen == shown
+
+
+def test_a_shift_by_hand():
+    picture = torch.arange(6.0).reshape(1, 1, 2, 3).repeat(3, 1, 1, 1)
+    by = torch.tensor([[0, 0], [1, 0], [-1, 2]])  # down, to the right
+    stays, down, up_and_right = fault_models.shift(picture, by)[:, 0].tolist()
+    assert stays == [[0, 1, 2], [3, 4, 5]]
+    assert down == [[0, 1, 2], [0, 1, 2]]
+    assert up_and_right == [[3, 3, 3], [3, 3, 3]]

@@ -1,0 +1,45 @@
+import torch
+from torchrl.envs import CatFrames, RewardSum
+
+from drone_rl.envs import (
+    CropRows,
+    DroneEnv,
+    GrayPixels,
+    StandardizePixels,
+    on_pixels,
+    with_transforms,
+)
+from drone_rl.envs.transforms import memory_of, see_film
+
+
+def test_transforms_are_applied_in_the_order_given():
+    env = with_transforms(DroneEnv(2), [GrayPixels(), StandardizePixels()])
+    assert [type(t) for t in env.transform] == [GrayPixels, StandardizePixels]
+    pixels = env.reset()["pixels"]
+    assert pixels.shape == (2, 1, 25, 64) and pixels.dtype == torch.float32
+    env.close()
+
+
+def test_without_transforms_the_environment_is_as_it_was():
+    env = with_transforms(DroneEnv(2))
+    assert env.reset()["pixels"].dtype == torch.uint8
+    env.close()
+
+
+def test_pictures_alone_are_transformed_in_order_and_by_those_that_look_at_them():
+    white = torch.full((3, 4, 2, 3), 255, dtype=torch.uint8)
+    standard = StandardizePixels(mean=0.5, std=0.25)
+    made = on_pixels([RewardSum(), GrayPixels(), standard, CropRows(1, 4)])(white)
+    torch.testing.assert_close(made, torch.full((3, 1, 3, 2), 2.0))
+    assert on_pixels([])(white) is white
+
+
+def test_a_film_is_seen_frame_by_frame_and_stacked_where_the_stack_stands():
+    standard = StandardizePixels(mean=0.5, std=0.25)
+    stack = CatFrames(N=3, dim=-3, in_keys=["pixels"])
+    film = [torch.full((2, 1, 2, 2), value) for value in (0.5, 0.75)]
+    seen = see_film([standard, stack], film)
+    assert seen.shape == (2, 3, 2, 2)
+    assert seen[0, :, 0, 0].tolist() == [0.0, 0.0, 1.0]  # the first repeats what is missing
+    assert see_film([standard], film)[0, 0, 0, 0] == 1.0
+    assert (memory_of([standard, stack]), memory_of([standard])) == (2, 0)

@@ -1,0 +1,118 @@
+import pytest
+import torch
+from torchrl.envs.utils import check_env_specs
+
+from tests.three_state import ThreeStateEnv, exact_gradient, outcomes
+
+
+def test_specs():
+    check_env_specs(ThreeStateEnv(4))
+
+
+def test_action_zero_stays_and_is_truncated():
+    env = ThreeStateEnv(5, horizon=2)
+    rollout = env.rollout(9, policy=lambda td: td.set("action", torch.zeros(5).long()))
+    assert rollout.shape == (5, 2)
+    assert rollout["next", "truncated"][:, -1].all()
+    assert rollout["next", "reward"].sum() == 0
+
+
+def test_action_one_succeeds_three_times_in_four():
+    env = ThreeStateEnv(20_000)
+    state = env.reset().set("action", torch.ones(20_000).long())
+    after = env.step(state)["next"]
+    assert after["terminated"].all()
+    assert abs(float(after["reward"].mean()) - 0.75) < 4 * (0.75 * 0.25 / 20_000) ** 0.5
+    assert torch.equal(after["reward"][:, 0], after["observation"][:, 2])
+
+
+def test_seed_repeats():
+    def draw(seed):
+        env = ThreeStateEnv(50, seed=seed)
+        return env.step(env.reset().set("action", torch.ones(50).long()))["next", "reward"]
+
+    assert torch.equal(draw(1), draw(1))
+    assert not torch.equal(draw(1), draw(2))
+
+
+def test_outcomes_of_two_steps_by_hand():
+    """Leave at once (1/5), later (4/5 * 1/2), or stay (4/5 * 1/2); 3 of 4 who leave succeed."""
+    found = {(o.actions, o.rewards): o.probability for o in outcomes([0.2, 0.5])}
+    assert found == pytest.approx(
+        {
+            ((1,), (1.0,)): 0.15,
+            ((1,), (0.0,)): 0.05,
+            ((0, 1), (0.0, 1.0)): 0.3,
+            ((0, 1), (0.0, 0.0)): 0.1,
+            ((0, 0), (0.0, 0.0)): 0.4,
+        }
+    )
+
+
+def test_outcomes_are_those_of_the_environment():
+    """4,000 worlds under a policy that leaves with probability 0.3 and 0.6."""
+    leaving, n = [0.3, 0.6], 4000
+    env, generator = ThreeStateEnv(n, horizon=2, seed=3), torch.Generator().manual_seed(0)
+    state, seen = env.reset(), [((), ())] * n
+    alive = torch.ones(n, dtype=torch.bool)
+    for leave in leaving:
+        action = (torch.rand(n, generator=generator) < leave).long()
+        after = env.step(state.set("action", action))["next"]
+        rewards, ended = after["reward"][:, 0].tolist(), after["done"][:, 0]
+        for i in alive.nonzero()[:, 0].tolist():
+            seen[i] = ((*seen[i][0], int(action[i])), (*seen[i][1], rewards[i]))
+        alive &= ~ended
+        state = after
+    assert not alive.any()
+    exact = {(o.actions, o.rewards): o.probability for o in outcomes(leaving)}
+    assert set(seen) == set(exact)
+    for kind, p in exact.items():
+        assert abs(seen.count(kind) / n - p) < 4 * (p * (1 - p) / n) ** 0.5
+
+
+@pytest.mark.parametrize("gamma", [1.0, 0.9])
+def test_exact_gradient_is_the_sum_over_outcomes(gamma):
+    """Of sum_t score_t g_t with g_t the discounted return; d log pi / d logit = action - p."""
+    leaving = [0.3, 0.6, 0.2]
+    total = torch.zeros(3, dtype=torch.float64)
+    for p, actions, rewards in outcomes(leaving):
+        for t, action in enumerate(actions):
+            to_go = sum(gamma**i * r for i, r in enumerate(rewards[t:]))
+            total[t] += p * (action - leaving[t]) * to_go
+    torch.testing.assert_close(exact_gradient(leaving, gamma), total)
+
+
+def test_exact_gradient_is_the_derivative_of_the_expected_reward():
+    def reward(logits):
+        stayed, total = 1.0, 0.0
+        for leave in logits.sigmoid():
+            total, stayed = total + 0.75 * stayed * leave, stayed * (1 - leave)
+        return total
+
+    logits = torch.tensor([0.4, -1.0, 0.3], dtype=torch.float64, requires_grad=True)
+    (slope,) = torch.autograd.grad(reward(logits), logits)
+    torch.testing.assert_close(exact_gradient(logits.sigmoid().tolist()), slope)
+    assert exact_gradient([0.5]).tolist() == [0.75 / 4]
+
+
+def test_truncated_exactly_at_the_horizon_and_terminated_before():
+    env = ThreeStateEnv(3, horizon=2)
+    state = env.reset()
+    state = env.step(state.set("action", torch.tensor([0, 1, 0])))["next"]
+    assert state["terminated"][:, 0].tolist() == [False, True, False]
+    assert not state["truncated"].any()
+    state = env.step(state.set("action", torch.tensor([0, 1, 1])))["next"]
+    assert state["terminated"][:, 0].tolist() == [False, True, True]
+    assert state["truncated"][:, 0].tolist() == [True, False, False]
+    assert state["done"].all()
+    assert state["reward"][1] == 0.0  # nothing more happens to a world that has ended
+
+
+def test_reset_of_some_worlds_leaves_the_others():
+    env = ThreeStateEnv(2, horizon=5)
+    state = env.step(env.reset().set("action", torch.tensor([1, 0])))["next"]
+    state["_reset"] = torch.tensor([[True], [False]])
+    again = env.reset(state)
+    assert again["observation"][0].tolist() == [1.0, 0.0, 0.0]
+    assert env._steps.tolist() == [0, 1]
+    assert not again["done"].any()

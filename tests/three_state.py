@@ -1,0 +1,125 @@
+"""The three-state Markov decision process of Fig. 3, small enough to know its exact gradient."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import torch
+from tensordict import TensorDict, TensorDictBase
+from torchrl.data import Binary, Categorical, Composite, OneHot, Unbounded
+from torchrl.envs import EnvBase
+
+SUCCESS_PROBABILITY = 0.75
+"""Of action 1 in state 0: to state 2, with reward 1; otherwise to state 1, with none."""
+
+
+class Outcome(NamedTuple):
+    """One way in which an episode can go."""
+
+    probability: float
+    actions: tuple[int, ...]
+    rewards: tuple[float, ...]
+
+
+def outcomes(leaving: Sequence[float]) -> list[Outcome]:
+    """Every way in which an episode can go, so that expectations become sums.
+
+    Args:
+        leaving: The policy's probability of action 1 in state 0 at each step; as many as `horizon`.
+    """
+    found, still_there = [], 1.0
+    for t, leave in enumerate(leaving):
+        actions, waited = (*[0] * t, 1), (0.0,) * t
+        success, failure = SUCCESS_PROBABILITY, 1 - SUCCESS_PROBABILITY
+        found.append(Outcome(still_there * leave * success, actions, (*waited, 1.0)))
+        found.append(Outcome(still_there * leave * failure, actions, (*waited, 0.0)))
+        still_there *= 1 - leave
+    stayed = len(leaving)
+    return [*found, Outcome(still_there, (0,) * stayed, (0.0,) * stayed)]
+
+
+def exact_gradient(leaving: Sequence[float], gamma: float = 1.0) -> torch.Tensor:
+    """The policy gradient with respect to the logit of action 1 at each step, without sampling.
+
+    It is P(still in state 0) p (1 - p) (Q(action 1) - Q(action 0)), with p of the step.
+    Undiscounted this is the gradient of the expected reward. With gamma below 1 it is what Eq. 15
+    estimates with discounted returns, each discounted from its own step: the gradient of nothing,
+    but what REINFORCE climbs.
+
+    Args:
+        leaving: As in `outcomes`.
+        gamma: Discount rate of Q.
+
+    Returns:
+        Shape: (len(leaving),), float64.
+    """
+    value, lead = 0.0, []
+    for leave in reversed(leaving):
+        stay = gamma * value
+        lead.insert(0, SUCCESS_PROBABILITY - stay)
+        value = leave * SUCCESS_PROBABILITY + (1 - leave) * stay
+    p = torch.tensor(leaving, dtype=torch.float64)
+    still_there = torch.cat([p.new_ones(1), (1 - p).cumprod(0)[:-1]])
+    return still_there * p * (1 - p) * p.new_tensor(lead)
+
+
+class ThreeStateEnv(EnvBase):
+    """Action 0 stays in state 0; action 1 goes to state 1 (25%) or, for reward 1, to state 2.
+
+    States 1 and 2 have no way out and no reward, so they end the episode; staying in state 0 is
+    truncated after `horizon` steps. Observation: the state, one-hot, shape (num_envs, 3).
+    """
+
+    def __init__(self, num_envs: int, *, horizon: int = 3, seed: int = 0) -> None:
+        """Makes the worlds.
+
+        Args:
+            num_envs: How many.
+            horizon: Steps after which an episode is truncated.
+            seed: Of the transitions.
+        """
+        super().__init__(batch_size=torch.Size([num_envs]))
+        self.horizon = horizon
+        n = num_envs
+        self.observation_spec = Composite(
+            observation=OneHot(3, shape=(n, 3), dtype=torch.float32), shape=(n,)
+        )
+        self.action_spec = Categorical(2, shape=(n,), dtype=torch.int64)
+        self.reward_spec = Unbounded((n, 1))
+        flags = ("done", "terminated", "truncated")
+        self.full_done_spec = Composite(
+            {name: Binary(1, (n, 1), dtype=torch.bool) for name in flags}, shape=(n,)
+        )
+        self._state = torch.zeros(n, dtype=torch.int64)
+        self._steps = torch.zeros(n, dtype=torch.int64)
+        self.set_seed(seed)
+
+    def _set_seed(self, seed: int | None) -> None:
+        self._generator = torch.Generator().manual_seed(0 if seed is None else seed)
+
+    def _reset(self, tensordict: TensorDictBase | None = None, **kwargs: object) -> TensorDictBase:
+        mask = None if tensordict is None else tensordict.get("_reset", None)
+        fresh = torch.ones(self.batch_size, dtype=torch.bool) if mask is None else mask.view(-1)
+        self._state = self._state.masked_fill(fresh, 0)
+        self._steps = self._steps.masked_fill(fresh, 0)
+        return self._observe(torch.zeros(self.batch_size, dtype=torch.bool), None)
+
+    def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
+        leaves = (tensordict["action"] == 1) & (self._state == 0)
+        draw = torch.rand(self.batch_size, generator=self._generator)
+        goal = torch.where(draw < SUCCESS_PROBABILITY, 2, 1)
+        self._state = torch.where(leaves, goal, self._state)
+        self._steps = self._steps + 1
+        reward = (leaves & (self._state == 2)).float()
+        return self._observe(self._state > 0, reward)
+
+    def _observe(self, terminated: torch.Tensor, reward: torch.Tensor | None) -> TensorDict:
+        truncated = ~terminated & (self._steps >= self.horizon)
+        entries = {
+            "observation": torch.nn.functional.one_hot(self._state, 3).float(),
+            "terminated": terminated[:, None],
+            "truncated": truncated[:, None],
+            "done": (terminated | truncated)[:, None],
+        }
+        if reward is not None:
+            entries["reward"] = reward[:, None]
+        return TensorDict(entries, self.batch_size)

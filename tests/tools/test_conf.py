@@ -1,0 +1,51 @@
+"""The files of conf/ that hold defaults are generated from the settings."""
+
+import dataclasses
+from typing import Annotated
+
+import yaml
+
+from drone_rl.utils.schema import Real
+from drone_rl.utils.settings import Settings
+from tools.conf import generated_files, main, make_text
+
+
+def test_the_generated_files_are_current(capsys):
+    assert main(["--check"]) == 0, f"run python -m tools.conf: {capsys.readouterr().out}"
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Some(Settings):
+    rate: Annotated[float, Real(0.0)] = 1e-5
+    """Learning rate; none for the default."""
+    name: str | None = None
+    """Name."""
+    is_on: bool = True
+    """Switch."""
+
+
+def test_a_file_keeps_its_head_and_gets_comments_and_values(tmp_path):
+    path = tmp_path / "some.yaml"
+    path.write_text("# Some settings.\ndefaults: [base_some, _self_]\n\nold: 3\n")
+    text = make_text(path, Some)
+    assert text.startswith(
+        "# Some settings.\ndefaults: [base_some, _self_]\n\n# Learning rate; null"
+    )
+    assert yaml.safe_load(text)["rate"] == 1e-5
+    assert "name: null\n# Switch.\nis_on: true\n" in text
+
+
+def test_a_stale_file_is_reported_and_written_again(tmp_path, monkeypatch):
+    path = tmp_path / "some.yaml"
+    path.write_text("# Some settings.\n\nold: 3\n")
+    monkeypatch.setattr("tools.conf.generated_files", lambda _: [(path, Some)])
+    assert main(["--check"]) == 1 and "old" in path.read_text()
+    assert main([]) == 0 and "old" not in path.read_text()
+    assert main(["--check"]) == 0
+
+
+def test_every_group_has_generated_files():
+    from drone_rl.cli.hydra.composition import conf_dir
+
+    groups = {path.parent.name for path, _ in generated_files(conf_dir())}
+    assert {"task", "camera", "network", "returns", "objective", "trainer"} <= groups

@@ -1,0 +1,57 @@
+"""A gradient in pieces is that of the whole; a step only along numbers."""
+
+import pytest
+import torch
+from tensordict import TensorDict
+from torch import nn
+
+from drone_rl.training.learners.learner import NotANumberError, accumulate, descend
+
+X = torch.tensor([[1.0], [2.0], [6.0]])
+
+
+def squares(layer, reduce=torch.mean):
+    """The loss (w x)^2, and a figure beside it."""
+
+    def losses(chunk):
+        value = reduce(layer(chunk["x"]).square())
+        return TensorDict({"loss_square": value, "mean": chunk["x"].mean()}, [])
+
+    return losses
+
+
+def one_weight(value=1.0):
+    layer = nn.Linear(1, 1, bias=False)
+    nn.init.constant_(layer.weight, value)
+    return layer
+
+
+@pytest.mark.parametrize("chunk", [1, 2, 3, 100])
+@pytest.mark.parametrize(("is_sum", "wanted"), [(False, 41 / 3), (True, 41.0)])
+def test_gradient_and_terms_by_hand(chunk, is_sum, wanted):
+    """1 + 4 + 36 = 41; the gradient of w^2 s at w = 1 is 2 s."""
+    layer = one_weight()
+    losses = squares(layer, torch.sum if is_sum else torch.mean)
+    terms = accumulate(TensorDict({"x": X}, [3]), losses, chunk, is_sum=is_sum)
+    assert terms == {"loss_square": pytest.approx(wanted), "mean": pytest.approx(3.0)}
+    assert float(layer.weight.grad) == pytest.approx(2 * wanted)
+
+
+@pytest.mark.parametrize(("most", "step"), [(None, 6.0), (10.0, 6.0), (1.5, 1.5)])
+def test_a_step_is_as_long_as_it_may_be(most, step):
+    layer = one_weight()
+    layer.weight.grad = torch.tensor([[6.0]])
+    optimiser = torch.optim.SGD(layer.parameters(), lr=1.0)
+    assert descend(optimiser, layer.named_parameters(), most) == pytest.approx(6.0)
+    assert float(layer.weight.detach()) == pytest.approx(1.0 - step)
+
+
+def test_no_number():
+    layer = one_weight(float("nan"))
+    with pytest.raises(NotANumberError, match=r"^loss_square is NaN"):
+        accumulate(TensorDict({"x": X}, [3]), squares(layer), 2)
+    layer = one_weight()
+    layer.weight.grad = torch.tensor([[float("inf")]])
+    with pytest.raises(NotANumberError, match=r"^the gradient of weight is NaN or infinite"):
+        descend(torch.optim.SGD(layer.parameters(), lr=1.0), layer.named_parameters(), None)
+    assert float(layer.weight.detach()) == 1.0

@@ -1,0 +1,287 @@
+"""Learners with a critic, from settings to policies that everything else takes as any other."""
+
+import copy
+import shutil
+
+import pytest
+import torch
+from tensordict.nn import TensorDictSequential
+from torchrl.collectors import Collector
+from torchrl.objectives.value import GAE
+
+import drone_rl
+from drone_rl.acceleration.fused_collector import FusedCollector
+from drone_rl.acceleration.fused_network import ActivationCache, FusedNetwork
+from drone_rl.config import TaskSettings
+from drone_rl.config.commands import FlightSettings
+from drone_rl.config.learning import A2c, Gae, Ppo, Rollouts, Sgd, Threads
+from drone_rl.config.networks import SmallCnn
+from drone_rl.config.training import TrainerSettings, TrainSettings
+from drone_rl.config.transforms import EpisodeReward, Gray, Stack
+from drone_rl.training import ActorCriticLearner, ReinforceLearner
+from drone_rl.training.components import make_collector, make_learner
+from drone_rl.utils.checkpoint import load_checkpoint, save_checkpoint
+from drone_rl.utils.errors import InputError
+from drone_rl.utils.progress import silent
+from drone_rl.verdicts.export import export
+
+TASK = TaskSettings(num_cubes=2, first_distance=4.0, spacing=4.0, front_margin=2.0, step_limit=29)
+TINY = TrainSettings(task=TASK, trainer=TrainerSettings(total_frames=300)).replace(
+    objective=Ppo(num_steps=12, minibatch_size=30),
+    collector=Rollouts(num_envs=5, num_threads=2),
+)
+STACKED = {"transforms": (Gray(), Stack(), EpisodeReward())}
+KINDS = {
+    "ppo": TINY,
+    "a2c of its own trunk": TINY.replace(objective=A2c(num_steps=12, shares_trunk=False)),
+    "stacked": TINY.replace(**STACKED),
+}
+
+
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory):
+    return drone_rl.train(TINY, folder=tmp_path_factory.mktemp("run") / "mine", progress=silent)
+
+
+def checkpoint(training):
+    return load_checkpoint(training.folder / "checkpoints" / "last.pt")
+
+
+def test_every_objective_has_its_learner():
+    for settings, kind in ((TINY, ActorCriticLearner), (TrainSettings(), ReinforceLearner)):
+        settings = settings.replace(task=TASK)
+        made = make_collector(settings)
+        learner = make_learner(settings, made)
+        assert isinstance(learner, kind)
+        assert learner.network is made.network
+        made.collector.shutdown()
+
+
+def test_gradients_by_the_kernel_teach_what_those_of_torch_do():
+    learned = {}
+    for is_compiled in (True, False):
+        limits = TrainerSettings(compiled=is_compiled, minibatch_frames=40)
+        settings = TrainSettings(task=TASK, trainer=limits, optimiser=Sgd(lr=1.0))
+        made = make_collector(settings)
+        learner = make_learner(settings, made)
+        network = learner.loss.actor_network.module[0].module
+        assert isinstance(network, FusedNetwork) is is_compiled
+        before = [p.detach().clone() for p in made.network.parameters()]
+        batch = next(iter(made.collector))
+        assert len(batch) > 2 * limits.minibatch_frames
+        learner.update(batch)
+        made.collector.shutdown()
+        learned[is_compiled] = [
+            p.detach() - b for p, b in zip(made.network.parameters(), before, strict=True)
+        ]
+    for by_kernel, by_torch in zip(learned[True], learned[False], strict=True):
+        assert by_torch.any()
+        assert (by_kernel - by_torch).norm() < 0.01 * by_torch.norm()  # but for an output near 0
+
+
+@pytest.mark.parametrize(
+    ("settings", "is_kept"),
+    [
+        ({}, True),
+        ({"trainer": TrainerSettings(compiled=False)}, False),
+        ({"collector": Threads(num_envs=4, num_threads=2)}, False),
+        ({"collector": Threads(compiled=False)}, False),
+        ({"network": SmallCnn(hidden=(600,))}, False),  # too many weights to learn by the kernel
+        ({"objective": Ppo(), "collector": Rollouts(), "returns": Gae()}, False),
+    ],
+)
+def test_what_the_network_made_is_kept_where_it_is_learned_from(settings, is_kept):
+    settings = TrainSettings(task=TASK).replace(**settings)
+    made = make_collector(settings)
+    learner = make_learner(settings, made)
+    sources = [getattr(part, "source", None) for part in made.collector.collectors]
+    kept = [s._cache for s in sources if isinstance(s, FusedCollector) and s._cache is not None]
+    assert (len(kept) == 1) is is_kept and bool(kept) is is_kept
+    assert ("activations" in learner.in_keys) is is_kept
+    if is_kept:
+        assert kept[0] is learner.loss.actor_network.module[0].module._cache
+    made.collector.shutdown()
+
+
+def test_what_was_made_in_flight_is_taken_and_teaches_the_same(monkeypatch):
+    learned, taken = [], []
+    for is_known in (True, False):
+        find = ActivationCache.find
+
+        def note(self, *given, find=find, is_known=is_known):
+            taken.append(find(self, *given))
+            return taken[-1] if is_known else None
+
+        monkeypatch.setattr(ActivationCache, "find", note)
+        settings = TrainSettings(task=TASK, trainer=TrainerSettings(minibatch_frames=40))
+        made = make_collector(settings)
+        learner, batches = make_learner(settings, made), iter(made.collector)
+        for _ in range(3):
+            learner.update(next(batches))
+        made.collector.shutdown()
+        learned.append([p.detach().clone() for p in made.network.parameters()])
+        monkeypatch.undo()
+    assert len(taken) > 12 and all(rows is not None for rows in taken)
+    assert all(torch.equal(*pair) for pair in zip(*learned, strict=True))
+
+
+@pytest.mark.parametrize("shares", [True, False])
+def test_a_critic_begins_alike_for_a_seed_and_leaves_the_policy_as_it_is(shares):
+    settings = TINY.replace(objective=Ppo(shares_trunk=shares))
+    states = []
+    for seed in (0, 0, 1):
+        made = make_collector(settings.replace(seed=seed))
+        states.append(copy.deepcopy(make_learner(settings.replace(seed=seed), made).state_dict()))
+        made.collector.shutdown()
+    one, two, other = (state["critic"] for state in states)
+    assert all(torch.equal(one[name], two[name]) for name in one)
+    weights = [name for name in one if name.endswith("weight")]
+    assert not any(torch.equal(one[name], other[name]) for name in weights)
+    assert len(one) == (2 if shares else len(states[0]["policy"]))
+    alone = make_collector(TrainSettings(task=TASK))
+    assert all(
+        torch.equal(states[0]["policy"][name], value)
+        for name, value in alone.network.state_dict().items()
+    )
+    alone.collector.shutdown()
+
+
+def assert_same(one, two):
+    if isinstance(one, dict | list):
+        assert len(one) == len(two)
+        for key in one if isinstance(one, dict) else range(len(one)):
+            assert_same(one[key], two[key])
+    elif isinstance(one, torch.Tensor):
+        assert one.numpy().tobytes() == two.numpy().tobytes()
+    else:
+        assert one == two
+
+
+@pytest.mark.parametrize("settings", KINDS.values(), ids=KINDS)
+def test_stopped_within_episodes_and_resumed_is_the_uninterrupted(settings, tmp_path):
+    longer = settings.trainer.replace(total_frames=900)
+    whole = drone_rl.train(settings, folder=tmp_path / "whole", trainer=longer, progress=silent)
+    half = drone_rl.train(settings, folder=tmp_path / "half", progress=silent)
+    assert half.result["frames"] == 300
+    counts = [c["step_count"] for c in checkpoint(half)["collector"]["collectors"]]
+    assert torch.cat(counts).count_nonzero() > 0  # episodes are under way
+    again = drone_rl.train(folder=half.folder, resume=True, trainer=longer, progress=silent)
+    one, two = checkpoint(whole), checkpoint(again)
+    for key in ("policy", "critic", "optimiser", "minibatches", "generators", "collector"):
+        assert_same(one[key], two[key])
+    told = [{k: v for k, v in state["progress"].items() if k != "seconds"} for state in (one, two)]
+    assert told[0] == told[1] and told[0]["episodes"] > 10
+
+
+def test_episodes_count_once_and_as_a_whole(trained):
+    """The frames of all episodes that ended, and of those that are under way, are all there are."""
+    columns = trained.metrics()
+    ended = [
+        length * (episodes - before)
+        for length, episodes, before in zip(
+            columns["train/length"],
+            columns["episodes"],
+            [0.0, *columns["episodes"]],
+            strict=False,
+        )
+        if episodes > before
+    ]
+    parts = checkpoint(trained)["collector"]["collectors"]
+    under_way = sum(int(part["step_count"].sum()) for part in parts)
+    assert sum(ended) + under_way == pytest.approx(trained.result["frames"])
+
+
+def test_its_policy_is_judged_and_exported_as_any_other(trained, tmp_path):
+    state = checkpoint(trained)
+    assert set(state["policy"]) == set(trained.policy.description.expected_weights())
+    judged = drone_rl.judge(trained.policy, episodes=4, progress=silent)
+    assert judged.verdict.sentence
+    export(trained.policy, tmp_path / "mine.safetensors", FlightSettings(episodes=4))
+    there = drone_rl.load_policy(tmp_path / "mine.safetensors").state["policy"]
+    assert_same(dict(there), dict(state["policy"]))
+
+
+HOSTILE = {
+    "body.position": (torch.full((3, 3), torch.nan).double(), "holds NaN or infinity"),
+    "cubes": (torch.zeros(3, 7, 3).double(), "is not of shape"),
+    "steps": (torch.zeros(3), "is not of shape"),
+    "lateral": (torch.full((3, 2), torch.inf).double(), "holds NaN or infinity"),
+    "side": ("none", "is not of shape"),
+}
+
+
+@pytest.mark.parametrize("where", HOSTILE)
+def test_worlds_that_no_training_left_are_refused(trained, tmp_path, where):
+    value, message = HOSTILE[where]
+    state = checkpoint(trained)
+    part = state["collector"]["collectors"][0]["worlds"]["worlds"]
+    *path, name = where.split(".")
+    for key in path:
+        part = part[key]
+    part[name] = value
+    refused(trained, tmp_path, state, rf"worlds\.{where}.* {message}.*; go on from the checkpoint")
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("critic", {}, "critic has other names"),
+        ("minibatches", torch.zeros(5056, dtype=torch.uint8), "does not fit this training"),
+        ("minibatches", 3, "minibatches is not of shape"),
+        ("collector", {"collectors": []}, "is not a list of 2"),
+    ],
+)
+def test_other_parts_that_no_training_left_are_refused(trained, tmp_path, key, value, message):
+    refused(trained, tmp_path, {**checkpoint(trained), key: value}, message)
+
+
+def refused(trained, folder, state, message):
+    shutil.copytree(trained.folder, folder / "run")
+    save_checkpoint(folder / "run" / "checkpoints" / "last.pt", state)
+    with pytest.raises(InputError, match=message):
+        drone_rl.train(folder=folder / "run", resume=True, progress=silent)
+
+
+@pytest.mark.parametrize("is_ours", [True, False])
+def test_advantages_are_torchrls_by_its_own_way_through_the_critic(is_ours):
+    """TorchRL looks at every next picture, too; its own collector's batches will do as well."""
+    made = make_collector(TINY.replace(collector=Rollouts(num_envs=5, num_threads=1)))
+    learner, (ours,) = make_learner(TINY, made), made.collector.collectors
+    torch.nn.init.normal_(learner.model.critic.module.weight)
+    collector = Collector(
+        ours.env,
+        ours.actor,
+        frames_per_batch=400,
+        total_frames=-1,
+        auto_register_policy_transforms=False,
+    )
+    if is_ours:
+        ours.num_steps = 80
+    batch = ours.collect() if is_ours else next(iter(collector))
+    assert batch["next", "terminated"].any() and batch["next", "truncated"].any()
+    both = TensorDictSequential(learner.model.trunk, learner.model.critic)
+    rates = {"gamma": TINY.returns.gamma, "lmbda": TINY.returns.lmbda}
+    gae = GAE(**rates, value_network=both, average_gae=True, deactivate_vmap=True)
+    found = learner.estimate(batch)
+    wanted = gae(batch.select(*learner._read))
+    for key in ("advantage", "value_target"):
+        torch.testing.assert_close(found[key], wanted[key], rtol=1e-4, atol=1e-5)
+    assert learner.update(found)["loss/grad_norm"] > 0
+    collector.shutdown()
+
+
+def test_a_collector_that_keeps_no_next_observations(monkeypatch, tmp_path):
+    """One of the user's own, of which the settings know nothing."""
+    collector = type("Mine", (Threads,), {"is_known": False, "target": Threads.target})
+    settings = TINY.replace(collector=collector(num_envs=2))
+    with pytest.raises(InputError, match=r"no entry \('next', 'pixels'\).*collector=rollouts$"):
+        drone_rl.train(settings, folder=tmp_path, progress=silent)
+
+
+def test_a_rate_far_too_high_fails_by_name(tmp_path):
+    """Numbers overflow: one line, and the checkpoint before it."""
+    settings = TINY.replace(optimiser=Sgd(lr=1e30))
+    with pytest.raises(InputError, match=r"NaN or infinite at update .*lower optimiser\.lr"):
+        drone_rl.train(settings, folder=tmp_path, progress=silent)
+    state = load_checkpoint(tmp_path / "checkpoints" / "last.pt")
+    assert all(value.isfinite().all() for value in state["policy"].values())

@@ -1,0 +1,33 @@
+"""How far a training is, as files and callbacks know it."""
+
+import dataclasses
+
+from drone_rl.policies.zoo.files import load_exported
+from drone_rl.training import Callback
+from drone_rl.training.callbacks import OngoingTraining, Progress
+from drone_rl.verdicts.export import export_policy
+from tests.policies.zoo.test_files import CHECKPOINT
+from tests.verdicts.test_card_text import VERDICT
+
+
+def test_it_begins_at_nothing():
+    assert set(dataclasses.asdict(Progress()).values()) == {0}
+
+
+def test_files_keep_all_of_it(tmp_path):
+    progress = dataclasses.asdict(Progress(7, 5, 3, 1.5, 2.25))
+    path = tmp_path / "policy.safetensors"
+    checkpoint = {**CHECKPOINT, "progress": progress}
+    export_policy(path, checkpoint, command="drone-rl train", verdict=VERDICT, seed=0, chosen=None)
+    assert load_exported(path)["progress"] == progress
+
+
+def test_a_trainer_is_what_a_callback_sees(make_trainer):
+    class Look(Callback):
+        def on_update(self, training: OngoingTraining, metrics):
+            names = [*OngoingTraining.__annotations__, "state_dict"]
+            assert all(hasattr(training, name) for name in names)
+            assert isinstance(training.progress, Progress)
+            training.stop_request = "seen"
+
+    assert make_trainer(callbacks=[Look()]).run() == "seen"

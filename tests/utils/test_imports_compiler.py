@@ -1,0 +1,96 @@
+"""Each in a process of its own: what is imported once stays so."""
+
+import subprocess
+import sys
+
+import pytest
+
+LOADED = "hasattr(sys.modules.get('torch._dynamo'), '__file__')"
+START = """import sys
+from drone_rl.utils.imports import leave_compiler_unloaded
+leave_compiler_unloaded()
+"""
+
+
+def run(code):
+    command = [sys.executable, "-W", "ignore", "-c", code]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_a_training_does_without_it(tmp_path):
+    code = f"""{START}
+import drone_rl
+short = drone_rl.TrainerSettings(total_frames=1)
+drone_rl.train(folder={str(tmp_path / "run")!r}, trainer=short)
+print({LOADED})"""
+    assert run(code).splitlines()[-1] == "False"
+
+
+def test_without_it_the_same_is_learned(tmp_path):
+    """Optimisers ask it to leave them alone, which they may be without."""
+    code = """
+import torch
+torch.manual_seed(0)
+layer = torch.nn.Linear(3, 2)
+adam = torch.optim.Adam(layer.parameters())
+for _ in range(3):
+    adam.zero_grad()
+    layer(torch.ones(4, 3)).square().sum().backward()
+    adam.step()
+print(layer.weight.tolist(), {0})
+"""
+    with_it, without = run("import sys" + code.format(LOADED)), run(START + code.format(LOADED))
+    assert with_it.replace("True", "False") == without
+
+
+def test_whoever_compiles_gets_it_and_all_that_was_noted():
+    code = f"""{START}
+import torch, tensordict
+assert not ({LOADED})
+noted = sys.modules["torch._dynamo"]._allowed
+assert noted
+compiled = torch.compile(lambda x: 2 * x + 1, backend="eager")
+assert compiled(torch.ones(2)).tolist() == [3.0, 3.0]
+assert {LOADED}
+from torch._dynamo import trace_rules
+assert all(trace_rules.is_callable_allowed(f) for f in noted)
+from torch._dynamo.eval_frame import OptimizedModule
+print("done")"""
+    assert run(code) == "done\n"
+
+
+def test_what_is_disabled_stays_so_once_it_is_there():
+    code = f"""{START}
+import torch
+@torch.compiler.disable
+def plain(x):
+    return x, torch.compiler.is_compiling()
+assert plain(torch.ones(1))[1] is False
+def outer(x):
+    return plain(x)[1], torch.compiler.is_compiling()
+print(torch.compile(outer, backend="eager")(torch.ones(1)))"""
+    assert run(code).strip() == "(False, True)"
+
+
+@pytest.mark.parametrize("first", ["import torch._dynamo", "import torch._dynamo.eval_frame"])
+def test_one_that_is_there_is_left_alone(first):
+    assert run(f"{first}\n{START}print({LOADED})").strip() == "True"
+
+
+def test_submodules_can_be_imported_and_inspection_loads_nothing():
+    code = f"""{START}
+import torch, inspect
+inspect.getmodule(torch.ones)
+assert not ({LOADED})
+import torch._dynamo.config
+print({LOADED}, torch._dynamo.config.verbose)"""
+    assert run(code).strip() == "True False"
+
+
+def test_what_is_marked_constant_is_so_marked():
+    code = f"""{START}
+import torch
+print(torch.compiler.assume_constant_result(lambda: 1)._dynamo_marked_constant, {LOADED})"""
+    assert run(code).strip() == "True False"
