@@ -1,7 +1,3 @@
-# pyright: reportAttributeAccessIssue=false
-# pyright: reportOptionalMemberAccess=false
-# pyright: reportIncompatibleMethodOverride=false
-# (dm_control's models of XML, its tasks' properties and its specs are untyped.)
 """A dm_control task for any `Task`: rules with a batch of one, rendered by OpenGL."""
 
 from typing import Any
@@ -84,7 +80,8 @@ class ComposerTask(composer.Task):
             self._looks = Appearances(appearance, 1, task=self.rules, camera=self.camera)
             distractors = self._looks.distractors
         self._arena = Field()
-        self._arena.mjcf_model.option.gravity = (0, 0, 0)
+        model: Any = self._arena.mjcf_model
+        model.option.gravity = (0, 0, 0)
         self._drone = Drone(size=self.rules.drone_size, camera=self.camera)
         self._arena.add_free_entity(self._drone)
         self._props = [*self.rules.make_props(), *make_distractors(distractors)]
@@ -94,7 +91,7 @@ class ComposerTask(composer.Task):
         self._flight = self._make_flight()
         self._reward = 0.0
         self._begin(np.random.RandomState(0))
-        self._pixels = self._drone.observables.front_center.enabled = pixels
+        self._pixels = self._drone.observables.front_center.enabled = pixels  # pyright: ignore[reportAttributeAccessIssue]
         self._look: Appearance | None = None
         if self._looks is not None:
             self._prepare()
@@ -128,11 +125,11 @@ class ComposerTask(composer.Task):
         return self._look
 
     @property
-    def task_observables(self) -> dict[str, observable.Generic]:
+    def task_observables(self) -> dict[str, observable.Generic]:  # pyright: ignore[reportIncompatibleMethodOverride]
         """The entries `Task.observed` of `Task.info`."""
         return self._task_observables
 
-    def action_spec(self, physics: mjcf.Physics) -> specs.Array:
+    def action_spec(self, physics: mjcf.Physics) -> specs.Array:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return the spec of the dynamics' action."""
         del physics
         entry = self.dynamics.actions.entry
@@ -212,7 +209,7 @@ class ComposerTask(composer.Task):
         del physics
         return self._reward
 
-    def should_terminate_episode(self, physics: mjcf.Physics) -> bool:
+    def should_terminate_episode(self, physics: mjcf.Physics) -> bool:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return whether the episode has ended."""
         del physics
         return int(self._state.end_reason) != 0
@@ -267,7 +264,7 @@ class ComposerTask(composer.Task):
         """Allocate textures, and enable the camera's rendering flags and fog."""
         root: Any = self._arena.mjcf_model
         opengl.prepare(root)
-        camera = self._drone.observables.front_center
+        camera = self._drone.observables.front_center  # pyright: ignore[reportAttributeAccessIssue]
         camera.render_flag_overrides = opengl.RENDER_FLAGS
         camera.corruptor = self._in_fog
 

@@ -1,6 +1,3 @@
-# pyright: reportAttributeAccessIssue=false
-# pyright: reportOptionalMemberAccess=false
-# (dm_control's models of XML are untyped.)
 """A flight that MuJoCo integrates: a drone's forces at every tick, and what it touches.
 
 Contacts are MuJoCo's own: springs that bounce and rub about as the settings say. A ball touches
@@ -11,7 +8,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-import mujoco
+import mujoco as mujoco_module
 import numpy as np
 import torch
 from dm_control import mjcf
@@ -26,6 +23,8 @@ from drone_rl.sim.dynamics.forces_kernel import forces, told
 from drone_rl.sim.dynamics.state import heading_only
 from drone_rl.sim.entities import DRONE_CAMERAS, Drone
 
+mujoco: Any = mujoco_module
+"""Its compiled functions have no types."""
 _GROUND, _OBSTACLE = 2, 4
 """Bits of what touches what."""
 _UNSEEN = 5
