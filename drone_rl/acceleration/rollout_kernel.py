@@ -39,7 +39,7 @@ wp.set_module_options(_OPTIONS)
 
 @wp.struct
 class CameraView:
-    """What draws, and what becomes of a picture before the network sees it."""
+    """What draws, and what becomes of a frame before the network sees it."""
 
     view: View
     geoms: Geoms
