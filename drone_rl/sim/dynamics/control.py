@@ -18,7 +18,7 @@ X, Y, HEADING, Z = range(4)
 
 
 class Mode(enum.IntEnum):
-    """SemanticClass of the number of an axis; inner controllers follow."""
+    """Meaning of the number of an axis; inner controllers follow."""
 
     THROTTLE = 0
     """Fraction of full thrust, 0 to 1."""
