@@ -61,7 +61,7 @@ def make_trainer():
             collector=Bandit(actor, seed=seed, postproc=TimeBaseline(0.9, max_steps=4)),
             learner=ReinforceLearner(
                 network=network,
-                loss=ReinforceLoss(actor),
+                loss=ReinforceLoss(actor, entropy_coeff=0.0),
                 optimiser=optimiser,
                 scheduler=torch.optim.lr_scheduler.StepLR(optimiser, 2, 0.9),
                 max_grad_norm=max_grad_norm,
