@@ -10,7 +10,7 @@ from benchmarks.parts import default_pipeline
 from drone_rl.explanations import embedding
 from drone_rl.explanations.hooks import feature_layer
 from drone_rl.explanations.response import response_map
-from drone_rl.explanations.rollouts import record
+from drone_rl.explanations.rollouts import collect, render_frames, select_frames
 from drone_rl.explanations.scenes import Scenes
 
 
@@ -36,13 +36,15 @@ def _parts(many: int) -> dict[str, Any]:
     env, actor, network = default_pipeline(256)
     layer = feature_layer(network)
     assert layer is not None  # the default's network has several
-    features = record(env, actor, network, many, layers=(layer,)).features[layer]
+    scenes = Scenes(env)
+    flights = collect(env, actor, num_episodes=1, num_frames=many)
+    rows = select_frames(flights.episode, many)
+    features = render_frames(flights, rows, scenes, network, (layer,)).features[layer]
     results = {}
     for count in (600, many):
         begin = time.perf_counter()
         embedding.embed(features[:count])
         results[f"tsne_{count}_s"] = time.perf_counter() - begin
-    scenes = Scenes(env)
     response_map(scenes, network, num_lateral=3, num_forward=3)
     begin = time.perf_counter()
     response_map(scenes, network)

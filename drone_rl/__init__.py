@@ -53,8 +53,7 @@ if TYPE_CHECKING:
     from drone_rl.policies.environment import make_env
     from drone_rl.policies.external_policy import ForeignPolicy, policy_from
     from drone_rl.policies.policy import Policy, load_policy
-    from drone_rl.policies.sb3.logits import Sb3Logits
-    from drone_rl.policies.sb3.trunk import Sb3Trunk
+    from drone_rl.policies.sb3 import Sb3Logits, Sb3Trunk
     from drone_rl.robustness.shifts import Shifts, shifts
     from drone_rl.sim.image_types import ImageRequest, ImageType
     from drone_rl.sim.tasks import register_task
@@ -100,8 +99,7 @@ _PLACES = {
     "flight.commands.pilot": ("Pilot",),
     "flight.commands.state": ("PilotState", "Trajectory"),
     "flight.commands.yaw": ("Drivetrain", "YawMode"),
-    "policies.sb3.logits": ("Sb3Logits",),
-    "policies.sb3.trunk": ("Sb3Trunk",),
+    "policies.sb3": ("Sb3Logits", "Sb3Trunk"),
     "config.commands": ("BodiesSettings", "EvaluateSettings", "JudgeSettings", "ShiftSettings"),
     "config.verification": (
         "ChanceSettings",

@@ -11,26 +11,26 @@ import drone_rl
 from drone_rl.utils.batch import Batch
 
 MUTABLE = {
-    "api.journal:Journal",
-    "robustness.domain:End",
-    "evaluation.rollouts:StepLog",
     "evaluation.metrics:Episodes",
-    "explanations.heat_maps:Explainer",
+    "evaluation.rollouts:StepLog",
     "explanations.class_models:Attempts",
     "explanations.class_models:ClassModel",
-    "explanations.rollouts:RolloutDataset",
+    "explanations.embedding:Embedding",
+    "explanations.heat_maps:Explainer",
     "explanations.interventions:Intervention",
+    "explanations.report.explanation:Explanation",
     "explanations.response:OutcomeMap",
     "explanations.response:ResponseMap",
-    "explanations.embedding:Embedding",
-    "proofs.findings:Findings",
-    "proofs.graph:Graph",
-    "report.explanation:Explanation",
+    "explanations.rollouts:RolloutDataset",
+    "robustness.domain:End",
     "sweeps.figures:Layout",
-    "sweeps.groups:Group",
     "sweeps.manifest:Sweep",
     "sweeps.rows:Row",
+    "sweeps.summary:Group",
     "training.callbacks:Progress",
+    "verification.provable:Journal",
+    "verification.prover.lattice:Graph",
+    "verification.prover.prover:Findings",
 }
 """Those that are not frozen, or not yet, below drone_rl; batches of tensors are none of them."""
 BY_NAME_ALONE = ("drone_rl.config.", "drone_rl.config.", "drone_rl.cli.")

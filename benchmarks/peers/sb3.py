@@ -16,8 +16,7 @@ from drone_rl.config.transforms import Gray, Standardize, Transform
 from drone_rl.envs.gymnasium.environments import DroneWorlds
 from drone_rl.envs.sb3.worlds import Sb3Worlds
 from drone_rl.policies.external_policy import policy_from
-from drone_rl.policies.sb3.logits import Sb3Logits
-from drone_rl.policies.sb3.trunk import Sb3Trunk
+from drone_rl.policies.sb3 import Sb3Logits, Sb3Trunk
 from drone_rl.training.trainer import running_mean
 from drone_rl.utils.errors import InputError
 

@@ -21,7 +21,7 @@ from drone_rl.acceleration.rollout_buffer import RolloutBuffer
 from drone_rl.envs.direct_renderer import DirectRenderer, Entries, Reasons
 from drone_rl.envs.transforms import StandardizePixels
 from drone_rl.policies.actor import CategoricalActor
-from drone_rl.policies.finite import require_finite
+from drone_rl.policies.networks import require_finite
 from drone_rl.sim.rendering.devices import WorkerPool, load_kernels
 from drone_rl.sim.rendering.raytrace.renderer import Raytracer
 from drone_rl.sim.rendering.raytrace.structs_kernel import Images

@@ -21,8 +21,7 @@ from drone_rl.acceleration.packed_layers import (
     unsupported,
 )
 from drone_rl.envs.direct_renderer import Reasons
-from drone_rl.policies.cnn import PolicyNetwork
-from drone_rl.policies.network import PictureNetwork
+from drone_rl.policies.networks import PictureNetwork, PolicyNetwork
 from drone_rl.sim.rendering.devices import WorkerPool, load_kernels
 
 MAX_WEIGHTS = 2**20

@@ -6,9 +6,9 @@
 # pyright: reportCallIssue=false
 # pyright: reportOperatorIssue=false
 # (Warp compiles this file; Python's types say nothing about it.)
-"""From the gradient of a small network's logits to that of its weights, or pictures, on a CPU.
+"""From the gradient of a small network's logits to that of its weights, or frames, on a CPU.
 
-A block of pictures at a time goes back through all layers, on one core, so that what is read again
+A block of frames at a time goes back through all layers, on one core, so that what is read again
 is still near.
 """
 
@@ -18,7 +18,7 @@ from drone_rl.acceleration.layers_backward_kernel import accumulate, fold, recti
 from drone_rl.acceleration.layers_kernel import copy, multiply
 
 BLOCK = wp.constant(64)
-"""Pictures at a time."""
+"""Frames at a time."""
 
 
 @wp.struct
@@ -34,10 +34,10 @@ class PackedParams:
     """Where those of each layer the other way begin."""
     back: wp.array[float]
     made_at: wp.array[int]
-    """Where the outputs of each layer begin among those of a picture, and where these end."""
+    """Where the outputs of each layer begin among those of a frame, and where these end."""
     num_convolutions: int
     near: int
-    """How much farther each picture's inputs of linear layers begin, once they are side by side."""
+    """How much farther each frame's inputs of linear layers begin, once they are side by side."""
 
 
 @wp.kernel
@@ -48,14 +48,14 @@ def answer(
     pictures: wp.array2d[float],
     made: wp.array[float],
 ) -> None:
-    """Outputs of all layers for a share of the pictures.
+    """Outputs of all layers for a share of the frames.
 
     Args:
-        first: The first picture.
+        first: The first frame.
         last: The one after the last: launch it with a dimension of 1.
         params: The network.
-        pictures: Gray. Shape: (pictures, pixels).
-        made: Takes the outputs: of each picture those of all layers.
+        pictures: Gray. Shape: (frames, pixels).
+        made: Takes the outputs: of each frame those of all layers.
     """
     size = _size(params)
     num_layers = params.geometry.shape[0]
@@ -80,7 +80,7 @@ def answer(
 
 @wp.func
 def _size(params: PackedParams) -> int:
-    """Room that the outputs of a picture take."""
+    """Room that the outputs of a frame take."""
     return params.made_at[params.geometry.shape[0]]
 
 
@@ -138,22 +138,22 @@ def learn(
     gradients: wp.array2d[float],
     seen: wp.array2d[float],
 ) -> None:
-    """What a share of the pictures, or the weights, have to do with the logits.
+    """What a share of the frames, or the weights, have to do with the logits.
 
     Args:
-        first: The first picture.
+        first: The first frame.
         last: The one after the last: launch it with a dimension of 1.
         member: Which of the rooms to work in, and which gradients to add to.
         params: The network.
-        pictures: Gray. Shape: (pictures, pixels).
+        pictures: Gray. Shape: (frames, pixels).
         made: Outputs, as `answer` writes them.
-        rows: Which of them each picture has.
-        grad_output: Gradient of the logits. Shape: (pictures, actions).
+        rows: Which of them each frame has.
+        grad_output: Gradient of the logits. Shape: (frames, actions).
         rooms: For gradients of outputs, one a member.
-        sides: For inputs of linear layers, of a block's pictures side by side, one a member.
+        sides: For inputs of linear layers, of a block's frames side by side, one a member.
         patches: For those of inputs of one convolution, one a member.
         gradients: Of the weights, to be added to, one a member; or of shape (0, 0).
-        seen: Gradient of the pictures, to be written; or of shape (0, 0).
+        seen: Gradient of the frames, to be written; or of shape (0, 0).
     """
     room = rooms[member]
     total = room
@@ -189,7 +189,7 @@ def _begin(
     room: wp.array[float],
     side: wp.array[float],
 ) -> None:
-    """Writes the gradient of a picture's logits, of those that fill up 0, and its linear inputs."""
+    """Writes the gradient of a frame's logits, of those that fill up 0, and its linear inputs."""
     inputs_at = params.made_at[params.num_convolutions - 1]
     top = params.geometry.shape[0] - 1
     given_at = rows[picture] * _size(params) + inputs_at
@@ -309,7 +309,7 @@ def _convolution(
     patches: wp.array[float],
     seen: wp.array2d[float],
 ) -> None:
-    """The same of a convolution and one picture; the first is asked only if that is wanted."""
+    """The same of a convolution and one frame; the first is asked only if that is wanted."""
     if layer == 0 and seen.shape[0] == 0:
         return
     outs = params.geometry[layer, 7]

@@ -18,11 +18,11 @@ from torch import Tensor, nn
 from drone_rl.acceleration.layers_kernel import Layers, decide, look
 from drone_rl.acceleration.packed_layers import PackedNetwork, unsupported
 from drone_rl.envs.direct_renderer import Reasons
-from drone_rl.policies.finite import require_finite
+from drone_rl.policies.networks import require_finite
 from drone_rl.sim.rendering.devices import load_kernels, start_warp
 
 _TOGETHER = wp.constant(16)
-"""Pictures whose linear layers are worked out together."""
+"""Frames whose linear layers are worked out together."""
 
 wp.set_module_options({"enable_backward": False})
 
@@ -37,7 +37,7 @@ def answer(
         layers: The network.
         pictures: A row each.
         room: To work in.
-        logits: Are written, a row a picture.
+        logits: Are written, a row a frame.
     """
     for first in range(0, pictures.shape[0], _TOGETHER):
         count = wp.min(pictures.shape[0] - first, _TOGETHER)

@@ -6,9 +6,9 @@
 # (Warp compiles this file; Python's types say nothing about it.)
 """The layers of a small network on one core of a CPU, for kernels that ask it within a loop.
 
-Libraries gain their speed on large batches. A kernel that flies a drone has a picture at a time, or
+Libraries gain their speed on large batches. A kernel that flies a drone has a frame at a time, or
 a handful; so here a layer is a product of matrices whose rows are read where they lie, be they
-patches of a picture with its channels last or pictures. Tiles of the product stay in registers,
+patches of a frame with its channels last or frames. Tiles of the product stay in registers,
 which makes it twice as fast as oneDNN on one core. Each number is summed in the order of its
 inputs, whatever is worked out beside it.
 """
@@ -127,7 +127,7 @@ def multiply(
         weights_at: Where these begin.
         made: Takes the outputs, row after row.
         made_at: Where these begin.
-        rows: Places that it looks at: of a patch, or pictures.
+        rows: Places that it looks at: of a patch, or frames.
         columns: Of these in a line.
         down: How much farther each line of places begins.
         across: How much farther each place in a line begins.
@@ -155,31 +155,31 @@ def copy(
 
 @wp.struct
 class Layers:
-    """A network: convolutions, of one picture after the other, then layers of many at once."""
+    """A network: convolutions, of one frame after the other, then layers of many at once."""
 
     steps: wp.array2d[int]
     """A row a layer: where it reads and writes in the room to work, and what `multiply` takes."""
     weights: wp.array[float]
     num_convolutions: int
     picture_size: int
-    """Numbers that the convolutions leave of a picture."""
+    """Numbers that the convolutions leave of a frame."""
     logits_at: int
-    """Where logits are in the room to work, `WIDTH` numbers a picture or a multiple of it."""
+    """Where logits are in the room to work, `WIDTH` numbers a frame or a multiple of it."""
     num_outs: int
-    """Of these for each picture."""
+    """Of these for each frame."""
     outputs_at: wp.array[int]
-    """Where those of each layer begin, where all of a picture are kept."""
+    """Where those of each layer begin, where all of a frame are kept."""
 
 
 @wp.func
 def look(layers: Layers, picture: wp.array[float], room: wp.array[float], row: int) -> None:
-    """What the convolutions make of a picture.
+    """What the convolutions make of a frame.
 
     Args:
         layers: The network.
         picture: Gray, pixel after pixel.
         room: To work in.
-        row: Number of the picture among those that are decided on together.
+        row: Number of the frame among those that are decided on together.
     """
     for layer in range(layers.num_convolutions):
         made_at = layers.steps[layer, 1]
@@ -194,12 +194,12 @@ def look(layers: Layers, picture: wp.array[float], room: wp.array[float], row: i
 
 @wp.func
 def decide(layers: Layers, room: wp.array[float], count: int) -> None:
-    """Logits of the pictures that were looked at.
+    """Logits of the frames that were looked at.
 
     Args:
         layers: The network.
         room: To work in.
-        count: Of pictures.
+        count: Of frames.
     """
     for layer in range(layers.num_convolutions, layers.steps.shape[0]):
         given_at, made_at = layers.steps[layer, 0], layers.steps[layer, 1]
@@ -210,14 +210,14 @@ def decide(layers: Layers, room: wp.array[float], count: int) -> None:
 def keep(
     layers: Layers, first: int, last: int, room: wp.array[float], row: int, outputs: wp.array[float]
 ) -> None:
-    """Copies what layers made of a picture, before the next one takes their room.
+    """Copies what layers made of a frame, before the next one takes their room.
 
     Args:
         layers: The network.
         first: The first of the layers.
         last: The one after the last.
         room: Where they worked.
-        row: Number of the picture among those that are decided on together.
+        row: Number of the frame among those that are decided on together.
         outputs: Takes them.
     """
     for layer in range(first, last):

@@ -12,7 +12,7 @@ import warp as wp
 from torch import Tensor, nn
 
 from drone_rl.acceleration.layers_kernel import WIDTH, Layers
-from drone_rl.policies.cnn import PolicyNetwork, Weighted
+from drone_rl.policies.networks import PolicyNetwork, Weighted
 
 
 class PackedLayer(NamedTuple):
@@ -28,7 +28,7 @@ class PackedLayer(NamedTuple):
 
     @property
     def is_convolution(self) -> bool:
-        """Whether it looks at one picture at a time."""
+        """Whether it looks at one frame at a time."""
         return isinstance(self.layer, nn.Conv2d)
 
     @property
@@ -54,7 +54,7 @@ class PackedLayer(NamedTuple):
 
     @property
     def num_made(self) -> int:
-        """Outputs for each picture."""
+        """Outputs for each frame."""
         rows, columns = self.places
         return rows * columns * self.num_outs
 
@@ -143,7 +143,7 @@ class Order:
 
 
 def outputs_at(layers: Sequence[PackedLayer]) -> list[int]:
-    """Where the outputs of each layer begin among those of a picture, and where these end."""
+    """Where the outputs of each layer begin among those of a frame, and where these end."""
     begins = list(accumulate((odd_lines(layer.num_made) for layer in layers), initial=0))
     return [*begins[:-1], odd_lines(begins[-1])]
 
@@ -215,7 +215,7 @@ def _letter(layer: nn.Module) -> str:
 
 
 class PackedNetwork:
-    """Convolutions of gray pictures, then linear layers, rectified in between."""
+    """Convolutions of gray frames, then linear layers, rectified in between."""
 
     def __init__(self, network: nn.Module, num_pictures: int) -> None:
         """Packs a network that is supported, see `unsupported`.
@@ -236,7 +236,7 @@ class PackedNetwork:
         made.picture_size = packed[made.num_convolutions].num_inputs
         made.logits_at, made.num_outs = steps[-1][1], packed[-1].num_outs
         *places, self.num_outputs = outputs_at(packed)
-        """Numbers that all layers make of a picture, and room between them."""
+        """Numbers that all layers make of a frame, and room between them."""
         made.outputs_at = wp.from_torch(torch.tensor(places, dtype=torch.int32))
         self.layers = made
         """For kernels."""

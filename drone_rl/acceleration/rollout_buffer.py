@@ -11,7 +11,7 @@ class RolloutBuffer:
     """A row a step, part after part, as long as any flight goes on.
 
     Its memory is used again, and so is that of what was read once nobody holds any of it: new
-    memory for as many pictures takes longer to get than to fill.
+    memory for as many frames takes longer to get than to fill.
     """
 
     def __init__(self, part: Mapping[str, Tensor]) -> None:

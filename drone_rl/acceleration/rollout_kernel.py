@@ -20,8 +20,15 @@ from typing import Any
 import warp as wp
 
 from drone_rl.acceleration.layers_kernel import Layers, decide, keep, look
-from drone_rl.sim.rendering.raytrace.plain_kernel import Scratch, render_image
-from drone_rl.sim.rendering.raytrace.structs_kernel import Geoms, Images, Materials, Poses, View
+from drone_rl.sim.rendering.raytrace.plain_kernel import render_image
+from drone_rl.sim.rendering.raytrace.structs_kernel import (
+    Geoms,
+    Images,
+    Materials,
+    Poses,
+    Scratch,
+    View,
+)
 
 TOGETHER = wp.constant(16)
 """Worlds that take a step together."""
@@ -32,7 +39,7 @@ wp.set_module_options(_OPTIONS)
 
 @wp.struct
 class CameraView:
-    """What draws, and what becomes of a picture before the network sees it."""
+    """What draws, and what becomes of a frame before the network sees it."""
 
     view: View
     geoms: Geoms

@@ -138,7 +138,7 @@ class Stream(Protocol):
         ...
 
     def forget(self) -> None:
-        """Start all episodes anew at the next call of `observe`."""
+        """Start all episodes again at the next call of `observe`."""
         ...
 
     def state_dict(self) -> dict[str, Any]:

@@ -17,6 +17,11 @@ from drone_rl.sim.dynamics import Dynamics
 from drone_rl.sim.tasks import Task, as_task
 from drone_rl.utils.errors import InputError
 
+BASELINES = (*BLIND_BASELINES, "oracle")
+"""Baselines of cube collection."""
+_RANDOM_ACTIONS = 5
+"""Key of the random actions' stream, derived from that of the first environment."""
+
 
 class Oracle(TensorDictModuleBase):
     """Act by the true state: an upper bound for a policy that sees images."""
@@ -85,12 +90,6 @@ class ConstantPolicy(TensorDictModuleBase):
         """Write the action of each environment."""
         action = self.action.expand(*tensordict.batch_size, *self.action.shape)
         return tensordict.set("action", action.to(tensordict["done"].device, copy=True))
-
-
-BASELINES = (*BLIND_BASELINES, "oracle")
-"""Baselines of cube collection."""
-_RANDOM_ACTIONS = 5
-"""Key of the random actions' stream, derived from that of the first environment."""
 
 
 def make_baseline(

@@ -115,6 +115,39 @@ def judge_policy(
     )
 
 
+def judge_for_selection(
+    path: Path,
+    episodes: int,
+    device: str,
+    renderer: str = "raytrace",
+    *,
+    seed: RootSeed | None = None,
+) -> tuple[dict[str, Any], dict]:
+    """Judge a checkpoint in environments reserved for selection, of which no report shows figures.
+
+    Args:
+        path: The checkpoint.
+        episodes: How many.
+        device: Where to run.
+        renderer: Name of the renderer.
+        seed: Root of the random streams; a fresh one by default.
+
+    Returns:
+        The verdict, as in verdict.json, and the checkpoint's progress.
+
+    Raises:
+        InputError: The checkpoint is unusable.
+    """
+    policy = load_policy(path)
+    count, seed = min(episodes, 250), seed or root_seed(None)
+    worlds = policy.flying(
+        count, seed=seed.value, stream=Stream.CHOICE, device=device, renderer=renderer
+    )
+    with worlds as (env, actor):
+        verdict = judge_policy(env, actor, episodes, seed=seed)
+        return verdict.as_dict(), policy.state["progress"]
+
+
 def judge(
     greedy: Episodes,
     baselines: Mapping[str, Episodes],
@@ -244,6 +277,22 @@ def observe(greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule) -> 
     return [values[~np.isnan(values)] for values in each]
 
 
+def estimate(quantity: int, values: NDArray, rule: Rule) -> Quantity:
+    """Estimate one of the rule's quantities from its values, as `observe` returns them.
+
+    Args:
+        quantity: Its index.
+        values: By episode.
+        rule: Thresholds.
+    """
+    name, thresholds = rule.quantities[quantity], rule.thresholds[quantity]
+    if name.startswith("offered"):
+        share = proportion(int(values.sum()), len(values), rule.confidence)
+        return Quantity(share["share"], share["lower95"], share["upper95"], thresholds)
+    mean = mean_bounds(values, *rule.ranges[quantity], rule.confidence)
+    return Quantity(mean["mean"], mean["lower95"], mean["upper95"], thresholds)
+
+
 def _observe_each(greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rule) -> list[NDArray]:
     """The same for all episodes, NaN where there is no value. Shapes: (n,), float64."""
     oracle = baselines["oracle"]
@@ -260,22 +309,6 @@ def _observe_each(greedy: Episodes, baselines: Mapping[str, Episodes], rule: Rul
     for name in rule.blind_baselines:
         observed.append(rule.good_share * oracle.success - baselines[name].success)
     return [values.numpy() for values in observed]
-
-
-def estimate(quantity: int, values: NDArray, rule: Rule) -> Quantity:
-    """Estimate one of the rule's quantities from its values, as `observe` returns them.
-
-    Args:
-        quantity: Its index.
-        values: By episode.
-        rule: Thresholds.
-    """
-    name, thresholds = rule.quantities[quantity], rule.thresholds[quantity]
-    if name.startswith("offered"):
-        share = proportion(int(values.sum()), len(values), rule.confidence)
-        return Quantity(share["share"], share["lower95"], share["upper95"], thresholds)
-    mean = mean_bounds(values, *rule.ranges[quantity], rule.confidence)
-    return Quantity(mean["mean"], mean["lower95"], mean["upper95"], thresholds)
 
 
 def _is_certain(found: tuple[Quantity, ...], rule: Rule) -> bool:
@@ -300,36 +333,3 @@ def _check_pairs(greedy: Episodes, others: list[Episodes]) -> None:
     for other in others:
         if not torch.equal(other.goals.world, greedy.goals.world):
             raise ValueError("policy and baselines have different initial states; pair them")
-
-
-def judge_for_selection(
-    path: Path,
-    episodes: int,
-    device: str,
-    renderer: str = "raytrace",
-    *,
-    seed: RootSeed | None = None,
-) -> tuple[dict[str, Any], dict]:
-    """Judge a checkpoint in environments reserved for selection, of which no report shows figures.
-
-    Args:
-        path: The checkpoint.
-        episodes: How many.
-        device: Where to run.
-        renderer: Name of the renderer.
-        seed: Root of the random streams; a fresh one by default.
-
-    Returns:
-        The verdict, as in verdict.json, and the checkpoint's progress.
-
-    Raises:
-        InputError: The checkpoint is unusable.
-    """
-    policy = load_policy(path)
-    count, seed = min(episodes, 250), seed or root_seed(None)
-    worlds = policy.flying(
-        count, seed=seed.value, stream=Stream.CHOICE, device=device, renderer=renderer
-    )
-    with worlds as (env, actor):
-        verdict = judge_policy(env, actor, episodes, seed=seed)
-        return verdict.as_dict(), policy.state["progress"]

@@ -34,9 +34,16 @@ from drone_rl.evaluation.rollouts import (
 from drone_rl.policies import PictureNetwork, make_actor
 from drone_rl.policies.base_policy import Pilot
 from drone_rl.policies.external_policy import ForeignPolicy
-from drone_rl.policies.finite import require_finite
-from drone_rl.policies.regrouped import REMEDY, Regrouped, require_same_in_any_batch
-from drone_rl.policies.rounding import Decide, RoundingBound, arithmetic_on, decider
+from drone_rl.policies.networks import require_finite
+from drone_rl.policies.rounding import (
+    REMEDY,
+    Decide,
+    Regrouped,
+    RoundingBound,
+    arithmetic_on,
+    decider,
+    require_same_in_any_batch,
+)
 from drone_rl.sim.actions import DiscreteActions
 from drone_rl.sim.dynamics import ComputerVision
 from drone_rl.utils.errors import InputError

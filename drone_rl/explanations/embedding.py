@@ -70,24 +70,6 @@ class Embedding:
     points: NDArray  # (T, 2)
     faithfulness: Faithfulness
     """With respect to the originals, not to their principal components."""
-    _mean: NDArray
-    _components: NDArray
-    _model: openTSNE.TSNEEmbedding
-
-    def place(self, originals: NDArray) -> NDArray:
-        """Embed new points; the existing ones stay where they are.
-
-        Args:
-            originals: Shape (N, D).
-
-        Returns:
-            Shape: (N, 2).
-        """
-        flat = originals.reshape(len(originals), -1).astype(np.float64)
-        reduced = np.ascontiguousarray((flat - self._mean) @ self._components.T)
-        placed = np.asarray(self._model.transform(reduced))
-        # the library may have shifted its embedding
-        return placed - (np.asarray(self._model) - self.points).mean(0)
 
 
 def embed(originals: NDArray, *, perplexity: float = 30.0, seed: int = 0) -> Embedding:
@@ -105,10 +87,8 @@ def embed(originals: NDArray, *, perplexity: float = 30.0, seed: int = 0) -> Emb
     check_perplexity(perplexity, len(flat))
     if not np.isfinite(flat).all():
         raise InputError("features hold a value that is not finite; the policy's weights are bad")
-    mean = flat.mean(0)
-    centred = flat - mean
-    components = _principal_components(centred)
-    reduced = np.ascontiguousarray(centred @ components.T)
+    centred = flat - flat.mean(0)
+    reduced = np.ascontiguousarray(centred @ _principal_components(centred).T)
     few = len(flat) <= FEW
     model = openTSNE.TSNE(
         perplexity=perplexity,  # pyright: ignore[reportArgumentType] (takes fractions, too)
@@ -119,7 +99,7 @@ def embed(originals: NDArray, *, perplexity: float = 30.0, seed: int = 0) -> Emb
         negative_gradient_method="bh" if few else "fft",
     ).fit(_distinct(reduced, seed))
     points = np.array(model)
-    return Embedding(points, faithfulness(centred, points), mean, components, model)
+    return Embedding(points, faithfulness(centred, points))
 
 
 def faithfulness(originals: NDArray, points: NDArray, k: int = NEIGHBOURS) -> Faithfulness:

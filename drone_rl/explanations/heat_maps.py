@@ -26,20 +26,6 @@ MapMethod = Callable[[Tensor, Tensor], Tensor]
 """Observations (T, C, H, W) and actions (T,) to heat maps (T, H, W), 0 or more."""
 
 
-def grad_cam(activations: Tensor, gradients: Tensor) -> Tensor:
-    """Compute Grad-CAM by Eqs. 19 and 20.
-
-    Args:
-        activations: Feature maps A. Shape: (T, K, h, w).
-        gradients: Derivative of the objective with respect to A. Shape: (T, K, h, w).
-
-    Returns:
-        ReLU of the sum of feature maps, weighted by their mean gradients. Shape: (T, h, w).
-    """
-    weights = gradients.mean((2, 3), keepdim=True)
-    return (weights * activations).sum(1).relu()
-
-
 @dataclasses.dataclass
 class Explainer:
     """Computes heat maps of one policy by several methods, all of the size of its observations."""

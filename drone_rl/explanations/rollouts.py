@@ -29,14 +29,8 @@ from drone_rl.sim.actions import Actions
 from drone_rl.sim.dynamics import BodyState, Dynamics
 from drone_rl.sim.rendering import Appearance
 from drone_rl.sim.tasks import State, Task
-from drone_rl.utils.archives import read_arrays
 from drone_rl.utils.errors import InputError
-from drone_rl.utils.files import parse_json
-from drone_rl.utils.limits import check_indices
-from drone_rl.utils.schema import as_mapping
 
-MOST_STEPS = 10**7
-"""Largest number of an episode or step in a file."""
 SEEN = {
     "observations": "what the policy's network got, float32 (T, C, h, w)",
     "probabilities": "the policy's probability of each action, float32 (T, number of actions)",
@@ -107,8 +101,7 @@ class RolloutDataset:
                 as rotor speeds, is as at the start of an episode.
         """
         kept = {name: self.tensor(name) for name in (*task.remembered, "step")}
-        attitude = self.tensor("attitude").double() if "attitude" in self.arrays else None
-        place = self.tensor("drone").double()
+        attitude, place = self.tensor("attitude").double(), self.tensor("drone").double()
         body = BodyState.at_rest(place, attitude)
         begun = body if dynamics is None else dynamics.start(place)
         if type(begun) is not BodyState:
@@ -138,30 +131,6 @@ class RolloutDataset:
                 f"data set {path} can't be written ({error.strerror}); choose another folder"
             ) from error
 
-    @classmethod
-    def load(cls, path: str | Path) -> "RolloutDataset":
-        """Read the file.
-
-        Raises:
-            InputError: It is missing, damaged or something else.
-        """
-        try:
-            entries = read_arrays(Path(path))
-            meta = parse_json(str(entries.pop("meta")), f"{path}: meta")
-            names = as_mapping(as_mapping(meta, "meta").get("fields"), "meta.fields")
-            arrays = {name: entries.pop(name) for name in names}
-            layers = {k: v for k, v in entries.items() if k.startswith("features/")}
-            for name in ("episode", "step"):
-                if name in arrays:
-                    check_indices(arrays[name], MOST_STEPS, name)
-            if len({value.shape[:1] for value in arrays.values()}) > 1:
-                raise InputError("its arrays are not of one length")
-        except (InputError, KeyError) as error:
-            raise InputError(
-                f"data set {path} can't be read ({error}); record it again with drone-rl explain"
-            ) from None
-        return cls(arrays, {k.removeprefix("features/"): v for k, v in layers.items()}, meta)
-
 
 def collect(
     env: TransformedEnv,
@@ -169,17 +138,15 @@ def collect(
     *,
     num_episodes: int,
     num_frames: int = 1,
-    greedy: bool = False,
     meta: dict[str, Any] | None = None,
 ) -> RolloutDataset:
-    """Collect whole episodes; only the policy's observations are rendered.
+    """Collect whole episodes with sampled actions; only observations are rendered.
 
     Args:
         env: A batch of environments.
         actor: The policy.
         num_episodes: Least number of episodes.
         num_frames: Least number of steps.
-        greedy: Whether to take the most probable action instead of sampling.
         meta: Origin of the policy.
 
     Returns:
@@ -193,15 +160,14 @@ def collect(
     worlds = worlds_of(env)
     keep = (("next", "info", "end_reason"),)
     collector = EpisodeCollector(env, _WithTruth(actor, (*worlds.task.entries, *_POSE)), keep=keep)
-    kind = ExplorationType.DETERMINISTIC if greedy else ExplorationType.RANDOM
     batches = []
-    with set_exploration_type(kind):
+    with set_exploration_type(ExplorationType.RANDOM):
         while collector.episodes < num_episodes or collector.frames < num_frames:
             missing = num_episodes - collector.episodes
             batches.append(collector.collect(missing if missing > 0 else None))
     fields = flown_fields(worlds.task, worlds.dynamics.actions)
     described = {**fields, "observations": SEEN["observations"]}
-    about = {"greedy": greedy, **(meta or {}), "fields": described}
+    about = {"greedy": False, **(meta or {}), "fields": described}
     batch = cast(TensorDictBase, torch.cat(batches))
     return RolloutDataset(_arrays(batch, worlds.task, worlds.dynamics.actions), {}, about)
 
@@ -263,26 +229,6 @@ def render_frames(
     for layer in layers:
         dataset.features[layer] = features(network, observations, layer).cpu().numpy()
     return dataset
-
-
-def record(
-    env: TransformedEnv,
-    actor: TensorDictModuleBase,
-    network: PictureNetwork,
-    num_frames: int,
-    *,
-    layers: tuple[str, ...] = (),
-    **kwargs: Any,
-) -> RolloutDataset:
-    """Collect episodes (see `collect` for more arguments) and render `num_frames` of their frames.
-
-    Raises:
-        InputError: num_frames is below 1, or a layer doesn't exist.
-    """
-    kwargs = {"num_episodes": 1, **kwargs}
-    flights = collect(env, actor, num_frames=num_frames, **kwargs)
-    rows = select_frames(flights.episode, num_frames)
-    return render_frames(flights, rows, Scenes(env), network, layers)
 
 
 class _WithTruth(TensorDictModuleBase):

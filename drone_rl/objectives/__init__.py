@@ -1,7 +1,7 @@
 """Returns, their estimators, and the loss that learns from them."""
 
-from drone_rl.objectives.advantages import Advantages
 from drone_rl.objectives.estimators import (
+    Advantages,
     BatchNormalised,
     LeaveOneOut,
     LinearRamp,

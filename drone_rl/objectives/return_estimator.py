@@ -27,7 +27,7 @@ class ReturnEstimator(Transform, abc.ABC):
     Where a batch ends within an episode, the return of that episode's steps is not known: they
     get 0, and ("collector", "mask"), which TorchRL's losses and ours honour, tells them from the
     others. An episode that began in an earlier batch is taken to begin with this one; TorchRL's
-    collectors start each batch anew with `reset_at_each_iter=True`.
+    collectors start each batch again with `reset_at_each_iter=True`.
 
     Examples:
         >>> Collector(env, actor, reset_at_each_iter=True, postproc=RewardToGo(), ...)

@@ -1,11 +1,9 @@
 """Networks and actors; they see specs, never a simulator."""
 
 from drone_rl.policies.actor import make_actor
-from drone_rl.policies.cnn import OriginalCNN, PolicyNetwork, SmallCNN
 from drone_rl.policies.critic import ActorCritic
 from drone_rl.policies.external_network import ForeignNetwork
-from drone_rl.policies.mlp import MLP
-from drone_rl.policies.network import PictureNetwork
+from drone_rl.policies.networks import MLP, OriginalCNN, PictureNetwork, PolicyNetwork, SmallCNN
 
 __all__ = [
     "MLP",

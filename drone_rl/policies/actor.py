@@ -12,9 +12,8 @@ from torchrl.data import TensorSpec
 from torchrl.envs.utils import ExplorationType, exploration_type
 from torchrl.modules import ProbabilisticActor
 
-from drone_rl.policies.network import PictureNetwork
-from drone_rl.policies.random_source import RandomSource
-from drone_rl.policies.squashed_normal import SquashedNormal
+from drone_rl.policies.distributions import RandomSource, SquashedNormal
+from drone_rl.policies.networks import PictureNetwork
 
 
 class SeededCategorical(Categorical):
@@ -42,12 +41,12 @@ class StraightActor(ProbabilisticActor):
     """A `ProbabilisticActor` that takes the straight way from network to action.
 
     The way around through TensorDict's modules, which `get_dist` and everything else still go,
-    takes longer than a small network does for one picture. The results are the same.
+    takes longer than a small network does for one frame. The results are the same.
     """
 
     @property
     def network(self) -> nn.Module:
-        """Pictures to outputs."""
+        """Frames to outputs."""
         return self._parts[0].module
 
     @property

@@ -1,7 +1,6 @@
-# pyright: reportArgumentType=false
-# pyright: reportCallIssue=false
-# (TensorDict annotates the star of its sequences' arguments as a list.)
-"""A critic beside a policy network: what a state is worth, for whoever learns with one."""
+"""A critic next to a policy network: it estimates the value of a state."""
+
+from typing import Any
 
 import torch
 from tensordict.nn import (
@@ -12,7 +11,7 @@ from tensordict.nn import (
 from torch import Tensor, nn
 
 from drone_rl.policies.actor import distribution_of
-from drone_rl.policies.cnn import PolicyNetwork, orthogonal
+from drone_rl.policies.networks import PolicyNetwork, orthogonal
 from drone_rl.utils.errors import InputError
 
 PIXELS, FEATURES = "pixels", "features"
@@ -21,9 +20,9 @@ VALUE = "state_value"
 
 
 class ActorCritic(nn.Module):
-    """A policy network, taken apart at its last layer, and a critic.
+    """A policy network, split before its last layer, and a critic.
 
-    The features are made once for all who read them. The policy's parameters are the network's own.
+    Policy and critic share the features. The policy's parameters are the network's own.
     """
 
     def __init__(
@@ -36,7 +35,7 @@ class ActorCritic(nn.Module):
 
         Args:
             network: The policy's.
-            own: The critic's, from pictures to one number; None makes one linear layer on the
+            own: The critic's, from frames to one number; None makes one linear layer on the
                 features of the policy, whose trunk both then share.
             generator: Source of that layer's initial weights.
 
@@ -52,16 +51,15 @@ class ActorCritic(nn.Module):
         *_, last = network.layers
         self.trunk = TensorDictModule(_Trunk(network), in_keys=[PIXELS], out_keys=[FEATURES])
         """"pixels" to "features"."""
-        self.actor = ProbabilisticTensorDictSequential(
-            TensorDictModule(last, in_keys=[FEATURES], out_keys=["logits"]),
-            ProbabilisticTensorDictModule(
-                in_keys=["logits"],
-                out_keys=["action"],
-                distribution_class=distribution_of(network.actions.entry.dtype),
-                return_log_prob=True,
-                log_prob_key=LOG_PROB,
-            ),
+        head = ProbabilisticTensorDictModule(
+            in_keys=["logits"],
+            out_keys=["action"],
+            distribution_class=distribution_of(network.actions.entry.dtype),
+            return_log_prob=True,
+            log_prob_key=LOG_PROB,
         )
+        modules: Any = (TensorDictModule(last, in_keys=[FEATURES], out_keys=["logits"]), head)
+        self.actor = ProbabilisticTensorDictSequential(*modules)
         """"features" to "logits" and the distribution of "action"."""
         self.critic = TensorDictModule(
             own or _one_number(last, generator),
@@ -80,7 +78,7 @@ class _Trunk(nn.Module):
         self.layers = network.layers[:-1]
 
     def forward(self, pixels: Tensor) -> Tensor:
-        """Pictures (*, C, H, W) to features (*, width)."""
+        """Frames (*, C, H, W) to features (*, width)."""
         features = self.layers(pixels.reshape(-1, *self.in_shape))
         return features.reshape(*pixels.shape[:-3], features.shape[-1])
 

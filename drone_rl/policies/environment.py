@@ -36,11 +36,11 @@ def make_env(
     Args:
         num_envs: How many.
         task: What the drone has to do: settings, or a name such as "pillars" for its defaults.
-        camera: The picture that it takes.
+        camera: The frame that it takes.
         dynamics: How it moves; in computer-vision mode by default.
         actions: What it can be asked for, where dynamics are settings; moves by default.
-        transforms: What becomes of the picture, in this order.
-        seed: Root of the worlds' random streams.
+        transforms: What becomes of the frame, in this order.
+        seed: Root of the environments' random streams.
         device: Where they are drawn: "cpu", "cuda" or "cuda:N".
         kwargs: See `drone_rl.envs.DroneEnv`; renderer="mujoco_warp" draws by MuJoCo Warp.
 

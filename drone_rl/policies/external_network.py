@@ -1,4 +1,4 @@
-"""Any callable from pictures to logits, made elsewhere, as a network like ours."""
+"""Any callable from frames to logits, made elsewhere, as a network like ours."""
 
 import copy
 from collections.abc import Callable
@@ -8,21 +8,21 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from drone_rl.policies.network import PictureNetwork
+from drone_rl.policies.networks import PictureNetwork
 from drone_rl.sim.actions import Actions
 from drone_rl.utils.errors import InputError
 
 Logits = Callable[[Any], Any]
-"""From a batch of pictures to logits (N, number of actions), a tensor or an array."""
+"""From a batch of frames to logits (N, number of actions), a tensor or an array."""
 _REPEATS = 1e-5
-"""Logits of the same picture that differ by more are drawn, not computed."""
+"""Logits of the same frame that differ by more are drawn, not computed."""
 
 
 class ForeignNetwork(PictureNetwork):
     """A copy of a torch module that computes and does not learn, or a callable as it is.
 
     Raises:
-        InputError: It takes no such pictures, its logits are not one an action, or it doesn't give
+        InputError: It takes no such frames, its logits are not one an action, or it doesn't give
             the same twice.
     """
 
@@ -35,11 +35,11 @@ class ForeignNetwork(PictureNetwork):
         takes_bytes: bool = False,
         device: torch.device | str = "cpu",
     ) -> None:
-        """Tries it on a picture.
+        """Tries it on a frame.
 
         Args:
             logits: The callable.
-            in_shape: Shape (C, H, W) of one picture.
+            in_shape: Shape (C, H, W) of one frame.
             actions: One for each logit.
             takes_bytes: Whether it wants RGB bytes (N, H, W, 3) in place of floats from 0 to 1.
             device: Where a module is put.

@@ -1,4 +1,4 @@
-"""Policies that were made elsewhere: any callable from pictures to logits."""
+"""Policies that were made elsewhere: any callable from frames to logits."""
 
 import dataclasses
 import sys
@@ -117,7 +117,7 @@ class ForeignPolicy(Pilot):
         """See `Pilot`.
 
         Raises:
-            InputError: It takes no such pictures, or its logits are not one an action.
+            InputError: It takes no such frames, or its logits are not one an action.
         """
         frame = Frame((self.camera.height, self.camera.width, 3))
         for transform in self.transforms or (Rgb(),):
@@ -155,20 +155,20 @@ def policy_from(
     of it. Of another torch function some explanations are left out, of any other callable more.
 
     Args:
-        logits: From a batch of pictures, floats (N, C, H, W) after the transforms, to a logit for
+        logits: From a batch of frames, floats (N, C, H, W) after the transforms, to a logit for
             each action (N, number of actions), as a tensor or an array.
         task: What it flies in.
-        camera: The picture that the drone takes; by default as large as the frames that `logits`
+        camera: The frame that the drone takes; by default as large as the frames that `logits`
             was trained on, if it says so (`observation_shape`, as `Sb3Logits` does).
         dynamics: How it moves.
         actions: What the logits ask for.
-        transforms: What becomes of the picture before it gets it; with an empty list it gets the
+        transforms: What becomes of the frame before it gets it; with an empty list it gets the
             camera's own, RGB bytes (N, H, W, 3). By default `Gray` and `Standardize`, or `Rgb` if
             `logits` was trained on colour frames.
         name: For people; that of the callable by default.
 
     Raises:
-        InputError: It takes no such pictures, or its logits are not one an action.
+        InputError: It takes no such frames, or its logits are not one an action.
     """
     if not callable(logits):
         raise InputError(
@@ -206,7 +206,7 @@ def _is_sb3_model(which: Any) -> bool:
 
 
 def _of_sb3(model: Any) -> ForeignPolicy:
-    from drone_rl.policies.sb3.logits import Sb3Logits  # needs Stable-Baselines3
+    from drone_rl.policies.sb3 import Sb3Logits  # needs Stable-Baselines3
 
     return policy_from(Sb3Logits(model), name=f"{type(model).__name__} of Stable-Baselines3")
 

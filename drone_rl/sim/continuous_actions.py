@@ -4,7 +4,7 @@ An action is three numbers in [-1, 1]: 1 is full speed forward and -1 none (ther
 is full speed to the left and -1 to the right, 1 is the greatest rate of turning to the left.
 
 A policy draws each from a normal distribution of its own and squashes it by tanh, see
-`drone_rl.policies.squashed_normal`. A network's outputs are three numbers for the means, then three
+`drone_rl.policies.distributions`. A network's outputs are three numbers for the means, then three
 for the deviations; `normal_of` says which.
 
 A wish has parts that reports can name: forward, left, right, turn left, turn right (the last two

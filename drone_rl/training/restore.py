@@ -40,7 +40,7 @@ def check_fits(saved: Any, own: Any, where: str) -> None:
 
 
 def check_optimiser(saved: Any, optimiser: torch.optim.Optimizer) -> None:
-    """Refuses an optimiser's state that is not one of this optimiser after steps, or before any.
+    """Refuses an optimizer's state that is not one of this optimizer after steps, or before any.
 
     Raises:
         InputError: See `check_fits`; also if a hyperparameter is another.

@@ -91,39 +91,6 @@ class Claim:
         }
 
 
-def _can_end_otherwise(stated: Certificate, greedy: Episodes, rounding: Rounding) -> bool:
-    """Whether rounding can lead to another end than the stated one."""
-    ends = rounding.outcomes
-    is_stated = _outcomes_of(stated, greedy) < len(stated.outcomes)
-    unknown = bool((ends.is_open.numpy() & is_stated).any())
-    is_other = ends.episodes is not None and not all(_ends_as_stated(stated, ends.episodes))
-    return rounding.is_excessive or unknown or is_other
-
-
-def _outcomes_of(stated: Certificate, episodes: Episodes) -> NDArray[np.int64]:
-    """Index of each episode's outcome; the number of outcomes where none is stated."""
-    groups = stated.groups
-    owner = np.repeat(np.arange(len(groups)), [len(boxes) for boxes in groups])
-    return owner[find(np.concatenate(groups), _placements(episodes))]
-
-
-def _ends_as_stated(stated: Certificate, greedy: Episodes) -> list[bool]:
-    """For each episode with a stated end, whether it ended so."""
-    outcome = _outcomes_of(stated, greedy)
-    flown = zip(outcome, greedy.end_reason.tolist(), greedy.goals.reached.tolist(), strict=True)
-    return [
-        (end, tuple(reached)) == (stated.outcomes[i].end, stated.outcomes[i].collected)
-        for i, end, reached in flown
-        if i < len(stated.outcomes)
-    ]
-
-
-def _placements(episodes: Episodes) -> NDArray[np.float64]:
-    """Positions of the cubes, metres to the left. Shape: (n, cubes)."""
-    places = episodes.goals.world.reshape(len(episodes), -1, 3)  # x, y, z of each cube
-    return places[..., 1].double().numpy()
-
-
 def find_claim(
     policy: Pilot,
     given: str | Path | None = None,
@@ -158,7 +125,9 @@ def find_claim(
                 "proved of it; leave the certificate out"
             )
         return None
-    path = certificate_path(policy.path) if given is None else _file(Path(given))
+    path = certificate_path(policy.path) if given is None else Path(given)
+    if given is not None and path.is_dir():
+        path = path / "certificate.json"
     if given is None and not path.is_file():
         return None
     try:
@@ -169,8 +138,37 @@ def find_claim(
         return Claim(path, None, refused=str(error))
 
 
-def _file(path: Path) -> Path:
-    return path / "certificate.json" if path.is_dir() else path
+def _can_end_otherwise(stated: Certificate, greedy: Episodes, rounding: Rounding) -> bool:
+    """Whether rounding can lead to another end than the stated one."""
+    ends = rounding.outcomes
+    is_stated = _outcomes_of(stated, greedy) < len(stated.outcomes)
+    unknown = bool((ends.is_open.numpy() & is_stated).any())
+    is_other = ends.episodes is not None and not all(_ends_as_stated(stated, ends.episodes))
+    return rounding.is_excessive or unknown or is_other
+
+
+def _outcomes_of(stated: Certificate, episodes: Episodes) -> NDArray[np.int64]:
+    """Index of each episode's outcome; the number of outcomes where none is stated."""
+    groups = stated.groups
+    owner = np.repeat(np.arange(len(groups)), [len(boxes) for boxes in groups])
+    return owner[find(np.concatenate(groups), _placements(episodes))]
+
+
+def _ends_as_stated(stated: Certificate, greedy: Episodes) -> list[bool]:
+    """For each episode with a stated end, whether it ended so."""
+    outcome = _outcomes_of(stated, greedy)
+    flown = zip(outcome, greedy.end_reason.tolist(), greedy.goals.reached.tolist(), strict=True)
+    return [
+        (end, tuple(reached)) == (stated.outcomes[i].end, stated.outcomes[i].collected)
+        for i, end, reached in flown
+        if i < len(stated.outcomes)
+    ]
+
+
+def _placements(episodes: Episodes) -> NDArray[np.float64]:
+    """Positions of the cubes, metres to the left. Shape: (n, cubes)."""
+    places = episodes.goals.world.reshape(len(episodes), -1, 3)  # x, y, z of each cube
+    return places[..., 1].double().numpy()
 
 
 def _try(

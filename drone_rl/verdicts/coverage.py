@@ -27,6 +27,8 @@ from drone_rl.utils.seeding import RootSeed
 
 RANDOM = 2
 """Number of random strengths within each range, in addition to its ends."""
+MOST_LOOKED_AT = 100
+"""Largest number of results of `drone-rl shifts` to read."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -60,94 +62,6 @@ class DomainRecheck:
             f"the ranges and random ones ({kind} seed {self.seed}{fitted}); fewer than "
             f"{self.fewest:,} successes at one would have contradicted the file"
         )
-
-
-def recheck_domain(
-    policy: Pilot,
-    needs: Mapping[str, Need],
-    numbers: Mapping[str, Any],
-    settings: JudgeSettings,
-    seed: RootSeed,
-) -> DomainRecheck:
-    """Run new episodes at the ends of the required ranges and at random strengths within them.
-
-    Args:
-        policy: Which, in its task.
-        needs: By axis, see `drone_rl.robustness.requirements.read_requirements`.
-        numbers: As in `shifts.json`, with the axes.
-        settings: `domain_flights`, `good_share`, device and renderer count.
-        seed: Root of the random streams of the sample and of its environments.
-    """
-    from drone_rl.robustness.shifts import make_policy_spec  # slow to import: it draws charts
-
-    how = ShiftSettings(device=settings.device, renderer=settings.renderer)
-    subject, rng = make_policy_spec(policy, how), np.random.default_rng(seed.value)
-    tried = {
-        axis: [*_strengths(axis, subject, needs[axis.name], numbers, rng)]
-        for axis in find_axes(needs, subject)
-    }
-    count = sum(map(len, tried.values())) + 1
-    with closing(PairedEvaluator(subject, settings.domain_flights, seed.value)) as evaluator:
-        oracle = evaluator.run(Condition(), agent=OracleAgent(looks=False)).episodes
-        prober = Prober(evaluator, oracle, settings.good_share, plain_part=1 / count)
-        found = [_contradiction(None, prober.plain, 0.0, "")]
-        for axis, strengths in tried.items():
-            for strength in strengths:
-                probed = prober.probe(axis.make(strength, subject), 1 / count)
-                value = axis.value(strength, subject)
-                found.append(_contradiction(axis.name, probed, value, axis.unit))
-    return DomainRecheck(
-        episodes=settings.domain_flights,
-        seed=seed.value,
-        seed_is_fixed=seed.is_fixed,
-        strengths={
-            axis.name: tuple(axis.value(strength, subject) for strength in strengths)
-            for axis, strengths in tried.items()
-        },
-        contradictions=tuple(line for line in found if line is not None),
-        fewest=_fewest(settings.domain_flights, prober.rule_at(1 / count)),
-    )
-
-
-def _strengths(
-    axis: Axis,
-    subject: PolicySpec,
-    need: Need,
-    numbers: Mapping[str, Any],
-    rng: np.random.Generator,
-) -> Iterator[float]:
-    """The ends other than no perturbation, and random strengths between them, each once."""
-    low, high = needed_range(numbers["axes"][axis.name], need)
-    ends = sorted(axis.position(axis.strength(value, subject)) for value in (low, high))
-    drawn = rng.uniform(ends[0], ends[1], RANDOM) if ends[0] < ends[1] else []
-    seen: set[float] = set()
-    for position in (*ends, *(float(one) for one in drawn)):
-        strength = axis.at(position)
-        strength = float(round(strength)) if axis.whole else strength
-        if abs(axis.position(strength)) > 1e-12 and strength not in seen:
-            seen.add(strength)
-            yield strength
-
-
-def _contradiction(
-    name: str | None, probed: Mapping[str, Any], value: float, unit: str
-) -> str | None:
-    return contradicted(name, value, unit, probed) if probed["bad"] else None
-
-
-def _fewest(episodes: int, rule: Rule) -> int:
-    """Fewest successes that do not contradict, with an oracle that always succeeds."""
-    least, most = 0, episodes
-    while least < most:
-        middle = (least + most) // 2
-        values = np.repeat([1.0, 0.0], [middle, episodes - middle]) - rule.good_share
-        upper = mean_bounds(values, -rule.good_share, 1.0, rule.confidence)["upper95"]
-        least, most = (least, middle) if upper > 0 else (middle + 1, most)
-    return least
-
-
-MOST_LOOKED_AT = 100
-"""Largest number of results of `drone-rl shifts` to read."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -245,7 +159,8 @@ def require(policy: Pilot, needed: str | Path, measured: SavedShifts | None) -> 
         InputError: The file is unusable, or no operating domain was measured, or it is refused.
     """
     needs = read_requirements(Path(needed))
-    remedy = f"run drone-rl shifts policy={_given(policy)} first, in the same task"
+    given = policy.path if isinstance(policy, Policy) else policy.name
+    remedy = f"run drone-rl shifts policy={given} first, in the same task"
     if measured is None:
         raise InputError(f"require_domain={needed}, but no domain of it was measured; {remedy}")
     if measured.numbers is None:
@@ -258,8 +173,88 @@ def require(policy: Pilot, needed: str | Path, measured: SavedShifts | None) -> 
     return Coverage(needs, {name: line for name, line in lacks.items() if line is not None})
 
 
-def _given(policy: Pilot) -> str:
-    return str(policy.path) if isinstance(policy, Policy) else policy.name
+def recheck_domain(
+    policy: Pilot,
+    needs: Mapping[str, Need],
+    numbers: Mapping[str, Any],
+    settings: JudgeSettings,
+    seed: RootSeed,
+) -> DomainRecheck:
+    """Run new episodes at the ends of the required ranges and at random strengths within them.
+
+    Args:
+        policy: Which, in its task.
+        needs: By axis, see `drone_rl.robustness.requirements.read_requirements`.
+        numbers: As in `shifts.json`, with the axes.
+        settings: `domain_flights`, `good_share`, device and renderer count.
+        seed: Root of the random streams of the sample and of its environments.
+    """
+    from drone_rl.robustness.shifts import make_policy_spec  # slow to import: it draws charts
+
+    how = ShiftSettings(device=settings.device, renderer=settings.renderer)
+    subject, rng = make_policy_spec(policy, how), np.random.default_rng(seed.value)
+    tried = {
+        axis: [*_strengths(axis, subject, needs[axis.name], numbers, rng)]
+        for axis in find_axes(needs, subject)
+    }
+    count = sum(map(len, tried.values())) + 1
+    with closing(PairedEvaluator(subject, settings.domain_flights, seed.value)) as evaluator:
+        oracle = evaluator.run(Condition(), agent=OracleAgent(looks=False)).episodes
+        prober = Prober(evaluator, oracle, settings.good_share, plain_part=1 / count)
+        found = [_contradiction(None, prober.plain, 0.0, "")]
+        for axis, strengths in tried.items():
+            for strength in strengths:
+                probed = prober.probe(axis.make(strength, subject), 1 / count)
+                value = axis.value(strength, subject)
+                found.append(_contradiction(axis.name, probed, value, axis.unit))
+    return DomainRecheck(
+        episodes=settings.domain_flights,
+        seed=seed.value,
+        seed_is_fixed=seed.is_fixed,
+        strengths={
+            axis.name: tuple(axis.value(strength, subject) for strength in strengths)
+            for axis, strengths in tried.items()
+        },
+        contradictions=tuple(line for line in found if line is not None),
+        fewest=_fewest(settings.domain_flights, prober.rule_at(1 / count)),
+    )
+
+
+def _strengths(
+    axis: Axis,
+    subject: PolicySpec,
+    need: Need,
+    numbers: Mapping[str, Any],
+    rng: np.random.Generator,
+) -> Iterator[float]:
+    """The ends other than no perturbation, and random strengths between them, each once."""
+    low, high = needed_range(numbers["axes"][axis.name], need)
+    ends = sorted(axis.position(axis.strength(value, subject)) for value in (low, high))
+    drawn = rng.uniform(ends[0], ends[1], RANDOM) if ends[0] < ends[1] else []
+    seen: set[float] = set()
+    for position in (*ends, *(float(one) for one in drawn)):
+        strength = axis.at(position)
+        strength = float(round(strength)) if axis.whole else strength
+        if abs(axis.position(strength)) > 1e-12 and strength not in seen:
+            seen.add(strength)
+            yield strength
+
+
+def _contradiction(
+    name: str | None, probed: Mapping[str, Any], value: float, unit: str
+) -> str | None:
+    return contradicted(name, value, unit, probed) if probed["bad"] else None
+
+
+def _fewest(episodes: int, rule: Rule) -> int:
+    """Fewest successes that do not contradict, with an oracle that always succeeds."""
+    least, most = 0, episodes
+    while least < most:
+        middle = (least + most) // 2
+        values = np.repeat([1.0, 0.0], [middle, episodes - middle]) - rule.good_share
+        upper = mean_bounds(values, -rule.good_share, 1.0, rule.confidence)["upper95"]
+        least, most = (least, middle) if upper > 0 else (middle + 1, most)
+    return least
 
 
 def _read(path: Path, policy: Policy) -> SavedShifts:

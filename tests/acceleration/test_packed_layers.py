@@ -10,7 +10,7 @@ from torch import nn
 from drone_rl.acceleration.layers_kernel import Layers, decide, look
 from drone_rl.acceleration.packed_layers import PackedNetwork, unsupported
 from drone_rl.policies import MLP, OriginalCNN, SmallCNN
-from drone_rl.policies.cnn import PolicyNetwork
+from drone_rl.policies.networks import PolicyNetwork
 from drone_rl.sim.rendering.devices import start_warp
 
 start_warp("cpu")

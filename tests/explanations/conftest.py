@@ -5,7 +5,7 @@ import torch
 
 from drone_rl.envs import DroneEnv, GrayPixels, StandardizePixels, with_transforms
 from drone_rl.explanations.context import Context
-from drone_rl.explanations.rollouts import record
+from drone_rl.explanations.rollouts import collect, render_frames, select_frames
 from drone_rl.explanations.scenes import Scenes
 from drone_rl.explanations.settings import ExplainSettings
 from drone_rl.policies import SmallCNN
@@ -28,7 +28,9 @@ def scenes(world):
 @pytest.fixture
 def dataset(world):
     env, actor, network = world
-    return record(env, actor, network, 60, layers=("relu1", "fc_relu1"), meta={"from": "a test"})
+    flights = collect(env, actor, num_episodes=1, num_frames=60, meta={"from": "a test"})
+    rows = select_frames(flights.episode, 60)
+    return render_frames(flights, rows, Scenes(env), network, ("relu1", "fc_relu1"))
 
 
 @pytest.fixture(scope="package")

@@ -38,14 +38,6 @@ def test_the_same_seed_gives_the_same_picture(clusters, embedding):
     np.testing.assert_array_equal(again.points, embedding.points)
 
 
-def test_new_points_go_to_their_cluster_and_move_nothing(clusters, embedding):
-    before = embedding.points.copy()
-    placed = embedding.place(clusters[:2] + 0.01)
-    centres = embedding.points.reshape(3, 40, 2).mean(1)
-    assert (np.linalg.norm(placed[:, None] - centres, axis=-1).argmin(1) == 0).all()
-    np.testing.assert_array_equal(embedding.points, before)
-
-
 def test_faithfulness_of_a_perfect_and_of_a_reversed_order():
     line = np.arange(9.0)[:, None]
     perfect = faithfulness(line, np.hstack([line, line]), k=2)

@@ -3,10 +3,15 @@ import math
 import pytest
 import torch
 
-from drone_rl.explanations.heat_maps import Explainer, grad_cam
+from drone_rl.explanations.heat_maps import Explainer
 from drone_rl.policies import MLP, ForeignNetwork, SmallCNN
 from drone_rl.sim.actions import MOVES
 from drone_rl.utils.errors import InputError
+
+
+def grad_cam(activations, gradients):
+    """Eqs. 19 and 20 as written: feature maps weighted by their mean gradients, ReLU."""
+    return (gradients.mean((2, 3), keepdim=True) * activations).sum(1).relu()
 
 
 @pytest.fixture

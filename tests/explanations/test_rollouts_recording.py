@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from drone_rl.explanations.rollouts import collect, record, render_frames, select_frames
+from drone_rl.explanations.rollouts import collect, render_frames, select_frames
 from drone_rl.explanations.scenes import Scenes
 from drone_rl.utils.errors import InputError
 
@@ -53,4 +53,4 @@ def test_drawn_frames_are_those_that_were_asked_for(flights, world):
 
 def test_no_frames_are_refused(world):
     with pytest.raises(InputError, match="frames=0"):
-        record(*world, 0)
+        collect(*world[:2], num_episodes=1, num_frames=0)

@@ -11,8 +11,7 @@ from torchrl.modules import ProbabilisticActor
 
 from drone_rl.policies import make_actor
 from drone_rl.policies.actor import SeededCategorical, distribution_of
-from drone_rl.policies.random_source import RandomSource
-from drone_rl.policies.squashed_normal import SquashedNormal
+from drone_rl.policies.distributions import RandomSource, SquashedNormal
 
 
 class Fixed(nn.Module):

@@ -1,7 +1,7 @@
 """Check an explanation's files before rendering: sizes, types, and that they fit each other."""
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -26,32 +26,50 @@ _SIDE = 512
 _ACTIONS = 16
 _MANY = 100_000
 _INTEGER, _FLOAT, _BOOL, _PIXEL = "iu", "f", "b", "u"
-_ARRAYS: Mapping[str, tuple[str, tuple[int, ...], int]] = {
-    "film_frames": (_PIXEL, (2000, _SIDE, _SIDE, 3), 2**23),
-    "film_heat": (_FLOAT, (2000, _SIDE, _SIDE), 2**23),
-    "film_probabilities": (_FLOAT, (2000, _ACTIONS), 2**20),
-    "film_actions": (_INTEGER, (2000,), 2**20),
-    "class_model_(probability|logit)": (_FLOAT, (_ACTIONS, 64, _SIDE, _SIDE), 2**25),
-    "tsne_(features|pixels)": (_FLOAT, (_MANY, 2), 2**21),
+_SIZES = {
+    "steps of the film": 2000,
+    "frames": _MANY,
+    "actions": _ACTIONS,
+    "outlines": 2**13,
+    "heights": 32,
+    **dict.fromkeys(("places ahead", "places to the side", "starts ahead"), _SIDE),
+    "starts to the side": _SIDE,
+}
+"""Largest sizes of dimensions; dimensions of the same name must have the same size."""
+_Arrays = Mapping[str, tuple[str, tuple[str | int, ...], int]]
+_ARRAYS: _Arrays = {
+    "film_frames": (_PIXEL, ("steps of the film", _SIDE, _SIDE, 3), 2**23),
+    "film_heat": (_FLOAT, ("steps of the film", _SIDE, _SIDE), 2**23),
+    "film_probabilities": (_FLOAT, ("steps of the film", "actions"), 2**20),
+    "film_actions": (_INTEGER, ("steps of the film",), 2**20),
+    "class_model_(probability|logit)": (_FLOAT, ("actions", 64, _SIDE, _SIDE), 2**25),
+    "tsne_(features|pixels)": (_FLOAT, ("frames", 2), 2**21),
     "places_points": (_FLOAT, (2**16, 2), 2**20),
-    "places_(ends|labels)": (_INTEGER, (2**13,), 2**17),
-    "response_height": (_FLOAT, (32,), 2**12),
-    "(response|outcome)_(forward|lateral)": (_FLOAT, (_SIDE,), 2**12),
-    "response_probabilities": (_FLOAT, (32, _SIDE, _SIDE, _ACTIONS), 2**20),
-    "response_blind": (_BOOL, (32, _SIDE, _SIDE), 2**18),
+    "places_(ends|labels)": (_INTEGER, ("outlines",), 2**17),
+    "(response|outcome)_height": (_FLOAT, ("heights",), 2**12),
+    "response_forward": (_FLOAT, ("places ahead",), 2**12),
+    "response_lateral": (_FLOAT, ("places to the side",), 2**12),
+    "response_oracle": (_INTEGER, ("places to the side",), 2**12),
+    "response_probabilities": (
+        _FLOAT,
+        ("heights", "places ahead", "places to the side", "actions"),
+        2**20,
+    ),
+    "response_blind": (_BOOL, ("heights", "places ahead", "places to the side"), 2**18),
     "response_without_target": (_FLOAT, (_ACTIONS,), 2**12),
-    "(response|outcome)_(oracle|stratum)": (_INTEGER, (_SIDE,), 2**12),
-    "outcome_height": (_FLOAT, (32,), 2**12),
-    "outcome_collected": (_BOOL, (32, _SIDE, _SIDE), 2**18),
+    "outcome_oracle|(response|outcome)_stratum": (_INTEGER, (_SIDE,), 2**12),
+    "outcome_forward": (_FLOAT, ("starts ahead",), 2**12),
+    "outcome_lateral": (_FLOAT, ("starts to the side",), 2**12),
+    "outcome_collected": (_BOOL, ("heights", "starts ahead", "starts to the side"), 2**18),
     "interventions": (_PIXEL, (32, _SIDE, _SIDE, 3), 2**23),
     "patch_effects": (_FLOAT, (_SIDE, _SIDE), 2**20),
     "shifts_[a-z_]+": (_PIXEL, (8, _SIDE, _SIDE, 3), 2**22),
 }
-"""Arrays of `arrays.npz`: kind of dtype, largest shape, most bytes."""
-_DATA: Mapping[str, tuple[str, tuple[int, ...], int]] = {
-    "frames": (_PIXEL, (_MANY, _SIDE, _SIDE, 3), 2**27),
-    "probabilities": (_FLOAT, (_MANY, _ACTIONS), 2**23),
-    "(actions|episode|step|event)": (_INTEGER, (_MANY,), 2**20),
+"""Arrays of `arrays.npz`: kind of dtype, dimensions or their largest sizes, most bytes."""
+_DATA: _Arrays = {
+    "frames": (_PIXEL, ("frames", _SIDE, _SIDE, 3), 2**27),
+    "probabilities": (_FLOAT, ("frames", "actions"), 2**23),
+    "(actions|episode|step|event)": (_INTEGER, ("frames",), 2**20),
     "flights/episode": (_INTEGER, (10 * _MANY,), 2**23),
 }
 """The same for `dataset.npz`."""
@@ -74,35 +92,6 @@ _FINITE = {
 """Arrays of coordinates, which must be finite."""
 _LONGEST = 2000
 """Most entries of any other list or mapping."""
-_DIMENSIONS: Mapping[str, tuple[str, ...]] = {
-    "film_frames": ("steps of the film", "", "", ""),
-    "film_heat": ("steps of the film", "", ""),
-    "film_probabilities": ("steps of the film", "actions"),
-    "film_actions": ("steps of the film",),
-    "frames": ("frames", "", "", ""),
-    "probabilities": ("frames", "actions"),
-    "actions": ("frames",),
-    "episode": ("frames",),
-    "step": ("frames",),
-    "event": ("frames",),
-    "tsne_features": ("frames", ""),
-    "tsne_pixels": ("frames", ""),
-    "class_model_probability": ("actions", "", "", ""),
-    "class_model_logit": ("actions", "", "", ""),
-    "places_ends": ("outlines",),
-    "places_labels": ("outlines",),
-    "response_height": ("heights",),
-    "response_forward": ("places ahead",),
-    "response_lateral": ("places to the side",),
-    "response_oracle": ("places to the side",),
-    "response_probabilities": ("heights", "places ahead", "places to the side", "actions"),
-    "response_blind": ("heights", "places ahead", "places to the side"),
-    "outcome_height": ("heights",),
-    "outcome_forward": ("starts ahead",),
-    "outcome_lateral": ("starts to the side",),
-    "outcome_collected": ("heights", "starts ahead", "starts to the side"),
-}
-"""What the dimensions of arrays count; dimensions with the same name must be equally long."""
 _METRES = Real(-1e4, 1e4)
 _SHARE = Real(0.0, 1.0)
 _PLACES: Mapping[str, Kind] = {
@@ -173,15 +162,20 @@ def _check_lengths(value: Any) -> None:
         level = [v for v in inner if isinstance(v, dict | list)]
 
 
-def _check_arrays(
-    arrays: Mapping[str, NDArray], known: Mapping[str, tuple[str, tuple[int, ...], int]]
-) -> None:
+def _check_arrays(arrays: Mapping[str, NDArray], known: _Arrays) -> None:
     if len(arrays) > _LONGEST:
         raise InputError(f"it holds {len(arrays)} arrays; give at most {_LONGEST}")
-    for pattern, (kinds, most, size) in known.items():
-        for name, value in arrays.items():
-            if re.fullmatch(pattern, name):
-                _check_array(name, value, kinds, most, size)
+    for name, (kinds, dimensions, size) in _matches(arrays, known):
+        most = tuple(_SIZES[d] if isinstance(d, str) else d for d in dimensions)
+        _check_array(name, arrays[name], kinds, most, size)
+
+
+def _matches(
+    names: Iterable[str], known: _Arrays
+) -> Iterator[tuple[str, tuple[str, tuple[str | int, ...], int]]]:
+    """Yield the known arrays among names, in the order of the table."""
+    for pattern, described in known.items():
+        yield from ((name, described) for name in names if re.fullmatch(pattern, name))
 
 
 def _check_array(name: str, value: NDArray, kinds: str, most: tuple[int, ...], size: int) -> None:
@@ -214,8 +208,8 @@ def check_fit(
     """
     known = {**data, **arrays}
     lengths: dict[str, tuple[int, str]] = {"actions": (len(actions.names), "the list of actions")}
-    for name, dimensions in _DIMENSIONS.items():
-        if name in known:
+    for name, (_, dimensions, _) in _matches(known, {**_DATA, **_ARRAYS}):
+        if any(isinstance(dimension, str) for dimension in dimensions):
             _check_dimensions(name, known[name].shape, dimensions, lengths)
     steps, frames = (lengths.get(what, (0, ""))[0] for what in ("steps of the film", "frames"))
     for name in ("actions", "film_actions"):
@@ -230,7 +224,7 @@ def check_fit(
 def _check_dimensions(
     name: str,
     shape: tuple[int, ...],
-    dimensions: tuple[str, ...],
+    dimensions: tuple[str | int, ...],
     lengths: dict[str, tuple[int, str]],
 ) -> None:
     if len(shape) != len(dimensions):
@@ -238,9 +232,10 @@ def _check_dimensions(
     for length, what in zip(shape, dimensions, strict=True):
         if length == 0:
             raise InputError(f"{name} has the shape {shape}: it is empty")
-        before, where = lengths.setdefault(what, (length, name)) if what else (length, name)
-        if before != length:
-            raise InputError(f"{name} has {length} {what}, but {where} has {before}")
+        if isinstance(what, str):
+            before, where = lengths.setdefault(what, (length, name))
+            if before != length:
+                raise InputError(f"{name} has {length} {what}, but {where} has {before}")
 
 
 def _check_film(numbers: Mapping[str, Any], steps: int) -> None:

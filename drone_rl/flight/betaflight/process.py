@@ -9,7 +9,6 @@ import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 from drone_rl.flight.betaflight.packets import CLI_PORT, RC_PORT, ROTOR_PORT, STATE_PORT
@@ -130,12 +129,7 @@ class FirmwareProcess:
         """Return itself."""
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *exception: object) -> None:
         """See `close`."""
         self.close()
 

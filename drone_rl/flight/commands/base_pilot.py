@@ -3,7 +3,6 @@
 import copy
 import math
 from collections.abc import Sequence
-from types import TracebackType
 from typing import Any, Self
 
 import torch
@@ -83,12 +82,7 @@ class BasePilot:
         """Return the pilot."""
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *exception: object) -> None:
         """Cancel the running command."""
         self._runner.cancel()
 

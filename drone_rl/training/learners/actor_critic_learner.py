@@ -27,7 +27,7 @@ _TOLD = ("loss_objective", "loss_critic", "loss_entropy", "clip_fraction", "kl_a
 
 
 class ActorCriticLearner:
-    """Values, advantages, then passes over minibatches, each a step of the optimiser.
+    """Values, advantages, then passes over minibatches, each a step of the optimizer.
 
     Values and log-probabilities are those of the policy and critic that an update begins with,
     and are computed once. What follows a step is taken to be the next one of its row, unless the
@@ -60,7 +60,7 @@ class ActorCriticLearner:
             generator: Shuffles the steps, on the CPU.
             scheduler: Stepped after each update.
             epochs: Passes over a batch.
-            minibatch_size: About how many steps make one step of the optimiser; None for all.
+            minibatch_size: About how many steps make one step of the optimizer; None for all.
             max_grad_norm: Clip the gradient of each to this norm; None for no clipping.
             chunk_frames: Steps in one forward and backward pass; changes nothing but memory.
         """
@@ -145,14 +145,14 @@ class ActorCriticLearner:
         return after
 
     def _look(self, pixels: Tensor) -> TensorDictBase:
-        """Features and values of pictures, without these. Shape: (num_pictures,)."""
+        """Features and values of frames, without these. Shape: (num_pictures,)."""
         chunks = (TensorDict({PIXELS: c}, [len(c)]) for c in pixels.split(self.chunk_frames))
         seen = [self.model.critic(self.model.trunk(chunk)).exclude(PIXELS) for chunk in chunks]
         # it takes TensorDicts, too, which its annotation lacks
         return torch.cat(seen)  # pyright: ignore[reportReturnType]
 
     def _descend(self, steps: TensorDictBase) -> Iterator[dict[str, float]]:
-        """Takes the steps of the optimiser. Yields what is told of each."""
+        """Takes the steps of the optimizer. Yields what is told of each."""
         pieces = max(1, round(len(steps) / (self.minibatch_size or len(steps))))
         for _ in range(self.epochs):
             order = torch.randperm(len(steps), generator=self.generator).to(steps.device)
@@ -167,7 +167,7 @@ class ActorCriticLearner:
         return self.loss(self.model.trunk(chunk))
 
     def state_dict(self) -> dict[str, Any]:
-        """Weights of both, and what the optimiser, scheduler and shuffling remember."""
+        """Weights of both, and what the optimizer, scheduler and shuffling remember."""
         return {
             "policy": self.network.state_dict(),
             "critic": self.model.critic.state_dict(),

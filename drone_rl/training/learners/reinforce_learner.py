@@ -28,7 +28,7 @@ class ReinforceLearner:
         """Connects the parts.
 
         Args:
-            network: The policy's, whose parameters the optimiser holds.
+            network: The policy's, whose parameters the optimizer holds.
             loss: Gives the `loss_*` terms of a batch, as a mean over its steps or a sum.
             optimiser: Over the network's parameters.
             scheduler: Stepped after each update.

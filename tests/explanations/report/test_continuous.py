@@ -52,7 +52,7 @@ def test_the_report_names_and_draws_the_parts(folder, tmp_path):
     page = write_report([folder], tmp_path).read_text()
     for name in NAMES:
         assert name in page, name
-    assert "more\nthan a third of the most" in page
+    assert "if that is above a third of the maximum" in page
     assert "<th>turn left</th><th>turn right</th><th>roughness</th>" in page
     assert "The first 5 maps" in page
     table = next(tmp_path.rglob("*response*.csv")).read_text().splitlines()

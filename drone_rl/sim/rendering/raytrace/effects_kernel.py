@@ -11,6 +11,7 @@ so that training without effects need not compile it.
 
 import warp as wp
 
+from drone_rl.sim.rendering.raytrace import structs_kernel as structs
 from drone_rl.sim.rendering.raytrace.intersection_kernel import BOX, PLANE
 from drone_rl.sim.rendering.raytrace.plain_kernel import find_visible, span_end, span_normal
 from drone_rl.sim.rendering.raytrace.shading_kernel import (
@@ -29,21 +30,6 @@ from drone_rl.sim.rendering.raytrace.shadows_kernel import (
     shadow_rectangle,
 )
 from drone_rl.sim.rendering.raytrace.spans_kernel import fill_floats, fill_ints
-from drone_rl.sim.rendering.raytrace.structs_kernel import (
-    FACES,
-    GRAY,
-    NO_GEOM,
-    RGB,
-    Effects,
-    Geoms,
-    GeomView,
-    Images,
-    Materials,
-    PixelValue,
-    Poses,
-    Scratch,
-    View,
-)
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
@@ -53,13 +39,13 @@ def render_images_with_effects(
     first: int,
     last: int,
     member: int,
-    view: View,
-    geoms: Geoms,
-    poses: Poses,
-    materials: Materials,
-    effects: Effects,
-    scratch: Scratch,
-    images: Images,
+    view: structs.View,
+    geoms: structs.Geoms,
+    poses: structs.Poses,
+    materials: structs.Materials,
+    effects: structs.Effects,
+    scratch: structs.Scratch,
+    images: structs.Images,
 ) -> None:
     """Render images one after the other, as one worker; see `plain_kernel.render_images`."""
     for row in range(first, last):
@@ -74,7 +60,9 @@ def render_images_with_effects(
 
 
 @wp.func
-def _cast_shadows(view: View, number: int, sun: wp.vec3, scratch: Scratch, member: int) -> None:
+def _cast_shadows(
+    view: structs.View, number: int, sun: wp.vec3, scratch: structs.Scratch, member: int
+) -> None:
     """Mark the pixels of a camera that are in shadow."""
     camera, rays, geom_views = view.cameras[number], view.rays[number], scratch.geom_views[member]
     nearest, owners, dark = scratch.nearest[member], scratch.owner[member], scratch.dark[member]
@@ -90,7 +78,7 @@ def _cast_shadows(view: View, number: int, sun: wp.vec3, scratch: Scratch, membe
                 first, last = row * view.width + part[0], row * view.width + part[1]
                 if caster.kind == BOX:
                     cast_box_shadow(
-                        dark, first, last, rays, nearest, owners, FACES, geom, caster, light
+                        dark, first, last, rays, nearest, owners, structs.FACES, geom, caster, light
                     )
                 else:
                     _cast_shadow(dark, first, last, rays, nearest, owners, geom, caster, light)
@@ -106,11 +94,13 @@ def _cast_shadow(
     nearest: wp.array[float],
     owners: wp.array[int],
     geom: int,
-    caster: GeomView,
+    caster: structs.GeomView,
     light: wp.vec3,
 ) -> None:
     """`cast_box_shadow` for any solid."""
-    mark_candidates(dark, first, last, rays, nearest, owners, FACES, geom, caster, light, CANDIDATE)
+    mark_candidates(
+        dark, first, last, rays, nearest, owners, structs.FACES, geom, caster, light, CANDIDATE
+    )
     pixel = first
     while pixel < last:
         if dark[pixel] == CANDIDATE:
@@ -120,16 +110,16 @@ def _cast_shadow(
 
 @wp.func
 def _shade(
-    view: View,
+    view: structs.View,
     number: int,
-    poses: Poses,
-    materials: Materials,
-    effects: Effects,
+    poses: structs.Poses,
+    materials: structs.Materials,
+    effects: structs.Effects,
     world: int,
     row: int,
-    scratch: Scratch,
+    scratch: structs.Scratch,
     member: int,
-    images: Images,
+    images: structs.Images,
 ) -> None:
     camera, rays, cosines = view.cameras[number], view.rays[number], view.cosines[number]
     nearest, owners, dark = scratch.nearest[member], scratch.owner[member], scratch.dark[member]
@@ -139,13 +129,13 @@ def _shade(
     while first < count:
         owner = owners[first]
         last = span_end(owners, first, count)
-        shown = PixelValue()
-        shown.number = NO_GEOM
-        if owner == NO_GEOM:
+        shown = structs.PixelValue()
+        shown.number = structs.NO_GEOM
+        if owner == structs.NO_GEOM:
             fill_floats(nearest, first, last, 0.0)
             color_sky(colors, first, last, rays, camera, poses, materials, effects, world)
         else:
-            geom_view = scratch.geom_views[member, owner // FACES]
+            geom_view = scratch.geom_views[member, owner // structs.FACES]
             normal = span_normal(geom_view, owner, rays[first], nearest[first])
             shown.number = geom_view.number
             shown.normal = geom_view.axes @ normal
@@ -162,9 +152,18 @@ def _shade(
                 effects,
                 world,
                 geom_view,
-                owner % FACES,
+                owner % structs.FACES,
                 normal,
             )
-        write_span(images, view.what & ~(RGB | GRAY), row, first, last, shown, nearest, cosines)
+        write_span(
+            images,
+            view.what & ~(structs.RGB | structs.GRAY),
+            row,
+            first,
+            last,
+            shown,
+            nearest,
+            cosines,
+        )
         first = last
     write_colors(images, view.what, row, 0, count, colors)

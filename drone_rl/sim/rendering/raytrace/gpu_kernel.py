@@ -6,6 +6,7 @@
 
 import warp as wp
 
+from drone_rl.sim.rendering.raytrace import structs_kernel as structs
 from drone_rl.sim.rendering.raytrace.intersection_kernel import (
     FAR_AWAY,
     PLANE,
@@ -25,26 +26,17 @@ from drone_rl.sim.rendering.raytrace.shading_kernel import (
     write_pixel,
 )
 from drone_rl.sim.rendering.raytrace.shadows_kernel import is_shadowed
-from drone_rl.sim.rendering.raytrace.structs_kernel import (
-    GRAY,
-    NO_GEOM,
-    RGB,
-    Effects,
-    Geoms,
-    GeomView,
-    Images,
-    Materials,
-    PixelValue,
-    Poses,
-    Scratch,
-    View,
-)
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 
 @wp.kernel
-def view_geoms(view: View, geoms: Geoms, poses: Poses, geom_views: wp.array2d[GeomView]) -> None:
+def view_geoms(
+    view: structs.View,
+    geoms: structs.Geoms,
+    poses: structs.Poses,
+    geom_views: wp.array2d[structs.GeomView],
+) -> None:
     """Compute all geoms relative to all cameras. Launch it with (num_images, num_geoms)."""
     row, geom = wp.tid()
     camera = view.cameras[row % view.cameras.shape[0]]
@@ -53,10 +45,12 @@ def view_geoms(view: View, geoms: Geoms, poses: Poses, geom_views: wp.array2d[Ge
 
 
 @wp.func
-def cast_ray(view: View, geom_views: wp.array[GeomView], ray: wp.vec3) -> tuple[float, int, int]:
+def cast_ray(
+    view: structs.View, geom_views: wp.array[structs.GeomView], ray: wp.vec3
+) -> tuple[float, int, int]:
     """Cast a ray: return the distance, the nearest geom, `NO_GEOM` for none, and its face."""
     nearest = float(FAR_AWAY)
-    owner = int(NO_GEOM)
+    owner = int(structs.NO_GEOM)
     face = int(0)
     for geom in range(geom_views.shape[0]):
         geom_view = geom_views[geom]
@@ -76,7 +70,10 @@ def cast_ray(view: View, geom_views: wp.array[GeomView], ray: wp.vec3) -> tuple[
 
 @wp.kernel
 def render_pixels(
-    view: View, geom_views: wp.array2d[GeomView], materials: Materials, images: Images
+    view: structs.View,
+    geom_views: wp.array2d[structs.GeomView],
+    materials: structs.Materials,
+    images: structs.Images,
 ) -> None:
     """Render pixels without effects. Launch it with (num_images, num_pixels)."""
     row, pixel = wp.tid()
@@ -95,13 +92,13 @@ def render_pixels(
 
 @wp.kernel
 def render_pixels_with_effects(
-    view: View,
-    poses: Poses,
-    geom_views: wp.array2d[GeomView],
-    materials: Materials,
-    effects: Effects,
-    scratch: Scratch,
-    images: Images,
+    view: structs.View,
+    poses: structs.Poses,
+    geom_views: wp.array2d[structs.GeomView],
+    materials: structs.Materials,
+    effects: structs.Effects,
+    scratch: structs.Scratch,
+    images: structs.Images,
 ) -> None:
     """Render pixels with effects, with one scratch buffer per image; see `render_pixels`."""
     row, pixel = wp.tid()
@@ -111,8 +108,8 @@ def render_pixels_with_effects(
     nearest, dark, colors = scratch.nearest[row], scratch.dark[row], scratch.colors[row]
     ray, last = rays[pixel], pixel + 1
     distance, owner, face = cast_ray(view, geom_views[row], ray)
-    shown = PixelValue()
-    shown.number = NO_GEOM
+    shown = structs.PixelValue()
+    shown.number = structs.NO_GEOM
     if owner < 0:
         distance = 0.0
         color_sky(colors, pixel, last, rays, camera, poses, materials, effects, world)
@@ -147,5 +144,7 @@ def render_pixels_with_effects(
             face,
             normal,
         )
-    write_pixel(images, view.what & ~(RGB | GRAY), row, pixel, shown, distance, -ray[2])
+    write_pixel(
+        images, view.what & ~(structs.RGB | structs.GRAY), row, pixel, shown, distance, -ray[2]
+    )
     write_colors(images, view.what, row, pixel, last, colors)

@@ -184,12 +184,8 @@ def intersect_plane(size: wp.vec3, point: wp.vec3, ray: wp.vec3) -> float:
 
 @wp.func
 def is_nearest(along: float, so_far: float, cosine: float, far: float) -> bool:
-    """Return whether a hit is in front of the nearest one before it.
+    """Return whether a hit `along` the ray, negative for a miss, is in front of the one `so_far`.
 
-    Args:
-        along: Distance of the hit; negative for a miss.
-        so_far: Distance of the nearest hit before.
-        cosine: Of the angle between the ray and the camera's axis.
-        far: Metres along the axis beyond which nothing is rendered.
+    `cosine` is that of the angle to the camera's axis, `far` the metres along it that are rendered.
     """
     return along >= 0.0 and along - so_far <= SAME * wp.max(so_far, 1.0) and along * cosine <= far

@@ -13,6 +13,7 @@ Pixels are counted by `while`: Warp's code of a `for` loop is several times as s
 
 import warp as wp
 
+from drone_rl.sim.rendering.raytrace import structs_kernel as structs
 from drone_rl.sim.rendering.raytrace.intersection_kernel import (
     FAR_AWAY,
     PLANE,
@@ -35,17 +36,6 @@ from drone_rl.sim.rendering.raytrace.spans_kernel import (
     fill_ints,
     intersect_level_plane,
 )
-from drone_rl.sim.rendering.raytrace.structs_kernel import (
-    FACES,
-    NO_GEOM,
-    Geoms,
-    GeomView,
-    Images,
-    Materials,
-    Poses,
-    Scratch,
-    View,
-)
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
@@ -55,12 +45,12 @@ def render_images(
     first: int,
     last: int,
     member: int,
-    view: View,
-    geoms: Geoms,
-    poses: Poses,
-    materials: Materials,
-    scratch: Scratch,
-    images: Images,
+    view: structs.View,
+    geoms: structs.Geoms,
+    poses: structs.Poses,
+    materials: structs.Materials,
+    scratch: structs.Scratch,
+    images: structs.Images,
 ) -> None:
     """Render images one after the other, as one worker: launch it with a dimension of 1.
 
@@ -83,39 +73,46 @@ def render_images(
 
 @wp.func
 def render_image(
-    view: View,
+    view: structs.View,
     camera: int,
-    geoms: Geoms,
-    poses: Poses,
+    geoms: structs.Geoms,
+    poses: structs.Poses,
     world: int,
-    materials: Materials,
-    scratch: Scratch,
+    materials: structs.Materials,
+    scratch: structs.Scratch,
     member: int,
-    images: Images,
+    images: structs.Images,
     row: int,
 ) -> None:
     """Render the image `row` of one camera of one environment; see `render_images`."""
     find_visible(view, camera, geoms, poses, world, scratch, member)
-    nearest, owners, rays = scratch.nearest[member], scratch.owner[member], view.rays[camera]
+    nearest, owners = scratch.nearest[member], scratch.owner[member]
+    geom_views, rays, cosines = scratch.geom_views[member], view.rays[camera], view.cosines[camera]
     count = view.height * view.width
     start = int(0)
     while start < count:
         owner = owners[start]
         end = span_end(owners, start, count)
         shown = sky_pixel(materials, world)
-        if owner == NO_GEOM:
+        if owner == structs.NO_GEOM:
             fill_floats(nearest, start, end, 0.0)
         else:
-            geom_view = scratch.geom_views[member, owner // FACES]
+            geom_view = geom_views[owner // structs.FACES]
             normal = span_normal(geom_view, owner, rays[start], nearest[start])
             shown = geom_pixel(materials, world, geom_view.number, geom_view.axes @ normal)
-        write_span(images, view.what, row, start, end, shown, nearest, view.cosines[camera])
+        write_span(images, view.what, row, start, end, shown, nearest, cosines)
         start = end
 
 
 @wp.func
 def find_visible(
-    view: View, camera: int, geoms: Geoms, poses: Poses, world: int, scratch: Scratch, member: int
+    view: structs.View,
+    camera: int,
+    geoms: structs.Geoms,
+    poses: structs.Poses,
+    world: int,
+    scratch: structs.Scratch,
+    member: int,
 ) -> None:
     """Find the nearest surface of each pixel, and leave it in `scratch`."""
     nearest = scratch.nearest[member]
@@ -123,7 +120,7 @@ def find_visible(
     geom_views = scratch.geom_views[member]
     rays = view.rays[camera]
     fill_floats(nearest, 0, view.height * view.width, FAR_AWAY)
-    fill_ints(owner, 0, view.height * view.width, NO_GEOM)
+    fill_ints(owner, 0, view.height * view.width, structs.NO_GEOM)
     pose = camera_pose(view.cameras[camera], poses, world)
     for geom in range(geoms.kind.shape[0]):
         geom_view = view_geom(geoms, geom, poses, world, pose)
@@ -140,31 +137,31 @@ def span_end(owners: wp.array[int], start: int, count: int) -> int:
     """Return the end of a span of one flat face or the sky; a round face's span is one pixel."""
     owner = owners[start]
     end = start + 1
-    if owner == NO_GEOM or owner % FACES != ROUND:
+    if owner == structs.NO_GEOM or owner % structs.FACES != ROUND:
         while end < count and owners[end] == owner:
             end += 1
     return end
 
 
 @wp.func
-def span_normal(geom_view: GeomView, owner: int, ray: wp.vec3, distance: float) -> wp.vec3:
+def span_normal(geom_view: structs.GeomView, owner: int, ray: wp.vec3, distance: float) -> wp.vec3:
     """Return the normal of a span's first pixel, in the geom's frame."""
     into = geom_view.into @ ray
     kind, size, eye = geom_view.kind, geom_view.size, geom_view.eye
-    return surface_normal(kind, size, owner % FACES, eye, into, distance)
+    return surface_normal(kind, size, owner % structs.FACES, eye, into, distance)
 
 
 @wp.func
 def _find_plane(
-    view: View,
+    view: structs.View,
     rays: wp.array[wp.vec3],
-    geom_view: GeomView,
+    geom_view: structs.GeomView,
     geom: int,
     nearest: wp.array[float],
     owner: wp.array[int],
 ) -> None:
     """Only rows that end below its horizon; if both ends of a row hit, so does all between."""
-    mark = geom * FACES + UPPER
+    mark = geom * structs.FACES + UPPER
     start = int(0)
     while start < view.height * view.width:
         end = start + view.width
@@ -188,17 +185,17 @@ def _find_plane(
 
 
 @wp.func
-def _hits(view: View, geom_view: GeomView, ray: wp.vec3, into: wp.vec3) -> bool:
+def _hits(view: structs.View, geom_view: structs.GeomView, ray: wp.vec3, into: wp.vec3) -> bool:
     along = intersect_plane(geom_view.size, geom_view.eye, into)
     return along >= 0.0 and along * -ray[2] <= view.far
 
 
 @wp.func
 def _find_solid(
-    view: View,
+    view: structs.View,
     part: wp.vec4i,
     rays: wp.array[wp.vec3],
-    geom_view: GeomView,
+    geom_view: structs.GeomView,
     geom: int,
     nearest: wp.array[float],
     owner: wp.array[int],
@@ -213,6 +210,6 @@ def _find_solid(
             along, face = intersect_solid(geom_view.kind, geom_view.size, geom_view.eye, into)
             if is_nearest(along, nearest[pixel], -ray[2], view.far):
                 nearest[pixel] = along
-                owner[pixel] = geom * FACES + face
+                owner[pixel] = geom * structs.FACES + face
             pixel += 1
         row += 1

@@ -101,14 +101,7 @@ def _corner(geom_view: GeomView, corner: int) -> wp.vec3:
 def pixel_rectangle(view: View, camera: Camera, lowest: wp.vec2, highest: wp.vec2) -> wp.vec4i:
     """Return the pixels that can show anything between two points of the image plane.
 
-    Args:
-        view: Image size.
-        camera: Field of view.
-        lowest: Right and down, on the image plane at distance 1.
-        highest: The other end.
-
-    Returns:
-        First and last+1 column, first and last+1 row.
+    Points are right and down, on the plane at distance 1. Returns first and last+1 column, and row.
     """
     return wp.vec4i(
         _first_pixel(lowest[0], camera.half_width, view.width),

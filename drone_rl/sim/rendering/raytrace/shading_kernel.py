@@ -5,6 +5,7 @@
 
 import warp as wp
 
+from drone_rl.sim.rendering.raytrace import structs_kernel as structs
 from drone_rl.sim.rendering.raytrace.intersection_kernel import ROUND
 from drone_rl.sim.rendering.raytrace.projection_kernel import up_in_camera
 from drone_rl.sim.rendering.raytrace.spans_kernel import (
@@ -20,32 +21,15 @@ from drone_rl.sim.rendering.raytrace.spans_kernel import (
     shade_sky,
     shade_textured,
 )
-from drone_rl.sim.rendering.raytrace.structs_kernel import (
-    DEPTH,
-    DISTANCE,
-    GRAY,
-    NORMALS,
-    RGB,
-    SEGMENTATION,
-    Camera,
-    Effects,
-    GeomView,
-    Images,
-    Materials,
-    PixelValue,
-    Poses,
-    TextureMap,
-    View,
-)
 from drone_rl.sim.rendering.view import WEIGHTS
 
 _RED, _GREEN, _BLUE = (wp.constant(weight) for weight in WEIGHTS)
 
 
 @wp.func
-def sky_pixel(materials: Materials, world: int) -> PixelValue:
+def sky_pixel(materials: structs.Materials, world: int) -> structs.PixelValue:
     """Return what a pixel shows that hits nothing."""
-    shown = PixelValue()
+    shown = structs.PixelValue()
     shown.number = -1
     shown.color = _bytes(materials.sky[world % materials.sky.shape[0]])
     shown.gray = _gray(shown.color)
@@ -53,9 +37,11 @@ def sky_pixel(materials: Materials, world: int) -> PixelValue:
 
 
 @wp.func
-def geom_pixel(materials: Materials, world: int, number: int, normal: wp.vec3) -> PixelValue:
+def geom_pixel(
+    materials: structs.Materials, world: int, number: int, normal: wp.vec3
+) -> structs.PixelValue:
     """Return what a pixel shows of a geom. Normal: world frame."""
-    shown = PixelValue()
+    shown = structs.PixelValue()
     shown.number = number
     shown.normal = normal
     shown.color = _bytes(_shade(materials, world, number, normal))
@@ -65,78 +51,68 @@ def geom_pixel(materials: Materials, world: int, number: int, normal: wp.vec3) -
 
 @wp.func
 def write_pixel(
-    images: Images,
+    images: structs.Images,
     what: int,
     row: int,
     pixel: int,
-    shown: PixelValue,
+    shown: structs.PixelValue,
     distance: float,
     cosine: float,
 ) -> None:
-    """Write a pixel.
-
-    Args:
-        images: Written.
-        what: Requested modalities.
-        row: Which image.
-        pixel: Which pixel.
-        shown: What it shows.
-        distance: Along its ray; 0 for the sky.
-        cosine: Of the angle between the ray and the camera's axis.
-    """
-    if (what & RGB) != 0:
+    """Write the requested modalities `what` of a pixel; `cosine` turns distance into depth."""
+    if (what & structs.RGB) != 0:
         images.rgb[row, pixel] = shown.color
-    if (what & GRAY) != 0:
+    if (what & structs.GRAY) != 0:
         images.gray[row, pixel] = shown.gray
-    if (what & DEPTH) != 0:
+    if (what & structs.DEPTH) != 0:
         images.depth[row, pixel] = distance * cosine
-    if (what & DISTANCE) != 0:
+    if (what & structs.DISTANCE) != 0:
         images.distance[row, pixel] = distance
-    if (what & SEGMENTATION) != 0:
+    if (what & structs.SEGMENTATION) != 0:
         images.segmentation[row, pixel] = shown.number
-    if (what & NORMALS) != 0:
+    if (what & structs.NORMALS) != 0:
         images.normals[row, pixel] = shown.normal
 
 
 @wp.func
 def write_span(
-    images: Images,
+    images: structs.Images,
     what: int,
     row: int,
     first: int,
     last: int,
-    shown: PixelValue,
+    shown: structs.PixelValue,
     distances: wp.array[float],
     cosines: wp.array[float],
 ) -> None:
     """`write_pixel` for a span of pixels with one value; distances and cosines of all pixels."""
-    if (what & RGB) != 0:
+    if (what & structs.RGB) != 0:
         fill_bytes(images.rgb[row], first, last, shown.color)
-    if (what & GRAY) != 0:
+    if (what & structs.GRAY) != 0:
         fill_floats(images.gray[row], first, last, shown.gray)
-    if (what & DEPTH) != 0:
+    if (what & structs.DEPTH) != 0:
         multiply(images.depth[row], first, last, distances, cosines)
-    if (what & DISTANCE) != 0:
+    if (what & structs.DISTANCE) != 0:
         copy(images.distance[row], first, last, distances)
-    if (what & SEGMENTATION) != 0:
+    if (what & structs.SEGMENTATION) != 0:
         fill_ints(images.segmentation[row], first, last, shown.number)
-    if (what & NORMALS) != 0:
+    if (what & structs.NORMALS) != 0:
         fill_vectors(images.normals[row], first, last, shown.normal)
 
 
 @wp.func
 def write_colors(
-    images: Images, what: int, row: int, first: int, last: int, colors: wp.array[wp.vec3ub]
+    images: structs.Images, what: int, row: int, first: int, last: int, colors: wp.array[wp.vec3ub]
 ) -> None:
     """Write colours that differ from pixel to pixel; see `write_span`."""
-    if (what & RGB) != 0:
+    if (what & structs.RGB) != 0:
         copy_colors(images.rgb[row], first, last, colors)
-    if (what & GRAY) != 0:
+    if (what & structs.GRAY) != 0:
         mix_gray(images.gray[row], first, last, colors, _RED, _GREEN, _BLUE)
 
 
 @wp.func
-def _shade(materials: Materials, world: int, geom: int, normal: wp.vec3) -> wp.vec3:
+def _shade(materials: structs.Materials, world: int, geom: int, normal: wp.vec3) -> wp.vec3:
     """Lambert's law under distant lights, 0 to 255. Normal: world frame."""
     own = materials.colors[world % materials.colors.shape[0], geom]
     row = world % materials.ambient.shape[0]
@@ -170,10 +146,10 @@ def color_sky(
     first: int,
     last: int,
     rays: wp.array[wp.vec3],
-    camera: Camera,
-    poses: Poses,
-    materials: Materials,
-    effects: Effects,
+    camera: structs.Camera,
+    poses: structs.Poses,
+    materials: structs.Materials,
+    effects: structs.Effects,
     world: int,
 ) -> None:
     """Colour a span of the sky: the horizon blended with the zenith."""
@@ -190,32 +166,18 @@ def color_geom(
     rays: wp.array[wp.vec3],
     nearest: wp.array[float],
     dark: wp.array[int],
-    view: View,
-    camera: Camera,
-    materials: Materials,
-    effects: Effects,
+    view: structs.View,
+    camera: structs.Camera,
+    materials: structs.Materials,
+    effects: structs.Effects,
     world: int,
-    geom_view: GeomView,
+    geom_view: structs.GeomView,
     face: int,
     normal: wp.vec3,
 ) -> None:
     """Colour a span of a flat face, or one pixel of a round one: light, shadow, texture, fog.
 
-    Args:
-        colors: Written.
-        first: First pixel.
-        last: One past the last pixel.
-        rays: Of the pixels.
-        nearest: Distance along each pixel's ray.
-        dark: Whether the surface is in shadow.
-        view: Image size.
-        camera: Field of view.
-        materials: Colours and light.
-        effects: Textures and fog.
-        world: Which environment.
-        geom_view: The geom.
-        face: Which of its faces.
-        normal: Of the face, in the geom's frame.
+    The normal is in the geom's frame; other arguments are those of `spans_kernel`.
     """
     own = 255.0 * materials.colors[world % materials.colors.shape[0], geom_view.number]
     lit, shaded = light_surface(materials, world, geom_view.axes @ normal)
@@ -239,7 +201,9 @@ def color_geom(
 
 
 @wp.func
-def light_surface(materials: Materials, world: int, normal: wp.vec3) -> tuple[wp.vec3, wp.vec3]:
+def light_surface(
+    materials: structs.Materials, world: int, normal: wp.vec3
+) -> tuple[wp.vec3, wp.vec3]:
     """Return the light on a surface in the sun, and in shadow. Normal: world frame."""
     row = world % materials.ambient.shape[0]
     dark = wp.vec3()
@@ -254,20 +218,12 @@ def light_surface(materials: Materials, world: int, normal: wp.vec3) -> tuple[wp
 
 @wp.func
 def map_texture(
-    start: int, side: int, tiles: float, geom_view: GeomView, face: int, normal: wp.vec3
-) -> TextureMap:
-    """Project a texture onto a face.
+    start: int, side: int, tiles: float, geom_view: structs.GeomView, face: int, normal: wp.vec3
+) -> structs.TextureMap:
+    """Project a texture onto a face. Normal: geom's frame.
 
     A flat face shows two coordinates of the geom's frame; a round one shows those of the side of a
     box with the most similar normal.
-
-    Args:
-        start: First texel.
-        side: Texels each way.
-        tiles: Per metre.
-        geom_view: The geom.
-        face: Which of its faces.
-        normal: Of the face, in the geom's frame.
     """
     axis = face // 2
     if face == ROUND:
@@ -277,7 +233,7 @@ def map_texture(
         right = 1
     if axis == 2:
         low = 1
-    cover = TextureMap()
+    cover = structs.TextureMap()
     cover.start = start
     cover.side = side
     cover.across = tiles * geom_view.into[right]

@@ -16,11 +16,11 @@ from drone_rl.sim.rendering.raytrace.structs_kernel import Camera, GeomView, Vie
 
 @wp.func
 def is_shadowed(geom_view: GeomView, ray: wp.vec3, distance: float, sun: wp.vec3) -> bool:
-    """Return whether a geom shadows a point.
+    """Return whether a geom shadows a point that is not on it.
 
     Args:
-        geom_view: The geom; not the one that the point is on.
-        ray: Of the camera, in the camera's frame, on which the point is.
+        geom_view: The geom.
+        ray: Of the point, in the camera's frame.
         distance: Of the point along the ray.
         sun: Direction of the sunlight, in the geom's frame.
     """
@@ -81,21 +81,20 @@ def cast_box_shadow(
     caster: GeomView,
     sun: wp.vec3,
 ) -> None:
-    """Mark the pixels of a span that a box shadows.
+    """Set `dark` to 1 for the pixels of a span that a box shadows; see `spans_kernel`.
 
     Args:
-        dark: Written: 1 in shadow.
+        dark: Written.
         first: First pixel.
         last: One past the last pixel.
         rays: Of the pixels.
         nearest: Distance of each visible surface.
-        owners: Its owner: `faces` times the geom, plus the face; negative for the sky.
-        faces: See above.
+        owners: See `Scratch.owner`.
+        faces: `FACES`.
         geom: Index of the caster, which does not shadow itself.
         caster: The box.
         sun: Direction of the sunlight, in the box's frame.
     """
-    ...
 
 
 CANDIDATE = wp.constant(2)
@@ -127,7 +126,6 @@ def mark_candidates(
     maybe: int,
 ) -> None:
     """Mark pixels whose sunlight passes the bounding sphere of a solid; see `cast_box_shadow`."""
-    ...
 
 
 @wp.func
@@ -163,17 +161,7 @@ def shadow_length(
 
 @wp.func
 def shadow_rectangle(view: View, camera: Camera, geom_view: GeomView, way: wp.vec3) -> wp.vec4i:
-    """Return the pixels outside which no ray meets a geom or its shadow.
-
-    Args:
-        view: Image size.
-        camera: Field of view.
-        geom_view: The geom.
-        way: From the geom to where its shadow ends, world frame.
-
-    Returns:
-        First and last+1 column, first and last+1 row.
-    """
+    """Return the pixels that can show a geom or its shadow, which ends `way` (world frame) away."""
     back = wp.transpose(geom_view.into)
     centre = -(back @ geom_view.eye)
     swept = back @ (wp.transpose(geom_view.axes) @ way)

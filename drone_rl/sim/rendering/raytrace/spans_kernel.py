@@ -2,6 +2,11 @@
 
 Warp's own loops allow for strided arrays and recompute each pixel's address, so they are not
 vectorized. These arrays are contiguous. A GPU calls the same functions for one pixel.
+
+Arguments: pixels from `first` up to, not including, `last`; `rays` in the camera's frame;
+`nearest`, the distance along each ray; `dark`, whether the surface is in shadow; `lit` and
+`shaded`, its colour in the sun and in shadow, 0 to 255 or more; `horizon` and `zenith`, colours of
+the sky, 0 to 255; `fog`, see `Effects.fog`.
 """
 
 import warp as wp
@@ -14,19 +19,16 @@ _FILL = "for (int i = first; i < last; ++i) values.data[i] = value;"
 @wp.func_native(_FILL)
 def fill_floats(values: wp.array[float], first: int, last: int, value: float) -> None:
     """Write one number to the pixels from `first` up to, not including, `last`."""
-    ...
 
 
 @wp.func_native(_FILL)
 def fill_ints(values: wp.array[int], first: int, last: int, value: int) -> None:
     """`fill_floats` for integers."""
-    ...
 
 
 @wp.func_native(_FILL)
 def fill_bytes(values: wp.array[wp.vec3ub], first: int, last: int, value: wp.vec3ub) -> None:
     """`fill_floats` for colours."""
-    ...
 
 
 @wp.func_native("""
@@ -39,13 +41,11 @@ for (int i = first; i < last; ++i) {
 }""")
 def fill_vectors(values: wp.array[wp.vec3], first: int, last: int, value: wp.vec3) -> None:
     """`fill_floats` for vectors."""
-    ...
 
 
 @wp.func_native("for (int i = first; i < last; ++i) values.data[i] = given.data[i];")
 def copy(values: wp.array[float], first: int, last: int, given: wp.array[float]) -> None:
     """Copy numbers."""
-    ...
 
 
 @wp.func_native("for (int i = first; i < last; ++i) values.data[i] = given.data[i] * by.data[i];")
@@ -53,7 +53,6 @@ def multiply(
     values: wp.array[float], first: int, last: int, given: wp.array[float], by: wp.array[float]
 ) -> None:
     """Write the products of two arrays."""
-    ...
 
 
 @wp.func_native("""
@@ -76,20 +75,11 @@ def intersect_level_plane(
     same: float,
     mark: int,
 ) -> None:
-    """Intersect rays with a plane that all of them meet; mark the pixels in which it is nearest.
+    """Intersect rays with a plane that all of them meet; `mark` the pixels in which it is nearest.
 
-    Args:
-        nearest: Distance of the nearest surface; updated.
-        owner: Its owner; updated.
-        first: First pixel.
-        last: One past the last pixel.
-        rays: Of the pixels.
-        down: A ray's dot product with it is its speed towards the plane.
-        height: Of the eye above the plane.
-        same: Relative distance within which the plane is in front.
-        mark: The plane's owner number.
+    `down` gives a ray's speed towards the plane by a dot product, `height` is that of the eye, and
+    `same` is the relative distance within which the plane is in front of what was nearest.
     """
-    ...
 
 
 @wp.func_native("""
@@ -109,7 +99,6 @@ def mix_gray(
     blue: float,
 ) -> None:
     """Write gray of colours by weights; each sum is rounded as by torch on x86."""
-    ...
 
 
 @wp.func_native("for (int i = first; i < last; ++i) values.data[i] = given.data[i];")
@@ -117,7 +106,6 @@ def copy_colors(
     values: wp.array[wp.vec3ub], first: int, last: int, given: wp.array[wp.vec3ub]
 ) -> None:
     """Copy colours."""
-    ...
 
 
 @wp.func_native("""
@@ -137,18 +125,7 @@ def shade_sky(
     horizon: wp.vec3,
     zenith: wp.vec3,
 ) -> None:
-    """Colour the sky.
-
-    Args:
-        colors: Written.
-        first: First pixel.
-        last: One past the last pixel.
-        rays: Of the pixels.
-        up: World's up axis in the camera's frame.
-        horizon: Colour at and below the horizon, 0 to 255.
-        zenith: Colour overhead.
-    """
-    ...
+    """Colour the sky; `up` is the world's up axis in the camera's frame."""
 
 
 _FADE = """
@@ -190,20 +167,7 @@ def shade_plain(
     fog: float,
     horizon: wp.vec3,
 ) -> None:
-    """Colour a flat face, with shadow and fog.
-
-    Args:
-        colors: Written.
-        first: First pixel.
-        last: One past the last pixel.
-        nearest: Distance along each pixel's ray.
-        dark: Whether the surface is in shadow.
-        lit: Its colour in the sun, 0 to 255 or more.
-        shaded: Its colour in shadow.
-        fog: See `Effects.fog`.
-        horizon: Colour of the fog.
-    """
-    ...
+    """Colour a flat face, with shadow and fog."""
 
 
 _AT_ONCE = """
@@ -296,23 +260,8 @@ def shade_textured(
     fog: float,
     horizon: wp.vec3,
 ) -> None:
-    """Colour a textured face; other arguments as of `shade_plain`.
+    """Colour a textured face; `lit` and `shaded` are the colours of a white texel.
 
     Texels are interpolated bilinearly. The mip level follows from the number of texels that a pixel
     covers, by the mean of its two sides.
-
-    Args:
-        colors: Written.
-        first: First pixel.
-        last: One past the last pixel.
-        rays: Of the pixels.
-        nearest: Distance along each pixel's ray.
-        dark: Whether the surface is in shadow.
-        texels: Of all textures, see `Effects`.
-        texture: The texture on this face.
-        lit: Colour in the sun of a white texel.
-        shaded: The same in shadow.
-        fog: See `Effects.fog`.
-        horizon: Colour of the fog.
     """
-    ...

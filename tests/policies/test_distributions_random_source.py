@@ -3,7 +3,7 @@ import copy
 import torch
 from torch import nn
 
-from drone_rl.policies.random_source import RandomSource
+from drone_rl.policies.distributions import RandomSource
 
 
 def test_a_copy_is_the_same_stream():

@@ -1,23 +1,73 @@
-"""Convolutional policy networks. Layers are named: explanations address them by name."""
+"""Policy networks: from observations to action logits.
 
+Layers are named, and explanations address them by name.
+"""
+
+import math
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
 
 import torch
 from torch import Tensor, nn
 
-from drone_rl.config.networks import OriginalCnn, SmallCnn
+from drone_rl.config.networks import Mlp, OriginalCnn, SmallCnn
 from drone_rl.config.registry import implements
-from drone_rl.policies.finite import require_finite
-from drone_rl.policies.network import PictureNetwork
+from drone_rl.sim.actions import MOVES, Actions
 from drone_rl.utils.errors import InputError
 
+
+class PictureNetwork(nn.Module):
+    """Any network from frames to the parameters of the action distribution.
+
+    For discrete actions these are logits, see `Actions.num_outputs`. Frames may have any number of
+    leading batch dimensions.
+    """
+
+    in_shape: tuple[int, ...]
+    """Shape (C, H, W) of one frame."""
+    actions: Actions = MOVES
+    """What the outputs mean."""
+    owner: str = "the policy"
+    """Name of the policy in error messages."""
+    is_differentiable: bool = True
+    """Whether the logits have gradients by the pixels."""
+    in_keys: tuple[str, ...] = ("pixels",)
+    """Entries of a batch that `forward` takes."""
+
+    @property
+    def num_actions(self) -> int:
+        """Number of outputs: logits, where actions are counted."""
+        return self.actions.num_outputs
+
+    @property
+    def has_weights(self) -> bool:
+        """Whether there are weights, which can be shuffled."""
+        return any(True for _ in self.parameters())
+
+    @property
+    def parts(self) -> nn.Module:
+        """The module whose layers are addressed by name."""
+        return self
+
+    def rescale(self, factor: Tensor, shift: Tensor) -> None:
+        """Scale and shift the logits permanently. Shapes: (num_actions,)."""
+        raise NotImplementedError
+
+    def forward(self, pixels: Tensor) -> Tensor:
+        """Frames (*, C, H, W) to logits (*, num_actions).
+
+        Raises:
+            InputError: The frames are of another shape than the network was built for.
+        """
+        raise NotImplementedError
+
+
 Weighted = nn.Conv2d | nn.Linear
-"""Layers that are initialised."""
+"""Layers with weights."""
 
 
 class PolicyNetwork(PictureNetwork):
-    """Layers from a picture to one logit an action, of which the last is linear: "logits"."""
+    """Layers from a frame to logits; the last one is linear and named "logits"."""
 
     def __init__(
         self,
@@ -28,7 +78,7 @@ class PolicyNetwork(PictureNetwork):
         """Wraps and initialises the layers.
 
         Args:
-            in_shape: Shape (C, H, W) of one picture.
+            in_shape: Shape (C, H, W) of one frame.
             layers: By name, in order.
             initialise: Called with each convolution and linear layer, and whether it is the last.
         """
@@ -59,10 +109,10 @@ class PolicyNetwork(PictureNetwork):
         bias.mul_(factor).add_(shift)
 
     def check(self, pixels: Tensor) -> None:
-        """Refuses pictures of another shape.
+        """Check the shape of frames.
 
         Raises:
-            InputError: They are.
+            InputError: It differs from that of the network.
         """
         if tuple(pixels.shape[-3:]) != self.in_shape:
             raise InputError(
@@ -74,7 +124,7 @@ class PolicyNetwork(PictureNetwork):
         """See `PictureNetwork`.
 
         Raises:
-            InputError: The pictures are of another shape or, unless gradients are recorded, an
+            InputError: The frames have another shape or, unless gradients are recorded, an
                 output is not finite.
         """
         self.check(pixels)
@@ -100,14 +150,14 @@ class OriginalCNN(PolicyNetwork):
         """Builds and initialises it (He-normal convolutions, Xavier-normal linear layers).
 
         Args:
-            in_shape: Shape (C, H, W) of one picture.
+            in_shape: Shape (C, H, W) of one frame.
             num_actions: Number of logits.
             channels: Output channels of the convolutions.
             hidden: Widths of the linear layers but the last.
             generator: Source of the initial weights.
 
         Raises:
-            InputError: The picture is too small.
+            InputError: The frame is too small.
         """
         convolutions: OrderedDict[str, nn.Module] = OrderedDict()
         before = in_shape[0]
@@ -132,7 +182,7 @@ class OriginalCNN(PolicyNetwork):
 
 @implements(SmallCnn)
 class SmallCNN(PolicyNetwork):
-    """Patches, one convolution and two linear layers: learns as well at a tenth of the cost."""
+    """A patch convolution, 3x3 convolutions and linear layers: a tenth of `OriginalCNN`'s cost."""
 
     def __init__(
         self,
@@ -147,7 +197,7 @@ class SmallCNN(PolicyNetwork):
         """Builds and initialises it: orthogonal, the logits near zero (a uniform first policy).
 
         Args:
-            in_shape: Shape (C, H, W) of one picture.
+            in_shape: Shape (C, H, W) of one frame.
             num_actions: Number of logits.
             patch: Size and stride, in pixels, of the first convolution.
             channels: Output channels of the convolutions; all after the first are 3x3.
@@ -155,7 +205,7 @@ class SmallCNN(PolicyNetwork):
             generator: Source of the initial weights.
 
         Raises:
-            InputError: The picture is too small.
+            InputError: The frame is too small.
         """
         convolutions: OrderedDict[str, nn.Module] = OrderedDict()
         before = in_shape[0]
@@ -185,7 +235,7 @@ def _with_head(
     hidden: Sequence[int],
     num_actions: int,
 ) -> "OrderedDict[str, nn.Module]":
-    """Adds linear layers, sized by what the convolutions make of a picture."""
+    """Add linear layers to convolutions."""
     layers = OrderedDict(convolutions)
     width = _flat_size(convolutions, in_shape)
     layers["flatten"] = nn.Flatten()
@@ -212,7 +262,7 @@ def _flat_size(convolutions: "OrderedDict[str, nn.Module]", in_shape: Sequence[i
 
 
 def _left(stack: Sequence[nn.Conv2d | nn.MaxPool2d], size: int) -> int:
-    """What square layers without padding leave of so many pixels; 0 or less where too few."""
+    """Return the output size of square layers without padding; 0 if the input is too small."""
     for layer in stack:
         kernel, stride = _side(layer.kernel_size), _side(layer.stride)
         size = (size - kernel) // stride + 1 if size >= kernel else 0
@@ -221,3 +271,55 @@ def _left(stack: Sequence[nn.Conv2d | nn.MaxPool2d], size: int) -> int:
 
 def _side(size: int | tuple[int, ...]) -> int:
     return size if isinstance(size, int) else size[0]
+
+
+@implements(Mlp)
+class MLP(PolicyNetwork):
+    """Linear layers on the flattened frame."""
+
+    def __init__(
+        self,
+        in_shape: Sequence[int],
+        num_actions: int,
+        *,
+        hidden: Sequence[int] = Mlp.hidden,
+        generator: torch.Generator | None = None,
+    ) -> None:
+        """Builds and initialises it: orthogonal, the logits near zero (a uniform first policy).
+
+        Args:
+            in_shape: Shape (C, H, W) of one frame.
+            num_actions: Number of logits.
+            hidden: Widths of the linear layers but the last.
+            generator: Source of the initial weights.
+        """
+        layers: OrderedDict[str, nn.Module] = OrderedDict(flatten=nn.Flatten())
+        width = math.prod(in_shape)
+        for i, size in enumerate(hidden, start=1):
+            layers[f"fc{i}"] = nn.Linear(width, size)
+            layers[f"fc_relu{i}"] = nn.ReLU()
+            width = size
+        layers["logits"] = nn.Linear(width, num_actions)
+        super().__init__(in_shape, layers, orthogonal(generator))
+
+
+def require_finite(outputs: Tensor, owner: str = "the policy") -> None:
+    """Check that outputs are finite.
+
+    Args:
+        outputs: Any shape.
+        owner: Name of the policy, for the message.
+
+    Raises:
+        InputError: An output is infinite or NaN.
+    """
+    is_finite = outputs.isfinite()
+    if bool(is_finite.all()):
+        return
+    value = float(outputs.detach()[~is_finite][0])
+    frames = int((~is_finite.reshape(-1, outputs.shape[-1]).all(-1)).sum())
+    observations = "an observation" if frames == 1 else f"{frames} observations"
+    raise InputError(
+        f"{owner} gives non-finite action logits ({value:g}) for {observations}; its weights are "
+        "too large for float32, so train it again or give another policy"
+    )

@@ -2,7 +2,7 @@ import pytest
 import torch
 
 from drone_rl.policies import MLP
-from drone_rl.policies.finite import require_finite
+from drone_rl.policies.networks import require_finite
 from drone_rl.utils.errors import InputError
 
 

@@ -9,7 +9,7 @@ from drone_rl.utils.errors import InputError
 
 spaces = pytest.importorskip("gymnasium.spaces", reason="Gymnasium is not installed")
 pytest.importorskip("stable_baselines3", reason="Stable-Baselines3 is not installed")
-from drone_rl.policies.sb3.trunk import Sb3Trunk  # noqa: E402 (after the skip)
+from drone_rl.policies.sb3 import Sb3Trunk  # noqa: E402 (after the skip)
 
 PICTURES = spaces.Box(-np.inf, np.inf, (1, 25, 64), np.float32)
 

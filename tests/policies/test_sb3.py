@@ -11,7 +11,7 @@ from drone_rl.utils.errors import InputError
 
 gymnasium = pytest.importorskip("gymnasium", reason="Gymnasium is not installed")
 sb3 = pytest.importorskip("stable_baselines3", reason="Stable-Baselines3 is not installed")
-from drone_rl.policies.sb3.logits import Sb3Logits  # noqa: E402 (after the skip)
+from drone_rl.policies.sb3 import Sb3Logits  # noqa: E402 (after the skip)
 
 
 class Still(gymnasium.Env):

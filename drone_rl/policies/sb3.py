@@ -1,31 +1,38 @@
-"""A policy that Stable-Baselines3 trained, as a network from pictures to logits."""
+"""Our network in Stable-Baselines3's policies, and their policies as networks of ours."""
 
 from typing import Any
 
 import numpy as np
 import torch
-from stable_baselines3.common.base_class import BaseAlgorithm
-from stable_baselines3.common.policies import ActorCriticPolicy
 from torch import Tensor, nn
 
-from drone_rl.utils.errors import InputError
+from drone_rl.config.networks import Network, SmallCnn
+from drone_rl.policies.networks import PolicyNetwork
+from drone_rl.utils.errors import InputError, extra
+
+extra("stable_baselines3", "sb3", "drone_rl.policies.sb3")
+
+from gymnasium import spaces  # noqa: E402 (after the check that the extra is installed)
+from stable_baselines3.common.base_class import BaseAlgorithm  # noqa: E402
+from stable_baselines3.common.policies import ActorCriticPolicy  # noqa: E402
+from stable_baselines3.common.torch_layers import BaseFeaturesExtractor  # noqa: E402
 
 _SAME = 1e-4
 """Log-probabilities that differ by less are the model's own."""
 
 
 class Sb3Logits(nn.Module):
-    """What the policy of PPO or A2C makes of pictures: `drone_rl.judge(Sb3Logits(model))`.
+    """What the policy of PPO or A2C makes of frames: `drone_rl.judge(Sb3Logits(model))`.
 
-    A policy that was trained on bytes gets pictures from 0 to 1 here, such as the transform `Rgb`
+    A policy that was trained on bytes gets frames from 0 to 1 here, such as the transform `Rgb`
     makes.
 
     Raises:
-        InputError: The model has no probabilities of a few actions that depend on a picture alone.
+        InputError: The model has no probabilities of a few actions that depend on a frame alone.
     """
 
     def __init__(self, model: BaseAlgorithm) -> None:
-        """Takes the modules between picture and logits, which it shares with the model.
+        """Takes the modules between frame and logits, which it shares with the model.
 
         Args:
             model: Of an actor-critic algorithm with discrete actions.
@@ -49,7 +56,7 @@ class Sb3Logits(nn.Module):
     """Of one frame, channels first; None if the model was not trained on frames."""
 
     def forward(self, pixels: Tensor) -> Tensor:
-        """Pictures (N, C, H, W) to logits (N, number of actions)."""
+        """Frames (N, C, H, W) to logits (N, number of actions)."""
         return self.logits(self.hidden(self.trunk(pixels * self.scale)))
 
     @torch.no_grad()
@@ -76,3 +83,32 @@ def _refusal(model: BaseAlgorithm) -> InputError:
         f"the policy of {type(model).__name__} gives no logits of a picture alone; give one of PPO "
         "or A2C with discrete actions, or a callable from pictures to logits"
     )
+
+
+class Sb3Trunk(BaseFeaturesExtractor):
+    """A features extractor: `policy_kwargs={"features_extractor_class": Sb3Trunk, "net_arch": []}`.
+
+    Raises:
+        InputError: The observations are no frames with the channels first.
+    """
+
+    def __init__(self, observation_space: spaces.Box, network: Network | None = None) -> None:
+        """Builds it with fresh weights, which Stable-Baselines3 then makes orthogonal as ours.
+
+        Args:
+            observation_space: Pictures (C, H, W).
+            network: Which; the default's by default.
+        """
+        shape = observation_space.shape
+        if len(shape) != 3:
+            raise InputError(f"Sb3Trunk got observations of shape {shape}; give pictures (C, H, W)")
+        made: Any = (network or SmallCnn()).make(shape, 1)
+        assert isinstance(made, PolicyNetwork)
+        width = made.layers.get_parameter("logits.weight").shape[1]
+        super().__init__(observation_space, features_dim=width)
+        # with our order of the weights in memory its initialisation could not do
+        self.layers = made.layers[:-1].to(memory_format=torch.contiguous_format)  # pyright: ignore[reportCallIssue] (torch's annotations lack it)
+
+    def forward(self, observations: Tensor) -> Tensor:
+        """Frames (N, C, H, W) to features (N, features_dim)."""
+        return self.layers(observations)

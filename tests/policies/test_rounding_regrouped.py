@@ -2,7 +2,7 @@ import pytest
 import torch
 
 from drone_rl.policies.external_network import ForeignNetwork
-from drone_rl.policies.regrouped import Regrouped
+from drone_rl.policies.rounding import Regrouped
 from drone_rl.sim.actions import MOVES
 
 

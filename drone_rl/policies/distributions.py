@@ -10,8 +10,19 @@ from torch.distributions import Distribution
 from torch.distributions.constraints import Constraint
 from torch.nn import functional
 
-from drone_rl.policies.random_source import RandomSource
 from drone_rl.sim.continuous_actions import normal_of
+
+
+class RandomSource:
+    """A torch generator that copies of a module share, so that no draw is made twice."""
+
+    def __init__(self, generator: torch.Generator) -> None:
+        self.generator = generator
+
+    def __deepcopy__(self, memo: dict) -> "RandomSource":
+        """Returns itself: the stream is one, however many copies draw from it."""
+        return self
+
 
 MOST = 1 - 1e-6
 """Size of an action; float32 hardly tells those above from 1, whose density is unknown."""
