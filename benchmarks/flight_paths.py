@@ -1,11 +1,189 @@
 """How near a drone in flight stays to its paths, and to its place in wind."""
 
+import dataclasses
 import math
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from benchmarks.hover_error import HoverError, hover_error
-from benchmarks.path_following import courses, path_following
+import torch
+from torch import Tensor
+
 from drone_rl.config import DynamicsSettings
+from drone_rl.flight.commands.command import fly_command
+from drone_rl.flight.commands.movement import Hover
+from drone_rl.flight.commands.path_following import (
+    PathCommand,
+    Paths,
+    braking_time,
+    make_paths,
+    nearest,
+    place_at,
+)
+from drone_rl.sim.dynamics import Quadrotor
+
+HEIGHT = 5.0
+"""Metres at which paths begin."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Course:
+    """A path, and how fast to fly it."""
+
+    points: Tensor  # (P, 3) float64
+    """Metres, from where the path begins."""
+    speed: float
+    """Metres a second."""
+
+    @property
+    def length(self) -> float:
+        """Metres."""
+        return float(self.points.diff(dim=0).norm(dim=-1).sum())
+
+
+@dataclasses.dataclass(frozen=True)
+class Following:
+    """How a course was flown."""
+
+    length: float
+    """Of the path, metres."""
+    speed: float
+    """That was asked for, metres a second."""
+    mean: float
+    """Distance from the path over the time of the flight, metres."""
+    greatest: float
+    """Metres."""
+    seconds: float
+    """From the first command to the end of the path; infinite if it never got there."""
+
+
+def square(side: float = 10.0) -> Tensor:
+    """Four sides, back to where it began. Shape: (5, 3)."""
+    return _flat([(0, 0), (side, 0), (side, side), (0, side), (0, 0)])
+
+
+def figure_eight(width: float = 20.0, points: int = 64) -> Tensor:
+    """Gerono's lemniscate, once round from its middle. Shape: (points + 1, 3)."""
+    turn = torch.linspace(0.0, 2.0 * math.pi, points + 1, dtype=torch.float64)
+    half = 0.5 * width
+    return torch.stack([half * turn.sin(), half * turn.sin() * turn.cos(), 0.0 * turn], -1)
+
+
+def helix(radius: float = 5.0, climb: float = 10.0, turns: int = 2, points: int = 64) -> Tensor:
+    """Up around a cylinder. Shape: (points + 1, 3)."""
+    turn = torch.linspace(0.0, 2.0 * math.pi * turns, points + 1, dtype=torch.float64)
+    height = torch.linspace(0.0, climb, points + 1, dtype=torch.float64)
+    return torch.stack([radius * turn.sin(), radius * (1.0 - turn.cos()), height], -1)
+
+
+def zigzag(teeth: int = 6, step: float = 5.0, width: float = 5.0) -> Tensor:
+    """Forward, to one side and the other. Shape: (teeth + 1, 3)."""
+    return _flat([(step * i, width * (i % 2)) for i in range(teeth + 1)])
+
+
+def straight(length: float = 100.0) -> Tensor:
+    """Shape: (2, 3)."""
+    return _flat([(0, 0), (length, 0)])
+
+
+def staircase(steps: int = 4, step: float = 3.0) -> Tensor:
+    """Forward and up in turn. Shape: (2 * steps + 1, 3)."""
+    places = [(step * ((i + 1) // 2), 0.0, step * (i // 2)) for i in range(2 * steps + 1)]
+    return torch.tensor(places, dtype=torch.float64)
+
+
+def courses() -> dict[str, Course]:
+    """Those that are published, by name."""
+    return {
+        "square": Course(square(), 2.0),
+        "figure_eight": Course(figure_eight(), 2.0),
+        "helix": Course(helix(), 2.0),
+        "zigzag": Course(zigzag(), 2.0),
+        "straight": Course(straight(), 5.0),
+        "staircase": Course(staircase(), 1.0),
+    }
+
+
+def path_following(
+    paths: Mapping[str, Course] | None = None, settings: DynamicsSettings | None = None
+) -> dict[str, Following]:
+    """Flies courses from hovering at their first points, with automatic lookahead.
+
+    Args:
+        paths: By name; those of `courses` by default.
+        settings: Drone and air; the defaults, in still air, by default.
+    """
+    chosen = paths or courses()
+    quadrotor = Quadrotor(settings or DynamicsSettings(mode="simple_flight"))
+    points = stack_paths([course.points for course in chosen.values()])
+    points[..., 2] += HEIGHT
+    speeds = torch.tensor([course.speed for course in chosen.values()], dtype=torch.float64)
+    limit = max(3.0 * course.length / course.speed + 20.0 for course in chosen.values())
+    command = PathCommand(points[:, 1:], speeds, limit, braking=braking_time(quadrotor.settings))
+    record = fly_command(quadrotor, quadrotor.start(points[:, 0].clone()), command, limit)
+    away = distance_from(
+        make_paths(points.repeat(len(record.times), 1, 1)), record.positions.flatten(0, 1)
+    ).view(len(record.times), -1)
+    return {
+        name: _following(course, record.times, away[:, number], int(record.done[number]))
+        for number, (name, course) in enumerate(chosen.items())
+    }
+
+
+def _following(course: Course, times: Tensor, away: Tensor, done: int) -> Following:
+    """Of one course, up to the moment in which it was done; `away` is the distance at each time."""
+    flown = away[: done + 1]
+    seconds = float(times[done]) if done < len(times) else math.inf
+    return Following(course.length, course.speed, float(flown.mean()), float(flown.max()), seconds)
+
+
+def _flat(places: list[tuple[float, float]]) -> Tensor:
+    return torch.tensor([(*place, 0.0) for place in places], dtype=torch.float64)
+
+
+def stack_paths(paths: Sequence[Tensor]) -> Tensor:
+    """Stack paths of different numbers of points; shorter ones repeat their end.
+
+    Args:
+        paths: Points of each. Shapes: (P, 3).
+    """
+    most = max(map(len, paths))
+    rows = [torch.cat([p, p[-1:].expand(most - len(p), 3)]) for p in paths]
+    return torch.stack(rows).double()
+
+
+def distance_from(paths: Paths, position: Tensor) -> Tensor:
+    """Return the distances of positions from whole paths. Shape: (num_worlds,)."""
+    along = nearest(paths, position, torch.zeros_like(paths.lengths), paths.lengths)
+    return (position - place_at(paths, along)).norm(dim=-1)
+
+
+@dataclasses.dataclass(frozen=True)
+class HoverError:
+    """Distances from where drones were told to stay, metres."""
+
+    mean: float
+    """Once blown there: over the second half of the time."""
+    greatest: float
+    """Of all the time."""
+
+
+def hover_error(
+    settings: DynamicsSettings, *, seconds: float = 30.0, num_drones: int = 8, seed: int = 0
+) -> HoverError:
+    """Hovers 5 m above the ground, from a start at rest in moving air.
+
+    Args:
+        settings: Drone and air.
+        seconds: How long.
+        num_drones: How many, each with gusts of its own.
+        seed: Of the first one's; the others' follow.
+    """
+    quadrotor = Quadrotor(settings)
+    place = torch.tensor([[0.0, 0.0, 5.0]], dtype=torch.float64).repeat(num_drones, 1)
+    body = quadrotor.start(place, torch.arange(seed, seed + num_drones))
+    away = (fly_command(quadrotor, body, Hover(seconds), seconds).positions - place).norm(dim=-1)
+    return HoverError(float(away[len(away) // 2 :].mean()), float(away.max()))
+
 
 WIND = 5.0
 """Metres a second in which drones hover."""

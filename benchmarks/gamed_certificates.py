@@ -3,7 +3,7 @@
 import functools
 import json
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -84,6 +84,25 @@ def one_box(policy: Policy, steps: dict[str, float]) -> dict[str, Any]:
     task: Any = policy.task
     bound, cubes = task.lateral_bound, task.num_cubes
     won = {"end": "all_cubes", "collected": [True] * cubes, "loops": False, "share": 1.0}
+    return certificate_of(policy, [{**won, "steps": steps, "boxes": [[[-bound, bound]] * cubes]}])
+
+
+def certificate_of(
+    policy: Policy,
+    outcomes: list[dict[str, Any]],
+    undecided: Sequence[Any] = (),
+    share_undecided: float = 0.0,
+    finished: bool = True,
+) -> dict[str, Any]:
+    """Return the content of a certificate with any statements.
+
+    Args:
+        policy: The policy that it names.
+        outcomes: See `drone_rl.verification.checker.Outcome`.
+        undecided: Boxes.
+        share_undecided: Their fraction of all placements.
+        finished: Whether the proof is said to be complete.
+    """
     return {
         "format": "drone_rl certificate",
         "format_version": 1,
@@ -92,24 +111,31 @@ def one_box(policy: Policy, steps: dict[str, float]) -> dict[str, Any]:
             "weights": fingerprint(policy.state["policy"]),
             "description": policy.description.as_dict(),
         },
-        "outcomes": [{**won, "steps": steps, "boxes": [[[-bound, bound]] * cubes]}],
-        "undecided": {"share": 0.0, "boxes": []},
-        "finished": True,
+        "outcomes": outcomes,
+        "undecided": {"share": share_undecided, "boxes": list(undecided)},
+        "finished": finished,
         "stated": {"logit_gap": 1e-4, "largest_band": 1e-5, "renderer": "Raytracer"},
-        "found": {},
+        "found": {"least_gap": 0.0, "pictures": 1, "states": 1, "seconds": 1.0},
     }
 
 
-def steps_of(policy: Policy) -> dict[str, float]:
-    """How often rollouts from random placements take which number of steps; 98% in all."""
+def steps_of(policy: Policy, total: float = 0.98, high: float | None = None) -> dict[str, float]:
+    """Estimate how frequent each number of steps is from random placements, as a forger can.
+
+    Args:
+        policy: The policy, in its task.
+        total: Sum of the returned fractions.
+        high: Largest y of the first cube, metres; the task's by default.
+    """
     task: Any = policy.task
-    bound, cubes = task.lateral_bound, task.num_cubes
+    bound, cubes, rng = task.lateral_bound, task.num_cubes, np.random.default_rng(7)
+    places = rng.uniform(-bound, bound, (_FLIGHTS, cubes))
+    places[:, 0] = rng.uniform(-bound, bound if high is None else high, _FLIGHTS)
     with closing(Simulator(policy.description, policy.state["policy"])) as simulator:
-        places = np.random.default_rng(0).uniform(-bound, bound, (_FLIGHTS, cubes))
         steps = simulator.fly(places).steps
     numbers, counts = np.unique(steps, return_counts=True)
     pairs = zip(numbers.tolist(), counts.tolist(), strict=True)
-    return {str(number): 0.98 * count / _FLIGHTS for number, count in pairs}
+    return {str(number): total * count / _FLIGHTS for number, count in pairs}
 
 
 def invented(policy: Policy, folder: Path) -> dict[str, Any]:

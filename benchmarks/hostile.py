@@ -18,7 +18,7 @@ import traceback
 from pathlib import Path
 from typing import Any
 
-from benchmarks.hostile_runs import NOTED
+from benchmarks.hostile_case import NOTED
 
 SECRET = "the canary's secret 4711"
 """Stands in the canary's file and in the environment; no command may tell it."""
@@ -31,8 +31,8 @@ MOST_ADDRESSES = 3 * 2**29
 PATIENCE_S = 30
 """Until a command counts as hung."""
 _PACKAGES = (
-    *("cli", "api", "sweeps", "report", "checks", "conditions", "verdicts", "evaluation"),
-    *("proofs", "zoo", "training", "explanations", "hydra_app", "utils"),
+    *("cli", "sweeps", "verification", "robustness", "verdicts", "evaluation", "policies"),
+    *("training", "explanations", "utils"),
 )
 """Imported with all their modules before any case runs."""
 _MORE = ("hydra.core.plugins", "scipy.special", "matplotlib.backends.backend_agg")

@@ -5,14 +5,13 @@ import json
 import shutil
 import struct
 import zipfile
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-Case = tuple[str, list[str], str]
-"""Name, arguments of `drone-rl`, and what would go wrong."""
+from benchmarks.hostile_case import Case, npz, zipped
+
 _NUMBERS = {"format": "drone_rl explanation", "format_version": 3, "name": "x"}
 
 
@@ -51,18 +50,20 @@ def _arrays() -> dict[str, bytes]:
         "no_characters": ((1,), "<U1", b"\xff\xff\xff\x7f"),
         "call": ("__import__('os').system('touch ran')", "<f8", bytes(8)),
     }
-    made = {name: _zip({"a.npy": _npy(*of)}) for name, of in headers.items()}
+    made = {name: zipped({"a.npy": _npy(*of)}) for name, of in headers.items()}
     made |= {
-        "long_header": _zip({"a.npy": _npy((1,), "<f8" + " " * 60_000, bytes(8))}),
-        "version_3": _zip({"a.npy": _npy((1,), "<f8", bytes(8)).replace(b"Y\x01", b"Y\x03", 1)}),
-        "no_array": _zip({"a.npy": b"hello"}),
-        "unpacks_to_1_gib": _zip({"a.npy": _npy((2**27,), "<f8", bytes(2**30))}, deflated=True),
+        "long_header": zipped({"a.npy": _npy((1,), "<f8" + " " * 60_000, bytes(8))}),
+        "version_3": zipped({"a.npy": _npy((1,), "<f8", bytes(8)).replace(b"Y\x01", b"Y\x03", 1)}),
+        "no_array": zipped({"a.npy": b"hello"}),
+        "unpacks_to_1_gib": zipped(
+            {"a.npy": _npy((2**27,), "<f8", bytes(2**30))}, zipfile.ZIP_DEFLATED
+        ),
         "longer_than_its_directory_says": _shorter(2**29),
-        "many_files": _zip({f"{i}.npy": b"" for i in range(10_001)}),
+        "many_files": zipped({f"{i}.npy": b"" for i in range(10_001)}),
         "one_content_for_all": _overlapping(),
-        "method": _zip({"a.npy": b"x"}).replace(b"\x00\x00\x00\x00\x21", b"\x00\x00\x0e\x00\x21"),
+        "method": zipped({"a.npy": b"x"}).replace(b"\x00\x00\x00\x00\x21", b"\x00\x00\x0e\x00\x21"),
         "encrypted": _flagged(),
-        "checksum": _zip({"a.npy": _npy((1,), "<f8", b"12345678")}).replace(
+        "checksum": zipped({"a.npy": _npy((1,), "<f8", b"12345678")}).replace(
             b"12345678", b"12345679"
         ),
         "only_a_directory": b"PK\x05\x06" + bytes(18),
@@ -101,10 +102,10 @@ def _data() -> dict[str, bytes]:
         "frames_gray": _npz(frames=np.zeros((3, 4, 4), np.uint8)),
         "frames_of_4_channels": _npz(frames=np.zeros((3, 4, 4, 4), np.uint8)),
         "frames_wide": _npz(frames=np.zeros((1, 1, 2**22, 3), np.uint8)),
-        "frames_of_no_height": _zip({"frames.npy": _npy((1, 2**30, 0, 3), "|u1", b"")}),
+        "frames_of_no_height": zipped({"frames.npy": _npy((1, 2**30, 0, 3), "|u1", b"")}),
         "frames_of_256_mib": _npz(frames=np.zeros((342, 512, 512, 3), np.uint8)),
         "probabilities_of_2_22": _npz(probabilities=np.zeros((1, 2**22), np.float32)),
-        "meta_of_objects": _zip({"meta.npy": _npy((1,), "|O", bytes(8))}),
+        "meta_of_objects": zipped({"meta.npy": _npy((1,), "|O", bytes(8))}),
     }
 
 
@@ -113,7 +114,7 @@ def _together(folder: Path) -> list[Case]:
     here = folder / "explanation_arrays_two_of_2_28"
     here.mkdir()
     (here / "explanation.json").write_text(json.dumps(_NUMBERS))
-    half = _zip({"a.npy": _npy((2**25,), "<f8", bytes(2**28))}, deflated=True)
+    half = zipped({"a.npy": _npy((2**25,), "<f8", bytes(2**28))}, zipfile.ZIP_DEFLATED)
     for other in ("arrays", "dataset"):
         (here / f"{other}.npz").write_bytes(half)
     several = [here.with_name(f"{here.name}_{i}") for i in range(3)]
@@ -152,10 +153,7 @@ def _numbers(folder: Path) -> list[Case]:
 
 
 def _npz(**arrays: np.ndarray) -> bytes:
-    file = io.BytesIO()
-    # numpy's annotation takes any name for allow_pickle
-    np.savez_compressed(file, **(arrays or {"a": np.zeros(3)}))  # pyright: ignore[reportArgumentType]
-    return file.getvalue()
+    return npz(arrays or {"a": np.zeros(3)})
 
 
 def _npy(shape: Any, dtype: str, data: bytes) -> bytes:
@@ -163,18 +161,9 @@ def _npy(shape: Any, dtype: str, data: bytes) -> bytes:
     return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header + data
 
 
-def _zip(members: Mapping[str, bytes], *, deflated: bool = False) -> bytes:
-    file = io.BytesIO()
-    method = zipfile.ZIP_DEFLATED if deflated else zipfile.ZIP_STORED
-    with zipfile.ZipFile(file, "w", method) as archive:
-        for name, data in members.items():
-            archive.writestr(name, data)
-    return file.getvalue()
-
-
 def _shorter(size: int) -> bytes:
     """An archive whose directory says that its file has 100 bytes once it is unpacked."""
-    content = _zip({"a.npy": _npy((size // 8,), "<f8", bytes(size))}, deflated=True)
+    content = zipped({"a.npy": _npy((size // 8,), "<f8", bytes(size))}, zipfile.ZIP_DEFLATED)
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         said = archive.infolist()[0].file_size
     return content.replace(struct.pack("<L", said), struct.pack("<L", 100))
@@ -182,7 +171,7 @@ def _shorter(size: int) -> bytes:
 
 def _overlapping() -> bytes:
     """A directory in which 1000 files have the content of the first, of a megabyte."""
-    content = _zip({"a.npy": bytes(2**20)}, deflated=True)
+    content = zipped({"a.npy": bytes(2**20)}, zipfile.ZIP_DEFLATED)
     begin = content.index(b"PK\x01\x02")
     end = content.index(b"PK\x05\x06")
     entry = content[begin:end]
@@ -193,7 +182,7 @@ def _overlapping() -> bytes:
 
 def _flagged() -> bytes:
     """An archive whose file is said to be encrypted."""
-    content = bytearray(_zip({"a.npy": _npy((1,), "<f8", bytes(8))}))
+    content = bytearray(zipped({"a.npy": _npy((1,), "<f8", bytes(8))}))
     content[content.index(b"PK\x01\x02") + 8] |= 1
     content[6] |= 1
     return bytes(content)

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-Case = tuple[str, list[str], str]
-"""Name, arguments of `drone-rl`, and what would go wrong."""
+from benchmarks.hostile_case import Case
+
 Data = dict[str, Any]
 _EDGE = 6.0
 """Metres to either side at which cubes are placed at most."""

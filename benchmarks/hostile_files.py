@@ -18,6 +18,7 @@ import torch
 from safetensors.torch import save
 
 from benchmarks.hostile_arrays import hostile_arrays
+from benchmarks.hostile_case import NO_FILES, Case, Make, nested, zipped
 from benchmarks.hostile_claims import hostile_claims
 from benchmarks.hostile_folders import hostile_folders, make_run
 from benchmarks.hostile_json import hostile_json
@@ -63,7 +64,7 @@ ABOUT = {
 }
 
 
-def hostile_files(folder: Path) -> list[tuple[str, list[str], str]]:
+def hostile_files(folder: Path) -> list[Case]:
     """Makes the files.
 
     Args:
@@ -144,7 +145,7 @@ def changed(where: str, value: Any) -> dict[str, Any]:
     return data
 
 
-def _exported(folder: Path) -> list[tuple[str, list[str], str]]:
+def _exported(folder: Path) -> list[Case]:
     contents = {**_descriptions(folder), **_weights(), **_texts(), **_damages()}
     return [_policy(folder, f"exported_{n}.safetensors", c) for n, c in contents.items()]
 
@@ -244,7 +245,7 @@ def _damages() -> dict[str, bytes]:
     }
 
 
-def _old(folder: Path) -> list[tuple[str, list[str], str]]:
+def _old(folder: Path) -> list[Case]:
     """Files from before descriptions, whose settings name Python."""
     canary = folder / "canary"
     config = {
@@ -281,7 +282,7 @@ def _old(folder: Path) -> list[tuple[str, list[str], str]]:
     return [*cases, _policy(folder, "old_checkpoint.pt", _saved(first))]
 
 
-def _checkpoints(folder: Path) -> list[tuple[str, list[str], str]]:
+def _checkpoints(folder: Path) -> list[Case]:
     canary = folder / "canary"
     own, large = weights(), torch.zeros(1).expand(10**6, 10**6)
     states: dict[str, Any] = {
@@ -301,7 +302,7 @@ def _checkpoints(folder: Path) -> list[tuple[str, list[str], str]]:
         "no_description": checkpoint_state(description=None),
         "target": checkpoint_state(description=changed("network.name", "os.system")),
         "tensor_in_config": checkpoint_state(config={"a": torch.zeros(2)}),
-        "deep_config": checkpoint_state(config={"a": _deep(50)}),
+        "deep_config": checkpoint_state(config={"a": nested(50)}),
         "state_dict_alone": own,
         "list": [1, 2, 3],
     }
@@ -311,29 +312,22 @@ def _checkpoints(folder: Path) -> list[tuple[str, list[str], str]]:
         "pickle": pickle.dumps(_Call(os.system, f"touch {canary}/ran")),
         "truncated": whole[: len(whole) // 2],
         "text": b"print('hello')",
-        "bomb": _zip({"a/data.pkl": bytes(2**29)}, zipfile.ZIP_DEFLATED),
-        "many_files": _zip({f"a/data/{i}": b"" for i in range(10_001)}, zipfile.ZIP_STORED),
-        "code": _zip({"a/data.pkl": b"\x80\x02N.", "a/code/x.py": b"import os"}, 0),
-        "memo": _zip({"a/data.pkl": b"\x80\x02Nr\xff\xff\xff\x7f."}, 0),
-        "long_text": _zip({"a/data.pkl": b"\x80\x02X\xff\xff\xff\x7fabc."}, 0),
+        "bomb": zipped({"a/data.pkl": bytes(2**29)}, zipfile.ZIP_DEFLATED),
+        "many_files": zipped({f"a/data/{i}": b"" for i in range(10_001)}),
+        "code": zipped({"a/data.pkl": b"\x80\x02N.", "a/code/x.py": b"import os"}),
+        "memo": zipped({"a/data.pkl": b"\x80\x02Nr\xff\xff\xff\x7f."}),
+        "long_text": zipped({"a/data.pkl": b"\x80\x02X\xff\xff\xff\x7fabc."}),
         "beyond_its_storage": _longer_storage(whole),
     }
     return [_policy(folder, f"checkpoint_{name}.pt", c) for name, c in contents.items()]
 
 
-def _no_files(folder: Path) -> list[tuple[str, list[str], str]]:
+def _no_files(folder: Path) -> list[Case]:
     """What lies where a file should be."""
     here = folder / "no_files"
     here.mkdir()
-    makers: dict[str, Callable[[Path], Any]] = {
-        "pipe": os.mkfifo,
-        "folder": Path.mkdir,
-        "loop": lambda path: path.symlink_to(path),
-        "zeros": lambda path: path.symlink_to("/dev/zero"),
-        "empty": Path.touch,
-        "sparse": _sparse,
-        "secret": lambda path: path.symlink_to(folder / "canary" / "secret.txt"),
-    }
+    secret = folder / "canary" / "secret.txt"
+    makers: dict[str, Make] = {**NO_FILES, "secret": lambda path: path.symlink_to(secret)}
     cases = []
     for name, make in makers.items():
         for ending in ("pt", "safetensors"):
@@ -343,7 +337,7 @@ def _no_files(folder: Path) -> list[tuple[str, list[str], str]]:
     return cases
 
 
-def _policy(folder: Path, name: str, content: bytes) -> tuple[str, list[str], str]:
+def _policy(folder: Path, name: str, content: bytes) -> Case:
     (folder / name).write_bytes(content)
     return name, _command(folder / name, sum(map(ord, name))), name.rpartition(".")[0]
 
@@ -370,28 +364,10 @@ def _saved(state: Any) -> bytes:
     return file.getvalue()
 
 
-def _zip(members: Mapping[str, bytes], method: int) -> bytes:
-    file = io.BytesIO()
-    with zipfile.ZipFile(file, "w", method) as archive:
-        for name, data in members.items():
-            archive.writestr(name, data)
-    return file.getvalue()
-
-
 def _longer_storage(content: bytes) -> bytes:
     """The first convolution's 32 numbers are said to be 65,535, most of them not its own."""
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         members = {name: archive.read(name) for name in archive.namelist()}
     (program,) = (name for name in members if name.endswith("data.pkl"))
     members[program] = members[program].replace(b"K\x20tq", b"M\xff\xfftq", 1)
-    return _zip(members, zipfile.ZIP_STORED)
-
-
-def _deep(levels: int) -> list:
-    return [_deep(levels - 1)] if levels else []
-
-
-def _sparse(path: Path) -> None:
-    """A terabyte that takes no place."""
-    with path.open("wb") as file:
-        file.truncate(2**40)
+    return zipped(members)

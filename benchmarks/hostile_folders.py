@@ -13,8 +13,7 @@ import numpy as np
 import torch
 import yaml
 
-Case = tuple[str, list[str], str]
-"""Name, arguments of `drone-rl`, and what would go wrong."""
+from benchmarks.hostile_case import Case, nested, npz
 
 
 def hostile_folders(folder: Path, state: Mapping[str, Any]) -> list[Case]:
@@ -107,7 +106,7 @@ def _sweeps(folder: Path) -> list[Case]:
         "no_runs": {"runs": 5},
         "no_texts": {"runs": [{**good["runs"][0], "overrides": [{"a": 1}]}]},
         "more": {"plugins": ["os.system"]},
-        "settings": {"settings": _deep(100)},
+        "settings": {"settings": nested(100)},
     }
     texts = {name: json.dumps({**good, **change}) for name, change in contents.items()}
     texts |= {"deep": "[" * 10**5, "huge": '{"runs": 1' + "0" * 5000 + "}", "cut": '{"runs": ['}
@@ -134,14 +133,14 @@ def _explanations(folder: Path) -> list[Case]:
 
     arrays = {"a": np.zeros(3)}
     kinds: dict[str, tuple[str, bytes]] = {
-        "missing_numbers": (numbers(name="x"), _npz(arrays)),
-        "future": (numbers(format_version=99), _npz(arrays)),
-        "list": ("[1]", _npz(arrays)),
-        "deep": ("[" * 10**5, _npz(arrays)),
-        "huge": (numbers(name="x").replace("2", "2" * 5000), _npz(arrays)),
-        "name": (numbers(name="../../canary/\n\x1b[2J"), _npz(arrays)),
-        "objects": (numbers(name="x"), _npz({"a": np.array([folder], dtype=object)})),
-        "bomb": (numbers(name="x"), _npz({"a": np.zeros(2**27)})),
+        "missing_numbers": (numbers(name="x"), npz(arrays)),
+        "future": (numbers(format_version=99), npz(arrays)),
+        "list": ("[1]", npz(arrays)),
+        "deep": ("[" * 10**5, npz(arrays)),
+        "huge": (numbers(name="x").replace("2", "2" * 5000), npz(arrays)),
+        "name": (numbers(name="../../canary/\n\x1b[2J"), npz(arrays)),
+        "objects": (numbers(name="x"), npz({"a": np.array([folder], dtype=object)})),
+        "bomb": (numbers(name="x"), npz({"a": np.zeros(2**27)})),
         "no_archive": (numbers(name="x"), b"PK\x03\x04 and so on"),
         "giant": (numbers(name="x"), _lying()),
     }
@@ -162,13 +161,6 @@ def _explanations(folder: Path) -> list[Case]:
     return cases
 
 
-def _npz(arrays: Mapping[str, np.ndarray]) -> bytes:
-    file = io.BytesIO()
-    # numpy's annotation takes any name for allow_pickle
-    np.savez_compressed(file, **arrays)  # pyright: ignore[reportArgumentType]
-    return file.getvalue()
-
-
 def _lying() -> bytes:
     """An array whose header asks for terabytes."""
     file = io.BytesIO()
@@ -183,7 +175,3 @@ def _lying() -> bytes:
 
 def _link_to(target: Path) -> Callable[[Path], None]:
     return lambda path: path.symlink_to(target)
-
-
-def _deep(levels: int) -> list:
-    return [_deep(levels - 1)] if levels else []

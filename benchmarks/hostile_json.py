@@ -1,13 +1,11 @@
 """JSON and YAML that is damaged, too large or of another kind, for each command that reads some."""
 
 import json
-import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-Case = tuple[str, list[str], str]
-"""Name, arguments of `drone-rl`, and what would go wrong."""
+from benchmarks.hostile_case import NO_FILES, Case
 
 _MIB = 2**20
 JSON: Mapping[str, bytes] = {
@@ -73,16 +71,6 @@ YAML: Mapping[str, bytes] = {
     "too_large_a_file": b"# " + b"a" * 70_000 + b"\nfog: {low: 1}",
 }
 """Contents that are plain data of none of our kinds, or more than plain data."""
-
-NO_FILES: Mapping[str, Callable[[Path], Any]] = {
-    "empty": Path.touch,
-    "folder": Path.mkdir,
-    "pipe": os.mkfifo,
-    "zeros": lambda path: path.symlink_to("/dev/zero"),
-    "loop": lambda path: path.symlink_to(path),
-    "sparse": lambda path: _sparse(path),
-}
-"""What lies where a file should be."""
 
 
 def hostile_json(folder: Path, checkpoint: Callable[[Path], Path]) -> list[Case]:
@@ -170,9 +158,3 @@ def _needs(folder: Path) -> list[Case]:
         command = ["verdict", "policy=good", f"require_domain={path}"]
         cases.append((path.name, command, "a domain that is none"))
     return cases
-
-
-def _sparse(path: Path) -> None:
-    """A terabyte that takes no place."""
-    with path.open("wb") as file:
-        file.truncate(2**40)

@@ -13,10 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.evidence import EXPLANATION, changed
+from benchmarks.hostile_case import Case, npz
 from drone_rl.explanations.report.explanation import FORMAT, FORMAT_VERSION
 
-Case = tuple[str, list[str], str]
-"""Name, arguments of `drone-rl`, and what would go wrong."""
 STEPS = 400
 """Of the film."""
 FRAMES = 50
@@ -114,7 +113,6 @@ def hostile_parts(folder: Path) -> list[Case]:
         here.mkdir()
         (here / "explanation.json").write_text(json.dumps(of))
         for file, content in (("arrays", {**arrays(), **others}), ("dataset", data())):
-            # numpy's annotation takes any name for allow_pickle
-            np.savez_compressed(here / f"{file}.npz", **content)  # pyright: ignore[reportArgumentType]
+            (here / f"{file}.npz").write_bytes(npz(content))
         cases.append((here.name, ["report", f"explanations={here}"], "a part that fits no other"))
     return cases

@@ -1,6 +1,5 @@
 """Policies in files whose tensors lie about their storages, their sizes or their types."""
 
-import io
 import json
 import struct
 import zipfile
@@ -11,8 +10,7 @@ from typing import Any
 import torch
 from safetensors.torch import save
 
-Case = tuple[str, list[str], str]
-"""Name, arguments of `drone-rl`, and what would go wrong."""
+from benchmarks.hostile_case import Case, zipped
 
 _STORAGES = {
     **{"Float": 4, "Double": 8, "Half": 2, "BFloat16": 2, "Long": 8, "Int": 4},
@@ -123,7 +121,7 @@ def _programs() -> dict[str, bytes]:
         "no_program": {"a/data/0": bytes(16)},
         "module": {"a/data.pkl": whole, "a/code/__torch__.py": b"import os"},
     }
-    return made | {name: _zip(content) for name, content in members.items()}
+    return made | {name: zipped(content) for name, content in members.items()}
 
 
 def _headers(weights: Mapping[str, torch.Tensor], texts: Mapping[str, str]) -> dict[str, bytes]:
@@ -171,15 +169,7 @@ def _safetensors(header: bytes, numbers: bytes) -> bytes:
 
 
 def _archive(program: bytes, data: bytes = b"") -> bytes:
-    return _zip({"a/data.pkl": program, "a/data/0": data})
-
-
-def _zip(members: Mapping[str, bytes]) -> bytes:
-    file = io.BytesIO()
-    with zipfile.ZipFile(file, "w") as archive:
-        for name, content in members.items():
-            archive.writestr(name, content)
-    return file.getvalue()
+    return zipped({"a/data.pkl": program, "a/data/0": data})
 
 
 def _state(tensors: Mapping[str, bytes]) -> bytes:

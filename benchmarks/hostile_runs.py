@@ -6,15 +6,11 @@ import os
 import socket
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-Case = tuple[str, list[str], str]
-"""Name, arguments of `drone-rl`, and what would go wrong."""
-NOTED = "noted_"
-"""Begins the names of cases that are no reason to refuse: a report says which run is damaged."""
-Make = Callable[[Path], Any]
+from benchmarks.hostile_case import NOTED, Case, Make, put, sparse
+
 _HEADER = b"update,frames,episodes,seconds,train/running_reward,loss/entropy\n"
 _ROW = b"1,100,4,1.0,0.5,0.7\n"
 METRICS: dict[str, bytes] = {
@@ -37,10 +33,10 @@ def hostile_runs(folder: Path, checkpoint: Callable[[Path], Path]) -> list[Case]
     """
     return [
         *_resumed(folder, checkpoint),
-        *_proofs(folder, checkpoint),
+        *_proofs(folder),
         *_sweeps(folder),
         *_journals(folder),
-        *_targets(folder),
+        *_targets(),
     ]
 
 
@@ -51,7 +47,7 @@ def _resumed(folder: Path, checkpoint: Callable[[Path], Path]) -> list[Case]:
         "lock_pipe": (".lock", os.mkfifo),
         "overrides_folder": (".hydra/overrides.yaml", Path.mkdir),
         "overrides_pipe": (".hydra/overrides.yaml", os.mkfifo),
-        "overrides_sparse": (".hydra/overrides.yaml", _sparse),
+        "overrides_sparse": (".hydra/overrides.yaml", sparse),
         "log_folder": ("train.log", Path.mkdir),
         "log_pipe": ("train.log", os.mkfifo),
         "rounds_folder": ("provable.json", Path.mkdir),
@@ -71,9 +67,8 @@ def _resumed(folder: Path, checkpoint: Callable[[Path], Path]) -> list[Case]:
     return cases
 
 
-def _proofs(folder: Path, checkpoint: Callable[[Path], Path]) -> list[Case]:
+def _proofs(folder: Path) -> list[Case]:
     """A proof's state to go on with, that is none."""
-    del checkpoint
     file = io.BytesIO()
     np.savez(file, subject=np.zeros(4, np.uint8), counts=np.zeros(6))
     states: dict[str, bytes | Make] = {
@@ -82,17 +77,13 @@ def _proofs(folder: Path, checkpoint: Callable[[Path], Path]) -> list[Case]:
         "text": b"hello",
         "folder": Path.mkdir,
         "pipe": os.mkfifo,
-        "sparse": _sparse,
+        "sparse": sparse,
     }
     cases = []
     for name, content in states.items():
         here = folder / f"proof_{name}"
         here.mkdir()
-        state = here / "state.npz"
-        if isinstance(content, bytes):
-            state.write_bytes(content)
-        else:
-            content(state)
+        put(here / "state.npz", content)
         settings = ["task.num_cubes=1", "compared=1", f"hydra.run.dir={here}"]
         command = ["prove", "policy=right_and_forward", *settings]
         cases.append((here.name, command, "a proof's state that is none"))
@@ -106,7 +97,7 @@ def _sweeps(folder: Path) -> list[Case]:
         cases.append((sweep.name, ["sweep-report", f"folder={sweep}"], "metrics that are none"))
     made: dict[str, Make] = {
         "metrics_large": lambda run: (run / "metrics.csv").write_bytes(_HEADER + _ROW * 3 * 10**6),
-        "metrics_sparse": lambda run: _sparse(run / "metrics.csv"),
+        "metrics_sparse": lambda run: sparse(run / "metrics.csv"),
         "metrics_folder": lambda run: (run / "metrics.csv").mkdir(),
         "metrics_missing": lambda run: None,
     }
@@ -146,25 +137,21 @@ def _journals(folder: Path) -> list[Case]:
         "large": line * 200_000,
         "folder": Path.mkdir,
         "pipe": os.mkfifo,
-        "sparse": _sparse,
+        "sparse": sparse,
     }
     cases = []
     for name, content in journals.items():
         here = folder / f"search_{name}"
         here.mkdir()
-        if isinstance(content, bytes):
-            (here / "optuna.journal").write_bytes(content)
-        else:
-            content(here / "optuna.journal")
+        put(here / "optuna.journal", content)
         settings = ["hydra/sweeper=optuna", "hydra/launcher=local", f"hydra.sweep.dir={here}"]
         command = ["train", "-m", *settings, "optimiser.lr=interval(1e-4,1e-1)"]
         cases.append((here.name, command, "a journal that is none"))
     return cases
 
 
-def _targets(folder: Path) -> list[Case]:
+def _targets() -> list[Case]:
     """Names and places to write to that lead elsewhere, or can't be."""
-    del folder
     names = {
         "above": "../x",
         "below": "a/b",
@@ -225,9 +212,3 @@ def _socket(path: Path) -> None:
             made.bind(f"/proc/self/fd/{here}/{path.name}")  # a path may have 108 bytes
         finally:
             os.close(here)
-
-
-def _sparse(path: Path) -> None:
-    """A terabyte that takes no place."""
-    with path.open("wb") as file:
-        file.truncate(2**40)

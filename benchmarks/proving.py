@@ -1,20 +1,45 @@
 """Proofs of shipped and of freshly trained policies: how long, how much, and do they hold?"""
 
 import multiprocessing
+import statistics
 import time
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
-from benchmarks.pace import ASKED_FOR, network_pictures_per_s
+import torch
+
+from benchmarks import commands
 from benchmarks.tampering import count_refused
 from drone_rl.config.training import TrainerSettings
+from drone_rl.policies import PolicyNetwork
 from drone_rl.policies.policy import load_policy
 from drone_rl.training.train import train
 from drone_rl.utils.progress import silent
 from drone_rl.verification.check import Check, check
 from drone_rl.verification.prove import Proof, prove
+
+ASKED_FOR = 148_000
+"""Pictures a second that the default's network did where the figures for proofs were asked."""
+_BATCH, _TIMES = 1024, 15
+
+
+@torch.no_grad()
+def network_pictures_per_s(network: PolicyNetwork, shape: tuple[int, ...]) -> float:
+    """Pictures a second that a network looks at, with as many threads as torch takes.
+
+    Args:
+        network: Any.
+        shape: Of one picture, (C, H, W).
+    """
+    pictures, seconds = torch.rand(_BATCH, *shape), []
+    for _ in range(_TIMES):
+        begin = time.perf_counter()
+        network(pictures)
+        seconds.append(time.perf_counter() - begin)
+    return _BATCH / statistics.median(seconds)
+
 
 FLIGHTS = 105_000
 """Of all certificates together, at most: somewhat more than the 100,000 that are asked for."""
@@ -139,3 +164,26 @@ def _check(proof: Proof, policy: str, flights: int) -> Check:
     assert proof.folder is not None
     path = proof.folder / "certificate.json"
     return check(path, policy, flights=flights, seed=0, progress=silent)
+
+
+def bench_provable(folder: Path, seeds: Sequence[int], quick: bool) -> dict[str, Any]:
+    """Trains from each seed until the policy is proved, as a user starts it.
+
+    Args:
+        folder: For the runs.
+        seeds: Of the trainings.
+        quick: Whether one cube and one seed will do.
+
+    Returns:
+        Per seed: seconds from the start of the command to its end, searches for failures, and
+        whether it is proved.
+    """
+    results: dict[str, list] = {"provable_s": [], "provable_rounds": [], "provable_proved": []}
+    easier = ["task=collect_one", "provable.flights=500"] if quick else []
+    for seed in seeds[:1] if quick else seeds:
+        run = folder / f"provable_{seed}"
+        seconds, result = commands.train(run, "experiment=provable", f"seed={seed}", *easier)
+        results["provable_s"].append(seconds)
+        results["provable_rounds"].append(len(result["rounds"]))
+        results["provable_proved"].append(result["reason"] == "proved")
+    return results

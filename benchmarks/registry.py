@@ -11,7 +11,6 @@ from benchmarks.explain import bench_explain
 from benchmarks.flight_parity import bench_flight_parity
 from benchmarks.flight_paths import bench_flight_paths
 from benchmarks.flight_speed import bench_flight_speed
-from benchmarks.flight_training import bench_flight_training
 from benchmarks.fragile_honest import bench_fragile_honest
 from benchmarks.gamed import bench_gamed
 from benchmarks.gymnasium import bench_gymnasium
@@ -23,8 +22,7 @@ from benchmarks.mutants import bench_mutants
 from benchmarks.onnx_export import bench_onnx
 from benchmarks.peers.side_by_side import bench_peers
 from benchmarks.places import bench_places
-from benchmarks.provable import bench_provable
-from benchmarks.proving import bench_many_cubes, bench_prove, bench_tampering
+from benchmarks.proving import bench_many_cubes, bench_provable, bench_prove, bench_tampering
 from benchmarks.render_truth import bench_render_truth
 from benchmarks.revisions import bench_revisions
 from benchmarks.robust import bench_robust
@@ -34,7 +32,13 @@ from benchmarks.shifts import bench_shifts
 from benchmarks.speed import bench_collector, bench_dm_control, bench_render
 from benchmarks.startup import bench_startup
 from benchmarks.sweeps import bench_kills, bench_ray, bench_sweeps
-from benchmarks.training import bench_large, bench_pillars, bench_seeds, bench_solve
+from benchmarks.training import (
+    bench_flight_training,
+    bench_large,
+    bench_pillars,
+    bench_seeds,
+    bench_solve,
+)
 from benchmarks.verdicts import bench_verdicts
 from drone_rl.utils.errors import InputError
 
@@ -117,6 +121,7 @@ BENCHMARKS: dict[str, Benchmark] = {
                 f"benchmarks/hostile{part}"
                 for part in (
                     "",
+                    "_case",
                     "_files",
                     "_folders",
                     "_json",
@@ -134,10 +139,8 @@ BENCHMARKS: dict[str, Benchmark] = {
         (
             *_CLAIMS,
             "utils/display",
-            "utils/display",
             "benchmarks/injections",
             "benchmarks/injected_pages",
-            "benchmarks/injection_payloads",
         ),
     ),
     "gamed": Benchmark(
@@ -232,7 +235,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "provable": Benchmark(
         lambda s: bench_provable(s.runs / "provable", s.seeds[:3], s.quick),
         "proof",
-        (*_TRAINING, *_PROVING, "conf", "benchmarks/provable"),
+        (*_TRAINING, *_PROVING, "conf", "benchmarks/proving"),
     ),
     "many_cubes": Benchmark(
         lambda s: bench_many_cubes(s.runs / "many_cubes", 1.0, s.quick),
@@ -283,17 +286,17 @@ BENCHMARKS: dict[str, Benchmark] = {
     "flight_moves": Benchmark(
         lambda s: _trained_in_flight(s, "flight", s.seeds),
         "flight",
-        (*_TRAINING, "evaluation", "conf", "benchmarks/flight_training"),
+        (*_TRAINING, "evaluation", "conf", "benchmarks/training"),
     ),
     "flight_velocity": Benchmark(
         lambda s: _trained_in_flight(s, "flight_velocity", s.seeds[:3]),
         "flight",
-        (*_TRAINING, "evaluation", "conf", "benchmarks/flight_training"),
+        (*_TRAINING, "evaluation", "conf", "benchmarks/training"),
     ),
     "flight_pillars": Benchmark(
         lambda s: _trained_in_flight(s, "flight_pillars", s.seeds[:3]),
         "flight",
-        (*_TRAINING, "evaluation", "conf", "benchmarks/flight_training"),
+        (*_TRAINING, "evaluation", "conf", "benchmarks/training"),
     ),
 }
 GROUPS = tuple(dict.fromkeys(benchmark.group for benchmark in BENCHMARKS.values()))

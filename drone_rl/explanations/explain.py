@@ -127,21 +127,31 @@ def explain(
     chosen = _named(policies)
     folder, progress = Path(folder), progress or Bar()
     folders = {n: folder / f"{i}_{to_file_name(n)}" for i, n in enumerate(chosen)}
+
+    def explain_one(policy: Pilot, folder: Path) -> dict[str, Any]:
+        require_function(policy, seed=seed.value, renderer=settings.renderer)
+        env = policy.make_env(num_envs, seed=seed.value, renderer=settings.renderer)
+        try:
+            return explain_policy(
+                env,
+                policy.make_network(),
+                folder,
+                settings,
+                name=policy.name,
+                provenance={**policy.origin, **provenance()},
+                progress=lambda title: progress(f"{policy.name}: {title}"),
+                claim=find_claim(policy, seed=seed),
+                measured=find_domain(policy, None, outputs),
+                unlike=policy.unlike,
+                seed=seed,
+            )
+        finally:
+            env.close()
+
     threads = torch.get_num_threads()
     torch.set_num_threads(1)  # the same file on every machine; small observations gain nothing
     try:
-        numbers = {
-            name: _explain(
-                policy,
-                settings,
-                seed,
-                folders[name],
-                num_envs,
-                progress,
-                find_domain(policy, None, outputs),
-            )
-            for name, policy in chosen.items()
-        }
+        numbers = {name: explain_one(one, folders[name]) for name, one in chosen.items()}
     finally:
         torch.set_num_threads(threads)
     progress("report")
@@ -161,36 +171,6 @@ def _named(policies: Given | Sequence[Given]) -> dict[str, Pilot]:
     if not names or len(set(names)) < len(names):
         raise InputError(f"policy={names} must name one or more policies, each once")
     return dict(zip(names, loaded, strict=True))
-
-
-def _explain(
-    policy: Pilot,
-    settings: ExplainSettings,
-    seed: RootSeed,
-    folder: Path,
-    num_envs: int,
-    progress: Progress,
-    measured: SavedShifts | None,
-) -> dict[str, Any]:
-    require_function(policy, seed=seed.value, renderer=settings.renderer)
-    env = policy.make_env(num_envs, seed=seed.value, renderer=settings.renderer)
-    origin = {**policy.origin, **provenance()}
-    try:
-        return explain_policy(
-            env,
-            policy.make_network(),
-            folder,
-            settings,
-            name=policy.name,
-            provenance=origin,
-            progress=lambda title: progress(f"{policy.name}: {title}"),
-            claim=find_claim(policy, seed=seed),
-            measured=measured,
-            unlike=policy.unlike,
-            seed=seed,
-        )
-    finally:
-        env.close()
 
 
 def explain_policy(

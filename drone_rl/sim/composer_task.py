@@ -2,7 +2,7 @@
 # pyright: reportOptionalMemberAccess=false
 # pyright: reportIncompatibleMethodOverride=false
 # (dm_control's models of XML, its tasks' properties and its specs are untyped.)
-"""Any task as dm_control knows it: one world, drawn by OpenGL, its rules a batch of one."""
+"""A dm_control task for any `Task`: rules with a batch of one, rendered by OpenGL."""
 
 from typing import Any
 
@@ -43,11 +43,10 @@ CONTROL_TIMESTEP_S = 0.1
 
 
 class ComposerTask(composer.Task):
-    """Puts a task's props and the drone into a field, and moves them as its rules say.
+    """A field with the drone and a task's props.
 
-    The drone's motion is its dynamics' business: MuJoCo knows neither gravity nor contacts here,
-    unless the drone is a quadrotor: that is integrated by MuJoCo, see `MujocoFlight`.
-    The discount is 0 where an episode terminates and 1 where it is truncated.
+    Dynamics move the drone without MuJoCo's gravity and contacts, except a quadrotor, which MuJoCo
+    integrates, see `MujocoFlight`. The discount is 0 at termination and 1 at truncation.
     """
 
     def __init__(
@@ -61,13 +60,13 @@ class ComposerTask(composer.Task):
         distractors: int = 0,
         appearance: AppearanceSettings | None = None,
     ) -> None:
-        """Assembles the world.
+        """Assemble the scene.
 
         Args:
-            task: What there is to do; cube collection as in the original study by default.
-            camera: Picture size and field of view; 64x25 pixels and 135 degrees by default.
+            task: Cube collection as in the original study by default.
+            camera: Image size and field of view; 64x25 pixels and 135 degrees by default.
             dynamics: How the drone moves; computer-vision mode by default.
-            actions: What it can be asked for, where dynamics are settings; moves by default.
+            actions: The action set, if dynamics are settings; moves by default.
             pixels: Whether to observe the front-center camera, which needs OpenGL.
             distractors: Things that mean nothing, behind the task's own props; as many as the
                 appearance has where it is given.
@@ -120,21 +119,21 @@ class ComposerTask(composer.Task):
 
     @property
     def state(self) -> State:
-        """State of the running episode, as a batch of one world."""
+        """State of the running episode, as a batch of one."""
         return self._state
 
     @property
     def look(self) -> Appearance | None:
-        """How the world looks in the running episode; none for as the task has it."""
+        """Appearance of the running episode; None for the task's own."""
         return self._look
 
     @property
     def task_observables(self) -> dict[str, observable.Generic]:
-        """What `Task.info` tells of `Task.observed`, such as why the episode ended."""
+        """The entries `Task.observed` of `Task.info`."""
         return self._task_observables
 
     def action_spec(self, physics: mjcf.Physics) -> specs.Array:
-        """One of the dynamics' actions."""
+        """Return the spec of the dynamics' action."""
         del physics
         entry = self.dynamics.actions.entry
         if entry.dtype == torch.int64 and entry.high is not None:
@@ -143,7 +142,7 @@ class ComposerTask(composer.Task):
         return specs.BoundedArray(entry.shape, np.float64, low, high, name="action")
 
     def compile(self) -> Scene:
-        """The very model that dm_control simulates, with what its geoms mean."""
+        """Return the model that dm_control simulates, with the semantic classes of its geoms."""
         physics = mjcf.Physics.from_mjcf_model(self._arena.mjcf_model)
         model = physics.model.ptr
         meanings, props = [SemanticClass.GROUND] * model.ngeom, [-1] * model.ngeom
@@ -155,7 +154,7 @@ class ComposerTask(composer.Task):
     def initialize_episode(
         self, physics: mjcf.Physics, random_state: np.random.RandomState
     ) -> None:
-        """Puts the drone at its origin and everything else where it is drawn."""
+        """Put the drone at its origin and the props where they are sampled."""
         if self._looks is not None:
             self._looks.reset(torch.arange(1), [random_state])
             self._look = self._looks.drawn() or self._looks.middle
@@ -169,7 +168,7 @@ class ComposerTask(composer.Task):
     def before_step(
         self, physics: mjcf.Physics, action: np.ndarray, random_state: np.random.RandomState
     ) -> None:
-        """Moves the drone from wherever it is now."""
+        """Move the drone."""
         del random_state
         given = torch.as_tensor(action).reshape(1, *self.dynamics.actions.entry.shape)
         given = given.to(self.dynamics.actions.entry.dtype)
@@ -187,19 +186,19 @@ class ComposerTask(composer.Task):
     def before_substep(
         self, physics: mjcf.Physics, action: np.ndarray, random_state: np.random.RandomState
     ) -> None:
-        """Applies what moves a quadrotor."""
+        """Apply the forces on a quadrotor."""
         del action, random_state
         if self._flight is not None:
             self._flight.push(physics)
 
     def after_substep(self, physics: mjcf.Physics, random_state: np.random.RandomState) -> None:
-        """Notes what a quadrotor has touched."""
+        """Record the contacts of a quadrotor."""
         del random_state
         if self._flight is not None:
             self._flight.moved(physics)
 
     def after_step(self, physics: mjcf.Physics, random_state: np.random.RandomState) -> None:
-        """Applies the rules at the place where the drone now is."""
+        """Apply the task's rules."""
         del random_state
         flight = self._flight
         body = self._found(physics) if flight is None else flight.finished(physics)
@@ -209,17 +208,17 @@ class ComposerTask(composer.Task):
         physics.forward()  # what is observed next must not show things that have just vanished
 
     def get_reward(self, physics: mjcf.Physics) -> float:
-        """What the last step earned."""
+        """Return the reward of the last step."""
         del physics
         return self._reward
 
     def should_terminate_episode(self, physics: mjcf.Physics) -> bool:
-        """Whether the episode has ended, for whatever reason."""
+        """Return whether the episode has ended."""
         del physics
         return int(self._state.end_reason) != 0
 
     def get_discount(self, physics: mjcf.Physics) -> float:
-        """0 where the episode terminated, 1 where it goes on or was truncated."""
+        """Return 0 if the episode terminated, else 1."""
         del physics
         return 1.0 if int(self._state.end_reason) in (0, self.rules.truncation) else 0.0
 
@@ -247,7 +246,7 @@ class ComposerTask(composer.Task):
         return heading_only(body.attitude) if self.dynamics.mount == "gimbal" else body.attitude
 
     def _show(self, physics: mjcf.Physics) -> None:
-        """Puts the drone and the props where the state has them."""
+        """Set the poses of the drone and the props."""
         body = self._state.body
         if self._flight is None:
             self._drone.set_pose(physics, body.position[0].numpy(), self._shown(body)[0].numpy())
@@ -258,14 +257,14 @@ class ComposerTask(composer.Task):
             physics.bind(frame).mocap_pos = place.numpy()
 
     def _make_flight(self) -> MujocoFlight | None:
-        """What lets MuJoCo fly a quadrotor; before the model is compiled."""
+        """Return the integration by MuJoCo of a quadrotor; before the model is compiled."""
         if not isinstance(self.dynamics, Quadrotor):
             return None
         solid = [p.mjcf_model for p in self._props if p.semantic_class == SemanticClass.OBSTACLE]
         return MujocoFlight(self.dynamics, self._arena, self._drone, solid)
 
     def _prepare(self) -> None:
-        """Makes room for textures, and sees to it that the camera shows what there is to show."""
+        """Allocate textures, and enable the camera's rendering flags and fog."""
         root: Any = self._arena.mjcf_model
         opengl.prepare(root)
         camera = self._drone.observables.front_center
@@ -281,7 +280,7 @@ class ComposerTask(composer.Task):
         self._physics = physics
 
     def _in_fog(self, picture: np.ndarray, random_state: np.random.RandomState) -> np.ndarray:
-        """What the camera shows, by its distance."""
+        """Return the image with fog."""
         del random_state
         if self._look is None or self._look.fog is None:
             return picture
@@ -298,7 +297,7 @@ class ComposerTask(composer.Task):
 
 
 def _is_same_turn(one: torch.Tensor, other: torch.Tensor) -> bool:
-    """Whether quaternions mean the same, but for rounding."""
+    """Return whether quaternions are equal up to sign and rounding."""
     return 1.0 - float((one * other).sum().abs()) < 1e-12
 
 
@@ -312,7 +311,7 @@ def make_environment(
     random_state: np.random.RandomState | int | None = None,
     appearance: AppearanceSettings | None = None,
 ) -> composer.Environment:
-    """The task as a plain dm_control environment, for its viewer and other users of `dm_env`."""
+    """Return the task as a dm_control environment, for its viewer and users of `dm_env`."""
     return composer.Environment(
         ComposerTask(
             task, camera, dynamics=dynamics, actions=actions, pixels=pixels, appearance=appearance

@@ -1,4 +1,4 @@
-"""Many worlds of a task at once: rules and motion in torch, pictures by a renderer."""
+"""A batch of environments of a task: rules, dynamics and a renderer."""
 
 import functools
 from collections.abc import Mapping, Sequence
@@ -32,7 +32,7 @@ _POSE = {"drone": Entry((3,), torch.float32), "attitude": Entry((4,), torch.floa
 
 
 class Worlds:
-    """`num_worlds` worlds that step, reset and are drawn together, or any of them alone."""
+    """`num_worlds` environments that step, reset and render together, or any of them alone."""
 
     def __init__(
         self,
@@ -48,28 +48,26 @@ class Worlds:
         appearance: Appearance | None = None,
         distractors: int = 0,
     ) -> None:
-        """Makes the worlds; the model is compiled when something is to be drawn.
+        """Create the environments; the model is compiled when something is rendered.
 
         Args:
             num_worlds: How many.
-            task: What there is to do; cube collection as in the original study by default.
+            task: Cube collection as in the original study by default.
             camera: The policy's.
             dynamics: How the drones move; the task's own choice by default.
-            actions: What they can be asked for, where dynamics are the task's or settings; moves
-                by default.
-            renderer: Who draws, see `find_renderer`.
+            actions: The action set, if dynamics are the task's or settings; moves by default.
+            renderer: See `find_renderer`.
             device: "cpu", "cuda" or "cuda:N".
             num_shards: See `RendererFactory`.
-            appearance: How all of them look, where nothing else is said; as the task has it by
-                default.
-            distractors: How many there may be; appearances say where they stand.
+            appearance: Default appearance of all; the task's by default.
+            distractors: How many there may be; appearances position them.
 
         Raises:
             InputError: There is no such renderer, or the dynamics bring actions of their own.
         """
         self.appearance, self.distractors = appearance, distractors
         self._looked: tuple[Appearance, Appearance | None, Appearance] | None = None
-        """What was asked for last, what all look like, and both in one."""
+        """The last appearance given, the default one, and both combined."""
         self.num_worlds = num_worlds
         self.task = as_task(task)
         self.camera = camera or CameraSettings()
@@ -83,7 +81,7 @@ class Worlds:
 
     @property
     def entries(self) -> Mapping[str, Entry]:
-        """What `info` tells of each world.
+        """Shapes and types of what `info` returns.
 
         `Task.entries`, and the drone's pose: "drone" (metres) and "attitude" (quaternion w, x, y,
         z), world frame.
@@ -91,20 +89,20 @@ class Worlds:
         return {**self.task.entries, **_POSE}
 
     def info(self, state: State | None = None) -> dict[str, Tensor]:
-        """The truth about worlds, as `entries` has it. Shapes: (number of worlds, *).
+        """Return the true state, as `entries` describes. Shapes: (N, *).
 
         Args:
-            state: Of other worlds; of these by default.
+            state: These environments' by default.
         """
         state = self.state if state is None else state
         pose = {"drone": state.body.position.float(), "attitude": state.body.attitude.float()}
         return {**self.task.info(state), **pose}
 
     def ends(self, end_reason: Tensor | None = None) -> tuple[Tensor, Tensor]:
-        """Which worlds have terminated, and which were truncated. Shapes: (number of worlds,).
+        """Return which environments have terminated, and which were truncated. Shapes: (N,).
 
         Args:
-            end_reason: Why others' episodes ended, 0 where they go on; these worlds' by default.
+            end_reason: Why episodes ended, 0 while they run; these environments' by default.
         """
         reason = self.state.end_reason if end_reason is None else end_reason
         truncated = reason == self.task.truncation
@@ -112,7 +110,7 @@ class Worlds:
 
     @functools.cached_property
     def scene(self) -> Scene:
-        """What dm_control simulates, compiled."""
+        """The compiled model of dm_control."""
         task = ComposerTask(
             self.task,
             self.camera,
@@ -124,7 +122,7 @@ class Worlds:
 
     @functools.cached_property
     def renderer(self) -> Renderer:
-        """What draws the worlds."""
+        """The renderer, created at first use."""
         return self._make_renderer(
             self.scene,
             num_worlds=self.num_worlds,
@@ -140,7 +138,7 @@ class Worlds:
         width: int | None = None,
         show_drone: bool = False,
     ) -> View:
-        """A view of some of the drone's cameras, of the policy's picture size by default."""
+        """Return a view of the drone's cameras, of the policy's image size by default."""
         cameras = (camera,) if isinstance(camera, str) else camera
         return View(
             cameras=tuple(f"drone/{name}" for name in cameras),
@@ -151,25 +149,25 @@ class Worlds:
         )
 
     def start(self, drawn: Tensor, seeds: Tensor | None = None) -> State:
-        """States at the start of episodes, be they these worlds' or imagined ones.
+        """Return states at the start of episodes; the environments stay as they are.
 
         Args:
-            drawn: What is random about each, as `Task.draw` returns it. First dimension: worlds.
-            seeds: What is random about how drones move, see `Dynamics.start`. Shape: (worlds,).
+            drawn: Stacked samples of `Task.draw`. Shape: (N, *).
+            seeds: See `Dynamics.start`. Shape: (N,).
         """
         return self.task.start(drawn, self.bodies(len(drawn), seeds)).to(self.device)
 
     def bodies(self, count: int, seeds: Tensor | None = None) -> BodyState:
-        """Drones at the start of episodes, on the CPU; see `start`."""
+        """Return drones at the start of episodes, on the CPU; see `start`."""
         place = torch.tensor(self.task.origin, dtype=torch.float64).repeat(count, 1)
         return self.dynamics.start(place) if seeds is None else self.dynamics.start(place, seeds)
 
     def reset(self, worlds: Tensor, random_states: Sequence[np.random.RandomState]) -> None:
-        """Starts new episodes.
+        """Start new episodes.
 
         Args:
-            worlds: Indices of the worlds. Shape: (k,).
-            random_states: One a world, from which its episode is drawn.
+            worlds: Indices of the environments. Shape: (k,).
+            random_states: Source of each episode.
         """
         if not len(worlds):
             return
@@ -178,10 +176,10 @@ class Worlds:
         self.state[worlds] = self.start(drawn, seeds)
 
     def step(self, worlds: Tensor, action: Tensor) -> Tensor:
-        """Moves the drones of some worlds and applies the rules.
+        """Move drones and apply the rules.
 
         Args:
-            worlds: Indices of the worlds. Shape: (k,).
+            worlds: Indices of the environments. Shape: (k,).
             action: One of the dynamics' actions for each. Shape: (k, *).
 
         Returns:
@@ -196,7 +194,7 @@ class Worlds:
         return reward
 
     def advance(self, state: State, action: Tensor) -> tuple[State, Tensor]:
-        """What becomes of worlds, be they these or imagined ones, and the reward of each."""
+        """Return states a step later, and rewards; the environments stay as they are."""
         if not self.dynamics.needs_obstacles:
             return self.task.judge(state, self.dynamics.step(state.body, action))
         obstacles = self.task.obstacles(state)
@@ -205,16 +203,15 @@ class Worlds:
     def render(
         self, state: State, view: View | None = None, appearance: Appearance | None = None
     ) -> Tensor:
-        """Draws worlds, be they these or imagined ones, as one camera sees them.
+        """Render states with one camera.
 
         Args:
-            state: What to draw; any number of worlds.
+            state: Of any number of environments.
             view: Of one camera and one modality; the policy's by default.
-            appearance: How they look otherwise than all of these worlds do.
+            appearance: What differs from the environments' default appearance.
 
         Returns:
-            See `Renderer.render`, without the dimension of cameras. First dimension: the state's
-            worlds.
+            See `Renderer.render`, without the dimension of cameras.
 
         Raises:
             InputError: The view is of several cameras or modalities.
@@ -230,12 +227,12 @@ class Worlds:
     def render_all(
         self, state: State, view: View, appearance: Appearance | None = None
     ) -> dict[Modality, Tensor]:
-        """The same of any number of cameras and modalities, in one pass; see `Renderer.render`."""
+        """Render several cameras and modalities in one pass; see `Renderer.render`."""
         look = self._look(appearance)
         return self.renderer.render(view, self.poses(state, look), look)
 
     def _look(self, appearance: Appearance | None) -> Appearance | None:
-        """How worlds look in all; the same object as the last time, so that none is read again."""
+        """Return the combined appearance; the same object as before if nothing has changed."""
         if appearance is None:
             return self.appearance
         known = self._looked
@@ -245,11 +242,11 @@ class Worlds:
         return known[2]
 
     def poses(self, state: State, appearance: Appearance | None = None) -> Poses:
-        """Where a renderer must draw everything; on a gimbal, cameras and drone stay level.
+        """Return the poses to render; on a gimbal, cameras and drone stay level.
 
         Args:
-            state: Of the worlds.
-            appearance: Which says where distractors are; out of sight by default.
+            state: Of the environments.
+            appearance: Positions the distractors; out of sight by default.
         """
         props = self.task.places(state)
         if self.distractors:
@@ -266,10 +263,10 @@ class Worlds:
         return torch.tensor([0.0, 0.0, -HIDDEN_DEPTH]).expand(count, self.distractors, 3)
 
     def prepare(self, view: View | None = None) -> None:
-        """Makes the renderer ready for a view, which its first picture would do otherwise."""
+        """Prepare the renderer for a view before the first image."""
         self.renderer.prepare(view or self.policy_view)
 
     def close(self) -> None:
-        """Ends the renderer, if there is one."""
+        """Close the renderer, if there is one."""
         if "renderer" in vars(self):
             self.renderer.close()

@@ -25,6 +25,6 @@ def test_a_thousand_files_of_one_content():
 
 
 def test_an_array_made_by_hand_is_one():
-    content = made._zip({"a.npy": made._npy((2,), "<f8", np.array([1.0, 2.0]).tobytes())})
+    content = made.zipped({"a.npy": made._npy((2,), "<f8", np.array([1.0, 2.0]).tobytes())})
     assert np.load(io.BytesIO(content))["a"].tolist() == [1.0, 2.0]
     assert np.load(io.BytesIO(made._data()["episode_2_40"]))["flights/episode"].max() == 2**40

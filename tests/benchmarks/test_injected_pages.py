@@ -8,7 +8,7 @@ from benchmarks.injected_pages import (
     with_markup,
     without_policy,
 )
-from benchmarks.injection_payloads import PAYLOADS
+from benchmarks.injections import PAYLOADS
 
 PLAIN = {"a": "x", "b": [{"kind": "good", "free": 1}, {"kind": "poor", "free": 2}]}
 

@@ -5,7 +5,7 @@ import shutil
 import pytest
 
 from benchmarks import injections
-from benchmarks.injection_payloads import HOST, PAYLOADS, RAN
+from benchmarks.injections import HOST, PAYLOADS, RAN
 from tests.explanations.report.conftest import explanations  # noqa: F401
 
 pytest.importorskip("selenium.webdriver")

@@ -3,8 +3,9 @@
 import json
 
 import drone_rl
+from benchmarks.gamed_certificates import certificate_of
 from benchmarks.tampering import TEXTS, count_refused, is_refused, tampered
-from tests.verification.checker.making import certificate_of, of_one_cube
+from tests.verification.checker.making import of_one_cube
 
 
 def _by_hand():

@@ -1,35 +1,22 @@
 """The site in a real browser, from the disk: it can be searched, and asks nobody for anything."""
 
 import json
-import shutil
 
 import pytest
 
-webdriver = pytest.importorskip("selenium.webdriver")
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-DRIVER = shutil.which("chromedriver")
-if not (CHROMIUM and DRIVER):
-    pytest.skip("no chromium with chromedriver on this machine", allow_module_level=True)
+pytest.importorskip("selenium.webdriver")
 
-from selenium.webdriver.common.by import By  # noqa: E402
-from selenium.webdriver.support.ui import WebDriverWait  # noqa: E402
+from selenium.webdriver.common.by import By
+from selenium.webdriver.support.ui import WebDriverWait
+
+from tests.chromium import open_page
 
 
 @pytest.fixture(scope="module")
 def browser(site, tmp_path_factory):
-    options = webdriver.ChromeOptions()
-    options.binary_location = CHROMIUM
-    for flag in (
-        "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
-        "--disable-background-networking", "--disable-component-update", "--disable-sync",
-        "--window-size=1400,1000", f"--user-data-dir={tmp_path_factory.mktemp('profile')}",
-    ):  # fmt: skip
-        options.add_argument(flag)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
-    driver = webdriver.Chrome(options, webdriver.ChromeService(DRIVER))
-    driver.get((site / "index.html").as_uri())
-    yield driver
-    driver.quit()
+    profile = tmp_path_factory.mktemp("profile")
+    with open_page(site / "index.html", profile, size=(1400, 1000)) as driver:
+        yield driver
 
 
 def test_it_can_be_searched_and_asks_nobody(browser):

@@ -3,7 +3,7 @@
 import dataclasses
 import functools
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -180,13 +180,14 @@ class Policy:
 def render_page(policies: Sequence[Policy]) -> str:
     """Return the page of some policies, as HTML."""
     environment = _environment()
+    explanations = [policy.explanation for policy in policies]
     several = len(policies) > 1
     style, script = static_text(environment, STYLES), static_text(environment, SCRIPTS)
     return environment.get_template("report.html").render(
         title="Can these policies be trusted?" if several else "Can this policy be trusted?",
         parts=_parts(environment, policies),
-        policies=[policy.explanation for policy in policies],
-        sources=[_source(policy.explanation) for policy in policies],
+        policies=explanations,
+        sources=[say(verdict.SOURCE, {**e.numbers, "source": e.source}) for e in explanations],
         policy=content_security_policy(style, script),
         style=style,
         script=script,
@@ -197,12 +198,11 @@ def render_page(policies: Sequence[Policy]) -> str:
 def _environment() -> jinja2.Environment:
     """Return the templates of this page, compiled once."""
     environment = page_environment("drone_rl.explanations.report")
-    environment.filters |= {"percent": _short_percent, "json": _json}
+    environment.filters |= {
+        "percent": _short_percent,
+        "json": functools.partial(json.dumps, indent=1),
+    }
     return environment
-
-
-def _source(explanation: Explanation) -> str:
-    return say(verdict.SOURCE, {**explanation.numbers, "source": explanation.source})
 
 
 def _parts(environment: jinja2.Environment, policies: Sequence[Policy]) -> list[dict[str, Any]]:
@@ -216,16 +216,16 @@ def _parts(environment: jinja2.Environment, policies: Sequence[Policy]) -> list[
         for name, part in PARTS.items()
         if htmls[name]
     ]
-    others = [(p.explanation, _others(p.explanation, PARTS.values())) for p in policies]
+    others = [(p.explanation, _others(p.explanation)) for p in policies]
     if any(keys for _, keys in others):
         html = Markup(environment.get_template("others.html").render(others=others))
         parts.append({"id": "others", "title": "Other numbers", "label": "Others", "html": html})
     return parts
 
 
-def _others(explanation: Explanation, parts: Iterable[Part]) -> list[str]:
+def _others(explanation: Explanation) -> list[str]:
     """Return entries that no part shows, such as those of a newer version."""
-    shown = FRAME.union(*(part.needs for part in parts if part.fits(explanation)))
+    shown = FRAME.union(*(part.needs for part in PARTS.values() if part.fits(explanation)))
     return sorted(explanation.numbers.keys() - shown)
 
 
@@ -246,7 +246,3 @@ def _save(drawn: Drawn, folder: Path, prefix: str) -> Mapping[str, str]:
 def _short_percent(fraction: float) -> str:
     """Format a fraction for a table."""
     return percent(fraction).replace("less than ", "<").replace("more than ", ">")
-
-
-def _json(value: Any) -> str:
-    return json.dumps(value, indent=1)

@@ -18,10 +18,10 @@ X, Y, HEADING, Z = range(4)
 
 
 class Mode(enum.IntEnum):
-    """What the number of an axis says. Controllers further in are given the rest."""
+    """Meaning of the number of an axis; inner controllers follow."""
 
     THROTTLE = 0
-    """Share of all thrust, 0 to 1."""
+    """Fraction of full thrust, 0 to 1."""
     RATE = 1
     """Radians a second about the body's axis."""
     ANGLE = 2
@@ -33,7 +33,7 @@ class Mode(enum.IntEnum):
     POSITION = 5
     """Metres, world frame."""
     ROTOR = 6
-    """Share of a rotor's most thrust, 0 to 1: all four are rotors then, in their order."""
+    """Fraction of a rotor's full thrust, 0 to 1; all four axes are rotors then."""
 
 
 _SIDEWAYS = (Mode.RATE, Mode.ANGLE, Mode.VELOCITY, Mode.HEADING_VELOCITY, Mode.POSITION, Mode.ROTOR)
@@ -50,7 +50,7 @@ Modes = tuple[Mode, Mode, Mode, Mode]
 
 @dataclasses.dataclass(frozen=True)
 class Goals:
-    """What `num_worlds` drones are told, all of them axis by axis in the same modes.
+    """Goals of the controllers of `num_worlds` drones, all in the same modes.
 
     Raises:
         InputError: An axis has no such mode, or two that go together differ.
@@ -61,10 +61,10 @@ class Goals:
     values: Tensor  # (num_worlds, 4) float64
     """In the units of the modes."""
     drift: Tensor | None = None  # (num_worlds, 4) float64
-    """How fast positions and headings that are wanted move on, a second; they stay by default."""
+    """Rate of change of positions and headings, a second; 0 by default."""
 
     def __post_init__(self) -> None:
-        """Refuses what no controller can do."""
+        """Check that controllers support the modes."""
         for axis, (mode, allowed) in enumerate(zip(self.modes, ALLOWED, strict=True)):
             if mode not in allowed:
                 known = ", ".join(m.name.lower() for m in allowed)
@@ -87,50 +87,44 @@ class Goals:
 
     @property
     def drifts(self) -> Tensor:
-        """The same, zeros where nothing drifts."""
+        """`drift`, zeros if it is None."""
         return torch.zeros_like(self.values) if self.drift is None else self.drift
 
 
 def rotor_goals(rotors: Tensor) -> Goals:
-    """Rotors told one by one, without any controller. Shape: (num_worlds, 4)."""
+    """Return goals that set rotors directly. Shape: (num_worlds, 4)."""
     return Goals((Mode.ROTOR, Mode.ROTOR, Mode.ROTOR, Mode.ROTOR), rotors)
 
 
 class Steering(Protocol):
-    """What actions mean."""
+    """Maps actions to goals of the controllers."""
 
     @property
     def actions(self) -> Actions:
-        """Which there are."""
+        """The action set."""
         ...
 
     def goals(self, body: FlightState, action: Tensor) -> Goals:
-        """What controllers are told until the next action.
-
-        Args:
-            body: The drones.
-            action: One for each. Shape: (num_worlds,), then that of `actions.entry`.
-        """
+        """Return the goals until the next action. `action`: (num_worlds,), then the entry's."""
         ...
 
 
 class Moves:
-    """The chapter's moves, flown as steps of the place where a drone is wanted.
+    """The chapter's moves: each shifts the target position along one axis of the world.
 
-    A move shifts that place along one axis of the world. It is never farther from the drone, along
-    either axis, than the lead: who moves on for long does not run away from the drone.
+    The target is never farther from the drone, along either axis, than the lead.
     """
 
     MODES = (Mode.POSITION, Mode.POSITION, Mode.ANGLE, Mode.POSITION)
     actions = MOVES
 
     def __init__(self, settings: ActionSettings) -> None:
-        """Takes the speed of moves and the lead."""
+        """Take the speed of moves and the lead."""
         self.lead = settings.move_lead
         self.drifts = torch.zeros(len(DIRECTIONS), 4, dtype=torch.float64)
         self.drifts[:, :2] = torch.tensor(DIRECTIONS, dtype=torch.float64)[:, :2]
         self.drifts *= settings.move_speed
-        """How fast each move shifts the place. Metres a second. Shape: (moves, 4)."""
+        """Speed of the target for each move, metres a second. Shape: (moves, 4)."""
 
     def goals(self, body: FlightState, action: Tensor) -> Goals:
         """See `Steering`."""
@@ -141,12 +135,12 @@ class Moves:
 
 
 class Velocities:
-    """Speed forward, speed to the left and rate of turning; the height is kept."""
+    """Speed forward, speed to the left and yaw rate; the height is kept."""
 
     MODES = (Mode.HEADING_VELOCITY, Mode.HEADING_VELOCITY, Mode.RATE, Mode.POSITION)
 
     def __init__(self, settings: ActionSettings) -> None:
-        """Takes the greatest speeds."""
+        """Take the greatest speeds."""
         self.actions = ContinuousActions.of(settings)
 
     def goals(self, body: FlightState, action: Tensor) -> Goals:
@@ -156,5 +150,5 @@ class Velocities:
 
 
 def make_steering(settings: ActionSettings) -> Moves | Velocities:
-    """What the actions of some settings mean."""
+    """Return the steering of settings."""
     return Moves(settings) if settings.kind == "moves" else Velocities(settings)

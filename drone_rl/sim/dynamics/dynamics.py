@@ -17,57 +17,52 @@ from drone_rl.utils.errors import InputError
 
 
 class Dynamics(Protocol):
-    """Moves drones. It holds none: states come in, states go out, as many worlds as they have.
-
-    Who derives from it needs `actions`, `start` and `step` alone: nothing is random then, nothing
-    but the task's rules knows of obstacles, and cameras are fixed to the body.
-    """
+    """Functions that move drones. A subclass needs only `actions`, `start` and `step`."""
 
     @property
     def actions(self) -> Actions:
-        """What it can be told to do."""
+        """The action set."""
         ...
 
     @property
     def mount(self) -> str:
-        """What holds the drone's cameras: "body", or "gimbal", which keeps them level."""
+        """Camera mount: "body", or "gimbal", which keeps cameras level."""
         return "body"
 
     @property
     def is_random(self) -> bool:
-        """Whether episodes differ by their `seeds`."""
+        """Whether `start` uses its `seeds`."""
         return False
 
     @property
     def needs_obstacles(self) -> bool:
-        """Whether `step` must be told what the drone can fly into."""
+        """Whether `step` needs the obstacles."""
         return False
 
     def start(self, position: Tensor, seeds: Tensor | None = None) -> BodyState:
-        """Drones at the start of an episode.
+        """Return drones at the start of an episode.
 
         Args:
-            position: Where, metres, world frame. Shape: (num_worlds, 3), float64.
-            seeds: Of what is random about each episode; none where `is_random` is false, and in
-                imagined worlds, of which everything is like the mean. Shape: (num_worlds,), int64.
+            position: Metres, world frame. Shape: (num_worlds, 3), float64.
+            seeds: Of the randomness of each episode; the mean without. Shape: (num_worlds,), int64.
         """
         ...
 
     def step(
         self, body: BodyState, action: Tensor, obstacles: Obstacles | None = None
     ) -> BodyState:
-        """What an action makes of each drone, a control step later; `body` stays as it is.
+        """Return the drones a control step later.
 
         Args:
-            body: Before.
+            body: Before; stays as it is.
             action: One of `actions` for each. Shape: (num_worlds,), then that of `actions.entry`.
-            obstacles: Of each world, as far as there are any and `needs_obstacles` is true.
+            obstacles: Of each environment, if `needs_obstacles` and there are any.
         """
         ...
 
 
 class ComputerVision:
-    """Moves a step forward, to the left or to the right, at once and without turning."""
+    """Moves a step forward, left or right, at once and without turning."""
 
     actions = MOVES
     mount = "body"
@@ -76,34 +71,27 @@ class ComputerVision:
     needs_obstacles = False
 
     def __init__(self, step_length: float = 1.0) -> None:
-        """Sets how far a move goes.
-
-        Args:
-            step_length: Metres.
-        """
+        """Set the length of a move, metres."""
         self.step_length = step_length
         self.moves = torch.tensor(DIRECTIONS, dtype=torch.float64) * step_length
         """Metres, world frame. Shape: (number of actions, 3), float64."""
 
     def start(self, position: Tensor, seeds: Tensor | None = None) -> BodyState:
-        """Drones that are level and at rest."""
+        """Return drones that are level and at rest."""
         del seeds
         return BodyState.at_rest(position)
 
     def step(
         self, body: BodyState, action: Tensor, obstacles: Obstacles | None = None
     ) -> BodyState:
-        """The same drones a move farther on."""
+        """Return the drones after a move."""
         del obstacles
         moves = self.moves.to(action.device)
         return body.moved(body.position + moves[action])
 
 
 class Kinematic:
-    """Flies level at the speeds that are asked for, at once: a drone without a body's inertia.
-
-    A step goes along the heading at its beginning, and then turns.
-    """
+    """Flies level at the commanded speeds, without inertia; a step moves first, and then turns."""
 
     mount = "body"
     """A drone that never tilts needs no gimbal."""
@@ -111,24 +99,19 @@ class Kinematic:
     needs_obstacles = False
 
     def __init__(self, actions: ActionSettings, timestep: float = 0.1) -> None:
-        """Sets the greatest speeds.
-
-        Args:
-            actions: They say which.
-            timestep: Seconds that an action lasts.
-        """
+        """Take the greatest speeds, and the seconds that an action lasts."""
         self.actions = ContinuousActions.of(actions)
         self.timestep = timestep
 
     def start(self, position: Tensor, seeds: Tensor | None = None) -> BodyState:
-        """Drones that are level, look forward and are at rest."""
+        """Return drones that are level, face forward and are at rest."""
         del seeds
         return BodyState.at_rest(position)
 
     def step(
         self, body: BodyState, action: Tensor, obstacles: Obstacles | None = None
     ) -> BodyState:
-        """The same drones a time step farther on; velocities are those of the step."""
+        """Return the drones a time step later; velocities are those of the step."""
         del obstacles
         forward, left, rate = self.actions.to_rates(action).unbind(-1)
         heading = heading_of(body.attitude)
@@ -145,14 +128,14 @@ class Kinematic:
 
 
 _SEEDS = 2**31 - 1
-"""How many different episodes of random dynamics there are."""
+"""Number of seeds of random dynamics."""
 
 
 class HasMoves(Protocol):
-    """A task, as far as it says how drones move unless the user wants otherwise."""
+    """A task, which has default dynamics."""
 
     def make_dynamics(self) -> Dynamics:
-        """In computer-vision mode, by moves."""
+        """See `Task.make_dynamics`."""
         ...
 
 
@@ -161,15 +144,15 @@ def make_dynamics(
     dynamics: DynamicsSettings | Dynamics | None = None,
     actions: ActionSettings | None = None,
 ) -> Dynamics:
-    """How drones move.
+    """Return the dynamics of settings.
 
     Args:
-        task: Whose own choice holds where actions set poses and are moves.
-        dynamics: Computer-vision mode by default; something that moves drones is taken as it is.
+        task: Its own dynamics are used for moves in computer-vision mode.
+        dynamics: Settings, computer-vision mode by default; or dynamics, which are returned.
         actions: Moves by default.
 
     Raises:
-        InputError: Actions are chosen for what brings its own.
+        InputError: Both dynamics and settings of actions are given.
     """
     if dynamics is not None and not isinstance(dynamics, DynamicsSettings):
         if actions is not None:
@@ -187,12 +170,5 @@ def make_dynamics(
 
 
 def draw_seeds(random_states: Sequence[np.random.RandomState]) -> Tensor:
-    """One for each episode, see `Dynamics.start`; drawn after all that the task draws.
-
-    Args:
-        random_states: Of the episodes' worlds.
-
-    Returns:
-        Shape: (number of episodes,), int64.
-    """
+    """Sample a seed for each episode, after the task has sampled. Shape: (N,), int64."""
     return torch.tensor([int(r.randint(_SEEDS)) for r in random_states], dtype=torch.int64)

@@ -18,45 +18,40 @@ from drone_rl.sim.dynamics.state import CLIMB, BodyState, FlightState, Obstacles
 from drone_rl.sim.rendering.devices import WorkerPool, on_torch_stream, start_warp
 
 _LEAST_WORK = 3000
-"""Ticks of all drones together for which a second thread is worth its while."""
+"""Ticks of all drones together from which more threads are faster."""
 
 
 class Quadrotor:
-    """Flies drones. It holds none: states come in, states go out, as many as they are."""
+    """Dynamics of drones with four rotors under their controllers."""
 
     def __init__(self, settings: DynamicsSettings, actions: ActionSettings | None = None) -> None:
-        """Takes a drone.
-
-        Args:
-            settings: Its body, controller and air.
-            actions: What policies can tell it; the chapter's three moves by default.
-        """
+        """Take the drone's body, controller and air, and its actions (moves by default)."""
         self.settings = settings
         self.steering = make_steering(actions or ActionSettings())
         self.frame = make_airframe(settings)
 
     @property
     def actions(self) -> Actions:
-        """What policies can tell it."""
+        """The action set."""
         return self.steering.actions
 
     @property
     def mount(self) -> str:
-        """How its cameras are mounted, see `DynamicsSettings.camera_mount`."""
+        """See `DynamicsSettings.camera_mount`."""
         return self.settings.camera_mount
 
     @property
     def is_random(self) -> bool:
-        """Whether episodes differ by the seed that `start` is given."""
+        """Whether there are gusts, which `seeds` make different."""
         return self.settings.gusts > 0.0
 
     @property
     def needs_obstacles(self) -> bool:
-        """Whether `step` minds what stands around."""
+        """Drones collide with obstacles."""
         return True
 
     def start(self, position: Tensor, seeds: Tensor | None = None) -> FlightState:
-        """Drones that hover where they are, at rest.
+        """Return drones that hover at rest.
 
         Args:
             position: Metres, world frame. Shape: (num_worlds, 3), float64.
@@ -70,32 +65,32 @@ class Quadrotor:
     def step(
         self, body: BodyState, action: Tensor, obstacles: Obstacles | None = None
     ) -> FlightState:
-        """What an action makes of each drone, a control step later; see `Dynamics`."""
+        """See `Dynamics.step`."""
         assert isinstance(body, FlightState)
         return self.fly(
             body, self.steering.goals(body, action), self.settings.control_ticks, obstacles
         )
 
     def push(self, body: FlightState, rotors: Tensor, ticks: int = 1) -> FlightState:
-        """The drones under rotors that somebody else commands.
+        """Return the drones after ticks under given rotor thrusts.
 
         Args:
             body: Before.
-            rotors: Shares of their most thrust. Shape: (num_worlds, 4), see `FlightState.rotors`.
-            ticks: How long.
+            rotors: Fractions of full thrust, see `FlightState.rotors`. Shape: (num_worlds, 4).
+            ticks: How many.
         """
         return self.fly(body, rotor_goals(rotors), ticks)
 
     def fly(
         self, body: FlightState, goals: Goals, ticks: int, obstacles: Obstacles | None = None
     ) -> FlightState:
-        """The drones under their controllers; `body` stays as it is.
+        """Return the drones after ticks under their controllers; `body` stays as it is.
 
         Args:
             body: Before.
-            goals: What they are told, for all of the time.
-            ticks: How long, each of `DynamicsSettings.tick` seconds.
-            obstacles: What they may touch besides the ground.
+            goals: Of the controllers, during all ticks.
+            ticks: How many, each of `DynamicsSettings.tick` seconds.
+            obstacles: What they can collide with besides the ground.
         """
         device, count = body.numbers.device, len(body)
         _load_kernels(str(device))

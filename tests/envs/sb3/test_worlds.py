@@ -131,7 +131,7 @@ def test_mistakes_are_told_in_a_line(make):
         drone_rl.Sb3Worlds(gymnasium.make_vec(NAME, num_envs=2))
     with pytest.raises(InputError, match=r"^transforms stack frames; use .* VecFrameStack$"):
         make([Gray(), Stack()])
-    with pytest.raises(InputError, match=r"^the transform late_frames is for TorchRL's"):
+    with pytest.raises(InputError, match=r"^the transform late_frames needs a TorchRL env"):
         make([Gray(), LateFrames()])
     with pytest.raises(InputError, match=r"^GrayPixels got torch.float32 frames"):
         make([Gray()], observations="state")

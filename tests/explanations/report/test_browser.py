@@ -1,42 +1,28 @@
 """The report in a real browser, headless: what a person would do with it."""
 
 import json
-import shutil
 
 import pytest
 
 from drone_rl.explanations.report import write_report
 
-webdriver = pytest.importorskip("selenium.webdriver")
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-DRIVER = shutil.which("chromedriver")
-if not (CHROMIUM and DRIVER):
-    pytest.skip("no chromium with chromedriver on this machine", allow_module_level=True)
+pytest.importorskip("selenium.webdriver")
 
-from selenium.webdriver.common.action_chains import ActionChains  # noqa: E402
-from selenium.webdriver.common.by import By  # noqa: E402
-from selenium.webdriver.support.ui import WebDriverWait  # noqa: E402
+from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.by import By
+from selenium.webdriver.support.ui import WebDriverWait
+
+from tests.chromium import open_page
 
 
 @pytest.fixture(scope="module")
 def browser(explanations, tmp_path_factory):
     folder = tmp_path_factory.mktemp("browser")
-    options = webdriver.ChromeOptions()
-    options.binary_location = CHROMIUM
-    for flag in (
-        "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
-        "--disable-background-networking", "--disable-component-update", "--disable-sync",
-        "--window-size=1200,900", f"--user-data-dir={folder / 'profile'}",
-    ):  # fmt: skip
-        options.add_argument(flag)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
-    driver = webdriver.Chrome(options, webdriver.ChromeService(DRIVER))
-    driver.get(write_report(explanations, folder).as_uri())
-    WebDriverWait(driver, 20).until(
-        lambda d: d.find_element(By.ID, "map1").get_attribute("data-ready") == "true"
-    )
-    yield driver
-    driver.quit()
+    with open_page(write_report(explanations, folder), folder / "profile") as driver:
+        WebDriverWait(driver, 20).until(
+            lambda d: d.find_element(By.ID, "map1").get_attribute("data-ready") == "true"
+        )
+        yield driver
 
 
 def points(browser):

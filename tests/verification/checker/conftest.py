@@ -5,8 +5,9 @@ import json
 
 import pytest
 
+from benchmarks.gamed_certificates import certificate_of, steps_of
 from drone_rl.verification.checker.certificate import parse_certificate
-from tests.verification.checker.making import certificate_of, of_one_cube, steps_of
+from tests.verification.checker.making import of_one_cube
 
 
 @pytest.fixture(scope="session")
@@ -28,9 +29,7 @@ def two_halves():
     policy = drone_rl.load_policy("good").in_task(num_cubes=2)
     boxes = [[[-6.0, 1.0], [-6.0, 6.0]], [[1.0, 6.0], [-6.0, 6.0]]]
     won = {"end": "all_cubes", "collected": [True, True], "loops": False, "share": 1.0}
-    found = steps_of(policy.description, policy.state["policy"])
-    steps = {number: 0.97 * share for number, share in found.items()}
-    return certificate_of(policy, [{**won, "steps": steps, "boxes": boxes}], [], 0.0)
+    return certificate_of(policy, [{**won, "steps": steps_of(policy, 0.97), "boxes": boxes}])
 
 
 @pytest.fixture

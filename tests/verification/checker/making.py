@@ -1,38 +1,20 @@
-"""True certificates without a prover: of one cube by bisection, of any boxes by hand."""
+"""Certificates without a prover: true ones of one cube by bisection, and of any boxes by hand."""
 
 import itertools
 
 import numpy as np
 
 import drone_rl
+from benchmarks.gamed_certificates import certificate_of, steps_of
 from drone_rl.sim.tasks.collect_cubes import EndReason
-from drone_rl.verification.checker import fingerprint
 from drone_rl.verification.checker.rollouts import Simulator
 
 BAND = 1e-5
-"""Metres on either side of a border that are left undecided."""
-
-
-def certificate_of(policy, outcomes, undecided, share_undecided, finished=True):
-    """The file's content."""
-    return {
-        "format": "drone_rl certificate",
-        "format_version": 1,
-        "policy": {
-            "name": policy.name,
-            "weights": fingerprint(policy.state["policy"]),
-            "description": policy.description.as_dict(),
-        },
-        "outcomes": outcomes,
-        "undecided": {"share": share_undecided, "boxes": undecided},
-        "finished": finished,
-        "stated": {"logit_gap": 1e-4, "largest_band": BAND, "renderer": "Raytracer"},
-        "found": {"least_gap": 0.0, "pictures": 1, "states": 1, "seconds": 1.0},
-    }
+"""Half-width of the undecided band at a border, metres."""
 
 
 def of_one_cube(name, **task):
-    """Flies a grid and halves every step of it at whose sides flights end otherwise."""
+    """Bisect between neighbours on a grid whose episodes end differently."""
     policy = drone_rl.load_policy(name).in_task(num_cubes=1, **task)
     simulator = Simulator(policy.description, policy.state["policy"])
     bound = policy.task.lateral_bound
@@ -57,7 +39,7 @@ def of_one_cube(name, **task):
 
 
 def _as_outcomes(pieces, cuts):
-    """Outcomes from the ends between cuts; around those where another outcome begins: undecided."""
+    """Return outcomes between cuts; bands around cuts between outcomes are undecided."""
     whole, stretches, undecided = cuts[-1] - cuts[0], {}, []
     spans = zip(pieces, itertools.pairwise(cuts), strict=True)
     for outcome, group in itertools.groupby(spans, key=lambda span: span[0][:2]):
@@ -90,24 +72,8 @@ def _length(boxes):
     return sum(high - low for ((low, high),) in boxes)
 
 
-def steps_of(description, state, flights=300, high=None):
-    """Which numbers of steps are how frequent from random placements, as a forger finds out.
-
-    `high` bounds where the first cube may stand.
-    """
-    simulator = Simulator(description, state)
-    bound, cubes = description.task.lateral_bound, description.task.num_cubes
-    rng = np.random.default_rng(7)
-    placements = rng.uniform(-bound, bound, (flights, cubes))
-    placements[:, 0] = rng.uniform(-bound, bound if high is None else high, flights)
-    flown = simulator.fly(placements)
-    simulator.close()
-    numbers, counts = np.unique(flown.steps, return_counts=True)
-    return {str(n): c / flights for n, c in zip(numbers.tolist(), counts.tolist(), strict=True)}
-
-
 def of_every_place(policy, end="all_cubes", undecided=False):
-    """By hand and not by any proof: every flight ends so, but perhaps where y of a cube is > 3."""
+    """State the same end everywhere, or only where the first cube's y is below 3."""
     task = policy.description.task
     bound, cubes = task.lateral_bound, task.num_cubes
     stated, left = [[[-bound, bound]] * cubes], []
@@ -115,9 +81,7 @@ def of_every_place(policy, end="all_cubes", undecided=False):
         stated = [[[-bound, 3.0], *[[-bound, bound]] * (cubes - 1)]]
         left = [[[3.0, bound], *[[-bound, bound]] * (cubes - 1)]]
     share = (bound + 3.0) / (2 * bound) if undecided else 1.0
-    state = policy.state["policy"]
-    found = steps_of(policy.description, state, high=3.0 if undecided else None)
-    steps = {number: 0.97 * share * part for number, part in found.items()}
+    steps = steps_of(policy, 0.97 * share, high=3.0 if undecided else None)
     outcome = {
         "end": end,
         "collected": [end == "all_cubes"] * cubes,

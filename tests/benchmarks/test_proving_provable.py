@@ -3,7 +3,7 @@
 import json
 
 from benchmarks import commands as running
-from benchmarks.provable import bench_provable
+from benchmarks.proving import bench_provable
 
 
 def test_proved_runs_are_gathered(monkeypatch, tmp_path):

@@ -1,6 +1,6 @@
 """The strings that would run."""
 
-from benchmarks.injection_payloads import HOST, MARKUP, PAYLOADS, RAN
+from benchmarks.injections import HOST, MARKUP, PAYLOADS, RAN
 
 
 def test_there_are_enough_and_readers_of_files_accept_them():

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from benchmarks import flight_training
-from benchmarks.flight_training import bench_flight_training
+from benchmarks import training
+from benchmarks.training import bench_flight_training
 
 
 def test_told_by_the_experiments_name(monkeypatch):
@@ -18,7 +18,7 @@ def test_told_by_the_experiments_name(monkeypatch):
             "reason": ["solved", "frames"],
         }
 
-    monkeypatch.setattr(flight_training, "train_and_evaluate", train_and_evaluate)
+    monkeypatch.setattr(training, "train_and_evaluate", train_and_evaluate)
     told = bench_flight_training("flight", Path("runs"), [3, 4], 1000, "cpu", False)
     assert told == {
         "flight_time_to_solve_s": [30.0, 40.0],

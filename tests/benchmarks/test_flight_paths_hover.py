@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from benchmarks.hover_error import hover_error
+from benchmarks.flight_paths import hover_error
 from drone_rl.config import DynamicsSettings
 
 

@@ -3,7 +3,7 @@ import math
 import pytest
 import torch
 
-from benchmarks import path_following as of
+from benchmarks import flight_paths as of
 from drone_rl.flight.commands.path_following import make_paths
 
 

@@ -5,7 +5,7 @@ import time
 import pytest
 from torch import nn
 
-from benchmarks.pace import network_pictures_per_s
+from benchmarks.proving import network_pictures_per_s
 
 
 class Slow(nn.Module):

@@ -1,0 +1,64 @@
+"""The form of a case of a malicious file, and files that are hard to read."""
+
+import os
+import zipfile
+from collections.abc import Callable, Mapping
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+Case = tuple[str, list[str], str]
+"""Name, arguments of `drone-rl`, and what would go wrong if the file were accepted."""
+Make = Callable[[Path], Any]
+"""Creates a file or anything else at a path."""
+NOTED = "noted_"
+"""Prefix of cases that are not refused: the report names the damaged run."""
+
+
+def put(path: Path, content: bytes | Make) -> None:
+    """Write bytes to a path, or create something else there."""
+    if isinstance(content, bytes):
+        path.write_bytes(content)
+    else:
+        content(path)
+
+
+def sparse(path: Path) -> None:
+    """Create a file of a terabyte that occupies no disk space."""
+    with path.open("wb") as file:
+        file.truncate(2**40)
+
+
+def nested(levels: int) -> list[Any]:
+    """Return lists within lists."""
+    return [nested(levels - 1)] if levels else []
+
+
+def zipped(members: Mapping[str, bytes], method: int = zipfile.ZIP_STORED) -> bytes:
+    """Return the content of a zip archive."""
+    file = BytesIO()
+    with zipfile.ZipFile(file, "w", method) as archive:
+        for name, content in members.items():
+            archive.writestr(name, content)
+    return file.getvalue()
+
+
+def npz(arrays: Mapping[str, np.ndarray]) -> bytes:
+    """Return the content of a compressed file of arrays."""
+    file = BytesIO()
+    # numpy annotates every keyword as allow_pickle
+    np.savez_compressed(file, **arrays)  # pyright: ignore[reportArgumentType]
+    return file.getvalue()
+
+
+NO_FILES: Mapping[str, Make] = {
+    "empty": Path.touch,
+    "folder": Path.mkdir,
+    "pipe": os.mkfifo,
+    "zeros": lambda path: path.symlink_to("/dev/zero"),
+    "loop": lambda path: path.symlink_to(path),
+    "sparse": sparse,
+}
+"""What may lie where a plain file is expected."""
