@@ -140,7 +140,7 @@ __all__ = ["DIRECTIONS", "MOVES", "Actions", "DiscreteActions", "Entry", "Move",
 
 
 class Entry(NamedTuple):
-    """One world's share of an array: its shape, type, and bounds where it has any."""
+    """Shape, type and bounds of an array, for one environment."""
 
     shape: tuple[int, ...]
     dtype: torch.dtype
@@ -156,75 +156,75 @@ class Actions(Protocol):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What people call the parts of a wish, in its order."""
+        """Names of the parts of a wish, in its order."""
         ...
 
     @property
     def order(self) -> tuple[int, ...]:
-        """The parts from left to right, as they are drawn."""
+        """The parts from left to right, as plots show them."""
         ...
 
     @property
     def entry(self) -> Entry:
-        """One world's action."""
+        """Shape, type and bounds of one environment's action."""
         ...
 
     @property
     def num_outputs(self) -> int:
-        """How many numbers a network gives."""
+        """Number of the network's outputs."""
         ...
 
     @property
     def output_names(self) -> tuple[str, ...]:
-        """What each of them is for."""
+        """Names of the network's outputs."""
         ...
 
     def wish(self, outputs: Tensor) -> Tensor:
-        """What a network's outputs ask for. Shapes: (*, num_outputs), (*, len(names))."""
+        """Return the wish of a network's outputs. (*, num_outputs) to (*, len(names))."""
         ...
 
     def scores(self, outputs: Tensor) -> Tensor:
-        """A number that each part's share grows with, without bounds. Shapes as of `wish`."""
+        """Return unbounded scores with which the shares of parts grow. Shapes as of `wish`."""
         ...
 
     def greedy(self, outputs: Tensor) -> Tensor:
-        """The action of who draws nothing. Shapes: (*, num_outputs); (*), then the entry's."""
+        """Return the most probable action. (*, num_outputs) to (*), then the entry's."""
         ...
 
     def chosen(self, wish: Tensor) -> Tensor:
-        """The part that is wished for most. Shape: (*)."""
+        """Return the part with the largest share. Shape: (*)."""
         ...
 
     def part(self, action: Tensor) -> Tensor:
-        """What part actions are. Shapes: (*), then the entry's; (*)."""
+        """Return the parts that actions belong to. (*), then the entry's, to (*)."""
         ...
 
     def always(self, name: str) -> Tensor:
-        """The action that is that part, and that as much as can be. Shape: the entry's."""
+        """Return the full-speed action of a part, by name. Shape: the entry's."""
         ...
 
     def draw(self, shape: tuple[int, ...], generator: torch.Generator) -> Tensor:
-        """Actions, all alike probable, on the generator's device. Shape: `shape`, the entry's."""
+        """Sample uniformly, on the generator's device. Shape: `shape`, then the entry's."""
         ...
 
     def fields(self) -> dict[str, str]:
-        """What is kept of an action, and what that means, in words."""
+        """Return the entries that data sets keep of an action, with descriptions."""
         ...
 
     def kept(self, action: Tensor) -> dict[str, Tensor]:
-        """These of actions. "actions" are the parts. Shapes: (T), then the entry's; (T, *)."""
+        """Return these entries; "actions" are the parts. (T), then the entry's, to (T, *)."""
         ...
 
     def mirror(self, wish: Wish) -> Wish:
-        """The same wish in a world where left is right. Shape kept."""
+        """Return the mirror image of a wish. Shape kept."""
         ...
 
     def distance(self, wish: Wish, other: Wish) -> Wish:
-        """How far two wishes lie apart, 0 to 1. Shape: (*)."""
+        """Return the distance of two wishes, 0 to 1. Shape: (*)."""
         ...
 
     def leaning(self, wish: Wish) -> Wish:
-        """How much a wish asks for the left, 0 to 1. Shape: (*)."""
+        """Return the share of parts to the left, 0 to 1. Shape: (*)."""
         ...
 
     def opposition(self, wish: NDArray, other: NDArray) -> NDArray:
@@ -232,26 +232,23 @@ class Actions(Protocol):
         ...
 
     def undoes(self, part: Tensor, before: Tensor) -> Tensor:
-        """Whether a part undoes the one before it. Shape: (*), bool."""
+        """Return whether a part undoes the one before it. Shape: (*), bool."""
         ...
 
     def sways(self, kept: Mapping[str, Tensor]) -> Tensor:
-        """Whether actions, as `kept`, can be undone and lead nowhere. Shape: (T,), bool.
-
-        Going back and forth is made of such.
-        """
+        """Return whether actions, as `kept`, are steps of going back and forth. (T,), bool."""
         ...
 
     def turns(self, part: Tensor) -> Tensor:
-        """Whether a part is another one in a mirror. Shape: (*), bool."""
+        """Return whether a part differs from its mirror image. Shape: (*), bool."""
         ...
 
     def agrees(self, part: Tensor, other: Tensor) -> Tensor:
-        """Whether parts are the same, or lead to the same side. Shape: (*), bool."""
+        """Return whether parts are equal or lead to the same side. Shape: (*), bool."""
         ...
 
     def as_dict(self) -> dict[str, Any]:
-        """All that a report needs to name and draw them, as plain values."""
+        """Return what reports need to name and plot them, as plain values."""
         ...
 
 

@@ -86,7 +86,7 @@ def check_ids(ids: Tensor, num_geoms: int) -> Tensor:
 
 
 FARTHEST = 65504.0
-"""What is told of the distance where nothing is hit, and the most that is told, in metres."""
+"""Depth where nothing is hit, and the largest depth, metres."""
 WHITE_DEPTH = 100.0
 """Depth at which pictures of depth are white, in metres."""
 BASELINE = 0.25
@@ -114,7 +114,7 @@ class ImageType(enum.IntEnum):
 
     @property
     def modality(self) -> Modality:
-        """What a renderer must draw for it."""
+        """The modality from which it is computed."""
         return _MODALITIES[self]
 
 
@@ -145,7 +145,7 @@ class ImageRequest:
     """Whether they are numbers (`pixels_as_float`), not red, green and blue."""
 
     def __post_init__(self) -> None:
-        """Refuses what there is not."""
+        """Check camera and type."""
         object.__setattr__(self, "camera", find_camera(self.camera).name)
         if self.image_type not in list(ImageType):
             names = ", ".join(f"{kind.value} ({kind.name.lower()})" for kind in ImageType)
@@ -165,7 +165,7 @@ def image(
     ids: Tensor | None = None,
     appearance: Appearance | None = None,
 ) -> Tensor:
-    """One image of each world; see `images`."""
+    """Return one image of each environment; see `images`."""
     request = ImageRequest(camera, image_type, as_float)
     (drawn,) = images(
         worlds, state, [request], height=height, width=width, ids=ids, appearance=appearance
@@ -183,7 +183,7 @@ def images(
     ids: Tensor | None = None,
     appearance: Appearance | None = None,
 ) -> list[Tensor]:
-    """Several images of each world, of one size, drawn in one pass.
+    """Render several images of each environment, of one size, in one pass.
 
     Args:
         worlds: Which draw.
