@@ -15,14 +15,14 @@ NUDGED = ("left", "right", "up", "down")
 _TURNS = ((0.0, 1.0, 0.0), (0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (-1.0, 0.0, 0.0))
 NEAR, FAR = 0.02, 60.0
 """Metres along the axis within which OpenGL draws."""
-_SLICES = 400
+SLICES = 400
 """Of OpenGL's round solids: of 1.5 m radius, they are flatter than 0.05 mm."""
 _XML = f"""<mujoco>
 <statistic extent="1"/>
 <visual>
   <headlight active="0"/>
   <map znear="{NEAR}" zfar="{FAR}"/>
-  <quality offsamples="0" shadowsize="0" numslices="{_SLICES}" numstacks="{_SLICES}"/>
+  <quality offsamples="0" shadowsize="0" numslices="{SLICES}" numstacks="{SLICES}"/>
   <global offwidth="1024" offheight="1024"/>
 </visual>
 <worldbody>

@@ -24,6 +24,7 @@ def picture():
     made["rgb"][inside], made["depth"][inside] = 100, 4.0
     made["segmentation"][inside], made["normals"][inside] = 3, [-1.0, 0.0, 0.0]
     made["nudged"] = np.stack([made["segmentation"]] * 4)
+    made["facets"] = np.zeros((12, 12))
     return made
 
 
