@@ -1,11 +1,8 @@
-# pyright: reportAttributeAccessIssue=false
-# pyright: reportGeneralTypeIssues=false
-# (Warp's structures are untyped.)
 """A network laid out for kernels, see `layers_kernel`."""
 
 from collections.abc import Sequence
 from itertools import accumulate
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import torch
 import warp as wp
@@ -229,7 +226,7 @@ class PackedNetwork:
         self.weights = torch.zeros(self._order.weights_at[-1])
         """As they are laid out."""
         steps, self.room = self._lay_out(packed, num_pictures)
-        made = Layers()
+        made: Any = Layers()
         made.steps = wp.from_torch(torch.tensor(steps, dtype=torch.int32))
         made.weights = wp.from_torch(self.weights)
         made.num_convolutions = sum(layer.is_convolution for layer in packed)

@@ -19,7 +19,7 @@ import drone_rl
 from drone_rl.envs.transforms import PixelTransform
 from drone_rl.objectives import ReturnEstimator, returns
 from drone_rl.policies import PolicyNetwork
-from drone_rl.policies.cnn import orthogonal
+from drone_rl.policies.networks import orthogonal
 
 
 @drone_rl.register_network("cells")

@@ -33,7 +33,7 @@ def truth_chart(explanation: Explanation) -> Figure:
         truth,
         lambda m: m.get("likeness"),
         0.5,
-        "similarity to maps of shuffled weights\n(must be below 0.5)",
+        "similarity on shuffled weights\n(must be below 0.5)",
     )
     for axis in axes[2:]:
         axis.set_yticklabels([])

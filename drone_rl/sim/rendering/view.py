@@ -1,4 +1,4 @@
-"""What a renderer is asked for: cameras, image size and modalities; RGB to grayscale."""
+"""Requests to a renderer: cameras, image size and modalities; RGB to grayscale."""
 
 import dataclasses
 from collections.abc import Container

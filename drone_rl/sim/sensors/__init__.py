@@ -1,4 +1,4 @@
-"""What drones sense beside pictures: inertia, pressure, Earth's field, their place, and touch."""
+"""Simulated sensors other than cameras: IMU, barometer, magnetometer, GPS and collisions."""
 
 from drone_rl.sim.sensors.inertial import Imu, ImuReading, Magnetometer, MagnetometerReading
 from drone_rl.sim.sensors.position import Barometer, BarometerReading, Fix, Gps, GpsReading

@@ -79,7 +79,7 @@ def test_each_test_has_a_chart_of_its_own_with_its_bar(truth):
     assert first[1:] == [
         "score above its strongest placebo",
         "hits above chance",
-        "similarity to maps of shuffled weights",
+        "similarity on shuffled weights",
     ]
     assert [list(axis.lines[-1].get_xdata()) for axis in axes[1:]] == [[0, 0], [0, 0], [0.5, 0.5]]
     assert list(axes[3].lines[0].get_xdata()) == [0.6, 0.8]
