@@ -46,9 +46,9 @@ def implements(*variants: type[Variant]) -> Callable[[F], F]:
     def connect(factory: F) -> F:
         for variant in variants:
             variant.factory = staticmethod(factory)
-        if isinstance(factory, type):
-            vars_of: Any = factory
-            vars_of.Settings = variants[0]
+        vars_of: Any = factory
+        if isinstance(vars_of, type):
+            setattr(vars_of, "Settings", variants[0])  # noqa: B010
         return factory
 
     return connect

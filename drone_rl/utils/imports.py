@@ -73,7 +73,12 @@ class _Hook:
         spec = PathFinder.find_spec(name, path, target) if name == self.name else None
         if spec is None or spec.loader is None:
             return None
-        spec.loader.exec_module = functools.partial(self.execute, execute=spec.loader.exec_module)
+        execute = spec.loader.exec_module
+
+        def exec_module(module: ModuleType) -> None:
+            self.execute(module, execute)
+
+        spec.loader.exec_module = exec_module
         return spec
 
 
