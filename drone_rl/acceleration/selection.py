@@ -61,6 +61,9 @@ def accelerate_stream(
         observed: Entries that the actor reads.
         kept: ("next", ...) entries to keep of each step.
     """
+    observed = tuple(observed)
+    if observed != ("pixels",):
+        return Reasons([f"the policy reads {', '.join(map(str, observed))} instead of pixels"])
     renderer = DirectRenderer.try_create(env, observed, kept)
     return renderer if isinstance(renderer, Reasons) else DirectStream(renderer)
 

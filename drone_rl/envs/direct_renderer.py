@@ -8,6 +8,7 @@ together. Where only maps from frame to frame lie between renderer and actor, it
 from collections.abc import Iterable, Sequence
 from typing import Any, Self
 
+import torch
 from tensordict import TensorDict, TensorDictBase
 from tensordict.utils import NestedKey
 from torch import Tensor
@@ -36,10 +37,15 @@ class DirectRenderer:
     """
 
     def __init__(
-        self, env: DroneEnv, transforms: Sequence[PixelTransform], kept: Iterable[NestedKey]
+        self,
+        env: DroneEnv,
+        transforms: Sequence[PixelTransform],
+        observed: Iterable[NestedKey],
+        kept: Iterable[NestedKey],
     ) -> None:
-        """Takes over the environment's states; see `try_create`."""
+        """Take over the environment's states; see `try_create`."""
         self.env, self.worlds = env, env.worlds
+        self._observed = tuple(observed)
         is_gray = type(next(iter(transforms), None)) is GrayPixels
         self.view = self.worlds.view(modality="gray") if is_gray else self.worlds.policy_view
         self.after: Sequence[Any] = transforms[1:] if is_gray else transforms
@@ -66,11 +72,13 @@ class DirectRenderer:
             observed: Entries that the actor reads.
             kept: ("next", ...) entries to keep of each step.
         """
-        base: Any = getattr(env, "base_env", None)
-        if type(env) is not TransformedEnv or type(base) is not DroneEnv:
-            return Reasons([f"environment {type(env).__name__} is no TransformedEnv of DroneEnv"])
-        one: Any = env.transform
+        base: Any = env.base_env if type(env) is TransformedEnv else env
+        if type(base) is not DroneEnv:
+            return Reasons([f"environment {type(base).__name__} is no DroneEnv"])
+        one: Any = env.transform if isinstance(env, TransformedEnv) else Compose()
         transforms: list[Any] = list(one) if isinstance(one, Compose) else [one]
+        observed = tuple(observed)
+        readable = {"pixels", "done", *(("info", name) for name in base.worlds.entries)}
         known = {("next", name) for name in FLAGS}
         known |= {("next", "info", name) for name in base.worlds.entries}
         reasons = [
@@ -78,25 +86,34 @@ class DirectRenderer:
             for t in transforms
             if not (isinstance(t, PixelTransform) and t.is_in_place)
         ]
-        if not base.pixels:
+        if "pixels" in observed and not base.pixels:
             reasons.append("the environment renders no pixels")
-        elif tuple(observed) != ("pixels",):
-            reasons.append(f"the policy reads {', '.join(map(str, observed))} instead of pixels")
+        reasons += [f"the policy reads {key}" for key in observed if key not in readable]
         reasons += [f"entry {key} is not fused" for key in kept if key not in known]
-        return Reasons(reasons) if reasons else cls(base, transforms, kept)
+        return Reasons(reasons) if reasons else cls(base, transforms, observed, kept)
 
     def look(self, state: State, rows: Tensor | None = None) -> TensorDictBase:
-        """Render the observations of states. First dimension: the state's.
+        """Return what the actor reads of states. First dimension: the state's.
 
         Args:
             state: Of some environments.
             rows: Indices of these environments; all by default. Shape: (k,).
         """
+        size, device = len(state.steps), state.steps.device
+        entries: Entries = {}
+        if "pixels" in self._observed:
+            entries["pixels"] = self._pixels(state, rows)
+        if "done" in self._observed:
+            entries["done"] = torch.zeros(size, 1, dtype=torch.bool, device=device)
+        if any(isinstance(key, tuple) for key in self._observed):
+            entries["info"] = TensorDict(self.worlds.info(state), [size], device=device)
+        return TensorDict(entries, [size], device=device)
+
+    def _pixels(self, state: State, rows: Tensor | None) -> Tensor:
         frames = self.worlds.render(state, self.view, self.env.looks.drawn(rows))
         if self.view.modalities == ("gray",):
             frames = frames[:, None]
-        pixels = self._transform(frames)
-        return TensorDict({"pixels": pixels}, [len(pixels)], device=pixels.device)
+        return self._transform(frames)
 
     def entries(self, state: State, reward: Tensor) -> tuple[Entries, Tensor]:
         """Return the kept entries of a step, and whether it ended an episode.

@@ -165,9 +165,7 @@ class MavlinkBridge:
         end = time.monotonic() + self.connect_within
         while self._heard < 0.0:
             if time.monotonic() > end:
-                raise FlightControllerError(
-                    f"no heartbeat of an autopilot in {self.connect_within:g} s"
-                )
+                raise FlightControllerError(f"no heartbeat in {self.connect_within:g} seconds")
             self._beat()
             self._receive(0.05)
 
@@ -177,16 +175,9 @@ class MavlinkBridge:
             return
         self._beaten = now
         kinds = self._dialect
-        self._send(
-            "heartbeat",
-            {
-                "type": kinds.MAV_TYPE_GENERIC,
-                "autopilot": kinds.MAV_AUTOPILOT_INVALID,
-                "base_mode": 0,
-                "custom_mode": 0,
-                "system_status": kinds.MAV_STATE_ACTIVE,
-            },
-        )
+        sender = {"type": kinds.MAV_TYPE_GENERIC, "autopilot": kinds.MAV_AUTOPILOT_INVALID}
+        status = {"base_mode": 0, "custom_mode": 0, "system_status": kinds.MAV_STATE_ACTIVE}
+        self._send("heartbeat", {**sender, **status})
 
     def _send(self, name: str, fields: dict[str, Any]) -> None:
         message = getattr(self._codec, f"{name}_encode")(**fields)

@@ -19,6 +19,7 @@ from drone_rl.envs import (
     with_transforms,
 )
 from drone_rl.envs.direct_renderer import DirectRenderer, Reasons
+from drone_rl.evaluation.baselines import make_baseline
 from drone_rl.policies import SmallCNN, make_actor
 from tests.continuous import make_policy, make_worlds
 
@@ -94,9 +95,10 @@ def reasons(env, observed, kept):
         ([Noise(), StandardizePixels()], {}, ["pixels"], [], "transform Noise is not fused"),
         ([LateFrames()], {}, ["pixels"], [], "transform LateFrames is not fused"),
         ([GrayPixels(out_keys=["gray"])], {}, ["gray"], [], "transform GrayPixels is not fused"),
-        ([], {}, ["pixels", ("info", "drone")], [], "the policy reads pixels, ('info', 'drone')"),
+        ([], {}, ["pixels", "hidden"], [], "the policy reads hidden"),
+        ([], {}, [("info", "wind")], [], "the policy reads ('info', 'wind')"),
         ([], {}, ["pixels"], [("next", "pixels")], "entry ('next', 'pixels') is not fused"),
-        (None, {"pixels": False}, [("info", "drone")], [], "the environment renders no pixels"),
+        (None, {"pixels": False}, ["pixels"], [], "the environment renders no pixels"),
     ],
 )
 def test_what_needs_steps_of_torchrl(transforms, options, observed, kept, reason):
@@ -108,8 +110,6 @@ def test_what_needs_steps_of_torchrl(transforms, options, observed, kept, reason
 def test_maps_of_pixels_need_no_steps_of_torchrl():
     transforms = (GrayPixels(), CropRows(5, 25), Blur(), StandardizePixels())
     assert not reasons(make_env(*transforms), ["pixels"], [*KEPT, REASON])
-    env = make_env(*transforms).base_env
-    assert "DroneEnv is no TransformedEnv" in reasons(env, ["pixels"], KEPT)
 
 
 def test_a_subclass_of_the_environment_is_stepped_by_torchrl():
@@ -117,4 +117,23 @@ def test_a_subclass_of_the_environment_is_stepped_by_torchrl():
         pass
 
     env = with_transforms(Windy(2, SHORT), [GrayPixels()])
-    assert "is no TransformedEnv of DroneEnv" in reasons(env, ["pixels"], KEPT)
+    assert "environment Windy is no DroneEnv" in reasons(env, ["pixels"], KEPT)
+
+
+@pytest.mark.parametrize("name", ["oracle", "random", "left"])
+def test_a_policy_that_reads_the_true_state_needs_no_steps_of_torchrl(name):
+    batches = []
+    for acceleration in ("direct", "none"):
+        env = DroneEnv(3, SHORT, seed=5, pixels=False)
+        actor = make_baseline(name, env.worlds.task, torch.Generator().manual_seed(3))
+        collector = EpisodeCollector(
+            env, actor, keep=KEPT, keep_observations=False, acceleration=acceleration
+        )
+        assert collector.source.name.startswith("direct" if acceleration == "direct" else "step")
+        batches.append(collector.collect())
+        collector.shutdown()
+    direct, stepped = batches
+    assert set(direct.keys(True, True)) == set(stepped.keys(True, True))
+    if name != "random":  # the stepping collector also samples actions of finished environments
+        for key in direct.keys(True, True):
+            assert torch.equal(direct[key], stepped[key]), key

@@ -1,0 +1,74 @@
+"""What several tasks share: props out of sight, sides, classes of goals, positions in view."""
+
+import math
+
+import pytest
+import torch
+
+from drone_rl.config import CameraSettings
+from drone_rl.sim.tasks import Goals
+from drone_rl.sim.tasks.common import (
+    HIDDEN_DEPTH,
+    Side,
+    hide_absent,
+    interval_classes,
+    move_left,
+    number_classes,
+    place_in_view,
+    side_of,
+)
+
+
+def test_absent_props_are_under_the_floor():
+    places = torch.tensor([[[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]], dtype=torch.float64)
+    hidden = hide_absent(places, torch.tensor([[True, False]]))
+    assert hidden.tolist() == [[[1.0, 2.0, 3.0], [4.0, 5.0, 6.0 - HIDDEN_DEPTH]]]
+
+
+def test_only_the_chosen_props_move_left():
+    places = torch.zeros(2, 2, 3, dtype=torch.float64)
+    moved = move_left(places, torch.tensor([1.0, -2.0]), torch.tensor([[1, 0], [1, 1]]))
+    assert moved[..., 1].tolist() == [[1.0, 0.0], [-2.0, -2.0]]
+    assert not moved[..., [0, 2]].any()
+    assert not places.any(), "the given places stay"
+
+
+def test_sides_have_a_tolerance():
+    lateral = torch.tensor([1.1, 1.0, 0.0, -1.0, -1.1])
+    assert side_of(lateral, 1.0).tolist() == [Side.LEFT, *[Side.AHEAD] * 3, Side.RIGHT]
+
+
+def goals(shape=(2, 3)):
+    reached = torch.zeros(shape, dtype=torch.bool)
+    return Goals(reached, torch.zeros(shape, dtype=torch.int64), torch.zeros(shape))
+
+
+def test_a_class_for_each_goal_of_an_episode():
+    classes = list(number_classes("cube", goals()))
+    assert [(name, label) for name, label, _ in classes] == [
+        ("cube", "first"), ("cube", "second"), ("cube", "third"),
+    ]  # fmt: skip
+    assert classes[1][2].tolist() == [[False, True, False]] * 2
+
+
+def test_classes_between_edges_include_the_upper_one():
+    values = torch.tensor([0.0, 0.5, 1.0, 2.0, 3.0, math.nan])
+    classes = list(interval_classes("height", values, [0.0, 1.0, 2.0]))
+    assert [label for _, label, _ in classes] == ["0 to 1 m", "1 to 2 m", "more than 2 m"]
+    chosen = [values[which].tolist() for *_, which in classes]
+    assert chosen == [[0.5, 1.0], [2.0], [3.0]]
+
+
+@pytest.mark.parametrize(
+    ("draw", "ahead", "left"),
+    [
+        ((0.0, 0.5), 2.0, 0.0),
+        ((1.0, 0.5), 10.0, 0.0),
+        ((1.0, 0.75), 6.0, 3.0),
+        ((0.0, 0.0), 2.0, -2.0),
+    ],
+)
+def test_positions_are_in_view(draw, ahead, left):
+    camera = CameraSettings(horizontal_fov=90.0)  # a slope of 1 at the border
+    found = place_in_view(torch.tensor([draw], dtype=torch.float64), camera, 2.0, 10.0, 3.0)
+    torch.testing.assert_close(found, torch.tensor([[ahead, left]], dtype=torch.float64))
