@@ -171,7 +171,8 @@ class FusedCollector:
     def _open_log(self, part: int, kept: tuple[str, ...]) -> Any:
         """Return arrays that one launch writes, and of which the named ones are kept."""
         log, pictures, room = rollout_kernel.RolloutLog(), Images(), self._buffer.open(part, kept)
-        pictures.gray = wp.from_torch(room["pixels"].flatten(1))
+        gray: Any = wp.from_torch(room["pixels"].flatten(1))
+        pictures.gray = gray
         self._logits = room["logits"]
         log.pictures, log.logits = pictures, wp.from_torch(self._logits)
         log.actions, log.rewards = wp.from_torch(room["action"]), wp.from_torch(room["reward"])

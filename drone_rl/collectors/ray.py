@@ -1,7 +1,3 @@
-# pyright: reportArgumentType=false
-# pyright: reportIncompatibleMethodOverride=false
-# pyright: reportReturnType=false
-# (Ray is untyped; torch.cat takes TensorDicts, which its annotation lacks.)
 """Collectors on a Ray cluster, whose workers may die.
 
 TorchRL's `RayCollector` makes the workers, places them on the cluster and ends them. Two of its
@@ -60,7 +56,7 @@ class RemoteEpisodes(BaseCollector):
         leaves = batch.items(include_nested=True, leaves_only=True)
         return {key: value.numpy() for key, value in leaves}, self.state_dict()
 
-    def state_dict(self) -> dict:
+    def state_dict(self) -> dict:  # pyright: ignore[reportIncompatibleMethodOverride]
         """State between two batches."""
         return {"episodes": self._episodes.state_dict(), "actions": self._actions.get_state()}
 
@@ -150,8 +146,8 @@ class RayEpisodeCollector:
         answers = [self._answer(i, tasks[i], shared) for i in numbers]
         self._states = [state for _, state in answers]
         batches = [_to_tensordict(arrays) for arrays, _ in answers]
-        batch = torch.cat(batches).to(self._device)
-        return batch if self.postproc is None else self.postproc(batch)
+        batch = torch.cat(batches).to(self._device)  # pyright: ignore[reportArgumentType]
+        return batch if self.postproc is None else self.postproc(batch)  # pyright: ignore[reportArgumentType]
 
     def state_dict(self) -> dict:
         """The workers' states, as they stand between two batches."""
@@ -219,7 +215,7 @@ def _start(
         warnings.simplefilter("ignore", UserWarning)  # it misses a policy that it need not send
         pool = RayCollector(
             list(makers),
-            collector_class=RemoteEpisodes,
+            collector_class=RemoteEpisodes,  # pyright: ignore[reportArgumentType]
             frames_per_batch=len(makers),
             sync=True,
             weight_sync_schemes={},

@@ -75,8 +75,8 @@ class DirectRenderer:
         base: Any = env.base_env if type(env) is TransformedEnv else env
         if type(base) is not DroneEnv:
             return Reasons([f"environment {type(base).__name__} is no DroneEnv"])
-        one: Any = env.transform if isinstance(env, TransformedEnv) else Compose()
-        transforms: list[Any] = list(one) if isinstance(one, Compose) else [one]
+        one: Any = env.transform if isinstance(env, TransformedEnv) else ()
+        transforms: list[Any] = list(one) if isinstance(one, (Compose, tuple)) else [one]
         observed = tuple(observed)
         readable = {"pixels", "done", *(("info", name) for name in base.worlds.entries)}
         known = {("next", name) for name in FLAGS}

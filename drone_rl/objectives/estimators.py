@@ -27,10 +27,9 @@ class _Discounted(ReturnEstimator):
         """
         super().__init__(**kwargs)
         own: Any = self.Settings
-        gamma = own.gamma if gamma is None else gamma
-        if not 0.0 <= gamma <= 1.0:
+        self.gamma: float = own.gamma if gamma is None else gamma
+        if not 0.0 <= self.gamma <= 1.0:
             raise InputError(f"gamma={gamma} is out of range; give a rate from 0 to 1")
-        self.gamma = gamma
 
 
 @implements(settings.TotalReward)

@@ -1,7 +1,3 @@
-# pyright: reportArgumentType=false
-# pyright: reportIncompatibleMethodOverride=false
-# pyright: reportIncompatibleVariableOverride=false
-# (TorchRL's loss modules are annotated otherwise than they are documented.)
 """REINFORCE as a TorchRL loss module, without a critic."""
 
 import dataclasses
@@ -38,7 +34,7 @@ class ReinforceLoss(LossModule):
     """
 
     @dataclasses.dataclass
-    class _AcceptedKeys:
+    class _AcceptedKeys:  # pyright: ignore[reportIncompatibleVariableOverride]
         """Names of the entries that the loss reads, changed by `set_keys`."""
 
         action: NestedKey = "action"
@@ -46,7 +42,7 @@ class ReinforceLoss(LossModule):
         return_to_go: NestedKey = "return_to_go"
         """What a return estimator wrote. Shape: (*batch, 1)."""
 
-    tensor_keys: _AcceptedKeys
+    tensor_keys: _AcceptedKeys  # pyright: ignore[reportIncompatibleMethodOverride]
     default_keys = _AcceptedKeys
     out_keys = ("loss_actor", "loss_entropy", "entropy")  # pyright: ignore
     entropy_coeff: torch.Tensor
@@ -87,13 +83,13 @@ class ReinforceLoss(LossModule):
         return [keys.action, keys.return_to_go, *self.actor_network.in_keys]
 
     @in_keys.setter
-    def in_keys(self, values: list[NestedKey]) -> None:
+    def in_keys(self, values: list[NestedKey]) -> None:  # pyright: ignore[reportIncompatibleMethodOverride]
         raise RuntimeError("in_keys follows from set_keys(...) and the actor; change those")
 
     def _forward_value_estimator_keys(self, **kwargs: NestedKey) -> None:
         """There is no value estimator to tell."""
 
-    @dispatch
+    @dispatch  # pyright: ignore[reportArgumentType]
     def forward(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Computes the loss of a batch.
 

@@ -140,7 +140,7 @@ class _Unpickler(pickle._Unpickler):
     def load(self) -> Any:
         """Runs the instructions."""
         used = _Watched(self.dispatch)
-        self.dispatch = used
+        self.dispatch = used  # pyright: ignore[reportAttributeAccessIssue] (of this load only)
         return super().load()
 
     def find_class(self, module: str, name: str) -> Any:
@@ -170,7 +170,7 @@ class _Unpickler(pickle._Unpickler):
 
     def _ignore_state(self) -> None:
         """What modules note beside their parameters (versions of layers) is not needed."""
-        self.stack.pop()
+        self.stack.pop()  # pyright: ignore[reportAttributeAccessIssue] (not in typeshed)
 
     dispatch[_INSTRUCTIONS["BUILD"]] = _ignore_state
 

@@ -1,7 +1,3 @@
-# pyright: reportArgumentType=false
-# pyright: reportCallIssue=false
-# pyright: reportFunctionMemberAccess=false
-# (Hydra's configuration is untyped; the job is a function with an attribute.)
 """Hydra plug-ins of `drone-rl train -m`: launchers and a sweeper; each run is its own process.
 
 Hydra's default launcher runs all jobs in one process, and its joblib launcher is unmaintained.
@@ -84,7 +80,7 @@ class SweepLauncher(Launcher):
             self._leave_as_it_was()
             raise
         if failed:
-            self.task_function.statuses.append(1)  # what `drone-rl` exits with
+            self.task_function.statuses.append(1)  # pyright: ignore[reportFunctionMemberAccess]
         return [_job_return(run) for run in runs]
 
     def _leave_as_it_was(self) -> None:
@@ -276,8 +272,10 @@ class OptunaSweeper(Sweeper):
         self, *, hydra_context: HydraContext, task_function: TaskFunction, config: DictConfig
     ) -> None:
         """Takes what Hydra hands over."""
-        self.hydra_context, self.config = hydra_context, config
-        self.launcher = Plugins.instance().instantiate_launcher(
+        # set once, before use, though Hydra declares them optional
+        self.hydra_context = hydra_context  # pyright: ignore[reportIncompatibleVariableOverride]
+        self.config = config  # pyright: ignore[reportIncompatibleVariableOverride]
+        self.launcher = Plugins.instance().instantiate_launcher(  # pyright: ignore[reportIncompatibleVariableOverride]
             hydra_context=hydra_context, task_function=task_function, config=config
         )
 

@@ -1,5 +1,3 @@
-# pyright: reportArgumentType=false
-# (Warp's annotations say less than it takes.)
 """Simple flight (Table 1): a drone with four rotors, flown by SimpleFlight's controller."""
 
 import functools
