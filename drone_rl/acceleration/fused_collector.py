@@ -165,7 +165,7 @@ class FusedCollector:
         envs, rows = envs[order], rows[order]
         logged = self._buffer.read(rows, names)
         if self._cache is not None and is_observed:
-            logged[ACTIVATIONS] = self._cache.add(rows, self._network.weights)
+            logged[ACTIVATIONS] = self._cache.add(rows, self._network.weights, logged["pixels"])
         return envs, logged
 
     def _open_log(self, part: int, kept: tuple[str, ...]) -> Any:

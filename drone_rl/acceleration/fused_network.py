@@ -35,8 +35,9 @@ class ActivationCache:
     """Activations of all layers, kept by a fused collector for the learner's forward pass.
 
     A handle names the activations of one observation: an entry of the batch carries it from the
-    collector to the network. Handles are valid until the collector's next batch. Whoever changes
-    the observations of a batch must remove the entry.
+    collector to the network. Handles are valid until the collector's next batch. Some pixels of
+    each observation are compared, so that changed observations are computed again; code that
+    changes a few pixels only must remove the entry.
     """
 
     def __init__(self, num_rows: int, num_outputs: int) -> None:
@@ -51,35 +52,53 @@ class ActivationCache:
         self.generation = 0
         """Counts the calls of `clear`."""
         self._weights = torch.empty(0)
+        self._samples: Tensor | None = None
 
     def clear(self) -> None:
         """Invalidate all handles, before the activations are overwritten."""
         self.generation += 1
 
-    def add(self, rows: Tensor, weights: Tensor) -> Tensor:
+    def add(self, rows: Tensor, weights: Tensor, observations: Tensor) -> Tensor:
         """Return handles of activations: -1 for each if there was not room for all.
 
         Args:
             rows: Of `outputs`. Shape: (k,), int64.
             weights: Packed weights that the activations were computed with.
+            observations: What the activations are of. Shape: (k, *).
         """
         self._weights = weights
         if int(rows.max()) >= len(self.outputs):
             return torch.full_like(rows, -1)
+        sampled = _sample_pixels(observations)
+        if self._samples is None:
+            self._samples = sampled.new_empty(len(self.outputs), sampled.shape[1])
+        self._samples[rows] = sampled
         return rows + self.generation * len(self.outputs)
 
-    def find(self, handles: Tensor, weights: Tensor) -> Tensor | None:
+    def find(self, handles: Tensor, weights: Tensor, observations: Tensor) -> Tensor | None:
         """Return the rows of activations, or None unless all are there for these weights.
+
+        None, too, if the observations have changed.
 
         Args:
             handles: As returned by `add`. Shape: (k,).
             weights: Packed weights.
+            observations: Those of the batch now. Shape: (k, *).
         """
         rows = handles - self.generation * len(self.outputs)
         is_valid = (rows >= 0) & (rows < len(self.outputs))
         if not (bool(is_valid.all()) and torch.equal(weights, self._weights)):
             return None
+        known = self._samples
+        if known is None or not torch.equal(known[rows], _sample_pixels(observations)):
+            return None
         return rows.int()
+
+
+def _sample_pixels(observations: Tensor) -> Tensor:
+    """Return about 16 pixels of each observation, spread evenly. Shape: (k, up to 31)."""
+    flat = observations.flatten(1)
+    return flat[:, :: max(1, flat.shape[1] // 16)]
 
 
 class FusedNetwork(PictureNetwork):
@@ -236,7 +255,7 @@ class _Work:
         if not self._is_fixed:
             self._order.pack(self._weights, self._back)
         if self._cache is not None and handles is not None:
-            rows = self._cache.find(handles, self._weights)
+            rows = self._cache.find(handles, self._weights, pixels)
             if rows is not None:
                 outputs = self._cache.outputs.view(-1)
                 return _Activations(outputs, rows, self._cache.generation)

@@ -17,7 +17,7 @@ from drone_rl.sweeps.runs import Run, read_failure, read_result
 from drone_rl.utils.consistency import read_entry
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.limits import SWEEP_RESULTS_BYTES, Allowance
-from drone_rl.utils.readers import TablesAllowance, read_table
+from drone_rl.utils.readers import NAMES_OF_0_1, TablesAllowance, read_table
 from drone_rl.utils.schema import Real, Whole
 
 Array = NDArray[np.float64]
@@ -241,7 +241,7 @@ _COLUMNS = {
 def _metrics_columns(path: Path, allowance: TablesAllowance) -> Array:
     """Return the `_COLUMNS` of each update. Shape: (num_updates, 4)."""
     rows = read_table(path, allowance)
-    header = next(rows, [])
+    header = [NAMES_OF_0_1.get(name, name) for name in next(rows, [])]
     needed = [header.index(name) if name in header else None for name in _COLUMNS]
     width = 1 + max((place for place in needed if place is not None), default=-1)
     kept = [row if len(row) >= width else row + [""] * (width - len(row)) for row in rows]

@@ -8,6 +8,7 @@ from typing import Any
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import parse_json, read_bytes, read_json
 from drone_rl.utils.limits import RESULT_BYTES
+from drone_rl.utils.readers import with_present_names
 from drone_rl.utils.schema import Text, as_mapping
 
 THREADS = {"OMP_NUM_THREADS": "1", "OMP_WAIT_POLICY": "PASSIVE"}
@@ -55,11 +56,11 @@ def read_result(folder: Path) -> dict[str, Any] | None:
     """Return `result.json` of a finished run, or None for an unfinished one."""
     try:
         content = read_bytes(folder / "result.json", RESULT_BYTES)
-        result = dict(as_mapping(parse_json(content, "result", allow_nan=True), "result"))
+        result = as_mapping(parse_json(content, "result", allow_nan=True), "result")
         reason = Text(100).read(result.get("reason"), "reason")
     except InputError:
         return None
-    return None if reason.startswith("SIG") else result
+    return None if reason.startswith("SIG") else with_present_names(result)
 
 
 def read_failure(run: Run) -> str | None:

@@ -18,7 +18,7 @@ from drone_rl.utils.checkpoint import save_checkpoint
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import remove_leftovers, write_atomically
 from drone_rl.utils.progress import Progress as Report
-from drone_rl.utils.readers import read_table
+from drone_rl.utils.readers import NAMES_OF_0_1, read_table
 from drone_rl.utils.schema import shown
 
 
@@ -155,7 +155,8 @@ class CsvCallback(Callback):
             return
         rows = [*read_table(self.path)] if self.path.stat().st_size else []
         whole = [r for r in rows[1:] if len(r) == len(rows[0])]  # the last may be cut short
-        kept = rows[:1] + [r for r in whole if self._update_of(r) <= training.progress.updates]
+        header = [[NAMES_OF_0_1.get(name, name) for name in row] for row in rows[:1]]
+        kept = header + [r for r in whole if self._update_of(r) <= training.progress.updates]
         text = io.StringIO(newline="")
         csv.writer(text).writerows(kept)
         write_atomically(self.path, text.getvalue())

@@ -10,6 +10,7 @@ from drone_rl.collectors.speedups import accelerated_gradients
 from drone_rl.config.learning import Episodes, Ray
 from drone_rl.config.training import TrainSettings
 from drone_rl.policies import PolicyNetwork, make_actor
+from drone_rl.sim.rendering.devices import check_device
 from drone_rl.sim.tasks import FailureReplayTask
 from drone_rl.training.learners import Learner
 
@@ -74,6 +75,7 @@ def make_collector(settings: TrainSettings, replay: FailureReplayTask | None = N
     Raises:
         InputError: There is no such device, or an extra isn't installed.
     """
+    check_device(settings.device)
     return settings.collector.make(settings, replay)
 
 

@@ -2,7 +2,7 @@
 
 import csv
 import io
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +28,18 @@ _DAMAGE = (
     *(LookupError, TypeError, AttributeError),
 )
 """What PyYAML raises for damaged content; not all of it is a `YAMLError`."""
+NAMES_OF_0_1 = {
+    "running_cubes": "running_reward",
+    "train/running_cubes": "train/running_reward",
+    "train/cubes": "train/reward",
+    "num_cubes": "largest_reward",
+}
+"""Names of figures in results, metrics and checkpoints of version 0.1, and the present names."""
+
+
+def with_present_names(figures: Mapping[str, Any]) -> dict[str, Any]:
+    """Return figures under their present names, whichever version wrote them."""
+    return {NAMES_OF_0_1.get(name, name): value for name, value in figures.items()}
 
 
 def read_yaml(path: Path, most: int = YAML_BYTES) -> Any:

@@ -190,7 +190,7 @@ def test_cached_activations_equal_computed_ones(max_steps, is_greedy, monkeypatc
         kind = DETERMINISTIC if is_greedy else ExplorationType.RANDOM
         with set_exploration_type(kind):
             batch = collector.collect()
-        assert cache.find(batch["activations"], weights) is not None
+        assert cache.find(batch["activations"], weights, batch["pixels"]) is not None
         half = batch[len(batch) // 2 :]
         for part in (batch, half):
             found = learned(network, reusing, part, part["activations"])
@@ -198,6 +198,8 @@ def test_cached_activations_equal_computed_ones(max_steps, is_greedy, monkeypatc
             assert all(torch.equal(*pair) for pair in zip(found, expected, strict=True))
             assert torch.equal(found[0], part["logits"])
             reusing(torch.zeros_like(batch["pixels"]))  # computed in memory of its own
+        darker = batch["pixels"] * 0.5
+        assert torch.equal(reusing(darker, batch["activations"]), plain(darker))
         with torch.no_grad():
             network.layers.fc1.weight.add_(0.1)  # other weights than the cached activations'
         logits = plain(batch["pixels"])
@@ -230,7 +232,8 @@ def test_activations_are_cached_if_they_fit(parts, fits, monkeypatch):
     assert 4 < batch["collector", "traj_ids"].bincount().max() <= 12
     assert (cache is None) is (parts == 0)
     if cache is not None:
-        rows = cache.find(batch["activations"], collector.source._network.weights)
+        weights = collector.source._network.weights
+        rows = cache.find(batch["activations"], weights, batch["pixels"])
         assert (rows is not None) is fits
         network = cached(collector)
         assert torch.equal(network(batch["pixels"], batch["activations"]), batch["logits"])

@@ -103,36 +103,51 @@ def test_reasons_against_networks_that_the_kernel_does_not_support():
 WEIGHTS = torch.tensor([1.0, -2.0])
 
 
+def seen(rows=(6, 0, 1, 7)):
+    """Observations of these rows, each with values of its own."""
+    return torch.arange(8.0)[list(rows), None].expand(-1, 40) + torch.arange(40.0) / 64
+
+
 def filled(rows=(6, 0, 1, 7)):
     cache = ActivationCache(8, 3)
     cache.clear()
-    return cache, cache.add(torch.tensor(rows), WEIGHTS)
+    return cache, cache.add(torch.tensor(rows), WEIGHTS, seen(rows))
 
 
 def test_handles_find_the_rows_of_activations():
     cache, handles = filled()
     assert cache.outputs.shape == (8, 3)
-    assert cache.find(handles, WEIGHTS.clone()).tolist() == [6, 0, 1, 7]
-    assert cache.find(handles[1:3], WEIGHTS).tolist() == [0, 1]
-    assert cache.find(handles, WEIGHTS).dtype == torch.int32
+    assert cache.find(handles, WEIGHTS.clone(), seen()).tolist() == [6, 0, 1, 7]
+    assert cache.find(handles[1:3], WEIGHTS, seen()[1:3]).tolist() == [0, 1]
+    assert cache.find(handles, WEIGHTS, seen()).dtype == torch.int32
+
+
+def test_handles_are_not_valid_for_changed_observations():
+    cache, handles = filled()
+    assert cache.find(handles, WEIGHTS, seen() + 2.0**-10) is None
+    assert cache.find(handles, WEIGHTS, seen().flip(0)) is None
+    assert cache.find(handles, WEIGHTS, seen().roll(1, 1)) is None
 
 
 def test_handles_are_not_valid_for_other_weights():
     cache, handles = filled()
-    assert cache.find(handles, torch.tensor([1.0, -2.0000002])) is None
+    assert cache.find(handles, torch.tensor([1.0, -2.0000002]), seen()) is None
 
 
 def test_handles_are_valid_until_the_cache_is_cleared():
     cache, handles = filled()
     cache.clear()
-    assert cache.find(handles, WEIGHTS) is None
-    other = cache.add(torch.tensor([6, 0]), WEIGHTS)
-    assert cache.find(other, WEIGHTS).tolist() == [6, 0]
-    assert cache.find(torch.cat([other, handles]), WEIGHTS) is None
-    assert ActivationCache(8, 3).find(handles, WEIGHTS) is None
+    assert cache.find(handles, WEIGHTS, seen()) is None
+    other = cache.add(torch.tensor([6, 0]), WEIGHTS, seen((6, 0)))
+    assert cache.find(other, WEIGHTS, seen((6, 0))).tolist() == [6, 0]
+    assert (
+        cache.find(torch.cat([other, handles]), WEIGHTS, torch.cat([seen((6, 0)), seen()])) is None
+    )
+    assert ActivationCache(8, 3).find(handles, WEIGHTS, seen()) is None
 
 
 def test_no_handle_is_valid_if_the_activations_do_not_all_fit():
     for last, fits in ((7, True), (8, False)):
-        cache, handles = filled((0, last))
-        assert (cache.find(handles, WEIGHTS) is not None) is fits
+        cache, handles = filled((0, min(last, 7)))
+        handles = cache.add(torch.tensor((0, last)), WEIGHTS, seen((0, 7)))
+        assert (cache.find(handles, WEIGHTS, seen((0, 7))) is not None) is fits

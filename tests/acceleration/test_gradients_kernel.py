@@ -74,9 +74,9 @@ def test_gradients_from_known_outputs_in_any_order_are_torchs(first, last):
     known.clear()
     known.outputs.fill_(3.0)  # wrong wherever another row is read
     known.outputs[rows] = outputs[:70]
-    handles = known.add(rows, work._weights.clone())[first:last]
+    handles = known.add(rows, work._weights.clone(), pictures)[first:last]
     some = pictures[first:last]
-    assert known.find(handles, work._weights) is not None
+    assert known.find(handles, work._weights, some) is not None
     logits, expected = taught(network, network, some, weights)
     found, gradients = taught(network, lambda x: learning(x, handles), some, weights)
     torch.testing.assert_close(found, logits)

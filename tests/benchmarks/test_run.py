@@ -22,7 +22,7 @@ def bench(tmp_path):
                     raise broken("out of order")
                 return {f"{name}_s": len(ran)}
 
-            return Benchmark(measure, "tests", ("bench/run",))
+            return Benchmark(measure, "tests", ("benchmarks/run",))
 
         given = {"folder": tmp_path, "quick": False, "device": "cpu", "num_envs": 2, "seeds": (0,)}
         setup = Setup(**given | {"episodes": 1, "memory_frames": 1} | changes)

@@ -168,7 +168,7 @@ def test_a_refused_sweep_changes_nothing(in_process, tmp_path, noted):
         (tmp_path / "s" / "multirun.yaml").write_text(noted)
     before = contents(tmp_path / "s")
     line = error_line(in_process("train", "-m", "seed=0,1", "hydra.sweep.dir=s"))
-    assert "holds runs of something else" in line
+    assert "holds other runs" in line
     assert contents(tmp_path / "s") == before
 
 
@@ -234,7 +234,7 @@ def test_full_disk_while_saving_keeps_the_previous_checkpoint(run, tmp_path):
     """A file-size limit stands in for a full disk: writing a checkpoint fails half-way."""
     code = (
         "import resource, sys, signal; signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
-        "from drone_rl.training import checkpoint as c\n"
+        "from drone_rl.utils import checkpoint as c\n"
         "save = c.save_checkpoint; n = [0]\n"
         "from drone_rl.training import callbacks\n"
         "def limited(path, state):\n"

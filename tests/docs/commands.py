@@ -7,8 +7,14 @@ import shlex
 from hydra import compose, initialize_config_dir
 from hydra.core.global_hydra import GlobalHydra
 
-from drone_rl.cli.hydra.composition import conf_dir, read_settings, register_schemas
+from drone_rl.cli.hydra.composition import (
+    conf_dir,
+    import_plugins,
+    read_settings,
+    register_schemas,
+)
 from drone_rl.cli.main import COMMANDS
+from drone_rl.utils.errors import InputError
 
 COMMAND = re.compile(r"^(?:[A-Z]+=\S+ )?drone-rl ([a-z-]+)(.*)$", re.MULTILINE)
 _SWEPT = re.compile(r"=(?:range\((\d+)\)|([^\[\]{},]+),.*)$")
@@ -32,6 +38,11 @@ def check_command(name, words):
     file = name.replace("-", "_")
     no_logger = ["logger=csv"] if name == "train" else []  # whose folder only a run knows
     told = [*no_logger, *getattr(module, "prepare", list)(told)]
+    if any(word.startswith("plugins=") for word in told):
+        try:
+            import_plugins(told)
+        except InputError:
+            return  # of a tutorial, whose own test has the module
     register_schemas(**{file: module.Command})
     getattr(module, "register", lambda: None)()
     GlobalHydra.instance().clear()

@@ -208,7 +208,7 @@ def test_a_look_stays_for_an_episode_and_is_gone_on_with():
 def test_a_texture_that_is_none_is_refused_before_anything_is_drawn(tmp_path):
     path = tmp_path / "ground.png"
     path.write_text("no picture")
-    with pytest.raises(InputError, match=r"ground\.png.* no picture"):
+    with pytest.raises(InputError, match=r"ground\.png.* can't be read as an image"):
         DroneEnv(1, SHORT, appearance=AppearanceSettings(ground_texture=str(path)))
 
 

@@ -194,7 +194,7 @@ def test_of_a_mere_callable_all_is_explained_that_can_be(network, tmp_path):
     assert numbers["provenance"]["trained"] is None
     page = done.report.read_text()
     assert "What is left out, and why" in page
-    assert "None could be tested" in page
+    assert "No method could be tested" in page
     assert "Grad-CAM; occlusion is shown" in page
 
 

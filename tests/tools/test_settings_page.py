@@ -96,7 +96,7 @@ def test_every_setting_has_a_meaning_and_seconds_are_seconds(cls):
 def test_variants_are_listed_below_their_parts():
     text = list_parts()
     network = text.partition("### network")[2].partition("### ")[0]
-    assert "**`small_cnn`** For small pictures" in network
+    assert "**`small_cnn`** Network for small images" in network
     assert make_table(SmallCnn, "network.") in network
     assert make_table(Crop, "transforms.crop.") in text  # of which there may be several
 

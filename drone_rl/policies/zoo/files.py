@@ -14,6 +14,7 @@ from drone_rl.utils.checkpoint import check_weights, load_checkpoint
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.files import parse_json, read_bytes
 from drone_rl.utils.overrides import COMMAND
+from drone_rl.utils.readers import with_present_names
 from drone_rl.utils.schema import Kind, Maybe, Plain, Real, Record, Text, Whole, as_mapping, shown
 
 MOST_HEADER = 2**20
@@ -22,7 +23,6 @@ _ENTRY = {"dtype", "shape", "data_offsets"}
 """What a file of safetensors states of each tensor."""
 _FOLDER = Path(__file__).resolve().parent
 _COUNT = Whole(0, 2**62)
-_NAMES_OF_0_1 = {"running_cubes": "running_reward"}
 _PROGRESS = Record(
     {
         "frames": _COUNT,
@@ -203,6 +203,4 @@ def _inner(metadata: Mapping[str, Any], key: str) -> Any:
 
 
 def _progress_of(progress: Any) -> dict[str, Any]:
-    """The progress of a file; version 0.1 wrote "running_cubes" for "running_reward"."""
-    given = as_mapping(progress, "progress")
-    return {_NAMES_OF_0_1.get(name, name): value for name, value in given.items()}
+    return with_present_names(as_mapping(progress, "progress"))
