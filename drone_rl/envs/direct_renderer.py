@@ -105,8 +105,12 @@ class DirectRenderer:
             entries["pixels"] = self._pixels(state, rows)
         if "done" in self._observed:
             entries["done"] = torch.zeros(size, 1, dtype=torch.bool, device=device)
-        if any(isinstance(key, tuple) for key in self._observed):
-            entries["info"] = TensorDict(self.worlds.info(state), [size], device=device)
+        names = [key[1] for key in self._observed if isinstance(key, tuple)]
+        if names:
+            info = self.worlds.info(state)
+            entries["info"] = TensorDict(
+                {name: info[name] for name in names}, [size], device=device
+            )
         return TensorDict(entries, [size], device=device)
 
     def _pixels(self, state: State, rows: Tensor | None) -> Tensor:

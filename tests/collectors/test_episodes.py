@@ -256,7 +256,7 @@ def test_episodes_of_one_step():
 def test_steps_are_masked_once_an_episode_has_ended(seeing):
     masked, step = [], seeing.env._step
     seeing.env._step = lambda state: masked.append("_step" in state) or step(state)
-    batch = seeing.collect()
+    batch = EpisodeCollector(seeing.env, seeing.actor, acceleration="none").collect()
     lengths = batch["collector", "traj_ids"].bincount()
     assert len(masked) == int(lengths.max())  # nothing is stepped after the last episode
     assert masked.index(True) == int(lengths.min())
