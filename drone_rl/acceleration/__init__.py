@@ -1,7 +1,7 @@
 """Faster implementations of collecting, learning and inference. The package is optional.
 
-Everything else works without it, only slower, and imports it in `drone_rl.collectors.speedups`
-alone, by the functions below. What they do not support they answer with the reasons.
+Without it everything works, only slower. `drone_rl.collectors.speedups` is the one module that
+imports it. Each function below returns an implementation, or the reasons why there is none.
 """
 
 from drone_rl.acceleration.direct_collector import DirectCollector, DirectStream
