@@ -4,6 +4,7 @@ This is the only module that imports that package. Whatever it does not support 
 and torch.
 """
 
+import importlib
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -29,6 +30,16 @@ kernel for whole episodes, which samples and sums in another order."""
 MISSING = Reasons(["drone_rl.acceleration is not installed"])
 
 
+def _package() -> Any:
+    """Return `drone_rl.acceleration`, or None if it is missing; errors within it are raised."""
+    try:
+        return importlib.import_module("drone_rl.acceleration")
+    except ModuleNotFoundError as error:
+        if error.name != "drone_rl.acceleration":
+            raise
+        return None
+
+
 def accelerated_collector(
     env: EnvBase, actor: TensorDictModuleBase, acceleration: Acceleration, **settings: Any
 ) -> "FusedCollector | DirectCollector | Reasons":
@@ -42,22 +53,20 @@ def accelerated_collector(
     """
     if acceleration == "none":
         return Reasons(["collector.compiled is false"])
-    try:
-        from drone_rl.acceleration import accelerate
-    except ImportError:
+    package = _package()
+    if package is None:
         return MISSING
-    return accelerate(env, actor, fused=acceleration == "fused", **settings)
+    return package.accelerate(env, actor, fused=acceleration == "fused", **settings)
 
 
 def accelerated_stream(
     env: EnvBase, observed: Iterable[NestedKey], kept: Iterable[NestedKey]
 ) -> "DirectStream | Reasons":
     """Return what steps environments on and on without TorchRL, or the reasons why not."""
-    try:
-        from drone_rl.acceleration import accelerate_stream
-    except ImportError:
+    package = _package()
+    if package is None:
         return MISSING
-    return accelerate_stream(env, observed, kept)
+    return package.accelerate_stream(env, observed, kept)
 
 
 def accelerated_gradients(
@@ -75,20 +84,18 @@ def accelerated_gradients(
         of: What has gradients. Gradients of pixels take the weights as they are now.
         cache: Makes the collector keep its activations, see `EpisodeSource.cache_activations`.
     """
-    try:
-        from drone_rl.acceleration import accelerate_gradients
-    except ImportError:
+    package = _package()
+    if package is None:
         return network
-    found = accelerate_gradients(network, num_threads, of=of, cache=cache)
+    found = package.accelerate_gradients(network, num_threads, of=of, cache=cache)
     return network if isinstance(found, Reasons) else found
 
 
 def accelerated_inference(network: nn.Module) -> Callable[[Tensor], Tensor]:
     """Return a function from pixels to logits without gradients, safe to call from any thread."""
     plain = torch.no_grad()(network.forward)
-    try:
-        from drone_rl.acceleration import accelerate_inference
-    except ImportError:
+    package = _package()
+    if package is None:
         return plain
-    found = accelerate_inference(network)
+    found = package.accelerate_inference(network)
     return plain if isinstance(found, Reasons) else found

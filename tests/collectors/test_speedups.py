@@ -54,3 +54,10 @@ def test_networks_stay_as_they_are_if_they_are_not_supported():
     pixels = torch.randn(2, 1, 25, 64)
     logits = speedups.accelerated_inference(network)(pixels)
     assert torch.equal(logits, network(pixels)) and not logits.requires_grad
+
+
+def test_an_error_within_the_package_is_no_missing_package(monkeypatch):
+    monkeypatch.delitem(sys.modules, "drone_rl.acceleration", raising=False)
+    monkeypatch.setitem(sys.modules, "drone_rl.acceleration.selection", None)
+    with pytest.raises(ModuleNotFoundError, match="selection"):
+        speedups.accelerated_inference(torch.nn.Identity())
