@@ -105,7 +105,7 @@ class DirectRenderer:
             entries["pixels"] = self._pixels(state, rows)
         if "done" in self._observed:
             entries["done"] = torch.zeros(size, 1, dtype=torch.bool, device=device)
-        names = [key[1] for key in self._observed if isinstance(key, tuple)]
+        names = [str(key[1]) for key in self._observed if isinstance(key, tuple)]
         if names:
             info = self.worlds.info(state)
             entries["info"] = TensorDict(
