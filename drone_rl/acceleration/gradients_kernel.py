@@ -1,11 +1,3 @@
-# ruff: noqa: UP018
-# pyright: reportIndexIssue=false
-# pyright: reportAttributeAccessIssue=false
-# pyright: reportGeneralTypeIssues=false
-# pyright: reportArgumentType=false
-# pyright: reportCallIssue=false
-# pyright: reportOperatorIssue=false
-# (Warp compiles this file; Python's types say nothing about it.)
 """From the gradient of a small network's logits to that of its weights, or frames, on a CPU.
 
 A block of frames at a time goes back through all layers, on one core, so that what is read again

@@ -1,10 +1,3 @@
-# pyright: reportIndexIssue=false
-# pyright: reportGeneralTypeIssues=false
-# pyright: reportArgumentType=false
-# pyright: reportCallIssue=false
-# pyright: reportOperatorIssue=false
-# pyright: reportAttributeAccessIssue=false
-# (Warp compiles the kernel; Python's types say nothing about it.)
 """Forward pass of a small network on one core, in half of torch's time."""
 
 import sys

@@ -1,8 +1,3 @@
-# pyright: reportIndexIssue=false
-# pyright: reportArgumentType=false
-# pyright: reportCallIssue=false
-# pyright: reportOperatorIssue=false
-# (Warp compiles this file; Python's types say nothing about it.)
 """The way back through a layer on one core of a CPU: to its weights, and to its inputs.
 
 Tiles of the first are as in `layers_kernel`; its product, with the weights the other way round, is

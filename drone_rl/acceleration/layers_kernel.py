@@ -1,9 +1,3 @@
-# pyright: reportIndexIssue=false
-# pyright: reportGeneralTypeIssues=false
-# pyright: reportArgumentType=false
-# pyright: reportCallIssue=false
-# pyright: reportOperatorIssue=false
-# (Warp compiles this file; Python's types say nothing about it.)
 """The layers of a small network on one core of a CPU, for kernels that ask it within a loop.
 
 Libraries gain their speed on large batches. A kernel that flies a drone has a frame at a time, or

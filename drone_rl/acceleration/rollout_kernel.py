@@ -1,13 +1,3 @@
-# ruff: noqa: RUF046, UP018
-# pyright: reportIndexIssue=false, reportInvalidTypeForm=false
-# pyright: reportAssignmentType=false
-# pyright: reportGeneralTypeIssues=false
-# pyright: reportArgumentType=false
-# pyright: reportCallIssue=false
-# pyright: reportOperatorIssue=false
-# pyright: reportAttributeAccessIssue=false
-# (Warp compiles this file; Python's types say nothing about it, and what a loop changes is
-# declared by its type.)
 """Whole episodes in one kernel on a CPU: rendering, forward pass, action, step and rules.
 
 The kernel is built for the rules of a task, which `Task.fused_rules` gives. A few environments take

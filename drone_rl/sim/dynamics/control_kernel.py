@@ -1,7 +1,3 @@
-# pyright: reportIndexIssue=false, reportGeneralTypeIssues=false, reportOperatorIssue=false
-# pyright: reportAttributeAccessIssue=false, reportReturnType=false, reportArgumentType=false
-# pyright: reportCallIssue=false, reportAssignmentType=false
-# (Warp compiles this file: its types are not those of Python.)
 """SimpleFlight's controllers in a cascade: position, velocity, attitude, rates, rotors.
 
 Each is a function of what is wanted, what is and the gains, and knows nothing of the others. What

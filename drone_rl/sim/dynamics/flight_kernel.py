@@ -1,7 +1,3 @@
-# pyright: reportIndexIssue=false, reportGeneralTypeIssues=false, reportOperatorIssue=false
-# pyright: reportAttributeAccessIssue=false, reportReturnType=false, reportArgumentType=false
-# pyright: reportCallIssue=false, reportAssignmentType=false
-# (Warp compiles this file: its types are not those of Python.)
 """All ticks of a command for one drone after the other.
 
 On a CPU a launch goes through its drones in turn, on a GPU each has a thread. Numbers are of single

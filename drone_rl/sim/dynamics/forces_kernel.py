@@ -1,7 +1,3 @@
-# pyright: reportIndexIssue=false, reportGeneralTypeIssues=false, reportOperatorIssue=false
-# pyright: reportAttributeAccessIssue=false, reportReturnType=false, reportArgumentType=false
-# pyright: reportCallIssue=false, reportAssignmentType=false
-# (Warp compiles this file: its types are not those of Python.)
 """What controllers, rotors and air do to drones in one tick, for whoever integrates it himself."""
 
 import torch

@@ -1,7 +1,3 @@
-# pyright: reportIndexIssue=false, reportGeneralTypeIssues=false, reportOperatorIssue=false
-# pyright: reportAttributeAccessIssue=false, reportReturnType=false, reportArgumentType=false
-# pyright: reportCallIssue=false, reportAssignmentType=false
-# (Warp compiles this file: its types are not those of Python.)
 """The chapter's moves flown by a quadrotor, for kernels that fly whole episodes.
 
 The same numbers, bit for bit, as `Quadrotor.step` gives.

@@ -1,7 +1,3 @@
-# pyright: reportIndexIssue=false, reportGeneralTypeIssues=false, reportOperatorIssue=false
-# pyright: reportAttributeAccessIssue=false, reportReturnType=false, reportArgumentType=false
-# pyright: reportCallIssue=false, reportAssignmentType=false
-# (Warp compiles this file: its types are not those of Python.)
 """A rigid body with rotors in moving air: forces, gusts, contacts, and a tick of motion.
 
 World frame: x forward, y left, z up; body frame the same where the drone is level and looks

@@ -1,8 +1,3 @@
-# ruff: noqa: RUF046, UP018
-# pyright: reportIndexIssue=false, reportGeneralTypeIssues=false, reportOperatorIssue=false
-# pyright: reportAttributeAccessIssue=false, reportReturnType=false, reportArgumentType=false
-# pyright: reportCallIssue=false, reportAssignmentType=false
-# (Warp compiles this file: its types are not those of Python.)
 """The rules of cube collection, as Warp functions.
 
 `judge` is the only statement of the rules. The batched step calls it from a kernel over

@@ -1,7 +1,3 @@
-# ruff: noqa: RUF046, UP018
-# pyright: reportArgumentType=false, reportAssignmentType=false, reportAttributeAccessIssue=false
-# pyright: reportCallIssue=false, reportGeneralTypeIssues=false, reportIndexIssue=false
-# pyright: reportOperatorIssue=false, reportReturnType=false
 """The ray tracer on a CPU with effects: sky gradient, fog, shadows and textures.
 
 `plain_kernel.find_visible` finds the visible surfaces; then solids cast shadows, each within the

@@ -1,7 +1,3 @@
-# ruff: noqa: RUF046, UP018
-# pyright: reportArgumentType=false, reportAssignmentType=false, reportAttributeAccessIssue=false
-# pyright: reportCallIssue=false, reportGeneralTypeIssues=false, reportIndexIssue=false
-# pyright: reportOperatorIssue=false, reportReturnType=false
 """The ray tracer on a GPU: one thread per pixel, with the same functions as on a CPU."""
 
 import warp as wp

@@ -1,7 +1,3 @@
-# ruff: noqa: RUF046, UP018
-# pyright: reportArgumentType=false, reportAttributeAccessIssue=false, reportCallIssue=false
-# pyright: reportGeneralTypeIssues=false, reportIndexIssue=false, reportOperatorIssue=false
-# pyright: reportReturnType=false
 """Ray casting: intersections of rays with solids and planes, each in its own frame.
 
 All solids are convex and closed, so a ray from outside enters each at most once. Rays that start

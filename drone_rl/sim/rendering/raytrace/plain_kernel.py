@@ -1,7 +1,3 @@
-# ruff: noqa: RUF046, UP018
-# pyright: reportArgumentType=false, reportAttributeAccessIssue=false, reportCallIssue=false
-# pyright: reportGeneralTypeIssues=false, reportIndexIssue=false, reportOperatorIssue=false
-# pyright: reportReturnType=false
 """The ray tracer on a CPU, for flat colours and light: one image at a time, geom by geom.
 
 `find_visible` takes the geoms in order and casts rays at each, in the geom's own frame, within the

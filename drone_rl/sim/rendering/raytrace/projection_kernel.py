@@ -1,7 +1,3 @@
-# ruff: noqa: RUF046, UP018
-# pyright: reportArgumentType=false, reportAttributeAccessIssue=false, reportCallIssue=false
-# pyright: reportGeneralTypeIssues=false, reportIndexIssue=false, reportOperatorIssue=false
-# pyright: reportReturnType=false
 """Projection: poses of cameras and geoms, and the pixels that can show a geom."""
 
 import warp as wp

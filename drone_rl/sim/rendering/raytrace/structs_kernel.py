@@ -1,5 +1,3 @@
-# pyright: reportGeneralTypeIssues=false, reportReturnType=false
-# (Warp compiles this file, which means more by it than Python's types.)
 """Structs that the ray tracer's kernels share: cameras, geoms, poses, materials, images, scratch.
 
 A batch of images has one row per image: all cameras of the first environment, of the second, ...
