@@ -1,6 +1,5 @@
 """`drone-rl bench`."""
 
-import dataclasses
 import importlib
 import json
 import logging
@@ -15,7 +14,6 @@ from drone_rl.utils.errors import InputError
 _log = logging.getLogger(__name__)
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Command(CommandSettings, BenchSettings):
     """Settings of `drone-rl bench`."""
 

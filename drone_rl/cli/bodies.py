@@ -1,6 +1,5 @@
 """`drone-rl bodies`."""
 
-import dataclasses
 import logging
 from pathlib import Path
 
@@ -11,7 +10,6 @@ from drone_rl.config.commands import BodiesSettings
 _log = logging.getLogger(__name__)
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Command(CommandSettings, BodiesSettings):
     """Settings of `drone-rl bodies`."""
 

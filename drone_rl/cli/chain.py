@@ -1,6 +1,5 @@
 """`drone-rl chain`."""
 
-import dataclasses
 import logging
 from pathlib import Path
 from typing import Annotated
@@ -14,7 +13,6 @@ from drone_rl.utils.schema import Real, Several
 _log = logging.getLogger(__name__)
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Command(PolicyCommandSettings, ChanceSettings):
     """Settings of `drone-rl chain`."""
 

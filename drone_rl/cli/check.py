@@ -1,6 +1,5 @@
 """`drone-rl check`."""
 
-import dataclasses
 import logging
 from pathlib import Path
 
@@ -13,7 +12,6 @@ from drone_rl.config.verification import CheckSettings
 _log = logging.getLogger(__name__)
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Command(CommandSettings, CheckSettings):
     """Settings of `drone-rl check`."""
 

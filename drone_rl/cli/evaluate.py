@@ -1,6 +1,5 @@
 """`drone-rl evaluate`."""
 
-import dataclasses
 import json
 import logging
 from pathlib import Path
@@ -15,7 +14,6 @@ from drone_rl.utils.schema import Whole
 _log = logging.getLogger(__name__)
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Command(RolloutCommandSettings, EvaluateSettings):
     """Settings of `drone-rl evaluate`."""
 

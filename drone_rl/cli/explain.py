@@ -1,6 +1,5 @@
 """`drone-rl explain`."""
 
-import dataclasses
 import logging
 from pathlib import Path
 from typing import Annotated, Any
@@ -16,7 +15,6 @@ from drone_rl.utils.schema import Listed, OneOf, Whole
 _log = logging.getLogger(__name__)
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Command(CommandSettings, ExplainSettings):
     """Settings of `drone-rl explain`."""
 

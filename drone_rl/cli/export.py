@@ -1,6 +1,5 @@
 """`drone-rl export`."""
 
-import dataclasses
 import logging
 from pathlib import Path
 from typing import Annotated
@@ -17,7 +16,6 @@ from drone_rl.utils.text import seed_line
 _log = logging.getLogger(__name__)
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Command(CommandSettings, FlightSettings):
     """Settings of `drone-rl export`."""
 

@@ -1,6 +1,5 @@
 """`drone-rl places`."""
 
-import dataclasses
 import logging
 from pathlib import Path
 
@@ -12,7 +11,6 @@ from drone_rl.config.verification import PlacesSettings
 _log = logging.getLogger(__name__)
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Command(PolicyCommandSettings, PlacesSettings):
     """Settings of `drone-rl places`."""
 

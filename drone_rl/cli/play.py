@@ -1,6 +1,5 @@
 """`drone-rl play`."""
 
-import dataclasses
 from pathlib import Path
 from typing import Annotated
 
@@ -11,7 +10,6 @@ from drone_rl.config import AppearanceSettings, RendererName
 from drone_rl.utils.schema import Whole
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Command(RolloutCommandSettings):
     """Settings of `drone-rl play`."""
 

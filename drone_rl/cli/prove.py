@@ -1,6 +1,5 @@
 """`drone-rl prove`."""
 
-import dataclasses
 import logging
 from pathlib import Path
 
@@ -15,7 +14,6 @@ NOT_PROVED = 15
 _log = logging.getLogger(__name__)
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Command(PolicyCommandSettings, ProveSettings):
     """Settings of `drone-rl prove`."""
 

@@ -1,6 +1,5 @@
 """`drone-rl report`."""
 
-import dataclasses
 import logging
 from pathlib import Path
 from typing import Annotated, Any
@@ -11,7 +10,6 @@ from drone_rl.utils.schema import Listed
 _log = logging.getLogger(__name__)
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Command(CommandSettings):
     """Settings of `drone-rl report`."""
 

@@ -1,13 +1,10 @@
 """Settings that several commands share."""
 
-import dataclasses
-
 from drone_rl.config.commands import PathsSettings
 from drone_rl.config.configuration import DynamicsChanges, TaskChanges, no_changes
 from drone_rl.utils.settings import Settings
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class CommandSettings(Settings):
     """Settings of every command."""
 
@@ -15,7 +12,6 @@ class CommandSettings(Settings):
     """Folders."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class PolicyCommandSettings(CommandSettings):
     """Settings of a command on one policy and its task."""
 
@@ -25,7 +21,6 @@ class PolicyCommandSettings(CommandSettings):
     """Changes of the policy's task."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class RolloutCommandSettings(PolicyCommandSettings):
     """Settings of a command that rolls out one policy."""
 

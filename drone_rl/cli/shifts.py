@@ -1,6 +1,5 @@
 """`drone-rl shifts`."""
 
-import dataclasses
 import logging
 from pathlib import Path
 
@@ -12,7 +11,6 @@ from drone_rl.config.commands import ShiftSettings
 _log = logging.getLogger(__name__)
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Command(RolloutCommandSettings, ShiftSettings):
     """Settings of `drone-rl shifts`."""
 

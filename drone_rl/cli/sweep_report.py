@@ -1,6 +1,5 @@
 """`drone-rl sweep-report`."""
 
-import dataclasses
 import logging
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,7 +11,6 @@ from drone_rl.utils.schema import Whole
 _log = logging.getLogger(__name__)
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Command(CommandSettings):
     """Settings of `drone-rl sweep-report`."""
 

@@ -1,6 +1,5 @@
 """`drone-rl train`: one run, or a sweep, whose own process imports no heavy libraries."""
 
-import dataclasses
 import functools
 import logging
 import signal
@@ -31,7 +30,6 @@ prepare = resuming.complete
 """Preprocessing of the command line, see `drone_rl.cli.hydra.composition`."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Command(CommandSettings, TrainSettings):
     """Settings of `drone-rl train`."""
 

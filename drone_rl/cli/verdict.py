@@ -1,6 +1,5 @@
 """`drone-rl verdict`."""
 
-import dataclasses
 import logging
 from pathlib import Path
 from typing import Annotated
@@ -14,7 +13,6 @@ from drone_rl.utils.schema import OneOf
 _log = logging.getLogger(__name__)
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Command(RolloutCommandSettings, JudgeSettings):
     """Settings of `drone-rl verdict`."""
 

@@ -1,6 +1,5 @@
 """Settings of appearance; each value is fixed, or a range that is sampled at every reset."""
 
-import dataclasses
 from typing import Annotated, Any
 
 from drone_rl.config.camera import FRONT, CameraSettings
@@ -29,7 +28,6 @@ _Place = Span(Several(Real(-10.0, 10.0, unit="m"), 3, 3))
 _Turn = Span(Several(Real(-90.0, 90.0, unit="degrees"), 3, 3))
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class AppearanceSettings(Settings):
     """Sun, sky, fog, colours, textures, distractors, and the mounting of the policy's camera.
 

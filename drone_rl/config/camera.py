@@ -1,6 +1,5 @@
 """Settings of the policy's camera and the names of renderers."""
 
-import dataclasses
 import math
 from typing import Annotated
 
@@ -11,7 +10,6 @@ FRONT = (0.4, 0.0, 0.0)
 """Where it sits on the drone. Metres, drone frame: x forward, y left, z up."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class CameraSettings(Settings):
     """The picture that the policy's camera takes."""
 
@@ -36,7 +34,6 @@ RendererName = Annotated[str, OneOf(RENDERERS)]
 """A setting that chooses one."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Rendered(Settings):
     """Settings of a command that renders images."""
 
@@ -44,7 +41,6 @@ class Rendered(Settings):
     """Renderer: raytrace, this package's ray tracer, or mujoco_warp, MuJoCo Warp's."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class OnDevice(Rendered):
     """Settings of a command that renders images and evaluates policies."""
 

@@ -1,6 +1,5 @@
 """Settings of commands: evaluation, verdict, robustness, dynamics sweep, benchmarks, Gymnasium."""
 
-import dataclasses
 from typing import Annotated, Any
 
 from drone_rl.config import ActionSettings, CameraSettings, DynamicsSettings
@@ -10,7 +9,6 @@ from drone_rl.utils.schema import Listed, Maybe, OneOf, Real, Several, Whole
 from drone_rl.utils.settings import Settings
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class FlightSettings(OnDevice):
     """Settings of held-out episodes."""
 
@@ -28,7 +26,6 @@ class FlightSettings(OnDevice):
         return min(self.num_envs, self.episodes)
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class EvaluateSettings(FlightSettings):
     """Settings of an evaluation."""
 
@@ -36,7 +33,6 @@ class EvaluateSettings(FlightSettings):
     """Evaluate the random and constant baselines and the oracle, too."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class JudgeSettings(FlightSettings):
     """Settings of a verdict."""
 
@@ -67,7 +63,6 @@ BODIES = (
 """Dynamics in which policies are tested, in this order."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class BodiesSettings(JudgeSettings):
     """Settings of a dynamics sweep: policies and dynamics."""
 
@@ -98,7 +93,6 @@ class BodiesSettings(JudgeSettings):
 MODES = ("constant", "drifting", "onset")
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class ShiftSettings(OnDevice):
     """Settings of robustness tests."""
 
@@ -133,7 +127,6 @@ class ShiftSettings(OnDevice):
             )
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class GymnasiumSettings(OnDevice):
     """Options of `gymnasium.make`; no command has them, so that no file of conf/ does."""
 
@@ -149,7 +142,6 @@ class GymnasiumSettings(OnDevice):
     """Return value of `render`: none, or rgb_array for images of the drone from behind."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class BenchSettings(Settings):
     """Settings of the benchmarks."""
 
@@ -171,7 +163,6 @@ class BenchSettings(Settings):
     """Folder of results.json and the plots."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class PathsSettings(Settings):
     """Folders."""
 

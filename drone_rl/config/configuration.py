@@ -34,7 +34,6 @@ ENTRY_POINTS = "drone_rl.policies"
 S = TypeVar("S", bound=Settings)
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Variant(Settings):
     """Settings of one variant of a part of a training.
 
@@ -261,7 +260,6 @@ def _without_none(hint: Any) -> Any:
 def _unregistered(part: type[Variant], target: str, given: Mapping[str, Any]) -> Variant:
     """A variant of which only the fields of its part are checked."""
 
-    @dataclasses.dataclass(frozen=True, kw_only=True)
     class Unregistered(part):
         is_known: ClassVar[bool] = False
 

@@ -4,7 +4,6 @@ The defaults are the original study's; the sizes of the cube and the drone, whic
 chosen so that a uniformly random policy collects about as much as it did there (0.84 cubes).
 """
 
-import dataclasses
 import math
 from typing import Annotated, ClassVar
 
@@ -14,7 +13,6 @@ from drone_rl.utils.schema import Whole
 
 
 @add_task
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class TaskSettings(BaseTaskSettings):
     """The cubes, the drone's moves and the boundaries. Lengths in metres, world frame.
 

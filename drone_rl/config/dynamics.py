@@ -3,7 +3,6 @@
 A drone is data: another drone is another file of these values.
 """
 
-import dataclasses
 import math
 from typing import Annotated
 
@@ -24,7 +23,6 @@ Gain = Annotated[float, Real(0.0, 1000.0)]
 Gains = Annotated[Triple, Several(Real(0.0, 1000.0), 3, 3)]
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class DynamicsSettings(Settings):
     """A drone with four rotors, SimpleFlight's controller that flies it, and the air around it.
 
@@ -146,7 +144,6 @@ ACTION_KINDS = ("moves", "velocity")
 Speed = Annotated[float, Real(0.0, 50.0, is_above=True, unit="m/s")]
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class ActionSettings(Settings):
     """Settings of the actions, one at each control step."""
 

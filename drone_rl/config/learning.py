@@ -1,6 +1,5 @@
 """Settings of what learns: returns, loss, optimizer, scheduler and collector."""
 
-import dataclasses
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any, ClassVar
 
@@ -10,7 +9,6 @@ from drone_rl.utils.schema import OneOf, Real, Whole
 Rate = Annotated[float, Real(0.0, 1.0)]
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Returns(Variant):
     """Settings of a return estimator."""
 
@@ -18,41 +16,35 @@ class Returns(Variant):
     """Whether to divide a batch's returns by their root mean square."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class _Discounted(Returns):
     gamma: Rate = 0.99
     """Discount rate, 0 to 1."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class TotalReward(Returns):
     """The whole episode's reward at every step (Eq. 12)."""
 
     target: ClassVar[str] = "total_reward"
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class LinearRamp(Returns):
     """The episode's reward times a ramp over the episode (variant 1)."""
 
     target: ClassVar[str] = "linear_ramp"
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class RewardToGo(_Discounted):
     """Discounted return (Eq. 14; the original's variant 2)."""
 
     target: ClassVar[str] = "reward_to_go"
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Standardised(_Discounted):
     """Discounted return, standardised over each episode (Algorithm 4; variant 0)."""
 
     target: ClassVar[str] = "standardised"
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class SuccessScaled(_Discounted):
     """Discounted return scaled by exp(reward - max_reward) (variant 3)."""
 
@@ -61,7 +53,6 @@ class SuccessScaled(_Discounted):
     """Reward of a perfect episode: the task's cubes."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class TimeBaseline(_Discounted):
     """Discounted return minus a running mean for each time step (variant 4)."""
 
@@ -74,7 +65,6 @@ class TimeBaseline(_Discounted):
     """Time steps that have a mean of their own: the task's limit."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class LeaveOneOut(_Discounted):
     """Discounted return minus the other episodes' mean at the same time step."""
 
@@ -85,14 +75,12 @@ class LeaveOneOut(_Discounted):
     """Discount rate, 0 to 1."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class BatchNormalised(_Discounted):
     """Discounted return, normalised over the batch."""
 
     target: ClassVar[str] = "batch_normalised"
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Gae(_Discounted):
     """Generalised advantage estimates, for objectives with a critic."""
 
@@ -105,7 +93,6 @@ class Gae(_Discounted):
     """GAE's lambda, 0 to 1; 0 looks one step ahead."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Collector(Variant):
     """Settings of a collector."""
 
@@ -120,7 +107,6 @@ class Collector(Variant):
         return {}
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Episodes(Collector):
     """Batches of complete episodes."""
 
@@ -129,14 +115,12 @@ class Episodes(Collector):
     faster on a CPU. It samples actions in another order: results for a seed depend on it."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Threads(Episodes):
     """Batches of complete episodes from threads of this process."""
 
     target: ClassVar[str] = "threads"
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Ray(Episodes):
     """Batches of complete episodes from workers on a Ray cluster."""
 
@@ -152,7 +136,6 @@ class Ray(Episodes):
     """Workers that may be lost, and replaced, before training stops."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Rollouts(Collector):
     """Batches of a fixed number of steps of each environment, from threads.
 
@@ -169,12 +152,10 @@ LearningRate = Annotated[float, Real(0.0, 1e30, is_above=True)]
 above that torch fails with an error of its own. Which rates make sense is for training to find."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Optimiser(Variant):
     """Settings of an optimizer."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Adam(Optimiser):
     """Adam."""
 
@@ -183,7 +164,6 @@ class Adam(Optimiser):
     """Learning rate."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Sgd(Optimiser):
     """Plain stochastic gradient ascent (Eq. 13)."""
 
@@ -192,12 +172,10 @@ class Sgd(Optimiser):
     """Learning rate; the original study's."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Scheduler(Variant):
     """Settings of a learning-rate schedule."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Constant(Scheduler):
     """Constant learning rate."""
 
@@ -208,7 +186,6 @@ class Constant(Scheduler):
     """Updates for which the factor holds."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class StepDecay(Scheduler):
     """The original study's schedule: 0.99 times the rate every 5 updates."""
 
@@ -222,7 +199,6 @@ class StepDecay(Scheduler):
 Weight = Annotated[float, Real(0.0)]
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Objective(Variant):
     """Settings of a loss and its learner."""
 
@@ -232,7 +208,6 @@ class Objective(Variant):
     """Other parts that the objective requires, and selects unless they are given."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Reinforce(Objective):
     """REINFORCE without a critic."""
 
@@ -243,7 +218,6 @@ class Reinforce(Objective):
     """Reduction over a batch's steps: mean, or sum as in Algorithm 4."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class WithCritic(Objective):
     """Objective with a critic."""
 
@@ -269,7 +243,6 @@ class WithCritic(Objective):
         return {"functional": False, **values}
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class A2c(WithCritic):
     """Advantage actor-critic: one step of the optimiser from each batch."""
 
@@ -278,7 +251,6 @@ class A2c(WithCritic):
     """Steps of each environment in a batch."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Ppo(WithCritic):
     """Proximal policy optimisation with clipped ratios: several passes over each batch."""
 

@@ -1,6 +1,5 @@
 """Settings of a policy's network."""
 
-import dataclasses
 from typing import Annotated, ClassVar
 
 from drone_rl.config.configuration import Variant
@@ -10,12 +9,10 @@ Channels = Annotated[tuple[int, ...], Several(Whole(1, 512, "channels"), 1, 8)]
 Widths = Annotated[tuple[int, ...], Several(Whole(1, 4096, "neurons"), 0, 8)]
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Network(Variant):
     """Settings of a network."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class SmallCnn(Network):
     """Network for small images: a tenth of the original's cost."""
 
@@ -28,7 +25,6 @@ class SmallCnn(Network):
     """Widths of the linear layers before the logits."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class OriginalCnn(Network):
     """The original study's network."""
 
@@ -39,7 +35,6 @@ class OriginalCnn(Network):
     """Widths of the linear layers before the logits."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Mlp(Network):
     """Linear layers on the flattened image."""
 

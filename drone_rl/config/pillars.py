@@ -1,6 +1,5 @@
 """Settings of the field of pillars."""
 
-import dataclasses
 import math
 import random
 from collections.abc import Iterator
@@ -15,7 +14,6 @@ _TRIED, _LEAST_OPEN = 400, 20
 
 
 @add_task
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class PillarsSettings(BaseTaskSettings):
     """Rows of pillars, the line beyond them, and the drone's moves. Metres, world frame.
 

@@ -12,14 +12,13 @@ Built-in parts have settings classes in this package, and `implements` connects 
 classes and functions in higher layers.
 """
 
-import dataclasses
 import inspect
 import math
 import re
 import types
 import typing
 from collections.abc import Callable, Set
-from typing import Annotated, Any, ClassVar, TypeVar
+from typing import Annotated, Any, TypeVar
 
 from drone_rl.config.configuration import Variant
 from drone_rl.config.learning import Collector, Objective, Returns
@@ -173,22 +172,17 @@ def _register(
     fields = _fields(name, factory, positional, skipped)
     inherited = part.__dataclass_fields__.keys() if part is Returns else set()
     names = {*(field for field, _, _ in fields), *inherited}
-    settings = dataclasses.make_dataclass(
-        name.title().replace("_", ""),
-        [(n, h, dataclasses.field(default=d)) for n, h, d in fields],
-        bases=(part,),
-        frozen=True,
-        kw_only=True,
-        namespace={
-            **(own or {}),
-            "__doc__": (inspect.getdoc(factory) or name).split("\n")[0],
-            "__module__": factory.__module__,
-            "target": name,
-            "factory": staticmethod(factory),
-            "arguments": lambda self: {n: v for n, v in self.values().items() if n in names},
-        },
-    )
-    settings.__annotations__["target"] = ClassVar[str]
+    namespace = {
+        **{field: default for field, _, default in fields},
+        **(own or {}),
+        "__annotations__": {field: hint for field, hint, _ in fields},
+        "__doc__": (inspect.getdoc(factory) or name).split("\n")[0],
+        "__module__": factory.__module__,
+        "target": name,
+        "factory": staticmethod(factory),
+        "arguments": lambda self: {n: v for n, v in self.values().items() if n in names},
+    }
+    settings = type(name.title().replace("_", ""), (part,), namespace)
     vars_of: Any = factory
     vars_of.Settings = settings
     return factory

@@ -4,7 +4,6 @@ The defaults are AirSim's where it has one. Each sensor has a factor on all of i
 perfect one.
 """
 
-import dataclasses
 from typing import Annotated
 
 from drone_rl.utils.schema import OneOf, Real
@@ -18,7 +17,6 @@ Share = Annotated[float, Real(0.0, 1000.0)]
 Metres = Annotated[float, Real(0.0, 10_000.0, unit="m")]
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class ImuSettings(Settings):
     """Accelerometer and gyroscope; the defaults are an MPU-6000's."""
 
@@ -44,7 +42,6 @@ class ImuSettings(Settings):
     """Standard deviation of its bias at the start, in thousandths of standard gravity."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class BarometerSettings(Settings):
     """Pressure of the standard atmosphere."""
 
@@ -64,7 +61,6 @@ class BarometerSettings(Settings):
     """In which that change forgets itself, in seconds."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class MagnetometerSettings(Settings):
     """Earth's field along the body's axes."""
 
@@ -84,7 +80,6 @@ class MagnetometerSettings(Settings):
     """The greatest constant error along each axis, drawn at the start, in gauss."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class GpsSettings(Settings):
     """A receiver that finds its satellites after a while and tells where it was."""
 
@@ -114,7 +109,6 @@ class GpsSettings(Settings):
     """The same of the velocity along each axis, in metres a second."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class SensorSettings(Settings):
     """All sensors of a drone but its cameras."""
 

@@ -1,6 +1,5 @@
 """What the settings of every task have in common, and the tasks by name."""
 
-import dataclasses
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, NamedTuple, TypeVar
 
@@ -32,7 +31,6 @@ class Things(NamedTuple):
     """z at which the drone starts."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class BaseTaskSettings(Settings):
     """Base class of a task's settings."""
 

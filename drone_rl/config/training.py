@@ -1,6 +1,5 @@
 """Settings of a training."""
 
-import dataclasses
 import re
 from typing import Annotated, Any, ClassVar, Self
 
@@ -38,7 +37,6 @@ from drone_rl.utils.settings import Settings
 MOST_TRANSFORMS = 16
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class TrainerSettings(Settings):
     """Settings of the length of a training."""
 
@@ -68,7 +66,6 @@ class TrainerSettings(Settings):
     """Seconds between two checkpoints."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class TrainSettings(Settings):
     """Settings of a training."""
 
@@ -148,7 +145,6 @@ _NEEDS = re.compile(r"([a-z][\w.-]*) (?:could not be imported|is not installed|i
 """What TorchRL's loggers say of a package that they miss."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Logger(Variant):
     """Settings of a TorchRL logger."""
 
@@ -170,7 +166,6 @@ class Logger(Variant):
             ) from error
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Tensorboard(Logger):
     """TensorBoard event files."""
 

@@ -1,6 +1,5 @@
 """Settings of transforms, from the camera's frame to the network's input."""
 
-import dataclasses
 from typing import Annotated, Any, ClassVar, NamedTuple
 
 from drone_rl.config.configuration import Variant
@@ -18,7 +17,6 @@ class Frame(NamedTuple):
     """Whether the values are float32, as networks need them."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Transform(Variant):
     """Settings of a transform."""
 
@@ -46,7 +44,6 @@ class Transform(Variant):
         return frame
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Gray(Transform):
     """RGB bytes to gray from 0 to 1."""
 
@@ -57,7 +54,6 @@ class Gray(Transform):
         return self._of_bytes(frame, 1)
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Rgb(Transform):
     """RGB bytes to colours from 0 to 1."""
 
@@ -68,7 +64,6 @@ class Rgb(Transform):
         return self._of_bytes(frame, 3)
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Chromaticity(Transform):
     """Fractions of red and blue in each pixel, minus a third: 0 for every gray level."""
 
@@ -83,7 +78,6 @@ class Chromaticity(Transform):
         return Frame((2, *frame.shape[1:]), True)
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Standardize(Transform):
     """Shifted and scaled: (x - mean) / std."""
 
@@ -98,7 +92,6 @@ class Standardize(Transform):
         return Frame(frame.shape, True)
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Crop(Transform):
     """The rows that are kept, from top (included) to bottom (excluded)."""
 
@@ -119,7 +112,6 @@ class Crop(Transform):
         return Frame((*frame.shape[:-2], self.bottom - self.top, frame.shape[-1]), frame.is_float)
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Resize(Transform):
     """Averaging over areas."""
 
@@ -134,7 +126,6 @@ class Resize(Transform):
         return Frame((self._of_floats(frame).shape[0], self.height, self.width), True)
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Stack(Transform):
     """The newest frames as channels, oldest first."""
 
@@ -151,21 +142,18 @@ class Stack(Transform):
         return Frame((frame.shape[0] * self.N, *frame.shape[1:]), frame.is_float)
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class EpisodeReward(Transform):
     """Sum of the episode's rewards so far, as "episode_reward"."""
 
     target: ClassVar[str] = "torchrl.envs.RewardSum"
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class StepCount(Transform):
     """Steps of the episode so far, as "step_count"."""
 
     target: ClassVar[str] = "torchrl.envs.StepCounter"
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Blur(Transform):
     """Gaussian blur."""
 
@@ -178,7 +166,6 @@ class Blur(Transform):
         return self._of_floats(frame)
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Fault(Transform):
     """Camera fault that is random or has memory."""
 
@@ -187,7 +174,6 @@ class Fault(Transform):
         return self._of_floats(frame)
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Noise(Fault):
     """Sensor noise, clipped at black and white."""
 
@@ -198,7 +184,6 @@ class Noise(Fault):
     """Time after which the correlation of a pixel's noise has fallen to 1/e; white noise at 0."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class DeadRows(Fault):
     """Dead rows of the sensor."""
 
@@ -238,7 +223,6 @@ class DeadRows(Fault):
             )
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class FrozenFrames(Fault):
     """Frames that repeat the previous one at random."""
 
@@ -247,7 +231,6 @@ class FrozenFrames(Fault):
     """Probability of each frame to repeat."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class LateFrames(Fault):
     """Delayed frames; until the first arrives, the episode's first frame."""
 
@@ -256,7 +239,6 @@ class LateFrames(Fault):
     """Delay."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Shift(Fault):
     """Image shifted by a constant of each episode, as by a misaligned camera."""
 

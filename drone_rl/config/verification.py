@@ -1,6 +1,5 @@
 """Settings of verification: proof, certificate check, success probabilities, decision map."""
 
-import dataclasses
 from typing import Annotated
 
 from drone_rl.config.camera import OnDevice, Rendered
@@ -9,7 +8,6 @@ from drone_rl.utils.schema import Real, Whole
 from drone_rl.utils.settings import Settings
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class CheckSettings(OnDevice):
     """Settings of a certificate check."""
 
@@ -20,7 +18,6 @@ class CheckSettings(OnDevice):
     printed and recorded."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class ChanceSettings(OnDevice):
     """Settings of exact success probabilities under sampled actions."""
 
@@ -35,7 +32,6 @@ class ChanceSettings(OnDevice):
     """Cells of such a box: more cells give tighter bounds and take longer."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class ProveSettings(Rendered):
     """Settings of a proof."""
 
@@ -53,7 +49,6 @@ class ProveSettings(Rendered):
     """Cached combinations of images; proofs of more cubes are split into parts."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class PlacesSettings(Rendered):
     """Settings of the decision map over the positions of one cube."""
 
@@ -78,7 +73,6 @@ class PlacesSettings(Rendered):
             )
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class ProvableSettings(Settings):
     """Settings of training until a proof succeeds."""
 

@@ -1,6 +1,5 @@
 """Settings of an explanation."""
 
-import dataclasses
 from typing import Annotated
 
 from drone_rl.config import RendererName
@@ -12,7 +11,6 @@ MIN_EPISODES = 30
 """Intervals from fewer episodes are too wide to be useful."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class ExplainSettings(Settings):
     """Settings of an explanation.
 

@@ -19,9 +19,10 @@ from drone_rl.utils.schema import Flag, Instance, Kind, Maybe, Record, Text, as_
 S = TypeVar("S", bound="Settings")
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@typing.dataclass_transform(kw_only_default=True, frozen_default=True)
+@dataclasses.dataclass(frozen=True)
 class Settings:
-    """Values that are checked before anything is built.
+    """Values that are checked before anything is built; each subclass is a frozen dataclass.
 
     A field is annotated with its type and its kind, as in `Annotated[int, Whole(1, 100)]`; of true
     or false, texts and other settings the type alone is enough.
@@ -30,6 +31,11 @@ class Settings:
         InputError: A value is of another type or out of bounds, or the values don't go together.
             The message begins with the field's name.
     """
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        """Make the subclass a frozen dataclass with keyword arguments."""
+        super().__init_subclass__(**kwargs)
+        dataclasses.dataclass(frozen=True, kw_only=True)(cls)
 
     def __post_init__(self) -> None:
         """Reads every value by its kind."""

@@ -54,7 +54,6 @@ _Seconds = Annotated[float, Real(0.0, 1e12)]
 _Share = Annotated[float, Real(0.0, 1.0)]
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Round(Settings):
     """The result of a search for failures, which are trained on next."""
 

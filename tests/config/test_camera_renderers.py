@@ -1,5 +1,3 @@
-import dataclasses
-
 import pytest
 
 from drone_rl.config.camera import RENDERERS, RendererName
@@ -7,7 +5,6 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.settings import Settings
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Some(Settings):
     renderer: RendererName = "raytrace"
 

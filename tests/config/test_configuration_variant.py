@@ -1,6 +1,5 @@
 """A part that comes in variants."""
 
-import dataclasses
 import datetime
 from typing import Annotated, ClassVar
 
@@ -13,7 +12,6 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Whole
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Day(Variant):
     target: ClassVar[str] = "datetime.timedelta"
     days: Annotated[int, Whole(0)] = 2

@@ -1,6 +1,5 @@
 """The files of conf/ that hold defaults are generated from the settings."""
 
-import dataclasses
 from typing import Annotated
 
 import yaml
@@ -14,7 +13,6 @@ def test_the_generated_files_are_current(capsys):
     assert main(["--check"]) == 0, f"run python -m tools.conf: {capsys.readouterr().out}"
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Some(Settings):
     rate: Annotated[float, Real(0.0)] = 1e-5
     """Learning rate; none for the default."""

@@ -1,6 +1,5 @@
 """The page of settings says of each what its class says."""
 
-import dataclasses
 import importlib
 from typing import Annotated, ClassVar
 
@@ -24,7 +23,6 @@ from tools.readme.settings import (
 )
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Sea(Settings):
     """Water.
 
@@ -44,7 +42,6 @@ class Sea(Settings):
     """Whether."""
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Pond(Sea):
     """Less water."""
 

@@ -1,6 +1,5 @@
 """Settings are checked wherever they come from, and a message begins with their name."""
 
-import dataclasses
 from typing import Annotated
 
 import pytest
@@ -10,12 +9,10 @@ from drone_rl.utils.schema import Real, Several, Whole
 from drone_rl.utils.settings import Settings, below, kinds_of, plain, snake_case, types_of
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Inner(Settings):
     x: Annotated[int, Whole(0, 9)] = 1
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Outer(Settings):
     count: Annotated[int, Whole(1, 3)] = 2
     size: Annotated[float, Real(0.0, 1.0)] | None = None
@@ -29,7 +26,6 @@ class Outer(Settings):
             raise InputError("size=None needs a value; give one")
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class More(Outer):
     extra: str = "z"
 

@@ -1,6 +1,5 @@
 """A command's settings, its exit status, and what becomes of a mistake in one of many runs."""
 
-import dataclasses
 import types
 
 import pytest
@@ -20,7 +19,6 @@ from drone_rl.utils.errors import InputError
 from drone_rl.utils.settings import Settings
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Command(Settings):
     name: str = "x"
 

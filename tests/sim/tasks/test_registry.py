@@ -1,4 +1,3 @@
-import dataclasses
 from typing import ClassVar
 
 import pytest
@@ -10,7 +9,6 @@ from drone_rl.utils.errors import InputError
 from tests.second_task import Posts
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class PostsSettings(BaseTaskSettings):
     name: ClassVar[str] = "posts"
     tall: bool = True
