@@ -139,8 +139,8 @@ class _Worlds:
             </body></worldbody></mujoco>""")
         self._worlds = [mujoco.MjData(self._model) for _ in range(len(body))]
         for data, row in zip(self._worlds, body.numbers.numpy(), strict=True):
-            data.qpos[:] = row[fs.POSITION.first : fs.ATTITUDE.last]
-            data.qvel[:] = row[fs.VELOCITY.first : fs.RATES.last]
+            data.qpos[:] = row[fs.POSITION : fs.VELOCITY]
+            data.qvel[:] = row[fs.VELOCITY : fs.ROTORS]
 
     def fly(self, quadrotor: Quadrotor, body: FlightState, goals: Goals, ticks: int) -> FlightState:
         """Applies the forces of every tick, and lets MuJoCo do the rest."""
@@ -150,8 +150,8 @@ class _Worlds:
             for data, row, push in zip(self._worlds, rows, given, strict=True):
                 data.xfrc_applied[1] = push
                 mujoco.mj_step(self._model, data)
-                row[fs.POSITION.first : fs.ATTITUDE.last] = data.qpos
-                row[fs.VELOCITY.first : fs.RATES.last] = data.qvel
+                row[fs.POSITION : fs.VELOCITY] = data.qpos
+                row[fs.VELOCITY : fs.ROTORS] = data.qvel
         return body
 
 

@@ -19,7 +19,7 @@ from drone_rl.config import DynamicsSettings
 from drone_rl.config.dynamics import GRAVITY
 from drone_rl.sim.dynamics import BodyState, FlightState, Goals, Quadrotor
 from drone_rl.sim.dynamics import state as fs
-from drone_rl.sim.dynamics.forces_kernel import forces, told
+from drone_rl.sim.dynamics.forces_kernel import forces
 from drone_rl.sim.dynamics.state import heading_only
 from drone_rl.sim.entities import DRONE_CAMERAS, Drone
 
@@ -116,12 +116,8 @@ class MujocoFlight:
     def found(self, physics: mjcf.Physics) -> FlightState:
         """The drone where MuJoCo has it; one moved by hand is told to stay there."""
         now = self._state.numbers.clone()
-        now[0, fs.POSITION.first : fs.ATTITUDE.last] = torch.from_numpy(
-            physics.data.qpos[self._pose]
-        )
-        now[0, fs.VELOCITY.first : fs.RATES.last] = torch.from_numpy(
-            physics.data.qvel[self._motion]
-        )
+        now[0, fs.POSITION : fs.VELOCITY] = torch.from_numpy(physics.data.qpos[self._pose])
+        now[0, fs.VELOCITY : fs.ROTORS] = torch.from_numpy(physics.data.qvel[self._motion])
         state = FlightState(now)
         is_moved = not np.array_equal(physics.data.qpos[self._pose], self._left)
         return state.settled() if is_moved else state
@@ -161,8 +157,9 @@ class MujocoFlight:
     def finished(self, physics: mjcf.Physics) -> FlightState:
         """The drone at the end of a command."""
         assert self._goals is not None
-        body = self.found(physics)
-        self._state = told(body, self._goals, self._tick * self._settings.tick)
+        self._state = body = self.found(physics)
+        seconds = self._tick * self._settings.tick
+        body.reference[:] = self._goals.reference_after(seconds, body)
         self.level_cameras(physics)
         return self._state
 
@@ -182,8 +179,8 @@ class MujocoFlight:
 
     def _put(self, physics: mjcf.Physics) -> None:
         numbers = self._state.numbers[0].numpy()
-        physics.data.qpos[self._pose] = numbers[fs.POSITION.first : fs.ATTITUDE.last]
-        physics.data.qvel[self._motion] = numbers[fs.VELOCITY.first : fs.RATES.last]
+        physics.data.qpos[self._pose] = numbers[fs.POSITION : fs.VELOCITY]
+        physics.data.qvel[self._motion] = numbers[fs.VELOCITY : fs.ROTORS]
         physics.data.xfrc_applied[self._body] = 0.0
         self._left = physics.data.qpos[self._pose].copy()
 
@@ -194,7 +191,7 @@ class MujocoFlight:
         return turn @ (share * np.array(self._settings.inertia) * data.qvel[self._motion][3:])
 
     def _touch(self, physics: mjcf.Physics) -> None:
-        """Obstacles count more than the ground, as in `flight_tick.touched`."""
+        """Obstacles count more than the ground, as in `flight_kernel.touched`."""
         data, row = physics.data, self._state.numbers[0]
         self._is_grounded = False
         for contact in data.contact[: data.ncon]:
@@ -204,14 +201,14 @@ class MujocoFlight:
                 continue
             now = self._state.ticks.item() * self._settings.tick
             self._is_grounded |= known[0] == fs.GROUND
-            if known[0] < 0 <= row[fs.THING.first] and row[fs.TIME.first] > now - self.timesteps[0]:
+            if known[0] < 0 <= row[fs.THING] and row[fs.TIME] > now - self.timesteps[0]:
                 continue
             sign = 1.0 if things[0] is not None else -1.0
-            row[fs.THING.first] = known[0]
-            row[fs.NORMAL.first : fs.NORMAL.last] = torch.tensor(sign * contact.frame[:3])
-            row[fs.POINT.first : fs.POINT.last] = torch.tensor(contact.pos)
-            row[fs.DEPTH.first] = -float(contact.dist)
-            row[fs.TIME.first] = now
+            row[fs.THING] = known[0]
+            row[fs.NORMAL : fs.NORMAL + 3] = torch.tensor(sign * contact.frame[:3])
+            row[fs.POINT : fs.POINT + 3] = torch.tensor(contact.pos)
+            row[fs.DEPTH] = -float(contact.dist)
+            row[fs.TIME] = now
 
 
 def _contact(settings: DynamicsSettings) -> dict[str, Any]:

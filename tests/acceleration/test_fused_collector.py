@@ -341,7 +341,7 @@ def test_a_lost_drone_ends_its_episode_in_the_kernel_too():
     begin = collector.source._worlds.begin
 
     def lose(state):
-        state.body.numbers[2, LOST.first] = 1.0
+        state.body.numbers[2, LOST] = 1.0
         begin(state)
 
     collector.source._worlds.begin = lose

@@ -177,7 +177,7 @@ class Drone:
         if not self.is_lost:
             self.body = self.quadrotor.fly(self.body, goals, ticks, self.obstacles)
         if self.is_lost:  # the drone stays at its last valid state
-            self.body.numbers[:, TICKS.first] += ticks
+            self.body.numbers[:, TICKS] += ticks
         self.trajectory.append(self.time, self.body)
         if self.sensors is not None:
             self.sensors.update(self.body, ticks * self.tick)
@@ -186,7 +186,7 @@ class Drone:
     def settle(self) -> None:
         """Mark the drone as landed and reset the climb controller."""
         self.landed = LandedState.LANDED
-        self.body.numbers[:, CLIMB.first] = 2.0 * self.quadrotor.settings.hover_throttle - 1.0
+        self.body.numbers[:, CLIMB] = 2.0 * self.quadrotor.settings.hover_throttle - 1.0
 
     def here(self) -> Tensor:
         """Return the current pose, as in `FlightState.reference`. Shape: (1, 4)."""

@@ -13,9 +13,9 @@ from drone_rl.sim.dynamics.state import (
     GROUND,
     NOTHING,
     POSITION,
+    REFERENCE,
     ROTORS,
     VELOCITY,
-    Slot,
 )
 
 Triple = tuple[float, float, float]
@@ -132,7 +132,7 @@ class Trajectory:
     def append(self, time: float, body: FlightState) -> None:
         """Record the state of one drone at a time in seconds."""
         self._times.append(time)
-        self._rows.append(body.numbers[0, : ROTORS.last].numpy().astype(np.float64))
+        self._rows.append(body.numbers[0, :REFERENCE].numpy().astype(np.float64))
 
     @property
     def times(self) -> np.ndarray:
@@ -142,25 +142,25 @@ class Trajectory:
     @property
     def positions(self) -> np.ndarray:
         """Metres. Shape: (T, 3)."""
-        return self._part(POSITION)
+        return self._part(POSITION, 3)
 
     @property
     def attitudes(self) -> np.ndarray:
         """Unit quaternions (w, x, y, z). Shape: (T, 4)."""
-        return self._part(ATTITUDE)
+        return self._part(ATTITUDE, 4)
 
     @property
     def velocities(self) -> np.ndarray:
         """Metres per second. Shape: (T, 3)."""
-        return self._part(VELOCITY)
+        return self._part(VELOCITY, 3)
 
     @property
     def rotors(self) -> np.ndarray:
         """Fractions of the maximum thrust, as in `FlightState.rotors`. Shape: (T, 4)."""
-        return self._part(ROTORS)
+        return self._part(ROTORS, 4)
 
-    def _part(self, slot: Slot) -> np.ndarray:
-        return np.array(self._rows).reshape(len(self), ROTORS.last)[:, slot.first : slot.last]
+    def _part(self, first: int, count: int) -> np.ndarray:
+        return np.array(self._rows).reshape(len(self), REFERENCE)[:, first : first + count]
 
 
 def state_html(state: PilotState, trajectory: Trajectory) -> str:

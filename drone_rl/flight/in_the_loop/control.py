@@ -8,12 +8,11 @@ import dataclasses
 import math
 
 import numpy as np
-import torch
 from torch import Tensor
 
 from drone_rl.config import DynamicsSettings
 from drone_rl.flight.in_the_loop.instruments import Readings, Vector
-from drone_rl.sim.dynamics import FlightState, Goals, Mode
+from drone_rl.sim.dynamics import Goals, Mode
 from drone_rl.sim.dynamics.control import HEADING, Y, Z
 from drone_rl.utils.errors import InputError
 
@@ -180,24 +179,6 @@ def setpoint_of(
     if heading is Mode.RATE:
         return Setpoint(velocity, readings.heading, yaw_rate=float(wanted[HEADING]))
     return Setpoint(velocity, float(wanted[HEADING]))
-
-
-def reference_after(goals: Goals, seconds: float, body: FlightState) -> Tensor:
-    """Return the reference pose after a command: the current pose on axes without a position goal.
-
-    Args:
-        goals: The command.
-        seconds: Its duration.
-        body: State after it.
-
-    Returns:
-        See `FlightState.reference`. Shape: (num_worlds, 4).
-    """
-    here = body.settled().reference
-    there = goals.values + seconds * goals.drifts
-    wanted = [mode is Mode.POSITION for mode in goals.modes]
-    wanted[HEADING] = goals.modes[HEADING] is Mode.ANGLE
-    return torch.where(torch.tensor(wanted), there, here)
 
 
 def _target(wanted: Vector, readings: Readings, goals: Goals) -> Vector:

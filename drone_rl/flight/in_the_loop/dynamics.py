@@ -6,7 +6,7 @@ import numpy as np
 from torch import Tensor
 
 from drone_rl.config import ActionSettings, DynamicsSettings
-from drone_rl.flight.in_the_loop.control import Setpoint, reference_after, setpoint_of
+from drone_rl.flight.in_the_loop.control import Setpoint, setpoint_of
 from drone_rl.flight.in_the_loop.drone import (
     LONGEST_DECISION,
     STICKS_TICKS,
@@ -91,7 +91,7 @@ class InTheLoopDynamics(Dynamics):
         assert isinstance(body, FlightState)
         drone, place = self.drone, body.position[0].numpy()
         drone.physics = self._physics
-        drone.body.numbers[:, SEED.first] = body.numbers[:, SEED.first]
+        drone.body.numbers[:, SEED] = body.numbers[:, SEED]
 
         def hovers(readings: Readings) -> bool:
             off = np.linalg.norm(readings.position - place)
@@ -138,7 +138,7 @@ class InTheLoopDynamics(Dynamics):
         drone.fly(track, seconds, every=every)
         self._last = time.monotonic()
         after = FlightState(drone.body.numbers.clone())
-        after.reference[:] = reference_after(goals, seconds, after)
+        after.reference[:] = goals.reference_after(seconds, after)
         return after
 
 

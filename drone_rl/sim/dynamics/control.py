@@ -90,6 +90,21 @@ class Goals:
         """`drift`, zeros if it is None."""
         return torch.zeros_like(self.values) if self.drift is None else self.drift
 
+    def reference_after(self, seconds: float, body: FlightState) -> Tensor:
+        """Return the reference of drones after a command: their pose on axes without a target.
+
+        Args:
+            seconds: Duration of the command.
+            body: Its result.
+
+        Returns:
+            See `FlightState.reference`. Shape: (num_worlds, 4).
+        """
+        has_target = [mode is Mode.POSITION for mode in self.modes]
+        has_target[HEADING] = self.modes[HEADING] is Mode.ANGLE
+        there = self.values + seconds * self.drifts
+        return torch.where(torch.tensor(has_target), there, body.settled().reference)
+
 
 def rotor_goals(rotors: Tensor) -> Goals:
     """Return goals that set rotors directly. Shape: (num_worlds, 4)."""

@@ -1,45 +1,105 @@
-"""All ticks of a command for one drone after the other.
+# ruff: noqa: RUF046, UP018
+"""All ticks of a command: controllers, rotors, air, motion and contacts, drone by drone.
 
-On a CPU a launch goes through its drones in turn, on a GPU each has a thread. Numbers are of single
-precision within a command and of double precision between commands; places count from where the
-command began, so that no more is lost of them in an hour than in a command.
+On a CPU a launch goes through its drones in turn, on a GPU each has a thread. Numbers have single
+precision within a command and double precision between commands. Positions count from where the
+command began, so that an hour loses no more precision than a command.
 """
 
 import warp as wp
 
 from drone_rl.sim.dynamics import state as fs
-from drone_rl.sim.dynamics.control_kernel import ANGLE, POSITION, Goal
-from drone_rl.sim.dynamics.rigid_body_kernel import Airframe, Motion, axes_of
-from drone_rl.sim.dynamics.tick_kernel import NO_THING, Flight, Touch, among, is_near, ticked
+from drone_rl.sim.dynamics.control import Goals, Mode
+from drone_rl.sim.dynamics.control_kernel import Goal, climb_memory, climb_missing, rotors_wanted
+from drone_rl.sim.dynamics.rigid_body_kernel import (
+    Airframe,
+    Axes,
+    Motion,
+    Overlap,
+    advanced,
+    answered,
+    axes_of,
+    box_overlap,
+    drag_of,
+    gust_after,
+    pushed_out,
+    thrust_of,
+    torque_of,
+)
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
-_PLACE = wp.constant(fs.POSITION.first)
-_ATTITUDE = wp.constant(fs.ATTITUDE.first)
-_SPEED = wp.constant(fs.VELOCITY.first)
-_SPIN = wp.constant(fs.RATES.first)
-_ROTORS = wp.constant(fs.ROTORS.first)
-_REFERENCE = wp.constant(fs.REFERENCE.first)
-_CLIMB = wp.constant(fs.CLIMB.first)
-_GUST = wp.constant(fs.GUST.first)
-_SEED = wp.constant(fs.SEED.first)
-_TICKS = wp.constant(fs.TICKS.first)
-_LOST = wp.constant(fs.LOST.first)
-_THING = wp.constant(fs.THING.first)
-_NORMAL = wp.constant(fs.NORMAL.first)
-_POINT = wp.constant(fs.POINT.first)
-_DEPTH = wp.constant(fs.DEPTH.first)
-_TIME = wp.constant(fs.TIME.first)
-_NUMBERS = wp.constant(fs.NUMBERS)
 _FASTEST = wp.constant(1000.0)
 """Metres or radians a second beyond which a motion has diverged."""
 _FARTHEST = wp.constant(1.0e18)
 """Square metres beyond which nothing is."""
+_WILDEST = wp.constant(10.0)
+"""Standard deviations that no gust is beyond."""
+
+
+@wp.struct
+class Command:
+    """A command to drones, and the obstacles around them. World frame, SI units."""
+
+    frame: Airframe
+    ticks: int
+    modes: wp.vec4i
+    goals: wp.array2d[wp.float64]
+    """See `Goals`."""
+    drifts: wp.array2d[wp.float64]
+    centers: wp.array2d[wp.vec3d]
+    """Of the obstacles of each environment."""
+    half_sizes: wp.vec3
+
+
+def make_command(
+    frame: Airframe, goals: Goals, ticks: int = 1, obstacles: fs.Obstacles | None = None
+) -> Command:
+    """Return a command that lasts some ticks, for kernels on the device of the goals."""
+    command = Command()
+    command.frame, command.ticks = frame, ticks
+    command.modes = wp.vec4i(*(int(mode) for mode in goals.modes))
+    command.goals = wp.from_torch(goals.values.contiguous())
+    command.drifts = wp.from_torch(goals.drifts.contiguous())
+    if obstacles is not None:
+        command.centers = wp.from_torch(obstacles.centers.contiguous(), dtype=wp.vec3d)
+        command.half_sizes = wp.vec3(*obstacles.half_sizes)
+    return command
+
+
+@wp.struct
+class Touch:
+    """The last contact of a command."""
+
+    thing: int
+    normal: wp.vec3
+    point: wp.vec3
+    depth: float
+    tick: int
+
+
+@wp.struct
+class Flight:
+    """One drone during a command."""
+
+    start: wp.vec3d
+    """Where the command began, metres."""
+    seed: wp.int64
+    """Of the episode's gusts."""
+    past: wp.int64
+    """Ticks of the episode before the command."""
+    tick: int
+    """Number of the present tick within the command."""
+    motion: Motion
+    rotors: wp.vec4
+    climb: float
+    gust: wp.vec3
+    touch: Touch
 
 
 @wp.func
 def is_sound(motion: Motion) -> bool:
-    """Whether all numbers are numbers, and none is absurd; NaN is less than nothing."""
+    """Return whether all numbers are finite and plausible; comparisons with NaN are false."""
     place = wp.length_sq(motion.position)
     speed = wp.length_sq(motion.velocity)
     spin = wp.length_sq(motion.rates)
@@ -50,15 +110,15 @@ def is_sound(motion: Motion) -> bool:
 
 
 @wp.func
-def is_told(goal: Goal, start: wp.vec3d) -> bool:
-    """Whether a place and what is wanted there are numbers."""
+def is_finite(goal: Goal, start: wp.vec3d) -> bool:
+    """Return whether a goal and a position are finite."""
     wanted = wp.length_sq(goal.values) + wp.length_sq(goal.drift)
     return wanted < _FARTHEST and wp.length_sq(start) < wp.float64(_FARTHEST)
 
 
 @wp.func
 def three(numbers: wp.array2d[wp.float64], world: int, first: int) -> wp.vec3:
-    """A vector out of a drone's numbers."""
+    """Return three of a drone's numbers."""
     return wp.vec3(
         float(numbers[world, first]),
         float(numbers[world, first + 1]),
@@ -68,7 +128,7 @@ def three(numbers: wp.array2d[wp.float64], world: int, first: int) -> wp.vec3:
 
 @wp.func
 def four(numbers: wp.array2d[wp.float64], world: int, first: int) -> wp.vec4:
-    """Four of a drone's numbers."""
+    """Return four of a drone's numbers."""
     return wp.vec4(
         float(numbers[world, first]),
         float(numbers[world, first + 1]),
@@ -78,169 +138,224 @@ def four(numbers: wp.array2d[wp.float64], world: int, first: int) -> wp.vec4:
 
 
 @wp.func
-def heading_of(motion: Motion) -> float:
-    """To the left of the world's x, radians."""
-    axes = axes_of(motion.attitude)
-    return wp.atan2(axes.forward[1], axes.forward[0])
-
-
-@wp.func
 def loaded(before: wp.array2d[wp.float64], world: int) -> Flight:
-    """A drone out of its numbers; its place counts from where it is."""
+    """Return a drone at the start of a command, from its numbers."""
     flight = Flight()
+    for axis in range(3):
+        flight.start[axis] = before[world, fs.POSITION + axis]
+    flight.seed = wp.int64(before[world, fs.SEED])
+    flight.past = wp.int64(before[world, fs.TICKS])
     flight.motion = Motion()
-    flight.motion.attitude = four(before, world, _ATTITUDE)
-    flight.motion.velocity = three(before, world, _SPEED)
-    flight.motion.rates = three(before, world, _SPIN)
-    flight.rotors = four(before, world, _ROTORS)
-    flight.climb = float(before[world, _CLIMB])
-    flight.gust = three(before, world, _GUST)
+    flight.motion.attitude = four(before, world, fs.ATTITUDE)
+    flight.motion.velocity = three(before, world, fs.VELOCITY)
+    flight.motion.rates = three(before, world, fs.RATES)
+    flight.rotors = four(before, world, fs.ROTORS)
+    flight.climb = float(before[world, fs.CLIMB])
+    flight.gust = three(before, world, fs.GUST)
     flight.touch = Touch()
-    flight.touch.thing = NO_THING
+    flight.touch.thing = fs.NOTHING
     return flight
 
 
 @wp.func
-def goal_of(
-    goals: wp.array2d[wp.float64],
-    drifts: wp.array2d[wp.float64],
-    modes: wp.vec4i,
-    world: int,
-    start: wp.vec3d,
-) -> Goal:
-    """What a drone is told; places count from where it is."""
+def goal_of(command: Command, world: int, start: wp.vec3d) -> Goal:
+    """Return a drone's goal; positions count from the start."""
     goal = Goal()
+    goal.modes = command.modes
     for axis in range(4):
-        value = goals[world, axis]
-        if modes[axis] == POSITION:
+        value = command.goals[world, axis]
+        if command.modes[axis] == Mode.POSITION:
             value = value - start[wp.min(axis, 2)]
         goal.values[axis] = float(value)
-        goal.drift[axis] = float(drifts[world, axis])
+        goal.drift[axis] = float(command.drifts[world, axis])
     return goal
 
 
 @wp.func
-def write_touch(
-    after: wp.array2d[wp.float64], world: int, touch: Touch, start: wp.vec3d, seconds: wp.float64
-) -> None:
-    """Records a contact; `seconds` is when, in the episode."""
-    after[world, _THING] = wp.float64(touch.thing)
-    for i in range(3):
-        after[world, _NORMAL + i] = wp.float64(touch.normal[i])
-        after[world, _POINT + i] = start[i] + wp.float64(touch.point[i])
-    after[world, _DEPTH] = wp.float64(touch.depth)
-    after[world, _TIME] = seconds
+def driven(frame: Airframe, goal: Goal, before: Flight, axes: Axes) -> Flight:
+    """Return a flight whose controllers, rotors and air are a tick later; it has not moved yet."""
+    flight = before
+    motion = before.motion
+    asked = rotors_wanted(frame, goal, motion, axes, before.climb)
+    if goal.modes[3] == Mode.VELOCITY or goal.modes[3] == Mode.POSITION:
+        flight.climb = climb_memory(frame, climb_missing(frame, goal, motion), before.climb)
+    flight.rotors = answered(frame, before.rotors, asked)
+    if frame.gusts > 0.0:
+        speed = wp.length(motion.velocity - frame.wind)
+        time = before.past + wp.int64(before.tick)
+        flight.gust = gust_after(frame, before.gust, speed, before.seed, time)
+    return flight
 
 
 @wp.func
-def write_reference(
-    after: wp.array2d[wp.float64],
-    goals: wp.array2d[wp.float64],
-    drifts: wp.array2d[wp.float64],
-    modes: wp.vec4i,
-    world: int,
-    seconds: wp.float64,
-) -> None:
-    """Records where a drone is wanted: where it is, of axes on which nothing was wanted."""
-    for axis in range(4):
-        reference = goals[world, axis] + seconds * drifts[world, axis]
-        if axis == 2:
-            if modes[2] != ANGLE:
-                axes = axes_of(four(after, world, _ATTITUDE))
-                reference = wp.float64(wp.atan2(axes.forward[1], axes.forward[0]))
-        elif modes[axis] != POSITION:
-            reference = after[world, _PLACE + wp.min(axis, 2)]
-        after[world, _REFERENCE + axis] = reference
+def force_on(frame: Airframe, flight: Flight, axes: Axes) -> wp.vec3:
+    """Return the force of rotors and air, newtons, world frame; without weight."""
+    through = flight.motion.velocity - frame.wind - flight.gust
+    return thrust_of(frame, flight.rotors) * axes.up + drag_of(frame, axes, through)
 
 
 @wp.func
-def write(
-    after: wp.array2d[wp.float64], world: int, flight: Flight, start: wp.vec3d, past: wp.int64
-) -> None:
-    """A drone's numbers at the end of a command; `past` counts the episode's ticks till then."""
+def ticked(frame: Airframe, goal: Goal, before: Flight) -> Flight:
+    """Return a flight a tick later, over bare ground."""
+    axes = axes_of(before.motion.attitude)
+    flight = driven(frame, goal, before, axes)
+    lift = thrust_of(frame, flight.rotors)
+    force = force_on(frame, flight, axes)
+    flight.motion = advanced(frame, before.motion, force, torque_of(frame, flight.rotors))
+    overlap = Overlap()
+    overlap.normal = wp.vec3(0.0, 0.0, 1.0)
+    overlap.depth = frame.radius - (float(before.start[2]) + flight.motion.position[2])
+    if overlap.depth >= 0.0:
+        flight.motion = grounded(frame, pushed_out(frame, flight.motion, overlap), lift)
+        flight.touch = touched(frame, flight, fs.GROUND, overlap)
+    return flight
+
+
+@wp.func
+def among(command: Command, world: int, before: Flight) -> Flight:
+    """Return a flight after the obstacles that it touches have pushed it back."""
+    flight = before
+    radius = command.frame.radius
+    for thing in range(command.centers.shape[1]):
+        center = flight.motion.position + wp.vec3(flight.start - command.centers[world, thing])
+        overlap = box_overlap(center, radius, command.half_sizes)
+        if overlap.depth > 0.0:
+            flight.motion = pushed_out(command.frame, flight.motion, overlap)
+            flight.touch = touched(command.frame, flight, thing, overlap)
+    return flight
+
+
+@wp.func
+def is_near(command: Command, world: int, flight: Flight) -> bool:
+    """Return whether the drone may touch any obstacle during the command, see `among`.
+
+    Rotors and weight gain no more speed than without air, and air no more than its own twice over.
+    """
+    frame = command.frame
+    seconds = frame.tick * float(command.ticks)
+    air = wp.length(frame.wind) + wp.length(flight.gust) + _WILDEST * frame.gusts
+    gain = frame.per_mass * (4.0 * frame.rotor_thrust + frame.weight) * seconds
+    fastest = wp.length(flight.motion.velocity) + 2.0 * air + gain
+    near = int(0)
+    for thing in range(command.centers.shape[1]):
+        center = wp.vec3(flight.start - command.centers[world, thing])
+        away = box_overlap(center, frame.radius + fastest * seconds, command.half_sizes)
+        if away.depth > 0.0:
+            near = 1
+    return near == 1
+
+
+@wp.func
+def grounded(frame: Airframe, motion: Motion, lift: float) -> Motion:
+    """Return the motion of a drone on the ground: level if its rotors can't carry it."""
+    after = motion
+    if lift < frame.weight:
+        w = motion.attitude[0]
+        z = motion.attitude[3]
+        length = wp.sqrt(wp.max(w * w + z * z, 1.0e-12))
+        after.attitude = wp.vec4(w / length, 0.0, 0.0, z / length)
+        after.rates = wp.vec3(0.0, 0.0, 0.0)
+    return after
+
+
+@wp.func
+def touched(frame: Airframe, flight: Flight, thing: int, overlap: Overlap) -> Touch:
+    """Return the contact to record of a drone that was pushed out of an overlap.
+
+    Obstacles take precedence over the ground, later contacts over earlier ones.
+    """
+    if flight.touch.thing >= 0 and thing < 0:
+        return flight.touch
+    now = Touch()
+    now.thing = thing
+    now.normal = overlap.normal
+    now.depth = overlap.depth
+    now.point = flight.motion.position - frame.radius * overlap.normal
+    now.tick = flight.tick
+    return now
+
+
+@wp.func
+def write(after: wp.array2d[wp.float64], world: int, flight: Flight, ticks: int) -> None:
+    """Write a drone's numbers after some ticks of a command."""
     motion = flight.motion
     for i in range(3):
-        after[world, _PLACE + i] = start[i] + wp.float64(motion.position[i])
-        after[world, _SPEED + i] = wp.float64(motion.velocity[i])
-        after[world, _SPIN + i] = wp.float64(motion.rates[i])
-        after[world, _GUST + i] = wp.float64(flight.gust[i])
+        after[world, fs.POSITION + i] = flight.start[i] + wp.float64(motion.position[i])
+        after[world, fs.VELOCITY + i] = wp.float64(motion.velocity[i])
+        after[world, fs.RATES + i] = wp.float64(motion.rates[i])
+        after[world, fs.GUST + i] = wp.float64(flight.gust[i])
     for i in range(4):
-        after[world, _ATTITUDE + i] = wp.float64(motion.attitude[i])
-        after[world, _ROTORS + i] = wp.float64(flight.rotors[i])
-    after[world, _CLIMB] = wp.float64(flight.climb)
-    after[world, _TICKS] = wp.float64(past)
+        after[world, fs.ATTITUDE + i] = wp.float64(motion.attitude[i])
+        after[world, fs.ROTORS + i] = wp.float64(flight.rotors[i])
+    after[world, fs.CLIMB] = wp.float64(flight.climb)
+    after[world, fs.TICKS] = wp.float64(flight.past + wp.int64(ticks))
 
 
 @wp.func
-def command(
-    frame: Airframe,
-    ticks: int,
-    modes: wp.vec4i,
-    goals: wp.array2d[wp.float64],
-    drifts: wp.array2d[wp.float64],
-    centers: wp.array2d[wp.vec3d],
-    half_sizes: wp.vec3,
-    before: wp.array2d[wp.float64],
-    after: wp.array2d[wp.float64],
-    world: int,
-) -> None:
-    """Flies a drone through all ticks of a command.
+def write_touch(after: wp.array2d[wp.float64], world: int, flight: Flight, tick: float) -> None:
+    """Write the last contact; a tick lasts so many seconds."""
+    touch = flight.touch
+    after[world, fs.THING] = wp.float64(touch.thing)
+    for i in range(3):
+        after[world, fs.NORMAL + i] = wp.float64(touch.normal[i])
+        after[world, fs.POINT + i] = flight.start[i] + wp.float64(touch.point[i])
+    after[world, fs.DEPTH] = wp.float64(touch.depth)
+    past = wp.float64(flight.past + wp.int64(touch.tick + 1))
+    after[world, fs.TIME] = wp.float64(tick) * past
 
-    Args:
-        frame: What it is.
-        ticks: How many.
-        modes: Of the goals, one an axis.
-        goals: See `Goals`.
-        drifts: See `Goals`.
-        centers: Of the obstacles of each drone's world, metres.
-        half_sizes: Of every obstacle, metres.
-        before: The drones, see `FlightState.numbers`.
-        after: Is written; may be the same.
-        world: Which of the drones.
-    """
-    start = wp.vec3d(before[world, _PLACE], before[world, _PLACE + 1], before[world, _PLACE + 2])
-    seed = wp.int64(before[world, _SEED])
-    past = wp.int64(before[world, _TICKS])
-    height = float(start[2])
-    goal = goal_of(goals, drifts, modes, world, start)
+
+@wp.func
+def write_reference(command: Command, after: wp.array2d[wp.float64], world: int) -> None:
+    """Write the reference after a command, see `Goals.reference_after`."""
+    seconds = wp.float64(command.frame.tick) * wp.float64(command.ticks)
+    for axis in range(4):
+        reference = command.goals[world, axis] + seconds * command.drifts[world, axis]
+        if axis == 2:
+            if command.modes[2] != Mode.ANGLE:
+                axes = axes_of(four(after, world, fs.ATTITUDE))
+                reference = wp.float64(wp.atan2(axes.forward[1], axes.forward[0]))
+        elif command.modes[axis] != Mode.POSITION:
+            reference = after[world, fs.POSITION + wp.min(axis, 2)]
+        after[world, fs.REFERENCE + axis] = reference
+
+
+@wp.func
+def run(
+    command: Command, before: wp.array2d[wp.float64], after: wp.array2d[wp.float64], world: int
+) -> None:
+    """Run all ticks of a command for one drone; `before` and `after` may be the same array."""
+    frame = command.frame
     flight = loaded(before, world)
-    lost = before[world, _LOST] != wp.float64(0.0) or not is_told(goal, start)
+    goal = goal_of(command, world, flight.start)
+    lost = before[world, fs.LOST] != wp.float64(0.0) or not is_finite(goal, flight.start)
     near = False
-    if centers.shape[1] > 0:
-        seconds = frame.tick * float(ticks)
-        near = is_near(frame, flight, start, centers[world], half_sizes, seconds)
-    for tick in range(ticks):
-        flight = ticked(frame, modes, goal, flight, height, seed, past, tick)
+    if command.centers.shape[1] > 0:
+        near = is_near(command, world, flight)
+    for tick in range(command.ticks):
+        flight.tick = tick
+        goal.seconds = frame.tick * float(tick)
+        flight = ticked(frame, goal, flight)
         if near:
-            flight = among(frame, flight, start, centers[world], half_sizes, tick)
-    for i in range(_NUMBERS):
+            flight = among(command, world, flight)
+    for i in range(fs.NUMBERS):
         after[world, i] = before[world, i]
     if lost or not is_sound(flight.motion):
-        after[world, _LOST] = wp.float64(1.0)
-        for i in range(_SPEED, _SPIN + 3):
+        after[world, fs.LOST] = wp.float64(1.0)
+        for i in range(fs.VELOCITY, fs.ROTORS):
             after[world, i] = wp.float64(0.0)
         return
-    length = wp.float64(frame.tick)
-    write(after, world, flight, start, past + wp.int64(ticks))
-    write_reference(after, goals, drifts, modes, world, length * wp.float64(ticks))
-    if flight.touch.thing != NO_THING:
-        when = length * wp.float64(past + wp.int64(flight.touch.tick + 1))
-        write_touch(after, world, flight.touch, start, when)
+    write(after, world, flight, command.ticks)
+    write_reference(command, after, world)
+    if flight.touch.thing != fs.NOTHING:
+        write_touch(after, world, flight, frame.tick)
 
 
 @wp.kernel
 def fly(
     first: int,
-    frame: Airframe,
-    ticks: int,
-    modes: wp.vec4i,
-    goals: wp.array2d[wp.float64],
-    drifts: wp.array2d[wp.float64],
-    centers: wp.array2d[wp.vec3d],
-    half_sizes: wp.vec3,
+    command: Command,
     before: wp.array2d[wp.float64],
     after: wp.array2d[wp.float64],
 ) -> None:
-    """Flies drones, a thread each; `first` is that of the first thread. See `command`."""
-    world = first + wp.tid()
-    command(frame, ticks, modes, goals, drifts, centers, half_sizes, before, after, world)
+    """Run a command for drones, a thread each; `first` is the first thread's drone."""
+    run(command, before, after, first + wp.tid())

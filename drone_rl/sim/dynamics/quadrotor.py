@@ -1,7 +1,6 @@
 """Simple flight (Table 1): a drone with four rotors, flown by SimpleFlight's controller."""
 
 import functools
-from typing import Any
 
 import torch
 import warp as wp
@@ -49,15 +48,10 @@ class Quadrotor:
         return True
 
     def start(self, position: Tensor, seeds: Tensor | None = None) -> FlightState:
-        """Return drones that hover at rest.
-
-        Args:
-            position: Metres, world frame. Shape: (num_worlds, 3), float64.
-            seeds: Of their gusts; all the same by default. Shape: (num_worlds,).
-        """
+        """Return drones that hover at rest; see `Dynamics`."""
         state = FlightState.at_rest(position, seeds=seeds)
         state.rotors[:] = self.settings.hover_throttle
-        state.numbers[:, CLIMB.first] = 2.0 * self.settings.hover_throttle - 1.0
+        state.numbers[:, CLIMB] = 2.0 * self.settings.hover_throttle - 1.0
         return state
 
     def step(
@@ -70,13 +64,7 @@ class Quadrotor:
         )
 
     def push(self, body: FlightState, rotors: Tensor, ticks: int = 1) -> FlightState:
-        """Return the drones after ticks under given rotor thrusts.
-
-        Args:
-            body: Before.
-            rotors: Fractions of full thrust, see `FlightState.rotors`. Shape: (num_worlds, 4).
-            ticks: How many.
-        """
+        """Return the drones after ticks under rotor thrusts, see `FlightState.rotors`."""
         return self.fly(body, rotor_goals(rotors), ticks)
 
     def fly(
@@ -93,20 +81,12 @@ class Quadrotor:
         device, count = body.numbers.device, len(body)
         _load_kernels(str(device))
         after = torch.empty_like(body.numbers)
-        centers, half_sizes = _boxes(obstacles, body)
-        given = [
-            _array(goals.values),
-            _array(goals.drifts),
-            _array(centers, wp.vec3d),
-            wp.vec3(*half_sizes),
-            _array(body.numbers),
-            _array(after),
-        ]
-        modes = wp.vec4i(*(int(mode) for mode in goals.modes))
+        command = flight_kernel.make_command(self.frame, goals, ticks, obstacles)
+        arrays = [wp.from_torch(numbers.contiguous()) for numbers in (body.numbers, after)]
 
         def work(member: int, first: int, last: int) -> None:
             del member
-            inputs = [first, self.frame, ticks, modes, *given]
+            inputs = [first, command, *arrays]
             wp.launch(flight_kernel.fly, last - first, inputs=inputs, device=str(device))
 
         if device.type == "cpu" and count * ticks >= _LEAST_WORK:
@@ -125,13 +105,3 @@ class Quadrotor:
 def _load_kernels(device: str) -> None:
     start_warp(device)
     wp.load_module(flight_kernel, device=device)
-
-
-def _array(value: Tensor, kind: Any = wp.float64) -> Any:
-    return wp.from_torch(value.contiguous(), dtype=kind, return_ctype=True)
-
-
-def _boxes(obstacles: Obstacles | None, body: FlightState) -> tuple[Tensor, tuple[float, ...]]:
-    if obstacles is None:
-        return body.numbers.new_zeros(len(body), 0, 3), (0.0, 0.0, 0.0)
-    return obstacles.centers, obstacles.half_sizes

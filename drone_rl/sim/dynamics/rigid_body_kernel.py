@@ -20,7 +20,7 @@ wp.set_module_options({"enable_backward": False})
 
 @wp.struct
 class Airframe:
-    """See `DynamicsSettings`, whose names these are, in single precision."""
+    """The fields of `DynamicsSettings`, in single precision."""
 
     tick: float
     weight: float
@@ -30,13 +30,13 @@ class Airframe:
     inertia: wp.vec3
     per_inertia: wp.vec3
     arm: float
-    """How far ahead and to the side each rotor stands, metres."""
+    """Distance of each rotor ahead and to the side, metres."""
     rotor_thrust: float
     rotor_torque: float
     rotor_pace: float
-    """Share of what is missing that a rotor gains in a tick."""
+    """Fraction of the difference that a rotor gains in a tick."""
     drag: wp.vec3
-    """Newtons for each square of a metre a second, along each axis."""
+    """Newtons for each (m/s)^2, along each axis."""
     radius: float
     restitution: float
     friction: float
@@ -56,7 +56,7 @@ class Airframe:
 
 
 def make_airframe(settings: DynamicsSettings) -> Airframe:
-    """The numbers of some settings, and what can be worked out of them beforehand."""
+    """Return the numbers of settings, and what follows from them."""
     frame = Airframe()
     same = set(vars(frame)) & {*settings.values()}
     for name in same:
@@ -96,7 +96,7 @@ class Axes:
 
 @wp.func
 def axes_of(attitude: wp.vec4) -> Axes:
-    """The columns of the rotation matrix."""
+    """Return the columns of the rotation matrix."""
     w = attitude[0]
     x = attitude[1]
     y = attitude[2]
@@ -112,21 +112,21 @@ def axes_of(attitude: wp.vec4) -> Axes:
 
 @wp.func
 def answered(frame: Airframe, rotors: wp.vec4, asked: wp.vec4) -> wp.vec4:
-    """What rotors do a tick after they are asked; they answer like a filter of first order."""
+    """Return rotors a tick later: a first-order filter of what is commanded."""
     return rotors + frame.rotor_pace * (asked - rotors)
 
 
 @wp.func
 def thrust_of(frame: Airframe, rotors: wp.vec4) -> float:
-    """Along the body's z, newtons."""
+    """Return the thrust along the body's z, newtons."""
     return frame.rotor_thrust * (rotors[0] + rotors[1] + rotors[2] + rotors[3])
 
 
 @wp.func
 def torque_of(frame: Airframe, rotors: wp.vec4) -> wp.vec3:
-    """About the body's axes, newton metres.
+    """Return the torque about the body's axes, newton metres.
 
-    Front right and rear left turn against the clock, seen from above, and so push the body with it.
+    Front right and rear left turn counterclockwise seen from above, and so push the body clockwise.
     """
     lever = frame.arm * frame.rotor_thrust
     return wp.vec3(
@@ -138,13 +138,7 @@ def torque_of(frame: Airframe, rotors: wp.vec4) -> wp.vec3:
 
 @wp.func
 def drag_of(frame: Airframe, axes: Axes, velocity: wp.vec3) -> wp.vec3:
-    """What the air does to a body, newtons, world frame.
-
-    Args:
-        frame: The drone.
-        axes: The body's.
-        velocity: Through the air, metres a second, world frame.
-    """
+    """Return the drag at a velocity through the air; newtons, metres a second, world frame."""
     forward = wp.dot(axes.forward, velocity)
     left = wp.dot(axes.left, velocity)
     up = wp.dot(axes.up, velocity)
@@ -157,13 +151,9 @@ def drag_of(frame: Airframe, axes: Axes, velocity: wp.vec3) -> wp.vec3:
 
 @wp.func
 def advanced(frame: Airframe, motion: Motion, force: wp.vec3, torque: wp.vec3) -> Motion:
-    """The motion a tick later.
+    """Return the motion a tick later.
 
-    Args:
-        frame: The drone.
-        motion: Before.
-        force: All but weight, newtons, world frame.
-        torque: Newton metres, body frame.
+    `force` is all but weight, newtons, world frame; `torque` newton metres, body frame.
     """
     tick = frame.tick
     rates = motion.rates
@@ -180,7 +170,7 @@ def advanced(frame: Airframe, motion: Motion, force: wp.vec3, torque: wp.vec3) -
 
 @wp.func
 def turned_by(attitude: wp.vec4, angle: wp.vec3) -> wp.vec4:
-    """An attitude after a small rotation about the body's axes, radians; of length 1."""
+    """Return an attitude of length 1 after a small rotation about the body's axes, radians."""
     square = wp.dot(angle, angle)
     c = 1.0 - square * (0.125 - square / 384.0)
     s = 0.5 - square * (1.0 / 48.0 - square / 3840.0)
@@ -210,15 +200,11 @@ _SPREAD = wp.constant(3.4641016151377544)
 def gust_after(
     frame: Airframe, gust: wp.vec3, airspeed: float, seed: wp.int64, tick: wp.int64
 ) -> wp.vec3:
-    """The air's velocity beside its mean, a tick later.
+    """Return the air's velocity minus its mean a tick later; metres a second, world frame.
 
-    Args:
-        frame: How strong gusts are, and how long.
-        gust: Before. Metres a second, world frame.
-        airspeed: Of the drone through air without gusts, metres a second. (With them, gusts that
-            blow against the wind would last longer than others, and the mean be less than it.)
-        seed: Of the episode.
-        tick: Number of the tick in the episode; each is of its own randomness.
+    `airspeed` is the drone's through air without gusts. With them, gusts against the wind would
+    last longer than others, and the mean would be below the wind. Each `tick` of the episode has
+    its own randomness.
     """
     decay = wp.exp(-frame.tick * wp.max(airspeed, SLOWEST) / frame.gust_length)
     strength = _SPREAD * frame.gusts * wp.sqrt(1.0 - decay * decay)
@@ -243,13 +229,7 @@ class Overlap:
 
 @wp.func
 def box_overlap(center: wp.vec3, radius: float, half: wp.vec3) -> Overlap:
-    """How a ball and a box stand to each other.
-
-    Args:
-        center: Of the ball, from the middle of the box, metres, along the box's axes.
-        radius: Of the ball.
-        half: Half the box's edges.
-    """
+    """Return the overlap of a ball, at `center` from the middle of a box, with it. Metres."""
     found = Overlap()
     nearest = wp.vec3(
         wp.clamp(center[0], -half[0], half[0]),
@@ -279,13 +259,7 @@ def box_overlap(center: wp.vec3, radius: float, half: wp.vec3) -> Overlap:
 
 @wp.func
 def bounced(frame: Airframe, velocity: wp.vec3, normal: wp.vec3) -> wp.vec3:
-    """Velocity after a contact: Newton's restitution and Coulomb's friction, at the ball's middle.
-
-    Args:
-        frame: Restitution and friction.
-        velocity: Before, metres a second.
-        normal: Out of what is touched.
-    """
+    """Return the velocity after a contact: Newton's restitution and Coulomb's friction."""
     into = -wp.dot(velocity, normal)
     if into <= 0.0:
         return velocity
@@ -301,7 +275,7 @@ def bounced(frame: Airframe, velocity: wp.vec3, normal: wp.vec3) -> wp.vec3:
 
 @wp.func
 def pushed_out(frame: Airframe, motion: Motion, overlap: Overlap) -> Motion:
-    """The motion of a drone that no longer reaches into a thing."""
+    """Return the motion of a drone that no longer overlaps a thing."""
     after = motion
     after.position = motion.position + overlap.depth * overlap.normal
     after.velocity = bounced(frame, motion.velocity, overlap.normal)

@@ -1,7 +1,7 @@
 """States of drones, at rest or in flight, and the obstacles around them."""
 
 import dataclasses
-from typing import NamedTuple, Self
+from typing import Self
 
 import torch
 from torch import Tensor
@@ -13,7 +13,7 @@ LEVEL = (1.0, 0.0, 0.0, 0.0)
 
 
 def heading_only(attitude: Tensor) -> Tensor:
-    """Attitudes without their tilt: the turns about the world's z axis that are nearest to them.
+    """Remove the tilt of attitudes: return the nearest rotations about the world's z axis.
 
     Args:
         attitude: Unit quaternions (w, x, y, z). Shape: (*, 4).
@@ -29,11 +29,7 @@ def heading_only(attitude: Tensor) -> Tensor:
 
 
 def heading_of(attitude: Tensor) -> Tensor:
-    """Where drones look, radians to the left of the world's x.
-
-    Args:
-        attitude: Unit quaternions (w, x, y, z). Shape: (*, 4).
-    """
+    """Return headings, radians to the left of the world's x. Unit quaternions: (*, 4)."""
     w, x, y, z = attitude.unbind(-1)
     return torch.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
 
@@ -53,30 +49,17 @@ class BodyState(Batch):
 
     @property
     def is_lost(self) -> Tensor:
-        """Whether a drone's motion has diverged, so that there is nothing more to say of it.
-
-        Shape: (num_worlds,), bool.
-        """
+        """Whether each drone's motion has diverged. Shape: (num_worlds,), bool."""
         return torch.zeros(len(self.position), dtype=torch.bool, device=self.position.device)
 
     def moved(self, position: Tensor, attitude: Tensor | None = None) -> Self:
-        """The same elsewhere.
-
-        Args:
-            position: Metres. Shape: (num_worlds, 3), float64.
-            attitude: As it is by default. Shape: (num_worlds, 4), float64.
-        """
+        """Return the same at another position, (num_worlds, 3), and attitude, (num_worlds, 4)."""
         attitude = self.attitude if attitude is None else attitude
         return dataclasses.replace(self, position=position, attitude=attitude)
 
     @classmethod
     def at_rest(cls, position: Tensor, attitude: Tensor | None = None) -> Self:
-        """Bodies that don't move.
-
-        Args:
-            position: Metres. Shape: (num_worlds, 3), float64.
-            attitude: Level by default. Shape: (num_worlds, 4), float64.
-        """
+        """Return bodies that don't move, level by default; shapes as of `moved`."""
         if attitude is None:
             attitude = position.new_tensor(LEVEL).repeat(len(position), 1)
         still = torch.zeros_like(position)
@@ -85,7 +68,7 @@ class BodyState(Batch):
 
 @dataclasses.dataclass(frozen=True)
 class Obstacles:
-    """Boxes along the world's axes, in every world as many and all of one size. Metres."""
+    """Axis-aligned boxes of one size, as many in every environment. Metres."""
 
     centers: Tensor  # (num_worlds, K, 3) float64
     """Their middles; far below the ground where one is absent."""
@@ -97,31 +80,11 @@ NOTHING, GROUND = -2, -1
 """Numbers of what is touched: no thing, and the ground. Obstacles count from 0."""
 
 
-class Slot(NamedTuple):
-    """Where a part of `FlightState.numbers` stands."""
-
-    first: int
-    last: int
-    """The one after the last."""
-
-
-POSITION = Slot(0, 3)
-ATTITUDE = Slot(3, 7)
-VELOCITY = Slot(7, 10)
-RATES = Slot(10, 13)
-ROTORS = Slot(13, 17)
-REFERENCE = Slot(17, 21)
-CLIMB = Slot(21, 22)
-GUST = Slot(22, 25)
-SEED = Slot(25, 26)
-TICKS = Slot(26, 27)
-LOST = Slot(27, 28)
-THING = Slot(28, 29)
-NORMAL = Slot(29, 32)
-POINT = Slot(32, 35)
-DEPTH = Slot(35, 36)
-TIME = Slot(36, 37)
-NUMBERS = TIME.last
+POSITION, ATTITUDE, VELOCITY, RATES, ROTORS, REFERENCE = 0, 3, 7, 10, 13, 17
+CLIMB, GUST, SEED, TICKS, LOST, THING = 21, 22, 25, 26, 27, 28
+NORMAL, POINT, DEPTH, TIME = 29, 32, 35, 36
+"""Index of the first number of each part of `FlightState.numbers`."""
+NUMBERS = 37
 """Of a drone."""
 
 
@@ -145,34 +108,24 @@ class FlightState(BodyState):
     """`num_worlds` drones in flight: a row of numbers each, of which the properties are views."""
 
     def __init__(self, numbers: Tensor) -> None:
-        """Takes all of them at once; kernels read and write them in one piece.
-
-        Args:
-            numbers: In the order of the slots. Shape: (num_worlds, NUMBERS), float64.
-        """
+        """Take all numbers, see `POSITION` and following. Shape: (num_worlds, NUMBERS), float64."""
         self.numbers = numbers
 
     @classmethod
     def at_rest(
         cls, position: Tensor, attitude: Tensor | None = None, seeds: Tensor | None = None
     ) -> Self:
-        """Drones that don't move, told to stay where they are.
-
-        Args:
-            position: Metres. Shape: (num_worlds, 3), float64.
-            attitude: Level by default. Shape: (num_worlds, 4), float64.
-            seeds: Of their gusts, whole numbers. Shape: (num_worlds,).
-        """
+        """See `BodyState`; they hold their position. `seeds` are those of gusts, (num_worlds,)."""
         state = cls(position.new_zeros(len(position), NUMBERS))
         state.position[:] = position
         state.attitude[:] = position.new_tensor(LEVEL) if attitude is None else attitude
-        state.numbers[:, THING.first] = NOTHING
+        state.numbers[:, THING] = NOTHING
         if seeds is not None:
-            state.numbers[:, SEED.first] = seeds.to(state.numbers)
+            state.numbers[:, SEED] = seeds.to(state.numbers)
         return state.settled()
 
     def settled(self) -> Self:
-        """The same, told to stay where they are."""
+        """Return the same with its pose as the reference."""
         state = type(self)(self.numbers.clone())
         state.reference[:, :2] = self.position[:, :2]
         state.reference[:, 2] = self.heading
@@ -180,7 +133,7 @@ class FlightState(BodyState):
         return state
 
     def moved(self, position: Tensor, attitude: Tensor | None = None) -> Self:
-        """See `BodyState`; they are told to stay there."""
+        """See `BodyState`; the new pose is the reference."""
         state = type(self)(self.numbers.clone())
         state.position[:] = position
         if attitude is not None:
@@ -190,22 +143,22 @@ class FlightState(BodyState):
     @property
     def position(self) -> Tensor:  # pyright: ignore[reportIncompatibleVariableOverride] (a view)
         """Metres. Shape: (num_worlds, 3)."""
-        return self._part(POSITION)
+        return self.numbers[:, POSITION : POSITION + 3]
 
     @property
     def attitude(self) -> Tensor:  # pyright: ignore[reportIncompatibleVariableOverride] (a view)
         """Unit quaternion (w, x, y, z). Shape: (num_worlds, 4)."""
-        return self._part(ATTITUDE)
+        return self.numbers[:, ATTITUDE : ATTITUDE + 4]
 
     @property
     def velocity(self) -> Tensor:  # pyright: ignore[reportIncompatibleVariableOverride] (a view)
         """Metres a second, world frame. Shape: (num_worlds, 3)."""
-        return self._part(VELOCITY)
+        return self.numbers[:, VELOCITY : VELOCITY + 3]
 
     @property
     def angular_velocity(self) -> Tensor:  # pyright: ignore[reportIncompatibleVariableOverride]
         """Radians a second about the body's axes. Shape: (num_worlds, 3)."""
-        return self._part(RATES)
+        return self.numbers[:, RATES : RATES + 3]
 
     @property
     def heading(self) -> Tensor:
@@ -214,40 +167,32 @@ class FlightState(BodyState):
 
     @property
     def rotors(self) -> Tensor:
-        """Share of its most thrust that each gives: front right, rear left, front left, rear right.
-
-        Shape: (num_worlds, 4).
-        """
-        return self._part(ROTORS)
+        """Fractions of full thrust: front right, rear left, front left, rear right. (N, 4)."""
+        return self.numbers[:, ROTORS : ROTORS + 4]
 
     @property
     def reference(self) -> Tensor:
-        """Where the controller wants the drone: metres, world frame; and its heading, radians.
-
-        The order is x, y, heading, z, as in `goals`. Shape: (num_worlds, 4).
-        """
-        return self._part(REFERENCE)
+        """Target of the controller: x, y, heading, z; metres and radians. Shape: (N, 4)."""
+        return self.numbers[:, REFERENCE : REFERENCE + 4]
 
     @property
     def gust(self) -> Tensor:
-        """Velocity of the air beside its mean, metres a second, world. Shape: (num_worlds, 3)."""
-        return self._part(GUST)
+        """Velocity of the air minus its mean, metres a second, world. Shape: (num_worlds, 3)."""
+        return self.numbers[:, GUST : GUST + 3]
 
     @property
     def ticks(self) -> Tensor:
         """Of physics in this episode, int64. Shape: (num_worlds,)."""
-        return self.numbers[:, TICKS.first].long()
+        return self.numbers[:, TICKS].long()
 
     @property
     def contact(self) -> Contact:
         """The last one."""
-        one = [self.numbers[:, slot.first] for slot in (THING, DEPTH, TIME)]
-        return Contact(one[0].long(), self._part(NORMAL), self._part(POINT), one[1], one[2])
+        n = self.numbers
+        normal, point = n[:, NORMAL : NORMAL + 3], n[:, POINT : POINT + 3]
+        return Contact(n[:, THING].long(), normal, point, n[:, DEPTH], n[:, TIME])
 
     @property
     def is_lost(self) -> Tensor:
-        """See `BodyState`; a lost drone stays where it was last seen."""
-        return self.numbers[:, LOST.first] != 0.0
-
-    def _part(self, slot: Slot) -> Tensor:
-        return self.numbers[:, slot.first : slot.last]
+        """See `BodyState`; a lost drone keeps its last position."""
+        return self.numbers[:, LOST] != 0.0

@@ -33,12 +33,12 @@ def test_angles(quaternion, angles):
 def test_contacts_have_names(hovering):
     body = hovering((0, 0, 1))
     assert collision_of(body) is None
-    body.numbers[0, THING.first] = GROUND
-    body.numbers[0, NORMAL.first : NORMAL.last] = torch.tensor([0.0, 0.0, 1.0]).double()
-    body.numbers[0, DEPTH.first] = 0.25
+    body.numbers[0, THING] = GROUND
+    body.numbers[0, NORMAL : NORMAL + 3] = torch.tensor([0.0, 0.0, 1.0]).double()
+    body.numbers[0, DEPTH] = 0.25
     touched = collision_of(body)
     assert (touched.thing, touched.normal, touched.depth) == ("ground", (0, 0, 1), 0.25)
-    body.numbers[0, THING.first] = 3
+    body.numbers[0, THING] = 3
     assert collision_of(body).thing == "obstacle 3"
 
 

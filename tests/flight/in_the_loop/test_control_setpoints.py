@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from drone_rl.config import ActionSettings, DynamicsSettings
-from drone_rl.flight.in_the_loop.control import reference_after, setpoint_of
+from drone_rl.flight.in_the_loop.control import setpoint_of
 from drone_rl.flight.in_the_loop.instruments import Readings
 from drone_rl.sim.dynamics import FlightState, Goals, Mode, Quadrotor
 from drone_rl.utils.errors import InputError
@@ -66,6 +66,6 @@ def test_where_it_is_wanted_afterwards():
     """A move of 0.1 s forward; speeds leave the height alone wanted."""
     moved = FlightState.at_rest(torch.tensor([[0.3, 0.1, 1.9]], dtype=torch.float64))
     forward = goals_of(ActionSettings(), torch.tensor([0]))
-    assert reference_after(forward, 0.1, moved).tolist() == [[0.4, 0.0, 0.0, 2.0]]
+    assert forward.reference_after(0.1, moved).tolist() == [[0.4, 0.0, 0.0, 2.0]]
     speeds = goals_of(ActionSettings(kind="velocity"), torch.zeros(1, 3))
-    assert reference_after(speeds, 0.1, moved).tolist() == [[0.3, 0.1, 0.0, 2.0]]
+    assert speeds.reference_after(0.1, moved).tolist() == [[0.3, 0.1, 0.0, 2.0]]

@@ -8,7 +8,7 @@ import torch
 
 from drone_rl.sim.dynamics import Mode
 from drone_rl.sim.dynamics import state as fs
-from drone_rl.sim.dynamics.forces_kernel import forces, told
+from drone_rl.sim.dynamics.forces_kernel import forces
 from tests.flying import ANGLES, GRAVITY, PLACES, SPEEDS, falling, matrix, numbers, quadrotor, still
 from tests.flying import told as goals_of
 
@@ -47,7 +47,7 @@ def test_they_are_what_a_tick_of_flight_moves_by(tick):
     for modes, drift in ((PLACES, (0.2, -0.1)), (SPEEDS, (0, 0)), (ANGLES, (0, 0))):
         drift = (*drift, 0.1 * (modes != SPEEDS), 0.0)
         goals = goals_of(modes, 0.5, -0.4, 0.3, 100.5, count=count, drift=drift)
-        state.numbers[:, fs.TICKS.first] = tick
+        state.numbers[:, fs.TICKS] = tick
         after, pushes = forces(drone.frame, state, goals, tick)
         since = goals.values + tick * 0.003 * goals.drifts  # the batch's tick is its first
         if modes == SPEEDS:
@@ -79,6 +79,6 @@ def test_where_a_drone_is_wanted_after_a_command():
     state = still(quadrotor())
     state.attitude[:] = numbers((math.cos(0.2), 0.0, 0.0, math.sin(0.2)))
     goals = goals_of(PLACES, 1.0, 2.0, 0.5, 101.0, drift=(0.1, 0.2, 0.3, 0.4))
-    np.testing.assert_allclose(told(state, goals, 2.0).reference[0], (1.2, 2.4, 1.1, 101.8))
+    np.testing.assert_allclose(goals.reference_after(2.0, state)[0], (1.2, 2.4, 1.1, 101.8))
     free = goals_of(SPEEDS, 1.0, 2.0, 0.5, 1.0)
-    np.testing.assert_allclose(told(state, free, 2.0).reference[0], (0, 0, 0.4, 100), atol=1e-9)
+    np.testing.assert_allclose(free.reference_after(2.0, state)[0], (0, 0, 0.4, 100), atol=1e-9)

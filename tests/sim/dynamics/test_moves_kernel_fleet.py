@@ -28,7 +28,7 @@ def test_takes_drones_over_and_leaves_them_alone():
     numbers.fill_(7.0)
     assert state.position[0].tolist() == [0.0, 1.0, 2.5]
     assert fleet.fleet.lead == 0.25 and fleet.fleet.is_gimballed == 0
-    assert fleet.fleet.ticks == 33
+    assert fleet.fleet.command.ticks == 33
 
 
 def test_none_fly_in_computer_vision_mode():

@@ -9,11 +9,13 @@ from drone_rl.sim.dynamics import state as fs
 from tests.flying import numbers
 
 
-def test_slots_follow_each_other_without_a_gap():
-    slots = [slot for slot in vars(fs).values() if isinstance(slot, fs.Slot)]
-    ends = sorted(slots)
-    assert ends[0].first == 0 and ends[-1].last == fs.NUMBERS
-    assert all(one.last == other.first for one, other in itertools.pairwise(ends))
+def test_parts_follow_each_other_without_a_gap():
+    sizes = {"POSITION": 3, "ATTITUDE": 4, "VELOCITY": 3, "RATES": 3, "ROTORS": 4, "REFERENCE": 4}
+    sizes |= {"CLIMB": 1, "GUST": 3, "SEED": 1, "TICKS": 1, "LOST": 1, "THING": 1, "NORMAL": 3}
+    sizes |= {"POINT": 3, "DEPTH": 1, "TIME": 1}
+    ends = itertools.accumulate(sizes.values())
+    assert [getattr(fs, name) for name in sizes] == [0, *ends][:-1]
+    assert sum(sizes.values()) == fs.NUMBERS
 
 
 def test_at_rest_is_told_to_stay_where_it_is():
@@ -22,7 +24,7 @@ def test_at_rest_is_told_to_stay_where_it_is():
     assert state.position.tolist() == [[1, 2, 3]] and not state.velocity.any()
     assert state.heading.item() == pytest.approx(0.7)
     assert state.reference[0].tolist() == pytest.approx([1.0, 2.0, 0.7, 3.0])
-    assert state.numbers[0, fs.SEED.first] == 5 and not state.is_lost.any()
+    assert state.numbers[0, fs.SEED] == 5 and not state.is_lost.any()
     assert state.contact.thing.tolist() == [fs.NOTHING] and state.ticks.tolist() == [0]
     assert FlightState.at_rest(numbers((0.0, 0.0, 0.0))).attitude.tolist() == [[1, 0, 0, 0]]
 

@@ -19,7 +19,7 @@ def resting(count, z=3.0):
 def touching(thing, seconds):
     """A drone in flight that has touched something."""
     state = FlightState.at_rest(resting(1).position)
-    state.numbers[:, THING.first], state.numbers[:, TIME.first] = thing, seconds
+    state.numbers[:, THING], state.numbers[:, TIME] = thing, seconds
     return state
 
 
