@@ -1,4 +1,3 @@
-# ruff: noqa: RUF046, UP018
 """All ticks of a command: controllers, rotors, air, motion and contacts, drone by drone.
 
 On a CPU a launch goes through its drones in turn, on a GPU each has a thread. Numbers have single

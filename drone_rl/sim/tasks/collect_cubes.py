@@ -100,11 +100,7 @@ class CollectCubes(Task[WorldState]):
 
     @property
     def entries(self) -> Mapping[str, Entry]:
-        """Algorithm 3's info, and the positions of the cubes (metres).
-
-        Number of cubes collected, which, on which side and how far aside each became the next one,
-        which is the next one, and why the episode ended.
-        """
+        """Algorithm 3's info: the state's fields, and the number of cubes collected."""
         cubes = self.settings.num_cubes
         return {
             "cubes": Entry((1,), torch.int64, 0, cubes),
@@ -131,20 +127,13 @@ class CollectCubes(Task[WorldState]):
         """Sample the positions of the cubes (Algorithm 2). Shape: (C, 3), metres."""
         s = self.settings
         bounds = (s.lateral_bound, s.vertical_bound)
-        offsets = random_state.uniform(-1.0, 1.0, size=(s.num_cubes, 2)) * bounds + (
-            0.0,
-            s.altitude,
-        )
+        offsets = random_state.uniform(-1.0, 1.0, size=(s.num_cubes, 2)) * bounds
+        offsets += (0.0, s.altitude)
         x = s.first_distance + s.spacing * np.arange(s.num_cubes)
         return torch.from_numpy(np.column_stack([x, offsets]))
 
     def start(self, drawn: Tensor, body: BodyState | None = None) -> WorldState:
-        """Return states at the start of episodes.
-
-        Args:
-            drawn: Positions of the cubes, metres. Shape: (N, C, 3).
-            body: The drones; at rest at the origin by default.
-        """
+        """Return states at the start of episodes, at rest by default; `drawn` are the cubes."""
         if body is None:
             body = BodyState.at_rest(drawn.new_tensor(self.origin).repeat(len(drawn), 1))
         no_cube = torch.zeros_like(drawn[..., 0], dtype=torch.bool)
@@ -163,16 +152,10 @@ class CollectCubes(Task[WorldState]):
 
     def judge(self, state: WorldState, body: BodyState) -> tuple[WorldState, Tensor]:
         """Apply Algorithms 1 and 3, see `collect_cubes_kernel.judge`."""
-        new = WorldState(
-            body=body,
-            cubes=state.cubes,
-            collected=state.collected.clone(),
-            passed=state.passed.clone(),
-            side=state.side.clone(),
-            lateral=state.lateral.clone(),
-            steps=state.steps + 1,
-            end_reason=torch.empty_like(state.steps),
-        )
+        written = ("collected", "passed", "side", "lateral")
+        copies = {name: getattr(state, name).clone() for name in written}
+        end = torch.empty_like(state.steps)
+        new = dataclasses.replace(state, body=body, steps=state.steps + 1, end_reason=end, **copies)
         reward = torch.empty(len(state), dtype=torch.float64, device=new.steps.device)
         others = (body.is_lost, new.steps, new.end_reason, reward)
         launch(judge_all, self.settings, new, *others)
@@ -287,11 +270,7 @@ class CollectCubes(Task[WorldState]):
         return side_of(offset[..., 1], self.settings.touch_distance)
 
     def grid(self, num_forward: int, num_lateral: int) -> Grid:
-        """Return where next cubes can stand.
-
-        Ahead: from almost touching to an episode's first cube. Sideways: as far as a next cube ever
-        stands. Up: level, lowest and highest.
-        """
+        """Return where next cubes can stand: ahead up to an episode's first cube."""
         s = self.settings
         reach = 2.0 * s.lateral_bound or s.touch_distance * 2
         nearest, bound = s.touch_distance + 0.5 * s.step_length, s.vertical_bound
@@ -325,18 +304,12 @@ class CollectCubes(Task[WorldState]):
     ) -> WorldState:
         """Put all cubes at random positions in view, uniform over the image's columns.
 
-        Ahead: from where a cube just fits in front of the camera to the distance of the first one
-        at the start. Sideways: no farther than cube and drone ever are.
+        Ahead up to the first cube at the start, sideways no farther than cubes ever are.
         """
         s = self.settings
         draw = torch.rand(*state.cubes.shape, generator=generator, dtype=torch.float64)
-        away = place_in_view(
-            draw[..., :2],
-            camera,
-            s.touch_distance + s.cube_size,
-            s.first_distance,
-            2 * s.lateral_bound,
-        )
+        nearest, widest = s.touch_distance + s.cube_size, 2 * s.lateral_bound
+        away = place_in_view(draw[..., :2], camera, nearest, s.first_distance, widest)
         up = (2 * draw[..., 2:] - 1) * s.vertical_bound
         cubes = state.drone[:, None] + torch.cat([away, up], -1).to(state.drone)
         standing = torch.zeros_like(state.passed)

@@ -1,7 +1,6 @@
-"""The rules of cube collection, as Warp functions.
+"""The rules of cube collection, as Warp functions of double precision.
 
-`judge` is the only statement of the rules. The batched step calls it from a kernel over
-environments, the fused episode kernel by `move`. Numbers are of double precision in both.
+`judge` is the only statement of the rules: the batched step and the fused kernel both call it.
 """
 
 import enum
@@ -40,17 +39,6 @@ class EndReason(enum.IntEnum):
     LOST_CONTROL = 5
     """The drone's motion diverged, see `BodyState.is_lost`: precedes all other reasons."""
 
-
-_RUNNING = wp.constant(int(EndReason.RUNNING))
-_ALL_CUBES = wp.constant(int(EndReason.ALL_CUBES))
-_FRONT_BOUNDARY = wp.constant(int(EndReason.FRONT_BOUNDARY))
-_SIDE_BOUNDARY = wp.constant(int(EndReason.SIDE_BOUNDARY))
-_STEP_LIMIT = wp.constant(int(EndReason.STEP_LIMIT))
-_LOST_CONTROL = wp.constant(int(EndReason.LOST_CONTROL))
-_LEFT = wp.constant(wp.int64(Side.LEFT))
-_AHEAD = wp.constant(wp.int64(Side.AHEAD))
-_RIGHT = wp.constant(wp.int64(Side.RIGHT))
-_DEPTH = wp.constant(wp.float64(HIDDEN_DEPTH))
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
@@ -93,12 +81,7 @@ def judge(cubes: Cubes, env: int, drone: wp.vec3d, steps: int, is_lost: bool) ->
     cubes are collected, when the drone is out of bounds, or at the step limit, in this order; a
     drone whose motion has diverged ends it before all these.
 
-    Args:
-        cubes: Of all environments; is written.
-        env: Which environment.
-        drone: Where its drone is now.
-        steps: Taken in the episode, this one included.
-        is_lost: Whether its motion has diverged.
+    `steps` includes this one; `is_lost` is whether the motion has diverged. Writes `cubes`.
     """
     outcome = Outcome()
     num_collected = int(0)
@@ -130,12 +113,11 @@ def note_sides(cubes: Cubes, env: int, drone: wp.vec3d) -> None:
     for cube in range(cubes.places.shape[1]):
         if not is_next_found and cubes.side[env, cube] < wp.int64(0):
             lateral = cubes.places[env, cube][1] - drone[1]
-            side = _AHEAD
+            cubes.side[env, cube] = wp.int64(Side.AHEAD)
             if lateral > cubes.bounds.touch_distance:
-                side = _LEFT
+                cubes.side[env, cube] = wp.int64(Side.LEFT)
             if lateral < -cubes.bounds.touch_distance:
-                side = _RIGHT
-            cubes.side[env, cube] = side
+                cubes.side[env, cube] = wp.int64(Side.RIGHT)
             cubes.lateral[env, cube] = lateral
         if is_present(cubes, env, cube):
             is_next_found = True
@@ -147,36 +129,16 @@ def _end_reason(
 ) -> int:
     """Return the first reason that holds, in the order of Algorithm 3; a lost drone before all."""
     if is_lost:
-        return _LOST_CONTROL
+        return EndReason.LOST_CONTROL
     if num_collected == cubes.places.shape[1]:
-        return _ALL_CUBES
+        return EndReason.ALL_CUBES
     if drone[0] > cubes.bounds.front_bound:
-        return _FRONT_BOUNDARY
+        return EndReason.FRONT_BOUNDARY
     if wp.abs(drone[1]) > cubes.bounds.side_bound:
-        return _SIDE_BOUNDARY
+        return EndReason.SIDE_BOUNDARY
     if steps >= cubes.bounds.step_limit:
-        return _STEP_LIMIT
-    return _RUNNING
-
-
-@wp.func
-def cubes_of(
-    bounds: Bounds,
-    places: wp.array2d[wp.vec3d],
-    collected: wp.array2d[wp.bool],
-    passed: wp.array2d[wp.bool],
-    side: wp.array2d[wp.int64],
-    lateral: wp.array2d[wp.float64],
-) -> Cubes:
-    """Return arrays as one structure."""
-    cubes = Cubes()
-    cubes.bounds = bounds
-    cubes.places = places
-    cubes.collected = collected
-    cubes.passed = passed
-    cubes.side = side
-    cubes.lateral = lateral
-    return cubes
+        return EndReason.STEP_LIMIT
+    return EndReason.RUNNING
 
 
 @wp.kernel
@@ -195,7 +157,7 @@ def judge_all(
 ) -> None:
     """Apply the rules to environments, a thread each."""
     env = wp.tid()
-    cubes = cubes_of(bounds, places, collected, passed, side, lateral)
+    cubes = Cubes(bounds, places, collected, passed, side, lateral)
     outcome = judge(cubes, env, drones[env], int(steps[env]), is_lost[env])
     end_reasons[env] = wp.int64(outcome.end_reason)
     rewards[env] = outcome.reward
@@ -213,7 +175,7 @@ def start_all(
 ) -> None:
     """Record the sides of cubes at the start of episodes, a thread each."""
     env = wp.tid()
-    note_sides(cubes_of(bounds, places, collected, passed, side, lateral), env, drones[env])
+    note_sides(Cubes(bounds, places, collected, passed, side, lateral), env, drones[env])
 
 
 @functools.cache
@@ -226,10 +188,10 @@ def make_bounds(settings: TaskSettings) -> Bounds:
 
 
 def launch(kernel: Any, settings: TaskSettings, state: Any, *others: Tensor) -> None:
-    """Run a kernel over environments.
+    """Run `judge_all` or `start_all` over environments.
 
     Args:
-        kernel: `judge_all` or `start_all`.
+        kernel: Which of the two.
         settings: Of the task.
         state: A `WorldState`, of which "collected", "passed", "side" and "lateral" are written.
         others: The kernel's other arguments. Shape: (N,).
@@ -242,13 +204,9 @@ def launch(kernel: Any, settings: TaskSettings, state: Any, *others: Tensor) -> 
     ]
     written = (state.collected, state.passed, state.side, state.lateral, *others)
     arrays = [wp.from_torch(tensor, return_ctype=True) for tensor in written]
+    inputs = [make_bounds(settings), *vectors, *arrays]
     with on_torch_stream(device):
-        wp.launch(
-            kernel,
-            len(state),
-            inputs=[make_bounds(settings), *vectors, *arrays],
-            device=str(device),
-        )
+        wp.launch(kernel, len(state), inputs=inputs, device=str(device))
 
 
 # The fused episode kernel
@@ -270,32 +228,20 @@ class Flights:
 
 @wp.func
 def place(flights: Flights, world: int, poses: Poses) -> None:
-    """Write where the drone and the cubes are rendered; attitudes change in flight alone.
-
-    Args:
-        flights: The environments.
-        world: Which of them.
-        poses: Of as many environments.
-    """
+    """Write the poses of drone and cubes for the renderer; only flying drones have attitudes."""
     poses.positions[world, DRONE_FRAME] = wp.vec3(flights.drones[world])
     if is_flying(flights.fleet):
         poses.attitudes[world] = camera_attitude(flights.fleet, world)
     for cube in range(flights.cubes.places.shape[1]):
         at = flights.cubes.places[world, cube]
         if not is_present(flights.cubes, world, cube):
-            at[2] = at[2] - _DEPTH
+            at[2] = at[2] - wp.float64(HIDDEN_DEPTH)
         poses.positions[world, DRONE_FRAME + 1 + cube] = wp.vec3(at)
 
 
 @wp.func
 def move(flights: Flights, world: int, action: int) -> float:
-    """Move a drone, as its dynamics do, and apply the rules. Returns the reward.
-
-    Args:
-        flights: The environments.
-        world: Which of them.
-        action: Of the drone.
-    """
+    """Move a drone by its dynamics and apply the rules. Returns the reward."""
     drone = flights.drones[world]
     lost = bool(False)
     if is_flying(flights.fleet):
@@ -318,37 +264,36 @@ class FlyingCubes:
 
     def __init__(self, settings: TaskSettings, dynamics: Dynamics, num_envs: int) -> None:
         """Allocate the arrays of at most `num_envs` environments; see `supports`."""
-        num_cubes = settings.num_cubes
+        shape = (num_envs, settings.num_cubes)
         self._drones = torch.zeros(num_envs, 3, dtype=torch.float64)
         self.steps = torch.zeros(num_envs, dtype=torch.int32)
         """Taken so far. Shape: (num_envs,)."""
         self.end_reasons = torch.zeros(num_envs, dtype=torch.int32)
         """Shape: (num_envs,)."""
         self.state = SimpleNamespace(
-            cubes=torch.zeros(num_envs, num_cubes, 3, dtype=torch.float64),
-            collected=torch.zeros(num_envs, num_cubes, dtype=torch.bool),
-            passed=torch.zeros(num_envs, num_cubes, dtype=torch.bool),
-            side=torch.zeros(num_envs, num_cubes, dtype=torch.int64),
-            lateral=torch.zeros(num_envs, num_cubes, dtype=torch.float64),
+            cubes=torch.zeros(*shape, 3, dtype=torch.float64),
+            collected=torch.zeros(shape, dtype=torch.bool),
+            passed=torch.zeros(shape, dtype=torch.bool),
+            side=torch.zeros(shape, dtype=torch.int64),
+            lateral=torch.zeros(shape, dtype=torch.float64),
         )
         """The cubes, named as in `WorldState`."""
-        places = torch.zeros(num_envs, 1 + DRONE_FRAME + num_cubes, 3)
-        attitudes = torch.tensor(LEVEL).repeat(num_envs, 1)
-        self.flights, self.poses = Flights(), Poses()
-        self.flights.drones = wp.from_torch(self._drones, dtype=wp.vec3d)
-        cubes = Cubes()
+        cubes, self.flights, self.poses = Cubes(), Flights(), Poses()
         cubes.bounds = make_bounds(settings)
         cubes.places = wp.from_torch(self.state.cubes, dtype=wp.vec3d)
         for name in ("collected", "passed", "side", "lateral"):
             setattr(cubes, name, wp.from_torch(getattr(self.state, name)))
         self.flights.cubes = cubes
+        self.flights.drones = wp.from_torch(self._drones, dtype=wp.vec3d)
         self.flights.steps = wp.from_torch(self.steps)
         self.flights.end_reasons = wp.from_torch(self.end_reasons)
         if isinstance(dynamics, ComputerVision):
             self.flights.moves = wp.from_torch(dynamics.moves.contiguous(), dtype=wp.vec3d)
         self._fleet = FlyingFleet(num_envs, dynamics if isinstance(dynamics, Quadrotor) else None)
         self.flights.fleet = self._fleet.fleet
+        places = torch.zeros(num_envs, 1 + DRONE_FRAME + settings.num_cubes, 3)
         self.poses.positions = wp.from_torch(places, dtype=wp.vec3)
+        attitudes = torch.tensor(LEVEL).repeat(num_envs, 1)
         self.poses.attitudes = wp.from_torch(attitudes, dtype=wp.vec4)
 
     @staticmethod

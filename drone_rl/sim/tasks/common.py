@@ -8,7 +8,6 @@ import torch
 from torch import Tensor
 
 from drone_rl.config import CameraSettings
-from drone_rl.sim.dynamics import BodyState
 from drone_rl.sim.tasks.task import Goals
 from drone_rl.utils.text import ordinal
 
@@ -45,13 +44,6 @@ def side_of(lateral: Tensor, tolerance: float) -> Tensor:
     """Return the `Side` of something so many metres to the left of the drone. Shape kept."""
     right = torch.where(lateral < -tolerance, Side.RIGHT.value, Side.AHEAD.value)
     return torch.where(lateral > tolerance, Side.LEFT.value, right)
-
-
-def unless_lost(reason: Tensor, body: BodyState, lost: int) -> Tensor:
-    """Return end reasons, `lost` where the motion of the drone has diverged. Shape: (N,)."""
-    if type(body) is BodyState:  # whose motion can't diverge
-        return reason
-    return reason.masked_fill(body.is_lost, lost)
 
 
 def number_classes(name: str, goals: Goals) -> Iterator[tuple[str, str, Tensor]]:

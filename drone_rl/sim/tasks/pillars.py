@@ -25,7 +25,6 @@ from drone_rl.sim.tasks.common import (
     number_classes,
     place_in_view,
     side_of,
-    unless_lost,
 )
 from drone_rl.sim.tasks.pillars_lanes import Lanes, meets, nearest_pillar
 from drone_rl.sim.tasks.task import Goals, Grid, OracleRule, State, Task
@@ -115,15 +114,12 @@ class Pillars(Task[FieldState]):
 
     @property
     def entries(self) -> Mapping[str, Entry]:
-        """What became of the rows, and where the pillars are.
+        """Rows passed, pillars touched, the fields `side` and `gap` of the state, and `rows`.
 
-        Which rows are passed; pillars touched; on which side the nearest open lane of each row was,
-        and how wide the gap, as the row came up; the next row; why the episode ended; the y of the
-        pillars (metres, infinite where none stands).
+        `rows` are the y of the pillars, metres, infinite where none stands.
         """
-        rows, size, pillars = (
-            getattr(self.settings, n) for n in ("num_rows", "row_size", "num_pillars")
-        )
+        s = self.settings
+        rows, pillars = s.num_rows, s.num_pillars
         return {
             "passed": Entry((rows,), torch.bool),
             "touched": Entry((pillars,), torch.bool),
@@ -131,7 +127,7 @@ class Pillars(Task[FieldState]):
             "gap": Entry((rows,), torch.float64),
             "next_row": Entry((1,), torch.int64, 0, rows),
             "end_reason": Entry((1,), torch.int64, 0, len(EndReason) - 1),
-            "rows": Entry((rows, size), torch.float32),
+            "rows": Entry((rows, s.row_size), torch.float32),
         }
 
     def make_dynamics(self) -> ComputerVision:
@@ -175,10 +171,8 @@ class Pillars(Task[FieldState]):
     def judge(self, state: FieldState, body: BodyState) -> tuple[FieldState, Tensor]:
         """Apply the rules after a step.
 
-        The way from the start to the line is worth 1, each metre as much; a touched pillar costs
-        the penalty. The episode ends at the line, at a pillar, outside the field, or at the step
-        limit. Of several reasons a touched pillar comes first, then the side boundary, then the
-        line.
+        The distance to the line is worth 1, evenly; a touched pillar costs the penalty. Of several
+        end reasons a touched pillar comes first, then the side boundary, the line, the step limit.
         """
         s, before, now = self.settings, state.drone, body.position
         hit = meets(s.touch_distance, before, now, state.pillars)
@@ -215,14 +209,14 @@ class Pillars(Task[FieldState]):
     def _end_reason(self, state: FieldState) -> Tensor:
         """Return the first reason that holds, from the last line of this upwards. (N,)."""
         s, (x, y, _) = self.settings, state.drone.unbind(-1)
-        reason = (
+        return (
             torch.zeros_like(state.steps)
             .masked_fill(state.steps >= s.step_limit, EndReason.STEP_LIMIT)
             .masked_fill(x >= s.finish, EndReason.FINISH_LINE)
             .masked_fill(y.abs() > s.spread, EndReason.SIDE_BOUNDARY)
             .masked_fill(state.touched.any(-1), EndReason.PILLAR_TOUCHED)
+            .masked_fill(state.body.is_lost, EndReason.LOST_CONTROL)
         )
-        return unless_lost(reason, state.body, EndReason.LOST_CONTROL)
 
     def places(self, state: FieldState) -> Tensor:
         """Return the pillars' positions; under the floor where none stands."""
@@ -348,8 +342,7 @@ class Pillars(Task[FieldState]):
     ) -> FieldState:
         """Put all pillars at random positions in view, uniform over the image's columns.
 
-        Ahead: from where a pillar just fits in front of the camera to the distance of the second
-        row at the start. Sideways: no farther than two fields' width.
+        Ahead up to the second row at the start, sideways up to two fields' width.
         """
         s = self.settings
         draw = torch.rand(*state.pillars.shape[:2], 2, generator=generator, dtype=torch.float64)

@@ -99,10 +99,7 @@ class OracleRule(NamedTuple):
         return set(self.actions.names) <= set(actions.names)
 
     def decide(self, known: Sequence[Tensor], actions: Actions) -> Tensor:
-        """Return actions of any set that `can_fly` accepts.
-
-        In an action set other than its own the oracle takes the part of the same name, at full
-        speed.
+        """Return actions of a set that `can_fly` accepts, by name and at full speed.
 
         Args:
             known: What it reads. Each shape: (N, *).
