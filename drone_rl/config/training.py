@@ -29,7 +29,7 @@ from drone_rl.config.learning import (
     Threads,
 )
 from drone_rl.config.networks import Network, SmallCnn
-from drone_rl.config.transforms import Gray, Standardize, Transform
+from drone_rl.config.transforms import DEFAULT_TRANSFORMS, Transform
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import Instance, Real, Several, Whole
 from drone_rl.utils.settings import Settings
@@ -81,7 +81,7 @@ class TrainSettings(Settings):
     """Camera of the policy."""
     transforms: Annotated[
         tuple[Transform, ...], Several(Instance(Transform), 0, MOST_TRANSFORMS)
-    ] = (Gray(), Standardize())
+    ] = DEFAULT_TRANSFORMS
     """Transforms of the image, in this order."""
     network: Network = SmallCnn()
     """Network of the policy."""

@@ -113,7 +113,7 @@ class Crop(Transform):
 
 
 class Resize(Transform):
-    """Averaging over areas."""
+    """Averaging over areas; nothing where images already have the size."""
 
     target: ClassVar[str] = "resize"
     height: Annotated[int, Whole(1, 1024, "pixels")] = 25
@@ -124,6 +124,10 @@ class Resize(Transform):
     def output(self, frame: Frame) -> Frame:
         """See `Transform`."""
         return Frame((self._of_floats(frame).shape[0], self.height, self.width), True)
+
+
+DEFAULT_TRANSFORMS = (Gray(), Resize(), Standardize())
+"""The resize leaves the default camera's images as they are: networks get 25x64 from any camera."""
 
 
 class Stack(Transform):

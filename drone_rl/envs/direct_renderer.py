@@ -15,7 +15,7 @@ from torch import Tensor
 from torchrl.envs import Compose, EnvBase, TransformedEnv
 
 from drone_rl.envs.drone_env import DroneEnv
-from drone_rl.envs.transforms import GrayPixels, PixelTransform, on_pixels
+from drone_rl.envs.transforms import GrayPixels, PixelTransform, on_pixels, without_identities
 from drone_rl.sim.tasks import State
 
 Entries = dict[NestedKey, Tensor]
@@ -45,11 +45,13 @@ class DirectRenderer:
     ) -> None:
         """Take over the environment's states; see `try_create`."""
         self.env, self.worlds = env, env.worlds
-        self._observed = tuple(observed)
+        self._observed, camera = tuple(observed), env.worlds.camera
         is_gray = type(next(iter(transforms), None)) is GrayPixels
         self.view = self.worlds.view(modality="gray") if is_gray else self.worlds.policy_view
-        self.after: Sequence[Any] = transforms[1:] if is_gray else transforms
-        """Transforms that are applied to rendered frames."""
+        frame = torch.zeros(1, camera.height, camera.width, 3, dtype=torch.uint8)
+        effective = without_identities(transforms, frame)
+        self.after: Sequence[Any] = effective[1:] if is_gray else effective
+        """Transforms that are applied to rendered frames, without identity resizing."""
         self._transform = on_pixels(self.after)
         self._kept = tuple(kept)
         self._info = [

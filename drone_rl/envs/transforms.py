@@ -139,7 +139,7 @@ class CropRows(PixelTransform):
 
 @implements(settings.Resize)
 class Resize(PixelTransform):
-    """Resizes frames (*, C, H, W) by averaging over areas.
+    """Resizes frames (*, C, H, W) by averaging over areas; those of the size stay as they are.
 
     Raises:
         InputError: A size is below 1.
@@ -220,6 +220,21 @@ def on_pixels(transforms: Iterable[Transform]) -> Callable[[Tensor], Tensor]:
         return images
 
     return apply
+
+
+def without_identities(transforms: Iterable[Transform], images: Tensor) -> list[Transform]:
+    """Leave out each resize to the size that images already have.
+
+    Args:
+        transforms: In order.
+        images: Any that the first transform can process.
+    """
+    kept: list[Transform] = []
+    for transform in transforms:
+        before, images = images, transform._apply_transform(images)
+        if type(transform) is not Resize or images.shape != before.shape:
+            kept.append(transform)
+    return kept
 
 
 def memory_of(transforms: Iterable[Transform]) -> int:

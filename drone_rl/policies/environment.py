@@ -13,7 +13,7 @@ from drone_rl.config import (
     CameraSettings,
     DynamicsSettings,
 )
-from drone_rl.config.transforms import Gray, Standardize, Transform
+from drone_rl.config.transforms import DEFAULT_TRANSFORMS, Transform
 from drone_rl.sim.dynamics import Dynamics
 from drone_rl.utils.errors import InputError
 from drone_rl.utils.schema import shown
@@ -26,7 +26,7 @@ def make_env(
     camera: CameraSettings | None = None,
     dynamics: DynamicsSettings | Dynamics | None = None,
     actions: ActionSettings | None = None,
-    transforms: Sequence[Transform] = (Gray(), Standardize()),
+    transforms: Sequence[Transform] = DEFAULT_TRANSFORMS,
     seed: int = 0,
     device: str = "cpu",
     **kwargs: Any,

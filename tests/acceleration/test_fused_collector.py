@@ -18,6 +18,7 @@ from drone_rl.envs import (
     CropRows,
     DroneEnv,
     GrayPixels,
+    Resize,
     RgbPixels,
     StandardizePixels,
     with_transforms,
@@ -87,6 +88,13 @@ def test_replayed_by_torchrls_steps_they_are_the_same_bit_for_bit(dynamics):
         network = collector.actor.module[0].module
         assert torch.allclose(network(batch["pixels"]), batch["logits"], atol=1e-5)
     assert collector.episodes == 15 and collector.frames > 15
+
+
+def test_a_resize_to_the_same_size_changes_nothing():
+    resized = make(transforms=(GrayPixels, lambda: Resize(height=25, width=64), StandardizePixels))
+    assert isinstance(resized.source, FusedCollector)
+    one, other = make().collect(), resized.collect()
+    assert all(torch.equal(one[key], other[key]) for key in one.keys(True, True))
 
 
 def test_what_is_told_by_the_kernel_is_what_a_replay_tells():

@@ -3,8 +3,16 @@
 import pytest
 import torch
 
-from drone_rl.config import TaskSettings
-from drone_rl.envs import CropRows, DroneEnv, GrayPixels, RgbPixels, with_transforms
+from drone_rl.config import CameraSettings, TaskSettings
+from drone_rl.envs import (
+    CropRows,
+    DroneEnv,
+    GrayPixels,
+    Resize,
+    RgbPixels,
+    StandardizePixels,
+    with_transforms,
+)
 from drone_rl.envs.direct_renderer import FLAGS, DirectRenderer
 
 SHORT = TaskSettings(num_cubes=2, first_distance=3.0, spacing=3.0, step_limit=5)
@@ -25,6 +33,22 @@ def test_gray_is_drawn_gray_and_the_same(first, modality):
     seen = env.reset()["pixels"]
     assert torch.equal(renderer.look(env.base_env.worlds.state)["pixels"], seen)
     env.close()
+
+
+@pytest.mark.parametrize(("size", "kept"), [((25, 64), 1), ((13, 32), 2), ((50, 128), 2)])
+def test_a_resize_to_the_size_of_the_camera_is_left_out(size, kept):
+    camera = CameraSettings(height=size[0], width=size[1])
+    transforms = [GrayPixels(), Resize(height=25, width=64), StandardizePixels()]
+    env = with_transforms(DroneEnv(2, SHORT, camera), transforms)
+    renderer = DirectRenderer.try_create(env, ["pixels"], KEPT)
+    assert [type(t) for t in renderer.after] == [Resize, StandardizePixels][-kept:]
+    seen = env.reset()["pixels"]
+    assert seen.shape == (2, 1, 25, 64)
+    assert torch.equal(renderer.look(env.base_env.worlds.state)["pixels"], seen)
+    plain = with_transforms(DroneEnv(2, SHORT, camera), [GrayPixels(), StandardizePixels()])
+    assert torch.equal(plain.reset()["pixels"], seen) is (kept == 1)
+    for each in (env, plain):
+        each.close()
 
 
 def test_a_step_is_told_as_torchrl_tells_it():

@@ -5,7 +5,7 @@ from torchrl.envs.utils import check_env_specs
 import drone_rl
 from drone_rl.config.transforms import Gray, Resize
 from drone_rl.evaluation.video import film
-from drone_rl.policies.zoo import certificate_path, policy_path
+from drone_rl.policies.zoo import certificate_path, describe, parse, policy_path
 from drone_rl.sim import worlds as worlds_module
 from drone_rl.sim.rendering import Raytracer
 from drone_rl.sim.tasks import Pillars
@@ -21,6 +21,20 @@ def test_worlds_as_policies_see_them():
     assert env.reset()["info", "cube_positions"].shape == (2, 2, 3)
     check_env_specs(env)
     env.close()
+
+
+def test_images_of_any_camera_have_the_networks_size():
+    camera = drone_rl.CameraSettings(width=32, height=13)
+    env = drone_rl.make_env(1, camera=camera)
+    assert env.reset()["pixels"].shape == (1, 1, 25, 64)
+    env.close()
+    settings = drone_rl.TrainSettings(camera=drone_rl.CameraSettings(width=128, height=50))
+    assert [step.name for step in settings.transforms] == ["gray", "resize", "standardize"]
+    described = describe(settings)
+    assert described.input.shape == (1, 25, 64)
+    before = described.as_dict()
+    del before["transforms"][1]
+    assert [step.name for step in parse(before).transforms] == ["gray", "standardize"]
 
 
 def test_other_pictures():

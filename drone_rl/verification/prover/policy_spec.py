@@ -13,7 +13,8 @@ import numpy as np
 import torch
 
 from drone_rl.config import TaskSettings
-from drone_rl.envs import on_pixels
+from drone_rl.envs import GrayPixels, StandardizePixels, on_pixels
+from drone_rl.envs.transforms import without_identities
 from drone_rl.policies import PolicyNetwork
 from drone_rl.policies.zoo import PolicyDescription
 from drone_rl.sim.actions import MOVES
@@ -26,8 +27,7 @@ from drone_rl.verification.prover.cube_images import FRONT, CameraModel, CubeIma
 from drone_rl.verification.prover.lattice import Lattice
 from drone_rl.verification.requirements import require_cubes, require_moves
 
-_SHADES = ("gray", "standardize")  # monotone transforms of each pixel alone
-_MONOTONE = (*_SHADES, "crop", "resize", "blur")  # monotone transforms
+_MONOTONE = ("gray", "standardize", "crop", "resize", "blur")  # monotone transforms
 _BLIND = ("step_count", "episode_reward")  # transforms that do not change images
 
 
@@ -128,8 +128,9 @@ def make_compositor(description: PolicyDescription, images: CubeImages) -> Compo
         )
     if names[:1] != ["gray"]:
         raise InputError("the policy observes colours; prove one whose first transform is gray")
-    count = next((i for i, n in enumerate(names) if n not in _SHADES), len(names))
-    made = [choice.make() for choice in chosen]
+    made = without_identities([choice.make() for choice in chosen], images.background)
+    shades = (GrayPixels, StandardizePixels)
+    count = next((i for i, t in enumerate(made) if not isinstance(t, shades)), len(made))
     shade, rest = on_pixels(made[:count]), on_pixels(made[count:])
     background = shade(images.background[None])[0, 0]
     faces = shade(images.colors[None, None, FRONT:])[0, 0, 0]

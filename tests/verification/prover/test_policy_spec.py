@@ -54,6 +54,18 @@ def test_transforms_after_the_shades_are_applied(spec):
     assert float(picture[0, 0, 0, 0]) == pytest.approx((sky - 0.5) / 0.25, abs=1e-5)
 
 
+def test_a_resize_to_the_same_size_is_left_out(spec):
+    resize = {"name": "resize", "height": 25, "width": 64}
+    standardize = {"name": "standardize", "mean": 0.5, "std": 0.25}
+    plain = make_compositor(with_transforms("gray", standardize), spec.images)
+    resized = make_compositor(with_transforms("gray", resize, standardize), spec.images)
+    assert resized._rest is None
+    picture = plain.paint([], 1)[0]
+    assert torch.equal(resized.paint([], 1)[0], picture)
+    smaller = make_compositor(with_transforms("gray", {**resize, "height": 24}), spec.images)
+    assert smaller.see(smaller.paint([], 1)[0]).shape == (1, 1, 24, 64)
+
+
 def test_a_blurred_picture_is_bounded_by_its_blurred_bounds(spec):
     blur = {"name": "blur", "width": 1.0}
     compositor = make_compositor(with_transforms("gray", blur), spec.images)
